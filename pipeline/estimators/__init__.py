@@ -1,0 +1,13 @@
+"""How parameters are found: one module per estimator, exporting `estimate`, and its name in the list below."""
+
+from importlib import import_module
+
+from pipeline.estimators.problem import Estimator
+
+ESTIMATORS = ("lse", "wlse")
+
+
+def estimator(name: str) -> Estimator:
+    """The estimator of that name."""
+    found: Estimator = import_module(f"pipeline.estimators.{name}").estimate
+    return found

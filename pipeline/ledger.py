@@ -1,0 +1,160 @@
+"""What was made from what: one small JSON file per task, beside the records it made.
+
+A task is current while its fingerprint (inputs by content, settings, robot, code, version) and the content of
+its outputs are what its entry says.  Comparing an old entry with a new fingerprint gives the reason to run.
+"""
+
+import ast
+import json
+from collections.abc import Iterable, Iterator
+from dataclasses import asdict, dataclass, field
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+from typing import Any
+
+from pipeline import store
+
+PACKAGE = Path(__file__).parent
+
+
+@dataclass(frozen=True)
+class Folders:
+    """The three folders of one study.  In the ledger a file is named `raw/...`, `processed/...` or `reports/...`."""
+
+    raw: Path
+    processed: Path
+    reports: Path
+
+    def file(self, name: str) -> Path:
+        """The file that a name in the ledger stands for."""
+        root, _, rest = name.partition("/")
+        return Path(getattr(self, root)) / rest
+
+
+@dataclass(frozen=True)
+class Fingerprint:
+    """Everything that the outputs of a task depend on."""
+
+    inputs: dict[str, str]  # file -> sha256
+    given: dict[str, str]  # what the stage was given besides records -> sha256
+    settings: dict[str, Any]
+    code: dict[str, str]  # module -> sha256
+    version: str
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One task as it was last run."""
+
+    stage: str
+    task: str
+    fingerprint: dict[str, Any]
+    outputs: dict[str, str] = field(default_factory=dict)  # file -> sha256
+    failed: str = ""
+
+
+class Ledger:
+    """The entries of one study."""
+
+    def __init__(self, folders: Folders) -> None:
+        self.folders = folders
+        self._digests: dict[Path, str] = {}
+
+    def place(self, stage: str, task: str) -> Path:
+        """Where the entry of a task is."""
+        return self.folders.processed / "tasks" / stage / f"{task.replace('/', '.')}.json"
+
+    def entry(self, stage: str, task: str) -> Entry | None:
+        """The entry of a task, or None when it has not run or its entry cannot be read."""
+        try:
+            return Entry(**json.loads(self.place(stage, task).read_text(encoding="utf-8")))
+        except (OSError, ValueError, TypeError):
+            return None
+
+    def entries(self, stage: str | None = None) -> Iterator[Entry]:
+        """Every entry, or every one of a stage, in order."""
+        for file in sorted((self.folders.processed / "tasks" / (stage or "")).rglob("*.json")):
+            entry = self.entry(file.parent.name, file.stem)
+            if entry:
+                yield entry
+
+    def write(self, entry: Entry) -> None:
+        """Record what a task made."""
+        text = json.dumps(asdict(entry), indent=1, ensure_ascii=False, sort_keys=True) + "\n"
+        store.write_bytes(self.place(entry.stage, entry.task), text.encode())
+
+    def remove(self, entry: Entry) -> None:
+        """Forget a task, and remove what it made."""
+        for name in entry.outputs:
+            self.folders.file(name).unlink(missing_ok=True)
+        self.place(entry.stage, entry.task).unlink(missing_ok=True)
+
+    def digest(self, name: str, fresh: bool = False) -> str:
+        """The hash of a file, read once a run; "" when it is not there."""
+        file = self.folders.file(name)
+        if fresh or file not in self._digests:
+            self._digests[file] = store.digest(file) if file.is_file() else ""
+        return self._digests[file]
+
+    def reasons(self, entry: Entry | None, now: Fingerprint) -> list[str]:
+        """Why a task has to run; nothing when it is current."""
+        if entry is None:
+            return ["it has not run yet"]
+        if entry.failed:
+            return ["it failed last time"]
+        changed = [f"{name} was altered" for name, sha in entry.outputs.items() if self.digest(name) != sha]
+        then = entry.fingerprint
+        if then.get("version") != now.version:
+            changed.append(f"version {then.get('version')} became {now.version}")
+        old = then.get("settings", {})
+        changed += [f"{k} = {old.get(k)!r} became {v!r}" for k, v in now.settings.items() if old.get(k) != v]
+        for what, words in (("given", "the {} changed"), ("code", "the code of {} changed"), ("inputs", "{} changed")):
+            old, new = then.get(what, {}), getattr(now, what)
+            changed += [words.format(name) for name in sorted(old.keys() | new.keys()) if old.get(name) != new.get(name)]
+        return changed
+
+
+@cache
+def code(module: str) -> dict[str, str]:
+    """The hash of a module and of everything of the pipeline that it imports, directly or not."""
+    files: dict[Path, None] = {}
+    _collect(_files(module), files)
+    return {file.relative_to(PACKAGE.parent).as_posix(): _hash_of(file) for file in sorted(files)}
+
+
+def _collect(found: Iterable[Path], files: dict[Path, None]) -> None:
+    for file in found:
+        if file not in files:
+            files[file] = None
+            if file.suffix == ".py":
+                for module in _imports(file):
+                    _collect(_files(module), files)
+
+
+def _imports(file: Path) -> Iterator[str]:
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("pipeline"):
+            for alias in node.names:
+                deeper = f"{node.module}.{alias.name}"
+                yield deeper if _files(deeper) else node.module
+
+
+def _files(module: str) -> list[Path]:
+    """The file of a module; the files of a package are all that lie in it, for it may import any of them by name."""
+    place = PACKAGE.joinpath(*module.split(".")[1:])
+    if place.with_suffix(".py").is_file():
+        return [place.with_suffix(".py")]
+    if place != PACKAGE and place.is_dir():
+        return sorted(f for f in place.rglob("*") if f.is_file() and "__pycache__" not in f.parts)
+    return []
+
+
+@cache
+def _hash_of(file: Path) -> str:
+    return store.digest(file)
+
+
+def hash_of_text(text: str) -> str:
+    """The sha256 of a text."""
+    return sha256(text.encode()).hexdigest()

@@ -1,0 +1,35 @@
+"""All records of a study, for stages that read every kind."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from pipeline.records import AnyRecord, Record
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a study's results come from: versions, and every file with its hash."""
+
+    version: str
+    packages: dict[str, str]
+    raw: dict[str, str]
+    processed: dict[str, str]
+    failures: dict[str, str]
+
+
+class Library:
+    """The records of a study by kind, read when asked for."""
+
+    def __init__(self, read: Callable[[type[Record]], Sequence[Record]]) -> None:
+        self._read = read
+        self._found: dict[type[Record], list[Record]] = {}
+
+    def all(self, kind: type[AnyRecord]) -> list[AnyRecord]:
+        """Every record of a kind, in the order of the study's logs and the robot's joints."""
+        if kind not in self._found:
+            self._found[kind] = list(self._read(kind))
+        return list(self._found[kind])  # type: ignore[arg-type]
+
+    def about(self, kind: type[AnyRecord], **scalars: str) -> list[AnyRecord]:
+        """Records of a kind whose scalars have these values."""
+        return [r for r in self.all(kind) if all(getattr(r, k) == v for k, v in scalars.items())]

@@ -1,0 +1,125 @@
+"""What every log format is asked for, and what it answers.
+
+A format is a module of this folder that exports two functions:
+
+    recognises(path: Path, head: bytes) -> bool      from the name and the first 4096 bytes alone
+    read(path: Path, options: Options) -> Log        raises BadLog
+
+`read` looks at headers only; the samples are read by iterating over `Log.blocks`.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import BadLog
+
+Block = dict[str, NDArray[np.float64]]  # channel name -> samples; every array of a block has one length
+
+
+@dataclass(frozen=True)
+class Options:
+    """What a study may say about how a file is to be read; None is found from the file."""
+
+    delimiter: str | None = None
+    decimal: str | None = None  # "." or ","
+    header: bool | None = None  # the first row holds names
+    encoding: str | None = None
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One channel of a log: its name is unique within the log, and its unit is what the log says, or ""."""
+
+    name: str
+    unit: str = ""
+    kind: str = "number"  # or "text", "time" (what cannot be used as a quantity is still listed)
+    derived: bool = False  # made by the reader, not written in the log ("write", "elapsed")
+
+
+@dataclass(frozen=True)
+class Clock:
+    """A clock that the format itself carries, for logs without a time channel: t = start + i * step [s]."""
+
+    step: float
+    start: float = 0.0
+
+
+@dataclass
+class Log(ABC):
+    """An opened log.
+
+    `warnings`, `facts`, `comments` and the counts grow while its blocks are read, and are whole when they are
+    exhausted.  Reading the blocks again starts them anew.
+    """
+
+    path: Path
+    format: str  # the name of the module that reads it
+    channels: tuple[Channel, ...]  # in the order of the file
+    clock: Clock | None = None
+    time: str = ""  # the channel that is the log's own time axis, where the format has one
+    started: str = ""  # date and time of the first sample as the file gives it, ISO 8601; "" where it does not
+    zone: str = ""  # "UTC", "local" or ""
+    facts: dict[str, str] = field(default_factory=dict)  # delimiter, encoding, operator ...: for people to read
+    warnings: list[str] = field(default_factory=list)  # one line each: the place in the file, and what was done
+    comments: list[str] = field(default_factory=list)  # what the operator wrote beside the samples, with its row
+    nulls: dict[str, int] = field(default_factory=dict)  # samples missing, of every channel that was read
+    nans: dict[str, int] = field(default_factory=dict)  # samples logged as NaN, of every channel that was read
+    dropped: int = 0  # rows that could not be used
+
+    @abstractmethod
+    def blocks(self, names: Sequence[str]) -> Iterator[Block]:
+        """Read the samples of these channels, in consecutive blocks of bounded size.
+
+        Missing cells and cells that hold NaN are both NaN in the block; they are counted apart in `nulls` and `nans`.
+
+        Raises
+        ------
+        BadLog
+            Where the file is damaged in a way that cannot be read past; names the file, line and column.
+        """
+
+    def find(self, name: str | int) -> Channel:
+        """The channel of a name, of the last part of a name where only one has it, or of a number counted from 0.
+
+        Raises
+        ------
+        BadLog
+            If there is none, or more than one; lists the closest.
+        """
+        if isinstance(name, int):
+            return self._numbered(name)
+        exact = [channel for channel in self.channels if channel.name == name]
+        last = [channel for channel in self.channels if channel.name.endswith(f"/{name}")]
+        if len(exact or last) == 1:
+            return (exact or last)[0]
+        if last:
+            raise BadLog(f"{self.path}: {len(last)} channels are called {name!r}; write {_listed(last, ' or ')}")
+        names = [channel.name for channel in self.channels]
+        close = get_close_matches(name, names, n=3, cutoff=0.5)
+        near = [channel for channel in self.channels if channel.name in close]
+        hint = f"the closest are {_listed(near)}" if near else f"it has {_listed(self.channels[:12])}"
+        raise BadLog(f"{self.path}: there is no channel {name!r} among its {len(names)}; {hint}")
+
+    def _numbered(self, number: int) -> Channel:
+        written = [channel for channel in self.channels if not channel.derived]
+        if not 0 <= number < len(written):
+            raise BadLog(f"{self.path}: there is no column {number}; its {len(written)} columns are counted from 0")
+        return written[number]
+
+    def _start_anew(self, names: Sequence[str], kinds: Sequence[str] = ("number",)) -> None:
+        """Empty the counts before the blocks are read, and refuse channels that do not hold numbers."""
+        self.nulls, self.nans = dict.fromkeys(names, 0), dict.fromkeys(names, 0)
+        self.dropped = 0
+        for name in names:
+            if (channel := self.find(name)).kind not in kinds:
+                raise BadLog(f"{self.path}: channel {name!r} holds {channel.kind}, not numbers; choose another")
+
+
+def _listed(channels: Sequence[Channel], joint: str = ", ") -> str:
+    return joint.join(repr(channel.name) for channel in channels) or "none"

@@ -1,0 +1,24 @@
+"""Which samples of a run are spoken of."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Chosen = NDArray[np.bool_]
+
+SETTLE = 1.0  # [s] in which a filter finds its feet, left out of what is said of the whole run
+
+
+def outside(t: Array, windows: Sequence[tuple[float, float]]) -> Chosen:
+    """Whether each time (N,) lies outside all windows."""
+    inside = np.zeros(len(t), dtype=bool)
+    for start, end in windows:
+        inside |= (t >= start) & (t <= end)
+    return ~inside
+
+
+def settled(t: Array) -> Chosen:
+    """Whether a filter has found its feet: all but the first second, unless there is little more than that."""
+    return t - t[0] >= SETTLE if t[-1] - t[0] > 5 * SETTLE else np.ones(len(t), dtype=bool)

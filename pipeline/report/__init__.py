@@ -1,0 +1,1 @@
+"""How results are shown: sections of content, and the two writers that turn them into HTML and PDF."""

@@ -1,0 +1,118 @@
+"""Every number of a report under a stable key, with where it comes from: the content of results.json."""
+
+import json
+import math
+import re
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+
+from pipeline.library import Library
+from pipeline.records import Average, Fit, Intake, Prediction, Record, Track, Whiteness
+from pipeline.report.number import Number
+
+
+@dataclass(frozen=True)
+class Result:
+    """One number: `source` is the record's file and the field, or the cell, that holds it."""
+
+    key: str
+    value: float
+    std: float | None
+    unit: str
+    source: str
+    sha256: str
+
+    def number(self, digits: int = 4) -> Number:
+        """The number as a report prints it."""
+        return Number(self.value, "" if self.unit == "1" else self.unit, self.std, self.key, digits)
+
+
+class Results(dict[str, Result]):
+    """Results by key, in the order in which they were found."""
+
+    def add(self, record: Record, key: str, name: str, std: str = "") -> None:
+        """Put a scalar of a record under a key."""
+        assert record.origin is not None
+        deviation = float(getattr(record, std)) if std else None
+        unit = record.origin.units.get(name, "")
+        self.put(key, float(getattr(record, name)), deviation, unit, record, f"#{name}")
+
+    def put(self, key: str, value: float, std: float | None, unit: str, record: Record, place: str) -> None:
+        """Put a number under a key, with the place in the record's file where it stands."""
+        assert record.origin is not None
+        if math.isfinite(value):
+            source = f"processed/{record.origin.path}{place}"
+            self[key] = Result(key, value, std, unit, source, record.origin.sha256)
+
+    def json(self) -> bytes:
+        """The content of results.json."""
+        text = json.dumps([asdict(result) for result in self.values()], indent=1, ensure_ascii=False, allow_nan=False)
+        return (text + "\n").encode()
+
+
+def collect(library: Library) -> Results:
+    """Every result of a study."""
+    found = Results()
+    for intake in library.all(Intake):
+        for name in ("rows", "rate", "duration", "jitter", "longest_gap", "duplicates", "dropped"):
+            found.add(intake, f"log.{intake.log}.{name}", name)
+    for average in library.all(Average):
+        _average(found, average)
+    for fit in library.all(Fit):
+        _fit(found, fit)
+    for prediction in library.all(Prediction):
+        for name in ("rmse", "nrmse", "r2", "relative_error"):
+            found.add(prediction, f"{prediction_key(prediction)}.{name}", name)
+    for track in library.all(Track):
+        for name in ("tau_ext_rms", "nis_mean"):
+            found.add(track, f"ekf.{track.log}.{track.joint}.{name}", name)
+    for whiteness in library.all(Whiteness):
+        _whiteness(found, whiteness)
+    return found
+
+
+def prediction_key(prediction: Prediction) -> str:
+    """`predict.<log>.<joint>.<model>.<estimator>`, or `cv.` where the log itself was fitted."""
+    first = "cv" if prediction.role == "identification" else "predict"
+    return ".".join((first, *prediction.key))
+
+
+def slug(text: str) -> str:
+    """A name as it stands in a key: 'gravity, sine' is gravity_sine."""
+    return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
+
+
+def _average(found: Results, average: Average) -> None:
+    if f"period.{average.log}" not in found:
+        found.add(average, f"period.{average.log}", "period", "period_std")
+        found.add(average, f"period.{average.log}.periods", "periods")
+    for name in ("sigma_q", "sigma_dq", "sigma_tau"):
+        found.add(average, f"noise.{average.log}.{average.joint}.{name}", name)
+
+
+def _fit(found: Results, fit: Fit) -> None:
+    key = ".".join(("fit", *fit.key))
+    for i, name in enumerate(fit.parameter):
+        theta, std, hac, unit = (getattr(fit, c)[i] for c in ("theta", "theta_std", "theta_std_hac", "unit"))
+        found.put(f"{key}.{slug(name)}", float(theta), float(hac), unit, fit, f"#theta[{name}]")
+        found.put(f"{key}.{slug(name)}.std_classical", float(std), None, unit, fit, f"#theta_std[{name}]")
+    for name in ("mse", "r2", "condition", "samples", "periods", "hac_lags"):
+        found.add(fit, f"{key}.{name}", name)
+
+
+def _whiteness(found: Results, w: Whiteness) -> None:
+    if w.signal.startswith("innovation_"):
+        key, short = f"ekf.{w.log}.{w.joint}", w.signal.removeprefix("innovation_")
+        for name, field in (("acf1", "acf1"), ("ljung_box_p", "ljung_box_p"), ("jarque_bera_p", "jarque_bera_p")):
+            found.add(w, f"{key}.{name}_{short}", field)
+        found.add(w, f"{key}.white", "all_white")
+    else:
+        for name in ("acf1", "ljung_box_p", "jarque_bera_p", "skewness", "kurtosis", "white"):
+            found.add(w, f"whiteness.{w.log}.{w.joint}.{w.signal}.{name}", name)
+
+
+def parse(source: str) -> Iterator[str]:
+    """The file, the field, and the row of a source: 'processed/fit/x.parquet#theta[inertia]'."""
+    file, _, place = source.partition("#")
+    field, _, row = place.partition("[")
+    yield from (file, field, row.removesuffix("]"))

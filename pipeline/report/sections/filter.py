@@ -1,0 +1,133 @@
+"""The external effort that the filter tracked, and whether its innovations are what they should be."""
+
+from collections.abc import Iterator
+
+from pipeline.records import Track, Whiteness
+from pipeline.report.content import Band, Block, Figure, Line, Panel, Prose, Section, Table, VSpan, literal
+from pipeline.report.context import Context, label, title
+from pipeline.report.sections.noise import autocorrelation
+
+
+def section(context: Context) -> Section | None:
+    """A table over all tracks, then each track."""
+    tracks = context.library.all(Track)
+    if not tracks:
+        return None
+    parts = (
+        Section(f"{title(t.joint)} in {literal(t.log)}", f"track-{t.log}-{t.joint}", tuple(of_track(context, t)))
+        for t in tracks
+    )
+    return Section("External effort", "filter", (intro(), assumptions(tracks), scores(context, tracks), *parts))
+
+
+def intro() -> Prose:
+    """What the filter does."""
+    return Prose(
+        "An extended Kalman filter follows position, velocity and external effort of each joint by itself. It takes the noise of its "
+        "measurements from the spread between periods; how fast the external effort may wander is a choice, stated in "
+        "[@filter-noise]. Its innovations, what each measurement adds to what was predicted, are white where the model and the "
+        "choice fit the data. Whiteness is tested over the whole run but its first second, contacts and reversals included."
+    )
+
+
+def assumptions(tracks: list[Track]) -> Table:
+    """What the filter assumed of noise."""
+    rows = tuple(
+        (title(t.joint), literal(t.log), *(with_unit(t, name) for name in ("r_q", "r_dq", "q_dq", "q_tau")))
+        for t in tracks
+    )
+    return Table(
+        "Noise that the filter assumes (standard deviations): of the measurements and of the velocity's process noise per sample, "
+        "both measured between periods, and of the random walk of the external effort, chosen.",
+        ("Joint", "Log", "Position", "Velocity", "Process", "Random walk"),
+        rows,
+        "filter-noise",
+        "llrrrr",
+    )
+
+
+def with_unit(track: Track, name: str) -> str:
+    """A setting of the filter, as text."""
+    unit = track.origin.units[name] if track.origin else ""
+    return f"{getattr(track, name):.3g} {unit}"
+
+
+def scores(context: Context, tracks: list[Track]) -> Table:
+    """Consistency and whiteness of every track."""
+    names = ("tau_ext_rms", "nis_mean", "acf1_q", "acf1_dq", "ljung_box_p_q", "ljung_box_p_dq")
+    rows = tuple(
+        (title(t.joint), literal(t.log), *(context.number(f"ekf.{t.log}.{t.joint}.{name}", 3) for name in names))
+        for t in tracks
+    )
+    header = (
+        "Joint",
+        "Log",
+        '$tau_"ext"$ rms',
+        "NIS",
+        "ACF(1) $q$",
+        "ACF(1) $dot(q)$",
+        "$p$ of $q$",
+        "$p$ of $dot(q)$",
+    )
+    return Table(
+        "External effort outside known contacts, normalised innovation squared (expected: 2), first autocorrelation of the "
+        "innovations, and the probability of a larger Ljung-Box statistic if they were white.",
+        header,
+        rows,
+        align="llrrrrrr",
+    )
+
+
+def of_track(context: Context, t: Track) -> Iterator[Block]:
+    """The figures of one track.  Fig 7.6-7.11"""
+    name, entry = f"{title(t.joint)} in {literal(t.log)}", context.study.log(t.log)
+    windows = tuple(
+        VSpan(start, end, "known contact" if i == 0 else "") for i, (start, end) in enumerate(entry.contact)
+    )
+    sigma = 2 * t.tau_ext_std
+    # The first samples know nothing yet: their band would set the scale of the whole plot.
+    shown = slice(min(int(0.25 * t.rate), len(t) // 10), None)
+    yield Figure(
+        f"{name}: position; effort measured and modelled; external effort tracked by the filter with two of its standard "
+        "deviations, beside measured minus modelled effort.",
+        f"Three panels over time for {name}: position, effort, external effort.",
+        (
+            Panel("Trajectory", "time [s]", label(t, "q", "position"), (*windows, Line(t.t, t.q, "", "blue"))),
+            Panel(
+                "Effort", "time [s]", label(t, "tau", "effort"),
+                (*windows, Line(t.t, t.tau, "measured", "sky"), Line(t.t, t.tau_hat, "model", "vermillion")),
+            ),
+            Panel(
+                "External effort", "time [s]", label(t, "tau_ext", "external effort"),
+                (
+                    *windows,
+                    Line(t.t[shown], t.tau_ext_direct[shown], "measured minus model", "grey"),
+                    Band(t.t[shown], (t.tau_ext - sigma)[shown], (t.tau_ext + sigma)[shown], "± 2 σ", "vermillion"),
+                    Line(t.t[shown], t.tau_ext[shown], "filter", "vermillion"),
+                ),
+            ),
+        ),
+        zoomable=True,
+        height=38,
+    )  # fmt: skip
+    yield from innovations(context, t, name)
+
+
+def innovations(context: Context, t: Track, name: str) -> Iterator[Figure]:
+    """Innovations over time and their autocorrelation."""
+    late = t.t - t.t[0] >= 1.0 if t.t[-1] - t.t[0] > 5 else t.t >= t.t[0]
+    panels = []
+    for field, words in (("innovation_q", "position innovation"), ("innovation_dq", "velocity innovation")):
+        values = getattr(t, field)[late]
+        panels.append(
+            Panel(words.capitalize(), "time [s]", label(t, field, words), (Line(t.t[late], values, "", "blue"),))
+        )
+        for w in context.library.about(Whiteness, log=t.log, joint=t.joint, signal=field):
+            panels.append(autocorrelation(w, f"ACF of the {words}"))
+    yield Figure(
+        f"{name}: innovations of position and velocity, and their autocorrelation with the 95 % band of white noise.",
+        f"Four panels for {name}: position and velocity innovations and their autocorrelations.",
+        tuple(panels),
+        columns=2,
+        height=42,
+    )

@@ -1,0 +1,31 @@
+"""Where the numbers come from: files and their hashes, versions, settings."""
+
+from dataclasses import asdict
+
+from pipeline.report.content import Block, Listing, Prose, Section, Table, literal
+from pipeline.report.context import Context
+
+
+def section(context: Context) -> Section:
+    """Everything needed to tell whether a report is of these files and this code."""
+    provenance, study = context.provenance, context.study
+    raw = tuple((literal(file), f"`{sha[:16]}`") for file, sha in provenance.raw.items())
+    versions = tuple(provenance.packages.items())
+    blocks: list[Block] = [
+        Prose(
+            f"Made by davinci-forces {provenance.version}. Every number of the tables is in `results.json` under a key of its own, with "
+            "the processed file and field that it stands in; `davinci-forces verify` follows them back to the raw files."
+        ),
+        Table("Raw files, with the first 16 digits of their SHA-256.", ("File", "SHA-256"), raw, align="ll"),
+        Table("Versions.", ("Package", "Version"), versions, align="ll"),
+        Prose("Settings used, defaults included:"),
+        Listing("\n".join(f"{name} = {value!r}" for name, value in asdict(study.settings).items())),
+    ]
+    if study.changed:
+        blocks += [Prose("Changes of the robot:"), Listing("\n".join(f"{k}: {v}" for k, v in study.changed.items()))]
+    blocks.append(
+        Prose(
+            f"{len(provenance.processed)} processed files stand behind this report; their hashes are in results.json."
+        )
+    )
+    return Section("Provenance", "provenance", tuple(blocks))

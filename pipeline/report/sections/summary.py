@@ -1,0 +1,116 @@
+"""What the study found, and how far to trust it."""
+
+from collections.abc import Iterator
+
+from pipeline.records import Fit, Note, Prediction, Track
+from pipeline.report.content import Block, Bullets, Prose, Section, Table, Verdict, literal
+from pipeline.report.context import Context, title
+from pipeline.report.results import prediction_key
+
+GOOD, FAIR = 0.9, 0.7  # shares of variance explained that call a model good, or usable with care
+
+
+def section(context: Context) -> Section:
+    """Verdicts first, then the numbers behind them."""
+    return Section("Summary", "summary", tuple(blocks(context)))
+
+
+def blocks(context: Context) -> Iterator[Block]:
+    """The summary's content."""
+    study = context.study
+    kind = "simulated" if study.simulated else "recorded"
+    yield Prose(
+        f"{len(study.logs)} {kind} logs of the {literal(study.robot.title)} were analysed. External effort is what the robot "
+        "exerts on its environment, found from motor currents and joint positions; no force sensor was used."
+    )
+    if study.simulated:
+        yield Verdict(
+            "info", "All data in this report are **simulated**. They show that the methods work, not what an arm does."
+        )
+    yield from failures(context)
+    if not context.library.all(Fit):
+        yield Verdict(
+            "bad", "No joint could be identified: there is no usable identification log, so no effort was tracked."
+        )
+        return
+    for joint in fitted(context):
+        yield from verdicts(context, joint)
+    yield table(context)
+    warnings = [literal(text) for note in context.library.all(Note) for text in severe(note)]
+    if warnings:
+        yield Prose("**What to look at.** The analysis itself warned of the following.")
+        yield Bullets(tuple(warnings))
+
+
+def severe(note: Note) -> Iterator[str]:
+    """The warnings of a note."""
+    yield from (text for severity, text in zip(note.severity, note.text, strict=True) if severity == "warning")
+
+
+def failures(context: Context) -> Iterator[Block]:
+    """What could not be done at all."""
+    for task, failed in context.provenance.failures.items():
+        yield Verdict("bad", f"**{literal(task)}** failed, and what depends on it is missing: {literal(failed)}")
+
+
+def fitted(context: Context) -> list[str]:
+    """The joints that have a fit, in the robot's order."""
+    return list(dict.fromkeys(fit.group for fit in context.library.all(Fit)))
+
+
+def used_fit(context: Context, joint: str) -> str:
+    """`<model>.<estimator>` of the fit that the filter ran with."""
+    own = [f"{fit.model}.{fit.estimator}" for fit in context.library.all(Fit) if fit.group == joint]
+    return context.study.settings.fit if context.study.settings.fit in own else own[0]
+
+
+def verdicts(context: Context, joint: str) -> Iterator[Verdict]:
+    """How well the model of a joint predicts, and whether its filter is consistent."""
+    name, fit = title(joint), used_fit(context, joint)
+    unseen = [p for p in context.library.all(Prediction) if p.joint == joint and f"{p.model}.{p.estimator}" == fit]
+    if unseen:
+        worst = min(unseen, key=lambda p: p.r2)
+        level = "good" if worst.r2 >= GOOD else "warn" if worst.r2 >= FAIR else "bad"
+        r2 = context.results[f"{prediction_key(worst)}.r2"].number(3)
+        yield Verdict(
+            level,  # type: ignore[arg-type]
+            f"**{name}**: the model explains at least {r2} of the variance of effort that it has not seen "
+            f"(worst: {literal(worst.log)}, {worst.scheme}).",
+        )
+    tracks = [track for track in context.library.all(Track) if track.joint == joint]
+    white = [t.log for t in tracks if context.results[f"ekf.{t.log}.{joint}.white"].value == 1]
+    if tracks and len(white) == len(tracks):
+        yield Verdict("good", f"**{name}**: the filter's innovations pass as white noise in all {len(tracks)} logs.")
+    elif tracks:
+        yield Verdict(
+            "warn",
+            f"**{name}**: the filter's innovations are not white over the whole run in {len(tracks) - len(white)} of "
+            f"{len(tracks)} logs, so its stated deviations are too small there: trust the free-space level instead.",
+        )
+
+
+def table(context: Context) -> Table:
+    """One row per joint and log that was tracked."""
+    rows = []
+    for track in context.library.all(Track):
+        key = f"ekf.{track.log}.{track.joint}"
+        white = context.results[f"{key}.white"].value == 1
+        rows.append(
+            (
+                title(track.joint),
+                literal(track.log),
+                track.role,
+                context.number(f"{key}.tau_ext_rms", 3),
+                context.number(f"{key}.nis_mean", 3),
+                "yes" if white else "no",
+            )
+        )
+    return Table(
+        "External effort outside known contacts (root mean square), the filter's normalised innovation squared (2 when it is "
+        "consistent), and whether its innovations are white. Where nothing touched the robot, the first is its floor: a contact "
+        "has to exceed it to be seen.",
+        ("Joint", "Log", "Role", "External effort", "NIS", "White"),
+        tuple(rows),
+        label="summary-table",
+        align="lllrrl",
+    )

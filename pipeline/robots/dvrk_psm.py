@@ -1,0 +1,17 @@
+"""The same arm driven by the da Vinci Research Kit, which logs effort at the joint, already in N m and N."""
+
+from dataclasses import replace
+
+from pipeline.robots import davinci
+from pipeline.robots.robot import Robot
+
+# Excitation trajectories of the public identification data have six harmonics (Wang et al. 2019).
+HARMONICS = 6
+
+ROBOT = Robot(
+    name="dvrk_psm",
+    title="da Vinci Research Kit, patient-side manipulator",
+    joints=tuple(
+        replace(joint, gear_ratio=1.0, torque_constant=1.0, harmonics=HARMONICS) for joint in davinci.ROBOT.joints
+    ),
+)

@@ -1,0 +1,71 @@
+"""What a robot is: its joints, each with its motor, its model and its limits, and the chain that carries them."""
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+from pipeline.errors import BadRobot
+from pipeline.maths.terms import Term
+
+
+class Kind(Enum):
+    """What a joint does, and so the units of everything about it."""
+
+    REVOLUTE = "revolute"
+    PRISMATIC = "prismatic"
+
+    def unit(self, template: str) -> str:
+        """Fill in a unit of `quantities` or of a term: '{position}/s' is 'rad/s' for a revolute joint."""
+        position, effort, inertia = ("rad", "N m", "kg m^2") if self is Kind.REVOLUTE else ("m", "N", "kg")
+        return template.format(position=position, effort=effort, inertia=inertia)
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Lower and upper bounds of position, velocity and acceleration, in the joint's units.  Table 6.2"""
+
+    q: tuple[float, float]
+    dq: tuple[float, float]
+    ddq: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One joint: its motor (Table 6.3), the terms of its model (6.7-6.14), and how it is excited and filtered."""
+
+    name: str
+    title: str
+    kind: Kind
+    terms: tuple[Term, ...]
+    limits: Limits
+    gear_ratio: float = 1.0  # eta [-], or [rad/m] for a prismatic joint
+    torque_constant: float = 1.0  # K_m [N m/A]
+    harmonics: int = 2  # N_f of the excitation
+    # How fast the external effort may wander: the intensity of its random walk, a standard deviation per square root
+    # of a second [effort/s^0.5].  A choice, not a measurement; the report says so.
+    q_tau: float = 1.0
+
+    def unit(self, template: str) -> str:
+        """Fill in the joint's units."""
+        return self.kind.unit(template)
+
+
+@dataclass(frozen=True)
+class Robot:
+    """The joints of an arm, from the base outwards."""
+
+    name: str
+    title: str
+    joints: tuple[Joint, ...] = field(default_factory=tuple)
+
+    def joint(self, name: str) -> Joint:
+        """The joint of that name.
+
+        Raises
+        ------
+        BadRobot
+            If there is none; the message lists those there are.
+        """
+        for joint in self.joints:
+            if joint.name == name:
+                return joint
+        raise BadRobot(f"robot {self.name} has no joint {name!r}; it has {', '.join(j.name for j in self.joints)}")

@@ -1,0 +1,91 @@
+"""Runs of the stages on studies: where their folders are, which of them can run, and how a run speaks."""
+
+import sys
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import typer
+
+from pipeline import study_file
+from pipeline.errors import BadStudy
+from pipeline.ledger import Folders
+from pipeline.runner import Console, Runner
+from pipeline.study import Study
+
+
+def folders(study: Path, processed: Path | None, reports: Path | None) -> Folders:
+    """The folders of a study: processed/ and reports/ are beside the folder that holds it."""
+    home = study.resolve().parent.parent
+    name = study.resolve().name
+    return Folders(study, (processed or home / "processed") / name, (reports or home / "reports") / name)
+
+
+def studies(named: Sequence[Path]) -> Iterator[Path]:
+    """The studies named, or every one in raw/ whose logs are there.
+
+    Raises
+    ------
+    BadStudy
+        If none is named and raw/ holds none.
+    """
+    if named:
+        yield from named
+        return
+    found = sorted(file.parent for file in Path("raw").glob("*/study.toml"))
+    if not found:
+        raise BadStudy("raw/ holds no study; `davinci-forces new` writes one from a log")
+    for folder in found:
+        study = study_file.read(folder)
+        absent = study.absent()
+        if len(absent) == sum(len(entry.files) for entry in study.logs):
+            typer.echo(f"{folder}: skipped, its logs are not here ({absent[0]} ...); study.toml says where to get them")
+        else:
+            yield folder
+
+
+def load(folder: Path) -> Study:
+    """Read a study, and make sure that its logs are there.
+
+    Raises
+    ------
+    BadStudy
+        With every problem at once.
+    """
+    study = study_file.read(folder)
+    absent = study.absent()
+    if absent:
+        raise BadStudy("\n".join(f"{folder / 'study.toml'}: file {name!r} is not in {folder}" for name in absent))
+    return study
+
+
+def run(
+    folder: Path, names: Sequence[str], processed: Path | None, reports: Path | None, force: bool, jobs: int
+) -> bool:
+    """Run stages on one study and say what was done; whether every task succeeded."""
+    study = load(folder)
+    runner = Runner(study, folders(folder, processed, reports), console(), force, jobs)
+    typer.secho(f"{folder}: {study.title}{' (SIMULATED)' if study.simulated else ''}", bold=True)
+    good = runner.run(names)
+    if not runner.ran:
+        typer.echo(f"{folder}: nothing to do, every stage is current")
+    for file in ("report.html", "report.pdf"):
+        made = runner.folders.reports / file
+        if "report" in names and made.exists():
+            typer.echo(f"{folder}: see {made}")
+    if not good:
+        typer.secho(f"{folder}: {runner.failures} of {runner.ran} tasks failed", fg="red", err=True)
+    return good
+
+
+def console() -> Console:
+    """Lines for a log; on a terminal, a bar as well."""
+
+    def progress(stage: str, done: int, total: int) -> None:
+        if sys.stderr.isatty():
+            width = 30
+            full = width * done // total
+            end = "\n" if done == total else ""
+            sys.stderr.write(f"\r{stage:14s} [{'#' * full}{'.' * (width - full)}] {done}/{total}{end}")
+            sys.stderr.flush()
+
+    return Console(typer.echo, lambda line: typer.secho(line, fg="yellow", err=True), progress)

@@ -1,0 +1,116 @@
+"""Find the period of every identification log and average its periods."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from pipeline.errors import NotPeriodic
+from pipeline.maths import averaging, period
+from pipeline.maths.averaging import Folded
+from pipeline.maths.smoothing import stretches
+from pipeline.records import Average, Column, Noise, Note, Signal, note
+from pipeline.robots.robot import Robot
+from pipeline.study import LogEntry
+
+HELD = 1e-3  # a joint is held where it moves less than this share of its range, or of 1 rad or 0.1 m
+MISMATCH = 5e-4  # a stated period is wrong by more than this share when the data disagree with it
+
+
+def run(
+    signals: Sequence[Signal], entry: LogEntry, robot: Robot, *, harmonics: int
+) -> Iterator[Average | Noise | Note]:
+    """One period of each joint that moves; the joints of a log share the period."""
+    if entry.role != "identification":
+        return
+    moving = [signal for signal in signals if moves(signal, robot)]
+    held = [signal.joint for signal in signals if not moves(signal, robot)]
+    if held:
+        yield note(
+            "average", entry.name, "note", *(f"{entry.name}: {j} does not move: held, and left out" for j in held)
+        )
+    if not moving:
+        raise NotPeriodic(
+            f"{entry.name}: no joint moves, so there is nothing to identify; check its channels and units"
+        )
+    orders = max(harmonics or robot.joint(signal.joint).harmonics for signal in moving)
+    found, remarks = shared_period(moving, entry, orders)
+    if remarks:
+        yield note("average", entry.name, "warning", *remarks)
+    for signal in moving:
+        yield from averaged(signal, found, entry.period or 0.0)
+
+
+def moves(signal: Signal, robot: Robot) -> bool:
+    """Whether a joint moves enough to say anything about its dynamics."""
+    low, high = robot.joint(signal.joint).limits.q
+    span = high - low if np.isfinite(high - low) else 1.0
+    return bool(np.ptp(signal.q) > HELD * 10 * span)
+
+
+def shared_period(signals: Sequence[Signal], entry: LogEntry, harmonics: int) -> tuple[period.Period, list[str]]:
+    """The period that all moving joints repeat with, and what there is to say about the one the study states.
+
+    Raises
+    ------
+    NotPeriodic
+        If the joints do not repeat, or fewer than two periods were recorded.
+    """
+    first = signals[0]
+    longest = max(stretches(first.stretch), key=lambda s: s.stop - s.start)
+    guess = period.guess([signal.q[longest] for signal in signals])
+    seconds = first.t[-1] - first.t[0] + 1.0 / first.rate
+    if guess is None:
+        stated = f"; the study states {entry.period} s" if entry.period else ""
+        raise NotPeriodic(
+            f"{entry.name}: {seconds:.2f} s hold no motion that repeats at least twice{stated}; record more periods, skip the "
+            "transient at the start, or give the log another role"
+        )
+    remarks, length = [], guess / first.rate
+    if entry.period:
+        multiple = max(round(entry.period / length), 1)
+        # A trajectory whose first harmonics happen to be nil repeats sooner than it was designed to.
+        if abs(entry.period - multiple * length) < max(MISMATCH * entry.period, multiple / first.rate):
+            length *= multiple
+    found = period.refine(first.t - first.t[0], [signal.q for signal in signals], length, harmonics)
+    if entry.period and abs(entry.period - found.length) > max(MISMATCH * entry.period, 5 * found.std):
+        remarks.append(
+            f"{entry.name}: the study states a period of {entry.period} s, but the joints repeat every {found.length:.4f} s "
+            f"(+- {found.std:.1g} s); the latter is used: correct the period in study.toml, or leave it out"
+        )
+    if averaging.whole_periods(first.t, found.length, first.rate) < 2:
+        raise NotPeriodic(f"{entry.name}: {seconds:.2f} s hold fewer than two periods of {found.length:.4f} s")
+    return found, remarks
+
+
+def averaged(signal: Signal, found: period.Period, stated: float) -> Iterator[Average | Noise]:
+    """Fold one joint at a period."""
+    K = averaging.phases(found.length, signal.rate)
+    M = averaging.whole_periods(signal.t, found.length, signal.rate)
+    used = signal.t - signal.t[0] < M * found.length - 0.5 / signal.rate
+    t = signal.t[used]
+
+    def folded(x: Column) -> Folded:
+        return averaging.fold(t, x[used], found.length, K)
+
+    q, dq, tau = folded(signal.q), folded(signal.dq), folded(signal.tau)
+    yield Average(
+        log=signal.log,
+        joint=signal.joint,
+        rate=signal.rate,
+        period=found.length,
+        period_std=found.std,
+        stated_period=stated,
+        periods=M,
+        sigma_q=averaging.noise_std(q),
+        sigma_dq=averaging.noise_std(dq),
+        sigma_tau=averaging.noise_std(tau),
+        t=np.arange(K) / K * found.length,
+        q=q.mean,
+        dq=dq.mean,
+        tau=tau.mean,
+        q_var=q.var,
+        dq_var=dq.var,
+        tau_var=tau.var,
+        count=q.count,
+    )
+    yield Noise(signal.log, signal.joint, t=t, q_noise=q.noise, dq_noise=dq.noise, tau_noise=tau.noise)

@@ -1,0 +1,108 @@
+"""Track the external effort on every joint of every log with an extended Kalman filter."""
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from pipeline.errors import PipelineError
+from pipeline.maths import ekf
+from pipeline.maths.dynamics import mass
+from pipeline.maths.smoothing import stretches
+from pipeline.maths.windows import outside, settled
+from pipeline.records import Average, Fit, Note, Signal, Track, note
+from pipeline.robots.robot import Joint
+from pipeline.stages.predict import measured_regressor
+from pipeline.study import LogEntry
+
+
+def run(
+    signal: Signal,
+    fits: Iterable[Fit],
+    averages: Iterable[Average],
+    entry: LogEntry,
+    joint: Joint,
+    *,
+    fit: str,
+    lowpass: float,
+    q_tau: float,
+) -> Iterator[Track | Note]:
+    """The filter's pass over one joint, with the Fit that the setting `fit` names.  (7.6)-(7.16)"""
+    if entry.role == "friction":
+        return
+    own = [f for f in fits if f.group == joint.name]
+    if not own:
+        yield note(
+            "ekf", f"{signal.log}.{joint.name}", "note",
+            f"{signal.log}/{joint.name}: no identification log moves this joint, so its external effort is not tracked",
+        )  # fmt: skip
+        return
+    chosen = next((f for f in own if f"{f.model}.{f.estimator}" == fit), None)
+    if chosen is None:
+        there = ", ".join(f"{f.model}.{f.estimator}" for f in own)
+        raise PipelineError(f"{joint.name}: there is no fit {fit!r}; set fit in [settings] to one of {there}")
+    noise = assumed([a for a in averages if a.joint == joint.name], chosen, joint, signal, q_tau or joint.q_tau)
+    yield tracked(signal, chosen, joint, noise, entry, lowpass, q_tau or joint.q_tau)
+
+
+def assumed(averages: list[Average], fit: Fit, joint: Joint, signal: Signal, q_tau: float) -> ekf.Noise:
+    """What the filter assumes of noise: measured between periods, except for the walk of the external effort.
+
+    The measured effort drives the model, so its noise is the velocity's process noise, scaled by T_s / M.
+    """
+    T_s = 1.0 / signal.rate
+    r_q, r_dq, sigma_tau = (
+        float(np.sqrt(np.mean([getattr(a, name) ** 2 for a in averages])))
+        for name in ("sigma_q", "sigma_dq", "sigma_tau")
+    )
+    # A noiseless log would leave the innovations without a covariance to be judged by.
+    r_q, r_dq = (max(r, 1e-9 * np.ptp(x), 1e-12) for r, x in ((r_q, signal.q), (r_dq, signal.dq)))
+    return ekf.Noise(r_q, r_dq, T_s * sigma_tau / abs(mass(joint.terms, fit.theta)), q_tau * np.sqrt(T_s))
+
+
+def tracked(
+    signal: Signal, fit: Fit, joint: Joint, noise: ekf.Noise, entry: LogEntry, lowpass: float, q_tau: float
+) -> Track:
+    """Filter every stretch of a signal; a gap starts the filter anew."""
+    first_std = max(float(np.std(signal.tau)), noise.q_tau)
+    passes = [
+        ekf.track(
+            joint.terms,
+            fit.theta,
+            signal.q[part],
+            signal.dq[part],
+            signal.tau[part],
+            1.0 / signal.rate,
+            noise,
+            first_std,
+        )
+        for part in stretches(signal.stretch)
+    ]
+    together = ekf.Tracked(*(np.concatenate(columns) for columns in zip(*passes, strict=True)))
+    tau_hat = measured_regressor(signal, joint, lowpass) @ fit.theta
+    counted = outside(signal.t, entry.contact) & settled(signal.t)
+    return Track(
+        log=signal.log,
+        joint=signal.joint,
+        model=fit.model,
+        estimator=fit.estimator,
+        filter="ekf",
+        role=signal.role,
+        rate=signal.rate,
+        tau_ext_rms=float(np.sqrt(np.mean(together.tau_ext[counted] ** 2))) if counted.any() else 0.0,
+        nis_mean=float(np.mean(together.nis[settled(signal.t)])),
+        r_q=noise.r_q,
+        r_dq=noise.r_dq,
+        q_dq=noise.q_dq,
+        q_tau=q_tau,
+        t=signal.t,
+        q=together.q,
+        dq=together.dq,
+        tau=signal.tau,
+        tau_hat=tau_hat,
+        tau_ext=together.tau_ext,
+        tau_ext_std=together.tau_ext_std,
+        tau_ext_direct=signal.tau - tau_hat,
+        innovation_q=together.innovation_q,
+        innovation_dq=together.innovation_dq,
+        nis=together.nis,
+    )

@@ -1,0 +1,221 @@
+"""Read every log into recordings, one per joint, in SI and at the joint's side of the gears."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from pipeline.errors import BadLog
+from pipeline.logs.log import Block, Channel, Log
+from pipeline.maths.clock import Clock
+from pipeline.records import Column, Intake, Note, Recording, note
+from pipeline.robots.robot import Joint, Robot
+from pipeline.study import LogEntry, Source
+from pipeline.units import SI, UNITS, canonical, measures, size
+
+MOST_REPEATED = 0.1  # share of rows equal to the one before, above which the recorder was faster than the robot
+MOST_JITTER = 0.1  # of the sampling time
+
+
+def run(log: Log, entry: LogEntry, robot: Robot) -> Iterator[Recording | Intake | Note]:
+    """Recordings in consecutive blocks, then what the reader noticed.
+
+    Raises
+    ------
+    BadLog
+        If a channel is not there, its unit is unknown or contradicts the study, it holds what is not a number, or
+        time does not increase.
+    """
+    reading = Reading(log, entry, robot)
+    for block in log.blocks(reading.names):
+        yield from reading.recordings(block)
+    yield reading.intake()
+    remarks = [*log.warnings, *reading.remarks()]
+    if remarks:
+        yield note("ingest", entry.name, "warning", *(f"{entry.name}: {remark}" for remark in remarks))
+
+
+@dataclass
+class Reading:
+    """One pass over a log: which channels feed what, and how far the clock has come."""
+
+    log: Log
+    entry: LogEntry
+    robot: Robot
+    clock: Clock = field(default_factory=Clock)
+    rows: int = 0
+
+    def __post_init__(self) -> None:
+        self.channels = {s.quantity: self.log.find(s.channel) for s in self.entry.channels}
+        self.scales = {s.quantity: self.scale(s, self.channels[s.quantity]) for s in self.entry.channels}
+        self.sources = {s.quantity: s for s in self.entry.channels}
+        names = [channel.name for channel in self.channels.values()]
+        if self.own_time:
+            names.append(self.own_time)
+        elif "time" not in self.sources and self.entry.rate is None and self.log.clock is None:
+            raise BadLog(
+                f"{self.log.path}: the log carries no clock; name its time channel in [log.channels], or say rate = ... [Hz]"
+            )
+        self.names = list(dict.fromkeys(names))
+
+    @property
+    def own_time(self) -> str:
+        """The log's own time channel, unless the study says otherwise."""
+        return "" if "time" in self.sources or self.entry.rate else self.log.time
+
+    def scale(self, source: Source, channel: Channel) -> float:
+        """What one unit of a channel is in SI: by the study's word, else the log's, else SI."""
+        said = canonical(channel.unit)
+        if source.unit and said in UNITS and said != source.unit:
+            raise BadLog(
+                f"{self.log.path}: channel {channel.name!r} says {channel.unit!r} and study.toml says {source.unit!r}; "
+                f"correct the unit of {source.quantity} in study.toml, or leave it out"
+            )
+        unit = source.unit or said or SI[source.measures]
+        if source.measures == "count":
+            return 1.0
+        if measures(unit) != source.measures:
+            what = f"measures {measures(unit)}" if unit in UNITS else "is not known"
+            raise BadLog(
+                f"{self.log.path}: channel {channel.name!r} is in {channel.unit!r}, which {what}, but {source.quantity} needs "
+                f"{source.measures}; say unit = ... for it in study.toml: {', '.join(u for u in UNITS if measures(u) == source.measures)}"
+            )
+        return size(unit)
+
+    def recordings(self, block: Block) -> Iterator[Recording]:
+        """The joints of one block, after the transient that the study skips."""
+        for name in self.names:
+            self.require_numbers(name, block[name])
+        t = self.times(block)
+        self.clock.update(t, np.column_stack([block[c.name] for c in self.channels.values()]))
+        self.require_increasing()
+        first = self.clock.first
+        kept = t - first >= self.entry.skip - 1e-9
+        for name in self.entry.joints:
+            joint = self.robot.joint(name)
+            q, dq, tau = (
+                self.of_joint(block, joint, either) for either in (("q", "theta_m"), ("dq", "dtheta_m"), ("tau", "i"))
+            )
+            assert q is not None
+            assert tau is not None
+            yield Recording(
+                log=self.entry.name,
+                joint=name,
+                role=self.entry.role,
+                rate=self.clock.rate,
+                velocity="derived" if dq is None else "logged",
+                t=(t - first)[kept],
+                q=q[kept],
+                dq=np.zeros(int(kept.sum())) if dq is None else dq[kept],
+                tau=tau[kept],
+            )
+        self.rows += len(t)
+
+    def times(self, block: Block) -> Column:
+        """Time of each row [s], by the study's time channel, its rate, the log's time channel or the log's clock."""
+        if "time" in self.sources:
+            return self.converted(block, "time")
+        rows = self.rows + np.arange(len(block[self.names[0]]))
+        if self.entry.rate:
+            return rows / self.entry.rate
+        if self.own_time:
+            return block[self.own_time]
+        assert self.log.clock is not None
+        return self.log.clock.start + rows * self.log.clock.step
+
+    def converted(self, block: Block, quantity: str) -> Column:
+        """A channel in SI: offset first, in the channel's unit, then sign and unit."""
+        source = self.sources[quantity]
+        return source.sign * self.scales[quantity] * (block[self.channels[quantity].name] + source.offset)
+
+    def of_joint(self, block: Block, joint: Joint, either: tuple[str, str]) -> Column | None:
+        """A quantity at the joint, from whichever side of the gears it was logged on.  (6.28), (6.29)"""
+        at_joint, at_motor = (f"{joint.name}.{symbol}" for symbol in either)
+        if at_joint in self.sources:
+            return self.converted(block, at_joint)
+        if at_motor not in self.sources:
+            return None
+        value = self.converted(block, at_motor)
+        ratio = joint.gear_ratio
+        return value * ratio * joint.torque_constant if either[1] == "i" else value / ratio
+
+    def require_numbers(self, name: str, values: Column) -> None:
+        """Refuse a channel with samples that are missing or not numbers."""
+        bad = np.flatnonzero(~np.isfinite(values))
+        if not len(bad):
+            return
+        row = self.rows + int(bad[0])
+        missing = self.log.nulls.get(name, 0)
+        what = f"has no sample at row {row}" if missing else f"holds {values[bad[0]]} at row {row}"
+        raise BadLog(
+            f"{self.log.path}: channel {name!r} {what} (counted from 0), and {len(bad)} of the {len(values)} rows read with it "
+            "lack a number; record it again, or give the part before it as a log of its own"
+        )
+
+    def require_increasing(self) -> None:
+        """Refuse a clock that stands still or goes back, and say where."""
+        clock = self.clock
+        if clock.backward or clock.repeated:
+            raise BadLog(
+                f"{self.log.path}: time does not increase at row {clock.bad_row} (counted from 0): "
+                f"{clock.bad_pair[0]:.9g} s, then {clock.bad_pair[1]:.9g} s; name another time channel, or say rate = ... [Hz] "
+                "to count samples instead"
+            )
+
+    def intake(self) -> Intake:
+        """What the reader noticed, once the log is exhausted.
+
+        Raises
+        ------
+        BadLog
+            If nothing is left to analyse.
+        """
+        clock, log = self.clock, self.log
+        if clock.samples < 2 or clock.last - clock.first <= self.entry.skip:
+            raise BadLog(
+                f"{log.path}: {clock.samples} samples are too few, with {self.entry.skip:g} s skipped at the start"
+            )
+        feeds: dict[str, list[str]] = {}
+        for quantity, channel in self.channels.items():
+            feeds.setdefault(channel.name, []).append(quantity)
+        if self.own_time:
+            feeds.setdefault(self.own_time, []).append("time")
+        names = [channel.name for channel in log.channels]
+        facts = {**log.facts, **({"comments": "; ".join(log.comments)} if log.comments else {})}
+        return Intake(
+            log=self.entry.name,
+            role=self.entry.role,
+            format=log.format,
+            files=self.entry.files,
+            started=log.started,
+            zone=log.zone,
+            rows=clock.samples,
+            rate=clock.rate,
+            duration=clock.last - clock.first,
+            jitter=clock.jitter,
+            longest_gap=clock.longest_gap,
+            backward=clock.backward,
+            repeated=clock.repeated,
+            duplicates=clock.duplicates,
+            dropped=log.dropped,
+            facts=tuple(f"{key}: {value}" for key, value in facts.items()),
+            warnings=tuple(log.warnings),
+            channel=np.array(names, object),
+            unit=np.array([channel.unit for channel in log.channels], object),
+            feeds=np.array([", ".join(feeds.get(name, [])) for name in names], object),
+            nulls=np.array([log.nulls.get(name, 0) for name in names]),
+            nans=np.array([log.nans.get(name, 0) for name in names]),
+        )
+
+    def remarks(self) -> Iterator[str]:
+        """What a reviewer should know about the clock and the rows."""
+        clock = self.clock
+        if clock.duplicates > MOST_REPEATED * clock.samples:
+            yield (
+                f"{clock.duplicates} of {clock.samples} rows ({clock.duplicates / clock.samples:.0%}) repeat the one before in every "
+                "channel used: the recorder ran faster than the robot's measurements"
+            )
+        if clock.jitter * clock.rate > MOST_JITTER:
+            yield f"the time between samples varies by {clock.jitter * 1e3:.3g} ms around {1e3 / clock.rate:.3g} ms"
+        if clock.longest_gap * clock.rate > 2.5:
+            yield f"the longest time between samples is {clock.longest_gap:.3g} s, {clock.longest_gap * clock.rate:.1f} samples"

@@ -1,0 +1,138 @@
+"""Predict the effort of logs that a fit has not seen, and score it; identification logs by leaving data out."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.errors import NotIdentifiable
+from pipeline.estimators import ESTIMATORS, estimator
+from pipeline.maths import averaging, harmonics
+from pipeline.maths.dynamics import regressor
+from pipeline.maths.smoothing import lowpass as low_passed
+from pipeline.maths.smoothing import motion, stretches
+from pipeline.maths.windows import outside
+from pipeline.records import Column, Fit, Prediction, Signal, Trajectory
+from pipeline.robots.robot import Joint
+from pipeline.stages.fit import MODEL, pose
+from pipeline.study import LogEntry
+
+PARTS = 20  # at most: periods are left out one at a time, or in as many groups
+
+
+def run(
+    signal: Signal,
+    trajectory: Trajectory | None,
+    trajectories: Iterable[Trajectory],
+    fits: Iterable[Fit],
+    entry: LogEntry,
+    joint: Joint,
+    *,
+    lowpass: float,
+) -> Iterator[Prediction]:
+    """One Prediction per fit of the joint; the prediction of an identification log comes from refits without it."""
+    if entry.role in ("validation", "contact"):
+        free = outside(signal.t, entry.contact)
+        Phi = measured_regressor(signal, joint, lowpass)
+        for fit in fits:
+            if fit.group == joint.name:
+                tau_hat = Phi @ fit.theta
+                yield scored(signal, fit.model, fit.estimator, entry.role, tau_hat, free, lowpass)
+    elif trajectory is not None:
+        others = [t for t in trajectories if t.joint == joint.name and t.log != signal.log]
+        left_out = without_the_log if others else without_a_period
+        for name in ESTIMATORS:
+            yield from left_out(signal, trajectory, others, joint, name, lowpass)
+
+
+def measured_regressor(signal: Signal, joint: Joint, lowpass: float) -> Column:
+    """Phi (N, p) of a recording that need not repeat, from low-passed motion."""
+    rows = []
+    for part in stretches(signal.stretch):
+        dq = signal.dq[part] if signal.velocity == "logged" else None
+        rows.append(regressor(joint.terms, *motion(signal.q[part], dq, signal.rate, lowpass)))
+    return np.vstack(rows)
+
+
+def without_the_log(
+    signal: Signal, own: Trajectory, others: Sequence[Trajectory], joint: Joint, name: str, lowpass: float
+) -> Iterator[Prediction]:
+    """Predict a log from a fit to the other identification logs."""
+    try:
+        theta = estimator(name)(pose(others, joint)).theta
+    except NotIdentifiable:
+        return
+    used = whole(signal, own)
+    tau_hat = regressor(joint.terms, *motion_at(own, signal.t[used] - signal.t[0])) @ theta
+    part = at(signal, used)
+    yield scored(part, MODEL, name, "leave one log out", tau_hat, np.ones(len(part.t), bool), lowpass)
+
+
+def without_a_period(
+    signal: Signal, own: Trajectory, _: Sequence[Trajectory], joint: Joint, name: str, lowpass: float
+) -> Iterator[Prediction]:
+    """Predict each period of a log from a fit to the other periods; only the effort is left out, not the path."""
+    used = whole(signal, own)
+    part = at(signal, used)
+    since = part.t - signal.t[0]
+    number = np.minimum((since / own.period + 1e-9).astype(int), own.periods - 1)
+    Phi = regressor(joint.terms, *motion_at(own, since))
+    tau_hat = np.empty(len(since))
+    for out in np.array_split(np.arange(own.periods), min(own.periods, PARTS)):
+        seen = ~np.isin(number, out)
+        rest = averaging.fold(part.t[seen], part.tau[seen], own.period, len(own.t), start=signal.t[0])
+        kept = replace(own, tau=rest.mean, tau_var=rest.var, periods=own.periods - len(out))
+        try:
+            tau_hat[~seen] = Phi[~seen] @ estimator(name)(pose([kept], joint)).theta
+        except NotIdentifiable:
+            return
+    yield scored(part, MODEL, name, "leave one period out", tau_hat, np.ones(len(since), bool), lowpass)
+
+
+def whole(signal: Signal, own: Trajectory) -> Column:
+    """Which samples belong to whole periods."""
+    return signal.t - signal.t[0] < own.periods * own.period - 0.5 / signal.rate
+
+
+def at(signal: Signal, which: Column) -> Signal:
+    """Some of the samples of a signal."""
+    columns = {name: getattr(signal, name)[which] for name in signal.columns()}
+    return replace(signal, **columns)
+
+
+def motion_at(own: Trajectory, since: Column) -> tuple[Column, Column, Column]:
+    """The trajectory's motion at any time since its start."""
+    omega = 2 * np.pi / own.period
+    c = harmonics.project(own.t, own.q, omega, own.harmonics)
+    dc = harmonics.derivative(c, omega)
+    ddc = harmonics.derivative(dc, omega)
+    q, dq, ddq = (harmonics.evaluate(x, since, omega) for x in (c, dc, ddc))
+    return q, dq, ddq
+
+
+def scored(
+    signal: Signal, model: str, name: str, scheme: str, tau_hat: Column, free: Column, lowpass: float
+) -> Prediction:
+    """A prediction with its scores, over the samples where nothing touched the robot."""
+    tau, error = signal.tau[free], (signal.tau - tau_hat)[free]
+    spread = tau - tau.mean()
+    smooth, smooth_error = (
+        np.concatenate([low_passed(x[part], signal.rate, lowpass) for part in stretches(signal.stretch)])[free]
+        for x in (signal.tau, signal.tau - tau_hat)
+    )
+    rmse = float(np.sqrt(np.mean(error**2)))
+    return Prediction(
+        log=signal.log,
+        joint=signal.joint,
+        model=model,
+        estimator=name,
+        role=signal.role,
+        scheme=scheme,
+        rmse=rmse,
+        nrmse=rmse / float(np.ptp(tau) or 1.0),
+        r2=float(1 - error @ error / ((spread @ spread) or 1.0)),
+        relative_error=float(np.linalg.norm(smooth_error) / (np.linalg.norm(smooth) or 1.0)),
+        t=signal.t,
+        tau=signal.tau,
+        tau_hat=tau_hat,
+    )

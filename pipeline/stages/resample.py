@@ -1,0 +1,81 @@
+"""Put every recording on a uniform clock, with its gaps marked and a velocity where none was logged."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from pipeline.maths.smoothing import motion
+from pipeline.records import Column, Note, Recording, Signal, note
+
+GAP = 2.5  # sampling times between two samples that count as an interruption
+EVEN = 0.02  # of a sampling time: clocks that stray less than this from a uniform one are taken as uniform
+FEWEST = 4  # samples that a cubic spline needs; a shorter stretch is left out
+
+
+def run(recording: Recording, *, lowpass: float) -> Iterator[Signal | Note]:
+    """One Signal per recording.  Gaps start a new stretch; nothing is ever interpolated across one."""
+    T_s = float(np.median(np.diff(recording.t)))
+    cuts = np.flatnonzero(np.diff(recording.t) > GAP * T_s) + 1
+    parts = [p for p in np.split(np.arange(len(recording.t)), cuts) if len(p) >= FEWEST]
+    if is_even(recording.t, parts, T_s):
+        # The mean over the longest stretch; a median would carry the rounding of the time stamps.
+        longest = max(parts, key=len)
+        T_s = float((recording.t[longest[-1]] - recording.t[longest[0]]) / (len(longest) - 1))
+        clocks, method = [recording.t[p] for p in parts], "as recorded"
+    else:
+        clocks, method = (
+            [uniform(recording.t[p], T_s) for p in parts],
+            "cubic spline through the samples of each stretch",
+        )
+    columns = [on_clock(recording, p, clock, method) for p, clock in zip(parts, clocks, strict=True)]
+    q, dq, tau = (np.concatenate(column) for column in zip(*columns, strict=True))
+    stretch = np.repeat(np.arange(len(parts)), [len(c) for c in clocks])
+    if recording.velocity == "derived":
+        dq = np.concatenate([motion(q[stretch == i], None, 1 / T_s, lowpass)[1] for i in range(len(parts))])
+    yield Signal(
+        log=recording.log,
+        joint=recording.joint,
+        role=recording.role,
+        rate=1.0 / T_s,
+        method=method,
+        velocity=recording.velocity,
+        gaps=len(parts) - 1,
+        t=np.concatenate(clocks),
+        q=q,
+        dq=dq,
+        tau=tau,
+        stretch=stretch,
+    )
+    yield from remarks(recording, method, cuts)
+
+
+def is_even(t: Column, parts: list[Column], T_s: float) -> bool:
+    """Whether every stretch runs on a uniform clock of its own, to a fraction of a sample."""
+    return all(np.abs(t[p] - np.linspace(t[p[0]], t[p[-1]], len(p))).max() < EVEN * T_s for p in parts)
+
+
+def uniform(t: Column, T_s: float) -> Column:
+    """A uniform clock from the first sample of a stretch, no further than its last."""
+    return t[0] + T_s * np.arange(int(np.floor((t[-1] - t[0]) / T_s * (1 + 1e-12))) + 1)
+
+
+def on_clock(recording: Recording, part: Column, clock: Column, method: str) -> tuple[Column, ...]:
+    """Position, velocity and effort of one stretch at the times of a clock."""
+    columns = (recording.q[part], recording.dq[part], recording.tau[part])
+    if method == "as recorded":
+        return columns
+    spline = make_interp_spline(recording.t[part], np.column_stack(columns), k=3)
+    return tuple(spline(clock).T)
+
+
+def remarks(recording: Recording, method: str, cuts: Column) -> Iterator[Note]:
+    """What was done to the clock, where anything was."""
+    name, said = f"{recording.log}/{recording.joint}", []
+    if len(cuts):
+        where = ", ".join(f"{recording.t[c - 1]:.3f} s" for c in cuts[:5])
+        said.append(f"{name}: {len(cuts)} gaps, not bridged, after {where}{' ...' if len(cuts) > 5 else ''}")
+    if method != "as recorded":
+        said.append(f"{name}: the clock is uneven, so the samples were put on a uniform one: {method}")
+    if said:
+        yield note("resample", f"{recording.log}.{recording.joint}", "note", *said)

@@ -1,0 +1,63 @@
+"""Test whether what averaging, the fit and the filter leave unexplained is white noise."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from scipy import stats
+
+from pipeline.maths.windows import settled
+from pipeline.records import Column, Noise, Residual, Track, Whiteness
+
+LAGS = 100  # of the autocorrelation that is shown
+TESTED_LAGS = 20  # of the Ljung-Box statistic
+LEVEL = 0.01  # below this probability a signal is called not white
+
+
+def run(subject: Noise | Residual | Track) -> Iterator[Whiteness]:
+    """What averaging removed, the effort that a fit leaves of a period, and a filter's innovations over its run."""
+    if isinstance(subject, Noise):
+        signals = {name: getattr(subject, name) for name in ("q_noise", "dq_noise", "tau_noise")}
+    elif isinstance(subject, Residual):
+        signals = {f"tau.{subject.model}.{subject.estimator}": subject.tau - subject.tau_hat}
+    else:
+        kept = settled(subject.t)
+        signals = {name: getattr(subject, name)[kept] for name in ("innovation_q", "innovation_dq")}
+    found = {name: statistics(x) for name, x in signals.items()}
+    together = int(all(result["white"] for result in found.values()))
+    for name, result in found.items():
+        yield Whiteness(log=subject.log, joint=subject.joint, signal=name, all_white=together, **result)  # type: ignore[arg-type]
+
+
+def statistics(x: Column) -> dict[str, object]:
+    """Autocorrelation, Ljung-Box and Jarque-Bera of one signal.
+
+    A signal without variance has nothing to test and is not called white.
+    """
+    from statsmodels.stats.diagnostic import acorr_ljungbox
+    from statsmodels.tsa.stattools import acf
+
+    N = len(x)
+    lags, tested_lags = min(LAGS, N // 4), min(TESTED_LAGS, N // 5)
+    if N < 20 or np.ptp(x) == 0:
+        correlation, box, p, normal = np.eye(1, lags + 1)[0], 0.0, 0.0, 0.0
+    else:
+        correlation = acf(x, nlags=lags, fft=True)
+        table = acorr_ljungbox(x, lags=[tested_lags])
+        box, p = float(table["lb_stat"].iloc[0]), float(table["lb_pvalue"].iloc[0])
+        normal = float(stats.jarque_bera(x).pvalue)
+    band = 1.96 / np.sqrt(N)
+    return {
+        "tested": N,
+        "band": float(band),
+        "acf1": float(correlation[1]) if lags else 0.0,
+        "outside": float(np.mean(np.abs(correlation[1:]) > band)) if lags else 0.0,
+        "ljung_box": box,
+        "ljung_box_lags": tested_lags,
+        "ljung_box_p": p,
+        "jarque_bera_p": normal,
+        "skewness": float(stats.skew(x)) if np.ptp(x) else 0.0,
+        "kurtosis": float(stats.kurtosis(x)) if np.ptp(x) else 0.0,
+        "white": int(p > LEVEL),
+        "lag": np.arange(lags + 1),
+        "acf": correlation,
+    }

@@ -1,0 +1,99 @@
+"""A study: what was recorded, and how it is to be analysed."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from pipeline.robots.robot import Robot
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a study is analysed.  Stages name the settings they use as keyword arguments."""
+
+    lowpass: float = 17.0  # [Hz] zero-phase low-pass where velocities and accelerations are differences
+    derivative: str = "harmonics"  # how periodic motion is differentiated: "harmonics" or "fft"
+    harmonics: int = 0  # of the excitation; 0 takes the robot's
+    fit: str = "independent.lse"  # the Fit that the filter runs with
+    q_tau: float = 0.0  # random walk of the external effort [effort/s^0.5]; 0 takes the robot's
+
+
+@dataclass(frozen=True)
+class Source:
+    """The channel that feeds one quantity of a log, and how its values become SI."""
+
+    quantity: str  # "hand_roll.q", "time", ...
+    channel: str | int
+    measures: str
+    unit: str | None = None
+    sign: int = 1
+    offset: float = 0.0
+
+    @property
+    def joint(self) -> str:
+        """The joint that the quantity is of, or "" for one of the whole log."""
+        return self.quantity.rpartition(".")[0]
+
+    @property
+    def symbol(self) -> str:
+        """The quantity without its joint."""
+        return self.quantity.rpartition(".")[2]
+
+
+@dataclass(frozen=True)
+class Weight:
+    """A known mass hung on the arm, at a point fixed to a link.  Section 7.5"""
+
+    mass: float  # [kg]
+    moves_with: str
+    position: tuple[float, float, float]  # [m] from the remote centre, in axes that at q = 0 are the base axes
+
+
+@dataclass(frozen=True)
+class LogEntry:
+    """One [[log]] of a study."""
+
+    name: str
+    files: tuple[str, ...]  # relative to the study
+    role: str
+    channels: tuple[Source, ...]
+    period: float | None = None
+    rate: float | None = None
+    skip: float = 0.0
+    contact: tuple[tuple[float, float], ...] = ()
+    weight: Weight | None = None
+    delimiter: str | None = None
+    decimal: str | None = None
+    header: bool | None = None
+    encoding: str | None = None
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The joints that the log has channels of, in the order of the file."""
+        return tuple(dict.fromkeys(source.joint for source in self.channels if source.joint))
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study, validated."""
+
+    folder: Path
+    title: str
+    robot: Robot
+    simulated: bool
+    settings: Settings
+    logs: tuple[LogEntry, ...]
+    changed: dict[str, Any] = field(default_factory=dict)  # what robot_overrides says, for the report
+
+    @property
+    def name(self) -> str:
+        """The folder's name."""
+        return self.folder.resolve().name
+
+    def log(self, name: str) -> LogEntry:
+        """The log of that name."""
+        return next(entry for entry in self.logs if entry.name == name)
+
+    def absent(self) -> tuple[str, ...]:
+        """Files of logs that are not there."""
+        return tuple(file for entry in self.logs for file in entry.files if not (self.folder / file).is_file())
