@@ -27,8 +27,8 @@ def phases(period: float, rate: float) -> int:
 
 
 def whole_periods(t: Array, period: float, rate: float) -> int:
-    """How many whole periods the samples cover, M."""
-    return int(np.floor((t[-1] - t[0] + 1.0 / rate) / period * (1 + 1e-6)))
+    """How many whole periods the samples cover, M; the last may lack less than half a sample, as its end is uncertain."""
+    return int(np.floor(((t[-1] - t[0]) * rate + 1.5) / (period * rate)))
 
 
 def fold(t: Array, x: Array, period: float, K: int, start: float | None = None) -> Folded:

@@ -1,0 +1,28 @@
+"""Write a commented study.toml for logs: what their channels are, and what they seem to hold."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def run(
+    files: Annotated[list[Path], typer.Argument(help="Logs, in the folder of the study: raw/<study>/<log>.")],
+    robot: Annotated[str, typer.Option(help="The robot, or a .toml file beside the study.")] = "davinci",
+    study: Annotated[Path | None, typer.Option(help="Folder of the study, where not that of the first log.")] = None,
+    show: Annotated[bool, typer.Option("--print", help="Print it instead of writing study.toml.")] = False,
+) -> None:
+    """Describe logs in a study.toml, which is never overwritten."""
+    from pipeline import new_study, store
+    from pipeline.errors import BadRequest
+
+    folder = study or files[0].parent
+    text = new_study.describe(files, folder, robot)
+    if show:
+        typer.echo(text)
+        return
+    target = folder / "study.toml"
+    if target.exists():
+        raise BadRequest(f"{target} is there already; move it away, or print the new one with --print")
+    store.write_bytes(target, text.encode())
+    typer.echo(f"{target}: written; check the channels, then run `davinci-forces all {folder}`")

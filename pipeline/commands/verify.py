@@ -1,0 +1,21 @@
+"""Check that raw files, processed files and every number of the report are what they were when it was made."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def run(
+    study: Annotated[Path, typer.Argument(help="Folder of a study: raw/<study>, which holds study.toml.")],
+    processed: Annotated[Path | None, typer.Option(help="Folder for processed files, where not beside raw/.")] = None,
+    reports: Annotated[Path | None, typer.Option(help="Folder for reports, where not beside raw/.")] = None,
+) -> None:
+    """Verify a study; what differs is named, and the exit code is 1."""
+    from pipeline import runs, verification
+
+    done = verification.verify(runs.folders(study, processed, reports))
+    typer.echo(
+        f"{study}: {done.raw} raw, {done.processed} processed and {done.reports} report files are unchanged, and all "
+        f"{done.numbers} numbers of results.json are those of their sources"
+    )

@@ -1,0 +1,97 @@
+"""A simulated arm for tests: recordings of known parameters, as records and as files."""
+
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.maths.dynamics import inverse
+from pipeline.records import Signal
+from pipeline.robots import davinci
+from pipeline.robots.robot import Joint
+
+THETA = {  # the LSE columns of Tables 6.4-6.6; the slide's inertia inside its physical bounds
+    "hand_roll": np.array([0.4528, 0.0103, 0.3706, 0.21968]),
+    "hand_pitch": np.array([0.2384, 0.1343, 0.0705, 0.9064, 0.4155]),
+    "instrument_slide": np.array([2.5626, 0.05, 3.2723, 3.984]),
+}
+EXCITATION = {  # Table 6.1 with its misprints corrected: period, a0, a1, b1, a2, b2
+    "hand_roll": (10.0, -0.1848, 0.0260, -0.2783, 0.0609, -0.4261),
+    "hand_pitch": (10.0, -0.1912, 0.2861, -0.0639, 0.1741, 0.3701),
+    "instrument_slide": (5.0, 0.02, 0.0001, 0.0002, -0.1632, -0.1350),
+}
+NOISE = {"hand_roll": 0.140, "hand_pitch": 0.214, "instrument_slide": 1.345}  # roots of the printed MSE
+
+
+def joint(name: str) -> Joint:
+    return davinci.ROBOT.joint(name)
+
+
+def excitation(name: str, t, period=None):
+    """Position, velocity and acceleration of the optimal trajectory.  (6.16)-(6.18)"""
+    T, a0, a1, b1, a2, b2 = EXCITATION[name]
+    w = 2 * np.pi / (period or T)
+    s1, c1, s2, c2 = np.sin(w * t), np.cos(w * t), np.sin(2 * w * t), np.cos(2 * w * t)
+    q = a0 + (a1 * s1 - b1 * c1) / w + (a2 * s2 - b2 * c2) / (2 * w)
+    dq = a1 * c1 + b1 * s1 + a2 * c2 + b2 * s2
+    return q, dq, w * (b1 * c1 - a1 * s1) + 2 * w * (b2 * c2 - a2 * s2)
+
+
+def signal(
+    name="hand_roll",
+    seed=0,
+    periods=10,
+    rate=100.0,
+    period=None,
+    noise=1.0,
+    role="identification",
+    log="run",
+    external=None,
+):
+    """An excited joint as a Signal; `noise` scales that of the effort, and external(t) is exerted on the environment."""
+    T = period or EXCITATION[name][0]
+    t = np.arange(round(periods * T * rate)) / rate
+    q, dq, ddq = excitation(name, t, T)
+    rng = np.random.default_rng(seed)
+    tau = inverse(joint(name).terms, THETA[name], q, dq, ddq) + noise * NOISE[name] * rng.normal(size=len(t))
+    if external is not None:
+        tau = tau + external(t)
+    q = q + noise * 1e-4 * rng.normal(size=len(t))
+    dq = dq + noise * 1e-3 * rng.normal(size=len(t))
+    columns = {"t": t, "q": q, "dq": dq, "tau": tau, "stretch": np.zeros(len(t), int)}
+    return Signal(log, name, role, rate, "as recorded", "logged", 0, **columns)
+
+
+def write_csv(file: Path, signals, extra=None) -> None:
+    """Signals of one clock as columns of text with a header: time, then <joint>.q, <joint>.dq, <joint>.tau of each."""
+    columns = {"time": signals[0].t}
+    for s in signals:
+        columns |= {f"{s.joint}.q": s.q, f"{s.joint}.dq": s.dq, f"{s.joint}.tau": s.tau}
+    columns |= extra or {}
+    rows = np.column_stack(list(columns.values()))
+    lines = [",".join(columns), *(",".join(map(repr, row)) for row in rows.tolist())]
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_text("\n".join(lines) + "\n")
+
+
+def log_table(name: str, file: str, role: str, joints, more="") -> str:
+    channels = "\n".join(f'"{j}.{s}" = "{j}.{s}"' for j in joints for s in ("q", "dq", "tau"))
+    return f'[[log]]\nname = "{name}"\nfile = "{file}"\nrole = "{role}"\n{more}\n[log.channels]\ntime = "time"\n{channels}\n'
+
+
+def write_study(folder: Path, seed=0, periods=5, rate=50.0) -> Path:
+    """A small study of two joints: excitation, validation and contact of the roll, and the slide's excitation."""
+    short = dict(periods=periods, rate=rate, seed=seed)
+    roll = signal("hand_roll", period=2.0, **short)
+    write_csv(folder / "roll.csv", [roll])
+    write_csv(folder / "slide.csv", [signal("instrument_slide", period=2.0, **short)])
+    write_csv(folder / "check.csv", [signal("hand_roll", period=2.6, **{**short, "seed": seed + 1})])
+    push = signal("hand_roll", period=2.6, external=lambda t: np.where((t > 4) & (t < 6), 1.0, 0.0), **short)
+    write_csv(folder / "push.csv", [push])
+    (folder / "study.toml").write_text(
+        'title = "A test"\nrobot = "davinci"\nsimulated = true\n'
+        + log_table("roll", "roll.csv", "identification", ["hand_roll"], "period = 2.0")
+        + log_table("slide", "slide.csv", "identification", ["instrument_slide"])
+        + log_table("check", "check.csv", "validation", ["hand_roll"])
+        + log_table("push", "push.csv", "contact", ["hand_roll"], "contact = [[4.0, 6.0]]")
+    )
+    return folder

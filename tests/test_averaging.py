@@ -1,0 +1,153 @@
+"""Periods and averages: the period is found, the periodic part survives, and what is reported is the spread."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from tests import arm
+
+from pipeline.errors import NotPeriodic
+from pipeline.maths import averaging, period
+from pipeline.records import Average, Noise, Note
+from pipeline.robots import davinci
+from pipeline.stages import average
+from pipeline.study import LogEntry
+
+
+def entry(**changes) -> LogEntry:
+    return LogEntry(**{"name": "run", "files": ("x",), "role": "identification", "channels": (), **changes})
+
+
+def run(signals, **changes):
+    made = list(average.run(signals, entry(**changes), davinci.ROBOT, harmonics=0))
+    return [r for r in made if isinstance(r, Average)], [r for r in made if isinstance(r, Note)]
+
+
+@given(st.floats(1.7, 11.0), st.integers(0, 2**32 - 1), st.floats(0.0, 6.0))
+def test_a_period_of_any_length_is_found_to_its_stated_uncertainty(length, seed, phase):
+    rng = np.random.default_rng(seed)
+    t = np.arange(round(6.3 * length * 100)) / 100
+    amplitudes = np.array([1.0, 0.5, 0.7])
+    angles = 2 * np.pi * np.outer(t, [1, 2, 3]) / length + phase
+    x = np.sin(angles) @ amplitudes + 0.02 * rng.normal(size=len(t))
+    guess = period.guess([x])
+    assert guess is not None
+    found = period.refine(t, [x], guess / 100, 3)
+    assert abs(found.length - length) < 6 * found.std
+
+
+def test_noise_has_no_period():
+    assert period.guess([np.random.default_rng(0).normal(size=4000)]) is None
+
+
+def test_the_stated_deviation_of_a_period_is_that_of_its_errors():
+    t, length = np.arange(3000) / 100, 6.4806
+    clean = np.sin(2 * np.pi * t / length) + 0.4 * np.cos(4 * np.pi * t / length)
+    founds = [
+        period.refine(t, [clean + 0.05 * np.random.default_rng(seed).normal(size=len(t))], length, 2)
+        for seed in range(200)
+    ]
+    scores = [(found.length - length) / found.std for found in founds]
+    assert np.std(scores) == pytest.approx(1.0, abs=4 / np.sqrt(2 * 200))
+
+
+@given(st.floats(37.2, 222.7), st.integers(2, 6))
+def test_a_smooth_signal_averages_to_itself_whatever_the_period(samples, periods):
+    """Samples fall beside the phases by up to half of one; nothing of the signal may leak into the variance."""
+    t = np.arange(int(samples * periods) + 1) / 100.0
+    length, K = samples / 100.0, int(samples)
+
+    def wave(t):
+        return 1.0 + np.sin(2 * np.pi * t / length) - 0.3 * np.cos(6 * np.pi * t / length)
+
+    M = averaging.whole_periods(t, length, 100.0)
+    used = t < M * length - 0.5 / 100.0
+    folded = averaging.fold(t[used], wave(t[used]), length, K)
+    assert_allclose(folded.mean, wave(np.arange(K) / K * length), atol=1e-9)
+    assert_allclose(folded.var, 0.0, atol=1e-15)
+
+
+def test_whole_samples_are_plainly_averaged():
+    x = np.random.default_rng(0).normal(size=(7, 200))
+    folded = averaging.fold(np.arange(1400) / 100, x.ravel(), 2.0, 200)
+    assert_allclose(folded.mean, x.mean(axis=0), atol=1e-12)
+    assert_allclose(folded.var, x.var(axis=0, ddof=1), atol=1e-12)
+    assert (folded.count == 7).all()
+
+
+def test_noise_keeps_its_size_and_stays_white_at_a_period_of_no_whole_number_of_samples():
+    t = np.arange(20_000) / 100
+    x = np.random.default_rng(0).normal(size=len(t))
+    folded = averaging.fold(t, x, 1.2345, averaging.phases(1.2345, 100))
+    degrees = len(t) - len(folded.mean)
+    assert averaging.noise_std(folded) == pytest.approx(1.0, abs=4 / np.sqrt(2 * degrees))
+    next_to = np.corrcoef(folded.noise[1:], folded.noise[:-1])[0, 1]
+    assert abs(next_to) < 4 / np.sqrt(len(t))
+
+
+def test_an_incomplete_last_period_is_left_out():
+    [made], _ = run([arm.signal(periods=4.6)])
+    assert made.periods == 4
+    assert made.count.sum() == pytest.approx(4 * 1000, abs=1)
+
+
+def test_a_wrong_stated_period_is_reported_and_not_used():
+    [made], notes = run([arm.signal(period=6.4806)], period=1 / 0.18)
+    assert made.period == pytest.approx(6.4806, abs=5 * made.period_std)
+    assert made.stated_period == 1 / 0.18
+    assert any("states a period of 5.55" in text and "6.4806" in text for note in notes for text in note.text)
+
+
+def test_a_right_stated_period_is_not_remarked_on():
+    _, notes = run([arm.signal()], period=10.0)
+    assert not notes
+
+
+def test_a_trajectory_whose_first_harmonic_is_nil_keeps_the_period_that_is_stated():
+    [made], notes = run([arm.signal("instrument_slide")], period=5.0)
+    assert made.period == pytest.approx(5.0, abs=1e-4)
+    assert made.periods == 10
+    assert not notes
+
+
+def test_the_joints_of_a_log_share_one_period_and_a_held_one_is_noted():
+    from dataclasses import replace
+
+    roll, pitch = arm.signal("hand_roll"), arm.signal("hand_pitch")
+    still = replace(
+        arm.signal("instrument_slide", noise=0),
+        q=np.zeros(len(roll)) + 1e-6,
+        t=roll.t,
+        dq=roll.dq * 0,
+        tau=roll.tau,
+        stretch=roll.stretch,
+    )
+    made, notes = run([roll, pitch, still])
+    assert [a.joint for a in made] == ["hand_roll", "hand_pitch"]
+    assert made[0].period == made[1].period
+    assert "instrument_slide does not move: held" in str(notes[0].text)
+
+
+@pytest.mark.parametrize(
+    ("signals", "says"),
+    [
+        ([arm.signal(periods=1.4)], "run: 14.00 s hold no motion that repeats at least twice"),
+        ([arm.signal("hand_roll", noise=0, periods=0.01)], "no joint moves"),
+    ],
+)
+def test_a_log_that_does_not_repeat_is_refused_by_name(signals, says):
+    with pytest.raises(NotPeriodic, match=says):
+        run(signals)
+
+
+def test_what_averaging_removes_is_the_noise():
+    made = list(average.run([arm.signal(seed=3)], entry(), davinci.ROBOT, harmonics=0))
+    [noise] = [r for r in made if isinstance(r, Noise)]
+    [mean] = [r for r in made if isinstance(r, Average)]
+    assert mean.sigma_tau == pytest.approx(arm.NOISE["hand_roll"], rel=4 / np.sqrt(2 * 9000))
+    assert abs(noise.tau_noise.mean()) < 1e-12
+
+
+def test_logs_of_other_roles_are_not_averaged():
+    assert run([arm.signal()], role="validation") == ([], [])

@@ -1,0 +1,242 @@
+"""The filter against what must hold of any Kalman filter, and against a batch solution."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from tests import arm
+from tests.test_averaging import entry
+from tests.test_estimation import trajectory
+
+from pipeline.errors import PipelineError
+from pipeline.maths import ekf, terms
+from pipeline.maths.dynamics import forward, inverse, mass, regressor, scalar_bias
+from pipeline.records import Average, Fit, Note, Track, Whiteness
+from pipeline.robots import davinci, dvrk_psm
+from pipeline.stages import average, fit
+from pipeline.stages import ekf as stage
+from pipeline.stages import whiteness
+
+T_S = 0.01
+CART = (terms.inertia, terms.viscous)
+THETA = np.array([0.5, 0.3])
+NOISE = ekf.Noise(r_q=1e-3, r_dq=8e-3, q_dq=1e-4, q_tau=0.05)
+
+
+def simulate(used, theta, tau_ext, tau, noise, seed=0, x=(0.1, -0.2)):
+    """Measurements of the model as it is printed: forward Euler, with the noises that the filter assumes."""
+    rng, (q, dq), rows = np.random.default_rng(seed), x, []
+    bias, M = scalar_bias(used, theta), mass(used, theta)
+    for k in range(len(tau)):
+        rows.append((q + noise.r_q * rng.normal(), dq + noise.r_dq * rng.normal()))
+        acceleration = (tau[k] - bias(q, dq)[0] - tau_ext[k]) / M
+        q, dq = q + T_S * dq, dq + T_S * acceleration + noise.q_dq * rng.normal()
+    return np.array(rows).T
+
+
+def walk(N, step, seed=1):
+    return np.cumsum(step * np.random.default_rng(seed).normal(size=N))
+
+
+def test_a_linear_model_gives_the_batch_least_squares_estimate():
+    """The last posterior is the weighted least squares estimate on all measurements, prior and process noise at once."""
+    N, M, v = 40, *THETA
+    tau = np.sin(np.arange(N) * T_S)
+    y = simulate(CART, THETA, walk(N, 0.05), tau, NOISE)
+    made = ekf.track(CART, THETA, *y, tau, T_S, NOISE, first_std=2.0)
+
+    F = np.array([[1, T_S, 0], [0, 1 - T_S * v / M, -T_S / M], [0, 0, 1]])
+    rows, right, size = [], [], 3 * N
+
+    def add(block, at, value, std):
+        row = np.zeros((len(block), size))
+        row[:, at : at + block.shape[1]] = block
+        rows.append(row / np.reshape(std, (-1, 1)))
+        right.append(np.asarray(value) / std)
+
+    add(np.eye(3), 0, np.zeros(3), np.sqrt([1 + 1e3 * NOISE.r_q**2, 1 + 1e3 * NOISE.r_dq**2, 4.0]))
+    for k in range(N):
+        add(np.eye(2, 3), 3 * k, y[:, k], np.array([NOISE.r_q, NOISE.r_dq]))
+        if k + 1 < N:
+            step = np.hstack([-F, np.eye(3)])
+            # Position has no process noise; a deviation of 1e-9 stands for none.
+            add(step, 3 * k, [0, T_S * tau[k] / M, 0], np.array([1e-9, NOISE.q_dq, NOISE.q_tau]))
+    A, b = np.vstack(rows), np.concatenate(right)
+    Q, R = np.linalg.qr(A)
+    batch = np.linalg.solve(R, Q.T @ b)[-3:]
+    root = np.linalg.inv(R)[-3:]
+    assert_allclose([made.q[-1], made.dq[-1], made.tau_ext[-1]], batch, rtol=1e-6)
+    assert made.tau_ext_std[-1] == pytest.approx(np.sqrt((root @ root.T)[2, 2]), rel=1e-6)
+
+
+@pytest.mark.parametrize("name", arm.THETA)
+def test_innovations_of_a_matched_model_are_white_and_as_large_as_stated(name):
+    used, theta = arm.joint(name).terms, arm.THETA[name].copy()
+    theta[-1] = 0.0  # Coulomb friction jumps at reversals, where no linearisation holds
+    N = 6000
+    t = np.arange(N) * T_S
+    tau_ext = walk(N, NOISE.q_tau)
+    tau = tau_ext + 3 * mass(used, theta) * np.sin(2 * t) + scalar_bias(used, theta)(0.0, 0.0)[0]
+    y = simulate(used, theta, tau_ext, tau, NOISE)
+    made = ekf.track(used, theta, *y, tau, T_S, NOISE, first_std=1.0)
+    kept = slice(200, None)
+    assert made.nis[kept].mean() == pytest.approx(2.0, abs=4 * 2 / np.sqrt(N - 200))
+    for x, r in ((made.innovation_q[kept], NOISE.r_q), (made.innovation_dq[kept], NOISE.r_dq)):
+        found = whiteness.statistics(x)
+        assert found["ljung_box_p"] > 1e-3
+        assert x.std() >= 0.99 * r
+    errors = (made.tau_ext - tau_ext)[kept] / made.tau_ext_std[kept]
+    assert errors.std() == pytest.approx(1.0, abs=0.2)
+
+
+def test_a_constant_force_that_no_sensor_measures_is_found():
+    N = 3000
+    tau = np.sin(np.arange(N) * T_S)
+    steady = NOISE._replace(q_tau=1e-6)
+    y = simulate(CART, THETA, np.full(N, 0.7), tau, steady)
+    made = ekf.track(CART, THETA, *y, tau, T_S, steady, first_std=2.0)
+    assert made.tau_ext_std[-1] < 0.02
+    assert abs(made.tau_ext[-1] - 0.7) < 4 * made.tau_ext_std[-1]
+
+
+def test_a_mass_hung_on_the_slide_gives_a_negative_effort():
+    """(7.8) makes tau_ext what the robot exerts on the environment: it holds the mass up, against gravity."""
+    used, theta = arm.joint("instrument_slide").terms, arm.THETA["instrument_slide"]
+    N, weight = 4000, 0.097 * 9.81
+    t = np.arange(N) * T_S
+    drive = 4.5 * np.sin(3 * t)
+    held = -theta[0] * 9.81 - weight  # gravity pulls the slide along +q
+    y = simulate(used, theta, np.full(N, -weight), drive + held, NOISE)
+    made = ekf.track(used, theta, *y, drive + held, T_S, NOISE, first_std=5.0)
+    assert made.tau_ext[1000:].mean() == pytest.approx(-weight, abs=0.05)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(1e-4, 10), st.floats(1e-6, 1), st.floats(1e-6, 1))
+def test_variances_stay_positive_and_numbers_finite(seed, M, r_q, r_dq):
+    rng = np.random.default_rng(seed)
+    y, tau = rng.normal(size=(2, 200)), rng.normal(size=200)
+    made = ekf.track(CART, np.array([M, 0.1]), *y, tau, T_S, ekf.Noise(r_q, r_dq, 1e-6, 1e-3), 1.0)
+    assert (made.tau_ext_std > 0).all()
+    assert all(np.isfinite(column).all() for column in made)
+
+
+def test_compiled_and_plain_agree(monkeypatch):
+    used, theta = arm.joint("hand_pitch").terms, arm.THETA["hand_pitch"]
+    signal = arm.signal("hand_pitch", periods=2)
+    arguments = (used, theta, signal.q, signal.dq, signal.tau, T_S, NOISE, 1.0)
+    plain = ekf.track(*arguments)
+    monkeypatch.setattr(ekf, "COMPILE_FROM", 0)
+    for a, b in zip(plain, ekf.track(*arguments), strict=True):
+        assert_allclose(a, b, rtol=1e-12, atol=1e-12 * np.abs(a).max())
+
+
+JOINTS = [j for robot in (davinci.ROBOT, dvrk_psm.ROBOT) for j in robot.joints]
+angle = st.floats(-0.6, 0.6)
+speed = st.floats(0.01, 1.2) | st.floats(-1.2, -0.01)  # away from the jump at standstill
+
+
+@pytest.mark.parametrize("term", terms.TERMS.values(), ids=terms.TERMS)
+@given(q=angle, dq=speed)
+def test_derivatives_of_a_term_match_finite_differences(term, q, dq):
+    bias, h = scalar_bias((term,), np.ones(1)), 1e-6
+    _, b_q, b_dq = bias(q, dq)
+    assert b_q == pytest.approx((bias(q + h, dq)[0] - bias(q - h, dq)[0]) / (2 * h), rel=1e-4, abs=1e-6)
+    assert b_dq == pytest.approx((bias(q, dq + h)[0] - bias(q, dq - h)[0]) / (2 * h), rel=1e-4, abs=1e-6)
+
+
+@pytest.mark.parametrize("joint", JOINTS, ids=lambda j: j.name)
+@given(q=angle, dq=speed, ddq=st.floats(-3, 3), seed=st.integers(0, 2**32 - 1))
+def test_forward_dynamics_undo_inverse_dynamics(joint, q, dq, ddq, seed):
+    theta = np.random.default_rng(seed).uniform(0.05, 5.0, len(joint.terms))
+    x = (np.array([q]), np.array([dq]))
+    tau = inverse(joint.terms, theta, *x, np.array([ddq]))
+    assert_allclose(forward(joint.terms, theta, *x, tau), ddq, atol=1e-9)
+
+
+@pytest.mark.parametrize("joint", JOINTS, ids=lambda j: j.name)
+@given(q=angle, dq=st.floats(-1.2, 1.2), seed=st.integers(0, 2**32 - 1))
+def test_the_filter_and_the_regressor_are_of_one_model(joint, q, dq, seed):
+    theta = np.random.default_rng(seed).normal(size=len(joint.terms))
+    Phi = regressor(joint.terms, np.array([q]), np.array([dq]), np.zeros(1))
+    assert scalar_bias(joint.terms, theta)(q, dq)[0] == pytest.approx((Phi @ theta)[0], rel=1e-12, abs=1e-12)
+
+
+@pytest.fixture(scope="module")
+def identified():
+    signal = arm.signal()
+    averages = [r for r in average.run([signal], entry(), davinci.ROBOT, harmonics=0) if isinstance(r, Average)]
+    fits = [r for r in fit.run([trajectory(signal)], davinci.ROBOT) if isinstance(r, Fit)]
+    return fits, averages
+
+
+def tracked(identified, signal, **changes):
+    made = stage.run(
+        signal, *identified, entry(role=signal.role, **changes), arm.joint(signal.joint),
+        fit=changes.pop("fit", "independent.lse"), lowpass=17.0, q_tau=0.0,
+    )  # fmt: skip
+    return list(made)
+
+
+def test_the_stage_finds_a_push_where_it_was(identified):
+    pushed = arm.signal(seed=5, period=7.3, role="contact", external=lambda t: np.where((t > 20) & (t < 30), 1.0, 0.0))
+    [made] = tracked(identified, pushed, contact=((20.0, 30.0),))
+    assert isinstance(made, Track)
+    inside = (made.t > 21) & (made.t < 29)
+    assert made.tau_ext[inside].mean() == pytest.approx(1.0, abs=0.1)
+    assert made.tau_ext_rms < 0.2
+    assert np.corrcoef(made.tau_ext_direct, made.tau_ext)[0, 1] > 0.8
+
+
+def test_the_filter_takes_its_noise_from_the_periods(identified):
+    [made] = tracked(identified, arm.signal(seed=5))
+    assert made.r_q == pytest.approx(1e-4, rel=0.05)
+    assert made.r_dq == pytest.approx(1e-3, rel=0.05)
+    assert made.q_dq == pytest.approx(0.01 * arm.NOISE["hand_roll"] / arm.THETA["hand_roll"][0], rel=0.1)
+
+
+def test_a_gap_starts_the_filter_anew(identified):
+    signal = arm.signal(seed=5)
+    object.__setattr__(signal, "stretch", (signal.t > 50).astype(int))
+    [made] = tracked(identified, signal)
+    first = np.flatnonzero(signal.t > 50)[0]
+    assert made.tau_ext_std[first] > 1.5 * made.tau_ext_std[first - 1]
+
+
+def test_a_joint_without_a_fit_is_noted_not_guessed(identified):
+    [made] = tracked(identified, arm.signal("hand_pitch"))
+    assert isinstance(made, Note)
+    assert "no identification log moves this joint" in made.text[0]
+
+
+def test_a_fit_that_does_not_exist_is_refused_with_those_there_are(identified):
+    with pytest.raises(
+        PipelineError, match="no fit 'coupled.pso'; set fit in .settings. to one of independent.lse, independent.wlse"
+    ):
+        list(
+            stage.run(
+                arm.signal(), *identified, entry(), arm.joint("hand_roll"), fit="coupled.pso", lowpass=17.0, q_tau=0.0
+            )
+        )
+
+
+def test_white_noise_is_called_white_as_often_as_the_level_says():
+    calls = [whiteness.statistics(np.random.default_rng(s).normal(size=500))["white"] for s in range(400)]
+    rejected = 400 - sum(calls)
+    assert rejected < 4 + 4 * np.sqrt(400 * 0.01 * 0.99)
+
+
+def test_a_walk_and_a_constant_are_not_called_white():
+    walked = whiteness.statistics(walk(1000, 1.0))
+    assert walked["white"] == 0
+    assert walked["acf1"] > 0.9
+    assert whiteness.statistics(np.ones(1000))["white"] == 0
+
+
+def test_a_track_is_white_only_when_all_its_innovations_are(identified):
+    [track] = tracked(identified, arm.signal(seed=5))
+    object.__setattr__(track, "innovation_q", np.random.default_rng(0).normal(size=len(track)))
+    object.__setattr__(track, "innovation_dq", walk(len(track), 1.0))
+    q, dq = whiteness.run(track)
+    assert isinstance(q, Whiteness)
+    assert (q.white, dq.white, q.all_white, dq.all_white) == (1, 0, 0, 0)

@@ -1,0 +1,227 @@
+"""Parameters: those put in come out, as well as they claim to."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose
+from tests import arm
+from tests.test_averaging import entry
+
+from pipeline.errors import NotIdentifiable
+from pipeline.estimators import ESTIMATORS, estimator
+from pipeline.estimators.problem import Problem, correlation_lags
+from pipeline.estimators.wlse import pooled
+from pipeline.records import Average, Fit, Note, Prediction, Residual, Trajectory
+from pipeline.robots import davinci
+from pipeline.stages import average, differentiate, fit, predict
+
+
+def trajectory(signal) -> Trajectory:
+    averages = average.run([signal], entry(name=signal.log), davinci.ROBOT, harmonics=0)
+    [mean] = [r for r in averages if isinstance(r, Average)]
+    made = differentiate.run(mean, davinci.ROBOT.joint(signal.joint), derivative="harmonics", harmonics=0)
+    return next(r for r in made if isinstance(r, Trajectory))
+
+
+def fits(*signals) -> dict[str, Fit]:
+    made = fit.run([trajectory(s) for s in signals], davinci.ROBOT)
+    return {r.estimator: r for r in made if isinstance(r, Fit)}
+
+
+def problem(K=400, seed=0, rho=0.0, M=10) -> tuple[Problem, np.ndarray]:
+    """A linear problem with known parameters and noise of a first-order autoregression."""
+    rng = np.random.default_rng(seed)
+    phase = 2 * np.pi * np.arange(K) / K
+    Phi = np.column_stack([np.sin(phase), np.cos(2 * phase), np.sign(np.sin(phase + 0.3))])
+    theta = np.array([1.0, -0.5, 0.2])
+    noise = rng.normal(size=K + 50)
+    for k in range(1, len(noise)):
+        noise[k] += rho * noise[k - 1]
+    tau_var = 0.01 * rng.chisquare(M - 1, size=K) / (M - 1) * M
+    tau = Phi @ theta + 0.1 * noise[50:] * np.sqrt(1 - rho**2)
+    return Problem(Phi, tau, tau_var, np.full(K, M), (0,), ("a", "b", "c")), theta
+
+
+def test_parameters_are_found_as_well_as_they_claim_to_be():
+    """Over many simulated recordings, errors over stated deviations have deviation one, for both estimators."""
+    found = [fits(arm.signal(seed=seed)) for seed in range(60)]
+    for name in ("lse", "wlse"):
+        for std in ("theta_std", "theta_std_hac"):
+            scores = np.array([(f[name].theta - arm.THETA["hand_roll"]) / getattr(f[name], std) for f in found])
+            assert_allclose(scores.std(axis=0), 1.0, atol=0.3)
+            assert_allclose(scores.mean(axis=0), 0.0, atol=4 / np.sqrt(60))
+
+
+@pytest.mark.parametrize("name", arm.THETA)
+def test_every_joint_gives_back_its_parameters(name):
+    lse = fits(arm.signal(name))["lse"]
+    assert (np.abs(lse.theta - arm.THETA[name]) < 4 * lse.theta_std).all()
+    assert list(lse.parameter) == [term.name for term in arm.joint(name).terms]
+
+
+def test_weights_of_averaged_variances_do_not_do_worse_than_none():
+    """Weights of single variances would: their parameters scatter 1.18 times as much at ten periods."""
+    lse, wlse = (
+        np.std([estimator(name)(problem(seed=seed)[0]).theta for seed in range(300)], axis=0)
+        for name in ("lse", "wlse")
+    )
+    assert (wlse / lse < 1.05).all()
+
+
+def test_weights_gain_where_noise_differs_over_the_period():
+    def varied(seed):
+        p, theta = problem(seed=seed, K=800)
+        loud = np.where(np.arange(800) < 400, 5.0, 1.0)
+        tau = p.Phi @ theta + (p.tau - p.Phi @ theta) * loud
+        return Problem(p.Phi, tau, p.tau_var * loud**2, p.periods, p.starts, p.names)
+
+    lse, wlse = (np.std([estimator(n)(varied(s)).theta for s in range(100)], axis=0) for n in ("lse", "wlse"))
+    assert (wlse < 0.75 * lse).all()
+
+
+def test_correlated_residuals_widen_the_newey_west_deviations_to_the_errors_there_are():
+    answers = [(estimator("lse")(p), theta) for p, theta in (problem(seed=s, rho=0.9, K=2000) for s in range(200))]
+    hac = np.std([(a.theta - theta) / a.theta_std_hac for a, theta in answers], axis=0)
+    classical = np.std([(a.theta - theta) / a.theta_std for a, theta in answers], axis=0)
+    assert (classical[:2] > 2.0).all()
+    assert (hac[:2] < 1.35).all()
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(0, 1e3))
+def test_any_other_parameters_have_the_error_that_the_normal_equations_predict(seed, size):
+    """MSE(theta) = MSE_LSE + d' (Phi' Phi / K) d with d = theta - theta_LSE."""
+    p, _ = problem(seed=seed)
+    lse = estimator("lse")(p).theta
+    d = size * np.random.default_rng(seed).normal(size=3)
+    excess = np.mean((p.tau - p.Phi @ (lse + d)) ** 2) - np.mean((p.tau - p.Phi @ lse) ** 2)
+    assert excess == pytest.approx(d @ (p.Phi.T @ p.Phi / len(p.tau)) @ d, rel=1e-9, abs=1e-9)
+
+
+@pytest.mark.parametrize("name", ESTIMATORS)
+def test_scaling_a_column_scales_its_parameter_and_nothing_else(name):
+    p, _ = problem()
+    scaled = Problem(p.Phi * [1e6, 1, 1], p.tau, p.tau_var, p.periods, p.starts, p.names)
+    assert_allclose(estimator(name)(scaled).theta * [1e6, 1, 1], estimator(name)(p).theta, rtol=1e-9)
+
+
+def test_columns_that_cannot_be_told_apart_are_refused_by_name():
+    p, _ = problem()
+    twice = Problem(
+        np.column_stack([p.Phi, p.Phi[:, 0] * (1 + 1e-12)]), p.tau, p.tau_var, p.periods, p.starts, (*"abc", "a again")
+    )
+    with pytest.raises(NotIdentifiable, match="does not tell a, b, c, a again apart"):
+        estimator("lse")(twice)
+
+
+def test_a_term_that_nothing_excites_is_refused_by_name():
+    p, _ = problem()
+    still = Problem(p.Phi * [1, 0, 1], p.tau, p.tau_var, p.periods, p.starts, p.names)
+    with pytest.raises(NotIdentifiable, match=r"excites \['b'\]"):
+        estimator("lse")(still)
+
+
+def test_few_periods_leave_the_weights_out_and_the_rest_goes_on():
+    made = list(fit.run([trajectory(arm.signal(periods=3))], davinci.ROBOT))
+    assert [r.estimator for r in made if isinstance(r, Fit)] == ["lse"]
+    [said] = [text for r in made if isinstance(r, Note) for text in r.text]
+    assert "wlse is left out: weights need at least 4 periods in every log, and one holds 3" in said
+
+
+@given(st.integers(4, 500), st.integers(4, 60), st.integers(0, 2**32 - 1))
+def test_pooling_keeps_the_mean_variance_and_never_leaves_a_weight_infinite(K, M, seed):
+    var = np.random.default_rng(seed).chisquare(2, size=K)
+    var[0] = 0.0
+    smooth = pooled(var, M)
+    assert (smooth > 0).all()
+    assert smooth.mean() == pytest.approx(var.mean(), rel=1e-9)
+
+
+def test_white_residuals_ask_for_few_lags_and_correlated_ones_for_many():
+    rng = np.random.default_rng(0)
+    white = rng.normal(size=2000)
+    walk = np.convolve(white, np.ones(20), "valid")
+    assert correlation_lags(white, (0,)) <= 4
+    assert correlation_lags(walk, (0,)) > 40
+
+
+def test_logs_of_a_joint_are_pooled():
+    one, both = fits(arm.signal(seed=1)), fits(arm.signal(seed=1, log="a"), arm.signal(seed=2, log="b", period=8.0))
+    assert both["lse"].logs == ("a", "b")
+    assert (both["lse"].theta_std < one["lse"].theta_std).all()
+
+
+def test_both_ways_of_differentiating_agree():
+    [mean] = [r for r in average.run([arm.signal()], entry(), davinci.ROBOT, harmonics=0) if isinstance(r, Average)]
+    made = [
+        next(differentiate.run(mean, arm.joint("hand_roll"), derivative=d, harmonics=0)) for d in ("harmonics", "fft")
+    ]
+    for name in ("q", "dq", "ddq"):
+        a, b = (getattr(m, name) for m in made)
+        assert_allclose(a, b, atol=1e-12 * np.abs(b).max())
+
+
+def test_derivatives_are_those_of_the_trajectory():
+    made = trajectory(arm.signal(noise=0))
+    expected = arm.excitation("hand_roll", made.t, made.period)
+    for name, wanted in zip(("q", "dq", "ddq"), expected, strict=True):
+        assert_allclose(getattr(made, name), wanted, atol=1e-7)
+
+
+def test_a_harmonic_that_is_left_out_is_remarked_on():
+    signal = arm.signal("hand_roll")
+    object.__setattr__(signal, "q", signal.q + 0.05 * np.sin(2 * np.pi * 5 * signal.t / 10))
+    [mean] = [r for r in average.run([signal], entry(), davinci.ROBOT, harmonics=0) if isinstance(r, Average)]
+    made = list(differentiate.run(mean, arm.joint("hand_roll"), derivative="harmonics", harmonics=0))
+    assert "harmonic 5 of the position is" in str(made[-1].text)
+
+
+def predictions(signal, role, fitted, trajectories=(), **changes):
+    own = next((t for t in trajectories if t.log == signal.log), None)
+    about = entry(name=signal.log, role=role, **changes)
+    return list(predict.run(signal, own, trajectories, fitted, about, arm.joint(signal.joint), lowpass=17.0))
+
+
+def test_a_validation_log_is_predicted_down_to_its_noise():
+    fitted = fits(arm.signal())
+    fresh = arm.signal(seed=9, period=7.3)
+    [made, _] = predictions(fresh, "validation", fitted.values())
+    assert made.scheme == "validation"
+    assert made.rmse == pytest.approx(arm.NOISE["hand_roll"], rel=0.05)
+    assert made.r2 == pytest.approx(1 - made.rmse**2 / fresh.tau.var(), rel=1e-9)
+
+
+def test_known_contacts_do_not_count_against_a_prediction():
+    pushed = arm.signal(seed=9, external=lambda t: np.where((t > 20) & (t < 30), 5.0, 0.0))
+    fitted = fits(arm.signal())
+    [inside, _] = predictions(pushed, "contact", fitted.values())
+    [outside, _] = predictions(pushed, "contact", fitted.values(), contact=((20.0, 30.0),))
+    assert inside.rmse > 5 * outside.rmse
+    assert outside.rmse == pytest.approx(arm.NOISE["hand_roll"], rel=0.05)
+
+
+def test_an_identification_log_is_predicted_from_the_others_or_from_its_other_periods():
+    a, b = arm.signal(seed=1, log="a"), arm.signal(seed=2, log="b")
+    together = [trajectory(a), trajectory(b)]
+    [by_log, _] = predictions(a, "identification", [], together)
+    [by_period, _] = predictions(a, "identification", [], together[:1])
+    assert (by_log.scheme, by_period.scheme) == ("leave one log out", "leave one period out")
+    for made in (by_log, by_period):
+        assert isinstance(made, Prediction)
+        assert made.rmse == pytest.approx(arm.NOISE["hand_roll"], rel=0.05)
+
+
+def test_a_period_that_differs_from_the_others_is_predicted_badly():
+    """Otherwise what is left out would have been seen."""
+    odd = arm.signal(seed=1, external=lambda t: np.where((t > 30) & (t < 40), 3.0 * np.sin(t), 0.0))
+    [made, _] = predictions(odd, "identification", [], [trajectory(odd)])
+    bad = (made.t > 30) & (made.t < 40)
+    errors = made.tau - made.tau_hat
+    assert errors[bad].std() > 10 * errors[~bad].std()
+
+
+def test_residuals_are_what_the_fit_leaves():
+    made = list(fit.run([trajectory(arm.signal())], davinci.ROBOT))
+    lse = next(r for r in made if isinstance(r, Fit))
+    residual = next(r for r in made if isinstance(r, Residual))
+    assert np.mean((residual.tau - residual.tau_hat) ** 2) == pytest.approx(lse.mse)
