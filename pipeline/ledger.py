@@ -68,9 +68,11 @@ class Ledger:
     def entry(self, stage: str, task: str) -> Entry | None:
         """The entry of a task, or None when it has not run or its entry cannot be read."""
         try:
-            return Entry(**json.loads(self.place(stage, task).read_text(encoding="utf-8")))
-        except (OSError, ValueError, TypeError):
+            text = self.place(stage, task).read_text(encoding="utf-8")
+            entry = Entry(**{key: value for key, value in json.loads(text).items() if key != "seal"})
+        except (OSError, ValueError, TypeError, AttributeError):
             return None
+        return entry if sealed(entry) == text else None
 
     def entries(self, stage: str | None = None) -> Iterator[Entry]:
         """Every entry, or every one of a stage, in order."""
@@ -81,8 +83,13 @@ class Ledger:
 
     def write(self, entry: Entry) -> None:
         """Record what a task made."""
-        text = json.dumps(asdict(entry), indent=1, ensure_ascii=False, sort_keys=True) + "\n"
-        store.write_bytes(self.place(entry.stage, entry.task), text.encode())
+        store.write_bytes(self.place(entry.stage, entry.task), sealed(entry).encode())
+
+    def broken(self) -> Iterator[Path]:
+        """Entries that are not as they were written."""
+        for file in sorted((self.folders.processed / "tasks").rglob("*")):
+            if file.is_file() and self.entry(file.parent.name, file.stem) is None:
+                yield file
 
     def remove(self, entry: Entry) -> None:
         """Forget a task, and remove what it made."""
@@ -111,8 +118,17 @@ class Ledger:
         changed += [f"{k} = {old.get(k)!r} became {v!r}" for k, v in now.settings.items() if old.get(k) != v]
         for what, words in (("given", "the {} changed"), ("code", "the code of {} changed"), ("inputs", "{} changed")):
             old, new = then.get(what, {}), getattr(now, what)
-            changed += [words.format(name) for name in sorted(old.keys() | new.keys()) if old.get(name) != new.get(name)]
+            changed += [
+                words.format(name) for name in sorted(old.keys() | new.keys()) if old.get(name) != new.get(name)
+            ]
         return changed
+
+
+def sealed(entry: Entry) -> str:
+    """An entry as it is written, with a hash of its own content, so that a change of it is noticed, too."""
+    content = asdict(entry)
+    seal = hash_of_text(json.dumps(content, ensure_ascii=False, sort_keys=True))
+    return json.dumps({**content, "seal": seal}, indent=1, ensure_ascii=False, sort_keys=True) + "\n"
 
 
 @cache

@@ -1,9 +1,10 @@
 """Runs stages on a study: reads what their signatures ask for, writes what they promise, skips what is current."""
 
 import importlib.metadata
+import os
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import asdict, dataclass, field, replace
 from importlib import import_module
 from multiprocessing import get_context
@@ -69,6 +70,7 @@ class Runner:
         self.ledger = Ledger(self.folders)
         self.failures = 0
         self.ran = 0
+        self._pool: ProcessPoolExecutor | None = None
 
     def run(self, names: Iterable[str]) -> bool:
         """Run these stages in order; whether every task of theirs succeeded.
@@ -81,8 +83,11 @@ class Runner:
         for half in list(store.leftovers(self.folders.processed)) + list(store.leftovers(self.folders.reports)):
             half.unlink()
         names = list(names)
-        for name in names:
-            self._stage(name, alone=len(names) == 1)
+        # One pool for all stages: a process of its own takes seconds to import what the stages need.
+        with ExitStack() as stack:
+            self._stack = stack
+            for name in names:
+                self._stage(name, alone=len(names) == 1)
         return self.failures == 0
 
     def _stage(self, name: str, alone: bool) -> None:
@@ -132,10 +137,11 @@ class Runner:
             for call in calls:
                 yield perform(*call)
             return
-        with ProcessPoolExecutor(min(self.jobs, len(calls)), mp_context=get_context("spawn")) as pool:
-            futures: list[Future[Outcome]] = [pool.submit(perform, *call) for call in calls]
-            for future in as_completed(futures):
-                yield future.result()
+        if self._pool is None:
+            self._pool = self._stack.enter_context(ProcessPoolExecutor(self.jobs, mp_context=get_context("spawn")))
+        futures: list[Future[Outcome]] = [self._pool.submit(perform, *call) for call in calls]
+        for future in as_completed(futures):
+            yield future.result()
 
     def _plan(self, asks: Declaration) -> Iterator[Task]:
         """Every call of a stage that the study and the records that are there give."""
@@ -191,6 +197,8 @@ class Runner:
         inputs = {f"processed/{place.as_posix()}" for places in task.records.values() for _, place in places}
         if "log" in asks.given.values():
             inputs |= {f"raw/{file}" for file in self.study.log(task.log).files}
+        if asks.name == "report":
+            inputs |= {f"raw/{file}" for file in ("study.toml", self.study.robot_file) if file}
         given = {
             what: hash_of_text(repr(_given(what, self.study, task))) for what in asks.given.values() if what != "log"
         }
@@ -217,10 +225,18 @@ def perform(study: Study, folders: Folders, task: Task, made_from: dict[str, Any
                 said += _lines(record)
         return Outcome(task, tuple(f"processed/{place.as_posix()}" for place in writer.places), said=tuple(said))
     except PipelineError as error:
+        kept = _anywhere(str(error), study, folders)
         with _writer(study, folders, made_from) as writer:
-            writer.write(note(task.stage, task.name.replace("/", "."), "error", str(error)))
+            writer.write(note(task.stage, task.name.replace("/", "."), "error", kept))
         places = tuple(f"processed/{place.as_posix()}" for place in writer.places)
-        return Outcome(task, places, failed=str(error), said=(f"error: {error}",))
+        return Outcome(task, places, failed=kept, said=(f"error: {error}",))
+
+
+def _anywhere(message: str, study: Study, folders: Folders) -> str:
+    """A message without the folders of this machine, as what is kept of it has to be the same on every one."""
+    for folder in (folders.processed, folders.reports, study.folder):
+        message = message.replace(f"{folder}{os.sep}", "")
+    return message
 
 
 @contextmanager

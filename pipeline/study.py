@@ -84,6 +84,7 @@ class Study:
     settings: Settings
     logs: tuple[LogEntry, ...]
     changed: dict[str, Any] = field(default_factory=dict)  # what robot_overrides says, for the report
+    robot_file: str = ""  # the .toml that describes the robot, where it lies beside the study
 
     @property
     def name(self) -> str:

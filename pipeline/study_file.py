@@ -1,6 +1,7 @@
 """Reading `raw/<study>/study.toml`, and saying everything that is wrong with it at once, each with its line."""
 
 import math
+import os
 import re
 import tomllib
 from dataclasses import fields, replace
@@ -75,7 +76,9 @@ class _Reader:
             raise BadStudy("\n".join(f"{self.file}:{line}: {problem}" for line, problem in found))
         assert robot is not None
         overrides = table.get("robot_overrides", {})
-        return Study(self.file.parent, title, robot, simulated, settings, tuple(e for e in logs if e), overrides)
+        own = table["robot"] if table["robot"].endswith(".toml") else ""
+        kept = tuple(entry for entry in logs if entry)
+        return Study(self.file.parent, title, robot, simulated, settings, kept, overrides, own)
 
     def robot(self, table: dict[str, Any]) -> Robot | None:
         name = self.take(table, "robot", str, None)
@@ -297,8 +300,9 @@ class _Reader:
             self.problem(self.start_of_log(len(names) - 1 - names[::-1].index(name)), f"two logs are named {name!r}")
 
     def inside(self, file: str) -> bool:
-        home = self.file.parent.resolve()
-        return (home / file).resolve().is_relative_to(home)
+        """Whether a path stays in the study as it is written; a link that somebody put there may point anywhere."""
+        path = Path(file)
+        return not path.is_absolute() and not path.drive and not os.path.normpath(file).startswith("..")
 
     def check(self, good: bool, line: int, problem: str) -> None:
         if not good:

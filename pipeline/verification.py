@@ -37,11 +37,12 @@ def verify(folders: Folders) -> Verified:
     said: dict[str, str] = {}
     for entry in ledger.entries():
         said |= {**entry.fingerprint["inputs"], **entry.outputs}
-    if not said:
+    broken = [f"{file} was altered: it is not as a stage wrote it" for file in ledger.broken()]
+    if not said and not broken:
         raise NotReproduced(f"{folders.processed} holds no results; run `davinci-forces all {folders.raw}` first")
-    problems = list(altered(folders, ledger, said))
-    results, broken = numbers(folders)
-    problems += broken if results is None else [p for r in results for p in differences(folders, r)]
+    problems = broken + list(altered(folders, ledger, said))
+    results, unreadable = numbers(folders)
+    problems += unreadable if results is None else [p for r in results for p in differences(folders, r)]
     problems += unknown(folders, said)
     if problems:
         raise NotReproduced("\n".join(problems))

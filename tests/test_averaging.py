@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from tests import arm
 
 from pipeline.errors import NotPeriodic
 from pipeline.maths import averaging, period
@@ -13,6 +12,7 @@ from pipeline.records import Average, Noise, Note
 from pipeline.robots import davinci
 from pipeline.stages import average
 from pipeline.study import LogEntry
+from tests import arm
 
 
 def entry(**changes) -> LogEntry:

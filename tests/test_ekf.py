@@ -5,18 +5,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from tests import arm
-from tests.test_averaging import entry
-from tests.test_estimation import trajectory
 
 from pipeline.errors import PipelineError
 from pipeline.maths import ekf, terms
 from pipeline.maths.dynamics import forward, inverse, mass, regressor, scalar_bias
 from pipeline.records import Average, Fit, Note, Track, Whiteness
 from pipeline.robots import davinci, dvrk_psm
-from pipeline.stages import average, fit
+from pipeline.stages import average, fit, whiteness
 from pipeline.stages import ekf as stage
-from pipeline.stages import whiteness
+from tests import arm
+from tests.test_averaging import entry
+from tests.test_estimation import trajectory
 
 T_S = 0.01
 CART = (terms.inertia, terms.viscous)

@@ -5,8 +5,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from tests import arm
-from tests.test_averaging import entry
 
 from pipeline.errors import NotIdentifiable
 from pipeline.estimators import ESTIMATORS, estimator
@@ -15,6 +13,8 @@ from pipeline.estimators.wlse import pooled
 from pipeline.records import Average, Fit, Note, Prediction, Residual, Trajectory
 from pipeline.robots import davinci
 from pipeline.stages import average, differentiate, fit, predict
+from tests import arm
+from tests.test_averaging import entry
 
 
 def trajectory(signal) -> Trajectory:

@@ -50,7 +50,7 @@ def solve(problem: Problem, weight: Array) -> Answer:
     K, p = problem.Phi.shape
     root = np.sqrt(weight)[:, None]
     scale = np.linalg.norm(problem.Phi * root, axis=0)
-    if K <= p or (scale == 0).any():
+    if p >= K or (scale == 0).any():
         still = [name for name, size in zip(problem.names, scale, strict=True) if size == 0]
         raise NotIdentifiable(f"{K} samples for {p} parameters; nothing in the motion excites {still or 'them'}")
     F, z = problem.Phi * root / scale, problem.tau * root[:, 0]

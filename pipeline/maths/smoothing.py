@@ -4,7 +4,6 @@ from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import butter, sosfiltfilt
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
@@ -19,6 +18,8 @@ def lowpass(x: Array, rate: float, cutoff: float) -> Array:
     """
     if cutoff >= 0.4 * rate or len(x) < 2:
         return x
+    from scipy.signal import butter, sosfiltfilt
+
     sos = butter(ORDER, cutoff, fs=rate, output="sos")
     return np.asarray(sosfiltfilt(sos, x, padlen=min(3 * round(rate / cutoff) + 3, len(x) - 1)))
 

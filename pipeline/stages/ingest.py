@@ -87,7 +87,7 @@ class Reading:
         for name in self.names:
             self.require_numbers(name, block[name])
         t = self.times(block)
-        self.clock.update(t, np.column_stack([block[c.name] for c in self.channels.values()]))
+        self.clock.update(t, np.column_stack([block[c.name] for q, c in self.channels.items() if q != "time"]))
         self.require_increasing()
         first = self.clock.first
         kept = t - first >= self.entry.skip - 1e-9

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
 
 from pipeline.maths.smoothing import motion
 from pipeline.records import Column, Note, Recording, Signal, note
@@ -65,6 +64,8 @@ def on_clock(recording: Recording, part: Column, clock: Column, method: str) -> 
     columns = (recording.q[part], recording.dq[part], recording.tau[part])
     if method == "as recorded":
         return columns
+    from scipy.interpolate import make_interp_spline
+
     spline = make_interp_spline(recording.t[part], np.column_stack(columns), k=3)
     return tuple(spline(clock).T)
 

@@ -3,7 +3,6 @@
 from collections.abc import Iterator
 
 import numpy as np
-from scipy import stats
 
 from pipeline.maths.windows import settled
 from pipeline.records import Column, Noise, Residual, Track, Whiteness
@@ -33,6 +32,7 @@ def statistics(x: Column) -> dict[str, object]:
 
     A signal without variance has nothing to test and is not called white.
     """
+    from scipy import stats
     from statsmodels.stats.diagnostic import acorr_ljungbox
     from statsmodels.tsa.stattools import acf
 

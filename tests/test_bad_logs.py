@@ -1,0 +1,251 @@
+"""Logs that are wrong: one readable message each, the other logs go on, and nothing is lost."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.stages import STAGES
+from tests import arm
+from tests.test_runs import call, contents
+
+
+@pytest.fixture
+def lab(tmp_path):
+    """A study of a good log and one to be spoilt."""
+    folder = tmp_path / "raw" / "arm"
+    good = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5)
+    arm.write_csv(folder / "good.csv", [good])
+    arm.write_csv(folder / "bad.csv", [good])
+    describe(folder)
+    return folder
+
+
+def describe(folder, more="", joints=("hand_roll",), role="identification"):
+    text = 'title = "T"\nrobot = "davinci"\n' + arm.log_table("good", "good.csv", "identification", ["hand_roll"])
+    (folder / "study.toml").write_text(text + arm.log_table("bad", "bad.csv", role, joints, more))
+
+
+def edit(folder, change):
+    file = folder / "bad.csv"
+    lines = file.read_text().splitlines()
+    file.write_text("\n".join(change(lines)) + "\n")
+
+
+def cell(lines, row, column, value):
+    cells = lines[row].split(",")
+    cells[column] = value
+    return [*lines[:row], ",".join(cells), *lines[row + 1 :]]
+
+
+def run(folder, code=1) -> str:
+    before = contents(folder)
+    names = STAGES[: STAGES.index("fit") + 1]
+    said = " ".join("".join(call_any(name, folder) for name in names).split())
+    assert contents(folder) == before
+    assert "Traceback" not in said
+    good = folder.parent.parent / "processed" / "arm" / "recording" / "good" / "hand_roll.parquet"
+    assert good.exists()
+    return said
+
+
+def call_any(name, folder) -> str:
+    from typer.testing import CliRunner
+
+    from pipeline.cli import app
+
+    result = CliRunner().invoke(app, [name, str(folder)])
+    assert result.exit_code in (0, 1), result.output
+    return result.output
+
+
+@pytest.mark.parametrize(
+    ("change", "says"),
+    [
+        (lambda lines: cell(lines, 40, 2, "broken"), "bad.csv"),
+        (lambda lines: cell(lines, 40, 2, "nan"), "channel 'hand_roll.dq' holds nan at row 39 (counted from 0)"),
+        (lambda lines: cell(lines, 40, 0, "0.5"), "time does not increase at row 39 (counted from 0): 0.76 s, then 0.5 s"),
+        (lambda lines: cell(lines, 40, 0, lines[39].split(",")[0]), "time does not increase at row 39 (counted from 0): 0.76 s"),
+        (lambda lines: [*lines[:1], *lines[1:120]], "bad: 2.38 s hold no motion that repeats at least twice"),
+        (lambda lines: lines[:1], "bad.csv"),
+        (lambda lines: lines[:2], "1 samples are too few"),
+        (lambda lines: [line.replace("hand_roll.q", "q1") for line in lines], "there is no channel 'hand_roll.q'"),
+        (lambda lines: [lines[0], *(",".join([line.split(",")[0], "0.1", "0.0", "0.5"]) for line in lines[1:])], "bad: no joint moves"),
+    ],
+    ids=["text", "nan", "time goes back", "time stands still", "one period", "header only", "one row", "no channel", "constant"],
+)  # fmt: skip
+def test_a_spoilt_log_is_named_and_the_good_one_goes_on(lab, change, says):
+    edit(lab, change)
+    assert says in run(lab)
+
+
+def test_what_is_kept_of_an_error_knows_no_folder_of_this_machine(lab, tmp_path):
+    edit(lab, lambda lines: cell(lines, 40, 2, "nan"))
+    run(lab)
+    kept = contents(tmp_path / "processed")
+    assert any(b"bad.csv: channel" in content for content in kept.values())
+    assert not [name for name, content in kept.items() if str(tmp_path).encode() in content]
+
+
+def test_an_empty_log_is_named(lab):
+    (lab / "bad.csv").write_bytes(b"")
+    assert "bad.csv: the file is empty (0 bytes)" in run(lab)
+
+
+def test_a_last_row_that_was_cut_is_dropped_with_a_warning(lab):
+    file = lab / "bad.csv"
+    file.write_text(file.read_text().rstrip("\n").rpartition(",")[0])
+    said = run(lab)
+    assert "warning: bad:" in said
+    assert "error" not in said
+
+
+def test_joints_of_different_lengths_are_named(lab):
+    edit(lab, lambda lines: [line if i < 200 else ",".join([*line.split(",")[:3], ""]) for i, line in enumerate(lines)])
+    assert "channel 'hand_roll.tau' has no sample at row 199 (counted from 0)" in run(lab)
+
+
+def test_an_unknown_unit_in_the_log_asks_for_one_in_the_study(lab):
+    edit(lab, lambda lines: [lines[0].replace("hand_roll.tau", "hand_roll.tau [lbf]"), *lines[1:]])
+    text = (lab / "study.toml").read_text()
+    head, tail = text.rsplit('"hand_roll.tau" = "hand_roll.tau"', 1)
+    (lab / "study.toml").write_text(head + '"hand_roll.tau" = "hand_roll.tau [lbf]"' + tail)
+    assert "is in 'lbf', which is not known, but hand_roll.tau needs torque; say unit = ..." in run(lab)
+
+
+def test_a_log_and_a_study_that_disagree_on_a_unit_are_an_error(lab):
+    edit(lab, lambda lines: [lines[0].replace("hand_roll.q", "hand_roll.q [deg]"), *lines[1:]])
+    text = (lab / "study.toml").read_text()
+    head, tail = text.rsplit('"hand_roll.q" = "hand_roll.q"', 1)
+    (lab / "study.toml").write_text(head + '"hand_roll.q" = { channel = "hand_roll.q [deg]", unit = "rad" }' + tail)
+    assert "says 'deg' and study.toml says 'rad'" in run(lab)
+
+
+def test_a_log_without_a_clock_asks_for_a_rate(lab):
+    text = (lab / "study.toml").read_text()
+    head, tail = text.rsplit('time = "time"\n', 1)
+    (lab / "study.toml").write_text(head + tail)
+    edit(lab, lambda lines: [line.replace("time", "sample") for line in lines])
+    assert "the log carries no clock; name its time channel in [log.channels], or say rate = ... [Hz]" in run(lab)
+
+
+def test_units_signs_and_offsets_come_to_the_joint_in_si(lab):
+    """Position in degrees off by 5 and mirrored, effort as a current in mA: the recording is the same."""
+    import pipeline
+
+    signal = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5)
+    changed = replace(signal, q=-np.rad2deg(signal.q) - 5, tau=signal.tau / (200 * 0.0438) * 1e3)
+    arm.write_csv(lab / "bad.csv", [changed])
+    text = (lab / "study.toml").read_text()
+    head, tail = text.rsplit('"hand_roll.q" = "hand_roll.q"', 1)
+    tail = tail.replace(
+        '"hand_roll.tau" = "hand_roll.tau"', '"hand_roll.i" = { channel = "hand_roll.tau", unit = "mA" }'
+    )
+    head += '"hand_roll.q" = { channel = "hand_roll.q", unit = "deg", sign = -1, offset = 5.0 }'
+    (lab / "study.toml").write_text(head + tail)
+    call("ingest", lab)
+    good, bad = (pipeline.read(lab, "Recording", log=name) for name in ("good", "bad"))
+    for column in ("t", "q", "dq", "tau"):
+        np.testing.assert_allclose(bad[column], good[column], atol=1e-12)
+
+
+def test_the_transient_is_skipped_and_the_clock_kept(lab):
+    import pipeline
+
+    describe(lab, more="skip = 1.0")
+    call("ingest", lab)
+    bad = pipeline.read(lab, "Recording", log="bad")
+    assert bad["t"].iloc[0] == 1.0
+
+
+def test_a_gap_is_marked_and_not_bridged(lab):
+    import pipeline
+
+    edit(lab, lambda lines: [*lines[:200], *lines[215:]])
+    said = call("ingest", lab)
+    assert "the longest time between samples is 0.32 s" in " ".join(said.split())
+    call("resample", lab)
+    signal = pipeline.read(lab, "Signal", log="bad")
+    assert signal["gaps"].iloc[0] == 1
+    assert list(np.unique(signal["stretch"])) == [0, 1]
+    assert np.diff(signal["t"]).max() == pytest.approx(0.32)
+
+
+def test_an_uneven_clock_is_made_uniform_and_said_to_be(lab):
+    import pipeline
+
+    rng = np.random.default_rng(0)
+    signal = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5, noise=0)
+    t = signal.t + rng.uniform(-0.2, 0.2, len(signal)) / 50
+    q, dq, _ = arm.excitation("hand_roll", t, 2.0)
+    arm.write_csv(lab / "bad.csv", [replace(signal, t=t, q=q, dq=dq, tau=np.sin(t))])
+    call("ingest", lab)
+    call("resample", lab)
+    made = pipeline.read(lab, "Signal", log="bad")
+    assert "cubic spline" in made["method"].iloc[0]
+    assert np.ptp(np.diff(made["t"])) < 1e-9
+    np.testing.assert_allclose(made["tau"], np.sin(made["t"] + t[0]), atol=1e-5)
+
+
+def test_velocity_that_was_not_logged_is_derived(lab):
+    import pipeline
+
+    text = (lab / "study.toml").read_text()
+    head, tail = text.rsplit('"hand_roll.dq" = "hand_roll.dq"\n', 1)
+    (lab / "study.toml").write_text(head + tail)
+    call("ingest", lab)
+    call("resample", lab)
+    good, bad = (pipeline.read(lab, "Signal", log=name) for name in ("good", "bad"))
+    assert bad["velocity"].iloc[0] == "derived"
+    middle = slice(50, -50)
+    np.testing.assert_allclose(bad["dq"][middle], good["dq"][middle], atol=0.02)
+
+
+def test_rows_that_repeat_are_flagged(lab):
+    def repeated(lines):
+        return [
+            line if i % 4 else ",".join([line.split(",")[0], *lines[i - 1].split(",")[1:]])
+            for i, line in enumerate(lines)
+        ]
+
+    edit(lab, lambda lines: [lines[0], *repeated(lines[1:])])
+    said = " ".join(call("ingest", lab).split())
+    assert "repeat the one before in every channel used" in said
+
+
+def test_parts_of_a_log_are_read_as_one(lab):
+    import pipeline
+
+    lines = (lab / "bad.csv").read_text().splitlines()
+    (lab / "one.csv").write_text("\n".join(lines[:300]) + "\n")
+    (lab / "two.csv").write_text("\n".join([lines[0], *lines[300:]]) + "\n")
+    text = (lab / "study.toml").read_text().replace('file = "bad.csv"', 'files = ["one.csv", "two.csv"]')
+    (lab / "study.toml").write_text(text)
+    call("ingest", lab)
+    good, bad = (pipeline.read(lab, "Recording", log=name) for name in ("good", "bad"))
+    np.testing.assert_array_equal(good["tau"], bad["tau"])
+
+
+def test_names_that_are_markup_appear_as_text_in_both_reports(lab, tmp_path):
+    import shutil
+    import subprocess
+
+    nasty = ["<script>alert(1)</script>", "#set page()", "$x$ & @y *b* `c`"]
+    signal = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5)
+    rows = np.column_stack([signal.t, signal.q, signal.dq, signal.tau]).tolist()
+    header = "\t".join(["time", *nasty])
+    (lab / "bad.csv").write_text("\n".join([header, *("\t".join(map(repr, row)) for row in rows)]) + "\n")
+    text = (lab / "study.toml").read_text()
+    for symbol, name in zip(("q", "dq", "tau"), nasty, strict=True):
+        head, tail = text.rsplit(f'"hand_roll.{symbol}" = "hand_roll.{symbol}"', 1)
+        text = head + f'"hand_roll.{symbol}" = "{name}"' + tail
+    (lab / "study.toml").write_text(text)
+    call("all", lab)
+    made = tmp_path / "reports" / "arm"
+    page = (made / "report.html").read_text()
+    assert "<script>alert(1)" not in page
+    assert "&lt;script&gt;alert(1)&lt;/script&gt;" in page
+    if shutil.which("pdftotext"):
+        said = subprocess.run(["pdftotext", "-layout", made / "report.pdf", "-"], capture_output=True, text=True).stdout
+        for name in nasty:
+            assert name in said

@@ -1,0 +1,293 @@
+"""Runs of a whole study: what is current is skipped, the same data give the same bytes, and nothing is half written."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pyarrow.parquet as pq
+import pytest
+from typer.testing import CliRunner
+
+import pipeline
+from pipeline.cli import app
+from pipeline.errors import BadRequest, MissingRecord
+from pipeline.stages import STAGES
+from tests.arm import write_study
+
+BEFORE_REPORT = STAGES[:-1]
+
+
+def call(*arguments, code=0) -> str:
+    result = CliRunner().invoke(app, [str(a) for a in arguments])
+    assert result.exit_code == code, result.output
+    return result.output
+
+
+def stages(study: Path, *options, names=BEFORE_REPORT) -> str:
+    return "".join(call(name, study, *options) for name in names)
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    return {f.relative_to(folder).as_posix(): f.read_bytes() for f in sorted(folder.rglob("*")) if f.is_file()}
+
+
+@pytest.fixture
+def study(tmp_path) -> Path:
+    return write_study(tmp_path / "raw" / "arm")
+
+
+@pytest.fixture(scope="module")
+def analysed(tmp_path_factory) -> Path:
+    folder = write_study(tmp_path_factory.mktemp("lab") / "raw" / "arm")
+    call("all", folder)
+    return folder
+
+
+@pytest.fixture
+def finished(analysed, tmp_path) -> Path:
+    """A copy of an analysed study, to be damaged."""
+    shutil.copytree(analysed.parent.parent, tmp_path, dirs_exist_ok=True)
+    return tmp_path / "raw" / "arm"
+
+
+def reports(study: Path) -> Path:
+    return study.parent.parent / "reports" / study.name
+
+
+def processed(study: Path) -> Path:
+    return study.parent.parent / "processed" / study.name
+
+
+def test_a_second_run_runs_no_stage_and_says_so(finished):
+    before = contents(processed(finished)) | contents(reports(finished))
+    said = call("all", finished)
+    assert "nothing to do, every stage is current" in said
+    assert "it has not run" not in said
+    assert contents(processed(finished)) | contents(reports(finished)) == before
+
+
+def test_the_same_data_give_the_same_bytes_whatever_the_number_of_processes(study, analysed):
+    call("all", study, "--jobs", 2)
+    assert contents(processed(study)) == contents(processed(analysed))
+    assert contents(reports(study)) == contents(reports(analysed))
+
+
+@pytest.mark.parametrize(
+    ("change", "reruns", "keeps"),
+    [
+        (("study.toml", '[[log]]\nname = "roll"', '[settings]\nlowpass = 12.0\n[[log]]\nname = "roll"'), ("predict", "lowpass = 17.0 became 12.0"), "ingest"),
+        (("study.toml", '[[log]]\nname = "roll"', '[robot_overrides.hand_roll]\nharmonics = 3\n[[log]]\nname = "roll"'), ("fit", "the robot changed"), None),
+        (("study.toml", "contact = [[4.0, 6.0]]", "contact = [[4.0, 6.1]]"), ("ekf", "the entry changed"), "differentiate"),
+    ],
+)  # fmt: skip
+def test_a_stage_runs_again_and_says_why(finished, change, reruns, keeps):
+    name, old, new = change
+    file = finished / name
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new, 1))
+    lines = stages(finished).splitlines()
+    stage, why = reruns
+    assert any(line.startswith(f"{stage}:") and why in line for line in lines), lines
+    if keeps:
+        assert any(line.startswith(f"{keeps}:") and line.endswith("current") for line in lines), lines
+
+
+def test_a_changed_sample_runs_what_depends_on_it_and_nothing_else(finished):
+    file = finished / "slide.csv"
+    lines = file.read_text().splitlines()
+    lines[5] = lines[5].replace("1", "2", 1)
+    file.write_text("\n".join(lines) + "\n")
+    said = call("ingest", finished)
+    assert "ingest: slide: raw/slide.csv changed" in said
+    assert "ingest: 3 of 4 current" in said
+
+
+def test_an_altered_processed_file_is_made_again(finished):
+    target = processed(finished) / "signal" / "roll" / "hand_roll.parquet"
+    good = target.read_bytes()
+    target.write_bytes(good[:200] + bytes([good[200] ^ 1]) + good[201:])
+    said = call("resample", finished)
+    assert "processed/signal/roll/hand_roll.parquet was altered" in said
+    assert target.read_bytes() == good
+
+
+def test_editing_a_term_of_the_model_makes_the_fit_run_again_and_says_why(finished, tmp_path):
+    """The package is copied, so that its code can be edited."""
+    code = tmp_path / "code"
+    shutil.copytree(Path(pipeline.__file__).parent, code / "pipeline", ignore=shutil.ignore_patterns("__pycache__"))
+
+    def fit() -> str:
+        environment = {**os.environ, "PYTHONPATH": str(code)}
+        done = subprocess.run(
+            [sys.executable, "-m", "pipeline", "fit", finished],
+            env=environment,
+            cwd=code,
+            capture_output=True,
+            text=True,
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout
+
+    assert "fit: 1 of 1 current" in fit()
+    terms = code / "pipeline" / "maths" / "terms.py"
+    terms.write_text(terms.read_text().replace('b="sign(dq)"', 'b="tanh(dq / 0.05)"'))
+    said = fit()
+    assert "the robot changed" in said
+    assert "the code of pipeline/maths/terms.py changed" in said
+
+
+def test_a_log_that_leaves_the_study_takes_its_records_with_it(finished):
+    text = (finished / "study.toml").read_text()
+    first, *logs = text.split("[[log]]")
+    (finished / "study.toml").write_text("[[log]]".join([first, *(log for log in logs if '"check"' not in log)]))
+    stages(finished)
+    assert not [name for name in contents(processed(finished)) if "check" in name]
+
+
+def test_a_run_that_is_killed_resumes_to_the_same_bytes(study, analysed):
+    """Killed again and again, at moments that move, until it is through; every file there is whole throughout."""
+    wanted = contents(processed(analysed))
+    command = [sys.executable, "-c", "from pipeline.cli import main; main()", "all", str(study)]
+    for attempt in range(12):
+        running = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        time.sleep(0.8 + 0.35 * attempt)
+        running.kill()
+        running.wait()
+        for name, content in contents(processed(study)).items():
+            assert name.endswith(".partial") or content == wanted[name], name
+    call("all", study)
+    assert contents(processed(study)) == wanted
+    assert contents(reports(study)) == contents(reports(analysed))
+
+
+def test_a_stage_out_of_order_says_what_to_run(study):
+    said = call("fit", study, code=1)
+    assert "fit has nothing to work on: there are no Trajectory records; run differentiate first" in said
+
+
+def test_units_meanings_and_origins_travel_with_the_file(analysed):
+    file = pq.ParquetFile(processed(analysed) / "average" / "slide" / "instrument_slide.parquet")
+    field = file.schema_arrow.field("tau_var")
+    assert field.metadata[b"unit"] == b"N^2"
+    assert field.metadata[b"meaning"] == b"variance of the effort between periods"
+    made_from = json.loads(file.metadata.metadata[b"made_from"])
+    assert made_from["inputs"].keys() == {"processed/signal/slide/instrument_slide.parquet"}
+    assert made_from["settings"] == {"harmonics": 0}
+    assert "pipeline/maths/averaging.py" in made_from["code"]
+
+
+def test_floats_are_stored_byte_by_byte_and_compressed(analysed):
+    group = pq.ParquetFile(processed(analysed) / "recording" / "roll" / "hand_roll.parquet").metadata.row_group(0)
+    for i in range(group.num_columns):
+        column = group.column(i)
+        assert column.compression == "ZSTD"
+        assert "BYTE_STREAM_SPLIT" in column.encodings
+        assert not column.has_dictionary_page
+
+
+def test_no_processed_file_knows_this_machine(analysed):
+    home = str(analysed.parent.parent).encode()
+    assert not [name for name, content in contents(processed(analysed)).items() if home in content]
+
+
+def test_a_study_is_read_back_as_a_frame_with_its_units(analysed):
+    frame = pipeline.read(analysed, "Track", joint="hand_roll")
+    assert set(frame["log"]) == {"roll", "check", "push"}
+    assert frame.attrs["units"]["tau_ext"] == "N m"
+    both = pipeline.read(analysed, "Track")
+    assert both.attrs["units"]["q"] == {"hand_roll": "rad", "instrument_slide": "m"}
+    assert len(pipeline.read(analysed, "Fit")) == 2 * (4 + 4)
+
+
+def test_reading_what_is_not_there_says_what_there_is(analysed, study):
+    with pytest.raises(BadRequest, match="no record 'Tracks'; there are Intake, Recording"):
+        pipeline.read(analysed, "Tracks")
+    with pytest.raises(BadRequest, match="Track has no arm; it has log, joint"):
+        pipeline.read(analysed, "Track", arm="left")
+    with pytest.raises(MissingRecord, match="run `davinci-forces all"):
+        pipeline.read(study, "Track")
+
+
+def test_results_hold_what_the_study_found(analysed):
+    results = {r["key"]: r for r in json.loads((reports(analysed) / "results.json").read_text())}
+    assert results["period.roll"]["value"] == pytest.approx(2.0, abs=5 * results["period.roll"]["std"])
+    assert results["fit.hand_roll.independent.lse.inertia"]["unit"] == "kg m^2"
+    assert results["predict.check.hand_roll.independent.lse.r2"]["value"] > 0.5
+    assert "cv.roll.hand_roll.independent.lse.r2" in results
+    for name in ("tau_ext_rms", "acf1_q", "acf1_dq", "ljung_box_p_q", "ljung_box_p_dq", "nis_mean", "white"):
+        assert f"ekf.push.hand_roll.{name}" in results
+
+
+def test_a_push_is_found_in_the_contact_log(analysed):
+    track = pipeline.read(analysed, "Track", log="push")
+    inside = track["t"].between(4.5, 5.9)
+    assert track["tau_ext"][inside].mean() == pytest.approx(1.0, abs=0.15)
+
+
+def test_verify_passes_what_was_made(analysed):
+    assert "are unchanged, and all" in call("verify", analysed)
+
+
+def flip(file: Path, at: int) -> None:
+    content = bytearray(file.read_bytes())
+    content[at % len(content)] ^= 1
+    file.write_bytes(content)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("where", ["raw", "processed", "reports"])
+def test_verify_names_a_file_in_which_one_byte_was_altered(finished, where, seed):
+    rng = np.random.default_rng(seed)
+    files = sorted(f for f in (finished.parent.parent / where).rglob("*") if f.is_file())
+    target = files[rng.integers(len(files))]
+    flip(target, int(rng.integers(target.stat().st_size)))
+    said = " ".join(call("verify", finished, code=1).split())
+    assert target.name in said
+
+
+def test_verify_names_a_number_that_was_altered(finished):
+    file = reports(finished) / "results.json"
+    results = json.loads(file.read_text())
+    for result in results:
+        if result["key"] == "fit.hand_roll.independent.lse.inertia":
+            result["value"] += 1e-9
+    file.write_text(json.dumps(results))
+    said = " ".join(call("verify", finished, code=1).split())
+    assert "fit.hand_roll.independent.lse.inertia: says" in said
+
+
+def test_verify_notices_files_that_are_gone_or_of_unknown_origin(finished):
+    (processed(finished) / "fit" / "hand_roll" / "independent.lse.parquet").unlink()
+    shutil.copy(
+        processed(finished) / "track" / "roll" / "hand_roll.parquet",
+        processed(finished) / "track" / "roll" / "stray.parquet",
+    )
+    said = " ".join(call("verify", finished, code=1).split())
+    assert "independent.lse.parquet is gone" in said
+    assert "stray.parquet was made by no stage" in said
+
+
+def test_all_takes_the_studies_of_raw_and_skips_those_without_logs(study, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    other = tmp_path / "raw" / "elsewhere"
+    other.mkdir()
+    (other / "study.toml").write_text((study / "study.toml").read_text())
+    monkeypatch.setattr("pipeline.cli.STAGES", ("ingest",))
+    said = call("all")
+    assert "raw/elsewhere: skipped, its logs are not here (roll.csv ...)" in said
+    assert (tmp_path / "processed" / "arm" / "recording" / "roll" / "hand_roll.parquet").exists()
+
+
+def test_folders_may_lie_elsewhere(study, tmp_path):
+    call("ingest", study, "--processed", tmp_path / "p", "--reports", tmp_path / "r")
+    assert (tmp_path / "p" / "arm" / "intake" / "roll.parquet").exists()
+
+
+def test_raw_files_are_never_touched(analysed, study):
+    assert contents(analysed) == contents(study)

@@ -1,0 +1,161 @@
+"""Study files: everything that is wrong is said at once, with its line; what is right means what it says."""
+
+import pytest
+
+from pipeline import robots, study_file
+from pipeline.errors import BadRobot, BadStudy
+from pipeline.robots.robot import Kind
+from tests.test_runs import call
+
+GOOD = """title = "T"
+robot = "davinci"
+[[log]]
+name = "a"
+file = "a.csv"
+role = "identification"
+period = 10
+contact = [[1, 2]]
+[log.channels]
+time = "Time"
+"hand_roll.theta_m" = { channel = "Motors/Roll", unit = "deg", sign = -1, offset = 0.5 }
+hand_roll.i = "Current"
+"""
+
+
+def read(tmp_path, text):
+    (tmp_path / "study.toml").write_text(text)
+    return study_file.read(tmp_path)
+
+
+def test_a_good_study_means_what_it_says(tmp_path):
+    made = read(tmp_path, GOOD)
+    [entry] = made.logs
+    assert (entry.name, entry.files, entry.period, entry.contact, entry.skip) == (
+        "a",
+        ("a.csv",),
+        10.0,
+        ((1.0, 2.0),),
+        0.0,
+    )
+    angle = next(s for s in entry.channels if s.symbol == "theta_m")
+    assert (angle.joint, angle.channel, angle.unit, angle.sign, angle.offset) == (
+        "hand_roll",
+        "Motors/Roll",
+        "deg",
+        -1,
+        0.5,
+    )
+    assert entry.joints == ("hand_roll",)
+    assert made.absent() == ("a.csv",)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('title = "T"', "title = 3", "1: title must be text, not 3"),
+        ('title = "T"', 'titel = "T"', "1: unknown key 'titel'; known are title, robot"),
+        ('robot = "davinci"', 'robot = "davinchi"', "2: there is no robot 'davinchi'; there are davinci, dvrk_psm"),
+        ('robot = "davinci"', 'robot = "../arm.toml"', "2: robot '../arm.toml' lies outside the study"),
+        ('robot = "davinci"', 'robot = "arm.toml"', "there is no such robot file"),
+        ('name = "a"', 'name = "A b"', "4: log name 'A b' must match [a-z0-9_-]+"),
+        ('name = "a"', "", "3: log 1 has no name"),
+        ('file = "a.csv"', 'file = "../a.csv"', "5: log 'a': '../a.csv' lies outside the study's folder"),
+        ('file = "a.csv"', 'file = "/etc/a.csv"', "lies outside the study's folder"),
+        ('file = "a.csv"', "", "log 'a': say either file"),
+        ('role = "identification"', 'role = "training"', "6: log 'a': role must not be 'training'; it is one of identification"),
+        ("period = 10", "period = -1", "7: log 'a': period must be positive, not -1"),
+        ("period = 10", 'period = "ten"', "7: period must be a number, not 'ten'"),
+        ("contact = [[1, 2]]", "contact = [[2, 1]]", "8: log 'a': contact must be a list of [start, end]"),
+        ("contact = [[1, 2]]", "colour = 1", "8: log 'a': unknown key 'colour'"),
+        ("hand_roll.theta_m", "hand_rol.theta_m", "11: log 'a': robot davinci has no joint 'hand_rol'; it has hand_roll"),
+        ("hand_roll.theta_m", "hand_roll.angle", "11: log 'a': there is no quantity 'hand_roll.angle'; there are time"),
+        ('unit = "deg"', 'unit = "degres"', "11: log 'a': channel of 'hand_roll.theta_m': unknown unit 'degres'; known are rad, deg"),
+        ('unit = "deg"', 'unit = "mm"', "11: log 'a': channel of 'hand_roll.theta_m': 'mm' measures length, but angle is needed"),
+        ("sign = -1", "sign = 2", "sign must be 1 or -1, not 2"),
+        ("offset = 0.5", "ofset = 0.5", "unknown key 'ofset'; known are channel, unit, sign, offset"),
+        ('hand_roll.i = "Current"', "", "3: log 'a': hand_roll has no effort; give hand_roll.tau or hand_roll.i"),
+        ('hand_roll.i = "Current"', 'hand_roll.i = "C"\nhand_roll.tau = "D"', "hand_roll has both tau and i; leave one out"),
+        ('hand_roll.i = "Current"', "hand_roll.i = -1", "must be a name, or a column number from 0, not -1"),
+        ("[[log]]", "[settings]\nlowpass = 0\n[[log]]", "4: settings: lowpass must be positive, not 0.0"),
+        ("[[log]]", "[settings]\nlow = 0\n[[log]]", "4: [settings]: unknown key 'low'; known are lowpass"),
+        ("[[log]]", "[robot_overrides.elbow]\ngear_ratio = 1\n[[log]]", "3: robot_overrides: davinci has no joint 'elbow'"),
+        ("[[log]]", "[robot_overrides.hand_roll]\ngear_ratio = 0\n[[log]]", "gear_ratio must be a number other than 0"),
+        ("[[log]]", "[robot_overrides.hand_roll]\ngears = 1\n[[log]]", "unknown key 'gears'; it may say title, terms"),
+        ('title = "T"', 'title = "T', "study.toml: Illegal character"),
+    ],
+)  # fmt: skip
+def test_what_is_wrong_is_said_with_its_line_and_the_remedy(tmp_path, old, new, says):
+    assert old in GOOD
+    with pytest.raises(BadStudy) as caught:
+        read(tmp_path, GOOD.replace(old, new, 1))
+    assert says in str(caught.value)
+
+
+def test_all_problems_are_said_at_once(tmp_path):
+    text = (
+        GOOD.replace("identification", "x")
+        .replace('"deg"', '"y"')
+        .replace("period = 10", "period = 0")
+        .replace("T", "T")
+    )
+    with pytest.raises(BadStudy) as caught:
+        read(tmp_path, text + GOOD.partition("[[log]]")[1] + GOOD.partition("[[log]]")[2])
+    lines = str(caught.value).splitlines()
+    assert len(lines) == 4
+    assert any("two logs are named 'a'" in line for line in lines)
+    assert all(line.startswith(f"{tmp_path}/study.toml:") for line in lines)
+
+
+def test_a_missing_study_says_how_to_get_one(tmp_path):
+    assert "`davinci-forces new` writes one from a log" in " ".join(call("all", tmp_path, code=1).split())
+
+
+def test_every_missing_file_is_named(tmp_path):
+    (tmp_path / "study.toml").write_text(GOOD.replace('file = "a.csv"', 'files = ["a.csv", "b.csv"]'))
+    said = " ".join(call("ingest", tmp_path, code=1).split())
+    assert "file 'a.csv' is not in" in said
+    assert "file 'b.csv' is not in" in said
+
+
+def test_overrides_change_one_robot_of_one_study(tmp_path):
+    made = read(tmp_path, GOOD.replace("[[log]]", "[robot_overrides.hand_roll]\ngear_ratio = 198.5\n[[log]]"))
+    assert made.robot.joint("hand_roll").gear_ratio == 198.5
+    assert made.robot.joint("hand_pitch").gear_ratio == 200.0
+    assert robots.load("davinci", tmp_path).joint("hand_roll").gear_ratio == 200.0
+
+
+ARM = """name = "mine"
+[[joint]]
+name = "shoulder"
+kind = "revolute"
+terms = ["inertia", "offset", "viscous friction"]
+gear_ratio = 50.0
+limits = { q = [-1, 1] }
+"""
+
+
+def test_a_robot_may_be_described_beside_the_study(tmp_path):
+    (tmp_path / "arm.toml").write_text(ARM)
+    robot = robots.load("arm.toml", tmp_path)
+    [joint] = robot.joints
+    assert (joint.kind, joint.gear_ratio, joint.limits.q) == (Kind.REVOLUTE, 50.0, (-1.0, 1.0))
+    assert [term.name for term in joint.terms] == ["inertia", "offset", "viscous friction"]
+    with pytest.raises(BadRobot, match="robot mine has no joint 'elbow'; it has shoulder"):
+        robot.joint("elbow")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('kind = "revolute"', 'kind = "screw"', "kind is 'revolute' or 'prismatic', not 'screw'"),
+        ('"offset"', '"stiction"', "terms must be a list of 'inertia'"),
+        ("gear_ratio = 50.0", "gear = 50.0", "unknown key 'gear'"),
+        ("q = [-1, 1]", "q = [1, -1]", "limits q must be [lower, upper]"),
+        ("[[joint]]", "[[joints]]", "unknown key 'joints'"),
+    ],
+)
+def test_what_is_wrong_with_a_robot_is_said(tmp_path, old, new, says):
+    (tmp_path / "arm.toml").write_text(ARM.replace(old, new, 1))
+    with pytest.raises(BadRobot) as caught:
+        robots.load("arm.toml", tmp_path)
+    assert says in str(caught.value)
