@@ -23,10 +23,11 @@ def section(context: Context) -> Section | None:
 def intro() -> Prose:
     """What the filter does."""
     return Prose(
-        "An extended Kalman filter follows position, velocity and external effort of each joint by itself. It takes the noise of its "
-        "measurements from the spread between periods; how fast the external effort may wander is a choice, stated in "
-        "[@filter-noise]. Its innovations, what each measurement adds to what was predicted, are white where the model and the "
-        "choice fit the data. Whiteness is tested over the whole run but its first second, contacts and reversals included."
+        "An extended Kalman filter follows position, velocity and external effort of each joint by itself. It takes "
+        "the noise of its measurements from the spread between periods; how fast the external effort may wander is a "
+        "choice, stated in [@filter-noise]. Its innovations, what each measurement adds to what was predicted, are "
+        "white where the model and the choice fit the data. Whiteness is tested over the whole run but its first "
+        "second, contacts and reversals included."
     )
 
 
@@ -37,8 +38,8 @@ def assumptions(tracks: list[Track]) -> Table:
         for t in tracks
     )
     return Table(
-        "Noise that the filter assumes (standard deviations): of the measurements and of the velocity's process noise per sample, "
-        "both measured between periods, and of the random walk of the external effort, chosen.",
+        "Noise that the filter assumes (standard deviations): of the measurements and of the velocity's process "
+        "noise per sample, both measured between periods, and of the random walk of the external effort, chosen.",
         ("Joint", "Log", "Position", "Velocity", "Process", "Random walk"),
         rows,
         "filter-noise",
@@ -70,8 +71,8 @@ def scores(context: Context, tracks: list[Track]) -> Table:
         "$p$ of $dot(q)$",
     )
     return Table(
-        "External effort outside known contacts, normalised innovation squared (expected: 2), first autocorrelation of the "
-        "innovations, and the probability of a larger Ljung-Box statistic if they were white.",
+        "External effort outside known contacts, normalised innovation squared (expected: 2), first autocorrelation "
+        "of the innovations, and the probability of a larger Ljung-Box statistic if they were white.",
         header,
         rows,
         align="llrrrrrr",
@@ -88,8 +89,8 @@ def of_track(context: Context, t: Track) -> Iterator[Block]:
     # The first samples know nothing yet: their band would set the scale of the whole plot.
     shown = slice(min(int(0.25 * t.rate), len(t) // 10), None)
     yield Figure(
-        f"{name}: position; effort measured and modelled; external effort tracked by the filter with two of its standard "
-        "deviations, beside measured minus modelled effort.",
+        f"{name}: position; effort measured and modelled; external effort tracked by the filter with two of its "
+        "standard deviations, beside measured minus modelled effort.",
         f"Three panels over time for {name}: position, effort, external effort.",
         (
             Panel("Trajectory", "time [s]", label(t, "q", "position"), (*windows, Line(t.t, t.q, "", "blue"))),

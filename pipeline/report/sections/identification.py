@@ -41,10 +41,10 @@ def section(context: Context) -> Section | None:
 def intro() -> Prose:
     """How to read the tables."""
     return Prose(
-        "The parameters of each joint come from the averaged periods of all its identification logs together. Two deviations are "
-        "given: the one beside each value allows for residuals that are correlated (Newey and West), the *classical* one takes "
-        "them as independent. Where the two differ much, the model misses something that repeats in every period, "
-        "usually friction.".replace("*classical*", "classical")
+        "The parameters of each joint come from the averaged periods of all its identification logs together. Two "
+        "deviations are given: the one beside each value allows for residuals that are correlated (Newey and West), "
+        "the classical one takes them as independent. Where the two differ much, the model misses something that "
+        "repeats in every period, usually friction."
     )
 
 
@@ -60,8 +60,8 @@ def of_joint(context: Context, fits: list[Fit]) -> Iterator[Block]:
         if negative:
             yield Verdict(
                 "warn",
-                f"{NAMES.get(fit.estimator, fit.estimator)} finds a negative {', '.join(negative)}, which no mechanism has: "
-                "compare it with its deviation.",
+                f"{NAMES.get(fit.estimator, fit.estimator)} finds a negative {', '.join(negative)}, which no "
+                "mechanism has: compare it with its deviation.",
             )
     for residual in context.library.about(Residual, joint=first.group, estimator=first.estimator):
         yield from figures(context, residual)
@@ -108,8 +108,8 @@ def quality(context: Context, fits: list[Fit]) -> Table:
         for f in fits
     )
     return Table(
-        "Mean squared error of the averaged effort, share of its variance explained, condition number of the regressor, and the "
-        "lags of correlation that the deviations allow for.",
+        "Mean squared error of the averaged effort, share of its variance explained, condition number of the "
+        "regressor, and the lags of correlation that the deviations allow for.",
         ("Estimator", "MSE", "$R^2$", "Condition", "Samples", "Periods", "Lags"),
         rows,
         align="lrrrrrr",
@@ -127,7 +127,10 @@ def figures(context: Context, residual: Residual) -> Iterator[Figure]:
         (
             Panel(
                 "Averaged effort and model", "time [s]", effort,
-                (Line(residual.t, residual.tau, "measured", "sky"), Line(residual.t, residual.tau_hat, "model", "vermillion")),
+                (
+                    Line(residual.t, residual.tau, "measured", "sky"),
+                    Line(residual.t, residual.tau_hat, "model", "vermillion"),
+                ),
             ),
             Panel("Residual", "time [s]", effort, (Line(residual.t, rest, "", "blue"),)),
         ),
@@ -156,7 +159,8 @@ def distribution(context: Context, residual: Residual, name: str) -> Iterator[Fi
     about = context.library.about(Whiteness, log=residual.log, joint=residual.joint, signal=signal)
     panels += [autocorrelation(w, "Autocorrelation") for w in about]
     yield Figure(
-        f"{name}: distribution and autocorrelation of the residual. A model that misses nothing leaves normal, white noise.",
+        f"{name}: distribution and autocorrelation of the residual. A model that misses nothing leaves "
+        "normal, white noise.",
         f"Panels for {name}: histogram, normal probability plot and autocorrelation of the residual.",
         tuple(panels),
         columns=3,

@@ -34,8 +34,9 @@ def section(context: Context) -> Section | None:
 def blocks(context: Context, averages: list[Average]) -> Iterator[Block]:
     """The section's content."""
     yield Prose(
-        "Every identification log repeats one period. Its periods are averaged, and what differs between them is taken as noise: "
-        "its deviations set what the filter assumes of its measurements. The period itself is found from the joints' motion."
+        "Every identification log repeats one period. Its periods are averaged, and what differs between them is "
+        "taken as noise: its deviations set what the filter assumes of its measurements. The period itself is found "
+        "from the joints' motion."
     )
     rows = tuple(
         (
@@ -64,16 +65,18 @@ def of_one(context: Context, average: Average) -> Iterator[Block]:
     whiteness = {w.signal: w for w in context.library.about(Whiteness, **about)}
     name = f"{title(average.joint)} in {literal(average.log)}"
     yield Figure(
-        f"{name}: the mean of {average.periods} periods beside the first of them; the position's spectrum with the harmonics that "
-        "are kept; velocity and acceleration from those harmonics beside differences of the logged position and velocity.",
+        f"{name}: the mean of {average.periods} periods beside the first of them; the position's spectrum with the "
+        "harmonics that are kept; velocity and acceleration from those harmonics beside differences of the logged "
+        "position and velocity.",
         f"Four panels for {name}: averaged effort, spectrum of the position, velocity and acceleration.",
         (one_period(average, signals[0]), spectrum(spectra[0]), *derivatives(average, trajectories[0])),
         columns=2,
         height=45,
     )
     yield Figure(
-        f"{name}: what averaging removed. Histogram of the effort noise with the normal density of the same deviation; normal "
-        "probability plot of the position noise; autocorrelation of the velocity noise with the 95 % band of white noise.",
+        f"{name}: what averaging removed. Histogram of the effort noise with the normal density of the same "
+        "deviation; normal probability plot of the position noise; autocorrelation of the velocity noise with the "
+        "95 % band of white noise.",
         f"Three panels for {name}: histogram, normal probability plot and autocorrelation of the noise.",
         tuple(removed(noises[0], whiteness)),
         columns=3,

@@ -13,8 +13,9 @@ def section(context: Context) -> Section:
     versions = tuple(provenance.packages.items())
     blocks: list[Block] = [
         Prose(
-            f"Made by davinci-forces {provenance.version}. Every number of the tables is in `results.json` under a key of its own, with "
-            "the processed file and field that it stands in; `davinci-forces verify` follows them back to the raw files."
+            f"Made by davinci-forces {provenance.version}. Every number of the tables is in `results.json` under a "
+            "key of its own, with the processed file and field that it stands in; `davinci-forces verify` follows "
+            "them back to the raw files."
         ),
         Table("Raw files, with the first 16 digits of their SHA-256.", ("File", "SHA-256"), raw, align="ll"),
         Table("Versions.", ("Package", "Version"), versions, align="ll"),

@@ -20,8 +20,9 @@ def blocks(context: Context) -> Iterator[Block]:
     study = context.study
     kind = "simulated" if study.simulated else "recorded"
     yield Prose(
-        f"{len(study.logs)} {kind} logs of the {literal(study.robot.title)} were analysed. External effort is what the robot "
-        "exerts on its environment, found from motor currents and joint positions; no force sensor was used."
+        f"{len(study.logs)} {kind} logs of the {literal(study.robot.title)} were analysed. External effort is "
+        "what the robot exerts on its environment, found from motor currents and joint positions; no force sensor "
+        "was used."
     )
     if study.simulated:
         yield Verdict(
@@ -106,9 +107,9 @@ def table(context: Context) -> Table:
             )
         )
     return Table(
-        "External effort outside known contacts (root mean square), the filter's normalised innovation squared (2 when it is "
-        "consistent), and whether its innovations are white. Where nothing touched the robot, the first is its floor: a contact "
-        "has to exceed it to be seen.",
+        "External effort outside known contacts (root mean square), the filter's normalised innovation squared "
+        "(2 when it is consistent), and whether its innovations are white. Where nothing touched the robot, the first "
+        "is its floor: a contact has to exceed it to be seen.",
         ("Joint", "Log", "Role", "External effort", "NIS", "White"),
         tuple(rows),
         label="summary-table",

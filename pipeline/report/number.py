@@ -1,0 +1,69 @@
+"""A number that knows how it is printed."""
+
+import math
+from dataclasses import dataclass
+
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+MINUS = "\N{MINUS SIGN}"
+MISSING = "–"
+
+
+@dataclass(frozen=True)
+class Number:
+    """A value with its unit, standard deviation and key in results.json.
+
+    Printed as value ± std with two significant digits of std, else with `digits` significant digits; far from one, with
+    a power of ten.  What is not finite is printed as a dash.
+    """
+
+    value: float
+    unit: str = ""
+    std: float | None = None
+    key: str | None = None
+    digits: int = 4
+
+    def __str__(self) -> str:
+        """The number with its unit."""
+        return f"{self.text} {self.unit}" if self.unit and self.text != MISSING else self.text
+
+    @property
+    def text(self) -> str:
+        """The number without its unit."""
+        if not math.isfinite(self.value):
+            return MISSING
+        if self.std is not None and math.isfinite(self.std) and self.std > 0:
+            return _with_deviation(self.value, self.std)
+        return _significant(self.value, self.digits)
+
+
+def _with_deviation(value: float, std: float) -> str:
+    exponent = _exponent(max(abs(value), std), 2)
+    last = _exponent(std, 2) - 1  # the power of ten of the last printed digit
+    if -4 < exponent < 6 and last <= 0:
+        return _signed(f"{value:.{-last}f} ± {std:.{-last}f}")
+    places = max(exponent - last, 0)
+    scale = 10.0**exponent
+    return _signed(f"({value / scale:.{places}f} ± {std / scale:.{places}f}) × 10{_power(exponent)}")
+
+
+def _significant(value: float, digits: int) -> str:
+    if value == 0:
+        return "0"
+    exponent = _exponent(value, digits)
+    if -4 < exponent < 6:
+        return _signed(f"{value:.{max(digits - 1 - exponent, 0)}f}")
+    mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
+    return _signed(f"{mantissa} × 10{_power(int(power))}")
+
+
+def _exponent(value: float, digits: int) -> int:
+    """The power of ten of the first digit once rounded to `digits`: 0.9996 to three is 1.00, so 0."""
+    return int(f"{value:.{digits - 1}e}".partition("e")[2]) if value else 0
+
+
+def _power(exponent: int) -> str:
+    return str(exponent).translate(SUPERSCRIPTS)
+
+
+def _signed(text: str) -> str:
+    return text.replace("-", MINUS)

@@ -1,0 +1,112 @@
+"""Figures: well-formed, complete, and the same in every process."""
+
+import hashlib
+import html as html_text
+import os
+import re
+import subprocess
+import sys
+from pathlib import Path
+from xml.etree import ElementTree
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.text import Text
+from report_documents import HOSTILE, still, zoomable
+
+from pipeline.report import html, pdf
+from pipeline.report.content import Document, Figure, Figure3D, Histogram, Line, Panel, walk
+from pipeline.report.figures import STYLE, draw, svg
+from pipeline.report.panels import wrapped
+from pipeline.report.ticks import power
+
+
+def test_every_mark_is_drawn_into_well_formed_svg_of_the_width_of_the_page(full: Document) -> None:
+    figures = [block for block in walk(full) if isinstance(block, Figure | Figure3D)]
+    assert len(figures) == 3
+    for figure in figures:
+        root = ElementTree.fromstring(svg(figure))
+        assert root.attrib["width"] == "481.889764pt"  # 170 mm
+        assert len(list(root.iter("{http://www.w3.org/2000/svg}path"))) > 20
+
+
+def test_words_are_drawn_as_they_are_even_where_matplotlib_reads_signs() -> None:
+    # matplotlib notes each line of words that it draws in a comment before its outlines.
+    drawn = html_text.unescape(" ".join(re.findall(r"<!-- (.*?) -->", svg(still()), re.DOTALL)))
+    for words in (HOSTILE, "$x$ [s]", "_under $y$", "counts", "LSE", "WLSE"):
+        assert words in drawn
+    with mpl.rc_context(STYLE):
+        texts = [text for text in draw(still()).findobj(Text) if "$" in text.get_text()]
+    assert len(texts) >= 3
+    assert not any(text.get_parse_math() for text in texts)
+
+
+def crowded(columns: int) -> Figure:
+    """Long labels, long legends and awkward numbers in panels of little room."""
+    x = np.linspace(0, 1e-4, 50)
+    labels = ("a legend entry of very many words", "another that is long", "short")
+    lines = tuple(Line(x, x * 1e9 * i, label) for i, label in enumerate(labels, 1))
+    panel = Panel("Title", "effort of the joint [N m]", "angular acceleration of the joint [rad/s²]", lines)
+    bars = Panel("", "x", "autocorrelation", (Histogram([1e5, 2e5, 3e5], [1e-5, 2e-5], "counts"),))
+    return Figure("", "", (panel, bars) * columns, columns=columns, height=45)
+
+
+@pytest.mark.parametrize("figure", [still(), zoomable(300, "z"), crowded(1), crowded(2), crowded(3)])
+def test_nothing_is_clipped_and_no_legend_covers_data(figure: Figure) -> None:
+    with mpl.rc_context(STYLE):
+        canvas = draw(figure)
+        canvas.savefig(Path(os.devnull), format="svg")
+        box = canvas.get_tightbbox()
+        height = canvas.get_size_inches()[1]
+        drawn = [(axes.get_legend(), axes.get_window_extent()) for axes in canvas.axes]
+        assert min(box.x0, box.y0) >= 0
+        assert box.x1 <= 170 / 25.4
+        assert box.y1 <= height
+        for legend, inside in drawn:
+            assert inside.height > 0.4 * 45 / 25.4 * canvas.dpi
+            assert legend is None or legend.get_window_extent().y0 >= inside.y1 - 1
+
+
+@pytest.mark.parametrize(
+    ("greatest", "taken"), [(0, 0), (1, 0), (19_999, 0), (1e5, 3), (2.5e-4, -6), (1e-3, -3), (3e9, 9)]
+)
+def test_axes_take_a_power_of_ten_out_of_large_and_small_numbers_only(greatest: float, taken: int) -> None:
+    assert power(greatest) == taken
+
+
+def test_a_long_axis_label_gives_its_unit_a_line_of_its_own() -> None:
+    assert wrapped("velocity [rad/s]", 60) == "velocity [rad/s]"
+    assert wrapped("velocity [rad/s]", 20) == "velocity\n[rad/s]"
+
+
+def test_a_figure_is_drawn_once() -> None:
+    figure = zoomable(50, "z")
+    assert svg(figure) is svg(figure)
+
+
+def test_a_figure_of_a_million_samples_stays_small() -> None:
+    assert len(svg(zoomable(1_000_000, "z"))) < 200_000
+
+
+def test_another_process_gives_the_same_bytes(full: Document) -> None:
+    program = (
+        "import hashlib; from report_documents import document; from pipeline.report import html, pdf; d = document();"
+        "[print(hashlib.sha256(w.render(d)).hexdigest()) for w in (pdf, html)]"
+    )
+    path = os.pathsep.join([str(Path(__file__).parent), str(Path(__file__).parents[2])])
+    environment = os.environ | {"PYTHONHASHSEED": "77", "PYTHONPATH": path}
+    result = subprocess.run(
+        [sys.executable, "-c", program], capture_output=True, text=True, check=True, env=environment, timeout=120
+    )
+    assert result.stdout.split() == [hashlib.sha256(writer.render(full)).hexdigest() for writer in (pdf, html)]
+
+
+def test_importing_the_content_imports_no_drawing_library() -> None:
+    program = (
+        "import sys; from pipeline.report import content, html, pdf; "
+        "print([n for n in ('matplotlib', 'bokeh', 'typst', 'jinja2', 'pandas') if n in sys.modules])"
+    )
+    root = str(Path(__file__).parents[2])
+    result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=root)
+    assert result.stdout.strip() == "[]"

@@ -1,0 +1,111 @@
+"""The PDF: text is text, figures are lines, nothing leaves the page; as poppler reads it, where it is installed."""
+
+import re
+import shutil
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from pipeline.report import pdf
+from pipeline.report.content import Document, Equation, Number, Prose, Section, Table
+from pipeline.report.layout import place, references
+from pipeline.report.typesetting import NotTypeset, typeset
+
+poppler = pytest.mark.skipif(shutil.which("pdftotext") is None, reason="no pdftotext on the path to read the PDF with")
+MILLIMETRE = 72 / 25.4
+
+
+@pytest.fixture(scope="module")
+def source(full: Document) -> bytes:
+    return pdf.render(full)
+
+
+def read(source: bytes, *options: str) -> str:
+    command = ["pdftotext", *options, "-", "-"]
+    return subprocess.run(command, input=source, capture_output=True, check=True, timeout=60).stdout.decode()
+
+
+def one(*blocks: object, simulated: bool = False) -> Document:
+    return Document("T", "s", simulated, (Section("A", "a", blocks),))  # type: ignore[arg-type]
+
+
+@poppler
+def test_text_that_looks_like_markup_is_shown_as_text(source: bytes) -> None:
+    text = re.sub(r"\s+", " ", read(source).replace("\N{ZERO WIDTH SPACE}", ""))
+    assert text.count("<script>alert(1)</script> #set page() $x$ *b* **c**") >= 6
+    assert "[@e] \\ \"q\" 'a' & é Ω" in text
+
+
+def test_no_text_can_become_markup() -> None:
+    template = pdf.TEMPLATE.read_text(encoding="utf-8")
+    evaluated = re.findall(r"eval\(([^)]*)\)", template)
+    assert evaluated == ['it, mode: "math"', 'it.typst, mode: "math"']
+
+
+@poppler
+def test_every_page_of_simulated_data_says_so(source: bytes) -> None:
+    pages = read(source).rstrip("\f").split("\f")
+    assert len(pages) > 2
+    assert all("SIMULATED" in page for page in pages)
+    assert "SIMULATED" not in read(pdf.render(one(Prose("text"))))
+
+
+@poppler
+def test_both_files_print_the_same_numbers(source: bytes, full: Document) -> None:
+    text = read(source)
+    for name in ("Figure 1.", "Figure 2.", "Figure 3.", "Table 1.", "(1)", "1.1"):
+        assert name in text
+    for reference in references(place(full)).values():
+        assert reference.split()[-1].strip(".") in text
+
+
+def test_figures_are_vectors_and_fonts_travel_along(source: bytes) -> None:
+    assert source.startswith(b"%PDF-1.7")
+    assert b"/Subtype/Image" not in source
+    assert not re.search(rb"/Subtype\s*/Image", source)
+    assert len(re.findall(rb"/FontFile[23]", source)) >= 3
+
+
+def test_the_same_document_gives_the_same_bytes_without_a_date(source: bytes, full: Document) -> None:
+    assert pdf.render(full) == source
+    assert b"CreationDate" not in source
+    assert b"ModDate" not in source
+
+
+@poppler
+@pytest.mark.parametrize("columns", [3, 9, 16])
+def test_no_table_leaves_the_page_and_a_long_one_repeats_its_header(columns: int) -> None:
+    names = tuple(f"h{i}" for i in range(columns - 1))
+    row = (
+        "`" + "0123456789abcdef" * 4 + "`",
+        *(Number(-123.456, "N m", 0.0123) for _ in range(columns - 2)),
+        "a/b" * 30,
+    )
+    rendered = pdf.render(one(Table("Wide.", ("f0", *names), (row,) * 40)))
+    edges = [float(x) for x in re.findall(r'xMax="([\d.]+)"', read(rendered, "-bbox"))]
+    assert max(edges) <= (210 - 20) * MILLIMETRE + 0.5
+    pages = read(rendered).rstrip("\f").split("\f")
+    assert len(pages) > 1
+    assert all("f0" in page for page in pages)
+
+
+@poppler
+def test_a_wide_equation_and_a_long_word_stay_on_the_page() -> None:
+    rendered = pdf.render(
+        one(Equation(" + ".join(f"theta_{i} dot(q)_{i}" for i in range(40)), "sum"), Prose("x" * 500))
+    )
+    edges = [float(x) for x in re.findall(r'xMax="([\d.]+)"', read(rendered, "-bbox"))]
+    assert max(edges) <= (210 - 20) * MILLIMETRE + 0.5
+
+
+def test_a_warning_of_typst_is_an_error(tmp_path: Path) -> None:
+    template = tmp_path / "warns.typ"
+    template.write_text('#text(font: "No such font")[x]')
+    with pytest.raises(NotTypeset, match="no such font"):
+        typeset(template, {}, "pdf")
+
+
+def test_a_wrong_equation_is_an_error() -> None:
+    with pytest.raises(NotTypeset, match=r"report\.typ"):
+        pdf.render(one(Equation("nonsense(", "?")))

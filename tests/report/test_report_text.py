@@ -1,0 +1,96 @@
+"""Inline marks, references and numbering."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline.report.content import Document, Equation, Number, Prose, Section, Table, literal, numbers
+from pipeline.report.inline import Span, parse, printable
+from pipeline.report.layout import place, references
+from pipeline.report.tables import columns
+from pipeline.report.widths import BREAK, PAGE, breakable, fit
+
+anything = st.text(st.one_of(st.sampled_from("\\$`*[]@a "), st.characters()))
+
+
+@given(anything)
+def test_literal_text_is_one_span_of_text_and_comes_back_unchanged(text: str) -> None:
+    assert "".join(span.text for span in parse(literal(text))) == printable(text)
+    assert {span.kind for span in parse(literal(text))} <= {"text"}
+
+
+@given(anything.filter(bool))
+def test_literal_text_inside_code_and_bold_stays_inside(text: str) -> None:
+    for kind, mark in (("code", "`"), ("bold", "**")):
+        assert parse(f"{mark}{literal(text)}{mark}") == (Span(kind, printable(text)),)
+
+
+def test_marks_are_read_and_a_mark_without_its_partner_is_text() -> None:
+    spans = parse("a $x_1$ `c` **b** [@fig-1] 5\\$ and ` and [@Wrong]")
+    assert spans == (
+        Span("text", "a "),
+        Span("maths", "x_1"),
+        Span("text", " "),
+        Span("code", "c"),
+        Span("text", " "),
+        Span("bold", "b"),
+        Span("text", " "),
+        Span("reference", "fig-1"),
+        Span("text", " 5$ and ` and [@Wrong]"),
+    )
+
+
+def test_sections_equations_figures_and_tables_are_numbered_in_reading_order(full: Document) -> None:
+    assert references(place(full)) == {
+        "first": "Section 1",
+        "method": "Section 1.1",
+        "second": "Section 2",
+        "parameters": "Table 1",
+        "still": "Figure 1",
+        "zoom": "Figure 3",
+        "update": "Eq. (1)",
+    }
+
+
+def test_a_reference_that_leads_nowhere_is_named() -> None:
+    with pytest.raises(ValueError, match="nowhere"):
+        place(Document("T", "s", False, (Section("A", "a", (Prose("[@a] and [@nowhere]"),)),)))
+
+
+def test_two_blocks_of_one_label_are_refused() -> None:
+    equation = Equation("x", "x", "same")
+    with pytest.raises(ValueError, match="same"):
+        Document("T", "s", False, (Section("A", "a", (equation, equation)),))
+
+
+def test_a_table_whose_rows_do_not_fit_its_header_is_refused() -> None:
+    with pytest.raises(ValueError, match="2 columns"):
+        Table("T", ("a", "b"), (("1",),))
+
+
+def test_the_numbers_of_a_document_are_found_in_reading_order(full: Document) -> None:
+    assert [number.key for number in numbers(full)] == ["fit.a", None, None, None]
+
+
+def test_a_unit_that_a_column_shares_moves_to_its_header_and_others_stay() -> None:
+    table = Table("T", ("name", "a", "b"), (("x", Number(1, "N m"), Number(1, "N")), ("y", "–", Number(2, "m"))))
+    name, a, b = columns(table)
+    assert [parse(column.head)[0].text for column in (name, a, b)] == ["name", "a [N\N{NO-BREAK SPACE}m]", "b"]
+    assert [cell.text for cell in a.cells] == ["1.000", "–"]
+    assert [cell.text for cell in b.cells] == ["1.000 N", "2.000 m"]
+    assert [column.align for column in (name, a, b)] == ["l", "r", "r"]
+
+
+@given(st.lists(st.lists(st.text("abc _", max_size=90), min_size=2, max_size=2), min_size=1, max_size=12))
+def test_fitted_columns_never_add_up_to_more_than_the_page(cells: list[list[str]]) -> None:
+    fitted = fit(cells)
+    widths = [w for w in fitted.widths if w is not None]
+    assert sum(widths) <= PAGE + 1e-6
+    assert len(widths) in (0, len(cells))
+
+
+@given(st.text("ab/_.- ", max_size=200), st.integers(5, 50))
+def test_long_words_may_break_and_lose_nothing(text: str, longest: int) -> None:
+    broken = breakable(text, longest)
+    assert broken.replace(BREAK, "") == text
+    assert all(len(piece) <= longest + 1 for piece in broken.replace(BREAK, " ").split())
