@@ -10,10 +10,11 @@ __all__ = ["read"]
 
 
 def read(study: str | Path, record: str, **about: str) -> "pd.DataFrame":
-    """The records of one kind of an analysed study, as one pandas DataFrame: `read("raw/mine", "Track", joint="hand_roll")`.
+    """The records of one kind of an analysed study as one DataFrame: `read("raw/mine", "Track", joint="hand_roll")`.
 
-    The scalars that tell records apart (log, joint, ...) are columns of their own.  `attrs["units"]` gives the unit of each
-    column; where it differs between joints, a dict by joint.  Keyword arguments keep records whose scalars have these values.
+    The scalars that tell records apart (log, joint, ...) are columns of their own.  `attrs["units"]` gives the unit of
+    each column; where it differs between joints, a dict by joint.  Keyword arguments keep records whose scalars have
+    these values.
 
     Raises
     ------

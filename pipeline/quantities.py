@@ -59,6 +59,7 @@ QUANTITIES = {
     "tau": Quantity("actuator effort at the joint", "{effort}"),
     "tau_hat": Quantity("effort predicted by the model", "{effort}"),
     "stretch": Quantity("number of the stretch without a gap that a sample belongs to"),
+    "held": Quantity("1 when the joint does not move during the recording, else 0"),
     "gaps": Quantity("interruptions of the recording"),
     "method": Quantity("how the recording was put on a uniform clock", ""),
     "velocity": Quantity("where the velocity comes from", ""),

@@ -138,6 +138,7 @@ class Signal(Record):
     method: str
     velocity: str
     gaps: int
+    held: int
     t: Column
     q: Column
     dq: Column
@@ -283,6 +284,7 @@ class Track(Record):
     estimator: str
     filter: str
     role: str
+    held: int
     rate: float
     tau_ext_rms: float
     nis_mean: float
@@ -343,7 +345,8 @@ class Note(Record):
 KINDS: dict[str, type[Record]] = {
     kind.__name__: kind
     for kind in (
-        Intake, Recording, Signal, Average, Noise, Trajectory, Spectrum, Fit, Residual, Prediction, Track, Whiteness, Note,
+        Intake, Recording, Signal, Average, Noise, Trajectory, Spectrum, Fit, Residual, Prediction, Track, Whiteness,
+        Note,
     )
 }  # fmt: skip
 

@@ -2,6 +2,7 @@
 
 import importlib.metadata
 import os
+import traceback
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from contextlib import ExitStack, contextmanager
@@ -187,6 +188,7 @@ class Runner:
         logs_ = [entry.name for entry in self.study.logs]
         joints = [joint.name for joint in self.study.robot.joints]
         log, joint = _about(place)
+        joint = log if log in joints else joint  # a Fit is about a joint alone
         rank = (
             (logs_.index(log) if log in logs_ else len(logs_)),
             (joints.index(joint) if joint in joints else len(joints)),
@@ -225,11 +227,23 @@ def perform(study: Study, folders: Folders, task: Task, made_from: dict[str, Any
                 said += _lines(record)
         return Outcome(task, tuple(f"processed/{place.as_posix()}" for place in writer.places), said=tuple(said))
     except PipelineError as error:
-        kept = _anywhere(str(error), study, folders)
-        with _writer(study, folders, made_from) as writer:
-            writer.write(note(task.stage, task.name.replace("/", "."), "error", kept))
-        places = tuple(f"processed/{place.as_posix()}" for place in writer.places)
-        return Outcome(task, places, failed=kept, said=(f"error: {error}",))
+        return _failed(study, folders, task, made_from, str(error))
+    except Exception as error:
+        # A fault of ours must not cost the other logs; where it happened is all that a report of it needs.
+        frame = traceback.extract_tb(error.__traceback__)[-1]
+        place = f"{Path(frame.filename).name}:{frame.lineno} in {frame.name}"
+        fault = f"{type(error).__name__}: {error} ({place})"
+        message = f"{fault}: a fault of davinci-forces, not of the data; please report it"
+        return _failed(study, folders, task, made_from, message)
+
+
+def _failed(study: Study, folders: Folders, task: Task, made_from: dict[str, Any], message: str) -> Outcome:
+    """The outcome of a task that could not be done: a note of why, for the report."""
+    kept = _anywhere(message, study, folders)
+    with _writer(study, folders, made_from) as writer:
+        writer.write(note(task.stage, task.name.replace("/", "."), "error", kept))
+    places = tuple(f"processed/{place.as_posix()}" for place in writer.places)
+    return Outcome(task, places, failed=kept, said=(f"error: {message}",))
 
 
 def _anywhere(message: str, study: Study, folders: Folders) -> str:

@@ -92,7 +92,7 @@ def schema(kind: type[Record], unit: Unit) -> pa.Schema:
     return pa.schema(
         pa.field(
             f.name,
-            ARROW[f.type],  # type: ignore[index]
+            ARROW[f.type],
             nullable=False,
             metadata={"meaning": QUANTITIES[f.name].meaning, "unit": unit(QUANTITIES[f.name].unit)},
         )

@@ -47,7 +47,7 @@ def signal(
     log="run",
     external=None,
 ):
-    """An excited joint as a Signal; `noise` scales that of the effort, and external(t) is exerted on the environment."""
+    """An excited joint as a Signal; `noise` scales the effort's, and external(t) is exerted on the environment."""
     T = period or EXCITATION[name][0]
     t = np.arange(round(periods * T * rate)) / rate
     q, dq, ddq = excitation(name, t, T)
@@ -57,8 +57,9 @@ def signal(
         tau = tau + external(t)
     q = q + noise * 1e-4 * rng.normal(size=len(t))
     dq = dq + noise * 1e-3 * rng.normal(size=len(t))
+    held = int(np.ptp(q) < 0.01)
     columns = {"t": t, "q": q, "dq": dq, "tau": tau, "stretch": np.zeros(len(t), int)}
-    return Signal(log, name, role, rate, "as recorded", "logged", 0, **columns)
+    return Signal(log, name, role, rate, "as recorded", "logged", 0, held, **columns)
 
 
 def write_csv(file: Path, signals, extra=None) -> None:
@@ -75,12 +76,13 @@ def write_csv(file: Path, signals, extra=None) -> None:
 
 def log_table(name: str, file: str, role: str, joints, more="") -> str:
     channels = "\n".join(f'"{j}.{s}" = "{j}.{s}"' for j in joints for s in ("q", "dq", "tau"))
-    return f'[[log]]\nname = "{name}"\nfile = "{file}"\nrole = "{role}"\n{more}\n[log.channels]\ntime = "time"\n{channels}\n'
+    entry = f'[[log]]\nname = "{name}"\nfile = "{file}"\nrole = "{role}"\n{more}\n'
+    return f'{entry}[log.channels]\ntime = "time"\n{channels}\n'
 
 
 def write_study(folder: Path, seed=0, periods=5, rate=50.0) -> Path:
     """A small study of two joints: excitation, validation and contact of the roll, and the slide's excitation."""
-    short = dict(periods=periods, rate=rate, seed=seed)
+    short = {"periods": periods, "rate": rate, "seed": seed}
     roll = signal("hand_roll", period=2.0, **short)
     write_csv(folder / "roll.csv", [roll])
     write_csv(folder / "slide.csv", [signal("instrument_slide", period=2.0, **short)])

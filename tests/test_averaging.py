@@ -73,7 +73,7 @@ def test_whole_samples_are_plainly_averaged():
     folded = averaging.fold(np.arange(1400) / 100, x.ravel(), 2.0, 200)
     assert_allclose(folded.mean, x.mean(axis=0), atol=1e-12)
     assert_allclose(folded.var, x.var(axis=0, ddof=1), atol=1e-12)
-    assert (folded.count == 7).all()
+    assert (folded.counts == 7).all()
 
 
 def test_noise_keeps_its_size_and_stays_white_at_a_period_of_no_whole_number_of_samples():

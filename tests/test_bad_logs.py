@@ -64,15 +64,27 @@ def call_any(name, folder) -> str:
     [
         (lambda lines: cell(lines, 40, 2, "broken"), "bad.csv"),
         (lambda lines: cell(lines, 40, 2, "nan"), "channel 'hand_roll.dq' holds nan at row 39 (counted from 0)"),
-        (lambda lines: cell(lines, 40, 0, "0.5"), "time does not increase at row 39 (counted from 0): 0.76 s, then 0.5 s"),
-        (lambda lines: cell(lines, 40, 0, lines[39].split(",")[0]), "time does not increase at row 39 (counted from 0): 0.76 s"),
+        (
+            lambda lines: cell(lines, 40, 0, "0.5"),
+            "time does not increase at row 39 (counted from 0): 0.76 s, then 0.5 s",
+        ),
+        (
+            lambda lines: cell(lines, 40, 0, lines[39].split(",")[0]),
+            "time does not increase at row 39 (counted from 0): 0.76 s",
+        ),
         (lambda lines: [*lines[:1], *lines[1:120]], "bad: 2.38 s hold no motion that repeats at least twice"),
         (lambda lines: lines[:1], "bad.csv"),
         (lambda lines: lines[:2], "1 samples are too few"),
         (lambda lines: [line.replace("hand_roll.q", "q1") for line in lines], "there is no channel 'hand_roll.q'"),
-        (lambda lines: [lines[0], *(",".join([line.split(",")[0], "0.1", "0.0", "0.5"]) for line in lines[1:])], "bad: no joint moves"),
+        (
+            lambda lines: [lines[0], *(",".join([line.split(",")[0], "0.1", "0.0", "0.5"]) for line in lines[1:])],
+            "bad: no joint moves",
+        ),
     ],
-    ids=["text", "nan", "time goes back", "time stands still", "one period", "header only", "one row", "no channel", "constant"],
+    ids=[
+        "text", "nan", "time goes back", "time stands still", "one period", "header only", "one row", "no channel",
+        "constant",
+    ],
 )  # fmt: skip
 def test_a_spoilt_log_is_named_and_the_good_one_goes_on(lab, change, says):
     edit(lab, change)

@@ -1,5 +1,7 @@
 """The filter against what must hold of any Kalman filter, and against a batch solution."""
 
+import re
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -39,7 +41,7 @@ def walk(N, step, seed=1):
 
 
 def test_a_linear_model_gives_the_batch_least_squares_estimate():
-    """The last posterior is the weighted least squares estimate on all measurements, prior and process noise at once."""
+    """The last posterior is the weighted least squares estimate on measurements, prior and process noise at once."""
     N, M, v = 40, *THETA
     tau = np.sin(np.arange(N) * T_S)
     y = simulate(CART, THETA, walk(N, 0.05), tau, NOISE)
@@ -209,9 +211,8 @@ def test_a_joint_without_a_fit_is_noted_not_guessed(identified):
 
 
 def test_a_fit_that_does_not_exist_is_refused_with_those_there_are(identified):
-    with pytest.raises(
-        PipelineError, match="no fit 'coupled.pso'; set fit in .settings. to one of independent.lse, independent.wlse"
-    ):
+    says = "no fit 'coupled.pso'; set fit in [settings] to one of independent.lse, independent.wlse"
+    with pytest.raises(PipelineError, match=re.escape(says)):
         list(
             stage.run(
                 arm.signal(), *identified, entry(), arm.joint("hand_roll"), fit="coupled.pso", lowpass=17.0, q_tau=0.0

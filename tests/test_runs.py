@@ -20,6 +20,7 @@ from pipeline.stages import STAGES
 from tests.arm import write_study
 
 BEFORE_REPORT = STAGES[:-1]
+FIRST = '[[log]]\nname = "roll"'  # how the first log of the study begins
 
 
 def call(*arguments, code=0) -> str:
@@ -80,9 +81,21 @@ def test_the_same_data_give_the_same_bytes_whatever_the_number_of_processes(stud
 @pytest.mark.parametrize(
     ("change", "reruns", "keeps"),
     [
-        (("study.toml", '[[log]]\nname = "roll"', '[settings]\nlowpass = 12.0\n[[log]]\nname = "roll"'), ("predict", "lowpass = 17.0 became 12.0"), "ingest"),
-        (("study.toml", '[[log]]\nname = "roll"', '[robot_overrides.hand_roll]\nharmonics = 3\n[[log]]\nname = "roll"'), ("fit", "the robot changed"), None),
-        (("study.toml", "contact = [[4.0, 6.0]]", "contact = [[4.0, 6.1]]"), ("ekf", "the entry changed"), "differentiate"),
+        (
+            ("study.toml", FIRST, f"[settings]\nlowpass = 12.0\n{FIRST}"),
+            ("predict", "lowpass = 17.0 became 12.0"),
+            "ingest",
+        ),
+        (
+            ("study.toml", FIRST, f"[robot_overrides.hand_roll]\nharmonics = 3\n{FIRST}"),
+            ("fit", "the robot changed"),
+            None,
+        ),
+        (
+            ("study.toml", "contact = [[4.0, 6.0]]", "contact = [[4.0, 6.1]]"),
+            ("ekf", "the entry changed"),
+            "differentiate",
+        ),
     ],
 )  # fmt: skip
 def test_a_stage_runs_again_and_says_why(finished, change, reruns, keeps):

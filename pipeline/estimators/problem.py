@@ -58,7 +58,8 @@ def solve(problem: Problem, weight: Array) -> Answer:
     condition = np.linalg.cond(R)
     if condition > 1e8:
         raise NotIdentifiable(
-            f"the motion does not tell {', '.join(problem.names)} apart: condition number {condition:.1e} of scaled columns"
+            f"the motion does not tell {', '.join(problem.names)} apart: "
+            f"condition number {condition:.1e} of scaled columns"
         )
     scaled = np.linalg.solve(R, Q.T @ z)
     bread = np.linalg.inv(R.T @ R)
@@ -80,8 +81,8 @@ def correlation_lags(residual: Array, starts: tuple[int, ...]) -> int:
     The bandwidth for a Bartlett window under a first-order autoregression.  (D. Andrews, 1991, (6.2), (6.4))
     """
     parts = np.split(residual, starts[1:])
-    rho = sum(x[1:] @ x[:-1] for x in parts) / max(residual @ residual, 1e-300)
-    rho = float(np.clip(rho, -0.97, 0.97))
+    first = sum(float(x[1:] @ x[:-1]) for x in parts) / max(float(residual @ residual), 1e-300)
+    rho = float(np.clip(first, -0.97, 0.97))
     alpha = 4 * rho**2 / ((1 - rho) ** 2 * (1 + rho) ** 2)
     return min(int(np.ceil(1.1447 * (alpha * len(residual)) ** (1 / 3))), min(map(len, parts)) // 3)
 

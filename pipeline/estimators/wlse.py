@@ -41,4 +41,4 @@ def pooled(var: Array, periods: int) -> Array:
     around = np.concatenate([var[K - reach :], var, var[:reach]])
     total = np.cumsum(np.concatenate([[0.0], around]))
     smooth = (total[2 * reach + 1 :] - total[: -2 * reach - 1]) / (2 * reach + 1)
-    return np.maximum(smooth, 1e-12 * var.mean() + 1e-300)
+    return np.asarray(np.maximum(smooth, 1e-12 * var.mean() + 1e-300))

@@ -17,7 +17,7 @@ class Folded(NamedTuple):
 
     mean: Array  # (K,)
     var: Array  # (K,) variance of one period, not of the mean
-    count: NDArray[np.int64]  # (K,) samples averaged
+    counts: NDArray[np.int64]  # (K,) samples averaged
     noise: Array  # (N,) sample minus mean
 
 
@@ -27,7 +27,7 @@ def phases(period: float, rate: float) -> int:
 
 
 def whole_periods(t: Array, period: float, rate: float) -> int:
-    """How many whole periods the samples cover, M; the last may lack less than half a sample, as its end is uncertain."""
+    """How many whole periods the samples cover, M; the last may lack less than half a sample: its end is uncertain."""
     return int(np.floor(((t[-1] - t[0]) * rate + 1.5) / (period * rate)))
 
 

@@ -81,7 +81,7 @@ def _compiled_pass() -> Callable[..., None]:
     return compiled
 
 
-def _pass(  # noqa: PLR0913
+def _pass(
     bias: Any, M: float, y_q: Any, y_dq: Any, tau: Any, T_s: float, r_q: float, r_dq: float, q_dq: float, q_tau: float,
     first_std: float, first: float, out_q: Any, out_dq: Any, out_tau: Any, out_std: Any, out_iq: Any, out_idq: Any,
     out_nis: Any,

@@ -31,7 +31,7 @@ def project(t: Array, x: Array, omega: float, harmonics: int) -> Array:
         F = basis(t[start : start + BLOCK], omega, harmonics)
         gram += F.T @ F
         right += F.T @ x[start : start + BLOCK]
-    return np.linalg.solve(gram, right)
+    return np.asarray(np.linalg.solve(gram, right), dtype=np.float64)
 
 
 def evaluate(c: Array, t: Array, omega: float) -> Array:

@@ -1,6 +1,7 @@
 """Velocities and accelerations of motion that does not repeat: zero-phase low-pass, then differences."""
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,5 +42,5 @@ def stretches(stretch: Integers) -> Iterator[slice]:
     if len(stretch) == 0:
         return
     edges = [0, *(np.flatnonzero(np.diff(stretch)) + 1).tolist(), len(stretch)]
-    for start, stop in zip(edges, edges[1:], strict=False):
+    for start, stop in pairwise(edges):
         yield slice(start, stop)

@@ -37,7 +37,7 @@ gravity_sin = Term("gravity, sine", "g sin(q)", "kg m", b="g * sin(q)", b_q="g *
 gravity_cos = Term("gravity, cosine", "g cos(q)", "kg m", b="g * cos(q)", b_q="-g * sin(q)")
 viscous = Term("viscous friction", "dot(q)", "{effort} s/{position}", b="dq", b_dq="1.0")
 # The jump at dq = 0 has no derivative; the filter takes it as zero there, as section 7.1.2 does.
-coulomb = Term("Coulomb friction", "op(\"sign\")(dot(q))", "{effort}", b="sign(dq)")
+coulomb = Term("Coulomb friction", 'op("sign")(dot(q))', "{effort}", b="sign(dq)")
 offset = Term("offset", "1", "{effort}", b="1.0")
 stiffness = Term("stiffness", "q", "{effort}/{position}", b="q", b_q="1.0")
 

@@ -25,6 +25,10 @@ class Context:
         """The result of that key as a cell, or a dash where there is none."""
         return self.results[key].number(digits) if key in self.results else "–"
 
+    def count(self, key: str) -> Number | str:
+        """The result of that key, which is a whole number, as a cell."""
+        return self.number(key, len(str(round(self.results[key].value))) if key in self.results else 1)
+
 
 def title(name: str) -> str:
     """The name of a log or joint as a heading: 'hand_roll' is 'Hand roll'."""

@@ -12,7 +12,6 @@ from pipeline.records import Average, Column, Noise, Note, Signal, note
 from pipeline.robots.robot import Robot
 from pipeline.study import LogEntry
 
-HELD = 1e-3  # a joint is held where it moves less than this share of its range, or of 1 rad or 0.1 m
 MISMATCH = 5e-4  # a stated period is wrong by more than this share when the data disagree with it
 
 
@@ -22,8 +21,8 @@ def run(
     """One period of each joint that moves; the joints of a log share the period."""
     if entry.role != "identification":
         return
-    moving = [signal for signal in signals if moves(signal, robot)]
-    held = [signal.joint for signal in signals if not moves(signal, robot)]
+    moving = [signal for signal in signals if not signal.held]
+    held = [signal.joint for signal in signals if signal.held]
     if held:
         yield note(
             "average", entry.name, "note", *(f"{entry.name}: {j} does not move: held, and left out" for j in held)
@@ -38,13 +37,6 @@ def run(
         yield note("average", entry.name, "warning", *remarks)
     for signal in moving:
         yield from averaged(signal, found, entry.period or 0.0)
-
-
-def moves(signal: Signal, robot: Robot) -> bool:
-    """Whether a joint moves enough to say anything about its dynamics."""
-    low, high = robot.joint(signal.joint).limits.q
-    span = high - low if np.isfinite(high - low) else 1.0
-    return bool(np.ptp(signal.q) > HELD * 10 * span)
 
 
 def shared_period(signals: Sequence[Signal], entry: LogEntry, harmonics: int) -> tuple[period.Period, list[str]]:
@@ -62,8 +54,8 @@ def shared_period(signals: Sequence[Signal], entry: LogEntry, harmonics: int) ->
     if guess is None:
         stated = f"; the study states {entry.period} s" if entry.period else ""
         raise NotPeriodic(
-            f"{entry.name}: {seconds:.2f} s hold no motion that repeats at least twice{stated}; record more periods, skip the "
-            "transient at the start, or give the log another role"
+            f"{entry.name}: {seconds:.2f} s hold no motion that repeats at least twice{stated}; record more periods, "
+            "skip the transient at the start, or give the log another role"
         )
     remarks, length = [], guess / first.rate
     if entry.period:
@@ -74,8 +66,9 @@ def shared_period(signals: Sequence[Signal], entry: LogEntry, harmonics: int) ->
     found = period.refine(first.t - first.t[0], [signal.q for signal in signals], length, harmonics)
     if entry.period and abs(entry.period - found.length) > max(MISMATCH * entry.period, 5 * found.std):
         remarks.append(
-            f"{entry.name}: the study states a period of {entry.period} s, but the joints repeat every {found.length:.4f} s "
-            f"(+- {found.std:.1g} s); the latter is used: correct the period in study.toml, or leave it out"
+            f"{entry.name}: the study states a period of {entry.period} s, but the joints repeat every "
+            f"{found.length:.4f} s (+- {found.std:.1g} s); the latter is used: "
+            "correct the period in study.toml, or leave it out"
         )
     if averaging.whole_periods(first.t, found.length, first.rate) < 2:
         raise NotPeriodic(f"{entry.name}: {seconds:.2f} s hold fewer than two periods of {found.length:.4f} s")
@@ -111,6 +104,6 @@ def averaged(signal: Signal, found: period.Period, stated: float) -> Iterator[Av
         q_var=q.var,
         dq_var=dq.var,
         tau_var=tau.var,
-        count=q.count,
+        count=q.counts,
     )
     yield Noise(signal.log, signal.joint, t=t, q_noise=q.noise, dq_noise=dq.noise, tau_noise=tau.noise)

@@ -37,8 +37,9 @@ def run(average: Average, joint: Joint, *, derivative: str, harmonics: int) -> I
         highest = orders + 1 + int(beyond.argmax())
         yield note(
             "differentiate", f"{average.log}.{average.joint}", "warning",
-            f"{average.log}/{average.joint}: harmonic {highest} of the position is {beyond.max() / amplitude[1:].max():.1%} of "
-            f"the largest, and {orders} harmonics are kept; raise `harmonics` in [settings] if it was commanded",
+            f"{average.log}/{average.joint}: harmonic {highest} of the position is "
+            f"{beyond.max() / amplitude[1:].max():.1%} of the largest, and {orders} harmonics are kept; raise "
+            "`harmonics` in [settings] if it was commanded",
         )  # fmt: skip
 
 

@@ -87,6 +87,7 @@ def tracked(
         estimator=fit.estimator,
         filter="ekf",
         role=signal.role,
+        held=signal.held,
         rate=signal.rate,
         tau_ext_rms=float(np.sqrt(np.mean(together.tau_ext[counted] ** 2))) if counted.any() else 0.0,
         nis_mean=float(np.mean(together.nis[settled(signal.t)])),

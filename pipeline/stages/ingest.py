@@ -54,7 +54,8 @@ class Reading:
             names.append(self.own_time)
         elif "time" not in self.sources and self.entry.rate is None and self.log.clock is None:
             raise BadLog(
-                f"{self.log.path}: the log carries no clock; name its time channel in [log.channels], or say rate = ... [Hz]"
+                f"{self.log.path}: the log carries no clock; name its time channel in [log.channels], "
+                "or say rate = ... [Hz]"
             )
         self.names = list(dict.fromkeys(names))
 
@@ -76,9 +77,10 @@ class Reading:
             return 1.0
         if measures(unit) != source.measures:
             what = f"measures {measures(unit)}" if unit in UNITS else "is not known"
+            fitting = ", ".join(u for u in UNITS if measures(u) == source.measures)
             raise BadLog(
-                f"{self.log.path}: channel {channel.name!r} is in {channel.unit!r}, which {what}, but {source.quantity} needs "
-                f"{source.measures}; say unit = ... for it in study.toml: {', '.join(u for u in UNITS if measures(u) == source.measures)}"
+                f"{self.log.path}: channel {channel.name!r} is in {channel.unit!r}, which {what}, but "
+                f"{source.quantity} needs {source.measures}; say unit = ... for it in study.toml: {fitting}"
             )
         return size(unit)
 
@@ -121,12 +123,13 @@ class Reading:
         if self.own_time:
             return block[self.own_time]
         assert self.log.clock is not None
-        return self.log.clock.start + rows * self.log.clock.step
+        return np.asarray(self.log.clock.start + rows * self.log.clock.step, dtype=np.float64)
 
     def converted(self, block: Block, quantity: str) -> Column:
         """A channel in SI: offset first, in the channel's unit, then sign and unit."""
         source = self.sources[quantity]
-        return source.sign * self.scales[quantity] * (block[self.channels[quantity].name] + source.offset)
+        shifted = block[self.channels[quantity].name] + source.offset
+        return shifted * (source.sign * self.scales[quantity])
 
     def of_joint(self, block: Block, joint: Joint, either: tuple[str, str]) -> Column | None:
         """A quantity at the joint, from whichever side of the gears it was logged on.  (6.28), (6.29)"""
@@ -148,8 +151,8 @@ class Reading:
         missing = self.log.nulls.get(name, 0)
         what = f"has no sample at row {row}" if missing else f"holds {values[bad[0]]} at row {row}"
         raise BadLog(
-            f"{self.log.path}: channel {name!r} {what} (counted from 0), and {len(bad)} of the {len(values)} rows read with it "
-            "lack a number; record it again, or give the part before it as a log of its own"
+            f"{self.log.path}: channel {name!r} {what} (counted from 0), and {len(bad)} of the {len(values)} rows "
+            "read with it lack a number; record it again, or give the part before it as a log of its own"
         )
 
     def require_increasing(self) -> None:
@@ -158,8 +161,8 @@ class Reading:
         if clock.backward or clock.repeated:
             raise BadLog(
                 f"{self.log.path}: time does not increase at row {clock.bad_row} (counted from 0): "
-                f"{clock.bad_pair[0]:.9g} s, then {clock.bad_pair[1]:.9g} s; name another time channel, or say rate = ... [Hz] "
-                "to count samples instead"
+                f"{clock.bad_pair[0]:.9g} s, then {clock.bad_pair[1]:.9g} s; name another time channel, "
+                "or say rate = ... [Hz] to count samples instead"
             )
 
     def intake(self) -> Intake:
@@ -212,10 +215,11 @@ class Reading:
         clock = self.clock
         if clock.duplicates > MOST_REPEATED * clock.samples:
             yield (
-                f"{clock.duplicates} of {clock.samples} rows ({clock.duplicates / clock.samples:.0%}) repeat the one before in every "
-                "channel used: the recorder ran faster than the robot's measurements"
+                f"{clock.duplicates} of {clock.samples} rows ({clock.duplicates / clock.samples:.0%}) repeat the one "
+                "before in every channel used: the recorder ran faster than the robot's measurements"
             )
         if clock.jitter * clock.rate > MOST_JITTER:
             yield f"the time between samples varies by {clock.jitter * 1e3:.3g} ms around {1e3 / clock.rate:.3g} ms"
         if clock.longest_gap * clock.rate > 2.5:
-            yield f"the longest time between samples is {clock.longest_gap:.3g} s, {clock.longest_gap * clock.rate:.1f} samples"
+            gap = clock.longest_gap
+            yield f"the longest time between samples is {gap:.3g} s, {gap * clock.rate:.1f} samples"

@@ -11,7 +11,7 @@ from pipeline.maths import averaging, harmonics
 from pipeline.maths.dynamics import regressor
 from pipeline.maths.smoothing import lowpass as low_passed
 from pipeline.maths.smoothing import motion, stretches
-from pipeline.maths.windows import outside
+from pipeline.maths.windows import Chosen, outside
 from pipeline.records import Column, Fit, Prediction, Signal, Trajectory
 from pipeline.robots.robot import Joint
 from pipeline.stages.fit import MODEL, pose
@@ -30,7 +30,12 @@ def run(
     *,
     lowpass: float,
 ) -> Iterator[Prediction]:
-    """One Prediction per fit of the joint; the prediction of an identification log comes from refits without it."""
+    """One Prediction per fit of the joint; the prediction of an identification log comes from refits without it.
+
+    A held joint is not predicted: at standstill friction takes any value up to its Coulomb level.
+    """
+    if signal.held:
+        return
     if entry.role in ("validation", "contact"):
         free = outside(signal.t, entry.contact)
         Phi = measured_regressor(signal, joint, lowpass)
@@ -89,12 +94,12 @@ def without_a_period(
     yield scored(part, MODEL, name, "leave one period out", tau_hat, np.ones(len(since), bool), lowpass)
 
 
-def whole(signal: Signal, own: Trajectory) -> Column:
+def whole(signal: Signal, own: Trajectory) -> Chosen:
     """Which samples belong to whole periods."""
-    return signal.t - signal.t[0] < own.periods * own.period - 0.5 / signal.rate
+    return signal.t - float(signal.t[0]) < own.periods * own.period - 0.5 / signal.rate
 
 
-def at(signal: Signal, which: Column) -> Signal:
+def at(signal: Signal, which: Chosen) -> Signal:
     """Some of the samples of a signal."""
     columns = {name: getattr(signal, name)[which] for name in signal.columns()}
     return replace(signal, **columns)
@@ -111,7 +116,7 @@ def motion_at(own: Trajectory, since: Column) -> tuple[Column, Column, Column]:
 
 
 def scored(
-    signal: Signal, model: str, name: str, scheme: str, tau_hat: Column, free: Column, lowpass: float
+    signal: Signal, model: str, name: str, scheme: str, tau_hat: Column, free: Chosen, lowpass: float
 ) -> Prediction:
     """A prediction with its scores, over the samples where nothing touched the robot."""
     tau, error = signal.tau[free], (signal.tau - tau_hat)[free]

@@ -3,20 +3,34 @@
 from collections.abc import Iterator
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pipeline.errors import BadLog
 from pipeline.maths.smoothing import motion
 from pipeline.records import Column, Note, Recording, Signal, note
+from pipeline.robots.robot import Joint
+
+Indices = NDArray[np.intp]
 
 GAP = 2.5  # sampling times between two samples that count as an interruption
 EVEN = 0.02  # of a sampling time: clocks that stray less than this from a uniform one are taken as uniform
+HELD = 0.01  # share of a joint's range, or of 1 rad or 1 m where it has no limits, below which it is held
 FEWEST = 4  # samples that a cubic spline needs; a shorter stretch is left out
 
 
-def run(recording: Recording, *, lowpass: float) -> Iterator[Signal | Note]:
-    """One Signal per recording.  Gaps start a new stretch; nothing is ever interpolated across one."""
+def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signal | Note]:
+    """One Signal per recording.  Gaps start a new stretch; nothing is ever interpolated across one.
+
+    Raises
+    ------
+    BadLog
+        If no stretch between gaps holds more than a few samples.
+    """
     T_s = float(np.median(np.diff(recording.t)))
     cuts = np.flatnonzero(np.diff(recording.t) > GAP * T_s) + 1
     parts = [p for p in np.split(np.arange(len(recording.t)), cuts) if len(p) >= FEWEST]
+    if not parts:
+        raise BadLog(f"{recording.log}/{recording.joint}: no stretch without a gap holds {FEWEST} samples")
     if is_even(recording.t, parts, T_s):
         # The mean over the longest stretch; a median would carry the rounding of the time stamps.
         longest = max(parts, key=len)
@@ -40,26 +54,34 @@ def run(recording: Recording, *, lowpass: float) -> Iterator[Signal | Note]:
         method=method,
         velocity=recording.velocity,
         gaps=len(parts) - 1,
+        held=int(not moves(q, joint)),
         t=np.concatenate(clocks),
         q=q,
         dq=dq,
         tau=tau,
         stretch=stretch,
     )
-    yield from remarks(recording, method, cuts)
+    yield from remarks(recording, method, cuts, sum(map(len, parts)))
 
 
-def is_even(t: Column, parts: list[Column], T_s: float) -> bool:
+def moves(q: Column, joint: Joint) -> bool:
+    """Whether a joint moves enough to say anything about its dynamics."""
+    low, high = joint.limits.q
+    return bool(np.ptp(q) > HELD * (high - low if np.isfinite(high - low) else 1.0))
+
+
+def is_even(t: Column, parts: list[Indices], T_s: float) -> bool:
     """Whether every stretch runs on a uniform clock of its own, to a fraction of a sample."""
     return all(np.abs(t[p] - np.linspace(t[p[0]], t[p[-1]], len(p))).max() < EVEN * T_s for p in parts)
 
 
 def uniform(t: Column, T_s: float) -> Column:
     """A uniform clock from the first sample of a stretch, no further than its last."""
-    return t[0] + T_s * np.arange(int(np.floor((t[-1] - t[0]) / T_s * (1 + 1e-12))) + 1)
+    steps = int(np.floor((t[-1] - t[0]) / T_s * (1 + 1e-12)))
+    return np.asarray(t[0] + T_s * np.arange(steps + 1))
 
 
-def on_clock(recording: Recording, part: Column, clock: Column, method: str) -> tuple[Column, ...]:
+def on_clock(recording: Recording, part: Indices, clock: Column, method: str) -> tuple[Column, ...]:
     """Position, velocity and effort of one stretch at the times of a clock."""
     columns = (recording.q[part], recording.dq[part], recording.tau[part])
     if method == "as recorded":
@@ -70,12 +92,14 @@ def on_clock(recording: Recording, part: Column, clock: Column, method: str) -> 
     return tuple(spline(clock).T)
 
 
-def remarks(recording: Recording, method: str, cuts: Column) -> Iterator[Note]:
+def remarks(recording: Recording, method: str, cuts: Indices, kept: int) -> Iterator[Note]:
     """What was done to the clock, where anything was."""
     name, said = f"{recording.log}/{recording.joint}", []
     if len(cuts):
         where = ", ".join(f"{recording.t[c - 1]:.3f} s" for c in cuts[:5])
         said.append(f"{name}: {len(cuts)} gaps, not bridged, after {where}{' ...' if len(cuts) > 5 else ''}")
+    if kept < len(recording):
+        said.append(f"{name}: {len(recording) - kept} samples in stretches of fewer than {FEWEST} were left out")
     if method != "as recorded":
         said.append(f"{name}: the clock is uneven, so the samples were put on a uniform one: {method}")
     if said:

@@ -16,25 +16,35 @@ def section(context: Context) -> Section | None:
     parts = (
         Section(f"{title(t.joint)} in {literal(t.log)}", f"track-{t.log}-{t.joint}", tuple(of_track(context, t)))
         for t in tracks
+        if not t.held
     )
-    return Section("External effort", "filter", (intro(), assumptions(tracks), scores(context, tracks), *parts))
+    return Section(
+        "External effort", "filter", (*intro(tracks), assumptions(context, tracks), scores(context, tracks), *parts)
+    )
 
 
-def intro() -> Prose:
-    """What the filter does."""
-    return Prose(
+def intro(tracks: list[Track]) -> Iterator[Prose]:
+    """What the filter does, and which joints it cannot say much about."""
+    yield Prose(
         "An extended Kalman filter follows position, velocity and external effort of each joint by itself. It takes "
         "the noise of its measurements from the spread between periods; how fast the external effort may wander is a "
         "choice, stated in [@filter-noise]. Its innovations, what each measurement adds to what was predicted, are "
         "white where the model and the choice fit the data. Whiteness is tested over the whole run but its first "
         "second, contacts and reversals included."
     )
+    held = [f"{title(t.joint)} in {literal(t.log)}" for t in tracks if t.held]
+    if held:
+        yield Prose(
+            f"Held joints are in the tables only ({', '.join(held)}): at standstill friction takes any value up to its "
+            "Coulomb level, and external effort up to that level cannot be told from it."
+        )
 
 
-def assumptions(tracks: list[Track]) -> Table:
+def assumptions(context: Context, tracks: list[Track]) -> Table:
     """What the filter assumed of noise."""
+    names = ("r_q", "r_dq", "q_dq", "q_tau")
     rows = tuple(
-        (title(t.joint), literal(t.log), *(with_unit(t, name) for name in ("r_q", "r_dq", "q_dq", "q_tau")))
+        (title(t.joint), literal(t.log), *(context.number(f"ekf.{t.log}.{t.joint}.{name}", 3) for name in names))
         for t in tracks
     )
     return Table(
@@ -45,12 +55,6 @@ def assumptions(tracks: list[Track]) -> Table:
         "filter-noise",
         "llrrrr",
     )
-
-
-def with_unit(track: Track, name: str) -> str:
-    """A setting of the filter, as text."""
-    unit = track.origin.units[name] if track.origin else ""
-    return f"{getattr(track, name):.3g} {unit}"
 
 
 def scores(context: Context, tracks: list[Track]) -> Table:

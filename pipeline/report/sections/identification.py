@@ -102,16 +102,17 @@ def unitless(context: Context, key: str) -> object:
 
 def quality(context: Context, fits: list[Fit]) -> Table:
     """How well each fit describes the averaged periods."""
-    names = ("mse", "r2", "condition", "samples", "periods", "hac_lags")
-    rows = tuple(
-        (NAMES.get(f.estimator, f.estimator), *(context.number(".".join(("fit", *f.key, name)), 4) for name in names))
-        for f in fits
-    )
+    rows = []
+    for fit in fits:
+        key = ".".join(("fit", *fit.key))
+        numbers = (context.number(f"{key}.{name}") for name in ("mse", "r2", "condition"))
+        counts = (context.count(f"{key}.{name}") for name in ("samples", "periods", "hac_lags"))
+        rows.append((NAMES.get(fit.estimator, fit.estimator), *numbers, *counts))
     return Table(
         "Mean squared error of the averaged effort, share of its variance explained, condition number of the "
         "regressor, and the lags of correlation that the deviations allow for.",
         ("Estimator", "MSE", "$R^2$", "Condition", "Samples", "Periods", "Lags"),
-        rows,
+        tuple(rows),
         align="lrrrrrr",
     )
 

@@ -43,7 +43,7 @@ def blocks(context: Context, averages: list[Average]) -> Iterator[Block]:
             literal(a.log),
             title(a.joint),
             context.number(f"period.{a.log}", 6),
-            context.number(f"period.{a.log}.periods", 3),
+            context.count(f"period.{a.log}.periods"),
             *(context.number(f"noise.{a.log}.{a.joint}.{s}", 3) for s in ("sigma_q", "sigma_dq", "sigma_tau")),
         )
         for a in averages
@@ -57,9 +57,8 @@ def blocks(context: Context, averages: list[Average]) -> Iterator[Block]:
 def of_one(context: Context, average: Average) -> Iterator[Block]:
     """The figures of one log and joint."""
     about = {"log": average.log, "joint": average.joint}
-    noises, trajectories, spectra, signals = (
-        context.library.about(kind, **about) for kind in (Noise, Trajectory, Spectrum, Signal)
-    )
+    noises, trajectories = context.library.about(Noise, **about), context.library.about(Trajectory, **about)
+    spectra, signals = context.library.about(Spectrum, **about), context.library.about(Signal, **about)
     if not (noises and trajectories and spectra and signals):
         return
     whiteness = {w.signal: w for w in context.library.about(Whiteness, **about)}

@@ -49,12 +49,12 @@ def overview(context: Context, intakes: list[Intake]) -> Table:
             literal(intake.log),
             intake.role,
             intake.format,
-            context.number(f"log.{intake.log}.rows", 7),
+            context.count(f"log.{intake.log}.rows"),
             context.number(f"log.{intake.log}.rate", 5),
             context.number(f"log.{intake.log}.duration", 5),
             context.number(f"log.{intake.log}.jitter", 2),
             context.number(f"period.{intake.log}", 6),
-            context.number(f"period.{intake.log}.periods", 3),
+            context.count(f"period.{intake.log}.periods"),
         )
         for intake in intakes
     )

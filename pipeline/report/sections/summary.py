@@ -78,7 +78,7 @@ def verdicts(context: Context, joint: str) -> Iterator[Verdict]:
             f"**{name}**: the model explains at least {r2} of the variance of effort that it has not seen "
             f"(worst: {literal(worst.log)}, {worst.scheme}).",
         )
-    tracks = [track for track in context.library.all(Track) if track.joint == joint]
+    tracks = [track for track in context.library.all(Track) if track.joint == joint and not track.held]
     white = [t.log for t in tracks if context.results[f"ekf.{t.log}.{joint}.white"].value == 1]
     if tracks and len(white) == len(tracks):
         yield Verdict("good", f"**{name}**: the filter's innovations pass as white noise in all {len(tracks)} logs.")
@@ -100,7 +100,7 @@ def table(context: Context) -> Table:
             (
                 title(track.joint),
                 literal(track.log),
-                track.role,
+                f"{track.role}, held" if track.held else track.role,
                 context.number(f"{key}.tau_ext_rms", 3),
                 context.number(f"{key}.nis_mean", 3),
                 "yes" if white else "no",
