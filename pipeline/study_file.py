@@ -53,7 +53,7 @@ class _Reader:
         title = self.problems.take(table, "title", str, self.folder.name)
         simulated = self.problems.take(table, "simulated", bool, False)
         robot = self.robot(table)
-        settings = self.settings(table.get("settings", {}))
+        settings = self.settings(self.problems.table(table, "settings"))
         entries = table.get("log", [])
         if not isinstance(entries, list) or not entries:
             self.problems.add(0, "it has no [[log]] table, so there is nothing to analyse")
@@ -62,7 +62,7 @@ class _Reader:
         self.twice([entry.name for entry in logs if entry])
         self.problems.refuse()
         assert robot is not None
-        overrides = table.get("robot_overrides", {})
+        overrides = self.problems.table(table, "robot_overrides")
         own = table["robot"] if table["robot"].endswith(".toml") else ""
         kept = tuple(entry for entry in logs if entry)
         return Study(self.folder, title, robot, simulated, settings, kept, overrides, own)
@@ -80,11 +80,12 @@ class _Reader:
         except BadRobot as error:
             self.problems.add(self.problems.line("robot"), str(error))
             return None
-        return self.overridden(robot, table.get("robot_overrides", {}))
+        return self.overridden(robot, self.problems.table(table, "robot_overrides"))
 
-    def overridden(self, robot: Robot, overrides: Any) -> Robot:
+    def overridden(self, robot: Robot, overrides: dict[str, Any]) -> Robot:
         joints = {joint.name: joint for joint in robot.joints}
-        for name, changes in overrides.items() if isinstance(overrides, dict) else ():
+        for name in overrides:
+            changes = self.problems.table(overrides, name)
             line = self.problems.line(rf"\[robot_overrides\.\"?{re.escape(name)}\"?\]", exact=False)
             if name not in joints:
                 known = ", ".join(joints)

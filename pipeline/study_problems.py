@@ -56,6 +56,14 @@ class Problems:
             says = f"{place}: unknown key {key!r}; known are {', '.join(known)}".lstrip(": ")
             self.add(self.line(re.escape(key), start), says)
 
+    def table(self, parent: dict[str, Any], key: str) -> dict[str, Any]:
+        """A table below another; empty where it is not there, or is something else, which is a problem."""
+        value = parent.get(key, {})
+        if isinstance(value, dict):
+            return value
+        self.add(self.line(re.escape(key)), f"{key} must be a table, not {value!r}")
+        return {}
+
     def take(self, table: dict[str, Any], key: str, kind: type, default: Any, start: int = 0) -> Any:
         """The value of a key if it is of that kind, else the default."""
         value: Any = table.get(key, default)

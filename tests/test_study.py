@@ -1,10 +1,16 @@
 """Study files: everything that is wrong is said at once, with its line; what is right means what it says."""
 
+import contextlib
+import tomllib
+
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from pipeline import robots, study_file
 from pipeline.errors import BadRobot, BadStudy
 from pipeline.robots.robot import Kind
+from pipeline.study_problems import Problems
 from tests.test_runs import call
 
 GOOD = """title = "T"
@@ -113,6 +119,36 @@ def test_what_is_wrong_is_said_with_its_line_and_the_remedy(tmp_path, old, new, 
     with pytest.raises(BadStudy) as caught:
         read(tmp_path, GOOD.replace(old, new, 1))
     assert says in str(caught.value)
+
+
+ANYTHING = st.recursive(
+    st.none() | st.booleans() | st.integers(-3, 3) | st.floats() | st.text(max_size=3),
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner, max_size=3),
+    max_leaves=4,
+)
+
+
+@given(data=st.data())
+def test_no_study_file_however_odd_ends_in_anything_but_a_message(data, tmp_path_factory):
+    """Any value of a good study, tables included, replaced by anything that TOML can hold."""
+    table = tomllib.loads(GOOD)
+    places: list = []
+
+    def walk(parent):
+        for key, value in parent.items() if isinstance(parent, dict) else enumerate(parent):
+            places.append((parent, key))
+            if isinstance(value, dict | list):
+                walk(value)
+
+    walk(table)
+    table |= {"settings": {"lowpass": 3.0}, "robot_overrides": {"hand_roll": {"gear_ratio": 2.0, "limits": {"q": [0, 1]}}}}
+    walk({key: table[key] for key in ("settings", "robot_overrides")})
+    parent, key = data.draw(st.sampled_from(places))
+    parent[key] = data.draw(ANYTHING)
+    folder = tmp_path_factory.mktemp("odd", numbered=True)
+    reader = study_file._Reader(folder, Problems(folder / "study.toml", GOOD))
+    with contextlib.suppress(BadStudy):
+        assert reader.study(table).logs
 
 
 def test_all_problems_are_said_at_once(tmp_path):
