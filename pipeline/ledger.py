@@ -148,12 +148,15 @@ def _collect(found: Iterable[Path], files: dict[Path, None]) -> None:
                     _collect(_files(module), files)
 
 
-def _imports(file: Path) -> Iterator[str]:
+@cache
+def _imports(file: Path) -> tuple[str, ...]:
+    found = []
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("pipeline"):
             for alias in node.names:
                 deeper = f"{node.module}.{alias.name}"
-                yield deeper if _files(deeper) else node.module
+                found.append(deeper if _files(deeper) else node.module)
+    return tuple(found)
 
 
 def _files(module: str) -> list[Path]:

@@ -8,7 +8,7 @@ from pipeline.library import Library, Provenance
 from pipeline.quantities import QUANTITIES
 from pipeline.records import Column, Record
 from pipeline.report.content import Number, literal
-from pipeline.report.results import Results
+from pipeline.report.results import Results, printed
 from pipeline.study import Study
 
 
@@ -40,7 +40,7 @@ def label(record: Record, field: str, meaning: str = "") -> str:
     """The label of an axis: what a field means and its unit."""
     unit = record.origin.units.get(field, "") if record.origin else ""
     words = meaning or QUANTITIES[field].meaning
-    return f"{words} [{unit}]" if unit not in ("", "1") else words
+    return f"{words} [{printed(unit)}]" if unit not in ("", "1") else words
 
 
 def normal_scores(x: Column) -> tuple[Column, Column, float, float]:

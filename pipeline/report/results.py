@@ -24,7 +24,7 @@ class Result:
 
     def number(self, digits: int = 4) -> Number:
         """The number as a report prints it."""
-        return Number(self.value, "" if self.unit == "1" else self.unit, self.std, self.key, digits)
+        return Number(self.value, printed(self.unit), self.std, self.key, digits)
 
 
 class Results(dict[str, Result]):
@@ -109,6 +109,12 @@ def _whiteness(found: Results, w: Whiteness) -> None:
     else:
         for name in ("acf1", "ljung_box_p", "jarque_bera_p", "skewness", "kurtosis", "white"):
             found.add(w, f"whiteness.{w.log}.{w.joint}.{w.signal}.{name}", name)
+
+
+def printed(unit: str) -> str:
+    """A unit as it is printed: powers as superscripts, a root as a root, and nothing for a pure number."""
+    words = re.sub(r"(\w+)\^0\.5", r"√\1", "" if unit == "1" else unit)
+    return re.sub(r"\^(\d)", lambda match: "⁰¹²³⁴⁵⁶⁷⁸⁹"[int(match[1])], words)
 
 
 def parse(source: str) -> Iterator[str]:

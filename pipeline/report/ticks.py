@@ -8,6 +8,7 @@ from pipeline.report.number import MINUS, SUPERSCRIPTS
 if TYPE_CHECKING:
     from matplotlib.axis import Axis
 
+FEW_DECADES = 3  # that still have room for more numbers than their powers of ten
 PLAIN = (2e-3, 2e4)  # greatest values between which an axis has numbers as they are
 
 
@@ -33,9 +34,19 @@ def scaled(axis: "Axis", label: str) -> str:
 
 
 def decades(axis: "Axis") -> None:
-    """Label 1, 2 and 5 of each decade as plain numbers: matplotlib's own labels overlap within few decades."""
-    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+    """Number a logarithmic axis whose range is set: 1, 2 and 5 of each of a few decades, else some whole decades."""
+    from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
-    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0), numticks=8))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    low, high = sorted(math.log10(limit) for limit in axis.get_view_interval())
+    first, last = math.ceil(low), math.floor(high)
+    if last - first < FEW_DECADES:
+        values = [digit * 10.0**n for n in range(first - 1, last + 1) for digit in (1, 2, 5)]
+        axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    else:
+        values = [10.0**n for n in range(first, last + 1, math.ceil((last - first) / FEW_DECADES))]
+        axis.set_major_formatter(
+            FuncFormatter(lambda value, _: f"10{str(round(math.log10(value))).translate(SUPERSCRIPTS)}")
+        )
+    axis.set_major_locator(FixedLocator([value for value in values if low <= math.log10(value) <= high]))
+    axis.set_minor_locator(NullLocator())
     axis.set_minor_formatter(NullFormatter())

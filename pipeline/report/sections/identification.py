@@ -19,7 +19,7 @@ from pipeline.report.content import (
     literal,
 )
 from pipeline.report.context import Context, histogram, label, normal_scores, title
-from pipeline.report.results import slug
+from pipeline.report.results import printed, slug
 from pipeline.report.sections.noise import autocorrelation
 
 NAMES = {"lse": "least squares", "wlse": "weighted least squares"}
@@ -79,7 +79,7 @@ def parameters(context: Context, fits: list[Fit]) -> Table:
         header += [fit.estimator.upper(), "classical deviation"]
     rows = []
     for i, name in enumerate(fits[0].parameter):
-        cells: list[object] = [f"$theta_{i + 1}$", name, fits[0].unit[i]]
+        cells: list[object] = [f"$theta_{i + 1}$", name, printed(fits[0].unit[i])]
         for fit in fits:
             key = ".".join(("fit", *fit.key, slug(name)))
             cells += [unitless(context, key), unitless(context, f"{key}.std_classical")]

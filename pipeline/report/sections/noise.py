@@ -138,5 +138,9 @@ def removed(noise: Noise, whiteness: dict[str, Whiteness]) -> Iterator[Panel]:
 
 def autocorrelation(w: Whiteness, heading: str) -> Panel:
     """An autocorrelation with the band that white noise stays in."""
-    marks = (HBand(-w.band, w.band, "95 % band"), Stems(w.lag[1:].astype(float), w.acf[1:], "", "blue"))
-    return Panel(heading, "lag [samples]", "autocorrelation", marks, y_range=(min(-0.2, float(w.acf.min()) * 1.1), 1.0))
+    rest = w.acf[1:]
+    marks = (HBand(-w.band, w.band, "95 % band"), Stems(w.lag[1:].astype(float), rest, "", "blue"))
+    # Small ones are drawn large enough to be told from the band, and always on both sides of zero.
+    reach = max(4 * w.band, 0.1)
+    low, high = min(-reach, 1.1 * float(rest.min())), max(reach, min(1.1 * float(rest.max()), 1.0))
+    return Panel(heading, "lag [samples]", "autocorrelation", marks, y_range=(low, high))
