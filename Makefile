@@ -15,7 +15,8 @@ CHECKED := .venv/checked
 PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 
 # One line a stage: what it reads, and what it makes.
-STAGES := ingest resample average differentiate fit predict ekf whiteness report
+STAGES := rehearse ingest resample average differentiate fit predict ekf whiteness report
+# rehearse      : robot -> Links Pose Workspace Control Lyapunov Excitation
 # ingest        : logs -> Recording Intake Note
 # resample      : Recording -> Signal Note
 # average       : Signal -> Average Noise Note

@@ -19,6 +19,7 @@ from pipeline.library import Library, Provenance
 from pipeline.logs.log import Options
 from pipeline.logs.parts import open_parts
 from pipeline.records import KINDS, Note, Record, note
+from pipeline.robots.robot import Kind
 from pipeline.signature import Declaration, Kinds, declaration
 from pipeline.stages import STAGES
 from pipeline.study import Study
@@ -168,7 +169,7 @@ class Runner:
                     yield Task(asks.name, entry.name, {**own, **every}, entry.name)
         elif "log" in asks.given.values():
             yield from (Task(asks.name, entry.name, log=entry.name) for entry in self.study.logs)
-        elif any(every.values()):
+        elif any(every.values()) or not asks.reads:
             yield Task(asks.name, asks.name, every)
 
     def _places(self, kinds: Kinds) -> Places:
@@ -258,7 +259,7 @@ def _writer(study: Study, folders: Folders, made_from: dict[str, Any]) -> Iterat
     def unit(record: Record) -> store.Unit:
         name = getattr(record, "joint", getattr(record, "group", ""))
         joints = {joint.name: joint for joint in study.robot.joints}
-        return joints[name].unit if name in joints else str
+        return joints[name].unit if name in joints else Kind.REVOLUTE.unit
 
     with store.Writer(folders.processed, unit, made_from) as writer:
         yield writer
@@ -334,4 +335,4 @@ def _listed(tasks: list[str]) -> str:
 
 def _before(stage: str) -> str:
     index = STAGES.index(stage)
-    return STAGES[index - 1] if index else "ingest"
+    return STAGES[index - 1] if index else STAGES[0]

@@ -11,7 +11,7 @@ import numpy as np
 from pipeline import store
 from pipeline.errors import NotReproduced, PipelineError
 from pipeline.ledger import Folders, Ledger
-from pipeline.records import KINDS, Record
+from pipeline.records import KINDS, Fit, Record
 from pipeline.report.results import parse
 
 
@@ -101,7 +101,9 @@ def cell(record: Record, field: str, row: str) -> float:
     value = getattr(record, field)
     if not row:
         return float(value)
-    labels = getattr(record, "parameter")  # noqa: B009 - only kinds with parameters have rows by name
+    if isinstance(value, tuple):
+        return float(value[int(row)])
+    labels = record.parameter if isinstance(record, Fit) else getattr(record, "link")  # noqa: B009 - the rows' names
     return float(value[int(np.flatnonzero(labels == row)[0])])
 
 

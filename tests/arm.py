@@ -81,7 +81,10 @@ def log_table(name: str, file: str, role: str, joints, more="") -> str:
 
 
 def write_study(folder: Path, seed=0, periods=5, rate=50.0) -> Path:
-    """A small study of two joints: excitation, validation and contact of the roll, and the slide's excitation."""
+    """A small study of two joints: excitation, validation and contact of the roll, and the slide's excitation.
+
+    The robot is one without a geometry, which leaves out the optimisation of its excitation.
+    """
     short = {"periods": periods, "rate": rate, "seed": seed}
     roll = signal("hand_roll", period=2.0, **short)
     write_csv(folder / "roll.csv", [roll])
@@ -90,7 +93,7 @@ def write_study(folder: Path, seed=0, periods=5, rate=50.0) -> Path:
     push = signal("hand_roll", period=2.6, external=lambda t: np.where((t > 4) & (t < 6), 1.0, 0.0), **short)
     write_csv(folder / "push.csv", [push])
     (folder / "study.toml").write_text(
-        'title = "A test"\nrobot = "davinci"\nsimulated = true\n'
+        'title = "A test"\nrobot = "dvrk_psm"\nsimulated = true\n'
         + log_table("roll", "roll.csv", "identification", ["hand_roll"], "period = 2.0")
         + log_table("slide", "slide.csv", "identification", ["instrument_slide"])
         + log_table("check", "check.csv", "validation", ["hand_roll"])

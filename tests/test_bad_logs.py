@@ -22,7 +22,7 @@ def lab(tmp_path):
 
 
 def describe(folder, more="", joints=("hand_roll",), role="identification"):
-    text = 'title = "T"\nrobot = "davinci"\n' + arm.log_table("good", "good.csv", "identification", ["hand_roll"])
+    text = 'title = "T"\nrobot = "dvrk_psm"\n' + arm.log_table("good", "good.csv", "identification", ["hand_roll"])
     (folder / "study.toml").write_text(text + arm.log_table("bad", "bad.csv", role, joints, more))
 
 
@@ -154,7 +154,8 @@ def test_units_signs_and_offsets_come_to_the_joint_in_si(lab):
         '"hand_roll.tau" = "hand_roll.tau"', '"hand_roll.i" = { channel = "hand_roll.tau", unit = "mA" }'
     )
     head += '"hand_roll.q" = { channel = "hand_roll.q", unit = "deg", sign = -1, offset = 5.0 }'
-    (lab / "study.toml").write_text(head + tail)
+    motor = "\n[robot_overrides.hand_roll]\ngear_ratio = 200.0\ntorque_constant = 0.0438\n"
+    (lab / "study.toml").write_text((head + tail).replace("[[log]]", motor + "[[log]]", 1))
     call("ingest", lab)
     good, bad = (pipeline.read(lab, "Recording", log=name) for name in ("good", "bad"))
     for column in ("t", "q", "dq", "tau"):

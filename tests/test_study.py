@@ -141,7 +141,10 @@ def test_no_study_file_however_odd_ends_in_anything_but_a_message(data, tmp_path
                 walk(value)
 
     walk(table)
-    table |= {"settings": {"lowpass": 3.0}, "robot_overrides": {"hand_roll": {"gear_ratio": 2.0, "limits": {"q": [0, 1]}}}}
+    table |= {
+        "settings": {"lowpass": 3.0},
+        "robot_overrides": {"hand_roll": {"gear_ratio": 2.0, "limits": {"q": [0, 1]}}},
+    }
     walk({key: table[key] for key in ("settings", "robot_overrides")})
     parent, key = data.draw(st.sampled_from(places))
     parent[key] = data.draw(ANYTHING)

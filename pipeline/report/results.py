@@ -7,7 +7,19 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 
 from pipeline.library import Library
-from pipeline.records import Average, Fit, Intake, Prediction, Record, Track, Whiteness
+from pipeline.records import (
+    Average,
+    Control,
+    Excitation,
+    Fit,
+    Intake,
+    Links,
+    Lyapunov,
+    Prediction,
+    Record,
+    Track,
+    Whiteness,
+)
 from pipeline.report.number import Number
 
 
@@ -53,6 +65,7 @@ class Results(dict[str, Result]):
 def collect(library: Library) -> Results:
     """Every result of a study."""
     found = Results()
+    _robot(found, library)
     for intake in library.all(Intake):
         for name in ("rows", "rate", "duration", "jitter", "longest_gap", "duplicates", "dropped"):
             found.add(intake, f"log.{intake.log}.{name}", name)
@@ -80,6 +93,28 @@ def prediction_key(prediction: Prediction) -> str:
 def slug(text: str) -> str:
     """A name as it stands in a key: 'gravity, sine' is gravity_sine."""
     return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
+
+
+def _robot(found: Results, library: Library) -> None:
+    for links in library.all(Links):
+        found.add(links, "robot.worst_condition", "worst_condition")
+        for i, link in enumerate(links.link):
+            for name in ("alpha", "a", "d", "offset", "mass"):
+                unit = links.origin.units[name] if links.origin else ""
+                value = float(getattr(links, name)[i])
+                found.put(f"robot.link.{link}.{name}", value, None, unit, links, f"#{name}[{link}]")
+    for control in library.all(Control):
+        for name in ("start", "reference", "error_10", "error_20", "error_end"):
+            found.add(control, f"control.{control.controller}.{control.joint}.{name}", name)
+    for lyapunov in library.all(Lyapunov):
+        found.add(lyapunov, f"control.{lyapunov.controller}.V_rise", "V_rise")
+    for excitation in library.all(Excitation):
+        key = f"excitation.{excitation.joint}.{excitation.source}"
+        for name in ("period", "objective", "condition", "excess_q", "excess_dq", "excess_ddq"):
+            found.add(excitation, f"{key}.{name}", name)
+        for i, value in enumerate(excitation.coefficients):
+            name = f"{'a' if i == 0 or i % 2 else 'b'}{(i + 1) // 2}"
+            found.put(f"{key}.{name}", value, None, "", excitation, f"#coefficients[{i}]")
 
 
 def _average(found: Results, average: Average) -> None:

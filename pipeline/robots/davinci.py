@@ -1,9 +1,21 @@
 """The first-generation da Vinci arm of the thesis: hand roll, hand pitch and instrument slide."""
 
 from pipeline.maths.terms import coulomb, gravity_cos, gravity_sin, inertia, lifted_mass, viscous
+from pipeline.robots.davinci_chain import BODIES, CHAIN
 from pipeline.robots.robot import Joint, Kind, Limits, Robot
 
 TORQUE_CONSTANT = 0.0438  # [N m/A], of every motor.  Table 6.3
+# Table 6.1 as printed; the roll's b1 and the slide's a0 are misprints, for their rows do not give their objectives or
+# break their limits.
+ROLL = (
+    ("table-6.1", (10.0, -0.1848, 0.0260, 0.0813, 0.0609, -0.4261)),
+    ("table-6.1-corrected", (10.0, -0.1848, 0.0260, -0.2783, 0.0609, -0.4261)),
+)
+PITCH = (("table-6.1", (10.0, -0.1912, 0.2861, -0.0639, 0.1741, 0.3701)),)
+INSERTION = (
+    ("table-6.1", (5.0, -0.0164, 0.0001, 0.0002, -0.1632, -0.1350)),
+    ("table-6.1-corrected", (5.0, 0.0200, 0.0001, 0.0002, -0.1632, -0.1350)),
+)
 HAND = Limits(q=(-0.6, 0.6), dq=(-1.2, 1.2), ddq=(-1.2, 1.2))  # Table 6.2
 SLIDE = Limits(q=(-0.0672, 0.1097), dq=(-2.0, 2.0), ddq=(-3.0, 3.0))
 
@@ -19,7 +31,8 @@ ROBOT = Robot(
             limits=HAND,
             gear_ratio=200.0,
             torque_constant=TORQUE_CONSTANT,
-            q_tau=2.0,
+            q_tau=0.5,
+            published=ROLL,
         ),
         Joint(
             name="hand_pitch",
@@ -29,7 +42,8 @@ ROBOT = Robot(
             limits=HAND,
             gear_ratio=200.0,
             torque_constant=TORQUE_CONSTANT,
-            q_tau=2.0,
+            q_tau=0.5,
+            published=PITCH,
         ),
         Joint(
             name="instrument_slide",
@@ -39,7 +53,10 @@ ROBOT = Robot(
             limits=SLIDE,
             gear_ratio=1340.0,
             torque_constant=TORQUE_CONSTANT,
-            q_tau=10.0,
+            q_tau=3.0,
+            published=INSERTION,
         ),
     ),
+    chain=CHAIN,
+    bodies=BODIES,
 )

@@ -12,6 +12,7 @@ ROBOT = Robot(
     name="dvrk_psm",
     title="da Vinci Research Kit, patient-side manipulator",
     joints=tuple(
-        replace(joint, gear_ratio=1.0, torque_constant=1.0, harmonics=HARMONICS) for joint in davinci.ROBOT.joints
+        replace(joint, gear_ratio=1.0, torque_constant=1.0, harmonics=HARMONICS, published=())
+        for joint in davinci.ROBOT.joints
     ),
 )

@@ -4,6 +4,8 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from pipeline.errors import BadRobot
+from pipeline.maths.bodies import Bodies
+from pipeline.maths.kinematics import Chain
 from pipeline.maths.terms import Term
 
 
@@ -40,6 +42,8 @@ class Joint:
     gear_ratio: float = 1.0  # eta [-], or [rad/m] for a prismatic joint
     torque_constant: float = 1.0  # K_m [N m/A]
     harmonics: int = 2  # N_f of the excitation
+    # Published excitation trajectories by name: period, a0, a1, b1, a2, b2, ...
+    published: tuple[tuple[str, tuple[float, ...]], ...] = ()
     # How fast the external effort may wander: the intensity of its random walk, a standard deviation per square root
     # of a second [effort/s^0.5].  A choice, not a measurement; the report says so.
     q_tau: float = 1.0
@@ -51,11 +55,16 @@ class Joint:
 
 @dataclass(frozen=True)
 class Robot:
-    """The joints of an arm, from the base outwards."""
+    """The joints of an arm, from the base outwards; with its chain and bodies where its geometry is known.
+
+    The first coordinates of the chain are the joints, in this order.
+    """
 
     name: str
     title: str
     joints: tuple[Joint, ...] = field(default_factory=tuple)
+    chain: Chain | None = None
+    bodies: Bodies | None = None
 
     def joint(self, name: str) -> Joint:
         """The joint of that name.

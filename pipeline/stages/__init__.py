@@ -15,4 +15,6 @@ The signature of `run` is the declaration of everything it needs:
     -> Iterator[Average | Note] the kinds of record it makes
 """
 
-STAGES = ("ingest", "resample", "average", "differentiate", "fit", "predict", "ekf", "whiteness", "report")
+STAGES = (
+    "rehearse", "ingest", "resample", "average", "differentiate", "fit", "predict", "ekf", "whiteness", "report",
+)  # fmt: skip

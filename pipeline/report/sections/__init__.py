@@ -3,4 +3,7 @@
 section(context: Context) -> Section | None        None where a study has nothing to say on it
 """
 
-SECTIONS = ("summary", "recorded", "noise", "identification", "prediction", "filter", "methods", "provenance")
+SECTIONS = (
+    "summary", "recorded", "noise", "identification", "prediction", "filter", "robot", "control", "excitation",
+    "methods", "provenance",
+)  # fmt: skip

@@ -1,0 +1,60 @@
+"""The robot that the analysis assumes: its chain, its links, and where its tip can go."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pipeline.records import Links, Pose, Workspace
+from pipeline.report.content import Block, Figure3D, Line3D, Points3D, Prose, Section, Table, literal
+from pipeline.report.context import Context
+
+
+def section(context: Context) -> Section | None:
+    """The chain and its table, where the robot's geometry is known."""
+    links = context.library.all(Links)
+    if not links:
+        return None
+    return Section("The robot", "robot", tuple(blocks(context, links[0])))
+
+
+def blocks(context: Context, links: Links) -> Iterator[Block]:
+    """The section's content.  Tables 3.1, 4.2, Fig 3.5"""
+    worst = context.results["robot.worst_condition"].number(3)
+    yield Prose(
+        f"The {literal(context.study.robot.title)} as a Denavit-Hartenberg chain. The parallelogram's three links turn "
+        "by the same angle, so that the tool pivots about a remote centre that nothing holds. Forces at the tip follow "
+        f"from efforts at the joints through the Jacobian; its condition number reaches {worst} within the joints' "
+        "limits, and is what the uncertainty of an effort can be multiplied by on its way to a force."
+    )
+    rows = tuple(
+        (
+            literal(link),
+            literal(links.parent[i]),
+            "–" if links.moved_by[i] == 0 else f"$q_{links.moved_by[i]}$",
+            *(context.number(f"robot.link.{link}.{name}", 4) for name in ("alpha", "a", "d", "offset", "mass")),
+        )
+        for i, link in enumerate(links.link)
+    )
+    header = ("Link", "On", "Moved by", "$alpha$", "$a$", "$d$", "$theta$ at 0", "Mass")
+    yield Table("Denavit-Hartenberg parameters and masses of the links.", header, rows, "links-table", "lllrrrrr")
+    yield chain(context)
+
+
+def chain(context: Context) -> Figure3D:
+    """The chain at three configurations, and the places that its tip reaches."""
+    colours = {"zero": "black", "low": "blue", "high": "vermillion"}
+    words = {"zero": "q = 0", "low": "lower limits", "high": "upper limits"}
+    marks: list[Line3D | Points3D] = []
+    for workspace in context.library.all(Workspace):
+        marks.append(Points3D(workspace.x, workspace.y, workspace.z, "places of the tip", "sky"))
+    for pose in context.library.all(Pose):
+        path = np.flatnonzero(pose.link != "9R")  # the two jaws lie on each other
+        marks.append(
+            Line3D(pose.x[path], pose.y[path], pose.z[path], words[pose.pose], colours[pose.pose])  # type: ignore[arg-type]
+        )
+    return Figure3D(
+        "The chain at q = 0 and at both ends of the joints' ranges, with places that the tip reaches in between.",
+        "The robot's links as lines in space at three configurations, and the cloud of places of its tip.",
+        tuple(marks),
+        height=110,
+    )
