@@ -20,6 +20,7 @@ app = typer.Typer(
     help=__doc__,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",  # the default swallows units in square brackets
 )
 
 StudyFolder = Annotated[Path, typer.Argument(help="Folder of a study: raw/<study>, which holds study.toml.")]

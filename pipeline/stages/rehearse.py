@@ -1,6 +1,7 @@
 """Rehearse the robot before anything is recorded: its chain, its controllers and its excitation, in simulation."""
 
 from collections.abc import Iterator
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,9 +48,7 @@ def geometry(robot: Robot) -> Iterator[Links | Pose | Workspace]:
     assert chain is not None
     assert bodies is not None
     limits = np.array([joint.limits.q for joint in robot.joints])
-    grid = np.stack(np.meshgrid(*(np.linspace(*pair, GRID) for pair in limits), indexing="ij"), axis=-1).reshape(
-        -1, ARM
-    )
+    grid = np.array(list(product(*(np.linspace(low, high, GRID) for low, high in limits.tolist()))))
     condition = workspace.condition(jacobian(chain, grid)[0][..., :ARM])
     x, y, z = tip(chain, grid).T
     names = np.array(chain.names, object)
@@ -118,16 +117,21 @@ def described(joint: Joint, source: str, series: Fourier) -> Excitation:
     """A trajectory with its objective, its condition and by how much it leaves the limits."""
     F = excitation.observation(joint.terms, series)
     t = np.linspace(0.0, series.period, 401)
+    q, dq, ddq = excitation.motion(series, t)
     ranges = zip(excitation.ranges(series), limits_of(joint), strict=True)
-    excess = [max(low - found[0], found[1] - high, 0.0) for found, (low, high) in ranges]
+    excess = [float(max(low - found[0], found[1] - high, 0.0)) for found, (low, high) in ranges]
     return Excitation(
-        joint.name,
-        source,
-        series.period,
-        float(excitation.determinant(F)[0]),
-        float(10 ** excitation.condition(F)[0]),
-        tuple(series.x.tolist()),
-        *map(float, excess),
-        t,
-        *excitation.motion(series, t),
+        joint=joint.name,
+        source=source,
+        period=series.period,
+        objective=float(excitation.determinant(F)[0]),
+        condition=float(10 ** excitation.condition(F)[0]),
+        coefficients=tuple(series.x.tolist()),
+        excess_q=excess[0],
+        excess_dq=excess[1],
+        excess_ddq=excess[2],
+        t=t,
+        q=q,
+        dq=dq,
+        ddq=ddq,
     )

@@ -1,0 +1,136 @@
+"""Print a robot's kinematics and dynamics at one pose: frames, tip, Jacobian, M, C dq and G."""
+
+import json
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from pipeline.robots.robot import Robot
+
+    Array = NDArray[np.float64]
+
+ROUNDING = 1e-14
+DEFAULT = 6  # coordinates of the pose where none is given: the arm with one jaw
+
+
+def run(
+    robot: Annotated[str, typer.Argument(help="A listed robot.")],
+    at: Annotated[
+        str | None, typer.Option(help="Pose q1,q2,...: 3, 6 or 7 values in rad or m; what is missing is 0.")
+    ] = None,
+    dq: Annotated[str | None, typer.Option(help="Velocities, for C dq: as many values as --at or fewer.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """The pose, the velocity Jacobian of the tip (7.21)-(7.24) and the terms of (4.38), with all joints in SI units."""
+    from pathlib import Path
+
+    from pipeline.robots import load
+
+    found = load(robot, Path())
+    q = _values("--at", at) if at is not None else [0.0] * DEFAULT
+    document = _document(found, q, _values("--dq", dq) if dq is not None else [])
+    typer.echo(json.dumps(document, indent=2, allow_nan=False) if as_json else _words(found, q, document))
+
+
+def _values(option: str, text: str) -> list[float]:
+    """Numbers separated by commas."""
+    import math
+
+    from pipeline.errors import BadRequest
+
+    values = []
+    for place, word in enumerate(text.split(","), start=1):
+        try:
+            values.append(float(word))
+        except ValueError:
+            raise BadRequest(f"{option} {text}: value {place} is {word.strip()!r}, not a number") from None
+        if not math.isfinite(values[-1]):
+            raise BadRequest(f"{option} {text}: value {place} is {word.strip()}, and must be finite")
+    return values
+
+
+def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]:
+    """Everything that is printed, as JSON's types.
+
+    Raises
+    ------
+    BadRequest
+        If the robot has no chain, or q and dq have not the numbers of values that it can take.
+    """
+    import numpy as np
+
+    from pipeline.errors import BadRequest
+    from pipeline.maths import kinematics, rigid_body, workspace
+
+    chain, bodies = robot.chain, robot.bodies
+    if chain is None or bodies is None:
+        raise BadRequest(f"robot {robot.name} has no chain: its geometry and masses are not known; davinci has one")
+    counts = sorted({len(robot.joints), chain.n - 1, chain.n})
+    if len(q) not in counts:
+        numbers = f"{', '.join(map(str, counts[:-1]))} or {counts[-1]}"
+        raise BadRequest(f"--at has {len(q)} values; the pose of {robot.name} has {numbers}")
+    if len(dq) > len(q):
+        raise BadRequest(f"--dq has {len(dq)} values and the pose {len(q)}; give as many or fewer")
+    pose, rates = np.array(q), np.array(dq + [0.0] * (len(q) - len(dq)))
+    T = kinematics.frames(chain, pose)
+    J_v, J_w = kinematics.jacobian(chain, pose)
+    singular = bool(workspace.is_singular(chain, pose))
+    return {
+        "frames": {
+            name: {"origin": t[:3, 3].tolist(), "rotation": t[:3, :3].tolist()}
+            for name, t in zip(chain.names, T, strict=True)
+        },
+        "tip": kinematics.tip(chain, pose).tolist(),
+        "jacobian_v": J_v.tolist(),
+        "jacobian_w": J_w.tolist(),
+        "mass": rigid_body.mass_matrix(chain, bodies, pose).tolist(),
+        "coriolis": rigid_body.coriolis(chain, bodies, pose, rates).tolist(),
+        "gravity": rigid_body.gravity(chain, bodies, pose).tolist(),
+        "condition": None if singular else float(workspace.condition(J_v)),
+        "warnings": _outside(robot, q) + ([_singular(chain, q)] if singular else []),
+    }
+
+
+def _outside(robot: "Robot", q: list[float]) -> list[str]:
+    """Which joints are beyond their limits: it is computed all the same."""
+    said = []
+    for joint, value in zip(robot.joints, q, strict=False):
+        (low, high), unit = joint.limits.q, joint.unit("{position}")
+        if not low <= value <= high:
+            said.append(f"{joint.name} at {value:g} {unit} is outside its limits, {low:g} to {high:g} {unit}")
+    return said
+
+
+def _singular(chain: Any, q: list[float]) -> str:
+    """Why the pose has no condition number, and where such poses lie."""
+    from pipeline.maths.workspace import ARM, SINGULAR, singular_slides
+
+    slides = ", ".join(sorted({f"{slide:.4f}" for slide in singular_slides(chain, q[1])}))
+    where = f"; at this pitch that is so where the slide is at {slides} m" if slides else ""
+    return (
+        f"singular: the condition number of J_v of the first {ARM} joints is above {SINGULAR:g}, so that they do not "
+        f"tell the force at the tip in one direction{where}"
+    )
+
+
+def _words(robot: "Robot", q: list[float], document: dict[str, Any]) -> str:
+    """The result for people: numbers in columns, everything in the base axes and SI units; rounding errors are 0."""
+    lines = [f"{robot.title} at q = {_numbers(q)}"]
+    lines += [f"warning: {text}" for text in document["warnings"]]
+    lines += ["", "frame   origin [m]"]
+    lines += [f"{name:>5}   {_numbers(frame['origin'])}" for name, frame in document["frames"].items()]
+    lines += ["", f"tip [m]   {_numbers(document['tip'])}"]
+    titles = {"jacobian_v": "J_v of the tip", "jacobian_w": "J_omega", "mass": "M"}
+    for key, title in titles.items():
+        lines += ["", title, *(f"  {_numbers(row)}" for row in document[key])]
+    lines += ["", f"C dq   {_numbers(document['coriolis'])}", f"G      {_numbers(document['gravity'])}"]
+    condition = document["condition"]
+    return "\n".join([*lines, "", f"condition of J_v   {'singular' if condition is None else f'{condition:.4g}'}"])
+
+
+def _numbers(values: list[float]) -> str:
+    return " ".join(f"{value if abs(value) > ROUNDING else 0.0:12.6g}" for value in values)

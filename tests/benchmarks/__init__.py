@@ -1,0 +1,1 @@
+"""What the readers cost, as ratios to doing as little as possible, within one run."""

@@ -1,0 +1,112 @@
+"""`davinci-forces robot`: the numbers of the library, as JSON and as text, and its refusals."""
+
+import json
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from pipeline.cli import guarded
+from pipeline.commands import robot
+from pipeline.errors import BadRequest, BadRobot
+from pipeline.maths import kinematics, rigid_body, workspace
+from pipeline.robots.davinci_chain import BODIES, CHAIN
+
+KEYS = ["frames", "tip", "jacobian_v", "jacobian_w", "mass", "coriolis", "gravity", "condition", "warnings"]
+app = typer.Typer()
+app.command()(guarded(robot.run))
+
+
+def asked(*words):
+    return CliRunner().invoke(app, list(words))
+
+
+def document(*words):
+    result = asked(*words, "--json")
+    assert result.exit_code == 0, result.output
+    return json.loads(result.stdout)
+
+
+@pytest.mark.parametrize("n", [3, 6, 7])
+def test_the_json_holds_what_the_library_computes(n):
+    q, dq = np.random.default_rng(n).uniform(-0.06, 0.1, (2, n))
+    found = document("davinci", "--at", ",".join(map(str, q)), "--dq", ",".join(map(str, dq)))
+    assert list(found) == KEYS
+    assert list(found["frames"]) == ["0", "1", "2", "3", "4", "5", "6", "7", "8", "9L", "9R"]
+    for name, T in zip(CHAIN.names, kinematics.frames(CHAIN, q), strict=True):
+        np.testing.assert_array_equal(found["frames"][name]["origin"], T[:3, 3])
+        np.testing.assert_array_equal(found["frames"][name]["rotation"], T[:3, :3])
+    assert found["tip"] == found["frames"]["9L"]["origin"]
+    J_v, J_w = kinematics.jacobian(CHAIN, q)
+    np.testing.assert_array_equal(found["jacobian_v"], J_v)
+    np.testing.assert_array_equal(found["jacobian_w"], J_w)
+    np.testing.assert_array_equal(found["mass"], rigid_body.mass_matrix(CHAIN, BODIES, q))
+    np.testing.assert_array_equal(found["coriolis"], rigid_body.coriolis(CHAIN, BODIES, q, dq))
+    np.testing.assert_array_equal(found["gravity"], rigid_body.gravity(CHAIN, BODIES, q))
+    assert found["condition"] == pytest.approx(np.linalg.cond(J_v))
+    assert found["warnings"] == []
+
+
+def test_without_velocities_nothing_is_centrifugal():
+    assert document("davinci", "--at", "0.1,0.2,0.03")["coriolis"] == [0, 0, 0]
+
+
+def test_velocities_that_are_missing_are_zero():
+    pose = ("davinci", "--at", "0.1,0.2,0.03")
+    assert document(*pose, "--dq", "0.5")["coriolis"] == document(*pose, "--dq", "0.5,0,0")["coriolis"]
+
+
+def test_without_a_pose_all_six_joints_are_at_zero():
+    assert document("davinci") == document("davinci", "--at", "0,0,0,0,0,0")
+
+
+def test_a_joint_beyond_its_limits_is_stated_and_computed_all_the_same():
+    found = document("davinci", "--at", "0.9,0,0.2")
+    assert [words.split()[0] for words in found["warnings"]] == ["hand_roll", "instrument_slide"]
+    assert "hand_roll at 0.9 rad is outside its limits, -0.6 to 0.6 rad" in asked("davinci", "--at", "0.9,0,0").stdout
+
+
+@pytest.mark.parametrize("pose", ["0,0,-0.1101", "0,0,-0.1101,0,0,0", "0.2,0.3,-0.1101"])
+def test_a_singular_pose_has_no_condition_number_and_says_why(pose):
+    found = document("davinci", "--at", pose)
+    assert found["condition"] is None
+    assert "singular" in found["warnings"][-1]
+    assert f"above {workspace.SINGULAR:g}" in found["warnings"][-1]
+    assert "-0.1101" in found["warnings"][-1]
+    assert "condition of J_v   singular" in asked("davinci", "--at", pose).stdout
+
+
+def test_the_text_shows_every_matrix_and_no_rounding_errors():
+    text = asked("davinci").stdout
+    for title in ("frame   origin [m]", "tip [m]", "J_v of the tip", "J_omega", "\nM\n", "C dq", "G   ", "condition"):
+        assert title in text
+    assert "e-1" not in text
+
+
+def test_a_negative_first_value_is_a_value():
+    assert document("davinci", "--at", "-0.1,0,0")["tip"][0] != 0
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (("--at", "0.1,0.2"), "--at has 2 values; the pose of davinci has 3, 6 or 7"),
+        (("--at", "0.1,x,0"), "--at 0.1,x,0: value 2 is 'x', not a number"),
+        (("--at", "0.1,nan,0"), "value 2 is nan, and must be finite"),
+        (("--at", "0,0,0", "--dq", "1,2,3,4"), "--dq has 4 values and the pose 3; give as many or fewer"),
+    ],
+)
+def test_bad_input_is_refused_with_its_place(words, says):
+    result = asked("davinci", *words)
+    assert result.exit_code == 1
+    assert says in result.output
+
+
+def test_a_robot_without_geometry_is_refused(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text('name = "mine"\n[[joint]]\nname = "a"\nkind = "revolute"\nterms = ["inertia"]\n')
+    with pytest.raises(BadRequest, match="robot mine has no chain"):
+        robot.run(str(file), None, None, False)
+    with pytest.raises(BadRobot, match="no robot 'nonsuch'"):
+        robot.run("nonsuch", None, None, False)
