@@ -71,6 +71,7 @@ class Log(ABC):
     nulls: dict[str, int] = field(default_factory=dict)  # samples missing, of every channel that was read
     nans: dict[str, int] = field(default_factory=dict)  # samples logged as NaN, of every channel that was read
     dropped: int = 0  # rows that could not be used
+    _at_open: tuple[int, int] | None = field(default=None, init=False, repr=False)  # warnings and comments from headers
 
     @abstractmethod
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
@@ -116,6 +117,8 @@ class Log(ABC):
         """Empty the counts before the blocks are read, and refuse channels that do not hold numbers."""
         self.nulls, self.nans = dict.fromkeys(names, 0), dict.fromkeys(names, 0)
         self.dropped = 0
+        self._at_open = self._at_open or (len(self.warnings), len(self.comments))
+        del self.warnings[self._at_open[0] :], self.comments[self._at_open[1] :]
         for name in names:
             if (channel := self.find(name)).kind not in kinds:
                 raise BadLog(f"{self.path}: channel {name!r} holds {channel.kind}, not numbers; choose another")

@@ -1,0 +1,194 @@
+"""Show what a log holds: channels, units, samples, clock, what is odd about it, and its first rows."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from pipeline.logs.log import Log
+    from pipeline.maths.clock import Clock
+    from pipeline.maths.outline import Outline
+
+BARS = "▁▂▃▄▅▆▇█"
+TIMES = ("time", "t", "t_s", "elapsed", "x_value", "seconds")
+MOST = 0.1  # share of repeated rows, and of jitter in the sampling time, above which they are flagged
+
+
+def run(
+    file: Annotated[Path, typer.Argument(help="A log: TDMS, LVM, or columns of text.")],
+    head: Annotated[int, typer.Option(min=0, help="Rows to show.")] = 5,
+    json: Annotated[bool, typer.Option("--json", help="Print it for a program to read.")] = False,
+) -> None:
+    """Show what a log holds: channels, units, samples, clock, warnings, first rows."""
+    import json as writer
+
+    found = describe(file, head)
+    if json:
+        typer.echo(writer.dumps(found, indent=1, ensure_ascii=False, allow_nan=False))
+    else:
+        typer.echo("\n".join(lines(found)))
+
+
+def describe(file: Path, head: int) -> dict[str, Any]:
+    """Read a whole log; what it holds, in plain values of which none is NaN.
+
+    Raises
+    ------
+    BadLog
+        If it cannot be read.
+    """
+    import numpy as np
+
+    from pipeline.logs import open_log
+    from pipeline.maths.clock import Clock
+    from pipeline.maths.outline import Outline
+
+    log = open_log(file)
+    names = [channel.name for channel in log.channels if channel.kind != "text"]
+    source, clock = _time(log), Clock()
+    measured = [c.name for c in log.channels if c.kind == "number" and not c.derived and c.name != source]
+    outlines = {name: Outline() for name in names}
+    first: dict[str, list[float]] = {name: [] for name in names}
+    rising = {} if source or log.clock else {name: Clock() for name in measured}
+    rows = 0
+    for block in log.blocks(names):
+        count = len(next(iter(block.values())))
+        t = block[source] if source else _counted(log, rows, count)
+        clock.update(t, np.column_stack([block[name] for name in measured]) if measured else None)
+        for name in names:
+            outlines[name].update(block[name])
+            first[name].extend(block[name][: max(0, head - rows)].tolist())
+        rising = {name: seen for name, seen in rising.items() if _still_rises(seen, block[name])}
+        rows += count
+    return {
+        "file": str(file), "format": log.format, "rows": rows, "started": log.started, "zone": log.zone,
+        "clock": _clock(log, source, clock, rising),
+        "channels": [_channel(log, channel, outlines.get(channel.name)) for channel in log.channels],
+        "facts": log.facts, "comments": log.comments, "dropped": log.dropped,
+        "warnings": [*log.warnings, *_flags(log, source, clock)],
+        "head": {name: [_plain(value) for value in values] for name, values in first.items()},
+    }  # fmt: skip
+
+
+def _time(log: "Log") -> str:
+    """The channel that holds the time: the format's own, else one that is called so, unless the format has a clock."""
+    if log.time or log.clock:
+        return log.time
+    words = (c.name for c in log.channels if c.kind == "number" and c.name.partition("[")[0].strip().lower() in TIMES)
+    return next(words, "")
+
+
+def _counted(log: "Log", rows: int, count: int) -> Any:
+    """Times by the log's clock [s]; samples are counted where it has none."""
+    import numpy as np
+
+    number = rows + np.arange(count, dtype=float)
+    return log.clock.start + number * log.clock.step if log.clock else number
+
+
+def _still_rises(seen: "Clock", values: Any) -> bool:
+    """Whether a channel has risen from every sample to the next up to here, as a time does."""
+    seen.update(values)
+    return not (seen.backward or seen.repeated) and abs(seen.last - seen.first) < float("inf")
+
+
+def _clock(log: "Log", source: str, clock: "Clock", rising: dict[str, "Clock"]) -> dict[str, Any]:
+    if not source and not log.clock:
+        told = "none: say rate = ... [Hz] for this log in study.toml"
+        for name, seen in rising.items():
+            told += f", or time = {name!r}, which rises throughout ({seen.rate:.6g} Hz if it is in seconds)"
+            break
+        return {"source": told, "duplicates": clock.duplicates}
+    return {
+        "source": f"channel {source!r}" if source else "the log's own interval",
+        "rate": _plain(clock.rate), "jitter": _plain(clock.jitter), "longest_gap": _plain(clock.longest_gap),
+        "duration": _plain(clock.last - clock.first), "backward": clock.backward, "repeated": clock.repeated,
+        "duplicates": clock.duplicates,
+    }  # fmt: skip
+
+
+def _channel(log: "Log", channel: Any, outline: "Outline | None") -> dict[str, Any]:
+    about = {"name": channel.name, "unit": channel.unit, "kind": channel.kind, "derived": channel.derived}
+    if outline is None:
+        return about
+    values = {name: _plain(getattr(outline, name)) for name in ("samples", "least", "most", "mean")}
+    counts = {"nulls": log.nulls.get(channel.name, 0), "nans": log.nans.get(channel.name, 0)}
+    return about | values | counts | {"course": [_plain(value) for value in outline.course.tolist()]}
+
+
+def _flags(log: "Log", source: str, clock: "Clock") -> Iterator[str]:
+    """What makes a recording doubtful though every cell of it can be read."""
+    if clock.duplicates > MOST * clock.samples:
+        share = clock.duplicates / clock.samples
+        yield f"{clock.duplicates} of {clock.samples} rows ({share:.0%}) repeat the one before in every channel"
+    if not source:
+        return
+    if clock.backward or clock.repeated:
+        yield (
+            f"time {source!r} goes back {clock.backward} times and stands still {clock.repeated} times, first in row "
+            f"{clock.bad_row + 1}; name another time channel, or say rate = ... [Hz] for this log in study.toml"
+        )
+    elif clock.jitter * clock.rate > MOST:
+        yield f"the clock is jittery: {clock.jitter * 1e3:.3g} ms around {1e3 / clock.rate:.3g} ms"
+    if clock.longest_gap * clock.rate > 2.5:
+        gap = clock.longest_gap
+        yield f"the longest time between samples is {gap:.3g} s, {gap * clock.rate:.1f} samples"
+
+
+def _plain(value: float) -> float | None:
+    """JSON knows neither NaN nor infinity."""
+    return value if abs(value) < float("inf") else None
+
+
+def lines(found: dict[str, Any]) -> Iterator[str]:
+    """The same for people."""
+    started = f", started {found['started']} ({found['zone']} time)" if found["started"] else ""
+    yield f"{found['file']}: {found['format']}, {found['rows']} rows{started}"
+    yield from (f"  {key}: {value}" for key, value in found["facts"].items())
+    clock = found["clock"]
+    yield f"clock: {clock['source']}"
+    if "rate" in clock:
+        yield f"  {clock['duration'] or 0:.6g} s at {clock['rate']:.6g} Hz, jitter {clock['jitter'] * 1e3:.3g} ms (std)"
+        yield f"  longest gap {clock['longest_gap']:.3g} s; {clock['backward']} steps back, {clock['repeated']} of zero"
+    yield f"  {clock['duplicates']} rows repeat the one before"
+    yield "channels:"
+    yield from _table([_row(i, channel) for i, channel in enumerate(found["channels"])])
+    if any(found["head"].values()):
+        yield "first rows:"
+        names = list(found["head"])
+        rows = zip(*found["head"].values(), strict=True)
+        yield from _table([names, *([_number(value) for value in row] for row in rows)])
+    for title in ("comments", "warnings"):
+        if found[title]:
+            yield f"{title}:"
+            yield from (f"  {line}" for line in found[title])
+
+
+def _row(number: int, channel: dict[str, Any]) -> list[str]:
+    name = [f"{number}", channel["name"], channel["unit"] or "-"]
+    if "samples" not in channel:
+        return [*name, channel["kind"]]
+    missing = ", ".join(f"{channel[kind]} {kind}" for kind in ("nulls", "nans") if channel[kind])
+    span = f"{_number(channel['least'])} .. {_number(channel['most'])}"
+    return [*name, span, sparkline(channel["course"]), missing or ("made by the reader" if channel["derived"] else "")]
+
+
+def _number(value: float | None) -> str:
+    return "-" if value is None else f"{value:.9g}" if abs(value) >= 1e5 else f"{value:.6g}"
+
+
+def _table(rows: list[list[str]]) -> Iterator[str]:
+    widths = [max(len(row[i]) for row in rows if i < len(row)) for i in range(max(map(len, rows), default=0))]
+    for row in rows:
+        yield "  " + "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=False)).rstrip()
+
+
+def sparkline(course: list[float | None]) -> str:
+    """The course of a channel in one line of bars, low to high; a blank where it has no value."""
+    values = [value for value in course if value is not None]
+    if not values:
+        return ""
+    low, span = min(values), (max(values) - min(values)) or 1.0
+    return "".join(" " if v is None else BARS[min(7, int(8 * (v - low) / span))] for v in course)

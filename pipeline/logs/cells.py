@@ -1,0 +1,113 @@
+"""Numbers out of rows of delimited cells, a block at a time, parsed by Arrow."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as csv
+from numpy.typing import NDArray
+
+NUMBER = re.compile(rb"[+-]?((\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
+UNREADABLE = pa.ArrowInvalid
+PIECE = 1 << 20  # [bytes] that one thread of Arrow parses at a time
+
+
+class NotANumber(ValueError):
+    """The cell at (row, column), counted from 0, holds something else than a number."""
+
+    def __init__(self, row: int, column: int, cell: bytes) -> None:
+        super().__init__(row, column, cell)
+        self.row, self.column, self.cell = row, column, cell
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Columns of numbers, NaN where a cell is empty; how many cells are; and the cells of a column of text."""
+
+    rows: int
+    columns: dict[int, NDArray[np.float64]]
+    nulls: dict[int, int]
+    texts: list[bytes | None]
+
+
+def marks(block: bytes, delimiter: bytes) -> bytes:
+    """The decimal marks among the bytes of a block: `.`, `,`, both or none."""
+    return bytes(mark for mark in b".," if mark != delimiter[0] and mark in block)
+
+
+def parse(
+    block: bytes,
+    width: int,
+    delimiter: bytes,
+    decimal: bytes,
+    wanted: Sequence[int],
+    text: int = -1,
+    quoted: bool = False,
+) -> Cells:
+    """Convert the `wanted` columns of rows of `width` cells to numbers; `text` is a column left as it stands.
+
+    Raises
+    ------
+    UNREADABLE
+        If a row has another width, or a wanted cell is no number.
+    """
+    types = {f"{i}": pa.float64() for i in wanted} | ({f"{text}": pa.binary()} if text >= 0 else {})
+    table = csv.read_csv(
+        pa.py_buffer(block),
+        read_options=csv.ReadOptions(column_names=[f"{i}" for i in range(width)], block_size=PIECE),
+        parse_options=csv.ParseOptions(delimiter=delimiter.decode(), quote_char='"' if quoted else False),
+        convert_options=csv.ConvertOptions(
+            column_types=types,
+            include_columns=list(types),
+            null_values=["", " "],
+            decimal_point=decimal.decode(),
+            check_utf8=False,
+        ),
+    )
+    columns = {i: table.column(f"{i}") for i in wanted}
+    return Cells(
+        rows=table.num_rows,
+        columns={i: column.to_numpy() for i, column in columns.items()},
+        nulls={i: column.null_count for i, column in columns.items()},
+        texts=table.column(f"{text}").to_pylist() if text >= 0 else [],
+    )
+
+
+def parse_either(block: bytes, width: int, delimiter: bytes, wanted: Sequence[int], text: int = -1) -> Cells:
+    """The same with whichever decimal mark the cells have, be it both; a cell with two marks is no number."""
+    found = marks(block, delimiter)
+    if len(found) == 2 and text < 0:
+        block, found = block.replace(b",", b"."), b"."
+    return parse(block, width, delimiter, found[:1] or b".", wanted, text)
+
+
+def parse_carefully(block: bytes, width: int, delimiter: bytes, wanted: Sequence[int]) -> Cells:
+    """The same, but it finds the cell that is no number, and forgives blanks around numbers.
+
+    Raises
+    ------
+    NotANumber
+        Where a wanted cell is none.
+    """
+    try:
+        return parse_either(block, width, delimiter, wanted)
+    except UNREADABLE:
+        rows = [[cell.strip() for cell in row.split(delimiter)] for row in block.splitlines()]
+    check(rows, wanted)
+    return parse_either(b"".join(delimiter.join(row) + b"\n" for row in rows), width, delimiter, wanted)
+
+
+def check(rows: Sequence[Sequence[bytes]], wanted: Sequence[int], number: re.Pattern[bytes] = NUMBER) -> None:
+    """Find a wanted cell that is no number.
+
+    Raises
+    ------
+    NotANumber
+        Where there is one.
+    """
+    for i, row in enumerate(rows):
+        for column in wanted:
+            if row[column] and not number.fullmatch(row[column]):
+                raise NotANumber(i, column, row[column])

@@ -1,0 +1,145 @@
+"""The metadata of a TDMS segment: which objects it holds, how their samples lie in it, and their properties.
+
+Layout as National Instruments publishes it ("TDMS File Format Internal Structure").
+"""
+
+import struct
+from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import numpy as np
+
+NO_DATA, AS_BEFORE = 0xFFFFFFFF, 0
+DAQMX, DIGITAL = 0x1269, 0x126A  # raw data of a DAQ card that still has to be scaled
+STRING, BOOLEAN, TIME, DAQMX_RAW = 0x20, 0x21, 0x44, 0xFFFFFFFF
+NUMBERS = {
+    1: "i1", 2: "i2", 3: "i4", 4: "i8", 5: "u1", 6: "u2", 7: "u4", 8: "u8", 9: "f4", 10: "f8",
+    0x19: "f4", 0x1A: "f8", BOOLEAN: "u1",
+}  # fmt: skip
+SIZES = {0x1B: 16, TIME: 16, 0x08000C: 8, 0x10000D: 16}  # [bytes] of those that are no plain number
+EPOCH = datetime(1904, 1, 1, tzinfo=UTC)
+
+
+class Damaged(ValueError):
+    """The bytes are no TDMS metadata."""
+
+
+@dataclass(frozen=True)
+class Samples:
+    """How the samples of one channel lie in one chunk of a segment."""
+
+    kind: int  # NI's number of the data type
+    count: int  # in a chunk
+    octets: int  # of them all
+    widths: tuple[int, ...] = ()  # DAQmx: bytes of a row in each of the card's buffers, which the channels share
+
+
+@dataclass
+class Objects:
+    """What the metadata said up to here, segment after segment."""
+
+    latest: dict[str, Samples] = field(default_factory=dict)  # by path: the last that was said of it
+    active: dict[str, Samples] = field(default_factory=dict)  # the channels with data in this segment, in their order
+    properties: dict[str, dict[str, Any]] = field(default_factory=dict)
+
+    def update(self, metadata: bytes, order: str, renew: bool) -> None:
+        """Take in the metadata of one segment.
+
+        Raises
+        ------
+        Damaged
+            Where it is cut, or makes no sense.
+        """
+        take = _Cursor(metadata, order)
+        try:
+            self._update(take, renew)
+        except (struct.error, IndexError, UnicodeDecodeError, KeyError, OverflowError) as error:
+            raise Damaged(f"its metadata makes no sense after {take.at} bytes ({error})") from None
+
+    def _update(self, take: "_Cursor", renew: bool) -> None:
+        self.active = {} if renew else dict(self.active)
+        for _ in range(take.number("I")):
+            path = take.text()
+            properties = self.properties.setdefault(path, {})
+            self._index(path, take.number("I"), take)
+            for _ in range(take.number("I")):
+                name = take.text()
+                properties[name] = take.value(take.number("I"))
+
+    def _index(self, path: str, header: int, take: "_Cursor") -> None:
+        if header == NO_DATA:
+            self.active.pop(path, None)
+            return
+        if header != AS_BEFORE:
+            self.latest[path] = take.daqmx(header) if header in (DAQMX, DIGITAL) else take.samples()
+        self.active[path] = self.latest[path]
+
+
+class _Cursor:
+    """Reads values off bytes."""
+
+    def __init__(self, data: bytes, order: str) -> None:
+        self.data, self.order, self.at = data, order, 0
+
+    def number(self, code: str) -> int:
+        (value,) = struct.unpack_from(self.order + code, self.data, self.at)
+        self.at += struct.calcsize("=" + code)
+        return int(value)
+
+    def bytes(self, length: int) -> bytes:
+        if self.at + length > len(self.data):
+            raise IndexError(f"{length} bytes are asked for, {len(self.data) - self.at} are left")
+        self.at += length
+        return self.data[self.at - length : self.at]
+
+    def text(self) -> str:
+        raw = self.bytes(self.number("I"))
+        try:
+            return raw.decode()
+        except UnicodeDecodeError:
+            return raw.decode("cp1252")
+
+    def value(self, kind: int) -> Any:
+        """A property."""
+        if kind == STRING:
+            return self.text()
+        if kind == TIME:
+            return self.moment()
+        if kind in NUMBERS:
+            code = np.dtype(self.order + NUMBERS[kind])
+            return np.frombuffer(self.bytes(code.itemsize), code)[0].item()
+        return self.bytes(SIZES[kind])
+
+    def moment(self) -> datetime | None:
+        """A time stamp; None for one that no calendar holds."""
+        parts = ("Q", "q") if self.order == "<" else ("q", "Q")
+        first, second = self.number(parts[0]), self.number(parts[1])
+        fraction, seconds = (first, second) if self.order == "<" else (second, first)
+        try:
+            return EPOCH + timedelta(seconds=seconds, microseconds=round(fraction / 2**64 * 1e6))
+        except OverflowError:
+            return None
+
+    def samples(self) -> Samples:
+        kind, dimension, count = self.number("I"), self.number("I"), self.number("Q")
+        if dimension != 1:
+            raise IndexError(f"an array of {dimension} dimensions; TDMS 2.0 has only one")
+        if kind == STRING:
+            return Samples(kind, count, self.number("Q"))
+        size = np.dtype(NUMBERS[kind]).itemsize if kind in NUMBERS else SIZES[kind]
+        return Samples(kind, count, count * size)
+
+    def daqmx(self, header: int) -> Samples:
+        _, dimension, count = self.number("I"), self.number("I"), self.number("Q")
+        if dimension != 1:
+            raise IndexError(f"an array of {dimension} dimensions; TDMS 2.0 has only one")
+        for _ in range(self.number("I")):
+            self.bytes(20 if header == DAQMX else 17)
+        widths = tuple(self.number("I") for _ in range(self.number("I")))
+        return Samples(DAQMX_RAW, count, 0, widths)
+
+
+def names(path: str) -> tuple[str, ...]:
+    """The group and the channel of an object's path: `/'Motors'/'Roll''s current'` -> `Motors`, `Roll's current`."""
+    return tuple(part.replace("''", "'") for part in path[2:-1].split("'/'")) if len(path) > 1 else ()

@@ -1,0 +1,30 @@
+"""How fast the arm is simulated: 60 s in closed loop, beside the clock on the wall."""
+
+import time
+from dataclasses import replace
+
+import pytest
+
+from pipeline.simulation import closed_loop
+from pipeline.simulation.scenario_file import load
+
+AT_LEAST = 50.0  # times faster than real time, with the wrist fixed
+
+
+@pytest.mark.parametrize("name", ["matched-roll-excitation", "realistic-roll-excitation"])
+def test_a_minute_of_closed_loop_is_simulated_fifty_times_faster_than_it_lasts(name, capsys):
+    scenario = load("davinci-arm")
+    log = replace(next(log for log in scenario.logs if log.name == name), duration=60.0, lead=0.0)
+    closed_loop.run(scenario, replace(log, duration=0.1))  # compiles
+    best = min(_seconds(scenario, log) for _ in range(5))
+    with capsys.disabled():
+        print(
+            f"\n{name}: 60 s at {scenario.rate:g} Hz control in {best:.3f} s, {60 / best:.0f} times real time", end=""
+        )
+    assert 60 / best >= AT_LEAST
+
+
+def _seconds(scenario, log) -> float:
+    start = time.perf_counter()
+    closed_loop.run(scenario, log)
+    return time.perf_counter() - start

@@ -1,0 +1,29 @@
+"""Reading a whole log at once, as the tests need it."""
+
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.logs import open_log
+from pipeline.logs.log import Log, Options
+
+Samples = dict[str, NDArray[np.float64]]
+Read = tuple[Log, Samples]
+
+
+def whole(path: Path, options: Options = Options()) -> Read:  # noqa: B008 - frozen
+    """The log, and all samples of all its channels that hold numbers or times."""
+    log = open_log(path, options)
+    names = [channel.name for channel in log.channels if channel.kind != "text"]
+    blocks = list(log.blocks(names))
+    return log, {name: np.concatenate([np.empty(0), *(block[name] for block in blocks)]) for name in names}
+
+
+def read(content: bytes, name: str = "log.lvm", options: Options = Options()) -> Read:  # noqa: B008 - frozen
+    """The same of the content of a file."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / name
+        path.write_bytes(content)
+        return whole(path, options)

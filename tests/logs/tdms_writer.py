@@ -1,0 +1,58 @@
+"""A writer of TDMS segments in the layouts that npTDMS does not write: interleaved, big-endian, without metadata."""
+
+import struct
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+KINDS = {"i1": 1, "i2": 2, "i4": 3, "i8": 4, "u1": 5, "u2": 6, "u4": 7, "u8": 8, "f4": 9, "f8": 10}
+METADATA, NEW_LIST, RAW, INTERLEAVED, BIG_ENDIAN = 2, 4, 8, 32, 64
+
+
+def segment(
+    channels: Mapping[str, NDArray[Any]],
+    interleaved: bool = False,
+    order: str = "<",
+    described: bool = True,
+    chunks: int = 1,
+    units: Mapping[str, str] | None = None,
+) -> bytes:
+    """A segment: its channels, whose samples are split into `chunks`; without metadata it continues the one before."""
+    metadata = _metadata(channels, order, chunks, units or {}) if described else b""
+    raw = _interleaved(channels, order) if interleaved else _contiguous(channels, order, chunks)
+    toc = RAW | (METADATA | NEW_LIST if described else 0)
+    toc |= (INTERLEAVED if interleaved else 0) | (BIG_ENDIAN if order == ">" else 0)
+    lead = struct.pack(order + "IQQ", 4713, len(metadata) + len(raw), len(metadata))
+    return b"TDSm" + struct.pack("<I", toc) + lead + metadata + raw
+
+
+def _metadata(channels: Mapping[str, NDArray[Any]], order: str, chunks: int, units: Mapping[str, str]) -> bytes:
+    def text(words: str) -> bytes:
+        return struct.pack(order + "I", len(words.encode())) + words.encode()
+
+    parts = [struct.pack(order + "I", len(channels))]
+    for name, samples in channels.items():
+        group, channel = (part.replace("'", "''") for part in name.split("/", 1))
+        parts.append(text(f"/'{group}'/'{channel}'"))
+        kind = KINDS[samples.dtype.str[1:]]
+        parts.append(struct.pack(order + "IIIQ", 20, kind, 1, len(samples) // chunks))
+        unit = units.get(name)
+        parts.append(struct.pack(order + "I", 1 if unit else 0))
+        if unit:
+            parts.append(text("unit_string") + struct.pack(order + "I", 0x20) + text(unit))
+    return b"".join(parts)
+
+
+def _interleaved(channels: Mapping[str, NDArray[Any]], order: str) -> bytes:
+    dtype = np.dtype([(name, samples.dtype.newbyteorder(order)) for name, samples in channels.items()])
+    rows = np.empty(len(next(iter(channels.values()))), dtype)
+    for name, samples in channels.items():
+        rows[name] = samples
+    return rows.tobytes()
+
+
+def _contiguous(channels: Mapping[str, NDArray[Any]], order: str, chunks: int) -> bytes:
+    parts = [np.array_split(samples.astype(samples.dtype.newbyteorder(order)), chunks) for samples in channels.values()]
+    return b"".join(part[i].tobytes() for i in range(chunks) for part in parts)

@@ -1,0 +1,193 @@
+"""Columns of numbers in text, in any dialect."""
+
+import gzip
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_array_equal
+
+from pipeline.errors import BadLog
+from pipeline.logs.log import Options
+from tests.logs.cutting import is_cut_honestly
+from tests.logs.reading import read, whole
+
+VALUES = st.floats(allow_nan=False, allow_infinity=False, width=64)
+DIALECTS = [("\t", "."), ("\t", ","), (";", "."), (";", ","), (",", "."), ("  ", ".")]
+
+
+@st.composite
+def dialects(draw: Any) -> tuple[bytes, np.ndarray[Any, Any], str]:
+    """A file, its samples, and the delimiter."""
+    delimiter, decimal = draw(
+        st.sampled_from([("\t", "."), ("\t", ","), (";", "."), (";", ","), (",", "."), ("  ", ".")])
+    )
+    columns, rows = draw(st.integers(2, 5)), draw(st.integers(2, 8))
+    values = np.array(
+        draw(st.lists(st.lists(VALUES, min_size=columns, max_size=columns), min_size=rows, max_size=rows))
+    )
+    lines = [delimiter.join(repr(float(v)).replace(".", decimal) for v in row) for row in values]
+    # A mark in the first row, for an integer such as 1e+300 has none and leaves the decimal mark open.
+    lines[0] = delimiter.join([f"0{decimal}5", *lines[0].split(delimiter)[1:]])
+    values[0, 0] = 0.5
+    if draw(st.booleans()):
+        lines.insert(0, delimiter.join(f"q{i}" for i in range(columns)))
+    end = draw(st.sampled_from(["\r\n", "\n", "\r", "\r\r\n"]))
+    return (end.join(lines) + end).encode(draw(st.sampled_from(["utf-8", "utf-8-sig", "utf-16"]))), values, delimiter
+
+
+@given(dialects())
+@settings(max_examples=150)
+def test_any_table_in_any_dialect_reads_back_bit_for_bit(file: tuple[bytes, Any, str]) -> None:
+    content, values, _ = file
+    _, samples = read(content, "log.csv")
+    assert_array_equal(np.column_stack(list(samples.values())), values)
+
+
+@given(dialects(), st.data())
+@settings(max_examples=100)
+def test_any_table_cut_at_any_byte_gives_whole_rows_or_a_clear_error(
+    file: tuple[bytes, Any, str], data: st.DataObject
+) -> None:
+    content = file[0]
+    is_cut_honestly(content, data.draw(st.integers(0, len(content))), "log.csv")
+
+
+def text(*lines: str, **options: Any) -> Any:
+    return read(("\n".join(lines) + "\n").encode(), "log.csv", Options(**options))
+
+
+def test_columns_without_a_header_are_numbered() -> None:
+    log, samples = text("0.5,1", "0.6,2")
+    assert list(samples) == ["column_0", "column_1"]
+    assert log.find(1).name == "column_1"
+    assert log.facts == {"delimiter": "comma", "decimal mark": ".", "header": "none: columns are numbered from 0"}
+
+
+def test_units_in_the_header_are_the_channels_units_and_names_stay_as_written() -> None:
+    log, _ = text("t [s];q (rad);plain", "0,5;1;2", "0,6;1;2")
+    assert [(channel.name, channel.unit) for channel in log.channels] == [
+        ("t [s]", "s"),
+        ("q (rad)", "rad"),
+        ("plain", ""),
+    ]
+
+
+def test_a_line_of_units_below_the_names_is_not_a_name() -> None:
+    log, samples = text("Recorded by <script>", "t\tq", "s\trad", "0.5\t1", "0.6\t2")
+    assert [(channel.name, channel.unit) for channel in log.channels] == [("t", "s"), ("q", "rad")]
+    assert log.comments == ["Recorded by <script>"]
+    assert_array_equal(samples["q"], [1, 2])
+
+
+def test_a_commented_header_gives_the_names() -> None:
+    log, samples = text("# t q", "0.0 1.0", "1.0 2.0")
+    assert list(samples) == ["t", "q"]
+    assert log.facts["delimiter"] == "space"
+
+
+def test_a_delimiter_at_the_end_of_every_row_makes_no_channel() -> None:
+    _, samples = text("t;q;", "0,5;1;", "0,6;2;")
+    assert list(samples) == ["t", "q"]
+
+
+def test_blank_lines_are_skipped_and_a_cut_last_row_is_dropped() -> None:
+    log, samples = read(b"t,q\n0.5,1\n\n0.6,2\n0.7,3", "log.csv")
+    assert_array_equal(samples["t"], [0.5, 0.6])
+    assert log.dropped == 1
+    assert log.warnings == ["line 5: the file ends within this row, which is dropped"]
+
+
+def test_empty_cells_are_nulls_and_nan_is_nan() -> None:
+    log, samples = text("t,q", "0.5,", "0.6,NaN", "0.7,3")
+    assert_array_equal(samples["q"], [np.nan, np.nan, 3])
+    assert (log.nulls["q"], log.nans["q"]) == (1, 1)
+
+
+def test_a_narrow_row_in_the_middle_is_filled_and_told_of() -> None:
+    log, samples = text("t,q", "0.5,1", "0.6", "0.7,3")
+    assert_array_equal(samples["q"], [1, np.nan, 3])
+    assert log.warnings == ["line 3: the first of 1 rows with too few cells, filled with nulls"]
+
+
+@pytest.mark.parametrize(
+    ("lines", "options", "words"),
+    [
+        (("t;q", "0,5;1", "0,6;bad", "0,7;3"), {}, r"log.csv:3: 'bad' in column 1 \(q\) is no number"),
+        (("t,q", "0.5,1", "0.6,1,2", "0.7,3"), {}, "log.csv:3: the row has 3 cells, where there are 2 columns"),
+        (("t,q,x", "0.5,1", "0.6,1", "0.7,3", "0.8,3"), {}, "the header names 3 columns"),
+        (("0,5", "0,6", "0,7"), {}, "the comma may be the delimiter, the decimal mark, or both; set `delimiter`"),
+        (("0,05,1,25", "0,06,1,26"), {}, "the comma may be"),
+        (("abc", "def"), {}, "no delimiter"),
+        (("0,5,1", "0,6,2"), {"delimiter": ",", "decimal": ","}, "no delimiter"),
+        (("0.4;1", "0.5;1.000,5", "0.6;2"), {}, "is no number with the decimal mark"),
+        (("bad;1;2", "0.5;1;2", "0.6;1;2"), {}, "holds numbers and text"),
+    ],
+)  # fmt: skip
+def test_what_can_be_read_in_two_ways_or_none_is_refused_with_the_remedy(lines: Any, options: Any, words: str) -> None:
+    with pytest.raises(BadLog, match=words):
+        text(*lines, **options)
+
+
+def test_the_study_settles_what_the_file_leaves_open() -> None:
+    _, samples = text("0,5", "1,5", "2,5", decimal=",")
+    assert_array_equal(samples["column_0"], [0.5, 1.5, 2.5])
+    _, samples = text("0,5", "1,5", "2,5", delimiter="comma")
+    assert_array_equal(samples["column_1"], [5, 5, 5])
+    _, samples = text("1;2", "3;4", header=True)
+    assert list(samples) == ["1", "2"]
+
+
+def test_a_header_settles_whether_the_comma_is_a_delimiter() -> None:
+    _, samples = text("t,q", "0,5", "1,6")
+    assert_array_equal(samples["q"], [5, 6])
+    _, samples = text("force", "0,5", "1,6")
+    assert_array_equal(samples["force"], [0.5, 1.6])
+
+
+def test_rows_that_labview_writes_without_headings_are_read() -> None:
+    _, samples = read(b"\t1,000000\t4,000000\r\n\t2,500000\t5,000000\r\n", "log.lvm")
+    assert_array_equal(samples["column_1"], [1, 2.5])
+    assert np.isnan(samples["column_0"]).all()
+    _, samples = read(b"X_Value\tUntitled\tComment\r\n0,000000\t4,000000\r\n1,000000\t5,000000\r\n", "log.lvm")
+    assert list(samples) == ["X_Value", "Untitled"]
+
+
+def test_a_zipped_log_is_read_as_far_as_it_is_whole() -> None:
+    rows = "".join(f"{i / 7!r},{i}\n" for i in range(5000))
+    packed = gzip.compress(rows.encode(), mtime=0)
+    log, samples = read(packed, "log.csv.gz")
+    assert len(samples["column_1"]) == 5000
+    assert not log.warnings
+    log, samples = read(packed[: len(packed) // 2], "log.csv.gz")
+    assert_array_equal(samples["column_1"], np.arange(len(samples["column_1"])))
+    assert 1000 < len(samples["column_1"]) < 5000
+    assert any("the compressed file ends before its data" in warning for warning in log.warnings)
+
+
+def test_quoted_cells_are_read_without_their_quotes() -> None:
+    _, samples = text('"t, first","q"', '"0.5","1"', '"0.6","2"')
+    assert list(samples) == ["t, first", "q"]
+    assert_array_equal(samples["q"], [1, 2])
+
+
+def test_a_column_of_dates_is_text_and_the_others_are_read() -> None:
+    log, samples = text("when;q", "2026-10-15 02:26:03;1,5", "2026-10-15 02:26:04;2,5")
+    assert [channel.kind for channel in log.channels] == ["text", "number"]
+    assert_array_equal(samples["q"], [1.5, 2.5])
+
+
+def test_recordings_of_other_arms_have_the_columns_that_their_notes_say(data: Any) -> None:
+    for name, columns, rows in (
+        ("dvrk_wpi/one.csv", 21, 5999),
+        ("dvrk_slide/arm_fourier2.csv", 9, 5990),
+        ("ur10e/joint_1.csv", 31, 5889),
+        ("palpation/phantom_T1_probes.csv", 4, 7270),
+        ("ur5/No10_Standstill_ForceSensor_All__i_target.csv", 7, 3507),
+    ):
+        _, samples = whole(data / name)
+        table = np.loadtxt(data / name, delimiter=",", skiprows=int("palpation" in name), max_rows=rows)
+        assert len(samples) == columns
+        assert_array_equal(np.column_stack(list(samples.values())), table)
