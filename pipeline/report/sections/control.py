@@ -35,8 +35,8 @@ def blocks(context: Context, studies: list[Control]) -> Iterator[Block]:
     yield response(context, "pd-to-zero", 1.5, with_V=True)
     yield response(context, "pd-to-pose", 1.5, with_V=False)
     yield Prose(
-        "A compensator that knows only 0.9 of the masses leaves PD with an offset. Integral action removes it, but with "
-        "the gains of Table 5.4 slowly: its own slow pole keeps the error **larger** than PD's offset for some twenty "
+        "A compensator that knows only 0.9 of the masses leaves PD with an offset. Integral action removes it, but "
+        "with the gains of Table 5.4 slowly: its slow pole keeps the error **larger** than PD's offset for some twenty "
         "seconds. The thesis calls the response faster, which this simulation does not confirm."
     )
     yield errors(context, studies)

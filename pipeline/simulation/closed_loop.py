@@ -1,0 +1,107 @@
+"""The whole arm in closed loop, as a scenario describes it, and the parameters that its joint models truly have."""
+
+from typing import cast
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.maths import kinematics
+from pipeline.maths.bodies import Bodies
+from pipeline.maths.dynamics import regressor
+from pipeline.maths.kinematics import Chain
+from pipeline.maths.rigid_body import inverse_dynamics
+from pipeline.maths.simulation import Body, Timing, simulate
+from pipeline.maths.simulation_forces import UP, Surroundings
+from pipeline.maths.simulation_plant import arm
+from pipeline.simulation.motion import Motion, Run
+from pipeline.simulation.scenario import Arm, BadScenario, Scenario, SimulatedLog
+
+Array = NDArray[np.float64]
+EXACT = 1e-9  # relative residual up to which a joint model describes the arm exactly
+
+
+def run(scenario: Scenario, log: SimulatedLog) -> Run:
+    """Simulate one recording, from rest at the first position asked for; the lead is run and not recorded.
+
+    Raises
+    ------
+    BadScenario
+        If the motion grows beyond all bounds, as it does under gains that the ticks are too slow for.
+    """
+    what, robot = cast(Arm, scenario.arm), scenario.robot
+    chain, bodies = _geometry(scenario)
+    names, n = [joint.name for joint in robot.joints], len(robot.joints)
+    ticks = round(1 / (scenario.rate * what.tick))
+    skipped, samples = round(log.lead * scenario.rate), round(log.duration * scenario.rate)
+    t = np.arange(-skipped, samples) / scenario.rate
+    reference = np.column_stack([log.position(name, t) for name in names])
+    stops = np.array([scenario.joints[name].stops for name in names])
+    friction = what.families[log.family].friction
+    body = Body(friction, stops[:, 0].copy(), stops[:, 1].copy(), np.ones(n, dtype=np.bool_))
+    plant = arm(chain, bodies, what.motors.gear_ratio**2 * what.rotors)
+    clock = Timing(what.tick, ticks)
+    instants = np.arange(len(t) * ticks, dtype=np.float64) * what.tick - log.lead
+    around = _around(log, chain, names, instants)
+    found = simulate(plant, body, what.motors, what.control, clock, reference, around, reference[0])
+    if not all(np.isfinite(values).all() for values in found):
+        raise BadScenario(
+            f"{scenario.name}: log {log.name}: the loop is unstable; lower its gains, or shorten arm.tick"
+        )
+    q, dq, tau, tau_ext, force = (values[skipped:] for values in found)
+    motions = {
+        name: Motion(*(np.ascontiguousarray(values[:, i]) for values in (q, dq, tau, tau_ext)))
+        for i, name in enumerate(names)
+    }
+    return Run(t[skipped:], {name: motions[name] for name in log.joints}, force)
+
+
+def _geometry(scenario: Scenario) -> tuple[Chain, Bodies]:
+    return cast(Chain, scenario.robot.chain), cast(Bodies, scenario.robot.bodies)
+
+
+def _around(log: SimulatedLog, chain: Chain, names: list[str], t: Array) -> Surroundings:
+    """What the arm touches at the ticks t (T,) [s]."""
+    efforts, forces = np.zeros((len(t), len(names))), np.zeros((len(t), 3))
+    for i, name in enumerate(names):
+        for push in log.external.get(name, ()):
+            efforts[:, i] += push.at(t)
+    for push in log.tip:
+        forces += np.outer(push.at(t), np.array(push.direction))
+    surface, tissue = np.zeros(3), log.tissue
+    if tissue:
+        q = [tissue.surface if name in log.moves else log.held.get(name, 0.0) for name in names]
+        surface = np.array(kinematics.tip(chain, q))
+    stiffness, damping = (tissue.stiffness, tissue.damping) if tissue else (0.0, 0.0)
+    return Surroundings(
+        efforts, forces, log.mass, stiffness, damping, surface, UP.copy(), bool(log.tip) or tissue is not None
+    )
+
+
+def hung_at(scenario: Scenario) -> Array:
+    """Where the tip is at q = 0 from the remote centre (3,) [m], base axes: where a mass is hung."""
+    chain, _ = _geometry(scenario)
+    return np.asarray(kinematics.tip(chain, np.zeros(len(scenario.robot.joints))) - kinematics.remote_centre(chain))
+
+
+def theta(scenario: Scenario, family: str) -> dict[str, Array]:
+    """The parameters of each joint's model while the other joints stay at zero, where the model is exact.
+
+    They are the ones with which the model gives the arm's own efforts; a joint whose friction has more to it than
+    viscous and Coulomb friction has none.
+    """
+    what, friction = cast(Arm, scenario.arm), cast(Arm, scenario.arm).families[family].friction
+    chain, bodies = _geometry(scenario)
+    rotors, found = what.motors.gear_ratio**2 * what.rotors, {}
+    random = np.random.default_rng(0)
+    for i, joint in enumerate(scenario.robot.joints):
+        q, dq, ddq = np.zeros((3, 200, len(scenario.robot.joints)))
+        q[:, i], dq[:, i], ddq[:, i] = random.uniform(-0.5, 0.5, (3, 200))
+        tau = inverse_dynamics(chain, bodies, q, dq, ddq)[:, i] + rotors[i] * ddq[:, i]
+        tau += friction.viscous[i] * dq[:, i] + friction.coulomb_up[i] * np.sign(dq[:, i])
+        F = regressor(joint.terms, q[:, i], dq[:, i], ddq[:, i])
+        parameters = np.linalg.lstsq(F, tau, rcond=None)[0]
+        plain = friction.coulomb_up[i] == friction.coulomb_down[i] == friction.static_up[i] == friction.static_down[i]
+        simple = plain and friction.bristle_stiffness[i] == 0
+        if simple and np.linalg.norm(F @ parameters - tau) <= EXACT * np.linalg.norm(tau):
+            found[joint.name] = parameters
+    return found

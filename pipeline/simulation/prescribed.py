@@ -1,0 +1,28 @@
+"""Joints that follow their trajectories exactly: the independent joint models, run backwards.  Section 6.1"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.maths.dynamics import inverse
+from pipeline.maths.excitation import Fourier, motion
+from pipeline.simulation.motion import Motion, Run
+from pipeline.simulation.scenario import Scenario, SimulatedLog
+
+Array = NDArray[np.float64]
+
+
+def simulate(scenario: Scenario, log: SimulatedLog) -> Run:
+    """The motion of every joint that is recorded."""
+    t = np.arange(round(log.duration * scenario.rate)) / scenario.rate
+    return Run(t, {name: _joint(scenario, log, name, t) for name in log.joints})
+
+
+def _joint(scenario: Scenario, log: SimulatedLog, name: str, t: Array) -> Motion:
+    simulated, move = scenario.joints[name], log.moves.get(name)
+    if isinstance(move, Fourier):
+        q, dq, ddq = motion(move, t)
+    else:
+        q, dq, ddq = log.position(name, t), np.zeros_like(t), np.zeros_like(t)
+    tau_ext = sum((push.at(t) for push in log.external.get(name, ())), np.zeros_like(t))
+    tau = inverse(simulated.joint.terms, np.array(simulated.theta), q, dq, ddq) + tau_ext
+    return Motion(q, dq, tau, tau_ext)

@@ -1,0 +1,77 @@
+"""A simulated study on disk: every log, study.toml and truth.toml, put in place when all of it is there."""
+
+import shutil
+import tempfile
+from collections.abc import Callable
+from pathlib import Path
+
+from pipeline.errors import BadRequest
+from pipeline.simulation import closed_loop, prescribed, study_words, truth_words, writers
+from pipeline.simulation.laboratory import Channel, generator, record
+from pipeline.simulation.motion import Run
+from pipeline.simulation.scenario import Noise, Scenario, SimulatedLog
+
+TRUTH = "truth.toml"
+
+
+def write(scenario: Scenario, folder: Path, force: bool, say: Callable[[str], None]) -> None:
+    """Simulate every log and put the study in place when it is whole; `say` is told of each log.
+
+    Raises
+    ------
+    BadRequest
+        If the folder holds something, unless `force` is given and what it holds is a simulated study.
+    """
+    check(folder, force)
+    folder.parent.mkdir(parents=True, exist_ok=True)
+    with tempfile.TemporaryDirectory(dir=folder.parent, prefix=f".{folder.name}-") as temporary:
+        new, old = Path(temporary) / "new", Path(temporary) / "old"
+        new.mkdir()
+        entries, truths = zip(*(_log(scenario, log, new, say) for log in scenario.logs), strict=True)
+        _text(new / "study.toml", study_words.study(scenario, entries))
+        _text(new / TRUTH, truth_words.truth(scenario, truths))
+        if folder.exists():
+            folder.rename(old)
+        shutil.move(new, folder)
+    size = sum(file.stat().st_size for file in folder.iterdir())
+    say(f"{folder}: {len(scenario.logs)} simulated logs, {size / 1e6:.2f} MB")
+
+
+def check(folder: Path, force: bool) -> None:
+    """Refuse to replace what should not be lost."""
+    if folder.exists() and not folder.is_dir():
+        raise BadRequest(f"{folder} is a file; name a folder that does not exist yet")
+    if not folder.is_dir() or not any(folder.iterdir()):
+        return
+    if not force:
+        raise BadRequest(f"{folder} is not empty; name another folder, or replace it with --force")
+    if not (folder / TRUTH).is_file():
+        raise BadRequest(f"{folder} has no {TRUTH}, so it is not a simulated study: it is left alone, --force or not")
+
+
+def _log(scenario: Scenario, log: SimulatedLog, folder: Path, say: Callable[[str], None]) -> tuple[str, str]:
+    run = closed_loop.run(scenario, log) if scenario.arm else prescribed.simulate(scenario, log)
+    channels, path = recorded(scenario, log, run), folder / log.file
+    writers.write(path, channels, scenario.rate, scenario.started)
+    size = path.stat().st_size / 1e6
+    say(f"{log.name}: {len(run.t)} samples of {', '.join(log.joints)} -> {log.file}, {size:.2f} MB")
+    return study_words.entry(scenario, log, path, channels), truth_words.entry(log, run)
+
+
+def recorded(scenario: Scenario, log: SimulatedLog, run: Run) -> list[Channel]:
+    """The channels of one log, with the noise of its seed."""
+    channels = [Channel("time", "Time", "s", run.t)] if log.clock == "channel" else []
+    for name, motion in run.motions.items():
+        random = generator(scenario.seed, log.name, name)
+        noise = noise_of(scenario, log.family, name)
+        channels += record(scenario.joints[name], motion, noise, scenario.rate, log.current_unit, random)
+    return channels
+
+
+def noise_of(scenario: Scenario, family: str, joint: str) -> Noise:
+    """The noise of a joint: of its family, where the whole arm is simulated."""
+    return scenario.arm.families[family].noise[joint] if scenario.arm else scenario.joints[joint].noise
+
+
+def _text(file: Path, text: str) -> None:
+    file.write_text(text, encoding="utf-8", newline="\n")

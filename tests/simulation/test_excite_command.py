@@ -1,0 +1,129 @@
+"""The command `excite`: what it prints and writes, and what it refuses."""
+
+import json
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from pipeline.commands import excite
+from pipeline.errors import BadRequest, BadRobot
+
+PITCH = "-0.1912,0.2861,-0.0639,0.1741,0.3701"
+app = typer.Typer()
+app.command()(excite.run)
+
+
+def call(*words: str) -> str:
+    result = CliRunner().invoke(app, list(words), catch_exceptions=False)
+    assert result.exit_code == 0
+    return result.stdout
+
+
+def test_json_of_given_coefficients_has_objective_coefficients_ranges_and_condition():
+    found = json.loads(call("davinci", "hand_pitch", "--evaluate", PITCH, "--json"))
+    assert found["objective"] == pytest.approx(-12.7527, abs=1e-3)
+    assert found["coefficients"] == {"a0": -0.1912, "a1": 0.2861, "b1": -0.0639, "a2": 0.1741, "b2": 0.3701}
+    assert found["ranges"]["q"] == pytest.approx([-0.6003, 0.6008], abs=1e-4)
+    assert found["condition"] == pytest.approx(47.2, abs=0.1)
+    assert found["within_limits"] is False
+
+
+def test_a_given_trajectory_that_breaks_a_limit_is_shown_to():
+    assert "LIMIT BROKEN: q goes from -0.6003 to 0.6008 rad, its limits are -0.6 and 0.6" in call(
+        "davinci", "hand_pitch", "--evaluate", PITCH
+    )
+
+
+def test_a_trajectory_that_tells_nothing_is_worth_null():
+    found = json.loads(call("davinci", "hand_pitch", "--evaluate", "0.1,0,0", "--json"))
+    assert (found["objective"], found["condition"]) == (None, None)
+    assert found["ranges"] == {"q": [0.1, 0.1], "dq": [0.0, 0.0], "ddq": [0.0, 0.0]}
+    assert "objective inf" in call("davinci", "hand_pitch", "--evaluate", "0.1,0,0")
+
+
+def test_the_table_for_the_controller_is_one_period_of_the_motion(tmp_path):
+    call("davinci", "instrument_slide", "--evaluate", "0.02,0.1,0.0", "--rate", "200", "--csv", str(tmp_path / "t.csv"))
+    lines = (tmp_path / "t.csv").read_text().splitlines()
+    t, q, dq, ddq = np.loadtxt(lines[1:], delimiter=",").T
+    w = 2 * np.pi / 5
+    assert lines[0] == "t,q,dq,ddq"
+    assert np.allclose(t, np.arange(1000) / 200)
+    assert np.allclose(q, 0.02 + 0.1 / w * np.sin(w * t))
+    assert np.allclose(dq, 0.1 * np.cos(w * t))
+    assert np.allclose(ddq, -0.1 * w * np.sin(w * t))
+
+
+ARM = """
+name = "arm"
+[[joint]]
+name = "shoulder"
+kind = "revolute"
+terms = ["inertia", "viscous friction"]
+harmonics = 2
+limits = { q = [-1.0, 1.0], dq = [-2.0, 2.0], ddq = [-5.0, 5.0] }
+[[joint]]
+name = "rail"
+kind = "prismatic"
+terms = ["inertia", "Coulomb friction"]
+harmonics = 2
+limits = { q = [-0.1, 0.3], dq = [-2.0, 2.0], ddq = [-5.0, 5.0] }
+"""
+
+
+@pytest.fixture
+def laboratory(tmp_path) -> str:
+    (tmp_path / "arm.toml").write_text(ARM)
+    return str(tmp_path / "arm.toml")
+
+
+def test_joints_of_independent_models_that_move_together_share_a_period_and_sum_their_objectives(laboratory, tmp_path):
+    found = json.loads(call(laboratory, "all", "--starts", "1", "--json", "--csv", str(tmp_path / "all.csv")))
+    assert list(found["joints"]) == ["shoulder", "rail"]
+    assert {joint["period"] for joint in found["joints"].values()} == {10.0}
+    assert found["objective"] == pytest.approx(sum(joint["objective"] for joint in found["joints"].values()))
+    assert (tmp_path / "all.csv").read_text().startswith("t,shoulder.q,shoulder.dq,shoulder.ddq,rail.q")
+
+
+@pytest.mark.parametrize("suffix", [".svg", ".png"])
+def test_a_plot_is_the_same_bytes_twice(tmp_path, suffix):
+    for name in ("one", "two"):
+        call("davinci", "hand_pitch", "--evaluate", PITCH, "--plot", str(tmp_path / f"{name}{suffix}"))
+    assert (tmp_path / f"one{suffix}").read_bytes() == (tmp_path / f"two{suffix}").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["davinci", "hand_pitch", "--dq", "0.1,0.5"], "hand_pitch: the velocity of a periodic motion"),
+        (["davinci", "hand_pitch", "--q", "2"], "--q takes lower,upper"),
+        (["davinci", "hand_pitch", "--evaluate", "1,2"], "--evaluate takes a0,a1,b1,a2,b2"),
+        (["davinci", "hand_pitch", "--evaluate", "1,x,2"], "--evaluate takes numbers"),
+        (["davinci", "hand_pitch", "--evaluate", "1,nan,2"], "finite"),
+        (["davinci", "all", "--evaluate", PITCH], "name it instead of `all`"),
+        (["davinci", "hand_pitch", "--period", "-1"], "--period must be positive"),
+        (["davinci", "hand_pitch", "--criterion", "volume"], "--criterion is one of determinant, condition"),
+        (["davinci", "hand_pitch", "--evaluate", PITCH, "--plot", "a.txt"], "a plot ends in"),
+        (["davinci", "hand_pitch", "--evaluate", PITCH, "--rate", "nan", "--csv", "a.csv"], "--rate must be positive"),
+        (["davinci", "hand_pitch", "--evaluate", PITCH, "--csv", "no/a.csv"], "a.csv: No such file or directory"),
+        (["davinci", "hand_pitch", "--evaluate", PITCH, "--plot", "no/a.svg"], "a.svg: No such file or directory"),
+        (["davinci", "hand_pitch", "--evaluate", PITCH, "--rate", "33.33", "--csv", "a.csv"], "whole number"),
+    ],
+)
+def test_what_cannot_be_met_is_refused_with_the_remedy(words, says, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(BadRequest) as error:
+        call(*words)
+    assert says in str(error.value)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_unknown_joint_is_answered_with_the_joints_there_are():
+    with pytest.raises(BadRobot, match="hand_roll, hand_pitch, instrument_slide"):
+        call("davinci", "elbow")
+
+
+def test_a_robot_of_a_laboratory_can_be_excited_too(laboratory):
+    found = json.loads(call(laboratory, "shoulder", "--starts", "2", "--json"))
+    assert found["within_limits"] is True

@@ -1,0 +1,180 @@
+"""Scenario files: what they say, and what is said about wrong ones."""
+
+from dataclasses import replace
+from importlib.resources import files
+
+import numpy as np
+import pytest
+
+from pipeline import robots
+from pipeline.maths.control import Regulator
+from pipeline.robots.davinci import ROBOT
+from pipeline.simulation.scenario import BadScenario, Path
+from pipeline.simulation.scenario_file import load, shipped
+
+GOOD = """
+title = "A roll"
+robot = "davinci"
+seed = 1
+rate = 100.0
+started = "2016-05-02T09:00:00"
+[joint.hand_roll]
+theta = { inertia = 0.4, "gravity, sine" = 0.1, "viscous friction" = 0.3, "Coulomb friction" = 0.2 }
+[[log]]
+name = "roll"
+file = "roll.tdms"
+role = "contact"
+duration = 10.0
+moves.hand_roll = { period = 5.0, a = [0.1], b = [0.0] }
+external.hand_roll = [ { shape = "triangle", start = 2.0, end = 4.0, peak = 1.0 } ]
+"""
+
+
+def shipped_text(name: str) -> str:
+    return files("pipeline.simulation").joinpath(f"scenarios/{name}.toml").read_text(encoding="utf-8")
+
+
+def read(tmp_path, text: str):
+    file = tmp_path / "mine.toml"
+    file.write_text(text, encoding="utf-8")
+    return load(str(file))
+
+
+def problems(tmp_path, text: str) -> list[str]:
+    with pytest.raises(BadScenario) as error:
+        read(tmp_path, text)
+    return [line.removeprefix(f"{tmp_path / 'mine.toml'}: ") for line in str(error.value).splitlines()]
+
+
+def test_a_scenario_says_what_its_file_says(tmp_path):
+    scenario = read(tmp_path, GOOD)
+    assert scenario.name == "mine"
+    assert scenario.joints["hand_roll"].theta == (0.4, 0.1, 0.3, 0.2)
+    log = scenario.logs[0]
+    assert (log.role, log.duration, log.windows) == ("contact", 10.0, [(2.0, 4.0)])
+    assert log.position("hand_roll", np.array([1.25])) == pytest.approx(0.1 * 5 / (2 * np.pi))
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_every_shipped_scenario_is_sound(name):
+    assert load(name).name == name
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("seed = 1", "sead = 1", ["seed is missing", "unknown key 'sead'"]),
+        ("seed = 1", "seed = 1.5", ["seed must be a whole number, not 1.5"]),
+        ('robot = "davinci"', 'robot = "raven"', ["robot must be one of davinci, dvrk_psm, not 'raven'"]),
+        ("rate = 100.0", "rate = 0", ["rate must be finite and greater than 0, not 0"]),
+        ("rate = 100.0", "rate = nan", ["rate must be finite and greater than 0, not nan"]),
+        ("rate = 100.0", "rate = 1e9", ["log roll: 1e+10 samples cannot be recorded"]),
+        ("rate = 100.0", "rate = 0.1", ["log roll: 1 samples cannot be recorded"]),
+        ("T09", " 9", ["started must be a date and time such as"]),
+        ("inertia = 0.4", "mass = 0.4", ["joint.hand_roll.theta: inertia is missing", "unknown key 'mass'"]),
+        ("hand_roll]", "elbow]", ["robot davinci has no joint 'elbow'", "there is no [joint.hand_roll]"]),
+        ('name = "roll"', 'name = "Roll 1"', ["log 1: name must match [a-z0-9_-]+, not 'Roll 1'"]),
+        ("roll.tdms", "../roll.tdms", ["log 1: file must be a plain file name"]),
+        ("roll.tdms", "roll.csv", ["ends in .tdms or .lvm"]),
+        ('role = "contact"', 'role = "dance"', ["log 1: role must be one of identification"]),
+        ("period = 5.0", "period = -5.0", ["log 1.moves.hand_roll: period must be finite and greater than 0"]),
+        ("b = [0.0]", "b = []", ["a and b must have one number for each harmonic, not 1 and 0"]),
+        ("b = [0.0]", "b = ['x']", ["b must be a list of finite numbers"]),
+        ("end = 4.0", "end = 1.0", ["log 1.external.hand_roll 1: end must be after start = 2, not 1"]),
+        ("end = 4.0", "end = 40.0", ["end = 40 s is after the recording's 10 s"]),
+        ('"triangle"', '"square"', ["shape must be one of triangle, pulse, not 'square'"]),
+        ("external.hand_roll", "external.hand_pitch", ["hand_pitch touches something but is not recorded"]),
+        ("duration = 10.0", "duration = 10.0\nmass = 1.0", ["log 1: unknown key 'mass'"]),
+        ("moves.hand_roll = {", "held.hand_roll = 0.0\nmoves.hand_roll = {", ["hand_roll both moves and is held"]),
+        ("[[log]]", "[log]", ["log must be a list of tables"]),
+        ("theta = {", "noise = 3\ntheta = {", ["joint.hand_roll.noise: must be a table, not 3"]),
+        ("moves.hand_roll = { period = 5.0, a = [0.1], b = [0.0] }", "moves.hand_roll = { path = [[0, 0], [1, 1]] }",
+         ["joints that follow their model exactly need a Fourier series"]),
+    ],
+)  # fmt: skip
+def test_everything_wrong_with_a_scenario_is_said_with_its_place(tmp_path, old, new, says):
+    assert old in GOOD
+    found = problems(tmp_path, GOOD.replace(old, new))
+    for words in says:
+        assert any(words in problem for problem in found), found
+
+
+def test_all_problems_are_said_at_once(tmp_path):
+    found = problems(tmp_path, GOOD.replace("rate = 100.0", "rate = -1").replace("roll.tdms", "roll.csv"))
+    assert len(found) == 2
+
+
+def test_two_logs_of_one_name_or_file_are_refused(tmp_path):
+    found = problems(tmp_path, GOOD + GOOD[GOOD.index("[[log]]") :])
+    assert found == ["two logs have the name 'roll'", "two logs have the file 'roll.tdms'"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("position_i = [7.5,", "position_i = [-7.5,", "arm.control: position_i must not be negative"),
+        ("tick = 5e-4", "tick = 3e-4", "must be whole ticks, not 33.3333 of them"),
+        ("tick = 5e-4", "tick = 'a'", "arm: tick must be a number, not 'a'"),
+        ("tick = 5e-4", "tick = 3e-2", "must be whole ticks, not 0.333333 of them"),
+        ("rotor_inertia = [1e-6, 1e-6, 1e-6]", "rotor_inertia = [1e-6]", "arm: rotor_inertia must be a list of 3"),
+        ("resistance = [2.0, 2.0, 2.0]", "resistance = [2.0, -2.0, 2.0]", "resistance must be greater than 0"),
+        ("resistance = [2.0, 2.0, 2.0]", "resistance = [2.0, 0.0, 2.0]", "resistance must be greater than 0"),
+        ("position_p", "position_q", "arm.control: position_p is missing"),
+        ("coulomb = [0.24, 0.20]", "coulomb = 0.24", "family.realistic.hand_roll: coulomb must be a list of numbers"),
+        ("coulomb = [0.24, 0.20]", "coulomb = [0.24, -0.20]", "coulomb must be two positive numbers"),
+        ("stops = [-0.09, 0.13]", "stops = [0.13, -0.09]", "stops must be lower and upper"),
+        ("skip = 5.0", "skip = 500.0", "skip = 500 s leaves nothing of 55 s"),
+        ("[[0, 0.0], [10, 0.05]", "[[0, 0.0], [0, 0.05]", "the times of path must increase"),
+        ("surface = 0.04, ", "", "tissue: surface is missing"),
+        ("force = [0.0, 12.0, 0.0]", "force = [0.0, 12.0]", "force must be a list of 3 finite numbers"),
+        (
+            "stops = [-0.09, 0.13]",
+            "stops = [0.05, 0.13]",
+            "instrument_slide starts at 0, beyond its stops 0.05 and 0.13",
+        ),
+    ],
+)
+def test_the_tables_of_the_whole_arm_are_checked_too(tmp_path, old, new, says):
+    text = shipped_text("davinci-arm")
+    assert old in text
+    found = problems(tmp_path, text.replace(old, new))
+    assert any(says in problem for problem in found), found
+
+
+def test_a_robot_whose_links_are_not_known_cannot_be_simulated_as_a_whole(monkeypatch):
+    monkeypatch.setattr(robots, "load", lambda *_: replace(ROBOT, chain=None))
+    with pytest.raises(BadScenario, match="the geometry and masses of davinci are not known"):
+        load("davinci-arm")
+
+
+def test_an_arm_may_be_run_by_the_pid_of_chapter_5(tmp_path):
+    text = shipped_text("davinci-arm")
+    start, end = text.index("[arm.control]"), text.index("[family.matched.hand_roll]")
+    pid = 'law = "pid"\nproportional = [1, 2, 3]\nderivative = [4, 5, 6]\nintegral = [0, 0, 0]\ngravity = 0.9\n'
+    law = read(tmp_path, text[:start] + "[arm.control]\n" + pid + text[end:]).arm.control
+    assert isinstance(law, Regulator)
+    assert law.derivative.tolist() == [4.0, 5.0, 6.0]
+    assert law.gravity == 0.9
+
+
+def test_a_family_may_give_a_log_another_role():
+    roles = {log.name: log.role for log in load("davinci-arm").logs}
+    assert roles["matched-roll-excitation"] == "identification"
+    assert roles["realistic-roll-excitation"] == "validation"
+
+
+def test_a_name_that_no_scenario_has_is_answered_with_those_there_are():
+    with pytest.raises(BadScenario, match="davinci-arm, davinci-demo"):
+        load("davinci")
+
+
+def test_a_file_that_is_not_toml_is_named(tmp_path):
+    assert "Expected" in problems(tmp_path, "title =")[0] or "Invalid" in problems(tmp_path, "title =")[0]
+
+
+def test_a_path_goes_at_constant_speed_or_eases_from_point_to_point():
+    points = ((0.0, 1.0), (2.0, 3.0), (3.0, 0.0))
+    t = np.array([-1.0, 0.0, 0.5, 1.0, 2.0, 9.0])
+    assert Path(points, ease=False).position(t) == pytest.approx([1.0, 1.0, 1.5, 2.0, 3.0, 0.0])
+    quarter = 1 + 2 * (1 - np.cos(np.pi / 4)) / 2
+    assert Path(points, ease=True).position(t) == pytest.approx([1.0, 1.0, quarter, 2.0, 3.0, 0.0])

@@ -1,0 +1,205 @@
+"""A simulated study: complete, readable, labelled, the same twice, and true to its truth."""
+
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+from scipy.signal import lfilter
+from typer.testing import CliRunner
+
+from pipeline import study_file
+from pipeline.commands import simulate
+from pipeline.errors import BadRequest
+from pipeline.logs import open_log
+from pipeline.maths.dynamics import regressor
+from pipeline.maths.excitation import motion
+from pipeline.simulation import study_folder
+from pipeline.simulation.laboratory import drift, generator, stepped
+from pipeline.simulation.scenario import Noise
+from pipeline.simulation.scenario_file import load
+from pipeline.study import Study
+
+app = typer.Typer()
+app.command()(simulate.run)
+SHORT = """
+title = "Both ways of recording"
+robot = "davinci"
+seed = 7
+rate = 100.0
+started = "2016-05-02T09:00:00"
+[joint.hand_roll]
+label = "Roll"
+encoder_step = 3.141592653589793e-3
+current_step = 1e-4
+theta = { inertia = 0.4, "gravity, sine" = 0.1, "viscous friction" = 0.3, "Coulomb friction" = 0.2 }
+noise = { q = 1e-5, dq = 1e-3, tau = 0.1 }
+"""
+LOG = """
+[[log]]
+name = "log-{0}"
+file = "log_{0}.{1}"
+role = "contact"
+duration = 5.0
+clock = "{2}"
+current_unit = "{3}"
+moves.hand_roll = {{ period = 5.0, a = [0.1], b = [0.2] }}
+external.hand_roll = [ {{ shape = "pulse", start = 2.0, end = 4.0, peak = 1.0 }} ]
+"""
+KINDS = [("tdms", "channel", "A"), ("tdms", "header", "mA"), ("lvm", "channel", "mA"), ("lvm", "header", "A")]
+
+
+@pytest.fixture(scope="module")
+def demo(tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("simulated") / "davinci-demo"
+    study_folder.write(load("davinci-demo"), folder, False, lambda _: None)
+    return folder
+
+
+def short(tmp_path) -> Path:
+    file = tmp_path / "short.toml"
+    file.write_text(SHORT + "".join(LOG.format(i, *kind) for i, kind in enumerate(KINDS)))
+    return file
+
+
+def channels(study: Study, name: str) -> dict[str, np.ndarray]:
+    """The samples of a log by quantity, as its file gives them."""
+    entry = study.log(name)
+    log = open_log(study.folder / entry.files[0])
+    sources = {str(source.channel): source.quantity for source in entry.channels}
+    blocks = list(log.blocks(list(sources)))
+    return {quantity: np.concatenate([b[channel] for b in blocks]) for channel, quantity in sources.items()}
+
+
+def test_the_study_is_valid_complete_labelled_and_small(demo):
+    study = study_file.read(demo)
+    assert study.simulated
+    assert not study.absent()
+    assert {entry.role for entry in study.logs} == {"identification", "validation", "contact"}
+    assert sum(file.stat().st_size for file in demo.iterdir()) < 5e6
+    assert tomllib.loads((demo / "truth.toml").read_text())["simulated"] is True
+    for entry in study.logs:
+        assert b"SIMULATED" in (demo / entry.files[0]).read_bytes()[:4096]
+
+
+def test_the_contact_windows_of_the_study_are_the_pushes_of_the_truth(demo):
+    truth = {entry["name"]: entry for entry in tomllib.loads((demo / "truth.toml").read_text())["log"]}
+    for entry in study_file.read(demo).logs:
+        pushes = truth[entry.name].get("push", [])
+        assert list(entry.contact) == [(push["start"], push["end"]) for push in pushes]
+        assert bool(pushes) == (entry.role == "contact")
+
+
+@pytest.mark.parametrize(
+    ("name", "joint", "size"),
+    [("roll", "hand_roll", 1.0), ("pitch", "hand_pitch", 1e-3), ("slide", "instrument_slide", 1.0)],
+)
+def test_least_squares_on_the_excitation_gives_the_truth_within_its_standard_errors(demo, name, joint, size):
+    study, truth = study_file.read(demo), tomllib.loads((demo / "truth.toml").read_text())["theta"][joint]
+    it, columns = study.robot.joint(joint), channels(study, f"{name}-excitation")
+    log = next(entry for entry in load("davinci-demo").logs if entry.name == f"{name}-excitation")
+    tau = columns[f"{joint}.i"] * size * it.gear_ratio * it.torque_constant
+    q, dq, ddq = motion(log.moves[joint], np.arange(len(tau)) / 100.0)
+    assert columns[f"{joint}.theta_m"] / it.gear_ratio == pytest.approx(q, abs=6 * 2e-5)  # noise and encoder
+    F = regressor(it.terms, q, dq, ddq)
+    theta, residual = np.linalg.lstsq(F, tau, rcond=None)[:2]
+    std = np.sqrt(np.diag(np.linalg.inv(F.T @ F)) * residual[0] / (len(tau) - len(theta)))
+    assert np.abs(theta - list(truth.values())).max() < 4 * std.max()
+    assert (np.abs(theta - list(truth.values())) < 4 * std).all()
+
+
+def test_every_way_of_recording_says_the_same_motion(tmp_path):
+    study_folder.write(load(str(short(tmp_path))), tmp_path / "out", False, lambda _: None)
+    study = study_file.read(tmp_path / "out")
+    w = 2 * np.pi / 5
+    t = np.arange(500) / 100
+    q = 0.1 / w * np.sin(w * t) - 0.2 / w * np.cos(w * t)
+    for i, (kind, clock, unit) in enumerate(KINDS):
+        entry = study.log(f"log-{i}")
+        log, columns = open_log(study.folder / entry.files[0]), channels(study, f"log-{i}")
+        assert log.format == kind
+        if clock == "channel":
+            assert columns["time"] == pytest.approx(t, abs=1e-6)
+        else:
+            assert (log.clock.step, log.clock.start) == (0.01, 0.0)
+        assert columns["hand_roll.theta_m"] == pytest.approx(200 * q, abs=200 * 6e-5)
+        amperes = columns["hand_roll.i"] * (1e-3 if unit == "mA" else 1.0)
+        assert amperes / 1e-4 == pytest.approx(np.round(amperes / 1e-4), abs=0.011)  # LVM has six decimals
+        pushed = amperes[200:400].mean() - amperes[np.r_[0:200, 400:500]].mean()
+        assert 0.5 < pushed * 200 * 0.0438 < 1.5
+
+
+def test_the_same_scenario_gives_the_same_bytes(tmp_path):
+    for out in ("one", "two"):
+        study_folder.write(load(str(short(tmp_path))), tmp_path / out, False, lambda _: None)
+    files = sorted(file.name for file in (tmp_path / "one").iterdir())
+    assert len(files) == len(KINDS) + 2
+    for file in files:
+        assert (tmp_path / "one" / file).read_bytes() == (tmp_path / "two" / file).read_bytes()
+
+
+def test_another_seed_gives_other_noise(tmp_path):
+    normal = [generator(seed, log, "hand_roll").normal() for seed, log in ((1, "a"), (2, "a"), (1, "b"))]
+    assert len(set(normal)) == 3
+
+
+def test_the_command_says_what_it_wrote_and_how_much(tmp_path):
+    result = CliRunner().invoke(app, [str(short(tmp_path)), str(tmp_path / "out")], catch_exceptions=False)
+    lines = result.stdout.splitlines()
+    assert lines[0].startswith("log-0: 500 samples of hand_roll -> log_0.tdms, 0.0")
+    assert lines[-1].startswith(str(tmp_path / "out"))
+    assert "4 simulated logs" in lines[-1]
+
+
+def test_a_folder_that_holds_something_is_left_alone(tmp_path):
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.txt").write_text("years of work")
+    scenario = load(str(short(tmp_path)))
+    for force, says in ((False, "is not empty"), (True, "has no truth.toml")):
+        with pytest.raises(BadRequest, match=says):
+            study_folder.write(scenario, tmp_path / "mine", force, lambda _: None)
+    with pytest.raises(BadRequest, match="is a file"):
+        study_folder.write(scenario, tmp_path / "mine" / "thesis.txt", True, lambda _: None)
+    assert (tmp_path / "mine" / "thesis.txt").read_text() == "years of work"
+
+
+def test_a_place_that_cannot_be_written_to_is_named(tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(BadRequest, match="file"):
+        simulate.run(str(short(tmp_path)), tmp_path / "file" / "out")
+
+
+def test_a_simulated_study_is_replaced_when_asked_for(tmp_path):
+    scenario, out = load(str(short(tmp_path))), tmp_path / "out"
+    study_folder.write(scenario, out, False, lambda _: None)
+    (out / "left.over").write_text("")
+    study_folder.write(scenario, out, True, lambda _: None)
+    assert not (out / "left.over").exists()
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["out", "short.toml"]
+
+
+def test_a_simulation_that_fails_leaves_nothing_behind(tmp_path, monkeypatch):
+    def fail(*_):
+        raise RuntimeError("the disk is full")
+
+    monkeypatch.setattr(study_folder.writers, "write", fail)
+    with pytest.raises(RuntimeError):
+        study_folder.write(load(str(short(tmp_path))), tmp_path / "out", False, lambda _: None)
+    assert [p.name for p in tmp_path.iterdir()] == ["short.toml"]
+
+
+def test_a_converter_gives_whole_steps():
+    assert stepped(np.array([0.26, -0.24, 0.0]), 0.5) == pytest.approx([0.5, -0.0, 0.0])
+    assert stepped(np.array([0.26]), 0.0) == pytest.approx([0.26])
+
+
+def test_drift_has_its_deviation_and_its_correlation():
+    noise = Noise(drift=0.4, correlation=0.5)
+    x = drift(noise, 100.0, 200_000, np.random.default_rng(3))
+    pole = np.exp(-1 / 50)
+    independent = 200_000 * (1 - pole) / (1 + pole)  # as many samples as tell something new
+    assert x.std() == pytest.approx(0.4, rel=4 / np.sqrt(2 * independent))
+    innovation = lfilter([1, -pole], [1], x)[1:]
+    assert innovation.std() == pytest.approx(0.4 * np.sqrt(1 - pole**2), rel=4 / np.sqrt(2 * 200_000))
+    assert abs(np.corrcoef(innovation[1:], innovation[:-1])[0, 1]) < 4 / np.sqrt(200_000)

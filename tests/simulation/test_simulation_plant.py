@@ -1,0 +1,25 @@
+"""The arm for the simulator is the arm of the rigid-body module."""
+
+import numpy as np
+import pytest
+
+from pipeline.maths import kinematics, rigid_body
+from pipeline.maths.simulation_continuous import at
+from pipeline.maths.simulation_plant import arm
+from pipeline.robots.davinci import ROBOT
+
+random = np.random.default_rng(4)
+
+
+@pytest.mark.parametrize("n", [3, 6, 7])
+def test_inertia_bias_and_tip_agree_with_the_vectorised_dynamics(n):
+    plant = arm(ROBOT.chain, ROBOT.bodies, np.full(n, 0.1))
+    for q, dq in random.uniform(-1, 1, (20, 2, n)):
+        M, b = at(plant, q, dq)
+        J = np.empty((3, n))
+        x = plant.tip(plant.data, q, J)
+        expected = rigid_body.mass_matrix(ROBOT.chain, ROBOT.bodies, q) + 0.1 * np.eye(n)
+        assert np.allclose(M, expected, rtol=0, atol=1e-12)
+        assert np.allclose(b, rigid_body.inverse_dynamics(ROBOT.chain, ROBOT.bodies, q, dq, 0 * q), rtol=0, atol=1e-12)
+        assert np.allclose(J, kinematics.jacobian(ROBOT.chain, q)[0], rtol=0, atol=1e-12)
+        assert np.allclose(x, kinematics.tip(ROBOT.chain, q), rtol=0, atol=1e-12)
