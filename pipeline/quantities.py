@@ -110,6 +110,7 @@ QUANTITIES = {
     "nis_mean": Quantity("mean of the normalised innovation squared; 2 for a consistent filter"),
     "r_q": Quantity("standard deviation of the position noise that the filter assumes", "{position}"),
     "r_dq": Quantity("standard deviation of the velocity noise that the filter assumes", "{position}/s"),
+    "q_q": Quantity("standard deviation of the position's process noise per sample", "{position}"),
     "q_dq": Quantity("standard deviation of the velocity's process noise per sample", "{position}/s"),
     "q_tau": Quantity("random walk of the external effort that the filter assumes", "{effort}/s^0.5"),
     # the robot, its controllers and its excitation

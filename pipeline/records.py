@@ -290,6 +290,7 @@ class Track(Record):
     nis_mean: float
     r_q: float
     r_dq: float
+    q_q: float
     q_dq: float
     q_tau: float
     t: Column

@@ -22,7 +22,7 @@ from tests.test_estimation import trajectory
 T_S = 0.01
 CART = (terms.inertia, terms.viscous)
 THETA = np.array([0.5, 0.3])
-NOISE = ekf.Noise(r_q=1e-3, r_dq=8e-3, q_dq=1e-4, q_tau=0.05)
+NOISE = ekf.Noise(r_q=1e-3, r_dq=8e-3, q_q=1e-5, q_dq=1e-4, q_tau=0.05)
 
 
 def simulate(used, theta, tau_ext, tau, noise, seed=0, x=(0.1, -0.2)):
@@ -32,7 +32,8 @@ def simulate(used, theta, tau_ext, tau, noise, seed=0, x=(0.1, -0.2)):
     for k in range(len(tau)):
         rows.append((q + noise.r_q * rng.normal(), dq + noise.r_dq * rng.normal()))
         acceleration = (tau[k] - bias(q, dq)[0] - tau_ext[k]) / M
-        q, dq = q + T_S * dq, dq + T_S * acceleration + noise.q_dq * rng.normal()
+        w_q, w_dq = rng.normal(size=2) * (noise.q_q, noise.q_dq)
+        q, dq = q + T_S * dq + w_q, dq + T_S * acceleration + w_dq
     return np.array(rows).T
 
 
@@ -61,8 +62,7 @@ def test_a_linear_model_gives_the_batch_least_squares_estimate():
         add(np.eye(2, 3), 3 * k, y[:, k], np.array([NOISE.r_q, NOISE.r_dq]))
         if k + 1 < N:
             step = np.hstack([-F, np.eye(3)])
-            # Position has no process noise; a deviation of 1e-9 stands for none.
-            add(step, 3 * k, [0, T_S * tau[k] / M, 0], np.array([1e-9, NOISE.q_dq, NOISE.q_tau]))
+            add(step, 3 * k, [0, T_S * tau[k] / M, 0], np.array([NOISE.q_q, NOISE.q_dq, NOISE.q_tau]))
     A, b = np.vstack(rows), np.concatenate(right)
     Q, R = np.linalg.qr(A)
     batch = np.linalg.solve(R, Q.T @ b)[-3:]
@@ -117,7 +117,7 @@ def test_a_mass_hung_on_the_slide_gives_a_negative_effort():
 def test_variances_stay_positive_and_numbers_finite(seed, M, r_q, r_dq):
     rng = np.random.default_rng(seed)
     y, tau = rng.normal(size=(2, 200)), rng.normal(size=200)
-    made = ekf.track(CART, np.array([M, 0.1]), *y, tau, T_S, ekf.Noise(r_q, r_dq, 1e-6, 1e-3), 1.0)
+    made = ekf.track(CART, np.array([M, 0.1]), *y, tau, T_S, ekf.Noise(r_q, r_dq, 0.0, 1e-6, 1e-3), 1.0)
     assert (made.tau_ext_std > 0).all()
     assert all(np.isfinite(column).all() for column in made)
 
@@ -193,7 +193,10 @@ def test_the_filter_takes_its_noise_from_the_periods(identified):
     [made] = tracked(identified, arm.signal(seed=5))
     assert made.r_q == pytest.approx(1e-4, rel=0.05)
     assert made.r_dq == pytest.approx(1e-3, rel=0.05)
-    assert made.q_dq == pytest.approx(0.01 * arm.NOISE["hand_roll"] / arm.THETA["hand_roll"][0], rel=0.1)
+    ddq = arm.excitation("hand_roll", made.t)[2]
+    assert made.q_q == pytest.approx(0.5e-4 * np.sqrt(np.mean(ddq**2)), rel=0.05)
+    driven = 0.01 * arm.NOISE["hand_roll"] / arm.THETA["hand_roll"][0]
+    assert made.q_dq == pytest.approx(driven, rel=0.1)
 
 
 def test_a_gap_starts_the_filter_anew(identified):

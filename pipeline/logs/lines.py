@@ -12,7 +12,7 @@ import numpy as np
 
 from pipeline.errors import BadLog
 
-SIZE = 8 << 20  # [bytes] of a block
+SIZE = 4 << 20  # [bytes] of a block
 LONGEST = 64 << 20  # [bytes] of a line
 GZIP = b"\x1f\x8b"
 CR, LF = 13, 10

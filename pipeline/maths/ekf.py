@@ -2,7 +2,7 @@
 
     x = [q, dq, tau_ext],        y = [q, dq] + v,        v ~ N(0, diag(r_q^2, r_dq^2))
 
-    q[k+1]       = q + T_s dq
+    q[k+1]       = q + T_s dq + w_q
     dq[k+1]      = dq + T_s (tau - b(q, dq) - tau_ext) / M + w_dq
     tau_ext[k+1] = tau_ext + w_tau                                                        (7.11)-(7.16)
 
@@ -28,10 +28,11 @@ FIRST = 1e3
 
 
 class Noise(NamedTuple):
-    """Standard deviations of the measurements, of the velocity's process noise and of the effort's steps."""
+    """Standard deviations of the measurements, and of what each state gains from one sample to the next."""
 
     r_q: float
     r_dq: float
+    q_q: float
     q_dq: float
     q_tau: float  # of one step of the random walk
 
@@ -82,12 +83,12 @@ def _compiled_pass() -> Callable[..., None]:
 
 
 def _pass(
-    bias: Any, M: float, y_q: Any, y_dq: Any, tau: Any, T_s: float, r_q: float, r_dq: float, q_dq: float, q_tau: float,
-    first_std: float, first: float, out_q: Any, out_dq: Any, out_tau: Any, out_std: Any, out_iq: Any, out_idq: Any,
+    bias: Any, M: float, y_q: Any, y_dq: Any, tau: Any, T_s: float, r_q: float, r_dq: float, q_q: float, q_dq: float,
+    q_tau: float, first_std: float, first: float, out_q: Any, out_dq: Any, out_tau: Any, out_std: Any, out_iq: Any, out_idq: Any,
     out_nis: Any,
 ) -> None:  # fmt: skip
     """The loop.  P is symmetric: a b c / b d e / c e f for the states q, dq, tau_ext."""
-    R_q, R_dq, Q_dq, Q_tau = r_q * r_q, r_dq * r_dq, q_dq * q_dq, q_tau * q_tau
+    R_q, R_dq, Q_q, Q_dq, Q_tau = r_q * r_q, r_dq * r_dq, q_q * q_q, q_dq * q_dq, q_tau * q_tau
     x_q, x_dq, x_tau = 0.0, 0.0, 0.0
     # Not the printed x = 0, P = Q_0 alone: Q_0 must be broad for the first sample to set the position and velocity.
     a, b, c, d, e, f = 1.0 + first * R_q, 0.0, 0.0, 1.0 + first * R_dq, 0.0, first_std * first_std
@@ -123,7 +124,7 @@ def _pass(
         x_q, x_dq = x_q + T_s * x_dq, x_dq + T_s * (tau[k] - bias_k - x_tau) / M
         n11, n12, n13 = a + T_s * b, b + T_s * d, c + T_s * e
         n21, n22, n23 = g * a + h * b + l * c, g * b + h * d + l * e, g * c + h * e + l * f
-        a = n11 + T_s * n12
+        a = n11 + T_s * n12 + Q_q
         b = g * n11 + h * n12 + l * n13
         d = g * n21 + h * n22 + l * n23 + Q_dq
         c, e, f = n13, n23, f + Q_tau

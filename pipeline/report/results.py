@@ -77,7 +77,7 @@ def collect(library: Library) -> Results:
         for name in ("rmse", "nrmse", "r2", "relative_error"):
             found.add(prediction, f"{prediction_key(prediction)}.{name}", name)
     for track in library.all(Track):
-        for name in ("tau_ext_rms", "nis_mean", "r_q", "r_dq", "q_dq", "q_tau"):
+        for name in ("tau_ext_rms", "nis_mean", "r_q", "r_dq", "q_q", "q_dq", "q_tau"):
             found.add(track, f"ekf.{track.log}.{track.joint}.{name}", name)
     for whiteness in library.all(Whiteness):
         _whiteness(found, whiteness)

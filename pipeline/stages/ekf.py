@@ -11,7 +11,7 @@ from pipeline.maths.smoothing import stretches
 from pipeline.maths.windows import outside, settled
 from pipeline.records import Average, Fit, Note, Signal, Track, note
 from pipeline.robots.robot import Joint
-from pipeline.stages.predict import measured_regressor
+from pipeline.stages.predict import measured_regressor, motion_of
 from pipeline.study import LogEntry
 
 
@@ -40,14 +40,18 @@ def run(
     if chosen is None:
         there = ", ".join(f"{f.model}.{f.estimator}" for f in own)
         raise PipelineError(f"{joint.name}: there is no fit {fit!r}; set fit in [settings] to one of {there}")
-    noise = assumed([a for a in averages if a.joint == joint.name], chosen, joint, signal, q_tau or joint.q_tau)
+    noise = assumed(
+        [a for a in averages if a.joint == joint.name], chosen, joint, signal, lowpass, q_tau or joint.q_tau
+    )
     yield tracked(signal, chosen, joint, noise, entry, lowpass, q_tau or joint.q_tau)
 
 
-def assumed(averages: list[Average], fit: Fit, joint: Joint, signal: Signal, q_tau: float) -> ekf.Noise:
-    """What the filter assumes of noise: measured between periods, except for the walk of the external effort.
+def assumed(averages: list[Average], fit: Fit, joint: Joint, signal: Signal, lowpass: float, q_tau: float) -> ekf.Noise:
+    """What the filter assumes of noise: all measured, except for the walk of the external effort.
 
-    The measured effort drives the model, so its noise is the velocity's process noise, scaled by T_s / M.
+    The measured effort drives the model, so its noise is process noise of the velocity, scaled by T_s / M.  Forward
+    Euler leaves out half of T_s^2 times the next derivative in each step of position and velocity; encoders are often
+    finer than that, so it is process noise, too.
     """
     T_s = 1.0 / signal.rate
     r_q, r_dq, sigma_tau = (
@@ -56,7 +60,10 @@ def assumed(averages: list[Average], fit: Fit, joint: Joint, signal: Signal, q_t
     )
     # A noiseless log would leave the innovations without a covariance to be judged by.
     r_q, r_dq = (max(r, 1e-9 * np.ptp(x), 1e-12) for r, x in ((r_q, signal.q), (r_dq, signal.dq)))
-    return ekf.Noise(r_q, r_dq, T_s * sigma_tau / abs(mass(joint.terms, fit.theta)), q_tau * np.sqrt(T_s))
+    ddq = np.concatenate([motion_of(signal, part, lowpass)[2] for part in stretches(signal.stretch)])
+    euler_q, euler_dq = (0.5 * T_s**2 * float(np.sqrt(np.mean(x**2))) for x in (ddq, np.gradient(ddq, T_s)))
+    driven = T_s * sigma_tau / abs(mass(joint.terms, fit.theta))
+    return ekf.Noise(r_q, r_dq, euler_q, float(np.hypot(driven, euler_dq)), q_tau * np.sqrt(T_s))
 
 
 def tracked(
@@ -93,6 +100,7 @@ def tracked(
         nis_mean=float(np.mean(together.nis[settled(signal.t)])),
         r_q=noise.r_q,
         r_dq=noise.r_dq,
+        q_q=noise.q_q,
         q_dq=noise.q_dq,
         q_tau=q_tau,
         t=signal.t,

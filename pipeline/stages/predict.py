@@ -54,9 +54,14 @@ def measured_regressor(signal: Signal, joint: Joint, lowpass: float) -> Column:
     """Phi (N, p) of a recording that need not repeat, from low-passed motion."""
     rows = []
     for part in stretches(signal.stretch):
-        dq = signal.dq[part] if signal.velocity == "logged" else None
-        rows.append(regressor(joint.terms, *motion(signal.q[part], dq, signal.rate, lowpass)))
+        rows.append(regressor(joint.terms, *motion_of(signal, part, lowpass)))
     return np.vstack(rows)
+
+
+def motion_of(signal: Signal, part: slice, lowpass: float) -> tuple[Column, Column, Column]:
+    """Low-passed position, velocity and acceleration of one stretch of a recording."""
+    dq = signal.dq[part] if signal.velocity == "logged" else None
+    return motion(signal.q[part], dq, signal.rate, lowpass)
 
 
 def without_the_log(

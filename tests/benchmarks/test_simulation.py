@@ -13,7 +13,7 @@ AT_LEAST = 50.0  # times faster than real time, with the wrist fixed
 
 @pytest.mark.parametrize("name", ["matched-roll-excitation", "realistic-roll-excitation"])
 def test_a_minute_of_closed_loop_is_simulated_fifty_times_faster_than_it_lasts(name, capsys):
-    scenario = load("davinci-arm")
+    scenario = load("davinci-demo")
     log = replace(next(log for log in scenario.logs if log.name == name), duration=60.0, lead=0.0)
     closed_loop.run(scenario, replace(log, duration=0.1))  # compiles
     best = min(_seconds(scenario, log) for _ in range(5))

@@ -25,7 +25,7 @@ SLIDE = "instrument_slide"
 
 @cache
 def scenario() -> Scenario:
-    return load("davinci-arm")
+    return load("davinci-demo")
 
 
 def log(name: str, **changes) -> SimulatedLog:

@@ -135,7 +135,7 @@ def test_two_logs_of_one_name_or_file_are_refused(tmp_path):
     ],
 )
 def test_the_tables_of_the_whole_arm_are_checked_too(tmp_path, old, new, says):
-    text = shipped_text("davinci-arm")
+    text = shipped_text("davinci-demo")
     assert old in text
     found = problems(tmp_path, text.replace(old, new))
     assert any(says in problem for problem in found), found
@@ -144,11 +144,11 @@ def test_the_tables_of_the_whole_arm_are_checked_too(tmp_path, old, new, says):
 def test_a_robot_whose_links_are_not_known_cannot_be_simulated_as_a_whole(monkeypatch):
     monkeypatch.setattr(robots, "load", lambda *_: replace(ROBOT, chain=None))
     with pytest.raises(BadScenario, match="the geometry and masses of davinci are not known"):
-        load("davinci-arm")
+        load("davinci-demo")
 
 
 def test_an_arm_may_be_run_by_the_pid_of_chapter_5(tmp_path):
-    text = shipped_text("davinci-arm")
+    text = shipped_text("davinci-demo")
     start, end = text.index("[arm.control]"), text.index("[family.matched.hand_roll]")
     pid = 'law = "pid"\nproportional = [1, 2, 3]\nderivative = [4, 5, 6]\nintegral = [0, 0, 0]\ngravity = 0.9\n'
     law = read(tmp_path, text[:start] + "[arm.control]\n" + pid + text[end:]).arm.control
@@ -158,13 +158,13 @@ def test_an_arm_may_be_run_by_the_pid_of_chapter_5(tmp_path):
 
 
 def test_a_family_may_give_a_log_another_role():
-    roles = {log.name: log.role for log in load("davinci-arm").logs}
+    roles = {log.name: log.role for log in load("davinci-demo").logs}
     assert roles["matched-roll-excitation"] == "identification"
     assert roles["realistic-roll-excitation"] == "validation"
 
 
 def test_a_name_that_no_scenario_has_is_answered_with_those_there_are():
-    with pytest.raises(BadScenario, match="davinci-arm, davinci-demo"):
+    with pytest.raises(BadScenario, match="davinci-demo, davinci-joints"):
         load("davinci")
 
 

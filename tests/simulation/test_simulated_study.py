@@ -52,8 +52,8 @@ KINDS = [("tdms", "channel", "A"), ("tdms", "header", "mA"), ("lvm", "channel", 
 
 @pytest.fixture(scope="module")
 def demo(tmp_path_factory) -> Path:
-    folder = tmp_path_factory.mktemp("simulated") / "davinci-demo"
-    study_folder.write(load("davinci-demo"), folder, False, lambda _: None)
+    folder = tmp_path_factory.mktemp("simulated") / "davinci-joints"
+    study_folder.write(load("davinci-joints"), folder, False, lambda _: None)
     return folder
 
 
@@ -98,7 +98,7 @@ def test_the_contact_windows_of_the_study_are_the_pushes_of_the_truth(demo):
 def test_least_squares_on_the_excitation_gives_the_truth_within_its_standard_errors(demo, name, joint, size):
     study, truth = study_file.read(demo), tomllib.loads((demo / "truth.toml").read_text())["theta"][joint]
     it, columns = study.robot.joint(joint), channels(study, f"{name}-excitation")
-    log = next(entry for entry in load("davinci-demo").logs if entry.name == f"{name}-excitation")
+    log = next(entry for entry in load("davinci-joints").logs if entry.name == f"{name}-excitation")
     tau = columns[f"{joint}.i"] * size * it.gear_ratio * it.torque_constant
     q, dq, ddq = motion(log.moves[joint], np.arange(len(tau)) / 100.0)
     assert columns[f"{joint}.theta_m"] / it.gear_ratio == pytest.approx(q, abs=6 * 2e-5)  # noise and encoder

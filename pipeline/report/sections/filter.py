@@ -42,18 +42,19 @@ def intro(tracks: list[Track]) -> Iterator[Prose]:
 
 def assumptions(context: Context, tracks: list[Track]) -> Table:
     """What the filter assumed of noise."""
-    names = ("r_q", "r_dq", "q_dq", "q_tau")
+    names = ("r_q", "r_dq", "q_q", "q_dq", "q_tau")
     rows = tuple(
         (title(t.joint), literal(t.log), *(context.number(f"ekf.{t.log}.{t.joint}.{name}", 3) for name in names))
         for t in tracks
     )
     return Table(
-        "Noise that the filter assumes (standard deviations): of the measurements and of the velocity's process "
-        "noise per sample, both measured between periods, and of the random walk of the external effort, chosen.",
-        ("Joint", "Log", "Position", "Velocity", "Process", "Random walk"),
+        "Noise that the filter assumes (standard deviations): of the measured position and velocity, from the spread "
+        "between periods; of their process noise per sample, from what forward Euler leaves out and from the noise of "
+        "the effort; and of the random walk of the external effort, chosen.",
+        ("Joint", "Log", "Position", "Velocity", "Process, $q$", "Process, $dot(q)$", "Random walk"),
         rows,
         "filter-noise",
-        "llrrrr",
+        "llrrrrr",
     )
 
 
