@@ -201,7 +201,8 @@ class Runner:
         if "log" in asks.given.values():
             inputs |= {f"raw/{file}" for file in self.study.log(task.log).files}
         if asks.name == "report":
-            inputs |= {f"raw/{file}" for file in ("study.toml", self.study.robot_file) if file}
+            beside = ("study.toml", self.study.robot_file, "truth.toml" if self.study.truth else "")
+            inputs |= {f"raw/{file}" for file in beside if file}
         given = {
             what: hash_of_text(repr(_given(what, self.study, task))) for what in asks.given.values() if what != "log"
         }
@@ -282,9 +283,10 @@ def _provenance(study: Study, folders: Folders, places: Places) -> Provenance:
     packages = ("numpy", "scipy", "pandas", "pyarrow", "statsmodels", "numba", "matplotlib", "bokeh", "typst", "npTDMS")
     ledger = Ledger(folders)
     raw = {f"raw/{study.name}/{file}": ledger.digest(f"raw/{file}") for entry in study.logs for file in entry.files}
-    raw = {f"raw/{study.name}/study.toml": ledger.digest("raw/study.toml"), **raw}
+    beside = ("study.toml", study.robot_file, "truth.toml" if study.truth else "")
+    raw = {f"raw/{study.name}/{file}": ledger.digest(f"raw/{file}") for file in beside if file} | raw
     processed = {place.as_posix(): ledger.digest(f"processed/{place.as_posix()}") for _, place in places}
-    failures = {f"{e.stage} {e.task}": e.failed for e in ledger.entries() if e.failed}
+    failures = {f"{e.stage} {e.task}": e.failed for e in ledger.entries() if e.failed and e.stage != "report"}
     return Provenance(VERSION, {p: importlib.metadata.version(p) for p in packages}, raw, processed, failures)
 
 

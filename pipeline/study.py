@@ -84,6 +84,9 @@ class Study:
     settings: Settings
     logs: tuple[LogEntry, ...]
     changed: dict[str, Any] = field(default_factory=dict)  # what robot_overrides says, for the report
+    truth: dict[str, Any] = field(
+        default_factory=dict
+    )  # truth.toml of a simulated study, for the report to compare with
     robot_file: str = ""  # the .toml that describes the robot, where it lies beside the study
 
     @property

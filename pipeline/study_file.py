@@ -65,7 +65,18 @@ class _Reader:
         overrides = self.problems.table(table, "robot_overrides")
         own = table["robot"] if table["robot"].endswith(".toml") else ""
         kept = tuple(entry for entry in logs if entry)
-        return Study(self.folder, title, robot, simulated, settings, kept, overrides, own)
+        return Study(
+            self.folder, title, robot, simulated, settings, kept, overrides, self.truth() if simulated else {}, own
+        )
+
+    def truth(self) -> dict[str, Any]:
+        """What is true of a simulated study, where it says so beside it."""
+        try:
+            return tomllib.loads((self.folder / "truth.toml").read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            return {}
+        except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise BadStudy(f"{self.folder / 'truth.toml'}: {error}") from None
 
     def robot(self, table: dict[str, Any]) -> Robot | None:
         name = self.problems.take(table, "robot", str, None)

@@ -1,6 +1,7 @@
 """Whether a study's files and numbers are still those that its results were made from."""
 
 import json
+import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -83,6 +84,9 @@ def differences(folders: Folders, result: dict[str, Any]) -> Iterator[str]:
     """Whether a result is what its source says."""
     name = f"{folders.reports / 'results.json'}: {result.get('key')}"
     try:
+        if result["source"].startswith("raw/truth.toml#"):
+            yield from of_truth(folders, result, name)
+            return
         file, field, row = parse(result["source"])
         place = Path(file).relative_to("processed")
         record = store.read(KINDS[_kind(place)], folders.processed, place)
@@ -94,6 +98,17 @@ def differences(folders: Folders, result: dict[str, Any]) -> Iterator[str]:
             yield f"{name}: {file} is not the file that it came from"
     except (PipelineError, KeyError, AttributeError, ValueError, IndexError) as error:
         yield f"{name}: cannot be followed to its source {result.get('source')!r}: {error}"
+
+
+def of_truth(folders: Folders, result: dict[str, Any], name: str) -> Iterator[str]:
+    """Whether a number of the truth is what truth.toml says."""
+    value: Any = tomllib.loads((folders.raw / "truth.toml").read_text(encoding="utf-8"))
+    for step in json.loads(result["source"].partition("#")[2]):
+        value = value[step]
+    if result["value"] != value:
+        yield f"{name}: says {result['value']!r}, but {result['source']} holds {value!r}"
+    if result["sha256"] != store.digest(folders.raw / "truth.toml"):
+        yield f"{name}: truth.toml is not the file that it came from"
 
 
 def cell(record: Record, field: str, row: str) -> float:

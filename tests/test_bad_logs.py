@@ -112,6 +112,26 @@ def test_a_last_row_that_was_cut_is_dropped_with_a_warning(lab):
     assert "error" not in said
 
 
+def test_a_binary_log_that_was_cut_keeps_its_whole_rows_with_a_warning(lab):
+    """LabVIEW writes channel after channel, so the later ones miss the end of a file that was cut."""
+    from nptdms import ChannelObject, TdmsWriter
+
+    signal = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5)
+    columns = {"time": signal.t, "hand_roll.q": signal.q, "hand_roll.dq": signal.dq, "hand_roll.tau": signal.tau}
+    with TdmsWriter(str(lab / "bad.tdms")) as file:
+        file.write_segment([ChannelObject("arm", name, values) for name, values in columns.items()])
+    content = (lab / "bad.tdms").read_bytes()
+    (lab / "bad.csv").unlink()
+    (lab / "bad.tdms").write_bytes(content[: -8 * 40])
+    (lab / "study.toml").write_text((lab / "study.toml").read_text().replace("bad.csv", "bad.tdms"))
+    said = run(lab)
+    assert "its last 40 rows lack some channels: they are left out" in said
+    assert "error" not in said
+    import pipeline
+
+    assert len(pipeline.read(lab, "Recording", log="bad")) == len(signal) - 40
+
+
 def test_joints_of_different_lengths_are_named(lab):
     edit(lab, lambda lines: [line if i < 200 else ",".join([*line.split(",")[:3], ""]) for i, line in enumerate(lines)])
     assert "channel 'hand_roll.tau' has no sample at row 199 (counted from 0)" in run(lab)

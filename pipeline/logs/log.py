@@ -71,6 +71,7 @@ class Log(ABC):
     nulls: dict[str, int] = field(default_factory=dict)  # samples missing, of every channel that was read
     nans: dict[str, int] = field(default_factory=dict)  # samples logged as NaN, of every channel that was read
     dropped: int = 0  # rows that could not be used
+    cut: bool = False  # the file ends before what was begun, so that channels may end in missing samples
     _at_open: tuple[int, int] | None = field(default=None, init=False, repr=False)  # warnings and comments from headers
 
     @abstractmethod

@@ -50,6 +50,7 @@ def read(path: Path, options: Options) -> Log:
         raise BadLog(f"{path}: no channel can be read from this TDMS file{why}; record it again")
     counts = {p: tuple(dict(shape).get(p, 0) for shape in shapes) for p in paths}
     log = TdmsLog(path, "tdms", _channels(walk.objects), warnings=warnings, size=walk.end, counts=counts, origin=origin)
+    log.cut = walk.cut
     _describe(log, walk, lengths)
     return log
 

@@ -54,6 +54,7 @@ class Walk:
     segments: int = 0
     layouts: set[str] = field(default_factory=set)
     end: int = 0  # of the last whole segment, or of the file
+    cut: bool = False  # a segment lacks some of its samples
 
     def regions(self) -> Iterator[Region]:
         """The regions of the file, in order."""
@@ -102,6 +103,7 @@ class Walk:
 
     def _cut(self, at: int, data: int, length: int) -> int:
         """The end of a segment whose length is unknown or beyond the end: the next segment, or the end of the file."""
+        self.cut = True
         end = self._next_tag(data)
         where = "the end of the file" if end == self.size else f"the next segment, at byte {end}"
         if length == UNKNOWN:

@@ -84,8 +84,8 @@ def _compiled_pass() -> Callable[..., None]:
 
 def _pass(
     bias: Any, M: float, y_q: Any, y_dq: Any, tau: Any, T_s: float, r_q: float, r_dq: float, q_q: float, q_dq: float,
-    q_tau: float, first_std: float, first: float, out_q: Any, out_dq: Any, out_tau: Any, out_std: Any, out_iq: Any, out_idq: Any,
-    out_nis: Any,
+    q_tau: float, first_std: float, first: float, out_q: Any, out_dq: Any, out_tau: Any, out_std: Any, out_iq: Any,
+    out_idq: Any, out_nis: Any,
 ) -> None:  # fmt: skip
     """The loop.  P is symmetric: a b c / b d e / c e f for the states q, dq, tau_ext."""
     R_q, R_dq, Q_q, Q_dq, Q_tau = r_q * r_q, r_dq * r_dq, q_q * q_q, q_dq * q_dq, q_tau * q_tau

@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.library import Library, Provenance
 from pipeline.quantities import QUANTITIES
-from pipeline.records import Column, Record
+from pipeline.records import Column, Record, Track
 from pipeline.report.content import Number, literal
 from pipeline.report.results import Results, printed
 from pipeline.study import Study
@@ -28,6 +28,17 @@ class Context:
     def count(self, key: str) -> Number | str:
         """The result of that key, which is a whole number, as a cell."""
         return self.number(key, len(str(round(self.results[key].value))) if key in self.results else 1)
+
+
+def most_telling(tracks: list[Track], most: int) -> list[Track]:
+    """The tracks that figures are spent on, in their order: contacts first, then validation, then identification.
+
+    A report of many logs would otherwise be too large to open, and its contacts hard to find.
+    """
+    order = ("contact", "weight", "tissue", "validation", "identification")
+    moving = [track for track in tracks if not track.held]
+    ranked = sorted(moving, key=lambda track: order.index(track.role) if track.role in order else len(order))
+    return [track for track in moving if track in ranked[:most]]
 
 
 def title(name: str) -> str:

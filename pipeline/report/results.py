@@ -56,6 +56,10 @@ class Results(dict[str, Result]):
             source = f"processed/{record.origin.path}{place}"
             self[key] = Result(key, value, std, unit, source, record.origin.sha256)
 
+    def truth(self, key: str, value: float, unit: str, path: tuple[str, ...], sha256: str) -> None:
+        """Put a number of a simulated study's truth under a key; `path` leads to it in truth.toml."""
+        self[key] = Result(key, value, None, unit, f"raw/truth.toml#{json.dumps(path, ensure_ascii=False)}", sha256)
+
     def json(self) -> bytes:
         """The content of results.json."""
         text = json.dumps([asdict(result) for result in self.values()], indent=1, ensure_ascii=False, allow_nan=False)

@@ -44,6 +44,7 @@ class Reading:
     robot: Robot
     clock: Clock = field(default_factory=Clock)
     rows: int = 0
+    lost: int = 0  # at the end of a file that was cut
 
     def __post_init__(self) -> None:
         self.channels = {s.quantity: self.log.find(s.channel) for s in self.entry.channels}
@@ -86,6 +87,9 @@ class Reading:
 
     def recordings(self, block: Block) -> Iterator[Recording]:
         """The joints of one block, after the transient that the study skips."""
+        block = self.without_cut_end(block)
+        if not len(block[self.names[0]]):
+            return
         for name in self.names:
             self.require_numbers(name, block[name])
         t = self.times(block)
@@ -112,6 +116,16 @@ class Reading:
                 tau=tau[kept],
             )
         self.rows += len(t)
+
+    def without_cut_end(self, block: Block) -> Block:
+        """A block without the rows at the end of a file that was cut, which some channels no longer have."""
+        if not self.log.cut:
+            return block
+        whole = np.all([np.isfinite(block[name]) for name in self.names], axis=0)
+        rows = np.flatnonzero(whole)
+        end = int(rows[-1]) + 1 if len(rows) else 0
+        self.lost += len(whole) - end
+        return {name: values[:end] for name, values in block.items()}
 
     def times(self, block: Block) -> Column:
         """Time of each row [s], by the study's time channel, its rate, the log's time channel or the log's clock."""
@@ -200,7 +214,7 @@ class Reading:
             backward=clock.backward,
             repeated=clock.repeated,
             duplicates=clock.duplicates,
-            dropped=log.dropped,
+            dropped=log.dropped + self.lost,
             facts=tuple(f"{key}: {value}" for key, value in facts.items()),
             warnings=tuple(log.warnings),
             channel=np.array(names, object),
@@ -213,6 +227,8 @@ class Reading:
     def remarks(self) -> Iterator[str]:
         """What a reviewer should know about the clock and the rows."""
         clock = self.clock
+        if self.lost:
+            yield f"the file is cut, and its last {self.lost} rows lack some channels: they are left out"
         if clock.duplicates > MOST_REPEATED * clock.samples:
             yield (
                 f"{clock.duplicates} of {clock.samples} rows ({clock.duplicates / clock.samples:.0%}) repeat the one "

@@ -4,6 +4,6 @@ section(context: Context) -> Section | None        None where a study has nothin
 """
 
 SECTIONS = (
-    "summary", "recorded", "noise", "identification", "prediction", "filter", "robot", "control", "excitation",
+    "summary", "recorded", "noise", "identification", "prediction", "filter", "truth", "robot", "control", "excitation",
     "methods", "provenance",
 )  # fmt: skip

@@ -4,8 +4,10 @@ from collections.abc import Iterator
 
 from pipeline.records import Track, Whiteness
 from pipeline.report.content import Band, Block, Figure, Line, Panel, Prose, Section, Table, VSpan, literal
-from pipeline.report.context import Context, label, title
+from pipeline.report.context import Context, label, most_telling, title
 from pipeline.report.sections.noise import autocorrelation
+
+FIGURES = 9  # tracks that are drawn; the others are in the tables, and all are in the processed files
 
 
 def section(context: Context) -> Section | None:
@@ -13,10 +15,10 @@ def section(context: Context) -> Section | None:
     tracks = context.library.all(Track)
     if not tracks:
         return None
+    shown = most_telling(tracks, FIGURES)
     parts = (
         Section(f"{title(t.joint)} in {literal(t.log)}", f"track-{t.log}-{t.joint}", tuple(of_track(context, t)))
-        for t in tracks
-        if not t.held
+        for t in shown
     )
     return Section(
         "External effort", "filter", (*intro(tracks), assumptions(context, tracks), scores(context, tracks), *parts)
@@ -32,6 +34,12 @@ def intro(tracks: list[Track]) -> Iterator[Prose]:
         "white where the model and the choice fit the data. Whiteness is tested over the whole run but its first "
         "second, contacts and reversals included."
     )
+    moving = sum(not t.held for t in tracks)
+    if moving > FIGURES:
+        yield Prose(
+            f"Figures show {FIGURES} of {moving} runs: contacts, weights and tissue first, then validation, then "
+            "identification. The others are in the tables, and all of them are in the processed files."
+        )
     held = [f"{title(t.joint)} in {literal(t.log)}" for t in tracks if t.held]
     if held:
         yield Prose(

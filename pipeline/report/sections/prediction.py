@@ -8,6 +8,8 @@ from pipeline.report.context import Context, label, title
 from pipeline.report.results import prediction_key
 from pipeline.report.sections.summary import used_fit
 
+FIGURES = 4  # predictions that are drawn, the worst ones
+
 
 def section(context: Context) -> Section | None:
     """Scores of all fits on all logs, and the predictions themselves."""
@@ -36,9 +38,15 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     )
     header = ("Log", "Joint", "Fit", "Unseen data", "RMSE", "RMSE over range", "$R^2$", "Relative error")
     yield Table("Prediction of unseen effort.", header, rows, "prediction-table", "llllrrrr")
-    for p in predictions:
-        if p.role != "identification" and f"{p.model}.{p.estimator}" == used_fit(context, p.joint):
-            yield figure(context, p)
+    drawn = [
+        p
+        for p in predictions
+        if p.role != "identification" and f"{p.model}.{p.estimator}" == used_fit(context, p.joint)
+    ]
+    worst = sorted(drawn, key=lambda p: p.r2)[:FIGURES]
+    if len(drawn) > FIGURES:
+        yield Prose(f"Figures show the {FIGURES} of {len(drawn)} predictions that explain the least.")
+    yield from (figure(context, p) for p in drawn if p in worst)
 
 
 def figure(context: Context, p: Prediction) -> Figure:
