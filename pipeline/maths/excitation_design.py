@@ -18,6 +18,7 @@ from pipeline.maths.excitation import (
     condition,
     determinant,
     instants,
+    observation,
     ranges,
     turning_points,
 )
@@ -27,6 +28,7 @@ Array = NDArray[np.float64]
 Criterion = Callable[[Array], tuple[float, Array]]
 CRITERIA: dict[str, Criterion] = {"determinant": determinant, "condition": condition}
 GRID = 24  # instants a harmonic at which the limits are asked for first
+POLISH = 1500  # random steps around the best of the local optima
 EXCHANGES = 4  # times that the instants where a limit was exceeded are added
 MARGIN = 1e-9  # of the limits, so that they also hold for numbers rounded on paper
 
@@ -82,7 +84,25 @@ def design(problem: Problem, starts: int, seed: int) -> Fourier:
     if not np.isfinite(_value(problem, best.x)):
         names = ", ".join(term.name for term in problem.terms)
         raise ValueError(f"no trajectory of {problem.harmonics} harmonics tells the terms {names} apart")
-    return best
+    return polished(problem, best, random)
+
+
+def polished(problem: Problem, series: Fourier, random: np.random.Generator) -> Fourier:
+    """A random search around a local optimum, for the jumps of friction at dq = 0, which the gradient does not see.
+
+    Steps grow when they succeed and shrink when they do not.  (I. Rechenberg's one-fifth rule, 1973)
+    """
+    value = _value(problem, series.x)
+    step = 0.02 * float(np.abs(series.x - problem.centre).max())
+    for _ in range(POLISH):
+        x = series.x + step * random.normal(size=len(series.x))
+        candidate = within(problem, Fourier.of(x, problem.period))
+        found = CRITERIA[problem.criterion](observation(problem.terms, candidate, problem.samples))[0]
+        better = found < value
+        if better:
+            series, value = candidate, found
+        step *= 1.5 if better else 1.5**-0.25
+    return series
 
 
 def within(problem: Problem, series: Fourier) -> Fourier:

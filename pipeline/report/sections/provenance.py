@@ -2,8 +2,10 @@
 
 from dataclasses import asdict
 
+from pipeline.records import Intake
 from pipeline.report.content import Block, Listing, Prose, Section, Table, literal
 from pipeline.report.context import Context
+from pipeline.report.sections.recorded import channels, starts
 
 
 def section(context: Context) -> Section:
@@ -29,4 +31,7 @@ def section(context: Context) -> Section:
             f"{len(provenance.processed)} processed files stand behind this report; their hashes are in results.json."
         )
     )
+    intakes = context.library.all(Intake)
+    if intakes:
+        blocks.append(Section("Channels", "channels", (starts(intakes), channels(intakes))))
     return Section("Provenance", "provenance", tuple(blocks))

@@ -18,21 +18,26 @@ def section(context: Context) -> Section | None:
 def blocks(context: Context, intakes: list[Intake]) -> Iterator[Block]:
     """The section's content."""
     yield overview(context, intakes)
-    for intake in intakes:
-        yield verdict(intake)
+    clean = [intake for intake in intakes if not remarks(intake)]
+    if clean:
+        yield Verdict("good", f"Read without a remark: {', '.join(literal(intake.log) for intake in clean)}.")
+    yield from (
+        Verdict("warn", f"**{literal(intake.log)}**: {literal('; '.join(remarks(intake)))}.")
+        for intake in intakes
+        if remarks(intake)
+    )
     methods = sorted({(s.method, s.velocity) for s in context.library.all(Signal)})
     yield Prose("How the recordings were put on a uniform clock, and where their velocities come from:")
     yield Bullets(tuple(f"clock: {method}; velocity: {words(velocity, context)}" for method, velocity in methods))
-    remarks = [
+    said = [
         literal(text)
         for note in context.library.all(Note)
         if note.stage in ("ingest", "resample", "average")
         for text in note.text
     ]
-    if remarks:
+    if said:
         yield Prose("Remarks of the readers and of the first stages:")
-        yield Bullets(tuple(remarks))
-    yield Section("Channels", "channels", tuple(channels(intake) for intake in intakes))
+        yield Bullets(tuple(said))
 
 
 def words(velocity: str, context: Context) -> str:
@@ -62,16 +67,8 @@ def overview(context: Context, intakes: list[Intake]) -> Table:
     return Table("The logs of the study.", header, rows, label="recorded-table", align="lllrrrrrr")
 
 
-def verdict(intake: Intake) -> Verdict:
-    """Whether a log can be trusted."""
-    started = f", started {literal(intake.started)} ({intake.zone or 'no zone given'})" if intake.started else ""
-    if (
-        not intake.warnings
-        and not intake.dropped
-        and intake.duplicates <= 0.1 * intake.rows
-        and intake.jitter * intake.rate < 0.1
-    ):
-        return Verdict("good", f"**{literal(intake.log)}** reads without a remark{started}.")
+def remarks(intake: Intake) -> list[str]:
+    """What keeps a log from being trusted without a second look."""
     said = list(intake.warnings)
     if intake.dropped:
         said.append(f"{intake.dropped} rows could not be used")
@@ -79,18 +76,29 @@ def verdict(intake: Intake) -> Verdict:
         said.append(f"{intake.duplicates} of {intake.rows} rows repeat the one before")
     if intake.jitter * intake.rate >= 0.1:
         said.append(f"the clock jitters by {intake.jitter * 1e3:.3g} ms")
-    return Verdict("warn", f"**{literal(intake.log)}**{started}: {literal('; '.join(said))}.")
+    return said
 
 
-def channels(intake: Intake) -> Table:
-    """What each channel of a log feeds."""
-    used = [i for i, feeds in enumerate(intake.feeds) if feeds]
-    rows = tuple((literal(intake.channel[i]), literal(intake.unit[i]) or "–", literal(intake.feeds[i])) for i in used)
-    unused = len(intake.channel) - len(used)
-    rest = f" {unused} other channels are not used." if unused else ""
-    files = ", ".join(intake.files)
-    return Table(
-        f"Channels of **{literal(intake.log)}** ({literal(files)}) that feed the analysis.{rest}",
-        ("Channel", "Unit in the log", "Feeds"),
-        rows,
+def channels(intakes: list[Intake]) -> Table:
+    """What each channel of every log feeds; channels that feed nothing are left out."""
+    rows = tuple(
+        (literal(intake.log), literal(intake.channel[i]), literal(intake.unit[i]) or "–", literal(intake.feeds[i]))
+        for intake in intakes
+        for i, feeds in enumerate(intake.feeds)
+        if feeds
     )
+    return Table("Channels that feed the analysis.", ("Log", "Channel", "Unit in the log", "Feeds"), rows)
+
+
+def starts(intakes: list[Intake]) -> Table:
+    """Files of every log, and when it was started."""
+    rows = tuple(
+        (
+            literal(intake.log),
+            literal(", ".join(intake.files)),
+            f"{literal(intake.started)} ({intake.zone or 'no zone given'})" if intake.started else "–",
+        )
+        for intake in intakes
+    )
+    caption = "Files of the logs, and the date and time of their first samples as they give it."
+    return Table(caption, ("Log", "File", "Started"), rows)
