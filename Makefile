@@ -22,7 +22,7 @@ STAGES := rehearse ingest resample average differentiate fit predict ekf whitene
 # average       : Signal -> Average Noise Note
 # differentiate : Average -> Trajectory Spectrum Note
 # fit           : Trajectory -> Fit Residual Note
-# predict       : Signal Trajectory Fit -> Prediction
+# predict       : Signal Trajectory Fit -> Prediction Note
 # ekf           : Signal Fit Average -> Track Note
 # whiteness     : Noise Residual Track -> Whiteness
 # report        : everything -> report.html report.pdf results.json

@@ -199,6 +199,7 @@ class Trajectory(Record):
     ddq: Column
     tau: Column
     tau_var: Column
+    count: Counts
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,5 +1,7 @@
 """Periods and averages: the period is found, the periodic part survives, and what is reported is the spread."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -35,6 +37,17 @@ def test_a_period_of_any_length_is_found_to_its_stated_uncertainty(length, seed,
     assert guess is not None
     found = period.refine(t, [x], guess / 100, 3)
     assert abs(found.length - length) < 6 * found.std
+
+
+@pytest.mark.parametrize(
+    ("amplitudes", "length"),
+    [((0.1, 0, 0, 0, 0, 0.4), 10.0), ((0.05, 0, 0.5), 10.0), ((0.03, 0.0, 0.0, 0.9, 0.05), 6.4806)],
+)
+def test_a_motion_that_nearly_repeats_within_its_period_keeps_the_whole_of_it(amplitudes, length):
+    t = np.arange(round(5.2 * length * 100)) / 100
+    x = sum(a * np.sin(2 * np.pi * (k + 1) * t / length + k) for k, a in enumerate(amplitudes))
+    x = x + 1e-3 * np.random.default_rng(0).normal(size=len(t))
+    assert period.guess([x]) / 100 == pytest.approx(length, rel=2e-3)
 
 
 def test_noise_has_no_period():
@@ -117,6 +130,7 @@ def test_the_joints_of_a_log_share_one_period_and_a_held_one_is_noted():
     roll, pitch = arm.signal("hand_roll"), arm.signal("hand_pitch")
     still = replace(
         arm.signal("instrument_slide", noise=0),
+        held=1,
         q=np.zeros(len(roll)) + 1e-6,
         t=roll.t,
         dq=roll.dq * 0,
@@ -147,6 +161,46 @@ def test_what_averaging_removes_is_the_noise():
     [mean] = [r for r in made if isinstance(r, Average)]
     assert mean.sigma_tau == pytest.approx(arm.NOISE["hand_roll"], rel=4 / np.sqrt(2 * 9000))
     assert abs(noise.tau_noise.mean()) < 1e-12
+
+
+def test_a_multiple_of_the_period_is_reported_and_not_used():
+    [made], notes = run([arm.signal(period=5.0)], period=10.0)
+    assert made.period == pytest.approx(5.0, abs=1e-3)
+    assert any("repeat every 5.0000 s" in text for note in notes for text in note.text)
+
+
+def test_a_joint_that_does_not_repeat_is_left_out_by_name_and_the_others_go_on():
+    walk = np.cumsum(np.random.default_rng(0).normal(size=10_000)) / 100
+    roll, pitch = arm.signal("hand_roll"), replace(arm.signal("hand_pitch"), q=walk)
+    made, notes = run([roll, pitch])
+    assert [a.joint for a in made] == ["hand_roll"]
+    assert any("hand_pitch does not repeat, unlike the other joints" in text for note in notes for text in note.text)
+
+
+def test_a_transient_in_one_period_is_remarked_on():
+    roll = arm.signal("hand_roll")
+    _, notes = run([replace(roll, q=roll.q + 0.2 * np.exp(-roll.t))])
+    assert any("period 1 of 10 differs from the mean" in text for note in notes for text in note.text)
+
+
+def test_a_gap_lowers_the_counts_of_the_phases_that_it_covers():
+    roll = arm.signal("hand_roll", periods=6)
+    kept = (roll.t < 22) | (roll.t > 45)
+    columns = {name: getattr(roll, name)[kept] for name in roll.columns()}
+    columns["stretch"] = (columns["t"] > 45).astype(int)
+    [made], _ = run([replace(roll, gaps=1, **columns)])
+    assert made.periods == 6
+    assert made.count.max() <= 4
+    assert made.count.min() >= 3
+
+
+def test_leaving_a_group_out_is_averaging_the_others():
+    t = np.arange(3000) / 100
+    x = np.random.default_rng(0).normal(size=3000)
+    for out, rest in enumerate(averaging.left_out(t, x, 5.0, 500, (t // 5).astype(int))):
+        kept = x.reshape(6, 500)[[m for m in range(6) if m != out]]
+        assert_allclose(rest.mean, kept.mean(axis=0), atol=1e-9)
+        assert_allclose(rest.var, kept.var(axis=0, ddof=1), atol=1e-9)
 
 
 def test_logs_of_other_roles_are_not_averaged():

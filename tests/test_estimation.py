@@ -132,7 +132,7 @@ def test_few_periods_leave_the_weights_out_and_the_rest_goes_on():
 def test_pooling_keeps_the_mean_variance_and_never_leaves_a_weight_infinite(K, M, seed):
     var = np.random.default_rng(seed).chisquare(2, size=K)
     var[0] = 0.0
-    smooth = pooled(var, M)
+    smooth = pooled(var, np.full(K, M))
     assert (smooth > 0).all()
     assert smooth.mean() == pytest.approx(var.mean(), rel=1e-9)
 

@@ -19,7 +19,7 @@ class Problem:
     Phi: Array  # (K, p)
     tau: Array  # (K,)
     tau_var: Array  # (K,) variance of one period at each sample
-    periods: NDArray[np.int64]  # (K,) how many periods each sample is the mean of, M
+    periods: NDArray[np.int64]  # (K,) how many periods each sample is the mean of, M; 0 where none was recorded
     starts: tuple[int, ...]  # where each log begins
     names: tuple[str, ...]  # of the parameters
 
@@ -39,15 +39,18 @@ Estimator = Callable[[Problem], Answer]
 def solve(problem: Problem, weight: Array) -> Answer:
     """Minimise the sum of weight (tau - Phi theta)^2, by QR of the scaled rows.  (6.42), (6.46)
 
-    `weight` is (K,).  The standard deviations take their scale from the residuals, so a model that does not fit has
-    wider ones, whatever the noise.
+    `weight` is (K,), 0 where there is nothing.  The standard deviations take their scale from the residuals, so a
+    model that does not fit has wider ones, whatever the noise.
 
     Raises
     ------
     NotIdentifiable
-        If the columns of Phi are linearly dependent, or there are no more samples than parameters.
+        If the columns of Phi are linearly dependent, there are no more samples than parameters, or the effort does
+        not vary.
     """
-    K, p = problem.Phi.shape
+    K, p = int((weight > 0).sum()), problem.Phi.shape[1]
+    if not np.ptp(problem.tau) > 0:
+        raise NotIdentifiable("the effort is the same throughout: check its channel")
     root = np.sqrt(weight)[:, None]
     scale = np.linalg.norm(problem.Phi * root, axis=0)
     if p >= K or (scale == 0).any():
@@ -93,5 +96,5 @@ def _newey_west(F: Array, residual: Array, bread: Array, starts: tuple[int, ...]
 
     scores = np.split(F * residual[:, None], starts[1:])
     meat = sum(S_hac_simple(part, nlags=lags) for part in scores)
-    K, p = F.shape
+    K, p = int(F.any(axis=1).sum()), F.shape[1]
     return np.asarray(bread @ meat @ bread * K / (K - p))

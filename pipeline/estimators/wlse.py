@@ -24,21 +24,26 @@ def estimate(problem: Problem) -> Answer:
     NotIdentifiable
         If a log holds fewer than `FEWEST` periods.
     """
-    fewest = int(problem.periods.min())
+    fewest = min(int(np.median(M)) for M in np.split(problem.periods, problem.starts[1:]))
     if fewest < FEWEST:
         raise NotIdentifiable(f"weights need at least {FEWEST} periods in every log, and one holds {fewest}")
-    parts = zip(
-        np.split(problem.tau_var, problem.starts[1:]), np.split(problem.periods, problem.starts[1:]), strict=True
-    )
-    variance = np.concatenate([pooled(var, int(M[0])) / M[0] for var, M in parts])
-    return solve(problem, 1.0 / variance)
+    parts = (np.split(column, problem.starts[1:]) for column in (problem.tau_var, problem.periods))
+    return solve(problem, np.concatenate([M / pooled(var, M) for var, M in zip(*parts, strict=True)]))
 
 
-def pooled(var: Array, periods: int) -> Array:
-    """The variance (K,) averaged around the period, over as many samples as `DEGREES` degrees of freedom need."""
-    K = len(var)
-    reach = min(int(np.ceil(DEGREES / (periods - 1))) // 2, (K - 1) // 2)
-    around = np.concatenate([var[K - reach :], var, var[:reach]])
-    total = np.cumsum(np.concatenate([[0.0], around]))
-    smooth = (total[2 * reach + 1 :] - total[: -2 * reach - 1]) / (2 * reach + 1)
+def pooled(var: Array, M: NDArray[np.int64]) -> Array:
+    """The variance (K,) of one period averaged around the period, over as many samples as `DEGREES` degrees need.
+
+    Each sample counts by its degrees of freedom, one less than the M (K,) periods that it is the mean of.
+    """
+    K, degrees = len(var), np.maximum(M - 1, 0).astype(float)
+    reach = min(int(np.ceil(DEGREES / max(float(np.median(degrees)), 1.0))) // 2, (K - 1) // 2)
+    smooth = around(var * degrees, reach) / np.maximum(around(degrees, reach), 1.0)
     return np.asarray(np.maximum(smooth, 1e-12 * var.mean() + 1e-300))
+
+
+def around(x: Array, reach: int) -> Array:
+    """The sum (K,) of each sample and its neighbours, the last being next to the first."""
+    K = len(x)
+    total = np.cumsum(np.concatenate([[0.0], x[K - reach :], x, x[:reach]]))
+    return np.asarray(total[2 * reach + 1 :] - total[:K])

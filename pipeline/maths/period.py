@@ -6,10 +6,11 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.harmonics import basis, project
+from pipeline.maths.harmonics import evaluate, project
 
 Array = NDArray[np.float64]
 
+AS_GOOD = 2.0  # times the smallest difference: a lag this good is a period, too
 DIP = 0.1  # a lag is a period when the normalised difference falls below this; the value of de Cheveigne and Kawahara
 
 
@@ -41,8 +42,10 @@ def difference(signals: Sequence[Array]) -> Array:
 def guess(signals: Sequence[Array]) -> float | None:
     """The shortest lag after which all signals repeat, in samples, or None where they do not.
 
-    The first dip of the cumulative mean normalised difference, then sharpened on its multiples, where the same
-    error of the period is a larger difference.  (A. de Cheveigne and H. Kawahara, YIN, 2002)
+    The first dip of the cumulative mean normalised difference says whether they do.  It may be a part of a period after
+    which a signal nearly repeats, so the shortest lag is taken that is about as good as the best; then it is sharpened
+    on its multiples, where the same error of the period is a larger difference.  (A. de Cheveigne and H. Kawahara,
+    YIN, 2002)
     """
     d = difference(signals)
     lags = np.arange(1, len(d))
@@ -50,10 +53,13 @@ def guess(signals: Sequence[Array]) -> float | None:
     below = np.flatnonzero(normalised < DIP)
     if not len(below):
         return None
-    lag = below[0]
-    while lag + 1 < len(normalised) and normalised[lag + 1] < normalised[lag]:
-        lag += 1
-    if lag + 1 == len(normalised):
+    first = int(below[0])
+    good = d <= AS_GOOD * d[first:].min() + 1e-12
+    good[:first] = False
+    start = int(np.flatnonzero(good)[0])
+    stop = start + int(np.argmin(good[start:])) if not good[start:].all() else len(d)
+    lag = start + int(np.argmin(d[start:stop]))
+    if lag == len(d) - 1 and d[lag] < d[lag - 1]:
         return None  # still falling where the record ends: half of it holds less than one period
     return _sharpened(d, _vertex(d, lag))
 
@@ -100,15 +106,13 @@ def _normal_equation(t: Array, signals: Sequence[Array], omega: float, harmonics
     """Gradient and information of the angular frequency, over all signals."""
     numerator = information = 0.0
     order = np.arange(1, harmonics + 1)
-    F = basis(t, omega, harmonics)
     for x in signals:
         c = project(t, x, omega, harmonics)
-        residual = x - F @ c
-        cosines, sines = c[1::2], c[2::2]
+        residual = x - evaluate(c, t, omega)
         turned = np.zeros_like(c)
-        turned[1::2], turned[2::2] = order * sines, -order * cosines
-        slope = t * (F @ turned)
-        free = slope - F @ project(t, slope, omega, harmonics)
+        turned[1::2], turned[2::2] = order * c[2::2], -order * c[1::2]
+        slope = t * evaluate(turned, t, omega)
+        free = slope - evaluate(project(t, slope, omega, harmonics), t, omega)
         weight = 1.0 / max(residual.var(), 1e-24 * x.var(), 1e-300)
         numerator += weight * float(free @ residual)
         information += weight * float(free @ free)

@@ -1,6 +1,7 @@
 """Which samples of a run are spoken of."""
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,3 +23,9 @@ def outside(t: Array, windows: Sequence[tuple[float, float]]) -> Chosen:
 def settled(t: Array) -> Chosen:
     """Whether a filter has found its feet: all but the first second, unless there is little more than that."""
     return t - t[0] >= SETTLE if t[-1] - t[0] > 5 * SETTLE else np.ones(len(t), dtype=bool)
+
+
+def longest_run(t: Array, rate: float) -> slice:
+    """The longest run of samples without a gap; `rate` [Hz]."""
+    edges = [0, *(np.flatnonzero(np.diff(t) > 1.5 / rate) + 1).tolist(), len(t)]
+    return max((slice(a, b) for a, b in pairwise(edges)), key=lambda part: part.stop - part.start)

@@ -12,6 +12,8 @@ from pipeline.records import Average, Column, Noise, Note, Signal, note
 from pipeline.robots.robot import Robot
 from pipeline.study import LogEntry
 
+DIFFERS = 0.01  # of the motion's standard deviation: a smaller difference between periods is not worth a remark
+ODD = 2.0  # times the usual difference from the mean: a period that differs by more stands out
 MISMATCH = 5e-4  # a stated period is wrong by more than this share when the data disagree with it
 
 
@@ -32,11 +34,47 @@ def run(
             f"{entry.name}: no joint moves, so there is nothing to identify; check its channels and units"
         )
     orders = max(harmonics or robot.joint(signal.joint).harmonics for signal in moving)
-    found, remarks = shared_period(moving, entry, orders)
+    moving, remarks = repeating(moving, entry)
+    found, more = shared_period(moving, entry, orders)
+    remarks += more
+    for signal in moving:
+        for record in averaged(signal, found, entry.period or 0.0):
+            yield record
+            if isinstance(record, Noise):
+                remarks += odd_period(record, signal, found.length)
     if remarks:
         yield note("average", entry.name, "warning", *remarks)
-    for signal in moving:
-        yield from averaged(signal, found, entry.period or 0.0)
+
+
+def repeating(moving: list[Signal], entry: LogEntry) -> tuple[list[Signal], list[str]]:
+    """The joints that repeat, when not all do so together, and what there is to say about the others."""
+    if period.guess([signal.q[longest(signal)] for signal in moving]) is not None:
+        return moving, []
+    alone = [signal for signal in moving if period.guess([signal.q[longest(signal)]]) is not None]
+    if not alone:
+        return moving, []
+    out = [signal.joint for signal in moving if signal not in alone]
+    return alone, [f"{entry.name}: {joint} does not repeat, unlike the other joints, and is left out" for joint in out]
+
+
+def longest(signal: Signal) -> slice:
+    """The longest stretch without a gap."""
+    return max(stretches(signal.stretch), key=lambda s: s.stop - s.start)
+
+
+def odd_period(noise: Noise, signal: Signal, length: float) -> list[str]:
+    """Whether one of the periods differs from the others, as a transient at the start or a stop at the end does."""
+    number = ((noise.t - noise.t[0]) / length + 1e-9).astype(int)
+    size = np.sqrt(np.bincount(number, noise.q_noise**2) / np.maximum(np.bincount(number), 1))
+    worst, usual = int(size.argmax()), float(np.median(size))
+    if size[worst] < DIFFERS * float(signal.q.std()) or (len(size) > 2 and size[worst] < ODD * usual):
+        return []
+    which = f"period {worst + 1} of {len(size)}" if len(size) > 2 else "the periods"
+    return [
+        f"{noise.log}/{noise.joint}: {which} differs from the mean by {size[worst]:.3g} rms, "
+        f"{size[worst] / signal.q.std():.1%} of the motion: skip a transient at the start (skip = ... in study.toml), "
+        "or cut off a stop at the end"
+    ]
 
 
 def shared_period(signals: Sequence[Signal], entry: LogEntry, harmonics: int) -> tuple[period.Period, list[str]]:
@@ -48,8 +86,7 @@ def shared_period(signals: Sequence[Signal], entry: LogEntry, harmonics: int) ->
         If the joints do not repeat, or fewer than two periods were recorded.
     """
     first = signals[0]
-    longest = max(stretches(first.stretch), key=lambda s: s.stop - s.start)
-    guess = period.guess([signal.q[longest] for signal in signals])
+    guess = period.guess([signal.q[longest(signal)] for signal in signals])
     seconds = first.t[-1] - first.t[0] + 1.0 / first.rate
     if guess is None:
         stated = f"; the study states {entry.period} s" if entry.period else ""
@@ -57,13 +94,8 @@ def shared_period(signals: Sequence[Signal], entry: LogEntry, harmonics: int) ->
             f"{entry.name}: {seconds:.2f} s hold no motion that repeats at least twice{stated}; record more periods, "
             "skip the transient at the start, or give the log another role"
         )
-    remarks, length = [], guess / first.rate
-    if entry.period:
-        multiple = max(round(entry.period / length), 1)
-        # A trajectory whose first harmonics happen to be nil repeats sooner than it was designed to.
-        if abs(entry.period - multiple * length) < max(MISMATCH * entry.period, multiple / first.rate):
-            length *= multiple
-    found = period.refine(first.t - first.t[0], [signal.q for signal in signals], length, harmonics)
+    remarks = []
+    found = period.refine(first.t - first.t[0], [signal.q for signal in signals], guess / first.rate, harmonics)
     if entry.period and abs(entry.period - found.length) > max(MISMATCH * entry.period, 5 * found.std):
         remarks.append(
             f"{entry.name}: the study states a period of {entry.period} s, but the joints repeat every "

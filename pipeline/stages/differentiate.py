@@ -29,6 +29,7 @@ def run(average: Average, joint: Joint, *, derivative: str, harmonics: int) -> I
         ddq=ddq,
         tau=average.tau,
         tau_var=average.tau_var,
+        count=average.count,
     )
     amplitude = fourier.amplitudes(average.q)
     yield Spectrum(average.log, average.joint, orders, np.arange(len(amplitude)) / average.period, amplitude)

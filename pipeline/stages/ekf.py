@@ -40,6 +40,13 @@ def run(
     if chosen is None:
         there = ", ".join(f"{f.model}.{f.estimator}" for f in own)
         raise PipelineError(f"{joint.name}: there is no fit {fit!r}; set fit in [settings] to one of {there}")
+    if mass(joint.terms, chosen.theta) <= 0:
+        yield note(
+            "ekf", f"{signal.log}.{joint.name}", "warning",
+            f"{signal.log}/{joint.name}: the fit's inertia is not positive, so no motion follows from it and nothing "
+            "is tracked; check the signs of the effort and of the position",
+        )  # fmt: skip
+        return
     noise = assumed(
         [a for a in averages if a.joint == joint.name], chosen, joint, signal, lowpass, q_tau or joint.q_tau
     )
@@ -86,7 +93,8 @@ def tracked(
     ]
     together = ekf.Tracked(*(np.concatenate(columns) for columns in zip(*passes, strict=True)))
     tau_hat = measured_regressor(signal, joint, lowpass) @ fit.theta
-    counted = outside(signal.t, entry.contact) & settled(signal.t)
+    calm = np.concatenate([settled(signal.t[part]) for part in stretches(signal.stretch)])
+    counted = outside(signal.t, entry.contact) & calm
     return Track(
         log=signal.log,
         joint=signal.joint,
@@ -96,8 +104,8 @@ def tracked(
         role=signal.role,
         held=signal.held,
         rate=signal.rate,
-        tau_ext_rms=float(np.sqrt(np.mean(together.tau_ext[counted] ** 2))) if counted.any() else 0.0,
-        nis_mean=float(np.mean(together.nis[settled(signal.t)])),
+        tau_ext_rms=float(np.sqrt(np.mean(together.tau_ext[counted] ** 2))) if counted.any() else float("nan"),
+        nis_mean=float(np.mean(together.nis[calm])),
         r_q=noise.r_q,
         r_dq=noise.r_dq,
         q_q=noise.q_q,

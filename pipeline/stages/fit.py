@@ -41,7 +41,7 @@ def pose(trajectories: Sequence[Trajectory], joint: Joint) -> Problem:
         Phi=np.vstack([regressor(joint.terms, t.q, t.dq, t.ddq) for t in trajectories]),
         tau=np.concatenate([t.tau for t in trajectories]),
         tau_var=np.concatenate([t.tau_var for t in trajectories]),
-        periods=np.repeat([t.periods for t in trajectories], lengths),
+        periods=np.concatenate([t.count for t in trajectories]),
         starts=tuple(np.cumsum([0, *lengths[:-1]]).tolist()),
         names=tuple(term.name for term in joint.terms),
     )

@@ -227,6 +227,13 @@ class Reading:
     def remarks(self) -> Iterator[str]:
         """What a reviewer should know about the clock and the rows."""
         clock = self.clock
+        for start, end in self.entry.contact:
+            if start >= clock.last - clock.first or end <= self.entry.skip:
+                yield (
+                    f"the contact window {start:g} to {end:g} s lies outside the log, which goes from "
+                    f"{self.entry.skip:g} to {clock.last - clock.first:g} s; contact times count from the log's first "
+                    "sample"
+                )
         if self.lost:
             yield f"the file is cut, and its last {self.lost} rows lack some channels: they are left out"
         if clock.duplicates > MOST_REPEATED * clock.samples:

@@ -12,7 +12,7 @@ from pipeline.maths.dynamics import regressor
 from pipeline.maths.smoothing import lowpass as low_passed
 from pipeline.maths.smoothing import motion, stretches
 from pipeline.maths.windows import Chosen, outside
-from pipeline.records import Column, Fit, Prediction, Signal, Trajectory
+from pipeline.records import Column, Fit, Note, Prediction, Signal, Trajectory, note
 from pipeline.robots.robot import Joint
 from pipeline.stages.fit import MODEL, pose
 from pipeline.study import LogEntry
@@ -29,7 +29,7 @@ def run(
     joint: Joint,
     *,
     lowpass: float,
-) -> Iterator[Prediction]:
+) -> Iterator[Prediction | Note]:
     """One Prediction per fit of the joint; the prediction of an identification log comes from refits without it.
 
     A held joint is not predicted: at standstill friction takes any value up to its Coulomb level.
@@ -38,6 +38,11 @@ def run(
         return
     if entry.role in ("validation", "contact"):
         free = outside(signal.t, entry.contact)
+        if not free.any():
+            name = f"{signal.log}/{joint.name}"
+            said = f"{name}: its contact windows cover the whole log, so nothing is left to score a prediction on"
+            yield note("predict", f"{signal.log}.{joint.name}", "warning", said)
+            return
         Phi = measured_regressor(signal, joint, lowpass)
         for fit in fits:
             if fit.group == joint.name:
@@ -45,9 +50,10 @@ def run(
                 yield scored(signal, fit.model, fit.estimator, entry.role, tau_hat, free, lowpass)
     elif trajectory is not None:
         others = [t for t in trajectories if t.joint == joint.name and t.log != signal.log]
-        left_out = without_the_log if others else without_a_period
-        for name in ESTIMATORS:
-            yield from left_out(signal, trajectory, others, joint, name, lowpass)
+        if others:
+            yield from without_the_log(signal, trajectory, others, joint, lowpass)
+        else:
+            yield from without_a_period(signal, trajectory, joint, lowpass)
 
 
 def measured_regressor(signal: Signal, joint: Joint, lowpass: float) -> Column:
@@ -65,38 +71,48 @@ def motion_of(signal: Signal, part: slice, lowpass: float) -> tuple[Column, Colu
 
 
 def without_the_log(
-    signal: Signal, own: Trajectory, others: Sequence[Trajectory], joint: Joint, name: str, lowpass: float
-) -> Iterator[Prediction]:
-    """Predict a log from a fit to the other identification logs."""
-    try:
-        theta = estimator(name)(pose(others, joint)).theta
-    except NotIdentifiable:
-        return
-    used = whole(signal, own)
-    tau_hat = regressor(joint.terms, *motion_at(own, signal.t[used] - signal.t[0])) @ theta
-    part = at(signal, used)
-    yield scored(part, MODEL, name, "leave one log out", tau_hat, np.ones(len(part.t), bool), lowpass)
+    signal: Signal, own: Trajectory, others: Sequence[Trajectory], joint: Joint, lowpass: float
+) -> Iterator[Prediction | Note]:
+    """Predict a log from fits to the other identification logs."""
+    part = at(signal, whole(signal, own))
+    Phi = regressor(joint.terms, *motion_at(own, part.t - signal.t[0]))
+    for name in ESTIMATORS:
+        try:
+            theta = estimator(name)(pose(others, joint)).theta
+        except NotIdentifiable as error:
+            yield not_predicted(signal, name, error)
+            continue
+        everywhere = np.ones(len(part.t), dtype=bool)
+        yield scored(part, MODEL, name, "leave one log out", Phi @ theta, everywhere, lowpass)
 
 
-def without_a_period(
-    signal: Signal, own: Trajectory, _: Sequence[Trajectory], joint: Joint, name: str, lowpass: float
-) -> Iterator[Prediction]:
-    """Predict each period of a log from a fit to the other periods; only the effort is left out, not the path."""
-    used = whole(signal, own)
-    part = at(signal, used)
+def without_a_period(signal: Signal, own: Trajectory, joint: Joint, lowpass: float) -> Iterator[Prediction | Note]:
+    """Predict each period of a log from fits to the other periods; only the effort is left out, not the path."""
+    part = at(signal, whole(signal, own))
     since = part.t - signal.t[0]
     number = np.minimum((since / own.period + 1e-9).astype(int), own.periods - 1)
+    group = number * min(own.periods, PARTS) // own.periods
     Phi = regressor(joint.terms, *motion_at(own, since))
-    tau_hat = np.empty(len(since))
-    for out in np.array_split(np.arange(own.periods), min(own.periods, PARTS)):
-        seen = ~np.isin(number, out)
-        rest = averaging.fold(part.t[seen], part.tau[seen], own.period, len(own.t), start=signal.t[0])
-        kept = replace(own, tau=rest.mean, tau_var=rest.var, periods=own.periods - len(out))
-        try:
-            tau_hat[~seen] = Phi[~seen] @ estimator(name)(pose([kept], joint)).theta
-        except NotIdentifiable:
-            return
-    yield scored(part, MODEL, name, "leave one period out", tau_hat, np.ones(len(since), bool), lowpass)
+    tau_hat = {name: np.empty(len(since)) for name in ESTIMATORS}
+    rests = averaging.left_out(part.t, part.tau, own.period, len(own.t), group)
+    for out, rest in enumerate(rests):
+        unseen = group == out
+        kept = replace(own, tau=rest.mean, tau_var=rest.var, count=rest.counts)
+        for name in list(tau_hat):
+            try:
+                tau_hat[name][unseen] = Phi[unseen] @ estimator(name)(pose([kept], joint)).theta
+            except NotIdentifiable as error:
+                yield not_predicted(signal, name, error)
+                del tau_hat[name]
+    for name, predicted in tau_hat.items():
+        yield scored(part, MODEL, name, "leave one period out", predicted, np.ones(len(since), dtype=bool), lowpass)
+
+
+def not_predicted(signal: Signal, name: str, error: NotIdentifiable) -> Note:
+    """Why an estimator has no leave-out score."""
+    about = f"{signal.log}/{signal.joint}"
+    said = f"{about}: {name} has no leave-out score, because a refit is not possible: {error}"
+    return note("predict", f"{signal.log}.{signal.joint}", "note", said)
 
 
 def whole(signal: Signal, own: Trajectory) -> Chosen:

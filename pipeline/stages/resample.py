@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import BadLog
+from pipeline.maths.smoothing import lowpass as lowpass_of
 from pipeline.maths.smoothing import motion
 from pipeline.records import Column, Note, Recording, Signal, note
 from pipeline.robots.robot import Joint
@@ -15,6 +16,8 @@ Indices = NDArray[np.intp]
 GAP = 2.5  # sampling times between two samples that count as an interruption
 EVEN = 0.02  # of a sampling time: clocks that stray less than this from a uniform one are taken as uniform
 HELD = 0.01  # share of a joint's range, or of 1 rad or 1 m where it has no limits, below which it is held
+SLOW = 5.0  # [Hz] below which a logged velocity is compared with that of the position
+AGREES = 0.1  # how far their ratio may be from 1
 FEWEST = 4  # samples that a cubic spline needs; a shorter stretch is left out
 
 
@@ -62,12 +65,36 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
         stretch=stretch,
     )
     yield from remarks(recording, method, cuts, sum(map(len, parts)))
+    wrong = disagreement(recording, q, dq, stretch, 1.0 / T_s) if moves(q, joint) else []
+    if wrong:
+        yield note("resample", f"{recording.log}.{recording.joint}", "warning", *wrong)
 
 
 def moves(q: Column, joint: Joint) -> bool:
     """Whether a joint moves enough to say anything about its dynamics."""
     low, high = joint.limits.q
-    return bool(np.ptp(q) > HELD * (high - low if np.isfinite(high - low) else 1.0))
+    # Percentiles, so that a single glitch of an encoder does not set a held joint moving.
+    reach = float(np.subtract(*np.percentile(q, [99.0, 1.0])))
+    return reach > HELD * (high - low if np.isfinite(high - low) else 1.0)
+
+
+def disagreement(recording: Recording, q: Column, dq: Column, stretch: Indices, rate: float) -> list[str]:
+    """Whether a logged velocity is that of the logged position, judged where both are slow enough to compare."""
+    if recording.velocity == "derived":
+        return []
+    cutoff = min(SLOW, 0.1 * rate)
+    pairs = [
+        (motion(q[stretch == i], None, rate, cutoff)[1], lowpass_of(dq[stretch == i], rate, cutoff))
+        for i in set(stretch.tolist())
+    ]
+    derived, logged = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
+    slope = float(derived @ logged / (derived @ derived))
+    if abs(slope - 1) < AGREES:
+        return []
+    return [
+        f"{recording.log}/{recording.joint}: the logged velocity is {slope:.3g} times that of the logged position; "
+        "check the sign, unit or column of either, and the rate of the clock"
+    ]
 
 
 def is_even(t: Column, parts: list[Indices], T_s: float) -> bool:

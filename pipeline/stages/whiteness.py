@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.maths.windows import settled
+from pipeline.maths.windows import longest_run, settled
 from pipeline.records import Column, Noise, Residual, Track, Whiteness
 
 LAGS = 100  # of the autocorrelation that is shown
@@ -19,8 +19,10 @@ def run(subject: Noise | Residual | Track) -> Iterator[Whiteness]:
     elif isinstance(subject, Residual):
         signals = {f"tau.{subject.model}.{subject.estimator}": subject.tau - subject.tau_hat}
     else:
-        kept = settled(subject.t)
-        signals = {name: getattr(subject, name)[kept] for name in ("innovation_q", "innovation_dq")}
+        # Correlations across a gap mean nothing, and after one the filter starts anew.
+        run_ = longest_run(subject.t, subject.rate)
+        kept = settled(subject.t[run_])
+        signals = {name: getattr(subject, name)[run_][kept] for name in ("innovation_q", "innovation_dq")}
     found = {name: statistics(x) for name, x in signals.items()}
     together = int(all(result["white"] for result in found.values()))
     for name, result in found.items():

@@ -2,11 +2,15 @@
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from pipeline.records import Fit, Note, Prediction, Track
 from pipeline.report.content import Block, Bullets, Prose, Section, Table, Verdict, literal
 from pipeline.report.context import Context, title
 from pipeline.report.results import prediction_key
 
+SAME_PATH = "leave one period out"  # a scheme that repeats the path, and so the model's error on it
+EXPECTED = 2.0  # normalised innovation squared of a consistent filter, of two measurements
 GOOD, FAIR = 0.9, 0.7  # shares of variance explained that call a model good, or usable with care
 
 
@@ -67,27 +71,51 @@ def used_fit(context: Context, joint: str) -> str:
 
 def verdicts(context: Context, joint: str) -> Iterator[Verdict]:
     """How well the model of a joint predicts, and whether its filter is consistent."""
-    name, fit = title(joint), used_fit(context, joint)
-    unseen = [p for p in context.library.all(Prediction) if p.joint == joint and f"{p.model}.{p.estimator}" == fit]
+    fit = used_fit(context, joint)
+    scored = [p for p in context.library.all(Prediction) if p.joint == joint and f"{p.model}.{p.estimator}" == fit]
+    unseen = [p for p in scored if p.scheme != SAME_PATH and (p.role != "contact" or context.study.log(p.log).contact)]
     if unseen:
-        worst = min(unseen, key=lambda p: p.r2)
-        level = "good" if worst.r2 >= GOOD else "warn" if worst.r2 >= FAIR else "bad"
-        r2 = context.results[f"{prediction_key(worst)}.r2"].number(3)
+        yield predicted(context, min(unseen, key=lambda p: p.r2))
+    elif scored:
+        r2 = context.results[f"{prediction_key(scored[0])}.r2"].number(3)
         yield Verdict(
-            level,  # type: ignore[arg-type]
-            f"**{name}**: the model explains at least {r2} of the variance of effort that it has not seen "
-            f"(worst: {literal(worst.log)}, {worst.scheme}).",
+            "info",
+            f"**{title(joint)}**: the model explains {r2} of the variance of other periods of the path that it was fitted "
+            "to. What it is worth on other paths is not known: add a validation log.",
         )
     tracks = [track for track in context.library.all(Track) if track.joint == joint and not track.held]
-    white = [t.log for t in tracks if context.results[f"ekf.{t.log}.{joint}.white"].value == 1]
-    if tracks and len(white) == len(tracks):
-        yield Verdict("good", f"**{name}**: the filter's innovations pass as white noise in all {len(tracks)} logs.")
-    elif tracks:
-        yield Verdict(
-            "warn",
-            f"**{name}**: the filter's innovations are not white over the whole run in {len(tracks) - len(white)} of "
-            f"{len(tracks)} logs, so its stated deviations are too small there: trust the free-space level instead.",
+    if tracks:
+        yield consistency(context, joint, tracks)
+
+
+def predicted(context: Context, worst: Prediction) -> Verdict:
+    """What is said of the worst prediction of a joint."""
+    name = title(worst.joint)
+    where = f"(worst: {literal(worst.log)}, {worst.scheme})"
+    if worst.r2 < 0:
+        return Verdict(
+            "bad", f"**{name}**: on effort that it has not seen, the model is worse than a constant {where}."
         )
+    level = "good" if worst.r2 >= GOOD else "warn" if worst.r2 >= FAIR else "bad"
+    r2 = context.results[f"{prediction_key(worst)}.r2"].number(3)
+    text = f"**{name}**: the model explains at least {r2} of the variance of effort that it has not seen {where}."
+    return Verdict(level, text)  # type: ignore[arg-type]
+
+
+def consistency(context: Context, joint: str, tracks: list[Track]) -> Verdict:
+    """Whether the deviations that the filter states can be believed."""
+    name = title(joint)
+    coloured = [t for t in tracks if context.results[f"ekf.{t.log}.{joint}.white"].value != 1]
+    if not coloured:
+        return Verdict("good", f"**{name}**: the filter's innovations pass as white noise in all {len(tracks)} logs.")
+    usual = float(np.median([t.nis_mean for t in tracks]))
+    size = "too small" if usual > 2 * EXPECTED else "too large" if usual < EXPECTED / 2 else "about as large as it is"
+    return Verdict(
+        "warn" if EXPECTED / 2 <= usual <= 2 * EXPECTED else "bad",
+        f"**{name}**: the filter's innovations are not white over the whole run in {len(coloured)} of {len(tracks)} logs, "
+        f"and what it states of their spread is {size}. Judge a contact by the free-space level, not by the filter's own "
+        "deviations.",
+    )
 
 
 def table(context: Context) -> Table:
