@@ -229,6 +229,15 @@ def test_white_noise_is_called_white_as_often_as_the_level_says():
     assert rejected < 4 + 4 * np.sqrt(400 * 0.01 * 0.99)
 
 
+def test_the_ljung_box_statistic_is_that_of_statsmodels_own_test():
+    from statsmodels.stats.diagnostic import acorr_ljungbox
+
+    x = walk(400, 1.0) * 0.1 + np.random.default_rng(3).normal(size=400)
+    own, table = whiteness.statistics(x), acorr_ljungbox(x, lags=[20])
+    assert own["ljung_box"] == pytest.approx(table["lb_stat"].iloc[0], rel=1e-9)
+    assert own["ljung_box_p"] == pytest.approx(table["lb_pvalue"].iloc[0], rel=1e-9)
+
+
 def test_a_walk_and_a_constant_are_not_called_white():
     walked = whiteness.statistics(walk(1000, 1.0))
     assert walked["white"] == 0

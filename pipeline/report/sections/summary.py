@@ -80,8 +80,8 @@ def verdicts(context: Context, joint: str) -> Iterator[Verdict]:
         r2 = context.results[f"{prediction_key(scored[0])}.r2"].number(3)
         yield Verdict(
             "info",
-            f"**{title(joint)}**: the model explains {r2} of the variance of other periods of the path that it was fitted "
-            "to. What it is worth on other paths is not known: add a validation log.",
+            f"**{title(joint)}**: the model explains {r2} of the variance of other periods of the path that it was "
+            "fitted to. What it is worth on other paths is not known: add a validation log.",
         )
     tracks = [track for track in context.library.all(Track) if track.joint == joint and not track.held]
     if tracks:
@@ -112,9 +112,9 @@ def consistency(context: Context, joint: str, tracks: list[Track]) -> Verdict:
     size = "too small" if usual > 2 * EXPECTED else "too large" if usual < EXPECTED / 2 else "about as large as it is"
     return Verdict(
         "warn" if EXPECTED / 2 <= usual <= 2 * EXPECTED else "bad",
-        f"**{name}**: the filter's innovations are not white over the whole run in {len(coloured)} of {len(tracks)} logs, "
-        f"and what it states of their spread is {size}. Judge a contact by the free-space level, not by the filter's own "
-        "deviations.",
+        f"**{name}**: the filter's innovations are not white over the whole run in {len(coloured)} of {len(tracks)} "
+        f"logs, and what it states of their spread is {size}. Judge a contact by the free-space level, not by the "
+        "filter's own deviations.",
     )
 
 
