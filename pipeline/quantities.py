@@ -72,7 +72,7 @@ QUANTITIES = {
     "count": Quantity("samples averaged at this phase"),
     "q_var": Quantity("variance of the position between periods", "{position}^2"),
     "dq_var": Quantity("variance of the velocity between periods", "({position}/s)^2"),
-    "tau_var": Quantity("variance of the effort between periods", "{effort}^2"),
+    "tau_var": Quantity("variance of the effort between periods", "({effort})^2"),
     "sigma_q": Quantity("standard deviation of the position noise", "{position}"),
     "sigma_dq": Quantity("standard deviation of the velocity noise", "{position}/s"),
     "sigma_tau": Quantity("standard deviation of the effort noise", "{effort}"),
@@ -90,7 +90,7 @@ QUANTITIES = {
     "theta_std_hac": Quantity(
         "standard deviation of theta, allowing for correlated residuals (Newey-West)", "see unit"
     ),
-    "mse": Quantity("mean squared error of the averaged effort", "{effort}^2"),
+    "mse": Quantity("mean squared error of the averaged effort", "({effort})^2"),
     "condition": Quantity("condition number of the regressor"),
     "samples": Quantity("number of samples fitted, K"),
     "hac_lags": Quantity("lags that the Newey-West errors allow for"),

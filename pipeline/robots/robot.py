@@ -1,5 +1,6 @@
 """What a robot is: its joints, each with its motor, its model and its limits, and the chain that carries them."""
 
+import re
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -18,7 +19,8 @@ class Kind(Enum):
     def unit(self, template: str) -> str:
         """Fill in a unit of `quantities` or of a term: '{position}/s' is 'rad/s' for a revolute joint."""
         position, effort, inertia = ("rad", "N m", "kg m^2") if self is Kind.REVOLUTE else ("m", "N", "kg")
-        return template.format(position=position, effort=effort, inertia=inertia)
+        filled = template.format(position=position, effort=effort, inertia=inertia)
+        return re.sub(r"\((\w+)\)\^", r"\1^", filled)  # (N)^2 is N^2, but (N m)^2 is not N m^2
 
 
 @dataclass(frozen=True)

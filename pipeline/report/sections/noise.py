@@ -49,7 +49,14 @@ def blocks(context: Context, averages: list[Average]) -> Iterator[Block]:
         for a in averages
     )
     header = ("Log", "Joint", "Period", "Periods", "Position noise", "Velocity noise", "Effort noise")
-    yield Table("Noise between periods (standard deviations of one sample).", header, rows, "noise-table", "llrrrrr")
+    yield Table(
+        "Noise between periods (standard deviations of one sample). The deviation of a period takes what its harmonics "
+        "leave as white, and is too small where it is not.",
+        header,
+        rows,
+        "noise-table",
+        "llrrrrr",
+    )
     for average in averages:
         yield from of_one(context, average)
 

@@ -1,9 +1,10 @@
 """What was recorded, and what the readers noticed."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from pipeline.records import Intake, Note, Signal
-from pipeline.report.content import Block, Bullets, Prose, Section, Table, Verdict, literal
+from pipeline.report.content import Block, Bullets, Number, Prose, Section, Table, Verdict, literal
 from pipeline.report.context import Context
 
 
@@ -58,13 +59,19 @@ def overview(context: Context, intakes: list[Intake]) -> Table:
             context.number(f"log.{intake.log}.rate", 5),
             context.number(f"log.{intake.log}.duration", 5),
             context.number(f"log.{intake.log}.jitter", 2),
-            context.number(f"period.{intake.log}", 6),
+            length(context, intake),
             context.count(f"period.{intake.log}.periods"),
         )
         for intake in intakes
     )
     header = ("Log", "Role", "Format", "Samples", "Rate", "Duration", "Clock jitter", "Period", "Periods")
     return Table("The logs of the study.", header, rows, label="recorded-table", align="lllrrrrrr")
+
+
+def length(context: Context, intake: Intake) -> Number | str:
+    """The period of a log, without its deviation, which the section on averaging gives."""
+    number = context.number(f"period.{intake.log}", 6)
+    return number if isinstance(number, str) else replace(number, std=None)
 
 
 def remarks(intake: Intake) -> list[str]:

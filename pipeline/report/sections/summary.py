@@ -24,9 +24,8 @@ def blocks(context: Context) -> Iterator[Block]:
     study = context.study
     kind = "simulated" if study.simulated else "recorded"
     yield Prose(
-        f"{len(study.logs)} {kind} logs of the {literal(study.robot.title)} were analysed. External effort is "
-        "what the robot exerts on its environment, found from motor currents and joint positions; no force sensor "
-        "was used."
+        f"The study holds {len(study.logs)} {kind} logs of the {literal(study.robot.title)}. External effort is what "
+        "the robot exerts on its environment, found from motor currents and joint positions; no force sensor was used."
     )
     if study.simulated:
         yield Verdict(
