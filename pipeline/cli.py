@@ -2,7 +2,9 @@
 
 import ast
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor
+from contextlib import contextmanager
 from functools import wraps
 from importlib import import_module
 from pathlib import Path
@@ -39,16 +41,29 @@ def main() -> None:
     app()
 
 
+@contextmanager
+def messages() -> Iterator[None]:
+    """Print what the pipeline raises on purpose, and what the machine refuses, as a message; leave with exit code 1."""
+    try:
+        yield
+    except BrokenPipeError:  # whoever read the output has gone, and needs no message
+        raise
+    except (PipelineError, OSError) as error:
+        typer.secho(f"error: {error}", fg="red", err=True)
+        raise typer.Exit(1) from None
+    except BrokenExecutor:
+        says = "a process of this run was ended from outside, perhaps for want of memory; run again with fewer --jobs"
+        typer.secho(f"error: {says}: what was finished is kept", fg="red", err=True)
+        raise typer.Exit(1) from None
+
+
 def guarded(run: Callable[..., Any]) -> Callable[..., Any]:
-    """Print what the pipeline raises on purpose as a message, and leave with exit code 1."""
+    """A command that ends in a message where it cannot go on."""
 
     @wraps(run)
     def command(*args: Any, **kwargs: Any) -> Any:
-        try:
+        with messages():
             return run(*args, **kwargs)
-        except PipelineError as error:
-            typer.secho(f"error: {error}", fg="red", err=True)
-            raise typer.Exit(1) from None
 
     return command
 
@@ -56,10 +71,14 @@ def guarded(run: Callable[..., Any]) -> Callable[..., Any]:
 def run_stages(
     study: Path, names: tuple[str, ...], processed: Path | None, reports: Path | None, force: bool, jobs: int
 ) -> bool:
-    """Run stages on one study; whether all went well."""
+    """Run stages on one study; whether all went well.  Why they could not run at all is printed."""
     from pipeline import runs
 
-    return runs.run(study, names, processed, reports, force, jobs)
+    try:
+        with messages():
+            return runs.run(study, names, processed, reports, force, jobs)
+    except typer.Exit:
+        return False
 
 
 def add_stage(name: str) -> None:

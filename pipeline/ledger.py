@@ -7,11 +7,15 @@ its outputs are what its entry says.  Comparing an old entry with a new fingerpr
 import ast
 import json
 from collections.abc import Iterable, Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, fields, is_dataclass
+from datetime import date, time
+from enum import Enum
 from functools import cache
 from hashlib import sha256
-from pathlib import Path
+from pathlib import Path, PurePath
 from typing import Any
+
+import numpy as np
 
 from pipeline import store
 
@@ -86,8 +90,8 @@ class Ledger:
         store.write_bytes(self.place(entry.stage, entry.task), sealed(entry).encode())
 
     def broken(self) -> Iterator[Path]:
-        """Entries that are not as they were written."""
-        for file in sorted((self.folders.processed / "tasks").rglob("*")):
+        """Entries that are not as they were written; other files there are no concern of ours."""
+        for file in sorted((self.folders.processed / "tasks").rglob("*.json")):
             if file.is_file() and self.entry(file.parent.name, file.stem) is None:
                 yield file
 
@@ -132,10 +136,11 @@ def sealed(entry: Entry) -> str:
 
 
 @cache
-def code(module: str) -> dict[str, str]:
-    """The hash of a module and of everything of the pipeline that it imports, directly or not."""
+def code(*modules: str) -> dict[str, str]:
+    """The hash of modules and of everything of the pipeline that they import, directly or not."""
     files: dict[Path, None] = {}
-    _collect(_files(module), files)
+    for module in modules:
+        _collect(_files(module), files)
     return {file.relative_to(PACKAGE.parent).as_posix(): _hash_of(file) for file in sorted(files)}
 
 
@@ -177,3 +182,36 @@ def _hash_of(file: Path) -> str:
 def hash_of_text(text: str) -> str:
     """The sha256 of a text."""
     return sha256(text.encode()).hexdigest()
+
+
+def hash_of(value: Any) -> str:
+    """The sha256 of a value by all that it holds: arrays by their bytes, of which `repr` shows a few digits."""
+    return hash_of_text(canonical(value))
+
+
+def canonical(value: Any) -> str:
+    """A text that two values share only if they hold the same.
+
+    Raises
+    ------
+    TypeError
+        If the value holds something of which that cannot be said.
+    """
+    if is_dataclass(value) and not isinstance(value, type):
+        held = (f"{f.name}={canonical(getattr(value, f.name))}" for f in fields(value))
+        return f"{type(value).__name__}({', '.join(held)})"
+    if isinstance(value, np.ndarray) and not value.dtype.hasobject:
+        return f"array({value.dtype.str}, {value.shape}, {sha256(value.tobytes()).hexdigest()})"
+    if isinstance(value, dict):
+        return f"{{{', '.join(sorted(f'{canonical(k)}: {canonical(v)}' for k, v in value.items()))}}}"
+    if isinstance(value, list | tuple):
+        return f"{type(value).__name__}({', '.join(map(canonical, value))})"
+    if isinstance(value, Enum):
+        return f"{type(value).__name__}.{value.name}"
+    if isinstance(value, PurePath):
+        return f"path({value.as_posix()!r})"
+    if isinstance(value, np.generic):
+        return canonical(value.item())
+    if value is None or isinstance(value, bool | int | float | str | date | time):
+        return repr(value)
+    raise TypeError(f"a {type(value).__name__} has no canonical text")

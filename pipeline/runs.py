@@ -35,26 +35,33 @@ def studies(named: Sequence[Path]) -> Iterator[Path]:
     if not found:
         raise BadStudy("raw/ holds no study; `davinci-forces new` writes one from a log")
     for folder in found:
-        study = study_file.read(folder)
+        try:
+            study = study_file.read(folder)
+        except BadStudy:  # its run says what is wrong with it
+            yield folder
+            continue
         absent = study.absent()
-        if len(absent) == sum(len(entry.files) for entry in study.logs):
+        if len(absent) == study.files:
             typer.echo(f"{folder}: skipped, its logs are not here ({absent[0]} ...); study.toml says where to get them")
         else:
             yield folder
 
 
 def load(folder: Path) -> Study:
-    """Read a study, and make sure that its logs are there.
+    """Read a study, and say which files of its logs are not there; those logs will fail, and no other.
 
     Raises
     ------
     BadStudy
-        With every problem at once.
+        With every problem at once; that no file at all is there is one.
     """
     study = study_file.read(folder)
     absent = study.absent()
-    if absent:
-        raise BadStudy("\n".join(f"{folder / 'study.toml'}: file {name!r} is not in {folder}" for name in absent))
+    lines = [f"{folder / 'study.toml'}: file {name!r} is not in {folder}" for name in absent]
+    if len(absent) == study.files:
+        raise BadStudy("\n".join(lines))
+    for line in lines:
+        typer.secho(f"warning: {line}", fg="yellow", err=True)
     return study
 
 

@@ -98,6 +98,11 @@ class Study:
         """The log of that name."""
         return next(entry for entry in self.logs if entry.name == name)
 
+    @property
+    def files(self) -> int:
+        """How many files its logs are in."""
+        return sum(len(entry.files) for entry in self.logs)
+
     def absent(self) -> tuple[str, ...]:
         """Files of logs that are not there."""
         return tuple(file for entry in self.logs for file in entry.files if not (self.folder / file).is_file())

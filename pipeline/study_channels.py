@@ -1,11 +1,11 @@
 """Reading [log.channels]: which channel of a log holds which quantity, and in what unit."""
 
-import math
 import re
 from dataclasses import dataclass
 from typing import Any
 
 from pipeline.robots import Kind, Robot
+from pipeline.robots.from_toml import is_number
 from pipeline.study import Source
 from pipeline.study_problems import Problems
 from pipeline.units import UNITS, canonical, measures
@@ -66,7 +66,7 @@ class Channels:
         unit, sign, offset = table.get("unit"), table.get("sign", 1), table.get("offset", 0.0)
         named = isinstance(channel, str) or (type(channel) is int and channel >= 0)
         signed = type(sign) is int and sign in (-1, 1)
-        shifted = type(offset) in (int, float) and math.isfinite(offset)
+        shifted = is_number(offset)
         check = self.problems.check
         check(named, line, f"{where} must be a name, or a column number from 0, not {channel!r}")
         check(signed, line, f"{where}: sign must be 1 or -1, not {sign!r}")

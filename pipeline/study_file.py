@@ -9,15 +9,18 @@ from typing import Any
 
 from pipeline import robots
 from pipeline.errors import BadRobot, BadStudy
+from pipeline.estimators import ESTIMATORS
 from pipeline.robots import Robot
-from pipeline.robots.from_toml import change
+from pipeline.robots.from_toml import RESERVED, change, is_number, wrong_name
 from pipeline.study import LogEntry, Settings, Study, Weight
 from pipeline.study_channels import Channels
-from pipeline.study_problems import Problems
+from pipeline.study_problems import Problems, implausible
 
-NAME = re.compile(r"[a-z0-9_-]+")
 ROLES = ("identification", "validation", "contact", "weight", "tissue", "friction")
-DERIVATIVES = ("harmonics", "fft")
+CHOICES = {
+    "derivative": ("harmonics", "fft"),
+    "fit": tuple(f"{model}.{estimator}" for model in ("independent",) for estimator in ESTIMATORS),
+}
 
 
 def read(folder: Path) -> Study:
@@ -34,10 +37,10 @@ def read(folder: Path) -> Study:
         table = tomllib.loads(text)
     except FileNotFoundError:
         raise BadStudy(f"{file}: there is no such file; `davinci-forces new` writes one from a log") from None
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise BadStudy(f"{file}: {error}") from None
     except OSError as error:
         raise BadStudy(f"{file}: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:  # of TOML, of UTF-8, of numbers and nesting beyond Python's limits
+        raise BadStudy(f"{file}: {error}") from None
     return _Reader(folder, Problems(file, text)).study(table)
 
 
@@ -50,7 +53,10 @@ class _Reader:
     def study(self, table: dict[str, Any]) -> Study:
         known = ("title", "robot", "simulated", "robot_overrides", "settings", "log")
         self.problems.unknown(table, known, "", 0)
-        title = self.problems.take(table, "title", str, self.folder.name)
+        name = self.folder.resolve().name
+        if name.partition(".")[0].lower() in RESERVED:
+            self.problems.add(0, f"the study's folder is called {name!r}, which is reserved on Windows; rename it")
+        title = self.problems.take(table, "title", str, name)
         simulated = self.problems.take(table, "simulated", bool, False)
         robot = self.robot(table)
         settings = self.settings(self.problems.table(table, "settings"))
@@ -75,7 +81,7 @@ class _Reader:
             return tomllib.loads((self.folder / "truth.toml").read_text(encoding="utf-8"))
         except FileNotFoundError:
             return {}
-        except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        except (OSError, ValueError, RecursionError) as error:
             raise BadStudy(f"{self.folder / 'truth.toml'}: {error}") from None
 
     def robot(self, table: dict[str, Any]) -> Robot | None:
@@ -116,11 +122,11 @@ class _Reader:
             for f in fields(Settings)
         }
         for name in ("lowpass", "harmonics", "q_tau"):
-            if values[name] < 0 or (name == "lowpass" and values[name] == 0):
-                self.problems.add(self.problems.line(name), f"settings: {name} must be positive, not {values[name]}")
-        if values["derivative"] not in DERIVATIVES:
-            line = self.problems.line("derivative")
-            self.problems.add(line, f"settings: derivative is one of {', '.join(DERIVATIVES)}")
+            if wrong := implausible(name, values[name]):
+                self.problems.add(self.problems.line(name), f"settings: {wrong}")
+        for name, choices in CHOICES.items():
+            says = f"settings: {name} must not be {values[name]!r}; it is one of {', '.join(choices)}"
+            self.problems.check(values[name] in choices, self.problems.line(name), says)
         return Settings(**values)
 
     def log(self, index: int, entry: Any, robot: Robot | None) -> LogEntry | None:
@@ -131,8 +137,8 @@ class _Reader:
         name = self.problems.take(entry, "name", str, f"log-{index + 1}", start)
         if "name" not in entry:
             self.problems.add(start, f"log {index + 1} has no name")
-        elif not NAME.fullmatch(name):
-            self.problems.add(self.problems.line("name", start), f"log name {name!r} must match [a-z0-9_-]+")
+        elif wrong := wrong_name(name):
+            self.problems.add(self.problems.line("name", start), f"log name {wrong}")
         place = f"log {name!r}"
         known = {f.name for f in fields(LogEntry)} | {"file"}
         self.problems.unknown(entry, tuple(sorted(known)), place, start)
@@ -143,10 +149,10 @@ class _Reader:
             channels=Channels(self.problems, robot, place, start).read(entry.get("channels", {})),
             period=self.problems.positive(entry, "period", place, start),
             rate=self.problems.positive(entry, "rate", place, start),
-            skip=self.problems.positive(entry, "skip", place, start, zero=True) or 0.0,
+            skip=self.problems.positive(entry, "skip", place, start) or 0.0,
             contact=self.windows(entry, place, start),
             weight=self.weight(entry, robot, place, start),
-            delimiter=self.problems.take(entry, "delimiter", str, None, start),
+            delimiter=self.delimiter(entry, place, start),
             decimal=self.problems.one_of(entry, "decimal", (".", ","), place, start) if "decimal" in entry else None,
             header=self.problems.take(entry, "header", bool, None, start),
             encoding=self.problems.take(entry, "encoding", str, None, start),
@@ -165,14 +171,19 @@ class _Reader:
             self.problems.check(self.inside(file), line, f"{place}: {file!r} lies outside the study's folder")
         return tuple(files)
 
+    def delimiter(self, entry: dict[str, Any], place: str, start: int) -> str | None:
+        delimiter: str | None = self.problems.take(entry, "delimiter", str, None, start)
+        says = f"{place}: delimiter must not be empty; leave it out, and it is found from the file"
+        self.problems.check(delimiter != "", self.problems.line("delimiter", start), says)
+        return delimiter
+
     def windows(self, entry: dict[str, Any], place: str, start: int) -> tuple[tuple[float, float], ...]:
         windows = entry.get("contact", [])
         good = isinstance(windows, list) and all(
-            isinstance(w, list) and len(w) == 2 and all(type(x) in (int, float) for x in w) and w[0] < w[1]
-            for w in windows
+            isinstance(w, list) and len(w) == 2 and all(map(is_number, w)) and 0 <= w[0] < w[1] for w in windows
         )
         line = self.problems.line("contact", start)
-        self.problems.check(good, line, f"{place}: contact must be a list of [start, end] in seconds")
+        self.problems.check(good, line, f"{place}: contact must be a list of [start, end] in seconds, from 0 on")
         return tuple((float(a), float(b)) for a, b in windows) if good else ()
 
     def weight(self, entry: dict[str, Any], robot: Robot | None, place: str, start: int) -> Weight | None:
@@ -191,8 +202,8 @@ class _Reader:
         joint = table.get("moves_with")
         names = [j.name for j in robot.joints] if robot else [joint]
         known = ", ".join(map(str, names))
-        heavy = type(mass) in (int, float) and mass > 0
-        three = isinstance(position, list) and len(position) == 3 and all(type(x) in (int, float) for x in position)
+        heavy = is_number(mass) and mass > 0
+        three = isinstance(position, list) and len(position) == 3 and all(map(is_number, position))
         self.problems.check(heavy, line, f"{place}: weight.mass must be positive, in kg")
         self.problems.check(joint in names, line, f"{place}: weight.moves_with must be one of {known}")
         self.problems.check(three, line, f"{place}: weight.position must be [x, y, z] in metres")
@@ -209,4 +220,4 @@ class _Reader:
     def inside(self, file: str) -> bool:
         """Whether a path stays in the study as it is written; a link that somebody put there may point anywhere."""
         path = Path(file)
-        return not path.is_absolute() and not path.drive and not os.path.normpath(file).startswith("..")
+        return not path.anchor and Path(os.path.normpath(file)).parts[:1] != ("..",)

@@ -1,11 +1,31 @@
 """What is wrong with a study file, gathered with the lines it is on, and the checks that many of its keys share."""
 
-import math
 import re
 from pathlib import Path
 from typing import Any
 
 from pipeline.errors import BadStudy
+from pipeline.robots.from_toml import is_number
+
+# The least and the greatest value, and the unit: beyond these a slip of the pen or of the unit is the likelier reason.
+PLAUSIBLE = {
+    "period": (1e-6, 1e6, "s"),
+    "rate": (1e-3, 1e7, "Hz"),
+    "skip": (0.0, 1e6, "s"),
+    "lowpass": (1e-6, 1e5, "Hz"),
+    "harmonics": (0, 100, ""),
+    "q_tau": (0.0, 1e6, "effort/s^0.5"),
+}
+
+
+def implausible(key: str, value: float) -> str:
+    """What is wrong with a number; "" where nothing is."""
+    least, most, unit = PLAUSIBLE[key]
+    if least <= value <= most:
+        return ""
+    if value < 0 or (value == 0 and least > 0):
+        return f"{key} must be positive, not {value}"
+    return f"{key} must lie between {least:g} and {most:g} {unit}".rstrip() + f", not {value}"
 
 
 class Problems:
@@ -67,20 +87,19 @@ class Problems:
     def take(self, table: dict[str, Any], key: str, kind: type, default: Any, start: int = 0) -> Any:
         """The value of a key if it is of that kind, else the default."""
         value: Any = table.get(key, default)
-        if kind is float and type(value) is int:
+        if kind is float and is_number(value):
             value = float(value)
-        fits = type(value) is kind
-        if key in table and not (fits and (kind is not float or math.isfinite(value))):
+        if key in table and not (type(value) is kind and (kind is not float or is_number(value))):
             words = {str: "text", bool: "true or false", float: "a number", int: "a whole number"}
             self.add(self.line(key, start), f"{key} must be {words[kind]}, not {table[key]!r}")
             return default
         return value
 
-    def positive(self, entry: dict[str, Any], key: str, place: str, start: int, zero: bool = False) -> float | None:
-        """A number above zero, or from zero on, or None where the key is missing or wrong."""
+    def positive(self, entry: dict[str, Any], key: str, place: str, start: int) -> float | None:
+        """A plausible number, or None where the key is missing or wrong."""
         value: float | None = self.take(entry, key, float, None, start)
-        if value is not None and (value < 0 or (value == 0 and not zero)):
-            self.add(self.line(key, start), f"{place}: {key} must be positive, not {value}")
+        if value is not None and (wrong := implausible(key, value)):
+            self.add(self.line(key, start), f"{place}: {wrong}")
             return None
         return value
 

@@ -2,8 +2,10 @@
 
 import json
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -12,8 +14,9 @@ import numpy as np
 from pipeline import store
 from pipeline.errors import NotReproduced, PipelineError
 from pipeline.ledger import Folders, Ledger
+from pipeline.library import Library
 from pipeline.records import KINDS, Fit, Record
-from pipeline.report.results import parse
+from pipeline.report.results import Results, collect, parse
 
 
 @dataclass(frozen=True)
@@ -35,33 +38,43 @@ def verify(folders: Folders) -> Verified:
         With every file and number that is not what it was, one a line.
     """
     ledger = Ledger(folders)
-    said: dict[str, str] = {}
+    said: dict[str, dict[str, str]] = {}
     for entry in ledger.entries():
-        said |= {**entry.fingerprint["inputs"], **entry.outputs}
+        for name, sha in (*entry.fingerprint["inputs"].items(), *entry.outputs.items()):
+            said.setdefault(name, {}).setdefault(sha, f"{entry.stage} {entry.task}")
     broken = [f"{file} was altered: it is not as a stage wrote it" for file in ledger.broken()]
     if not said and not broken:
         raise NotReproduced(f"{folders.processed} holds no results; run `davinci-forces all {folders.raw}` first")
     problems = broken + list(altered(folders, ledger, said))
     results, unreadable = numbers(folders)
     problems += unreadable if results is None else [p for r in results for p in differences(folders, r)]
-    problems += unknown(folders, said)
+    problems += strangers(folders, said)
+    if results is not None:
+        problems += misstated(folders, results, collect(Library(partial(records, folders, said))))
     if problems:
         raise NotReproduced("\n".join(problems))
-    count = {root: sum(name.startswith(f"{root}/") for name in said) for root in ("raw", "processed", "reports")}
+    there = [name for name in said if ledger.digest(name)]
+    count = {root: sum(name.startswith(f"{root}/") for name in there) for root in ("raw", "processed", "reports")}
     return Verified(**count, numbers=len(results or []))
 
 
-def altered(folders: Folders, ledger: Ledger, said: dict[str, str]) -> Iterator[str]:
-    """Files whose content is not what was hashed when they were read or made."""
-    for name, sha in sorted(said.items()):
-        file = folders.file(name)
-        if not file.is_file():
+def altered(folders: Folders, ledger: Ledger, said: dict[str, dict[str, str]]) -> Iterator[str]:
+    """Files whose content is not what was hashed when they were read or made, by each task that did."""
+    for name, hashes in sorted(said.items()):
+        file, now = folders.file(name), ledger.digest(name)
+        if not now and any(hashes):
             yield f"{file} is gone"
-        elif ledger.digest(name) != sha:
-            yield f"{file} was altered: its SHA-256 is {ledger.digest(name)[:16]}..., and was {sha[:16]}..."
+            continue
+        for was, task in hashes.items():
+            if now == was:
+                continue
+            if not was:
+                yield f"{file} is there now, and was not for {task}"
+            else:
+                yield f"{file} was altered: its SHA-256 is {now[:16]}..., and was {was[:16]}... for {task}"
 
 
-def unknown(folders: Folders, said: dict[str, str]) -> list[str]:
+def strangers(folders: Folders, said: dict[str, dict[str, str]]) -> list[str]:
     """Processed files that no stage made."""
     files = (f for f in sorted(folders.processed.rglob("*.parquet")))
     names = ((f, f"processed/{f.relative_to(folders.processed).as_posix()}") for f in files)
@@ -80,6 +93,37 @@ def numbers(folders: Folders) -> tuple[list[dict[str, Any]] | None, list[str]]:
         return None, [f"{file} cannot be read: {error}"]
 
 
+def records(folders: Folders, said: Iterable[str], kind: type[Record]) -> list[Record]:
+    """Every record of a kind that a stage made; one that cannot be read was altered, which is said elsewhere."""
+    found = []
+    for name in sorted(said):
+        if name.startswith(f"processed/{kind.__name__.lower()}/"):
+            with suppress(PipelineError):
+                found.append(store.read(kind, folders.processed, Path(name).relative_to("processed")))
+    return found
+
+
+def misstated(folders: Folders, results: list[dict[str, Any]], found: Results) -> Iterator[str]:
+    """Results whose deviation or unit is not what the records give, and results that are not there."""
+    keys = {str(result.get("key")) for result in results}
+    place = folders.reports / "results.json"
+    yield from (f"{place}: {key} is gone" for key in found if key not in keys)
+    for result in results:
+        key = str(result.get("key"))
+        # The truth has the unit of what was found, and no deviation.
+        group, _, parameter = key.removeprefix("truth.").rpartition(".")
+        beside = [k for k in found if k.startswith(f"fit.{group}.") and k.endswith(f".{parameter}")]
+        if key in found:
+            std, unit = found[key].std, found[key].unit
+        elif key.startswith("truth.") and beside:
+            std, unit = None, found[beside[0]].unit
+        else:
+            continue
+        for word, value in (("std", std), ("unit", unit)):
+            if result.get(word) != value:
+                yield f"{place}: {key}: says {word} {result.get(word)!r}, but its records give {value!r}"
+
+
 def differences(folders: Folders, result: dict[str, Any]) -> Iterator[str]:
     """Whether a result is what its source says."""
     name = f"{folders.reports / 'results.json'}: {result.get('key')}"
@@ -96,7 +140,7 @@ def differences(folders: Folders, result: dict[str, Any]) -> Iterator[str]:
         assert record.origin is not None
         if result["sha256"] != record.origin.sha256:
             yield f"{name}: {file} is not the file that it came from"
-    except (PipelineError, KeyError, AttributeError, ValueError, IndexError) as error:
+    except (PipelineError, LookupError, AttributeError, TypeError, ValueError, OSError) as error:
         yield f"{name}: cannot be followed to its source {result.get('source')!r}: {error}"
 
 
@@ -123,4 +167,4 @@ def cell(record: Record, field: str, row: str) -> float:
 
 
 def _kind(place: Path) -> str:
-    return next(name for name in KINDS if name.lower() == place.parts[0])
+    return {name.lower(): name for name in KINDS}[place.parts[0]]

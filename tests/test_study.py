@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from pipeline import robots, study_file
 from pipeline.errors import BadRobot, BadStudy
+from pipeline.robots.from_toml import RESERVED
 from pipeline.robots.robot import Kind
 from pipeline.study_problems import Problems
 from tests.test_runs import call
@@ -152,6 +153,61 @@ def test_no_study_file_however_odd_ends_in_anything_but_a_message(data, tmp_path
     reader = study_file._Reader(folder, Problems(folder / "study.toml", GOOD))
     with contextlib.suppress(BadStudy):
         assert reader.study(table).logs
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("[[log]]", '[settings]\nfit = "coupled.x"\n[[log]]',
+         "4: settings: fit must not be 'coupled.x'; it is one of independent.lse, independent.wlse"),
+        ("[[log]]", "[settings]\nharmonics = 101\n[[log]]",
+         "4: settings: harmonics must lie between 0 and 100, not 101"),
+        ("[[log]]", "[settings]\nharmonics = -1\n[[log]]", "harmonics must be positive, not -1"),
+        ("[[log]]", "[settings]\nlowpass = 1e6\n[[log]]",
+         "lowpass must lie between 1e-06 and 100000 Hz, not 1000000.0"),
+        ("[[log]]", f"[settings]\nlowpass = 1{'0' * 400}\n[[log]]", "4: lowpass must be a number"),
+        ("period = 10", "period = 1e7", "7: log 'a': period must lie between 1e-06 and 1e+06 s, not 10000000.0"),
+        ("period = 10", "rate = 1e-4", "7: log 'a': rate must lie between 0.001 and 1e+07 Hz, not 0.0001"),
+        ("period = 10", "rate = 1e8", "rate must lie between"),
+        ("period = 10", "skip = 1e9", "skip must lie between"),
+        ("period = 10", 'delimiter = ""', "7: log 'a': delimiter must not be empty"),
+        ("contact = [[1, 2]]", "contact = [[-1, 2]]", "8: log 'a': contact must be a list of [start, end]"),
+        ("contact = [[1, 2]]", "contact = [[1, inf]]", "8: log 'a': contact must be a list of [start, end]"),
+        ('name = "a"', 'name = "con"', "4: log name 'con' is reserved on Windows"),
+        ("offset = 0.5", f"offset = 1{'0' * 400}", "offset must be a number"),
+        ('title = "T"', f"title = {'1' * 5000}", "Exceeds the limit"),
+        ('file = "a.csv"', 'file = "b/../../a.csv"', "lies outside the study's folder"),
+        ('file = "a.csv"', 'file = ".."', "lies outside the study's folder"),
+    ],
+)  # fmt: skip
+def test_what_is_not_plausible_is_refused(tmp_path, old, new, says):
+    assert old in GOOD
+    (tmp_path / "study.toml").write_text(GOOD.replace(old, new, 1))
+    with pytest.raises(BadStudy) as caught:
+        study_file.read(tmp_path)
+    assert says in str(caught.value)
+
+
+@pytest.mark.parametrize("file", ["..x.csv", "...csv", "a/../b.csv"])
+def test_a_file_whose_name_begins_with_dots_lies_inside(tmp_path, file):
+    (tmp_path / "study.toml").write_text(GOOD.replace("a.csv", file))
+    assert study_file.read(tmp_path).logs[0].files == (file,)
+
+
+def test_settings_at_their_limits_are_taken(tmp_path):
+    limits = '[settings]\nlowpass = 1e5\nharmonics = 100\nfit = "independent.wlse"\n[[log]]'
+    (tmp_path / "study.toml").write_text(GOOD.replace("[[log]]", limits))
+    settings = study_file.read(tmp_path).settings
+    assert (settings.lowpass, settings.harmonics, settings.fit) == (1e5, 100, "independent.wlse")
+
+
+@pytest.mark.parametrize("name", ["con", "NUL", "com1.old"])
+def test_a_study_may_not_be_called_what_windows_reserves(tmp_path, name):
+    (tmp_path / name).mkdir()
+    (tmp_path / name / "study.toml").write_text(GOOD)
+    with pytest.raises(BadStudy, match=f"is called '{name}', which is reserved on Windows"):
+        study_file.read(tmp_path / name)
+    assert "comx" not in RESERVED
 
 
 def test_all_problems_are_said_at_once(tmp_path):

@@ -1,0 +1,82 @@
+"""The records that flow between stages.
+
+A record is a few scalars that say what it is about, and columns of one length that say what was measured or
+found.  It checks itself once, when made, so a stage can trust what it is handed and `store` can write any of
+them the same way.  Every field is a symbol of `quantities`.  `KEY` names the scalars that tell one record of a
+kind from another: they are its place on disk.
+"""
+
+from dataclasses import fields
+from typing import Any, ClassVar, NamedTuple, TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.errors import BadRecord
+
+Column = NDArray[np.float64]
+Counts = NDArray[np.int64]
+Labels = NDArray[np.object_]
+Names = tuple[str, ...]
+
+COLUMN_DTYPES: dict[Any, Any] = {Column: np.float64, Counts: np.int64, Labels: np.object_}
+
+
+class Origin(NamedTuple):
+    """Where a record was read from: the file, its hash, and the units of its fields."""
+
+    path: str
+    sha256: str
+    units: dict[str, str]
+
+
+class Record:
+    """What all records share; never made itself."""
+
+    KEY: ClassVar[Names] = ("log", "joint")
+    origin: ClassVar[Origin | None] = None  # set on the instances that `store` read
+
+    @classmethod
+    def columns(cls) -> Names:
+        """Names of the fields that are columns."""
+        return tuple(f.name for f in fields(cls) if f.type in COLUMN_DTYPES)  # type: ignore[arg-type]
+
+    @classmethod
+    def scalars(cls) -> Names:
+        """Names of the fields that are scalars."""
+        return tuple(f.name for f in fields(cls) if f.type not in COLUMN_DTYPES)  # type: ignore[arg-type]
+
+    @property
+    def key(self) -> Names:
+        """What tells this record from others of its kind."""
+        return tuple(str(getattr(self, name)) for name in self.KEY)
+
+    def __post_init__(self) -> None:
+        for f in fields(self):  # type: ignore[arg-type]
+            if f.type in COLUMN_DTYPES:
+                column = np.asarray(getattr(self, f.name), dtype=COLUMN_DTYPES[f.type])
+                object.__setattr__(self, f.name, column)
+        self._check_lengths()
+        self._check_finite()
+
+    def _check_lengths(self) -> None:
+        lengths = {name: len(getattr(self, name)) for name in self.columns()}
+        if len(set(lengths.values())) > 1:
+            raise BadRecord(f"{self}: columns differ in length: {lengths}")
+
+    def _check_finite(self) -> None:
+        for name in self.columns():
+            column = getattr(self, name)
+            if column.dtype.kind == "f" and not np.isfinite(column).all():
+                bad = np.flatnonzero(~np.isfinite(column))
+                raise BadRecord(f"{self}: {name} has {len(bad)} values that are not finite, the first at row {bad[0]}")
+
+    def __str__(self) -> str:
+        return f"{type(self).__name__} {'/'.join(self.key)}"
+
+    def __len__(self) -> int:
+        columns = self.columns()
+        return len(getattr(self, columns[0])) if columns else 0
+
+
+AnyRecord = TypeVar("AnyRecord", bound=Record)

@@ -1,0 +1,65 @@
+"""Robots that laboratories describe: whatever the file holds, there is a robot or a message."""
+
+import tomllib
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from pipeline import robots
+from pipeline.errors import BadRobot
+from pipeline.robots.from_toml import _robot
+from tests.test_study import ANYTHING, ARM
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('name = "mine"', "name = 5", "name must be text, not 5"),
+        ('name = "mine"', 'title = ["a"]', "title must be text, not ['a']"),
+        ('terms = ["inertia", "offset", "viscous friction"]', 'terms = [["x"]]', "terms must be a list of 'inertia'"),
+        ('"offset"', '"inertia"', "terms must name no term twice"),
+        ('name = "shoulder"', 'name = "lpt1"', "name 'lpt1' is reserved on Windows"),
+        ("gear_ratio = 50.0", f"gear_ratio = 1{'0' * 400}", "gear_ratio must be a number other than 0"),
+        ("gear_ratio = 50.0", f"gear_ratio = {'1' * 5000}", "Exceeds the limit"),
+    ],
+)
+def test_what_is_wrong_with_a_robot_is_said_without_a_traceback(tmp_path, old, new, says):
+    assert old in ARM
+    (tmp_path / "arm.toml").write_text(ARM.replace(old, new, 1))
+    with pytest.raises(BadRobot) as caught:
+        robots.load("arm.toml", tmp_path)
+    assert says in str(caught.value)
+
+
+@pytest.mark.parametrize("joint", ["3", "[3]", '"shoulder"', "{}"])
+def test_joints_that_are_no_tables_are_refused(tmp_path, joint):
+    (tmp_path / "arm.toml").write_text(f"joint = {joint}")
+    with pytest.raises(BadRobot, match=r"joint must be a table: write \[\[joint\]\]"):
+        robots.load("arm.toml", tmp_path)
+
+
+def test_a_folder_in_place_of_a_robot_is_refused(tmp_path):
+    (tmp_path / "arm.toml").mkdir()
+    with pytest.raises(BadRobot, match=r"arm\.toml: "):
+        robots.load("arm.toml", tmp_path)
+
+
+@given(data=st.data())
+def test_no_robot_file_however_odd_ends_in_anything_but_problems(data):
+    """Any value of a good robot, tables included, replaced by anything that TOML can hold."""
+    table = tomllib.loads(ARM)
+    places: list = []
+
+    def walk(parent):
+        for key, value in parent.items() if isinstance(parent, dict) else enumerate(parent):
+            places.append((parent, key))
+            if isinstance(value, dict | list):
+                walk(value)
+
+    walk(table)
+    parent, key = data.draw(st.sampled_from(places))
+    parent[key] = data.draw(ANYTHING | st.integers(10**400, 10**401))
+    problems: list[str] = []
+    made = _robot(table, "arm", problems)
+    assert problems or made.joints

@@ -1,0 +1,294 @@
+"""Runs in a world that is not kind: missing files, full disks, two runs at once, altered results."""
+
+import json
+import shutil
+import subprocess
+import sys
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline import lock
+from pipeline.errors import BadRequest
+from pipeline.ledger import canonical, code, hash_of
+from pipeline.lock import locked
+from pipeline.robots import davinci
+from tests import arm
+from tests.test_runs import call, contents, processed, reports
+
+
+@pytest.fixture
+def raw(tmp_path):
+    """An empty raw/ folder."""
+    folder = tmp_path / "raw"
+    folder.mkdir()
+    return folder
+
+
+def small(folder, logs=("one", "two")):
+    """A study of short logs of one joint."""
+    signal = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5)
+    for name in logs:
+        arm.write_csv(folder / f"{name}.csv", [signal])
+    tables = "".join(arm.log_table(name, f"{name}.csv", "identification", ["hand_roll"]) for name in logs)
+    (folder / "study.toml").write_text('robot = "dvrk_psm"\n' + tables)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def analysed(tmp_path_factory):
+    folder = small(tmp_path_factory.mktemp("lab") / "raw" / "lab", ("one",))
+    call("all", folder)
+    return folder
+
+
+@pytest.fixture
+def finished(analysed, tmp_path):
+    """A copy of an analysed study, to be damaged."""
+    shutil.copytree(analysed.parent.parent, tmp_path, dirs_exist_ok=True)
+    return tmp_path / "raw" / "lab"
+
+
+def flat(said: str) -> str:
+    return " ".join(said.split())
+
+
+def test_the_readers_of_logs_count_for_ingest_and_the_store_for_every_stage(finished):
+    entry = json.loads((processed(finished) / "tasks" / "ingest" / "one.json").read_text())
+    assert {"pipeline/logs/text.py", "pipeline/logs/tdms.py", "pipeline/logs/blocks.py"} <= set(
+        entry["fingerprint"]["code"]
+    )
+    for file in (processed(finished) / "tasks").rglob("*.json"):
+        assert "pipeline/store.py" in json.loads(file.read_text())["fingerprint"]["code"], file
+
+
+def test_code_of_several_modules_is_that_of_each():
+    assert code("pipeline.units", "pipeline.store") == code("pipeline.units") | code("pipeline.store")
+
+
+def test_the_hash_of_a_robot_sees_every_bit_of_it():
+    """In the last digit of one mass, where what numpy prints is the same."""
+    bodies = davinci.ROBOT.bodies
+    masses = bodies.masses.copy()
+    masses[2] = np.nextafter(masses[2], 1)
+    other = replace(davinci.ROBOT, bodies=replace(bodies, masses=masses))
+    assert repr(other) == repr(davinci.ROBOT)
+    assert hash_of(other) != hash_of(davinci.ROBOT)
+    same = replace(davinci.ROBOT, bodies=replace(bodies, masses=bodies.masses.copy()))
+    assert hash_of(same) == hash_of(davinci.ROBOT)
+
+
+def test_a_canonical_text_tells_values_apart_that_differ():
+    values = [1, 1.0, True, "1", (1,), [1], {1: 1}, None, np.ones(1), np.ones((1, 1)), np.ones(1, int), "None", ("1",)]
+    assert len({canonical(value) for value in values}) == len(values)
+    assert canonical({"a": 1, "b": 2}) == canonical({"b": 2, "a": 1})
+    with pytest.raises(TypeError, match="object has no canonical text"):
+        canonical([object()])
+
+
+def test_a_missing_file_costs_its_own_log_and_no_other(raw, tmp_path):
+    folder = small(raw / "lab")
+    (folder / "two.csv").unlink()
+    said = flat(call("all", folder, code=1))
+    assert f"warning: {folder / 'study.toml'}: file 'two.csv' is not in {folder}" in said
+    assert "ingest: error: file 'two.csv' of log 'two' is not in raw/lab" in said
+    made = tmp_path / "processed" / "lab"
+    assert (made / "fit" / "hand_roll" / "independent.lse.parquet").exists()
+    assert (tmp_path / "reports" / "lab" / "report.html").exists()
+    assert not (made / "recording" / "two").exists()
+    assert "are unchanged" in call("verify", folder)
+    small(folder)
+    assert "ingest: two: it failed last time" in flat(call("ingest", folder))
+
+
+def test_a_study_of_which_no_file_is_there_says_so_and_stops(raw):
+    folder = small(raw / "lab")
+    for name in ("one", "two"):
+        (folder / f"{name}.csv").unlink()
+    said = flat(call("ingest", folder, code=1))
+    assert "file 'one.csv' is not in" in said
+    assert "file 'two.csv' is not in" in said
+    assert not (raw.parent / "processed").exists()
+
+
+@pytest.mark.parametrize("named", [True, False])
+def test_a_broken_study_does_not_stop_the_others(raw, monkeypatch, named):
+    monkeypatch.chdir(raw.parent)
+    monkeypatch.setattr("pipeline.cli.STAGES", ("ingest",))
+    for name in ("a", "c"):
+        (raw / name).mkdir()
+    (raw / "a" / "study.toml").write_text("title = 3")
+    (raw / "c" / "study.toml").write_text("titel = 3")
+    small(raw / "b")
+    said = call("all", *(["raw/a", "raw/b", "raw/c"] if named else []), code=1)
+    assert said.count("title must be text, not 3") == 1
+    assert said.count("unknown key 'titel'") == 1
+    assert (raw.parent / "processed" / "b" / "recording" / "one" / "hand_roll.parquet").exists()
+
+
+def test_a_file_in_place_of_the_processed_folder_is_said(raw, tmp_path):
+    (tmp_path / "p").write_text("")
+    assert str(tmp_path / "p") in call("ingest", small(raw / "lab"), "--processed", tmp_path / "p", code=1)
+
+
+@pytest.mark.parametrize(
+    ("failure", "says"),
+    [
+        (OSError(28, "No space left on device", "x.parquet"), "No space left on device: 'x.parquet'"),
+        (PermissionError(13, "Permission denied", "x.parquet"), "Permission denied: 'x.parquet'"),
+        (BrokenProcessPool("a child process terminated abruptly"), "run again with fewer --jobs"),
+    ],
+)
+def test_what_the_machine_refuses_is_a_message(raw, monkeypatch, failure, says):
+    def refuse(*_):
+        raise failure
+
+    monkeypatch.setattr("pipeline.runner.perform", refuse)
+    said = flat(call("ingest", small(raw / "lab"), code=1))
+    assert says in said
+
+
+def test_a_log_that_may_not_be_read_is_no_fault_of_ours(raw, monkeypatch):
+    def refuse(files, options):
+        raise PermissionError(13, "Permission denied", str(files[0]))
+
+    monkeypatch.setattr("pipeline.execution.open_parts", refuse)
+    said = flat(call("ingest", small(raw / "lab"), code=1))
+    assert "Permission denied" in said
+    assert "fault of davinci-forces" not in said
+
+
+HOLD = """
+import sys, time
+from pathlib import Path
+from pipeline.lock import locked
+with locked(Path(sys.argv[1])):
+    print("held", flush=True)
+    time.sleep(60)
+"""
+
+
+@pytest.fixture
+def holder(raw):
+    """Another process that works on the study raw/lab."""
+    folder = raw.parent / "processed" / "lab"
+    other = subprocess.Popen([sys.executable, "-c", HOLD, str(folder)], stdout=subprocess.PIPE, text=True)
+    assert other.stdout.readline() == "held\n"
+    yield other
+    other.kill()
+    other.wait()
+    other.stdout.close()
+
+
+def test_a_second_run_on_a_study_is_refused_until_the_first_has_ended_however_it_ends(raw, holder):
+    folder = small(raw / "lab")
+    half = raw.parent / "processed" / "lab" / "x.parquet.partial"
+    half.write_text("of the other run")
+    assert "another run is working on this study" in flat(call("ingest", folder, code=1))
+    assert half.read_text() == "of the other run"
+    holder.kill()
+    holder.wait()
+    call("ingest", folder)
+    assert not half.exists()
+    assert ".lock" not in contents(raw.parent / "processed" / "lab")
+
+
+def test_a_lock_is_gone_when_its_block_is_left(tmp_path):
+    with locked(tmp_path / "p"):
+        assert (tmp_path / "p" / ".lock").exists()
+        with pytest.raises(BadRequest, match="another run"), locked(tmp_path / "p"):
+            pass
+        assert (tmp_path / "p" / ".lock").exists()
+    assert not (tmp_path / "p" / ".lock").exists()
+
+
+def test_a_lock_on_a_file_that_was_removed_meanwhile_counts_for_nothing(tmp_path, monkeypatch):
+    """The run before removes its lock after this one has opened it and before this one holds it."""
+    real, held = lock._lock, []
+
+    def late(handle):
+        if not held:
+            (tmp_path / ".lock").unlink()
+        held.append(handle)
+        return real(handle)
+
+    monkeypatch.setattr(lock, "_lock", late)
+    with locked(tmp_path), pytest.raises(BadRequest, match="another run"), locked(tmp_path):
+        pass
+    assert len(held) == 3
+
+
+def test_many_runs_at_once_hold_the_lock_one_after_the_other(tmp_path):
+    """Each appends to a file what would be torn if two were inside at once."""
+    text = """
+import sys, time
+from pathlib import Path
+from pipeline.errors import BadRequest
+from pipeline.lock import locked
+folder, done = Path(sys.argv[1]), 0
+while done < 40:
+    try:
+        with locked(folder):
+            marker = folder / "inside"
+            marker.touch(exist_ok=False)
+            marker.unlink()
+            done += 1
+    except BadRequest:
+        time.sleep(0.0005)
+"""
+    runs_ = [subprocess.Popen([sys.executable, "-c", text, str(tmp_path)]) for _ in range(3)]
+    assert [run.wait() for run in runs_] == [0, 0, 0]
+
+
+def test_the_title_of_a_study_named_by_a_dot_is_its_folder(raw, monkeypatch):
+    monkeypatch.chdir(small(raw / "lab"))
+    assert ".: lab" in call("ingest", ".")
+
+
+@pytest.mark.parametrize(
+    ("key", "word", "value"),
+    [
+        ("fit.hand_roll.independent.lse.inertia", "std", 1e-9),
+        ("fit.hand_roll.independent.lse.inertia", "unit", "kg"),
+        ("fit.hand_roll.independent.lse.mse", "std", 0.1),
+        ("period.one", "unit", "ms"),
+        ("ekf.one.hand_roll.tau_ext_rms", "unit", "N"),
+    ],
+)
+def test_verify_names_a_deviation_or_a_unit_that_was_altered(finished, key, word, value):
+    file = reports(finished) / "results.json"
+    results = json.loads(file.read_text())
+    next(r for r in results if r["key"] == key)[word] = value
+    file.write_text(json.dumps(results))
+    assert f"{key}: says {word} {value!r}, but its records give" in flat(call("verify", finished, code=1))
+
+
+def test_verify_names_results_that_are_gone_or_odd(finished):
+    file = reports(finished) / "results.json"
+    results = json.loads(file.read_text())
+    gone = results.pop()["key"]
+    odd = [{**results[0], "source": source} for source in ("processed/fits/a.parquet#mse", "raw/truth.toml#[1]", 3)]
+    file.write_text(json.dumps([*results, *odd, {}]))
+    said = flat(call("verify", finished, code=1))
+    assert f"{gone} is gone" in said
+    assert said.count("cannot be followed to its source") == 4
+
+
+def test_verify_passes_over_files_that_are_no_entries(finished):
+    (processed(finished) / "tasks" / "ingest" / ".DS_Store").write_bytes(b"\0")
+    assert "are unchanged" in call("verify", finished)
+
+
+def test_verify_compares_a_file_with_what_every_task_knew_of_it(finished):
+    """A record is made anew and read by one of two tasks; the other's work, first in order, is of one that is gone."""
+    table = finished / "one.csv"
+    lines = table.read_text().splitlines()
+    lines[5] = lines[5].replace("1", "2", 1)
+    table.write_text("\n".join(lines) + "\n")
+    call("ingest", finished)
+    call("resample", finished)
+    said = flat(call("verify", finished, code=1))
+    line = said.partition("recording/one/hand_roll.parquet was altered")[2].partition("was altered")[0]
+    assert "for report report" in line
