@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from pipeline import store
+from pipeline.catalogue import Catalogue, Provenance
 from pipeline.errors import BadLog, PipelineError
 from pipeline.ledger import Folders, Ledger
-from pipeline.library import Library, Provenance
 from pipeline.logs.log import Log, Options
 from pipeline.logs.parts import open_parts
 from pipeline.plan import VERSION, Places, Task, beside, given
@@ -102,7 +102,7 @@ def _report(run: Callable[..., dict[str, bytes]], study: Study, folders: Folders
     def read(kind: type[Record]) -> list[Record]:
         return [store.read(kind, folders.processed, place) for name, place in places if name == kind.__name__]
 
-    files = run(Library(read), study, _provenance(study, folders, places))
+    files = run(Catalogue(read), study, _provenance(study, folders, places))
     for name, content in files.items():
         store.write_bytes(folders.reports / name, content)
     return tuple(f"reports/{name}" for name in files)

@@ -8,7 +8,7 @@ from importlib import import_module
 from inspect import Parameter, signature
 from typing import Any, get_args, get_origin, get_type_hints
 
-from pipeline.library import Library, Provenance
+from pipeline.catalogue import Catalogue, Provenance
 from pipeline.logs.log import Log
 from pipeline.records import Record
 from pipeline.robots.robot import Joint, Robot
@@ -48,7 +48,7 @@ def declaration(name: str) -> Declaration:
     for parameter, hint in hints.items():
         if parameter in found.settings:
             continue
-        if hint in (Library, Provenance):
+        if hint in (Catalogue, Provenance):
             continue
         if hint in GIVEN:
             found.given[parameter] = GIVEN[hint]

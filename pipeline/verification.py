@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 
 from pipeline import store
+from pipeline.catalogue import Catalogue
 from pipeline.errors import NotReproduced, PipelineError
 from pipeline.ledger import Folders, Ledger
-from pipeline.library import Library
 from pipeline.records import KINDS, Fit, Record
 from pipeline.report.results import Results, collect, parse
 
@@ -50,7 +50,7 @@ def verify(folders: Folders) -> Verified:
     problems += unreadable if results is None else [p for r in results for p in differences(folders, r)]
     problems += strangers(folders, said)
     if results is not None:
-        problems += misstated(folders, results, collect(Library(partial(records, folders, said))))
+        problems += misstated(folders, results, collect(Catalogue(partial(records, folders, said))))
     if problems:
         raise NotReproduced("\n".join(problems))
     there = [name for name in said if ledger.digest(name)]

@@ -11,7 +11,7 @@ from numba import njit
 
 @njit(inline="always")
 def cosine_sine(x):  # type: ignore[no-untyped-def]
-    """cos x and sin x to 1e-15 for |x| < 1e5, without branches, which the library's functions have.
+    """cos x and sin x to 1e-15 for |x| < 1e5, without branches, which the catalogue's functions have.
 
     Reduced to |r| <= pi/4 in two parts of pi/2; polynomials of fdlibm's k_cos and k_sin (Sun Microsystems, 1993).
     """

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.library import Library, Provenance
+from pipeline.catalogue import Catalogue, Provenance
 from pipeline.quantities import QUANTITIES
 from pipeline.records import Column, Record, Track
 from pipeline.report.content import Number, literal
@@ -16,7 +16,7 @@ from pipeline.study import Study
 class Context:
     """One study, ready to be reported."""
 
-    library: Library
+    catalogue: Catalogue
     study: Study
     results: Results
     provenance: Provenance

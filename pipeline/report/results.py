@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 
-from pipeline.library import Library
+from pipeline.catalogue import Catalogue
 from pipeline.records import (
     Average,
     Control,
@@ -66,24 +66,24 @@ class Results(dict[str, Result]):
         return (text + "\n").encode()
 
 
-def collect(library: Library) -> Results:
+def collect(catalogue: Catalogue) -> Results:
     """Every result of a study."""
     found = Results()
-    _robot(found, library)
-    for intake in library.all(Intake):
+    _robot(found, catalogue)
+    for intake in catalogue.all(Intake):
         for name in ("rows", "rate", "duration", "jitter", "longest_gap", "duplicates", "dropped"):
             found.add(intake, f"log.{intake.log}.{name}", name)
-    for average in library.all(Average):
+    for average in catalogue.all(Average):
         _average(found, average)
-    for fit in library.all(Fit):
+    for fit in catalogue.all(Fit):
         _fit(found, fit)
-    for prediction in library.all(Prediction):
+    for prediction in catalogue.all(Prediction):
         for name in ("rmse", "nrmse", "r2", "relative_error"):
             found.add(prediction, f"{prediction_key(prediction)}.{name}", name)
-    for track in library.all(Track):
+    for track in catalogue.all(Track):
         for name in ("tau_ext_rms", "nis_mean", "r_q", "r_dq", "q_q", "q_dq", "q_tau"):
             found.add(track, f"ekf.{track.log}.{track.joint}.{name}", name)
-    for whiteness in library.all(Whiteness):
+    for whiteness in catalogue.all(Whiteness):
         _whiteness(found, whiteness)
     return found
 
@@ -99,20 +99,20 @@ def slug(text: str) -> str:
     return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
 
 
-def _robot(found: Results, library: Library) -> None:
-    for links in library.all(Links):
+def _robot(found: Results, catalogue: Catalogue) -> None:
+    for links in catalogue.all(Links):
         found.add(links, "robot.worst_condition", "worst_condition")
         for i, link in enumerate(links.link):
             for name in ("alpha", "a", "d", "offset", "mass"):
                 unit = links.origin.units[name] if links.origin else ""
                 value = float(getattr(links, name)[i])
                 found.put(f"robot.link.{link}.{name}", value, None, unit, links, f"#{name}[{link}]")
-    for control in library.all(Control):
+    for control in catalogue.all(Control):
         for name in ("start", "reference", "error_10", "error_20", "error_end"):
             found.add(control, f"control.{control.controller}.{control.joint}.{name}", name)
-    for lyapunov in library.all(Lyapunov):
+    for lyapunov in catalogue.all(Lyapunov):
         found.add(lyapunov, f"control.{lyapunov.controller}.V_rise", "V_rise")
-    for excitation in library.all(Excitation):
+    for excitation in catalogue.all(Excitation):
         key = f"excitation.{excitation.joint}.{excitation.source}"
         for name in ("period", "objective", "condition", "excess_q", "excess_dq", "excess_ddq"):
             found.add(excitation, f"{key}.{name}", name)

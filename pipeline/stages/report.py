@@ -2,7 +2,7 @@
 
 from importlib import import_module
 
-from pipeline.library import Library, Provenance
+from pipeline.catalogue import Catalogue, Provenance
 from pipeline.report import html, pdf
 from pipeline.report.content import Document
 from pipeline.report.context import Context
@@ -11,9 +11,9 @@ from pipeline.report.sections import SECTIONS
 from pipeline.study import Study
 
 
-def run(library: Library, study: Study, provenance: Provenance) -> dict[str, bytes]:
+def run(catalogue: Catalogue, study: Study, provenance: Provenance) -> dict[str, bytes]:
     """The files of the report, by name; what is shown and results.json come from the same numbers."""
-    context = Context(library, study, collect(library), provenance)
+    context = Context(catalogue, study, collect(catalogue), provenance)
     found = (import_module(f"pipeline.report.sections.{name}").section(context) for name in SECTIONS)
     document = Document(
         title="Contact forces without a force sensor",

@@ -102,7 +102,7 @@ def test_another_process_gives_the_same_bytes(full: Document) -> None:
     assert result.stdout.split() == [hashlib.sha256(writer.render(full)).hexdigest() for writer in (pdf, html)]
 
 
-def test_importing_the_content_imports_no_drawing_library() -> None:
+def test_importing_the_content_imports_no_drawing_catalogue() -> None:
     program = (
         "import sys; from pipeline.report import content, html, pdf; "
         "print([n for n in ('matplotlib', 'bokeh', 'typst', 'jinja2', 'pandas') if n in sys.modules])"

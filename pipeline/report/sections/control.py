@@ -16,7 +16,7 @@ WORDS = {
 
 def section(context: Context) -> Section | None:
     """What chapter 5 showed, and what it did not."""
-    studies = context.library.all(Control)
+    studies = context.catalogue.all(Control)
     if not studies:
         return None
     return Section("Control, in simulation", "control", tuple(blocks(context, studies)))
@@ -44,7 +44,7 @@ def blocks(context: Context, studies: list[Control]) -> Iterator[Block]:
 
 def response(context: Context, study: str, until: float, with_V: bool) -> Figure:
     """Positions and velocities of a study."""
-    runs = context.library.about(Control, controller=study)
+    runs = context.catalogue.about(Control, controller=study)
     first = [run for run in runs if run.joint in {"hand_roll", "hand_pitch", "instrument_slide"}]
     q = tuple(Line(run.t[run.t < until], run.q[run.t < until], title(run.joint)) for run in runs)
     dq = tuple(Line(run.t[run.t < until], run.dq[run.t < until], title(run.joint)) for run in first)
@@ -52,7 +52,7 @@ def response(context: Context, study: str, until: float, with_V: bool) -> Figure
         Panel("Position", "time [s]", "position [rad or m]", q),
         Panel("Velocity of the first three joints", "time [s]", "velocity [rad/s or m/s]", dq),
     ]
-    for lyapunov in context.library.about(Lyapunov, controller=study) if with_V else ():
+    for lyapunov in context.catalogue.about(Lyapunov, controller=study) if with_V else ():
         early = lyapunov.t < until
         line = (Line(lyapunov.t[early], lyapunov.V[early], "", "black"), HLine(0.0))
         panels.append(Panel("Lyapunov function", "time [s]", label(lyapunov, "V"), line))

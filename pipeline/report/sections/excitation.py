@@ -11,7 +11,7 @@ WORDS = {"table-6.1": "Table 6.1", "table-6.1-corrected": "Table 6.1, misprint c
 
 def section(context: Context) -> Section | None:
     """Objectives and limits of every trajectory."""
-    every = context.library.all(Excitation)
+    every = context.catalogue.all(Excitation)
     if not every:
         return None
     return Section("Excitation", "excitation", tuple(blocks(context, every)))

@@ -12,7 +12,7 @@ FIGURES = 9  # tracks that are drawn; the others are in the tables, and all are 
 
 def section(context: Context) -> Section | None:
     """A table over all tracks, then each track."""
-    tracks = context.library.all(Track)
+    tracks = context.catalogue.all(Track)
     if not tracks:
         return None
     shown = most_telling(tracks, FIGURES)
@@ -136,7 +136,7 @@ def innovations(context: Context, t: Track, name: str) -> Iterator[Figure]:
         panels.append(
             Panel(words.capitalize(), "time [s]", label(t, field, words), (Line(t.t[late], values, "", "blue"),))
         )
-        for w in context.library.about(Whiteness, log=t.log, joint=t.joint, signal=field):
+        for w in context.catalogue.about(Whiteness, log=t.log, joint=t.joint, signal=field):
             panels.append(autocorrelation(w, f"ACF of the {words}"))
     yield Figure(
         f"{name}: innovations of position and velocity, and their autocorrelation with the 95 % band of white noise.",

@@ -27,7 +27,7 @@ NAMES = {"lse": "least squares", "wlse": "weighted least squares"}
 
 def section(context: Context) -> Section | None:
     """One subsection per joint."""
-    fits = context.library.all(Fit)
+    fits = context.catalogue.all(Fit)
     if not fits:
         return None
     joints = dict.fromkeys(fit.group for fit in fits)
@@ -63,7 +63,7 @@ def of_joint(context: Context, fits: list[Fit]) -> Iterator[Block]:
                 f"{NAMES.get(fit.estimator, fit.estimator)} finds a negative {', '.join(negative)}, which no "
                 "mechanism has: compare it with its deviation.",
             )
-    for residual in context.library.about(Residual, joint=first.group, estimator=first.estimator):
+    for residual in context.catalogue.about(Residual, joint=first.group, estimator=first.estimator):
         yield from figures(context, residual)
 
 
@@ -157,7 +157,7 @@ def distribution(context: Context, residual: Residual, name: str) -> Iterator[Fi
         ),
     ]  # fmt: skip
     signal = f"tau.{residual.model}.{residual.estimator}"
-    about = context.library.about(Whiteness, log=residual.log, joint=residual.joint, signal=signal)
+    about = context.catalogue.about(Whiteness, log=residual.log, joint=residual.joint, signal=signal)
     panels += [autocorrelation(w, "Autocorrelation") for w in about]
     yield Figure(
         f"{name}: distribution and autocorrelation of the residual. A model that misses nothing leaves "

@@ -61,7 +61,7 @@ def blocks(context: Context) -> Iterator[Block]:
         "the parameters minimise the weighted sum of squared differences between effort and regressor times parameters",
         "estimation",
     )
-    if any(fit.estimator == "wlse" for fit in context.library.all(Fit)):
+    if any(fit.estimator == "wlse" for fit in context.catalogue.all(Fit)):
         yield Prose('The weights are $W = "diag"(M \\/ sigma_tau^2)$; with fewer than four periods they are left out.')
     yield Prose(
         "**Filtering.** The state holds position, velocity and external effort, the last as a random walk. Each "

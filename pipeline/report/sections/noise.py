@@ -25,7 +25,7 @@ from pipeline.report.context import Context, histogram, label, normal_scores, ti
 
 def section(context: Context) -> Section | None:
     """A table of deviations, and for each identification log and joint what averaging removed."""
-    averages = context.library.all(Average)
+    averages = context.catalogue.all(Average)
     if not averages:
         return None
     return Section("Averaging and noise", "noise", tuple(blocks(context, averages)))
@@ -64,11 +64,11 @@ def blocks(context: Context, averages: list[Average]) -> Iterator[Block]:
 def of_one(context: Context, average: Average) -> Iterator[Block]:
     """The figures of one log and joint."""
     about = {"log": average.log, "joint": average.joint}
-    noises, trajectories = context.library.about(Noise, **about), context.library.about(Trajectory, **about)
-    spectra, signals = context.library.about(Spectrum, **about), context.library.about(Signal, **about)
+    noises, trajectories = context.catalogue.about(Noise, **about), context.catalogue.about(Trajectory, **about)
+    spectra, signals = context.catalogue.about(Spectrum, **about), context.catalogue.about(Signal, **about)
     if not (noises and trajectories and spectra and signals):
         return
-    whiteness = {w.signal: w for w in context.library.about(Whiteness, **about)}
+    whiteness = {w.signal: w for w in context.catalogue.about(Whiteness, **about)}
     name = f"{title(average.joint)} in {literal(average.log)}"
     yield Figure(
         f"{name}: the mean of {average.periods} periods beside the first of them; the position's spectrum with the "

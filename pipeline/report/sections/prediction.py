@@ -13,7 +13,7 @@ FIGURES = 4  # predictions that are drawn, the worst ones
 
 def section(context: Context) -> Section | None:
     """Scores of all fits on all logs, and the predictions themselves."""
-    predictions = context.library.all(Prediction)
+    predictions = context.catalogue.all(Prediction)
     if not predictions:
         return None
     return Section("Prediction", "prediction", tuple(blocks(context, predictions)))

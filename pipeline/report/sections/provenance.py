@@ -31,7 +31,7 @@ def section(context: Context) -> Section:
             f"{len(provenance.processed)} processed files stand behind this report; their hashes are in results.json."
         )
     )
-    intakes = context.library.all(Intake)
+    intakes = context.catalogue.all(Intake)
     if intakes:
         blocks.append(Section("Channels", "channels", (starts(intakes), channels(intakes))))
     return Section("Provenance", "provenance", tuple(blocks))

@@ -10,7 +10,7 @@ from pipeline.report.context import Context
 
 def section(context: Context) -> Section | None:
     """One table over all logs, then each log's channels and remarks."""
-    intakes = context.library.all(Intake)
+    intakes = context.catalogue.all(Intake)
     if not intakes:
         return None
     return Section("What was recorded", "recorded", tuple(blocks(context, intakes)))
@@ -27,12 +27,12 @@ def blocks(context: Context, intakes: list[Intake]) -> Iterator[Block]:
         for intake in intakes
         if remarks(intake)
     )
-    methods = sorted({(s.method, s.velocity) for s in context.library.all(Signal)})
+    methods = sorted({(s.method, s.velocity) for s in context.catalogue.all(Signal)})
     yield Prose("How the recordings were put on a uniform clock, and where their velocities come from:")
     yield Bullets(tuple(f"clock: {method}; velocity: {words(velocity, context)}" for method, velocity in methods))
     said = [
         literal(text)
-        for note in context.library.all(Note)
+        for note in context.catalogue.all(Note)
         if note.stage in ("ingest", "resample", "average")
         for text in note.text
     ]

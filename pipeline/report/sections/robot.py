@@ -11,7 +11,7 @@ from pipeline.report.context import Context
 
 def section(context: Context) -> Section | None:
     """The chain and its table, where the robot's geometry is known."""
-    links = context.library.all(Links)
+    links = context.catalogue.all(Links)
     if not links:
         return None
     return Section("The robot", "robot", tuple(blocks(context, links[0])))
@@ -45,9 +45,9 @@ def chain(context: Context) -> Figure3D:
     colours = {"zero": "black", "low": "blue", "high": "vermillion"}
     words = {"zero": "q = 0", "low": "lower limits", "high": "upper limits"}
     marks: list[Line3D | Points3D] = []
-    for workspace in context.library.all(Workspace):
+    for workspace in context.catalogue.all(Workspace):
         marks.append(Points3D(workspace.x, workspace.y, workspace.z, "places of the tip", "sky"))
-    for pose in context.library.all(Pose):
+    for pose in context.catalogue.all(Pose):
         path = np.flatnonzero(pose.link != "9R")  # the two jaws lie on each other
         marks.append(
             Line3D(pose.x[path], pose.y[path], pose.z[path], words[pose.pose], colours[pose.pose])  # type: ignore[arg-type]

@@ -32,7 +32,7 @@ def blocks(context: Context) -> Iterator[Block]:
             "info", "All data in this report are **simulated**. They show that the methods work, not what an arm does."
         )
     yield from failures(context)
-    if not context.library.all(Fit):
+    if not context.catalogue.all(Fit):
         yield Verdict(
             "bad", "No joint could be identified: there is no usable identification log, so no effort was tracked."
         )
@@ -40,7 +40,7 @@ def blocks(context: Context) -> Iterator[Block]:
     for joint in fitted(context):
         yield from verdicts(context, joint)
     yield table(context)
-    warnings = [literal(text) for note in context.library.all(Note) for text in severe(note)]
+    warnings = [literal(text) for note in context.catalogue.all(Note) for text in severe(note)]
     if warnings:
         yield Prose("**What to look at.** The analysis itself warned of the following.")
         yield Bullets(tuple(warnings))
@@ -59,19 +59,19 @@ def failures(context: Context) -> Iterator[Block]:
 
 def fitted(context: Context) -> list[str]:
     """The joints that have a fit, in the robot's order."""
-    return list(dict.fromkeys(fit.group for fit in context.library.all(Fit)))
+    return list(dict.fromkeys(fit.group for fit in context.catalogue.all(Fit)))
 
 
 def used_fit(context: Context, joint: str) -> str:
     """`<model>.<estimator>` of the fit that the filter ran with."""
-    own = [f"{fit.model}.{fit.estimator}" for fit in context.library.all(Fit) if fit.group == joint]
+    own = [f"{fit.model}.{fit.estimator}" for fit in context.catalogue.all(Fit) if fit.group == joint]
     return context.study.settings.fit if context.study.settings.fit in own else own[0]
 
 
 def verdicts(context: Context, joint: str) -> Iterator[Verdict]:
     """How well the model of a joint predicts, and whether its filter is consistent."""
     fit = used_fit(context, joint)
-    scored = [p for p in context.library.all(Prediction) if p.joint == joint and f"{p.model}.{p.estimator}" == fit]
+    scored = [p for p in context.catalogue.all(Prediction) if p.joint == joint and f"{p.model}.{p.estimator}" == fit]
     unseen = [p for p in scored if p.scheme != SAME_PATH and (p.role != "contact" or context.study.log(p.log).contact)]
     if unseen:
         yield predicted(context, min(unseen, key=lambda p: p.r2))
@@ -82,7 +82,7 @@ def verdicts(context: Context, joint: str) -> Iterator[Verdict]:
             f"**{title(joint)}**: the model explains {r2} of the variance of other periods of the path that it was "
             "fitted to. What it is worth on other paths is not known: add a validation log.",
         )
-    tracks = [track for track in context.library.all(Track) if track.joint == joint and not track.held]
+    tracks = [track for track in context.catalogue.all(Track) if track.joint == joint and not track.held]
     if tracks:
         yield consistency(context, joint, tracks)
 
@@ -120,7 +120,7 @@ def consistency(context: Context, joint: str, tracks: list[Track]) -> Verdict:
 def table(context: Context) -> Table:
     """One row per joint and log that was tracked."""
     rows = []
-    for track in context.library.all(Track):
+    for track in context.catalogue.all(Track):
         key = f"ekf.{track.log}.{track.joint}"
         white = context.results[f"{key}.white"].value == 1
         rows.append(

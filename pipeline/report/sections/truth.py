@@ -32,13 +32,13 @@ def blocks(context: Context) -> Iterator[Block]:
         yield from parameters(context, joint, path, theta)
     for log in context.study.truth.get("log", []):
         for joint in dict.fromkeys(push.get("joint") for push in log.get("push", [])):
-            tracks = context.library.about(Track, log=log["name"], joint=str(joint))
+            tracks = context.catalogue.about(Track, log=log["name"], joint=str(joint))
             yield from (pushes(track, [p for p in log["push"] if p.get("joint") == joint]) for track in tracks)
 
 
 def true_parameters(context: Context) -> Iterator[tuple[str, tuple[str, ...], dict[str, float]]]:
     """Joint, place in truth.toml and true parameters of every joint that has a fit."""
-    fitted = {fit.group for fit in context.library.all(Fit)}
+    fitted = {fit.group for fit in context.catalogue.all(Fit)}
     theta: dict[str, Any] = context.study.truth.get("theta", {})
     for first, below in theta.items():
         if first in fitted:

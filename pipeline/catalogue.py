@@ -17,7 +17,7 @@ class Provenance:
     failures: dict[str, str]
 
 
-class Library:
+class Catalogue:
     """The records of a study by kind, read when asked for."""
 
     def __init__(self, read: Callable[[type[Record]], Sequence[Record]]) -> None:
