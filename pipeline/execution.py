@@ -55,9 +55,7 @@ def perform(study: Study, folders: Folders, task: Task, made_from: dict[str, Any
                 writer.write(record)
                 said += _lines(record)
         return Outcome(task, tuple(f"processed/{place.as_posix()}" for place in writer.places), said=tuple(said))
-    except PipelineError as error:
-        return _failed(study, folders, task, made_from, str(error))
-    except OSError as error:
+    except (PipelineError, OSError) as error:
         return _failed(study, folders, task, made_from, str(error))
     except Exception as error:
         # A fault of ours must not cost the other logs; where it happened is all that a report of it needs.

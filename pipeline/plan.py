@@ -41,19 +41,16 @@ class Plan:
             yield Task("report", "report", {"records": self.places(tuple(KINDS.values()))})
         elif asks.each:
             [(parameter, kinds)] = asks.each.items()
+            others = {p: self.places(k) for p, k in asks.beside.items()}
             for kind, place in self.places(kinds):
                 log, joint = _about(place)
-                beside = {
-                    p: tuple(x for x in self.places(k) if _about(x[1]) == (log, joint)) for p, k in asks.beside.items()
-                }
-                records = {parameter: ((kind, place),), **beside, **every}
+                same = {p: tuple(x for x in there if _about(x[1]) == (log, joint)) for p, there in others.items()}
+                records = {parameter: ((kind, place),), **same, **every}
                 yield Task(asks.name, _task_name(kind, place, len(kinds)), records, log, joint)
         elif asks.per_log:
+            of_all = {p: self.places(k) for p, k in asks.per_log.items()}
             for entry in self.study.logs:
-                own = {
-                    p: tuple(x for x in self.places(k) if _about(x[1])[0] == entry.name)
-                    for p, k in asks.per_log.items()
-                }
+                own = {p: tuple(x for x in there if _about(x[1])[0] == entry.name) for p, there in of_all.items()}
                 if any(own.values()):
                     yield Task(asks.name, entry.name, {**own, **every}, entry.name)
         elif "log" in asks.given.values():

@@ -90,7 +90,7 @@ class Runner:
             self.console.say(f"{name}: {current} of {len(tasks)} current")
 
     def _perform(self, name: str, due: dict[str, tuple[Task, Fingerprint]]) -> None:
-        for done, outcome in enumerate(self._outcomes([task for task, _ in due.values()], due), start=1):
+        for done, outcome in enumerate(self._outcomes(due), start=1):
             task, fingerprint = due[outcome.task.name]
             before = self.ledger.entry(name, task.name)
             for stale in set(before.outputs if before else ()) - set(outcome.outputs):
@@ -103,8 +103,8 @@ class Runner:
                 self.console.warn(f"{name}: {line}")
             self.console.progress(name, done, len(due))
 
-    def _outcomes(self, tasks: list[Task], due: dict[str, tuple[Task, Fingerprint]]) -> Iterator[Outcome]:
-        calls = [(self.study, self.folders, task, asdict(due[task.name][1])) for task in tasks]
+    def _outcomes(self, due: dict[str, tuple[Task, Fingerprint]]) -> Iterator[Outcome]:
+        calls = [(self.study, self.folders, task, asdict(fingerprint)) for task, fingerprint in due.values()]
         if self.jobs == 1 or len(calls) == 1:
             for call in calls:
                 yield perform(*call)

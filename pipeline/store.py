@@ -12,7 +12,6 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -173,8 +172,3 @@ def _table(record: Record, described: pa.Schema) -> pa.Table:
 
 def _scalar(value: Any) -> Any:
     return tuple(value) if isinstance(value, list) else value
-
-
-def as_array(values: list[str]) -> Labels:
-    """Labels from a list of strings."""
-    return np.array(values, dtype=object)

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from pipeline import robots
 from pipeline.errors import BadRobot
 from pipeline.robots.from_toml import _robot
-from tests.test_study import ANYTHING, ARM
+from tests.test_study import ANYTHING, ARM, places_of
 
 
 @pytest.mark.parametrize(
@@ -49,16 +49,7 @@ def test_a_folder_in_place_of_a_robot_is_refused(tmp_path):
 def test_no_robot_file_however_odd_ends_in_anything_but_problems(data):
     """Any value of a good robot, tables included, replaced by anything that TOML can hold."""
     table = tomllib.loads(ARM)
-    places: list = []
-
-    def walk(parent):
-        for key, value in parent.items() if isinstance(parent, dict) else enumerate(parent):
-            places.append((parent, key))
-            if isinstance(value, dict | list):
-                walk(value)
-
-    walk(table)
-    parent, key = data.draw(st.sampled_from(places))
+    parent, key = data.draw(st.sampled_from(places_of(table)))
     parent[key] = data.draw(ANYTHING | st.integers(10**400, 10**401))
     problems: list[str] = []
     made = _robot(table, "arm", problems)

@@ -129,24 +129,26 @@ ANYTHING = st.recursive(
 )
 
 
+def places_of(parent) -> list:
+    """Every place in nested tables and lists, as what holds it and its key."""
+    found = []
+    for key, value in parent.items() if isinstance(parent, dict) else enumerate(parent):
+        found.append((parent, key))
+        if isinstance(value, dict | list):
+            found += places_of(value)
+    return found
+
+
 @given(data=st.data())
 def test_no_study_file_however_odd_ends_in_anything_but_a_message(data, tmp_path_factory):
     """Any value of a good study, tables included, replaced by anything that TOML can hold."""
     table = tomllib.loads(GOOD)
-    places: list = []
-
-    def walk(parent):
-        for key, value in parent.items() if isinstance(parent, dict) else enumerate(parent):
-            places.append((parent, key))
-            if isinstance(value, dict | list):
-                walk(value)
-
-    walk(table)
+    places = places_of(table)
     table |= {
         "settings": {"lowpass": 3.0},
         "robot_overrides": {"hand_roll": {"gear_ratio": 2.0, "limits": {"q": [0, 1]}}},
     }
-    walk({key: table[key] for key in ("settings", "robot_overrides")})
+    places += places_of({key: table[key] for key in ("settings", "robot_overrides")})
     parent, key = data.draw(st.sampled_from(places))
     parent[key] = data.draw(ANYTHING)
     folder = tmp_path_factory.mktemp("odd", numbered=True)

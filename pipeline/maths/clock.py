@@ -8,6 +8,8 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+GAP = 2.5  # sampling times between two samples that count as an interruption
+
 
 @dataclass
 class Clock:

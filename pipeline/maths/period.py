@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.maths.harmonics import evaluate, project
+from pipeline.maths.harmonics import derivative, evaluate, project
 
 Array = NDArray[np.float64]
 
@@ -105,13 +105,10 @@ def refine(t: Array, signals: Sequence[Array], period: float, harmonics: int, st
 def _normal_equation(t: Array, signals: Sequence[Array], omega: float, harmonics: int) -> tuple[float, float]:
     """Gradient and information of the angular frequency, over all signals."""
     numerator = information = 0.0
-    order = np.arange(1, harmonics + 1)
     for x in signals:
         c = project(t, x, omega, harmonics)
         residual = x - evaluate(c, t, omega)
-        turned = np.zeros_like(c)
-        turned[1::2], turned[2::2] = order * c[2::2], -order * c[1::2]
-        slope = t * evaluate(turned, t, omega)
+        slope = t * evaluate(derivative(c, 1.0), t, omega)
         free = slope - evaluate(project(t, slope, omega, harmonics), t, omega)
         weight = 1.0 / max(residual.var(), 1e-24 * x.var(), 1e-300)
         numerator += weight * float(free @ residual)

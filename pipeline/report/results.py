@@ -3,7 +3,6 @@
 import json
 import math
 import re
-from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 
 from pipeline.catalogue import Catalogue
@@ -142,8 +141,8 @@ def _fit(found: Results, fit: Fit) -> None:
 def _whiteness(found: Results, w: Whiteness) -> None:
     if w.signal.startswith("innovation_"):
         key, short = f"ekf.{w.log}.{w.joint}", w.signal.removeprefix("innovation_")
-        for name, field in (("acf1", "acf1"), ("ljung_box_p", "ljung_box_p"), ("jarque_bera_p", "jarque_bera_p")):
-            found.add(w, f"{key}.{name}_{short}", field)
+        for name in ("acf1", "ljung_box_p", "jarque_bera_p"):
+            found.add(w, f"{key}.{name}_{short}", name)
         found.add(w, f"{key}.white", "all_white")
     else:
         for name in ("acf1", "ljung_box_p", "jarque_bera_p", "skewness", "kurtosis", "white"):
@@ -156,8 +155,8 @@ def printed(unit: str) -> str:
     return re.sub(r"\^(\d)", lambda match: "⁰¹²³⁴⁵⁶⁷⁸⁹"[int(match[1])], words)
 
 
-def parse(source: str) -> Iterator[str]:
+def parse(source: str) -> tuple[str, str, str]:
     """The file, the field, and the row of a source: 'processed/fit/x.parquet#theta[inertia]'."""
     file, _, place = source.partition("#")
     field, _, row = place.partition("[")
-    yield from (file, field, row.removesuffix("]"))
+    return file, field, row.removesuffix("]")

@@ -1,7 +1,6 @@
 """The [[log]] tables of a scenario: what each recording is of."""
 
 import math
-import re
 from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path as File
@@ -10,11 +9,11 @@ import numpy as np
 
 from pipeline.maths.excitation import Fourier
 from pipeline.maths.simulation_forces import SHAPES
+from pipeline.robots.from_toml import NAME
 from pipeline.simulation.scenario import Path, Push, SimulatedJoint, SimulatedLog, Tissue
 from pipeline.simulation.table import Table
+from pipeline.study_file import ROLES
 
-NAME = re.compile(r"[a-z0-9_-]+")
-ROLES = ("identification", "validation", "contact", "weight", "tissue", "friction")
 FORMATS = (".tdms", ".lvm")
 
 

@@ -34,8 +34,8 @@ def run(
             f"{entry.name}: no joint moves, so there is nothing to identify; check its channels and units"
         )
     orders = max(harmonics or robot.joint(signal.joint).harmonics for signal in moving)
-    moving, remarks = repeating(moving, entry)
-    found, more = shared_period(moving, entry, orders)
+    moving, guess, remarks = repeating(moving, entry)
+    found, more = shared_period(moving, guess, entry, orders)
     remarks += more
     for signal in moving:
         for record in averaged(signal, found, entry.period or 0.0):
@@ -46,15 +46,20 @@ def run(
         yield note("average", entry.name, "warning", *remarks)
 
 
-def repeating(moving: list[Signal], entry: LogEntry) -> tuple[list[Signal], list[str]]:
-    """The joints that repeat, when not all do so together, and what there is to say about the others."""
-    if period.guess([signal.q[longest(signal)] for signal in moving]) is not None:
-        return moving, []
-    alone = [signal for signal in moving if period.guess([signal.q[longest(signal)]]) is not None]
+def repeating(moving: list[Signal], entry: LogEntry) -> tuple[list[Signal], float | None, list[str]]:
+    """The joints that repeat, after how many samples they do so together, and what there is to say of the others."""
+    guess = guessed(moving)
+    alone = [signal for signal in moving if guessed([signal]) is not None] if guess is None else []
     if not alone:
-        return moving, []
+        return moving, guess, []
     out = [signal.joint for signal in moving if signal not in alone]
-    return alone, [f"{entry.name}: {joint} does not repeat, unlike the other joints, and is left out" for joint in out]
+    said = [f"{entry.name}: {joint} does not repeat, unlike the other joints, and is left out" for joint in out]
+    return alone, guessed(alone), said
+
+
+def guessed(signals: Sequence[Signal]) -> float | None:
+    """The shortest lag [samples] after which joints repeat together, or None where they do not."""
+    return period.guess([signal.q[longest(signal)] for signal in signals])
 
 
 def longest(signal: Signal) -> slice:
@@ -77,7 +82,9 @@ def odd_period(noise: Noise, signal: Signal, length: float) -> list[str]:
     ]
 
 
-def shared_period(signals: Sequence[Signal], entry: LogEntry, harmonics: int) -> tuple[period.Period, list[str]]:
+def shared_period(
+    signals: Sequence[Signal], guess: float | None, entry: LogEntry, harmonics: int
+) -> tuple[period.Period, list[str]]:
     """The period that all moving joints repeat with, and what there is to say about the one the study states.
 
     Raises
@@ -86,7 +93,6 @@ def shared_period(signals: Sequence[Signal], entry: LogEntry, harmonics: int) ->
         If the joints do not repeat, or fewer than two periods were recorded.
     """
     first = signals[0]
-    guess = period.guess([signal.q[longest(signal)] for signal in signals])
     seconds = first.t[-1] - first.t[0] + 1.0 / first.rate
     if guess is None:
         stated = f"; the study states {entry.period} s" if entry.period else ""

@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline.errors import BadLog
 from pipeline.logs.log import Block, Channel, Log
-from pipeline.maths.clock import Clock
+from pipeline.maths.clock import GAP, Clock
 from pipeline.records import Column, Intake, Note, Recording, note
 from pipeline.robots.robot import Joint, Robot
 from pipeline.study import LogEntry, Source
@@ -243,6 +243,6 @@ class Reading:
             )
         if clock.jitter * clock.rate > MOST_JITTER:
             yield f"the time between samples varies by {clock.jitter * 1e3:.3g} ms around {1e3 / clock.rate:.3g} ms"
-        if clock.longest_gap * clock.rate > 2.5:
+        if clock.longest_gap * clock.rate > GAP:
             gap = clock.longest_gap
             yield f"the longest time between samples is {gap:.3g} s, {gap * clock.rate:.1f} samples"

@@ -6,14 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import BadLog
+from pipeline.maths.clock import GAP
 from pipeline.maths.smoothing import lowpass as lowpass_of
-from pipeline.maths.smoothing import motion
+from pipeline.maths.smoothing import motion, stretches
 from pipeline.records import Column, Note, Recording, Signal, note
 from pipeline.robots.robot import Joint
 
 Indices = NDArray[np.intp]
 
-GAP = 2.5  # sampling times between two samples that count as an interruption
 EVEN = 0.02  # of a sampling time: clocks that stray less than this from a uniform one are taken as uniform
 HELD = 0.01  # share of a joint's range, or of 1 rad or 1 m where it has no limits, below which it is held
 SLOW = 5.0  # [Hz] below which a logged velocity is compared with that of the position
@@ -48,7 +48,8 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
     q, dq, tau = (np.concatenate(column) for column in zip(*columns, strict=True))
     stretch = np.repeat(np.arange(len(parts)), [len(c) for c in clocks])
     if recording.velocity == "derived":
-        dq = np.concatenate([motion(q[stretch == i], None, 1 / T_s, lowpass)[1] for i in range(len(parts))])
+        dq = np.concatenate([motion(q[part], None, 1 / T_s, lowpass)[1] for part in stretches(stretch)])
+    held = not moves(q, joint)
     yield Signal(
         log=recording.log,
         joint=recording.joint,
@@ -57,7 +58,7 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
         method=method,
         velocity=recording.velocity,
         gaps=len(parts) - 1,
-        held=int(not moves(q, joint)),
+        held=int(held),
         t=np.concatenate(clocks),
         q=q,
         dq=dq,
@@ -65,7 +66,7 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
         stretch=stretch,
     )
     yield from remarks(recording, method, cuts, sum(map(len, parts)))
-    wrong = disagreement(recording, q, dq, stretch, 1.0 / T_s) if moves(q, joint) else []
+    wrong = [] if held else disagreement(recording, q, dq, stretch, 1.0 / T_s)
     if wrong:
         yield note("resample", f"{recording.log}.{recording.joint}", "warning", *wrong)
 
@@ -84,8 +85,7 @@ def disagreement(recording: Recording, q: Column, dq: Column, stretch: Indices, 
         return []
     cutoff = min(SLOW, 0.1 * rate)
     pairs = [
-        (motion(q[stretch == i], None, rate, cutoff)[1], lowpass_of(dq[stretch == i], rate, cutoff))
-        for i in set(stretch.tolist())
+        (motion(q[part], None, rate, cutoff)[1], lowpass_of(dq[part], rate, cutoff)) for part in stretches(stretch)
     ]
     derived, logged = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
     slope = float(derived @ logged / (derived @ derived))

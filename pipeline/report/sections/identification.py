@@ -1,6 +1,7 @@
 """The parameters of every joint, and what the fits leave unexplained."""
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 from pipeline.records import Fit, Residual, Whiteness
 from pipeline.report.content import (
@@ -94,8 +95,6 @@ def parameters(context: Context, fits: list[Fit]) -> Table:
 
 def unitless(context: Context, key: str) -> object:
     """A number whose unit stands in a column of its own."""
-    from dataclasses import replace
-
     number = context.number(key, 2)
     return number if isinstance(number, str) else replace(number, unit="")
 
