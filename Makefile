@@ -15,16 +15,16 @@ CHECKED := .venv/checked
 PIP := $(BIN)/python -m pip --disable-pip-version-check -q
 
 # One line a stage: what it reads, and what it makes.
-STAGES := rehearse ingest resample average differentiate fit predict ekf whiteness report
-# rehearse      : robot -> Links Pose Workspace Control Lyapunov Excitation
-# ingest        : logs -> Recording Intake Note
-# resample      : Recording -> Signal Note
-# average       : Signal -> Average Noise Note
-# differentiate : Average -> Trajectory Spectrum Note
-# fit           : Trajectory -> Fit Residual Note
-# predict       : Signal Trajectory Fit -> Prediction Note
-# ekf           : Signal Fit Average -> Track Note
-# whiteness     : Noise Residual Track -> Whiteness
+STAGES := design ingest resample average differentiate fit predict ekf whiteness report
+# design        : robot -> Links Pose Workspace Control Lyapunov Excitation
+# ingest        : logs -> Recording LogSummary Diagnostic
+# resample      : Recording -> Signal Diagnostic
+# average       : Signal -> Average PeriodResidual Diagnostic
+# differentiate : Average -> Trajectory Spectrum Diagnostic
+# fit           : Trajectory -> Fit Residual Diagnostic
+# predict       : Signal Trajectory Fit -> Prediction Diagnostic
+# ekf           : Signal Fit Average -> Track Diagnostic
+# whiteness     : PeriodResidual Residual Track -> Whiteness
 # report        : everything -> report.html report.pdf results.json
 
 .PHONY: all test check bench demo clean help $(STAGES)

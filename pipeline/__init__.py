@@ -23,6 +23,6 @@ def read(study: str | Path, record: str, **about: str) -> "pd.DataFrame":
     MissingRecord
         If the study has none: run its stages first.
     """
-    from pipeline.frames import read as read_frames
+    from pipeline.runner.dataframes import read as read_frames
 
     return read_frames(Path(study), record, about)

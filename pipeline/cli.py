@@ -72,7 +72,7 @@ def run_stages(
     study: Path, names: tuple[str, ...], processed: Path | None, reports: Path | None, force: bool, jobs: int
 ) -> bool:
     """Run stages on one study; whether all went well.  Why they could not run at all is printed."""
-    from pipeline import runs
+    from pipeline.runner import runs
 
     try:
         with messages():
@@ -107,7 +107,7 @@ def run_all(
     jobs: Jobs = 1,
 ) -> None:
     """Run every stage, on the studies named or on all in raw/ whose logs are there."""
-    from pipeline import runs
+    from pipeline.runner import runs
 
     good = [run_stages(study, STAGES, processed, reports, force, jobs) for study in runs.studies(studies or [])]
     if not all(good):

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.maths.dynamics import inverse
+from pipeline.maths.models.dynamics import inverse
 from pipeline.records import Signal
 from pipeline.robots import davinci
 from pipeline.robots.robot import Joint
@@ -57,9 +57,9 @@ def signal(
         tau = tau + external(t)
     q = q + noise * 1e-4 * rng.normal(size=len(t))
     dq = dq + noise * 1e-3 * rng.normal(size=len(t))
-    held = int(np.ptp(q) < 0.01)
-    columns = {"t": t, "q": q, "dq": dq, "tau": tau, "stretch": np.zeros(len(t), int)}
-    return Signal(log, name, role, rate, "as recorded", "logged", 0, held, **columns)
+    at_rest = int(np.ptp(q) < 0.01)
+    columns = {"t": t, "q": q, "dq": dq, "tau": tau, "segment": np.zeros(len(t), int)}
+    return Signal(log, name, role, rate, "as recorded", "logged", 0, at_rest, **columns)
 
 
 def write_csv(file: Path, signals, extra=None) -> None:

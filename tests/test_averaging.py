@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from pipeline.errors import NotPeriodic
-from pipeline.maths import averaging, period
-from pipeline.records import Average, Noise, Note
+from pipeline.maths.signals import averaging, period
+from pipeline.records import Average, Diagnostic, PeriodResidual
 from pipeline.robots import davinci
 from pipeline.stages import average
 from pipeline.study import LogEntry
@@ -23,7 +23,7 @@ def entry(**changes) -> LogEntry:
 
 def run(signals, **changes):
     made = list(average.run(signals, entry(**changes), davinci.ROBOT, harmonics=0))
-    return [r for r in made if isinstance(r, Average)], [r for r in made if isinstance(r, Note)]
+    return [r for r in made if isinstance(r, Average)], [r for r in made if isinstance(r, Diagnostic)]
 
 
 @given(st.floats(1.7, 11.0), st.integers(0, 2**32 - 1), st.floats(0.0, 6.0))
@@ -124,23 +124,23 @@ def test_a_trajectory_whose_first_harmonic_is_nil_keeps_the_period_that_is_state
     assert not notes
 
 
-def test_the_joints_of_a_log_share_one_period_and_a_held_one_is_noted():
+def test_the_joints_of_a_log_share_one_period_and_one_at_rest_is_noted():
     from dataclasses import replace
 
     roll, pitch = arm.signal("hand_roll"), arm.signal("hand_pitch")
     still = replace(
         arm.signal("instrument_slide", noise=0),
-        held=1,
+        at_rest=1,
         q=np.zeros(len(roll)) + 1e-6,
         t=roll.t,
         dq=roll.dq * 0,
         tau=roll.tau,
-        stretch=roll.stretch,
+        segment=roll.segment,
     )
     made, notes = run([roll, pitch, still])
     assert [a.joint for a in made] == ["hand_roll", "hand_pitch"]
     assert made[0].period == made[1].period
-    assert "instrument_slide does not move: held" in str(notes[0].text)
+    assert "instrument_slide does not move: at rest" in str(notes[0].text)
 
 
 @pytest.mark.parametrize(
@@ -157,7 +157,7 @@ def test_a_log_that_does_not_repeat_is_refused_by_name(signals, says):
 
 def test_what_averaging_removes_is_the_noise():
     made = list(average.run([arm.signal(seed=3)], entry(), davinci.ROBOT, harmonics=0))
-    [noise] = [r for r in made if isinstance(r, Noise)]
+    [noise] = [r for r in made if isinstance(r, PeriodResidual)]
     [mean] = [r for r in made if isinstance(r, Average)]
     assert mean.sigma_tau == pytest.approx(arm.NOISE["hand_roll"], rel=4 / np.sqrt(2 * 9000))
     assert abs(noise.tau_noise.mean()) < 1e-12
@@ -187,7 +187,7 @@ def test_a_gap_lowers_the_counts_of_the_phases_that_it_covers():
     roll = arm.signal("hand_roll", periods=6)
     kept = (roll.t < 22) | (roll.t > 45)
     columns = {name: getattr(roll, name)[kept] for name in roll.columns()}
-    columns["stretch"] = (columns["t"] > 45).astype(int)
+    columns["segment"] = (columns["t"] > 45).astype(int)
     [made], _ = run([replace(roll, gaps=1, **columns)])
     assert made.periods == 6
     assert made.count.max() <= 4

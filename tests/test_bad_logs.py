@@ -200,7 +200,7 @@ def test_a_gap_is_marked_and_not_bridged(lab):
     call("resample", lab)
     signal = pipeline.read(lab, "Signal", log="bad")
     assert signal["gaps"].iloc[0] == 1
-    assert list(np.unique(signal["stretch"])) == [0, 1]
+    assert list(np.unique(signal["segment"])) == [0, 1]
     assert np.diff(signal["t"]).max() == pytest.approx(0.32)
 
 

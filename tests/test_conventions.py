@@ -6,6 +6,7 @@ import pkgutil
 import re
 import subprocess
 import sys
+from collections import defaultdict
 from dataclasses import fields
 from importlib import import_module
 from pathlib import Path
@@ -14,94 +15,167 @@ import pytest
 from typer.testing import CliRunner
 
 import pipeline
-from pipeline import commands, estimators, logs, robots, stages
+from pipeline import commands, estimators, filters, logs, robots, stages
 from pipeline.cli import app
-from pipeline.quantities import QUANTITIES
 from pipeline.records import KINDS, Record
-from pipeline.report import sections
-from pipeline.signature import declaration
+from pipeline.records.quantities import QUANTITIES
+from pipeline.report import sections, writers
+from pipeline.runner.signature import declaration
 from pipeline.study import Settings
 
 ROOT = Path(pipeline.__file__).parent
 HOME = ROOT.parent
 SOURCES = sorted(ROOT.rglob("*.py"))
-
-DATA = {"errors", "quantities", "units"}
-MAY_IMPORT = {  # package or module -> what of the pipeline it may import, besides itself and the errors
-    "errors": set(),
-    "quantities": set(),
-    "units": set(),
-    "maths": set(),
-    "records": set(),
-    "store": {"quantities", "records"},
-    "robots": {"maths"},
-    "study": {"robots"},
-    "study_problems": {"robots"},
-    "study_channels": {"robots", "study", "study_problems", "units"},
-    "study_file": {"estimators", "robots", "study", "study_channels", "study_problems"},
-    "logs": {"units"},
-    "estimators": {"maths"},
-    "catalogue": {"records"},
-    "report": {"quantities", "records", "catalogue", "study"},
-    "stages": {"estimators", "catalogue", "logs", "maths", "records", "report", "robots", "study", "units"},
-    "ledger": {"store"},
-    "signature": {"catalogue", "logs", "records", "robots", "stages", "study"},
-    "lock": set(),
-    "plan": {"ledger", "records", "signature", "stages", "study"},
-    "execution": {"ledger", "catalogue", "logs", "plan", "records", "robots", "signature", "store", "study"},
-    "runner": {"execution", "ledger", "lock", "plan", "signature", "stages", "store", "study"},
-    "runs": {"ledger", "runner", "study", "study_file"},
-    "frames": {"ledger", "records", "runs", "store"},
-    "verification": {"ledger", "catalogue", "records", "report", "store"},
-    "new_study": {"logs", "robots", "units"},
-    "simulation": {"logs", "maths", "robots", "store", "study", "study_file", "units"},
-    "commands": {
-        "logs",
-        "maths",
-        "new_study",
-        "report",
-        "robots",
-        "runs",
-        "simulation",
-        "store",
-        "units",
-        "verification",
-    },
-    "cli": {"commands", "runs", "stages"},
-    "__main__": {"cli"},
-    "__init__": {"frames"},
+LISTS = {  # extension folder -> its choices
+    "robots": robots.ROBOTS,
+    "estimators": estimators.ESTIMATORS,
+    "filters": filters.FILTERS,
+    "logs": logs.FORMATS,
+    "stages": stages.STAGES,
+    "report.sections": sections.SECTIONS,
+    "report.writers": tuple(writers.WRITERS.values()),
+    "commands": commands.COMMANDS,
 }
+EXPORTED = {  # extension folder -> the name that a choice exports
+    "robots": "ROBOT",
+    "estimators": "estimate",
+    "filters": "track",
+    "logs": "recognises",
+    "stages": "run",
+    "report.sections": "section",
+    "report.writers": "render",
+    "commands": "run",
+}
+
+# From the top down: what stands in a row may import what stands below it, and of its own row itself only.
+TIERS = (
+    ("__main__",),
+    ("cli",),
+    ("__init__", "commands"),
+    ("runner",),
+    ("stages",),
+    ("report",),
+    ("simulation",),
+    ("excitation",),
+    ("study",),
+    ("estimators", "filters"),
+    ("logs", "records", "robots"),
+    ("maths",),
+    ("errors", "units"),
+)
+# The same inside maths, where what is computed from motion stands above what motion is.
+MATHS = (
+    ("simulation", "excitation", "contact"),
+    ("models",),
+    ("mechanics", "signals"),
+    ("arrays", "compiled", "constants"),
+)
 
 
 def imports(source: Path) -> set[str]:
+    """Modules that a module imports, wherever it does; a name from a package may be a module of it."""
     names = set()
     for node in ast.walk(ast.parse(source.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom):
-            names |= {f"{node.module}.{a.name}" if node.module == "pipeline" else node.module for a in node.names}
+            names |= {f"{node.module}.{a.name}" for a in node.names}
         elif isinstance(node, ast.Import):
             names |= {a.name for a in node.names}
     return names
 
 
+def rooms(source: Path, below: str = "pipeline") -> set[str]:
+    """The modules and folders right below a package that a module imports."""
+    return {name.removeprefix(f"{below}.").split(".")[0] for name in imports(source) if name.startswith(f"{below}.")}
+
+
+def tier(room: str, tiers) -> int:
+    return next(i for i, row in enumerate(tiers) if room in row)
+
+
 @pytest.mark.parametrize("source", SOURCES, ids=lambda s: str(s.relative_to(ROOT)))
-def test_imports_point_inwards(source):
+def test_imports_point_downwards(source):
     home = source.relative_to(ROOT).parts[0].removesuffix(".py")
-    inside = {name.split(".")[1] for name in imports(source) if name.startswith("pipeline.")}
-    assert inside - {home, "errors"} <= MAY_IMPORT[home]
+    for room in rooms(source) - {home}:
+        assert tier(room, TIERS) > tier(home, TIERS), f"{home} imports {room}"
 
 
-@pytest.mark.parametrize("source", sorted((ROOT / "maths").glob("*.py")), ids=lambda s: s.name)
+@pytest.mark.parametrize("source", sorted((ROOT / "maths").rglob("*.py")), ids=lambda s: str(s.relative_to(ROOT)))
+def test_imports_of_maths_point_downwards(source):
+    home = source.relative_to(ROOT / "maths").parts[0].removesuffix(".py")
+    if home == "__init__":
+        return
+    for room in rooms(source, "pipeline.maths") - {home}:
+        assert tier(room, MATHS) > tier(home, MATHS), f"maths.{home} imports maths.{room}"
+
+
+@pytest.mark.parametrize("folder", ["stages", "report.sections", "estimators", "filters", "commands"])
+def test_choices_of_a_folder_do_not_import_each_other(folder):
+    package = f"pipeline.{folder}"
+    listed = {name for name, _ in choices(import_module(package))}
+    for name in sorted(listed):
+        for source in sources(import_module(f"{package}.{name}")):
+            assert not rooms(source, package) & listed - {name}, f"{package}.{name}"
+
+
+def test_no_two_modules_import_each_other():
+    names = {dotted(source) for source in SOURCES}
+    graph = {}
+    for source in SOURCES:
+        needs = {name if name in names else name.rpartition(".")[0] for name in imports(source)}
+        graph[dotted(source)] = needs & names - {dotted(source)}
+    assert not cycle(graph)
+
+
+def dotted(source: Path) -> str:
+    """The name by which a module is imported."""
+    return ".".join(source.relative_to(HOME).with_suffix("").parts).removesuffix(".__init__")
+
+
+def cycle(graph: dict[str, set[str]]) -> list[str]:
+    """Names that import each other, found by leaving out what imports nothing that is left."""
+    left = dict(graph)
+    while free := [name for name, needs in left.items() if not needs & set(left)]:
+        for name in free:
+            del left[name]
+    return sorted(left)
+
+
+def test_a_newcomer_finds_his_way_in_the_package():
+    entries = [p for p in ROOT.iterdir() if p.name != "__pycache__"]
+    assert len(entries) <= 20, sorted(p.name for p in entries)
+
+
+def test_a_class_that_leaves_its_package_has_a_name_of_its_own():
+    """Of two classes of one name, a reader of an import cannot tell which is meant."""
+    made = defaultdict(set)
+    for source in SOURCES:
+        for node in ast.parse(source.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.ClassDef):
+                made[node.name].add(source.parent.relative_to(ROOT.parent).as_posix().replace("/", "."))
+    for source in SOURCES:
+        home = source.parent.relative_to(ROOT.parent).as_posix().replace("/", ".")
+        for name in imports(source):
+            package, _, last = name.rpartition(".")
+            if len(made[last]) > 1:
+                assert package.startswith(home), f"{name} in {source}: {sorted(made[last])}"
+
+
+def test_arrays_are_named_once():
+    aliases = re.compile(r"^\w+ = NDArray\[np\.(float64|bool_)\]", re.M)
+    assert [s.name for s in SOURCES if aliases.search(s.read_text(encoding="utf-8"))] == ["arrays.py"]
+
+
+@pytest.mark.parametrize("source", sorted((ROOT / "maths").rglob("*.py")), ids=lambda s: str(s.relative_to(ROOT)))
 def test_maths_is_numpy_scipy_and_numba_only(source):
     outside = {name.split(".")[0] for name in imports(source)}
     assert outside - set(sys.stdlib_module_names) <= {"numpy", "scipy", "numba", "pipeline"}
-    assert not {
-        name for name in imports(source) if name.startswith("pipeline.") and not name.startswith("pipeline.maths")
-    }
+    assert rooms(source) <= {"maths", "errors", "units"}
 
 
 @pytest.mark.parametrize("source", sorted((ROOT / "stages").glob("*.py")), ids=lambda s: s.name)
 def test_a_stage_opens_no_file(source):
-    assert not imports(source) & {"pathlib", "os", "pyarrow", "pyarrow.parquet", "pipeline.store", "shutil", "io"}
+    opening = {"pathlib", "os", "pyarrow", "pyarrow.parquet", "pipeline.records.store", "shutil", "io"}
+    assert not imports(source) & opening
     called = {
         n.func.id
         for n in ast.walk(ast.parse(source.read_text()))
@@ -110,39 +184,34 @@ def test_a_stage_opens_no_file(source):
     assert "open" not in called
 
 
+@pytest.mark.parametrize("source", sorted((ROOT / "report").rglob("*.py")), ids=lambda s: str(s.relative_to(ROOT)))
+def test_the_report_computes_no_physics(source):
+    physics = {name for name in imports(source) if name.startswith(("pipeline.maths", "pipeline.robots"))}
+    assert physics <= {"pipeline.maths", "pipeline.maths.arrays", "pipeline.maths.arrays.Array"}
+
+
+def sources(module) -> list[Path]:
+    """The files of a module, or of a package."""
+    file = Path(module.__file__)
+    return sorted(file.parent.rglob("*.py")) if file.name == "__init__.py" else [file]
+
+
+def choices(package) -> list[tuple[str, object]]:
+    """The modules of an extension folder that its `__init__` lists, and what they export."""
+    listed = LISTS[package.__name__.removeprefix("pipeline.")]
+    return [(name, import_module(f"{package.__name__}.{name}")) for name in listed]
+
+
 def exporting(package, name: str) -> set[str]:
-    """Modules of a package that define a name at their top."""
-    found = set()
-    for module in pkgutil.iter_modules(package.__path__):
-        tree = (
-            ast.parse((Path(package.__path__[0]) / f"{module.name}.py").read_text(encoding="utf-8"))
-            if not module.ispkg
-            else None
-        )
-        tops = ast.walk(tree) if tree is None else tree.body
-        for node in tops:
-            targets = getattr(node, "targets", [getattr(node, "target", None)])
-            names = {getattr(node, "name", None), *(getattr(t, "id", None) for t in targets)}
-            if name in names:
-                found.add(module.name)
-    return found
+    """Modules of a package that define, or hand on, a name."""
+    modules = (module.name for module in pkgutil.iter_modules(package.__path__))
+    return {module for module in modules if hasattr(import_module(f"{package.__name__}.{module}"), name)}
 
 
-@pytest.mark.parametrize(
-    ("package", "exported", "listed"),
-    [
-        (robots, "ROBOT", robots.ROBOTS),
-        (estimators, "estimate", estimators.ESTIMATORS),
-        (logs, "recognises", logs.FORMATS),
-        (stages, "run", stages.STAGES),
-        (sections, "section", sections.SECTIONS),
-        (commands, "run", commands.COMMANDS),
-    ],
-    ids=lambda x: getattr(x, "__name__", None),
-)
-def test_every_choice_of_an_extension_folder_is_listed(package, exported, listed):
-    assert exporting(package, exported) == set(listed)
-    assert len(set(listed)) == len(listed)
+@pytest.mark.parametrize(("folder", "exported"), EXPORTED.items())
+def test_every_choice_of_an_extension_folder_is_listed(folder, exported):
+    assert exporting(import_module(f"pipeline.{folder}"), exported) == set(LISTS[folder])
+    assert len(set(LISTS[folder])) == len(LISTS[folder])
 
 
 def test_every_field_of_every_record_is_a_quantity_and_every_quantity_is_used():

@@ -9,9 +9,11 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from pipeline.errors import PipelineError
-from pipeline.maths import ekf, terms
-from pipeline.maths.dynamics import forward, inverse, mass, regressor, scalar_bias
-from pipeline.records import Average, Fit, Note, Track, Whiteness
+from pipeline.filters import ekf
+from pipeline.filters.problem import NoiseModel
+from pipeline.maths.models import terms
+from pipeline.maths.models.dynamics import forward, inverse, mass, regressor, scalar_bias
+from pipeline.records import Average, Diagnostic, Fit, Track, Whiteness
 from pipeline.robots import davinci, dvrk_psm
 from pipeline.stages import average, fit, whiteness
 from pipeline.stages import ekf as stage
@@ -22,7 +24,7 @@ from tests.test_estimation import trajectory
 T_S = 0.01
 CART = (terms.inertia, terms.viscous)
 THETA = np.array([0.5, 0.3])
-NOISE = ekf.Noise(r_q=1e-3, r_dq=8e-3, q_q=1e-5, q_dq=1e-4, q_tau=0.05)
+NOISE = NoiseModel(r_q=1e-3, r_dq=8e-3, q_q=1e-5, q_dq=1e-4, q_tau=0.05)
 
 
 def simulate(used, theta, tau_ext, tau, noise, seed=0, x=(0.1, -0.2)):
@@ -117,7 +119,7 @@ def test_a_mass_hung_on_the_slide_gives_a_negative_effort():
 def test_variances_stay_positive_and_numbers_finite(seed, M, r_q, r_dq):
     rng = np.random.default_rng(seed)
     y, tau = rng.normal(size=(2, 200)), rng.normal(size=200)
-    made = ekf.track(CART, np.array([M, 0.1]), *y, tau, T_S, ekf.Noise(r_q, r_dq, 0.0, 1e-6, 1e-3), 1.0)
+    made = ekf.track(CART, np.array([M, 0.1]), *y, tau, T_S, NoiseModel(r_q, r_dq, 0.0, 1e-6, 1e-3), 1.0)
     assert (made.tau_ext_std > 0).all()
     assert all(np.isfinite(column).all() for column in made)
 
@@ -201,7 +203,7 @@ def test_the_filter_takes_its_noise_from_the_periods(identified):
 
 def test_a_gap_starts_the_filter_anew(identified):
     signal = arm.signal(seed=5)
-    object.__setattr__(signal, "stretch", (signal.t > 50).astype(int))
+    object.__setattr__(signal, "segment", (signal.t > 50).astype(int))
     [made] = tracked(identified, signal)
     first = np.flatnonzero(signal.t > 50)[0]
     assert made.tau_ext_std[first] > 1.5 * made.tau_ext_std[first - 1]
@@ -209,7 +211,7 @@ def test_a_gap_starts_the_filter_anew(identified):
 
 def test_a_joint_without_a_fit_is_noted_not_guessed(identified):
     [made] = tracked(identified, arm.signal("hand_pitch"))
-    assert isinstance(made, Note)
+    assert isinstance(made, Diagnostic)
     assert "no identification log moves this joint" in made.text[0]
 
 

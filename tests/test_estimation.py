@@ -8,9 +8,9 @@ from numpy.testing import assert_allclose
 
 from pipeline.errors import NotIdentifiable
 from pipeline.estimators import ESTIMATORS, estimator
-from pipeline.estimators.problem import Problem, correlation_lags
+from pipeline.estimators.problem import Regression, correlation_lags
 from pipeline.estimators.wlse import pooled
-from pipeline.records import Average, Fit, Note, Prediction, Residual, Trajectory
+from pipeline.records import Average, Diagnostic, Fit, Prediction, Residual, Trajectory
 from pipeline.robots import davinci
 from pipeline.stages import average, differentiate, fit, predict
 from tests import arm
@@ -29,7 +29,7 @@ def fits(*signals) -> dict[str, Fit]:
     return {r.estimator: r for r in made if isinstance(r, Fit)}
 
 
-def problem(K=400, seed=0, rho=0.0, M=10) -> tuple[Problem, np.ndarray]:
+def problem(K=400, seed=0, rho=0.0, M=10) -> tuple[Regression, np.ndarray]:
     """A linear problem with known parameters and noise of a first-order autoregression."""
     rng = np.random.default_rng(seed)
     phase = 2 * np.pi * np.arange(K) / K
@@ -40,7 +40,7 @@ def problem(K=400, seed=0, rho=0.0, M=10) -> tuple[Problem, np.ndarray]:
         noise[k] += rho * noise[k - 1]
     tau_var = 0.01 * rng.chisquare(M - 1, size=K) / (M - 1) * M
     tau = Phi @ theta + 0.1 * noise[50:] * np.sqrt(1 - rho**2)
-    return Problem(Phi, tau, tau_var, np.full(K, M), (0,), ("a", "b", "c")), theta
+    return Regression(Phi, tau, tau_var, np.full(K, M), (0,), ("a", "b", "c")), theta
 
 
 def test_parameters_are_found_as_well_as_they_claim_to_be():
@@ -74,7 +74,7 @@ def test_weights_gain_where_noise_differs_over_the_period():
         p, theta = problem(seed=seed, K=800)
         loud = np.where(np.arange(800) < 400, 5.0, 1.0)
         tau = p.Phi @ theta + (p.tau - p.Phi @ theta) * loud
-        return Problem(p.Phi, tau, p.tau_var * loud**2, p.periods, p.starts, p.names)
+        return Regression(p.Phi, tau, p.tau_var * loud**2, p.periods, p.starts, p.names)
 
     lse, wlse = (np.std([estimator(n)(varied(s)).theta for s in range(100)], axis=0) for n in ("lse", "wlse"))
     assert (wlse < 0.75 * lse).all()
@@ -101,13 +101,13 @@ def test_any_other_parameters_have_the_error_that_the_normal_equations_predict(s
 @pytest.mark.parametrize("name", ESTIMATORS)
 def test_scaling_a_column_scales_its_parameter_and_nothing_else(name):
     p, _ = problem()
-    scaled = Problem(p.Phi * [1e6, 1, 1], p.tau, p.tau_var, p.periods, p.starts, p.names)
+    scaled = Regression(p.Phi * [1e6, 1, 1], p.tau, p.tau_var, p.periods, p.starts, p.names)
     assert_allclose(estimator(name)(scaled).theta * [1e6, 1, 1], estimator(name)(p).theta, rtol=1e-9)
 
 
 def test_columns_that_cannot_be_told_apart_are_refused_by_name():
     p, _ = problem()
-    twice = Problem(
+    twice = Regression(
         np.column_stack([p.Phi, p.Phi[:, 0] * (1 + 1e-12)]), p.tau, p.tau_var, p.periods, p.starts, (*"abc", "a again")
     )
     with pytest.raises(NotIdentifiable, match="does not tell a, b, c, a again apart"):
@@ -116,7 +116,7 @@ def test_columns_that_cannot_be_told_apart_are_refused_by_name():
 
 def test_a_term_that_nothing_excites_is_refused_by_name():
     p, _ = problem()
-    still = Problem(p.Phi * [1, 0, 1], p.tau, p.tau_var, p.periods, p.starts, p.names)
+    still = Regression(p.Phi * [1, 0, 1], p.tau, p.tau_var, p.periods, p.starts, p.names)
     with pytest.raises(NotIdentifiable, match=r"excites \['b'\]"):
         estimator("lse")(still)
 
@@ -124,7 +124,7 @@ def test_a_term_that_nothing_excites_is_refused_by_name():
 def test_few_periods_leave_the_weights_out_and_the_rest_goes_on():
     made = list(fit.run([trajectory(arm.signal(periods=3))], davinci.ROBOT))
     assert [r.estimator for r in made if isinstance(r, Fit)] == ["lse"]
-    [said] = [text for r in made if isinstance(r, Note) for text in r.text]
+    [said] = [text for r in made if isinstance(r, Diagnostic) for text in r.text]
     assert "wlse is left out: weights need at least 4 periods in every log, and one holds 3" in said
 
 

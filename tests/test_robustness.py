@@ -10,11 +10,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline import lock
 from pipeline.errors import BadRequest
-from pipeline.ledger import canonical, code, hash_of
-from pipeline.lock import locked
 from pipeline.robots import davinci
+from pipeline.runner import lock
+from pipeline.runner.ledger import canonical, code, hash_of
+from pipeline.runner.lock import locked
 from tests import arm
 from tests.test_runs import call, contents, processed, reports
 
@@ -57,15 +57,15 @@ def flat(said: str) -> str:
 
 def test_the_readers_of_logs_count_for_ingest_and_the_store_for_every_stage(finished):
     entry = json.loads((processed(finished) / "tasks" / "ingest" / "one.json").read_text())
-    assert {"pipeline/logs/text.py", "pipeline/logs/tdms.py", "pipeline/logs/blocks.py"} <= set(
+    assert {"pipeline/logs/text/reader.py", "pipeline/logs/tdms/reader.py", "pipeline/logs/blocks.py"} <= set(
         entry["fingerprint"]["code"]
     )
     for file in (processed(finished) / "tasks").rglob("*.json"):
-        assert "pipeline/store.py" in json.loads(file.read_text())["fingerprint"]["code"], file
+        assert "pipeline/records/store.py" in json.loads(file.read_text())["fingerprint"]["code"], file
 
 
 def test_code_of_several_modules_is_that_of_each():
-    assert code("pipeline.units", "pipeline.store") == code("pipeline.units") | code("pipeline.store")
+    assert code("pipeline.units", "pipeline.records.store") == code("pipeline.units") | code("pipeline.records.store")
 
 
 def test_the_hash_of_a_robot_sees_every_bit_of_it():
@@ -145,7 +145,7 @@ def test_what_the_machine_refuses_is_a_message(raw, monkeypatch, failure, says):
     def refuse(*_):
         raise failure
 
-    monkeypatch.setattr("pipeline.runner.perform", refuse)
+    monkeypatch.setattr("pipeline.runner.runner.perform", refuse)
     said = flat(call("ingest", small(raw / "lab"), code=1))
     assert says in said
 
@@ -154,7 +154,7 @@ def test_a_log_that_may_not_be_read_is_no_fault_of_ours(raw, monkeypatch):
     def refuse(files, options):
         raise PermissionError(13, "Permission denied", str(files[0]))
 
-    monkeypatch.setattr("pipeline.execution.open_parts", refuse)
+    monkeypatch.setattr("pipeline.runner.execution.open_parts", refuse)
     said = flat(call("ingest", small(raw / "lab"), code=1))
     assert "Permission denied" in said
     assert "fault of davinci-forces" not in said
@@ -163,7 +163,7 @@ def test_a_log_that_may_not_be_read_is_no_fault_of_ours(raw, monkeypatch):
 HOLD = """
 import sys, time
 from pathlib import Path
-from pipeline.lock import locked
+from pipeline.runner.lock import locked
 with locked(Path(sys.argv[1])):
     print("held", flush=True)
     time.sleep(60)
@@ -226,7 +226,7 @@ def test_many_runs_at_once_hold_the_lock_one_after_the_other(tmp_path):
 import sys, time
 from pathlib import Path
 from pipeline.errors import BadRequest
-from pipeline.lock import locked
+from pipeline.runner.lock import locked
 folder, done = Path(sys.argv[1]), 0
 while done < 40:
     try:

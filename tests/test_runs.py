@@ -148,11 +148,11 @@ def test_editing_a_term_of_the_model_makes_the_fit_run_again_and_says_why(finish
         return done.stdout
 
     assert "fit: 1 of 1 current" in fit()
-    terms = code / "pipeline" / "maths" / "terms.py"
+    terms = code / "pipeline" / "maths" / "models" / "terms.py"
     terms.write_text(terms.read_text().replace('b="sign(dq)"', 'b="tanh(dq / 0.05)"'))
     said = fit()
     assert "the robot changed" in said
-    assert "the code of pipeline/maths/terms.py changed" in said
+    assert "the code of pipeline/maths/models/terms.py changed" in said
 
 
 def test_a_log_that_leaves_the_study_takes_its_records_with_it(finished):
@@ -192,7 +192,7 @@ def test_units_meanings_and_origins_travel_with_the_file(analysed):
     made_from = json.loads(file.metadata.metadata[b"made_from"])
     assert made_from["inputs"].keys() == {"processed/signal/slide/instrument_slide.parquet"}
     assert made_from["settings"] == {"harmonics": 0}
-    assert "pipeline/maths/averaging.py" in made_from["code"]
+    assert "pipeline/maths/signals/averaging.py" in made_from["code"]
 
 
 def test_floats_are_stored_byte_by_byte_and_compressed(analysed):
@@ -299,7 +299,7 @@ def test_all_takes_the_studies_of_raw_and_skips_those_without_logs(study, monkey
 
 def test_folders_may_lie_elsewhere(study, tmp_path):
     call("ingest", study, "--processed", tmp_path / "p", "--reports", tmp_path / "r")
-    assert (tmp_path / "p" / "arm" / "intake" / "roll.parquet").exists()
+    assert (tmp_path / "p" / "arm" / "log_summary" / "roll.parquet").exists()
 
 
 def test_raw_files_are_never_touched(analysed, study):

@@ -7,11 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline import robots, study_file
+from pipeline import robots
 from pipeline.errors import BadRobot, BadStudy
 from pipeline.robots.from_toml import RESERVED
 from pipeline.robots.robot import Kind
-from pipeline.study_problems import Problems
+from pipeline.study import reading
+from pipeline.study.problems import Problems
 from tests.test_runs import call
 
 GOOD = """title = "T"
@@ -31,7 +32,7 @@ hand_roll.i = "Current"
 
 def read(tmp_path, text):
     (tmp_path / "study.toml").write_text(text)
-    return study_file.read(tmp_path)
+    return reading.read(tmp_path)
 
 
 def test_a_good_study_means_what_it_says(tmp_path):
@@ -152,7 +153,7 @@ def test_no_study_file_however_odd_ends_in_anything_but_a_message(data, tmp_path
     parent, key = data.draw(st.sampled_from(places))
     parent[key] = data.draw(ANYTHING)
     folder = tmp_path_factory.mktemp("odd", numbered=True)
-    reader = study_file._Reader(folder, Problems(folder / "study.toml", GOOD))
+    reader = reading._Reader(folder, Problems(folder / "study.toml", GOOD))
     with contextlib.suppress(BadStudy):
         assert reader.study(table).logs
 
@@ -186,20 +187,20 @@ def test_what_is_not_plausible_is_refused(tmp_path, old, new, says):
     assert old in GOOD
     (tmp_path / "study.toml").write_text(GOOD.replace(old, new, 1))
     with pytest.raises(BadStudy) as caught:
-        study_file.read(tmp_path)
+        reading.read(tmp_path)
     assert says in str(caught.value)
 
 
 @pytest.mark.parametrize("file", ["..x.csv", "...csv", "a/../b.csv"])
 def test_a_file_whose_name_begins_with_dots_lies_inside(tmp_path, file):
     (tmp_path / "study.toml").write_text(GOOD.replace("a.csv", file))
-    assert study_file.read(tmp_path).logs[0].files == (file,)
+    assert reading.read(tmp_path).logs[0].files == (file,)
 
 
 def test_settings_at_their_limits_are_taken(tmp_path):
     limits = '[settings]\nlowpass = 1e5\nharmonics = 100\nfit = "independent.wlse"\n[[log]]'
     (tmp_path / "study.toml").write_text(GOOD.replace("[[log]]", limits))
-    settings = study_file.read(tmp_path).settings
+    settings = reading.read(tmp_path).settings
     assert (settings.lowpass, settings.harmonics, settings.fit) == (1e5, 100, "independent.wlse")
 
 
@@ -208,7 +209,7 @@ def test_a_study_may_not_be_called_what_windows_reserves(tmp_path, name):
     (tmp_path / name).mkdir()
     (tmp_path / name / "study.toml").write_text(GOOD)
     with pytest.raises(BadStudy, match=f"is called '{name}', which is reserved on Windows"):
-        study_file.read(tmp_path / name)
+        reading.read(tmp_path / name)
     assert "comx" not in RESERVED
 
 

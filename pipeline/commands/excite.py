@@ -9,7 +9,7 @@ import typer
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from pipeline.simulation.trajectory import Excitation
+    from pipeline.excitation.trajectory import ExcitationTrajectory
 
 
 def run(
@@ -33,8 +33,8 @@ def run(
 ) -> None:
     """Minimise -log10 det(F'F) over a Fourier series whose limits hold at every instant."""
     from pipeline.errors import BadRequest
-    from pipeline.simulation import trajectory
-    from pipeline.simulation.excite import Request, answer, arm_of, load
+    from pipeline.excitation import trajectory
+    from pipeline.excitation.request import Request, answer, arm_of, load
 
     request = Request(robot, joint, evaluate, period, harmonics, criterion, (q, dq, ddq), starts, seed)
     found = answer(request)
@@ -49,7 +49,9 @@ def run(
     typer.echo(json.dumps(_document(robot, found, arm), indent=2) if as_json else _words(found, arm))
 
 
-def _document(robot: str, found: "Sequence[Excitation]", arm: tuple[float, float, int] | None) -> dict[str, Any]:
+def _document(
+    robot: str, found: "Sequence[ExcitationTrajectory]", arm: tuple[float, float, int] | None
+) -> dict[str, Any]:
     if len(found) == 1:
         return {"robot": robot, **found[0].facts()}
     joints = {e.joint.name: e.facts() for e in found}
@@ -60,7 +62,7 @@ def _document(robot: str, found: "Sequence[Excitation]", arm: tuple[float, float
     return {"robot": robot, "joint": "all", **told, "joints": joints}
 
 
-def _words(found: "Sequence[Excitation]", arm: tuple[float, float, int] | None) -> str:
+def _words(found: "Sequence[ExcitationTrajectory]", arm: tuple[float, float, int] | None) -> str:
     lines = []
     if arm:
         lines.append(f"all joints: objective {arm[0]:.4f}, condition {arm[1]:.1f}, {arm[2]} base parameters")

@@ -8,8 +8,8 @@ import typer
 
 if TYPE_CHECKING:
     from pipeline.logs.log import Log
-    from pipeline.maths.clock import Clock
-    from pipeline.maths.outline import Outline
+    from pipeline.maths.signals.clock import ClockStatistics
+    from pipeline.maths.signals.outline import Outline
 
 BARS = "▁▂▃▄▅▆▇█"
 TIMES = ("time", "t", "t_s", "elapsed", "x_value", "seconds")
@@ -42,16 +42,16 @@ def describe(file: Path, head: int) -> dict[str, Any]:
     import numpy as np
 
     from pipeline.logs import open_log
-    from pipeline.maths.clock import Clock
-    from pipeline.maths.outline import Outline
+    from pipeline.maths.signals.clock import ClockStatistics
+    from pipeline.maths.signals.outline import Outline
 
     log = open_log(file)
     names = [channel.name for channel in log.channels if channel.kind != "text"]
-    source, clock = _time(log), Clock()
+    source, clock = _time(log), ClockStatistics()
     measured = [c.name for c in log.channels if c.kind == "number" and not c.derived and c.name != source]
     outlines = {name: Outline() for name in names}
     first: dict[str, list[float]] = {name: [] for name in names}
-    rising = {} if source or log.clock else {name: Clock() for name in measured}
+    rising = {} if source or log.clock else {name: ClockStatistics() for name in measured}
     rows = 0
     for block in log.blocks(names):
         count = len(next(iter(block.values())))
@@ -88,13 +88,13 @@ def _counted(log: "Log", rows: int, count: int) -> Any:
     return log.clock.start + number * log.clock.step if log.clock else number
 
 
-def _still_rises(seen: "Clock", values: Any) -> bool:
+def _still_rises(seen: "ClockStatistics", values: Any) -> bool:
     """Whether a channel has risen from every sample to the next up to here, as a time does."""
     seen.update(values)
     return not (seen.backward or seen.repeated) and abs(seen.last - seen.first) < float("inf")
 
 
-def _clock(log: "Log", source: str, clock: "Clock", rising: dict[str, "Clock"]) -> dict[str, Any]:
+def _clock(log: "Log", source: str, clock: "ClockStatistics", rising: dict[str, "ClockStatistics"]) -> dict[str, Any]:
     if not source and not log.clock:
         told = "none: say rate = ... [Hz] for this log in study.toml"
         for name, seen in rising.items():
@@ -118,7 +118,7 @@ def _channel(log: "Log", channel: Any, outline: "Outline | None") -> dict[str, A
     return about | values | counts | {"course": [_plain(value) for value in outline.course.tolist()]}
 
 
-def _flags(log: "Log", source: str, clock: "Clock") -> Iterator[str]:
+def _flags(log: "Log", source: str, clock: "ClockStatistics") -> Iterator[str]:
     """What makes a recording doubtful though every cell of it can be read."""
     if clock.duplicates > MOST * clock.samples:
         share = clock.duplicates / clock.samples

@@ -13,11 +13,12 @@ def run(
     show: Annotated[bool, typer.Option("--print", help="Print it instead of writing study.toml.")] = False,
 ) -> None:
     """Describe logs in a study.toml, which is never overwritten."""
-    from pipeline import new_study, store
     from pipeline.errors import BadRequest
+    from pipeline.records import store
+    from pipeline.study import template
 
     folder = study or files[0].parent
-    text = new_study.describe(files, folder, robot)
+    text = template.describe(files, folder, robot)
     if show:
         typer.echo(text)
         return

@@ -6,12 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from pipeline.robots.robot import Robot
-
-    Array = NDArray[np.float64]
 
 ROUNDING = 1e-14
 DEFAULT = 6  # coordinates of the pose where none is given: the arm with one jaw
@@ -64,7 +59,7 @@ def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]
     import numpy as np
 
     from pipeline.errors import BadRequest
-    from pipeline.maths import kinematics, rigid_body, workspace
+    from pipeline.maths.mechanics import kinematics, rigid_body, workspace
 
     chain, bodies = robot.chain, robot.bodies
     if chain is None or bodies is None:
@@ -107,7 +102,7 @@ def _outside(robot: "Robot", q: list[float]) -> list[str]:
 
 def _singular(chain: Any, q: list[float]) -> str:
     """Why the pose has no condition number, and where such poses lie."""
-    from pipeline.maths.workspace import ARM, SINGULAR, singular_slides
+    from pipeline.maths.mechanics.workspace import ARM, SINGULAR, singular_slides
 
     slides = ", ".join(sorted({f"{slide:.4f}" for slide in singular_slides(chain, q[1])}))
     where = f"; at this pitch that is so where the slide is at {slides} m" if slides else ""

@@ -14,7 +14,7 @@ def run(
     """Simulate a scenario and write the study folder OUT: study.toml, the logs, and truth.toml."""
     from pipeline.errors import BadRequest
     from pipeline.simulation import study_folder
-    from pipeline.simulation.scenario_file import load
+    from pipeline.simulation.scenario.reading import load
 
     study_folder.check(out, force)
     try:

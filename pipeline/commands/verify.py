@@ -12,7 +12,7 @@ def run(
     reports: Annotated[Path | None, typer.Option(help="Folder for reports, where not beside raw/.")] = None,
 ) -> None:
     """Verify a study; what differs is named, and the exit code is 1."""
-    from pipeline import runs, verification
+    from pipeline.runner import runs, verification
 
     done = verification.verify(runs.folders(study, processed, reports))
     typer.echo(

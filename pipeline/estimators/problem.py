@@ -8,12 +8,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import NotIdentifiable
-
-Array = NDArray[np.float64]
+from pipeline.maths.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)
-class Problem:
+class Regression:
     """Find theta with Phi theta close to tau: K samples, p parameters, one averaged period of each log in turn."""
 
     Phi: Array  # (K, p)
@@ -24,7 +23,7 @@ class Problem:
     names: tuple[str, ...]  # of the parameters
 
 
-class Answer(NamedTuple):
+class Estimate(NamedTuple):
     """Parameters with two standard deviations: residuals taken as uncorrelated, and allowed to be correlated."""
 
     theta: Array  # (p,)
@@ -33,10 +32,10 @@ class Answer(NamedTuple):
     hac_lags: int
 
 
-Estimator = Callable[[Problem], Answer]
+Estimator = Callable[[Regression], Estimate]
 
 
-def solve(problem: Problem, weight: Array) -> Answer:
+def solve(problem: Regression, weight: Array) -> Estimate:
     """Minimise the sum of weight (tau - Phi theta)^2, by QR of the scaled rows.  (6.42), (6.46)
 
     `weight` is (K,), 0 where there is nothing.  The standard deviations take their scale from the residuals, so a
@@ -70,7 +69,7 @@ def solve(problem: Problem, weight: Array) -> Answer:
     variance = residual @ residual / (K - p)
     lags = correlation_lags(residual, problem.starts)
     hac = _newey_west(F, residual, bread, problem.starts, lags)
-    return Answer(
+    return Estimate(
         theta=scaled / scale,
         theta_std=np.sqrt(variance * np.diag(bread)) / scale,
         theta_std_hac=np.sqrt(np.diag(hac)) / scale,

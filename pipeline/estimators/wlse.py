@@ -4,15 +4,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import NotIdentifiable
-from pipeline.estimators.problem import Answer, Problem, solve
-
-Array = NDArray[np.float64]
+from pipeline.estimators.problem import Estimate, Regression, solve
+from pipeline.maths.arrays import Array
 
 FEWEST = 4  # periods: fewer say too little about their own spread
 DEGREES = 200  # degrees of freedom behind each weight, which leave it uncertain by 10 %
 
 
-def estimate(problem: Problem) -> Answer:
+def estimate(problem: Regression) -> Estimate:
     """theta = (Phi' W Phi)^-1 Phi' W tau, with W the inverse variance of the averaged effort.  (6.49), corrected
 
     The variance between M periods at one sample has M - 1 degrees of freedom; weights of its inverse are so uncertain

@@ -1,54 +1,27 @@
-"""The records that flow between stages: a few scalars, and columns of one length; see `record`."""
+"""The records that flow between stages, one module for each stage that makes them; see `record`."""
 
-import numpy as np
-
-from pipeline.records.findings import Fit, Note, Prediction, Residual, Track, Whiteness
-from pipeline.records.periods import Average, Noise, Spectrum, Trajectory
+from pipeline.records.average import Average, PeriodResidual
+from pipeline.records.design import Control, Excitation, Links, Lyapunov, Pose, Workspace
+from pipeline.records.diagnostic import Diagnostic, diagnostic
+from pipeline.records.differentiate import Spectrum, Trajectory
+from pipeline.records.ekf import Track
+from pipeline.records.fit import Fit, Residual
+from pipeline.records.ingest import LogSummary, Recording
+from pipeline.records.predict import Prediction
 from pipeline.records.record import COLUMN_DTYPES, AnyRecord, Column, Counts, Labels, Names, Origin, Record
-from pipeline.records.recordings import Intake, Recording, Signal
-from pipeline.records.rehearsal import Control, Excitation, Links, Lyapunov, Pose, Workspace
+from pipeline.records.resample import Signal
+from pipeline.records.whiteness import Whiteness
 
 __all__ = [
-    "COLUMN_DTYPES",
-    "KINDS",
-    "AnyRecord",
-    "Average",
-    "Column",
-    "Control",
-    "Counts",
-    "Excitation",
-    "Fit",
-    "Intake",
-    "Labels",
-    "Links",
-    "Lyapunov",
-    "Names",
-    "Noise",
-    "Note",
-    "Origin",
-    "Pose",
-    "Prediction",
-    "Record",
-    "Recording",
-    "Residual",
-    "Signal",
-    "Spectrum",
-    "Track",
-    "Trajectory",
-    "Whiteness",
-    "Workspace",
-    "note",
-]
+    "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Column", "Control", "Counts", "Diagnostic", "Excitation", "Fit",
+    "Labels", "Links", "LogSummary", "Lyapunov", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Record",
+    "Recording", "Residual", "Signal", "Spectrum", "Track", "Trajectory", "Whiteness", "Workspace", "diagnostic",
+]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
     kind.__name__: kind
     for kind in (
-        Links, Pose, Workspace, Control, Lyapunov, Excitation, Intake, Recording, Signal, Average, Noise, Trajectory,
-        Spectrum, Fit, Residual, Prediction, Track, Whiteness, Note,
+        Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Signal, Average, PeriodResidual,
+        Trajectory, Spectrum, Fit, Residual, Prediction, Track, Whiteness, Diagnostic,
     )
 }  # fmt: skip
-
-
-def note(stage: str, subject: str, severity: str, *texts: str) -> Note:
-    """A note of one or more lines of one severity."""
-    return Note(stage, subject, np.array([severity] * len(texts), object), np.array(texts, object))

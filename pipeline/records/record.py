@@ -6,6 +6,7 @@ them the same way.  Every field is a symbol of `quantities`.  `KEY` names the sc
 kind from another: they are its place on disk.
 """
 
+import re
 from dataclasses import fields
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
@@ -13,9 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import BadRecord
+from pipeline.maths.arrays import Array, Integers
 
-Column = NDArray[np.float64]
-Counts = NDArray[np.int64]
+Column = Array
+Counts = Integers
 Labels = NDArray[np.object_]
 Names = tuple[str, ...]
 
@@ -35,6 +37,11 @@ class Record:
 
     KEY: ClassVar[Names] = ("log", "joint")
     origin: ClassVar[Origin | None] = None  # set on the instances that `store` read
+
+    @classmethod
+    def folder(cls) -> str:
+        """The folder of its files, its name in lower case: `log_summary`."""
+        return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower()
 
     @classmethod
     def columns(cls) -> Names:

@@ -5,21 +5,21 @@ import math
 import re
 from dataclasses import asdict, dataclass
 
-from pipeline.catalogue import Catalogue
 from pipeline.records import (
     Average,
     Control,
     Excitation,
     Fit,
-    Intake,
     Links,
+    LogSummary,
     Lyapunov,
     Prediction,
     Record,
     Track,
     Whiteness,
 )
-from pipeline.report.number import Number
+from pipeline.records.catalogue import Catalogue
+from pipeline.report.content.number import Number
 
 
 @dataclass(frozen=True)
@@ -69,7 +69,7 @@ def collect(catalogue: Catalogue) -> Results:
     """Every result of a study."""
     found = Results()
     _robot(found, catalogue)
-    for intake in catalogue.all(Intake):
+    for intake in catalogue.all(LogSummary):
         for name in ("rows", "rate", "duration", "jitter", "longest_gap", "duplicates", "dropped"):
             found.add(intake, f"log.{intake.log}.{name}", name)
     for average in catalogue.all(Average):

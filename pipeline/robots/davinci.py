@@ -1,6 +1,6 @@
 """The first-generation da Vinci arm of the thesis: hand roll, hand pitch and instrument slide."""
 
-from pipeline.maths.terms import coulomb, gravity_cos, gravity_sin, inertia, lifted_mass, viscous
+from pipeline.maths.models.terms import coulomb, gravity_cos, gravity_sin, inertia, lifted_mass, viscous
 from pipeline.robots.davinci_chain import BODIES, CHAIN
 from pipeline.robots.robot import Joint, Kind, Limits, Robot
 

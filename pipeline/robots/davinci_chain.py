@@ -7,13 +7,13 @@ from math import pi
 
 import numpy as np
 
-from pipeline.maths.bodies import Bodies, cylinder
-from pipeline.maths.drives import Drives
-from pipeline.maths.kinematics import HELD, Chain
+from pipeline.maths.mechanics.bodies import Bodies, cylinder
+from pipeline.maths.mechanics.drives import Drives
+from pipeline.maths.mechanics.kinematics import FIXED, Chain
 
 # Table 3.1: name, alpha [rad], a [m], d [m], theta [rad], coordinate (the index of its q), carried by frame.
 LINKS = (
-    ("1", -pi / 2, 0.0, 0.161, 0.0, HELD, 0),  # base
+    ("1", -pi / 2, 0.0, 0.161, 0.0, FIXED, 0),  # base
     ("2", -pi / 2, 0.0, -0.035, -pi / 2, 0, 1),  # pivot plate
     ("3", pi, 0.190, 0.0, 0.03, 1, 2),  # parallelogram base
     ("4", pi, 0.515, 0.0, 0.03 + pi / 2, 1, 3),  # parallelogram upper bar

@@ -23,7 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.errors import BadRobot
-from pipeline.maths.terms import TERMS
+from pipeline.maths.models.terms import TERMS
 from pipeline.robots.robot import Joint, Kind, Limits, Robot
 
 NAME = re.compile(r"[a-z0-9_-]+")

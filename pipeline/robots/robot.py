@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 from enum import Enum
 
 from pipeline.errors import BadRobot
-from pipeline.maths.bodies import Bodies
-from pipeline.maths.kinematics import Chain
-from pipeline.maths.terms import Term
+from pipeline.maths.mechanics.bodies import Bodies
+from pipeline.maths.mechanics.kinematics import Chain
+from pipeline.maths.models.terms import Term
 
 
 class Kind(Enum):

@@ -3,24 +3,23 @@
 from typing import cast
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.maths import kinematics
-from pipeline.maths.bodies import Bodies
-from pipeline.maths.dynamics import regressor
-from pipeline.maths.kinematics import Chain
-from pipeline.maths.rigid_body import inverse_dynamics
-from pipeline.maths.simulation import Body, Timing, simulate
-from pipeline.maths.simulation_forces import UP, Surroundings
-from pipeline.maths.simulation_plant import arm
-from pipeline.simulation.motion import Motion, Run
-from pipeline.simulation.scenario import Arm, BadScenario, Scenario, SimulatedLog
+from pipeline.maths.arrays import Array
+from pipeline.maths.mechanics import kinematics
+from pipeline.maths.mechanics.bodies import Bodies
+from pipeline.maths.mechanics.kinematics import Chain
+from pipeline.maths.mechanics.rigid_body import inverse_dynamics
+from pipeline.maths.models.dynamics import regressor
+from pipeline.maths.simulation.closed_loop import JointConstraints, Timing, simulate
+from pipeline.maths.simulation.plant import arm
+from pipeline.maths.simulation.surroundings import UP, Surroundings
+from pipeline.simulation.motion import Motion, SimulatedRun
+from pipeline.simulation.scenario.scenario import BadScenario, Scenario, SimulatedArm, SimulatedLog
 
-Array = NDArray[np.float64]
 EXACT = 1e-9  # relative residual up to which a joint model describes the arm exactly
 
 
-def run(scenario: Scenario, log: SimulatedLog) -> Run:
+def run(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
     """Simulate one recording, from rest at the first position asked for; the lead is run and not recorded.
 
     Raises
@@ -28,7 +27,7 @@ def run(scenario: Scenario, log: SimulatedLog) -> Run:
     BadScenario
         If the motion grows beyond all bounds, as it does under gains that the ticks are too slow for.
     """
-    what, robot = cast(Arm, scenario.arm), scenario.robot
+    what, robot = cast(SimulatedArm, scenario.arm), scenario.robot
     chain, bodies = _geometry(scenario)
     names, n = [joint.name for joint in robot.joints], len(robot.joints)
     ticks = round(1 / (scenario.rate * what.tick))
@@ -37,7 +36,7 @@ def run(scenario: Scenario, log: SimulatedLog) -> Run:
     reference = np.column_stack([log.position(name, t) for name in names])
     stops = np.array([scenario.joints[name].stops for name in names])
     friction = what.families[log.family].friction
-    body = Body(friction, stops[:, 0].copy(), stops[:, 1].copy(), np.ones(n, dtype=np.bool_))
+    body = JointConstraints(friction, stops[:, 0].copy(), stops[:, 1].copy(), np.ones(n, dtype=np.bool_))
     plant = arm(chain, bodies, what.motors.gear_ratio**2 * what.rotors)
     clock = Timing(what.tick, ticks)
     instants = np.arange(len(t) * ticks, dtype=np.float64) * what.tick - log.lead
@@ -52,7 +51,7 @@ def run(scenario: Scenario, log: SimulatedLog) -> Run:
         name: Motion(*(np.ascontiguousarray(values[:, i]) for values in (q, dq, tau, tau_ext)))
         for i, name in enumerate(names)
     }
-    return Run(t[skipped:], {name: motions[name] for name in log.joints}, force)
+    return SimulatedRun(t[skipped:], {name: motions[name] for name in log.joints}, force)
 
 
 def _geometry(scenario: Scenario) -> tuple[Chain, Bodies]:
@@ -89,7 +88,7 @@ def theta(scenario: Scenario, family: str) -> dict[str, Array]:
     They are the ones with which the model gives the arm's own efforts; a joint whose friction has more to it than
     viscous and Coulomb friction has none.
     """
-    what, friction = cast(Arm, scenario.arm), cast(Arm, scenario.arm).families[family].friction
+    what, friction = cast(SimulatedArm, scenario.arm), cast(SimulatedArm, scenario.arm).families[family].friction
     chain, bodies = _geometry(scenario)
     rotors, found = what.motors.gear_ratio**2 * what.rotors, {}
     random = np.random.default_rng(0)

@@ -2,10 +2,7 @@
 
 from dataclasses import dataclass
 
-import numpy as np
-from numpy.typing import NDArray
-
-Array = NDArray[np.float64]
+from pipeline.maths.arrays import Array
 
 
 @dataclass(frozen=True)
@@ -19,7 +16,7 @@ class Motion:
 
 
 @dataclass(frozen=True)
-class Run:
+class SimulatedRun:
     """What truly happened in one recording: its clock (N,) [s], its joints, and the tip where it is known."""
 
     t: Array

@@ -1,20 +1,18 @@
 """Joints that follow their trajectories exactly: the independent joint models, run backwards.  Section 6.1"""
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pipeline.maths.dynamics import inverse
-from pipeline.maths.excitation import Fourier, motion
-from pipeline.simulation.motion import Motion, Run
-from pipeline.simulation.scenario import Scenario, SimulatedLog
-
-Array = NDArray[np.float64]
+from pipeline.maths.arrays import Array
+from pipeline.maths.excitation.fourier import Fourier, motion
+from pipeline.maths.models.dynamics import inverse
+from pipeline.simulation.motion import Motion, SimulatedRun
+from pipeline.simulation.scenario.scenario import Scenario, SimulatedLog
 
 
-def simulate(scenario: Scenario, log: SimulatedLog) -> Run:
+def simulate(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
     """The motion of every joint that is recorded."""
     t = np.arange(round(log.duration * scenario.rate)) / scenario.rate
-    return Run(t, {name: _joint(scenario, log, name, t) for name in log.joints})
+    return SimulatedRun(t, {name: _joint(scenario, log, name, t) for name in log.joints})
 
 
 def _joint(scenario: Scenario, log: SimulatedLog, name: str, t: Array) -> Motion:

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from pathlib import Path
 
 from pipeline.errors import BadRequest
-from pipeline.simulation import closed_loop, prescribed, study_words, truth_words, writers
-from pipeline.simulation.laboratory import Channel, generator, record
-from pipeline.simulation.motion import Run
-from pipeline.simulation.scenario import Noise, Scenario, SimulatedLog
+from pipeline.simulation import closed_loop, prescribed, study_toml, truth_toml, writers
+from pipeline.simulation.motion import SimulatedRun
+from pipeline.simulation.scenario.scenario import Scenario, SensorNoise, SimulatedLog
+from pipeline.simulation.sensors import SimulatedChannel, generator, record
 
 TRUTH = "truth.toml"
 
@@ -28,8 +28,8 @@ def write(scenario: Scenario, folder: Path, force: bool, say: Callable[[str], No
         new, old = Path(temporary) / "new", Path(temporary) / "old"
         new.mkdir()
         entries, truths = zip(*(_log(scenario, log, new, say) for log in scenario.logs), strict=True)
-        _text(new / "study.toml", study_words.study(scenario, entries))
-        _text(new / TRUTH, truth_words.truth(scenario, truths))
+        _text(new / "study.toml", study_toml.study(scenario, entries))
+        _text(new / TRUTH, truth_toml.truth(scenario, truths))
         if folder.exists():
             folder.rename(old)
         shutil.move(new, folder)
@@ -55,12 +55,12 @@ def _log(scenario: Scenario, log: SimulatedLog, folder: Path, say: Callable[[str
     writers.write(path, channels, scenario.rate, scenario.started)
     size = path.stat().st_size / 1e6
     say(f"{log.name}: {len(run.t)} samples of {', '.join(log.joints)} -> {log.file}, {size:.2f} MB")
-    return study_words.entry(scenario, log, path, channels), truth_words.entry(log, run)
+    return study_toml.entry(scenario, log, path, channels), truth_toml.entry(log, run)
 
 
-def recorded(scenario: Scenario, log: SimulatedLog, run: Run) -> list[Channel]:
+def recorded(scenario: Scenario, log: SimulatedLog, run: SimulatedRun) -> list[SimulatedChannel]:
     """The channels of one log, with the noise of its seed."""
-    channels = [Channel("time", "Time", "s", run.t)] if log.clock == "channel" else []
+    channels = [SimulatedChannel("time", "Time", "s", run.t)] if log.clock == "channel" else []
     for name, motion in run.motions.items():
         random = generator(scenario.seed, log.name, name)
         noise = noise_of(scenario, log.family, name)
@@ -68,7 +68,7 @@ def recorded(scenario: Scenario, log: SimulatedLog, run: Run) -> list[Channel]:
     return channels
 
 
-def noise_of(scenario: Scenario, family: str, joint: str) -> Noise:
+def noise_of(scenario: Scenario, family: str, joint: str) -> SensorNoise:
     """The noise of a joint: of its family, where the whole arm is simulated."""
     return scenario.arm.families[family].noise[joint] if scenario.arm else scenario.joints[joint].noise
 

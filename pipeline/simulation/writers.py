@@ -7,13 +7,13 @@ from pathlib import Path
 import numpy as np
 from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
 
-from pipeline.simulation.laboratory import Channel
+from pipeline.simulation.sensors import SimulatedChannel
 
 GROUP = "Motors"
 SAYS = "SIMULATED data, not a recording of a robot"
 
 
-def write(path: Path, channels: Sequence[Channel], rate: float, started: str) -> None:
+def write(path: Path, channels: Sequence[SimulatedChannel], rate: float, started: str) -> None:
     """Write the channels in the format that the file's name asks for.
 
     A channel whose quantity is `time` is the first column or channel; without one the file's header says the step.
@@ -21,14 +21,14 @@ def write(path: Path, channels: Sequence[Channel], rate: float, started: str) ->
     {".tdms": tdms, ".lvm": lvm}[path.suffix](path, channels, rate, started)
 
 
-def named(path: Path, channel: Channel) -> str:
+def named(path: Path, channel: SimulatedChannel) -> str:
     """The name by which a reader finds a channel in the file."""
     if path.suffix == ".tdms":
         return f"{GROUP}/{channel.name}"
     return "X_Value" if channel.quantity == "time" else channel.name
 
 
-def tdms(path: Path, channels: Sequence[Channel], rate: float, started: str) -> None:
+def tdms(path: Path, channels: Sequence[SimulatedChannel], rate: float, started: str) -> None:
     """Write a TDMS file of one group."""
     step = {} if channels[0].quantity == "time" else {"wf_start_offset": 0.0, "wf_increment": 1 / rate}
     root = RootObject({"name": path.stem, "description": SAYS, "started": started})
@@ -39,7 +39,7 @@ def tdms(path: Path, channels: Sequence[Channel], rate: float, started: str) -> 
         writer.write_segment([root, GroupObject(GROUP), *objects])
 
 
-def lvm(path: Path, channels: Sequence[Channel], rate: float, started: str) -> None:
+def lvm(path: Path, channels: Sequence[SimulatedChannel], rate: float, started: str) -> None:
     """Write an LVM file of one segment, as the express block "Write To Measurement File" does."""
     timed = channels[0].quantity == "time"
     columns = channels[1:] if timed else channels
@@ -62,7 +62,7 @@ def _header(started: str, timed: bool) -> list[str]:
     return ["LabVIEW Measurement\t", *(f"{key}\t{value}" for key, value in entries.items()), "\t"]
 
 
-def _segment(columns: Sequence[Channel], rate: float, started: str) -> list[str]:
+def _segment(columns: Sequence[SimulatedChannel], rate: float, started: str) -> list[str]:
     date, time = _date_time(started)
     entries = {
         "Samples": str(len(columns[0].samples)), "Date": date, "Time": time, "Y_Unit_Label": "", "X_Dimension": "Time",

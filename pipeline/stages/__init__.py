@@ -12,9 +12,9 @@ The signature of `run` is the declaration of everything it needs:
     joint: Joint, robot: Robot  what the robot is
     study: Study                the whole study
     *, lowpass: float           a setting of the study, by name
-    -> Iterator[Average | Note] the kinds of record it makes
+    -> Iterator[Average | Diagnostic] the kinds of record it makes
 """
 
 STAGES = (
-    "rehearse", "ingest", "resample", "average", "differentiate", "fit", "predict", "ekf", "whiteness", "report",
+    "design", "ingest", "resample", "average", "differentiate", "fit", "predict", "ekf", "whiteness", "report",
 )  # fmt: skip

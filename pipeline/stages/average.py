@@ -5,10 +5,10 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from pipeline.errors import NotPeriodic
-from pipeline.maths import averaging, period
-from pipeline.maths.averaging import Folded
-from pipeline.maths.smoothing import stretches
-from pipeline.records import Average, Column, Noise, Note, Signal, note
+from pipeline.maths.signals import averaging, period
+from pipeline.maths.signals.averaging import Folded
+from pipeline.maths.signals.smoothing import segments
+from pipeline.records import Average, Column, Diagnostic, PeriodResidual, Signal, diagnostic
 from pipeline.robots.robot import Robot
 from pipeline.study import LogEntry
 
@@ -19,15 +19,15 @@ MISMATCH = 5e-4  # a stated period is wrong by more than this share when the dat
 
 def run(
     signals: Sequence[Signal], entry: LogEntry, robot: Robot, *, harmonics: int
-) -> Iterator[Average | Noise | Note]:
+) -> Iterator[Average | PeriodResidual | Diagnostic]:
     """One period of each joint that moves; the joints of a log share the period."""
     if entry.role != "identification":
         return
-    moving = [signal for signal in signals if not signal.held]
-    held = [signal.joint for signal in signals if signal.held]
-    if held:
-        yield note(
-            "average", entry.name, "note", *(f"{entry.name}: {j} does not move: held, and left out" for j in held)
+    moving = [signal for signal in signals if not signal.at_rest]
+    at_rest = [signal.joint for signal in signals if signal.at_rest]
+    if at_rest:
+        yield diagnostic(
+            "average", entry.name, "note", *(f"{entry.name}: {j} does not move: at rest, and left out" for j in at_rest)
         )
     if not moving:
         raise NotPeriodic(
@@ -40,10 +40,10 @@ def run(
     for signal in moving:
         for record in averaged(signal, found, entry.period or 0.0):
             yield record
-            if isinstance(record, Noise):
+            if isinstance(record, PeriodResidual):
                 remarks += odd_period(record, signal, found.length)
     if remarks:
-        yield note("average", entry.name, "warning", *remarks)
+        yield diagnostic("average", entry.name, "warning", *remarks)
 
 
 def repeating(moving: list[Signal], entry: LogEntry) -> tuple[list[Signal], float | None, list[str]]:
@@ -63,11 +63,11 @@ def guessed(signals: Sequence[Signal]) -> float | None:
 
 
 def longest(signal: Signal) -> slice:
-    """The longest stretch without a gap."""
-    return max(stretches(signal.stretch), key=lambda s: s.stop - s.start)
+    """The longest segment without a gap."""
+    return max(segments(signal.segment), key=lambda s: s.stop - s.start)
 
 
-def odd_period(noise: Noise, signal: Signal, length: float) -> list[str]:
+def odd_period(noise: PeriodResidual, signal: Signal, length: float) -> list[str]:
     """Whether one of the periods differs from the others, as a transient at the start or a stop at the end does."""
     number = ((noise.t - noise.t[0]) / length + 1e-9).astype(int)
     size = np.sqrt(np.bincount(number, noise.q_noise**2) / np.maximum(np.bincount(number), 1))
@@ -113,7 +113,7 @@ def shared_period(
     return found, remarks
 
 
-def averaged(signal: Signal, found: period.Period, stated: float) -> Iterator[Average | Noise]:
+def averaged(signal: Signal, found: period.Period, stated: float) -> Iterator[Average | PeriodResidual]:
     """Fold one joint at a period."""
     K = averaging.phases(found.length, signal.rate)
     M = averaging.whole_periods(signal.t, found.length, signal.rate)
@@ -144,4 +144,4 @@ def averaged(signal: Signal, found: period.Period, stated: float) -> Iterator[Av
         tau_var=tau.var,
         count=q.counts,
     )
-    yield Noise(signal.log, signal.joint, t=t, q_noise=q.noise, dq_noise=dq.noise, tau_noise=tau.noise)
+    yield PeriodResidual(signal.log, signal.joint, t=t, q_noise=q.noise, dq_noise=dq.noise, tau_noise=tau.noise)

@@ -4,14 +4,16 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.maths import harmonics as fourier
-from pipeline.records import Average, Column, Note, Spectrum, Trajectory, note
+from pipeline.maths.signals import harmonics as fourier
+from pipeline.records import Average, Column, Diagnostic, Spectrum, Trajectory, diagnostic
 from pipeline.robots.robot import Joint
 
 LEFT_OUT = 0.01  # share of the largest harmonic above which one that is left out is worth a remark
 
 
-def run(average: Average, joint: Joint, *, derivative: str, harmonics: int) -> Iterator[Trajectory | Spectrum | Note]:
+def run(
+    average: Average, joint: Joint, *, derivative: str, harmonics: int
+) -> Iterator[Trajectory | Spectrum | Diagnostic]:
     """Position, velocity and acceleration from the harmonics of the excitation.  (6.34)"""
     orders = harmonics or joint.harmonics
     q, dq, ddq = (differentiated(average, orders, order, derivative) for order in (0, 1, 2))
@@ -36,7 +38,7 @@ def run(average: Average, joint: Joint, *, derivative: str, harmonics: int) -> I
     beyond = amplitude[orders + 1 :]
     if len(beyond) and beyond.max() > LEFT_OUT * amplitude[1:].max():
         highest = orders + 1 + int(beyond.argmax())
-        yield note(
+        yield diagnostic(
             "differentiate", f"{average.log}.{average.joint}", "warning",
             f"{average.log}/{average.joint}: harmonic {highest} of the position is "
             f"{beyond.max() / amplitude[1:].max():.1%} of the largest, and {orders} harmonics are kept; raise "

@@ -5,14 +5,17 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from pipeline.errors import PipelineError
-from pipeline.maths import ekf
-from pipeline.maths.dynamics import mass
-from pipeline.maths.smoothing import stretches
-from pipeline.maths.windows import outside, settled
-from pipeline.records import Average, Fit, Note, Signal, Track, note
+from pipeline.estimators.regression import measured_regressor, motion_of
+from pipeline.filters import tracker
+from pipeline.filters.problem import NoiseModel, Tracked
+from pipeline.maths.models.dynamics import mass
+from pipeline.maths.signals.smoothing import segments
+from pipeline.maths.signals.windows import outside, settled
+from pipeline.records import Average, Diagnostic, Fit, Signal, Track, diagnostic
 from pipeline.robots.robot import Joint
-from pipeline.stages.predict import measured_regressor, motion_of
 from pipeline.study import LogEntry
+
+FILTER = "ekf"
 
 
 def run(
@@ -25,13 +28,13 @@ def run(
     fit: str,
     lowpass: float,
     q_tau: float,
-) -> Iterator[Track | Note]:
+) -> Iterator[Track | Diagnostic]:
     """The filter's pass over one joint, with the Fit that the setting `fit` names.  (7.6)-(7.16)"""
     if entry.role == "friction":
         return
     own = [f for f in fits if f.group == joint.name]
     if not own:
-        yield note(
+        yield diagnostic(
             "ekf", f"{signal.log}.{joint.name}", "note",
             f"{signal.log}/{joint.name}: no identification log moves this joint, so its external effort is not tracked",
         )  # fmt: skip
@@ -41,7 +44,7 @@ def run(
         there = ", ".join(f"{f.model}.{f.estimator}" for f in own)
         raise PipelineError(f"{joint.name}: there is no fit {fit!r}; set fit in [settings] to one of {there}")
     if mass(joint.terms, chosen.theta) <= 0:
-        yield note(
+        yield diagnostic(
             "ekf", f"{signal.log}.{joint.name}", "warning",
             f"{signal.log}/{joint.name}: the fit's inertia is not positive, so no motion follows from it and nothing "
             "is tracked; check the signs of the effort and of the position",
@@ -53,7 +56,9 @@ def run(
     yield tracked(signal, chosen, joint, noise, entry, lowpass, q_tau or joint.q_tau)
 
 
-def assumed(averages: list[Average], fit: Fit, joint: Joint, signal: Signal, lowpass: float, q_tau: float) -> ekf.Noise:
+def assumed(
+    averages: list[Average], fit: Fit, joint: Joint, signal: Signal, lowpass: float, q_tau: float
+) -> NoiseModel:
     """What the filter assumes of noise: all measured, except for the walk of the external effort.
 
     The measured effort drives the model, so its noise is process noise of the velocity, scaled by T_s / M.  Forward
@@ -67,19 +72,20 @@ def assumed(averages: list[Average], fit: Fit, joint: Joint, signal: Signal, low
     )
     # A noiseless log would leave the innovations without a covariance to be judged by.
     r_q, r_dq = (max(r, 1e-9 * np.ptp(x), 1e-12) for r, x in ((r_q, signal.q), (r_dq, signal.dq)))
-    ddq = np.concatenate([motion_of(signal, part, lowpass)[2] for part in stretches(signal.stretch)])
+    ddq = np.concatenate([motion_of(signal, part, lowpass)[2] for part in segments(signal.segment)])
     euler_q, euler_dq = (0.5 * T_s**2 * float(np.sqrt(np.mean(x**2))) for x in (ddq, np.gradient(ddq, T_s)))
     driven = T_s * sigma_tau / abs(mass(joint.terms, fit.theta))
-    return ekf.Noise(r_q, r_dq, euler_q, float(np.hypot(driven, euler_dq)), q_tau * np.sqrt(T_s))
+    return NoiseModel(r_q, r_dq, euler_q, float(np.hypot(driven, euler_dq)), q_tau * np.sqrt(T_s))
 
 
 def tracked(
-    signal: Signal, fit: Fit, joint: Joint, noise: ekf.Noise, entry: LogEntry, lowpass: float, q_tau: float
+    signal: Signal, fit: Fit, joint: Joint, noise: NoiseModel, entry: LogEntry, lowpass: float, q_tau: float
 ) -> Track:
-    """Filter every stretch of a signal; a gap starts the filter anew."""
+    """Filter every segment of a signal; a gap starts the filter anew."""
     first_std = max(float(np.std(signal.tau)), noise.q_tau)
+    track = tracker(FILTER)
     passes = [
-        ekf.track(
+        track(
             joint.terms,
             fit.theta,
             signal.q[part],
@@ -89,20 +95,20 @@ def tracked(
             noise,
             first_std,
         )
-        for part in stretches(signal.stretch)
+        for part in segments(signal.segment)
     ]
-    together = ekf.Tracked(*(np.concatenate(columns) for columns in zip(*passes, strict=True)))
+    together = Tracked(*(np.concatenate(columns) for columns in zip(*passes, strict=True)))
     tau_hat = measured_regressor(signal, joint, lowpass) @ fit.theta
-    calm = np.concatenate([settled(signal.t[part]) for part in stretches(signal.stretch)])
+    calm = np.concatenate([settled(signal.t[part]) for part in segments(signal.segment)])
     counted = outside(signal.t, entry.contact) & calm
     return Track(
         log=signal.log,
         joint=signal.joint,
         model=fit.model,
         estimator=fit.estimator,
-        filter="ekf",
+        filter=FILTER,
         role=signal.role,
-        held=signal.held,
+        at_rest=signal.at_rest,
         rate=signal.rate,
         tau_ext_rms=float(np.sqrt(np.mean(together.tau_ext[counted] ** 2))) if counted.any() else float("nan"),
         nis_mean=float(np.mean(together.nis[calm])),

@@ -6,15 +6,14 @@ import numpy as np
 
 from pipeline.errors import NotIdentifiable
 from pipeline.estimators import ESTIMATORS, estimator
-from pipeline.estimators.problem import Answer, Problem
-from pipeline.maths.dynamics import mass, regressor
-from pipeline.records import Fit, Note, Residual, Trajectory, note
+from pipeline.estimators.problem import Estimate, Regression
+from pipeline.estimators.regression import MODEL, pose
+from pipeline.maths.models.dynamics import mass, regressor
+from pipeline.records import Diagnostic, Fit, Residual, Trajectory, diagnostic
 from pipeline.robots.robot import Joint, Robot
 
-MODEL = "independent"  # each joint by itself, section 6.1
 
-
-def run(trajectories: Iterable[Trajectory], robot: Robot) -> Iterator[Fit | Residual | Note]:
+def run(trajectories: Iterable[Trajectory], robot: Robot) -> Iterator[Fit | Residual | Diagnostic]:
     """One Fit per joint and estimator; an estimator that cannot be used says why, and the rest goes on."""
     every = list(trajectories)
     for joint in robot.joints:
@@ -26,28 +25,17 @@ def run(trajectories: Iterable[Trajectory], robot: Robot) -> Iterator[Fit | Resi
             try:
                 answer = estimator(name)(problem)
             except NotIdentifiable as error:
-                yield note("fit", joint.name, "warning", f"{joint.name}: {name} is left out: {error}")
+                yield diagnostic("fit", joint.name, "warning", f"{joint.name}: {name} is left out: {error}")
                 continue
             if mass(joint.terms, answer.theta) <= 0:
-                yield note("fit", joint.name, "warning", f"{joint.name}: {name} finds an inertia that is not positive")
+                yield diagnostic(
+                    "fit", joint.name, "warning", f"{joint.name}: {name} finds an inertia that is not positive"
+                )
             yield summarised(own, joint, name, problem, answer)
             yield from residuals(own, joint, name, answer)
 
 
-def pose(trajectories: Sequence[Trajectory], joint: Joint) -> Problem:
-    """The least squares problem of one joint: the averaged periods of all its logs, one after the other.  (6.37)"""
-    lengths = [len(t) for t in trajectories]
-    return Problem(
-        Phi=np.vstack([regressor(joint.terms, t.q, t.dq, t.ddq) for t in trajectories]),
-        tau=np.concatenate([t.tau for t in trajectories]),
-        tau_var=np.concatenate([t.tau_var for t in trajectories]),
-        periods=np.concatenate([t.count for t in trajectories]),
-        starts=tuple(np.cumsum([0, *lengths[:-1]]).tolist()),
-        names=tuple(term.name for term in joint.terms),
-    )
-
-
-def summarised(own: Sequence[Trajectory], joint: Joint, name: str, problem: Problem, answer: Answer) -> Fit:
+def summarised(own: Sequence[Trajectory], joint: Joint, name: str, problem: Regression, answer: Estimate) -> Fit:
     """A Fit with how well it describes the averaged periods."""
     residual = problem.tau - problem.Phi @ answer.theta
     spread = problem.tau - problem.tau.mean()
@@ -71,7 +59,7 @@ def summarised(own: Sequence[Trajectory], joint: Joint, name: str, problem: Prob
     )
 
 
-def residuals(own: Sequence[Trajectory], joint: Joint, name: str, answer: Answer) -> Iterator[Residual]:
+def residuals(own: Sequence[Trajectory], joint: Joint, name: str, answer: Estimate) -> Iterator[Residual]:
     """What the fit leaves of each log's averaged effort.  (6.54)"""
     for t in own:
         tau_hat = regressor(joint.terms, t.q, t.dq, t.ddq) @ answer.theta

@@ -7,8 +7,8 @@ import numpy as np
 
 from pipeline.errors import BadLog
 from pipeline.logs.log import Block, Channel, Log
-from pipeline.maths.clock import GAP, Clock
-from pipeline.records import Column, Intake, Note, Recording, note
+from pipeline.maths.signals.clock import GAP, ClockStatistics
+from pipeline.records import Column, Diagnostic, LogSummary, Recording, diagnostic
 from pipeline.robots.robot import Joint, Robot
 from pipeline.study import LogEntry, Source
 from pipeline.units import SI, UNITS, canonical, measures, size
@@ -17,7 +17,7 @@ MOST_REPEATED = 0.1  # share of rows equal to the one before, above which the re
 MOST_JITTER = 0.1  # of the sampling time
 
 
-def run(log: Log, entry: LogEntry, robot: Robot) -> Iterator[Recording | Intake | Note]:
+def run(log: Log, entry: LogEntry, robot: Robot) -> Iterator[Recording | LogSummary | Diagnostic]:
     """Recordings in consecutive blocks, then what the reader noticed.
 
     Raises
@@ -32,7 +32,7 @@ def run(log: Log, entry: LogEntry, robot: Robot) -> Iterator[Recording | Intake 
     yield reading.intake()
     remarks = [*log.warnings, *reading.remarks()]
     if remarks:
-        yield note("ingest", entry.name, "warning", *(f"{entry.name}: {remark}" for remark in remarks))
+        yield diagnostic("ingest", entry.name, "warning", *(f"{entry.name}: {remark}" for remark in remarks))
 
 
 @dataclass
@@ -42,7 +42,7 @@ class Reading:
     log: Log
     entry: LogEntry
     robot: Robot
-    clock: Clock = field(default_factory=Clock)
+    clock: ClockStatistics = field(default_factory=ClockStatistics)
     rows: int = 0
     lost: int = 0  # at the end of a file that was cut
 
@@ -179,7 +179,7 @@ class Reading:
                 "or say rate = ... [Hz] to count samples instead"
             )
 
-    def intake(self) -> Intake:
+    def intake(self) -> LogSummary:
         """What the reader noticed, once the log is exhausted.
 
         Raises
@@ -199,7 +199,7 @@ class Reading:
             feeds.setdefault(self.own_time, []).append("time")
         names = [channel.name for channel in log.channels]
         facts = {**log.facts, **({"comments": "; ".join(log.comments)} if log.comments else {})}
-        return Intake(
+        return LogSummary(
             log=self.entry.name,
             role=self.entry.role,
             format=log.format,

@@ -7,14 +7,15 @@ import numpy as np
 
 from pipeline.errors import NotIdentifiable
 from pipeline.estimators import ESTIMATORS, estimator
-from pipeline.maths import averaging, harmonics
-from pipeline.maths.dynamics import regressor
-from pipeline.maths.smoothing import lowpass as low_passed
-from pipeline.maths.smoothing import motion, stretches
-from pipeline.maths.windows import Chosen, outside
-from pipeline.records import Column, Fit, Note, Prediction, Signal, Trajectory, note
+from pipeline.estimators.regression import MODEL, measured_regressor, pose
+from pipeline.maths.arrays import Booleans
+from pipeline.maths.models.dynamics import regressor
+from pipeline.maths.signals import averaging, harmonics
+from pipeline.maths.signals.smoothing import lowpass as low_passed
+from pipeline.maths.signals.smoothing import segments
+from pipeline.maths.signals.windows import outside
+from pipeline.records import Column, Diagnostic, Fit, Prediction, Signal, Trajectory, diagnostic
 from pipeline.robots.robot import Joint
-from pipeline.stages.fit import MODEL, pose
 from pipeline.study import LogEntry
 
 PARTS = 20  # at most: periods are left out one at a time, or in as many groups
@@ -29,19 +30,19 @@ def run(
     joint: Joint,
     *,
     lowpass: float,
-) -> Iterator[Prediction | Note]:
+) -> Iterator[Prediction | Diagnostic]:
     """One Prediction per fit of the joint; the prediction of an identification log comes from refits without it.
 
-    A held joint is not predicted: at standstill friction takes any value up to its Coulomb level.
+    A joint at rest is not predicted: at standstill friction takes any value up to its Coulomb level.
     """
-    if signal.held:
+    if signal.at_rest:
         return
     if entry.role in ("validation", "contact"):
         free = outside(signal.t, entry.contact)
         if not free.any():
             name = f"{signal.log}/{joint.name}"
             said = f"{name}: its contact windows cover the whole log, so nothing is left to score a prediction on"
-            yield note("predict", f"{signal.log}.{joint.name}", "warning", said)
+            yield diagnostic("predict", f"{signal.log}.{joint.name}", "warning", said)
             return
         Phi = measured_regressor(signal, joint, lowpass)
         for fit in fits:
@@ -56,23 +57,9 @@ def run(
             yield from without_a_period(signal, trajectory, joint, lowpass)
 
 
-def measured_regressor(signal: Signal, joint: Joint, lowpass: float) -> Column:
-    """Phi (N, p) of a recording that need not repeat, from low-passed motion."""
-    rows = []
-    for part in stretches(signal.stretch):
-        rows.append(regressor(joint.terms, *motion_of(signal, part, lowpass)))
-    return np.vstack(rows)
-
-
-def motion_of(signal: Signal, part: slice, lowpass: float) -> tuple[Column, Column, Column]:
-    """Low-passed position, velocity and acceleration of one stretch of a recording."""
-    dq = signal.dq[part] if signal.velocity == "logged" else None
-    return motion(signal.q[part], dq, signal.rate, lowpass)
-
-
 def without_the_log(
     signal: Signal, own: Trajectory, others: Sequence[Trajectory], joint: Joint, lowpass: float
-) -> Iterator[Prediction | Note]:
+) -> Iterator[Prediction | Diagnostic]:
     """Predict a log from fits to the other identification logs."""
     part = at(signal, whole(signal, own))
     Phi = regressor(joint.terms, *motion_at(own, part.t - signal.t[0]))
@@ -86,7 +73,9 @@ def without_the_log(
         yield scored(part, MODEL, name, "leave one log out", Phi @ theta, everywhere, lowpass)
 
 
-def without_a_period(signal: Signal, own: Trajectory, joint: Joint, lowpass: float) -> Iterator[Prediction | Note]:
+def without_a_period(
+    signal: Signal, own: Trajectory, joint: Joint, lowpass: float
+) -> Iterator[Prediction | Diagnostic]:
     """Predict each period of a log from fits to the other periods; only the effort is left out, not the path."""
     part = at(signal, whole(signal, own))
     since = part.t - signal.t[0]
@@ -108,19 +97,19 @@ def without_a_period(signal: Signal, own: Trajectory, joint: Joint, lowpass: flo
         yield scored(part, MODEL, name, "leave one period out", predicted, np.ones(len(since), dtype=bool), lowpass)
 
 
-def not_predicted(signal: Signal, name: str, error: NotIdentifiable) -> Note:
+def not_predicted(signal: Signal, name: str, error: NotIdentifiable) -> Diagnostic:
     """Why an estimator has no leave-out score."""
     about = f"{signal.log}/{signal.joint}"
     said = f"{about}: {name} has no leave-out score, because a refit is not possible: {error}"
-    return note("predict", f"{signal.log}.{signal.joint}", "note", said)
+    return diagnostic("predict", f"{signal.log}.{signal.joint}", "note", said)
 
 
-def whole(signal: Signal, own: Trajectory) -> Chosen:
+def whole(signal: Signal, own: Trajectory) -> Booleans:
     """Which samples belong to whole periods."""
     return signal.t - float(signal.t[0]) < own.periods * own.period - 0.5 / signal.rate
 
 
-def at(signal: Signal, which: Chosen) -> Signal:
+def at(signal: Signal, which: Booleans) -> Signal:
     """Some of the samples of a signal."""
     columns = {name: getattr(signal, name)[which] for name in signal.columns()}
     return replace(signal, **columns)
@@ -137,13 +126,13 @@ def motion_at(own: Trajectory, since: Column) -> tuple[Column, Column, Column]:
 
 
 def scored(
-    signal: Signal, model: str, name: str, scheme: str, tau_hat: Column, free: Chosen, lowpass: float
+    signal: Signal, model: str, name: str, scheme: str, tau_hat: Column, free: Booleans, lowpass: float
 ) -> Prediction:
     """A prediction with its scores, over the samples where nothing touched the robot."""
     tau, error = signal.tau[free], (signal.tau - tau_hat)[free]
     spread = tau - tau.mean()
     smooth, smooth_error = (
-        np.concatenate([low_passed(x[part], signal.rate, lowpass) for part in stretches(signal.stretch)])[free]
+        np.concatenate([low_passed(x[part], signal.rate, lowpass) for part in segments(signal.segment)])[free]
         for x in (signal.tau, signal.tau - tau_hat)
     )
     rmse = float(np.sqrt(np.mean(error**2)))

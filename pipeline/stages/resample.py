@@ -6,50 +6,50 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import BadLog
-from pipeline.maths.clock import GAP
-from pipeline.maths.smoothing import lowpass as lowpass_of
-from pipeline.maths.smoothing import motion, stretches
-from pipeline.records import Column, Note, Recording, Signal, note
+from pipeline.maths.signals.clock import GAP
+from pipeline.maths.signals.smoothing import lowpass as lowpass_of
+from pipeline.maths.signals.smoothing import motion, segments
+from pipeline.records import Column, Diagnostic, Recording, Signal, diagnostic
 from pipeline.robots.robot import Joint
 
 Indices = NDArray[np.intp]
 
 EVEN = 0.02  # of a sampling time: clocks that stray less than this from a uniform one are taken as uniform
-HELD = 0.01  # share of a joint's range, or of 1 rad or 1 m where it has no limits, below which it is held
+AT_REST = 0.01  # share of a joint's range, or of 1 rad or 1 m where it has no limits, below which it is at rest
 SLOW = 5.0  # [Hz] below which a logged velocity is compared with that of the position
 AGREES = 0.1  # how far their ratio may be from 1
-FEWEST = 4  # samples that a cubic spline needs; a shorter stretch is left out
+FEWEST = 4  # samples that a cubic spline needs; a shorter segment is left out
 
 
-def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signal | Note]:
-    """One Signal per recording.  Gaps start a new stretch; nothing is ever interpolated across one.
+def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signal | Diagnostic]:
+    """One Signal per recording.  Gaps start a new segment; nothing is ever interpolated across one.
 
     Raises
     ------
     BadLog
-        If no stretch between gaps holds more than a few samples.
+        If no segment between gaps holds more than a few samples.
     """
     T_s = float(np.median(np.diff(recording.t)))
     cuts = np.flatnonzero(np.diff(recording.t) > GAP * T_s) + 1
     parts = [p for p in np.split(np.arange(len(recording.t)), cuts) if len(p) >= FEWEST]
     if not parts:
-        raise BadLog(f"{recording.log}/{recording.joint}: no stretch without a gap holds {FEWEST} samples")
+        raise BadLog(f"{recording.log}/{recording.joint}: no segment without a gap holds {FEWEST} samples")
     if is_even(recording.t, parts, T_s):
-        # The mean over the longest stretch; a median would carry the rounding of the time stamps.
+        # The mean over the longest segment; a median would carry the rounding of the time stamps.
         longest = max(parts, key=len)
         T_s = float((recording.t[longest[-1]] - recording.t[longest[0]]) / (len(longest) - 1))
         clocks, method = [recording.t[p] for p in parts], "as recorded"
     else:
         clocks, method = (
             [uniform(recording.t[p], T_s) for p in parts],
-            "cubic spline through the samples of each stretch",
+            "cubic spline through the samples of each segment",
         )
     columns = [on_clock(recording, p, clock, method) for p, clock in zip(parts, clocks, strict=True)]
     q, dq, tau = (np.concatenate(column) for column in zip(*columns, strict=True))
-    stretch = np.repeat(np.arange(len(parts)), [len(c) for c in clocks])
+    segment = np.repeat(np.arange(len(parts)), [len(c) for c in clocks])
     if recording.velocity == "derived":
-        dq = np.concatenate([motion(q[part], None, 1 / T_s, lowpass)[1] for part in stretches(stretch)])
-    held = not moves(q, joint)
+        dq = np.concatenate([motion(q[part], None, 1 / T_s, lowpass)[1] for part in segments(segment)])
+    at_rest = not moves(q, joint)
     yield Signal(
         log=recording.log,
         joint=recording.joint,
@@ -58,35 +58,33 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
         method=method,
         velocity=recording.velocity,
         gaps=len(parts) - 1,
-        held=int(held),
+        at_rest=int(at_rest),
         t=np.concatenate(clocks),
         q=q,
         dq=dq,
         tau=tau,
-        stretch=stretch,
+        segment=segment,
     )
     yield from remarks(recording, method, cuts, sum(map(len, parts)))
-    wrong = [] if held else disagreement(recording, q, dq, stretch, 1.0 / T_s)
+    wrong = [] if at_rest else disagreement(recording, q, dq, segment, 1.0 / T_s)
     if wrong:
-        yield note("resample", f"{recording.log}.{recording.joint}", "warning", *wrong)
+        yield diagnostic("resample", f"{recording.log}.{recording.joint}", "warning", *wrong)
 
 
 def moves(q: Column, joint: Joint) -> bool:
     """Whether a joint moves enough to say anything about its dynamics."""
     low, high = joint.limits.q
-    # Percentiles, so that a single glitch of an encoder does not set a held joint moving.
+    # Percentiles, so that a single glitch of an encoder does not set a joint at rest moving.
     reach = float(np.subtract(*np.percentile(q, [99.0, 1.0])))
-    return reach > HELD * (high - low if np.isfinite(high - low) else 1.0)
+    return reach > AT_REST * (high - low if np.isfinite(high - low) else 1.0)
 
 
-def disagreement(recording: Recording, q: Column, dq: Column, stretch: Indices, rate: float) -> list[str]:
+def disagreement(recording: Recording, q: Column, dq: Column, segment: Indices, rate: float) -> list[str]:
     """Whether a logged velocity is that of the logged position, judged where both are slow enough to compare."""
     if recording.velocity == "derived":
         return []
     cutoff = min(SLOW, 0.1 * rate)
-    pairs = [
-        (motion(q[part], None, rate, cutoff)[1], lowpass_of(dq[part], rate, cutoff)) for part in stretches(stretch)
-    ]
+    pairs = [(motion(q[part], None, rate, cutoff)[1], lowpass_of(dq[part], rate, cutoff)) for part in segments(segment)]
     derived, logged = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
     slope = float(derived @ logged / (derived @ derived))
     if abs(slope - 1) < AGREES:
@@ -98,18 +96,18 @@ def disagreement(recording: Recording, q: Column, dq: Column, stretch: Indices, 
 
 
 def is_even(t: Column, parts: list[Indices], T_s: float) -> bool:
-    """Whether every stretch runs on a uniform clock of its own, to a fraction of a sample."""
+    """Whether every segment runs on a uniform clock of its own, to a fraction of a sample."""
     return all(np.abs(t[p] - np.linspace(t[p[0]], t[p[-1]], len(p))).max() < EVEN * T_s for p in parts)
 
 
 def uniform(t: Column, T_s: float) -> Column:
-    """A uniform clock from the first sample of a stretch, no further than its last."""
+    """A uniform clock from the first sample of a segment, no further than its last."""
     steps = int(np.floor((t[-1] - t[0]) / T_s * (1 + 1e-12)))
     return np.asarray(t[0] + T_s * np.arange(steps + 1))
 
 
 def on_clock(recording: Recording, part: Indices, clock: Column, method: str) -> tuple[Column, ...]:
-    """Position, velocity and effort of one stretch at the times of a clock."""
+    """Position, velocity and effort of one segment at the times of a clock."""
     columns = (recording.q[part], recording.dq[part], recording.tau[part])
     if method == "as recorded":
         return columns
@@ -119,15 +117,15 @@ def on_clock(recording: Recording, part: Indices, clock: Column, method: str) ->
     return tuple(spline(clock).T)
 
 
-def remarks(recording: Recording, method: str, cuts: Indices, kept: int) -> Iterator[Note]:
+def remarks(recording: Recording, method: str, cuts: Indices, kept: int) -> Iterator[Diagnostic]:
     """What was done to the clock, where anything was."""
     name, said = f"{recording.log}/{recording.joint}", []
     if len(cuts):
         where = ", ".join(f"{recording.t[c - 1]:.3f} s" for c in cuts[:5])
         said.append(f"{name}: {len(cuts)} gaps, not bridged, after {where}{' ...' if len(cuts) > 5 else ''}")
     if kept < len(recording):
-        said.append(f"{name}: {len(recording) - kept} samples in stretches of fewer than {FEWEST} were left out")
+        said.append(f"{name}: {len(recording) - kept} samples in segments of fewer than {FEWEST} were left out")
     if method != "as recorded":
         said.append(f"{name}: the clock is uneven, so the samples were put on a uniform one: {method}")
     if said:
-        yield note("resample", f"{recording.log}.{recording.joint}", "note", *said)
+        yield diagnostic("resample", f"{recording.log}.{recording.joint}", "note", *said)

@@ -4,17 +4,17 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.maths.windows import longest_run, settled
-from pipeline.records import Column, Noise, Residual, Track, Whiteness
+from pipeline.maths.signals.windows import longest_run, settled
+from pipeline.records import Column, PeriodResidual, Residual, Track, Whiteness
 
 LAGS = 100  # of the autocorrelation that is shown
 TESTED_LAGS = 20  # of the Ljung-Box statistic
 LEVEL = 0.01  # below this probability a signal is called not white
 
 
-def run(subject: Noise | Residual | Track) -> Iterator[Whiteness]:
+def run(subject: PeriodResidual | Residual | Track) -> Iterator[Whiteness]:
     """What averaging removed, the effort that a fit leaves of a period, and a filter's innovations over its run."""
-    if isinstance(subject, Noise):
+    if isinstance(subject, PeriodResidual):
         signals = {name: getattr(subject, name) for name in ("q_noise", "dq_noise", "tau_noise")}
     elif isinstance(subject, Residual):
         signals = {f"tau.{subject.model}.{subject.estimator}": subject.tau - subject.tau_hat}

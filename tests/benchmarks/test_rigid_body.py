@@ -6,7 +6,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from pipeline.maths import rigid_body
+from pipeline.maths.mechanics import rigid_body
 from pipeline.robots.davinci_chain import BODIES, CHAIN
 from tests.robot.pinocchio_arm import tree
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import pytest
 
 from pipeline.simulation import closed_loop
-from pipeline.simulation.scenario_file import load
+from pipeline.simulation.scenario.reading import load
 
 AT_LEAST = 50.0  # times faster than real time, with the wrist fixed
 

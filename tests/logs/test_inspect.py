@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 from pipeline.commands import inspect
-from pipeline.maths.outline import Outline
+from pipeline.maths.signals.outline import Outline
 from tests.logs.lvm_writer import Style, Write, lvm
 
 

@@ -13,7 +13,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
 from pipeline.errors import BadLog
-from pipeline.logs import blocks, tdms_samples, tdms_walk
+from pipeline.logs import blocks
+from pipeline.logs.tdms import samples as tdms_samples
+from pipeline.logs.tdms import walk as tdms_walk
 from tests.logs.cutting import is_cut_honestly
 from tests.logs.reading import read
 from tests.logs.tdms_writer import KINDS, segment

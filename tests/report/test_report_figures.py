@@ -15,11 +15,11 @@ import pytest
 from matplotlib.text import Text
 from report_documents import HOSTILE, still, zoomable
 
-from pipeline.report import html, pdf
 from pipeline.report.content import Document, Figure, Figure3D, Histogram, Line, Panel, walk
-from pipeline.report.figures import STYLE, draw, svg
-from pipeline.report.panels import wrapped
-from pipeline.report.ticks import power
+from pipeline.report.figures.panels import wrapped
+from pipeline.report.figures.svg import STYLE, draw, svg
+from pipeline.report.figures.ticks import power
+from pipeline.report.writers import html, pdf
 
 
 def test_every_mark_is_drawn_into_well_formed_svg_of_the_width_of_the_page(full: Document) -> None:
@@ -91,7 +91,7 @@ def test_a_figure_of_a_million_samples_stays_small() -> None:
 
 def test_another_process_gives_the_same_bytes(full: Document) -> None:
     program = (
-        "import hashlib; from report_documents import document; from pipeline.report import html, pdf; d = document();"
+        "import hashlib; from report_documents import document; from pipeline.report.writers import html, pdf; d = document();"
         "[print(hashlib.sha256(w.render(d)).hexdigest()) for w in (pdf, html)]"
     )
     path = os.pathsep.join([str(Path(__file__).parent), str(Path(__file__).parents[2])])
@@ -104,7 +104,7 @@ def test_another_process_gives_the_same_bytes(full: Document) -> None:
 
 def test_importing_the_content_imports_no_drawing_catalogue() -> None:
     program = (
-        "import sys; from pipeline.report import content, html, pdf; "
+        "import sys; from pipeline.report import content; from pipeline.report.writers import html, pdf; "
         "print([n for n in ('matplotlib', 'bokeh', 'typst', 'jinja2', 'pandas') if n in sys.modules])"
     )
     root = str(Path(__file__).parents[2])

@@ -17,9 +17,9 @@ import numpy as np
 import pytest
 from report_documents import HOSTILE, document, zoomable
 
-from pipeline.report import html
 from pipeline.report.content import Document, Equation, Prose, Section
-from pipeline.report.typesetting import NotTypeset
+from pipeline.report.writers import html
+from pipeline.report.writers.typesetting import NotTypeset
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 

@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.report import pdf
 from pipeline.report.content import Document, Equation, Number, Prose, Section, Table
-from pipeline.report.layout import place, references
-from pipeline.report.typesetting import NotTypeset, typeset
+from pipeline.report.content.layout import place, references
+from pipeline.report.writers import pdf
+from pipeline.report.writers.typesetting import NotTypeset, typeset
 
 poppler = pytest.mark.skipif(shutil.which("pdftotext") is None, reason="no pdftotext on the path to read the PDF with")
 MILLIMETRE = 72 / 25.4

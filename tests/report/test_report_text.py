@@ -5,10 +5,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline.report.content import Document, Equation, Number, Prose, Section, Table, literal, numbers
-from pipeline.report.inline import Span, parse, printable
-from pipeline.report.layout import place, references
-from pipeline.report.tables import columns
-from pipeline.report.widths import BREAK, PAGE, breakable, fit
+from pipeline.report.content.inline import Span, parse, printable
+from pipeline.report.content.layout import place, references
+from pipeline.report.content.tables import columns
+from pipeline.report.writers.widths import BREAK, PAGE, breakable, fit
 
 anything = st.text(st.one_of(st.sampled_from("\\$`*[]@a "), st.characters()))
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from report_documents import zoomable
 
 from pipeline.report.content import Band, Figure, Line, Panel, Points
-from pipeline.report.traces import envelope, thin, thinned
+from pipeline.report.figures.traces import envelope, thin, thinned
 
 
 @given(st.integers(0, 2**31), st.integers(2, 3000), st.integers(1, 200))

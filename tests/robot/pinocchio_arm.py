@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pipeline.maths.bodies import Bodies
-from pipeline.maths.kinematics import HELD, Chain
+from pipeline.maths.mechanics.bodies import Bodies
+from pipeline.maths.mechanics.kinematics import FIXED, Chain
 
 
 class Tree(NamedTuple):
@@ -29,7 +29,7 @@ def tree(pin: Any, chain: Chain, bodies: Bodies, n: int) -> Tree:
         c, s = np.cos(chain.alpha[i]), np.sin(chain.alpha[i])
         after = pin.SE3(np.array([[1, 0, 0], [0, c, -s], [0, s, c]]), np.array([chain.a[i], 0, 0]))
         carrier, local = place[parent]
-        if chain.coordinate[i] == HELD:
+        if chain.coordinate[i] == FIXED:
             joint, at = carrier, local * before * after
         else:
             kind = pin.JointModelPZ() if chain.slides[i] else pin.JointModelRZ()

@@ -7,11 +7,11 @@ import pytest
 from numba import njit
 from scipy.integrate import solve_ivp
 
-from pipeline.maths import rigid_body, rigid_body_kernels, rigid_body_link, rigid_body_sample, samples
-from pipeline.maths.terms import GRAVITY
+from pipeline.maths.constants import GRAVITY
+from pipeline.maths.mechanics import lanes, link, rigid_body, sample, samples
 from pipeline.robots.davinci_chain import BODIES, CHAIN
 
-N = 2 * rigid_body_kernels.LANES + 5  # two full blocks and one that is not
+N = 2 * lanes.LANES + 5  # two full blocks and one that is not
 SIZES = pytest.mark.parametrize("n", [3, 6, 7])
 
 
@@ -65,14 +65,14 @@ def test_samples_may_have_any_leading_axes_and_any_order_in_memory(compiled):
 
 @SIZES
 def test_one_sample_s_mass_matrix_and_bias_come_out_of_compiled_code(n):
-    arm = rigid_body_kernels.pack(CHAIN, BODIES, n)
-    mass_and_bias = rigid_body_sample.mass_and_bias
+    arm = lanes.pack(CHAIN, BODIES, n)
+    mass_and_bias = sample.mass_and_bias
 
     @njit
     def step(arm, q, dq, M, bias, work):
         mass_and_bias(arm, GRAVITY, q, dq, M, bias, work)
 
-    M, bias, work = np.empty((n, n)), np.empty(n), rigid_body_sample.work(arm)
+    M, bias, work = np.empty((n, n)), np.empty(n), sample.work(arm)
     for q, dq in motions(n)[:2].swapaxes(0, 1)[:5]:
         step(arm, q, dq, M, bias, work)
         np.testing.assert_allclose(M, rigid_body.mass_matrix(CHAIN, BODIES, q), rtol=0, atol=1e-13)
@@ -81,11 +81,11 @@ def test_one_sample_s_mass_matrix_and_bias_come_out_of_compiled_code(n):
 
 
 def test_an_arm_of_six_joints_that_falls_freely_keeps_its_energy():
-    arm, M, bias = rigid_body_kernels.pack(CHAIN, BODIES, 6), np.empty((6, 6)), np.empty(6)
-    work = rigid_body_sample.work(arm)
+    arm, M, bias = lanes.pack(CHAIN, BODIES, 6), np.empty((6, 6)), np.empty(6)
+    work = sample.work(arm)
 
     def rates(_, x):
-        rigid_body_sample.mass_and_bias(arm, GRAVITY, x[:6].copy(), x[6:].copy(), M, bias, work)
+        sample.mass_and_bias(arm, GRAVITY, x[:6].copy(), x[6:].copy(), M, bias, work)
         return np.concatenate([x[6:], np.linalg.solve(M, -bias)])
 
     start = np.concatenate(motions(6, 0.5)[:2, 0])
@@ -99,7 +99,7 @@ def test_cosine_and_sine_are_those_of_the_library_in_every_quadrant():
     def both(x):
         c, s = np.empty(len(x)), np.empty(len(x))
         for i in range(len(x)):
-            c[i], s[i] = rigid_body_link.cosine_sine(x[i])
+            c[i], s[i] = link.cosine_sine(x[i])
         return c, s
 
     near = np.arange(-9, 10) * np.pi / 4  # where quadrants meet
@@ -111,9 +111,9 @@ def test_cosine_and_sine_are_those_of_the_library_in_every_quadrant():
 
 def test_links_that_are_held_for_good_become_part_of_those_that_carry_them():
     for n, links in ((3, 6), (6, 9), (7, 10)):
-        assert len(rigid_body_kernels.pack(CHAIN, BODIES, n).parent) == links
-    assert len(rigid_body_kernels.pack(CHAIN, BODIES, 3, fold=False).parent) == 10
-    total = rigid_body_kernels.pack(CHAIN, BODIES, 3).links[:, 6].sum()
+        assert len(lanes.pack(CHAIN, BODIES, n).parent) == links
+    assert len(lanes.pack(CHAIN, BODIES, 3, fold=False).parent) == 10
+    total = lanes.pack(CHAIN, BODIES, 3).links[:, 6].sum()
     assert total == pytest.approx(BODIES.counted(3).masses.sum())
 
 
@@ -122,9 +122,9 @@ def test_compiled_code_that_is_older_than_the_physics_it_holds_is_dropped(tmp_pa
         class stats:  # noqa: N801
             cache_path = str(tmp_path)
 
-        py_func = rigid_body_kernels.forget_older
+        py_func = lanes.forget_older
 
-    newest = max(os.path.getmtime(m.__file__) for m in (rigid_body_link, rigid_body_kernels))
+    newest = max(os.path.getmtime(m.__file__) for m in (link, lanes))
     stale, current, other = (
         tmp_path / f"m.{name}-1.py311.nbi" for name in (Kernel.py_func.__name__, f"{Kernel.py_func.__name__}", "other")
     )
@@ -132,7 +132,7 @@ def test_compiled_code_that_is_older_than_the_physics_it_holds_is_dropped(tmp_pa
     for file, age in ((stale, -10), (current, 10), (other, -10)):
         file.touch()
         os.utime(file, (newest + age, newest + age))
-    rigid_body_kernels.forget_older(Kernel)
+    lanes.forget_older(Kernel)
     assert not stale.exists()
     assert current.exists()
     assert other.exists()

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.maths import kinematics, workspace
+from pipeline.maths.mechanics import kinematics, workspace
 from pipeline.robots.davinci import ROBOT
 from pipeline.robots.davinci_chain import CHAIN
 from tests.robot import thesis_matrices as thesis

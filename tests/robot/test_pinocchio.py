@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.maths import kinematics, rigid_body
+from pipeline.maths.mechanics import kinematics, rigid_body
 from pipeline.robots.davinci_chain import BODIES, CHAIN
 from tests.robot.pinocchio_arm import tree
 

@@ -5,10 +5,10 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pytest
 
-from pipeline.maths.bodies import Bodies
-from pipeline.maths.drives import Drives
-from pipeline.maths.kinematics import Chain
-from pipeline.maths.reduced_joint import reduced_parameters
+from pipeline.maths.mechanics.bodies import Bodies
+from pipeline.maths.mechanics.drives import Drives
+from pipeline.maths.mechanics.kinematics import Chain
+from pipeline.maths.models.reduced_joint import reduced_parameters
 from pipeline.robots.davinci import ROBOT
 from pipeline.robots.davinci_chain import BODIES, CHAIN, DRIVES, GUESSED_LC5, bodies
 

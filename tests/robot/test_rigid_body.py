@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pipeline.maths import rigid_body
-from pipeline.maths.bodies import from_parameters
-from pipeline.maths.drives import Drives, seen_at_joint
+from pipeline.maths.mechanics import rigid_body
+from pipeline.maths.mechanics.bodies import from_parameters
+from pipeline.maths.mechanics.drives import Drives, seen_at_joint
 from pipeline.robots.davinci_chain import BODIES, CHAIN, DRIVES
 from tests.robot import thesis_matrices as thesis
 

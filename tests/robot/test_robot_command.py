@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from pipeline.cli import guarded
 from pipeline.commands import robot
 from pipeline.errors import BadRequest, BadRobot
-from pipeline.maths import kinematics, rigid_body, workspace
+from pipeline.maths.mechanics import kinematics, rigid_body, workspace
 from pipeline.robots.davinci_chain import BODIES, CHAIN
 
 KEYS = ["frames", "tip", "jacobian_v", "jacobian_w", "mass", "coriolis", "gravity", "condition", "warnings"]

@@ -6,18 +6,18 @@ from functools import cache
 import numpy as np
 import pytest
 
-from pipeline.maths import kinematics
-from pipeline.maths.control import Regulator
-from pipeline.maths.dynamics import regressor
-from pipeline.maths.rigid_body import gravity
-from pipeline.maths.simulation import Body, Timing, simulate
-from pipeline.maths.simulation_forces import nothing
-from pipeline.maths.simulation_plant import arm
+from pipeline.maths.mechanics import kinematics
+from pipeline.maths.mechanics.rigid_body import gravity
+from pipeline.maths.models.dynamics import regressor
+from pipeline.maths.simulation.closed_loop import JointConstraints, Timing, simulate
+from pipeline.maths.simulation.control import Regulator
+from pipeline.maths.simulation.plant import arm
+from pipeline.maths.simulation.surroundings import nothing
 from pipeline.simulation import closed_loop
-from pipeline.simulation.motion import Run
-from pipeline.simulation.scenario import BadScenario, Path, Scenario, SimulatedLog
-from pipeline.simulation.scenario_file import load
-from pipeline.simulation.truth_words import touched
+from pipeline.simulation.motion import SimulatedRun
+from pipeline.simulation.scenario.reading import load
+from pipeline.simulation.scenario.scenario import BadScenario, Path, Scenario, SimulatedLog
+from pipeline.simulation.truth_toml import touched
 
 G = 9.81
 SLIDE = "instrument_slide"
@@ -32,7 +32,7 @@ def log(name: str, **changes) -> SimulatedLog:
     return replace(next(entry for entry in scenario().logs if entry.name == name), **changes)
 
 
-def run(entry: SimulatedLog) -> Run:
+def run(entry: SimulatedLog) -> SimulatedRun:
     return closed_loop.run(scenario(), entry)
 
 
@@ -152,7 +152,7 @@ def test_pd_with_gravity_compensation_at_a_controllers_rate_comes_to_rest_at_its
     n = 3
     none = what.families["matched"].friction._replace(**{f"coulomb_{d}": np.zeros(n) for d in ("up", "down")})
     none = none._replace(static_up=np.zeros(n), static_down=np.zeros(n))
-    body = Body(none, np.full(n, -1.0), np.full(n, 1.0), np.ones(n, bool))
+    body = JointConstraints(none, np.full(n, -1.0), np.full(n, 1.0), np.ones(n, bool))
     plant = arm(robot.chain, robot.bodies, what.motors.gear_ratio**2 * what.rotors)
     goal = np.array([-np.pi / 8, np.pi / 8, 0.1])
     law = Regulator(np.full(n, 500.0), np.array([50.0, 50.0, 40.0]), np.zeros(n), 1.0)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pipeline.maths.control import Motors, Regulator, current_after, pi
-from pipeline.maths.simulation_continuous import Regulated, regulate
-from pipeline.maths.simulation_plant import arm
+from pipeline.maths.simulation.continuous import Regulated, regulate
+from pipeline.maths.simulation.control import Motors, Regulator, current_after, pi
+from pipeline.maths.simulation.plant import arm
 from pipeline.robots.davinci import ROBOT
 
 K_P = np.array([500, 500, 500, 10, 10, 1.0])  # Table 5.1
@@ -56,7 +56,7 @@ def test_the_lyapunov_function_falls_by_what_damping_takes():
 
 
 def test_a_compensator_that_knows_nine_tenths_of_the_masses_leaves_pd_with_the_offset_of_the_tenth():
-    from pipeline.maths.rigid_body import gravity
+    from pipeline.maths.mechanics.rigid_body import gravity
 
     run = study(False, 0.9, "rest", 60.0)
     expected = 0.1 * gravity(ROBOT.chain, ROBOT.bodies, run.q[-1]) / K_P

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.maths.excitation import Fourier, condition, determinant, instants, motion, observation, ranges
-from pipeline.maths.excitation_design import Problem, design, impossible, within
-from pipeline.maths.terms import inertia, stiffness
+from pipeline.maths.excitation.fourier import Fourier, condition, determinant, instants, motion, observation, ranges
+from pipeline.maths.excitation.joint import ExcitationProblem, design, impossible, within
+from pipeline.maths.models.terms import inertia, stiffness
 from pipeline.robots.davinci import ROBOT
 
 TABLE_6_1 = {  # with b1 of hand roll corrected; f as printed, and for hand roll as that correction gives it
@@ -25,10 +25,10 @@ series_of = st.builds(
 )  # fmt: skip
 
 
-def problem(name: str, criterion: str = "determinant") -> Problem:
+def problem(name: str, criterion: str = "determinant") -> ExcitationProblem:
     joint = ROBOT.joint(name)
     limits = (joint.limits.q, joint.limits.dq, joint.limits.ddq)
-    return Problem(joint.terms, limits, TABLE_6_1[name][1], joint.harmonics, criterion)
+    return ExcitationProblem(joint.terms, limits, TABLE_6_1[name][1], joint.harmonics, criterion)
 
 
 @given(series_of)
@@ -110,7 +110,7 @@ def test_the_same_seed_designs_the_same_trajectory():
 
 @given(series_of)
 def test_a_shrunk_trajectory_keeps_every_limit(series):
-    asked = Problem((inertia,), ((-0.3, 0.5), (-1.0, 0.2), (-np.inf, 2.0)), series.period, len(series.a))
+    asked = ExcitationProblem((inertia,), ((-0.3, 0.5), (-1.0, 0.2), (-np.inf, 2.0)), series.period, len(series.a))
     for (low, high), (lowest, highest) in zip(asked.limits, ranges(within(asked, series)), strict=True):
         assert low <= lowest
         assert highest <= high
@@ -128,10 +128,10 @@ def test_a_shrunk_trajectory_keeps_every_limit(series):
 def test_limits_that_no_periodic_motion_keeps_are_refused_with_the_reason(limits, says):
     assert says in impossible(limits)
     with pytest.raises(ValueError, match=says):
-        design(Problem((inertia,), limits, 10.0, 2), 1, 0)
+        design(ExcitationProblem((inertia,), limits, 10.0, 2), 1, 0)
 
 
 def test_terms_that_no_trajectory_tells_apart_are_named():
     # with one harmonic about a fixed centre of zero, the acceleration is -w^2 times the position
     with pytest.raises(ValueError, match="inertia, stiffness, stiffness"):
-        design(Problem((inertia, stiffness, stiffness), ((-1, 1), (-1, 1), (-1, 1)), 10.0, 1), 1, 0)
+        design(ExcitationProblem((inertia, stiffness, stiffness), ((-1, 1), (-1, 1), (-1, 1)), 10.0, 1), 1, 0)

@@ -3,19 +3,19 @@
 import numpy as np
 import pytest
 
-from pipeline.maths.excitation import Fourier, determinant, instants, motion
-from pipeline.maths.excitation_arm import ArmProblem, arm_observation, arm_problem, design_together
-from pipeline.maths.excitation_arm import _cost as cost
-from pipeline.maths.excitation_design import Problem, design
-from pipeline.maths.rigid_body import inverse_dynamics
+from pipeline.maths.excitation.arm import ArmExcitationProblem, arm_observation, arm_problem, design_together
+from pipeline.maths.excitation.arm import _cost as cost
+from pipeline.maths.excitation.fourier import Fourier, determinant, instants, motion
+from pipeline.maths.excitation.joint import ExcitationProblem, design
+from pipeline.maths.mechanics.rigid_body import inverse_dynamics
 from pipeline.robots.davinci import ROBOT
 
 LIMITS = {joint.name: (joint.limits.q, joint.limits.dq, joint.limits.ddq) for joint in ROBOT.joints}
 
 
 @pytest.fixture(scope="module")
-def arm() -> ArmProblem:
-    joints = [Problem(joint.terms, LIMITS[joint.name], 8.0, 2, samples=60) for joint in ROBOT.joints]
+def arm() -> ArmExcitationProblem:
+    joints = [ExcitationProblem(joint.terms, LIMITS[joint.name], 8.0, 2, samples=60) for joint in ROBOT.joints]
     return arm_problem(ROBOT.chain, joints)
 
 

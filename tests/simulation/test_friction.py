@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.maths.friction import Friction, bristle, level, steady
+from pipeline.maths.simulation.friction import Friction, bristle, level, steady
 
 ONE = np.ones(1)
 

@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 
 from pipeline import robots
-from pipeline.maths.control import Regulator
+from pipeline.maths.simulation.control import Regulator
 from pipeline.robots.davinci import ROBOT
-from pipeline.simulation.scenario import BadScenario, Path
-from pipeline.simulation.scenario_file import load, shipped
+from pipeline.simulation.scenario.reading import load, shipped
+from pipeline.simulation.scenario.scenario import BadScenario, Path
 
 GOOD = """
 title = "A roll"
@@ -31,7 +31,7 @@ external.hand_roll = [ { shape = "triangle", start = 2.0, end = 4.0, peak = 1.0 
 
 
 def shipped_text(name: str) -> str:
-    return files("pipeline.simulation").joinpath(f"scenarios/{name}.toml").read_text(encoding="utf-8")
+    return files("pipeline.simulation").joinpath(f"shipped/{name}.toml").read_text(encoding="utf-8")
 
 
 def read(tmp_path, text: str):

@@ -9,17 +9,16 @@ import typer
 from scipy.signal import lfilter
 from typer.testing import CliRunner
 
-from pipeline import study_file
 from pipeline.commands import simulate
 from pipeline.errors import BadRequest
 from pipeline.logs import open_log
-from pipeline.maths.dynamics import regressor
-from pipeline.maths.excitation import motion
+from pipeline.maths.excitation.fourier import motion
+from pipeline.maths.models.dynamics import regressor
 from pipeline.simulation import study_folder
-from pipeline.simulation.laboratory import drift, generator, stepped
-from pipeline.simulation.scenario import Noise
-from pipeline.simulation.scenario_file import load
-from pipeline.study import Study
+from pipeline.simulation.scenario.reading import load
+from pipeline.simulation.scenario.scenario import SensorNoise
+from pipeline.simulation.sensors import drift, generator, stepped
+from pipeline.study import Study, reading
 
 app = typer.Typer()
 app.command()(simulate.run)
@@ -73,7 +72,7 @@ def channels(study: Study, name: str) -> dict[str, np.ndarray]:
 
 
 def test_the_study_is_valid_complete_labelled_and_small(demo):
-    study = study_file.read(demo)
+    study = reading.read(demo)
     assert study.simulated
     assert not study.absent()
     assert {entry.role for entry in study.logs} == {"identification", "validation", "contact"}
@@ -85,7 +84,7 @@ def test_the_study_is_valid_complete_labelled_and_small(demo):
 
 def test_the_contact_windows_of_the_study_are_the_pushes_of_the_truth(demo):
     truth = {entry["name"]: entry for entry in tomllib.loads((demo / "truth.toml").read_text())["log"]}
-    for entry in study_file.read(demo).logs:
+    for entry in reading.read(demo).logs:
         pushes = truth[entry.name].get("push", [])
         assert list(entry.contact) == [(push["start"], push["end"]) for push in pushes]
         assert bool(pushes) == (entry.role == "contact")
@@ -96,7 +95,7 @@ def test_the_contact_windows_of_the_study_are_the_pushes_of_the_truth(demo):
     [("roll", "hand_roll", 1.0), ("pitch", "hand_pitch", 1e-3), ("slide", "instrument_slide", 1.0)],
 )
 def test_least_squares_on_the_excitation_gives_the_truth_within_its_standard_errors(demo, name, joint, size):
-    study, truth = study_file.read(demo), tomllib.loads((demo / "truth.toml").read_text())["theta"][joint]
+    study, truth = reading.read(demo), tomllib.loads((demo / "truth.toml").read_text())["theta"][joint]
     it, columns = study.robot.joint(joint), channels(study, f"{name}-excitation")
     log = next(entry for entry in load("davinci-joints").logs if entry.name == f"{name}-excitation")
     tau = columns[f"{joint}.i"] * size * it.gear_ratio * it.torque_constant
@@ -111,7 +110,7 @@ def test_least_squares_on_the_excitation_gives_the_truth_within_its_standard_err
 
 def test_every_way_of_recording_says_the_same_motion(tmp_path):
     study_folder.write(load(str(short(tmp_path))), tmp_path / "out", False, lambda _: None)
-    study = study_file.read(tmp_path / "out")
+    study = reading.read(tmp_path / "out")
     w = 2 * np.pi / 5
     t = np.arange(500) / 100
     q = 0.1 / w * np.sin(w * t) - 0.2 / w * np.cos(w * t)
@@ -195,7 +194,7 @@ def test_a_converter_gives_whole_steps():
 
 
 def test_drift_has_its_deviation_and_its_correlation():
-    noise = Noise(drift=0.4, correlation=0.5)
+    noise = SensorNoise(drift=0.4, correlation=0.5)
     x = drift(noise, 100.0, 200_000, np.random.default_rng(3))
     pole = np.exp(-1 / 50)
     independent = 200_000 * (1 - pole) / (1 + pole)  # as many samples as tell something new

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from pipeline.maths import kinematics, rigid_body
-from pipeline.maths.simulation_continuous import at
-from pipeline.maths.simulation_plant import arm
+from pipeline.maths.mechanics import kinematics, rigid_body
+from pipeline.maths.simulation.continuous import at
+from pipeline.maths.simulation.plant import arm
 from pipeline.robots.davinci import ROBOT
 
 random = np.random.default_rng(4)

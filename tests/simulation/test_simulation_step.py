@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from pipeline.maths.friction import Friction
-from pipeline.maths.simulation_continuous import at as dynamics
-from pipeline.maths.simulation_plant import arm
-from pipeline.maths.simulation_step import State, middle, step
+from pipeline.maths.simulation.continuous import at as dynamics
+from pipeline.maths.simulation.friction import Friction
+from pipeline.maths.simulation.plant import arm
+from pipeline.maths.simulation.step import State, middle, step
 from pipeline.robots.davinci import ROBOT
 
 G = 9.81

@@ -3,7 +3,19 @@
 section(context: Context) -> Section | None        None where a study has nothing to say on it
 """
 
+from collections.abc import Callable
+from importlib import import_module
+
+from pipeline.report.content import Section
+from pipeline.report.context import Context
+
 SECTIONS = (
     "summary", "recorded", "noise", "identification", "prediction", "filter", "truth", "robot", "control", "excitation",
     "methods", "provenance",
 )  # fmt: skip
+
+
+def writes(name: str) -> Callable[[Context], Section | None]:
+    """What writes the section of that name."""
+    section: Callable[[Context], Section | None] = import_module(f"pipeline.report.sections.{name}").section
+    return section

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from pipeline.records import Track, Whiteness
 from pipeline.report.content import Band, Block, Figure, Line, Panel, Prose, Section, Table, VSpan, literal
 from pipeline.report.context import Context, label, most_telling, title
-from pipeline.report.sections.noise import autocorrelation
+from pipeline.report.plots import autocorrelation
 
 FIGURES = 9  # tracks that are drawn; the others are in the tables, and all are in the processed files
 
@@ -34,17 +34,17 @@ def intro(tracks: list[Track]) -> Iterator[Prose]:
         "white where the model and the choice fit the data. Whiteness is tested over the whole run but its first "
         "second, contacts and reversals included."
     )
-    moving = sum(not t.held for t in tracks)
+    moving = sum(not t.at_rest for t in tracks)
     if moving > FIGURES:
         yield Prose(
             f"Figures show {FIGURES} of {moving} runs: contacts, weights and tissue first, then validation, then "
             "identification. The others are in the tables, and all of them are in the processed files."
         )
-    held = [f"{title(t.joint)} in {literal(t.log)}" for t in tracks if t.held]
-    if held:
+    at_rest = [f"{title(t.joint)} in {literal(t.log)}" for t in tracks if t.at_rest]
+    if at_rest:
         yield Prose(
-            f"Held joints are in the tables only ({', '.join(held)}): at standstill friction takes any value up to its "
-            "Coulomb level, and external effort up to that level cannot be told from it."
+            f"Joints at rest are in the tables only ({', '.join(at_rest)}): at standstill friction takes any value up "
+            "to its Coulomb level, and external effort up to that level cannot be told from it."
         )
 
 

@@ -19,9 +19,9 @@ from pipeline.report.content import (
     Verdict,
     literal,
 )
-from pipeline.report.context import Context, histogram, label, normal_scores, title
+from pipeline.report.context import Context, label, title
+from pipeline.report.plots import autocorrelation, histogram, normal_scores
 from pipeline.report.results import printed, slug
-from pipeline.report.sections.noise import autocorrelation
 
 NAMES = {"lse": "least squares", "wlse": "weighted least squares"}
 

@@ -4,11 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.records import Average, Noise, Signal, Spectrum, Trajectory, Whiteness
+from pipeline.records import Average, PeriodResidual, Signal, Spectrum, Trajectory, Whiteness
 from pipeline.report.content import (
     Block,
     Figure,
-    HBand,
     Histogram,
     Line,
     Panel,
@@ -16,11 +15,11 @@ from pipeline.report.content import (
     Prose,
     Reference,
     Section,
-    Stems,
     Table,
     literal,
 )
-from pipeline.report.context import Context, histogram, label, normal_scores, title
+from pipeline.report.context import Context, label, title
+from pipeline.report.plots import autocorrelation, histogram, normal_scores
 
 
 def section(context: Context) -> Section | None:
@@ -64,7 +63,10 @@ def blocks(context: Context, averages: list[Average]) -> Iterator[Block]:
 def of_one(context: Context, average: Average) -> Iterator[Block]:
     """The figures of one log and joint."""
     about = {"log": average.log, "joint": average.joint}
-    noises, trajectories = context.catalogue.about(Noise, **about), context.catalogue.about(Trajectory, **about)
+    noises, trajectories = (
+        context.catalogue.about(PeriodResidual, **about),
+        context.catalogue.about(Trajectory, **about),
+    )
     spectra, signals = context.catalogue.about(Spectrum, **about), context.catalogue.about(Signal, **about)
     if not (noises and trajectories and spectra and signals):
         return
@@ -127,7 +129,7 @@ def derivatives(average: Average, trajectory: Trajectory) -> tuple[Panel, Panel]
     )
 
 
-def removed(noise: Noise, whiteness: dict[str, Whiteness]) -> Iterator[Panel]:
+def removed(noise: PeriodResidual, whiteness: dict[str, Whiteness]) -> Iterator[Panel]:
     """Fig 6.7, 6.10 and 6.11."""
     edges, densities, grid, normal = histogram(noise.tau_noise)
     bars = (Histogram(edges, densities, "", "sky"), Line(grid, normal, "normal", "vermillion"))
@@ -141,13 +143,3 @@ def removed(noise: Noise, whiteness: dict[str, Whiteness]) -> Iterator[Panel]:
     )
     if w := whiteness.get("dq_noise"):
         yield autocorrelation(w, "Velocity noise")
-
-
-def autocorrelation(w: Whiteness, heading: str) -> Panel:
-    """An autocorrelation with the band that white noise stays in."""
-    rest = w.acf[1:]
-    marks = (HBand(-w.band, w.band, "95 % band"), Stems(w.lag[1:].astype(float), rest, "", "blue"))
-    # Small ones are drawn large enough to be told from the band, and always on both sides of zero.
-    reach = max(4 * w.band, 0.1)
-    low, high = min(-reach, 1.1 * float(rest.min())), max(reach, min(1.1 * float(rest.max()), 1.0))
-    return Panel(heading, "lag [samples]", "autocorrelation", marks, y_range=(low, high))

@@ -6,7 +6,6 @@ from pipeline.records import Prediction
 from pipeline.report.content import Block, Figure, Line, Panel, Prose, Section, Table, VSpan, literal
 from pipeline.report.context import Context, label, title
 from pipeline.report.results import prediction_key
-from pipeline.report.sections.summary import used_fit
 
 FIGURES = 4  # predictions that are drawn, the worst ones
 
@@ -39,9 +38,7 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     header = ("Log", "Joint", "Fit", "Unseen data", "RMSE", "RMSE over range", "$R^2$", "Relative error")
     yield Table("Prediction of unseen effort.", header, rows, "prediction-table", "llllrrrr")
     drawn = [
-        p
-        for p in predictions
-        if p.role != "identification" and f"{p.model}.{p.estimator}" == used_fit(context, p.joint)
+        p for p in predictions if p.role != "identification" and f"{p.model}.{p.estimator}" == context.used_fit(p.joint)
     ]
     worst = sorted(drawn, key=lambda p: p.r2)[:FIGURES]
     if len(drawn) > FIGURES:

@@ -2,10 +2,9 @@
 
 from dataclasses import asdict
 
-from pipeline.records import Intake
+from pipeline.records import LogSummary
 from pipeline.report.content import Block, Listing, Prose, Section, Table, literal
 from pipeline.report.context import Context
-from pipeline.report.sections.recorded import channels, starts
 
 
 def section(context: Context) -> Section:
@@ -31,7 +30,32 @@ def section(context: Context) -> Section:
             f"{len(provenance.processed)} processed files stand behind this report; their hashes are in results.json."
         )
     )
-    intakes = context.catalogue.all(Intake)
+    intakes = context.catalogue.all(LogSummary)
     if intakes:
         blocks.append(Section("Channels", "channels", (starts(intakes), channels(intakes))))
     return Section("Provenance", "provenance", tuple(blocks))
+
+
+def channels(intakes: list[LogSummary]) -> Table:
+    """What each channel of every log feeds; channels that feed nothing are left out."""
+    rows = tuple(
+        (literal(intake.log), literal(intake.channel[i]), literal(intake.unit[i]) or "–", literal(intake.feeds[i]))
+        for intake in intakes
+        for i, feeds in enumerate(intake.feeds)
+        if feeds
+    )
+    return Table("Channels that feed the analysis.", ("Log", "Channel", "Unit in the log", "Feeds"), rows)
+
+
+def starts(intakes: list[LogSummary]) -> Table:
+    """Files of every log, and when it was started."""
+    rows = tuple(
+        (
+            literal(intake.log),
+            literal(", ".join(intake.files)),
+            f"{literal(intake.started)} ({intake.zone or 'no zone given'})" if intake.started else "–",
+        )
+        for intake in intakes
+    )
+    caption = "Files of the logs, and the date and time of their first samples as they give it."
+    return Table(caption, ("Log", "File", "Started"), rows)

@@ -3,20 +3,20 @@
 from collections.abc import Iterator
 from dataclasses import replace
 
-from pipeline.records import Intake, Note, Signal
+from pipeline.records import Diagnostic, LogSummary, Signal
 from pipeline.report.content import Block, Bullets, Number, Prose, Section, Table, Verdict, literal
 from pipeline.report.context import Context
 
 
 def section(context: Context) -> Section | None:
     """One table over all logs, then each log's channels and remarks."""
-    intakes = context.catalogue.all(Intake)
+    intakes = context.catalogue.all(LogSummary)
     if not intakes:
         return None
     return Section("What was recorded", "recorded", tuple(blocks(context, intakes)))
 
 
-def blocks(context: Context, intakes: list[Intake]) -> Iterator[Block]:
+def blocks(context: Context, intakes: list[LogSummary]) -> Iterator[Block]:
     """The section's content."""
     yield overview(context, intakes)
     clean = [intake for intake in intakes if not remarks(intake)]
@@ -32,7 +32,7 @@ def blocks(context: Context, intakes: list[Intake]) -> Iterator[Block]:
     yield Bullets(tuple(f"clock: {method}; velocity: {words(velocity, context)}" for method, velocity in methods))
     said = [
         literal(text)
-        for note in context.catalogue.all(Note)
+        for note in context.catalogue.all(Diagnostic)
         if note.stage in ("ingest", "resample", "average")
         for text in note.text
     ]
@@ -48,7 +48,7 @@ def words(velocity: str, context: Context) -> str:
     return "as logged" if velocity == "logged" else derived
 
 
-def overview(context: Context, intakes: list[Intake]) -> Table:
+def overview(context: Context, intakes: list[LogSummary]) -> Table:
     """One row per log."""
     rows = tuple(
         (
@@ -68,13 +68,13 @@ def overview(context: Context, intakes: list[Intake]) -> Table:
     return Table("The logs of the study.", header, rows, label="recorded-table", align="lllrrrrrr")
 
 
-def length(context: Context, intake: Intake) -> Number | str:
+def length(context: Context, intake: LogSummary) -> Number | str:
     """The period of a log, without its deviation, which the section on averaging gives."""
     number = context.number(f"period.{intake.log}", 6)
     return number if isinstance(number, str) else replace(number, std=None)
 
 
-def remarks(intake: Intake) -> list[str]:
+def remarks(intake: LogSummary) -> list[str]:
     """What keeps a log from being trusted without a second look."""
     said = list(intake.warnings)
     if intake.dropped:
@@ -84,28 +84,3 @@ def remarks(intake: Intake) -> list[str]:
     if intake.jitter * intake.rate >= 0.1:
         said.append(f"the clock jitters by {intake.jitter * 1e3:.3g} ms")
     return said
-
-
-def channels(intakes: list[Intake]) -> Table:
-    """What each channel of every log feeds; channels that feed nothing are left out."""
-    rows = tuple(
-        (literal(intake.log), literal(intake.channel[i]), literal(intake.unit[i]) or "–", literal(intake.feeds[i]))
-        for intake in intakes
-        for i, feeds in enumerate(intake.feeds)
-        if feeds
-    )
-    return Table("Channels that feed the analysis.", ("Log", "Channel", "Unit in the log", "Feeds"), rows)
-
-
-def starts(intakes: list[Intake]) -> Table:
-    """Files of every log, and when it was started."""
-    rows = tuple(
-        (
-            literal(intake.log),
-            literal(", ".join(intake.files)),
-            f"{literal(intake.started)} ({intake.zone or 'no zone given'})" if intake.started else "–",
-        )
-        for intake in intakes
-    )
-    caption = "Files of the logs, and the date and time of their first samples as they give it."
-    return Table(caption, ("Log", "File", "Started"), rows)

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.records import Fit, Note, Prediction, Track
+from pipeline.records import Diagnostic, Fit, Prediction, Track
 from pipeline.report.content import Block, Bullets, Prose, Section, Table, Verdict, literal
 from pipeline.report.context import Context, title
 from pipeline.report.results import prediction_key
@@ -40,13 +40,13 @@ def blocks(context: Context) -> Iterator[Block]:
     for joint in fitted(context):
         yield from verdicts(context, joint)
     yield table(context)
-    warnings = [literal(text) for note in context.catalogue.all(Note) for text in severe(note)]
+    warnings = [literal(text) for note in context.catalogue.all(Diagnostic) for text in severe(note)]
     if warnings:
         yield Prose("**What to look at.** The analysis itself warned of the following.")
         yield Bullets(tuple(warnings))
 
 
-def severe(note: Note) -> Iterator[str]:
+def severe(note: Diagnostic) -> Iterator[str]:
     """The warnings of a note."""
     yield from (text for severity, text in zip(note.severity, note.text, strict=True) if severity == "warning")
 
@@ -62,15 +62,9 @@ def fitted(context: Context) -> list[str]:
     return list(dict.fromkeys(fit.group for fit in context.catalogue.all(Fit)))
 
 
-def used_fit(context: Context, joint: str) -> str:
-    """`<model>.<estimator>` of the fit that the filter ran with."""
-    own = [f"{fit.model}.{fit.estimator}" for fit in context.catalogue.all(Fit) if fit.group == joint]
-    return context.study.settings.fit if context.study.settings.fit in own else own[0]
-
-
 def verdicts(context: Context, joint: str) -> Iterator[Verdict]:
     """How well the model of a joint predicts, and whether its filter is consistent."""
-    fit = used_fit(context, joint)
+    fit = context.used_fit(joint)
     scored = [p for p in context.catalogue.all(Prediction) if p.joint == joint and f"{p.model}.{p.estimator}" == fit]
     unseen = [p for p in scored if p.scheme != SAME_PATH and (p.role != "contact" or context.study.log(p.log).contact)]
     if unseen:
@@ -82,7 +76,7 @@ def verdicts(context: Context, joint: str) -> Iterator[Verdict]:
             f"**{title(joint)}**: the model explains {r2} of the variance of other periods of the path that it was "
             "fitted to. What it is worth on other paths is not known: add a validation log.",
         )
-    tracks = [track for track in context.catalogue.all(Track) if track.joint == joint and not track.held]
+    tracks = [track for track in context.catalogue.all(Track) if track.joint == joint and not track.at_rest]
     if tracks:
         yield consistency(context, joint, tracks)
 
@@ -127,7 +121,7 @@ def table(context: Context) -> Table:
             (
                 title(track.joint),
                 literal(track.log),
-                f"{track.role}, held" if track.held else track.role,
+                f"{track.role}, at rest" if track.at_rest else track.role,
                 context.number(f"{key}.tau_ext_rms", 3),
                 context.number(f"{key}.nis_mean", 3),
                 "yes" if white else "no",

@@ -9,7 +9,6 @@ from pipeline.records import Fit, Track
 from pipeline.report.content import Block, Figure, Line, Panel, Prose, Section, Table, Verdict, literal
 from pipeline.report.context import Context, label, title
 from pipeline.report.results import slug
-from pipeline.report.sections.summary import used_fit
 
 WORST = 4.0  # standard errors that a parameter may be off before it is called wrong
 SHAPES = {"triangle": ((0.0, 0.0), (0.5, 1.0), (1.0, 0.0)), "pulse": ((0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0))}
@@ -52,7 +51,7 @@ def parameters(context: Context, joint: str, path: tuple[str, ...], theta: dict[
     sha256 = context.provenance.raw.get(f"raw/{context.study.name}/truth.toml", "")
     rows, scores = [], []
     for name, value in theta.items():
-        found = context.results.get(f"fit.{joint}.{used_fit(context, joint)}.{slug(name)}")
+        found = context.results.get(f"fit.{joint}.{context.used_fit(joint)}.{slug(name)}")
         if found is None or not found.std:
             continue
         key = f"truth.{joint}.{slug(name)}"

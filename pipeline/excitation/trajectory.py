@@ -1,0 +1,166 @@
+"""An excitation trajectory for people and for controllers: what is said of it, its table over one period, its plot."""
+
+import io
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from pipeline.errors import BadRequest
+from pipeline.maths.arrays import Array
+from pipeline.maths.excitation.fourier import Fourier, condition, motion, observation, ranges
+from pipeline.maths.excitation.joint import CRITERIA, ExcitationProblem, design
+from pipeline.robots.robot import Joint, Kind
+
+PERIODS = {Kind.REVOLUTE: 10.0, Kind.PRISMATIC: 5.0}  # [s] of Table 6.1
+PLOTS = (".svg", ".png", ".pdf")
+
+
+@dataclass(frozen=True)
+class ExcitationTrajectory:
+    """A trajectory of one joint, and the problem that it solves or is judged by."""
+
+    joint: Joint
+    problem: ExcitationProblem
+    series: Fourier
+
+    @property
+    def objective(self) -> float:
+        """The criterion: -log10 det(F^T F), or log10 of the condition number.  (6.20)"""
+        return CRITERIA[self.problem.criterion](self._F())[0]
+
+    @property
+    def condition(self) -> float:
+        """The condition number of F."""
+        return float(10 ** condition(self._F())[0])
+
+    @property
+    def broken(self) -> list[str]:
+        """The limits that the trajectory does not keep, in words."""
+        names = zip(("q", "dq", "ddq"), ("", "/s", "/s^2"), ranges(self.series), self.problem.limits, strict=True)
+        unit = self.joint.unit("{position}")
+        return [
+            f"{name} goes from {lowest:.4f} to {highest:.4f} {unit}{per}, its limits are {low:g} and {high:g}"
+            for name, per, (lowest, highest), (low, high) in names
+            if lowest < low or highest > high
+        ]
+
+    def facts(self) -> dict[str, Any]:
+        """All that is said of it, in JSON's types."""
+        x, names = self.series.x.tolist(), coefficient_names(len(self.series.a))
+        symbols = ("q", "dq", "ddq")
+        return {
+            "joint": self.joint.name,
+            "criterion": self.problem.criterion,
+            "objective": finite(self.objective),
+            "condition": finite(self.condition),
+            "coefficients": dict(zip(names, x, strict=True)),
+            "period": self.series.period,
+            "samples": self.problem.samples,
+            "ranges": {s: list(r) for s, r in zip(symbols, ranges(self.series), strict=True)},
+            "limits": {s: list(r) for s, r in zip(symbols, self.problem.limits, strict=True)},
+            "within_limits": not self.broken,
+        }
+
+    def _F(self) -> Array:
+        return observation(self.problem.terms, self.series, self.problem.samples)
+
+
+def finite(value: float) -> float | None:
+    """The number, or JSON's null where it is infinite because the trajectory does not tell the terms apart."""
+    return value if math.isfinite(value) else None
+
+
+def coefficient_names(harmonics: int) -> list[str]:
+    """a0, a1, b1, a2, b2, ..."""
+    return ["a0", *(f"{letter}{k}" for k in range(1, harmonics + 1) for letter in "ab")]
+
+
+def problem_of(joint: Joint, period: float | None, harmonics: int | None, criterion: str) -> ExcitationProblem:
+    """What the excitation of a joint is asked for, with its own limits."""
+    limits = (joint.limits.q, joint.limits.dq, joint.limits.ddq)
+    return ExcitationProblem(
+        joint.terms, limits, period or PERIODS[joint.kind], harmonics or joint.harmonics, criterion
+    )
+
+
+def designed(joint: Joint, problem: ExcitationProblem, starts: int, seed: int) -> ExcitationTrajectory:
+    """The best trajectory found.
+
+    Raises
+    ------
+    BadRequest
+        If the limits of the joint cannot be kept, or no trajectory tells its parameters apart.
+    """
+    try:
+        return ExcitationTrajectory(joint, problem, design(problem, starts, seed))
+    except ValueError as error:
+        raise BadRequest(f"{joint.name}: {error}") from None
+
+
+def csv(excitations: Sequence[ExcitationTrajectory], rate: float) -> str:
+    """One period of the trajectories at the controller's rate [Hz]: t, q, dq, ddq, with SI units.
+
+    Raises
+    ------
+    BadRequest
+        If the periods differ, or a period is no whole number of samples.
+    """
+    if not (math.isfinite(rate) and rate > 0):
+        raise BadRequest(f"--rate must be positive, not {rate:g}")
+    period = excitations[0].series.period
+    samples = round(period * rate)
+    if any(e.series.period != period for e in excitations):
+        raise BadRequest("joints that move together need one period; say which with --period")
+    if abs(period * rate - samples) > 1e-9 * samples or samples < 1:
+        raise BadRequest(
+            f"a period of {period:g} s is {period * rate:g} samples at {rate:g} Hz; choose a period or a rate that "
+            "gives a whole number, so that the trajectory repeats exactly"
+        )
+    t = np.arange(samples) / rate
+    prefixes = [f"{e.joint.name}." if len(excitations) > 1 else "" for e in excitations]
+    header = ",".join(["t", *(f"{p}{symbol}" for p in prefixes for symbol in ("q", "dq", "ddq"))])
+    text = io.StringIO()
+    table = np.column_stack([t, *(column for e in excitations for column in motion(e.series, t))])
+    np.savetxt(text, table, "%.12g", delimiter=",", header=header, comments="", newline="\n")
+    return text.getvalue()
+
+
+def plot(excitations: Sequence[ExcitationTrajectory], path: Path) -> None:
+    """Position, velocity and acceleration over one period, between their limits.  Fig 6.5
+
+    Raises
+    ------
+    BadRequest
+        If the file's name does not end in a format that can be drawn.
+    """
+    if path.suffix not in PLOTS:
+        raise BadRequest(f"{path}: a plot ends in {', '.join(PLOTS)}")
+    import matplotlib as mpl
+    from matplotlib.figure import Figure
+
+    with mpl.rc_context({"svg.hashsalt": "davinci-forces"}):
+        figure = Figure(figsize=(4.5 * len(excitations), 6.5), layout="constrained")
+        for axes, excitation in zip(figure.subplots(3, len(excitations), squeeze=False).T, excitations, strict=True):
+            _draw(axes, excitation)
+        metadata = {".svg": {"Date": None}, ".pdf": {"CreationDate": None}}.get(path.suffix, {})
+        figure.savefig(path, metadata=metadata, dpi=150)
+
+
+def _draw(axes: Any, excitation: ExcitationTrajectory) -> None:
+    t = np.linspace(0.0, excitation.series.period, 1001)
+    unit = excitation.joint.unit("{position}")
+    labels = (f"position [{unit}]", f"velocity [{unit}/s]", f"acceleration [{unit}/s²]")
+    for ax, values, limits, label in zip(
+        axes, motion(excitation.series, t), excitation.problem.limits, labels, strict=True
+    ):
+        ax.plot(t, values, color="#0072b2")
+        for limit in limits:
+            ax.axhline(limit, color="#d55e00", linestyle="--", linewidth=1.0)
+        ax.set(ylabel=label, xlim=(0.0, t[-1]))
+        ax.grid(alpha=0.3)
+    axes[0].set_title(f"{excitation.joint.title}: objective {excitation.objective:.4f}", fontsize=10)
+    axes[-1].set_xlabel("t [s]; dashed: the limits")

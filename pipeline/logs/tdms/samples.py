@@ -1,0 +1,115 @@
+"""The samples of TDMS regions as numbers, in pieces of bounded size, and channels of different lengths side by side."""
+
+from collections.abc import Iterator, Sequence
+from typing import Any, BinaryIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.logs.log import Block
+from pipeline.logs.tdms.walk import BLOCK, Column, Region
+
+ROWS = 1 << 17  # of a piece
+
+
+def pieces(file: BinaryIO, regions: Iterator[Region], paths: Sequence[str], origin: dict[str, int]) -> Iterator[Block]:
+    """The samples of channels that always come together, as many of each in every piece.
+
+    `origin` gives, for a channel of time stamps, the second since 1904 that its times are counted from.
+    """
+    for region in regions:
+        columns = {path: region.columns[path] for path in paths if path in region.columns}
+        if not columns:
+            continue
+        dense = all(column.step == column.dtype.itemsize for column in columns.values())
+        read = _slices if dense and region.stride > BLOCK else _records
+        for views in read(file, region, columns):
+            yield {path: _numbers(view, origin.get(path, 0)) for path, view in views.items()}
+
+
+def _records(file: BinaryIO, region: Region, columns: dict[str, Column]) -> Iterator[dict[str, NDArray[Any]]]:
+    """Many whole records at a time."""
+    widest = max(column.count for column in columns.values())
+    many = max(1, min(BLOCK // region.stride, ROWS // max(widest, 1)))
+    needed = max(
+        column.offset + (column.count - 1) * column.step + column.dtype.itemsize for column in columns.values()
+    )
+    for first in range(0, region.records, many):
+        records = min(many, region.records - first)
+        file.seek(region.position + first * region.stride)
+        raw = file.read((records - 1) * region.stride + needed)
+        yield {path: _view(raw, records, region.stride, column).reshape(-1) for path, column in columns.items()}
+
+
+def _view(raw: bytes, records: int, stride: int, column: Column) -> NDArray[Any]:
+    shape = (records, column.count)
+    if not column.count:
+        return np.empty(shape, column.dtype)
+    return np.ndarray(shape, column.dtype, raw, offset=column.offset, strides=(stride, column.step))
+
+
+def _slices(file: BinaryIO, region: Region, columns: dict[str, Column]) -> Iterator[dict[str, NDArray[Any]]]:
+    """Records that are too large to be read whole: a slice of every channel at a time."""
+    most = max(column.count for column in columns.values())
+    for record in range(region.records):
+        start = region.position + record * region.stride
+        for first in range(0, most, ROWS):
+            yield {path: _slice(file, start, column, first) for path, column in columns.items()}
+
+
+def _slice(file: BinaryIO, start: int, column: Column, first: int) -> NDArray[Any]:
+    count = max(0, min(ROWS, column.count - first))
+    file.seek(start + column.offset + first * column.step)
+    return np.frombuffer(file.read(count * column.dtype.itemsize), column.dtype)
+
+
+def _numbers(samples: NDArray[Any], origin: int) -> NDArray[np.float64]:
+    if samples.dtype.names:
+        return (samples["seconds"] - origin) + samples["fraction"] / 2.0**64
+    return samples.astype(np.float64)
+
+
+class Queue:
+    """The samples of some channels that came and are not handed on yet."""
+
+    def __init__(self, source: Iterator[Block], paths: Sequence[str]) -> None:
+        self.source, self.paths = source, paths
+        self.parts: list[Block] = []
+        self.length, self.ended = 0, False
+
+    def fill(self) -> None:
+        """Read until there is a block's worth, or the end."""
+        while self.length < ROWS and not self.ended:
+            part = next(self.source, None)
+            if part is None:
+                self.ended = True
+            else:
+                self.parts.append(part)
+                self.length += len(part[self.paths[0]])
+
+    def take(self, rows: int) -> tuple[Block, int]:
+        """The next rows, filled up with NaN behind the end, and how many are filled up."""
+        lacking = max(0, rows - self.length)
+        whole = {path: np.concatenate([part[path] for part in self.parts] or [np.empty(0)]) for path in self.paths}
+        self.parts = [{path: samples[rows:] for path, samples in whole.items()}] if self.length > rows else []
+        self.length = max(0, self.length - rows)
+        fill = np.full(lacking, np.nan)
+        return {p: np.concatenate((s[:rows], fill)) if lacking else s[:rows] for p, s in whole.items()}, lacking
+
+
+def side_by_side(queues: Sequence[Queue]) -> Iterator[tuple[Block, dict[str, int]]]:
+    """Blocks of all channels, and how many samples each lacks, until the longest ends."""
+    while True:
+        for queue in queues:
+            queue.fill()
+        going = [queue.length for queue in queues if not queue.ended]
+        rows = min(going) if going else max((queue.length for queue in queues), default=0)
+        if not rows:
+            return
+        block: Block = {}
+        lacking: dict[str, int] = {}
+        for queue in queues:
+            part, short = queue.take(rows)
+            block |= part
+            lacking |= dict.fromkeys(queue.paths, short)
+        yield block, lacking

@@ -1,0 +1,1 @@
+"""Trajectories that tell most about a joint or an arm, within its limits."""

@@ -1,0 +1,1 @@
+"""The arm as rigid bodies: kinematics, dynamics, and what the drives add."""

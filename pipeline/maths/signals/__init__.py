@@ -1,0 +1,1 @@
+"""Signals in time: clocks, periods, averages, harmonics, low-passing."""

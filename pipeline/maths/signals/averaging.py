@@ -1,0 +1,79 @@
+"""Averaging the repeated periods of a recording, whatever the ratio of its period to its sampling time."""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.maths.arrays import Array, Integers
+from pipeline.maths.signals.harmonics import evaluate, project
+
+SMOOTH = 30  # harmonics that describe how a signal moves within the width of one phase bin
+
+
+class Folded(NamedTuple):
+    """One period on K evenly spaced phases, and what averaging removed from every sample used."""
+
+    mean: Array  # (K,)
+    var: Array  # (K,) variance of one period, not of the mean
+    counts: NDArray[np.int64]  # (K,) samples averaged
+    noise: Array  # (N,) sample minus mean
+
+
+def phases(period: float, rate: float) -> int:
+    """How many phases a period is divided into, K: as many as it holds whole samples, so that none stays empty."""
+    return int(np.floor(period * rate * (1 + 1e-6)))
+
+
+def whole_periods(t: Array, period: float, rate: float) -> int:
+    """How many whole periods the samples cover, M; the last may lack less than half a sample: its end is uncertain."""
+    return int(np.floor(((t[-1] - t[0]) * rate + 1.5) / (period * rate)))
+
+
+def fold(t: Array, x: Array, period: float, K: int) -> Folded:
+    """Average the samples at each of K phases, from the first sample on.
+
+    A sample rarely falls on a phase exactly.  A smooth harmonic fit carries it from where it was taken to the phase,
+    and only what the fit leaves is averaged: for a period of a whole number of samples this is plain averaging, the
+    noise stays as white as it was, and a jump of friction does not ring as it would under interpolation.  A phase that
+    no sample falls on takes the fit and a count of 0.  `t`, `x` are (N,).  (6.30), (6.31)
+    """
+    smooth, rest, bins = _carried(t, x, period, K)
+    counts = np.bincount(bins, minlength=K)
+    mean = np.bincount(bins, rest, K) / np.maximum(counts, 1)
+    away = rest - mean[bins]
+    var = np.bincount(bins, away * away, K) / np.maximum(counts - 1, 1)
+    return Folded(mean + smooth, var, counts, away)
+
+
+def left_out(t: Array, x: Array, period: float, K: int, groups: Integers) -> Iterator[Folded]:
+    """The average without each group of samples in turn, `groups` (N,) numbered from 0; `noise` stays empty.
+
+    The smooth fit is that of all samples: it only carries each to the phase beside it.
+    """
+    smooth, rest, bins = _carried(t, x, period, K)
+    size = int(groups.max()) + 1
+    place = groups * K + bins
+    sums = [np.bincount(place, w, size * K).reshape(size, K) for w in (np.ones_like(rest), rest, rest * rest)]
+    totals = [part.sum(axis=0) for part in sums]
+    for group in range(size):
+        n, total, squares = (whole - part[group] for whole, part in zip(totals, sums, strict=True))
+        counts = np.rint(n).astype(np.int64)
+        mean = total / np.maximum(counts, 1)
+        var = np.maximum(squares - counts * mean**2, 0.0) / np.maximum(counts - 1, 1)
+        yield Folded(mean + smooth, var, counts, np.empty(0))
+
+
+def _carried(t: Array, x: Array, period: float, K: int) -> tuple[Array, Array, Integers]:
+    """The smooth fit at the phases (K,), what it leaves of each sample (N,), and the phase of each sample (N,)."""
+    omega, since = 2 * np.pi / period, t - t[0]
+    c = project(since, x, omega, min(SMOOTH, K // 4))
+    bins = np.rint(since / period % 1.0 * K).astype(np.int64) % K
+    return evaluate(c, np.arange(K) / K * period, omega), x - evaluate(c, since, omega), bins
+
+
+def noise_std(folded: Folded) -> float:
+    """Standard deviation of the noise, with one degree of freedom spent per phase.  (6.32), corrected"""
+    degrees = len(folded.noise) - int((folded.counts > 0).sum())
+    return float(np.sqrt(folded.noise @ folded.noise / degrees))

@@ -1,0 +1,44 @@
+"""Velocities and accelerations of motion that does not repeat: zero-phase low-pass, then differences."""
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+
+from pipeline.maths.arrays import Array, Integers
+
+ORDER = 4  # of the Butterworth filter, run forwards and backwards
+
+
+def lowpass(x: Array, rate: float, cutoff: float) -> Array:
+    """Low-pass a signal (N,) without delay; `cutoff` [Hz] is where the two passes together have halved the power twice.
+
+    A cutoff at or above 0.4 of the sampling rate leaves the signal as it is.
+    """
+    if cutoff >= 0.4 * rate or len(x) < 2:
+        return x
+    from scipy.signal import butter, sosfiltfilt
+
+    sos = butter(ORDER, cutoff, fs=rate, output="sos")
+    return np.asarray(sosfiltfilt(sos, x, padlen=min(3 * round(rate / cutoff) + 3, len(x) - 1)))
+
+
+def motion(q: Array, dq: Array | None, rate: float, cutoff: float) -> tuple[Array, Array, Array]:
+    """Position, velocity and acceleration (N,) each, from a logged velocity where there is one.
+
+    Differences are central; the ends are one-sided.
+    """
+    smooth = lowpass(q, rate, cutoff)
+    if len(q) < 2:
+        return smooth, np.zeros_like(q), np.zeros_like(q)
+    velocity = np.gradient(smooth, 1.0 / rate) if dq is None else lowpass(dq, rate, cutoff)
+    return smooth, velocity, np.gradient(velocity, 1.0 / rate)
+
+
+def segments(segment: Integers) -> Iterator[slice]:
+    """The runs of samples without a gap between them."""
+    if len(segment) == 0:
+        return
+    edges = [0, *(np.flatnonzero(np.diff(segment)) + 1).tolist(), len(segment)]
+    for start, stop in pairwise(edges):
+        yield slice(start, stop)

@@ -1,0 +1,29 @@
+"""Which samples of a run are spoken of."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from pipeline.maths.arrays import Array, Booleans
+
+SETTLE = 1.0  # [s] in which a filter finds its feet, left out of what is said of the whole run
+
+
+def outside(t: Array, windows: Sequence[tuple[float, float]]) -> Booleans:
+    """Whether each time (N,) lies outside all windows."""
+    inside = np.zeros(len(t), dtype=bool)
+    for start, end in windows:
+        inside |= (t >= start) & (t <= end)
+    return ~inside
+
+
+def settled(t: Array) -> Booleans:
+    """Whether a filter has found its feet: all but the first second, unless there is little more than that."""
+    return t - t[0] >= SETTLE if t[-1] - t[0] > 5 * SETTLE else np.ones(len(t), dtype=bool)
+
+
+def longest_run(t: Array, rate: float) -> slice:
+    """The longest run of samples without a gap; `rate` [Hz]."""
+    edges = [0, *(np.flatnonzero(np.diff(t) > 1.5 / rate) + 1).tolist(), len(t)]
+    return max((slice(a, b) for a, b in pairwise(edges)), key=lambda part: part.stop - part.start)

@@ -1,0 +1,50 @@
+"""Records of what was measured: how logs were read, and the motion and effort of their joints."""
+
+from dataclasses import dataclass
+
+from pipeline.records.record import Column, Counts, Labels, Names, Record
+
+
+@dataclass(frozen=True, eq=False)
+class LogSummary(Record):
+    """How one log was read: what the reader noticed, and what each of its channels is used for."""
+
+    KEY = ("log",)
+
+    log: str
+    role: str
+    format: str
+    files: Names
+    started: str
+    zone: str
+    rows: int
+    rate: float
+    duration: float
+    jitter: float
+    longest_gap: float
+    backward: int
+    repeated: int
+    duplicates: int
+    dropped: int
+    facts: Names
+    warnings: Names
+    channel: Labels
+    unit: Labels
+    feeds: Labels
+    nulls: Counts
+    nans: Counts
+
+
+@dataclass(frozen=True, eq=False)
+class Recording(Record):
+    """One joint during one log, as recorded: at the log's own clock, in joint units."""
+
+    log: str
+    joint: str
+    role: str
+    rate: float
+    velocity: str  # "logged", or "derived": dq is then zero here and filled in when the clock is made uniform
+    t: Column
+    q: Column
+    dq: Column
+    tau: Column

@@ -1,0 +1,26 @@
+"""Records of predictions of effort that a fit has not seen."""
+
+from dataclasses import dataclass
+
+from pipeline.records.record import Column, Record
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction(Record):
+    """The effort of a log that a fit has not seen, beside what the fit makes of it."""
+
+    KEY = ("log", "joint", "model", "estimator")
+
+    log: str
+    joint: str
+    model: str
+    estimator: str
+    role: str
+    scheme: str  # "validation", "contact", "leave one log out" or "leave one period out"
+    rmse: float
+    nrmse: float
+    r2: float
+    relative_error: float
+    t: Column
+    tau: Column
+    tau_hat: Column

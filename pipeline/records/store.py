@@ -1,0 +1,174 @@
+"""Records on disk: one Parquet file per record.
+
+The columns are the record's own; its scalars are in the file's metadata, with the unit and meaning of every
+field and what the file was made from.  Nothing in a file changes from run to run, so the same raw data give the
+same bytes.  A file appears under its own name only when it is whole.
+"""
+
+import hashlib
+import json
+from collections.abc import Callable, Iterator
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import pyarrow as pa
+import pyarrow.parquet as pq
+
+from pipeline.errors import BadRecord, MissingRecord
+from pipeline.records import AnyRecord, Column, Counts, Labels, Names, Origin, Record
+from pipeline.records.quantities import QUANTITIES
+
+Unit = Callable[[str], str]
+
+ARROW = {Column: pa.float64(), Counts: pa.int64(), Labels: pa.string()}
+PARTIAL = ".partial"  # what the name of a file that is still being written ends with
+
+
+def path(kind: type[Record], key: Names) -> Path:
+    """Where a record is, below its study's folder: `track/<log>/<joint>.parquet`."""
+    first, rest = key[0], ".".join(key[1:])
+    folder = Path(kind.folder())
+    return folder / first / f"{rest}.parquet" if rest else folder / f"{first}.parquet"
+
+
+class Writer:
+    """Writes the records of one task.  Records of one kind and key that follow each other are one file.
+
+    Use as a context: the files get their names when the block is left without an error, and vanish otherwise.
+    """
+
+    def __init__(self, folder: Path, unit: Callable[[Record], Unit], made_from: dict[str, Any]) -> None:
+        self.folder, self.unit, self.made_from = folder, unit, made_from
+        self._open: dict[Path, pq.ParquetWriter] = {}
+        self._last: dict[Path, Record] = {}
+
+    def __enter__(self) -> "Writer":
+        return self
+
+    def write(self, record: Record) -> Path:
+        """Append a record's rows to its file; its scalars count as those of the last part written."""
+        place = path(type(record), record.key)
+        if place not in self._open:
+            target = self.folder / place
+            target.parent.mkdir(parents=True, exist_ok=True)
+            described = schema(type(record), self.unit(record))
+            self._open[place] = pq.ParquetWriter(_partial(target), described, **_encoding(described))
+        self._open[place].write_table(_table(record, self._open[place].schema))
+        self._last[place] = record
+        return place
+
+    def __exit__(self, failure: type[BaseException] | None, *_: object) -> None:
+        for place, file in self._open.items():
+            file.add_key_value_metadata(self._metadata(place))
+            file.close()
+        for place in self._open:
+            whole = self.folder / place
+            if failure is None:
+                _partial(whole).replace(whole)
+            else:
+                _partial(whole).unlink()
+
+    def _metadata(self, place: Path) -> dict[str, str]:
+        record = self._last[place]
+        units = {name: self.unit(record)(QUANTITIES[name].unit) for name in record.scalars()}
+        values = {name: getattr(record, name) for name in record.scalars()}
+        return {
+            "record": type(record).__name__,
+            "scalars": json.dumps(values, ensure_ascii=False),
+            "units": json.dumps(units, ensure_ascii=False),
+            "made_from": json.dumps(self.made_from, ensure_ascii=False, sort_keys=True),
+        }
+
+    @property
+    def places(self) -> list[Path]:
+        """The files written, below the folder."""
+        return sorted(self._open)
+
+
+def schema(kind: type[Record], unit: Unit) -> pa.Schema:
+    """The columns of a record, each with its meaning and unit."""
+    return pa.schema(
+        pa.field(
+            f.name,
+            ARROW[f.type],
+            nullable=False,
+            metadata={"meaning": QUANTITIES[f.name].meaning, "unit": unit(QUANTITIES[f.name].unit)},
+        )
+        for f in fields(kind)  # type: ignore[arg-type]
+        if f.type in ARROW
+    )
+
+
+def read(kind: type[AnyRecord], folder: Path, place: Path) -> AnyRecord:
+    """Read a record back, with its origin.
+
+    Raises
+    ------
+    MissingRecord
+        If the file is not there.
+    BadRecord
+        If it is not a record of this kind, as this version writes it.
+    """
+    whole = folder / place
+    if not whole.exists():
+        raise MissingRecord(f"{whole} is not there; run the stage that writes {kind.__name__} records first")
+    try:
+        with pq.ParquetFile(whole) as file:
+            table, found = file.read(), file.metadata.metadata or {}
+        metadata = {key.decode(): found[key].decode() for key in (b"record", b"scalars", b"units")}
+        if metadata["record"] != kind.__name__:
+            raise KeyError(metadata["record"])
+        scalars = {name: _scalar(value) for name, value in json.loads(metadata["scalars"]).items()}
+        columns = {name: table[name].to_numpy() for name in kind.columns()}
+        record = kind(**columns, **scalars)
+    except (pa.ArrowException, KeyError, TypeError, ValueError, OSError) as error:
+        raise BadRecord(
+            f"{whole}: not a {kind.__name__} as this version writes it ({error}); run with --force"
+        ) from error
+    units = json.loads(metadata["units"]) | {f.name: f.metadata[b"unit"].decode() for f in table.schema}
+    object.__setattr__(record, "origin", Origin(place.as_posix(), digest(whole), units))
+    return record
+
+
+def digest(file: Path) -> str:
+    """The sha256 of a file's bytes."""
+    with file.open("rb") as stream:
+        return hashlib.file_digest(stream, "sha256").hexdigest()
+
+
+def write_bytes(file: Path, content: bytes) -> None:
+    """Write a file so that it is there whole or not at all."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    _partial(file).write_bytes(content)
+    _partial(file).replace(file)
+
+
+def leftovers(folder: Path) -> Iterator[Path]:
+    """Files that an interrupted run left half written."""
+    return folder.rglob(f"*{PARTIAL}")
+
+
+def _partial(file: Path) -> Path:
+    return file.with_name(file.name + PARTIAL)
+
+
+def _encoding(described: pa.Schema) -> dict[str, Any]:
+    """Floats byte by byte and compressed, which is smaller and faster than dictionaries of them."""
+    floats = [f.name for f in described if pa.types.is_floating(f.type)]
+    return {
+        "compression": "zstd",
+        "compression_level": 1,
+        "use_dictionary": [f.name for f in described if f.name not in floats],
+        "column_encoding": dict.fromkeys(floats, "BYTE_STREAM_SPLIT"),
+        "write_statistics": False,
+        "store_schema": True,
+    }
+
+
+def _table(record: Record, described: pa.Schema) -> pa.Table:
+    return pa.table({f.name: pa.array(getattr(record, f.name), f.type) for f in described}, described)
+
+
+def _scalar(value: Any) -> Any:
+    return tuple(value) if isinstance(value, list) else value

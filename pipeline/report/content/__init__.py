@@ -1,0 +1,45 @@
+"""What a report says, as data: documents of sections of blocks, numbers that know their key, figures as marks."""
+
+from pipeline.report.content.document import (
+    Block,
+    Bullets,
+    Cell,
+    Document,
+    Equation,
+    Figure,
+    Figure3D,
+    Level,
+    Listing,
+    Prose,
+    Section,
+    Table,
+    Verdict,
+    name_of,
+    numbers,
+    walk,
+)
+from pipeline.report.content.inline import literal
+from pipeline.report.content.marks import (
+    AnyMark,
+    Band,
+    Bars,
+    HBand,
+    Histogram,
+    HLine,
+    Line,
+    Line3D,
+    Panel,
+    Points,
+    Points3D,
+    Reference,
+    Stems,
+    VLine,
+    VSpan,
+)
+from pipeline.report.content.number import Number
+
+__all__ = [
+    "AnyMark", "Band", "Bars", "Block", "Bullets", "Cell", "Document", "Equation", "Figure", "Figure3D", "HBand",
+    "HLine", "Histogram", "Level", "Line", "Line3D", "Listing", "Number", "Panel", "Points", "Points3D", "Prose",
+    "Reference", "Section", "Stems", "Table", "VLine", "VSpan", "Verdict", "literal", "name_of", "numbers", "walk",
+]  # fmt: skip

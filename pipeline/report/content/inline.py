@@ -1,0 +1,65 @@
+"""Inline marks: `$maths$`, backticks for code, `**bold**` and `[@label]`; a backslash takes a mark's meaning away."""
+
+import re
+from typing import Literal, NamedTuple
+
+Kind = Literal["text", "code", "bold", "maths", "reference"]
+
+MARK = re.compile(
+    r"\\(?P<escaped>[\\$`*\[\]])"
+    r"|\$(?P<maths>(?:\\.|[^$\\])+)\$"
+    r"|`(?P<code>(?:\\.|[^`\\])+)`"
+    r"|\*\*(?P<bold>(?:\\.|[^*\\])+)\*\*"
+    r"|\[@(?P<reference>[a-z0-9][a-z0-9._-]*)\]",
+    re.DOTALL,
+)
+CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufffe\uffff]")
+
+
+class Span(NamedTuple):
+    """A run of text of one kind."""
+
+    kind: Kind
+    text: str
+
+
+def literal(text: str) -> str:
+    """Escape text that may hold anything, so that it is shown as it is wherever inline marks are read."""
+    return re.sub(r"([\\$`*\[])", r"\\\1", printable(text))
+
+
+def printable(text: str) -> str:
+    """Replace what no page can show (control characters, lone surrogates) by the replacement character."""
+    return CONTROL.sub("\N{REPLACEMENT CHARACTER}", text)
+
+
+def parse(text: str) -> tuple[Span, ...]:
+    """Split marked text into spans; a mark without its partner is text."""
+    spans: list[Span] = []
+    place = 0
+    for match in MARK.finditer(text):
+        spans.append(Span("text", text[place : match.start()]))
+        spans.append(_span(match))
+        place = match.end()
+    spans.append(Span("text", text[place:]))
+    return _joined(spans)
+
+
+def _span(match: re.Match[str]) -> Span:
+    kind, text = match.lastgroup, match[match.lastgroup or 0]
+    if kind == "escaped":
+        return Span("text", text)
+    if kind in ("code", "bold"):
+        text = re.sub(r"\\([\\$`*\[\]])", r"\1", text)
+    return Span(kind, printable(text))  # type: ignore[arg-type]
+
+
+def _joined(spans: list[Span]) -> tuple[Span, ...]:
+    """Neighbouring texts as one, none of them empty."""
+    joined: list[Span] = []
+    for span in spans:
+        if span.kind == "text" and joined and joined[-1].kind == "text":
+            joined[-1] = Span("text", joined[-1].text + printable(span.text))
+        elif span.text:
+            joined.append(Span(span.kind, printable(span.text)))
+    return tuple(joined)

@@ -1,0 +1,104 @@
+"""Numbering what a document holds, once for all writers: both print the same numbers and link the same references."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from pipeline.report.content.document import (
+    Block,
+    Bullets,
+    Document,
+    Equation,
+    Figure,
+    Figure3D,
+    Listing,
+    Prose,
+    Section,
+    Table,
+    Verdict,
+    name_of,
+    walk,
+)
+from pipeline.report.content.inline import Kind, parse
+
+KINDS: dict[type, str] = {Figure: "figure", Figure3D: "figure", Table: "table", Equation: "equation"}
+NAMES = {"figure": "Figure {}", "table": "Table {}", "equation": "Eq. ({})", "section": "Section {}"}
+TEXTS: dict[type, Callable[[Any], tuple[str, ...]]] = {
+    Prose: lambda prose: (prose.text,),
+    Bullets: lambda bullets: bullets.items,
+    Listing: lambda listing: (),
+    Verdict: lambda verdict: (verdict.text,),
+    Equation: lambda equation: (),
+    Table: lambda table: (table.caption, *table.header, *(c for row in table.rows for c in row if isinstance(c, str))),
+    Figure: lambda figure: (figure.caption,),
+    Figure3D: lambda figure: (figure.caption,),
+    Section: lambda section: (section.title,),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """A block in its place: its kind, number and anchor, and for a section its depth and what it holds."""
+
+    block: Block
+    kind: str
+    number: str = ""
+    anchor: str = ""
+    depth: int = 0
+    blocks: tuple["Placed", ...] = ()
+
+
+def place(document: Document) -> tuple[Placed, ...]:
+    """The sections of a document, numbered: sections 1, 1.1; figures, tables and equations 1, 2, 3.
+
+    Raises ValueError where a reference leads nowhere.
+    """
+    check_references(document)
+    counters: Counter[str] = Counter()
+    return tuple(_section(section, str(i), 1, counters) for i, section in enumerate(document.sections, 1))
+
+
+def references(placed: tuple[Placed, ...]) -> dict[str, str]:
+    """What a reference to each label or anchor prints: {'roll-residual': 'Figure 3'}."""
+    found: dict[str, str] = {}
+    for item in placed:
+        if item.number and name_of(item.block):
+            found[item.anchor] = NAMES[item.kind].format(item.number)
+        found |= references(item.blocks)
+    return found
+
+
+def marked(document: Document, kind: Kind) -> Iterator[str]:
+    """What stands in the inline marks of one kind, in all texts of a document."""
+    for block in walk(document):
+        for text in TEXTS[type(block)](block):
+            yield from (span.text for span in parse(text) if span.kind == kind)
+
+
+def check_references(document: Document) -> None:
+    """Every reference leads somewhere; raises ValueError that names those that do not."""
+    named = {name_of(block) for block in walk(document)}
+    if missing := sorted(set(marked(document, "reference")) - named):
+        raise ValueError(f"{document.title}: references to labels that no block has: {missing}")
+
+
+def _section(section: Section, number: str, depth: int, counters: Counter[str]) -> Placed:
+    children: list[Placed] = []
+    for block in section.blocks:
+        if isinstance(block, Section):
+            counters[number] += 1
+            children.append(_section(block, f"{number}.{counters[number]}", depth + 1, counters))
+        else:
+            children.append(_block(block, counters))
+    return Placed(section, "section", number, section.anchor, depth, tuple(children))
+
+
+def _block(block: Block, counters: Counter[str]) -> Placed:
+    kind = KINDS.get(type(block), "")
+    if not kind:
+        return Placed(block, type(block).__name__.lower())
+    counters[kind] += 1
+    number = str(counters[kind])
+    # A capital letter cannot be confused with a label, which has none.
+    return Placed(block, kind, number, name_of(block) or f"{kind.capitalize()}-{number}")

@@ -1,0 +1,1 @@
+"""Figures as data become drawings: panels, marks, ticks and colours, by matplotlib."""

@@ -1,0 +1,40 @@
+"""Plots that several sections show: histograms, normal probability plots and autocorrelations."""
+
+import numpy as np
+
+from pipeline.records import Column, Whiteness
+from pipeline.report.content import HBand, Panel, Stems
+
+
+def normal_scores(x: Column) -> tuple[Column, Column, float, float]:
+    """A normal probability plot: theoretical quantiles, ordered values, and the line through the quartiles.
+
+    At most 500 points, evenly spread over the order, as more cannot be told apart on paper.
+    """
+    from scipy.stats import norm
+
+    ordered = np.sort(x)
+    scores = norm.ppf((np.arange(1, len(x) + 1) - 0.375) / (len(x) + 0.25))
+    shown = np.unique(np.linspace(0, len(x) - 1, min(len(x), 500)).round().astype(int))
+    low, high = np.quantile(x, [0.25, 0.75])
+    slope = (high - low) / (2 * norm.ppf(0.75))
+    return scores[shown], ordered[shown], float(slope), float((low + high) / 2)
+
+
+def histogram(x: Column, bins: int = 40) -> tuple[Column, Column, Column, Column]:
+    """Edges and densities of a histogram, and the normal density of the same mean and deviation."""
+    densities, edges = np.histogram(x, bins=bins, density=True)
+    grid = np.linspace(edges[0], edges[-1], 200)
+    sigma = float(x.std()) or 1.0
+    normal = np.exp(-0.5 * ((grid - x.mean()) / sigma) ** 2) / (sigma * np.sqrt(2 * np.pi))
+    return edges, densities, grid, normal
+
+
+def autocorrelation(w: Whiteness, heading: str) -> Panel:
+    """An autocorrelation with the band that white noise stays in."""
+    rest = w.acf[1:]
+    marks = (HBand(-w.band, w.band, "95 % band"), Stems(w.lag[1:].astype(float), rest, "", "blue"))
+    # Small ones are drawn large enough to be told from the band, and always on both sides of zero.
+    reach = max(4 * w.band, 0.1)
+    low, high = min(-reach, 1.1 * float(rest.min())), max(reach, min(1.1 * float(rest.max()), 1.0))
+    return Panel(heading, "lag [samples]", "autocorrelation", marks, y_range=(low, high))

@@ -1,0 +1,133 @@
+"""The report as one HTML file that needs nothing else: no network, no second file, no installed font."""
+
+import base64
+import hashlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from pipeline.report.content import Document, Equation, Figure, Figure3D, walk
+from pipeline.report.content.inline import Span, parse, printable
+from pipeline.report.content.layout import Placed, marked, place, references
+from pipeline.report.content.tables import columns
+from pipeline.report.figures.traces import Thinned, thinned
+from pipeline.report.writers.equations import Drawing, Formula, drawings
+from pipeline.report.writers.vectors import inlined
+from pipeline.report.writers.zoomable import Json, embedding, script
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
+
+TEMPLATES = Path(__file__).parent / "templates"
+LARGEST = 4_700_000  # [bytes] of a file, of which the traces get what everything else leaves
+POINT_BYTES = 11  # of a point of a trace: two numbers in single precision, in base 64
+MOST_POINTS, FEWEST_POINTS = 20_000, 2_000  # of one zoomable figure
+START = """
+const traces = JSON.parse(document.getElementById("Traces").textContent);
+Bokeh.logger.set_level("error");
+Bokeh.embed.embed_items(traces.documents, traces.items);
+"""
+
+
+def render(document: Document) -> bytes:
+    """The whole file; the same document gives the same bytes.
+
+    Raises ValueError where a reference leads nowhere, and NotTypeset where an equation is wrong.
+    """
+    placed = place(document)
+    figures = {item.anchor: item.block for item in _flat(placed) if isinstance(item.block, Figure | Figure3D)}
+    letters: dict[str, str] = {}
+    zooms = {name: f for name, f in figures.items() if isinstance(f, Figure) and f.zoomable}
+    drawn = {n: inlined(f, f"F{i}", letters) for i, (n, f) in enumerate(figures.items()) if n not in zooms}
+    formulas, symbols = drawings(_formulas(document))
+    page: Json = {
+        "document": document, "placed": placed, "references": references(placed), "figures": drawn,
+        "formulas": formulas, "letters": "".join(letters[n] for n in sorted(letters)) + symbols,
+    }  # fmt: skip
+    traces = _thin(zooms, LARGEST - len(_fill(page, {}, "").encode()) - len(script()))
+    return _fill(page, traces, _data(traces)).encode()
+
+
+def _thin(zooms: dict[str, Figure], room: int) -> dict[str, Thinned]:
+    """Each zoomable figure in as many points as the file has room for."""
+    share = room // POINT_BYTES // max(len(zooms), 1)
+    limit = max(FEWEST_POINTS, min(MOST_POINTS, share))
+    return {name: thinned(figure, limit) for name, figure in zooms.items()}
+
+
+def _data(traces: dict[str, Thinned]) -> str:
+    """The traces as JSON in which nothing can end the element that holds it."""
+    if not traces:
+        return ""
+    content = embedding({f"Traces-{name}": trace.figure for name, trace in traces.items()})
+    return json.dumps(content, separators=(",", ":")).replace("<", "\\u003c")
+
+
+def _formulas(document: Document) -> list[Formula]:
+    display = [Formula(block.typst, True) for block in walk(document) if isinstance(block, Equation)]
+    return [Formula(maths, False) for maths in marked(document, "maths")] + display
+
+
+def _flat(placed: tuple[Placed, ...]) -> list[Placed]:
+    return [item for one in placed for item in (one, *_flat(one.blocks))]
+
+
+def _fill(page: Json, traces: dict[str, Thinned], data: str) -> str:
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
+
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True, finalize=_finalize,
+    )  # fmt: skip
+    environment.filters |= {"inline": _inline(page), "columns": columns, "raw": Markup}
+    scripts = [script().replace("</script", "<\\/script"), START] if data else []
+    return environment.get_template("report.html").render(
+        page, traces=traces, data=Markup(data), scripts=[Markup(text) for text in scripts],
+        hashes=[_hash(text) for text in scripts],
+    )  # fmt: skip
+
+
+def _finalize(value: Any) -> Any:
+    """Text that is not HTML yet, without what no page can hold."""
+    return printable(value) if isinstance(value, str) and not hasattr(value, "__html__") else value
+
+
+def _hash(text: str) -> str:
+    """What the content security policy calls a script that may run."""
+    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+
+
+def _inline(page: Json) -> Callable[[str], "Markup"]:
+    """A filter from marked text to HTML."""
+    from markupsafe import Markup
+
+    def maths(text: str) -> Markup:
+        return _maths(text, page["formulas"][Formula(text, False)])
+
+    def reference(text: str) -> Markup:
+        return Markup('<a href="#{}">{}</a>').format(text, page["references"][text])
+
+    shapes: dict[str, Callable[[str], Any]] = {
+        "text": Markup.escape,
+        "code": Markup("<code>{}</code>").format,
+        "bold": Markup("<strong>{}</strong>").format,
+        "maths": maths,
+        "reference": reference,
+    }
+
+    def inline(text: str) -> Markup:
+        spans: tuple[Span, ...] = parse(text)
+        return Markup("").join(shapes[span.kind](span.text) for span in spans)
+
+    return inline
+
+
+def _maths(text: str, drawing: Drawing) -> "Markup":
+    from markupsafe import Markup
+
+    style = f"width:{drawing.width:.3f}em;height:{drawing.height:.3f}em;vertical-align:{-drawing.depth:.3f}em"
+    return Markup('<svg class="maths" role="img" aria-label="{}" viewBox="{}" style="{}">{}</svg>').format(
+        text, drawing.view, style, Markup(drawing.body)
+    )

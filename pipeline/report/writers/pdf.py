@@ -1,0 +1,111 @@
+"""The report as PDF, typeset by Typst: the template reads the document as data, so no text can become markup."""
+
+from functools import singledispatch
+from pathlib import Path
+from typing import Any
+
+from pipeline.report.content import (
+    Bullets,
+    Document,
+    Equation,
+    Figure,
+    Figure3D,
+    Listing,
+    Prose,
+    Section,
+    Table,
+    Verdict,
+)
+from pipeline.report.content.inline import parse, printable
+from pipeline.report.content.layout import Placed, place, references
+from pipeline.report.content.tables import columns
+from pipeline.report.figures.svg import svg
+from pipeline.report.writers.typesetting import typeset
+from pipeline.report.writers.widths import breakable, fit
+
+TEMPLATE = Path(__file__).parent / "templates/report.typ"
+Json = dict[str, Any]
+
+
+def render(document: Document) -> bytes:
+    """The whole file; the same document gives the same bytes.
+
+    Raises ValueError where a reference leads nowhere, and NotTypeset where Typst fails or warns.
+    """
+    placed = place(document)
+    content = {
+        "title": printable(document.title),
+        "study": printable(document.study),
+        "simulated": document.simulated,
+        "references": references(placed),
+        "blocks": [_placed(item) for item in placed],
+    }
+    return typeset(TEMPLATE, content, "pdf")[0]
+
+
+def _placed(item: Placed) -> Json:
+    common = {"kind": item.kind, "number": item.number, "anchor": item.anchor, "depth": item.depth}
+    return common | data(item.block) | {"blocks": [_placed(child) for child in item.blocks]}
+
+
+def _inline(text: str) -> list[Json]:
+    """Marked text as the template reads it; long words outside maths may break."""
+    return [span._asdict() | ({} if span.kind == "maths" else {"text": breakable(span.text)}) for span in parse(text)]
+
+
+@singledispatch
+def data(block: Any) -> Json:
+    """What the template needs of a block besides its place."""
+    raise TypeError(f"{type(block).__name__} is not a block of a report")
+
+
+@data.register(Section)
+def _(section: Section) -> Json:
+    return {"title": _inline(section.title)}
+
+
+@data.register(Prose)
+def _(prose: Prose) -> Json:
+    return {"paragraphs": [_inline(text.strip()) for text in prose.text.split("\n\n") if text.strip()]}
+
+
+@data.register(Bullets)
+def _(bullets: Bullets) -> Json:
+    return {"items": [_inline(item) for item in bullets.items]}
+
+
+@data.register(Listing)
+def _(listing: Listing) -> Json:
+    return {"text": breakable(printable(listing.text), 80)}
+
+
+@data.register(Verdict)
+def _(verdict: Verdict) -> Json:
+    return {"level": verdict.level, "text": _inline(verdict.text)}
+
+
+@data.register(Equation)
+def _(equation: Equation) -> Json:
+    return {"typst": equation.typst, "alt": equation.alt}
+
+
+@data.register(Table)
+def _(table: Table) -> Json:
+    shown = columns(table)
+    fitted = fit([[column.head, *(cell.text for cell in column.cells)] for column in shown])
+    return {
+        "caption": _inline(table.caption),
+        "size": fitted.size,
+        "widths": fitted.widths,
+        "aligns": [column.align for column in shown],
+        "header": [fitted.cell(i, column.head) for i, column in enumerate(shown)],
+        "rows": [
+            [fitted.cell(i, column.cells[row].text) for i, column in enumerate(shown)] for row in range(len(table.rows))
+        ],
+    }
+
+
+@data.register(Figure)
+@data.register(Figure3D)
+def _(figure: Figure | Figure3D) -> Json:
+    return {"caption": _inline(figure.caption), "alt": printable(figure.alt), "svg": svg(figure)}

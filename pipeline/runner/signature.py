@@ -1,0 +1,80 @@
+"""What a stage asks for and promises, read from the signature of its `run`."""
+
+import types
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields
+from functools import cache
+from importlib import import_module
+from inspect import Parameter, signature
+from typing import Any, get_args, get_origin, get_type_hints
+
+from pipeline.logs.log import Log
+from pipeline.records import Record
+from pipeline.records.catalogue import Catalogue, Provenance
+from pipeline.robots.robot import Joint, Robot
+from pipeline.study import LogEntry, Settings, Study
+
+Kinds = tuple[type[Record], ...]
+GIVEN = {Log: "log", LogEntry: "entry", Joint: "joint", Robot: "robot", Study: "study"}
+SETTINGS = tuple(f.name for f in fields(Settings))
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """What a stage reads, by parameter, and what it makes."""
+
+    name: str
+    each: dict[str, Kinds]  # called once for each record of these kinds
+    per_log: dict[str, Kinds]  # called once a log, with all its records of these kinds
+    beside: dict[str, Kinds]  # the record about the same log and joint, or None
+    every: dict[str, Kinds]  # all records
+    given: dict[str, str]  # parameter -> "log", "entry", "joint", "robot" or "study"
+    settings: tuple[str, ...]
+    makes: Kinds
+
+    @property
+    def reads(self) -> Kinds:
+        """The kinds of record that must exist before the stage runs."""
+        every = (self.each, self.per_log, self.beside, self.every)
+        return tuple(dict.fromkeys(kind for group in every for kinds in group.values() for kind in kinds))
+
+
+@cache
+def declaration(name: str) -> Declaration:
+    """Read the signature of a stage."""
+    run = import_module(f"pipeline.stages.{name}").run
+    hints = get_type_hints(run)
+    found = Declaration(name, {}, {}, {}, {}, {}, _settings(name, run), _kinds(_inner(hints.pop("return"))))
+    for parameter, hint in hints.items():
+        if parameter in found.settings:
+            continue
+        if hint in (Catalogue, Provenance):
+            continue
+        if hint in GIVEN:
+            found.given[parameter] = GIVEN[hint]
+        elif get_origin(hint) is Sequence:
+            found.per_log[parameter] = _kinds(_inner(hint))
+        elif get_origin(hint) is Iterable:
+            found.every[parameter] = _kinds(_inner(hint))
+        elif type(None) in get_args(hint):
+            found.beside[parameter] = _kinds(hint)
+        else:
+            found.each[parameter] = _kinds(hint)
+    return found
+
+
+def _settings(name: str, run: Any) -> tuple[str, ...]:
+    asked = [p.name for p in signature(run).parameters.values() if p.kind is Parameter.KEYWORD_ONLY]
+    unknown = sorted(set(asked) - set(SETTINGS))
+    if unknown:
+        raise TypeError(f"stage {name} asks for settings that do not exist: {', '.join(unknown)}")
+    return tuple(asked)
+
+
+def _inner(hint: Any) -> Any:
+    return get_args(hint)[0] if get_origin(hint) in (Iterable, Iterator, Sequence) else hint
+
+
+def _kinds(hint: Any) -> Kinds:
+    members = get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
+    return tuple(kind for kind in members if isinstance(kind, type) and issubclass(kind, Record))

@@ -1,0 +1,1 @@
+"""What is simulated and recorded: a scenario as data, and the reading of its TOML."""

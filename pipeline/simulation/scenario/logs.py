@@ -1,0 +1,146 @@
+"""The [[log]] tables of a scenario: what each recording is of."""
+
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path as File
+
+import numpy as np
+
+from pipeline.maths.excitation.fourier import Fourier
+from pipeline.maths.simulation.surroundings import SHAPES
+from pipeline.robots.from_toml import NAME
+from pipeline.simulation.scenario.scenario import Path, Push, SimulatedJoint, SimulatedLog, Tissue
+from pipeline.simulation.scenario.table import TomlTable
+from pipeline.study.reading import ROLES
+
+FORMATS = (".tdms", ".lvm")
+
+
+def logs_of(table: TomlTable, joints: dict[str, SimulatedJoint], families: Sequence[str]) -> tuple[SimulatedLog, ...]:
+    """Read every [[log]]; one that several families record is there once for each, named after the family."""
+    logs = tuple(log for entry in table.tables("log") for log in _log(entry, joints, families))
+    if not logs:
+        table.problem("it has no [[log]], so nothing would be recorded")
+    for what in ("name", "file"):
+        values = [getattr(log, what) for log in logs]
+        for twice in sorted({value for value in values if values.count(value) > 1}):
+            table.problem(f"two logs have the {what} {twice!r}")
+    return logs
+
+
+def _log(table: TomlTable, joints: dict[str, SimulatedJoint], families: Sequence[str]) -> list[SimulatedLog]:
+    name, file = table.text("name"), table.text("file")
+    if not NAME.fullmatch(name):
+        table.problem(f"name must match [a-z0-9_-]+, not {name!r}")
+    if File(file).name != file or File(file).suffix not in FORMATS:
+        table.problem(f"file must be a plain file name that ends in {' or '.join(FORMATS)}, not {file!r}")
+    duration = table.number("duration", above=0.0)
+    role = table.text("role", choices=ROLES)
+    moves = {key: _move(entry) for key, entry in table.table("moves").each()}
+    held_table, external = table.table("held"), table.table("external")
+    held = {key: held_table.number(key) for key in held_table.values}
+    pushes = {key: tuple(_push(e, duration, False) for e in external.tables(key)) for key in external.values}
+    _check_joints(table, joints, moves, held, pushes)
+    clock = table.text("clock", "channel", ("channel", "header"))
+    unit = table.text("current_unit", "A", ("A", "mA"))
+    log = SimulatedLog(name, file, role, duration, moves, held, pushes, unit, clock)
+    found = _of_arm(table, log, joints, families) if families else _of_joints(table, log)
+    table.close()
+    return found
+
+
+def _check_joints(
+    table: TomlTable, joints: dict[str, SimulatedJoint], moves: object, held: object, pushes: object
+) -> None:
+    moving, still, pushed = (set(names) for names in (moves, held, pushes))  # type: ignore[call-overload]
+    for key in sorted((moving | still | pushed) - set(joints)):
+        table.problem(f"there is no [joint.{key}]; there are {', '.join(joints)}")
+    for key in sorted(moving & still):
+        table.problem(f"{key} both moves and is held")
+    for key in sorted(pushed - moving - still):
+        table.problem(f"{key} touches something but is not recorded; let it move or hold it")
+    if not moving:
+        table.problem("no joint moves; it needs a table moves")
+
+
+def _of_joints(table: TomlTable, log: SimulatedLog) -> list[SimulatedLog]:
+    for key, move in log.moves.items():
+        if isinstance(move, Path):
+            table.problem(f"moves.{key} is a path; joints that follow their model exactly need a Fourier series")
+    return [log]
+
+
+def _of_arm(
+    table: TomlTable, log: SimulatedLog, joints: dict[str, SimulatedJoint], families: Sequence[str]
+) -> list[SimulatedLog]:
+    """What only the whole arm can do, and the log as each of its families gives it."""
+    lead, skip = table.number("lead", 0.0, low=0.0), table.number("skip", 0.0, low=0.0)
+    if skip >= log.duration:
+        table.problem(f"skip = {skip:g} s leaves nothing of {log.duration:g} s")
+    for name, joint in joints.items():
+        start, (low, high) = float(log.position(name, np.array([-lead]))[0]), joint.stops
+        if start < low or start > high:
+            table.problem(f"{name} starts at {start:g}, beyond its stops {low:g} and {high:g}")
+    mass = table.number("mass", 0.0, low=0.0)
+    tip = tuple(_push(entry, log.duration, True) for entry in table.tables("tip"))
+    tissue = _tissue(table.table("tissue")) if "tissue" in table else None
+    wanted = table.texts("families", list(families), families)
+    roles_table = table.table("role_in")
+    roles = {family: roles_table.text(family, log.role, ROLES) for family in families}
+    roles_table.close()
+    shared = {**vars(log), "lead": lead, "skip": skip, "mass": mass, "tip": tip, "tissue": tissue}
+    return [
+        SimulatedLog(
+            **{
+                **shared,
+                "name": f"{family}-{log.name}",
+                "file": f"{family}_{log.file}",
+                "family": family,
+                "role": roles[family],
+            }
+        )
+        for family in wanted
+    ]
+
+
+def _move(table: TomlTable) -> Fourier | Path:
+    if "path" in table:
+        points = table.pairs("path")
+        ease = table.flag("ease", False)
+        if any(b[0] <= a[0] for a, b in pairwise(points)):
+            table.problem("the times of path must increase")
+        table.close()
+        return Path(points or ((0.0, 0.0), (1.0, 0.0)), ease)
+    a, b = table.numbers("a"), table.numbers("b")
+    if len(a) != len(b) or not a:
+        table.problem(f"a and b must have one number for each harmonic, not {len(a)} and {len(b)}")
+        a = b = (0.0,)
+    series = Fourier(table.number("a0", 0.0), a, b, table.number("period", above=0.0))
+    table.close()
+    return series
+
+
+def _push(table: TomlTable, duration: float, at_tip: bool) -> Push:
+    shape = table.text("shape", choices=SHAPES)
+    start, end = table.number("start", low=0.0), table.number("end")
+    direction = None
+    if at_tip:
+        force = table.numbers("force", count=3) or (0.0, 0.0, 1.0)
+        peak = math.hypot(*force) or 1.0
+        x, y, z = (part / peak for part in force)
+        direction = (x, y, z)
+    else:
+        peak = table.number("peak")
+    if end <= start:
+        table.problem(f"end must be after start = {start:g}, not {end:g}")
+    if end > duration and not math.isnan(duration):
+        table.problem(f"end = {end:g} s is after the recording's {duration:g} s")
+    table.close()
+    return Push(shape, start, end, peak, direction)
+
+
+def _tissue(table: TomlTable) -> Tissue:
+    found = Tissue(table.number("surface"), table.number("stiffness", above=0.0), table.number("damping", 0.0, low=0.0))
+    table.close()
+    return found
