@@ -3,8 +3,8 @@
 from pathlib import Path
 
 import numpy as np
-
 from pipeline.maths.models.dynamics import inverse
+
 from pipeline.records import Signal
 from pipeline.robots import davinci
 from pipeline.robots.robot import Joint

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
+from pipeline.maths.models.dynamics import forward, inverse, mass, regressor, scalar_bias
 
 from pipeline.errors import PipelineError
 from pipeline.filters import ekf
 from pipeline.filters.problem import NoiseModel
 from pipeline.maths.models import terms
-from pipeline.maths.models.dynamics import forward, inverse, mass, regressor, scalar_bias
 from pipeline.records import Average, Diagnostic, Fit, Track, Whiteness
 from pipeline.robots import davinci, dvrk_psm
 from pipeline.stages import average, fit, whiteness

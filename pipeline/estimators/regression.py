@@ -1,40 +1,48 @@
-"""Records as regressions: averaged periods to be fitted, and recordings whose effort is to be predicted."""
+"""Records as motions and regressions: averaged periods to be fitted, and recordings whose effort is to be predicted."""
 
 from collections.abc import Sequence
 
 import numpy as np
 
 from pipeline.estimators.problem import Regression
-from pipeline.maths.models.dynamics import regressor
+from pipeline.maths.arrays import Array
+from pipeline.maths.models.model import Model, Motion
 from pipeline.maths.signals.smoothing import motion, segments
-from pipeline.records import Column, Signal, Trajectory
-from pipeline.robots.robot import Joint
-
-MODEL = "independent"  # each joint by itself, section 6.1
+from pipeline.records import Signal, Trajectory
 
 
-def pose(trajectories: Sequence[Trajectory], joint: Joint) -> Regression:
+def pose(model: Model, trajectories: Sequence[Trajectory]) -> Regression:
     """The least squares problem of one joint: the averaged periods of all its logs, one after the other.  (6.37)"""
     lengths = [len(t) for t in trajectories]
     return Regression(
-        Phi=np.vstack([regressor(joint.terms, t.q, t.dq, t.ddq) for t in trajectories]),
+        Phi=np.vstack([model.regressor(averaged_motion(t)).Phi[:, 0] for t in trajectories]),
         tau=np.concatenate([t.tau for t in trajectories]),
         tau_var=np.concatenate([t.tau_var for t in trajectories]),
         periods=np.concatenate([t.count for t in trajectories]),
         starts=tuple(np.cumsum([0, *lengths[:-1]]).tolist()),
-        names=tuple(term.name for term in joint.terms),
+        names=tuple(parameter.name for parameter in model.parameters),
     )
 
 
-def measured_regressor(signal: Signal, joint: Joint, lowpass: float) -> Column:
-    """Phi (N, p) of a recording that need not repeat, from low-passed motion."""
-    rows = []
-    for part in segments(signal.segment):
-        rows.append(regressor(joint.terms, *motion_of(signal, part, lowpass)))
-    return np.vstack(rows)
+def averaged_motion(trajectory: Trajectory) -> Motion:
+    """One averaged period of a joint, which repeats."""
+    columns = (trajectory.q, trajectory.dq, trajectory.ddq)
+    q, dq, ddq = (x[:, None] for x in columns)
+    return Motion(q, dq, ddq, trajectory.period / len(q), np.zeros(len(q), np.int64), periodic=True)
 
 
-def motion_of(signal: Signal, part: slice, lowpass: float) -> tuple[Column, Column, Column]:
-    """Low-passed position, velocity and acceleration of one segment of a recording."""
+def measured_motion(signal: Signal, lowpass: float) -> Motion:
+    """A recording of a joint that need not repeat: low-passed, with its acceleration, each segment by itself."""
+    parts = [_smoothed(signal, part, lowpass) for part in segments(signal.segment)]
+    q, dq, ddq = (np.concatenate(columns)[:, None] for columns in zip(*parts, strict=True))
+    return Motion(q, dq, ddq, 1.0 / signal.rate, signal.segment)
+
+
+def predicted(model: Model, theta: Array, motion: Motion) -> Array:
+    """The effort (N,) of a joint that moves so."""
+    return np.asarray(model.regressor(motion).Phi[:, 0] @ theta)
+
+
+def _smoothed(signal: Signal, part: slice, lowpass: float) -> tuple[Array, Array, Array]:
     dq = signal.dq[part] if signal.velocity == "logged" else None
     return motion(signal.q[part], dq, signal.rate, lowpass)

@@ -1,75 +1,46 @@
 """The extended Kalman filter of one joint, with the external effort as a state.
 
-    x = [q, dq, tau_ext],        y = [q, dq] + v,        v ~ N(0, diag(r_q^2, r_dq^2))
+x = [q, dq, tau_ext],        y = [q, dq] + v,        v ~ N(0, diag(r_q^2, r_dq^2))
 
-    q[k+1]       = q + T_s dq + w_q
-    dq[k+1]      = dq + T_s (tau - b(q, dq) - tau_ext) / M + w_dq
-    tau_ext[k+1] = tau_ext + w_tau                                                        (7.11)-(7.16)
-
-One loop of scalars serves both ways of running it: compiled for long recordings, and as plain Python on lists for
-short ones, where compiling costs more than it saves.  Both do the same arithmetic in the same order.
+q[k+1]       = q + T_s dq + w_q
+dq[k+1]      = dq + T_s (tau - b(q, dq) - tau_ext) / M + w_dq
+tau_ext[k+1] = tau_ext + w_tau                                                        (7.11)-(7.16)
 """
 
-from collections.abc import Callable, Sequence
-from functools import cache
 from typing import Any
 
 import numpy as np
 
 from pipeline.filters.problem import NoiseModel, Tracked
 from pipeline.maths.arrays import Array
-from pipeline.maths.models.dynamics import ScalarBias, mass, scalar_bias
-from pipeline.maths.models.terms import Term
+from pipeline.maths.compiled import cached
+from pipeline.maths.models import bias as derivation
+from pipeline.maths.models.kernels import bias
+from pipeline.maths.models.model import JointDynamics
 
-COMPILE_FROM = 200_000  # samples
 # The first prediction knows nothing: 10^3 times as uncertain as the measurement noise, and a broad external effort.
 FIRST = 1e3
 
 
 def track(
-    terms: Sequence[Term],
-    theta: Array,
-    q: Array,
-    dq: Array,
-    tau: Array,
-    T_s: float,
-    noise: NoiseModel,
-    first_std: float,
+    joint: JointDynamics, q: Array, dq: Array, tau: Array, T_s: float, noise: NoiseModel, first_std: float
 ) -> Tracked:
     """Filter a recording: correct with y_k, then predict with tau_k.  (7.6), (7.7)
 
     `q`, `dq`, `tau` are (N,) in the joint's units, `T_s` [s]; `first_std` is the standard deviation of the external
     effort before the first sample, when the state is taken as 0.
     """
-    N, inertia = len(q), mass(terms, theta)
-    bias = scalar_bias(terms, theta)
-    if N >= COMPILE_FROM:
-        out = np.empty((7, N))
-        _compiled_pass()(*_jitted(bias), inertia, q, dq, tau, T_s, *noise, first_std, FIRST, *out)
-        return Tracked(*out)
-    rows = [[0.0] * N for _ in range(7)]
-    _pass(bias, inertia, q.tolist(), dq.tolist(), tau.tolist(), T_s, *noise, first_std, FIRST, *rows)
-    return Tracked(*(np.array(row) for row in rows))
+    out = np.empty((7, len(q)))
+    q, dq, drive, inertia = (np.ascontiguousarray(x, float) for x in (q, dq, tau - joint.known, joint.inertia))
+    _pass(joint.coefficients, inertia, q, dq, drive, T_s, *noise, first_std, FIRST, *out)
+    return Tracked(*out)
 
 
-def _jitted(bias: ScalarBias) -> tuple[Any]:
-    from numba import njit
-
-    return (njit(bias),)
-
-
-@cache
-def _compiled_pass() -> Callable[..., None]:
-    from numba import njit
-
-    compiled: Callable[..., None] = njit(_pass)
-    return compiled
-
-
+@cached(derivation)
 def _pass(
-    bias: Any, M: float, y_q: Any, y_dq: Any, tau: Any, T_s: float, r_q: float, r_dq: float, q_q: float, q_dq: float,
-    q_tau: float, first_std: float, first: float, out_q: Any, out_dq: Any, out_tau: Any, out_std: Any, out_iq: Any,
-    out_idq: Any, out_nis: Any,
+    c_b: Any, inertia: Any, y_q: Any, y_dq: Any, drive: Any, T_s: float, r_q: float, r_dq: float, q_q: float,
+    q_dq: float, q_tau: float, first_std: float, first: float, out_q: Any, out_dq: Any, out_tau: Any, out_std: Any,
+    out_iq: Any, out_idq: Any, out_nis: Any,
 ) -> None:  # fmt: skip
     """The loop.  P is symmetric: a b c / b d e / c e f for the states q, dq, tau_ext."""
     R_q, R_dq, Q_q, Q_dq, Q_tau = r_q * r_q, r_dq * r_dq, q_q * q_q, q_dq * q_dq, q_tau * q_tau
@@ -103,9 +74,10 @@ def _pass(
         out_q[k], out_dq[k], out_tau[k], out_std[k] = x_q, x_dq, x_tau, f**0.5
         out_iq[k], out_idq[k], out_nis[k] = i_q, i_dq, nis
         # x = f(x, u), P = F P F' + Q with F = [1 T 0; g h l; 0 0 1]
-        bias_k, bias_q, bias_dq = bias(x_q, x_dq)
+        bias_k, bias_q, bias_dq = bias(c_b, x_q, x_dq, 0.0)
+        M = inertia[k]
         g, h, l = -T_s * bias_q / M, 1.0 - T_s * bias_dq / M, -T_s / M  # noqa: E741
-        x_q, x_dq = x_q + T_s * x_dq, x_dq + T_s * (tau[k] - bias_k - x_tau) / M
+        x_q, x_dq = x_q + T_s * x_dq, x_dq + T_s * (drive[k] - bias_k - x_tau) / M
         n11, n12, n13 = a + T_s * b, b + T_s * d, c + T_s * e
         n21, n22, n23 = g * a + h * b + l * c, g * b + h * d + l * e, g * c + h * e + l * f
         a = n11 + T_s * n12 + Q_q

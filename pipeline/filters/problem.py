@@ -1,10 +1,10 @@
 """What every filter is asked, and what it answers."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import NamedTuple
 
 from pipeline.maths.arrays import Array
-from pipeline.maths.models.terms import Term
+from pipeline.maths.models.model import JointDynamics
 
 
 class NoiseModel(NamedTuple):
@@ -29,5 +29,5 @@ class Tracked(NamedTuple):
     nis: Array
 
 
-# track(terms, theta, q, dq, tau, T_s, noise, first_std)
-Filter = Callable[[Sequence[Term], Array, Array, Array, Array, float, NoiseModel, float], Tracked]
+# track(joint, q, dq, tau, T_s, noise, first_std)
+Filter = Callable[[JointDynamics, Array, Array, Array, float, NoiseModel, float], Tracked]

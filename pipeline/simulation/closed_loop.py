@@ -9,7 +9,7 @@ from pipeline.maths.mechanics import kinematics
 from pipeline.maths.mechanics.bodies import Bodies
 from pipeline.maths.mechanics.kinematics import Chain
 from pipeline.maths.mechanics.rigid_body import inverse_dynamics
-from pipeline.maths.models.dynamics import regressor
+from pipeline.maths.models.independent import regressor
 from pipeline.maths.simulation.closed_loop import JointConstraints, Timing, simulate
 from pipeline.maths.simulation.plant import arm
 from pipeline.maths.simulation.surroundings import UP, Surroundings

@@ -4,7 +4,7 @@ import numpy as np
 
 from pipeline.maths.arrays import Array
 from pipeline.maths.excitation.fourier import Fourier, motion
-from pipeline.maths.models.dynamics import inverse
+from pipeline.maths.models.independent import regressor
 from pipeline.simulation.motion import Motion, SimulatedRun
 from pipeline.simulation.scenario.scenario import Scenario, SimulatedLog
 
@@ -22,5 +22,5 @@ def _joint(scenario: Scenario, log: SimulatedLog, name: str, t: Array) -> Motion
     else:
         q, dq, ddq = log.position(name, t), np.zeros_like(t), np.zeros_like(t)
     tau_ext = sum((push.at(t) for push in log.external.get(name, ())), np.zeros_like(t))
-    tau = inverse(simulated.joint.terms, np.array(simulated.theta), q, dq, ddq) + tau_ext
+    tau = regressor(simulated.joint.terms, q, dq, ddq) @ np.array(simulated.theta) + tau_ext
     return Motion(q, dq, tau, tau_ext)

@@ -5,13 +5,14 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from pipeline.errors import PipelineError
-from pipeline.estimators.regression import measured_regressor, motion_of
+from pipeline.estimators.regression import measured_motion, predicted
 from pipeline.filters import tracker
 from pipeline.filters.problem import NoiseModel, Tracked
-from pipeline.maths.models.dynamics import mass
+from pipeline.maths.models.model import JointDynamics, Motion
 from pipeline.maths.signals.smoothing import segments
 from pipeline.maths.signals.windows import outside, settled
-from pipeline.records import Average, Diagnostic, Fit, Signal, Track, diagnostic
+from pipeline.records import Average, Column, Diagnostic, Fit, Signal, Track, diagnostic
+from pipeline.robots.models import independent
 from pipeline.robots.robot import Joint
 from pipeline.study import LogEntry
 
@@ -43,21 +44,23 @@ def run(
     if chosen is None:
         there = ", ".join(f"{f.model}.{f.estimator}" for f in own)
         raise PipelineError(f"{joint.name}: there is no fit {fit!r}; set fit in [settings] to one of {there}")
-    if mass(joint.terms, chosen.theta) <= 0:
+    model, motion = independent(joint), measured_motion(signal, lowpass)
+    [dynamics] = model.joint_dynamics(chosen.theta, motion)
+    if dynamics.inertia.min() <= 0:
         yield diagnostic(
             "ekf", f"{signal.log}.{joint.name}", "warning",
             f"{signal.log}/{joint.name}: the fit's inertia is not positive, so no motion follows from it and nothing "
             "is tracked; check the signs of the effort and of the position",
         )  # fmt: skip
         return
-    noise = assumed(
-        [a for a in averages if a.joint == joint.name], chosen, joint, signal, lowpass, q_tau or joint.q_tau
-    )
-    yield tracked(signal, chosen, joint, noise, entry, lowpass, q_tau or joint.q_tau)
+    q_tau = q_tau or joint.q_tau
+    noise = assumed([a for a in averages if a.joint == joint.name], dynamics, motion, signal, q_tau)
+    tau_hat = predicted(model, chosen.theta, motion)
+    yield tracked(signal, chosen, dynamics, tau_hat, noise, entry, q_tau)
 
 
 def assumed(
-    averages: list[Average], fit: Fit, joint: Joint, signal: Signal, lowpass: float, q_tau: float
+    averages: list[Average], dynamics: JointDynamics, motion: Motion, signal: Signal, q_tau: float
 ) -> NoiseModel:
     """What the filter assumes of noise: all measured, except for the walk of the external effort.
 
@@ -72,22 +75,21 @@ def assumed(
     )
     # A noiseless log would leave the innovations without a covariance to be judged by.
     r_q, r_dq = (max(r, 1e-9 * np.ptp(x), 1e-12) for r, x in ((r_q, signal.q), (r_dq, signal.dq)))
-    ddq = np.concatenate([motion_of(signal, part, lowpass)[2] for part in segments(signal.segment)])
+    ddq = motion.ddq[:, 0]
     euler_q, euler_dq = (0.5 * T_s**2 * float(np.sqrt(np.mean(x**2))) for x in (ddq, np.gradient(ddq, T_s)))
-    driven = T_s * sigma_tau / abs(mass(joint.terms, fit.theta))
+    driven = T_s * sigma_tau / float(np.mean(dynamics.inertia))
     return NoiseModel(r_q, r_dq, euler_q, float(np.hypot(driven, euler_dq)), q_tau * np.sqrt(T_s))
 
 
 def tracked(
-    signal: Signal, fit: Fit, joint: Joint, noise: NoiseModel, entry: LogEntry, lowpass: float, q_tau: float
+    signal: Signal, fit: Fit, dynamics: JointDynamics, tau_hat: Column, noise: NoiseModel, entry: LogEntry, q_tau: float
 ) -> Track:
     """Filter every segment of a signal; a gap starts the filter anew."""
     first_std = max(float(np.std(signal.tau)), noise.q_tau)
     track = tracker(FILTER)
     passes = [
         track(
-            joint.terms,
-            fit.theta,
+            dynamics._replace(inertia=dynamics.inertia[part], known=dynamics.known[part]),
             signal.q[part],
             signal.dq[part],
             signal.tau[part],
@@ -98,7 +100,6 @@ def tracked(
         for part in segments(signal.segment)
     ]
     together = Tracked(*(np.concatenate(columns) for columns in zip(*passes, strict=True)))
-    tau_hat = measured_regressor(signal, joint, lowpass) @ fit.theta
     calm = np.concatenate([settled(signal.t[part]) for part in segments(signal.segment)])
     counted = outside(signal.t, entry.contact) & calm
     return Track(

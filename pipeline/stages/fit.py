@@ -7,10 +7,12 @@ import numpy as np
 from pipeline.errors import NotIdentifiable
 from pipeline.estimators import ESTIMATORS, estimator
 from pipeline.estimators.problem import Estimate, Regression
-from pipeline.estimators.regression import MODEL, pose
-from pipeline.maths.models.dynamics import mass, regressor
+from pipeline.estimators.regression import averaged_motion, pose, predicted
+from pipeline.maths.arrays import Array
+from pipeline.maths.models.model import Model
 from pipeline.records import Diagnostic, Fit, Residual, Trajectory, diagnostic
-from pipeline.robots.robot import Joint, Robot
+from pipeline.robots.models import independent
+from pipeline.robots.robot import Robot
 
 
 def run(trajectories: Iterable[Trajectory], robot: Robot) -> Iterator[Fit | Residual | Diagnostic]:
@@ -20,47 +22,52 @@ def run(trajectories: Iterable[Trajectory], robot: Robot) -> Iterator[Fit | Resi
         own = [trajectory for trajectory in every if trajectory.joint == joint.name]
         if not own:
             continue
-        problem = pose(own, joint)
+        model = independent(joint)
+        regression = pose(model, own)
         for name in ESTIMATORS:
             try:
-                answer = estimator(name)(problem)
+                estimate = estimator(name)(regression)
             except NotIdentifiable as error:
                 yield diagnostic("fit", joint.name, "warning", f"{joint.name}: {name} is left out: {error}")
                 continue
-            if mass(joint.terms, answer.theta) <= 0:
-                yield diagnostic(
-                    "fit", joint.name, "warning", f"{joint.name}: {name} finds an inertia that is not positive"
-                )
-            yield summarised(own, joint, name, problem, answer)
-            yield from residuals(own, joint, name, answer)
+            if not has_positive_inertia(model, estimate.theta, own):
+                finds = f"{joint.name}: {name} finds an inertia that is not positive"
+                yield diagnostic("fit", joint.name, "warning", finds)
+            yield summarised(own, model, name, regression, estimate)
+            yield from residuals(own, model, name, estimate)
 
 
-def summarised(own: Sequence[Trajectory], joint: Joint, name: str, problem: Regression, answer: Estimate) -> Fit:
+def has_positive_inertia(model: Model, theta: Array, trajectories: Sequence[Trajectory]) -> bool:
+    """Whether M is positive definite along the trajectories; where it is not, no motion follows from the model."""
+    return all(np.linalg.eigvalsh(model.inertia(theta, averaged_motion(t).q)).min() > 0 for t in trajectories)
+
+
+def summarised(own: Sequence[Trajectory], model: Model, name: str, regression: Regression, estimate: Estimate) -> Fit:
     """A Fit with how well it describes the averaged periods."""
-    residual = problem.tau - problem.Phi @ answer.theta
-    spread = problem.tau - problem.tau.mean()
+    residual = regression.tau - regression.Phi @ estimate.theta
+    spread = regression.tau - regression.tau.mean()
     return Fit(
-        group=joint.name,
-        model=MODEL,
+        group=model.group,
+        model=model.name,
         estimator=name,
         logs=tuple(t.log for t in own),
-        samples=len(problem.tau),
+        samples=len(regression.tau),
         periods=min(t.periods for t in own),
         mse=float(np.mean(residual**2)),
         r2=float(1 - residual @ residual / (spread @ spread)),
-        condition=float(np.linalg.cond(problem.Phi)),
-        hac_lags=answer.hac_lags,
-        parameter=np.array([term.name for term in joint.terms], object),
-        phi=np.array([term.typst for term in joint.terms], object),
-        unit=np.array([joint.unit(term.unit) for term in joint.terms], object),
-        theta=answer.theta,
-        theta_std=answer.theta_std,
-        theta_std_hac=answer.theta_std_hac,
+        condition=float(np.linalg.cond(regression.Phi)),
+        hac_lags=estimate.hac_lags,
+        parameter=np.array([parameter.name for parameter in model.parameters], object),
+        phi=np.array([parameter.typst for parameter in model.parameters], object),
+        unit=np.array([parameter.unit for parameter in model.parameters], object),
+        theta=estimate.theta,
+        theta_std=estimate.theta_std,
+        theta_std_hac=estimate.theta_std_hac,
     )
 
 
-def residuals(own: Sequence[Trajectory], joint: Joint, name: str, answer: Estimate) -> Iterator[Residual]:
+def residuals(own: Sequence[Trajectory], model: Model, name: str, estimate: Estimate) -> Iterator[Residual]:
     """What the fit leaves of each log's averaged effort.  (6.54)"""
     for t in own:
-        tau_hat = regressor(joint.terms, t.q, t.dq, t.ddq) @ answer.theta
-        yield Residual(t.log, joint.name, MODEL, name, t.rate, t=t.t, dq=t.dq, tau=t.tau, tau_hat=tau_hat)
+        tau_hat = predicted(model, estimate.theta, averaged_motion(t))
+        yield Residual(t.log, t.joint, model.name, name, t.rate, t=t.t, dq=t.dq, tau=t.tau, tau_hat=tau_hat)

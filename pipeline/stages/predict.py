@@ -7,14 +7,15 @@ import numpy as np
 
 from pipeline.errors import NotIdentifiable
 from pipeline.estimators import ESTIMATORS, estimator
-from pipeline.estimators.regression import MODEL, measured_regressor, pose
+from pipeline.estimators.regression import measured_motion, pose, predicted
 from pipeline.maths.arrays import Booleans
-from pipeline.maths.models.dynamics import regressor
+from pipeline.maths.models.model import Model, Motion
 from pipeline.maths.signals import averaging, harmonics
 from pipeline.maths.signals.smoothing import lowpass as low_passed
 from pipeline.maths.signals.smoothing import segments
 from pipeline.maths.signals.windows import outside
 from pipeline.records import Column, Diagnostic, Fit, Prediction, Signal, Trajectory, diagnostic
+from pipeline.robots.models import independent
 from pipeline.robots.robot import Joint
 from pipeline.study import LogEntry
 
@@ -37,6 +38,7 @@ def run(
     """
     if signal.at_rest:
         return
+    model = independent(joint)
     if entry.role in ("validation", "contact"):
         free = outside(signal.t, entry.contact)
         if not free.any():
@@ -44,44 +46,44 @@ def run(
             said = f"{name}: its contact windows cover the whole log, so nothing is left to score a prediction on"
             yield diagnostic("predict", f"{signal.log}.{joint.name}", "warning", said)
             return
-        Phi = measured_regressor(signal, joint, lowpass)
+        motion = measured_motion(signal, lowpass)
         for fit in fits:
             if fit.group == joint.name:
-                tau_hat = Phi @ fit.theta
+                tau_hat = predicted(model, fit.theta, motion)
                 yield scored(signal, fit.model, fit.estimator, entry.role, tau_hat, free, lowpass)
     elif trajectory is not None:
         others = [t for t in trajectories if t.joint == joint.name and t.log != signal.log]
         if others:
-            yield from without_the_log(signal, trajectory, others, joint, lowpass)
+            yield from without_the_log(signal, trajectory, others, model, lowpass)
         else:
-            yield from without_a_period(signal, trajectory, joint, lowpass)
+            yield from without_a_period(signal, trajectory, model, lowpass)
 
 
 def without_the_log(
-    signal: Signal, own: Trajectory, others: Sequence[Trajectory], joint: Joint, lowpass: float
+    signal: Signal, own: Trajectory, others: Sequence[Trajectory], model: Model, lowpass: float
 ) -> Iterator[Prediction | Diagnostic]:
     """Predict a log from fits to the other identification logs."""
     part = at(signal, whole(signal, own))
-    Phi = regressor(joint.terms, *motion_at(own, part.t - signal.t[0]))
+    motion = motion_at(own, part.t - signal.t[0])
     for name in ESTIMATORS:
         try:
-            theta = estimator(name)(pose(others, joint)).theta
+            theta = estimator(name)(pose(model, others)).theta
         except NotIdentifiable as error:
             yield not_predicted(signal, name, error)
             continue
         everywhere = np.ones(len(part.t), dtype=bool)
-        yield scored(part, MODEL, name, "leave one log out", Phi @ theta, everywhere, lowpass)
+        yield scored(part, model.name, name, "leave one log out", predicted(model, theta, motion), everywhere, lowpass)
 
 
 def without_a_period(
-    signal: Signal, own: Trajectory, joint: Joint, lowpass: float
+    signal: Signal, own: Trajectory, model: Model, lowpass: float
 ) -> Iterator[Prediction | Diagnostic]:
     """Predict each period of a log from fits to the other periods; only the effort is left out, not the path."""
     part = at(signal, whole(signal, own))
     since = part.t - signal.t[0]
     number = np.minimum((since / own.period + 1e-9).astype(int), own.periods - 1)
     group = number * min(own.periods, PARTS) // own.periods
-    Phi = regressor(joint.terms, *motion_at(own, since))
+    Phi = model.regressor(motion_at(own, since)).Phi[:, 0]
     tau_hat = {name: np.empty(len(since)) for name in ESTIMATORS}
     rests = averaging.left_out(part.t, part.tau, own.period, len(own.t), group)
     for out, rest in enumerate(rests):
@@ -89,12 +91,12 @@ def without_a_period(
         kept = replace(own, tau=rest.mean, tau_var=rest.var, count=rest.counts)
         for name in list(tau_hat):
             try:
-                tau_hat[name][unseen] = Phi[unseen] @ estimator(name)(pose([kept], joint)).theta
+                tau_hat[name][unseen] = Phi[unseen] @ estimator(name)(pose(model, [kept])).theta
             except NotIdentifiable as error:
                 yield not_predicted(signal, name, error)
                 del tau_hat[name]
-    for name, predicted in tau_hat.items():
-        yield scored(part, MODEL, name, "leave one period out", predicted, np.ones(len(since), dtype=bool), lowpass)
+    for name, effort in tau_hat.items():
+        yield scored(part, model.name, name, "leave one period out", effort, np.ones(len(since), dtype=bool), lowpass)
 
 
 def not_predicted(signal: Signal, name: str, error: NotIdentifiable) -> Diagnostic:
@@ -115,14 +117,14 @@ def at(signal: Signal, which: Booleans) -> Signal:
     return replace(signal, **columns)
 
 
-def motion_at(own: Trajectory, since: Column) -> tuple[Column, Column, Column]:
-    """The trajectory's motion at any time since its start."""
+def motion_at(own: Trajectory, since: Column) -> Motion:
+    """The trajectory's motion at any time since its start, as one segment."""
     omega = 2 * np.pi / own.period
     c = harmonics.project(own.t, own.q, omega, own.harmonics)
     dc = harmonics.derivative(c, omega)
     ddc = harmonics.derivative(dc, omega)
-    q, dq, ddq = (harmonics.evaluate(x, since, omega) for x in (c, dc, ddc))
-    return q, dq, ddq
+    q, dq, ddq = (harmonics.evaluate(x, since, omega)[:, None] for x in (c, dc, ddc))
+    return Motion(q, dq, ddq, 1.0 / own.rate, np.zeros(len(since), np.int64))
 
 
 def scored(

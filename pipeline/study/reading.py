@@ -12,6 +12,7 @@ from pipeline.errors import BadRobot, BadStudy
 from pipeline.estimators import ESTIMATORS
 from pipeline.robots import Robot
 from pipeline.robots.from_toml import RESERVED, change, is_number, wrong_name
+from pipeline.robots.models import MODELS
 from pipeline.study import LogEntry, Settings, Study, Weight
 from pipeline.study.channels import Channels
 from pipeline.study.problems import Problems, implausible
@@ -19,7 +20,7 @@ from pipeline.study.problems import Problems, implausible
 ROLES = ("identification", "validation", "contact", "weight", "tissue", "friction")
 CHOICES = {
     "derivative": ("harmonics", "fft"),
-    "fit": tuple(f"{model}.{estimator}" for model in ("independent",) for estimator in ESTIMATORS),
+    "fit": tuple(f"{model}.{estimator}" for model in MODELS for estimator in ESTIMATORS),
 }
 
 

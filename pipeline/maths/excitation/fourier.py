@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.maths.arrays import Array
-from pipeline.maths.models.dynamics import regressor
+from pipeline.maths.models.independent import regressor
 from pipeline.maths.models.terms import Term
 
 Range = tuple[float, float]

@@ -1,7 +1,7 @@
 """The trajectory that tells most about a joint, within limits that hold at every instant.  Section 6.3.2"""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -21,7 +21,7 @@ from pipeline.maths.excitation.fourier import (
     ranges,
     turning_points,
 )
-from pipeline.maths.models.dynamics import regressor
+from pipeline.maths.models.independent import regressor, slopes
 from pipeline.maths.models.terms import Term
 
 Criterion = Callable[[Array], tuple[float, Array]]
@@ -158,7 +158,6 @@ def _cost(problem: ExcitationProblem, x: Array) -> tuple[float, Array]:
     q, dq, ddq = (B @ x for B in bases)
     value, by_F = CRITERIA[problem.criterion](regressor(problem.terms, q, dq, ddq))
     gradient = bases[2].T @ (by_F @ np.array([term.a for term in problem.terms]))
-    for B, part in zip(bases[:2], ("b_q", "b_dq"), strict=True):
-        slopes = [replace(term, a=0.0, b=getattr(term, part)) for term in problem.terms]
-        gradient += B.T @ (by_F * regressor(slopes, q, dq, ddq)).sum(axis=1)
+    for B, by_motion in zip(bases[:2], slopes(problem.terms, q, dq), strict=True):
+        gradient += B.T @ (by_F * by_motion).sum(axis=1)
     return value, gradient

@@ -2,42 +2,57 @@
 
 A joint model is linear in its parameters (6.8), and each of its terms is linear in acceleration:
 
-    tau = sum_i theta_i phi_i(q, dq, ddq),        phi_i = a_i ddq + b_i(q, dq)
+    tau = sum_i theta_i phi_i,        phi_i = a_i ddq + b_i(q, dq)
 
-so one tuple of terms gives the regressor for identification, and the inertia, the bias force and its
-derivatives for the filter.  The parts of a term are written as expressions in q and dq, because the same
-expression has to run on arrays (numpy) and, sample by sample, inside the filter's compiled loop (math).
+so one tuple of terms gives the regressor for identification, and the inertia, the bias and its derivatives for the
+filter.  b_i is a combination of the functions of `bias`.
 """
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from pipeline.maths.constants import GRAVITY
+from pipeline.maths.models.bias import COEFFICIENTS, Coefficients
 
 
 @dataclass(frozen=True)
 class Term:
-    """One column of the regressor: phi = a ddq + b(q, dq), with the derivatives of b.
+    """One column of the regressor: phi = a ddq + sum of b[f] f(q, dq) over functions f of `COEFFICIENTS`.
 
     `unit` is that of the parameter, with {inertia}, {effort} and {position} left to the joint; `typst` is phi in
-    Typst's maths, for equations.  Expressions may use q, dq, g, sin, cos, tanh, exp, sign and abs.
+    Typst's maths, for equations; a `positive` parameter is one whose sign physics knows.  A term of z has a
+    `displacement`, in the joint's units.
     """
 
     name: str
     typst: str
     unit: str
     a: float = 0.0
-    b: str = "0.0"
-    b_q: str = "0.0"
-    b_dq: str = "0.0"
+    b: Mapping[str, float] = field(default_factory=dict)
+    positive: bool = False
+    displacement: float = 0.0
+
+    def __post_init__(self) -> None:
+        if unknown := sorted(set(self.b) - set(COEFFICIENTS)):
+            raise ValueError(f"term {self.name!r}: no functions {unknown}; there are {', '.join(COEFFICIENTS)}")
+        if ("z" in self.b) != (self.displacement > 0):
+            raise ValueError(f"term {self.name!r}: a term of z, and no other, has a displacement greater than 0")
+
+    @property
+    def coefficients(self) -> Coefficients:
+        """The coefficients of b, for `bias`."""
+        one, sine, cosine, linear, viscous, coulomb, presliding = (self.b.get(name, 0.0) for name in COEFFICIENTS)
+        return one, sine, cosine, linear, viscous, coulomb, presliding
 
 
-inertia = Term("inertia", "dot.double(q)", "{inertia}", a=1.0)
-lifted_mass = Term("lifted mass", "(dot.double(q) - g)", "{inertia}", a=1.0, b="-g")
-gravity_sin = Term("gravity, sine", "g sin(q)", "kg m", b="g * sin(q)", b_q="g * cos(q)")
-gravity_cos = Term("gravity, cosine", "g cos(q)", "kg m", b="g * cos(q)", b_q="-g * sin(q)")
-viscous = Term("viscous friction", "dot(q)", "{effort} s/{position}", b="dq", b_dq="1.0")
-# The jump at dq = 0 has no derivative; the filter takes it as zero there, as section 7.1.2 does.
-coulomb = Term("Coulomb friction", 'op("sign")(dot(q))', "{effort}", b="sign(dq)")
-offset = Term("offset", "1", "{effort}", b="1.0")
-stiffness = Term("stiffness", "q", "{effort}/{position}", b="q", b_q="1.0")
+inertia = Term("inertia", "dot.double(q)", "{inertia}", a=1.0, positive=True)
+lifted_mass = Term("lifted mass", "(dot.double(q) - g)", "{inertia}", a=1.0, b={"1": -GRAVITY}, positive=True)
+gravity_sin = Term("gravity, sine", "g sin(q)", "kg m", b={"sin q": GRAVITY})
+gravity_cos = Term("gravity, cosine", "g cos(q)", "kg m", b={"cos q": GRAVITY})
+viscous = Term("viscous friction", "dot(q)", "{effort} s/{position}", b={"dq": 1.0}, positive=True)
+coulomb = Term("Coulomb friction", 'op("sign")(dot(q))', "{effort}", b={"sign(dq)": 1.0}, positive=True)
+offset = Term("offset", "1", "{effort}", b={"1": 1.0})
+stiffness = Term("stiffness", "q", "{effort}/{position}", b={"q": 1.0})
 
 TERMS = {
     term.name: term for term in (inertia, lifted_mass, gravity_sin, gravity_cos, viscous, coulomb, offset, stiffness)

@@ -1,0 +1,95 @@
+"""The model of a joint that moves by itself, or is taken to: a sum of terms.  Section 6.1"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.maths.arrays import Array
+from pipeline.maths.models.bias import Coefficients, bias
+from pipeline.maths.models.memory import deflection
+from pipeline.maths.models.model import JointDynamics, Motion, Parameter, Regressor
+from pipeline.maths.models.terms import Term
+
+
+@dataclass(frozen=True)
+class IndependentJoint:
+    """tau = sum_i theta_i (a_i ddq + b_i(q, dq)), with the units of the terms filled in.  (6.8), (6.11), (6.13)"""
+
+    group: str
+    terms: tuple[Term, ...]
+    units: tuple[str, ...]  # of the parameters
+    name: str = "independent"
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The joint alone."""
+        return (self.group,)
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """One a term."""
+        pairs = zip(self.terms, self.units, strict=True)
+        return tuple(Parameter(term.name, term.typst, unit, term.positive) for term, unit in pairs)
+
+    def regressor(self, motion: Motion) -> Regressor:
+        """Phi (N, 1, p).  (6.9), (6.12), (6.14)"""
+        q, dq, ddq = (x[:, 0] for x in motion[:3])
+        known, columns = np.ones(len(q), np.bool_), []
+        for term in self.terms:
+            z = np.zeros_like(q)
+            if term.displacement:
+                z, started = deflection(motion, 0, term.displacement)
+                known &= started
+            columns.append(column(term, q, dq, ddq, z))
+        return Regressor(np.stack(columns, axis=-1)[:, None, :], known)
+
+    def inertia(self, theta: Array, q: Array) -> Array:
+        """M (N, 1, 1), the same everywhere.  (6.5)"""
+        return np.full((len(q), 1, 1), inertia_of(self.terms, theta))
+
+    def bias(self, theta: Array, motion: Motion) -> Array:
+        """V + F + G (N, 1)."""
+        still = motion._replace(ddq=np.zeros_like(motion.ddq))
+        return np.asarray(self.regressor(still).Phi @ theta)
+
+    def joint_dynamics(self, theta: Array, motion: Motion) -> tuple[JointDynamics]:
+        """The terms of the joint's own state as coefficients, those with a memory as known effort."""
+        c = combined(self.terms, theta)
+        with_memory = [theta_i * bool(term.displacement) for theta_i, term in zip(theta, self.terms, strict=True)]
+        known = self.bias(np.array(with_memory), motion)[:, 0] if any(with_memory) else np.zeros(len(motion.q))
+        return (JointDynamics(np.full(len(motion.q), inertia_of(self.terms, theta)), c, known),)
+
+
+def column(term: Term, q: Array, dq: Array, ddq: Array, z: Array) -> Array:
+    """phi (N,) of one term."""
+    b, _, _ = bias(term.coefficients, q, dq, z)
+    return np.asarray(term.a * ddq + b)
+
+
+def regressor(terms: Sequence[Term], q: Array, dq: Array, ddq: Array) -> Array:
+    """Phi (K, p) of terms without memory; q, dq and ddq (K,) in the joint's units.  (6.9), (6.12), (6.14)"""
+    return np.stack([column(term, q, dq, ddq, np.zeros_like(q)) for term in terms], axis=-1)
+
+
+def slopes(terms: Sequence[Term], q: Array, dq: Array) -> tuple[Array, Array]:
+    """The derivatives of the columns of Phi by q and dq, (K, p) each; friction's jump has none and counts as 0."""
+    by_q, by_dq = (np.stack(columns, axis=-1) for columns in zip(*(_slopes(t, q, dq) for t in terms), strict=True))
+    return by_q, by_dq
+
+
+def _slopes(term: Term, q: Array, dq: Array) -> tuple[Array, Array]:
+    _, b_q, b_dq = bias(term.coefficients, q, dq, np.zeros_like(q))
+    return b_q + np.zeros_like(q), b_dq + np.zeros_like(q)
+
+
+def inertia_of(terms: Sequence[Term], theta: Array) -> float:
+    """What multiplies the acceleration: M, constant for a joint that moves alone.  (6.5)"""
+    return float(sum(p * term.a for p, term in zip(theta, terms, strict=True)))
+
+
+def combined(terms: Sequence[Term], theta: Array) -> Coefficients:
+    """The coefficients of b = sum_i theta_i b_i, for `bias`; terms with a memory are left out."""
+    rows = np.array([term.coefficients if not term.displacement else np.zeros(7) for term in terms])
+    one, sine, cosine, linear, viscous, coulomb, presliding = (np.asarray(theta) @ rows).tolist()
+    return one, sine, cosine, linear, viscous, coulomb, presliding

@@ -1,0 +1,37 @@
+"""Friction that remembers where it came from: the deflection that the measured motion drives."""
+
+from itertools import pairwise
+
+import numpy as np
+
+from pipeline.maths.arrays import Array, Booleans
+from pipeline.maths.models.model import Motion
+
+RUN_IN = 3.0  # displacements of travel after which a deflection has forgotten how it started, to exp(-2 RUN_IN)
+
+
+def deflection(motion: Motion, joint: int, x_0: float) -> tuple[Array, Booleans]:
+    """The deflection z (N,) of one joint, and where it is known (N,); `x_0` is in the joint's units.
+
+    It starts relaxed after each gap, and is known once the joint has travelled `RUN_IN` displacements; a period is run
+    twice, so that it starts where it ends.
+    """
+    dq = motion.dq[:, joint]
+    z, known = np.empty(len(dq)), np.empty(len(dq), np.bool_)
+    edges = [0, *(np.flatnonzero(np.diff(motion.segment)) + 1).tolist(), len(dq)]
+    for start, stop in pairwise(edges):
+        part = np.ascontiguousarray(dq[start:stop])
+        first = _run(part, motion.T_s, x_0, 0.0) if motion.periodic else None
+        z[start:stop] = _run(part, motion.T_s, x_0, 0.0 if first is None else float(first[-1]))
+        travel = np.cumsum(np.abs(part)) * motion.T_s
+        known[start:stop] = motion.periodic or travel >= RUN_IN * x_0
+    return z, known
+
+
+def _run(dq: Array, T_s: float, x_0: float, z: float) -> Array:
+    """The deflection at each sample (N,), from z at the first."""
+    from pipeline.maths.models import kernels
+
+    out = np.empty(len(dq))
+    kernels.deflections(dq, T_s, x_0, z, out)
+    return out
