@@ -5,6 +5,7 @@ from itertools import pairwise
 import numpy as np
 
 from pipeline.maths.arrays import Array, Booleans
+from pipeline.maths.models.bias import deflect
 from pipeline.maths.models.model import Motion
 
 RUN_IN = 3.0  # displacements of travel after which a deflection has forgotten how it started, to exp(-2 RUN_IN)
@@ -21,8 +22,11 @@ def deflection(motion: Motion, joint: int, x_0: float) -> tuple[Array, Booleans]
     edges = [0, *(np.flatnonzero(np.diff(motion.segment)) + 1).tolist(), len(dq)]
     for start, stop in pairwise(edges):
         part = np.ascontiguousarray(dq[start:stop])
-        first = _run(part, motion.T_s, x_0, 0.0) if motion.periodic else None
-        z[start:stop] = _run(part, motion.T_s, x_0, 0.0 if first is None else float(first[-1]))
+        z_0 = 0.0
+        if motion.periodic:
+            before = _run(part, motion.T_s, x_0, z_0)
+            z_0 = float(deflect(before[-1], part[-1], motion.T_s, x_0))
+        z[start:stop] = _run(part, motion.T_s, x_0, z_0)
         travel = np.cumsum(np.abs(part)) * motion.T_s
         known[start:stop] = motion.periodic or travel >= RUN_IN * x_0
     return z, known
