@@ -61,6 +61,8 @@ class Control(Record):
     joint: str
     start: float
     reference: float
+    settling_time: float  # NaN where it does not settle, or is not to move
+    overshoot: float
     error_10: float
     error_20: float
     error_end: float
@@ -77,6 +79,7 @@ class Lyapunov(Record):
 
     controller: str
     V_rise: float
+    V_0: float
     t: Column
     V: Column
 

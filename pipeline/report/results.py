@@ -107,10 +107,11 @@ def _robot(found: Results, catalogue: Catalogue) -> None:
                 value = float(getattr(links, name)[i])
                 found.put(f"robot.link.{link}.{name}", value, None, unit, links, f"#{name}[{link}]")
     for control in catalogue.all(Control):
-        for name in ("start", "reference", "error_10", "error_20", "error_end"):
+        for name in ("start", "reference", "settling_time", "overshoot", "error_10", "error_20", "error_end"):
             found.add(control, f"control.{control.controller}.{control.joint}.{name}", name)
     for lyapunov in catalogue.all(Lyapunov):
         found.add(lyapunov, f"control.{lyapunov.controller}.V_rise", "V_rise")
+        found.add(lyapunov, f"control.{lyapunov.controller}.V_0", "V_0")
     for excitation in catalogue.all(Excitation):
         key = f"excitation.{excitation.joint}.{excitation.source}"
         for name in ("period", "objective", "condition", "excess_q", "excess_dq", "excess_ddq"):

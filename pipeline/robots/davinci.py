@@ -1,7 +1,8 @@
 """The first-generation da Vinci arm of the thesis: hand roll, hand pitch and instrument slide."""
 
 from pipeline.maths.models.terms import coulomb, gravity_cos, gravity_sin, inertia, lifted_mass, viscous
-from pipeline.robots.davinci_chain import BODIES, CHAIN
+from pipeline.robots.davinci_chain import BODIES, CHAIN, DRIVES, WRIST
+from pipeline.robots.davinci_control import CONTROL
 from pipeline.robots.robot import Joint, Kind, Limits, Robot
 
 TORQUE_CONSTANT = 0.0438  # [N m/A], of every motor.  Table 6.3
@@ -59,4 +60,7 @@ ROBOT = Robot(
     ),
     chain=CHAIN,
     bodies=BODIES,
+    wrist=WRIST,
+    drives=DRIVES,
+    control=CONTROL,
 )

@@ -73,10 +73,12 @@ def bodies(lc5: float = -CYLINDERS[HOLDER][5]) -> Bodies:
 
 BODIES = bodies()
 
-# Gear ratios of Table 6.3, friction of the initial guesses of Tables 6.4-6.6; the motors' inertia is neglected (4.29).
+WRIST = ("instrument_roll", "instrument_pitch", "instrument_yaw", "grip")
+# Gear ratios of Table 6.3; friction of the initial guesses of Tables 6.4-6.6, which say nothing of the wrist; the
+# motors' inertia is neglected (4.29).
 DRIVES = Drives(
-    gear_ratio=np.array([200.0, 200.0, 1340.0]),
-    motor_inertia=np.zeros(3),
-    viscous=np.array([1.0, 1.0, 1.0]),
-    coulomb=np.array([1.0, 0.1, 3.0]),
+    gear_ratio=np.array([200.0, 200.0, 1340.0, 7.5, 12.4, 12.0, 12.0]),
+    motor_inertia=np.zeros(7),
+    viscous=np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]),
+    coulomb=np.array([1.0, 0.1, 3.0, 0.0, 0.0, 0.0, 0.0]),
 )

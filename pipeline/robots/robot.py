@@ -6,6 +6,7 @@ from enum import Enum
 
 from pipeline.errors import BadRobot
 from pipeline.maths.mechanics.bodies import Bodies
+from pipeline.maths.mechanics.drives import Drives
 from pipeline.maths.mechanics.kinematics import Chain
 from pipeline.maths.models.terms import Term
 
@@ -56,10 +57,28 @@ class Joint:
 
 
 @dataclass(frozen=True)
+class ControlStudy:
+    """A controller to be tried in simulation: PD or PID with gravity compensation.  Chapter 5
+
+    Every tuple has one number for each coordinate that takes part, in its own units; the others are held at 0.
+    """
+
+    name: str
+    start: tuple[float, ...]
+    target: tuple[float, ...]
+    proportional: tuple[float, ...]  # K_p
+    derivative: tuple[float, ...]  # K_d
+    integral: tuple[float, ...]  # K_i; 0 for PD
+    viscous: tuple[float, ...]  # friction of the arm
+    known_masses: float  # share of the masses that gravity compensation knows
+    duration: float  # [s]
+
+
+@dataclass(frozen=True)
 class Robot:
     """The joints of an arm, from the base outwards; with its chain and bodies where its geometry is known.
 
-    The first coordinates of the chain are the joints, in this order.
+    The first coordinates of the chain are the joints, in this order; `wrist` names those beyond them.
     """
 
     name: str
@@ -67,6 +86,14 @@ class Robot:
     joints: tuple[Joint, ...] = field(default_factory=tuple)
     chain: Chain | None = None
     bodies: Bodies | None = None
+    wrist: tuple[str, ...] = ()
+    drives: Drives | None = None  # of all coordinates of the chain
+    control: tuple[ControlStudy, ...] = ()
+
+    @property
+    def coordinates(self) -> tuple[str, ...]:
+        """The names of all coordinates."""
+        return (*(joint.name for joint in self.joints), *self.wrist)
 
     def joint(self, name: str) -> Joint:
         """The joint of that name.

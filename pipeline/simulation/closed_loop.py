@@ -7,16 +7,17 @@ import numpy as np
 from pipeline.maths.arrays import Array
 from pipeline.maths.mechanics import kinematics
 from pipeline.maths.mechanics.bodies import Bodies
+from pipeline.maths.mechanics.drives import Drives
 from pipeline.maths.mechanics.kinematics import Chain
-from pipeline.maths.mechanics.rigid_body import inverse_dynamics
-from pipeline.maths.models.independent import regressor
+from pipeline.maths.models.reduced_joint import reduced_parameters
 from pipeline.maths.simulation.closed_loop import JointConstraints, Timing, simulate
 from pipeline.maths.simulation.plant import arm
 from pipeline.maths.simulation.surroundings import UP, Surroundings
 from pipeline.simulation.motion import Motion, SimulatedRun
 from pipeline.simulation.scenario.scenario import BadScenario, Scenario, SimulatedArm, SimulatedLog
 
-EXACT = 1e-9  # relative residual up to which a joint model describes the arm exactly
+EXACT = 1e-9  # size up to which a parameter that a model lacks counts as 0, in SI
+DIGITS = 12  # of a true parameter that follows from the links: rounding differs from machine to machine beyond
 
 
 def run(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
@@ -85,22 +86,20 @@ def hung_at(scenario: Scenario) -> Array:
 def theta(scenario: Scenario, family: str) -> dict[str, Array]:
     """The parameters of each joint's model while the other joints stay at zero, where the model is exact.
 
-    They are the ones with which the model gives the arm's own efforts; a joint whose friction has more to it than
-    viscous and Coulomb friction has none.
+    Friction is as the scenario states it; inertia and gravity follow from the links, to `DIGITS` digits, so that they
+    are the same on every machine.  A joint whose friction has more to it than viscous and Coulomb friction has none.
     """
     what, friction = cast(SimulatedArm, scenario.arm), cast(SimulatedArm, scenario.arm).families[family].friction
     chain, bodies = _geometry(scenario)
-    rotors, found = what.motors.gear_ratio**2 * what.rotors, {}
-    random = np.random.default_rng(0)
+    drives = Drives(what.motors.gear_ratio, what.rotors, friction.viscous, friction.coulomb_up)
+    parameters = {}
     for i, joint in enumerate(scenario.robot.joints):
-        q, dq, ddq = np.zeros((3, 200, len(scenario.robot.joints)))
-        q[:, i], dq[:, i], ddq[:, i] = random.uniform(-0.5, 0.5, (3, 200))
-        tau = inverse_dynamics(chain, bodies, q, dq, ddq)[:, i] + rotors[i] * ddq[:, i]
-        tau += friction.viscous[i] * dq[:, i] + friction.coulomb_up[i] * np.sign(dq[:, i])
-        F = regressor(joint.terms, q[:, i], dq[:, i], ddq[:, i])
-        parameters = np.linalg.lstsq(F, tau, rcond=None)[0]
         plain = friction.coulomb_up[i] == friction.coulomb_down[i] == friction.static_up[i] == friction.static_down[i]
-        simple = plain and friction.bristle_stiffness[i] == 0
-        if simple and np.linalg.norm(F @ parameters - tau) <= EXACT * np.linalg.norm(tau):
-            found[joint.name] = parameters
-    return found
+        if not plain or friction.bristle_stiffness[i] > 0:
+            continue
+        values = reduced_parameters(chain, bodies, i, len(scenario.robot.joints), drives)
+        names = [term.name for term in joint.terms]
+        if all(abs(value) < EXACT for name, value in values.items() if name not in names):
+            theta = [values.get(name, 0.0) for name in names]
+            parameters[joint.name] = np.array([float(f"{value:.{DIGITS}g}") for value in theta])
+    return parameters

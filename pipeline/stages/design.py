@@ -1,4 +1,4 @@
-"""Rehearse the robot before anything is recorded: its chain, its controllers and its excitation, in simulation."""
+"""Design what is to be recorded: the robot's chain, its controllers and its excitation, in simulation."""
 
 from collections.abc import Iterator
 from itertools import product
@@ -9,90 +9,109 @@ from pipeline.maths.excitation import fourier
 from pipeline.maths.excitation.fourier import Fourier
 from pipeline.maths.excitation.joint import ExcitationProblem, design
 from pipeline.maths.mechanics import workspace
-from pipeline.maths.mechanics.kinematics import frames, jacobian, tip
+from pipeline.maths.mechanics.bodies import Bodies
+from pipeline.maths.mechanics.kinematics import Chain, frames, jacobian, tip
 from pipeline.maths.simulation.control import Regulator
 from pipeline.records import Column, Control, Excitation, Links, Lyapunov, Pose, Workspace
-from pipeline.robots.robot import Joint, Robot
+from pipeline.robots.robot import ControlStudy, Joint, Robot
 
 STARTS = 8  # of the excitation's optimiser; `davinci-forces excite` takes its time
 GRID = 11  # places along each joint's range
-ARM = 3  # joints that carry the tip
-# Tables 5.1-5.4: gains of the six joints, the pose that is left or aimed at, and how long is watched [s].
-K_P = (500.0, 500.0, 500.0, 10.0, 10.0, 1.0)
-K_D = (50.0, 50.0, 40.0, 2.0, 0.2, 0.02)
-K_I = (50.0, 50.0, 40.0, 2.0, 1.0, 0.1)
-POSE = (-np.pi / 8, np.pi / 8, 0.2, -np.pi / 4, -np.pi / 4, -np.pi / 4)
-STUDIES = (  # name, from the pose to zero, integral action, share of the masses that the compensator knows, duration
-    ("pd-to-zero", True, False, 1.0, 3.0),
-    ("pd-to-pose", False, False, 1.0, 3.0),
-    ("pd-light", False, False, 0.9, 60.0),
-    ("pid-light", False, True, 0.9, 60.0),
-)
-WRIST = ("instrument_roll", "instrument_pitch", "instrument_yaw")
+ARM = 3  # coordinates at most that carry the tip, and whose ranges are gone through
+SETTLED = 0.02  # of the step, within which a joint counts as settled
 
 
 def run(robot: Robot) -> Iterator[Links | Pose | Workspace | Control | Lyapunov | Excitation]:
     """What is known of a robot before its logs; of one without a geometry, the excitation of its joints only."""
-    if robot.chain is not None and robot.bodies is not None:
-        yield from geometry(robot)
-        yield from control(robot)
+    if robot.chain is not None:
+        yield from geometry(robot, robot.chain)
+        if robot.bodies is not None:
+            yield from control(robot, robot.chain, robot.bodies)
     for joint in robot.joints:
         yield from excitations(joint)
 
 
-def geometry(robot: Robot) -> Iterator[Links | Pose | Workspace]:
+def geometry(robot: Robot, chain: Chain) -> Iterator[Links | Pose | Workspace]:
     """The chain, where its frames are, and where its tip can go.  Tables 3.1, 4.2, Fig 3.5"""
-    chain, bodies = robot.chain, robot.bodies
-    assert chain is not None
-    assert bodies is not None
-    limits = np.array([joint.limits.q for joint in robot.joints])
-    grid = np.array(list(product(*(np.linspace(low, high, GRID) for low, high in limits.tolist()))))
-    condition = workspace.condition(jacobian(chain, grid)[0][..., :ARM])
-    x, y, z = tip(chain, grid).T
+    n = min(ARM, len(robot.joints))
+    limits = np.array([joint.limits.q for joint in robot.joints[:n]])
+    limited = bool(np.isfinite(limits).all())
+    condition, names = np.array([]), np.array(chain.names, object)
+    if limited:
+        grid = np.array(list(product(*(np.linspace(low, high, GRID) for low, high in limits.tolist()))))
+        condition = workspace.condition(jacobian(chain, grid)[0])
+    yield links(robot, chain, float(condition.max()) if limited else float("nan"))
+    poses = {"zero": np.zeros(n)} | ({"low": limits[:, 0], "high": limits[:, 1]} if limited else {})
+    for name, q in poses.items():
+        x, y, z = frames(chain, q)[:, :3, 3].T
+        yield Pose(robot.name, name, names, names[[0, *chain.parent]], x, y, z)
+    if limited:
+        x, y, z = tip(chain, grid).T
+        yield Workspace(robot.name, x, y, z, condition)
+
+
+def links(robot: Robot, chain: Chain, worst_condition: float) -> Links:
+    """The links with their Denavit-Hartenberg parameters, and their masses where these are known, else 0."""
     names = np.array(chain.names, object)
-    parents = names[[0, *chain.parent]]
-    yield Links(
+    return Links(
         robot=robot.name,
-        worst_condition=float(condition.max()),
+        worst_condition=worst_condition,
         link=names[1:],
-        parent=parents[1:],
+        parent=names[[0, *chain.parent]][1:],
         alpha=chain.alpha,
         a=chain.a,
         d=chain.d,
         offset=chain.theta,
         moved_by=chain.coordinate + 1,
-        mass=bodies.masses,
+        mass=np.zeros(len(chain.parent)) if robot.bodies is None else robot.bodies.masses,
     )
-    for name, q in (("zero", np.zeros(ARM)), ("low", limits[:, 0]), ("high", limits[:, 1])):
-        origins = frames(chain, q)[:, :3, 3]
-        yield Pose(robot.name, name, names, parents, *origins.T)
-    yield Workspace(robot.name, x, y, z, condition)
 
 
-def control(robot: Robot) -> Iterator[Control | Lyapunov]:
-    """The studies of section 5.2, with friction that is viscous only.  Fig 5.2-5.6"""
+def control(robot: Robot, chain: Chain, bodies: Bodies) -> Iterator[Control | Lyapunov]:
+    """The robot's control studies, with friction that is viscous only.  Section 5.2, Fig 5.2-5.6"""
     from pipeline.maths.simulation.continuous import regulate
     from pipeline.maths.simulation.plant import arm
 
-    assert robot.chain is not None
-    assert robot.bodies is not None
-    rest, pose = np.zeros(len(POSE)), np.array(POSE)
-    viscous = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])  # the initial guesses of Tables 6.4-6.6
-    names = [*(joint.name for joint in robot.joints), *WRIST]
-    for study, to_zero, integral, known, duration in STUDIES:
-        law = Regulator(np.array(K_P), np.array(K_D), np.array(K_I) if integral else rest, 1.0)
-        plant, belief = (arm(robot.chain, robot.bodies.scaled(share), rest) for share in (1.0, known))
-        here, there = (pose, rest) if to_zero else (rest, pose)
-        done = regulate(plant, belief, law, viscous, here, there, duration)
-        for i, name in enumerate(names):
-            yield watched(study, name, done.t, done.q[:, i], done.dq[:, i], here[i], there[i])
-        yield Lyapunov(study, max(float(np.diff(done.V).max()), 0.0), done.t, done.V)
+    for study in robot.control:
+        start, target, K_p, K_d, K_i, viscous = map(
+            np.array,
+            (study.start, study.target, study.proportional, study.derivative, study.integral, study.viscous),
+        )
+        law, rotors = Regulator(K_p, K_d, K_i, 1.0), np.zeros(len(start))
+        plant, belief = (arm(chain, bodies.scaled(share), rotors) for share in (1.0, study.known_masses))
+        run = regulate(plant, belief, law, viscous, start, target, study.duration)
+        for i, name in enumerate(robot.coordinates[: len(start)]):
+            yield watched(study, name, run.t, run.q[:, i], run.dq[:, i], start[i], target[i])
+        rise = max(float(np.diff(run.V).max()), 0.0)
+        yield Lyapunov(study.name, rise, float(run.V[0]), run.t, run.V)
 
 
-def watched(study: str, joint: str, t: Column, q: Column, dq: Column, start: float, reference: float) -> Control:
-    """One joint of a study, with its errors as time goes on."""
-    ten, twenty = (float(reference - np.interp(when, t, q)) for when in (10.0, 20.0))
-    return Control(study, joint, float(start), float(reference), ten, twenty, float(reference - q[-1]), t, q, dq)
+def watched(
+    study: ControlStudy, joint: str, t: Column, q: Column, dq: Column, start: float, reference: float
+) -> Control:
+    """One joint of a study: how far it overshoots, when it settles, and its errors as time goes on."""
+    step = reference - start
+    if step:
+        overshoot = max(float(((q - reference) / step).max()), 0.0)
+        away = np.flatnonzero(np.abs(q - reference) > SETTLED * abs(step))
+        settling_time = float(t[away[-1] + 1]) if away[-1] + 1 < len(t) else float("nan")
+    else:
+        overshoot = settling_time = float("nan")
+    later = [float(reference - np.interp(when, t, q)) if when <= t[-1] else float("nan") for when in (10.0, 20.0)]
+    return Control(
+        controller=study.name,
+        joint=joint,
+        start=float(start),
+        reference=float(reference),
+        settling_time=settling_time,
+        overshoot=overshoot,
+        error_10=later[0],
+        error_20=later[1],
+        error_end=float(reference - q[-1]),
+        t=t,
+        q=q,
+        dq=dq,
+    )
 
 
 def excitations(joint: Joint) -> Iterator[Excitation]:

@@ -102,7 +102,7 @@ def test_the_slide_lifts_what_hangs_on_it():
 
 
 def test_drives_add_their_inertia_and_friction_to_the_joint_s_terms():
-    drives = Drives(DRIVES.gear_ratio, np.full(3, 1e-6), DRIVES.viscous, DRIVES.coulomb)
+    drives = Drives(DRIVES.gear_ratio[:3], np.full(3, 1e-6), DRIVES.viscous[:3], DRIVES.coulomb[:3])
     slide = reduced_parameters(CHAIN, BODIES, 2, drives=drives)
     assert slide["inertia"] == pytest.approx(1340**2 * 1e-6)
     assert (slide["viscous friction"], slide["Coulomb friction"]) == (1.0, 3.0)
@@ -110,7 +110,7 @@ def test_drives_add_their_inertia_and_friction_to_the_joint_s_terms():
 
 @pytest.mark.parametrize("joint", [0, 1, 2])
 def test_the_names_are_those_of_terms_that_the_joint_s_model_has(joint):
-    found = reduced_parameters(CHAIN, BODIES, joint, drives=DRIVES)
+    found = reduced_parameters(CHAIN, BODIES, joint, drives=DRIVES.reduced(3))
     nonzero = {name for name, value in found.items() if abs(value) > 1e-12}
     assert nonzero <= {term.name for term in ROBOT.joints[joint].terms}
 

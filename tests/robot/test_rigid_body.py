@@ -158,7 +158,7 @@ def test_masses_known_badly_scale_every_effort_alike():
 
 
 def test_drives_add_reflected_inertia_and_friction():
-    drives = Drives(np.array([200.0, 200, 1340]), np.full(3, 1e-6), DRIVES.viscous, DRIVES.coulomb)
+    drives = Drives(np.array([200.0, 200, 1340]), np.full(3, 1e-6), DRIVES.viscous[:3], DRIVES.coulomb[:3])
     q, dq, ddq = motions(3, 5)
     tau = rigid_body.inverse_dynamics(CHAIN, BODIES, q, dq, ddq, drives)
     bare = rigid_body.inverse_dynamics(CHAIN, BODIES, q, dq, ddq)

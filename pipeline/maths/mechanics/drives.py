@@ -25,6 +25,10 @@ class Drives:
     viscous: Array  # v [N m s/rad], or [N s/m]
     coulomb: Array  # c [N m], or [N]
 
+    def reduced(self, n: int) -> "Drives":
+        """Those of the first n coordinates."""
+        return Drives(self.gear_ratio[:n], self.motor_inertia[:n], self.viscous[:n], self.coulomb[:n])
+
     @property
     def inertia(self) -> Array:
         """The motors' inertia at the joints, eta^2 J_m (n,).  (4.28), which (4.29) neglects and (6.7)-(6.13) keep"""
