@@ -83,7 +83,7 @@ class Lyapunov(Record):
 
 @dataclass(frozen=True, eq=False)
 class Excitation(Record):
-    """One period of an excitation trajectory, published or found, with what it is worth and what it exceeds."""
+    """One period of an excitation trajectory, published or designed, with what it is worth and what it exceeds."""
 
     KEY = ("joint", "source")
 

@@ -7,7 +7,7 @@ from pipeline.records.record import Column, Labels, Names, Record
 
 @dataclass(frozen=True, eq=False)
 class Fit(Record):
-    """The parameters of a model, found by one estimator from all identification logs."""
+    """The parameters of a model, estimated by one estimator from all identification logs."""
 
     KEY = ("group", "model", "estimator")
 
@@ -31,7 +31,7 @@ class Fit(Record):
 
 @dataclass(frozen=True, eq=False)
 class Residual(Record):
-    """The averaged effort of one identification log beside what a fit makes of it."""
+    """The averaged effort of one identification log, and the effort that a fit gives for it."""
 
     KEY = ("log", "joint", "model", "estimator")
 

@@ -7,7 +7,7 @@ from pipeline.records.record import Column, Record
 
 @dataclass(frozen=True, eq=False)
 class Prediction(Record):
-    """The effort of a log that a fit has not seen, beside what the fit makes of it."""
+    """The effort of a log that a fit has not seen, and the effort that the fit predicts for it."""
 
     KEY = ("log", "joint", "model", "estimator")
 

@@ -1,7 +1,7 @@
 """The records that flow between stages.
 
 A record is a few scalars that say what it is about, and columns of one length that say what was measured or
-found.  It checks itself once, when made, so a stage can trust what it is handed and `store` can write any of
+estimated.  It checks itself once, when made, so a stage can trust what it is handed and `store` can write any of
 them the same way.  Every field is a symbol of `quantities`.  `KEY` names the scalars that tell one record of a
 kind from another: they are its place on disk.
 """
