@@ -37,36 +37,38 @@ def run(
     from pipeline.excitation.request import Request, answer, arm_of, load
 
     request = Request(robot, joint, evaluate, period, harmonics, criterion, (q, dq, ddq), starts, seed)
-    found = answer(request)
+    trajectories = answer(request)
     try:
         if csv:
-            csv.write_text(trajectory.csv(found, rate), encoding="utf-8", newline="\n")
+            csv.write_text(trajectory.csv(trajectories, rate), encoding="utf-8", newline="\n")
         if plot:
-            trajectory.plot(found, plot)
+            trajectory.plot(trajectories, plot)
     except OSError as error:
         raise BadRequest(f"{error.filename}: {error.strerror}") from None
-    arm = arm_of(load(robot), found) if joint == "all" else None
-    typer.echo(json.dumps(_document(robot, found, arm), indent=2) if as_json else _words(found, arm))
+    arm = arm_of(load(robot), trajectories) if joint == "all" else None
+    typer.echo(
+        json.dumps(_document(robot, trajectories, arm), indent=2) if as_json else _format_text(trajectories, arm)
+    )
 
 
 def _document(
-    robot: str, found: "Sequence[ExcitationTrajectory]", arm: tuple[float, float, int] | None
+    robot: str, trajectories: "Sequence[ExcitationTrajectory]", arm: tuple[float, float, int] | None
 ) -> dict[str, Any]:
-    if len(found) == 1:
-        return {"robot": robot, **found[0].facts()}
-    joints = {e.joint.name: e.facts() for e in found}
+    if len(trajectories) == 1:
+        return {"robot": robot, **trajectories[0].facts()}
+    joints = {e.joint.name: e.facts() for e in trajectories}
     if arm is None:
-        return {"robot": robot, "joint": "all", "objective": sum(e.objective for e in found), "joints": joints}
+        return {"robot": robot, "joint": "all", "objective": sum(e.objective for e in trajectories), "joints": joints}
     objective, condition, parameters = arm
-    told = {"objective": objective, "condition": condition, "base_parameters": parameters}
-    return {"robot": robot, "joint": "all", **told, "joints": joints}
+    totals = {"objective": objective, "condition": condition, "base_parameters": parameters}
+    return {"robot": robot, "joint": "all", **totals, "joints": joints}
 
 
-def _words(found: "Sequence[ExcitationTrajectory]", arm: tuple[float, float, int] | None) -> str:
+def _format_text(trajectories: "Sequence[ExcitationTrajectory]", arm: tuple[float, float, int] | None) -> str:
     lines = []
     if arm:
         lines.append(f"all joints: objective {arm[0]:.4f}, condition {arm[1]:.1f}, {arm[2]} base parameters")
-    for e in found:
+    for e in trajectories:
         facts = e.facts()
         lines += [
             f"{e.joint.name}: objective {e.objective:.4f}, condition {e.condition:.1f}, period {e.series.period:g} s"
@@ -75,5 +77,5 @@ def _words(found: "Sequence[ExcitationTrajectory]", arm: tuple[float, float, int
         for symbol, (low, high) in facts["ranges"].items():
             lower, upper = facts["limits"][symbol]
             lines += [f"  {symbol:3} from {low:.5f} to {high:.5f}, limits {lower:g} and {upper:g}"]
-        lines += [f"  LIMIT BROKEN: {words}" for words in e.broken]
+        lines += [f"  LIMIT BROKEN: {text}" for text in e.broken]
     return "\n".join(lines)

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 BARS = "▁▂▃▄▅▆▇█"
 TIMES = ("time", "t", "t_s", "elapsed", "x_value", "seconds")
-MOST = 0.1  # share of repeated rows, and of jitter in the sampling time, above which they are flagged
+MAX_SHARE = 0.1  # share of repeated rows, and of jitter in the sampling time, above which they are flagged
 
 
 def run(
@@ -24,11 +24,11 @@ def run(
     """Show what a log holds: channels, units, samples, clock, warnings, first rows."""
     import json as writer
 
-    found = describe(file, head)
+    description = describe(file, head)
     if json:
-        typer.echo(writer.dumps(found, indent=1, ensure_ascii=False, allow_nan=False))
+        typer.echo(writer.dumps(description, indent=1, ensure_ascii=False, allow_nan=False))
     else:
-        typer.echo("\n".join(lines(found)))
+        typer.echo("\n".join(lines(description)))
 
 
 def describe(file: Path, head: int) -> dict[str, Any]:
@@ -60,7 +60,7 @@ def describe(file: Path, head: int) -> dict[str, Any]:
         for name in names:
             outlines[name].update(block[name])
             first[name].extend(block[name][: max(0, head - rows)].tolist())
-        rising = {name: seen for name, seen in rising.items() if _still_rises(seen, block[name])}
+        rising = {name: statistics for name, statistics in rising.items() if _still_rises(statistics, block[name])}
         rows += count
     return {
         "file": str(file), "format": log.format, "rows": rows, "started": log.started, "zone": log.zone,
@@ -76,8 +76,8 @@ def _time(log: "Log") -> str:
     """The channel that holds the time: the format's own, else one that is called so, unless the format has a clock."""
     if log.time or log.clock:
         return log.time
-    words = (c.name for c in log.channels if c.kind == "number" and c.name.partition("[")[0].strip().lower() in TIMES)
-    return next(words, "")
+    names = (c.name for c in log.channels if c.kind == "number" and c.name.partition("[")[0].strip().lower() in TIMES)
+    return next(names, "")
 
 
 def _counted(log: "Log", rows: int, count: int) -> Any:
@@ -88,19 +88,19 @@ def _counted(log: "Log", rows: int, count: int) -> Any:
     return log.clock.start + number * log.clock.step if log.clock else number
 
 
-def _still_rises(seen: "ClockStatistics", values: Any) -> bool:
+def _still_rises(statistics: "ClockStatistics", values: Any) -> bool:
     """Whether a channel has risen from every sample to the next up to here, as a time does."""
-    seen.update(values)
-    return not (seen.backward or seen.repeated) and abs(seen.last - seen.first) < float("inf")
+    statistics.update(values)
+    return not (statistics.backward or statistics.repeated) and abs(statistics.last - statistics.first) < float("inf")
 
 
 def _clock(log: "Log", source: str, clock: "ClockStatistics", rising: dict[str, "ClockStatistics"]) -> dict[str, Any]:
     if not source and not log.clock:
-        told = "none: say rate = ... [Hz] for this log in study.toml"
-        for name, seen in rising.items():
-            told += f", or time = {name!r}, which rises throughout ({seen.rate:.6g} Hz if it is in seconds)"
+        advice = "none: say rate = ... [Hz] for this log in study.toml"
+        for name, statistics in rising.items():
+            advice += f", or time = {name!r}, which rises throughout ({statistics.rate:.6g} Hz if it is in seconds)"
             break
-        return {"source": told, "duplicates": clock.duplicates}
+        return {"source": advice, "duplicates": clock.duplicates}
     return {
         "source": f"channel {source!r}" if source else "the log's own interval",
         "rate": _plain(clock.rate), "jitter": _plain(clock.jitter), "longest_gap": _plain(clock.longest_gap),
@@ -120,7 +120,7 @@ def _channel(log: "Log", channel: Any, outline: "Outline | None") -> dict[str, A
 
 def _flags(log: "Log", source: str, clock: "ClockStatistics") -> Iterator[str]:
     """What makes a recording doubtful though every cell of it can be read."""
-    if clock.duplicates > MOST * clock.samples:
+    if clock.duplicates > MAX_SHARE * clock.samples:
         share = clock.duplicates / clock.samples
         yield f"{clock.duplicates} of {clock.samples} rows ({share:.0%}) repeat the one before in every channel"
     if not source:
@@ -130,7 +130,7 @@ def _flags(log: "Log", source: str, clock: "ClockStatistics") -> Iterator[str]:
             f"time {source!r} goes back {clock.backward} times and stands still {clock.repeated} times, first in row "
             f"{clock.bad_row + 1}; name another time channel, or say rate = ... [Hz] for this log in study.toml"
         )
-    elif clock.jitter * clock.rate > MOST:
+    elif clock.jitter * clock.rate > MAX_SHARE:
         yield f"the clock is jittery: {clock.jitter * 1e3:.3g} ms around {1e3 / clock.rate:.3g} ms"
     if clock.longest_gap * clock.rate > 2.5:
         gap = clock.longest_gap
@@ -142,28 +142,28 @@ def _plain(value: float) -> float | None:
     return value if abs(value) < float("inf") else None
 
 
-def lines(found: dict[str, Any]) -> Iterator[str]:
+def lines(description: dict[str, Any]) -> Iterator[str]:
     """The same for people."""
-    started = f", started {found['started']} ({found['zone']} time)" if found["started"] else ""
-    yield f"{found['file']}: {found['format']}, {found['rows']} rows{started}"
-    yield from (f"  {key}: {value}" for key, value in found["facts"].items())
-    clock = found["clock"]
+    started = f", started {description['started']} ({description['zone']} time)" if description["started"] else ""
+    yield f"{description['file']}: {description['format']}, {description['rows']} rows{started}"
+    yield from (f"  {key}: {value}" for key, value in description["facts"].items())
+    clock = description["clock"]
     yield f"clock: {clock['source']}"
     if "rate" in clock:
         yield f"  {clock['duration'] or 0:.6g} s at {clock['rate']:.6g} Hz, jitter {clock['jitter'] * 1e3:.3g} ms (std)"
         yield f"  longest gap {clock['longest_gap']:.3g} s; {clock['backward']} steps back, {clock['repeated']} of zero"
     yield f"  {clock['duplicates']} rows repeat the one before"
     yield "channels:"
-    yield from _table([_row(i, channel) for i, channel in enumerate(found["channels"])])
-    if any(found["head"].values()):
+    yield from _table([_row(i, channel) for i, channel in enumerate(description["channels"])])
+    if any(description["head"].values()):
         yield "first rows:"
-        names = list(found["head"])
-        rows = zip(*found["head"].values(), strict=True)
+        names = list(description["head"])
+        rows = zip(*description["head"].values(), strict=True)
         yield from _table([names, *([_number(value) for value in row] for row in rows)])
     for title in ("comments", "warnings"):
-        if found[title]:
+        if description[title]:
             yield f"{title}:"
-            yield from (f"  {line}" for line in found[title])
+            yield from (f"  {line}" for line in description[title])
 
 
 def _row(number: int, channel: dict[str, Any]) -> list[str]:

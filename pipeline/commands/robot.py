@@ -25,10 +25,10 @@ def run(
 
     from pipeline.robots import load
 
-    found = load(robot, Path())
+    arm = load(robot, Path())
     q = _values("--at", at) if at is not None else [0.0] * DEFAULT
-    document = _document(found, q, _values("--dq", dq) if dq is not None else [])
-    typer.echo(json.dumps(document, indent=2, allow_nan=False) if as_json else _words(found, q, document))
+    document = _document(arm, q, _values("--dq", dq) if dq is not None else [])
+    typer.echo(json.dumps(document, indent=2, allow_nan=False) if as_json else _format_text(arm, q, document))
 
 
 def _values(option: str, text: str) -> list[float]:
@@ -92,12 +92,12 @@ def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]
 
 def _outside(robot: "Robot", q: list[float]) -> list[str]:
     """Which joints are beyond their limits: it is computed all the same."""
-    said = []
+    warnings = []
     for joint, value in zip(robot.joints, q, strict=False):
         (low, high), unit = joint.limits.q, joint.unit("{position}")
         if not low <= value <= high:
-            said.append(f"{joint.name} at {value:g} {unit} is outside its limits, {low:g} to {high:g} {unit}")
-    return said
+            warnings.append(f"{joint.name} at {value:g} {unit} is outside its limits, {low:g} to {high:g} {unit}")
+    return warnings
 
 
 def _singular(chain: Any, q: list[float]) -> str:
@@ -112,7 +112,7 @@ def _singular(chain: Any, q: list[float]) -> str:
     )
 
 
-def _words(robot: "Robot", q: list[float], document: dict[str, Any]) -> str:
+def _format_text(robot: "Robot", q: list[float], document: dict[str, Any]) -> str:
     """The result for people: numbers in columns, everything in the base axes and SI units; rounding errors are 0."""
     lines = [f"{robot.title} at q = {_numbers(q)}"]
     lines += [f"warning: {text}" for text in document["warnings"]]

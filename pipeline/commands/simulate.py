@@ -1,4 +1,4 @@
-"""Simulate a study: logs as the laboratory would have recorded them, and the truth beside them."""
+"""Simulate a study: logs as the laboratory would have recorded them, and their ground truth."""
 
 from pathlib import Path
 from typing import Annotated

@@ -14,8 +14,8 @@ def run(
     """Verify a study; what differs is named, and the exit code is 1."""
     from pipeline.runner import runs, verification
 
-    done = verification.verify(runs.folders(study, processed, reports))
+    counts = verification.verify(runs.folders(study, processed, reports))
     typer.echo(
-        f"{study}: {done.raw} raw, {done.processed} processed and {done.reports} report files are unchanged, and all "
-        f"{done.numbers} numbers of results.json are those of their sources"
+        f"{study}: {counts.raw} raw, {counts.processed} processed and {counts.reports} report files are unchanged, and "
+        f"all {counts.numbers} numbers of results.json are those of their sources"
     )

@@ -1,1 +1,1 @@
-"""What a laboratory should run: excitation asked for in words, as trajectories, tables and plots."""
+"""Excitation experiments as a command line asks for them: trajectories, tables and plots."""

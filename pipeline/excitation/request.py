@@ -1,4 +1,4 @@
-"""What is asked of an excitation, as words of a command line, and the trajectories that answer it."""
+"""What is asked of an excitation, as options of a command line, and the trajectories that answer it."""
 
 import math
 from collections.abc import Sequence
@@ -62,12 +62,12 @@ def answer(request: Request) -> list[ExcitationTrajectory]:
     return [_excitation(request, joint, problem) for joint, problem in zip(joints, problems, strict=True)]
 
 
-def arm_of(robot: Robot, found: Sequence[ExcitationTrajectory]) -> tuple[float, float, int] | None:
+def arm_of(robot: Robot, trajectories: Sequence[ExcitationTrajectory]) -> tuple[float, float, int] | None:
     """Objective, condition number and number of base parameters of all joints together, where the links are known."""
-    if robot.chain is None or len(found) < len(robot.joints):
+    if robot.chain is None or len(trajectories) < len(robot.joints):
         return None
-    problem = arm_problem(robot.chain, [excitation.problem for excitation in found])
-    F = arm_observation(problem, [excitation.series for excitation in found])
+    problem = arm_problem(robot.chain, [trajectory.problem for trajectory in trajectories])
+    F = arm_observation(problem, [trajectory.series for trajectory in trajectories])
     return CRITERIA[problem.joints[0].criterion](F)[0], float(10 ** condition(F)[0]), F.shape[1]
 
 

@@ -1,4 +1,4 @@
-"""An excitation trajectory for people and for controllers: what is said of it, its table over one period, its plot."""
+"""An excitation trajectory for people and for controllers: its properties, its table over one period, its plot."""
 
 import io
 import math
@@ -39,7 +39,7 @@ class ExcitationTrajectory:
 
     @property
     def broken(self) -> list[str]:
-        """The limits that the trajectory does not keep, in words."""
+        """The limits that the trajectory does not keep, one a line."""
         names = zip(("q", "dq", "ddq"), ("", "/s", "/s^2"), ranges(self.series), self.problem.limits, strict=True)
         unit = self.joint.unit("{position}")
         return [
@@ -49,7 +49,7 @@ class ExcitationTrajectory:
         ]
 
     def facts(self) -> dict[str, Any]:
-        """All that is said of it, in JSON's types."""
+        """All of its properties, in JSON's types."""
         x, names = self.series.x.tolist(), coefficient_names(len(self.series.a))
         symbols = ("q", "dq", "ddq")
         return {

@@ -24,16 +24,16 @@ def ahead(blocks: Iterator[Block]) -> Iterator[Block]:
 
 
 def _gathered(blocks: Iterator[Block]) -> Iterator[Block]:
-    held: list[Block] = []
+    waiting: list[Block] = []
     rows = 0
     for block in blocks:
-        held.append(block)
+        waiting.append(block)
         rows += len(next(iter(block.values()), ()))
         if rows >= ROWS:
-            yield _joined(held)
-            held, rows = [], 0
+            yield _joined(waiting)
+            waiting, rows = [], 0
     if rows:
-        yield _joined(held)
+        yield _joined(waiting)
 
 
 def _joined(blocks: Sequence[Block]) -> Block:

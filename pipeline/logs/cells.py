@@ -77,10 +77,10 @@ def parse(
 
 def parse_either(block: bytes, width: int, delimiter: bytes, wanted: Sequence[int], text: int = -1) -> Cells:
     """The same with whichever decimal mark the cells have, be it both; a cell with two marks is no number."""
-    found = marks(block, delimiter)
-    if len(found) == 2 and text < 0:
-        block, found = block.replace(b",", b"."), b"."
-    return parse(block, width, delimiter, found[:1] or b".", wanted, text)
+    decimals = marks(block, delimiter)
+    if len(decimals) == 2 and text < 0:
+        block, decimals = block.replace(b",", b"."), b"."
+    return parse(block, width, delimiter, decimals[:1] or b".", wanted, text)
 
 
 def parse_carefully(block: bytes, width: int, delimiter: bytes, wanted: Sequence[int]) -> Cells:

@@ -70,24 +70,24 @@ class Lines:
     def blocks(self, size: int = SIZE) -> Iterator[Block]:
         """The blocks of the file, in order."""
         self.cut, self.padding, self.damage = b"", 0, ""
-        rest, line = b"", 1
+        remainder, line = b"", 1
         for piece in self._without_padding(self._decoded(self._bytes(size))):
             end = _last_end(piece)
             if not end:
-                piece, rest = rest + piece, b""
+                piece, remainder = remainder + piece, b""
                 end = _last_end(piece)
-            block = _block(line, b"".join((rest, memoryview(piece)[:end])) if end else b"")
-            rest = piece[end:]
-            if len(rest) > LONGEST:
+            block = _block(line, b"".join((remainder, memoryview(piece)[:end])) if end else b"")
+            remainder = piece[end:]
+            if len(remainder) > LONGEST:
                 raise BadLog(f"{self.path}:{line}: a line of more than {LONGEST} bytes; this is not a log in text")
             if block.text:
                 yield block
                 line += block.lines
-        if rest.endswith(b"\r"):
-            block, rest = _block(line, rest), b""
+        if remainder.endswith(b"\r"):
+            block, remainder = _block(line, remainder), b""
             yield block
             line += block.lines
-        self.cut, self.cut_at = rest, line
+        self.cut, self.cut_at = remainder, line
 
     def _bytes(self, size: int) -> Iterator[bytes]:
         with self.path.open("rb") as file:
@@ -125,16 +125,16 @@ class Lines:
             yield decoder.decode(b"", final=True).encode()
 
     def _without_padding(self, pieces: Iterable[bytes]) -> Iterator[bytes]:
-        held = 0  # NUL bytes that are padding unless something follows them
+        padding = 0  # NUL bytes that are padding unless something follows them
         for piece in pieces:
             solid = piece.rstrip(b"\0")
-            if solid and held:
-                yield b"\0" * held
-                held = 0
-            held += len(piece) - len(solid)
+            if solid and padding:
+                yield b"\0" * padding
+                padding = 0
+            padding += len(piece) - len(solid)
             if solid:
                 yield solid
-        self.padding = held
+        self.padding = padding
 
 
 def _last_end(text: bytes) -> int:

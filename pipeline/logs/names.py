@@ -21,5 +21,5 @@ def unique(names: Sequence[str], taken: Iterable[str] = ()) -> tuple[str, ...]:
 
 def unit_in(name: str) -> str:
     """The unit of a name such as `q [rad]` or `q (rad)`, else ""."""
-    found = IN_BRACKETS.fullmatch(name)
-    return found.group(1) if found else ""
+    unit = IN_BRACKETS.fullmatch(name)
+    return unit.group(1) if unit else ""

@@ -1,8 +1,9 @@
 """Records of averaged periods: the mean, and what averaging removes."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from pipeline.records.record import Column, Counts, Record
+from pipeline.records.record import Column, Counts, Published, Record
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +28,12 @@ class Average(Record):
     dq_var: Column
     tau_var: Column
     count: Counts
+
+    def published(self) -> Iterator[Published]:
+        """The period, which the joints of a log share, and the noise between periods."""
+        yield Published(f"period.{self.log}", "period", std="period_std")
+        yield Published(f"period.{self.log}.periods", "periods")
+        yield from self.publish(f"noise.{self.log}.{self.joint}", "sigma_q", "sigma_dq", "sigma_tau")
 
 
 @dataclass(frozen=True, eq=False)

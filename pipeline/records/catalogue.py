@@ -22,13 +22,13 @@ class Catalogue:
 
     def __init__(self, read: Callable[[type[Record]], Sequence[Record]]) -> None:
         self._read = read
-        self._found: dict[type[Record], list[Record]] = {}
+        self._records: dict[type[Record], list[Record]] = {}
 
     def all(self, kind: type[AnyRecord]) -> list[AnyRecord]:
         """Every record of a kind, in the order of the study's logs and the robot's joints."""
-        if kind not in self._found:
-            self._found[kind] = list(self._read(kind))
-        return list(self._found[kind])  # type: ignore[arg-type]
+        if kind not in self._records:
+            self._records[kind] = list(self._read(kind))
+        return list(self._records[kind])  # type: ignore[arg-type]
 
     def about(self, kind: type[AnyRecord], **scalars: str) -> list[AnyRecord]:
         """Records of a kind whose scalars have these values."""

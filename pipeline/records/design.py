@@ -1,8 +1,9 @@
 """Records of what is known of a robot before anything is recorded: geometry, control studies, excitation."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from pipeline.records.record import Column, Counts, Labels, Record
+from pipeline.records.record import Column, Counts, Labels, Published, Record
 
 
 @dataclass(frozen=True, eq=False)
@@ -10,6 +11,7 @@ class Links(Record):
     """The links of a robot: Denavit-Hartenberg parameters and masses.  Tables 3.1 and 4.2"""
 
     KEY = ("robot",)
+    ROWS = "link"
 
     robot: str
     worst_condition: float
@@ -21,6 +23,13 @@ class Links(Record):
     offset: Column
     moved_by: Counts
     mass: Column
+
+    def published(self) -> Iterator[Published]:
+        """The geometry of every link, and the worst condition of the tip's Jacobian."""
+        yield Published("robot.worst_condition", "worst_condition")
+        for i, link in enumerate(self.link):
+            for name in ("alpha", "a", "d", "offset", "mass"):
+                yield Published(f"robot.link.{link}.{name}", name, row=i)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,6 +79,11 @@ class Control(Record):
     q: Column
     dq: Column
 
+    def published(self) -> Iterator[Published]:
+        """How the joint follows its reference."""
+        names = ("start", "reference", "settling_time", "overshoot", "error_10", "error_20", "error_end")
+        yield from self.publish(f"control.{self.controller}.{self.joint}", *names)
+
 
 @dataclass(frozen=True, eq=False)
 class Lyapunov(Record):
@@ -83,10 +97,14 @@ class Lyapunov(Record):
     t: Column
     V: Column
 
+    def published(self) -> Iterator[Published]:
+        """Where it starts, and how far it rises."""
+        yield from self.publish(f"control.{self.controller}", "V_rise", "V_0")
+
 
 @dataclass(frozen=True, eq=False)
 class Excitation(Record):
-    """One period of an excitation trajectory, published or found, with what it is worth and what it exceeds."""
+    """One period of an excitation trajectory, published or designed, with what it is worth and what it exceeds."""
 
     KEY = ("joint", "source")
 
@@ -103,3 +121,12 @@ class Excitation(Record):
     q: Column
     dq: Column
     ddq: Column
+
+    def published(self) -> Iterator[Published]:
+        """What the trajectory is worth, what it exceeds, and its coefficients as Table 6.1 names them."""
+        prefix = f"excitation.{self.joint}.{self.source}"
+        names = ("period", "objective", "condition", "excess_q", "excess_dq", "excess_ddq")
+        yield from self.publish(prefix, *names)
+        for i in range(len(self.coefficients)):
+            letter = "a" if i == 0 or i % 2 else "b"
+            yield Published(f"{prefix}.{letter}{(i + 1) // 2}", "coefficients", row=i)

@@ -1,8 +1,9 @@
 """Records of the external effort."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from pipeline.records.record import Column, Record
+from pipeline.records.record import Column, Published, Record
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,3 +36,8 @@ class Track(Record):
     innovation_q: Column
     innovation_dq: Column
     nis: Column
+
+    def published(self) -> Iterator[Published]:
+        """What the filter found outside contacts, and the noise that it assumes."""
+        names = ("tau_ext_rms", "nis_mean", "r_q", "r_dq", "q_q", "q_dq", "q_tau")
+        yield from self.publish(f"{self.filter}.{self.log}.{self.joint}", *names)

@@ -1,15 +1,17 @@
 """Records of the parameters of a model, and what they leave of the effort."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from pipeline.records.record import Column, Labels, Names, Record
+from pipeline.records.record import Column, Labels, Names, Published, Record, slug
 
 
 @dataclass(frozen=True, eq=False)
 class Fit(Record):
-    """The parameters of a model, found by one estimator from all identification logs."""
+    """The parameters of a model, estimated by one estimator from all identification logs."""
 
     KEY = ("group", "model", "estimator")
+    ROWS = "parameter"
 
     group: str
     model: str
@@ -28,10 +30,18 @@ class Fit(Record):
     theta_std: Column
     theta_std_hac: Column
 
+    def published(self) -> Iterator[Published]:
+        """The parameters with both standard errors, and the fit to the averaged effort."""
+        prefix = ".".join(("fit", *self.key))
+        for i, parameter in enumerate(self.parameter):
+            yield Published(f"{prefix}.{slug(parameter)}", "theta", std="theta_std_hac", row=i)
+            yield Published(f"{prefix}.{slug(parameter)}.std_classical", "theta_std", row=i)
+        yield from self.publish(prefix, "mse", "r2", "condition", "samples", "periods", "hac_lags")
+
 
 @dataclass(frozen=True, eq=False)
 class Residual(Record):
-    """The averaged effort of one identification log beside what a fit makes of it."""
+    """The averaged effort of one identification log, and the effort that a fit gives for it."""
 
     KEY = ("log", "joint", "model", "estimator")
 

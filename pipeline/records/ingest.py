@@ -1,8 +1,9 @@
 """Records of what was measured: how logs were read, and the motion and effort of their joints."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from pipeline.records.record import Column, Counts, Labels, Names, Record
+from pipeline.records.record import Column, Counts, Labels, Names, Published, Record
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +34,11 @@ class LogSummary(Record):
     feeds: Labels
     nulls: Counts
     nans: Counts
+
+    def published(self) -> Iterator[Published]:
+        """What the reader noticed of the clock and the rows."""
+        names = ("rows", "rate", "duration", "jitter", "longest_gap", "duplicates", "dropped")
+        yield from self.publish(f"log.{self.log}", *names)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,13 +1,14 @@
 """Records of predictions of effort that a fit has not seen."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from pipeline.records.record import Column, Record
+from pipeline.records.record import Column, Published, Record
 
 
 @dataclass(frozen=True, eq=False)
 class Prediction(Record):
-    """The effort of a log that a fit has not seen, beside what the fit makes of it."""
+    """The effort of a log that a fit has not seen, and the effort that the fit predicts for it."""
 
     KEY = ("log", "joint", "model", "estimator")
 
@@ -24,3 +25,12 @@ class Prediction(Record):
     t: Column
     tau: Column
     tau_hat: Column
+
+    @property
+    def prefix(self) -> str:
+        """`predict.<log>.<joint>.<model>.<estimator>`, or `cv.` where the log itself was fitted."""
+        return ".".join(("cv" if self.role == "identification" else "predict", *self.key))
+
+    def published(self) -> Iterator[Published]:
+        """The scores."""
+        yield from self.publish(self.prefix, "rmse", "nrmse", "r2", "relative_error")

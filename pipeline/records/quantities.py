@@ -6,6 +6,8 @@ therefore written with {position} and {effort}, and a joint fills them in.
 
 from typing import NamedTuple
 
+PER_ROW = "see unit"  # of a quantity whose every row has a unit of its own, in the column `unit`
+
 
 class Quantity(NamedTuple):
     """The meaning of a symbol, for labels and schemas, and its unit."""
@@ -21,7 +23,7 @@ QUANTITIES = {
     "role": Quantity("what the recording is for", ""),
     "group": Quantity("the joint, or the arm, that a model describes", ""),
     "model": Quantity("structure of the model", ""),
-    "estimator": Quantity("how the parameters were found", ""),
+    "estimator": Quantity("how the parameters were estimated", ""),
     "filter": Quantity("how the external effort was tracked", ""),
     "signal": Quantity("which signal was tested", ""),
     "logs": Quantity("recordings that were pooled", ""),
@@ -66,7 +68,7 @@ QUANTITIES = {
     "value": Quantity("measured value", "{unit}"),
     # periods and noise
     "period": Quantity("length of one period", "s"),
-    "period_std": Quantity("standard deviation of the period", "s"),
+    "period_std": Quantity("standard error of the period", "s"),
     "stated_period": Quantity("length of one period as the study states it; 0 where it does not", "s"),
     "periods": Quantity("number of periods averaged, M"),
     "count": Quantity("samples averaged at this phase"),
@@ -85,15 +87,13 @@ QUANTITIES = {
     # parameters
     "parameter": Quantity("name of the model term", ""),
     "phi": Quantity("the model term, in Typst's mathematics", ""),
-    "theta": Quantity("parameter of the model term", "see unit"),
-    "theta_std": Quantity("standard deviation of theta, residuals taken as uncorrelated", "see unit"),
-    "theta_std_hac": Quantity(
-        "standard deviation of theta, allowing for correlated residuals (Newey-West)", "see unit"
-    ),
+    "theta": Quantity("parameter of the model term", PER_ROW),
+    "theta_std": Quantity("standard error of theta, residuals taken as uncorrelated", PER_ROW),
+    "theta_std_hac": Quantity("standard error of theta, allowing for correlated residuals (Newey-West)", PER_ROW),
     "mse": Quantity("mean squared error of the averaged effort", "({effort})^2"),
     "condition": Quantity("condition number of the regressor"),
     "samples": Quantity("number of samples fitted, K"),
-    "hac_lags": Quantity("lags that the Newey-West errors allow for"),
+    "hac_lags": Quantity("lags that the Newey-West standard errors allow for"),
     # predictions
     "rmse": Quantity("root mean squared error of the predicted effort", "{effort}"),
     "nrmse": Quantity("root mean squared error over the range of the effort"),

@@ -1,12 +1,13 @@
 """The records that flow between stages.
 
 A record is a few scalars that say what it is about, and columns of one length that say what was measured or
-found.  It checks itself once, when made, so a stage can trust what it is handed and `store` can write any of
+estimated.  It checks itself once, when made, so a stage can trust what it is handed and `store` can write any of
 them the same way.  Every field is a symbol of `quantities`.  `KEY` names the scalars that tell one record of a
-kind from another: they are its place on disk.
+kind from another: they are its place on disk.  `published` says which of its numbers results.json holds.
 """
 
 import re
+from collections.abc import Iterator
 from dataclasses import fields
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
@@ -32,10 +33,20 @@ class Origin(NamedTuple):
     units: dict[str, str]
 
 
+class Published(NamedTuple):
+    """A number of a record that results.json holds: the field, or the row of a column, under a key."""
+
+    key: str
+    field: str
+    std: str = ""  # the field that holds its standard error
+    row: int | None = None
+
+
 class Record:
     """What all records share; never made itself."""
 
     KEY: ClassVar[Names] = ("log", "joint")
+    ROWS: ClassVar[str] = ""  # the column that names the rows, where rows have names
     origin: ClassVar[Origin | None] = None  # set on the instances that `store` read
 
     @classmethod
@@ -57,6 +68,28 @@ class Record:
     def key(self) -> Names:
         """What tells this record from others of its kind."""
         return tuple(str(getattr(self, name)) for name in self.KEY)
+
+    def published(self) -> Iterator[Published]:
+        """The numbers of this record that belong in results.json."""
+        return iter(())
+
+    def publish(self, prefix: str, *names: str) -> Iterator[Published]:
+        """Scalars under `<prefix>.<name>`."""
+        return (Published(f"{prefix}.{name}", name) for name in names)
+
+    def row_name(self, row: int) -> str:
+        """What a row is called where a number is traced back to it."""
+        return str(getattr(self, self.ROWS)[row]) if self.ROWS else str(row)
+
+    def row_number(self, name: str) -> int:
+        """The row of that name.
+
+        Raises
+        ------
+        ValueError
+            If there is none.
+        """
+        return [str(label) for label in getattr(self, self.ROWS)].index(name) if self.ROWS else int(name)
 
     def __post_init__(self) -> None:
         for f in fields(self):  # type: ignore[arg-type]
@@ -87,3 +120,8 @@ class Record:
 
 
 AnyRecord = TypeVar("AnyRecord", bound=Record)
+
+
+def slug(text: str) -> str:
+    """A name as it stands in a key: 'gravity, sine' is gravity_sine."""
+    return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")

@@ -27,9 +27,9 @@ PARTIAL = ".partial"  # what the name of a file that is still being written ends
 
 def path(kind: type[Record], key: Names) -> Path:
     """Where a record is, below its study's folder: `track/<log>/<joint>.parquet`."""
-    first, rest = key[0], ".".join(key[1:])
+    first, name = key[0], ".".join(key[1:])
     folder = Path(kind.folder())
-    return folder / first / f"{rest}.parquet" if rest else folder / f"{first}.parquet"
+    return folder / first / f"{name}.parquet" if name else folder / f"{first}.parquet"
 
 
 class Writer:
@@ -115,8 +115,8 @@ def read(kind: type[AnyRecord], folder: Path, place: Path) -> AnyRecord:
         raise MissingRecord(f"{whole} is not there; run the stage that writes {kind.__name__} records first")
     try:
         with pq.ParquetFile(whole) as file:
-            table, found = file.read(), file.metadata.metadata or {}
-        metadata = {key.decode(): found[key].decode() for key in (b"record", b"scalars", b"units")}
+            table, stored = file.read(), file.metadata.metadata or {}
+        metadata = {key.decode(): stored[key].decode() for key in (b"record", b"scalars", b"units")}
         if metadata["record"] != kind.__name__:
             raise KeyError(metadata["record"])
         scalars = {name: _scalar(value) for name, value in json.loads(metadata["scalars"]).items()}

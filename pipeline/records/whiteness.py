@@ -1,8 +1,9 @@
 """Records of tests of what should be white noise."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from pipeline.records.record import Column, Counts, Record
+from pipeline.records.record import Column, Counts, Published, Record
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,3 +29,14 @@ class Whiteness(Record):
     all_white: int
     lag: Counts
     acf: Column
+
+    def published(self) -> Iterator[Published]:
+        """The tests, of innovations among the filter's own numbers."""
+        if not self.signal.startswith("innovation_"):
+            names = ("acf1", "ljung_box_p", "jarque_bera_p", "skewness", "kurtosis", "white")
+            yield from self.publish(f"whiteness.{self.log}.{self.joint}.{self.signal}", *names)
+            return
+        prefix, signal = f"ekf.{self.log}.{self.joint}", self.signal.removeprefix("innovation_")
+        for name in ("acf1", "ljung_box_p", "jarque_bera_p"):
+            yield Published(f"{prefix}.{name}_{signal}", name)
+        yield Published(f"{prefix}.white", "all_white")

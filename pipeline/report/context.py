@@ -6,7 +6,7 @@ from pipeline.records import Fit, Record, Track
 from pipeline.records.catalogue import Catalogue, Provenance
 from pipeline.records.quantities import QUANTITIES
 from pipeline.report.content import Number, literal
-from pipeline.report.results import Results, printed
+from pipeline.report.results import Results, format_unit
 from pipeline.study import Study
 
 
@@ -29,8 +29,8 @@ class Context:
 
     def used_fit(self, joint: str) -> str:
         """`<model>.<estimator>` of the fit that the filter ran with."""
-        own = [f"{fit.model}.{fit.estimator}" for fit in self.catalogue.all(Fit) if fit.group == joint]
-        return self.study.settings.fit if self.study.settings.fit in own else own[0]
+        names = [f"{fit.model}.{fit.estimator}" for fit in self.catalogue.all(Fit) if fit.group == joint]
+        return self.study.settings.fit if self.study.settings.fit in names else names[0]
 
 
 def most_telling(tracks: list[Track], most: int) -> list[Track]:
@@ -46,12 +46,12 @@ def most_telling(tracks: list[Track], most: int) -> list[Track]:
 
 def title(name: str) -> str:
     """The name of a log or joint as a heading: 'hand_roll' is 'Hand roll'."""
-    words = literal(name.replace("_", " "))
-    return words[:1].upper() + words[1:]
+    text = literal(name.replace("_", " "))
+    return text[:1].upper() + text[1:]
 
 
 def label(record: Record, field: str, meaning: str = "") -> str:
     """The label of an axis: what a field means and its unit."""
     unit = record.origin.units.get(field, "") if record.origin else ""
-    words = meaning or QUANTITIES[field].meaning
-    return f"{words} [{printed(unit)}]" if unit not in ("", "1") else words
+    text = meaning or QUANTITIES[field].meaning
+    return f"{text} [{format_unit(unit)}]" if unit not in ("", "1") else text

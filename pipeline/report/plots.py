@@ -22,7 +22,7 @@ def normal_scores(x: Column) -> tuple[Column, Column, float, float]:
 
 
 def histogram(x: Column, bins: int = 40) -> tuple[Column, Column, Column, Column]:
-    """Edges and densities of a histogram, and the normal density of the same mean and deviation."""
+    """Edges and densities of a histogram, and the normal density of the same mean and standard deviation."""
     densities, edges = np.histogram(x, bins=bins, density=True)
     grid = np.linspace(edges[0], edges[-1], 200)
     sigma = float(x.std()) or 1.0
@@ -32,9 +32,9 @@ def histogram(x: Column, bins: int = 40) -> tuple[Column, Column, Column, Column
 
 def autocorrelation(w: Whiteness, heading: str) -> Panel:
     """An autocorrelation with the band that white noise stays in."""
-    rest = w.acf[1:]
-    marks = (HBand(-w.band, w.band, "95 % band"), Stems(w.lag[1:].astype(float), rest, "", "blue"))
+    acf = w.acf[1:]
+    marks = (HBand(-w.band, w.band, "95 % band"), Stems(w.lag[1:].astype(float), acf, "", "blue"))
     # Small ones are drawn large enough to be told from the band, and always on both sides of zero.
     reach = max(4 * w.band, 0.1)
-    low, high = min(-reach, 1.1 * float(rest.min())), max(reach, min(1.1 * float(rest.max()), 1.0))
+    low, high = min(-reach, 1.1 * float(acf.min())), max(reach, min(1.1 * float(acf.max()), 1.0))
     return Panel(heading, "lag [samples]", "autocorrelation", marks, y_range=(low, high))

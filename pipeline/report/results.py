@@ -5,20 +5,10 @@ import math
 import re
 from dataclasses import asdict, dataclass
 
-from pipeline.records import (
-    Average,
-    Control,
-    Excitation,
-    Fit,
-    Links,
-    LogSummary,
-    Lyapunov,
-    Prediction,
-    Record,
-    Track,
-    Whiteness,
-)
+from pipeline.records import KINDS, Record
 from pipeline.records.catalogue import Catalogue
+from pipeline.records.quantities import PER_ROW
+from pipeline.records.record import Published
 from pipeline.report.content.number import Number
 
 
@@ -35,28 +25,25 @@ class Result:
 
     def number(self, digits: int = 4) -> Number:
         """The number as a report prints it."""
-        return Number(self.value, printed(self.unit), self.std, self.key, digits)
+        return Number(self.value, format_unit(self.unit), self.std, self.key, digits)
 
 
 class Results(dict[str, Result]):
-    """Results by key, in the order in which they were found."""
+    """Results by key, in the order in which they were collected."""
 
-    def add(self, record: Record, key: str, name: str, std: str = "") -> None:
-        """Put a scalar of a record under a key."""
+    def add(self, record: Record, number: Published) -> None:
+        """Put a number of a record under its key, unless there is one already: joints of a log share some."""
+        value, unit = cell(record, number.field, number.row)
+        if number.key in self or not math.isfinite(value):
+            return
         assert record.origin is not None
-        deviation = float(getattr(record, std)) if std else None
-        unit = record.origin.units.get(name, "")
-        self.put(key, float(getattr(record, name)), deviation, unit, record, f"#{name}")
-
-    def put(self, key: str, value: float, std: float | None, unit: str, record: Record, place: str) -> None:
-        """Put a number under a key, with the place in the record's file where it stands."""
-        assert record.origin is not None
-        if math.isfinite(value):
-            source = f"processed/{record.origin.path}{place}"
-            self[key] = Result(key, value, std, unit, source, record.origin.sha256)
+        std = cell(record, number.std, number.row)[0] if number.std else None
+        row = "" if number.row is None else f"[{record.row_name(number.row)}]"
+        source = f"processed/{record.origin.path}#{number.field}{row}"
+        self[number.key] = Result(number.key, value, std, unit, source, record.origin.sha256)
 
     def truth(self, key: str, value: float, unit: str, path: tuple[str, ...], sha256: str) -> None:
-        """Put a number of a simulated study's truth under a key; `path` leads to it in truth.toml."""
+        """Put a number of a simulated study's ground truth under a key; `path` leads to it in truth.toml."""
         self[key] = Result(key, value, None, unit, f"raw/truth.toml#{json.dumps(path, ensure_ascii=False)}", sha256)
 
     def json(self) -> bytes:
@@ -66,97 +53,33 @@ class Results(dict[str, Result]):
 
 
 def collect(catalogue: Catalogue) -> Results:
-    """Every result of a study."""
-    found = Results()
-    _robot(found, catalogue)
-    for intake in catalogue.all(LogSummary):
-        for name in ("rows", "rate", "duration", "jitter", "longest_gap", "duplicates", "dropped"):
-            found.add(intake, f"log.{intake.log}.{name}", name)
-    for average in catalogue.all(Average):
-        _average(found, average)
-    for fit in catalogue.all(Fit):
-        _fit(found, fit)
-    for prediction in catalogue.all(Prediction):
-        for name in ("rmse", "nrmse", "r2", "relative_error"):
-            found.add(prediction, f"{prediction_key(prediction)}.{name}", name)
-    for track in catalogue.all(Track):
-        for name in ("tau_ext_rms", "nis_mean", "r_q", "r_dq", "q_q", "q_dq", "q_tau"):
-            found.add(track, f"ekf.{track.log}.{track.joint}.{name}", name)
-    for whiteness in catalogue.all(Whiteness):
-        _whiteness(found, whiteness)
-    return found
+    """Every number that a study's records publish."""
+    results = Results()
+    for kind in KINDS.values():
+        if kind.published is Record.published:  # it has none, and may be large
+            continue
+        for record in catalogue.all(kind):
+            for number in record.published():
+                results.add(record, number)
+    return results
 
 
-def prediction_key(prediction: Prediction) -> str:
-    """`predict.<log>.<joint>.<model>.<estimator>`, or `cv.` where the log itself was fitted."""
-    first = "cv" if prediction.role == "identification" else "predict"
-    return ".".join((first, *prediction.key))
+def cell(record: Record, field: str, row: int | None) -> tuple[float, str]:
+    """A scalar of a record, or one row of a column, with its unit; a row may have a unit of its own."""
+    value = getattr(record, field)
+    unit = record.origin.units.get(field, "") if record.origin else ""
+    if row is None:
+        return float(value), unit
+    return float(value[row]), str(record.unit[row]) if unit == PER_ROW else unit  # type: ignore[attr-defined]
 
 
-def slug(text: str) -> str:
-    """A name as it stands in a key: 'gravity, sine' is gravity_sine."""
-    return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
-
-
-def _robot(found: Results, catalogue: Catalogue) -> None:
-    for links in catalogue.all(Links):
-        found.add(links, "robot.worst_condition", "worst_condition")
-        for i, link in enumerate(links.link):
-            for name in ("alpha", "a", "d", "offset", "mass"):
-                unit = links.origin.units[name] if links.origin else ""
-                value = float(getattr(links, name)[i])
-                found.put(f"robot.link.{link}.{name}", value, None, unit, links, f"#{name}[{link}]")
-    for control in catalogue.all(Control):
-        for name in ("start", "reference", "settling_time", "overshoot", "error_10", "error_20", "error_end"):
-            found.add(control, f"control.{control.controller}.{control.joint}.{name}", name)
-    for lyapunov in catalogue.all(Lyapunov):
-        found.add(lyapunov, f"control.{lyapunov.controller}.V_rise", "V_rise")
-        found.add(lyapunov, f"control.{lyapunov.controller}.V_0", "V_0")
-    for excitation in catalogue.all(Excitation):
-        key = f"excitation.{excitation.joint}.{excitation.source}"
-        for name in ("period", "objective", "condition", "excess_q", "excess_dq", "excess_ddq"):
-            found.add(excitation, f"{key}.{name}", name)
-        for i, value in enumerate(excitation.coefficients):
-            name = f"{'a' if i == 0 or i % 2 else 'b'}{(i + 1) // 2}"
-            found.put(f"{key}.{name}", value, None, "", excitation, f"#coefficients[{i}]")
-
-
-def _average(found: Results, average: Average) -> None:
-    if f"period.{average.log}" not in found:
-        found.add(average, f"period.{average.log}", "period", "period_std")
-        found.add(average, f"period.{average.log}.periods", "periods")
-    for name in ("sigma_q", "sigma_dq", "sigma_tau"):
-        found.add(average, f"noise.{average.log}.{average.joint}.{name}", name)
-
-
-def _fit(found: Results, fit: Fit) -> None:
-    key = ".".join(("fit", *fit.key))
-    for i, name in enumerate(fit.parameter):
-        theta, std, hac, unit = (getattr(fit, c)[i] for c in ("theta", "theta_std", "theta_std_hac", "unit"))
-        found.put(f"{key}.{slug(name)}", float(theta), float(hac), unit, fit, f"#theta[{name}]")
-        found.put(f"{key}.{slug(name)}.std_classical", float(std), None, unit, fit, f"#theta_std[{name}]")
-    for name in ("mse", "r2", "condition", "samples", "periods", "hac_lags"):
-        found.add(fit, f"{key}.{name}", name)
-
-
-def _whiteness(found: Results, w: Whiteness) -> None:
-    if w.signal.startswith("innovation_"):
-        key, short = f"ekf.{w.log}.{w.joint}", w.signal.removeprefix("innovation_")
-        for name in ("acf1", "ljung_box_p", "jarque_bera_p"):
-            found.add(w, f"{key}.{name}_{short}", name)
-        found.add(w, f"{key}.white", "all_white")
-    else:
-        for name in ("acf1", "ljung_box_p", "jarque_bera_p", "skewness", "kurtosis", "white"):
-            found.add(w, f"whiteness.{w.log}.{w.joint}.{w.signal}.{name}", name)
-
-
-def printed(unit: str) -> str:
+def format_unit(unit: str) -> str:
     """A unit as it is printed: powers as superscripts, a root as a root, and nothing for a pure number."""
-    words = re.sub(r"(\w+)\^0\.5", r"√\1", "" if unit == "1" else unit)
-    return re.sub(r"\^(\d)", lambda match: "⁰¹²³⁴⁵⁶⁷⁸⁹"[int(match[1])], words)
+    text = re.sub(r"(\w+)\^0\.5", r"√\1", "" if unit == "1" else unit)
+    return re.sub(r"\^(\d)", lambda match: "⁰¹²³⁴⁵⁶⁷⁸⁹"[int(match[1])], text)
 
 
-def parse(source: str) -> tuple[str, str, str]:
+def parse_source(source: str) -> tuple[str, str, str]:
     """The file, the field, and the row of a source: 'processed/fit/x.parquet#theta[inertia]'."""
     file, _, place = source.partition("#")
     field, _, row = place.partition("[")

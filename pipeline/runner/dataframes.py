@@ -1,5 +1,6 @@
-"""Records as pandas DataFrames, for people who go on from where the pipeline ends."""
+"""Records and results as pandas DataFrames, for people who go on from where the pipeline ends."""
 
+import json
 from pathlib import Path
 from typing import Any
 
@@ -18,11 +19,11 @@ def read(study: Path, kind: str, about: dict[str, str]) -> pd.DataFrame:
     unknown = set(about) - set(KINDS[kind].scalars())
     if unknown:
         raise BadRequest(f"{kind} has no {', '.join(sorted(unknown))}; it has {', '.join(KINDS[kind].scalars())}")
-    places = folders(study, None, None)
-    made = sorted({name for entry in Ledger(places).entries() for name in entry.outputs})
+    study_folders = folders(study, None, None)
+    outputs = sorted({name for entry in Ledger(study_folders).entries() for name in entry.outputs})
     folder = f"processed/{KINDS[kind].folder()}/"
-    mine = [Path(name).relative_to("processed") for name in made if name.startswith(folder)]
-    records = [store.read(KINDS[kind], places.processed, place) for place in mine]
+    files = [Path(name).relative_to("processed") for name in outputs if name.startswith(folder)]
+    records = [store.read(KINDS[kind], study_folders.processed, file) for file in files]
     records = [r for r in records if all(str(getattr(r, k)) == v for k, v in about.items())]
     if not records:
         raise MissingRecord(
@@ -35,6 +36,21 @@ def read(study: Path, kind: str, about: dict[str, str]) -> pd.DataFrame:
     return frame
 
 
+def results(study: Path) -> pd.DataFrame:
+    """Every number of a study's results.json; see `pipeline.results`."""
+    file = folders(study, None, None).reports / "results.json"
+    names = ["key", "value", "std", "unit", "source"]
+    try:
+        rows = [[result[name] for name in names] for result in json.loads(file.read_text(encoding="utf-8"))]
+    except FileNotFoundError:
+        raise MissingRecord(f"{file} is not there; run `davinci-forces all {study}`") from None
+    except (ValueError, TypeError, LookupError) as error:
+        again = f"`davinci-forces report {study}` makes it anew"
+        raise MissingRecord(f"{file} is not as the report wrote it ({error!r}); {again}") from None
+    frame = pd.DataFrame(rows, columns=names).set_index("key")
+    return frame.astype({"value": float, "std": float})
+
+
 def as_frame(record: Record) -> pd.DataFrame:
     """One record, its key and single scalars repeated on every row."""
     scalars = {name: getattr(record, name) for name in record.scalars()}
@@ -45,8 +61,11 @@ def as_frame(record: Record) -> pd.DataFrame:
 
 def units(records: list[Any]) -> dict[str, str | dict[str, str]]:
     """The unit of each field; by joint where joints differ."""
-    found: dict[str, dict[str, str]] = {}
+    units_by_joint: dict[str, dict[str, str]] = {}
     for record in records:
         for name, unit in record.origin.units.items():
-            found.setdefault(name, {})[getattr(record, "joint", getattr(record, "group", ""))] = unit
-    return {name: of if len(set(of.values())) > 1 else next(iter(of.values())) for name, of in found.items()}
+            units_by_joint.setdefault(name, {})[getattr(record, "joint", getattr(record, "group", ""))] = unit
+    return {
+        name: by_joint if len(set(by_joint.values())) > 1 else next(iter(by_joint.values()))
+        for name, by_joint in units_by_joint.items()
+    }

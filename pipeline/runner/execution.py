@@ -17,19 +17,19 @@ from pipeline.records import KINDS, Diagnostic, Record, diagnostic, store
 from pipeline.records.catalogue import Catalogue, Provenance
 from pipeline.robots.robot import Kind
 from pipeline.runner.ledger import Folders, Ledger
-from pipeline.runner.plan import VERSION, Places, Task, beside, given
+from pipeline.runner.plan import VERSION, Places, Task, given, study_files
 from pipeline.runner.signature import Declaration, declaration
 from pipeline.study import Study
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a task made, or why it could not, and what it wants said."""
+    """What a task made, or why it could not, and its messages for the console."""
 
     task: Task
     outputs: tuple[str, ...]
     failed: str = ""
-    said: tuple[str, ...] = ()
+    messages: tuple[str, ...] = ()
 
 
 def perform(study: Study, folders: Folders, task: Task, made_from: dict[str, Any]) -> Outcome:
@@ -38,10 +38,10 @@ def perform(study: Study, folders: Folders, task: Task, made_from: dict[str, Any
     Raises
     ------
     OSError
-        If not even a note of what went wrong can be written.
+        If not even a diagnostic of what went wrong can be written.
     """
     asks = declaration(task.stage)
-    said: list[str] = []
+    messages: list[str] = []
     try:
         arguments = {p: _argument(asks, folders, task, p) for p in task.records if p != "records"}
         arguments |= {p: _given(what, study, task) for p, what in asks.given.items()}
@@ -52,8 +52,10 @@ def perform(study: Study, folders: Folders, task: Task, made_from: dict[str, Any
         with _writer(study, folders, made_from) as writer:
             for record in run(**arguments):
                 writer.write(record)
-                said += _lines(record)
-        return Outcome(task, tuple(f"processed/{place.as_posix()}" for place in writer.places), said=tuple(said))
+                messages += _messages(record)
+        return Outcome(
+            task, tuple(f"processed/{place.as_posix()}" for place in writer.places), messages=tuple(messages)
+        )
     except (PipelineError, OSError) as error:
         return _failed(study, folders, task, made_from, str(error))
     except Exception as error:
@@ -66,15 +68,15 @@ def perform(study: Study, folders: Folders, task: Task, made_from: dict[str, Any
 
 
 def _failed(study: Study, folders: Folders, task: Task, made_from: dict[str, Any], message: str) -> Outcome:
-    """The outcome of a task that could not be done: a note of why, for the report."""
-    kept = _anywhere(message, study, folders)
+    """The outcome of a task that could not be done: a diagnostic of why, for the report."""
+    portable = _without_folders(message, study, folders)
     with _writer(study, folders, made_from) as writer:
-        writer.write(diagnostic(task.stage, task.name.replace("/", "."), "error", kept))
+        writer.write(diagnostic(task.stage, task.name.replace("/", "."), "error", portable))
     places = tuple(f"processed/{place.as_posix()}" for place in writer.places)
-    return Outcome(task, places, failed=kept, said=(f"error: {message}",))
+    return Outcome(task, places, failed=portable, messages=(f"error: {message}",))
 
 
-def _anywhere(message: str, study: Study, folders: Folders) -> str:
+def _without_folders(message: str, study: Study, folders: Folders) -> str:
     """A message without the folders of this machine, as what is kept of it has to be the same on every one."""
     for folder in (folders.processed, folders.reports, study.folder):
         message = message.replace(f"{folder}{os.sep}", "")
@@ -108,7 +110,7 @@ def _report(run: Callable[..., dict[str, bytes]], study: Study, folders: Folders
 def _provenance(study: Study, folders: Folders, places: Places) -> Provenance:
     packages = ("numpy", "scipy", "pandas", "pyarrow", "statsmodels", "numba", "matplotlib", "bokeh", "typst", "npTDMS")
     ledger = Ledger(folders)
-    files = (*beside(study), *(file for entry in study.logs for file in entry.files))
+    files = (*study_files(study), *(file for entry in study.logs for file in entry.files))
     raw = {f"raw/{study.name}/{file}": ledger.digest(f"raw/{file}") for file in files}
     processed = {place.as_posix(): ledger.digest(f"processed/{place.as_posix()}") for _, place in places}
     failures = {f"{e.stage} {e.task}": e.failed for e in ledger.entries() if e.failed and e.stage != "report"}
@@ -116,12 +118,12 @@ def _provenance(study: Study, folders: Folders, places: Places) -> Provenance:
 
 
 def _argument(asks: Declaration, folders: Folders, task: Task, parameter: str) -> Any:
-    read = [store.read(KINDS[kind], folders.processed, place) for kind, place in task.records[parameter]]
+    records = [store.read(KINDS[kind], folders.processed, place) for kind, place in task.records[parameter]]
     if parameter in asks.each:
-        return read[0]
-    if parameter in asks.beside:
-        return read[0] if read else None
-    return read
+        return records[0]
+    if parameter in asks.optional:
+        return records[0] if records else None
+    return records
 
 
 def _given(what: str, study: Study, task: Task) -> Any:
@@ -138,7 +140,7 @@ def _log(study: Study, task: Task) -> Log:
     return open_parts([study.folder / file for file in entry.files], options)
 
 
-def _lines(record: Record) -> list[str]:
+def _messages(record: Record) -> list[str]:
     if not isinstance(record, Diagnostic):
         return []
     return [f"{s}: {t}" for s, t in zip(record.severity, record.text, strict=True) if s in ("warning", "error")]

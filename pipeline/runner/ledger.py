@@ -1,4 +1,4 @@
-"""What was made from what: one small JSON file per task, beside the records it made.
+"""What was made from what: one small JSON file per task, next to the records it made.
 
 A task is current while its fingerprint (inputs by content, settings, robot, code, version) and the content of
 its outputs are what its entry says.  Comparing an old entry with a new fingerprint gives the reason to run.
@@ -33,8 +33,8 @@ class Folders:
 
     def file(self, name: str) -> Path:
         """The file that a name in the ledger stands for."""
-        root, _, rest = name.partition("/")
-        return Path(getattr(self, root)) / rest
+        root, _, path = name.partition("/")
+        return Path(getattr(self, root)) / path
 
 
 @dataclass(frozen=True)
@@ -123,10 +123,10 @@ class Ledger:
             changed.append(f"version {then.get('version')} became {now.version}")
         old = then.get("settings", {})
         changed += [f"{k} = {old.get(k)!r} became {v!r}" for k, v in now.settings.items() if old.get(k) != v]
-        for what, words in (("given", "the {} changed"), ("code", "the code of {} changed"), ("inputs", "{} changed")):
+        for what, reason in (("given", "the {} changed"), ("code", "the code of {} changed"), ("inputs", "{} changed")):
             old, new = then.get(what, {}), getattr(now, what)
             changed += [
-                words.format(name) for name in sorted(old.keys() | new.keys()) if old.get(name) != new.get(name)
+                reason.format(name) for name in sorted(old.keys() | new.keys()) if old.get(name) != new.get(name)
             ]
         return changed
 
@@ -147,8 +147,8 @@ def code(*modules: str) -> dict[str, str]:
     return {file.relative_to(PACKAGE.parent).as_posix(): _hash_of(file) for file in sorted(files)}
 
 
-def _collect(found: Iterable[Path], files: dict[Path, None]) -> None:
-    for file in found:
+def _collect(sources: Iterable[Path], files: dict[Path, None]) -> None:
+    for file in sources:
         if file not in files:
             files[file] = None
             if file.suffix == ".py":
@@ -158,13 +158,13 @@ def _collect(found: Iterable[Path], files: dict[Path, None]) -> None:
 
 @cache
 def _imports(file: Path) -> tuple[str, ...]:
-    found = []
+    modules = []
     for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("pipeline"):
             for alias in node.names:
                 deeper = f"{node.module}.{alias.name}"
-                found.append(deeper if _files(deeper) else node.module)
-    return tuple(found)
+                modules.append(deeper if _files(deeper) else node.module)
+    return tuple(modules)
 
 
 def _files(module: str) -> list[Path]:
@@ -204,8 +204,8 @@ def canonical(value: Any) -> str:
         If the value holds something of which that cannot be said.
     """
     if is_dataclass(value) and not isinstance(value, type):
-        held = (f"{f.name}={canonical(getattr(value, f.name))}" for f in fields(value))
-        return f"{type(value).__name__}({', '.join(held)})"
+        items = (f"{f.name}={canonical(getattr(value, f.name))}" for f in fields(value))
+        return f"{type(value).__name__}({', '.join(items)})"
     if isinstance(value, np.ndarray) and not value.dtype.hasobject:
         return f"array({value.dtype.str}, {value.shape}, {sha256(value.tobytes()).hexdigest()})"
     if isinstance(value, dict):

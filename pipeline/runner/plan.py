@@ -41,16 +41,16 @@ class Plan:
             yield Task("report", "report", {"records": self.places(tuple(KINDS.values()))})
         elif asks.each:
             [(parameter, kinds)] = asks.each.items()
-            others = {p: self.places(k) for p, k in asks.beside.items()}
+            optional = {p: self.places(k) for p, k in asks.optional.items()}
             for kind, place in self.places(kinds):
                 log, joint = _about(place)
-                same = {p: tuple(x for x in there if _about(x[1]) == (log, joint)) for p, there in others.items()}
+                same = {p: tuple(x for x in places if _about(x[1]) == (log, joint)) for p, places in optional.items()}
                 records = {parameter: ((kind, place),), **same, **every}
                 yield Task(asks.name, _task_name(kind, place, len(kinds)), records, log, joint)
         elif asks.per_log:
-            of_all = {p: self.places(k) for p, k in asks.per_log.items()}
+            per_log = {p: self.places(k) for p, k in asks.per_log.items()}
             for entry in self.study.logs:
-                own = {p: tuple(x for x in there if _about(x[1])[0] == entry.name) for p, there in of_all.items()}
+                own = {p: tuple(x for x in places if _about(x[1])[0] == entry.name) for p, places in per_log.items()}
                 if any(own.values()):
                     yield Task(asks.name, entry.name, {**own, **every}, entry.name)
         elif "log" in asks.given.values():
@@ -60,15 +60,16 @@ class Plan:
 
     def places(self, kinds: Kinds) -> Places:
         """Files of these kinds that the stages made, in the order of the study's logs and the robot's joints."""
-        wanted = {kind.folder(): kind.__name__ for kind in kinds}
-        found = []
+        kind_names = {kind.folder(): kind.__name__ for kind in kinds}
+        located = []
         for stage in STAGES:
             for entry in self.ledger.entries(stage):
                 for name in entry.outputs:
-                    root, _, rest = name.partition("/")
-                    if root == "processed" and rest.partition("/")[0] in wanted:
-                        found.append((wanted[rest.partition("/")[0]], Path(rest)))
-        return tuple(sorted(found, key=self._order))
+                    root, _, path = name.partition("/")
+                    folder = path.partition("/")[0]
+                    if root == "processed" and folder in kind_names:
+                        located.append((kind_names[folder], Path(path)))
+        return tuple(sorted(located, key=self._order))
 
     def _order(self, item: tuple[str, Path]) -> tuple[Any, ...]:
         kind, place = item
@@ -88,7 +89,7 @@ class Plan:
         if "log" in asks.given.values():
             inputs |= {f"raw/{file}" for file in self.study.log(task.log).files}
         if asks.name == "report":
-            inputs |= {f"raw/{file}" for file in beside(self.study)}
+            inputs |= {f"raw/{file}" for file in study_files(self.study)}
         given_ = {what: hash_of(given(what, self.study, task)) for what in asks.given.values() if what != "log"}
         settings = asdict(self.study.settings)
         chosen = settings if "study" in asks.given.values() else {name: settings[name] for name in asks.settings}
@@ -98,7 +99,7 @@ class Plan:
         return Fingerprint(hashes, given_, chosen, code(f"pipeline.stages.{asks.name}", *at_work), VERSION)
 
 
-def beside(study: Study) -> tuple[str, ...]:
+def study_files(study: Study) -> tuple[str, ...]:
     """The files of a study besides its logs."""
     return tuple(file for file in ("study.toml", study.robot_file, "truth.toml" if study.truth else "") if file)
 

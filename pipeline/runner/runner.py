@@ -56,8 +56,8 @@ class Runner:
         with ExitStack() as stack:
             self._stack = stack
             stack.enter_context(locked(self.folders.processed))
-            for half in [*store.leftovers(self.folders.processed), *store.leftovers(self.folders.reports)]:
-                half.unlink()
+            for leftover in [*store.leftovers(self.folders.processed), *store.leftovers(self.folders.reports)]:
+                leftover.unlink()
             self._remove_obsolete()
             for name in names:
                 self._stage(name, alone=len(names) == 1)
@@ -91,15 +91,15 @@ class Runner:
             if entry.task.replace("/", ".") not in planned:
                 self.ledger.remove(entry)
         due: dict[str, tuple[Task, Fingerprint]] = {}
-        why: dict[str, list[str]] = {}
+        tasks_by_reason: dict[str, list[str]] = {}
         for task in tasks:
             now = self.plan.fingerprint(asks, task)
             reasons = ["--force"] if self.force else self.ledger.reasons(self.ledger.entry(name, task.name), now)
             if reasons:
                 due[task.name] = task, now
-                why.setdefault(_brief(reasons), []).append(task.name)
-        for reason, which in why.items():
-            self.console.say(f"{name}: {_listed(which)}: {reason}")
+                tasks_by_reason.setdefault(_brief(reasons), []).append(task.name)
+        for reason, names in tasks_by_reason.items():
+            self.console.say(f"{name}: {_listed(names)}: {reason}")
         self._perform(name, due)
         current = len(tasks) - len(due)
         if current:
@@ -115,7 +115,7 @@ class Runner:
             self.ledger.write(Entry(name, task.name, asdict(fingerprint), hashes, outcome.failed))
             self.ran += 1
             self.failures += bool(outcome.failed)
-            for line in outcome.said:
+            for line in outcome.messages:
                 self.console.warn(f"{name}: {line}")
             self.console.progress(name, done, len(due))
 

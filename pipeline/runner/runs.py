@@ -2,14 +2,21 @@
 
 import sys
 from collections.abc import Iterator, Sequence
+from glob import glob
 from pathlib import Path
+from time import perf_counter
+from typing import Literal
 
 import typer
 
 from pipeline.errors import BadStudy
-from pipeline.runner.ledger import Folders
+from pipeline.runner.execution import Outcome
+from pipeline.runner.ledger import Fingerprint, Folders
+from pipeline.runner.plan import Task
 from pipeline.runner.runner import Console, Runner
 from pipeline.study import Study, reading
+
+Verbosity = Literal["quiet", "normal", "verbose"]
 
 
 def folders(study: Path, processed: Path | None, reports: Path | None) -> Folders:
@@ -19,16 +26,16 @@ def folders(study: Path, processed: Path | None, reports: Path | None) -> Folder
     return Folders(study, (processed or home / "processed") / name, (reports or home / "reports") / name)
 
 
-def studies(named: Sequence[Path]) -> Iterator[Path]:
-    """The studies named, or every one in raw/ whose logs are there.
+def studies(named: Sequence[Path], verbosity: Verbosity = "normal") -> Iterator[Path]:
+    """The studies named, patterns expanded, or every one in raw/ whose logs are there.
 
     Raises
     ------
     BadStudy
-        If none is named and raw/ holds none.
+        If none is named and raw/ holds none, or a pattern matches none.
     """
     if named:
-        yield from named
+        yield from (folder for name in named for folder in matching(name))
         return
     found = sorted(file.parent for file in Path("raw").glob("*/study.toml"))
     if not found:
@@ -40,10 +47,41 @@ def studies(named: Sequence[Path]) -> Iterator[Path]:
             yield folder
             continue
         absent = study.absent()
-        if len(absent) == study.files:
-            typer.echo(f"{folder}: skipped, its logs are not here ({absent[0]} ...); study.toml says where to get them")
-        else:
+        if len(absent) < study.files:
             yield folder
+        elif verbosity != "quiet":
+            typer.echo(f"{folder}: skipped, its logs are not here ({absent[0]} ...); study.toml says where to get them")
+
+
+def matching(name: Path) -> list[Path]:
+    """The folders that a name with * or ? stands for, as not every shell expands it; any other name is one folder.
+
+    Raises
+    ------
+    BadStudy
+        If there is no such folder.
+    """
+    if name.exists() or not set("*?") & set(str(name)):
+        return [name]
+    folders = [Path(match) for match in sorted(glob(str(name))) if Path(match).is_dir()]
+    if not folders:
+        raise BadStudy(f"{name}: no folder has a name like this; a study is a folder that holds study.toml")
+    return folders
+
+
+def one(name: Path) -> Path:
+    """The one study that a name stands for.
+
+    Raises
+    ------
+    BadStudy
+        If a pattern stands for none, or for several.
+    """
+    folders = matching(name)
+    if len(folders) > 1:
+        names = ", ".join(map(str, folders))
+        raise BadStudy(f"{name} stands for {len(folders)} studies, {names}: name one of them; `all` takes several")
+    return folders[0]
 
 
 def load(folder: Path) -> Study:
@@ -65,33 +103,59 @@ def load(folder: Path) -> Study:
 
 
 def run(
-    folder: Path, names: Sequence[str], processed: Path | None, reports: Path | None, force: bool, jobs: int
+    folder: Path,
+    names: Sequence[str],
+    processed: Path | None = None,
+    reports: Path | None = None,
+    force: bool = False,
+    jobs: int = 1,
+    verbosity: Verbosity = "normal",
 ) -> bool:
     """Run stages on one study and say what was done; whether every task succeeded."""
     study = load(folder)
-    runner = Runner(study, folders(folder, processed, reports), console(), force, jobs)
-    typer.secho(f"{folder}: {study.title}{' (SIMULATED)' if study.simulated else ''}", bold=True)
+    speaks = console(verbosity)
+    kind = Narrator if verbosity == "verbose" else Runner
+    runner = kind(study, folders(folder, processed, reports), speaks, force, jobs)
+    speaks.say(typer.style(f"{folder}: {study.title}{' (SIMULATED)' if study.simulated else ''}", bold=True))
     good = runner.run(names)
     if not runner.ran:
-        typer.echo(f"{folder}: nothing to do, every stage is current")
+        speaks.say(f"{folder}: nothing to do, every stage is current")
     for file in ("report.html", "report.pdf"):
         made = runner.folders.reports / file
         if "report" in names and made.exists():
-            typer.echo(f"{folder}: see {made}")
+            speaks.say(f"{folder}: see {made}")
     if not good:
         typer.secho(f"{folder}: {runner.failures} of {runner.ran} tasks failed", fg="red", err=True)
     return good
 
 
-def console() -> Console:
-    """Lines for a log; on a terminal, a bar as well."""
+class Narrator(Runner):
+    """A runner that says of every task, too, when it is done: how long it took, or how far its stage then was."""
+
+    def _outcomes(self, due: dict[str, tuple[Task, Fingerprint]]) -> Iterator[Outcome]:
+        together = self.jobs > 1 and len(due) > 1
+        start = perf_counter()
+        for outcome in super()._outcomes(due):
+            seconds = perf_counter() - start
+            when = f"done {seconds:.2f} s into the stage" if together else f"took {seconds:.2f} s"
+            self.console.say(f"{outcome.task.stage}: {outcome.task.name}: {when}")
+            yield outcome
+            start = start if together else perf_counter()
+
+
+def console(verbosity: Verbosity) -> Console:
+    """Lines for a log; on a terminal, a bar as well.  Warnings are never left out."""
 
     def progress(stage: str, done: int, total: int) -> None:
-        if sys.stderr.isatty():
+        if verbosity == "normal" and sys.stderr.isatty():
             width = 30
             full = width * done // total
             end = "\n" if done == total else ""
             sys.stderr.write(f"\r{stage:14s} [{'#' * full}{'.' * (width - full)}] {done}/{total}{end}")
             sys.stderr.flush()
 
-    return Console(typer.echo, lambda line: typer.secho(line, fg="yellow", err=True), progress)
+    def say(line: str) -> None:
+        if verbosity != "quiet":
+            typer.echo(line)
+
+    return Console(say, lambda line: typer.secho(line, fg="yellow", err=True), progress)

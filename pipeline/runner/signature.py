@@ -26,7 +26,7 @@ class Declaration:
     name: str
     each: dict[str, Kinds]  # called once for each record of these kinds
     per_log: dict[str, Kinds]  # called once a log, with all its records of these kinds
-    beside: dict[str, Kinds]  # the record about the same log and joint, or None
+    optional: dict[str, Kinds]  # the record about the same log and joint, or None
     every: dict[str, Kinds]  # all records
     given: dict[str, str]  # parameter -> "log", "entry", "joint", "robot" or "study"
     settings: tuple[str, ...]
@@ -35,8 +35,8 @@ class Declaration:
     @property
     def reads(self) -> Kinds:
         """The kinds of record that must exist before the stage runs."""
-        every = (self.each, self.per_log, self.beside, self.every)
-        return tuple(dict.fromkeys(kind for group in every for kinds in group.values() for kind in kinds))
+        groups = (self.each, self.per_log, self.optional, self.every)
+        return tuple(dict.fromkeys(kind for group in groups for kinds in group.values() for kind in kinds))
 
 
 @cache
@@ -44,23 +44,23 @@ def declaration(name: str) -> Declaration:
     """Read the signature of a stage."""
     run = import_module(f"pipeline.stages.{name}").run
     hints = get_type_hints(run)
-    found = Declaration(name, {}, {}, {}, {}, {}, _settings(name, run), _kinds(_inner(hints.pop("return"))))
+    declared = Declaration(name, {}, {}, {}, {}, {}, _settings(name, run), _kinds(_inner(hints.pop("return"))))
     for parameter, hint in hints.items():
-        if parameter in found.settings:
+        if parameter in declared.settings:
             continue
         if hint in (Catalogue, Provenance):
             continue
         if hint in GIVEN:
-            found.given[parameter] = GIVEN[hint]
+            declared.given[parameter] = GIVEN[hint]
         elif get_origin(hint) is Sequence:
-            found.per_log[parameter] = _kinds(_inner(hint))
+            declared.per_log[parameter] = _kinds(_inner(hint))
         elif get_origin(hint) is Iterable:
-            found.every[parameter] = _kinds(_inner(hint))
+            declared.every[parameter] = _kinds(_inner(hint))
         elif type(None) in get_args(hint):
-            found.beside[parameter] = _kinds(hint)
+            declared.optional[parameter] = _kinds(hint)
         else:
-            found.each[parameter] = _kinds(hint)
-    return found
+            declared.each[parameter] = _kinds(hint)
+    return declared
 
 
 def _settings(name: str, run: Any) -> tuple[str, ...]:

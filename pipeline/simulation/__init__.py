@@ -1,1 +1,1 @@
-"""Simulated studies: a scenario in, logs as the laboratory would have recorded them out, with the truth beside them."""
+"""Simulated studies: a scenario in, logs as the sensors would have recorded them out, with the ground truth."""

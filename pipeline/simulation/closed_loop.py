@@ -28,26 +28,28 @@ def run(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
     BadScenario
         If the motion grows beyond all bounds, as it does under gains that the ticks are too slow for.
     """
-    what, robot = cast(SimulatedArm, scenario.arm), scenario.robot
+    simulated_arm, robot = cast(SimulatedArm, scenario.arm), scenario.robot
     chain, bodies = _geometry(scenario)
     names, n = [joint.name for joint in robot.joints], len(robot.joints)
-    ticks = round(1 / (scenario.rate * what.tick))
+    ticks = round(1 / (scenario.rate * simulated_arm.tick))
     skipped, samples = round(log.lead * scenario.rate), round(log.duration * scenario.rate)
     t = np.arange(-skipped, samples) / scenario.rate
     reference = np.column_stack([log.position(name, t) for name in names])
     stops = np.array([scenario.joints[name].stops for name in names])
-    friction = what.families[log.family].friction
+    friction = simulated_arm.families[log.family].friction
     body = JointConstraints(friction, stops[:, 0].copy(), stops[:, 1].copy(), np.ones(n, dtype=np.bool_))
-    plant = arm(chain, bodies, what.motors.gear_ratio**2 * what.rotors)
-    clock = Timing(what.tick, ticks)
-    instants = np.arange(len(t) * ticks, dtype=np.float64) * what.tick - log.lead
+    plant = arm(chain, bodies, simulated_arm.motors.gear_ratio**2 * simulated_arm.rotors)
+    clock = Timing(simulated_arm.tick, ticks)
+    instants = np.arange(len(t) * ticks, dtype=np.float64) * simulated_arm.tick - log.lead
     around = _around(log, chain, names, instants)
-    found = simulate(plant, body, what.motors, what.control, clock, reference, around, reference[0])
-    if not all(np.isfinite(values).all() for values in found):
+    simulated = simulate(
+        plant, body, simulated_arm.motors, simulated_arm.control, clock, reference, around, reference[0]
+    )
+    if not all(np.isfinite(values).all() for values in simulated):
         raise BadScenario(
             f"{scenario.name}: log {log.name}: the loop is unstable; lower its gains, or shorten arm.tick"
         )
-    q, dq, tau, tau_ext, force = (values[skipped:] for values in found)
+    q, dq, tau, tau_ext, force = (values[skipped:] for values in simulated)
     motions = {
         name: Motion(*(np.ascontiguousarray(values[:, i]) for values in (q, dq, tau, tau_ext)))
         for i, name in enumerate(names)
@@ -89,9 +91,10 @@ def theta(scenario: Scenario, family: str) -> dict[str, Array]:
     Friction is as the scenario states it; inertia and gravity follow from the links, to `DIGITS` digits, so that they
     are the same on every machine.  A joint whose friction has more to it than viscous and Coulomb friction has none.
     """
-    what, friction = cast(SimulatedArm, scenario.arm), cast(SimulatedArm, scenario.arm).families[family].friction
+    simulated_arm = cast(SimulatedArm, scenario.arm)
+    friction = simulated_arm.families[family].friction
     chain, bodies = _geometry(scenario)
-    drives = Drives(what.motors.gear_ratio, what.rotors, friction.viscous, friction.coulomb_up)
+    drives = Drives(simulated_arm.motors.gear_ratio, simulated_arm.rotors, friction.viscous, friction.coulomb_up)
     parameters = {}
     for i, joint in enumerate(scenario.robot.joints):
         plain = friction.coulomb_up[i] == friction.coulomb_down[i] == friction.static_up[i] == friction.static_down[i]

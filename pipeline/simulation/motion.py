@@ -1,4 +1,4 @@
-"""What a simulation found out."""
+"""The results of a simulation: motion and efforts."""
 
 from dataclasses import dataclass
 

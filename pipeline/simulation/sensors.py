@@ -1,4 +1,4 @@
-"""What the laboratory's recorder sees of a motion: motor angles, motor speeds and currents, in steps and with noise."""
+"""What the sensors record of a motion: motor angles, motor speeds and currents, in steps and with noise."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""The truth.toml of a simulated study: what estimates are compared with, in the report and nowhere else."""
+"""The truth.toml of a simulated study: the ground truth that the report, and nothing else, compares estimates with."""
 
 from collections.abc import Sequence
 
@@ -20,10 +20,10 @@ def truth(scenario: Scenario, entries: Sequence[str]) -> str:
         for name, simulated in scenario.joints.items():
             lines += _noise(f"noise.{name}", simulated.noise)
     else:
-        for family, what in scenario.arm.families.items():
-            lines += _theta(f"theta.{family}", scenario, closed_loop.theta(scenario, family))
-            for name, noise in what.noise.items():
-                lines += _noise(f"noise.{family}.{name}", noise)
+        for name, family in scenario.arm.families.items():
+            lines += _theta(f"theta.{name}", scenario, closed_loop.theta(scenario, name))
+            for joint, noise in family.noise.items():
+                lines += _noise(f"noise.{name}.{joint}", noise)
     return "\n".join([*lines, "", *entries])
 
 
@@ -49,14 +49,14 @@ def touched(run: SimulatedRun) -> list[list[float]]:
     """When the tip touched something: [onset, end] of each time [s], to a sample."""
     if run.force is None:
         return []
-    there = np.concatenate([[False], np.linalg.norm(run.force, axis=1) > 0, [False]])
-    edges = np.flatnonzero(there[1:] != there[:-1])
+    contact = np.concatenate([[False], np.linalg.norm(run.force, axis=1) > 0, [False]])
+    edges = np.flatnonzero(contact[1:] != contact[:-1])
     return [[float(run.t[start]), float(run.t[end - 1])] for start, end in edges.reshape(-1, 2).tolist()]
 
 
-def _theta(place: str, scenario: Scenario, found: dict[str, NDArray[np.float64]]) -> list[str]:
+def _theta(place: str, scenario: Scenario, parameters: dict[str, NDArray[np.float64]]) -> list[str]:
     lines = []
-    for name, values in found.items():
+    for name, values in parameters.items():
         terms = scenario.robot.joint(name).terms
         lines += ["", f"[{place}.{name}]"]
         lines += [f"{toml(t.name)} = {toml(p)}" for t, p in zip(terms, values.tolist(), strict=True)]

@@ -1,4 +1,4 @@
-"""Recordings as files that LabVIEW would have written, TDMS and LVM; they say themselves that they are simulated."""
+"""Recordings as files that LabVIEW would have written, TDMS and LVM; their headers say that they are simulated."""
 
 from collections.abc import Sequence
 from io import StringIO
@@ -40,7 +40,7 @@ def tdms(path: Path, channels: Sequence[SimulatedChannel], rate: float, started:
 
 
 def lvm(path: Path, channels: Sequence[SimulatedChannel], rate: float, started: str) -> None:
-    """Write an LVM file of one segment, as the express block "Write To Measurement File" does."""
+    """Write an LVM file of one file segment, as the express block "Write To Measurement File" does."""
     timed = channels[0].quantity == "time"
     columns = channels[1:] if timed else channels
     names = ["X_Value", *(c.name for c in columns), "Comment"]

@@ -34,8 +34,8 @@ class Channels:
     def read(self, table: Any) -> tuple[Source, ...]:
         """The sources that are right."""
         if not isinstance(table, dict) or not table:
-            says = f"{self.place}: [log.channels] must say which channel holds which quantity"
-            self.problems.add(self.start, says)
+            problem = f"{self.place}: [log.channels] must say which channel holds which quantity"
+            self.problems.add(self.start, problem)
             return ()
         sources = [self.source(quantity, value) for quantity, value in _flat(table)]
         good = tuple(s for s in sources if s)
@@ -56,8 +56,8 @@ class Channels:
     def source(self, quantity: str, value: Any) -> Source | None:
         """The channel of one quantity, by name or number, or in a table that says more about it."""
         line = self.problems.line(re.escape(quantity), self.start)
-        what = self.what(quantity, line)
-        if what is None:
+        needed = self.measured(quantity, line)
+        if needed is None:
             return None
         table: dict[str, Any] = value if isinstance(value, dict) else {"channel": value}
         where = f"{self.place}: channel of {quantity!r}"
@@ -71,14 +71,14 @@ class Channels:
         check(named, line, f"{where} must be a name, or a column number from 0, not {channel!r}")
         check(signed, line, f"{where}: sign must be 1 or -1, not {sign!r}")
         check(shifted, line, f"{where}: offset must be a number, not {offset!r}")
-        if unit is not None and not self.unit(unit, what, where, line):
+        if unit is not None and not self.unit(unit, needed, where, line):
             return None
         if not (named and signed and shifted):
             return None
-        return Source(quantity, channel, what, canonical(unit) if unit else None, sign, float(offset))
+        return Source(quantity, channel, needed, canonical(unit) if unit else None, sign, float(offset))
 
-    def what(self, quantity: str, line: int) -> str | None:
-        """What the unit of a quantity measures, or None for one that there is not."""
+    def measured(self, quantity: str, line: int) -> str | None:
+        """What the unit of a quantity measures, or None for an unknown quantity."""
         joint, _, symbol = quantity.rpartition(".")
         if not joint and quantity in OF_THE_LOG:
             return OF_THE_LOG[quantity]
@@ -88,22 +88,22 @@ class Channels:
             return None
         if self.robot is None:
             return None
-        found = next((j for j in self.robot.joints if j.name == joint), None)
-        if found is None:
-            names = ", ".join(j.name for j in self.robot.joints)
-            says = f"{self.place}: robot {self.robot.name} has no joint {joint!r}; it has {names}"
-            self.problems.add(line, says)
+        names = [j.name for j in self.robot.joints]
+        if joint not in names:
+            known = ", ".join(names)
+            problem = f"{self.place}: robot {self.robot.name} has no joint {joint!r}; it has {known}"
+            self.problems.add(line, problem)
             return None
-        position, effort = ("angle", "torque") if found.kind is Kind.REVOLUTE else ("length", "force")
+        position, effort = ("angle", "torque") if self.robot.joint(joint).kind is Kind.REVOLUTE else ("length", "force")
         return OF_A_JOINT[symbol].format(position=position, effort=effort)
 
-    def unit(self, unit: Any, what: str, where: str, line: int) -> bool:
+    def unit(self, unit: Any, needed: str, where: str, line: int) -> bool:
         """Whether a unit is known and measures what is needed."""
         if not isinstance(unit, str) or measures(unit) is None:
             self.problems.add(line, f"{where}: unknown unit {unit!r}; known are {', '.join(UNITS)}")
             return False
-        if measures(unit) != what:
-            self.problems.add(line, f"{where}: {unit!r} measures {measures(unit)}, but {what} is needed")
+        if measures(unit) != needed:
+            self.problems.add(line, f"{where}: {unit!r} measures {measures(unit)}, but {needed} is needed")
             return False
         return True
 

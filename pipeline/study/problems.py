@@ -33,11 +33,11 @@ class Problems:
 
     def __init__(self, file: Path, text: str) -> None:
         self.file, self.lines = file, text.splitlines()
-        self.found: set[tuple[int, str]] = set()
+        self.noted: set[tuple[int, str]] = set()
 
     def add(self, line: int, text: str) -> None:
         """Take in one problem."""
-        self.found.add((max(line, 1), text))
+        self.noted.add((max(line, 1), text))
 
     def check(self, good: bool, line: int, problem: str) -> None:
         """Take in a problem, unless all is good."""
@@ -45,15 +45,15 @@ class Problems:
             self.add(line, problem)
 
     def refuse(self) -> None:
-        """Raise what was found, in the order of the file.
+        """Raise what was noted, in the order of the file.
 
         Raises
         ------
         BadStudy
             With every problem, one a line; nothing is raised where there is none.
         """
-        if self.found:
-            raise BadStudy("\n".join(f"{self.file}:{line}: {problem}" for line, problem in sorted(self.found)))
+        if self.noted:
+            raise BadStudy("\n".join(f"{self.file}:{line}: {problem}" for line, problem in sorted(self.noted)))
 
     def start_of_log(self, index: int) -> int:
         """The line of the [[log]] of that index."""
@@ -73,8 +73,8 @@ class Problems:
     def unknown(self, table: Any, known: tuple[str, ...], place: str, start: int) -> None:
         """Keys of a table that mean nothing."""
         for key in sorted(set(table) - set(known)) if isinstance(table, dict) else ():
-            says = f"{place}: unknown key {key!r}; known are {', '.join(known)}".lstrip(": ")
-            self.add(self.line(re.escape(key), start), says)
+            problem = f"{place}: unknown key {key!r}; known are {', '.join(known)}".lstrip(": ")
+            self.add(self.line(re.escape(key), start), problem)
 
     def table(self, parent: dict[str, Any], key: str) -> dict[str, Any]:
         """A table below another; empty where it is not there, or is something else, which is a problem."""
@@ -108,6 +108,6 @@ class Problems:
         value = entry.get(key)
         if value not in choices:
             line = self.line(key, start) if key in entry else start
-            says = "is missing" if key not in entry else f"must not be {value!r}"
-            self.add(line, f"{place}: {key} {says}; it is one of {', '.join(choices)}")
+            problem = "is missing" if key not in entry else f"must not be {value!r}"
+            self.add(line, f"{place}: {key} {problem}; it is one of {', '.join(choices)}")
         return str(value)

@@ -77,7 +77,7 @@ class _Reader:
         )
 
     def truth(self) -> dict[str, Any]:
-        """What is true of a simulated study, where it says so beside it."""
+        """The ground truth of a simulated study, where its folder has a truth.toml."""
         try:
             return tomllib.loads((self.folder / "truth.toml").read_text(encoding="utf-8"))
         except FileNotFoundError:
@@ -109,9 +109,9 @@ class _Reader:
                 known = ", ".join(joints)
                 self.problems.add(line, f"robot_overrides: {robot.name} has no joint {name!r}; it has {known}")
                 continue
-            found: list[str] = []
-            joints[name] = change(joints[name], changes, f"robot_overrides.{name}", found)
-            for problem in found:
+            mistakes: list[str] = []
+            joints[name] = change(joints[name], changes, f"robot_overrides.{name}", mistakes)
+            for problem in mistakes:
                 self.problems.add(line, problem)
         return replace(robot, joints=tuple(joints.values()))
 
@@ -126,8 +126,8 @@ class _Reader:
             if wrong := implausible(name, values[name]):
                 self.problems.add(self.problems.line(name), f"settings: {wrong}")
         for name, choices in CHOICES.items():
-            says = f"settings: {name} must not be {values[name]!r}; it is one of {', '.join(choices)}"
-            self.problems.check(values[name] in choices, self.problems.line(name), says)
+            problem = f"settings: {name} must not be {values[name]!r}; it is one of {', '.join(choices)}"
+            self.problems.check(values[name] in choices, self.problems.line(name), problem)
         return Settings(**values)
 
     def log(self, index: int, entry: Any, robot: Robot | None) -> LogEntry | None:
@@ -174,8 +174,8 @@ class _Reader:
 
     def delimiter(self, entry: dict[str, Any], place: str, start: int) -> str | None:
         delimiter: str | None = self.problems.take(entry, "delimiter", str, None, start)
-        says = f"{place}: delimiter must not be empty; leave it out, and it is found from the file"
-        self.problems.check(delimiter != "", self.problems.line("delimiter", start), says)
+        problem = f"{place}: delimiter must not be empty; leave it out, and it is found from the file"
+        self.problems.check(delimiter != "", self.problems.line("delimiter", start), problem)
         return delimiter
 
     def windows(self, entry: dict[str, Any], place: str, start: int) -> tuple[tuple[float, float], ...]:
@@ -191,8 +191,8 @@ class _Reader:
         table, line = entry.get("weight"), self.problems.line("weight", start)
         if table is None:
             if entry.get("role") == "weight":
-                says = "a weight log says weight = { mass = ..., moves_with = ..., position = ... }"
-                self.problems.add(start, f"{place}: {says}")
+                problem = "a weight log says weight = { mass = ..., moves_with = ..., position = ... }"
+                self.problems.add(start, f"{place}: {problem}")
             return None
         if not isinstance(table, dict):
             self.problems.add(line, f"{place}: weight must be a table")

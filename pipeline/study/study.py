@@ -84,10 +84,8 @@ class Study:
     settings: Settings
     logs: tuple[LogEntry, ...]
     changed: dict[str, Any] = field(default_factory=dict)  # what robot_overrides says, for the report
-    truth: dict[str, Any] = field(
-        default_factory=dict
-    )  # truth.toml of a simulated study, for the report to compare with
-    robot_file: str = ""  # the .toml that describes the robot, where it lies beside the study
+    truth: dict[str, Any] = field(default_factory=dict)  # ground truth of a simulated study: its truth.toml
+    robot_file: str = ""  # the .toml in the study's folder that describes the robot, if there is one
 
     @property
     def name(self) -> str:

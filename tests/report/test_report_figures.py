@@ -16,9 +16,9 @@ from matplotlib.text import Text
 from report_documents import HOSTILE, still, zoomable
 
 from pipeline.report.content import Document, Figure, Figure3D, Histogram, Line, Panel, walk
-from pipeline.report.figures.panels import wrapped
-from pipeline.report.figures.svg import STYLE, draw, svg
-from pipeline.report.figures.ticks import power
+from pipeline.report.figures.panels import wrap_label
+from pipeline.report.figures.svg import STYLE, draw_figure, svg
+from pipeline.report.figures.ticks import power_of_ten
 from pipeline.report.writers import html, pdf
 
 
@@ -37,7 +37,7 @@ def test_words_are_drawn_as_they_are_even_where_matplotlib_reads_signs() -> None
     for words in (HOSTILE, "$x$ [s]", "_under $y$", "counts", "LSE", "WLSE"):
         assert words in drawn
     with mpl.rc_context(STYLE):
-        texts = [text for text in draw(still()).findobj(Text) if "$" in text.get_text()]
+        texts = [text for text in draw_figure(still()).findobj(Text) if "$" in text.get_text()]
     assert len(texts) >= 3
     assert not any(text.get_parse_math() for text in texts)
 
@@ -55,7 +55,7 @@ def crowded(columns: int) -> Figure:
 @pytest.mark.parametrize("figure", [still(), zoomable(300, "z"), crowded(1), crowded(2), crowded(3)])
 def test_nothing_is_clipped_and_no_legend_covers_data(figure: Figure) -> None:
     with mpl.rc_context(STYLE):
-        canvas = draw(figure)
+        canvas = draw_figure(figure)
         canvas.savefig(Path(os.devnull), format="svg")
         box = canvas.get_tightbbox()
         height = canvas.get_size_inches()[1]
@@ -72,12 +72,12 @@ def test_nothing_is_clipped_and_no_legend_covers_data(figure: Figure) -> None:
     ("greatest", "taken"), [(0, 0), (1, 0), (19_999, 0), (1e5, 3), (2.5e-4, -6), (1e-3, -3), (3e9, 9)]
 )
 def test_axes_take_a_power_of_ten_out_of_large_and_small_numbers_only(greatest: float, taken: int) -> None:
-    assert power(greatest) == taken
+    assert power_of_ten(greatest) == taken
 
 
 def test_a_long_axis_label_gives_its_unit_a_line_of_its_own() -> None:
-    assert wrapped("velocity [rad/s]", 60) == "velocity [rad/s]"
-    assert wrapped("velocity [rad/s]", 20) == "velocity\n[rad/s]"
+    assert wrap_label("velocity [rad/s]", 60) == "velocity [rad/s]"
+    assert wrap_label("velocity [rad/s]", 20) == "velocity\n[rad/s]"
 
 
 def test_a_figure_is_drawn_once() -> None:
@@ -91,7 +91,8 @@ def test_a_figure_of_a_million_samples_stays_small() -> None:
 
 def test_another_process_gives_the_same_bytes(full: Document) -> None:
     program = (
-        "import hashlib; from report_documents import document; from pipeline.report.writers import html, pdf; d = document();"
+        "import hashlib; from report_documents import document; from pipeline.report.writers import html, pdf;"
+        "d = document();"
         "[print(hashlib.sha256(w.render(d)).hexdigest()) for w in (pdf, html)]"
     )
     path = os.pathsep.join([str(Path(__file__).parent), str(Path(__file__).parents[2])])

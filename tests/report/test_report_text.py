@@ -8,7 +8,7 @@ from pipeline.report.content import Document, Equation, Number, Prose, Section, 
 from pipeline.report.content.inline import Span, parse, printable
 from pipeline.report.content.layout import place, references
 from pipeline.report.content.tables import columns
-from pipeline.report.writers.widths import BREAK, PAGE, breakable, fit
+from pipeline.report.writers.widths import BREAK, PAGE, allow_breaks, fit_columns
 
 anything = st.text(st.one_of(st.sampled_from("\\$`*[]@a "), st.characters()))
 
@@ -83,7 +83,7 @@ def test_a_unit_that_a_column_shares_moves_to_its_header_and_others_stay() -> No
 
 @given(st.lists(st.lists(st.text("abc _", max_size=90), min_size=2, max_size=2), min_size=1, max_size=12))
 def test_fitted_columns_never_add_up_to_more_than_the_page(cells: list[list[str]]) -> None:
-    fitted = fit(cells)
+    fitted = fit_columns(cells)
     widths = [w for w in fitted.widths if w is not None]
     assert sum(widths) <= PAGE + 1e-6
     assert len(widths) in (0, len(cells))
@@ -91,6 +91,6 @@ def test_fitted_columns_never_add_up_to_more_than_the_page(cells: list[list[str]
 
 @given(st.text("ab/_.- ", max_size=200), st.integers(5, 50))
 def test_long_words_may_break_and_lose_nothing(text: str, longest: int) -> None:
-    broken = breakable(text, longest)
+    broken = allow_breaks(text, longest)
     assert broken.replace(BREAK, "") == text
     assert all(len(piece) <= longest + 1 for piece in broken.replace(BREAK, " ").split())

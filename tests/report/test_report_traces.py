@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from report_documents import zoomable
 
 from pipeline.report.content import Band, Figure, Line, Panel, Points
-from pipeline.report.figures.traces import envelope, thin, thinned
+from pipeline.report.figures.traces import envelope, thin_figure, thin_mark
 
 
 @given(st.integers(0, 2**31), st.integers(2, 3000), st.integers(1, 200))
@@ -31,7 +31,7 @@ def test_the_envelope_keeps_the_extremes_of_every_range_of_x(seed: int, samples:
 def test_one_sample_that_stands_out_survives_among_a_million() -> None:
     y = np.zeros(1_000_000)
     y[654_321] = -7.0
-    line = thin(Line(np.arange(1e6), y), 1000)
+    line = thin_mark(Line(np.arange(1e6), y), 1000)
     assert isinstance(line, Line)
     assert len(line.x) <= 1000
     assert line.x[line.y == -7.0] == [654_321.0]
@@ -40,7 +40,7 @@ def test_one_sample_that_stands_out_survives_among_a_million() -> None:
 def test_a_thinned_band_covers_the_band() -> None:
     x = np.linspace(0, 1, 10_000)
     y = np.sin(300 * x)
-    band = thin(Band(x, y - 1, y + 1), 400)
+    band = thin_mark(Band(x, y - 1, y + 1), 400)
     assert isinstance(band, Band)
     assert 2 * len(band.x) <= 400
     place = np.searchsorted(band.x, x, side="right") - 1
@@ -50,7 +50,7 @@ def test_a_thinned_band_covers_the_band() -> None:
 
 def test_points_off_the_order_of_x_are_taken_at_even_steps_with_their_deviations() -> None:
     x = np.sin(np.arange(1000.0))
-    points = thin(Points(x, x, y_std=np.abs(x)), 100)
+    points = thin_mark(Points(x, x, y_std=np.abs(x)), 100)
     assert isinstance(points, Points)
     assert points.y_std is not None
     np.testing.assert_array_equal(points.x, x[::10])
@@ -59,7 +59,7 @@ def test_points_off_the_order_of_x_are_taken_at_even_steps_with_their_deviations
 
 @pytest.mark.parametrize("samples", [100, 4_998, 5_000, 60_000])
 def test_a_figure_keeps_to_its_limit_and_says_what_it_shows(samples: int) -> None:
-    result = thinned(zoomable(samples, "z"), 20_000)
+    result = thin_figure(zoomable(samples, "z"), 20_000)
     drawn = sum(
         len(mark.x) * (2 if isinstance(mark, Band) else 1)
         for panel in result.figure.panels
@@ -74,7 +74,7 @@ def test_a_figure_keeps_to_its_limit_and_says_what_it_shows(samples: int) -> Non
 
 def test_short_marks_stay_whole_beside_long_ones() -> None:
     short, long = Line(np.arange(50.0), np.arange(50.0)), Line(np.arange(9000.0), np.arange(9000.0))
-    result = thinned(Figure("", "", (Panel("", "", "", (long, short)),)), 1000)
+    result = thin_figure(Figure("", "", (Panel("", "", "", (long, short)),)), 1000)
     first, second = result.figure.panels[0].marks
     assert second.x is not None
     assert len(second.x) == 50  # type: ignore[union-attr]

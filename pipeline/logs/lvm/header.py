@@ -1,4 +1,4 @@
-"""The two headers of a LabVIEW measurement file: of the file, and of each segment in it."""
+"""The two headers of a LabVIEW measurement file: of the file, and of each file segment in it."""
 
 import re
 from collections.abc import Sequence
@@ -29,13 +29,13 @@ class FileHeader:
     separator: bytes = b"\t"
     decimal: str = ""
     x_columns: str = "One"  # "No", "One" or "Multi"
-    several: bool = False  # every write has a segment header of its own
+    several: bool = False  # every write is a file segment with a header of its own
     tags: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Layout:
-    """What the cells of a segment's rows are.  Column 0 is x, or empty where the rows have none."""
+    """What the cells of a file segment's rows are.  Column 0 is x, or empty where the rows have none."""
 
     file: FileHeader
     names: tuple[str, ...]  # of every column of a row, unique; "" for one that holds nothing
@@ -85,7 +85,7 @@ def file_header(lines: Sequence[bytes], encoding: str | None) -> FileHeader:
 
 
 def layout(lines: Sequence[bytes], columns: bytes, file: FileHeader, line: int, encoding: str | None) -> Layout:
-    """What a segment's header and its column line say.
+    """What a file segment's header and its column line say.
 
     Raises
     ------
@@ -115,7 +115,7 @@ def layout(lines: Sequence[bytes], columns: bytes, file: FileHeader, line: int, 
 
 
 def dated(like: Layout, lines: Sequence[bytes], line: int, encoding: str | None) -> Layout:
-    """The layout of a segment whose header differs in its date only."""
+    """The layout of a file segment whose header differs in its date only."""
     tags = _tags([text for text in lines if text[:4] in (b"Date", b"Time")], like.file.separator.decode(), encoding)
     start, started = _started(tags, like.file)
     return replace(like, line=line, start=start, started=started)
@@ -139,8 +139,8 @@ def unescaped(comment: bytes, encoding: str | None) -> str:
 
 def _separator(lines: Sequence[bytes]) -> bytes:
     for line in lines[1:]:
-        if found := SEPARATOR.fullmatch(line):
-            return {b"Tab": b"\t", b"Comma": b","}.get(found[2].strip(), found[1])
+        if tag := SEPARATOR.fullmatch(line):
+            return {b"Tab": b"\t", b"Comma": b","}.get(tag[2].strip(), tag[1])
     return lines[0][len(MAGIC) : len(MAGIC) + 1].strip(b" ") or b"\t"
 
 
@@ -172,10 +172,10 @@ def _check(tags: dict[str, list[str]], channels: int, line: int, remarks: list[s
     dimension = next((cell for cell in tags.get("X_Dimension", []) if cell), "Time")
     if dimension != "Time":
         raise BadHeader(f"the x axis is {dimension}, not time: this is no recording over time; choose another file")
-    said = _first(tags, "Channels")
-    if said.isdecimal() and int(said) != channels:
+    stated = _first(tags, "Channels")
+    if stated.isdecimal() and int(stated) != channels:
         remarks.append(
-            f"line {line}: the header says {said} channels, the column line names {channels}, which are read"
+            f"line {line}: the header says {stated} channels, the column line names {channels}, which are read"
         )
 
 

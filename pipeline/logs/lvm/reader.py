@@ -55,7 +55,7 @@ def _opened(path: Path, options: Options, walk: Walk) -> "LvmLog":
     written = [Channel(name, unit) for name, unit in units.items()] + [Channel(f"column_{i}") for i in extra]
     names = [channel.name for channel in written]
     has_x = any(each.file.x_columns != "No" for each in layouts)
-    dated = walk.segments > 1 and one.start is not None
+    dated = walk.file_segments > 1 and one.start is not None
     derived = unique(("write", "elapsed"), names)[: 1 + dated]
     clock = None if has_x or dated or one.step is None else Clock(one.step, one.x0)
     warnings = [_rounded(one)] if clock and _rounded(one) else []
@@ -81,7 +81,7 @@ def _rounded(one: Layout) -> str:
 def _facts(one: Layout, walk: Walk) -> dict[str, str]:
     tags = {tag: one.file.tags[tag] for tag in FOR_PEOPLE if one.file.tags.get(tag)}
     delimiter = {b"\t": "tab", b",": "comma", b";": "semicolon"}.get(one.file.separator, one.file.separator.decode())
-    return tags | {"delimiter": delimiter, "X_Columns": one.file.x_columns, "segments": str(walk.segments)}
+    return tags | {"delimiter": delimiter, "X_Columns": one.file.x_columns, "segments": str(walk.file_segments)}
 
 
 @dataclass
@@ -90,8 +90,8 @@ class LvmLog(Log):
 
     Besides the channels of the file it has `write`, which counts from 1 the writes that the rows came in, as far as
     they can be told apart (a new header, a blank line, an x that goes back or stands still); and, where several
-    segments have a date, `elapsed`: the time since the first segment's start, from the start of the row's segment
-    and its x.
+    file segments have a date, `elapsed`: the time since the start of the first, from the start of the row's own file
+    segment and its x.
     """
 
     options: Options = field(default_factory=Options)

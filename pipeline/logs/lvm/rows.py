@@ -15,7 +15,7 @@ from pipeline.logs.lvm.walk import Walk
 from pipeline.logs.remarks import Remarks
 from pipeline.maths.arrays import Array
 
-DATED = 1e9  # [s] an x beyond this counts from 1904, not from the start of the segment
+DATED = 1e9  # [s] an x beyond this counts from 1904, not from the start of the file segment
 MOST_COMMENTS = 1000
 
 
@@ -27,10 +27,10 @@ class Reading:
         self.derived = [channel.name for channel in log.channels if channel.derived]
         self.say = Remarks(log.warnings)
         self.walk, self.lines = Walk(encoding, self.say), Lines(log.path, encoding)
-        self.write = self.rows = self.in_segment = self.back = 0
+        self.write = self.rows = self.rows_in_segment = self.back = 0
         self.went_back = ""
         self.last_x = np.nan
-        self.segment: Layout | None = None
+        self.file_segment: Layout | None = None
         self.first: Layout | None = None
         self.marked = False
 
@@ -94,7 +94,7 @@ class Reading:
             self.log.nans[name] += int(np.count_nonzero(np.isnan(cells.columns[i]))) - cells.nulls[i]
         x = cells.columns[0] if run.layout.file.x_columns != "No" else None
         self.first = self.first or run.layout
-        before = self.in_segment if run.layout is self.segment else 0
+        before = self.rows_in_segment if run.layout is self.file_segment else 0
         made = {"write": self._writes(run, x, cells.rows), "elapsed": self._elapsed(run, x, cells.rows, before)}
         self._look_at(run, cells.rows)
         for name, values in zip(self.derived, made.values(), strict=False):
@@ -107,24 +107,25 @@ class Reading:
         return {name: block[name] for name in self.names}
 
     def _look_at(self, run: Run, rows: int) -> None:
-        """Segments, comments and decimal marks of a run."""
-        for (first, layout), end in zip(run.segments, [*(row for row, _ in run.segments[1:]), rows], strict=True):
-            if layout is not self.segment:
+        """File segments, comments and decimal marks of a run."""
+        ends = [*(row for row, _ in run.file_segments[1:]), rows]
+        for (first, layout), end in zip(run.file_segments, ends, strict=True):
+            if layout is not self.file_segment:
                 self._begin_segment(layout)
-            self.in_segment += end - first
+            self.rows_in_segment += end - first
         for line, cell in run.comments[: MOST_COMMENTS - len(self.log.comments)]:
             self.log.comments.append(f"line {line}: {unescaped(cell, self.encoding)}")
-        said, found = run.layout.file.decimal, decoded(marks(run.block, run.layout.file.separator))
-        if not self.marked and not run.commented and (len(found) > 1 or (said and found and found != said)):
+        stated, written = run.layout.file.decimal, decoded(marks(run.block, run.layout.file.separator))
+        if not self.marked and not run.commented and (len(written) > 1 or (stated and written and written != stated)):
             self.marked = True
             self.say(
-                f"line {run.first}: the header's decimal mark is {said or 'not given'!r}, cells have "
-                f"{' and '.join(map(repr, found))}; each cell is read with its own"
+                f"line {run.first}: the header's decimal mark is {stated or 'not given'!r}, cells have "
+                f"{' and '.join(map(repr, written))}; each cell is read with its own"
             )
 
     def _begin_segment(self, layout: Layout) -> None:
         self._check_samples()
-        self.segment, self.in_segment = layout, 0
+        self.file_segment, self.rows_in_segment = layout, 0
         assert self.first is not None
         if absent := sorted(set(self.first.names) - set(layout.names)):
             self.say(f"line {layout.line}: from here on there is no {', '.join(absent)}: nulls")
@@ -153,13 +154,13 @@ class Reading:
         self.back += len(rows)
 
     def _elapsed(self, run: Run, x: Array | None, rows: int, before: int) -> Array:
-        """Time since the start of the first segment [s]; `before` rows of the run's first segment came already."""
+        """Time since the start of the first file segment [s]; `before` rows of the run's first one came already."""
         assert self.first is not None
-        firsts = np.array([row for row, _ in run.segments])
+        firsts = np.array([row for row, _ in run.file_segments])
         counts = np.diff(firsts, append=rows)
-        starts = [_seconds_between(self.first, layout) for _, layout in run.segments]
+        starts = [_seconds_between(self.first, layout) for _, layout in run.file_segments]
         if x is None:
-            x0, step = ([getattr(layout, name) or 0.0 for _, layout in run.segments] for name in ("x0", "step"))
+            x0, step = ([getattr(layout, name) or 0.0 for _, layout in run.file_segments] for name in ("x0", "step"))
             number = np.arange(rows) - np.repeat(firsts, counts)
             number[: counts[0]] += before
             x = np.repeat(x0, counts) + np.repeat(step, counts) * number
@@ -167,18 +168,18 @@ class Reading:
 
     def _check_samples(self) -> None:
         """A header counts the samples of its write; without several headers, of the first write only."""
-        if self.segment is None or self.segment.samples is None:
+        if self.file_segment is None or self.file_segment.samples is None:
             return
-        said, found = self.segment.samples, self.in_segment
-        if found < said or (found > said and self.segment.file.several):
-            self.say(f"line {self.segment.line}: the header says {said} samples, {found} rows follow; these are read")
+        line, stated, rows = self.file_segment.line, self.file_segment.samples, self.rows_in_segment
+        if rows < stated or (rows > stated and self.file_segment.file.several):
+            self.say(f"line {line}: the header says {stated} samples, {rows} rows follow; these are read")
 
     def _close(self) -> None:
         """What is known only at the end of the file."""
         self._check_samples()
         walk, say = self.walk, self.say
-        if self.rows and walk.layout is not self.segment:
-            say(f"line {walk.line}: the file ends behind the header of a segment, which holds no rows")
+        if self.rows and walk.layout is not self.file_segment:
+            say(f"line {walk.line}: the file ends behind the header of a file segment, which holds no rows")
         if not self.rows:
             say("the file holds headers and no rows: the recorder stopped before its first write")
         if self.back:
@@ -205,5 +206,5 @@ class Reading:
 
 
 def _seconds_between(first: Layout, layout: Layout) -> float:
-    """From the start of one segment to that of another [s]; NaN where one has no date."""
+    """From the start of one file segment to that of another [s]; NaN where one has no date."""
     return float(layout.start - first.start) if layout.start is not None and first.start is not None else np.nan

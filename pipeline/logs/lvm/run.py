@@ -12,9 +12,9 @@ WRITTEN = re.compile(rb"-?\d+[.,]\d+(E[+-]?\d+)?|NaN|-?Inf")  # as LabVIEW write
 
 @dataclass
 class Run:
-    """Consecutive rows with the same columns, of one or more segments, all of `width` cells."""
+    """Consecutive rows with the same columns, of one or more file segments, all of `width` cells."""
 
-    layout: Layout  # of the first segment
+    layout: Layout  # of the first file segment
     width: int
     first: int  # line of its first row
     block: bytes = b""
@@ -22,7 +22,7 @@ class Run:
     lines: list[int] | None = None  # line of each row, where they are not consecutive
     begins: list[int] = field(default_factory=list)  # rows at which a write begins, by what stands before them
     comments: list[tuple[int, bytes]] = field(default_factory=list)  # with their lines
-    segments: list[tuple[int, Layout]] = field(default_factory=list)  # the row that each begins at
+    file_segments: list[tuple[int, Layout]] = field(default_factory=list)  # the row that each begins at
 
     def line(self, row: int) -> int:
         """The line that a row stands on."""

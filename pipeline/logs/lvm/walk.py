@@ -33,8 +33,8 @@ class Walk:
     file: FileHeader = field(default_factory=FileHeader)
     layout: Layout | None = None
     line: int = 0
-    met: dict[tuple[str, ...], Layout] = field(default_factory=dict)  # the first segment with these columns
-    segments: int = 0
+    met: dict[tuple[str, ...], Layout] = field(default_factory=dict)  # the first file segment with these columns
+    file_segments: int = 0
     narrow: int = 0  # rows with too few cells
     first_narrow: int = 0  # line of the first of them
     wide: dict[int, int] = field(default_factory=dict)  # cells of a row, where too many -> line of the first such row
@@ -45,7 +45,7 @@ class Walk:
     _run: Run | None = None
     _rows: list[bytes] = field(default_factory=list)
     _done: list[Run] = field(default_factory=list)
-    _like: tuple[bytes, ...] = ()  # the segment header before, but for its date
+    _like: tuple[bytes, ...] = ()  # the header of the file segment before, but for its date
 
     def runs(self, block: Block, take: Callable[[Run, int], Taken | None]) -> Iterator[tuple[Run, Taken | None]]:
         """The runs of rows in a block of whole lines.
@@ -79,8 +79,8 @@ class Walk:
         if width not in (self.layout.width, self.layout.width + 1):
             return None
         begins = [0] if self._begins else []
-        commented, segments = width > self.layout.width, [(0, self.layout)]
-        return Run(self.layout, width, block.first, block.text, commented, begins=begins, segments=segments)
+        commented, file_segments = width > self.layout.width, [(0, self.layout)]
+        return Run(self.layout, width, block.first, block.text, commented, begins=begins, file_segments=file_segments)
 
     def _line_by_line(self, block: Block) -> Iterator[Run]:
         for self.line, line in enumerate(block.text.split(b"\n")[:-1], start=block.first):
@@ -105,7 +105,7 @@ class Walk:
         problem = {
             "special": "the special block is not closed by ***End_Special***",
             "columns": f"the column line, which names the channels and begins with {X}, is missing",
-            "between": "no header of a segment follows the file's header",
+            "between": "no header of a file segment follows the file's header",
         }.get(self.state, f"no line {END.decode()} ends the header")
         if self.layout is None:
             raise BadHeader(f"{problem}; without it the samples have no names")
@@ -145,7 +145,7 @@ class Walk:
         self.layout = self._parsed(line)
         self._header, self._begins, self._width = [], True, self.layout.width
         self.met.setdefault(self.layout.names, self.layout)
-        self.segments += 1
+        self.file_segments += 1
         for remark in self.layout.remarks:
             self.say(remark)
         return "row"
@@ -197,8 +197,8 @@ class Walk:
             self._run, self._rows = Run(layout, layout.width, self.line, lines=[]), []
         run, cells = self._run, line.count(separator) + 1
         assert run.lines is not None
-        if not run.segments or run.segments[-1][1] is not layout:
-            run.segments.append((len(run.lines), layout))
+        if not run.file_segments or run.file_segments[-1][1] is not layout:
+            run.file_segments.append((len(run.lines), layout))
         if cells != layout.width:
             line, cells = self._fitted(line, cells, separator, layout, run)
         if self._begins or (cells != self._width and layout.file.x_columns == "No"):
@@ -212,10 +212,10 @@ class Walk:
         """A row whose width is not the layout's, without trailing empty cells and its comment."""
         while cells > layout.width and line.endswith(separator):
             line, cells = line[: -len(separator)], cells - 1
-        rest, _, last = line.rpartition(separator)
+        row, _, last = line.rpartition(separator)
         if last and ((cells > layout.width and not WRITTEN.fullmatch(last)) or not NUMBER.fullmatch(last.strip())):
             run.comments.append((self.line, last))
-            line, cells = rest, cells - 1
+            line, cells = row, cells - 1
         if cells > layout.width:
             self.wide.setdefault(cells, self.line)
         elif cells < layout.width:
@@ -227,11 +227,11 @@ class Walk:
         """Where a write has a channel fewer, the comment of its first row stands under the last channel's name."""
         if not self._rows or not run.lines:
             return
-        rest, _, last = self._rows[-1].rpartition(separator)
+        row, _, last = self._rows[-1].rpartition(separator)
         if last and not NUMBER.fullmatch(last.strip()):
             run.comments.append((run.lines[-1], last))
             self._is_narrow(run.lines[-1])
-            self._rows[-1] = rest
+            self._rows[-1] = row
 
     def _is_narrow(self, line: int) -> None:
         self.narrow, self.first_narrow = self.narrow + 1, self.first_narrow or line

@@ -1,4 +1,4 @@
-"""The metadata of a TDMS segment: which objects it holds, how their samples lie in it, and their properties.
+"""The metadata of a TDMS file segment: which objects it holds, how their samples lie in it, and their properties.
 
 Layout as National Instruments publishes it ("TDMS File Format Internal Structure").
 """
@@ -27,7 +27,7 @@ class Damaged(ValueError):
 
 @dataclass(frozen=True)
 class Samples:
-    """How the samples of one channel lie in one chunk of a segment."""
+    """How the samples of one channel lie in one chunk of a file segment."""
 
     kind: int  # NI's number of the data type
     count: int  # in a chunk
@@ -37,14 +37,14 @@ class Samples:
 
 @dataclass
 class Objects:
-    """What the metadata said up to here, segment after segment."""
+    """What the metadata said up to here, file segment after file segment."""
 
-    latest: dict[str, Samples] = field(default_factory=dict)  # by path: the last that was said of it
-    active: dict[str, Samples] = field(default_factory=dict)  # the channels with data in this segment, in their order
+    latest: dict[str, Samples] = field(default_factory=dict)  # by path: what was stated last
+    active: dict[str, Samples] = field(default_factory=dict)  # channels with data in this file segment, in order
     properties: dict[str, dict[str, Any]] = field(default_factory=dict)
 
     def update(self, metadata: bytes, order: str, renew: bool) -> None:
-        """Take in the metadata of one segment.
+        """Take in the metadata of one file segment.
 
         Raises
         ------

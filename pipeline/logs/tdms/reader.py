@@ -22,12 +22,12 @@ UNITS = ("unit_string", "ni_unitdescription", "unit", "units")
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether the file begins with the tag of a segment, or is named as a TDMS file."""
+    """Whether the file begins with the tag of a file segment, or is named as a TDMS file."""
     return head.startswith(TAG) or path.suffix.lower() == ".tdms"
 
 
 def read(path: Path, options: Options) -> Log:
-    """Open the file: walk its segments and take in their metadata.
+    """Open the file: walk its file segments and take in their metadata.
 
     Raises
     ------
@@ -122,10 +122,10 @@ class TdmsLog(Log):
 
 
 def _describe(log: TdmsLog, walk: Walk, lengths: Mapping[str, int]) -> None:
-    """What the properties and the segments say about the log."""
+    """What the properties and the file segments say about the log."""
     properties = walk.objects.properties
     latest = walk.objects.latest
-    log.facts["segments"] = str(walk.segments)
+    log.facts["segments"] = str(walk.file_segments)
     log.facts["layout"] = ", ".join(sorted(walk.layouts))
     log.facts |= {key: str(value) for key, value in properties.get("/", {}).items() if isinstance(value, str) and value}
     log.scaled = frozenset(p for p, s in latest.items() if s.kind == DAQMX_RAW or _scales(properties, p))
@@ -135,8 +135,8 @@ def _describe(log: TdmsLog, walk: Walk, lengths: Mapping[str, int]) -> None:
     _describe_time(log, {path: properties.get(path, {}) for path in latest})
     sizes = {"/".join(names(path)): lengths.get(path, 0) for path in latest}
     if len(set(sizes.values())) > 1:
-        said = ", ".join(f"{name}: {length}" for name, length in list(sizes.items())[:6])
-        log.warnings.append(f"channels have different numbers of samples ({said}); the shorter end in nulls")
+        counts = ", ".join(f"{name}: {length}" for name, length in list(sizes.items())[:6])
+        log.warnings.append(f"channels have different numbers of samples ({counts}); the shorter end in nulls")
     elif not any(sizes.values()):
         log.warnings.append("the file names channels and holds no samples: the recorder stopped before its first write")
 
@@ -144,7 +144,8 @@ def _describe(log: TdmsLog, walk: Walk, lengths: Mapping[str, int]) -> None:
 def _scales(properties: Mapping[str, dict[str, Any]], path: str) -> dict[str, Any]:
     """The properties that scale a channel: its own, else its group's, else the file's."""
     group = path[: path.find("'/'") + 1]
-    return next((found for p in (path, group, "/") if scaled.is_scaled(found := properties.get(p, {}))), {})
+    candidates = (properties.get(p, {}) for p in (path, group, "/"))
+    return next((candidate for candidate in candidates if scaled.is_scaled(candidate)), {})
 
 
 def _describe_time(log: TdmsLog, properties: Mapping[str, Mapping[str, Any]]) -> None:

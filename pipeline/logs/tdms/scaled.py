@@ -1,7 +1,7 @@
 """TDMS channels that need more than their bytes: raw values of DAQ cards, and scales that the file describes.
 
-npTDMS reads these.  It is always given the open file, never its path: it would trust an index of whatever age and
-state that lies beside it.
+npTDMS reads these.  It is always given the open file, never its path: it would trust an index file of whatever
+age and state in the same folder.
 """
 
 import io

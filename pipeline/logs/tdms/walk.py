@@ -1,7 +1,7 @@
-"""The segments of a TDMS file, from lead-in to lead-in, as regions of equal records.
+"""The file segments of a TDMS file, from lead-in to lead-in, as regions of equal records.
 
-A control loop that writes one sample per call leaves millions of segments or chunks behind.  Those that are alike are
-found by comparing whole blocks of the file, and become one region, so that no loop runs over them.
+A control loop that writes one sample per call leaves millions of file segments or chunks behind.  Those that are alike
+are found by comparing whole blocks of the file, and become one region, so that no loop runs over them.
 """
 
 import struct
@@ -17,8 +17,8 @@ TAG = b"TDSm"
 LEAD_IN = 28  # [bytes]
 METADATA, NEW_LIST, RAW, INTERLEAVED, BIG_ENDIAN, DAQMX = 2, 4, 8, 32, 64, 128
 VERSIONS = [struct.pack(order + "I", version) for order in "<>" for version in (4712, 4713)]
-UNKNOWN = 2**64 - 1  # as the length of a segment that LabVIEW did not live to finish
-SMALL = 1 << 14  # [bytes] of a segment
+UNKNOWN = 2**64 - 1  # as the length of a file segment that LabVIEW did not live to finish
+SMALL = 1 << 14  # [bytes] of a file segment
 BLOCK = 8 << 20
 
 
@@ -45,16 +45,16 @@ class Region:
 
 @dataclass
 class Walk:
-    """A pass over the segments of a file of `size` bytes.  `say` is told, once, why it ended early."""
+    """A pass over the file segments of a file of `size` bytes.  `say` is told, once, why it ended early."""
 
     file: BinaryIO
     size: int
     say: Callable[[str], None]
     objects: Objects = field(default_factory=Objects)
-    segments: int = 0
+    file_segments: int = 0
     layouts: set[str] = field(default_factory=set)
-    end: int = 0  # of the last whole segment, or of the file
-    cut: bool = False  # a segment lacks some of its samples
+    end: int = 0  # of the last whole file segment, or of the file
+    cut: bool = False  # a file segment lacks some of its samples
 
     def regions(self) -> Iterator[Region]:
         """The regions of the file, in order."""
@@ -80,10 +80,11 @@ class Walk:
                 yield from self._within(toc, order, data, end, more, LEAD_IN + length, whole)
             except Damaged as problem:
                 self.say(
-                    f"byte {at}: the segment that begins here is damaged: {problem}; it is not read, nor what follows"
+                    f"byte {at}: the file segment that begins here is damaged: {problem}; it is not read, nor what "
+                    "follows"
                 )
                 return None
-            self.segments += 1 + more
+            self.file_segments += 1 + more
             at = self.end = end + more * (LEAD_IN + length)
         return None
 
@@ -97,21 +98,26 @@ class Walk:
         if not lead.strip(b"\0"):
             self.say(f"byte {at}: {left} NUL bytes follow, as a power cut leaves them; they are not read")
         elif TAG.startswith(lead[:4]):
-            self.say(f"byte {at}: the file is cut within the head of a segment; its last {left} bytes are not read")
+            self.say(
+                f"byte {at}: the file is cut within the head of a file segment; its last {left} bytes are not read"
+            )
         else:
-            self.say(f"byte {at}: no segment begins here, the file is damaged; its last {left} bytes are not read")
+            self.say(f"byte {at}: no file segment begins here, the file is damaged; its last {left} bytes are not read")
 
     def _cut(self, at: int, data: int, length: int) -> int:
-        """The end of a segment whose length is unknown or beyond the end: the next segment, or the end of the file."""
+        """The end of a file segment whose length is unknown or too large: the next one, or the end of the file."""
         self.cut = True
         end = self._next_tag(data)
-        where = "the end of the file" if end == self.size else f"the next segment, at byte {end}"
+        where = "the end of the file" if end == self.size else f"the next file segment, at byte {end}"
         if length == UNKNOWN:
-            self.say(f"byte {at}: the length of the segment that begins here was never written; read up to {where}")
+            self.say(
+                f"byte {at}: the length of the file segment that begins here was never written; read up to {where}"
+            )
         else:
             short = at + LEAD_IN + length - end
             self.say(
-                f"byte {at}: the segment that begins here lacks {short} bytes; whole samples up to {where} are kept"
+                f"byte {at}: the file segment that begins here lacks {short} bytes; "
+                f"whole samples up to {where} are kept"
             )
         return end
 
@@ -119,26 +125,26 @@ class Walk:
         """Where the next lead-in stands, or the end of the file."""
         while at < self.size:
             block = self._read(at, BLOCK)
-            found = block.find(TAG)
-            while found >= 0:
-                if self._read(at + found, 12)[8:] in VERSIONS:
-                    return at + found
-                found = block.find(TAG, found + 1)
+            tag = block.find(TAG)
+            while tag >= 0:
+                if self._read(at + tag, 12)[8:] in VERSIONS:
+                    return at + tag
+                tag = block.find(TAG, tag + 1)
             at += max(len(block) - len(TAG) + 1, 1)
         return self.size
 
     def _alike(self, head: bytes, at: int, stride: int) -> int:
-        """How many of the segments that follow have the same lead-in and metadata."""
-        found = 0
+        """How many of the file segments that follow have the same lead-in and metadata."""
+        alike = 0
         while True:
             many = min(self.size - at, max(BLOCK, stride)) // stride
             same = self._same(head, at, stride, many)
-            found, at = found + same, at + same * stride
+            alike, at = alike + same, at + same * stride
             if same < many or not many:
-                return found
+                return alike
 
     def _same(self, head: bytes, at: int, stride: int, many: int) -> int:
-        """How many of the next segments begin like this: compared at once where they are small, else one by one."""
+        """How many of the next file segments begin like this: compared at once where small, else one by one."""
         if stride > SMALL:
             return next((i for i in range(many) if self._read(at + i * stride, len(head)) != head), many)
         block = np.frombuffer(self._read(at, many * stride), np.uint8).reshape(many, stride)
@@ -148,7 +154,7 @@ class Walk:
     def _within(
         self, toc: int, order: str, data: int, end: int, more: int, stride: int, whole: bool
     ) -> Iterator[Region]:
-        """The regions of a segment and of the `more` like it that follow, `stride` bytes apart."""
+        """The regions of a file segment and of the `more` like it that follow, `stride` bytes apart."""
         active = self.objects.active
         if not toc & RAW or not active:
             return
@@ -166,18 +172,18 @@ class Walk:
 def _regions(
     active: dict[str, Samples], order: str, interleaved: bool, data: int, length: int, whole: bool
 ) -> Iterator[Region]:
-    """The regions of the raw data of one segment."""
+    """The regions of the raw data of one file segment."""
     if interleaved:
         yield from _interleaved(active, order, data, length)
         return
     size = _chunk_size(active)
-    chunks, rest = divmod(length, size) if size else (0, 0)
+    chunks, left = divmod(length, size) if size else (0, 0)
     counts = {path: samples.count for path, samples in active.items()}
     if chunks:
         yield Region(data, chunks, size, _contiguous(active, counts, order), counts)
-    if rest:
-        counts = _left_over(active, rest, size, whole)
-        yield Region(data + chunks * size, 1, rest, _contiguous(active, counts, order), counts)
+    if left:
+        counts = _left_over(active, left, size, whole)
+        yield Region(data + chunks * size, 1, left, _contiguous(active, counts, order), counts)
 
 
 def _interleaved(active: dict[str, Samples], order: str, data: int, length: int) -> Iterator[Region]:
@@ -207,33 +213,33 @@ def _contiguous(active: dict[str, Samples], counts: dict[str, int], order: str) 
     return columns
 
 
-def _left_over(active: dict[str, Samples], rest: int, size: int, whole: bool) -> dict[str, int]:
-    """Samples in the last chunk of a segment where it is shorter than the others.
+def _left_over(active: dict[str, Samples], left: int, size: int, whole: bool) -> dict[str, int]:
+    """Samples in the last chunk of a file segment, of `left` bytes, where it is shorter than the others.
 
-    A recorder that ended in good order shares the rest out over the channels; a file that was cut holds the first
+    A recorder that ended in good order shares these out over the channels; a file that was cut holds the first
     channels whole and nothing of the last ones.
     """
     kinds = {samples.kind for samples in active.values()}
     if STRING in kinds:
         return dict.fromkeys(active, 0)
     if whole or DAQMX_RAW in kinds:
-        return {path: samples.count * rest // size for path, samples in active.items()}
+        return {path: samples.count * left // size for path, samples in active.items()}
     counts = {}
     for path, samples in active.items():
-        counts[path] = min(samples.count, rest // _size(samples))
-        rest = max(rest - samples.octets, 0)
+        counts[path] = min(samples.count, left // _size(samples))
+        left = max(left - samples.octets, 0)
     return counts
 
 
-def _joined(region: Region, segments: int, stride: int) -> Region | None:
-    """The region of equal segments, with one record per segment, where each channel's samples are evenly spaced."""
+def _joined(region: Region, file_segments: int, stride: int) -> Region | None:
+    """The region of equal file segments, one record for each, where each channel's samples are evenly spaced."""
     if region.records > 1 and any(column.count > 1 for column in region.columns.values()):
         return None
     columns = region.columns
     if region.records > 1:
         columns = {path: replace(c, step=region.stride, count=region.records) for path, c in columns.items()}
     counts = {path: count * region.records for path, count in region.counts.items()}
-    return Region(region.position, segments, stride, columns, counts)
+    return Region(region.position, file_segments, stride, columns, counts)
 
 
 def _chunk_size(active: dict[str, Samples]) -> int:

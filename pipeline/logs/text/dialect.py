@@ -98,9 +98,11 @@ def _marks(rows: Sequence[str], options: Options) -> tuple[str, str]:
 
 def _score(body: Sequence[str], delimiter: str, number: re.Pattern[str]) -> tuple[int, int]:
     """Lines that are mostly numbers, and the numbers in them."""
-    found = [sum(bool(number.fullmatch(cell)) for cell in cells) for cells in (split(line, delimiter) for line in body)]
+    numbers = [
+        sum(bool(number.fullmatch(cell)) for cell in cells) for cells in (split(line, delimiter) for line in body)
+    ]
     filled = [sum(bool(cell) for cell in split(line, delimiter)) for line in body]
-    good = [count for count, cells in zip(found, filled, strict=True) if count and 2 * count >= cells]
+    good = [count for count, cells in zip(numbers, filled, strict=True) if count and 2 * count >= cells]
     return len(good), sum(good)
 
 

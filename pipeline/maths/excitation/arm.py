@@ -54,8 +54,8 @@ def design_together(problem: ArmExcitationProblem, starts: int, seed: int) -> li
     ValueError
         If a joint's limits cannot be kept, or if no trajectory tells its terms apart.
     """
-    found = [_local(problem, [design(joint, 4, seed + i) for joint in problem.joints]) for i in range(starts)]
-    return min(found, key=lambda series: CRITERIA[problem.joints[0].criterion](arm_observation(problem, series))[0])
+    optima = [_local(problem, [design(joint, 4, seed + i) for joint in problem.joints]) for i in range(starts)]
+    return min(optima, key=lambda series: CRITERIA[problem.joints[0].criterion](arm_observation(problem, series))[0])
 
 
 def _local(problem: ArmExcitationProblem, series: list[Fourier]) -> list[Fourier]:

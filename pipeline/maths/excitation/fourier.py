@@ -64,14 +64,14 @@ def turning_points(series: Fourier) -> tuple[Array, Array, Array]:
     """
     k = np.arange(1, len(series.a) + 1)
     velocity = np.array(series.a) - 1j * np.array(series.b)  # a_k cos + b_k sin = Re(velocity_k z^k)
-    found = []
+    times = []
     for derivative in (velocity, 1j * k * velocity, -(k**2) * velocity):
         size = np.abs(derivative)
         derivative = np.where(size > 1e-14 * size.max(), derivative, 0.0)  # what rounding hides anyway spoils the roots
         roots = np.roots(np.concatenate([derivative[::-1], [0.0], derivative.conj()]))
         angles = np.concatenate([[0.0], np.angle(roots) % (2 * np.pi)])
-        found.append(angles * (series.period / (2 * np.pi)))
-    return found[0], found[1], found[2]
+        times.append(angles * (series.period / (2 * np.pi)))
+    return times[0], times[1], times[2]
 
 
 def ranges(series: Fourier) -> tuple[Range, Range, Range]:

@@ -78,8 +78,8 @@ def design(problem: ExcitationProblem, starts: int, seed: int) -> Fourier:
     if reason := impossible(problem.limits):
         raise ValueError(reason)
     random = np.random.default_rng(seed)
-    found = [_local(problem, _start(problem, random)) for _ in range(starts)]
-    best = min(found, key=lambda series: _value(problem, series.x))
+    optima = [_local(problem, _start(problem, random)) for _ in range(starts)]
+    best = min(optima, key=lambda series: _value(problem, series.x))
     if not np.isfinite(_value(problem, best.x)):
         names = ", ".join(term.name for term in problem.terms)
         raise ValueError(f"no trajectory of {problem.harmonics} harmonics tells the terms {names} apart")
@@ -96,10 +96,10 @@ def polished(problem: ExcitationProblem, series: Fourier, random: np.random.Gene
     for _ in range(POLISH):
         x = series.x + step * random.normal(size=len(series.x))
         candidate = within(problem, Fourier.of(x, problem.period))
-        found = CRITERIA[problem.criterion](observation(problem.terms, candidate, problem.samples))[0]
-        better = found < value
+        objective = CRITERIA[problem.criterion](observation(problem.terms, candidate, problem.samples))[0]
+        better = objective < value
         if better:
-            series, value = candidate, found
+            series, value = candidate, objective
         step *= 1.5 if better else 1.5**-0.25
     return series
 

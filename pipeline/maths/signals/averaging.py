@@ -39,23 +39,24 @@ def fold(t: Array, x: Array, period: float, K: int) -> Folded:
     noise stays as white as it was, and a jump of friction does not ring as it would under interpolation.  A phase that
     no sample falls on takes the fit and a count of 0.  `t`, `x` are (N,).  (6.30), (6.31)
     """
-    smooth, rest, bins = _carried(t, x, period, K)
+    smooth, residual, bins = _carried(t, x, period, K)
     counts = np.bincount(bins, minlength=K)
-    mean = np.bincount(bins, rest, K) / np.maximum(counts, 1)
-    away = rest - mean[bins]
-    var = np.bincount(bins, away * away, K) / np.maximum(counts - 1, 1)
-    return Folded(mean + smooth, var, counts, away)
+    mean = np.bincount(bins, residual, K) / np.maximum(counts, 1)
+    noise = residual - mean[bins]
+    var = np.bincount(bins, noise * noise, K) / np.maximum(counts - 1, 1)
+    return Folded(mean + smooth, var, counts, noise)
 
 
 def left_out(t: Array, x: Array, period: float, K: int, groups: Integers) -> Iterator[Folded]:
     """The average without each group of samples in turn, `groups` (N,) numbered from 0; `noise` stays empty.
 
-    The smooth fit is that of all samples: it only carries each to the phase beside it.
+    The smooth fit is that of all samples: it only carries each to the nearest phase.
     """
-    smooth, rest, bins = _carried(t, x, period, K)
+    smooth, residual, bins = _carried(t, x, period, K)
     size = int(groups.max()) + 1
     place = groups * K + bins
-    sums = [np.bincount(place, w, size * K).reshape(size, K) for w in (np.ones_like(rest), rest, rest * rest)]
+    powers = (np.ones_like(residual), residual, residual * residual)
+    sums = [np.bincount(place, w, size * K).reshape(size, K) for w in powers]
     totals = [part.sum(axis=0) for part in sums]
     for group in range(size):
         n, total, squares = (whole - part[group] for whole, part in zip(totals, sums, strict=True))

@@ -55,7 +55,7 @@ def derivative(c: Array, omega: float) -> Array:
 def differentiate_fft(x: Array, period: float, harmonics: int, order: int) -> Array:
     """Differentiate one period in the frequency domain, keeping its mean and first harmonics only.
 
-    Each kept line of the spectrum is multiplied by (j omega)^order; the rest is taken as noise.  `x` is (K,), evenly
+    Each kept line of the spectrum is multiplied by (j omega)^order; the others are taken as noise.  `x` is (K,), evenly
     sampled, its last sample not repeating the first; returns (K,).  `order` 0 smooths.  (6.34)
     """
     spectrum = np.fft.rfft(x)

@@ -13,7 +13,7 @@ DIP = 0.1  # a lag is a period when the normalised difference falls below this; 
 
 
 class Period(NamedTuple):
-    """A period and how well the data determine it [s]."""
+    """A period and its standard error [s]."""
 
     length: float
     std: float
@@ -85,7 +85,7 @@ def refine(t: Array, signals: Sequence[Array], period: float, harmonics: int, st
     """The period whose harmonics fit the signals best, by Gauss-Newton with the coefficients projected out.
 
     `t` (N,) [s]; `signals` (N,) each, weighted by what each leaves unexplained; `period` [s] close enough that the
-    highest harmonic drifts less than half a turn over the record.  The standard deviation takes the residuals as
+    highest harmonic drifts less than half a turn over the record.  The standard error takes the residuals as
     white, and so is too small where they are not.  (G. Golub and V. Pereyra, variable projection, 1973)
     """
     omega, shifted = 2 * np.pi / period, t - t.mean()

@@ -36,7 +36,7 @@ def motion(q: Array, dq: Array | None, rate: float, cutoff: float) -> tuple[Arra
 
 
 def segments(segment: Integers) -> Iterator[slice]:
-    """The runs of samples without a gap between them."""
+    """The segments of a signal: runs of samples without a gap, by the number of the segment of each sample."""
     if len(segment) == 0:
         return
     edges = [0, *(np.flatnonzero(np.diff(segment)) + 1).tolist(), len(segment)]

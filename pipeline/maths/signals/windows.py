@@ -1,4 +1,4 @@
-"""Which samples of a run are spoken of."""
+"""Which samples of a recording are evaluated."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline.maths.arrays import Array, Booleans
 
-SETTLE = 1.0  # [s] in which a filter finds its feet, left out of what is said of the whole run
+SETTLE = 1.0  # [s] of a filter's transient, left out of the statistics of the whole run
 
 
 def outside(t: Array, windows: Sequence[tuple[float, float]]) -> Booleans:
@@ -19,11 +19,11 @@ def outside(t: Array, windows: Sequence[tuple[float, float]]) -> Booleans:
 
 
 def settled(t: Array) -> Booleans:
-    """Whether a filter has found its feet: all but the first second, unless there is little more than that."""
+    """Whether a filter's transient is over: all but the first second, unless there is little more than that."""
     return t - t[0] >= SETTLE if t[-1] - t[0] > 5 * SETTLE else np.ones(len(t), dtype=bool)
 
 
 def longest_run(t: Array, rate: float) -> slice:
-    """The longest run of samples without a gap; `rate` [Hz]."""
+    """The longest segment, a run of samples without a gap; `rate` [Hz]."""
     edges = [0, *(np.flatnonzero(np.diff(t) > 1.5 / rate) + 1).tolist(), len(t)]
     return max((slice(a, b) for a, b in pairwise(edges)), key=lambda part: part.stop - part.start)

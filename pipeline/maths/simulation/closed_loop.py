@@ -36,7 +36,7 @@ class JointConstraints(NamedTuple):
     friction: Friction
     lower: Array  # hard stops (n,)
     upper: Array
-    moving: NDArray[np.bool_]  # joints that are not held by a brake (n,)
+    moving: NDArray[np.bool_]  # (n,); the other joints stay at rest
 
 
 class Timing(NamedTuple):

@@ -1,6 +1,6 @@
 """The studies of chapter 5: controllers without a clock, friction that is viscous only, an implicit adaptive solver.
 
-The wrist's inertias are so small beside its gains that an explicit solver would need steps of microseconds.
+The wrist's inertias are so small for its gains that an explicit solver would need steps of microseconds.
 """
 
 from typing import NamedTuple
@@ -46,12 +46,13 @@ def regulate(
         return np.concatenate([state[n : 2 * n], ddq, target - state[:n]])
 
     start = np.concatenate([q, np.zeros(2 * n)])
-    found = solve_ivp(slope, (0.0, duration), start, method="Radau", rtol=RELATIVE, atol=ABSOLUTE)
-    if not found.success:
-        raise ArithmeticError(f"the solver stopped at {found.t[-1]:g} s: {found.message}")
-    q_t, dq_t = found.y[:n].T, found.y[n : 2 * n].T
+    solution = solve_ivp(slope, (0.0, duration), start, method="Radau", rtol=RELATIVE, atol=ABSOLUTE)
+    if not solution.success:
+        raise ArithmeticError(f"the solver stopped at {solution.t[-1]:g} s: {solution.message}")
+    q_t, dq_t = solution.y[:n].T, solution.y[n : 2 * n].T
     V = [lyapunov(at(plant, x, dx)[0], dx, law.proportional, target - x) for x, dx in zip(q_t, dq_t, strict=True)]
-    return Regulated(found.t, q_t, dq_t, np.array([effort(state) for state in found.y.T]), np.array(V))
+    efforts = np.array([effort(state) for state in solution.y.T])
+    return Regulated(solution.t, q_t, dq_t, efforts, np.array(V))
 
 
 def at(plant: Plant, q: Array, dq: Array) -> tuple[Array, Array]:

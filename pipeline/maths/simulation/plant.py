@@ -38,7 +38,7 @@ class PlantData(NamedTuple):
 
 
 def arm(chain: Chain, bodies: Bodies, rotors: Array) -> Plant:
-    """The arm with as many joints as there are `rotors` (n,), eta^2 J_m; later coordinates are held at 0."""
+    """The arm with as many joints as there are `rotors` (n,), eta^2 J_m; later coordinates stay at rest at 0."""
     n = len(rotors)
     packed, links, chain = pack(chain, bodies, n), list[int](), chain.reduced(n)
     frame = chain.names.index(chain.tip)

@@ -49,7 +49,7 @@ def step(
     """Advance the state by h [s] under constant efforts.
 
     `M` (n, n) and `b` (n,) are inertia and bias at the middle of the step, `tau` (n,) is the effort less the external
-    one.  Joints that are not `moving` (n,) are held.  A joint that would pass `lower` or `upper` is put there and
+    one.  Joints that are not `moving` (n,) stay at rest.  A joint that would pass `lower` or `upper` is put there and
     loses its velocity, as Simulink's second-order integrator does (section 4.5).
     """
     q, dq, z, before = state
@@ -67,9 +67,9 @@ def step(
         _velocity(A, r, up, down, free, new)
         hit = False
         for i in range(n):
-            there = q[i] + h / 2 * (dq[i] + new[i])
-            if free[i] and (there > upper[i] or there < lower[i]):
-                side[i], free[i], hit = 1.0 if there > upper[i] else -1.0, False, True
+            end = q[i] + h / 2 * (dq[i] + new[i])
+            if free[i] and (end > upper[i] or end < lower[i]):
+                side[i], free[i], hit = 1.0 if end > upper[i] else -1.0, False, True
         if not hit:
             break
     for i in range(n):

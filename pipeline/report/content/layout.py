@@ -52,7 +52,10 @@ class Placed:
 def place(document: Document) -> tuple[Placed, ...]:
     """The sections of a document, numbered: sections 1, 1.1; figures, tables and equations 1, 2, 3.
 
-    Raises ValueError where a reference leads nowhere.
+    Raises
+    ------
+    ValueError
+        If a reference leads nowhere.
     """
     check_references(document)
     counters: Counter[str] = Counter()
@@ -61,25 +64,31 @@ def place(document: Document) -> tuple[Placed, ...]:
 
 def references(placed: tuple[Placed, ...]) -> dict[str, str]:
     """What a reference to each label or anchor prints: {'roll-residual': 'Figure 3'}."""
-    found: dict[str, str] = {}
+    printed: dict[str, str] = {}
     for item in placed:
         if item.number and name_of(item.block):
-            found[item.anchor] = NAMES[item.kind].format(item.number)
-        found |= references(item.blocks)
-    return found
+            printed[item.anchor] = NAMES[item.kind].format(item.number)
+        printed |= references(item.blocks)
+    return printed
 
 
-def marked(document: Document, kind: Kind) -> Iterator[str]:
-    """What stands in the inline marks of one kind, in all texts of a document."""
+def marked_texts(document: Document, kind: Kind) -> Iterator[str]:
+    """The contents of the inline marks of one kind, in all texts of a document."""
     for block in walk(document):
         for text in TEXTS[type(block)](block):
             yield from (span.text for span in parse(text) if span.kind == kind)
 
 
 def check_references(document: Document) -> None:
-    """Every reference leads somewhere; raises ValueError that names those that do not."""
+    """Check that every reference leads somewhere.
+
+    Raises
+    ------
+    ValueError
+        If any does not, with all of their labels.
+    """
     named = {name_of(block) for block in walk(document)}
-    if missing := sorted(set(marked(document, "reference")) - named):
+    if missing := sorted(set(marked_texts(document, "reference")) - named):
         raise ValueError(f"{document.title}: references to labels that no block has: {missing}")
 
 

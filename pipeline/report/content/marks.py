@@ -93,7 +93,7 @@ class Histogram:
 
 @dataclass(frozen=True, eq=False)
 class Bars:
-    """One bar per name; several Bars in a panel share the names and stand beside each other."""
+    """One bar per name; several Bars in a panel share the names and stand side by side."""
 
     names: tuple[str, ...]
     heights: Array

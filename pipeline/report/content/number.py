@@ -10,7 +10,7 @@ MISSING = "–"
 
 @dataclass(frozen=True)
 class Number:
-    """A value with its unit, standard deviation and key in results.json.
+    """A value with its unit, standard error and key in results.json.
 
     Printed as value ± std with two significant digits of std, else with `digits` significant digits; far from one, with
     a power of ten.  What is not finite is printed as a dash.
@@ -32,18 +32,18 @@ class Number:
         if not math.isfinite(self.value):
             return MISSING
         if self.std is not None and math.isfinite(self.std) and self.std > 0:
-            return _with_deviation(self.value, self.std)
+            return _with_std(self.value, self.std)
         return _significant(self.value, self.digits)
 
 
-def _with_deviation(value: float, std: float) -> str:
+def _with_std(value: float, std: float) -> str:
     exponent = _exponent(max(abs(value), std), 2)
     last = _exponent(std, 2) - 1  # the power of ten of the last printed digit
     if -4 < exponent < 6 and last <= 0:
         return _signed(f"{value:.{-last}f} ± {std:.{-last}f}")
-    places = max(exponent - last, 0)
+    decimals = max(exponent - last, 0)
     scale = 10.0**exponent
-    return _signed(f"({value / scale:.{places}f} ± {std / scale:.{places}f}) × 10{_power(exponent)}")
+    return _signed(f"({value / scale:.{decimals}f} ± {std / scale:.{decimals}f}) × 10{_power(exponent)}")
 
 
 def _significant(value: float, digits: int) -> str:

@@ -10,7 +10,7 @@ NO_BREAK = "\N{NO-BREAK SPACE}"
 
 
 @dataclass(frozen=True)
-class Shown:
+class TextCell:
     """One cell as it is printed, and the key of its number in results.json."""
 
     text: str
@@ -23,7 +23,7 @@ class TextColumn:
 
     head: str
     align: str
-    cells: tuple[Shown, ...]
+    cells: tuple[TextCell, ...]
 
 
 def columns(table: Table) -> tuple[TextColumn, ...]:
@@ -38,10 +38,10 @@ def _column(head: str, align: str, cells: tuple[Cell, ...]) -> TextColumn:
     unit = numbers[0].unit if len({number.unit for number in numbers}) == 1 else ""
     head = f"{head} {literal(f'[{unit}]').replace(' ', NO_BREAK)}".strip() if unit else head
     align = align.strip() or ("r" if numbers else "l")
-    return TextColumn(head, align, tuple(_shown(cell, bool(unit)) for cell in cells))
+    return TextColumn(head, align, tuple(_text_cell(cell, bool(unit)) for cell in cells))
 
 
-def _shown(cell: Cell, unit_in_head: bool) -> Shown:
+def _text_cell(cell: Cell, unit_in_head: bool) -> TextCell:
     if isinstance(cell, str):
-        return Shown(cell)
-    return Shown(literal(cell.text if unit_in_head else str(cell)), cell.key or "")
+        return TextCell(cell)
+    return TextCell(literal(cell.text if unit_in_head else str(cell)), cell.key or "")

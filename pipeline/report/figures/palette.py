@@ -31,7 +31,7 @@ class Coloured(Protocol):
 M = TypeVar("M", bound=Coloured)
 
 
-def coloured(marks: Sequence[M]) -> Iterator[tuple[M, str]]:
+def assign_colours(marks: Sequence[M]) -> Iterator[tuple[M, str]]:
     """Each mark with its colour; those that name none take turns."""
     turn = cycle(TURN)
     for mark in marks:

@@ -4,10 +4,10 @@ import textwrap
 from typing import TYPE_CHECKING
 
 from pipeline.report.content.marks import AnyMark, Bars, Line, Panel, Points, Stems
-from pipeline.report.figures.draw import named, stroke, stroke_bars
-from pipeline.report.figures.palette import coloured
-from pipeline.report.figures.ticks import decades, scaled
-from pipeline.report.figures.traces import ordered, thin
+from pipeline.report.figures.draw import draw_bars, draw_mark, unescape_label
+from pipeline.report.figures.palette import assign_colours
+from pipeline.report.figures.ticks import scale_ticks, set_log_ticks
+from pipeline.report.figures.traces import is_sorted, thin_mark
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -27,48 +27,48 @@ def draw_panel(axes: "Axes", panel: Panel, width: float, height: float, x_label:
     bars = any(isinstance(mark, Bars) for mark in panel.marks)
     across = panel.x_label if bars else _ticks(axes, "x", panel.x_log, panel.x_label, 4 if width < 70 else 8)
     up = _ticks(axes, "y", panel.y_log, panel.y_label, 5)
-    axes.set_xlabel(wrapped(across, width - 18) if x_label else "", parse_math=False)
-    axes.set_ylabel(wrapped(up, height - 18), parse_math=False)
-    head(axes, panel.title, width)
+    axes.set_xlabel(wrap_label(across, width - 18) if x_label else "", parse_math=False)
+    axes.set_ylabel(wrap_label(up, height - 18), parse_math=False)
+    draw_heading(axes, panel.title, width)
 
 
 def _draw_marks(axes: "Axes", panel: Panel, width: float) -> None:
-    marks = list(coloured(panel.marks))
-    stroke_bars([(mark, colour) for mark, colour in marks if isinstance(mark, Bars)], axes)
+    marks = list(assign_colours(panel.marks))
+    draw_bars([(mark, colour) for mark, colour in marks if isinstance(mark, Bars)], axes)
     for order, (mark, colour) in enumerate(marks):
         if not isinstance(mark, Bars):
-            stroke(thin(mark, _most(mark, width)), axes, colour, 2 + 0.01 * order)
+            draw_mark(thin_mark(mark, _max_points(mark, width)), axes, colour, 2 + 0.01 * order)
     if any(isinstance(mark, Points | Stems) for mark in panel.marks):
         axes.margins(x=0.03)  # room for symbols at the ends
 
 
-def _most(mark: AnyMark, width: float) -> int:
+def _max_points(mark: AnyMark, width: float) -> int:
     """Points beyond which more of them cannot be seen in a panel of this width [mm]."""
     if isinstance(mark, Points | Stems):
         return round(SYMBOLS * width)
-    return round((VERTICES if not isinstance(mark, Line) or ordered(mark.x) else LOOP_VERTICES) * width)
+    return round((VERTICES if not isinstance(mark, Line) or is_sorted(mark.x) else LOOP_VERTICES) * width)
 
 
-def _ticks(axes: "Axes", name: str, log: bool, label: str, most: int) -> str:
+def _ticks(axes: "Axes", name: str, log: bool, label: str, max_ticks: int) -> str:
     """Put readable ticks on one axis; returns its label, with the power of ten that its numbers leave out."""
     axis = axes.xaxis if name == "x" else axes.yaxis
     if log:
         axes.set_xscale("log") if name == "x" else axes.set_yscale("log")
-        decades(axis)
+        set_log_ticks(axis)
         return label
-    axes.locator_params(nbins=most, axis="x" if name == "x" else "y")
-    return scaled(axis, label)
+    axes.locator_params(nbins=max_ticks, axis="x" if name == "x" else "y")
+    return scale_ticks(axis, label)
 
 
-def wrapped(label: str, room: float) -> str:
+def wrap_label(label: str, room: float) -> str:
     """An axis label in lines that fit into `room` [mm], the unit on a line of its own where that is enough."""
-    words, bracket, unit = label.rpartition(" [")
-    if not words or len(label) * LETTER <= room:
-        return _lines(label, room)
-    return f"{_lines(words, room)}\n{bracket.strip()}{unit}"
+    meaning, bracket, unit = label.rpartition(" [")
+    if not meaning or len(label) * LETTER <= room:
+        return _wrap(label, room)
+    return f"{_wrap(meaning, room)}\n{bracket.strip()}{unit}"
 
 
-def _lines(text: str, room: float) -> str:
+def _wrap(text: str, room: float) -> str:
     return textwrap.fill(text, max(int(room / LETTER), 1), break_long_words=False, break_on_hyphens=False)
 
 
@@ -81,17 +81,19 @@ def legend_rows(panel: Panel, width: float) -> int:
     """Rows of the legend above a panel of this width [mm]."""
     labels = [mark.label for mark in panel.marks if mark.label]
     columns = legend_columns(labels, width) if labels else 1
-    return -(-len(labels) // columns) if columns > 1 else sum(_entry(label, width).count("\n") + 1 for label in labels)
+    if columns > 1:
+        return -(-len(labels) // columns)
+    return sum(_wrap_entry(label, width).count("\n") + 1 for label in labels)
 
 
-def _entry(label: str, width: float) -> str:
-    return _lines(label, width - 32)
+def _wrap_entry(label: str, width: float) -> str:
+    return _wrap(label, width - 32)
 
 
-def head(axes: "Axes", title: str, width: float) -> None:
+def draw_heading(axes: "Axes", title: str, width: float) -> None:
     """Title and legend above the axes, where they cover no data."""
     handles, labels = axes.get_legend_handles_labels()
-    title = _lines(title, 0.9 * (width - 18))  # bold letters are wider
+    title = _wrap(title, 0.9 * (width - 18))  # bold letters are wider
     if not handles:
         axes.set_title(title, loc="left", fontsize=9, fontweight="bold", pad=4, parse_math=False)
         return
@@ -103,4 +105,4 @@ def head(axes: "Axes", title: str, width: float) -> None:
     legend.get_title().set_parse_math(False)
     # Set afterwards: matplotlib leaves out a label that begins with an underscore, and reads dollars as maths.
     for text, label in zip(legend.get_texts(), labels, strict=True):
-        text.set(text=_entry(named(label), width), parse_math=False)
+        text.set(text=_wrap_entry(unescape_label(label), width), parse_math=False)

@@ -10,9 +10,9 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from pipeline.report.content import Figure, Figure3D
-from pipeline.report.figures.draw import stroke3d
-from pipeline.report.figures.palette import coloured
-from pipeline.report.figures.panels import LEGEND_ROW, draw_panel, head, legend_rows
+from pipeline.report.figures.draw import draw_mark_3d
+from pipeline.report.figures.palette import assign_colours
+from pipeline.report.figures.panels import LEGEND_ROW, draw_heading, draw_panel, legend_rows
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,36 +57,36 @@ def svg(figure: Figure | Figure3D) -> str:
         with mpl.rc_context(STYLE), warnings.catch_warnings():
             # A character that the font lacks is drawn as a box; the name is in the tables as well.
             warnings.filterwarnings("ignore", message="Glyph .* missing from")
-            drawn[figure] = _saved(draw(figure))
+            drawn[figure] = _to_svg(draw_figure(figure))
     return drawn[figure]
 
 
-def _saved(canvas: "Canvas") -> str:
+def _to_svg(canvas: "Canvas") -> str:
     file = io.StringIO()
     canvas.savefig(file, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
     text = file.getvalue()
-    return _rounded(text[text.index("<svg") :])
+    return _round_coordinates(text[text.index("<svg") :])
 
 
-def _rounded(text: str) -> str:
+def _round_coordinates(text: str) -> str:
     """Coordinates to a hundredth of a point, in long paths to a tenth: a third of the size, and it cannot be seen."""
     text = re.sub(r'(?<= [xy]=")-?\d+\.\d{3,}', lambda n: f"{float(n[0]):.2f}", text)
-    return re.sub(r' d="[^"]*"', lambda path: _short(path[0]), text)
+    return re.sub(r' d="[^"]*"', lambda path: _round_path(path[0]), text)
 
 
-def _short(path: str) -> str:
-    places = 1 if len(path) > 2000 else 2
-    path = re.sub(r"-?\d+\.\d{2,}", lambda n: f"{float(n[0]):.{places}f}", path)
+def _round_path(path: str) -> str:
+    decimals = 1 if len(path) > 2000 else 2
+    path = re.sub(r"-?\d+\.\d{2,}", lambda n: f"{float(n[0]):.{decimals}f}", path)
     return re.sub(r"\s*([A-Za-z])\s+", r"\1", path)
 
 
 @singledispatch
-def draw(figure: Any) -> "Canvas":
+def draw_figure(figure: Any) -> "Canvas":
     """A figure on a canvas of the page's width."""
     raise TypeError(f"{type(figure).__name__} is not a figure")
 
 
-@draw.register(Figure)
+@draw_figure.register(Figure)
 def _(figure: Figure) -> "Canvas":
     rows = -(-len(figure.panels) // figure.columns)
     width = WIDTH / figure.columns
@@ -114,22 +114,22 @@ def _canvas(height: float) -> "Canvas":
     return canvas
 
 
-@draw.register(Figure3D)
+@draw_figure.register(Figure3D)
 def _(figure: Figure3D) -> "Canvas":
     canvas = _canvas(figure.height)
     axes: Any = canvas.add_subplot(projection="3d")
-    for mark, colour in coloured(figure.marks):
-        stroke3d(mark, axes, colour)
-    _cube(axes, figure)
+    for mark, colour in assign_colours(figure.marks):
+        draw_mark_3d(mark, axes, colour)
+    _set_equal_ranges(axes, figure)
     axes.set_xlabel(figure.x_label)
     axes.set_ylabel(figure.y_label)
     axes.set_zlabel(figure.z_label)
     axes.view_init(elev=figure.elevation, azim=figure.azimuth)
-    head(axes, "", WIDTH)
+    draw_heading(axes, "", WIDTH)
     return canvas
 
 
-def _cube(axes: Any, figure: Figure3D) -> None:
+def _set_equal_ranges(axes: Any, figure: Figure3D) -> None:
     """Ranges of one length about the middle of the marks, so that angles in space are true."""
     points = np.hstack([[mark.x, mark.y, mark.z] for mark in figure.marks])
     least, greatest = np.nanmin(points, axis=1), np.nanmax(points, axis=1)

@@ -1,4 +1,4 @@
-"""Numbers on axes: short ones, the power of ten said once in the axis label."""
+"""Numbers on axes: short ones, the power of ten written once in the axis label."""
 
 import math
 from typing import TYPE_CHECKING
@@ -12,28 +12,28 @@ FEW_DECADES = 3  # that still have room for more numbers than their powers of te
 PLAIN = (2e-3, 2e4)  # greatest values between which an axis has numbers as they are
 
 
-def power(greatest: float) -> int:
+def power_of_ten(greatest: float) -> int:
     """The power of ten, a multiple of three, that leaves numbers between one and a thousand; 0 where none is needed."""
     if greatest == 0 or PLAIN[0] <= greatest < PLAIN[1]:
         return 0
     return 3 * math.floor(math.log10(greatest) / 3)
 
 
-def scaled(axis: "Axis", label: str) -> str:
+def scale_ticks(axis: "Axis", label: str) -> str:
     """Take a power of ten out of the numbers of an axis whose range is set; returns its label with that power."""
     from matplotlib.ticker import FuncFormatter
 
     # matplotlib would put the power at the end of the axis, where the legend is.
-    taken = power(float(max(abs(limit) for limit in axis.get_view_interval())))
-    if taken == 0:
+    exponent = power_of_ten(float(max(abs(limit) for limit in axis.get_view_interval())))
+    if exponent == 0:
         return label
-    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 10.0**taken:.6g}".replace("-", MINUS)))
-    ten = f"10{str(taken).translate(SUPERSCRIPTS)}"
-    words, bracket, unit = label.rpartition("[")
-    return f"{words}[{ten} {unit}" if bracket else f"{label} [{ten}]"
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value / 10.0**exponent:.6g}".replace("-", MINUS)))
+    ten = f"10{str(exponent).translate(SUPERSCRIPTS)}"
+    meaning, bracket, unit = label.rpartition("[")
+    return f"{meaning}[{ten} {unit}" if bracket else f"{label} [{ten}]"
 
 
-def decades(axis: "Axis") -> None:
+def set_log_ticks(axis: "Axis") -> None:
     """Number a logarithmic axis whose range is set: 1, 2 and 5 of each of a few decades, else some whole decades."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 

@@ -10,12 +10,12 @@ from pipeline.report.content import Section
 from pipeline.report.context import Context
 
 SECTIONS = (
-    "summary", "recorded", "noise", "identification", "prediction", "filter", "truth", "robot", "control", "excitation",
-    "methods", "provenance",
+    "summary", "recorded", "noise", "identification", "prediction", "filter", "ground_truth", "robot", "control",
+    "excitation", "methods", "provenance",
 )  # fmt: skip
 
 
-def writes(name: str) -> Callable[[Context], Section | None]:
-    """What writes the section of that name."""
-    section: Callable[[Context], Section | None] = import_module(f"pipeline.report.sections.{name}").section
-    return section
+def section_builder(name: str) -> Callable[[Context], Section | None]:
+    """The function that builds the section of that name."""
+    build: Callable[[Context], Section | None] = import_module(f"pipeline.report.sections.{name}").section
+    return build

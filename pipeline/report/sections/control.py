@@ -6,7 +6,7 @@ from pipeline.records import Control, Lyapunov
 from pipeline.report.content import Block, Figure, HLine, Line, Panel, Prose, Section, Table, Verdict
 from pipeline.report.context import Context, label, title
 
-WORDS = {
+CAPTIONS = {
     "pd-to-zero": "PD with gravity compensation, from the pose to zero",
     "pd-to-pose": "PD with gravity compensation, from zero to the pose",
     "pd-light": "PD, gravity compensated with 0.9 of the masses",
@@ -57,8 +57,8 @@ def response(context: Context, study: str, until: float, with_V: bool) -> Figure
         line = (Line(lyapunov.t[early], lyapunov.V[early], "", "black"), HLine(0.0))
         panels.append(Panel("Lyapunov function", "time [s]", label(lyapunov, "V"), line))
     return Figure(
-        f"Simulated: {WORDS[study]}.",
-        f"Positions and velocities over time: {WORDS[study]}.",
+        f"Simulated: {CAPTIONS[study]}.",
+        f"Positions and velocities over time: {CAPTIONS[study]}.",
         tuple(panels),
         columns=2,
         height=52,

@@ -17,7 +17,7 @@ def section(context: Context) -> Section | None:
         return None
     shown = most_telling(tracks, FIGURES)
     parts = (
-        Section(f"{title(t.joint)} in {literal(t.log)}", f"track-{t.log}-{t.joint}", tuple(of_track(context, t)))
+        Section(f"{title(t.joint)} in {literal(t.log)}", f"track-{t.log}-{t.joint}", tuple(track_blocks(context, t)))
         for t in shown
     )
     return Section(
@@ -92,7 +92,7 @@ def scores(context: Context, tracks: list[Track]) -> Table:
     )
 
 
-def of_track(context: Context, t: Track) -> Iterator[Block]:
+def track_blocks(context: Context, t: Track) -> Iterator[Block]:
     """The figures of one track.  Fig 7.6-7.11"""
     name, entry = f"{title(t.joint)} in {literal(t.log)}", context.study.log(t.log)
     windows = tuple(
@@ -103,7 +103,7 @@ def of_track(context: Context, t: Track) -> Iterator[Block]:
     shown = slice(min(int(0.25 * t.rate), len(t) // 10), None)
     yield Figure(
         f"{name}: position; effort measured and modelled; external effort tracked by the filter with two of its "
-        "standard deviations, beside measured minus modelled effort.",
+        "standard deviations, and measured minus modelled effort.",
         f"Three panels over time for {name}: position, effort, external effort.",
         (
             Panel("Trajectory", "time [s]", label(t, "q", "position"), (*windows, Line(t.t, t.q, "", "blue"))),
@@ -131,13 +131,13 @@ def innovations(context: Context, t: Track, name: str) -> Iterator[Figure]:
     """Innovations over time and their autocorrelation."""
     late = t.t - t.t[0] >= 1.0 if t.t[-1] - t.t[0] > 5 else t.t >= t.t[0]
     panels = []
-    for field, words in (("innovation_q", "position innovation"), ("innovation_dq", "velocity innovation")):
+    for field, meaning in (("innovation_q", "position innovation"), ("innovation_dq", "velocity innovation")):
         values = getattr(t, field)[late]
         panels.append(
-            Panel(words.capitalize(), "time [s]", label(t, field, words), (Line(t.t[late], values, "", "blue"),))
+            Panel(meaning.capitalize(), "time [s]", label(t, field, meaning), (Line(t.t[late], values, "", "blue"),))
         )
         for w in context.catalogue.about(Whiteness, log=t.log, joint=t.joint, signal=field):
-            panels.append(autocorrelation(w, f"ACF of the {words}"))
+            panels.append(autocorrelation(w, f"ACF of the {meaning}"))
     yield Figure(
         f"{name}: innovations of position and velocity, and their autocorrelation with the 95 % band of white noise.",
         f"Four panels for {name}: position and velocity innovations and their autocorrelations.",

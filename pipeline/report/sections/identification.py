@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from pipeline.records import Fit, Residual, Whiteness
+from pipeline.records.record import slug
 from pipeline.report.content import (
     Block,
     Equation,
@@ -21,7 +22,7 @@ from pipeline.report.content import (
 )
 from pipeline.report.context import Context, label, title
 from pipeline.report.plots import autocorrelation, histogram, normal_scores
-from pipeline.report.results import printed, slug
+from pipeline.report.results import format_unit
 
 NAMES = {"lse": "least squares", "wlse": "weighted least squares"}
 
@@ -33,7 +34,7 @@ def section(context: Context) -> Section | None:
         return None
     joints = dict.fromkeys(fit.group for fit in fits)
     parts = (
-        Section(title(joint), f"fit-{joint}", tuple(of_joint(context, [f for f in fits if f.group == joint])))
+        Section(title(joint), f"fit-{joint}", tuple(joint_blocks(context, [f for f in fits if f.group == joint])))
         for joint in joints
     )
     return Section("Identification", "identification", (intro(), *parts))
@@ -43,13 +44,13 @@ def intro() -> Prose:
     """How to read the tables."""
     return Prose(
         "The parameters of each joint come from the averaged periods of all its identification logs together. Two "
-        "deviations are given: the one beside each value allows for residuals that are correlated (Newey and West), "
-        "the classical one takes them as independent. Where the two differ much, the model misses something that "
-        "repeats in every period, usually friction."
+        "standard errors are given: the one after each value allows for residuals that are correlated (Newey and "
+        "West), the classical one takes them as independent. Where the two differ much, the model misses something "
+        "that repeats in every period, usually friction."
     )
 
 
-def of_joint(context: Context, fits: list[Fit]) -> Iterator[Block]:
+def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
     """The content about one joint."""
     first = fits[0]
     terms = " + ".join(f"theta_{i} {phi}" for i, phi in enumerate(first.phi, start=1))
@@ -62,7 +63,7 @@ def of_joint(context: Context, fits: list[Fit]) -> Iterator[Block]:
             yield Verdict(
                 "warn",
                 f"{NAMES.get(fit.estimator, fit.estimator)} finds a negative {', '.join(negative)}, which no "
-                "mechanism has: compare it with its deviation.",
+                "mechanism has: compare it with its standard error.",
             )
     for residual in context.catalogue.about(Residual, joint=first.group, estimator=first.estimator):
         yield from figures(context, residual)
@@ -74,13 +75,13 @@ def physical(name: str) -> bool:
 
 
 def parameters(context: Context, fits: list[Fit]) -> Table:
-    """Parameters with their deviations, estimators beside each other.  Tables 6.4-6.6"""
+    """Parameters with their standard errors, estimators side by side.  Tables 6.4-6.6"""
     header = ["", "Parameter", "Unit"]
     for fit in fits:
-        header += [fit.estimator.upper(), "classical deviation"]
+        header += [fit.estimator.upper(), "classical standard error"]
     rows = []
     for i, name in enumerate(fits[0].parameter):
-        cells: list[object] = [f"$theta_{i + 1}$", name, printed(fits[0].unit[i])]
+        cells: list[object] = [f"$theta_{i + 1}$", name, format_unit(fits[0].unit[i])]
         for fit in fits:
             key = ".".join(("fit", *fit.key, slug(name)))
             cells += [unitless(context, key), unitless(context, f"{key}.std_classical")]
@@ -109,7 +110,7 @@ def quality(context: Context, fits: list[Fit]) -> Table:
         rows.append((NAMES.get(fit.estimator, fit.estimator), *numbers, *counts))
     return Table(
         "Mean squared error of the averaged effort, share of its variance explained, condition number of the "
-        "regressor, and the lags of correlation that the deviations allow for.",
+        "regressor, and the lags of correlation that the standard errors allow for.",
         ("Estimator", "MSE", "$R^2$", "Condition", "Samples", "Periods", "Lags"),
         tuple(rows),
         align="lrrrrrr",
@@ -119,7 +120,7 @@ def quality(context: Context, fits: list[Fit]) -> Table:
 def figures(context: Context, residual: Residual) -> Iterator[Figure]:
     """Measured and predicted effort, and what is left."""
     name = f"{title(residual.joint)} in {literal(residual.log)}"
-    rest = residual.tau - residual.tau_hat
+    errors = residual.tau - residual.tau_hat
     effort = label(residual, "tau", "effort")
     yield Figure(
         f"{name}: averaged effort, the {residual.estimator.upper()} model, and what the model leaves.",
@@ -132,7 +133,7 @@ def figures(context: Context, residual: Residual) -> Iterator[Figure]:
                     Line(residual.t, residual.tau_hat, "model", "vermillion"),
                 ),
             ),
-            Panel("Residual", "time [s]", effort, (Line(residual.t, rest, "", "blue"),)),
+            Panel("Residual", "time [s]", effort, (Line(residual.t, errors, "", "blue"),)),
         ),
         columns=2,
         height=50,
@@ -142,9 +143,9 @@ def figures(context: Context, residual: Residual) -> Iterator[Figure]:
 
 def distribution(context: Context, residual: Residual, name: str) -> Iterator[Figure]:
     """Histogram, normal probability plot and autocorrelation of a residual."""
-    rest, effort = residual.tau - residual.tau_hat, label(residual, "tau", "residual")
-    edges, densities, grid, normal = histogram(rest)
-    scores, ordered, slope, middle = normal_scores(rest)
+    errors, effort = residual.tau - residual.tau_hat, label(residual, "tau", "residual")
+    edges, densities, grid, normal = histogram(errors)
+    scores, ordered, slope, middle = normal_scores(errors)
     panels = [
         Panel(
             "Histogram", effort, "density",

@@ -90,7 +90,7 @@ def blocks(context: Context) -> Iterator[Block]:
     yield Prose(
         "Forward Euler leaves out $1/2 T_s^2$ times the next derivative in each step, which counts as process noise. "
         "The measured effort drives the model, so its noise $sigma_tau$ is process noise of the velocity, with "
-        "deviation $T_s sigma_tau \\/ M$. **Whiteness** is judged by the autocorrelation, its 95 % band "
+        "standard deviation $T_s sigma_tau \\/ M$. **Whiteness** is judged by the autocorrelation, its 95 % band "
         "$1.96 \\/ sqrt(N)$, and the Ljung-Box statistic over 20 lags; a signal is called white when its probability "
         "exceeds 1 %."
     )

@@ -23,7 +23,7 @@ from pipeline.report.plots import autocorrelation, histogram, normal_scores
 
 
 def section(context: Context) -> Section | None:
-    """A table of deviations, and for each identification log and joint what averaging removed."""
+    """A table of standard deviations, and for each identification log and joint what averaging removed."""
     averages = context.catalogue.all(Average)
     if not averages:
         return None
@@ -34,8 +34,8 @@ def blocks(context: Context, averages: list[Average]) -> Iterator[Block]:
     """The section's content."""
     yield Prose(
         "Every identification log repeats one period. Its periods are averaged, and what differs between them is "
-        "taken as noise: its deviations set what the filter assumes of its measurements. The period itself is found "
-        "from the joints' motion."
+        "taken as noise: its standard deviations set what the filter assumes of its measurements. The period itself is "
+        "estimated from the joints' motion."
     )
     rows = tuple(
         (
@@ -49,32 +49,30 @@ def blocks(context: Context, averages: list[Average]) -> Iterator[Block]:
     )
     header = ("Log", "Joint", "Period", "Periods", "Position noise", "Velocity noise", "Effort noise")
     yield Table(
-        "Noise between periods (standard deviations of one sample). The deviation of a period takes what its harmonics "
-        "leave as white, and is too small where it is not.",
+        "Noise between periods (standard deviations of one sample). The standard error of a period takes what its "
+        "harmonics leave as white, and is too small where it is not.",
         header,
         rows,
         "noise-table",
         "llrrrrr",
     )
     for average in averages:
-        yield from of_one(context, average)
+        yield from average_figures(context, average)
 
 
-def of_one(context: Context, average: Average) -> Iterator[Block]:
+def average_figures(context: Context, average: Average) -> Iterator[Block]:
     """The figures of one log and joint."""
     about = {"log": average.log, "joint": average.joint}
-    noises, trajectories = (
-        context.catalogue.about(PeriodResidual, **about),
-        context.catalogue.about(Trajectory, **about),
-    )
+    period_residuals = context.catalogue.about(PeriodResidual, **about)
+    trajectories = context.catalogue.about(Trajectory, **about)
     spectra, signals = context.catalogue.about(Spectrum, **about), context.catalogue.about(Signal, **about)
-    if not (noises and trajectories and spectra and signals):
+    if not (period_residuals and trajectories and spectra and signals):
         return
     whiteness = {w.signal: w for w in context.catalogue.about(Whiteness, **about)}
     name = f"{title(average.joint)} in {literal(average.log)}"
     yield Figure(
-        f"{name}: the mean of {average.periods} periods beside the first of them; the position's spectrum with the "
-        "harmonics that are kept; velocity and acceleration from those harmonics beside differences of the logged "
+        f"{name}: the mean of {average.periods} periods and the first of them; the position's spectrum with the "
+        "harmonics that are kept; velocity and acceleration from those harmonics and from differences of the logged "
         "position and velocity.",
         f"Four panels for {name}: averaged effort, spectrum of the position, velocity and acceleration.",
         (one_period(average, signals[0]), spectrum(spectra[0]), *derivatives(average, trajectories[0])),
@@ -83,17 +81,17 @@ def of_one(context: Context, average: Average) -> Iterator[Block]:
     )
     yield Figure(
         f"{name}: what averaging removed. Histogram of the effort noise with the normal density of the same "
-        "deviation; normal probability plot of the position noise; autocorrelation of the velocity noise with the "
-        "95 % band of white noise.",
+        "standard deviation; normal probability plot of the position noise; autocorrelation of the velocity noise with "
+        "the 95 % band of white noise.",
         f"Three panels for {name}: histogram, normal probability plot and autocorrelation of the noise.",
-        tuple(removed(noises[0], whiteness)),
+        tuple(noise_panels(period_residuals[0], whiteness)),
         columns=3,
         height=45,
     )
 
 
 def one_period(average: Average, signal: Signal) -> Panel:
-    """Fig 6.6."""
+    """The mean period and the first one.  Fig 6.6"""
     first = signal.t - signal.t[0] < average.period
     marks = (
         Line(signal.t[first] - signal.t[0], signal.tau[first], "first period", "sky"),
@@ -103,7 +101,7 @@ def one_period(average: Average, signal: Signal) -> Panel:
 
 
 def spectrum(s: Spectrum) -> Panel:
-    """Fig 6.8."""
+    """The spectrum of the position, and the harmonics that are kept of it.  Fig 6.8"""
     shown = slice(0, min(len(s.amplitude), max(4 * s.harmonics, 20)))
     kept = np.arange(len(s.amplitude)) <= s.harmonics
     f, a = s.frequency[shown], np.maximum(s.amplitude[shown], 1e-12)
@@ -113,7 +111,7 @@ def spectrum(s: Spectrum) -> Panel:
 
 
 def derivatives(average: Average, trajectory: Trajectory) -> tuple[Panel, Panel]:
-    """Fig 6.9."""
+    """Velocity and acceleration from the harmonics and by differences.  Fig 6.9"""
     step = average.t[1] - average.t[0]
     velocity = (
         Line(average.t, np.gradient(average.q, step), "difference of position", "sky"),
@@ -129,16 +127,16 @@ def derivatives(average: Average, trajectory: Trajectory) -> tuple[Panel, Panel]
     )
 
 
-def removed(noise: PeriodResidual, whiteness: dict[str, Whiteness]) -> Iterator[Panel]:
-    """Fig 6.7, 6.10 and 6.11."""
-    edges, densities, grid, normal = histogram(noise.tau_noise)
+def noise_panels(period_residual: PeriodResidual, whiteness: dict[str, Whiteness]) -> Iterator[Panel]:
+    """Histogram, normal probability plot and autocorrelation of what averaging removed.  Fig 6.7, 6.10, 6.11"""
+    edges, densities, grid, normal = histogram(period_residual.tau_noise)
     bars = (Histogram(edges, densities, "", "sky"), Line(grid, normal, "normal", "vermillion"))
-    yield Panel("Effort noise", label(noise, "tau_noise", "effort"), "density", bars)
-    scores, ordered, slope, middle = normal_scores(noise.q_noise)
+    yield Panel("Effort noise", label(period_residual, "tau_noise", "effort"), "density", bars)
+    scores, ordered, slope, middle = normal_scores(period_residual.q_noise)
     yield Panel(
         "Position noise",
         "normal quantile",
-        label(noise, "q_noise", "position"),
+        label(period_residual, "q_noise", "position"),
         (Points(scores, ordered, "", "blue"), Reference(slope, middle, "normal", "vermillion")),
     )
     if w := whiteness.get("dq_noise"):

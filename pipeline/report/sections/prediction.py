@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from pipeline.records import Prediction
 from pipeline.report.content import Block, Figure, Line, Panel, Prose, Section, Table, VSpan, literal
 from pipeline.report.context import Context, label, title
-from pipeline.report.results import prediction_key
 
 FIGURES = 4  # predictions that are drawn, the worst ones
 
@@ -31,7 +30,7 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
             title(p.joint),
             p.estimator.upper(),
             p.scheme,
-            *(context.number(f"{prediction_key(p)}.{name}", 3) for name in ("rmse", "nrmse", "r2", "relative_error")),
+            *(context.number(f"{p.prefix}.{name}", 3) for name in ("rmse", "nrmse", "r2", "relative_error")),
         )
         for p in predictions
     )

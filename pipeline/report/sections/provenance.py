@@ -30,32 +30,32 @@ def section(context: Context) -> Section:
             f"{len(provenance.processed)} processed files stand behind this report; their hashes are in results.json."
         )
     )
-    intakes = context.catalogue.all(LogSummary)
-    if intakes:
-        blocks.append(Section("Channels", "channels", (starts(intakes), channels(intakes))))
+    summaries = context.catalogue.all(LogSummary)
+    if summaries:
+        blocks.append(Section("Channels", "channels", (start_times(summaries), channels(summaries))))
     return Section("Provenance", "provenance", tuple(blocks))
 
 
-def channels(intakes: list[LogSummary]) -> Table:
+def channels(summaries: list[LogSummary]) -> Table:
     """What each channel of every log feeds; channels that feed nothing are left out."""
     rows = tuple(
-        (literal(intake.log), literal(intake.channel[i]), literal(intake.unit[i]) or "–", literal(intake.feeds[i]))
-        for intake in intakes
-        for i, feeds in enumerate(intake.feeds)
+        (literal(summary.log), literal(summary.channel[i]), literal(summary.unit[i]) or "–", literal(summary.feeds[i]))
+        for summary in summaries
+        for i, feeds in enumerate(summary.feeds)
         if feeds
     )
     return Table("Channels that feed the analysis.", ("Log", "Channel", "Unit in the log", "Feeds"), rows)
 
 
-def starts(intakes: list[LogSummary]) -> Table:
+def start_times(summaries: list[LogSummary]) -> Table:
     """Files of every log, and when it was started."""
     rows = tuple(
         (
-            literal(intake.log),
-            literal(", ".join(intake.files)),
-            f"{literal(intake.started)} ({intake.zone or 'no zone given'})" if intake.started else "–",
+            literal(summary.log),
+            literal(", ".join(summary.files)),
+            f"{literal(summary.started)} ({summary.zone or 'no zone given'})" if summary.started else "–",
         )
-        for intake in intakes
+        for summary in summaries
     )
     caption = "Files of the logs, and the date and time of their first samples as they give it."
     return Table(caption, ("Log", "File", "Started"), rows)

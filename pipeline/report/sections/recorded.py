@@ -10,77 +10,79 @@ from pipeline.report.context import Context
 
 def section(context: Context) -> Section | None:
     """One table over all logs, then each log's channels and remarks."""
-    intakes = context.catalogue.all(LogSummary)
-    if not intakes:
+    summaries = context.catalogue.all(LogSummary)
+    if not summaries:
         return None
-    return Section("What was recorded", "recorded", tuple(blocks(context, intakes)))
+    return Section("What was recorded", "recorded", tuple(blocks(context, summaries)))
 
 
-def blocks(context: Context, intakes: list[LogSummary]) -> Iterator[Block]:
+def blocks(context: Context, summaries: list[LogSummary]) -> Iterator[Block]:
     """The section's content."""
-    yield overview(context, intakes)
-    clean = [intake for intake in intakes if not remarks(intake)]
+    yield overview(context, summaries)
+    clean = [summary for summary in summaries if not remarks(summary)]
     if clean:
-        yield Verdict("good", f"Read without a remark: {', '.join(literal(intake.log) for intake in clean)}.")
+        yield Verdict("good", f"Read without a remark: {', '.join(literal(summary.log) for summary in clean)}.")
     yield from (
-        Verdict("warn", f"**{literal(intake.log)}**: {literal('; '.join(remarks(intake)))}.")
-        for intake in intakes
-        if remarks(intake)
+        Verdict("warn", f"**{literal(summary.log)}**: {literal('; '.join(remarks(summary)))}.")
+        for summary in summaries
+        if remarks(summary)
     )
     methods = sorted({(s.method, s.velocity) for s in context.catalogue.all(Signal)})
     yield Prose("How the recordings were put on a uniform clock, and where their velocities come from:")
-    yield Bullets(tuple(f"clock: {method}; velocity: {words(velocity, context)}" for method, velocity in methods))
-    said = [
+    yield Bullets(
+        tuple(f"clock: {method}; velocity: {velocity_source(velocity, context)}" for method, velocity in methods)
+    )
+    remarks_of_stages = [
         literal(text)
-        for note in context.catalogue.all(Diagnostic)
-        if note.stage in ("ingest", "resample", "average")
-        for text in note.text
+        for diagnostic in context.catalogue.all(Diagnostic)
+        if diagnostic.stage in ("ingest", "resample", "average")
+        for text in diagnostic.text
     ]
-    if said:
+    if remarks_of_stages:
         yield Prose("Remarks of the readers and of the first stages:")
-        yield Bullets(tuple(said))
+        yield Bullets(tuple(remarks_of_stages))
 
 
-def words(velocity: str, context: Context) -> str:
+def velocity_source(velocity: str, context: Context) -> str:
     """Where a velocity comes from."""
     cutoff = context.study.settings.lowpass
     derived = f"differences of the position after a zero-phase low-pass at {cutoff:g} Hz"
     return "as logged" if velocity == "logged" else derived
 
 
-def overview(context: Context, intakes: list[LogSummary]) -> Table:
+def overview(context: Context, summaries: list[LogSummary]) -> Table:
     """One row per log."""
     rows = tuple(
         (
-            literal(intake.log),
-            intake.role,
-            intake.format,
-            context.count(f"log.{intake.log}.rows"),
-            context.number(f"log.{intake.log}.rate", 5),
-            context.number(f"log.{intake.log}.duration", 5),
-            context.number(f"log.{intake.log}.jitter", 2),
-            length(context, intake),
-            context.count(f"period.{intake.log}.periods"),
+            literal(summary.log),
+            summary.role,
+            summary.format,
+            context.count(f"log.{summary.log}.rows"),
+            context.number(f"log.{summary.log}.rate", 5),
+            context.number(f"log.{summary.log}.duration", 5),
+            context.number(f"log.{summary.log}.jitter", 2),
+            period_length(context, summary),
+            context.count(f"period.{summary.log}.periods"),
         )
-        for intake in intakes
+        for summary in summaries
     )
     header = ("Log", "Role", "Format", "Samples", "Rate", "Duration", "Clock jitter", "Period", "Periods")
     return Table("The logs of the study.", header, rows, label="recorded-table", align="lllrrrrrr")
 
 
-def length(context: Context, intake: LogSummary) -> Number | str:
-    """The period of a log, without its deviation, which the section on averaging gives."""
-    number = context.number(f"period.{intake.log}", 6)
+def period_length(context: Context, summary: LogSummary) -> Number | str:
+    """The period of a log, without its standard error, which the section on averaging gives."""
+    number = context.number(f"period.{summary.log}", 6)
     return number if isinstance(number, str) else replace(number, std=None)
 
 
-def remarks(intake: LogSummary) -> list[str]:
+def remarks(summary: LogSummary) -> list[str]:
     """What keeps a log from being trusted without a second look."""
-    said = list(intake.warnings)
-    if intake.dropped:
-        said.append(f"{intake.dropped} rows could not be used")
-    if intake.duplicates > 0.1 * intake.rows:
-        said.append(f"{intake.duplicates} of {intake.rows} rows repeat the one before")
-    if intake.jitter * intake.rate >= 0.1:
-        said.append(f"the clock jitters by {intake.jitter * 1e3:.3g} ms")
-    return said
+    texts = list(summary.warnings)
+    if summary.dropped:
+        texts.append(f"{summary.dropped} rows could not be used")
+    if summary.duplicates > 0.1 * summary.rows:
+        texts.append(f"{summary.duplicates} of {summary.rows} rows repeat the one before")
+    if summary.jitter * summary.rate >= 0.1:
+        texts.append(f"the clock jitters by {summary.jitter * 1e3:.3g} ms")
+    return texts

@@ -43,14 +43,14 @@ def blocks(context: Context, links: Links) -> Iterator[Block]:
 def chain(context: Context) -> Figure3D:
     """The chain at three configurations, and the places that its tip reaches."""
     colours = {"zero": "black", "low": "blue", "high": "vermillion"}
-    words = {"zero": "q = 0", "low": "lower limits", "high": "upper limits"}
+    configurations = {"zero": "q = 0", "low": "lower limits", "high": "upper limits"}
     marks: list[Line3D | Points3D] = []
     for workspace in context.catalogue.all(Workspace):
         marks.append(Points3D(workspace.x, workspace.y, workspace.z, "places of the tip", "sky"))
     for pose in context.catalogue.all(Pose):
         path = np.flatnonzero(pose.link != "9R")  # the two jaws lie on each other
         marks.append(
-            Line3D(pose.x[path], pose.y[path], pose.z[path], words[pose.pose], colours[pose.pose])  # type: ignore[arg-type]
+            Line3D(pose.x[path], pose.y[path], pose.z[path], configurations[pose.pose], colours[pose.pose])  # type: ignore[arg-type]
         )
     return Figure3D(
         "The chain at q = 0 and at both ends of the joints' ranges, with places that the tip reaches in between.",

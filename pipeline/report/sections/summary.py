@@ -7,7 +7,6 @@ import numpy as np
 from pipeline.records import Diagnostic, Fit, Prediction, Track
 from pipeline.report.content import Block, Bullets, Prose, Section, Table, Verdict, literal
 from pipeline.report.context import Context, title
-from pipeline.report.results import prediction_key
 
 SAME_PATH = "leave one period out"  # a scheme that repeats the path, and so the model's error on it
 EXPECTED = 2.0  # normalised innovation squared of a consistent filter, of two measurements
@@ -25,7 +24,8 @@ def blocks(context: Context) -> Iterator[Block]:
     kind = "simulated" if study.simulated else "recorded"
     yield Prose(
         f"The study holds {len(study.logs)} {kind} logs of the {literal(study.robot.title)}. External effort is what "
-        "the robot exerts on its environment, found from motor currents and joint positions; no force sensor was used."
+        "the robot exerts on its environment, estimated from motor currents and joint positions; no force sensor was "
+        "used."
     )
     if study.simulated:
         yield Verdict(
@@ -37,18 +37,20 @@ def blocks(context: Context) -> Iterator[Block]:
             "bad", "No joint could be identified: there is no usable identification log, so no effort was tracked."
         )
         return
-    for joint in fitted(context):
+    for joint in fitted_joints(context):
         yield from verdicts(context, joint)
     yield table(context)
-    warnings = [literal(text) for note in context.catalogue.all(Diagnostic) for text in severe(note)]
+    warnings = [literal(text) for diagnostic in context.catalogue.all(Diagnostic) for text in warning_texts(diagnostic)]
     if warnings:
         yield Prose("**What to look at.** The analysis itself warned of the following.")
         yield Bullets(tuple(warnings))
 
 
-def severe(note: Diagnostic) -> Iterator[str]:
-    """The warnings of a note."""
-    yield from (text for severity, text in zip(note.severity, note.text, strict=True) if severity == "warning")
+def warning_texts(diagnostic: Diagnostic) -> Iterator[str]:
+    """The warnings of a diagnostic."""
+    yield from (
+        text for severity, text in zip(diagnostic.severity, diagnostic.text, strict=True) if severity == "warning"
+    )
 
 
 def failures(context: Context) -> Iterator[Block]:
@@ -57,7 +59,7 @@ def failures(context: Context) -> Iterator[Block]:
         yield Verdict("bad", f"**{literal(task)}** failed, and what depends on it is missing: {literal(failed)}")
 
 
-def fitted(context: Context) -> list[str]:
+def fitted_joints(context: Context) -> list[str]:
     """The joints that have a fit, in the robot's order."""
     return list(dict.fromkeys(fit.group for fit in context.catalogue.all(Fit)))
 
@@ -68,9 +70,9 @@ def verdicts(context: Context, joint: str) -> Iterator[Verdict]:
     scored = [p for p in context.catalogue.all(Prediction) if p.joint == joint and f"{p.model}.{p.estimator}" == fit]
     unseen = [p for p in scored if p.scheme != SAME_PATH and (p.role != "contact" or context.study.log(p.log).contact)]
     if unseen:
-        yield predicted(context, min(unseen, key=lambda p: p.r2))
+        yield prediction_verdict(context, min(unseen, key=lambda p: p.r2))
     elif scored:
-        r2 = context.results[f"{prediction_key(scored[0])}.r2"].number(3)
+        r2 = context.results[f"{scored[0].prefix}.r2"].number(3)
         yield Verdict(
             "info",
             f"**{title(joint)}**: the model explains {r2} of the variance of other periods of the path that it was "
@@ -78,11 +80,11 @@ def verdicts(context: Context, joint: str) -> Iterator[Verdict]:
         )
     tracks = [track for track in context.catalogue.all(Track) if track.joint == joint and not track.at_rest]
     if tracks:
-        yield consistency(context, joint, tracks)
+        yield consistency_verdict(context, joint, tracks)
 
 
-def predicted(context: Context, worst: Prediction) -> Verdict:
-    """What is said of the worst prediction of a joint."""
+def prediction_verdict(context: Context, worst: Prediction) -> Verdict:
+    """The verdict on the worst prediction of a joint."""
     name = title(worst.joint)
     where = f"(worst: {literal(worst.log)}, {worst.scheme})"
     if worst.r2 < 0:
@@ -90,13 +92,13 @@ def predicted(context: Context, worst: Prediction) -> Verdict:
             "bad", f"**{name}**: on effort that it has not seen, the model is worse than a constant {where}."
         )
     level = "good" if worst.r2 >= GOOD else "warn" if worst.r2 >= FAIR else "bad"
-    r2 = context.results[f"{prediction_key(worst)}.r2"].number(3)
+    r2 = context.results[f"{worst.prefix}.r2"].number(3)
     text = f"**{name}**: the model explains at least {r2} of the variance of effort that it has not seen {where}."
     return Verdict(level, text)  # type: ignore[arg-type]
 
 
-def consistency(context: Context, joint: str, tracks: list[Track]) -> Verdict:
-    """Whether the deviations that the filter states can be believed."""
+def consistency_verdict(context: Context, joint: str, tracks: list[Track]) -> Verdict:
+    """Whether the standard deviations that the filter states can be believed."""
     name = title(joint)
     coloured = [t for t in tracks if context.results[f"ekf.{t.log}.{joint}.white"].value != 1]
     if not coloured:
@@ -107,7 +109,7 @@ def consistency(context: Context, joint: str, tracks: list[Track]) -> Verdict:
         "warn" if EXPECTED / 2 <= usual <= 2 * EXPECTED else "bad",
         f"**{name}**: the filter's innovations are not white over the whole run in {len(coloured)} of {len(tracks)} "
         f"logs, and what it states of their spread is {size}. Judge a contact by the free-space level, not by the "
-        "filter's own deviations.",
+        "filter's own standard deviations.",
     )
 
 

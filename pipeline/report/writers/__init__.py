@@ -8,7 +8,7 @@ from pipeline.report.content import Document
 WRITERS = {"report.html": "html", "report.pdf": "pdf"}
 
 
-def writer(file: str) -> Callable[[Document], bytes]:
-    """What renders a document as that file."""
+def renderer(file: str) -> Callable[[Document], bytes]:
+    """The function that renders a document as that file."""
     render: Callable[[Document], bytes] = import_module(f"pipeline.report.writers.{WRITERS[file]}").render
     return render

@@ -31,14 +31,14 @@ class Drawing:
     depth: float
 
 
-def drawings(formulas: list[Formula]) -> tuple[dict[Formula, Drawing], str]:
+def draw_formulas(formulas: list[Formula]) -> tuple[dict[Formula, Drawing], str]:
     """Draw each formula; returns the drawings and the shapes of all letters, to be put into the page once."""
-    wanted = sorted(set(formulas))
-    if not wanted:
+    distinct = sorted(set(formulas))
+    if not distinct:
         return {}, ""
-    pages = [page.decode() for page in _pages(wanted)]
+    pages = [page.decode() for page in _pages(distinct)]
     symbols = {name: symbol for page in pages for symbol, name in re.findall(r'(<symbol id="(\w+)".*?</symbol>)', page)}
-    drawn = {formula: _drawing(formula, page) for formula, page in zip(wanted, pages, strict=True)}
+    drawn = {formula: _drawing(formula, page) for formula, page in zip(distinct, pages, strict=True)}
     return drawn, "".join(symbols[name] for name in sorted(symbols))
 
 
@@ -55,9 +55,9 @@ def _pages(formulas: list[Formula]) -> list[bytes]:
 
 
 def _drawing(formula: Formula, page: str) -> Drawing:
-    head, _, rest = page.partition(">")
-    width, height = (float(re.search(rf' {side}="([\d.]+)pt"', head)[1]) for side in ("width", "height"))  # type: ignore[index]
-    body = re.sub(r"<defs>.*?</defs>", "", rest.removesuffix("</svg>"), flags=re.DOTALL).replace("xlink:href", "href")
+    tag, _, body = page.partition(">")
+    width, height = (float(re.search(rf' {side}="([\d.]+)pt"', tag)[1]) for side in ("width", "height"))  # type: ignore[index]
+    body = re.sub(r"<defs>.*?</defs>", "", body.removesuffix("</svg>"), flags=re.DOTALL).replace("xlink:href", "href")
     body = body.replace('"#000000"', '"currentColor"')
     top = 0.0 if formula.display else STRUT - ROOM
     depth = 0.0 if formula.display else height - STRUT

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 from pipeline.report.content import Document, Equation, Figure, Figure3D, walk
 from pipeline.report.content.inline import Span, parse, printable
-from pipeline.report.content.layout import Placed, marked, place, references
+from pipeline.report.content.layout import Placed, marked_texts, place, references
 from pipeline.report.content.tables import columns
-from pipeline.report.figures.traces import Thinned, thinned
-from pipeline.report.writers.equations import Drawing, Formula, drawings
-from pipeline.report.writers.vectors import inlined
-from pipeline.report.writers.zoomable import Json, embedding, script
+from pipeline.report.figures.traces import ThinnedFigure, thin_figure
+from pipeline.report.writers.equations import Drawing, Formula, draw_formulas
+from pipeline.report.writers.vectors import inline_svg
+from pipeline.report.writers.zoomable import Json, bokeh_script, embed_items
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -33,47 +33,52 @@ Bokeh.embed.embed_items(traces.documents, traces.items);
 def render(document: Document) -> bytes:
     """The whole file; the same document gives the same bytes.
 
-    Raises ValueError where a reference leads nowhere, and NotTypeset where an equation is wrong.
+    Raises
+    ------
+    ValueError
+        If a reference leads nowhere.
+    NotTypeset
+        If an equation is wrong.
     """
     placed = place(document)
-    figures = {item.anchor: item.block for item in _flat(placed) if isinstance(item.block, Figure | Figure3D)}
+    figures = {item.anchor: item.block for item in _flatten(placed) if isinstance(item.block, Figure | Figure3D)}
     letters: dict[str, str] = {}
     zooms = {name: f for name, f in figures.items() if isinstance(f, Figure) and f.zoomable}
-    drawn = {n: inlined(f, f"F{i}", letters) for i, (n, f) in enumerate(figures.items()) if n not in zooms}
-    formulas, symbols = drawings(_formulas(document))
+    drawn = {n: inline_svg(f, f"F{i}", letters) for i, (n, f) in enumerate(figures.items()) if n not in zooms}
+    formulas, symbols = draw_formulas(_formulas(document))
     page: Json = {
         "document": document, "placed": placed, "references": references(placed), "figures": drawn,
         "formulas": formulas, "letters": "".join(letters[n] for n in sorted(letters)) + symbols,
     }  # fmt: skip
-    traces = _thin(zooms, LARGEST - len(_fill(page, {}, "").encode()) - len(script()))
-    return _fill(page, traces, _data(traces)).encode()
+    traces = _thin_figures(zooms, LARGEST - len(_fill(page, {}, "").encode()) - len(bokeh_script()))
+    return _fill(page, traces, _traces_json(traces)).encode()
 
 
-def _thin(zooms: dict[str, Figure], room: int) -> dict[str, Thinned]:
+def _thin_figures(zooms: dict[str, Figure], room: int) -> dict[str, ThinnedFigure]:
     """Each zoomable figure in as many points as the file has room for."""
     share = room // POINT_BYTES // max(len(zooms), 1)
     limit = max(FEWEST_POINTS, min(MOST_POINTS, share))
-    return {name: thinned(figure, limit) for name, figure in zooms.items()}
+    return {name: thin_figure(figure, limit) for name, figure in zooms.items()}
 
 
-def _data(traces: dict[str, Thinned]) -> str:
+def _traces_json(traces: dict[str, ThinnedFigure]) -> str:
     """The traces as JSON in which nothing can end the element that holds it."""
     if not traces:
         return ""
-    content = embedding({f"Traces-{name}": trace.figure for name, trace in traces.items()})
+    content = embed_items({f"Traces-{name}": trace.figure for name, trace in traces.items()})
     return json.dumps(content, separators=(",", ":")).replace("<", "\\u003c")
 
 
 def _formulas(document: Document) -> list[Formula]:
     display = [Formula(block.typst, True) for block in walk(document) if isinstance(block, Equation)]
-    return [Formula(maths, False) for maths in marked(document, "maths")] + display
+    return [Formula(maths, False) for maths in marked_texts(document, "maths")] + display
 
 
-def _flat(placed: tuple[Placed, ...]) -> list[Placed]:
-    return [item for one in placed for item in (one, *_flat(one.blocks))]
+def _flatten(placed: tuple[Placed, ...]) -> list[Placed]:
+    return [item for parent in placed for item in (parent, *_flatten(parent.blocks))]
 
 
-def _fill(page: Json, traces: dict[str, Thinned], data: str) -> str:
+def _fill(page: Json, traces: dict[str, ThinnedFigure], data: str) -> str:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
 
@@ -82,7 +87,7 @@ def _fill(page: Json, traces: dict[str, Thinned], data: str) -> str:
         lstrip_blocks=True, finalize=_finalize,
     )  # fmt: skip
     environment.filters |= {"inline": _inline(page), "columns": columns, "raw": Markup}
-    scripts = [script().replace("</script", "<\\/script"), START] if data else []
+    scripts = [bokeh_script().replace("</script", "<\\/script"), START] if data else []
     return environment.get_template("report.html").render(
         page, traces=traces, data=Markup(data), scripts=[Markup(text) for text in scripts],
         hashes=[_hash(text) for text in scripts],

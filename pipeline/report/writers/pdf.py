@@ -21,7 +21,7 @@ from pipeline.report.content.layout import Placed, place, references
 from pipeline.report.content.tables import columns
 from pipeline.report.figures.svg import svg
 from pipeline.report.writers.typesetting import typeset
-from pipeline.report.writers.widths import breakable, fit
+from pipeline.report.writers.widths import allow_breaks, fit_columns
 
 TEMPLATE = Path(__file__).parent / "templates/report.typ"
 Json = dict[str, Any]
@@ -30,7 +30,12 @@ Json = dict[str, Any]
 def render(document: Document) -> bytes:
     """The whole file; the same document gives the same bytes.
 
-    Raises ValueError where a reference leads nowhere, and NotTypeset where Typst fails or warns.
+    Raises
+    ------
+    ValueError
+        If a reference leads nowhere.
+    NotTypeset
+        If Typst fails or warns.
     """
     placed = place(document)
     content = {
@@ -45,54 +50,56 @@ def render(document: Document) -> bytes:
 
 def _placed(item: Placed) -> Json:
     common = {"kind": item.kind, "number": item.number, "anchor": item.anchor, "depth": item.depth}
-    return common | data(item.block) | {"blocks": [_placed(child) for child in item.blocks]}
+    return common | block_data(item.block) | {"blocks": [_placed(child) for child in item.blocks]}
 
 
 def _inline(text: str) -> list[Json]:
     """Marked text as the template reads it; long words outside maths may break."""
-    return [span._asdict() | ({} if span.kind == "maths" else {"text": breakable(span.text)}) for span in parse(text)]
+    return [
+        span._asdict() | ({} if span.kind == "maths" else {"text": allow_breaks(span.text)}) for span in parse(text)
+    ]
 
 
 @singledispatch
-def data(block: Any) -> Json:
-    """What the template needs of a block besides its place."""
+def block_data(block: Any) -> Json:
+    """What the template needs of a block besides kind, number, anchor and depth."""
     raise TypeError(f"{type(block).__name__} is not a block of a report")
 
 
-@data.register(Section)
+@block_data.register(Section)
 def _(section: Section) -> Json:
     return {"title": _inline(section.title)}
 
 
-@data.register(Prose)
+@block_data.register(Prose)
 def _(prose: Prose) -> Json:
     return {"paragraphs": [_inline(text.strip()) for text in prose.text.split("\n\n") if text.strip()]}
 
 
-@data.register(Bullets)
+@block_data.register(Bullets)
 def _(bullets: Bullets) -> Json:
     return {"items": [_inline(item) for item in bullets.items]}
 
 
-@data.register(Listing)
+@block_data.register(Listing)
 def _(listing: Listing) -> Json:
-    return {"text": breakable(printable(listing.text), 80)}
+    return {"text": allow_breaks(printable(listing.text), 80)}
 
 
-@data.register(Verdict)
+@block_data.register(Verdict)
 def _(verdict: Verdict) -> Json:
     return {"level": verdict.level, "text": _inline(verdict.text)}
 
 
-@data.register(Equation)
+@block_data.register(Equation)
 def _(equation: Equation) -> Json:
     return {"typst": equation.typst, "alt": equation.alt}
 
 
-@data.register(Table)
+@block_data.register(Table)
 def _(table: Table) -> Json:
     shown = columns(table)
-    fitted = fit([[column.head, *(cell.text for cell in column.cells)] for column in shown])
+    fitted = fit_columns([[column.head, *(cell.text for cell in column.cells)] for column in shown])
     return {
         "caption": _inline(table.caption),
         "size": fitted.size,
@@ -105,7 +112,7 @@ def _(table: Table) -> Json:
     }
 
 
-@data.register(Figure)
-@data.register(Figure3D)
+@block_data.register(Figure)
+@block_data.register(Figure3D)
 def _(figure: Figure | Figure3D) -> Json:
     return {"caption": _inline(figure.caption), "alt": printable(figure.alt), "svg": svg(figure)}

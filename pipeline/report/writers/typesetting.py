@@ -16,7 +16,10 @@ class NotTypeset(PipelineError):
 def typeset(template: Path, content: Any, output: Literal["pdf", "svg"]) -> list[bytes]:
     """Compile a template that reads `content` as data, never as markup; one item per page of SVG, one for a PDF.
 
-    Raises NotTypeset with Typst's own words when it fails or warns.
+    Raises
+    ------
+    NotTypeset
+        If Typst fails or warns, with its own message.
     """
     import typst
 

@@ -16,7 +16,7 @@ BREAK = "\N{ZERO WIDTH SPACE}"
 
 
 @dataclass(frozen=True)
-class Fitted:
+class FittedTable:
     """How a table is set: the letters [pt], and each column's width [pt] (None: as wide as its words) and letters."""
 
     size: float
@@ -27,27 +27,28 @@ class Fitted:
         """The spans of a cell, its words breakable where the column is narrower than they are."""
         room = self.letters[column]
         return [
-            span._asdict() | ({} if room == inf or span.kind == "maths" else {"text": breakable(span.text, int(room))})
+            span._asdict()
+            | ({} if room == inf or span.kind == "maths" else {"text": allow_breaks(span.text, int(room))})
             for span in parse(text)
         ]
 
 
-def fit(cells: list[list[str]]) -> Fitted:
+def fit_columns(cells: list[list[str]]) -> FittedTable:
     """The largest letters at which the columns fit as they are; else columns that share the page, in smaller ones."""
     natural = [max(map(_letters, column), default=0) + SLACK for column in cells]
     for size in SIZES[:2]:
         if sum(natural) * EM * size + INSET * len(natural) <= PAGE:
-            return Fitted(size, (None,) * len(natural), (inf,) * len(natural))
-    words = [max((len(word) for text in column for word in _words(text)), default=0) for column in cells]
+            return FittedTable(size, (None,) * len(natural), (inf,) * len(natural))
+    longest = [max((len(word) for text in column for word in _split_words(text)), default=0) for column in cells]
     for size in SIZES[1:]:
         room = (PAGE - INSET * len(natural)) / (EM * size)
-        letters = share(natural, room)
-        if size == SIZES[-1] or all(got >= min(word, 14) for got, word in zip(letters, words, strict=True)):
+        letters = share_room(natural, room)
+        if size == SIZES[-1] or all(width >= min(word, 14) for width, word in zip(letters, longest, strict=True)):
             break
-    return Fitted(size, tuple(n * EM * size + INSET for n in letters), tuple(max(n - SLACK, 1) for n in letters))
+    return FittedTable(size, tuple(n * EM * size + INSET for n in letters), tuple(max(n - SLACK, 1) for n in letters))
 
 
-def share(wanted: list[int], room: float) -> list[float]:
+def share_room(wanted: list[int], room: float) -> list[float]:
     """Room for each: what it wants while that is below an equal share of what the greedier ones leave."""
     shares, left = [0.0] * len(wanted), room
     order = sorted(range(len(wanted)), key=lambda i: wanted[i])
@@ -58,7 +59,7 @@ def share(wanted: list[int], room: float) -> list[float]:
     return shares
 
 
-def breakable(text: str, longest: int = LONG) -> str:
+def allow_breaks(text: str, longest: int = LONG) -> str:
     """Allow words longer than `longest` to break: after a sign that separates parts of a name, or anywhere."""
 
     def cut(match: re.Match[str]) -> str:
@@ -77,5 +78,5 @@ def _length(span: Span) -> int:
     return len(span.text) if span.kind != "maths" else len(re.sub(r"[a-z]{2,}|[^a-z]", "x", span.text))
 
 
-def _words(text: str) -> list[str]:
+def _split_words(text: str) -> list[str]:
     return [word for span in parse(text) if span.kind != "maths" for word in span.text.split()]

@@ -11,7 +11,7 @@ import numpy as np
 from pipeline.maths.arrays import Array
 from pipeline.report.content import Figure
 from pipeline.report.content.marks import Band, HBand, Histogram, HLine, Line, Panel, Points, Stems, VLine, VSpan
-from pipeline.report.figures.palette import coloured
+from pipeline.report.figures.palette import assign_colours
 
 Json = dict[str, Any]
 PIXELS = 96 / 25.4  # of CSS in a millimetre
@@ -21,14 +21,14 @@ DASHES = {"solid": "solid", "dashed": [6, 3], "dotted": [1.5, 2.5]}
 
 
 @cache
-def script() -> str:
+def bokeh_script() -> str:
     """Bokeh's own script, the minified core only: no tables, widgets, WebGL or maths."""
     import bokeh
 
     return (Path(bokeh.__file__).parent / "server/static/js/bokeh.min.js").read_text(encoding="utf-8")
 
 
-def embedding(figures: dict[str, Figure]) -> Json:
+def embed_items(figures: dict[str, Figure]) -> Json:
     """What Bokeh's `embed_items` needs to draw each figure into the element of its name."""
     from bokeh.document import Document
 
@@ -36,14 +36,14 @@ def embedding(figures: dict[str, Figure]) -> Json:
     for name, figure in figures.items():
         document = Document()
         document.add_root(_layout(figure))
-        content = _renamed(document.to_json(deferred=False), name)
+        content = _renumber_ids(document.to_json(deferred=False), name)
         root = content["roots"][0]["id"]
         documents[name] = content
         items.append({"docid": name, "roots": {root: name}, "root_ids": [root]})
     return {"documents": documents, "items": items}
 
 
-def _renamed(content: Any, prefix: str) -> Any:
+def _renumber_ids(content: Any, prefix: str) -> Any:
     """The same document with its ids counted anew: Bokeh counts on through the life of a process."""
     fresh: dict[str, str] = {}
     numbers = count(1)
@@ -67,7 +67,7 @@ def _layout(figure: Figure) -> Any:
     for panel in figure.panels:
         plots.append(_plot(panel, figure, plots[0].x_range if plots else None))
     for plot, panel in zip(plots[-figure.columns :], figure.panels[-figure.columns :], strict=True):
-        plot.xaxis.axis_label = _words(panel.x_label)
+        plot.xaxis.axis_label = _plain_text(panel.x_label)
         plot.height += 22
     return gridplot(
         plots, ncols=figure.columns, sizing_mode="stretch_width", merge_tools=True, toolbar_location="right",
@@ -87,10 +87,12 @@ def _plot(panel: Panel, figure: Figure, x_range: Any) -> Any:
         min_border_right=12,
     )  # fmt: skip
     _style(plot, panel)
-    entries = [(_words(mark.label), [trace(mark, plot, colour)]) for mark, colour in coloured(panel.marks)]
+    entries = [
+        (_plain_text(mark.label), [draw_trace(mark, plot, colour)]) for mark, colour in assign_colours(panel.marks)
+    ]
     _add_legend(plot, [(label, renderers) for label, renderers in entries if label])
     if panel.title:
-        plot.add_layout(Title(text=_words(panel.title), text_font_size="13px", text_color="#1a1a1a"), "above")
+        plot.add_layout(Title(text=_plain_text(panel.title), text_font_size="13px", text_color="#1a1a1a"), "above")
     return plot
 
 
@@ -101,7 +103,7 @@ def _range(limits: tuple[float, float] | None, padding: float) -> Any:
 
 
 def _style(plot: Any, panel: Panel) -> None:
-    plot.yaxis.axis_label = _words(panel.y_label)
+    plot.yaxis.axis_label = _plain_text(panel.y_label)
     for axis in (plot.xaxis, plot.yaxis):
         axis.axis_label_text_font_style = "normal"
         axis.axis_label_text_font_size = axis.major_label_text_font_size = "12px"
@@ -109,7 +111,7 @@ def _style(plot: Any, panel: Panel) -> None:
         axis.minor_tick_line_color = None
     plot.yaxis.ticker.desired_num_ticks = 5
     plot.grid.grid_line_color = "#e4e4e4"
-    # Room of one width beside every panel keeps the axes of a column in line.
+    # Room of one width to the left of every panel keeps the axes of a column in line.
     plot.min_border_left = 74
 
 
@@ -126,12 +128,12 @@ def _add_legend(plot: Any, items: list[tuple[str, list[Any]]]) -> None:
         plot.add_layout(legend, "above")
 
 
-def _words(text: str) -> str:
-    """Text that Bokeh takes for text: between its signs for maths it would look for a script on the network."""
+def _plain_text(text: str) -> str:
+    """A text that Bokeh takes for text: between its signs for maths it would look for a script on the network."""
     return re.sub(r"\$(?=\$)|\\(?=[\[(])", "\\g<0>\u200b", text)
 
 
-def _short(column: Array) -> Any:
+def _single_precision(column: Array) -> Any:
     """Single precision, where it tells neighbouring samples apart."""
     steps = np.abs(np.diff(column))
     step = float(np.median(steps[steps > 0])) if np.any(steps > 0) else 1.0
@@ -139,56 +141,58 @@ def _short(column: Array) -> Any:
 
 
 @singledispatch
-def trace(mark: Any, plot: Any, colour: str) -> Any:
+def draw_trace(mark: Any, plot: Any, colour: str) -> Any:
     """Draw one mark on a plot; returns what its legend entry hides."""
     raise TypeError(f"{type(mark).__name__} cannot be part of a zoomable figure")
 
 
-@trace.register(Line)
+@draw_trace.register(Line)
 def _(mark: Line, plot: Any, colour: str) -> Any:
     dash = DASHES[mark.style]
-    return plot.line(_short(mark.x), mark.y.astype(np.float32), line_color=colour, line_width=1.2, line_dash=dash)
+    return plot.line(
+        _single_precision(mark.x), mark.y.astype(np.float32), line_color=colour, line_width=1.2, line_dash=dash
+    )
 
 
-@trace.register(Points)
+@draw_trace.register(Points)
 def _(mark: Points, plot: Any, colour: str) -> Any:
     if mark.y_std is not None:
         plot.segment(mark.x, mark.y - mark.y_std, mark.x, mark.y + mark.y_std, line_color=colour)
-    return plot.scatter(_short(mark.x), mark.y.astype(np.float32), size=4, color=colour, line_color=None)
+    return plot.scatter(_single_precision(mark.x), mark.y.astype(np.float32), size=4, color=colour, line_color=None)
 
 
-@trace.register(Band)
+@draw_trace.register(Band)
 def _(mark: Band, plot: Any, colour: str) -> Any:
     lower, upper = mark.lower.astype(np.float32), mark.upper.astype(np.float32)
-    return plot.varea(_short(mark.x), lower, upper, fill_color=colour, fill_alpha=0.25)
+    return plot.varea(_single_precision(mark.x), lower, upper, fill_color=colour, fill_alpha=0.25)
 
 
-@trace.register(Stems)
+@draw_trace.register(Stems)
 def _(mark: Stems, plot: Any, colour: str) -> Any:
     return plot.segment(mark.x, np.zeros_like(mark.y), mark.x, mark.y, line_color=colour, line_width=1.2)
 
 
-@trace.register(Histogram)
+@draw_trace.register(Histogram)
 def _(mark: Histogram, plot: Any, colour: str) -> Any:
     left, right = mark.edges[:-1], mark.edges[1:]
     return plot.quad(left=left, right=right, bottom=0, top=mark.counts, color=colour, fill_alpha=0.75)
 
 
-@trace.register(HLine)
+@draw_trace.register(HLine)
 def _(mark: HLine, plot: Any, colour: str) -> Any:
     return plot.hspan(y=[mark.y], line_color=colour, line_dash=DASHES[mark.style])
 
 
-@trace.register(VLine)
+@draw_trace.register(VLine)
 def _(mark: VLine, plot: Any, colour: str) -> Any:
     return plot.vspan(x=[mark.x], line_color=colour, line_dash=DASHES[mark.style])
 
 
-@trace.register(HBand)
+@draw_trace.register(HBand)
 def _(mark: HBand, plot: Any, colour: str) -> Any:
     return plot.hstrip(y0=[mark.lower], y1=[mark.upper], color=colour, fill_alpha=0.18, line_color=None)
 
 
-@trace.register(VSpan)
+@draw_trace.register(VSpan)
 def _(mark: VSpan, plot: Any, colour: str) -> Any:
     return plot.vstrip(x0=[mark.start], x1=[mark.end], color=colour, fill_alpha=0.18, line_color=None)

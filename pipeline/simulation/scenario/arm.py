@@ -82,9 +82,9 @@ def _friction(table: TomlTable) -> tuple[float, ...]:
 def noise_of(table: TomlTable) -> SensorNoise:
     """The noise of one joint."""
     values = table.table("noise")
-    found = SensorNoise(
+    noise = SensorNoise(
         **{key: values.number(key, 0.0, low=0.0) for key in ("q", "dq", "tau", "drift")},
         correlation=values.number("correlation", 1.0, above=0.0),
     )
     values.close()
-    return found
+    return noise

@@ -18,14 +18,14 @@ FORMATS = (".tdms", ".lvm")
 
 
 def logs_of(table: TomlTable, joints: dict[str, SimulatedJoint], families: Sequence[str]) -> tuple[SimulatedLog, ...]:
-    """Read every [[log]]; one that several families record is there once for each, named after the family."""
+    """Read every [[log]]; one that several families record is listed once for each, named after the family."""
     logs = tuple(log for entry in table.tables("log") for log in _log(entry, joints, families))
     if not logs:
         table.problem("it has no [[log]], so nothing would be recorded")
-    for what in ("name", "file"):
-        values = [getattr(log, what) for log in logs]
-        for twice in sorted({value for value in values if values.count(value) > 1}):
-            table.problem(f"two logs have the {what} {twice!r}")
+    for field in ("name", "file"):
+        values = [getattr(log, field) for log in logs]
+        for duplicate in sorted({value for value in values if values.count(value) > 1}):
+            table.problem(f"two logs have the {field} {duplicate!r}")
     return logs
 
 
@@ -45,9 +45,9 @@ def _log(table: TomlTable, joints: dict[str, SimulatedJoint], families: Sequence
     clock = table.text("clock", "channel", ("channel", "header"))
     unit = table.text("current_unit", "A", ("A", "mA"))
     log = SimulatedLog(name, file, role, duration, moves, held, pushes, unit, clock)
-    found = _of_arm(table, log, joints, families) if families else _of_joints(table, log)
+    logs = _of_arm(table, log, joints, families) if families else _of_joints(table, log)
     table.close()
-    return found
+    return logs
 
 
 def _check_joints(
@@ -141,6 +141,8 @@ def _push(table: TomlTable, duration: float, at_tip: bool) -> Push:
 
 
 def _tissue(table: TomlTable) -> Tissue:
-    found = Tissue(table.number("surface"), table.number("stiffness", above=0.0), table.number("damping", 0.0, low=0.0))
+    tissue = Tissue(
+        table.number("surface"), table.number("stiffness", above=0.0), table.number("damping", 0.0, low=0.0)
+    )
     table.close()
-    return found
+    return tissue

@@ -19,8 +19,8 @@ LONGEST = 10_000_000  # samples of a log
 
 def shipped() -> tuple[str, ...]:
     """The names of the scenarios that come with the package."""
-    found = (entry.name for entry in files("pipeline.simulation").joinpath("shipped").iterdir())
-    return tuple(sorted(name.removesuffix(".toml") for name in found if name.endswith(".toml")))
+    names = (entry.name for entry in files("pipeline.simulation").joinpath("shipped").iterdir())
+    return tuple(sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml")))
 
 
 def load(scenario: str) -> Scenario:
@@ -40,10 +40,10 @@ def load(scenario: str) -> Scenario:
     except tomllib.TOMLDecodeError as error:
         raise BadScenario(f"{scenario}: {error}") from None
     problems: list[str] = []
-    found = _scenario(File(scenario).stem, TomlTable(table, "", problems))
+    checked = _scenario(File(scenario).stem, TomlTable(table, "", problems))
     if problems:
         raise BadScenario("\n".join(f"{scenario}: {problem}" for problem in problems))
-    return found
+    return checked
 
 
 def _text(file: File) -> str:

@@ -104,7 +104,7 @@ class SimulatedArm:
 
 @dataclass(frozen=True)
 class SimulatedLog:
-    """One recording: which joints move and how, which are held where, and what they touch."""
+    """One recording: which joints move and how, which are at rest and where, and what they touch."""
 
     name: str
     file: str

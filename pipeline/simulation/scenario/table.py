@@ -18,7 +18,7 @@ class TomlTable:
         return key in self.values
 
     def problem(self, text: str) -> None:
-        """Diagnostic something wrong with this table."""
+        """Note something wrong with this table."""
         self.problems.append(f"{self.place}: {text}" if self.place else text)
 
     def number(self, key: str, default: float | None = None, low: float = -math.inf, above: float = -math.inf) -> float:
@@ -28,8 +28,8 @@ class TomlTable:
             return math.nan
         if not math.isfinite(value) or value < low or value <= above:
             bounds = {f"greater than {above:g}": above, f"at least {low:g}": low}
-            said = " and ".join(["finite", *(words for words, bound in bounds.items() if bound > -math.inf)])
-            self.problem(f"{key} must be {said}, not {value!r}")
+            demands = " and ".join(["finite", *(words for words, bound in bounds.items() if bound > -math.inf)])
+            self.problem(f"{key} must be {demands}, not {value!r}")
             return math.nan
         return float(value)
 
@@ -95,11 +95,11 @@ class TomlTable:
     def tables(self, key: str) -> list["TomlTable"]:
         """The tables of a list, such as [[log]]; none where it is missing."""
         self.asked.append(key)
-        found = self.values.get(key, [])
-        if not isinstance(found, list):
-            self.problem(f"{key} must be a list of tables, not {found!r}")
+        entries = self.values.get(key, [])
+        if not isinstance(entries, list):
+            self.problem(f"{key} must be a list of tables, not {entries!r}")
             return []
-        return [TomlTable(each, self._within(f"{key} {i}"), self.problems) for i, each in enumerate(found, start=1)]
+        return [TomlTable(entry, self._within(f"{key} {i}"), self.problems) for i, entry in enumerate(entries, start=1)]
 
     def close(self) -> None:
         """Report the keys that nothing asked for."""

@@ -1,0 +1,91 @@
+"""Comparison of a simulated study with its ground truth, which nothing but the report ever sees."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from pipeline.records import Fit, Track
+from pipeline.records.record import slug
+from pipeline.report.content import Block, Figure, Line, Panel, Prose, Section, Table, Verdict, literal
+from pipeline.report.context import Context, label, title
+
+LIMIT = 4.0  # standard errors that an estimate may be off before it is called wrong
+SHAPES = {"triangle": ((0.0, 0.0), (0.5, 1.0), (1.0, 0.0)), "pulse": ((0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0))}
+
+
+def section(context: Context) -> Section | None:
+    """Parameters and external efforts, estimated and true; only of a simulated study."""
+    if not context.study.truth:
+        return None
+    return Section("Comparison with ground truth", "truth", tuple(blocks(context)))
+
+
+def blocks(context: Context) -> Iterator[Block]:
+    """The section's content."""
+    yield Prose(
+        "This study is simulated, so the ground truth is known. It is stored with the logs, no stage reads it, and "
+        "this section compares with it: parameters where the simulated friction is what the model says, and external "
+        "efforts everywhere."
+    )
+    for joint, path, theta in true_parameters(context):
+        yield from parameters(context, joint, path, theta)
+    for log in context.study.truth.get("log", []):
+        for joint in dict.fromkeys(push.get("joint") for push in log.get("push", [])):
+            tracks = context.catalogue.about(Track, log=log["name"], joint=str(joint))
+            pushes = [push for push in log["push"] if push.get("joint") == joint]
+            yield from (effort_figure(track, pushes) for track in tracks)
+
+
+def true_parameters(context: Context) -> Iterator[tuple[str, tuple[str, ...], dict[str, float]]]:
+    """Joint, path in truth.toml and true parameters of every joint that has a fit."""
+    fitted = {fit.group for fit in context.catalogue.all(Fit)}
+    theta: dict[str, Any] = context.study.truth.get("theta", {})
+    for name, entry in theta.items():
+        if name in fitted:
+            yield name, ("theta", name), entry
+        else:  # a model of several joints has a table for each
+            yield from ((joint, ("theta", name, joint), values) for joint, values in entry.items() if joint in fitted)
+
+
+def parameters(context: Context, joint: str, path: tuple[str, ...], theta: dict[str, float]) -> Iterator[Block]:
+    """The estimated parameters of one joint, compared with the true ones."""
+    sha256 = context.provenance.raw.get(f"raw/{context.study.name}/truth.toml", "")
+    rows, errors = [], []
+    for name, value in theta.items():
+        estimate = context.results.get(f"fit.{joint}.{context.used_fit(joint)}.{slug(name)}")
+        if estimate is None or not estimate.std:
+            continue
+        key = f"truth.{joint}.{slug(name)}"
+        context.results.truth(key, value, estimate.unit, (*path, name), sha256)
+        errors.append(abs(estimate.value - value) / estimate.std)
+        rows.append((name, context.number(key, 5), estimate.number()))
+    if not rows:
+        return
+    yield Table(f"{title(joint)}: true and estimated parameters.", ("Parameter", "True", "Estimated"), tuple(rows))
+    good = max(errors) < LIMIT
+    judgement = "all lie" if good else "not all lie"
+    yield Verdict("good" if good else "bad", f"**{title(joint)}**: {judgement} within four of their standard errors.")
+
+
+def effort_figure(track: Track, pushes: list[dict[str, Any]]) -> Figure:
+    """The effort exerted on a joint, and the filter's estimate of it."""
+    t, effort = true_effort(pushes, float(track.t[-1]))
+    name = f"{title(track.joint)} in {literal(track.log)}"
+    marks = (Line(track.t, track.tau_ext, "filter", "vermillion"), Line(t, effort, "true", "black"))
+    return Figure(
+        f"{name}: external effort tracked by the filter, and true external effort.",
+        f"External effort over time for {name}, tracked and true.",
+        (Panel("External effort", "time [s]", label(track, "tau_ext", "external effort"), marks),),
+        height=42,
+    )
+
+
+def true_effort(pushes: list[dict[str, Any]], end: float) -> tuple[Any, Any]:
+    """Times [s] and values (n,) of the corners of the effort that was exerted."""
+    corners = [(0.0, 0.0)]
+    for push in sorted(pushes, key=lambda p: float(p["start"])):
+        span = push["end"] - push["start"]
+        corners += [(push["start"] + x * span, y * push["peak"]) for x, y in SHAPES[push["shape"]]]
+    corners.append((end, 0.0))
+    return np.array([x for x, _ in corners]), np.array([y for _, y in corners])
