@@ -1,12 +1,14 @@
 """What is known of a robot before its logs: the design's records say what the mathematics says."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from pipeline.maths.mechanics.kinematics import tip
 from pipeline.records import Control, Excitation, Links, Lyapunov, Pose, Workspace
-from pipeline.robots import davinci, dvrk_psm
+from pipeline.robots import davinci, dvrk_psm, from_toml
 from pipeline.stages import design
 
 
@@ -65,6 +67,53 @@ def test_what_is_found_keeps_the_limits_and_what_is_printed_does_not(made):
         assert found.excess_q == found.excess_dq == found.excess_ddq == 0.0
     [slide] = of(made, Excitation, joint="instrument_slide", source="table-6.1")
     assert slide.excess_q == pytest.approx(0.033, abs=0.001)
+
+
+def test_the_lyapunov_function_starts_at_the_energy_of_the_stretched_controller(made):
+    """V = e' K_p e / 2 at rest.  (5.9)"""
+    for study in davinci.ROBOT.control:
+        e = np.subtract(study.target, study.start)
+        [lyapunov] = of(made, Lyapunov, controller=study.name)
+        assert pytest.approx(e @ (np.array(study.proportional) * e) / 2, rel=1e-12) == lyapunov.V_0
+
+
+def test_overshoot_and_settling_are_those_of_the_response():
+    """A second-order response overshoots by exp(-pi zeta / sqrt(1 - zeta^2)), and stays in the band once it settles."""
+    zeta, w = 0.4, 3.0
+    t = np.linspace(0, 12, 40_001)
+    w_d = w * np.sqrt(1 - zeta**2)
+    step = 1 - np.exp(-zeta * w * t) * (np.cos(w_d * t) + zeta / np.sqrt(1 - zeta**2) * np.sin(w_d * t))
+    study = davinci.ROBOT.control[0]
+    run = design.watched(study, "a", t, 1.0 - 2.0 * step, np.zeros_like(t), 1.0, -1.0)
+    assert run.overshoot == pytest.approx(np.exp(-np.pi * zeta / np.sqrt(1 - zeta**2)), rel=1e-4)
+    assert abs(step[t >= run.settling_time] - 1).max() <= 0.02
+    assert abs(step[t < run.settling_time][-1] - 1) > 0.02
+
+
+def test_what_a_study_is_too_short_to_show_is_left_open(made):
+    [short] = of(made, Control, controller="pd-to-pose", joint="hand_roll")
+    assert np.isnan([short.error_10, short.error_20]).all()
+    [light] = of(made, Control, controller="pd-light", joint="hand_pitch")
+    assert np.isfinite([light.error_10, light.error_20]).all()
+
+
+def test_a_robot_of_any_number_of_joints_has_a_design():
+    """A fourth joint on a robot with a chain, two joints of it only, and joints without limits."""
+    joints = davinci.ROBOT.joints
+    fourth = replace(joints[0], name="instrument_roll", published=())
+    for some in ((*joints, fourth), joints[:2], tuple(replace(j, limits=from_toml.UNLIMITED) for j in joints)):
+        robot = replace(davinci.ROBOT, joints=some, wrist=davinci.ROBOT.coordinates[len(some) :], control=())
+        records = list(design.run(robot))
+        assert of(records, Links)
+        assert of(records, Pose, pose="zero")
+        limited = all(np.isfinite(j.limits.q).all() for j in some)
+        assert bool(of(records, Workspace)) == limited
+
+
+def test_every_coordinate_of_the_da_vinci_has_a_name_and_a_drive():
+    robot = davinci.ROBOT
+    assert len(robot.coordinates) == robot.chain.n == len(robot.drives.gear_ratio) == len(set(robot.coordinates))
+    assert list(robot.drives.gear_ratio[:3]) == [joint.gear_ratio for joint in robot.joints]
 
 
 def test_a_robot_without_geometry_or_published_excitation_has_nothing_to_design():

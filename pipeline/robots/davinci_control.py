@@ -16,9 +16,21 @@ NONE = (0.0,) * 6
 POSE = (-pi / 8, pi / 8, 0.2, -pi / 4, -pi / 4, -pi / 4)  # Tables 5.2 and 5.3
 VISCOUS = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 
+LIGHT = "gravity compensated with 0.9 of the masses"
+
 CONTROL = (
-    ControlStudy("pd-to-zero", POSE, NONE, K_P, K_D, NONE, VISCOUS, known_masses=1.0, duration=3.0),
-    ControlStudy("pd-to-pose", NONE, POSE, K_P, K_D, NONE, VISCOUS, known_masses=1.0, duration=3.0),
-    ControlStudy("pd-light", NONE, POSE, K_P, K_D, NONE, VISCOUS, known_masses=0.9, duration=60.0),
-    ControlStudy("pid-light", NONE, POSE, K_P, K_D, K_I, VISCOUS, known_masses=0.9, duration=60.0),
-)
+    ControlStudy(
+        "pd-to-zero", "PD with gravity compensation, from the pose to zero",
+        POSE, NONE, K_P, K_D, NONE, VISCOUS, known_masses=1.0, duration=3.0,
+    ),
+    ControlStudy(
+        "pd-to-pose", "PD with gravity compensation, from zero to the pose",
+        NONE, POSE, K_P, K_D, NONE, VISCOUS, known_masses=1.0, duration=3.0,
+    ),
+    ControlStudy(
+        "pd-light", f"PD, {LIGHT}", NONE, POSE, K_P, K_D, NONE, VISCOUS, known_masses=0.9, duration=60.0,
+    ),
+    ControlStudy(
+        "pid-light", f"PID, {LIGHT}", NONE, POSE, K_P, K_D, K_I, VISCOUS, known_masses=0.9, duration=60.0,
+    ),
+)  # fmt: skip

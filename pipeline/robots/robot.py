@@ -64,6 +64,7 @@ class ControlStudy:
     """
 
     name: str
+    title: str
     start: tuple[float, ...]
     target: tuple[float, ...]
     proportional: tuple[float, ...]  # K_p

@@ -42,7 +42,7 @@ def blocks(context: Context) -> Iterator[Block]:
         "differentiated exactly."
     )
     yield Equation(
-        "cal(F)[dif^n overline(q) / dif t^n] = (j omega)^n Q(omega)",
+        "cal(F)[(dif^n overline(q)) / (dif t^n)] = (j omega)^n Q(omega)",
         "the spectrum of the n-th derivative is j omega to the n times that of the position",
         "differentiation",
     )
