@@ -35,6 +35,7 @@ class Written:
     names: dict[str, str]
     time: str = ""  # the channel of the times; "" where the format counts samples
     knows: bool = False  # that this channel is the time, as the format says so
+    whole_only: bool = False  # the recorder writes it at once, so that one that was cut may be refused
 
 
 def tdms_with_a_step() -> Written:
@@ -129,7 +130,9 @@ def test_a_file_that_was_cut_gives_whole_rows_or_a_clear_error(name: str, writte
 
 @EXAMPLE
 def test_a_file_that_lost_its_last_quarter_keeps_half_of_its_samples(name: str, written: Written):
-    """Which a reader that refuses whatever was cut would not."""
+    """Which a reader that refuses whatever was cut would not keep."""
+    if written.whole_only:
+        pytest.skip("a file of this format is read whole or not at all")
     log, samples = read(written.content[: len(written.content) * 3 // 4], written.file)
     kept = sum(np.isfinite(samples[log.find(written.names[column]).name]).sum() for column in COLUMNS)
     assert ROWS <= kept < 2 * ROWS
