@@ -3,6 +3,7 @@ PYTHON ?= python3
 STUDY ?=
 JOBS ?= 1
 TESTS ?=
+WORKERS ?= auto
 
 ifeq ($(OS),Windows_NT)
 BIN := .venv/Scripts
@@ -11,8 +12,15 @@ BIN := .venv/bin
 endif
 RUN := $(BIN)/davinci-forces
 READY := .venv/ready
-CHECKED := .venv/checked
+READY_TO_TEST := .venv/ready-to-test
+READY_TO_CHECK := .venv/ready-to-check
+READY_TO_COMPARE := .venv/ready-to-compare
 PIP := $(BIN)/python -m pip --disable-pip-version-check -q
+INSTALL := $(PIP) install --require-hashes --no-deps
+# A file's tests share what they analyse and compile, so a file stays in one process.
+PYTEST := $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile
+LOCK := uv pip compile -q --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header
+UPGRADE ?=
 
 # One line a stage: what it reads, and what it makes.
 STAGES := design ingest resample average differentiate fit predict ekf whiteness report
@@ -27,7 +35,7 @@ STAGES := design ingest resample average differentiate fit predict ekf whiteness
 # whiteness     : PeriodResidual Residual Track -> Whiteness
 # report        : everything -> report.html report.pdf results.json
 
-.PHONY: all test check bench demo clean help $(STAGES)
+.PHONY: all quick test check format lint types oracles bench locks demo clean help $(STAGES)
 
 all: $(READY) ## analyse every study in raw/ whose logs are here (STUDY=raw/x for one, JOBS=n for processes)
 	$(RUN) all $(STUDY) --jobs $(JOBS)
@@ -35,18 +43,36 @@ all: $(READY) ## analyse every study in raw/ whose logs are here (STUDY=raw/x fo
 $(STAGES): $(READY)
 	$(RUN) $@ $(or $(STUDY),raw/davinci-demo) --jobs $(JOBS)
 
-test: $(READY) ## run the tests (TESTS=--slow for the long studies, too)
-	$(BIN)/python -m pytest $(TESTS)
+quick: $(READY_TO_TEST) ## run the tests that take moments, for while you work
+	$(PYTEST) -m "not medium and not slow" $(TESTS)
 
-check: $(CHECKED) ## format, lint, types, tests, slow ones included
+test: $(READY_TO_TEST) ## run the tests (TESTS=--slow for the longest studies, too; WORKERS=n for processes)
+	$(PYTEST) $(TESTS)
+
+check: lint types oracles ## what continuous integration checks: format, lint, types, and every test
+	$(MAKE) --no-print-directory test TESTS=--slow
+
+format: $(READY_TO_CHECK) ## lay out the code, and mend what the linter can
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+lint: $(READY_TO_CHECK) ## say where the code is not laid out or breaks a rule
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
-	$(BIN)/mypy
-	$(BIN)/python -m pytest --slow
 
-bench: $(CHECKED) ## the benchmarks at full size, against their rivals
-	$(PIP) install --require-hashes --no-deps -r tests/benchmarks/rivals.lock
+types: $(READY_TO_CHECK) ## check the types
+	$(BIN)/mypy
+
+oracles: $(READY_TO_COMPARE) ## install what tests compare with, where it is there: Pinocchio
+
+bench: $(READY_TO_TEST) $(READY_TO_COMPARE) ## the benchmarks at full size, against their rivals
 	$(BIN)/python -m pytest tests/benchmarks --full -s
+
+locks: ## pin anew what the project needs, by uv (UPGRADE=--upgrade for newer versions)
+	$(LOCK) $(UPGRADE) pyproject.toml --group build -o requirements.lock
+	$(LOCK) $(UPGRADE) --group test -c requirements.lock -o tests/test.lock
+	$(LOCK) $(UPGRADE) --group check -c requirements.lock -o tests/check.lock
+	$(LOCK) $(UPGRADE) --group oracles -c requirements.lock -o tests/oracles.lock
 
 demo: $(READY) ## simulate the demonstration study anew
 	$(RUN) simulate davinci-demo raw/davinci-demo --force
@@ -64,10 +90,18 @@ $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || \
 	  { echo "Python cannot make environments here; on Debian and Ubuntu run: apt-get install python3-venv"; exit 1; }
 	$(PYTHON) -m venv .venv
-	$(PIP) install --require-hashes --no-deps -r requirements.lock
+	$(INSTALL) -r requirements.lock
 	$(PIP) install --no-deps --no-build-isolation -e .
 	@touch $@
 
-$(CHECKED): $(READY) tests/check.lock
-	$(PIP) install --require-hashes --no-deps -r tests/check.lock
+$(READY_TO_TEST): $(READY) tests/test.lock
+	$(INSTALL) -r tests/test.lock
+	@touch $@
+
+$(READY_TO_CHECK): $(READY_TO_TEST) tests/check.lock
+	$(INSTALL) -r tests/check.lock
+	@touch $@
+
+$(READY_TO_COMPARE): $(READY_TO_TEST) tests/oracles.lock
+	$(INSTALL) -r tests/oracles.lock
 	@touch $@

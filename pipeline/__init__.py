@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     import pandas as pd
 
-__all__ = ["read"]
+__all__ = ["read", "results", "run"]
 
 
 def read(study: str | Path, record: str, **about: str) -> "pd.DataFrame":
@@ -26,3 +26,42 @@ def read(study: str | Path, record: str, **about: str) -> "pd.DataFrame":
     from pipeline.runner.dataframes import read as read_frames
 
     return read_frames(Path(study), record, about)
+
+
+def run(study: str | Path, *stages: str, force: bool = False, jobs: int = 1, quiet: bool = False) -> bool:
+    """Run stages on a study, in their order, or all where none is named; whether every task succeeded.
+
+    What is current is skipped, as on the command line.  `jobs` is the number of processes.
+
+    Raises
+    ------
+    BadRequest
+        If there is no such stage.
+    PipelineError
+        If the study is wrong, another run is working on it, or a stage has nothing to work on.
+    """
+    from pipeline.errors import BadRequest
+    from pipeline.stages import STAGES
+
+    unknown = [name for name in stages if name not in STAGES]
+    if unknown:
+        raise BadRequest(f"there is no stage {unknown[0]!r}; there are {', '.join(STAGES)}")
+    from pipeline.runner import runs
+
+    names = [name for name in STAGES if name in stages] or STAGES
+    return runs.run(Path(study), names, force=force, jobs=jobs, verbosity="quiet" if quiet else "normal")
+
+
+def results(study: str | Path) -> "pd.DataFrame":
+    """Every number of a study's report, by its key: `results("raw/mine").loc["period.roll", "value"]`.
+
+    The columns are value, std (NaN where there is none), unit, and source, the record that holds the number.
+
+    Raises
+    ------
+    MissingRecord
+        If the study has no results: run its stages first.
+    """
+    from pipeline.runner.dataframes import results as read_results
+
+    return read_results(Path(study))

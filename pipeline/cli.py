@@ -1,6 +1,7 @@
 """Contact forces of a da Vinci arm from its motor currents, without a force sensor: from logs to a report."""
 
 import ast
+import re
 import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor
@@ -8,18 +9,20 @@ from contextlib import contextmanager
 from functools import wraps
 from importlib import import_module
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperCommand
 
 from pipeline.commands import COMMANDS
 from pipeline.errors import PipelineError
 from pipeline.stages import STAGES
 
+if TYPE_CHECKING:
+    from pipeline.runner.runs import Verbosity
+
 app = typer.Typer(
     no_args_is_help=True,
-    add_completion=False,
-    help=__doc__,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
     rich_markup_mode="markdown",  # the default swallows units in square brackets
@@ -31,6 +34,19 @@ Processed = Annotated[Path | None, typer.Option(help="Folder for processed files
 Reports = Annotated[Path | None, typer.Option(help="Folder for reports, instead of reports/ beside raw/.")]
 Force = Annotated[bool, typer.Option("--force", help="Run what is current, too.")]
 Jobs = Annotated[int, typer.Option(min=1, help="Processes to spread the work over.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say only what went wrong, or may have.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say of each task, too, when it is done and its time.")]
+
+
+class ShownAsWritten(TyperCommand):
+    """A command whose help shows `raw/<study>`, which Markdown takes for a tag of HTML and leaves out."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        for described in (self, *self.params):
+            words = getattr(described, "help", None)
+            if words and self.rich_markup_mode == "markdown":
+                vars(described)["help"] = re.sub(r"(`[^`]*`)|<", lambda match: match[1] or r"\<", words)
 
 
 def main() -> None:
@@ -68,15 +84,45 @@ def guarded(run: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-def run_stages(
-    study: Path, names: tuple[str, ...], processed: Path | None, reports: Path | None, force: bool, jobs: int
-) -> bool:
+def tell_version(asked: bool) -> None:
+    """Print the version, where it is asked for, and leave."""
+    if asked:
+        from importlib.metadata import version
+
+        typer.echo(f"davinci-forces {version('davinci-forces')}")
+        raise typer.Exit
+
+
+Version = Annotated[
+    bool, typer.Option("--version", callback=tell_version, is_eager=True, help="Print the version and leave.")
+]
+
+
+@app.callback(help=__doc__)
+def options(version: Version = False) -> None:
+    """What holds for every command; the option does its work by itself."""
+
+
+def verbosity(quiet: bool, verbose: bool) -> "Verbosity":
+    """How much a run says.
+
+    Raises
+    ------
+    typer.BadParameter
+        If it is to say both less and more.
+    """
+    if quiet and verbose:
+        raise typer.BadParameter("a run cannot be both --quiet and --verbose; leave one out")
+    return "quiet" if quiet else "verbose" if verbose else "normal"
+
+
+def run_stages(study: Path, names: tuple[str, ...], *how: Any) -> bool:
     """Run stages on one study; whether all went well.  Why they could not run at all is printed."""
     from pipeline.runner import runs
 
     try:
         with messages():
-            return runs.run(study, names, processed, reports, force, jobs)
+            return runs.run(study, names, *how)
     except typer.Exit:
         return False
 
@@ -84,7 +130,7 @@ def run_stages(
 def add_stage(name: str) -> None:
     """Make a stage a command of the same name, explained by its own docstring."""
 
-    @app.command(name, help=docstring(f"stages/{name}"), rich_help_panel="Stages, in order")
+    @app.command(name, help=docstring(f"stages/{name}"), rich_help_panel="Stages, in order", cls=ShownAsWritten)
     @guarded
     def command(
         study: StudyFolder,
@@ -92,12 +138,17 @@ def add_stage(name: str) -> None:
         reports: Reports = None,
         force: Force = False,
         jobs: Jobs = 1,
+        quiet: Quiet = False,
+        verbose: Verbose = False,
     ) -> None:
-        if not run_stages(study, (name,), processed, reports, force, jobs):
+        from pipeline.runner import runs
+
+        says = verbosity(quiet, verbose)
+        if not run_stages(runs.one(study), (name,), processed, reports, force, jobs, says):
             raise typer.Exit(1)
 
 
-@app.command("all", rich_help_panel="Stages, in order")
+@app.command("all", rich_help_panel="Stages, in order", cls=ShownAsWritten)
 @guarded
 def run_all(
     studies: Studies = None,
@@ -105,11 +156,15 @@ def run_all(
     reports: Reports = None,
     force: Force = False,
     jobs: Jobs = 1,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """Run every stage, on the studies named or on all in raw/ whose logs are there."""
     from pipeline.runner import runs
 
-    good = [run_stages(study, STAGES, processed, reports, force, jobs) for study in runs.studies(studies or [])]
+    says = verbosity(quiet, verbose)
+    named = runs.studies(studies or [], says)
+    good = [run_stages(study, STAGES, processed, reports, force, jobs, says) for study in named]
     if not all(good):
         raise typer.Exit(1)
 
@@ -124,4 +179,5 @@ for stage in STAGES:
     add_stage(stage)
 for other in COMMANDS:
     module = import_module(f"pipeline.commands.{other}")
-    app.command(other, help=module.__doc__, rich_help_panel="Other commands")(guarded(module.run))
+    added = app.command(other, help=module.__doc__, rich_help_panel="Other commands", cls=ShownAsWritten)
+    added(guarded(module.run))

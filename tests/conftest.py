@@ -1,31 +1,121 @@
-"""What every test may ask for."""
+"""What every test may ask for, which tests take long, and how a run speaks of what it did not check."""
 
 import os
+import time
+from collections import defaultdict
+from collections.abc import Callable
 from pathlib import Path
 
 import matplotlib as mpl
 import pytest
 from hypothesis import settings
+from typer.testing import CliRunner
 
 mpl.use("Agg")
 settings.register_profile("project", deadline=None, derandomize=True)
+settings.register_profile("quick", settings.get_profile("project"), max_examples=20)
 settings.load_profile("project")
+
+HERE = Path(__file__).parent
+ROOT = HERE.parent
+BESIDE = ROOT.parent / "shared" / "data"
+BENCHMARKS = HERE / "benchmarks"
+
+# Tests that take seconds beside those that take moments; a whole file where no test is named.  A new test says so
+# itself, with `@pytest.mark.medium`.
+MEDIUM: dict[str, tuple[str, ...]] = {
+    "report/test_report_figures.py": ("test_another_process_gives_the_same_bytes",),
+    "report/test_report_html.py": (
+        "test_a_browser_opens_it_without_a_word_and_draws_the_traces",
+        "test_a_dozen_long_traces_stay_under_five_megabytes",
+    ),
+    "robot/test_rigid_body.py": (
+        "test_mass_matrix_coriolis_and_gravity_are_those_of_an_independent_lagrangian[6]",
+        "test_mass_matrix_coriolis_and_gravity_are_those_of_an_independent_lagrangian[7]",
+    ),
+    "simulation/test_closed_loop.py": (),
+    "simulation/test_control.py": (
+        "test_a_compensator_that_knows_nine_tenths_of_the_masses_leaves_pd_with_the_offset_of_the_tenth",
+        "test_pd_with_gravity_compensation_converges",
+        "test_the_pid_of_table_5_4_removes_that_offset_but_is_worse_than_pd_for_over_twenty_seconds",
+    ),
+    "simulation/test_excitation.py": (
+        "test_a_design_for_the_condition_number_is_better_at_it_than_one_for_the_determinant",
+        "test_a_designed_trajectory_is_as_good_as_promised_and_keeps_its_limits_at_every_instant",
+        "test_the_same_seed_designs_the_same_trajectory",
+    ),
+    "simulation/test_excite_command.py": (
+        "test_a_robot_of_a_laboratory_can_be_excited_too",
+        "test_joints_of_independent_models_that_move_together_share_a_period_and_sum_their_objectives",
+    ),
+    "test_bad_logs.py": ("test_names_that_are_markup_appear_as_text_in_both_reports",),
+    "test_design.py": (),
+    "test_estimation.py": ("test_parameters_are_found_as_well_as_they_claim_to_be",),
+    "test_real_data.py": (),
+    "test_robustness.py": (
+        "test_a_missing_file_costs_its_own_log_and_no_other",
+        "test_the_readers_of_logs_count_for_ingest_and_the_store_for_every_stage",
+        "test_verify_compares_a_file_with_what_every_task_knew_of_it",
+        "test_verify_names_a_deviation_or_a_unit_that_was_altered",
+        "test_verify_names_results_that_are_gone_or_odd",
+        "test_verify_passes_over_files_that_are_no_entries",
+    ),
+    "test_runs.py": (),
+}
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:
-    parser.addoption("--slow", action="store_true", help="run long studies, too")
-    parser.addoption("--full", action="store_true", help="run benchmarks at their full size")
+    parser.addoption("--slow", action="store_true", help="run the longest studies, too")
+    parser.addoption("--full", action="store_true", help="run benchmarks, at their full size")
 
 
+def pytest_configure(config: pytest.Config) -> None:
+    if "not medium" in config.getoption("markexpr"):
+        settings.load_profile("quick")
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Benchmarks hold on a machine that does nothing else, so they run by themselves: asked for, or named."""
+    return True if collection_path == BENCHMARKS and not _benchmarks(config) else None
+
+
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
-    if not config.getoption("--slow"):
-        for item in items:
-            if "slow" in item.keywords:
-                item.add_marker(pytest.mark.skip(reason="a long study; run with --slow"))
+    for item in items:
+        if _medium(item):
+            item.add_marker(pytest.mark.medium)
+        if "slow" in item.keywords and not config.getoption("--slow"):
+            item.add_marker(pytest.mark.skip(reason="one of the longest studies; run with --slow"))
 
 
-ROOT = Path(__file__).parent.parent
-BESIDE = ROOT.parent / "shared" / "data"
+def _medium(item: pytest.Item) -> bool:
+    """Whether a test is listed as medium, by its own name or with its whole file."""
+    file = item.path.relative_to(HERE).as_posix() if item.path.is_relative_to(HERE) else ""
+    names = MEDIUM.get(file)
+    return names is not None and (not names or bool({item.name, item.name.partition("[")[0]} & set(names)))
+
+
+def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter, config: pytest.Config) -> None:
+    """One line for every test, or file of tests, that was not run, with the reason."""
+    skipped = defaultdict(list)
+    for report in terminalreporter.stats.get("skipped", ()):
+        file, _, name = report.nodeid.partition("::")
+        reason = report.longrepr[2] if isinstance(report.longrepr, tuple) else str(report.longrepr)
+        skipped[file, reason.removeprefix("Skipped: ")].append(name.partition("[")[0].removeprefix("test_"))
+    for (file, reason), names in skipped.items():
+        many = list(dict.fromkeys(name.replace("_", " ") for name in names if name))
+        what = "all of it" if not many else many[0] if len(many) == 1 else f"{len(names)} tests, {many[0]!r} the first"
+        terminalreporter.write_line(f"not checked: {file}: {what} ({reason})")
+    left_out = [mark for mark in ("medium", "slow") if f"not {mark}" in config.getoption("markexpr")]
+    if left_out:
+        terminalreporter.write_line(f"not checked: tests marked {' or '.join(left_out)} (`make test` runs them)")
+    if not _benchmarks(config) and HERE.is_relative_to(config.rootpath):
+        terminalreporter.write_line("not checked: how fast it is (`make bench` does)")
+
+
+def _benchmarks(config: pytest.Config) -> bool:
+    named = any(Path(argument.partition("::")[0]).resolve().is_relative_to(BENCHMARKS) for argument in config.args)
+    return named or bool(config.getoption("--full"))
 
 
 @pytest.fixture(scope="session")
@@ -35,3 +125,40 @@ def data() -> Path:
     if not folder.is_dir():
         pytest.skip(f"real recordings are not at {folder}; set DAVINCI_FORCES_DATA to their folder")
     return folder
+
+
+@pytest.fixture(scope="session")
+def analysed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A small study that every stage has run on; it is made once a run of the tests, and not to be changed."""
+
+    def make(home: Path) -> None:
+        from pipeline.cli import app
+        from tests.arm import write_study
+
+        done = CliRunner().invoke(app, ["all", str(write_study(home / "raw" / "arm"))])
+        assert done.exit_code == 0, done.output
+
+    return once(tmp_path_factory, "analysed", make) / "raw" / "arm"
+
+
+def once(factory: pytest.TempPathFactory, name: str, make: Callable[[Path], None]) -> Path:
+    """A folder that one of the processes that run the tests fills, and that the others wait for."""
+    base = factory.getbasetemp()
+    home = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / name
+    done, failed = home.with_suffix(".done"), home.with_suffix(".failed")
+    try:
+        os.close(os.open(home.with_suffix(".begun"), os.O_CREAT | os.O_EXCL))
+    except FileExistsError:
+        until = time.monotonic() + 600
+        while not done.exists():
+            if failed.exists() or time.monotonic() > until:
+                pytest.fail(f"{name} was not made by the process that began to; its own error says why")
+            time.sleep(0.1)
+        return home
+    try:
+        make(home)
+    except BaseException:
+        failed.touch()
+        raise
+    done.touch()
+    return home

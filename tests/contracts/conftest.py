@@ -51,10 +51,12 @@ def robot() -> Robot:
 def lab(tmp_path_factory) -> Lab:
     folder = arm.write_study(tmp_path_factory.mktemp("contracts") / "raw" / "arm")
     study = replace(reading.read(folder), robot=robot(), truth=TRUTH)
-    runner = Runner(study, folders(folder, None, None), Console(lambda line: None, lambda line: None))
+    said: list[str] = []
+    runner = Runner(study, folders(folder, None, None), Console(lambda line: None, said.append))
     with pytest.MonkeyPatch.context() as shorter:
         shorten(shorter)
-        assert runner.run(name for name in STAGES if name != "report")
+        good = runner.run(name for name in STAGES if name != "report")
+    assert good, "\n".join(said)
     return Lab(study, runner.folders, Plan(study, Ledger(runner.folders)))
 
 

@@ -17,36 +17,21 @@ class Dimension:
 
     powers: Powers = (0, 0, 0)
 
-    def __mul__(self, other):
-        kg, m, s = (a + b for a, b in zip(self.powers, pure(other).powers, strict=True))
+    def __mul__(self, other: "Dimension"):
+        kg, m, s = (a + b for a, b in zip(self.powers, other.powers, strict=True))
         return Dimension((kg, m, s))
 
-    def __truediv__(self, other):
-        return self * pure(other) ** -1
+    def __truediv__(self, other: "Dimension"):
+        return self * other**-1
 
     def __pow__(self, n: int):
         kg, m, s = (n * a for a in self.powers)
         return Dimension((kg, m, s))
 
-    def __add__(self, other):
-        if self != pure(other):
+    def __add__(self, other: "Dimension"):
+        if self != other:
             raise TypeError(f"{self} and {other} do not add up")
         return self
-
-    def __rtruediv__(self, other):
-        return pure(other) / self
-
-    def __neg__(self):
-        return self
-
-    __abs__ = __neg__
-    __rmul__ = __mul__
-    __radd__ = __sub__ = __rsub__ = __add__
-
-
-def pure(value) -> Dimension:
-    """The dimension of what may be a bare number."""
-    return value if isinstance(value, Dimension) else Dimension()
 
 
 def of_unit(text: str) -> Dimension:

@@ -1,4 +1,4 @@
-"""Every filter, on a joint that is linear: there it has to be the batch solution, and as good as it says.
+"""Every filter, on a joint that is linear in its state: there it is the batch solution, and as good as it says.
 
 The model is that of (7.11)-(7.16): q and dq are measured, forward Euler steps them, and the external effort walks.
 """
@@ -14,6 +14,7 @@ from scipy.stats import chi2
 
 from pipeline.filters import FILTERS
 from pipeline.filters.problem import Filter, NoiseModel
+from pipeline.maths.models.model import JointDynamics
 from pipeline.maths.models.terms import inertia, offset, stiffness, viscous
 from tests import arm
 
@@ -28,11 +29,18 @@ FILTER = pytest.mark.parametrize(
 )
 
 
-def transition() -> tuple[np.ndarray, np.ndarray]:
-    """x[k+1] = F x[k] + B [tau[k], 1] of the state x = [q, dq, tau_ext]."""
-    M, v, c, f = THETA
+def swaying(N: int) -> JointDynamics:
+    """A joint whose inertia others change as they move, and whose motor holds a known effort of theirs."""
+    joint = arm.dynamics(TERMS, THETA, N)
+    t = T_S * np.arange(N)
+    return joint._replace(inertia=joint.inertia * (1 + 0.4 * np.sin(2 * t)), known=0.8 * np.cos(5 * t))
+
+
+def transition(joint: JointDynamics, k: int, tau: float) -> tuple[np.ndarray, np.ndarray]:
+    """F and u of x[k+1] = F x[k] + u, with the state x = [q, dq, tau_ext]."""
+    M, (_, v, c, f) = joint.inertia[k], THETA
     F = np.array([[1, T_S, 0], [-T_S * c / M, 1 - T_S * v / M, -T_S / M], [0, 0, 1]])
-    return F, np.array([[0, 0], [T_S / M, -T_S * f / M], [0, 0]])
+    return F, np.array([0, T_S * (tau - joint.known[k] - f) / M, 0])
 
 
 def simulate(N: int, noise: NoiseModel, seed: int, walks=True) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -40,13 +48,14 @@ def simulate(N: int, noise: NoiseModel, seed: int, walks=True) -> tuple[np.ndarr
 
     The external effort starts as uncertain as the filter is told, unless it does not walk: it is then 0.7.
     """
-    random, (F, B) = np.random.default_rng(seed), transition()
+    random, joint = np.random.default_rng(seed), swaying(N)
     tau = np.sin(3 * T_S * np.arange(N))
     x = np.empty((N, 3))
     x[0] = 0.1, -0.2, FIRST_STD * random.normal() if walks else 0.7
     w = random.normal(size=(N, 3)) * (noise.q_q, noise.q_dq, noise.q_tau if walks else 0.0)
     for k in range(N - 1):
-        x[k + 1] = F @ x[k] + B @ (tau[k], 1.0) + w[k]
+        F, u = transition(joint, k, tau[k])
+        x[k + 1] = F @ x[k] + u + w[k]
     return x, (x[:, :2] + random.normal(size=(N, 2)) * (noise.r_q, noise.r_dq)).T, tau
 
 
@@ -55,7 +64,7 @@ def batch(y: np.ndarray, tau: np.ndarray, noise: NoiseModel) -> tuple[np.ndarray
 
     Nothing is known of the first position and velocity.
     """
-    N, (F, B) = y.shape[1], transition()
+    N, joint = y.shape[1], swaying(y.shape[1])
     A, b = np.zeros((1 + 2 * N + 3 * (N - 1), 3 * N)), np.zeros(1 + 2 * N + 3 * (N - 1))
     A[0, 2] = 1 / FIRST_STD
     weights, steps = 1 / np.array(noise[:2]), 1 / np.array(noise[2:])
@@ -63,9 +72,9 @@ def batch(y: np.ndarray, tau: np.ndarray, noise: NoiseModel) -> tuple[np.ndarray
         rows = slice(1 + 2 * k, 3 + 2 * k)
         A[rows, 3 * k : 3 * k + 2], b[rows] = np.diag(weights), weights * y[:, k]
     for k in range(N - 1):
-        rows = slice(1 + 2 * N + 3 * k, 4 + 2 * N + 3 * k)
+        rows, (F, u) = slice(1 + 2 * N + 3 * k, 4 + 2 * N + 3 * k), transition(joint, k, tau[k])
         A[rows, 3 * k : 3 * k + 6] = steps[:, None] * np.hstack([-F, np.eye(3)])
-        b[rows] = steps * (B @ (tau[k], 1.0))
+        b[rows] = steps * u
     scale = np.linalg.norm(A, axis=0)
     Q, R = np.linalg.qr(A / scale)
     root = np.linalg.inv(R)[-3:]
@@ -79,7 +88,7 @@ def test_the_last_state_is_the_batch_least_squares_estimate(track: Filter, N: in
     # the measurement's 1e-12 and 1e-10.
     noise = NoiseModel(r_q=1e-6, r_dq=1e-5, q_q=1e-7, q_dq=1e-6, q_tau=0.05)
     _, y, tau = simulate(N, noise, seed=N)
-    made = track(arm.dynamics(TERMS, THETA, len(tau)), *y, tau, T_S, noise, FIRST_STD)
+    made = track(swaying(len(tau)), *y, tau, T_S, noise, FIRST_STD)
     state, covariance = batch(y, tau, noise)
     assert_allclose([made.q[-1], made.dq[-1]], state[:2], rtol=0, atol=1e-9)
     assert_allclose(made.tau_ext[-1], state[2], rtol=0, atol=1e-8 * FIRST_STD)
@@ -90,7 +99,7 @@ def test_the_last_state_is_the_batch_least_squares_estimate(track: Filter, N: in
 def test_innovations_are_as_large_as_stated(track: Filter):
     N, settled = 20_000, 10
     _, y, tau = simulate(N, NOISE, seed=0)
-    nis = track(arm.dynamics(TERMS, THETA, len(tau)), *y, tau, T_S, NOISE, FIRST_STD).nis[settled:]
+    nis = track(swaying(len(tau)), *y, tau, T_S, NOISE, FIRST_STD).nis[settled:]
     low, high = chi2.interval(0.9999, 2 * len(nis))  # two measurements a sample, independent of those before
     assert low < nis.sum() < high
 
@@ -100,7 +109,7 @@ def test_errors_of_the_external_effort_are_as_large_as_stated(track: Filter):
     scores = []
     for seed in range(SEEDS):
         x, y, tau = simulate(150, NOISE, seed)
-        made = track(arm.dynamics(TERMS, THETA, len(tau)), *y, tau, T_S, NOISE, FIRST_STD)
+        made = track(swaying(len(tau)), *y, tau, T_S, NOISE, FIRST_STD)
         scores.append((made.tau_ext[-1] - x[-1, 2]) / made.tau_ext_std[-1])
     # The standard error of a mean is 1/sqrt(n), that of a deviation 1/sqrt(2 n); four of each are let.
     assert np.mean(scores) == pytest.approx(0.0, abs=4 / np.sqrt(SEEDS))
@@ -111,7 +120,7 @@ def test_errors_of_the_external_effort_are_as_large_as_stated(track: Filter):
 def test_a_constant_effort_that_no_sensor_measures_is_found_within_its_stated_deviation(track: Filter):
     steady = NOISE._replace(q_tau=1e-6)
     x, y, tau = simulate(3000, steady, seed=1, walks=False)
-    made = track(arm.dynamics(TERMS, THETA, len(tau)), *y, tau, T_S, steady, FIRST_STD)
+    made = track(swaying(len(tau)), *y, tau, T_S, steady, FIRST_STD)
     assert made.tau_ext_std[-1] < 0.02 * x[-1, 2]
     assert abs(made.tau_ext[-1] - x[-1, 2]) < 4 * made.tau_ext_std[-1]
 

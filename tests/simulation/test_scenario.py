@@ -65,7 +65,7 @@ def test_every_shipped_scenario_is_sound(name):
     [
         ("seed = 1", "sead = 1", ["seed is missing", "unknown key 'sead'"]),
         ("seed = 1", "seed = 1.5", ["seed must be a whole number, not 1.5"]),
-        ('robot = "davinci"', 'robot = "raven"', ["robot must be one of davinci, dvrk_psm, not 'raven'"]),
+        ('robot = "davinci"', 'robot = "raven"', [f"robot must be one of {', '.join(robots.ROBOTS)}, not 'raven'"]),
         ("rate = 100.0", "rate = 0", ["rate must be finite and greater than 0, not 0"]),
         ("rate = 100.0", "rate = nan", ["rate must be finite and greater than 0, not nan"]),
         ("rate = 100.0", "rate = 1e9", ["log roll: 1e+10 samples cannot be recorded"]),

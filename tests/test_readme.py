@@ -1,0 +1,245 @@
+"""What the README tells of names, keys and defaults is what the code has."""
+
+import json
+import re
+import shutil
+import tomllib
+from dataclasses import asdict, fields
+from pathlib import Path
+
+import numpy as np
+import pytest
+import typer
+from typer.testing import CliRunner
+
+import pipeline
+from pipeline import commands, stages
+from pipeline.cli import app
+from pipeline.records import COLUMN_DTYPES, KINDS, Control, Excitation, Links, Lyapunov, Origin, Record
+from pipeline.records.catalogue import Catalogue
+from pipeline.report.results import collect
+from pipeline.robots.from_toml import CHANGEABLE
+from pipeline.runner.signature import declaration
+from pipeline.study import LogEntry, Settings, Weight, reading
+from pipeline.study.channels import OF_A_JOINT, OF_THE_LOG
+from pipeline.study.reading import ROLES
+from pipeline.units import SI, UNITS
+from tests.conftest import ROOT
+
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+SPAN = re.compile(r"`([^`]+)`")
+
+
+def rows(*header: str) -> list[list[str]]:
+    """The cells of the rows of the one table whose header begins with these words."""
+    lines = README.splitlines()
+    [start] = [i for i, line in enumerate(lines) if line.startswith("| " + " | ".join(header) + " |")]
+    table = []
+    for line in lines[start + 2 :]:
+        if not line.startswith("|"):
+            break
+        table.append([cell.strip() for cell in line.strip("|").split("|")])
+    return table
+
+
+def spans(cell: str) -> list[str]:
+    return SPAN.findall(cell)
+
+
+def named(table: list[list[str]]) -> list[str]:
+    """What stands in code in the first column."""
+    return [span for row in table for span in spans(row[0])]
+
+
+def makers(kind: type) -> list[str]:
+    return [name for name in stages.STAGES if kind in declaration(name).makes]
+
+
+def test_records_are_those_that_there_are_with_their_folders_and_stages():
+    table = rows("record", "folder", "made by")
+    assert named(table) == list(KINDS)
+    for [name], [folder], made_by in ((spans(row[0]), spans(row[1]), row[2]) for row in table):
+        made = makers(KINDS[name])
+        assert folder == KINDS[name].folder(), name
+        assert made_by == (f"`{made[0]}`" if len(made) == 1 else "any stage"), name
+
+
+def test_settings_are_those_that_there_are_with_their_defaults():
+    table = rows("setting", "default")
+    defaults = {spans(name)[0]: tomllib.loads(f"x = {default}")["x"] for name, default, *_ in table}
+    assert list(defaults.items()) == list(asdict(Settings()).items())
+    assert [type(value) for value in defaults.values()] == [type(f.default) for f in fields(Settings)]
+
+
+def test_roles_are_those_that_there_are():
+    listed = [role.strip() for row in rows("role") for role in row[0].split(",")]
+    assert sorted(listed) == sorted(ROLES)
+    comment = re.search(r"^role = .*# (.*)$", README, re.M)[1]
+    assert re.split(r", | or ", comment) == list(ROLES)
+
+
+def test_channels_are_those_that_there_are_with_the_units_taken():
+    joint, log = rows("channel of a joint"), rows("channel of the log")
+    assert sorted(named(joint)) == sorted(OF_A_JOINT)
+    assert sorted(named(log)) == sorted(OF_THE_LOG)
+    for row in joint:
+        last = OF_A_JOINT[spans(row[0])[-1]]
+        kinds = {last.format(position=p, effort=e) for p, e in (("angle", "torque"), ("length", "force"))}
+        assert all(SI[kind] in re.split(r", | or ", row[2]) for kind in kinds), row
+    for row in log:
+        units = [SI[OF_THE_LOG[name]] or "-" for name in spans(row[0])]
+        assert row[2] in (", ".join(units), units[0])
+
+
+def test_units_are_those_that_there_are():
+    told = re.search(r"Units: (.*?), and rates", README, re.S)[1]
+    names = set(re.findall(r"m?N m\b|[^\s,]+", told.replace("N mN", "N, mN")))
+    assert names == {unit for unit in UNITS if "/" not in unit}
+
+
+def test_keys_of_a_study_and_its_logs_are_all_told():
+    code = README.partition("```toml")[2].partition("```")[0]
+    said = re.sub(r"```.*?```", "", README.partition("## In Python")[0], flags=re.S)
+    told = set(re.findall(r"\b(\w+) = ", code + " ".join(spans(said))))
+    told |= set(re.findall(r"\[+(?:log\.)?(\w+)", code)) | {span for span in spans(said) if span.isidentifier()}
+    assert {f.name for f in fields(LogEntry)} | {f.name for f in fields(Weight)} | {"file"} <= told
+    assert {"title", "robot", "simulated", "settings", "log", *CHANGEABLE} <= told
+    assert "[robot_overrides." in said
+
+
+def test_stages_commands_and_options_are_those_that_there_are():
+    assert named(rows("stage", "does")) == list(stages.STAGES)
+    assert named(rows("command", "does")) == list(commands.COMMANDS)
+    options = {o for p in typer.main.get_command(app).commands["fit"].params for o in p.opts if o.startswith("--")}
+    assert {option.split()[0] for option in named(rows("option", "does"))} == options - {"--help"}
+
+
+def test_targets_of_the_makefile_are_all_told():
+    makefile = (ROOT / "Makefile").read_text()
+    targets = set(re.findall(r"^([a-z]+):.*##", makefile, re.M))
+    listed = set(spans(README.partition("targets of the Makefile:")[2].partition("\n\n")[0]))
+    assert listed == targets
+    for target in named(rows("while you work")):
+        assert target.removeprefix("make ") in targets
+
+
+def test_what_is_to_be_written_has_a_place_and_is_listed_in_one():
+    package = ROOT / "pipeline"
+    for _, write, _, listed in rows("to add"):
+        assert (package / spans(write)[0]).parent.is_dir() or (package / spans(write.partition(" in ")[2])[0]).exists()
+        for file in (span for span in spans(listed) if span.endswith(".py")):
+            assert (package / file).is_file(), file
+
+
+def test_old_names_are_gone_and_new_ones_there():
+    names = {"stage": set(stages.STAGES), "record": set(KINDS)}
+    names["column"] = {column for kind in KINDS.values() for column in (*kind.columns(), *kind.scalars())}
+    names["folder in `processed/<study>/`"] = {kind.folder() for kind in KINDS.values()}
+    renamed = [row for row in rows("what", "0.1.0") if row[0] != "modules"]
+    assert renamed
+    for what, old, new in renamed:
+        assert spans(old)[0] not in names[what]
+        assert spans(new)[0] in names[what]
+
+
+def test_new_modules_are_there():
+    package = ROOT / "pipeline"
+    for _, _, new in (row for row in rows("what", "0.1.0") if row[0] == "modules"):
+        home = ""
+        for place in spans(new.partition(";")[0]):
+            home = place if not place.startswith(".") else f"{home.rpartition('.')[0]}{place}"
+            path = package / home.removesuffix(".*").replace(".", "/")
+            assert path.is_dir() or path.with_suffix(".py").is_file(), place
+
+
+def test_the_version_to_be_cited_is_the_package_s():
+    version = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["version"]
+    assert f"(version {version})" in README
+    assert f"version = {{{version}}}" in README
+
+
+WORD = {"source": r"(?:found|table-6\.1|table-6\.1-corrected)"}  # the words of keys that may hold a dot
+
+
+def patterns() -> dict[str, re.Pattern[str]]:
+    """Every key that the README tells, as a pattern; one that begins with a dot ends like the first of its row."""
+    found = {}
+    for cell, *_ in rows("key", "is"):
+        first, *others = spans(cell)
+        for key in (first, *(first.rpartition(".")[0] + other for other in others)):
+            found[key] = re.compile(re.sub(r"<(\w+)>", lambda m: WORD.get(m[1], "[^.]+"), key.replace(".", r"\.")))
+    return found
+
+
+def told(keys: set[str]) -> tuple[set[str], set[str]]:
+    """Keys that no pattern tells, and patterns that tell of none."""
+    known = patterns()
+    return (
+        {key for key in keys if not any(pattern.fullmatch(key) for pattern in known.values())},
+        {name for name, pattern in known.items() if not any(pattern.fullmatch(key) for key in keys)},
+    )
+
+
+def made(kind: type[Record], **about: str) -> Record:
+    """A record of a kind with whatever its fields may hold, as if it had been read."""
+    rows = 2
+    values = {str: "x", float: 1.0, int: 1, tuple[float, ...]: (1.0, 2.0, 3.0, 4.0, 5.0)}
+    values |= {column: np.ones(rows, dtype) for column, dtype in COLUMN_DTYPES.items()}
+    record = kind(**{f.name: about.get(f.name, values[f.type]) for f in fields(kind)})
+    object.__setattr__(record, "origin", Origin("x.parquet", "", {f.name: "" for f in fields(kind)}))
+    return record
+
+
+ROBOT = ("robot.", "control.", "excitation.")
+
+
+def test_keys_of_a_robot_are_told_and_those_told_are_there():
+    """Of records made by hand, as designing a robot takes half a minute."""
+    records = [made(Links), made(Control), made(Lyapunov), made(Excitation, source="table-6.1")]
+    keys = set(collect(Catalogue(lambda kind: [record for record in records if isinstance(record, kind)])))
+    assert {key.partition(".")[0] + "." for key in keys} == set(ROBOT)
+    untold, empty = told(keys)
+    assert not untold
+    assert not {name for name in empty if name.startswith(ROBOT)}
+
+
+@pytest.mark.medium
+def test_keys_of_a_study_are_told_and_those_told_are_there(analysed, tmp_path):
+    """The study is one that is simulated, so that it has a truth."""
+    home = tmp_path / "lab"
+    shutil.copytree(analysed.parent.parent, home)
+    (home / "raw" / "arm" / "truth.toml").write_text("simulated = true\n[theta.hand_roll]\ninertia = 0.45\n")
+    assert CliRunner().invoke(app, ["report", str(home / "raw" / "arm")]).exit_code == 0
+    keys = {result["key"] for result in json.loads((home / "reports" / "arm" / "results.json").read_text())}
+    assert "truth.hand_roll.inertia" in keys
+    untold, empty = told(keys)
+    assert not untold
+    assert not {name for name in empty if not name.startswith(ROBOT)}
+
+
+@pytest.mark.medium
+def test_the_lines_of_python_run_as_they_are_written(analysed, tmp_path, capsys):
+    shutil.copytree(analysed.parent.parent, tmp_path / "lab")
+    code = README.partition("```python\n")[2].partition("```")[0]
+    exec(code.replace("raw/davinci-demo", str(tmp_path / "lab" / "raw" / "arm")), {})
+    printed = capsys.readouterr().out
+    assert "nothing to do, every stage is current" in printed
+    assert "\nN m\n" in printed
+    assert "kg m^2" in printed
+
+
+def test_the_study_file_of_the_readme_is_one(tmp_path):
+    (tmp_path / "study.toml").write_text(README.partition("```toml\n")[2].partition("```")[0])
+    study = reading.read(tmp_path)
+    assert study.settings == Settings()
+    assert study.logs[0].joints == ("hand_roll",)
+
+
+def test_what_python_is_offered_is_what_the_readme_shows():
+    code = README.partition("```python\n")[2].partition("```")[0]
+    assert {f"pipeline.{name}(" for name in pipeline.__all__} <= set(re.findall(r"pipeline\.\w+\(", code))
+
+
+def test_the_readme_leads_to_files_that_are_there():
+    for file in re.findall(r"`((?:pipeline|tests|raw/d)[\w./-]*\.(?:py|md|toml))`", README):
+        assert Path(ROOT / file).is_file(), file

@@ -1,0 +1,77 @@
+"""The package as others install it: from a wheel, in an environment and a folder that know nothing of the checkout."""
+
+import os
+import shutil
+import subprocess
+import sys
+import sysconfig
+import venv
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import ROOT
+
+Run = Callable[..., str]
+
+
+def run(*command: object, cwd: Path) -> str:
+    environment = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    done = subprocess.run([str(word) for word in command], cwd=cwd, env=environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stdout
+
+
+@pytest.fixture(scope="module")
+def wheel(tmp_path_factory) -> Path:
+    """Built from a copy, so that the checkout stays as it is."""
+    source, out = tmp_path_factory.mktemp("source"), tmp_path_factory.mktemp("wheel")
+    skip = shutil.ignore_patterns("__pycache__")
+    shutil.copytree(ROOT / "pipeline", source / "pipeline", ignore=skip)
+    for name in ("pyproject.toml", "README.md", "LICENSE"):
+        shutil.copy(ROOT / name, source)
+    options = ("--no-deps", "--no-build-isolation", "--no-index", "--disable-pip-version-check", "-q")
+    run(sys.executable, "-m", "pip", "wheel", *options, "-w", out, source, cwd=out)
+    [file] = out.glob("*.whl")
+    return file
+
+
+@pytest.fixture(scope="module")
+def installed(wheel, tmp_path_factory) -> Path:
+    """The folder of an environment's programs; what the package needs is lent by the environment of the tests."""
+    home = tmp_path_factory.mktemp("fresh") / "venv"
+    venv.create(home, with_pip=False, symlinks=os.name != "nt")
+    paths = sysconfig.get_paths("venv", vars={"base": str(home), "platbase": str(home)})
+    python = Path(paths["scripts"]) / Path(sys.executable).name
+    options = ("--no-deps", "--no-index", "--disable-pip-version-check", "-q")
+    run(sys.executable, "-m", "pip", "--python", python, "install", *options, wheel, cwd=home)
+    (Path(paths["purelib"]) / "lent.pth").write_text(sysconfig.get_paths()["purelib"] + "\n")
+    return Path(paths["scripts"])
+
+
+@pytest.mark.medium
+def test_the_wheel_holds_every_file_of_the_package(wheel):
+    package = ROOT / "pipeline"
+    files = (file for file in package.rglob("*") if file.is_file() and "__pycache__" not in file.parts)
+    wanted = {file.relative_to(ROOT).as_posix() for file in files if file.suffix != ".md"}
+    with zipfile.ZipFile(wheel) as archive:
+        held = {name for name in archive.namelist() if name.startswith("pipeline/")}
+    assert held == wanted
+    assert {"pipeline/py.typed", "pipeline/simulation/shipped/davinci-joints.toml"} <= held
+    assert {Path(name).suffix for name in held} == {".py", ".toml", ".html", ".typ", ".css", ".typed"}
+
+
+@pytest.mark.slow
+def test_an_installed_package_simulates_and_analyses_in_an_empty_folder(installed, tmp_path):
+    program = installed / "davinci-forces"
+    python = next(installed.glob("python*"))
+    place = run(python, "-c", "import pipeline; print(pipeline.__file__)", cwd=tmp_path).strip()
+    assert Path(place).is_relative_to(installed.parent)
+    run(program, "simulate", "davinci-joints", "raw/joints", cwd=tmp_path)
+    run(program, "all", "--jobs", os.cpu_count() or 1, cwd=tmp_path)
+    assert {file.name for file in (tmp_path / "reports" / "joints").iterdir()} == {
+        "report.html", "report.pdf", "results.json"
+    }  # fmt: skip
+    assert "are unchanged" in run(program, "verify", "raw/joints", cwd=tmp_path)
