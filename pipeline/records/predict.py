@@ -21,6 +21,10 @@ class Prediction(Record):
     rmse: float
     nrmse: float
     r2: float
+    r2_ceiling: float
+    model_error: float
+    model_error_std: float
+    effort_rms: float
     relative_error: float
     t: Column
     tau: Column
@@ -33,4 +37,5 @@ class Prediction(Record):
 
     def published(self) -> Iterator[Published]:
         """The scores."""
-        yield from self.publish(self.prefix, "rmse", "nrmse", "r2", "relative_error")
+        yield from self.publish(self.prefix, "rmse", "nrmse", "r2", "r2_ceiling", "effort_rms", "relative_error")
+        yield Published(f"{self.prefix}.model_error", "model_error", std="model_error_std")

@@ -98,6 +98,10 @@ QUANTITIES = {
     "rmse": Quantity("root mean squared error of the predicted effort", "{effort}"),
     "nrmse": Quantity("root mean squared error over the range of the effort"),
     "r2": Quantity("share of the effort's variance explained, R2"),
+    "r2_ceiling": Quantity("R2 that a model without error would reach, given the noise of the effort"),
+    "model_error": Quantity("root mean square of the model's error, without noise, after the low-pass", "{effort}"),
+    "model_error_std": Quantity("standard error of the model's error", "{effort}"),
+    "effort_rms": Quantity("root mean square of the effort after the low-pass", "{effort}"),
     "relative_error": Quantity("norm of the error over the norm of the effort, both low-passed alike"),
     # filtering
     "tau_ext": Quantity("external effort: what the robot exerts on the environment", "{effort}"),

@@ -11,8 +11,8 @@ from pipeline.estimators.regression import measured_motion, pose, predicted
 from pipeline.maths.arrays import Booleans
 from pipeline.maths.models.model import Model, Motion
 from pipeline.maths.signals import averaging, harmonics
-from pipeline.maths.signals.smoothing import lowpass as low_passed
-from pipeline.maths.signals.smoothing import segments
+from pipeline.maths.signals.noise import model_error, noise_std, smoothed
+from pipeline.maths.signals.smoothing import share_passed
 from pipeline.maths.signals.windows import outside
 from pipeline.records import Column, Diagnostic, Fit, Prediction, Signal, Trajectory, diagnostic
 from pipeline.robots.models import independent
@@ -134,10 +134,11 @@ def scored(
     tau, error = signal.tau[free], (signal.tau - tau_hat)[free]
     spread = tau - tau.mean()
     smooth, smooth_error = (
-        np.concatenate([low_passed(x[part], signal.rate, lowpass) for part in segments(signal.segment)])[free]
-        for x in (signal.tau, signal.tau - tau_hat)
+        smoothed(x, signal.segment, signal.rate, lowpass)[free] for x in (signal.tau, signal.tau - tau_hat)
     )
     rmse = float(np.sqrt(np.mean(error**2)))
+    noise = noise_std(signal.tau - tau_hat, signal.segment, signal.rate, lowpass)
+    beyond_noise, beyond_noise_std = model_error(smooth_error, noise * np.sqrt(share_passed(signal.rate, lowpass)))
     return Prediction(
         log=signal.log,
         joint=signal.joint,
@@ -148,6 +149,10 @@ def scored(
         rmse=rmse,
         nrmse=rmse / float(np.ptp(tau) or 1.0),
         r2=float(1 - error @ error / ((spread @ spread) or 1.0)),
+        r2_ceiling=1.0 - noise**2 / (float(tau.var()) or 1.0),
+        model_error=beyond_noise,
+        model_error_std=beyond_noise_std,
+        effort_rms=float(np.sqrt(np.mean(smooth**2))),
         relative_error=float(np.linalg.norm(smooth_error) / (np.linalg.norm(smooth) or 1.0)),
         t=signal.t,
         tau=signal.tau,
