@@ -1,13 +1,37 @@
-"""A simulated arm for tests: recordings of known parameters, as records and as files."""
+"""A small arm of the tests' own: its robot, and recordings of known parameters, as records and as files."""
 
+import json
 from pathlib import Path
 
 import numpy as np
-from pipeline.maths.models.dynamics import inverse
 
+from pipeline.maths.models.independent import combined, inertia_of, regressor
+from pipeline.maths.models.model import JointDynamics
+from pipeline.maths.models.terms import coulomb, gravity_cos, gravity_sin, inertia, lifted_mass, viscous
 from pipeline.records import Signal
-from pipeline.robots import davinci
-from pipeline.robots.robot import Joint
+from pipeline.robots.robot import Joint, Kind, Limits, Robot
+
+HAND = Limits(q=(-0.6, 0.6), dq=(-1.2, 1.2), ddq=(-1.2, 1.2))
+SLIDE = Limits(q=(-0.07, 0.11), dq=(-2.0, 2.0), ddq=(-3.0, 3.0))
+MOTOR = {"gear_ratio": 100.0, "torque_constant": 0.05}
+
+ARM = Robot(
+    name="arm",
+    title="Arm of the tests",
+    joints=(
+        Joint(
+            "hand_roll", "Hand roll", Kind.REVOLUTE, (inertia, gravity_sin, viscous, coulomb), HAND, **MOTOR, q_tau=0.5
+        ),
+        Joint(
+            "hand_pitch", "Hand pitch", Kind.REVOLUTE, (inertia, gravity_sin, gravity_cos, viscous, coulomb), HAND,
+            **MOTOR, q_tau=0.5,
+        ),
+        Joint(
+            "instrument_slide", "Instrument slide", Kind.PRISMATIC, (lifted_mass, inertia, viscous, coulomb), SLIDE,
+            gear_ratio=1000.0, torque_constant=0.05, q_tau=3.0,
+        ),
+    ),
+)  # fmt: skip
 
 THETA = {  # the LSE columns of Tables 6.4-6.6; the slide's inertia inside its physical bounds
     "hand_roll": np.array([0.4528, 0.0103, 0.3706, 0.21968]),
@@ -23,7 +47,7 @@ NOISE = {"hand_roll": 0.140, "hand_pitch": 0.214, "instrument_slide": 1.345}  # 
 
 
 def joint(name: str) -> Joint:
-    return davinci.ROBOT.joint(name)
+    return ARM.joint(name)
 
 
 def excitation(name: str, t, period=None):
@@ -34,6 +58,11 @@ def excitation(name: str, t, period=None):
     q = a0 + (a1 * s1 - b1 * c1) / w + (a2 * s2 - b2 * c2) / (2 * w)
     dq = a1 * c1 + b1 * s1 + a2 * c2 + b2 * s2
     return q, dq, w * (b1 * c1 - a1 * s1) + 2 * w * (b2 * c2 - a2 * s2)
+
+
+def dynamics(terms, theta, N) -> JointDynamics:
+    """What a filter is told of a joint of these terms."""
+    return JointDynamics(np.full(N, inertia_of(terms, theta)), combined(terms, theta), np.zeros(N))
 
 
 def signal(
@@ -52,7 +81,7 @@ def signal(
     t = np.arange(round(periods * T * rate)) / rate
     q, dq, ddq = excitation(name, t, T)
     rng = np.random.default_rng(seed)
-    tau = inverse(joint(name).terms, THETA[name], q, dq, ddq) + noise * NOISE[name] * rng.normal(size=len(t))
+    tau = regressor(joint(name).terms, q, dq, ddq) @ THETA[name] + noise * NOISE[name] * rng.normal(size=len(t))
     if external is not None:
         tau = tau + external(t)
     q = q + noise * 1e-4 * rng.normal(size=len(t))
@@ -80,10 +109,24 @@ def log_table(name: str, file: str, role: str, joints, more="") -> str:
     return f'{entry}[log.channels]\ntime = "time"\n{channels}\n'
 
 
+def write_robot(folder: Path) -> None:
+    """The arm as a laboratory would describe it: arm.toml, beside a study."""
+    tables = [f'name = "{ARM.name}"\ntitle = "{ARM.title}"\n']
+    for j in ARM.joints:
+        limits = ", ".join(f"{name} = {list(getattr(j.limits, name))}" for name in ("q", "dq", "ddq"))
+        tables.append(
+            f'[[joint]]\nname = "{j.name}"\ntitle = "{j.title}"\nkind = "{j.kind.value}"\n'
+            f"terms = {json.dumps([term.name for term in j.terms])}\nlimits = {{ {limits} }}\n"
+            f"gear_ratio = {j.gear_ratio}\ntorque_constant = {j.torque_constant}\n"
+            f"harmonics = {j.harmonics}\nq_tau = {j.q_tau}\n"
+        )
+    (folder / "arm.toml").write_text("\n".join(tables))
+
+
 def write_study(folder: Path, seed=0, periods=5, rate=50.0) -> Path:
     """A small study of two joints: excitation, validation and contact of the roll, and the slide's excitation.
 
-    The robot is one without a geometry, which leaves out the optimisation of its excitation.
+    The robot has no geometry, which leaves its chain, its controllers and its excitation out of the design.
     """
     short = {"periods": periods, "rate": rate, "seed": seed}
     roll = signal("hand_roll", period=2.0, **short)
@@ -92,8 +135,9 @@ def write_study(folder: Path, seed=0, periods=5, rate=50.0) -> Path:
     write_csv(folder / "check.csv", [signal("hand_roll", period=2.6, **{**short, "seed": seed + 1})])
     push = signal("hand_roll", period=2.6, external=lambda t: np.where((t > 4) & (t < 6), 1.0, 0.0), **short)
     write_csv(folder / "push.csv", [push])
+    write_robot(folder)
     (folder / "study.toml").write_text(
-        'title = "A test"\nrobot = "dvrk_psm"\nsimulated = true\n'
+        'title = "A test"\nrobot = "arm.toml"\nsimulated = true\n'
         + log_table("roll", "roll.csv", "identification", ["hand_roll"], "period = 2.0")
         + log_table("slide", "slide.csv", "identification", ["instrument_slide"])
         + log_table("check", "check.csv", "validation", ["hand_roll"])

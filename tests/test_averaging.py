@@ -11,7 +11,6 @@ from numpy.testing import assert_allclose
 from pipeline.errors import NotPeriodic
 from pipeline.maths.signals import averaging, period
 from pipeline.records import Average, Diagnostic, PeriodResidual
-from pipeline.robots import davinci
 from pipeline.stages import average
 from pipeline.study import LogEntry
 from tests import arm
@@ -22,7 +21,7 @@ def entry(**changes) -> LogEntry:
 
 
 def run(signals, **changes):
-    made = list(average.run(signals, entry(**changes), davinci.ROBOT, harmonics=0))
+    made = list(average.run(signals, entry(**changes), arm.ARM, harmonics=0))
     return [r for r in made if isinstance(r, Average)], [r for r in made if isinstance(r, Diagnostic)]
 
 
@@ -156,7 +155,7 @@ def test_a_log_that_does_not_repeat_is_refused_by_name(signals, says):
 
 
 def test_what_averaging_removes_is_the_noise():
-    made = list(average.run([arm.signal(seed=3)], entry(), davinci.ROBOT, harmonics=0))
+    made = list(average.run([arm.signal(seed=3)], entry(), arm.ARM, harmonics=0))
     [noise] = [r for r in made if isinstance(r, PeriodResidual)]
     [mean] = [r for r in made if isinstance(r, Average)]
     assert mean.sigma_tau == pytest.approx(arm.NOISE["hand_roll"], rel=4 / np.sqrt(2 * 9000))

@@ -22,7 +22,8 @@ def lab(tmp_path):
 
 
 def describe(folder, more="", joints=("hand_roll",), role="identification"):
-    text = 'title = "T"\nrobot = "dvrk_psm"\n' + arm.log_table("good", "good.csv", "identification", ["hand_roll"])
+    arm.write_robot(folder)
+    text = 'title = "T"\nrobot = "arm.toml"\n' + arm.log_table("good", "good.csv", "identification", ["hand_roll"])
     (folder / "study.toml").write_text(text + arm.log_table("bad", "bad.csv", role, joints, more))
 
 

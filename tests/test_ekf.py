@@ -1,20 +1,17 @@
-"""The filter against what must hold of any Kalman filter, and against a batch solution."""
+"""The extended Kalman filter on joints with friction and gravity, its stage, and the tests of whiteness."""
 
 import re
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from pipeline.maths.models.dynamics import forward, inverse, mass, regressor, scalar_bias
 
 from pipeline.errors import PipelineError
 from pipeline.filters import ekf
 from pipeline.filters.problem import NoiseModel
-from pipeline.maths.models import terms
+from pipeline.maths.models.bias import bias
+from pipeline.maths.models.independent import combined, inertia_of
 from pipeline.records import Average, Diagnostic, Fit, Track, Whiteness
-from pipeline.robots import davinci, dvrk_psm
 from pipeline.stages import average, fit, whiteness
 from pipeline.stages import ekf as stage
 from tests import arm
@@ -22,18 +19,16 @@ from tests.test_averaging import entry
 from tests.test_estimation import trajectory
 
 T_S = 0.01
-CART = (terms.inertia, terms.viscous)
-THETA = np.array([0.5, 0.3])
 NOISE = NoiseModel(r_q=1e-3, r_dq=8e-3, q_q=1e-5, q_dq=1e-4, q_tau=0.05)
 
 
 def simulate(used, theta, tau_ext, tau, noise, seed=0, x=(0.1, -0.2)):
     """Measurements of the model as it is printed: forward Euler, with the noises that the filter assumes."""
     rng, (q, dq), rows = np.random.default_rng(seed), x, []
-    bias, M = scalar_bias(used, theta), mass(used, theta)
+    M, c = inertia_of(used, theta), combined(used, theta)
     for k in range(len(tau)):
         rows.append((q + noise.r_q * rng.normal(), dq + noise.r_dq * rng.normal()))
-        acceleration = (tau[k] - bias(q, dq)[0] - tau_ext[k]) / M
+        acceleration = (tau[k] - bias(c, q, dq, 0.0)[0] - tau_ext[k]) / M
         w_q, w_dq = rng.normal(size=2) * (noise.q_q, noise.q_dq)
         q, dq = q + T_S * dq + w_q, dq + T_S * acceleration + w_dq
     return np.array(rows).T
@@ -43,36 +38,6 @@ def walk(N, step, seed=1):
     return np.cumsum(step * np.random.default_rng(seed).normal(size=N))
 
 
-def test_a_linear_model_gives_the_batch_least_squares_estimate():
-    """The last posterior is the weighted least squares estimate on measurements, prior and process noise at once."""
-    N, M, v = 40, *THETA
-    tau = np.sin(np.arange(N) * T_S)
-    y = simulate(CART, THETA, walk(N, 0.05), tau, NOISE)
-    made = ekf.track(CART, THETA, *y, tau, T_S, NOISE, first_std=2.0)
-
-    F = np.array([[1, T_S, 0], [0, 1 - T_S * v / M, -T_S / M], [0, 0, 1]])
-    rows, right, size = [], [], 3 * N
-
-    def add(block, at, value, std):
-        row = np.zeros((len(block), size))
-        row[:, at : at + block.shape[1]] = block
-        rows.append(row / np.reshape(std, (-1, 1)))
-        right.append(np.asarray(value) / std)
-
-    add(np.eye(3), 0, np.zeros(3), np.sqrt([1 + 1e3 * NOISE.r_q**2, 1 + 1e3 * NOISE.r_dq**2, 4.0]))
-    for k in range(N):
-        add(np.eye(2, 3), 3 * k, y[:, k], np.array([NOISE.r_q, NOISE.r_dq]))
-        if k + 1 < N:
-            step = np.hstack([-F, np.eye(3)])
-            add(step, 3 * k, [0, T_S * tau[k] / M, 0], np.array([NOISE.q_q, NOISE.q_dq, NOISE.q_tau]))
-    A, b = np.vstack(rows), np.concatenate(right)
-    Q, R = np.linalg.qr(A)
-    batch = np.linalg.solve(R, Q.T @ b)[-3:]
-    root = np.linalg.inv(R)[-3:]
-    assert_allclose([made.q[-1], made.dq[-1], made.tau_ext[-1]], batch, rtol=1e-6)
-    assert made.tau_ext_std[-1] == pytest.approx(np.sqrt((root @ root.T)[2, 2]), rel=1e-6)
-
-
 @pytest.mark.parametrize("name", arm.THETA)
 def test_innovations_of_a_matched_model_are_white_and_as_large_as_stated(name):
     used, theta = arm.joint(name).terms, arm.THETA[name].copy()
@@ -80,9 +45,9 @@ def test_innovations_of_a_matched_model_are_white_and_as_large_as_stated(name):
     N = 6000
     t = np.arange(N) * T_S
     tau_ext = walk(N, NOISE.q_tau)
-    tau = tau_ext + 3 * mass(used, theta) * np.sin(2 * t) + scalar_bias(used, theta)(0.0, 0.0)[0]
+    tau = tau_ext + 3 * inertia_of(used, theta) * np.sin(2 * t) + combined(used, theta)[0]
     y = simulate(used, theta, tau_ext, tau, NOISE)
-    made = ekf.track(used, theta, *y, tau, T_S, NOISE, first_std=1.0)
+    made = ekf.track(arm.dynamics(used, theta, N), *y, tau, T_S, NOISE, first_std=1.0)
     kept = slice(200, None)
     assert made.nis[kept].mean() == pytest.approx(2.0, abs=4 * 2 / np.sqrt(N - 200))
     for x, r in ((made.innovation_q[kept], NOISE.r_q), (made.innovation_dq[kept], NOISE.r_dq)):
@@ -93,16 +58,6 @@ def test_innovations_of_a_matched_model_are_white_and_as_large_as_stated(name):
     assert errors.std() == pytest.approx(1.0, abs=0.2)
 
 
-def test_a_constant_force_that_no_sensor_measures_is_found():
-    N = 3000
-    tau = np.sin(np.arange(N) * T_S)
-    steady = NOISE._replace(q_tau=1e-6)
-    y = simulate(CART, THETA, np.full(N, 0.7), tau, steady)
-    made = ekf.track(CART, THETA, *y, tau, T_S, steady, first_std=2.0)
-    assert made.tau_ext_std[-1] < 0.02
-    assert abs(made.tau_ext[-1] - 0.7) < 4 * made.tau_ext_std[-1]
-
-
 def test_a_mass_hung_on_the_slide_gives_a_negative_effort():
     """(7.8) makes tau_ext what the robot exerts on the environment: it holds the mass up, against gravity."""
     used, theta = arm.joint("instrument_slide").terms, arm.THETA["instrument_slide"]
@@ -111,65 +66,27 @@ def test_a_mass_hung_on_the_slide_gives_a_negative_effort():
     drive = 4.5 * np.sin(3 * t)
     held = -theta[0] * 9.81 - weight  # gravity pulls the slide along +q
     y = simulate(used, theta, np.full(N, -weight), drive + held, NOISE)
-    made = ekf.track(used, theta, *y, drive + held, T_S, NOISE, first_std=5.0)
+    made = ekf.track(arm.dynamics(used, theta, N), *y, drive + held, T_S, NOISE, first_std=5.0)
     assert made.tau_ext[1000:].mean() == pytest.approx(-weight, abs=0.05)
 
 
-@given(st.integers(0, 2**32 - 1), st.floats(1e-4, 10), st.floats(1e-6, 1), st.floats(1e-6, 1))
-def test_variances_stay_positive_and_numbers_finite(seed, M, r_q, r_dq):
-    rng = np.random.default_rng(seed)
-    y, tau = rng.normal(size=(2, 200)), rng.normal(size=200)
-    made = ekf.track(CART, np.array([M, 0.1]), *y, tau, T_S, NoiseModel(r_q, r_dq, 0.0, 1e-6, 1e-3), 1.0)
-    assert (made.tau_ext_std > 0).all()
-    assert all(np.isfinite(column).all() for column in made)
-
-
-def test_compiled_and_plain_agree(monkeypatch):
+def test_the_loop_is_the_same_compiled_and_as_it_is_written():
     used, theta = arm.joint("hand_pitch").terms, arm.THETA["hand_pitch"]
     signal = arm.signal("hand_pitch", periods=2)
-    arguments = (used, theta, signal.q, signal.dq, signal.tau, T_S, NOISE, 1.0)
-    plain = ekf.track(*arguments)
-    monkeypatch.setattr(ekf, "COMPILE_FROM", 0)
-    for a, b in zip(plain, ekf.track(*arguments), strict=True):
+    told = arm.dynamics(used, theta, len(signal))
+    compiled = ekf.track(told, signal.q, signal.dq, signal.tau, T_S, NOISE, 1.0)
+    written = np.empty((7, len(signal)))
+    motion = (told.inertia, signal.q, signal.dq, signal.tau)
+    ekf._pass.py_func(told.coefficients, *motion, T_S, *NOISE, 1.0, ekf.FIRST, *written)
+    for a, b in zip(compiled, written, strict=True):
         assert_allclose(a, b, rtol=1e-12, atol=1e-12 * np.abs(a).max())
-
-
-JOINTS = [j for robot in (davinci.ROBOT, dvrk_psm.ROBOT) for j in robot.joints]
-angle = st.floats(-0.6, 0.6)
-speed = st.floats(0.01, 1.2) | st.floats(-1.2, -0.01)  # away from the jump at standstill
-
-
-@pytest.mark.parametrize("term", terms.TERMS.values(), ids=terms.TERMS)
-@given(q=angle, dq=speed)
-def test_derivatives_of_a_term_match_finite_differences(term, q, dq):
-    bias, h = scalar_bias((term,), np.ones(1)), 1e-6
-    _, b_q, b_dq = bias(q, dq)
-    assert b_q == pytest.approx((bias(q + h, dq)[0] - bias(q - h, dq)[0]) / (2 * h), rel=1e-4, abs=1e-6)
-    assert b_dq == pytest.approx((bias(q, dq + h)[0] - bias(q, dq - h)[0]) / (2 * h), rel=1e-4, abs=1e-6)
-
-
-@pytest.mark.parametrize("joint", JOINTS, ids=lambda j: j.name)
-@given(q=angle, dq=speed, ddq=st.floats(-3, 3), seed=st.integers(0, 2**32 - 1))
-def test_forward_dynamics_undo_inverse_dynamics(joint, q, dq, ddq, seed):
-    theta = np.random.default_rng(seed).uniform(0.05, 5.0, len(joint.terms))
-    x = (np.array([q]), np.array([dq]))
-    tau = inverse(joint.terms, theta, *x, np.array([ddq]))
-    assert_allclose(forward(joint.terms, theta, *x, tau), ddq, atol=1e-9)
-
-
-@pytest.mark.parametrize("joint", JOINTS, ids=lambda j: j.name)
-@given(q=angle, dq=st.floats(-1.2, 1.2), seed=st.integers(0, 2**32 - 1))
-def test_the_filter_and_the_regressor_are_of_one_model(joint, q, dq, seed):
-    theta = np.random.default_rng(seed).normal(size=len(joint.terms))
-    Phi = regressor(joint.terms, np.array([q]), np.array([dq]), np.zeros(1))
-    assert scalar_bias(joint.terms, theta)(q, dq)[0] == pytest.approx((Phi @ theta)[0], rel=1e-12, abs=1e-12)
 
 
 @pytest.fixture(scope="module")
 def identified():
     signal = arm.signal()
-    averages = [r for r in average.run([signal], entry(), davinci.ROBOT, harmonics=0) if isinstance(r, Average)]
-    fits = [r for r in fit.run([trajectory(signal)], davinci.ROBOT) if isinstance(r, Fit)]
+    averages = [r for r in average.run([signal], entry(), arm.ARM, harmonics=0) if isinstance(r, Average)]
+    fits = [r for r in fit.run([trajectory(signal)], arm.ARM) if isinstance(r, Fit)]
     return fits, averages
 
 

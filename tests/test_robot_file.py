@@ -9,7 +9,13 @@ from hypothesis import strategies as st
 from pipeline import robots
 from pipeline.errors import BadRobot
 from pipeline.robots.from_toml import _robot
+from tests import arm
 from tests.test_study import ANYTHING, ARM, places_of
+
+
+def test_a_robot_that_is_written_out_reads_back_as_it_was(tmp_path):
+    arm.write_robot(tmp_path)
+    assert robots.load("arm.toml", tmp_path) == arm.ARM
 
 
 @pytest.mark.parametrize(

@@ -33,7 +33,8 @@ def small(folder, logs=("one", "two")):
     for name in logs:
         arm.write_csv(folder / f"{name}.csv", [signal])
     tables = "".join(arm.log_table(name, f"{name}.csv", "identification", ["hand_roll"]) for name in logs)
-    (folder / "study.toml").write_text('robot = "dvrk_psm"\n' + tables)
+    arm.write_robot(folder)
+    (folder / "study.toml").write_text('robot = "arm.toml"\n' + tables)
     return folder
 
 

@@ -17,7 +17,7 @@ import pipeline
 from pipeline.cli import app
 from pipeline.errors import BadRequest, MissingRecord
 from pipeline.stages import STAGES
-from tests.arm import write_study
+from tests.arm import write_robot, write_study
 
 BEFORE_REPORT = STAGES[:-1]
 FIRST = '[[log]]\nname = "roll"'  # how the first log of the study begins
@@ -290,6 +290,7 @@ def test_all_takes_the_studies_of_raw_and_skips_those_without_logs(study, monkey
     monkeypatch.chdir(tmp_path)
     other = tmp_path / "raw" / "elsewhere"
     other.mkdir()
+    write_robot(other)
     (other / "study.toml").write_text((study / "study.toml").read_text())
     monkeypatch.setattr("pipeline.cli.STAGES", ("ingest",))
     said = call("all")

@@ -30,7 +30,7 @@ class Context:
     def used_fit(self, joint: str) -> str:
         """`<model>.<estimator>` of the fit that the filter ran with."""
         names = [f"{fit.model}.{fit.estimator}" for fit in self.catalogue.all(Fit) if fit.group == joint]
-        return self.study.settings.fit if self.study.settings.fit in names else names[0]
+        return self.study.settings.fit if self.study.settings.fit in names or not names else names[0]
 
 
 def most_telling(tracks: list[Track], most: int) -> list[Track]:

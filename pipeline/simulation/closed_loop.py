@@ -13,7 +13,7 @@ from pipeline.maths.models.reduced_joint import reduced_parameters
 from pipeline.maths.simulation.closed_loop import JointConstraints, Timing, simulate
 from pipeline.maths.simulation.plant import arm
 from pipeline.maths.simulation.surroundings import UP, Surroundings
-from pipeline.simulation.motion import Motion, SimulatedRun
+from pipeline.simulation.motion import SimulatedMotion, SimulatedRun
 from pipeline.simulation.scenario.scenario import BadScenario, Scenario, SimulatedArm, SimulatedLog
 
 EXACT = 1e-9  # size up to which a parameter that a model lacks counts as 0, in SI
@@ -51,7 +51,7 @@ def run(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
         )
     q, dq, tau, tau_ext, force = (values[skipped:] for values in simulated)
     motions = {
-        name: Motion(*(np.ascontiguousarray(values[:, i]) for values in (q, dq, tau, tau_ext)))
+        name: SimulatedMotion(*(np.ascontiguousarray(values[:, i]) for values in (q, dq, tau, tau_ext)))
         for i, name in enumerate(names)
     }
     return SimulatedRun(t[skipped:], {name: motions[name] for name in log.joints}, force)

@@ -6,7 +6,7 @@ from pipeline.maths.arrays import Array
 
 
 @dataclass(frozen=True)
-class Motion:
+class SimulatedMotion:
     """What truly happened at one joint, at the recorder's instants; every array is (N,)."""
 
     q: Array
@@ -20,5 +20,5 @@ class SimulatedRun:
     """What truly happened in one recording: its clock (N,) [s], its joints, and the tip where it is known."""
 
     t: Array
-    motions: dict[str, Motion]
+    motions: dict[str, SimulatedMotion]
     force: Array | None = None  # (N, 3) [N] of the tip on its surroundings, base frame

@@ -5,7 +5,7 @@ import numpy as np
 from pipeline.maths.arrays import Array
 from pipeline.maths.excitation.fourier import Fourier, motion
 from pipeline.maths.models.independent import regressor
-from pipeline.simulation.motion import Motion, SimulatedRun
+from pipeline.simulation.motion import SimulatedMotion, SimulatedRun
 from pipeline.simulation.scenario.scenario import Scenario, SimulatedLog
 
 
@@ -15,7 +15,7 @@ def simulate(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
     return SimulatedRun(t, {name: _joint(scenario, log, name, t) for name in log.joints})
 
 
-def _joint(scenario: Scenario, log: SimulatedLog, name: str, t: Array) -> Motion:
+def _joint(scenario: Scenario, log: SimulatedLog, name: str, t: Array) -> SimulatedMotion:
     simulated, move = scenario.joints[name], log.moves.get(name)
     if isinstance(move, Fourier):
         q, dq, ddq = motion(move, t)
@@ -23,4 +23,4 @@ def _joint(scenario: Scenario, log: SimulatedLog, name: str, t: Array) -> Motion
         q, dq, ddq = log.position(name, t), np.zeros_like(t), np.zeros_like(t)
     tau_ext = sum((push.at(t) for push in log.external.get(name, ())), np.zeros_like(t))
     tau = regressor(simulated.joint.terms, q, dq, ddq) @ np.array(simulated.theta) + tau_ext
-    return Motion(q, dq, tau, tau_ext)
+    return SimulatedMotion(q, dq, tau, tau_ext)

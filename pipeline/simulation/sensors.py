@@ -6,7 +6,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from pipeline.maths.arrays import Array
-from pipeline.simulation.motion import Motion
+from pipeline.simulation.motion import SimulatedMotion
 from pipeline.simulation.scenario.scenario import SensorNoise, SimulatedJoint
 
 
@@ -22,7 +22,7 @@ class SimulatedChannel:
 
 def record(
     simulated: SimulatedJoint,
-    motion: Motion,
+    motion: SimulatedMotion,
     noise: SensorNoise,
     rate: float,
     current_unit: str,

@@ -5,10 +5,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from pipeline.maths.models.dynamics import regressor
 
 from pipeline.maths.mechanics import kinematics
 from pipeline.maths.mechanics.rigid_body import gravity
+from pipeline.maths.models.independent import regressor
 from pipeline.maths.simulation.closed_loop import JointConstraints, Timing, simulate
 from pipeline.maths.simulation.control import Regulator
 from pipeline.maths.simulation.plant import arm

@@ -6,7 +6,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import typer
-from pipeline.maths.models.dynamics import regressor
 from scipy.signal import lfilter
 from typer.testing import CliRunner
 
@@ -14,6 +13,7 @@ from pipeline.commands import simulate
 from pipeline.errors import BadRequest
 from pipeline.logs import open_log
 from pipeline.maths.excitation.fourier import motion
+from pipeline.maths.models.independent import regressor
 from pipeline.simulation import study_folder
 from pipeline.simulation.scenario.reading import load
 from pipeline.simulation.scenario.scenario import SensorNoise

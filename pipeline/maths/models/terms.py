@@ -28,7 +28,7 @@ class Term:
     typst: str
     unit: str
     a: float = 0.0
-    b: Mapping[str, float] = field(default_factory=dict)
+    b: Mapping[str, float] = field(default_factory=dict, hash=False)
     positive: bool = False
     displacement: float = 0.0
 

@@ -31,9 +31,10 @@ def blocks(context: Context, studies: list[ControlStudy]) -> Iterator[Block]:
         "$V = 1/2 dot(q)^T M dot(q) + 1/2 tilde(q)^T K_p tilde(q)$ never rises."
     )
     for study in exact:
-        rise, start = (context.results[f"control.{study.name}.{name}"] for name in ("V_rise", "V_0"))
-        verdict = f"{study.title}: $V$ starts at {start.number(4)} and rises by {rise.number(2)} at the most."
-        yield Verdict("good" if rise.value == 0 else "bad", verdict)
+        rise, start = (context.results.get(f"control.{study.name}.{name}") for name in ("V_rise", "V_0"))
+        if rise and start:
+            verdict = f"{study.title}: $V$ starts at {start.number(4)} and rises by {rise.number(2)} at the most."
+            yield Verdict("good" if rise.value == 0 else "bad", verdict)
         yield response(context, study)
     if exact:
         yield settling(context, exact)

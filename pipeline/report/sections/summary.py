@@ -79,7 +79,7 @@ def verdicts(context: Context, joint: str) -> Iterator[Verdict]:
             "fitted to. What it is worth on other paths is not known: add a validation log.",
         )
     tracks = [track for track in context.catalogue.all(Track) if track.joint == joint and not track.at_rest]
-    if tracks:
+    if tracks and all(f"ekf.{track.log}.{joint}.white" in context.results for track in tracks):
         yield consistency_verdict(context, joint, tracks)
 
 
@@ -118,7 +118,7 @@ def table(context: Context) -> Table:
     rows = []
     for track in context.catalogue.all(Track):
         key = f"ekf.{track.log}.{track.joint}"
-        white = context.results[f"{key}.white"].value == 1
+        white = context.results.get(f"{key}.white")
         rows.append(
             (
                 title(track.joint),
@@ -126,7 +126,7 @@ def table(context: Context) -> Table:
                 f"{track.role}, at rest" if track.at_rest else track.role,
                 context.number(f"{key}.tau_ext_rms", 3),
                 context.number(f"{key}.nis_mean", 3),
-                "yes" if white else "no",
+                "–" if white is None else "yes" if white.value == 1 else "no",
             )
         )
     return Table(

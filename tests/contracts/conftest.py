@@ -1,0 +1,72 @@
+"""A small study, analysed once: records of every kind, for the contracts of stages and sections."""
+
+from dataclasses import dataclass, replace
+
+import pytest
+
+from pipeline.maths.excitation.fourier import Fourier
+from pipeline.maths.simulation import continuous
+from pipeline.records import KINDS, Record, store
+from pipeline.records.catalogue import Catalogue
+from pipeline.robots import Robot, davinci
+from pipeline.robots.davinci_chain import BODIES, CHAIN
+from pipeline.runner.ledger import Folders, Ledger
+from pipeline.runner.plan import Plan
+from pipeline.runner.runner import Console, Runner
+from pipeline.runner.runs import folders
+from pipeline.stages import STAGES, design
+from pipeline.study import Study, reading
+from tests import arm
+
+TRUTH = {
+    "theta": {name: dict(zip((t.name for t in arm.joint(name).terms), theta.tolist(), strict=True))
+              for name, theta in arm.THETA.items()},
+    "log": [{"name": "push", "push": [
+        {"joint": "hand_roll", "shape": "pulse", "start": 4.0, "end": 6.0, "peak": 1.0}]}],
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Lab:
+    """A study with its folders, in which every stage but the report has run."""
+
+    study: Study
+    folders: Folders
+    plan: Plan
+
+    def records(self, kind: type[Record]) -> list[Record]:
+        return [store.read(kind, self.folders.processed, place) for _, place in self.plan.places((kind,))]
+
+
+def robot() -> Robot:
+    """The arm of the tests with a geometry and a published trajectory, so that there is something to design."""
+    roll, *others = arm.ARM.joints
+    published = (("table-6.1-corrected", arm.EXCITATION["hand_roll"]),)
+    short = tuple(replace(study, duration=0.05) for study in davinci.ROBOT.control)
+    joints, wrist = (replace(roll, published=published), *others), davinci.ROBOT.wrist
+    return replace(arm.ARM, joints=joints, chain=CHAIN, bodies=BODIES, wrist=wrist, control=short)
+
+
+@pytest.fixture(scope="session")
+def lab(tmp_path_factory) -> Lab:
+    folder = arm.write_study(tmp_path_factory.mktemp("contracts") / "raw" / "arm")
+    study = replace(reading.read(folder), robot=robot(), truth=TRUTH)
+    runner = Runner(study, folders(folder, None, None), Console(lambda line: None, lambda line: None))
+    with pytest.MonkeyPatch.context() as shorter:
+        shorten(shorter)
+        assert runner.run(name for name in STAGES if name != "report")
+    return Lab(study, runner.folders, Plan(study, Ledger(runner.folders)))
+
+
+def shorten(patch: pytest.MonkeyPatch) -> None:
+    """Leave out what takes long of a design, and none of the kinds of record that it makes."""
+    patch.setattr(continuous, "RELATIVE", 1e-4)
+    patch.setattr(continuous, "ABSOLUTE", 1e-6)
+    patch.setattr(design, "design", lambda problem, *_: Fourier(0.0, (0.1, 0.05), (0.05, 0.1), problem.period))
+
+
+@pytest.fixture(scope="session")
+def catalogue(lab: Lab) -> Catalogue:
+    """Every record of the study, read already."""
+    records = {kind: lab.records(kind) for kind in KINDS.values()}
+    return Catalogue(records.__getitem__)

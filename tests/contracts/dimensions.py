@@ -1,0 +1,87 @@
+"""Dimensions, to compare the unit of a parameter with the term that it multiplies."""
+
+from dataclasses import dataclass
+
+from pipeline.maths.constants import GRAVITY
+from pipeline.maths.models.terms import Term
+from pipeline.robots.robot import Kind
+
+Powers = tuple[int, int, int]
+BASE: dict[str, Powers] = {"1": (0, 0, 0), "rad": (0, 0, 0), "kg": (1, 0, 0), "m": (0, 1, 0), "s": (0, 0, 1)}
+BASE["N"] = (1, 1, -2)
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """Powers of kg, m and s; an angle has none, and neither has a bare number."""
+
+    powers: Powers = (0, 0, 0)
+
+    def __mul__(self, other):
+        kg, m, s = (a + b for a, b in zip(self.powers, pure(other).powers, strict=True))
+        return Dimension((kg, m, s))
+
+    def __truediv__(self, other):
+        return self * pure(other) ** -1
+
+    def __pow__(self, n: int):
+        kg, m, s = (n * a for a in self.powers)
+        return Dimension((kg, m, s))
+
+    def __add__(self, other):
+        if self != pure(other):
+            raise TypeError(f"{self} and {other} do not add up")
+        return self
+
+    def __rtruediv__(self, other):
+        return pure(other) / self
+
+    def __neg__(self):
+        return self
+
+    __abs__ = __neg__
+    __rmul__ = __mul__
+    __radd__ = __sub__ = __rsub__ = __add__
+
+
+def pure(value) -> Dimension:
+    """The dimension of what may be a bare number."""
+    return value if isinstance(value, Dimension) else Dimension()
+
+
+def of_unit(text: str) -> Dimension:
+    """The dimension of a unit such as 'N m s/rad'."""
+    above, _, below = text.partition("/")
+    return _product(above) / _product(below)
+
+
+def _product(text: str) -> Dimension:
+    found = Dimension()
+    for factor in text.split():
+        name, _, power = factor.partition("^")
+        found *= Dimension(BASE[name]) ** int(power or 1)
+    return found
+
+
+def of_phi(term: Term, kind: Kind) -> Dimension:
+    """The dimension of a term for a kind of joint; raises TypeError where it has none."""
+    second, position = of_unit("s"), of_unit(kind.unit("{position}"))
+    angle = Dimension() + position if {"sin q", "cos q"} & set(term.b) else Dimension()  # a length has no sine
+    functions = {"1": angle, "sin q": angle, "cos q": angle, "q": position, "dq": position / second}
+    # A factor of g has its dimension, and others are bare numbers; sign and deflection are bare numbers, too.
+    parts = [
+        functions.get(name, Dimension()) * (of_unit("m/s^2") if abs(factor) == GRAVITY else Dimension())
+        for name, factor in term.b.items()
+    ]
+    total, *others = [position / second**2, *parts] if term.a else parts
+    for part in others:
+        total = total + part
+    return total
+
+
+def is_effort(term: Term, kind: Kind) -> bool:
+    """Whether parameter times term is an effort of this kind of joint."""
+    try:
+        return of_unit(kind.unit(term.unit)) * of_phi(term, kind) == of_unit(kind.unit("{effort}"))
+    except TypeError:
+        return False

@@ -1,0 +1,84 @@
+"""Every section of the report: of a study that has everything, of one that has nothing, and of any in between."""
+
+from importlib import import_module
+
+import pytest
+
+from pipeline.records import KINDS
+from pipeline.records.catalogue import Catalogue, Provenance
+from pipeline.report.content import Document, Equation, Figure, Figure3D, Number, Section, Table, name_of, walk
+from pipeline.report.content.layout import place
+from pipeline.report.context import Context
+from pipeline.report.results import collect
+from pipeline.report.sections import SECTIONS
+from tests.contracts.conftest import Lab
+
+SECTION = pytest.mark.parametrize("name", SECTIONS)
+PROVENANCE = Provenance("1", {"numpy": "2"}, {"raw/arm/roll.csv": "0" * 64}, {}, {"fit": "no joint moves"})
+
+
+def context(lab: Lab, catalogue: Catalogue) -> Context:
+    return Context(catalogue, lab.study, collect(catalogue), PROVENANCE)
+
+
+def without(catalogue: Catalogue, *kinds: type) -> Catalogue:
+    return Catalogue(lambda kind: [] if kind in kinds else catalogue.all(kind))
+
+
+def written(name: str, about: Context) -> Section | None:
+    return import_module(f"pipeline.report.sections.{name}").section(about)
+
+
+@pytest.fixture(scope="module")
+def full(lab: Lab, catalogue: Catalogue) -> Context:
+    return context(lab, catalogue)
+
+
+@SECTION
+def test_a_study_that_has_everything_has_the_section(name: str, full: Context):
+    section = written(name, full)
+    assert isinstance(section, Section)
+    assert section.title
+    names = [label for block in walk(section) if (label := name_of(block))]
+    assert len(set(names)) == len(names)
+
+
+@SECTION
+def test_figures_and_equations_are_told_in_other_words_to_those_who_do_not_see_them(name: str, full: Context):
+    for block in walk(written(name, full)):
+        if isinstance(block, Figure | Figure3D):
+            assert block.alt.strip()
+            assert block.caption.strip()
+            assert block.alt != block.caption
+        if isinstance(block, Equation):
+            assert block.alt.strip()
+            assert block.alt != block.typst
+
+
+@SECTION
+def test_every_number_of_a_table_is_the_result_of_its_key(name: str, full: Context):
+    tables = [block for block in walk(written(name, full)) if isinstance(block, Table)]
+    for number in [cell for table in tables for row in table.rows for cell in row if isinstance(cell, Number)]:
+        assert number.key in full.results
+        assert number.value == full.results[number.key].value
+
+
+@SECTION
+def test_a_study_without_records_has_no_section_or_one_that_says_so(name: str, lab: Lab, catalogue: Catalogue):
+    section = written(name, context(lab, without(catalogue, *KINDS.values())))
+    if section is not None:
+        place(Document("A test", "arm", True, (section,)))
+
+
+@SECTION
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_kind_of_record_that_is_missing_costs_no_section(name: str, kind: str, lab: Lab, catalogue: Catalogue):
+    """As it is when its stage failed, or has not run."""
+    section = written(name, context(lab, without(catalogue, KINDS[kind])))
+    if section is not None:
+        place(Document("A test", "arm", True, (section,)))
+
+
+def test_the_sections_together_are_a_document_whose_labels_differ_and_whose_references_lead_somewhere(full: Context):
+    sections = tuple(section for name in SECTIONS if (section := written(name, full)))
+    assert len(place(Document("A test", "arm", True, sections))) == len(SECTIONS)

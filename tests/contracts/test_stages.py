@@ -1,0 +1,96 @@
+"""Every stage: a pure function that gets what its signature asks for, and makes what it says."""
+
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import pytest
+from numpy.testing import assert_array_equal
+
+from pipeline.records import Diagnostic, Record
+from pipeline.records.catalogue import Catalogue, Provenance
+from pipeline.runner.execution import _argument, _given
+from pipeline.runner.plan import Task
+from pipeline.runner.signature import declaration
+from pipeline.stages import STAGES
+from tests.contracts.conftest import Lab, shorten
+
+STAGE = pytest.mark.parametrize("name", STAGES)
+OF_RECORDS = pytest.mark.parametrize("name", [name for name in STAGES if name != "report"])
+
+
+@STAGE
+def test_the_declaration_parses_and_the_stage_says_what_it_does(name: str):
+    module = import_module(f"pipeline.stages.{name}")
+    assert module.__doc__
+    assert module.run.__doc__
+    asks = declaration(name)
+    groups = [asks.each, asks.per_log, asks.every]
+    assert len(asks.each) <= 1  # of two, the runner could not tell how often to call it
+    assert [parameter for group in groups for parameter, kinds in group.items() if not kinds] == []
+    assert bool(asks.makes) is (name != "report")
+
+
+def arguments(lab: Lab, task: Task) -> dict[str, Any]:
+    """What the runner would hand to a stage; records that cannot be written into."""
+    asks = declaration(task.stage)
+    found = {parameter: _argument(asks, lab.folders, task, parameter) for parameter in task.records}
+    for record in [r for value in found.values() for r in (value if isinstance(value, list) else [value]) if r]:
+        for column in record.columns():
+            getattr(record, column).setflags(write=False)
+    found |= {parameter: _given(what, lab.study, task) for parameter, what in asks.given.items()}
+    return found | {setting: getattr(lab.study.settings, setting) for setting in asks.settings}
+
+
+@contextmanager
+def away(*there: Path) -> Iterator[None]:
+    """Without these folders."""
+    elsewhere = {folder: folder.with_name(f"{folder.name}.away") for folder in there if folder.exists()}
+    for folder, gone in elsewhere.items():
+        folder.rename(gone)
+    try:
+        yield
+    finally:
+        for folder, gone in elsewhere.items():
+            gone.rename(folder)
+
+
+def same(one: Record, other: Record) -> None:
+    assert type(one) is type(other)
+    for name in one.scalars():
+        assert repr(getattr(one, name)) == repr(getattr(other, name)), f"{one}: {name}"
+    for name in one.columns():
+        assert_array_equal(getattr(one, name), getattr(other, name), err_msg=f"{one}: {name}")
+
+
+@OF_RECORDS
+def test_the_same_records_give_the_same_records_and_nothing_else_is_read(name: str, lab: Lab, monkeypatch):
+    """Twice on the very same arguments, which stay as they are, and with the study's files moved away meanwhile."""
+    shorten(monkeypatch)
+    run, asks = import_module(f"pipeline.stages.{name}").run, declaration(name)
+    files = [lab.folders.processed, *([] if "log" in asks.given.values() else [lab.study.folder])]
+    made: Counter[tuple[str, ...]] = Counter()
+    kinds: set[type[Record]] = set()
+    for task in lab.plan.tasks(asks):
+        handed = arguments(lab, task)
+        with away(*files):
+            first, second = (list(run(**handed)) for _ in range(2))
+        for one, other in zip(first, second, strict=True):
+            same(one, other)
+        kinds |= {type(record) for record in first}
+        made.update({(type(record).__name__, *record.key) for record in first})
+    assert kinds | {Diagnostic} == {*asks.makes, Diagnostic}
+    assert [key for key, tasks in made.items() if tasks > 1] == []  # one would overwrite the other
+
+
+def test_the_report_of_the_same_records_is_the_same(lab: Lab, catalogue: Catalogue, monkeypatch):
+    """Its numbers; the writers are slow, and `test_runs` compares what they write."""
+    stage = import_module("pipeline.stages.report")
+    monkeypatch.setattr(stage, "WRITERS", {})
+    with away(lab.folders.processed, lab.study.folder):
+        first, second = (stage.run(catalogue, lab.study, Provenance("1", {}, {}, {}, {})) for _ in range(2))
+    assert first["results.json"] == second["results.json"]
+    assert b'"fit.hand_roll.independent.lse.inertia"' in first["results.json"]

@@ -1,0 +1,96 @@
+"""Every term of a joint's model: its parts are those of one expression, and its unit is that of what it multiplies."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pipeline.maths.models import kernels, terms
+from pipeline.maths.models.bias import bias as bias_of
+from pipeline.maths.models.independent import combined, inertia_of, regressor, slopes
+from pipeline.maths.models.terms import TERMS, Term
+from pipeline.report.writers.equations import Formula, draw_formulas
+from pipeline.robots.robot import Kind
+from tests.contracts.dimensions import is_effort
+
+TERM = pytest.mark.parametrize("term", TERMS.values(), ids=TERMS)
+random = np.random.default_rng(0)
+Q = random.uniform(-1.0, 1.0, 200)
+DQ = random.uniform(0.05, 1.2, 200) * random.choice([-1.0, 1.0], 200)  # away from the jump at standstill
+
+
+def bias(term, q, dq) -> np.ndarray:
+    """b, b_q and b_dq (3, N), as the filter's loop has them."""
+    c = combined((term,), np.ones(1))
+    return np.array([kernels.bias(c, *x, 0.0) for x in zip(q.tolist(), dq.tolist(), strict=True)]).T
+
+
+def test_every_term_is_listed_under_its_name():
+    written = [value for value in vars(terms).values() if isinstance(value, Term)]
+    assert {term.name: term for term in written} == TERMS
+    assert len(TERMS) == len(written)
+
+
+@TERM
+def test_derivatives_are_those_of_finite_differences(term):
+    _, b_q, b_dq = bias(term, Q, DQ)
+    h = 1e-6
+    by_q = (bias(term, Q + h, DQ)[0] - bias(term, Q - h, DQ)[0]) / (2 * h)
+    by_dq = (bias(term, Q, DQ + h)[0] - bias(term, Q, DQ - h)[0]) / (2 * h)
+    # Truncation is h^2/6 times the third derivative, below 1e4 for what bends within a hundredth of a radian or metre;
+    # rounding is 1e-16 |b| / h.
+    assert_allclose(b_q, by_q, rtol=0, atol=1e-8)
+    assert_allclose(b_dq, by_dq, rtol=0, atol=1e-8)
+
+
+@TERM
+def test_arrays_and_scalars_give_the_same(term):
+    """At standstill and at zero, too; numpy and math differ in the last bits of a sine."""
+    q, dq = (np.append(x, [0.0, 0.0, 0.3]) for x in (Q, DQ))
+    dq[-3:] = 0.0, 0.4, 0.0
+    phi = regressor((term,), q, dq, np.zeros_like(q))[:, 0]
+    assert phi.shape == q.shape
+    assert_allclose(bias(term, q, dq)[0], phi, rtol=1e-14, atol=1e-15)
+
+
+def test_all_terms_together_are_one_model_in_the_regressor_and_in_the_loop():
+    model, theta = tuple(TERMS.values()), random.uniform(0.5, 2.0, len(TERMS))
+    c = combined(model, theta)
+    for q, dq in [(0.3, -0.2), (-0.4, 0.7), (0.1, 0.0)]:
+        [phi] = regressor(model, np.array([q]), np.array([dq]), np.zeros(1))
+        assert kernels.bias(c, q, dq, 0.0)[0] == pytest.approx(phi @ theta, rel=1e-14)
+        assert_allclose(kernels.bias(c, q, dq, 0.0), bias_of(c, q, dq, 0.0), rtol=1e-14)
+
+
+@TERM
+def test_slopes_of_the_regressor_are_those_of_the_loop(term):
+    """Excitation is optimised with them."""
+    by_q, by_dq = slopes((term,), Q, DQ)
+    assert_allclose([by_q[:, 0], by_dq[:, 0]], bias(term, Q, DQ)[1:], rtol=1e-14, atol=1e-15)
+
+
+@TERM
+def test_a_term_is_linear_in_acceleration_with_its_slope_a(term):
+    ddq = random.uniform(-3.0, 3.0, len(Q))
+    still, one, two = (regressor((term,), Q, DQ, k * ddq)[:, 0] for k in (0, 1, 2))
+    assert_allclose(one - still, term.a * ddq, rtol=0, atol=1e-14)  # g and ddq round at 1e-15
+    assert_allclose(two - still, 2 * term.a * ddq, rtol=0, atol=1e-14)
+    assert inertia_of((term,), np.array([2.0])) == 2.0 * term.a
+
+
+@TERM
+def test_some_motion_excites_a_term(term):
+    phi = regressor((term,), Q, DQ, random.uniform(-3.0, 3.0, len(Q)))
+    assert np.abs(phi).max() > 0.01
+    assert np.isfinite(phi).all()
+
+
+@TERM
+def test_the_unit_is_that_of_an_effort_over_the_term(term):
+    """For a kind of joint at least: gravity's sine is for joints that turn, a lifted mass for those that slide."""
+    assert "{" not in "".join(kind.unit(term.unit) for kind in Kind)
+    assert any(is_effort(term, kind) for kind in Kind)
+
+
+def test_every_term_can_be_typeset():
+    formulas = [Formula(term.typst, True) for term in TERMS.values()]
+    assert set(draw_formulas(formulas)[0]) == set(formulas)
