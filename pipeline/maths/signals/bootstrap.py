@@ -5,13 +5,14 @@ Kuensch, The jackknife and the bootstrap for general stationary observations, An
 
 from collections.abc import Callable, Sequence
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
 
 BLOCKS = 20
 DRAWS = 200
 
-Statistic = Callable[[Sequence[slice]], float]
+Block = TypeVar("Block")
 
 
 def blocks(N: int, count: int = BLOCKS) -> list[slice]:
@@ -20,8 +21,10 @@ def blocks(N: int, count: int = BLOCKS) -> list[slice]:
     return [slice(start, stop) for start, stop in pairwise(edges) if stop > start]
 
 
-def standard_error(statistic: Statistic, parts: Sequence[slice], seed: int = 0) -> float:
+def standard_error(statistic: Callable[[list[Block]], float], parts: Sequence[Block], seed: int = 0) -> float:
     """The standard deviation of a statistic of blocks over draws of as many blocks, with replacement.
+
+    A block is whatever the statistic takes: samples, or what is already known of them.
 
     NaN for a single block, of which nothing can be drawn.
     """

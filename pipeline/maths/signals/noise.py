@@ -12,8 +12,8 @@ NORMAL_MAD = 0.6744897501960817  # median of |x| of a standard normal variable
 def noise_std(residual: Array, segment: Integers, rate: float, cutoff: float) -> float:
     """Standard deviation of the white noise in a residual (N,), from what a low-pass at `cutoff` [Hz] takes out of it.
 
-    The model's error is slower than that but for jumps where the motion turns, so the median is taken, which a few jumps
-    do not move.  0 where the sampling rate leaves the low-pass nothing to take out.
+    The model's error is slower than that but for jumps where the motion turns, so the median is taken, which a few
+    jumps do not move.  0 where the sampling rate leaves the low-pass nothing to take out.
     """
     passed = share_passed(rate, cutoff)
     if passed == 1.0:
@@ -36,8 +36,10 @@ def model_error(slow: Array, noise: float) -> tuple[float, float]:
     squares = slow**2
     excess = float(np.mean(squares)) - noise**2
     error = float(np.sqrt(max(excess, 0.0)))
-    spread = standard_error(
-        lambda chosen: np.array([squares[part].mean() for part in chosen]).mean(), blocks(len(slow))
-    )
+    spread = standard_error(_mean, [float(squares[part].mean()) for part in blocks(len(slow))])
     # d sqrt(x) = dx / (2 sqrt(x)), which says nothing near 0: there the root of the spread is the bound.
     return error, min(spread / (2.0 * error), float(np.sqrt(spread))) if error > 0 else float(np.sqrt(spread))
+
+
+def _mean(parts: list[float]) -> float:
+    return float(np.mean(parts))
