@@ -95,6 +95,7 @@ QUANTITIES = {
     "samples": Quantity("number of samples fitted, K"),
     "hac_lags": Quantity("lags that the Newey-West standard errors allow for"),
     # predictions
+    "path": Quantity("whether the recording follows a path that was fitted", ""),
     "rmse": Quantity("root mean squared error of the predicted effort", "{effort}"),
     "nrmse": Quantity("root mean squared error over the range of the effort"),
     "r2": Quantity("share of the effort's variance explained, R2"),
