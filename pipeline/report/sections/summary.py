@@ -71,9 +71,7 @@ def blocks(context: Context) -> Iterator[Block]:
     panels = tuple(panel for trusted in trusts for panel in effort_panel(context, trusted))
     if panels:
         yield Figure(
-            "External effort on each joint that moves, in the contact log of the joint on which the model errs most, "
-            "with contact windows shaded, the peak in each, and the free-space level: 95 % of samples where nothing "
-            "touches the robot lie in the grey band.",
+            caption(contacts),
             f"External effort over time, one panel a joint: {'; '.join(map(spoken, contacts[:3])) or 'no contact'}.",
             panels,
             label="answer-figure",
@@ -82,12 +80,23 @@ def blocks(context: Context) -> Iterator[Block]:
     yield trust_table(context, trusts)
     yield from first_looks(context, trusts)
     yield Prose(
-        f"Good: the model's error is at most {GOOD:.0%} of the effort's root mean square on a path that was not "
-        f"fitted; caution: at most {CAUTION:.0%}, or the same path. A 95 % band is right when it covers "
-        f"{COVERED[0]:.0%} to {COVERED[1]:.0%} of free-space samples. Rows show the worst run of each joint that no "
-        "parameter was fitted to."
+        f"Good: the model's error is at most {percent(GOOD)} of the effort's root mean square on a path that was not "
+        f"fitted; caution: at most {percent(CAUTION)}, or the same path. A 95 % band is right when it covers "
+        f"{percent(COVERED[0])} to {percent(COVERED[1])} of free-space samples. Rows show the worst "
+        "run of each joint that no parameter was fitted to."
     )
     yield Prose("Reviewed by ______________________ on ______________   ☐ accept   ☐ accept with remarks   ☐ reject")
+
+
+def caption(contacts: list[Contact]) -> str:
+    """What the figure shows."""
+    level = "the grey band holds 95 % of samples where nothing touches the robot"
+    if not contacts:
+        return f"External effort on each joint in its worst run that was not fitted; {level}."
+    return (
+        "External effort on each joint, in the contact log on which its model errs most, with the windows of contact "
+        f"shaded and the peak in each; {level}."
+    )
 
 
 def fitted_joints(context: Context) -> list[str]:
@@ -100,7 +109,8 @@ def trust(context: Context, joint: str) -> Trust:
     fit = context.used_fit(joint)
     scored = [p for p in context.catalogue.all(Prediction) if p.joint == joint and f"{p.model}.{p.estimator}" == fit]
     scored = [p for p in scored if p.role != "contact" or context.study.log(p.log).contact]
-    unseen = [p for p in scored if p.path == "another path" and p.role != "identification"] or scored
+    others = [p for p in scored if p.role != "identification"] or scored
+    unseen = [p for p in others if p.path == "another path"] or others
     spaces = [space for space in context.catalogue.all(FreeSpace) if space.joint == joint]
     spaces = [space for space in spaces if space.role != "identification"] or spaces
     return Trust(
@@ -130,6 +140,11 @@ def opening(context: Context, trusts: list[Trust], contacts: list[Contact]) -> s
     )
 
 
+def percent(share: float) -> str:
+    """A share as it is printed."""
+    return f"{100 * share:.0f} %"
+
+
 def count(number: int, noun: str) -> str:
     """A number with its noun: '1 run', '3 runs'."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
@@ -140,10 +155,10 @@ def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
     own = context.catalogue.about(Contact, joint=trusted.joint)
     errors = {p.log: p.model_error for p in context.catalogue.about(Prediction, joint=trusted.joint)}
     logs = sorted((c.log for c in own if len(joints_touched(context, c)) == 1), key=lambda log: errors.get(log, 0.0))
-    logs = logs or [c.log for c in own] or ([trusted.space.log] if trusted.space else [])
+    logs = logs or [c.log for c in own] or ([trusted.space.log] if trusted.space is not None else [])
     for track in context.catalogue.about(Track, joint=trusted.joint, log=logs[-1]) if logs else []:
         spans = [VSpan(start, end, "", "sky") for start, end in context.study.log(track.log).contact]
-        levels = [trusted.space.free_level] if trusted.space else []
+        levels = [trusted.space.free_level] if trusted.space is not None else []
         level = [HBand(-size, size, "free space: 95 % of samples") for size in levels]
         calm = track.t - track.t[0] >= 1.0
         line = Line(track.t[calm], track.tau_ext[calm], "external effort", "vermillion")
@@ -204,13 +219,13 @@ def trust_row(context: Context, trusted: Trust) -> tuple[Cell, ...]:
         row += ["–"] * 4
     else:
         r2, ceiling = (context.number(f"{p.prefix}.{name}", 2) for name in ("r2", "r2_ceiling"))
-        row += [context.number(f"{p.prefix}.model_error", 2), f"{trusted.share:.0%}", r2, ceiling]
+        row += [context.number(f"{p.prefix}.model_error", 2), f"{percent(trusted.share)}", r2, ceiling]
     if space is None:
         row += ["–"] * 2
     else:
         key = f"{space.filter}.{space.log}.{space.joint}"
-        row += [context.number(f"{key}.detection_level", 2), f"{space.coverage:.0%}"]
-    return (*row, "–" if p is None else f"{literal(p.log)}, {p.path}")
+        row += [context.number(f"{key}.detection_level", 2), f"{percent(space.coverage)}"]
+    return (*row, "–" if p is None else p.path.removesuffix(" path"))
 
 
 def first_looks(context: Context, trusts: list[Trust]) -> Iterator[Block]:
@@ -227,11 +242,11 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
         p, space, name = trusted.prediction, trusted.space, title(trusted.joint)
         if p is not None and trusted.share > GOOD:
             error = context.results[f"{p.prefix}.model_error"].number(2)
-            text = f"**{name}, {literal(p.log)}**: the model errs by {error}, {trusted.share:.0%} of the effort."
+            text = f"**{name}, {literal(p.log)}**: the model errs by {error}, {percent(trusted.share)} of the effort."
             yield trusted.share / GOOD, f"{text} See [@prediction]."
         if p is not None and p.path == "same path":
             yield (
-                2.0,
+                4.0,
                 (
                     f"**{name}**: judged on the path that was fitted ({literal(p.log)}), where the model's error "
                     "repeats; record a validation log on another path. See [@prediction]."
@@ -241,8 +256,8 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
             yield (
                 1.0 + 10 * (COVERED[0] - space.coverage),
                 (
-                    f"**{name}, {literal(space.log)}**: the 95 % band is too narrow, it covers {space.coverage:.0%} of "
-                    "free-space samples; judge contacts by the detection level. See [@filter]."
+                    f"**{name}, {literal(space.log)}**: the 95 % band is too narrow, it covers "
+                    f"{percent(space.coverage)} of free-space samples; judge contacts by the detection level. See [@filter]."
                 ),
             )
     for diagnostic in context.catalogue.all(Diagnostic):
