@@ -65,7 +65,8 @@ def _(mark: Points, axes: "Axes", colour: str, order: float) -> None:
             va="bottom" if y >= 0 else "top", fontsize=8, color=colour, parse_math=False, zorder=order + 1,
         )  # fmt: skip
     if mark.names:
-        axes.margins(y=0.2)  # room for the names
+        low, high = axes.get_ylim()
+        axes.set_ylim(low - 0.16 * (high - low), high + 0.16 * (high - low))  # room for the names
 
 
 @draw_mark.register(Band)

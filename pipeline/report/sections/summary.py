@@ -1,7 +1,7 @@
 """The answer: the external effort, how far to trust it, and what to look at first."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -68,14 +68,14 @@ def blocks(context: Context) -> Iterator[Block]:
     trusts = [trust(context, joint) for joint in fitted_joints(context)]
     contacts = context.catalogue.all(Contact)
     yield Prose(opening(context, trusts, contacts))
-    panels = tuple(panel for trusted in trusts for panel in effort_panel(context, trusted))
+    panels = [panel for trusted in trusts for panel in effort_panel(context, trusted)]
     if panels:
         yield Figure(
             caption(contacts),
             f"External effort over time, one panel a joint: {'; '.join(map(spoken, contacts[:3])) or 'no contact'}.",
-            panels,
+            tuple(panel if i == 0 else unlabelled(panel) for i, panel in enumerate(panels)),
             label="answer-figure",
-            height=40,
+            height=34,
         )
     yield trust_table(context, trusts)
     yield from first_looks(context, trusts)
@@ -168,6 +168,11 @@ def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
         yield Panel(heading, "time [s]", effort, (*spans, *level, line, *peaks))
 
 
+def unlabelled(panel: Panel) -> Panel:
+    """A panel without the legend that the first of its figure has already."""
+    return replace(panel, marks=tuple(replace(mark, label="") for mark in panel.marks))
+
+
 def joints_touched(context: Context, contact: Contact) -> list[Contact]:
     """The joints with contact windows in the same log."""
     return [other for other in context.catalogue.about(Contact, log=contact.log) if other.above.any()]
@@ -190,42 +195,33 @@ def spoken(contact: Contact) -> str:
 
 def trust_table(context: Context, trusts: list[Trust]) -> Table:
     """One row a joint."""
-    header = (
-        "Joint",
-        "",
-        "Model error",
-        "of effort",
-        "$R^2$",
-        "ceiling",
-        "Detection level",
-        "Band covers",
-        "On",
-    )
+    header = ("Joint", "Verdict", "Model error", "Of effort", "$R^2$", "At most", "Detection level", "Covered")
     return Table(
         "How far to trust it: the model's error beyond noise, $R^2$ and the most that noise leaves of it, the "
         "detection level that 99 % of free-space samples stay below, and how many of them the 95 % band covers.",
         header,
         tuple(trust_row(context, trusted) for trusted in trusts),
         label="trust-table",
-        align="llrrrrrrl",
+        align="llrrrrrr",
     )
 
 
 def trust_row(context: Context, trusted: Trust) -> tuple[Cell, ...]:
     """The numbers of one joint, with the runs that they are of."""
     p, space = trusted.prediction, trusted.space
-    row: list[Cell] = [title(trusted.joint), WORDS[trusted.level]]
+    same = ", same path" if p is not None and p.path == "same path" else ""
+    row: list[Cell] = [title(trusted.joint), WORDS[trusted.level] + same]
     if p is None:
         row += ["–"] * 4
     else:
         r2, ceiling = (context.number(f"{p.prefix}.{name}", 2) for name in ("r2", "r2_ceiling"))
-        row += [context.number(f"{p.prefix}.model_error", 2), f"{percent(trusted.share)}", r2, ceiling]
+        row += [context.number(f"{p.prefix}.model_error", 2), percent(trusted.share), r2, ceiling]
     if space is None:
         row += ["–"] * 2
     else:
         key = f"{space.filter}.{space.log}.{space.joint}"
-        row += [context.number(f"{key}.detection_level", 2), f"{percent(space.coverage)}"]
-    return (*row, "–" if p is None else p.path.removesuffix(" path"))
+        row += [context.number(f"{key}.detection_level", 2), percent(space.coverage)]
+    return tuple(row)
 
 
 def first_looks(context: Context, trusts: list[Trust]) -> Iterator[Block]:
@@ -257,7 +253,8 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
                 1.0 + 10 * (COVERED[0] - space.coverage),
                 (
                     f"**{name}, {literal(space.log)}**: the 95 % band is too narrow, it covers "
-                    f"{percent(space.coverage)} of free-space samples; judge contacts by the detection level. See [@filter]."
+                    f"{percent(space.coverage)} of free-space samples; judge contacts by the detection level. "
+                    "See [@filter]."
                 ),
             )
     for diagnostic in context.catalogue.all(Diagnostic):
