@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.records import Contact, Diagnostic, Fit, FreeSpace, Prediction, Track
+from pipeline.records import Contact, Diagnostic, Fit, FreeSpace, Prediction, Record, Track
 from pipeline.report.content import (
     Block,
     Bullets,
@@ -234,32 +234,28 @@ def first_looks(context: Context, trusts: list[Trust]) -> Iterator[Block]:
 
 def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:
     """What deserves a look, with how much."""
+    predicted, tracked = see(context, Prediction, "prediction"), see(context, Track, "filter")
     for trusted in trusts:
         p, space, name = trusted.prediction, trusted.space, title(trusted.joint)
         if p is not None and trusted.share > GOOD:
             error = context.results[f"{p.prefix}.model_error"].number(2)
-            text = f"**{name}, {literal(p.log)}**: the model errs by {error}, {percent(trusted.share)} of the effort."
-            yield trusted.share / GOOD, f"{text} See [@prediction]."
+            errs = f"the model errs by {error}, {percent(trusted.share)} of the effort."
+            yield trusted.share / GOOD, f"**{name}, {literal(p.log)}**: {errs}{predicted}"
         if p is not None and p.path == "same path":
-            yield (
-                4.0,
-                (
-                    f"**{name}**: judged on the path that was fitted ({literal(p.log)}), where the model's error "
-                    "repeats; record a validation log on another path. See [@prediction]."
-                ),
-            )
+            repeats = f"judged on the path that was fitted ({literal(p.log)}), where the model's error repeats; "
+            yield 4.0, f"**{name}**: {repeats}record a validation log on another path.{predicted}"
         if space is not None and space.coverage < COVERED[0]:
-            yield (
-                1.0 + 10 * (COVERED[0] - space.coverage),
-                (
-                    f"**{name}, {literal(space.log)}**: the 95 % band is too narrow, it covers "
-                    f"{percent(space.coverage)} of free-space samples; judge contacts by the detection level. "
-                    "See [@filter]."
-                ),
-            )
+            narrow = f"the 95 % band is too narrow, it covers {percent(space.coverage)} of free-space samples; "
+            remedy = f"judge contacts by the detection level.{tracked}"
+            yield 1.0 + 10 * (COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {narrow}{remedy}"
     for diagnostic in context.catalogue.all(Diagnostic):
         for text in warning_texts(diagnostic):
             yield 1.5, literal(text)
+
+
+def see(context: Context, kind: type[Record], anchor: str) -> str:
+    """Where more is said, if it is: a section is there only if there are records for it."""
+    return f" See [@{anchor}]." if context.catalogue.all(kind) else ""
 
 
 def warning_texts(diagnostic: Diagnostic) -> Iterator[str]:
