@@ -1,5 +1,6 @@
 """The records that flow between stages, one module for each stage that makes them; see `record`."""
 
+from pipeline.records.assess import FreeSpace
 from pipeline.records.average import Average, PeriodResidual
 from pipeline.records.design import Control, Excitation, Links, Lyapunov, Pose, Workspace
 from pipeline.records.diagnostic import Diagnostic, diagnostic
@@ -7,21 +8,23 @@ from pipeline.records.differentiate import Spectrum, Trajectory
 from pipeline.records.ekf import Track
 from pipeline.records.fit import Fit, Residual
 from pipeline.records.ingest import LogSummary, Recording
+from pipeline.records.measure import Contact
 from pipeline.records.predict import Prediction
 from pipeline.records.record import COLUMN_DTYPES, AnyRecord, Column, Counts, Labels, Names, Origin, Record
 from pipeline.records.resample import Signal
 from pipeline.records.whiteness import Whiteness
 
 __all__ = [
-    "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Column", "Control", "Counts", "Diagnostic", "Excitation", "Fit",
-    "Labels", "Links", "LogSummary", "Lyapunov", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Record",
-    "Recording", "Residual", "Signal", "Spectrum", "Track", "Trajectory", "Whiteness", "Workspace", "diagnostic",
+    "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Column", "Contact", "Control", "Counts", "Diagnostic",
+    "Excitation", "Fit", "FreeSpace", "Labels", "Links", "LogSummary", "Lyapunov", "Names", "Origin",
+    "PeriodResidual", "Pose", "Prediction", "Record", "Recording", "Residual", "Signal", "Spectrum", "Track",
+    "Trajectory", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
     kind.__name__: kind
     for kind in (
         Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Signal, Average, PeriodResidual,
-        Trajectory, Spectrum, Fit, Residual, Prediction, Track, Whiteness, Diagnostic,
+        Trajectory, Spectrum, Fit, Residual, Prediction, Track, FreeSpace, Contact, Whiteness, Diagnostic,
     )
 }  # fmt: skip

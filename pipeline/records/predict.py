@@ -18,9 +18,14 @@ class Prediction(Record):
     estimator: str
     role: str
     scheme: str  # "validation", "contact", "leave one log out" or "leave one period out"
+    path: str  # "another path" than what was fitted, or the "same path", on which the model's error repeats
     rmse: float
     nrmse: float
     r2: float
+    r2_ceiling: float
+    model_error: float
+    model_error_std: float
+    effort_rms: float
     relative_error: float
     t: Column
     tau: Column
@@ -33,4 +38,5 @@ class Prediction(Record):
 
     def published(self) -> Iterator[Published]:
         """The scores."""
-        yield from self.publish(self.prefix, "rmse", "nrmse", "r2", "relative_error")
+        yield from self.publish(self.prefix, "rmse", "nrmse", "r2", "r2_ceiling", "effort_rms", "relative_error")
+        yield Published(f"{self.prefix}.model_error", "model_error", std="model_error_std")

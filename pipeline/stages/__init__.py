@@ -16,5 +16,6 @@ The signature of `run` is the declaration of everything it needs:
 """
 
 STAGES = (
-    "design", "ingest", "resample", "average", "differentiate", "fit", "predict", "ekf", "whiteness", "report",
+    "design", "ingest", "resample", "average", "differentiate", "fit", "predict", "ekf", "assess", "measure",
+    "whiteness", "report",
 )  # fmt: skip

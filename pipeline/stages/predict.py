@@ -11,14 +11,16 @@ from pipeline.estimators.regression import measured_motion, pose, predicted
 from pipeline.maths.arrays import Booleans
 from pipeline.maths.models.model import Model, Motion
 from pipeline.maths.signals import averaging, harmonics
-from pipeline.maths.signals.smoothing import lowpass as low_passed
-from pipeline.maths.signals.smoothing import segments
+from pipeline.maths.signals.noise import model_error, noise_std, smoothed
+from pipeline.maths.signals.path import likeness
+from pipeline.maths.signals.smoothing import segments, share_passed
 from pipeline.maths.signals.windows import outside
 from pipeline.records import Column, Diagnostic, Fit, Prediction, Signal, Trajectory, diagnostic
 from pipeline.robots.models import independent
 from pipeline.robots.robot import Joint
 from pipeline.study import LogEntry
 
+SAME_PATH = 0.95  # correlation of positions above which two recordings follow the same path
 PARTS = 20  # at most: periods are left out one at a time, or in as many groups
 
 
@@ -47,16 +49,25 @@ def run(
             yield diagnostic("predict", f"{signal.log}.{joint.name}", "warning", said)
             return
         motion = measured_motion(signal, lowpass)
+        path = "same path" if follows(signal, [t for t in trajectories if t.joint == joint.name]) else "another path"
         for fit in fits:
             if fit.group == joint.name:
                 tau_hat = predicted(model, fit.theta, motion)
-                yield scored(signal, fit.model, fit.estimator, entry.role, tau_hat, free, lowpass)
+                prediction = scored(signal, fit.model, fit.estimator, entry.role, tau_hat, free, lowpass)
+                yield replace(prediction, path=path)
     elif trajectory is not None:
         others = [t for t in trajectories if t.joint == joint.name and t.log != signal.log]
         if others:
             yield from without_the_log(signal, trajectory, others, model, lowpass)
         else:
             yield from without_a_period(signal, trajectory, model, lowpass)
+
+
+def follows(signal: Signal, trajectories: Sequence[Trajectory]) -> bool:
+    """Whether a recording follows the path of one that a fit has seen, on which the model's error repeats."""
+    part = max(segments(signal.segment), key=lambda s: s.stop - s.start)
+    likenesses = [likeness(signal.t[part], signal.q[part], t.q, t.period) for t in trajectories]
+    return max(likenesses, default=0.0) > SAME_PATH
 
 
 def without_the_log(
@@ -134,10 +145,11 @@ def scored(
     tau, error = signal.tau[free], (signal.tau - tau_hat)[free]
     spread = tau - tau.mean()
     smooth, smooth_error = (
-        np.concatenate([low_passed(x[part], signal.rate, lowpass) for part in segments(signal.segment)])[free]
-        for x in (signal.tau, signal.tau - tau_hat)
+        smoothed(x, signal.segment, signal.rate, lowpass)[free] for x in (signal.tau, signal.tau - tau_hat)
     )
     rmse = float(np.sqrt(np.mean(error**2)))
+    noise = noise_std(signal.tau - tau_hat, signal.segment, signal.rate, lowpass)
+    beyond_noise, beyond_noise_std = model_error(smooth_error, noise * np.sqrt(share_passed(signal.rate, lowpass)))
     return Prediction(
         log=signal.log,
         joint=signal.joint,
@@ -145,9 +157,14 @@ def scored(
         estimator=name,
         role=signal.role,
         scheme=scheme,
+        path="same path" if scheme == "leave one period out" else "another path",
         rmse=rmse,
         nrmse=rmse / float(np.ptp(tau) or 1.0),
         r2=float(1 - error @ error / ((spread @ spread) or 1.0)),
+        r2_ceiling=1.0 - noise**2 / (float(tau.var()) or 1.0),
+        model_error=beyond_noise,
+        model_error_std=beyond_noise_std,
+        effort_rms=float(np.sqrt(np.mean(smooth**2))),
         relative_error=float(np.linalg.norm(smooth_error) / (np.linalg.norm(smooth) or 1.0)),
         t=signal.t,
         tau=signal.tau,

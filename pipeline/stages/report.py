@@ -1,5 +1,7 @@
 """Write the report of a study: report.html, report.pdf and results.json."""
 
+import hashlib
+
 from pipeline.records.catalogue import Catalogue, Provenance
 from pipeline.report.content import Document
 from pipeline.report.context import Context
@@ -12,11 +14,21 @@ from pipeline.study import Study
 def run(catalogue: Catalogue, study: Study, provenance: Provenance) -> dict[str, bytes]:
     """The files of the report, by name; what is shown and results.json come from the same numbers."""
     context = Context(catalogue, study, collect(catalogue), provenance)
-    sections = (section_builder(name)(context) for name in SECTIONS)
+    built = [section_builder(name)(context) for name in SECTIONS]
+    sections = tuple(section for section in built if section is not None)
+    results = context.results.json()
     document = Document(
         title="Contact forces without a force sensor",
         study=study.title,
         simulated=study.simulated,
-        sections=tuple(section for section in sections if section is not None),
+        sections=sections,
+        edition=f"report ID {identity(provenance, results)} · davinci-forces {provenance.version}",
     )
-    return {file: renderer(file)(document) for file in WRITERS} | {"results.json": context.results.json()}
+    return {file: renderer(file)(document) for file in WRITERS} | {"results.json": results}
+
+
+def identity(provenance: Provenance, results: bytes) -> str:
+    """128 bits of the sha256 of all that the report is made from: raw inputs, study file, records, results.json."""
+    files = {**provenance.raw, **provenance.processed, "results.json": hashlib.sha256(results).hexdigest()}
+    manifest = "\n".join(f"{sha} {name}" for name, sha in sorted(files.items()))
+    return hashlib.sha256(manifest.encode()).hexdigest()[:32]

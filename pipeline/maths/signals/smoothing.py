@@ -23,6 +23,16 @@ def lowpass(x: Array, rate: float, cutoff: float) -> Array:
     return np.asarray(sosfiltfilt(sos, x, padlen=min(3 * round(rate / cutoff) + 3, len(x) - 1)))
 
 
+def share_passed(rate: float, cutoff: float) -> float:
+    """The share of the power of white noise that `lowpass` lets through."""
+    if cutoff >= 0.4 * rate:
+        return 1.0
+    from scipy.signal import butter, sosfreqz
+
+    _, H = sosfreqz(butter(ORDER, cutoff, fs=rate, output="sos"), 4096)
+    return float(np.mean(np.abs(H) ** 4))  # two passes multiply the amplitude by |H| each
+
+
 def motion(q: Array, dq: Array | None, rate: float, cutoff: float) -> tuple[Array, Array, Array]:
     """Position, velocity and acceleration (N,) each, from a logged velocity where there is one.
 

@@ -23,6 +23,16 @@ def settled(t: Array) -> Booleans:
     return t - t[0] >= SETTLE if t[-1] - t[0] > 5 * SETTLE else np.ones(len(t), dtype=bool)
 
 
+def free_space(t: Array, windows: Sequence[tuple[float, float]], rate: float) -> Booleans:
+    """Whether nothing touches the robot at each time (N,), and no filter is still settling: at the start, after each
+    gap, and after each window; `rate` [Hz].
+    """
+    after = [(start, end + SETTLE) for start, end in windows]
+    gaps = [0, *(np.flatnonzero(np.diff(t) > 1.5 / rate) + 1).tolist(), len(t)]
+    calm = np.concatenate([settled(t[a:b]) for a, b in pairwise(gaps)])
+    return np.asarray(outside(t, after) & calm)
+
+
 def longest_run(t: Array, rate: float) -> slice:
     """The longest segment, a run of samples without a gap; `rate` [Hz]."""
     edges = [0, *(np.flatnonzero(np.diff(t) > 1.5 / rate) + 1).tolist(), len(t)]

@@ -123,12 +123,13 @@ Block = Prose | Bullets | Listing | Verdict | Equation | Table | Figure | Figure
 
 @dataclass(frozen=True)
 class Document:
-    """A whole report; a `simulated` one says so at the top of every page."""
+    """A whole report, its first section before the contents; a `simulated` one says so at the top of every page."""
 
     title: str
     study: str
     simulated: bool
     sections: tuple[Section, ...]
+    edition: str = ""  # which report this is: its ID and the version that made it
 
     def __post_init__(self) -> None:
         names = [name for block in walk(self) if (name := name_of(block))]

@@ -40,13 +40,14 @@ class Line(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Points(Mark):
-    """Separate points, with a bar of +- `y_std` about each where it is given."""
+    """Separate points, each with a bar of +- `y_std` about it and its name beside it where these are given."""
 
     x: Array
     y: Array
     label: str = ""
     colour: Colour = ""
     y_std: Array | None = None
+    names: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -59,6 +59,14 @@ def _(mark: Points, axes: "Axes", colour: str, order: float) -> None:
         mark.x, mark.y, mark.y_std, fmt="o", markersize=2.6, markeredgewidth=0, color=colour, elinewidth=0.9, capsize=2,
         label=escape_label(mark.label), zorder=order,
     )  # fmt: skip
+    for x, y, name in zip(mark.x, mark.y, mark.names, strict=False):
+        axes.annotate(
+            name, (x, y), (0, 4 if y >= 0 else -4), textcoords="offset points", ha="center",
+            va="bottom" if y >= 0 else "top", fontsize=8, color=colour, parse_math=False, zorder=order + 1,
+        )  # fmt: skip
+    if mark.names:
+        low, high = axes.get_ylim()
+        axes.set_ylim(low - 0.16 * (high - low), high + 0.16 * (high - low))  # room for the names
 
 
 @draw_mark.register(Band)

@@ -1,62 +1,102 @@
-"""What the study found, and how far to trust it."""
+"""The answer: the external effort, how far to trust it, and what to look at first."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.records import Diagnostic, Fit, Prediction, Track
-from pipeline.report.content import Block, Bullets, Prose, Section, Table, Verdict, literal
-from pipeline.report.context import Context, title
+from pipeline.records import Contact, Diagnostic, Fit, FreeSpace, Prediction, Record, Track
+from pipeline.report.content import (
+    Block,
+    Bullets,
+    Cell,
+    Figure,
+    HBand,
+    Line,
+    Panel,
+    Points,
+    Prose,
+    Section,
+    Table,
+    Verdict,
+    VSpan,
+    literal,
+)
+from pipeline.report.context import Context, label, title
 
-SAME_PATH = "leave one period out"  # a scheme that repeats the path, and so the model's error on it
-EXPECTED = 2.0  # normalised innovation squared of a consistent filter, of two measurements
-GOOD, FAIR = 0.9, 0.7  # shares of variance explained that call a model good, or usable with care
+GOOD, CAUTION = 0.10, 0.25  # model error over the effort's root mean square
+COVERED = (0.90, 0.98)  # coverage of a 95 % band that is right
+WORDS = {"good": "● Good", "warn": "▲ Caution", "bad": "✖ Problem"}
+
+
+@dataclass(frozen=True)
+class Trust:
+    """What is known of how far the external effort of one joint can be trusted: its worst unseen run."""
+
+    joint: str
+    prediction: Prediction | None
+    space: FreeSpace | None
+
+    @property
+    def share(self) -> float:
+        """Model error over the root mean square of the effort."""
+        p = self.prediction
+        return p.model_error / p.effort_rms if p is not None and p.effort_rms > 0 else float("nan")
+
+    @property
+    def level(self) -> str:
+        """Good, caution or problem; never good on the path that was fitted, where the model's error repeats."""
+        if self.prediction is None or np.isnan(self.share):
+            return "warn"
+        level = "good" if self.share <= GOOD else "warn" if self.share <= CAUTION else "bad"
+        return "warn" if level == "good" and self.prediction.path == "same path" else level
 
 
 def section(context: Context) -> Section:
-    """Verdicts first, then the numbers behind them."""
-    return Section("Summary", "summary", tuple(blocks(context)))
+    """The answer on one page, then what the analysis warned of."""
+    return Section("The answer", "summary", tuple(blocks(context)))
 
 
 def blocks(context: Context) -> Iterator[Block]:
-    """The summary's content."""
-    study = context.study
-    kind = "simulated" if study.simulated else "recorded"
-    yield Prose(
-        f"The study holds {len(study.logs)} {kind} logs of the {literal(study.robot.title)}. External effort is what "
-        "the robot exerts on its environment, estimated from motor currents and joint positions; no force sensor was "
-        "used."
-    )
-    if study.simulated:
-        yield Verdict(
-            "info", "All data in this report are **simulated**. They show that the methods work, not what an arm does."
-        )
+    """The section's content."""
     yield from failures(context)
     if not context.catalogue.all(Fit):
         yield Verdict(
             "bad", "No joint could be identified: there is no usable identification log, so no effort was tracked."
         )
         return
-    for joint in fitted_joints(context):
-        yield from verdicts(context, joint)
-    yield table(context)
-    warnings = [literal(text) for diagnostic in context.catalogue.all(Diagnostic) for text in warning_texts(diagnostic)]
-    if warnings:
-        yield Prose("**What to look at.** The analysis itself warned of the following.")
-        yield Bullets(tuple(warnings))
-
-
-def warning_texts(diagnostic: Diagnostic) -> Iterator[str]:
-    """The warnings of a diagnostic."""
-    yield from (
-        text for severity, text in zip(diagnostic.severity, diagnostic.text, strict=True) if severity == "warning"
+    trusts = [trust(context, joint) for joint in fitted_joints(context)]
+    contacts = context.catalogue.all(Contact)
+    yield Prose(opening(context, trusts, contacts))
+    panels = [panel for trusted in trusts for panel in effort_panel(context, trusted)]
+    if panels:
+        yield Figure(
+            caption(contacts),
+            f"External effort over time, one panel a joint: {'; '.join(map(spoken, contacts[:3])) or 'no contact'}.",
+            tuple(panel if i == 0 else unlabelled(panel) for i, panel in enumerate(panels)),
+            label="answer-figure",
+            height=34,
+        )
+    yield trust_table(context, trusts)
+    yield from first_looks(context, trusts)
+    yield Prose(
+        f"Good: the model's error is at most {percent(GOOD)} of the effort's root mean square on a path that was not "
+        f"fitted; caution: at most {percent(CAUTION)}, or the same path. A 95 % band is right when it covers "
+        f"{percent(COVERED[0])} to {percent(COVERED[1])} of free-space samples. Rows show the worst "
+        "run of each joint that no parameter was fitted to."
     )
+    yield Prose("Reviewed by ______________________ on ______________   ☐ accept   ☐ accept with remarks   ☐ reject")
 
 
-def failures(context: Context) -> Iterator[Block]:
-    """What could not be done at all."""
-    for task, failed in context.provenance.failures.items():
-        yield Verdict("bad", f"**{literal(task)}** failed, and what depends on it is missing: {literal(failed)}")
+def caption(contacts: list[Contact]) -> str:
+    """What the figure shows."""
+    level = "the grey band holds 95 % of samples where nothing touches the robot"
+    if not contacts:
+        return f"External effort on each joint in its worst run that was not fitted; {level}."
+    return (
+        "External effort on each joint, in the contact log on which its model errs most, with the windows of contact "
+        f"shaded and the peak in each; {level}."
+    )
 
 
 def fitted_joints(context: Context) -> list[str]:
@@ -64,77 +104,167 @@ def fitted_joints(context: Context) -> list[str]:
     return list(dict.fromkeys(fit.group for fit in context.catalogue.all(Fit)))
 
 
-def verdicts(context: Context, joint: str) -> Iterator[Verdict]:
-    """How well the model of a joint predicts, and whether its filter is consistent."""
+def trust(context: Context, joint: str) -> Trust:
+    """The worst unseen prediction of a joint by the fit that the filter uses, and its worst free space."""
     fit = context.used_fit(joint)
     scored = [p for p in context.catalogue.all(Prediction) if p.joint == joint and f"{p.model}.{p.estimator}" == fit]
-    unseen = [p for p in scored if p.scheme != SAME_PATH and (p.role != "contact" or context.study.log(p.log).contact)]
-    if unseen:
-        yield prediction_verdict(context, min(unseen, key=lambda p: p.r2))
-    elif scored:
-        r2 = context.results[f"{scored[0].prefix}.r2"].number(3)
-        yield Verdict(
-            "info",
-            f"**{title(joint)}**: the model explains {r2} of the variance of other periods of the path that it was "
-            "fitted to. What it is worth on other paths is not known: add a validation log.",
-        )
-    tracks = [track for track in context.catalogue.all(Track) if track.joint == joint and not track.at_rest]
-    if tracks and all(f"ekf.{track.log}.{joint}.white" in context.results for track in tracks):
-        yield consistency_verdict(context, joint, tracks)
-
-
-def prediction_verdict(context: Context, worst: Prediction) -> Verdict:
-    """The verdict on the worst prediction of a joint."""
-    name = title(worst.joint)
-    where = f"(worst: {literal(worst.log)}, {worst.scheme})"
-    if worst.r2 < 0:
-        return Verdict(
-            "bad", f"**{name}**: on effort that it has not seen, the model is worse than a constant {where}."
-        )
-    level = "good" if worst.r2 >= GOOD else "warn" if worst.r2 >= FAIR else "bad"
-    r2 = context.results[f"{worst.prefix}.r2"].number(3)
-    text = f"**{name}**: the model explains at least {r2} of the variance of effort that it has not seen {where}."
-    return Verdict(level, text)  # type: ignore[arg-type]
-
-
-def consistency_verdict(context: Context, joint: str, tracks: list[Track]) -> Verdict:
-    """Whether the standard deviations that the filter states can be believed."""
-    name = title(joint)
-    coloured = [t for t in tracks if context.results[f"ekf.{t.log}.{joint}.white"].value != 1]
-    if not coloured:
-        return Verdict("good", f"**{name}**: the filter's innovations pass as white noise in all {len(tracks)} logs.")
-    usual = float(np.median([t.nis_mean for t in tracks]))
-    size = "too small" if usual > 2 * EXPECTED else "too large" if usual < EXPECTED / 2 else "about as large as it is"
-    return Verdict(
-        "warn" if EXPECTED / 2 <= usual <= 2 * EXPECTED else "bad",
-        f"**{name}**: the filter's innovations are not white over the whole run in {len(coloured)} of {len(tracks)} "
-        f"logs, and what it states of their spread is {size}. Judge a contact by the free-space level, not by the "
-        "filter's own standard deviations.",
+    scored = [p for p in scored if p.role != "contact" or context.study.log(p.log).contact]
+    others = [p for p in scored if p.role != "identification"] or scored
+    unseen = [p for p in others if p.path == "another path"] or others
+    spaces = [space for space in context.catalogue.all(FreeSpace) if space.joint == joint]
+    spaces = [space for space in spaces if space.role != "identification"] or spaces
+    return Trust(
+        joint,
+        max(unseen, key=lambda p: p.model_error, default=None),
+        max(spaces, key=lambda space: space.detection_level, default=None),
     )
 
 
-def table(context: Context) -> Table:
-    """One row per joint and log that was tracked."""
-    rows = []
-    for track in context.catalogue.all(Track):
-        key = f"ekf.{track.log}.{track.joint}"
-        white = context.results.get(f"{key}.white")
-        rows.append(
-            (
-                title(track.joint),
-                literal(track.log),
-                f"{track.role}, at rest" if track.at_rest else track.role,
-                context.number(f"{key}.tau_ext_rms", 3),
-                context.number(f"{key}.nis_mean", 3),
-                "–" if white is None else "yes" if white.value == 1 else "no",
-            )
-        )
+def opening(context: Context, trusts: list[Trust], contacts: list[Contact]) -> str:
+    """One paragraph: what was estimated, and which contacts stand out."""
+    kind = "simulated " if context.study.simulated else ""
+    runs = len({track.log for track in context.catalogue.all(Track)})
+    windows = sum(len(contact) for contact in contacts)
+    above = sum(int(contact.above.sum()) for contact in contacts)
+    text = (
+        f"External effort, torque [N m] at joints that turn and force [N] at joints that slide, was estimated on "
+        f"{count(len(trusts), 'joint')} in {count(runs, kind + 'run')} of the {literal(context.study.robot.title)} "
+        "from motor currents and joint positions, without a force sensor. It is what the robot exerts on its "
+        "environment. "
+    )
+    if not windows:
+        return text + "The study states no contact windows, so no contact is measured."
+    return text + (
+        f"**{above} of {count(windows, 'window')} of contact, counted joint by joint, stand out from free space.** "
+        "Efforts below the detection level in the table cannot be told from the model's error."
+    )
+
+
+def percent(share: float) -> str:
+    """A share as it is printed."""
+    return f"{100 * share:.0f} %"
+
+
+def count(number: int, noun: str) -> str:
+    """A number with its noun: '1 run', '3 runs'."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
+    """The external effort of a joint in its most doubtful contact log, or where there is none, in its worst run."""
+    own = context.catalogue.about(Contact, joint=trusted.joint)
+    errors = {p.log: p.model_error for p in context.catalogue.about(Prediction, joint=trusted.joint)}
+    logs = sorted((c.log for c in own if len(joints_touched(context, c)) == 1), key=lambda log: errors.get(log, 0.0))
+    logs = logs or [c.log for c in own] or ([trusted.space.log] if trusted.space is not None else [])
+    for track in context.catalogue.about(Track, joint=trusted.joint, log=logs[-1]) if logs else []:
+        spans = [VSpan(start, end, "", "sky") for start, end in context.study.log(track.log).contact]
+        levels = [trusted.space.free_level] if trusted.space is not None else []
+        level = [HBand(-size, size, "free space: 95 % of samples") for size in levels]
+        calm = track.t - track.t[0] >= 1.0
+        line = Line(track.t[calm], track.tau_ext[calm], "external effort", "vermillion")
+        peaks = [named_peaks(track, c) for c in own if c.log == track.log]
+        heading = f"{title(track.joint)}, {track.log}"
+        effort = label(track, "tau_ext", "effort")
+        yield Panel(heading, "time [s]", effort, (*spans, *level, line, *peaks))
+
+
+def unlabelled(panel: Panel) -> Panel:
+    """A panel without the legend that the first of its figure has already."""
+    return replace(panel, marks=tuple(replace(mark, label="") for mark in panel.marks))
+
+
+def joints_touched(context: Context, contact: Contact) -> list[Contact]:
+    """The joints with contact windows in the same log."""
+    return [other for other in context.catalogue.about(Contact, log=contact.log) if other.above.any()]
+
+
+def named_peaks(track: Track, contact: Contact) -> Points:
+    """The peak in each window, with its value."""
+    places = []
+    for start, end in zip(contact.onset, contact.release, strict=True):
+        inside = np.flatnonzero((track.t >= start) & (track.t <= end))
+        places.append(inside[np.argmax(np.abs(track.tau_ext[inside]))])
+    return Points(track.t[places], track.tau_ext[places], "", "black", names=tuple(f"{p:+.3g}" for p in contact.peak))
+
+
+def spoken(contact: Contact) -> str:
+    """The peaks of a log in words, for those who cannot see the figure."""
+    unit = contact.origin.units["peak"] if contact.origin else ""
+    return f"{contact.joint.replace('_', ' ')} peaks at {', '.join(f'{p:+.3g}' for p in contact.peak)} {unit}"
+
+
+def trust_table(context: Context, trusts: list[Trust]) -> Table:
+    """One row a joint."""
+    header = ("Joint", "Verdict", "Model error", "Of effort", "$R^2$", "At most", "Detection level", "Covered")
     return Table(
-        "External effort outside known contacts (root mean square), the filter's normalised innovation squared "
-        "(2 when it is consistent), and whether its innovations are white. Where nothing touched the robot, the first "
-        "is its floor: a contact has to exceed it to be seen.",
-        ("Joint", "Log", "Role", "External effort", "NIS", "White"),
-        tuple(rows),
-        label="summary-table",
-        align="lllrrl",
+        "How far to trust it: the model's error beyond noise, $R^2$ and the most that noise leaves of it, the "
+        "detection level that 99 % of free-space samples stay below, and how many of them the 95 % band covers.",
+        header,
+        tuple(trust_row(context, trusted) for trusted in trusts),
+        label="trust-table",
+        align="llrrrrrr",
     )
+
+
+def trust_row(context: Context, trusted: Trust) -> tuple[Cell, ...]:
+    """The numbers of one joint, with the runs that they are of."""
+    p, space = trusted.prediction, trusted.space
+    same = ", same path" if p is not None and p.path == "same path" else ""
+    row: list[Cell] = [title(trusted.joint), WORDS[trusted.level] + same]
+    if p is None:
+        row += ["–"] * 4
+    else:
+        r2, ceiling = (context.number(f"{p.prefix}.{name}", 2) for name in ("r2", "r2_ceiling"))
+        row += [context.number(f"{p.prefix}.model_error", 2), percent(trusted.share), r2, ceiling]
+    if space is None:
+        row += ["–"] * 2
+    else:
+        key = f"{space.filter}.{space.log}.{space.joint}"
+        row += [context.number(f"{key}.detection_level", 2), percent(space.coverage)]
+    return tuple(row)
+
+
+def first_looks(context: Context, trusts: list[Trust]) -> Iterator[Block]:
+    """The three things to look at first, worst first."""
+    looks = sorted(looks_at(context, trusts), key=lambda look: -look[0])
+    if looks:
+        yield Prose("**Look at these first.**")
+        yield Bullets(tuple(text for _, text in looks[:3]))
+
+
+def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:
+    """What deserves a look, with how much."""
+    predicted, tracked = see(context, Prediction, "prediction"), see(context, Track, "filter")
+    for trusted in trusts:
+        p, space, name = trusted.prediction, trusted.space, title(trusted.joint)
+        if p is not None and trusted.share > GOOD:
+            error = context.results[f"{p.prefix}.model_error"].number(2)
+            errs = f"the model errs by {error}, {percent(trusted.share)} of the effort."
+            yield trusted.share / GOOD, f"**{name}, {literal(p.log)}**: {errs}{predicted}"
+        if p is not None and p.path == "same path":
+            repeats = f"judged on the path that was fitted ({literal(p.log)}), where the model's error repeats; "
+            yield 4.0, f"**{name}**: {repeats}record a validation log on another path.{predicted}"
+        if space is not None and space.coverage < COVERED[0]:
+            narrow = f"the 95 % band is too narrow, it covers {percent(space.coverage)} of free-space samples; "
+            remedy = f"judge contacts by the detection level.{tracked}"
+            yield 1.0 + 10 * (COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {narrow}{remedy}"
+    for diagnostic in context.catalogue.all(Diagnostic):
+        for text in warning_texts(diagnostic):
+            yield 1.5, literal(text)
+
+
+def see(context: Context, kind: type[Record], anchor: str) -> str:
+    """Where more is said, if it is: a section is there only if there are records for it."""
+    return f" See [@{anchor}]." if context.catalogue.all(kind) else ""
+
+
+def warning_texts(diagnostic: Diagnostic) -> Iterator[str]:
+    """The warnings of a diagnostic."""
+    pairs = zip(diagnostic.severity, diagnostic.text, strict=True)
+    yield from (text for severity, text in pairs if severity == "warning")
+
+
+def failures(context: Context) -> Iterator[Block]:
+    """What could not be done at all."""
+    for task, failed in context.provenance.failures.items():
+        yield Verdict("bad", f"**{literal(task)}** failed, and what depends on it is missing: {literal(failed)}")

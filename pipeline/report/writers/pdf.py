@@ -42,6 +42,7 @@ def render(document: Document) -> bytes:
         "title": printable(document.title),
         "study": printable(document.study),
         "simulated": document.simulated,
+        "edition": printable(document.edition),
         "references": references(placed),
         "blocks": [_placed(item) for item in placed],
     }

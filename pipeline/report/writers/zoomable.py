@@ -158,6 +158,8 @@ def _(mark: Line, plot: Any, colour: str) -> Any:
 def _(mark: Points, plot: Any, colour: str) -> Any:
     if mark.y_std is not None:
         plot.segment(mark.x, mark.y - mark.y_std, mark.x, mark.y + mark.y_std, line_color=colour)
+    if mark.names:
+        plot.text(mark.x, mark.y, list(map(_plain_text, mark.names)), text_font_size="11px", text_align="center")
     return plot.scatter(_single_precision(mark.x), mark.y.astype(np.float32), size=4, color=colour, line_color=None)
 
 

@@ -1,0 +1,1 @@
+"""What an external effort says of contacts: how large it is where nothing touches the robot, and within windows."""

@@ -1,0 +1,37 @@
+"""Standard errors where there is no formula: by drawing blocks of samples that are longer than what correlates.
+
+Kuensch, The jackknife and the bootstrap for general stationary observations, Annals of Statistics 17 (1989).
+"""
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import TypeVar
+
+import numpy as np
+
+BLOCKS = 20
+DRAWS = 200
+
+Block = TypeVar("Block")
+
+
+def blocks(N: int, count: int = BLOCKS) -> list[slice]:
+    """N samples as so many blocks of about one length; fewer where there are not that many samples."""
+    edges = np.linspace(0, N, min(count, max(N, 1)) + 1).round().astype(int).tolist()
+    return [slice(start, stop) for start, stop in pairwise(edges) if stop > start]
+
+
+def standard_error(statistic: Callable[[list[Block]], float], parts: Sequence[Block], seed: int = 0) -> float:
+    """The standard deviation of a statistic of blocks over draws of as many blocks, with replacement.
+
+    A block is whatever the statistic takes: samples, or what is already known of them.
+
+    NaN for a single block, of which nothing can be drawn.
+    """
+    if len(parts) < 2:
+        return float("nan")
+    rng = np.random.default_rng(seed)
+    draws = rng.integers(0, len(parts), (DRAWS, len(parts)))
+    # A draw of as many blocks as there are understates a variance by (n - 1) / n.
+    scale = np.sqrt(len(parts) / (len(parts) - 1))
+    return float(scale * np.std([statistic([parts[i] for i in draw]) for draw in draws]))
