@@ -23,7 +23,7 @@ LOCK := uv pip compile -q --universal --python-version 3.11 --generate-hashes --
 UPGRADE ?=
 
 # One line a stage: what it reads, and what it makes.
-STAGES := design ingest resample average differentiate fit predict ekf whiteness report
+STAGES := design ingest resample average differentiate fit predict ekf assess measure whiteness report
 # design        : robot -> Links Pose Workspace Control Lyapunov Excitation
 # ingest        : logs -> Recording LogSummary Diagnostic
 # resample      : Recording -> Signal Diagnostic
@@ -32,6 +32,8 @@ STAGES := design ingest resample average differentiate fit predict ekf whiteness
 # fit           : Trajectory -> Fit Residual Diagnostic
 # predict       : Signal Trajectory Fit -> Prediction Diagnostic
 # ekf           : Signal Fit Average -> Track Diagnostic
+# assess        : Track -> FreeSpace
+# measure       : Track FreeSpace -> Contact
 # whiteness     : PeriodResidual Residual Track -> Whiteness
 # report        : everything -> report.html report.pdf results.json
 
