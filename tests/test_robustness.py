@@ -65,7 +65,7 @@ def test_the_readers_of_logs_count_for_ingest_and_the_store_for_every_stage(fini
 
 
 def test_code_of_several_modules_is_that_of_each():
-    assert code("pipeline.units", "pipeline.records.store") == code("pipeline.units") | code("pipeline.records.store")
+    assert code("pipeline.maths.units", "pipeline.records.store") == code("pipeline.maths.units") | code("pipeline.records.store")
 
 
 def test_the_hash_of_a_robot_sees_every_bit_of_it():

@@ -4,11 +4,11 @@ import re
 from dataclasses import dataclass
 from typing import Any
 
+from pipeline.maths.units import UNITS, canonical, measures
 from pipeline.robots import Kind, Robot
 from pipeline.robots.from_toml import is_number
 from pipeline.study import Source
 from pipeline.study.problems import Problems
-from pipeline.units import UNITS, canonical, measures
 
 # quantity -> what its unit measures, with the joint's own kind of position and effort left open
 OF_A_JOINT = {
