@@ -11,7 +11,7 @@ from pipeline.maths.excitation.fourier import Fourier
 from pipeline.maths.simulation.surroundings import SHAPES
 from pipeline.robots.from_toml import NAME
 from pipeline.simulation.scenario.scenario import Path, Push, SimulatedJoint, SimulatedLog, Tissue
-from pipeline.study.reading import ROLES
+from pipeline.study.entries import ROLES
 from pipeline.toml import TomlTable
 
 FORMATS = (".tdms", ".lvm")
