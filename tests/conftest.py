@@ -24,6 +24,9 @@ BENCHMARKS = HERE / "benchmarks"
 # Tests that take seconds beside those that take moments; a whole file where no test is named.  A new test says so
 # itself, with `@pytest.mark.medium`.
 MEDIUM: dict[str, tuple[str, ...]] = {
+    "logs/test_labview_files.py": (
+        "test_a_file_of_each_kind_cut_at_every_other_byte_gives_whole_rows_or_a_clear_error",
+    ),
     "report/test_report_figures.py": ("test_another_process_gives_the_same_bytes",),
     "report/test_report_html.py": (
         "test_a_browser_opens_it_without_a_word_and_draws_the_traces",
@@ -37,6 +40,7 @@ MEDIUM: dict[str, tuple[str, ...]] = {
     "simulation/test_control.py": (
         "test_a_compensator_that_knows_nine_tenths_of_the_masses_leaves_pd_with_the_offset_of_the_tenth",
         "test_pd_with_gravity_compensation_converges",
+        "test_the_lyapunov_function_never_rises",
         "test_the_pid_of_table_5_4_removes_that_offset_but_is_worse_than_pd_for_over_twenty_seconds",
     ),
     "simulation/test_excitation.py": (
@@ -45,6 +49,7 @@ MEDIUM: dict[str, tuple[str, ...]] = {
         "test_the_same_seed_designs_the_same_trajectory",
     ),
     "simulation/test_excite_command.py": (
+        "test_a_plot_is_the_same_bytes_twice",
         "test_a_robot_of_a_laboratory_can_be_excited_too",
         "test_joints_of_independent_models_that_move_together_share_a_period_and_sum_their_objectives",
     ),

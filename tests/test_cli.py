@@ -119,6 +119,7 @@ def test_a_verbose_run_names_every_task_with_its_time(study):
     assert "took" not in call("ingest", study, "--force")
 
 
+@pytest.mark.medium
 def test_tasks_that_run_together_say_how_far_the_stage_was(study):
     said = call("ingest", study, "--verbose", "--jobs", 2)
     done = re.findall(r"^ingest: (\w+): done (\d+\.\d\d) s into the stage$", said, re.M)

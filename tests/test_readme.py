@@ -15,15 +15,15 @@ from typer.testing import CliRunner
 import pipeline
 from pipeline import commands, stages
 from pipeline.cli import app
+from pipeline.maths.units import SI, UNITS
 from pipeline.records import COLUMN_DTYPES, KINDS, Control, Excitation, Links, Lyapunov, Origin, Record
 from pipeline.records.catalogue import Catalogue
 from pipeline.report.results import collect
-from pipeline.robots.from_toml import CHANGEABLE
+from pipeline.robots.robot import Joint
 from pipeline.runner.signature import declaration
 from pipeline.study import LogEntry, Settings, Weight, reading
 from pipeline.study.channels import OF_A_JOINT, OF_THE_LOG
-from pipeline.study.reading import ROLES
-from pipeline.units import SI, UNITS
+from pipeline.study.entries import ROLES
 from tests.conftest import ROOT
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -103,7 +103,8 @@ def test_keys_of_a_study_and_its_logs_are_all_told():
     told = set(re.findall(r"\b(\w+) = ", code + " ".join(spans(said))))
     told |= set(re.findall(r"\[+(?:log\.)?(\w+)", code)) | {span for span in spans(said) if span.isidentifier()}
     assert {f.name for f in fields(LogEntry)} | {f.name for f in fields(Weight)} | {"file"} <= told
-    assert {"title", "robot", "simulated", "settings", "log", *CHANGEABLE} <= told
+    changeable = {f.name for f in fields(Joint)} - {"name", "kind", "published"}
+    assert {"title", "robot", "simulated", "settings", "log"} | changeable <= told
     assert "[robot_overrides." in said
 
 

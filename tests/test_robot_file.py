@@ -8,7 +8,9 @@ from hypothesis import strategies as st
 
 from pipeline import robots
 from pipeline.errors import BadRobot
-from pipeline.robots.from_toml import _robot
+from pipeline.robots.from_toml import robot_of
+from pipeline.toml import TomlTable
+from pipeline.toml.file import TomlFile
 from tests import arm
 from tests.test_study import ANYTHING, ARM, places_of
 
@@ -21,12 +23,20 @@ def test_a_robot_that_is_written_out_reads_back_as_it_was(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ('name = "mine"', "name = 5", "name must be text, not 5"),
-        ('name = "mine"', 'title = ["a"]', "title must be text, not ['a']"),
-        ('terms = ["inertia", "offset", "viscous friction"]', 'terms = [["x"]]', "terms must be a list of 'inertia'"),
-        ('"offset"', '"inertia"', "terms must name no term twice"),
-        ('name = "shoulder"', 'name = "lpt1"', "name 'lpt1' is reserved on Windows"),
-        ("gear_ratio = 50.0", f"gear_ratio = 1{'0' * 400}", "gear_ratio must be a number other than 0"),
+        ('name = "mine"', "name = 5", "arm.toml:1: name must be text, not 5"),
+        ('name = "mine"', 'title = ["a"]', "arm.toml:1: title must be text, not ['a']"),
+        (
+            'terms = ["inertia", "offset", "viscous friction"]',
+            'terms = [["x"]]',
+            ":5: joint 1 (shoulder): terms must be a list of 'inertia'",
+        ),
+        ('"offset"', '"inertia"', ":5: joint 1 (shoulder): terms must name no term twice"),
+        ('name = "shoulder"', 'name = "lpt1"', "arm.toml:3: joint 1: name 'lpt1' is reserved on Windows"),
+        (
+            "gear_ratio = 50.0",
+            f"gear_ratio = 1{'0' * 400}",
+            ":6: joint 1 (shoulder): gear_ratio must be a number other than 0",
+        ),
         ("gear_ratio = 50.0", f"gear_ratio = {'1' * 5000}", "Exceeds the limit"),
     ],
 )
@@ -41,7 +51,7 @@ def test_what_is_wrong_with_a_robot_is_said_without_a_traceback(tmp_path, old, n
 @pytest.mark.parametrize("joint", ["3", "[3]", '"shoulder"', "{}"])
 def test_joints_that_are_no_tables_are_refused(tmp_path, joint):
     (tmp_path / "arm.toml").write_text(f"joint = {joint}")
-    with pytest.raises(BadRobot, match=r"joint must be a table: write \[\[joint\]\]"):
+    with pytest.raises(BadRobot, match=r"arm\.toml:1: joint must be a list of tables: write \[\[joint\]\]"):
         robots.load("arm.toml", tmp_path)
 
 
@@ -57,6 +67,6 @@ def test_no_robot_file_however_odd_ends_in_anything_but_problems(data):
     table = tomllib.loads(ARM)
     parent, key = data.draw(st.sampled_from(places_of(table)))
     parent[key] = data.draw(ANYTHING | st.integers(10**400, 10**401))
-    problems: list[str] = []
-    made = _robot(table, "arm", problems)
-    assert problems or made.joints
+    file = TomlFile("arm.toml", {})
+    made = robot_of(TomlTable(table, file), "arm")
+    assert file.problems() or made.joints

@@ -12,7 +12,8 @@ from pipeline.errors import BadRobot, BadStudy
 from pipeline.robots.from_toml import RESERVED
 from pipeline.robots.robot import Kind
 from pipeline.study import reading
-from pipeline.study.problems import Problems
+from pipeline.toml import TomlTable
+from pipeline.toml.file import TomlFile
 from tests.test_runs import call
 
 GOOD = """title = "T"
@@ -73,10 +74,10 @@ def test_a_good_study_means_what_it_says(tmp_path):
         (
             'role = "identification"',
             'role = "training"',
-            "6: log 'a': role must not be 'training'; it is one of identification",
+            "6: log 'a': role must be one of identification, validation, contact",
         ),
         ("period = 10", "period = -1", "7: log 'a': period must be positive, not -1"),
-        ("period = 10", 'period = "ten"', "7: period must be a number, not 'ten'"),
+        ("period = 10", 'period = "ten"', "7: log 'a': period must be a number, not 'ten'"),
         ("contact = [[1, 2]]", "contact = [[2, 1]]", "8: log 'a': contact must be a list of [start, end]"),
         ("contact = [[1, 2]]", "colour = 1", "8: log 'a': unknown key 'colour'"),
         (
@@ -105,14 +106,16 @@ def test_a_good_study_means_what_it_says(tmp_path):
         ),
         ('hand_roll.i = "Current"', "hand_roll.i = -1", "must be a name, or a column number from 0, not -1"),
         ("[[log]]", "[settings]\nlowpass = 0\n[[log]]", "4: settings: lowpass must be positive, not 0.0"),
-        ("[[log]]", "[settings]\nlow = 0\n[[log]]", "4: [settings]: unknown key 'low'; known are lowpass"),
+        ("[[log]]", "[settings]\nlow = 0\n[[log]]", "4: settings: unknown key 'low'; known are lowpass"),
         (
             "[[log]]",
             "[robot_overrides.elbow]\ngear_ratio = 1\n[[log]]",
             "3: robot_overrides: davinci has no joint 'elbow'",
         ),
-        ("[[log]]", "[robot_overrides.hand_roll]\ngear_ratio = 0\n[[log]]", "gear_ratio must be a number other than 0"),
-        ("[[log]]", "[robot_overrides.hand_roll]\ngears = 1\n[[log]]", "unknown key 'gears'; it may say title, terms"),
+        ("[[log]]", "[robot_overrides.hand_roll]\ngear_ratio = 0\n[[log]]",
+            "4: robot_overrides.hand_roll: gear_ratio must be a number other than 0, not 0"),
+        ("[[log]]", "[robot_overrides.hand_roll]\ngears = 1\n[[log]]",
+            "4: robot_overrides.hand_roll: unknown key 'gears'; known are title, terms"),
         ('title = "T"', 'title = "T', "study.toml: Illegal character"),
     ],
 )  # fmt: skip
@@ -153,22 +156,21 @@ def test_no_study_file_however_odd_ends_in_anything_but_a_message(data, tmp_path
     parent, key = data.draw(st.sampled_from(places))
     parent[key] = data.draw(ANYTHING)
     folder = tmp_path_factory.mktemp("odd", numbered=True)
-    reader = reading._Reader(folder, Problems(folder / "study.toml", GOOD))
     with contextlib.suppress(BadStudy):
-        assert reader.study(table).logs
+        assert reading.study_of(TomlTable(table, TomlFile("study.toml", {})), folder).logs
 
 
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
         ("[[log]]", '[settings]\nfit = "coupled.x"\n[[log]]',
-         "4: settings: fit must not be 'coupled.x'; it is one of independent.lse, "),
+         "4: settings: fit must be one of independent.lse, "),
         ("[[log]]", "[settings]\nharmonics = 101\n[[log]]",
          "4: settings: harmonics must lie between 0 and 100, not 101"),
         ("[[log]]", "[settings]\nharmonics = -1\n[[log]]", "harmonics must be positive, not -1"),
         ("[[log]]", "[settings]\nlowpass = 1e6\n[[log]]",
          "lowpass must lie between 1e-06 and 100000 Hz, not 1000000.0"),
-        ("[[log]]", f"[settings]\nlowpass = 1{'0' * 400}\n[[log]]", "4: lowpass must be a number"),
+        ("[[log]]", f"[settings]\nlowpass = 1{'0' * 400}\n[[log]]", "4: settings: lowpass must be a number, not 1000"),
         ("period = 10", "period = 1e7", "7: log 'a': period must lie between 1e-06 and 1e+06 s, not 10000000.0"),
         ("period = 10", "rate = 1e-4", "7: log 'a': rate must lie between 0.001 and 1e+07 Hz, not 0.0001"),
         ("period = 10", "rate = 1e8", "rate must lie between"),
@@ -223,9 +225,61 @@ def test_all_problems_are_said_at_once(tmp_path):
     with pytest.raises(BadStudy) as caught:
         read(tmp_path, text + GOOD.partition("[[log]]")[1] + GOOD.partition("[[log]]")[2])
     lines = str(caught.value).splitlines()
-    assert len(lines) == 4
-    assert any("two logs are named 'a'" in line for line in lines)
+    assert len(lines) == 5
+    assert any("14: two logs are named 'a'" in line for line in lines)
+    assert any(f"5: file 'a.csv' is not in {tmp_path}" in line for line in lines)
     assert all(line.startswith(f"{tmp_path}/study.toml:") for line in lines)
+
+
+def problems(folder) -> list[str]:
+    """What is said of a study in `folder`, without the folder."""
+    with pytest.raises(BadStudy) as caught:
+        reading.read(folder)
+    return str(caught.value).replace(f"{folder}/", "").replace(str(folder), "the folder").splitlines()
+
+
+def test_nothing_that_is_wrong_hides_anything_else(tmp_path):
+    text = GOOD.replace("title", "titel").replace("period = 10", "period = -10").replace("hand_roll.i", "hand_rol.i")
+    (tmp_path / "study.toml").write_text(text)
+    known = "known are title, robot, simulated, robot_overrides, settings, log; did you mean 'title'?"
+    assert problems(tmp_path) == [
+        f"study.toml:1: unknown key 'titel'; {known}",
+        "study.toml:5: file 'a.csv' is not in the folder",
+        "study.toml:7: log 'a': period must be positive, not -10.0",
+        "study.toml:12: log 'a': robot davinci has no joint 'hand_rol'; it has hand_roll, hand_pitch, instrument_slide",
+    ]
+
+
+def test_a_file_that_is_not_there_is_looked_for_on_the_line_that_names_it(tmp_path):
+    files = 'files = [ # in this order\n  "a.csv",\n  "b.csv",\n]'
+    (tmp_path / "a.csv").write_text("")
+    (tmp_path / "study.toml").write_text(GOOD.replace('file = "a.csv"', files).replace("period = 10", "period = 0"))
+    assert problems(tmp_path) == [
+        "study.toml:7: file 'b.csv' is not in the folder",
+        "study.toml:10: log 'a': period must be positive, not 0.0",
+    ]
+
+
+def test_what_is_wrong_with_a_study_and_with_its_robot_is_said_together(tmp_path):
+    arm = ARM.replace("gear_ratio = 50.0", "gear_ratio = 0").replace("[-1, 1]", "[1]")
+    study = GOOD.replace('"davinci"', '"my_arm.toml"').replace("period = 10", "period = 0")
+    (tmp_path / "my_arm.toml").write_text(arm)
+    (tmp_path / "study.toml").write_text(study.replace("hand_roll.theta_m", "shoulder.theta_m"))
+    (tmp_path / "a.csv").write_text("")
+    assert problems(tmp_path) == [
+        "study.toml:7: log 'a': period must be positive, not 0.0",
+        "study.toml:12: log 'a': robot mine has no joint 'hand_roll'; it has shoulder",
+        "my_arm.toml:6: joint 1 (shoulder): gear_ratio must be a number other than 0, not 0",
+        "my_arm.toml:7: joint 1 (shoulder).limits: q must be [lower, upper], not [1]",
+    ]
+
+
+def test_joints_are_not_doubted_where_the_robot_does_not_say_which_it_has(tmp_path):
+    (tmp_path / "my_arm.toml").write_text(ARM.replace("shoulder", "Shoulder"))
+    study = GOOD.replace('"davinci"', '"my_arm.toml"').replace("hand_roll", "shoulder")
+    (tmp_path / "study.toml").write_text(study)
+    (tmp_path / "a.csv").write_text("")
+    assert problems(tmp_path) == ["my_arm.toml:3: joint 1: name 'Shoulder' must match [a-z0-9_-]+"]
 
 
 def test_a_missing_study_says_how_to_get_one(tmp_path):
@@ -235,8 +289,8 @@ def test_a_missing_study_says_how_to_get_one(tmp_path):
 def test_every_missing_file_is_named(tmp_path):
     (tmp_path / "study.toml").write_text(GOOD.replace('file = "a.csv"', 'files = ["a.csv", "b.csv"]'))
     said = " ".join(call("ingest", tmp_path, code=1).split())
-    assert "file 'a.csv' is not in" in said
-    assert "file 'b.csv' is not in" in said
+    assert "study.toml:5: file 'a.csv' is not in" in said
+    assert "study.toml:5: file 'b.csv' is not in" in said
 
 
 def test_overrides_change_one_robot_of_one_study(tmp_path):
@@ -269,11 +323,24 @@ def test_a_robot_may_be_described_beside_the_study(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ('kind = "revolute"', 'kind = "screw"', "kind is 'revolute' or 'prismatic', not 'screw'"),
-        ('"offset"', '"stiction"', "terms must be a list of 'inertia'"),
-        ("gear_ratio = 50.0", "gear = 50.0", "unknown key 'gear'"),
-        ("q = [-1, 1]", "q = [1, -1]", "limits q must be [lower, upper]"),
-        ("[[joint]]", "[[joints]]", "unknown key 'joints'"),
+        (
+            'kind = "revolute"',
+            'kind = "screw"',
+            "arm.toml:4: joint 1 (shoulder): kind must be one of revolute, prismatic, not 'screw'",
+        ),
+        ('"offset"', '"stiction"', "arm.toml:5: joint 1 (shoulder): terms must be a list of 'inertia'"),
+        (
+            "gear_ratio = 50.0",
+            "gear = 50.0",
+            "arm.toml:6: joint 1 (shoulder): unknown key 'gear'; known are name, kind, title, terms, limits, "
+            "gear_ratio, torque_constant, harmonics, q_tau; did you mean 'gear_ratio'?",
+        ),
+        ("q = [-1, 1]", "q = [1, -1]", "arm.toml:7: joint 1 (shoulder).limits: q must be [lower, upper], not [1, -1]"),
+        (
+            "[[joint]]",
+            "[[joints]]",
+            "arm.toml:2: unknown key 'joints'; known are name, title, joint; did you mean 'joint'?",
+        ),
     ],
 )
 def test_what_is_wrong_with_a_robot_is_said(tmp_path, old, new, says):

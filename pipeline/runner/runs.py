@@ -94,7 +94,7 @@ def load(folder: Path) -> Study:
     """
     study = reading.read(folder)
     absent = study.absent()
-    lines = [f"{folder / 'study.toml'}: file {name!r} is not in {folder}" for name in absent]
+    lines = [f"{folder / 'study.toml'}:{study.lines[name]}: file {name!r} is not in {folder}" for name in absent]
     if len(absent) == study.files:
         raise BadStudy("\n".join(lines))
     for line in lines:

@@ -8,10 +8,10 @@ import numpy as np
 from pipeline.errors import BadLog
 from pipeline.logs.log import Block, Channel, Log
 from pipeline.maths.signals.clock import GAP, ClockStatistics
+from pipeline.maths.units import SI, UNITS, canonical, measures, size
 from pipeline.records import Column, Diagnostic, LogSummary, Recording, diagnostic
 from pipeline.robots.robot import Joint, Robot
 from pipeline.study import LogEntry, Source
-from pipeline.units import SI, UNITS, canonical, measures, size
 
 MOST_REPEATED = 0.1  # share of rows equal to the one before, above which the recorder was faster than the robot
 MOST_JITTER = 0.1  # of the sampling time

@@ -86,6 +86,7 @@ class Study:
     changed: dict[str, Any] = field(default_factory=dict)  # what robot_overrides says, for the report
     truth: dict[str, Any] = field(default_factory=dict)  # ground truth of a simulated study: its truth.toml
     robot_file: str = ""  # the .toml in the study's folder that describes the robot, if there is one
+    lines: dict[str, int] = field(default_factory=dict, compare=False)  # of study.toml, by the file of a log they name
 
     @property
     def name(self) -> str:

@@ -9,8 +9,8 @@ from pipeline import robots
 from pipeline.errors import BadRequest
 from pipeline.logs import open_log
 from pipeline.logs.log import Channel, Log
+from pipeline.maths.units import canonical, measures
 from pipeline.robots.robot import Joint, Robot
-from pipeline.units import canonical, measures
 
 TIME = ("time", "t", "t_s", "elapsed", "x_value", "seconds")
 # Words of a channel's name that tell what it holds, the telling ones first.

@@ -1,17 +1,24 @@
 """Scenario files: what they say, and what is said about wrong ones."""
 
+import tomllib
 from dataclasses import replace
 from importlib.resources import files
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from pipeline import robots
 from pipeline.maths.simulation.control import Regulator
 from pipeline.robots.davinci import ROBOT
-from pipeline.simulation.scenario.reading import load, shipped
+from pipeline.simulation.scenario.reading import _scenario, load, shipped
 from pipeline.simulation.scenario.scenario import BadScenario, Path
+from pipeline.toml import TomlTable
+from pipeline.toml.file import TomlFile
+from tests.test_study import ANYTHING, places_of
 
+LISTED = ", ".join(robots.ROBOTS)
 GOOD = """
 title = "A roll"
 robot = "davinci"
@@ -43,7 +50,7 @@ def read(tmp_path, text: str):
 def problems(tmp_path, text: str) -> list[str]:
     with pytest.raises(BadScenario) as error:
         read(tmp_path, text)
-    return [line.removeprefix(f"{tmp_path / 'mine.toml'}: ") for line in str(error.value).splitlines()]
+    return [line.removeprefix(f"{tmp_path / 'mine.toml'}:") for line in str(error.value).splitlines()]
 
 
 def test_a_scenario_says_what_its_file_says(tmp_path):
@@ -63,40 +70,40 @@ def test_every_shipped_scenario_is_sound(name):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("seed = 1", "sead = 1", ["seed is missing", "unknown key 'sead'"]),
-        ("seed = 1", "seed = 1.5", ["seed must be a whole number, not 1.5"]),
-        ('robot = "davinci"', 'robot = "raven"', [f"robot must be one of {', '.join(robots.ROBOTS)}, not 'raven'"]),
-        ("rate = 100.0", "rate = 0", ["rate must be finite and greater than 0, not 0"]),
-        ("rate = 100.0", "rate = nan", ["rate must be finite and greater than 0, not nan"]),
-        ("rate = 100.0", "rate = 1e9", ["log roll: 1e+10 samples cannot be recorded"]),
-        ("rate = 100.0", "rate = 0.1", ["log roll: 1 samples cannot be recorded"]),
-        ("T09", " 9", ["started must be a date and time such as"]),
-        ("inertia = 0.4", "mass = 0.4", ["joint.hand_roll.theta: inertia is missing", "unknown key 'mass'"]),
-        ("hand_roll]", "elbow]", ["robot davinci has no joint 'elbow'", "there is no [joint.hand_roll]"]),
-        ('name = "roll"', 'name = "Roll 1"', ["log 1: name must match [a-z0-9_-]+, not 'Roll 1'"]),
-        ("roll.tdms", "../roll.tdms", ["log 1: file must be a plain file name"]),
-        ("roll.tdms", "roll.csv", ["ends in .tdms or .lvm"]),
-        ('role = "contact"', 'role = "dance"', ["log 1: role must be one of identification"]),
-        ("period = 5.0", "period = -5.0", ["log 1.moves.hand_roll: period must be finite and greater than 0"]),
-        ("b = [0.0]", "b = []", ["a and b must have one number for each harmonic, not 1 and 0"]),
-        ("b = [0.0]", "b = ['x']", ["b must be a list of finite numbers"]),
-        ("end = 4.0", "end = 1.0", ["log 1.external.hand_roll 1: end must be after start = 2, not 1"]),
-        ("end = 4.0", "end = 40.0", ["end = 40 s is after the recording's 10 s"]),
-        ('"triangle"', '"square"', ["shape must be one of triangle, pulse, not 'square'"]),
-        ("external.hand_roll", "external.hand_pitch", ["hand_pitch touches something but is not recorded"]),
-        ("duration = 10.0", "duration = 10.0\nmass = 1.0", ["log 1: unknown key 'mass'"]),
-        ("moves.hand_roll = {", "held.hand_roll = 0.0\nmoves.hand_roll = {", ["hand_roll both moves and is held"]),
-        ("[[log]]", "[log]", ["log must be a list of tables"]),
-        ("theta = {", "noise = 3\ntheta = {", ["joint.hand_roll.noise: must be a table, not 3"]),
+        ("seed = 1", "sead = 1", [(1, "seed is missing"), (4, "unknown key 'sead'")]),
+        ("seed = 1", "seed = 1.5", [(4, "seed must be a whole number, not 1.5")]),
+        ('robot = "davinci"', 'robot = "raven"', [(3, f"robot must be one of {LISTED}, not 'raven'")]),
+        ("rate = 100.0", "rate = 0", [(5, "rate must be finite and greater than 0, not 0")]),
+        ("rate = 100.0", "rate = nan", [(5, "rate must be finite and greater than 0, not nan")]),
+        ("rate = 100.0", "rate = 1e9", [(5, "log roll: 1e+10 samples cannot be recorded")]),
+        ("rate = 100.0", "rate = 0.1", [(5, "log roll: 1 samples cannot be recorded")]),
+        ("T09", " 9", [(6, "started must be a date and time such as")]),
+        ("inertia = 0.4", "mass = 0.4", [(8, "joint.hand_roll.theta: inertia is missing"), (8, "unknown key 'mass'")]),
+        ("hand_roll]", "elbow]", [(7, "robot davinci has no joint 'elbow'"), (14, "there is no [joint.hand_roll]")]),
+        ('name = "roll"', 'name = "Roll 1"', [(10, "log 1: name must match [a-z0-9_-]+, not 'Roll 1'")]),
+        ("roll.tdms", "../roll.tdms", [(11, "log 1: file must be a plain file name")]),
+        ("roll.tdms", "roll.csv", [(11, "ends in .tdms or .lvm")]),
+        ('role = "contact"', 'role = "dance"', [(12, "log 1: role must be one of identification")]),
+        ("period = 5.0", "period = -5.0", [(14, "log 1.moves.hand_roll: period must be finite and greater than 0")]),
+        ("b = [0.0]", "b = []", [(14, "a and b must have one number for each harmonic, not 1 and 0")]),
+        ("b = [0.0]", "b = ['x']", [(14, "b must be a list of finite numbers")]),
+        ("end = 4.0", "end = 1.0", [(15, "log 1.external.hand_roll 1: end must be after start = 2, not 1")]),
+        ("end = 4.0", "end = 40.0", [(15, "end = 40 s is after the recording's 10 s")]),
+        ('"triangle"', '"square"', [(15, "shape must be one of triangle, pulse, not 'square'")]),
+        ("external.hand_roll", "external.hand_pitch", [(15, "hand_pitch touches something but is not recorded")]),
+        ("duration = 10.0", "duration = 10.0\nmass = 1.0", [(14, "log 1: unknown key 'mass'")]),
+        ("moves.hand_roll", "held.hand_roll = 0.0\nmoves.hand_roll", [(14, "hand_roll both moves and is held")]),
+        ("[[log]]", "[log]", [(9, "log must be a list of tables")]),
+        ("theta = {", "noise = 3\ntheta = {", [(8, "joint.hand_roll.noise: must be a table, not 3")]),
         ("moves.hand_roll = { period = 5.0, a = [0.1], b = [0.0] }", "moves.hand_roll = { path = [[0, 0], [1, 1]] }",
-         ["joints that follow their model exactly need a Fourier series"]),
+         [(14, "joints that follow their model exactly need a Fourier series")]),
     ],
 )  # fmt: skip
 def test_everything_wrong_with_a_scenario_is_said_with_its_place(tmp_path, old, new, says):
     assert old in GOOD
     found = problems(tmp_path, GOOD.replace(old, new))
-    for words in says:
-        assert any(words in problem for problem in found), found
+    for line, words in says:
+        assert any(problem.startswith(f"{line}: ") and words in problem for problem in found), found
 
 
 def test_all_problems_are_said_at_once(tmp_path):
@@ -106,7 +113,7 @@ def test_all_problems_are_said_at_once(tmp_path):
 
 def test_two_logs_of_one_name_or_file_are_refused(tmp_path):
     found = problems(tmp_path, GOOD + GOOD[GOOD.index("[[log]]") :])
-    assert found == ["two logs have the name 'roll'", "two logs have the file 'roll.tdms'"]
+    assert found == ["17: two logs have the name 'roll'", "18: two logs have the file 'roll.tdms'"]
 
 
 @pytest.mark.parametrize(
@@ -114,24 +121,24 @@ def test_two_logs_of_one_name_or_file_are_refused(tmp_path):
     [
         ("position_i = [7.5,", "position_i = [-7.5,", "arm.control: position_i must not be negative"),
         ("tick = 5e-4", "tick = 3e-4", "must be whole ticks, not 33.3333 of them"),
+        ("rate = 100.0", "rate = 1e-323", "samples cannot be recorded"),
         ("tick = 5e-4", "tick = 'a'", "arm: tick must be a number, not 'a'"),
         ("tick = 5e-4", "tick = 3e-2", "must be whole ticks, not 0.333333 of them"),
         ("rotor_inertia = [1e-6, 1e-6, 1e-6]", "rotor_inertia = [1e-6]", "arm: rotor_inertia must be a list of 3"),
         ("resistance = [2.0, 2.0, 2.0]", "resistance = [2.0, -2.0, 2.0]", "resistance must be greater than 0"),
         ("resistance = [2.0, 2.0, 2.0]", "resistance = [2.0, 0.0, 2.0]", "resistance must be greater than 0"),
         ("position_p", "position_q", "arm.control: position_p is missing"),
-        ("coulomb = [0.24, 0.20]", "coulomb = 0.24", "family.realistic.hand_roll: coulomb must be a list of numbers"),
+        (
+            "coulomb = [0.24, 0.20]",
+            "coulomb = 0.24",
+            "realistic.hand_roll: coulomb must be a list of 2 finite",
+        ),
         ("coulomb = [0.24, 0.20]", "coulomb = [0.24, -0.20]", "coulomb must be two positive numbers"),
         ("stops = [-0.09, 0.13]", "stops = [0.13, -0.09]", "stops must be lower and upper"),
         ("skip = 5.0", "skip = 500.0", "skip = 500 s leaves nothing of 55 s"),
         ("[[0, 0.0], [10, 0.05]", "[[0, 0.0], [0, 0.05]", "the times of path must increase"),
         ("surface = 0.04, ", "", "tissue: surface is missing"),
         ("force = [0.0, 12.0, 0.0]", "force = [0.0, 12.0]", "force must be a list of 3 finite numbers"),
-        (
-            "stops = [-0.09, 0.13]",
-            "stops = [0.05, 0.13]",
-            "instrument_slide starts at 0, beyond its stops 0.05 and 0.13",
-        ),
     ],
 )
 def test_the_tables_of_the_whole_arm_are_checked_too(tmp_path, old, new, says):
@@ -139,6 +146,19 @@ def test_the_tables_of_the_whole_arm_are_checked_too(tmp_path, old, new, says):
     assert old in text
     found = problems(tmp_path, text.replace(old, new))
     assert any(says in problem for problem in found), found
+    changed = {number for number, line in enumerate(text.splitlines(), start=1) if old in line}
+    assert {int(problem.partition(":")[0]) for problem in found} & changed
+
+
+def test_a_log_that_starts_beyond_a_stop_is_said_where_it_says_so(tmp_path):
+    text = shipped_text("davinci-demo")
+    found = problems(tmp_path, text.replace("stops = [-0.09, 0.13]", "stops = [0.05, 0.13]"))
+    assert found
+    for problem in found:
+        line, says = problem.split(": ", 1)
+        assert "instrument_slide starts at " in says
+        assert says.endswith(", beyond its stops 0.05 and 0.13")
+        assert text.splitlines()[int(line) - 1].startswith(("[[log]]", "moves.instrument_slide", "held."))
 
 
 def test_a_robot_whose_links_are_not_known_cannot_be_simulated_as_a_whole(monkeypatch):
@@ -178,3 +198,14 @@ def test_a_path_goes_at_constant_speed_or_eases_from_point_to_point():
     assert Path(points, ease=False).position(t) == pytest.approx([1.0, 1.0, 1.5, 2.0, 3.0, 0.0])
     quarter = 1 + 2 * (1 - np.cos(np.pi / 4)) / 2
     assert Path(points, ease=True).position(t) == pytest.approx([1.0, 1.0, quarter, 2.0, 3.0, 0.0])
+
+
+@given(data=st.data())
+def test_no_scenario_file_however_odd_ends_in_anything_but_problems(data):
+    """Any value of a good scenario, tables included, replaced by anything that TOML can hold."""
+    table = tomllib.loads(data.draw(st.sampled_from((GOOD, shipped_text("davinci-demo")))))
+    parent, key = data.draw(st.sampled_from(places_of(table)))
+    parent[key] = data.draw(ANYTHING | st.integers(10**400, 10**401))
+    file = TomlFile("odd.toml", {})
+    made = _scenario("odd", TomlTable(table, file))
+    assert file.problems() or made.logs

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 from pipeline.logs.log import Options
 from pipeline.logs.names import unique, unit_in
-from pipeline.units import canonical, measures
+from pipeline.maths.units import canonical, measures
 
 NAMED = {"tab": "\t", "comma": ",", "semicolon": ";", "space": " ", "\\t": "\t"}
 NAMES = {delimiter: name for name, delimiter in NAMED.items() if name != "\\t"}

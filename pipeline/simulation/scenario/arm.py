@@ -7,15 +7,17 @@ from pipeline.maths.simulation.control import Cascade, Motors, Regulator
 from pipeline.maths.simulation.friction import Friction
 from pipeline.robots.robot import Robot
 from pipeline.simulation.scenario.scenario import Family, SensorNoise, SimulatedArm, SimulatedJoint
-from pipeline.simulation.scenario.table import TomlTable
+from pipeline.toml import TomlTable
 
 
 def arm_of(table: TomlTable, robot: Robot, joints: dict[str, SimulatedJoint]) -> SimulatedArm:
     """Read [arm], [arm.control] and the families.  Every list has one number for each joint."""
     if robot.chain is None or robot.bodies is None:
-        table.problem(f"the geometry and masses of {robot.name} are not known, so there is no arm to simulate")
+        table.problem(f"the geometry and masses of {robot.name} are not known, so there is no arm to simulate", "arm")
     if list(joints) != [joint.name for joint in robot.joints]:
-        table.problem(f"the whole arm needs [joint.<name>] of {', '.join(j.name for j in robot.joints)}, in that order")
+        table.problem(
+            f"the whole arm needs [joint.<name>] of {', '.join(j.name for j in robot.joints)}, in that order", "joint"
+        )
     arm, n = table.table("arm"), len(robot.joints)
     tick = arm.number("tick", above=0.0)
     rotors = _list(arm, "rotor_inertia", n)
@@ -50,7 +52,9 @@ def _control(table: TomlTable, n: int) -> Cascade | Regulator:
 def _list(table: TomlTable, key: str, n: int, positive: bool = False) -> Array:
     values = table.numbers(key, count=n)
     if any(value < 0 or (positive and value == 0) for value in values):
-        table.problem(f"{key} must {'be greater than 0' if positive else 'not be negative'}, but is {list(values)}")
+        table.problem(
+            f"{key} must {'be greater than 0' if positive else 'not be negative'}, but is {list(values)}", key
+        )
     return np.array(values if len(values) == n else [1.0] * n)
 
 
@@ -70,10 +74,10 @@ def _friction(table: TomlTable) -> tuple[float, ...]:
     static = table.numbers("static", list(coulomb), count=2) or coulomb
     for key, values in (("coulomb", coulomb), ("static", static)):
         if min(values) < 0:
-            table.problem(f"{key} must be two positive numbers, up and down, not {list(values)}")
+            table.problem(f"{key} must be two positive numbers, up and down, not {list(values)}", key)
     stiffness = table.number("bristle_stiffness", 0.0, low=0.0)
     if stiffness > 0 and min(coulomb) <= 0:
-        table.problem("bristles need Coulomb friction greater than 0")
+        table.problem("bristles need Coulomb friction greater than 0", "coulomb")
     velocity = table.number("stribeck_velocity", 0.01, above=0.0)
     damping = table.number("bristle_damping", 0.0, low=0.0)
     return (table.number("viscous", low=0.0), *coulomb, *static, velocity, stiffness, damping)

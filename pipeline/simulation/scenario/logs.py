@@ -11,37 +11,34 @@ from pipeline.maths.excitation.fourier import Fourier
 from pipeline.maths.simulation.surroundings import SHAPES
 from pipeline.robots.from_toml import NAME
 from pipeline.simulation.scenario.scenario import Path, Push, SimulatedJoint, SimulatedLog, Tissue
-from pipeline.simulation.scenario.table import TomlTable
-from pipeline.study.reading import ROLES
+from pipeline.study.entries import ROLES
+from pipeline.toml import TomlTable
 
 FORMATS = (".tdms", ".lvm")
 
 
 def logs_of(table: TomlTable, joints: dict[str, SimulatedJoint], families: Sequence[str]) -> tuple[SimulatedLog, ...]:
     """Read every [[log]]; one that several families record is listed once for each, named after the family."""
-    logs = tuple(log for entry in table.tables("log") for log in _log(entry, joints, families))
-    if not logs:
-        table.problem("it has no [[log]], so nothing would be recorded")
+    entries = table.tables("log", "it has no [[log]], so nothing would be recorded")
+    logs = [(i, log) for i, entry in enumerate(entries) for log in _log(entry, joints, families)]
     for field in ("name", "file"):
-        values = [getattr(log, field) for log in logs]
-        for duplicate in sorted({value for value in values if values.count(value) > 1}):
-            table.problem(f"two logs have the {field} {duplicate!r}")
-    return logs
+        table.unique("log", field, ((i, getattr(log, field)) for i, log in logs), f"two logs have the {field}")
+    return tuple(log for _, log in logs)
 
 
 def _log(table: TomlTable, joints: dict[str, SimulatedJoint], families: Sequence[str]) -> list[SimulatedLog]:
     name, file = table.text("name"), table.text("file")
     if not NAME.fullmatch(name):
-        table.problem(f"name must match [a-z0-9_-]+, not {name!r}")
+        table.problem(f"name must match [a-z0-9_-]+, not {name!r}", "name")
     if File(file).name != file or File(file).suffix not in FORMATS:
-        table.problem(f"file must be a plain file name that ends in {' or '.join(FORMATS)}, not {file!r}")
+        table.problem(f"file must be a plain file name that ends in {' or '.join(FORMATS)}, not {file!r}", "file")
     duration = table.number("duration", above=0.0)
     role = table.text("role", choices=ROLES)
     moves = {key: _move(entry) for key, entry in table.table("moves").each()}
     held_table, external = table.table("held"), table.table("external")
     held = {key: held_table.number(key) for key in held_table.values}
     pushes = {key: tuple(_push(e, duration, False) for e in external.tables(key)) for key in external.values}
-    _check_joints(table, joints, moves, held, pushes)
+    _check_joints(table, joints, set(moves), set(held), set(pushes))
     clock = table.text("clock", "channel", ("channel", "header"))
     unit = table.text("current_unit", "A", ("A", "mA"))
     log = SimulatedLog(name, file, role, duration, moves, held, pushes, unit, clock)
@@ -51,15 +48,15 @@ def _log(table: TomlTable, joints: dict[str, SimulatedJoint], families: Sequence
 
 
 def _check_joints(
-    table: TomlTable, joints: dict[str, SimulatedJoint], moves: object, held: object, pushes: object
+    table: TomlTable, joints: dict[str, SimulatedJoint], moving: set[str], still: set[str], pushed: set[str]
 ) -> None:
-    moving, still, pushed = (set(names) for names in (moves, held, pushes))  # type: ignore[call-overload]
-    for key in sorted((moving | still | pushed) - set(joints)):
-        table.problem(f"there is no [joint.{key}]; there are {', '.join(joints)}")
-    for key in sorted(moving & still):
-        table.problem(f"{key} both moves and is held")
-    for key in sorted(pushed - moving - still):
-        table.problem(f"{key} touches something but is not recorded; let it move or hold it")
+    for said, keys in (("moves", moving), ("held", still), ("external", pushed)):
+        for key in keys - set(joints):
+            table.problem(f"there is no [joint.{key}]; there are {', '.join(joints)}", said, key)
+    for key in moving & still:
+        table.problem(f"{key} both moves and is held", "held", key)
+    for key in pushed - moving - still:
+        table.problem(f"{key} touches something but is not recorded; let it move or hold it", "external", key)
     if not moving:
         table.problem("no joint moves; it needs a table moves")
 
@@ -67,7 +64,8 @@ def _check_joints(
 def _of_joints(table: TomlTable, log: SimulatedLog) -> list[SimulatedLog]:
     for key, move in log.moves.items():
         if isinstance(move, Path):
-            table.problem(f"moves.{key} is a path; joints that follow their model exactly need a Fourier series")
+            problem = f"moves.{key} is a path; joints that follow their model exactly need a Fourier series"
+            table.problem(problem, "moves", key)
     return [log]
 
 
@@ -77,11 +75,13 @@ def _of_arm(
     """What only the whole arm can do, and the log as each of its families gives it."""
     lead, skip = table.number("lead", 0.0, low=0.0), table.number("skip", 0.0, low=0.0)
     if skip >= log.duration:
-        table.problem(f"skip = {skip:g} s leaves nothing of {log.duration:g} s")
+        table.problem(f"skip = {skip:g} s leaves nothing of {log.duration:g} s", "skip")
     for name, joint in joints.items():
         start, (low, high) = float(log.position(name, np.array([-lead]))[0]), joint.stops
         if start < low or start > high:
-            table.problem(f"{name} starts at {start:g}, beyond its stops {low:g} and {high:g}")
+            said = {**dict.fromkeys(log.held, "held"), **dict.fromkeys(log.moves, "moves")}
+            keys = (said[name], name) if name in said else ()
+            table.problem(f"{name} starts at {start:g}, beyond its stops {low:g} and {high:g}", *keys)
     mass = table.number("mass", 0.0, low=0.0)
     tip = tuple(_push(entry, log.duration, True) for entry in table.tables("tip"))
     tissue = _tissue(table.table("tissue")) if "tissue" in table else None
@@ -106,10 +106,10 @@ def _of_arm(
 
 def _move(table: TomlTable) -> Fourier | Path:
     if "path" in table:
-        points = table.pairs("path")
+        points = table.pairs("path", "a list of two or more pairs of numbers", least=2)
         ease = table.flag("ease", False)
         if any(b[0] <= a[0] for a, b in pairwise(points)):
-            table.problem("the times of path must increase")
+            table.problem("the times of path must increase", "path")
         table.close()
         return Path(points or ((0.0, 0.0), (1.0, 0.0)), ease)
     a, b = table.numbers("a"), table.numbers("b")
@@ -133,9 +133,9 @@ def _push(table: TomlTable, duration: float, at_tip: bool) -> Push:
     else:
         peak = table.number("peak")
     if end <= start:
-        table.problem(f"end must be after start = {start:g}, not {end:g}")
+        table.problem(f"end must be after start = {start:g}, not {end:g}", "end")
     if end > duration and not math.isnan(duration):
-        table.problem(f"end = {end:g} s is after the recording's {duration:g} s")
+        table.problem(f"end = {end:g} s is after the recording's {duration:g} s", "end")
     table.close()
     return Push(shape, start, end, peak, direction)
 

@@ -1,18 +1,17 @@
-"""Reading a scenario from TOML, and saying everything that is wrong with it at once, each with its place."""
+"""Reading a scenario from TOML, and saying everything that is wrong with it at once, each with its line."""
 
 import math
 import re
-import tomllib
 from importlib.resources import files
 from pathlib import Path as File
 
-from pipeline import robots
+from pipeline import robots, toml
 from pipeline.errors import BadRobot
 from pipeline.robots.robot import Robot
 from pipeline.simulation.scenario.arm import arm_of, noise_of
 from pipeline.simulation.scenario.logs import logs_of
 from pipeline.simulation.scenario.scenario import BadScenario, Scenario, SensorNoise, SimulatedJoint
-from pipeline.simulation.scenario.table import TomlTable
+from pipeline.toml import TomlTable
 
 LONGEST = 10_000_000  # samples of a log
 
@@ -33,26 +32,14 @@ def load(scenario: str) -> Scenario:
     """
     if scenario in shipped():
         text = files("pipeline.simulation").joinpath("shipped", f"{scenario}.toml").read_text(encoding="utf-8")
+        table = toml.parse(text, scenario, BadScenario)
+    elif File(scenario).is_file():
+        table = toml.read(File(scenario), BadScenario)
     else:
-        text = _text(File(scenario))
-    try:
-        table = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise BadScenario(f"{scenario}: {error}") from None
-    problems: list[str] = []
-    checked = _scenario(File(scenario).stem, TomlTable(table, "", problems))
-    if problems:
-        raise BadScenario("\n".join(f"{scenario}: {problem}" for problem in problems))
-    return checked
-
-
-def _text(file: File) -> str:
-    if not file.is_file():
-        raise BadScenario(f"there is no scenario {str(file)!r}; there are {', '.join(shipped())}, or name a .toml file")
-    try:
-        return file.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise BadScenario(f"{file}: {error}") from None
+        raise BadScenario(f"there is no scenario {scenario!r}; there are {', '.join(shipped())}, or name a .toml file")
+    made = _scenario(File(scenario).stem, table)
+    table.file.refuse(BadScenario)
+    return made
 
 
 def _scenario(name: str, table: TomlTable) -> Scenario:
@@ -63,17 +50,21 @@ def _scenario(name: str, table: TomlTable) -> Scenario:
         table.problem("it has no [joint.<name>] table, so nothing can move")
     arm = arm_of(table, robot, joints) if whole else None
     rate = table.number("rate", above=0.0)
-    turn = 1 / (rate * arm.tick) if arm else 1.0  # in ticks; NaN where a problem is noted already
+    turn = 1 / rate / arm.tick if arm else 1.0  # in ticks; NaN where a problem is noted already
     if math.isfinite(turn) and abs(turn - round(turn)) > 1e-6:
-        table.problem(f"a turn of the controller at {rate:g} Hz must be whole ticks, not {turn:g} of them")
+        table.problem(
+            f"a turn of the controller at {rate:g} Hz must be whole ticks, not {turn:g} of them", "arm", "tick"
+        )
     logs = logs_of(table, joints, tuple(arm.families) if arm else ())
     for log in logs:
         samples = (log.lead + log.duration) * rate
         if math.isfinite(samples) and not 2 <= samples <= LONGEST:
-            table.problem(f"log {log.name}: {samples:.3g} samples cannot be recorded; it must be 2 to {LONGEST}")
+            table.problem(
+                f"log {log.name}: {samples:.3g} samples cannot be recorded; it must be 2 to {LONGEST}", "rate"
+            )
     title, seed, started = table.text("title", name), table.whole("seed"), table.text("started")
     if started and not re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d", started):
-        table.problem(f"started must be a date and time such as '2016-05-02T09:00:00', not {started!r}")
+        table.problem(f"started must be a date and time such as '2016-05-02T09:00:00', not {started!r}", "started")
     table.close()
     return Scenario(name, title, robot, seed, rate, started, joints, logs, arm)
 
@@ -99,6 +90,6 @@ def _joint(robot: Robot, name: str, table: TomlTable, whole: bool) -> SimulatedJ
     encoder, current = table.number("encoder_step", 0.0, low=0.0), table.number("current_step", 0.0, low=0.0)
     low, high = table.numbers("stops", [-1e9, 1e9], count=2) or (-math.inf, math.inf)
     if low >= high:
-        table.problem(f"stops must be lower and upper, not {low:g} and {high:g}")
+        table.problem(f"stops must be lower and upper, not {low:g} and {high:g}", "stops")
     table.close()
     return SimulatedJoint(joint, label, encoder, current, (low, high), noise, theta)

@@ -1,0 +1,117 @@
+"""Reading the [[log]] tables of a study file."""
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from pipeline.robots import Robot
+from pipeline.robots.from_toml import wrong_name
+from pipeline.study import LogEntry, Weight
+from pipeline.study.channels import Channels
+from pipeline.study.plausible import optional
+from pipeline.toml import TomlTable
+
+ROLES = ("identification", "validation", "contact", "weight", "tissue", "friction")
+WINDOWS = "a list of [start, end] in seconds, from 0 on"
+
+
+def entries_of(study: TomlTable, robot: Robot | None) -> tuple[LogEntry, ...]:
+    """Every [[log]]; `robot` is None where the study names none that is known."""
+    tables = study.tables("log", "it has no [[log]] table, so there is nothing to analyse")
+    logs = tuple(_entry(study, i, table, robot) for i, table in enumerate(tables))
+    study.unique("log", "name", enumerate(log.name for log in logs), "two logs are named")
+    return logs
+
+
+def lines_of_files(study: TomlTable, logs: Sequence[LogEntry]) -> dict[str, int]:
+    """The line that first names each file."""
+    lines: dict[str, int] = {}
+    for n, log in enumerate(logs):
+        key = "files" if ("log", n, "files") in study.file.lines else "file"
+        for i, file in enumerate(log.files):
+            lines.setdefault(file, study.file.line(("log", n, key, i)))
+    return lines
+
+
+def inside(file: str) -> bool:
+    """Whether a path stays in the study as it is written; a link that somebody put there may point anywhere."""
+    path = Path(file)
+    return not path.anchor and Path(os.path.normpath(file)).parts[:1] != ("..",)
+
+
+def _entry(study: TomlTable, index: int, table: TomlTable, robot: Robot | None) -> LogEntry:
+    name = _name(study, index, table)
+    table.place = f"log {name!r}"
+    entry = LogEntry(
+        name=name,
+        files=_files(table),
+        role=table.text("role", choices=ROLES),
+        channels=Channels(table, robot).read(),
+        period=optional(table, "period"),
+        rate=optional(table, "rate"),
+        skip=optional(table, "skip") or 0.0,
+        contact=_windows(table),
+        weight=_weight(table, robot),
+        delimiter=_delimiter(table),
+        decimal=table.text("decimal", choices=(".", ",")) if "decimal" in table else None,
+        header=table.flag("header") if "header" in table else None,
+        encoding=table.text("encoding") if "encoding" in table else None,
+    )
+    table.close()
+    return entry
+
+
+def _name(study: TomlTable, index: int, table: TomlTable) -> str:
+    if "name" not in table:
+        study.problem(f"log {index + 1} has no name", "log", index)
+    name = table.text("name", f"log-{index + 1}")
+    if wrong := wrong_name(name):
+        study.problem(f"log name {wrong}", "log", index, "name")
+    return name
+
+
+def _files(table: TomlTable) -> tuple[str, ...]:
+    if ("file" in table) == ("files" in table):
+        table.problem('say either file = "..." or files = ["..."]')
+        return ()
+    if "files" in table:
+        words = "a list of names of files"
+        named = table.take("files", [], (list,), words, lambda files: files and all(map(_is_name, files)))
+    else:
+        named = [table.take("file", "", (str,), "the name of a file", _is_name)]
+    for i, file in enumerate(named):
+        if not inside(file):
+            table.problem(f"{file!r} lies outside the study's folder", "files" if "files" in table else "file", i)
+    return tuple(file for file in named if file and inside(file))
+
+
+def _is_name(value: object) -> bool:
+    return isinstance(value, str) and value != ""
+
+
+def _delimiter(table: TomlTable) -> str | None:
+    if table.values.get("delimiter") == "":
+        problem = "delimiter must not be empty; leave it out, and it is found from the file"
+        table.problem(problem, "delimiter")
+    return table.text("delimiter") if "delimiter" in table else None
+
+
+def _windows(table: TomlTable) -> tuple[tuple[float, float], ...]:
+    windows = table.pairs("contact", WINDOWS, [])
+    for i, (start, end) in enumerate(windows):
+        if not 0 <= start < end:
+            table.problem(f"contact must be {WINDOWS}, not [{start:g}, {end:g}]", "contact", i)
+    return windows
+
+
+def _weight(table: TomlTable, robot: Robot | None) -> Weight | None:
+    if "weight" not in table:
+        if table.values.get("role") == "weight":
+            table.problem("a weight log says weight = { mass = ..., moves_with = ..., position = ... }")
+        return None
+    weight = table.table("weight")
+    mass = weight.number("mass", above=0.0, words="a number of kg")
+    moves_with = weight.text("moves_with", choices=[joint.name for joint in robot.joints] if robot else ())
+    position = weight.numbers("position", count=3, words="[x, y, z] in metres")
+    weight.close()
+    return Weight(mass, moves_with, (position[0], position[1], position[2])) if position else None
