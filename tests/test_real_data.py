@@ -59,9 +59,10 @@ def test_a_hung_mass_is_seen_on_the_joints_that_carry_it_and_not_on_the_slide(re
     assert louder("instrument_slide") < 1.2
 
 
-def test_what_the_stated_deviations_miss_is_said_in_the_report(dvrk):
+def test_page_one_says_that_the_band_is_too_narrow_and_that_the_path_is_the_one_that_was_fitted(dvrk):
     page = (dvrk.parent.parent / "reports" / "dvrk-psm" / "report.html").read_text()
-    assert "not white over the whole run" in page
+    assert "the 95 % band is too narrow" in page
+    assert page.count("Caution, same path") == 3
     assert "SIMULATED" not in page
 
 

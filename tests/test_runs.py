@@ -149,7 +149,7 @@ def test_editing_a_term_of_the_model_makes_the_fit_run_again_and_says_why(finish
 
     assert "fit: 1 of 1 current" in fit()
     terms = code / "pipeline" / "maths" / "models" / "terms.py"
-    terms.write_text(terms.read_text().replace('b="sign(dq)"', 'b="tanh(dq / 0.05)"'))
+    terms.write_text(terms.read_text().replace('b={"sign(dq)": 1.0}', 'b={"sign(dq)": 2.0}'))
     said = fit()
     assert "the robot changed" in said
     assert "the code of pipeline/maths/models/terms.py changed" in said
