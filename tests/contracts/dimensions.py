@@ -64,9 +64,16 @@ def of_phi(term: Term, kind: Kind) -> Dimension:
     return total
 
 
-def is_effort(term: Term, kind: Kind) -> bool:
-    """Whether parameter times term is an effort of this kind of joint."""
+def has_a_dimension(term: Term, kind: Kind) -> bool:
+    """Whether a term means anything for this kind of joint: a length has no sine."""
     try:
-        return of_unit(kind.unit(term.unit)) * of_phi(term, kind) == of_unit(kind.unit("{effort}"))
+        of_phi(term, kind)
     except TypeError:
         return False
+    return True
+
+
+def is_effort(term: Term, kind: Kind) -> bool:
+    """Whether parameter times term is an effort of this kind of joint."""
+    effort = of_unit(kind.unit("{effort}"))
+    return has_a_dimension(term, kind) and of_unit(kind.unit(term.unit)) * of_phi(term, kind) == effort

@@ -66,7 +66,7 @@ def _(mark: Points, axes: "Axes", colour: str, order: float) -> None:
         )  # fmt: skip
     if mark.names:
         low, high = axes.get_ylim()
-        axes.set_ylim(low - 0.16 * (high - low), high + 0.16 * (high - low))  # room for the names
+        axes.set_ylim(low - 0.3 * (high - low), high + 0.3 * (high - low))  # room for the names
 
 
 @draw_mark.register(Band)
