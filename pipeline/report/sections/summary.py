@@ -75,17 +75,16 @@ def blocks(context: Context) -> Iterator[Block]:
             f"External effort over time, one panel a joint: {'; '.join(map(spoken, contacts[:3])) or 'no contact'}.",
             tuple(panel if i == 0 else unlabelled(panel) for i, panel in enumerate(panels)),
             label="answer-figure",
-            height=34,
+            height=32,
         )
     yield trust_table(context, trusts)
     yield from first_looks(context, trusts)
-    yield Prose(
-        f"Good: the model's error is at most {percent(GOOD)} of the effort's root mean square on a path that was not "
-        f"fitted; caution: at most {percent(CAUTION)}, or the same path. A 95 % band is right when it covers "
-        f"{percent(COVERED[0])} to {percent(COVERED[1])} of free-space samples. Rows show the worst "
-        "run of each joint that no parameter was fitted to."
-    )
     yield Prose("Reviewed by ______________________ on ______________   ☐ accept   ☐ accept with remarks   ☐ reject")
+    yield Prose(
+        f"Rows show the worst run of each joint that was not fitted. Good: error at most {percent(GOOD)} of the effort's "
+        f"root mean square, on a path that was not fitted; caution: at most {percent(CAUTION)}, or the same path. A band "
+        f"is right when it covers {percent(COVERED[0])} to {percent(COVERED[1])}."
+    )
 
 
 def caption(contacts: list[Contact]) -> str:
