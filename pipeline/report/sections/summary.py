@@ -81,9 +81,9 @@ def blocks(context: Context) -> Iterator[Block]:
     yield from first_looks(context, trusts)
     yield Prose("Reviewed by ______________________ on ______________   ☐ accept   ☐ accept with remarks   ☐ reject")
     yield Prose(
-        f"Rows show the worst run of each joint that was not fitted. Good: error at most {percent(GOOD)} of the effort's "
-        f"root mean square, on a path that was not fitted; caution: at most {percent(CAUTION)}, or the same path. A band "
-        f"is right when it covers {percent(COVERED[0])} to {percent(COVERED[1])}."
+        f"Rows show the worst run of each joint that was not fitted. Good: error at most {percent(GOOD)} of the "
+        f"effort's root mean square, on a path that was not fitted; caution: at most {percent(CAUTION)}, or the same "
+        f"path. A band is right when it covers {percent(COVERED[0])} to {percent(COVERED[1])}."
     )
 
 
