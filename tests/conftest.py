@@ -24,6 +24,17 @@ BENCHMARKS = HERE / "benchmarks"
 # Tests that take seconds beside those that take moments; a whole file where no test is named.  A new test says so
 # itself, with `@pytest.mark.medium`.
 MEDIUM: dict[str, tuple[str, ...]] = {
+    "contracts/test_formats.py": ("test_a_file_that_was_cut_gives_whole_rows_or_a_clear_error",),
+    "contracts/test_sections.py": (),
+    "logs/test_lvm.py": (
+        "test_any_table_cut_at_any_byte_gives_whole_rows_or_a_clear_error",
+        "test_blocks_of_any_size_give_the_same_samples",
+    ),
+    "models/test_model.py": (
+        "test_a_filter_tracks_each_joint_of_a_coupled_arm_with_what_the_model_says_of_it",
+        "test_the_protocol_describes_a_coupled_arm_whose_friction_remembers",
+    ),
+    "robot/test_kernels.py": (),
     "logs/test_labview_files.py": (
         "test_a_file_of_each_kind_cut_at_every_other_byte_gives_whole_rows_or_a_clear_error",
     ),
@@ -37,12 +48,7 @@ MEDIUM: dict[str, tuple[str, ...]] = {
         "test_mass_matrix_coriolis_and_gravity_are_those_of_an_independent_lagrangian[7]",
     ),
     "simulation/test_closed_loop.py": (),
-    "simulation/test_control.py": (
-        "test_a_compensator_that_knows_nine_tenths_of_the_masses_leaves_pd_with_the_offset_of_the_tenth",
-        "test_pd_with_gravity_compensation_converges",
-        "test_the_lyapunov_function_never_rises",
-        "test_the_pid_of_table_5_4_removes_that_offset_but_is_worse_than_pd_for_over_twenty_seconds",
-    ),
+    "simulation/test_control.py": (),
     "simulation/test_excitation.py": (
         "test_a_design_for_the_condition_number_is_better_at_it_than_one_for_the_determinant",
         "test_a_designed_trajectory_is_as_good_as_promised_and_keeps_its_limits_at_every_instant",
@@ -53,6 +59,9 @@ MEDIUM: dict[str, tuple[str, ...]] = {
         "test_a_robot_of_a_laboratory_can_be_excited_too",
         "test_joints_of_independent_models_that_move_together_share_a_period_and_sum_their_objectives",
     ),
+    "simulation/test_friction.py": (),
+    "simulation/test_simulation_plant.py": (),
+    "simulation/test_simulation_step.py": (),
     "test_bad_logs.py": ("test_names_that_are_markup_appear_as_text_in_both_reports",),
     "test_design.py": (),
     "test_estimation.py": ("test_parameters_are_found_as_well_as_they_claim_to_be",),
