@@ -14,7 +14,7 @@ from pipeline.excitation.trajectory import PERIODS, ExcitationTrajectory, coeffi
 from pipeline.maths.excitation.arm import arm_observation, arm_problem, design_together
 from pipeline.maths.excitation.fourier import Fourier, Range, condition
 from pipeline.maths.excitation.joint import CRITERIA, ExcitationProblem
-from pipeline.maths.mechanics.kinematics import Chain
+from pipeline.maths.mechanics.chain import Chain
 from pipeline.robots.robot import Joint, Robot
 
 STARTS_OF_ARM = 12  # starts of one joint for one of the arm, which takes as much longer

@@ -8,30 +8,32 @@ from math import pi
 import numpy as np
 
 from pipeline.maths.mechanics.bodies import Bodies, cylinder
+from pipeline.maths.mechanics.chain import TableRow, denavit_hartenberg
 from pipeline.maths.mechanics.drives import Drives
-from pipeline.maths.mechanics.kinematics import FIXED, Chain
 
-# Table 3.1: name, alpha [rad], a [m], d [m], theta [rad], coordinate (the index of its q), carried by frame.
-LINKS = (
-    ("1", -pi / 2, 0.0, 0.161, 0.0, FIXED, 0),  # base
-    ("2", -pi / 2, 0.0, -0.035, -pi / 2, 0, 1),  # pivot plate
-    ("3", pi, 0.190, 0.0, 0.03, 1, 2),  # parallelogram base
-    ("4", pi, 0.515, 0.0, 0.03 + pi / 2, 1, 3),  # parallelogram upper bar
-    ("5", pi / 2, 0.040, 0.0, 0.0, 1, 4),  # instrument holder
-    ("6", 0.0, 0.0, 0.282, 0.0, 2, 5),  # needle driver house, the one that slides
-    ("7", pi / 2, 0.0, 0.0, 0.0, 3, 6),  # needle driver neck
-    ("8", pi / 2, 0.009, 0.0, pi / 2, 4, 7),  # needle driver head
-    ("9L", 0.0, 0.009, 0.0, 0.0, 5, 8),  # left jawbone
-    ("9R", 0.0, 0.009, 0.0, 0.0, 6, 8),  # right jawbone
+# Table 3.1: name, carried by, alpha [rad], a [m], d [m], theta [rad], coordinate (the index of its q).
+CHAIN = denavit_hartenberg(
+    [
+        TableRow("1", "0", -pi / 2, 0.0, 0.161, 0.0),  # base
+        TableRow("2", "1", -pi / 2, 0.0, -0.035, -pi / 2, 0),  # pivot plate
+        TableRow("3", "2", pi, 0.190, 0.0, 0.03, 1),  # parallelogram base
+        TableRow("4", "3", pi, 0.515, 0.0, 0.03 + pi / 2, 1),  # parallelogram upper bar
+        TableRow("5", "4", pi / 2, 0.040, 0.0, 0.0, 1),  # instrument holder
+        TableRow("6", "5", 0.0, 0.0, 0.282, 0.0, 2, slides=True),  # needle driver house
+        TableRow("7", "6", pi / 2, 0.0, 0.0, 0.0, 3),  # needle driver neck
+        TableRow("8", "7", pi / 2, 0.009, 0.0, pi / 2, 4),  # needle driver head
+        TableRow("9L", "8", 0.0, 0.009, 0.0, 0.0, 5),  # left jawbone
+        TableRow("9R", "8", 0.0, 0.009, 0.0, 0.0, 6),  # right jawbone
+    ],
+    tip="9L",
 )
-SLIDING = "6"
 
-# Table 4.2: mass [kg], height [m], radius [m]; then the cylinder's axis and the centre of mass as a distance [m] along
-# an axis of the link's frame (Table 4.1, Eq 4.17).  Fig 4.3 shows the axes of links 3 and 4; the others are those that
-# reproduce Eq 6.7 and 6.10.  Link 6's centre lies along -z: the printed [0, -lc6, 0] would put it 0.4 m sideways.
+# Table 4.2, links 2 to 9R: mass [kg], height [m], radius [m]; then the cylinder's axis and the centre of mass as a
+# distance [m] along an axis of the link's frame of Table 3.1 (Table 4.1, Eq 4.17).  Fig 4.3 shows the axes of links 3
+# and 4; the others are those that reproduce Eq 6.7 and 6.10.  Link 6's centre lies along -z: the printed [0, -lc6, 0]
+# would put it 0.4 m sideways.
 X, Y, Z = 0, 1, 2
 CYLINDERS = (
-    (0.0, 0.0, 0.0, Z, Z, 0.0),
     (0.5, 0.22, 0.035, Y, Y, 0.0),
     (4.0, 0.19, 0.1, X, X, -0.34),
     (0.7, 0.515, 0.07, X, X, -0.257),
@@ -42,32 +44,27 @@ CYLINDERS = (
     (0.01, 0.009, 0.005, X, X, -0.0045),
     (0.01, 0.009, 0.005, X, X, -0.0045),
 )
-HOLDER = 4  # link 5, counted from 0
+HOLDER = CHAIN.links.index("5")
 GUESSED_LC5 = 0.2  # [m] with which the initial guesses of Tables 6.4-6.6 were computed; Table 4.1 prints 0.3
-
-CHAIN = Chain(
-    alpha=np.array([link[1] for link in LINKS]),
-    a=np.array([link[2] for link in LINKS]),
-    d=np.array([link[3] for link in LINKS]),
-    theta=np.array([link[4] for link in LINKS]),
-    slides=np.array([link[0] == SLIDING for link in LINKS]),
-    coordinate=np.array([link[5] for link in LINKS]),
-    parent=np.array([link[6] for link in LINKS]),
-    names=("0", *(link[0] for link in LINKS)),
-    tip="9L",
-    n=7,
-)
 
 
 def bodies(lc5: float = -CYLINDERS[HOLDER][5]) -> Bodies:
-    """The links as uniform cylinders, with the centre of the instrument holder `lc5` [m] from its frame."""
+    """The links as uniform cylinders, with the centre of the instrument holder `lc5` [m] from its frame.
+
+    They are in the links' own frames, as the dynamics take them.
+    """
+    return in_table_frames(lc5).within(CHAIN.of_links)
+
+
+def in_table_frames(lc5: float = -CYLINDERS[HOLDER][5]) -> Bodies:
+    """The same bodies as Tables 4.1 and 4.2 give them, in the frames of Table 3.1."""
     centres = np.zeros((len(CYLINDERS), 3))
     for centre, (*_, axis, along) in zip(centres, CYLINDERS, strict=True):
         centre[axis] = along
     centres[HOLDER, Z] = -lc5
     inertias = [cylinder(mass, height, radius, axis) for mass, height, radius, axis, _, _ in CYLINDERS]
     # With six coordinates or fewer there is one jaw.
-    counts_from = np.array([7 if name == "9R" else 0 for name, *_ in LINKS])
+    counts_from = np.array([7 if name == "9R" else 0 for name in CHAIN.links])
     return Bodies(np.array([body[0] for body in CYLINDERS]), centres, np.array(inertias), counts_from)
 
 

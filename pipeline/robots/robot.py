@@ -6,8 +6,8 @@ from enum import Enum
 
 from pipeline.errors import BadRobot
 from pipeline.maths.mechanics.bodies import Bodies
+from pipeline.maths.mechanics.chain import Chain
 from pipeline.maths.mechanics.drives import Drives
-from pipeline.maths.mechanics.kinematics import Chain
 from pipeline.maths.models.terms import Term
 
 

@@ -7,8 +7,8 @@ import numpy as np
 from pipeline.maths.arrays import Array
 from pipeline.maths.mechanics import kinematics
 from pipeline.maths.mechanics.bodies import Bodies
+from pipeline.maths.mechanics.chain import Chain
 from pipeline.maths.mechanics.drives import Drives
-from pipeline.maths.mechanics.kinematics import Chain
 from pipeline.maths.models.reduced_joint import reduced_parameters
 from pipeline.maths.simulation.closed_loop import JointConstraints, Timing, simulate
 from pipeline.maths.simulation.plant import arm

@@ -10,7 +10,8 @@ from pipeline.maths.excitation.fourier import Fourier
 from pipeline.maths.excitation.joint import ExcitationProblem, design
 from pipeline.maths.mechanics import workspace
 from pipeline.maths.mechanics.bodies import Bodies
-from pipeline.maths.mechanics.kinematics import Chain, frames, jacobian, tip
+from pipeline.maths.mechanics.chain import Chain
+from pipeline.maths.mechanics.kinematics import frames, jacobian, tip
 from pipeline.maths.simulation.control import Regulator
 from pipeline.records import Column, Control, Excitation, Links, Lyapunov, Pose, Workspace
 from pipeline.robots.robot import ControlStudy, Joint, Robot
@@ -44,27 +45,32 @@ def geometry(robot: Robot, chain: Chain) -> Iterator[Links | Pose | Workspace]:
     poses = {"zero": np.zeros(n)} | ({"low": limits[:, 0], "high": limits[:, 1]} if limited else {})
     for name, q in poses.items():
         x, y, z = frames(chain, q)[:, :3, 3].T
-        yield Pose(robot.name, name, names, names[[0, *chain.parent]], x, y, z)
+        yield Pose(robot.name, name, names, names[chain.before], x, y, z)
     if limited:
         x, y, z = tip(chain, grid).T
         yield Workspace(robot.name, x, y, z, condition)
 
 
 def links(robot: Robot, chain: Chain, worst_condition: float) -> Links:
-    """The links with their Denavit-Hartenberg parameters, and their masses where these are known, else 0."""
+    """The frames with their Denavit-Hartenberg parameters, and the masses of their links; NaN is not known."""
     names = np.array(chain.names, object)
+    known = np.full(len(chain.links), np.nan) if robot.bodies is None else robot.bodies.masses
+    masses = dict(zip(chain.links, known.tolist(), strict=True))
     return Links(
         robot=robot.name,
         worst_condition=worst_condition,
         link=names[1:],
-        parent=names[[0, *chain.parent]][1:],
-        alpha=chain.alpha,
-        a=chain.a,
-        d=chain.d,
-        offset=chain.theta,
-        moved_by=chain.coordinate + 1,
-        mass=np.zeros(len(chain.parent)) if robot.bodies is None else robot.bodies.masses,
+        parent=names[chain.before][1:],
+        **table(chain),
+        moved_by=chain.moved_by[1:] + 1,
+        mass=np.array([masses.get(name, 0.0) for name in chain.names[1:]]),
     )
+
+
+def table(chain: Chain) -> dict[str, Column]:
+    """The parameters of the frames after the base as a table has given them, NaN where none has."""
+    rows = np.array([row[2:6] for row in chain.table] or [(np.nan,) * 4] * (len(chain.names) - 1))
+    return dict(zip(("alpha", "a", "d", "offset"), rows.T, strict=True))
 
 
 def control(robot: Robot, chain: Chain, bodies: Bodies) -> Iterator[Control | Lyapunov]:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from pipeline.maths.mechanics.bodies import Bodies
-from pipeline.maths.mechanics.kinematics import FIXED, Chain
+from pipeline.maths.mechanics.chain import FIXED, Chain
 
 
 class Tree(NamedTuple):
@@ -21,22 +21,22 @@ class Tree(NamedTuple):
 def tree(pin: Any, chain: Chain, bodies: Bodies, n: int) -> Tree:
     chain, bodies = chain.reduced(n), bodies.counted(n)
     model = pin.Model()
-    place: list[tuple[int, Any]] = [(0, pin.SE3.Identity())]  # joint that carries each frame, and the frame in it
-    E, frames = [], []
-    for i, (name, parent) in enumerate(zip(chain.names[1:], chain.parent, strict=True)):
-        c, s = np.cos(chain.theta[i]), np.sin(chain.theta[i])
-        before = pin.SE3(np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]), np.array([0, 0, chain.d[i]]))
-        c, s = np.cos(chain.alpha[i]), np.sin(chain.alpha[i])
-        after = pin.SE3(np.array([[1, 0, 0], [0, c, -s], [0, s, c]]), np.array([chain.a[i], 0, 0]))
+    place: list[tuple[int, Any]] = [(0, pin.SE3.Identity())]  # joint that carries each body, and the body in it
+    E = []
+    for i, (name, parent) in enumerate(zip(chain.links, chain.parent, strict=True)):
         carrier, local = place[parent]
+        at = local * pin.SE3(chain.placement[i])
         if chain.coordinate[i] == FIXED:
-            joint, at = carrier, local * before * after
+            place.append((carrier, at))
         else:
             kind = pin.JointModelPZ() if chain.slides[i] else pin.JointModelRZ()
-            joint, at = model.addJoint(carrier, kind, local * before, name), after
+            place.append((model.addJoint(carrier, kind, at, name), pin.SE3.Identity()))
             E.append(np.eye(n)[chain.coordinate[i]])
-        place.append((joint, at))
-        inertia = pin.Inertia(bodies.masses[i], bodies.centres[i], bodies.inertias[i])
-        model.appendBodyToJoint(joint, inertia, at)
+        joint, local = place[-1]
+        model.appendBodyToJoint(joint, pin.Inertia(bodies.masses[i], bodies.centres[i], bodies.inertias[i]), local)
+    frames = []
+    for name, body, offset in zip(chain.names[1:], chain.body[1:], chain.offset[1:], strict=True):
+        joint, local = place[body]
+        at = local * pin.SE3(offset)
         frames.append(model.addFrame(pin.Frame(f"frame {name}", joint, 0, at, pin.FrameType.OP_FRAME)))
     return Tree(model, model.createData(), np.array(E), frames)

@@ -1,17 +1,16 @@
 """The compiled kernels, against the same dynamics in numpy."""
 
-import os
-
 import numpy as np
 import pytest
 from numba import njit
 from scipy.integrate import solve_ivp
 
 from pipeline.maths.constants import GRAVITY
-from pipeline.maths.mechanics import lanes, link, rigid_body, sample, samples
+from pipeline.maths.mechanics import kernels, rigid_body, vector
 from pipeline.robots.davinci_chain import BODIES, CHAIN
+from tests.robot import lagrangian
 
-N = 2 * lanes.LANES + 5  # two full blocks and one that is not
+N = 9 * vector.LANES + 1  # nine full vectors, and one sample more
 SIZES = pytest.mark.parametrize("n", [3, 6, 7])
 
 
@@ -25,7 +24,7 @@ def compiled(monkeypatch):
 
     def both(f):
         few = f()
-        monkeypatch.setattr(samples, "COMPILE_FROM", 1)
+        monkeypatch.setattr(rigid_body, "COMPILE_FROM", 1)
         return few, f()
 
     return both
@@ -63,35 +62,44 @@ def test_samples_may_have_any_leading_axes_and_any_order_in_memory(compiled):
     np.testing.assert_allclose(many, few, rtol=0, atol=1e-12)
 
 
+def test_too_few_samples_for_a_vector_are_no_exception(compiled):
+    q, dq, ddq = motions(3)[:, : vector.LANES]  # the fewest that the kernels take
+    few, many = compiled(lambda: rigid_body.inverse_dynamics(CHAIN, BODIES, q, dq, ddq))
+    np.testing.assert_allclose(many, few, rtol=0, atol=1e-12)
+
+
 @SIZES
 def test_one_sample_s_mass_matrix_and_bias_come_out_of_compiled_code(n):
-    arm = lanes.pack(CHAIN, BODIES, n)
-    mass_and_bias = sample.mass_and_bias
+    arm, rest = rigid_body.moving(CHAIN, BODIES, n), np.zeros(n)
+    mass_and_bias = kernels.mass_and_bias
 
     @njit
-    def step(arm, q, dq, M, bias, work):
-        mass_and_bias(arm, GRAVITY, q, dq, M, bias, work)
+    def step(arm, q, dq, rest, M, bias):
+        mass_and_bias(arm, GRAVITY, q, dq, rest, M, bias)
 
-    M, bias, work = np.empty((n, n)), np.empty(n), sample.work(arm)
+    M, bias = np.empty((n, n)), np.empty(n)
     for q, dq in motions(n)[:2].swapaxes(0, 1)[:5]:
-        step(arm, q, dq, M, bias, work)
+        step(arm, q, dq, rest, M, bias)
         np.testing.assert_allclose(M, rigid_body.mass_matrix(CHAIN, BODIES, q), rtol=0, atol=1e-13)
         still = rigid_body.inverse_dynamics(CHAIN, BODIES, q, dq, 0 * q)
         np.testing.assert_allclose(bias, still, rtol=0, atol=1e-12)
 
 
-def test_an_arm_of_six_joints_that_falls_freely_keeps_its_energy():
-    arm, M, bias = lanes.pack(CHAIN, BODIES, 6), np.empty((6, 6)), np.empty(6)
-    work = sample.work(arm)
+@pytest.mark.parametrize(("n", "least"), [(3, 1.0), (6, 0.1)])
+def test_an_arm_that_falls_freely_keeps_its_energy(n, least):
+    arm, M, bias, rest = rigid_body.moving(CHAIN, BODIES, n), np.empty((n, n)), np.empty(n), np.zeros(n)
 
     def rates(_, x):
-        sample.mass_and_bias(arm, GRAVITY, x[:6].copy(), x[6:].copy(), M, bias, work)
-        return np.concatenate([x[6:], np.linalg.solve(M, -bias)])
+        kernels.mass_and_bias(arm, GRAVITY, x[:n].copy(), x[n:].copy(), rest, M, bias)
+        return np.concatenate([x[n:], np.linalg.solve(M, -bias)])
 
-    start = np.concatenate(motions(6, 0.5)[:2, 0])
+    start = np.concatenate(motions(n, 0.5)[:2, 0])
     run = solve_ivp(rates, (0, 1), start, method="DOP853", rtol=1e-11, atol=1e-12)
-    total = sum(rigid_body.energy(CHAIN, BODIES, run.y[:6].T, run.y[6:].T))
+    q, dq = run.y[:n].T, run.y[n:].T
+    kinetic = lagrangian.kinetic(CHAIN, BODIES, q, dq)
+    total = kinetic + lagrangian.potential(CHAIN, BODIES, q)
     assert np.abs(total - total[0]).max() < 1e-9
+    assert np.ptp(kinetic) > least  # it did fall
 
 
 def test_cosine_and_sine_are_those_of_the_library_in_every_quadrant():
@@ -99,7 +107,7 @@ def test_cosine_and_sine_are_those_of_the_library_in_every_quadrant():
     def both(x):
         c, s = np.empty(len(x)), np.empty(len(x))
         for i in range(len(x)):
-            c[i], s[i] = link.cosine_sine(x[i])
+            c[i], s[i] = kernels.cosine_sine(x[i])
         return c, s
 
     near = np.arange(-9, 10) * np.pi / 4  # where quadrants meet
@@ -109,30 +117,38 @@ def test_cosine_and_sine_are_those_of_the_library_in_every_quadrant():
     np.testing.assert_allclose(s, np.sin(x), rtol=0, atol=1e-15)
 
 
-def test_links_that_are_held_for_good_become_part_of_those_that_carry_them():
-    for n, links in ((3, 6), (6, 9), (7, 10)):
-        assert len(lanes.pack(CHAIN, BODIES, n).parent) == links
-    assert len(lanes.pack(CHAIN, BODIES, 3, fold=False).parent) == 10
-    total = lanes.pack(CHAIN, BODIES, 3).links[:, 6].sum()
+def test_links_that_nothing_moves_become_part_of_those_that_carry_them():
+    for n, links in ((3, 5), (6, 8), (7, 9)):
+        assert len(rigid_body.moving(CHAIN, BODIES, n).parent) == links
+    total = rigid_body.moving(CHAIN, BODIES, 3).rows[:, 12].sum()
     assert total == pytest.approx(BODIES.counted(3).masses.sum())
 
 
-def test_compiled_code_that_is_older_than_the_physics_it_holds_is_dropped(tmp_path):
-    class Kernel:
-        class stats:  # noqa: N801
-            cache_path = str(tmp_path)
+def test_a_vector_is_as_good_as_its_lanes_anywhere_in_memory():
+    """As operand of vectors and floats, in lists, at addresses that are no multiple of its size."""
 
-        py_func = lanes.forget_older
+    @njit
+    def run(x, y, out):
+        for start in range(len(x) - vector.LANES + 1):
+            a, b = vector.gather(x, start, 1), vector.gather(y, start, 1)
+            kept = [(a, -b)] * 3
+            kept[1] = (2.0 * a + b * 0.5, a - 1.0)
+            vector.scatter(out, start, 1, kept[1][0] * kept[1][1] - kept[2][1])
 
-    newest = max(os.path.getmtime(m.__file__) for m in (link, lanes))
-    stale, current, other = (
-        tmp_path / f"m.{name}-1.py311.nbi" for name in (Kernel.py_func.__name__, f"{Kernel.py_func.__name__}", "other")
-    )
-    current = current.with_name(current.name.replace("-1.", "-2."))
-    for file, age in ((stale, -10), (current, 10), (other, -10)):
-        file.touch()
-        os.utime(file, (newest + age, newest + age))
-    lanes.forget_older(Kernel)
-    assert not stale.exists()
-    assert current.exists()
-    assert other.exists()
+    x, y = np.random.default_rng(0).normal(size=(2, 9 * vector.LANES + 1))
+    out = np.zeros_like(x)
+    run(x, y, out)
+    np.testing.assert_array_equal(out, (2.0 * x + y * 0.5) * (x - 1.0) + y)
+
+
+def test_a_sample_that_is_not_a_number_spoils_no_other(compiled):
+    q, dq, ddq = motions(6)
+    q[0] = dq[20] = np.nan
+    good = np.setdiff1d(np.arange(N), [0, 20])
+    for f in (
+        lambda: rigid_body.inverse_dynamics(CHAIN, BODIES, q, dq, ddq),
+        lambda: rigid_body.regressor(CHAIN, q, dq, ddq),
+    ):
+        for found in compiled(f):
+            assert np.isfinite(found[good]).all()
+            assert np.isnan(found[0]).any()

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from pipeline.maths.mechanics.bodies import Bodies
+from pipeline.maths.mechanics.chain import denavit_hartenberg
 from pipeline.maths.mechanics.drives import Drives
-from pipeline.maths.mechanics.kinematics import Chain
 from pipeline.maths.models.reduced_joint import reduced_parameters
 from pipeline.robots.davinci import ROBOT
-from pipeline.robots.davinci_chain import BODIES, CHAIN, DRIVES, GUESSED_LC5, bodies
+from pipeline.robots.davinci_chain import BODIES, CHAIN, DRIVES, GUESSED_LC5, in_table_frames
 
-# What the formulas are written in, and where it is in the bodies: link 3 is row 2 of the arrays.
+# What the formulas are written in, and where it is in the bodies: link 3 is row 1 of the arrays.
 CENTRES = {3: (0, -1), 4: (0, -1), 5: (2, -1), 6: (2, -1), 7: (1, -1), 8: (0, -1), 9: (0, -1)}
 Physical = Mapping[str, float]
 
@@ -21,11 +21,11 @@ def physical(of: Bodies) -> dict[str, float]:
     """m3, lc3, Ix3 and so on, as the thesis names them."""
     found = {}
     for link in range(2, 10):
-        found[f"m{link}"] = of.masses[link - 1]
-        found |= {f"I{axis}{link}": of.inertias[link - 1, i, i] for i, axis in enumerate("xyz")}
+        found[f"m{link}"] = of.masses[link - 2]
+        found |= {f"I{axis}{link}": of.inertias[link - 2, i, i] for i, axis in enumerate("xyz")}
         if link in CENTRES:
             axis, sign = CENTRES[link]
-            found[f"lc{link}"] = sign * of.centres[link - 1, axis]
+            found[f"lc{link}"] = sign * of.centres[link - 2, axis]
     return found
 
 
@@ -66,30 +66,32 @@ def of_the_chain(joint: int, at: Bodies, masses: np.ndarray) -> np.ndarray:
 
 @pytest.mark.parametrize("link", [3, 4, 5, 6, 7, 8, 9])
 def test_every_mass_enters_the_pitch_as_in_the_corrected_equation(link):
-    more = BODIES.masses + (np.arange(10) == link - 1)
+    more = BODIES.masses + (np.arange(9) == link - 2)
     found = of_the_chain(1, BODIES, more) - of_the_chain(1, BODIES, BODIES.masses)
     # Each printed coefficient is rounded to 0.01, and up to three of them meet in one parameter.
-    np.testing.assert_allclose(found, coefficients(corrected_pitch, physical(BODIES), f"m{link}"), atol=0.015)
+    np.testing.assert_allclose(
+        found, coefficients(corrected_pitch, physical(in_table_frames()), f"m{link}"), atol=0.015
+    )
 
 
 @pytest.mark.parametrize("link", [3, 4, 5])
 def test_every_mass_enters_the_roll_as_in_the_printed_equation(link):
-    more = BODIES.masses + (np.arange(10) == link - 1)
+    more = BODIES.masses + (np.arange(9) == link - 2)
     found = of_the_chain(0, BODIES, more) - of_the_chain(0, BODIES, BODIES.masses)
-    printed = coefficients(roll, physical(BODIES), f"m{link}")
+    printed = coefficients(roll, physical(in_table_frames()), f"m{link}")
     np.testing.assert_allclose(found[:2], printed, atol=0.015 if link != 4 else 0.005)
     assert abs(found[2]) < 1e-12  # the roll has no cosine
 
 
 def test_the_signs_printed_for_the_pitch_are_not_those_of_the_chain():
-    printed = np.array(pitch(physical(BODIES), wrist=0.18, head=0.18, iz7=0, sine=-1, cosine=-0.01))
+    printed = np.array(pitch(physical(in_table_frames()), wrist=0.18, head=0.18, iz7=0, sine=-1, cosine=-0.01))
     found = np.array(list(reduced_parameters(CHAIN, BODIES, 1).values()))
     assert abs(printed - found)[1] > 1.5
-    assert abs(np.array(corrected_pitch(physical(BODIES))) - found)[1] < 0.001
+    assert abs(np.array(corrected_pitch(physical(in_table_frames()))) - found)[1] < 0.001
 
 
 def test_the_initial_guesses_come_from_the_printed_equations_with_another_lc5():
-    guessed = physical(bodies(GUESSED_LC5))
+    guessed = physical(in_table_frames(GUESSED_LC5))
     assert round(roll(guessed)[1], 3) == 0.194  # Table 6.4
     printed = pitch(guessed, wrist=0.18, head=0.18, iz7=0, sine=-1, cosine=0.01)
     np.testing.assert_allclose(printed, [0.2961, 1.9475, 0.115], atol=5e-5)  # Table 6.5
@@ -116,6 +118,6 @@ def test_the_names_are_those_of_terms_that_the_joint_s_model_has(joint):
 
 
 def test_a_joint_whose_inertia_depends_on_its_position_is_refused():
-    bent = Chain(**{**{f: getattr(CHAIN, f) for f in CHAIN.__dataclass_fields__}, "alpha": CHAIN.alpha + 0.3})
+    bent = denavit_hartenberg([row._replace(alpha=row.alpha + 0.3) for row in CHAIN.table], CHAIN.tip)
     with pytest.raises(ValueError, match="joint 1 moving alone is not of the form"):
         reduced_parameters(bent, BODIES, 1)

@@ -2,12 +2,14 @@
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
 from pipeline.maths.mechanics import rigid_body
-from pipeline.maths.mechanics.bodies import from_parameters
-from pipeline.maths.mechanics.drives import Drives, seen_at_joint
-from pipeline.robots.davinci_chain import BODIES, CHAIN, DRIVES
+from pipeline.maths.mechanics.bodies import Bodies
+from pipeline.maths.mechanics.chain import Chain
+from pipeline.maths.mechanics.drives import Drives
+from pipeline.robots import dvrk_psm_chain
+from pipeline.robots.davinci_chain import BODIES, CHAIN, DRIVES, in_table_frames
+from tests.robot import lagrangian
 from tests.robot import thesis_matrices as thesis
 
 SIZES = pytest.mark.parametrize("n", [3, 6, 7])
@@ -33,115 +35,21 @@ def test_the_mass_matrix_is_symmetric_and_positive_definite(n):
     assert np.linalg.eigvalsh(M).min() > 1e-7  # the jaws' own inertia is 3e-7 kg m^2
 
 
-@SIZES
-def test_the_rate_of_the_mass_matrix_less_twice_coriolis_is_skew(n):
-    q, dq, _ = motions(n)
-    M_dot = np.einsum("nijk,nk->nij", thesis.gradient(lambda at: rigid_body.mass_matrix(CHAIN, BODIES, at), q), dq)
-    S = M_dot - 2 * rigid_body.coriolis_matrix(CHAIN, BODIES, q, dq)
-    np.testing.assert_allclose(S + S.swapaxes(1, 2), 0, atol=1e-12)
-
-
-@SIZES
-def test_the_coriolis_matrix_is_made_of_christoffel_s_symbols(n):
-    q, dq, _ = motions(n, 20)
-    dM = thesis.gradient(lambda at: rigid_body.mass_matrix(CHAIN, BODIES, at), q)
-    symbols = (np.einsum("nijk->nijk", dM) + np.einsum("nikj->nijk", dM) - np.einsum("njki->nijk", dM)) / 2
-    C = rigid_body.coriolis_matrix(CHAIN, BODIES, q, dq)
-    np.testing.assert_allclose(C, np.einsum("nijk,nk->nij", symbols, dq), rtol=0, atol=1e-11)
-
-
-@SIZES
-def test_inverse_dynamics_is_the_sum_of_its_parts(n):
-    q, dq, ddq = motions(n)
-    M, C = rigid_body.mass_matrix(CHAIN, BODIES, q), rigid_body.coriolis_matrix(CHAIN, BODIES, q, dq)
-    parts = (M @ ddq[..., None] + C @ dq[..., None])[..., 0] + rigid_body.gravity(CHAIN, BODIES, q)
-    np.testing.assert_allclose(rigid_body.inverse_dynamics(CHAIN, BODIES, q, dq, ddq), parts, rtol=0, atol=1e-13)
-
-
-@SIZES
-def test_forward_dynamics_undoes_inverse_dynamics(n):
-    q, dq, ddq = motions(n)
-    drives = Drives(*np.random.default_rng(1).uniform(0.1, 2.0, (4, n)))
-    tau = rigid_body.inverse_dynamics(CHAIN, BODIES, q, dq, ddq, drives)
-    found = rigid_body.forward_dynamics(CHAIN, BODIES, q, dq, tau + 0.3, 0.3, drives)
-    np.testing.assert_allclose(found, ddq, rtol=0, atol=1e-11)
-
-
-def test_an_external_effort_is_what_the_arm_exerts_on_its_surroundings():
-    q = np.array([0.1, 0.2, 0.03])
-    held = rigid_body.gravity(CHAIN, BODIES, q)
-    pushed = rigid_body.forward_dynamics(CHAIN, BODIES, q, 0 * q, held, np.array([0.0, 0.0, 1.0]))
-    assert pushed[2] < 0  # pushing downwards, along +q3, it is pushed back
-
-
-def test_the_arm_held_by_gravity_compensation_stays_where_it_is():
-    q = motions(6)[0]
-    ddq = rigid_body.forward_dynamics(CHAIN, BODIES, q, 0 * q, rigid_body.gravity(CHAIN, BODIES, q))
-    np.testing.assert_allclose(ddq, 0, atol=1e-8)  # gravity rounds at 1e-15, over inertias of 3e-7
-
-
-def test_an_arm_that_falls_freely_keeps_its_energy():
-    q, dq = np.array([0.3, -0.4, 0.02]), np.array([0.5, 0.2, -0.1])
-
-    def rates(_, x):
-        return np.concatenate([x[3:], rigid_body.forward_dynamics(CHAIN, BODIES, x[:3], x[3:], np.zeros(3))])
-
-    run = solve_ivp(rates, (0, 1), np.concatenate([q, dq]), method="DOP853", rtol=1e-11, atol=1e-12)
-    total = sum(rigid_body.energy(CHAIN, BODIES, run.y[:3].T, run.y[3:].T))
-    assert np.abs(total - total[0]).max() < 1e-9
-    assert np.ptp(rigid_body.energy(CHAIN, BODIES, run.y[:3].T, run.y[3:].T).kinetic) > 1  # it did fall
-
-
 def test_no_samples_give_no_results():
     none = np.zeros((3, 0, 6))
     assert rigid_body.inverse_dynamics(CHAIN, BODIES, *none).shape == (0, 6)
     assert rigid_body.mass_matrix(CHAIN, BODIES, none[0]).shape == (0, 6, 6)
-    assert rigid_body.regressor(CHAIN, *none).shape == (0, 6, 100)
-
-
-def test_power_is_the_rate_of_energy():
-    q, dq, ddq = motions(6, 20)
-    h = 1e-5
-    ahead, behind = (
-        sum(rigid_body.energy(CHAIN, BODIES, q + s * h * dq + h**2 / 2 * ddq, dq + s * h * ddq)) for s in (1, -1)
-    )
-    power = np.sum(rigid_body.inverse_dynamics(CHAIN, BODIES, q, dq, ddq) * dq, axis=1)
-    np.testing.assert_allclose((ahead - behind) / (2 * h), power, rtol=1e-7, atol=1e-7)
+    assert rigid_body.regressor(CHAIN, *none).shape == (0, 6, 90)
 
 
 @SIZES
 def test_the_effort_is_linear_in_the_inertial_parameters(n):
     q, dq, ddq = motions(n)
-    pi = np.random.default_rng(5).uniform(-1, 1, 100)
-    bodies = from_parameters(pi, np.zeros(10, int))
+    pi = np.random.default_rng(5).uniform(-1, 1, 90)
+    bodies = lagrangian.from_parameters(pi)
     Y = rigid_body.regressor(CHAIN, q, dq, ddq)
     expected = rigid_body.inverse_dynamics(CHAIN, bodies, q, dq, ddq)
     np.testing.assert_allclose(Y @ pi, expected, rtol=0, atol=1e-11)
-
-
-@SIZES
-def test_base_parameters_give_the_same_effort_on_other_motions(n):
-    base = rigid_body.base_parameters(rigid_body.regressor(CHAIN, *motions(n, 200)))
-    other = np.random.default_rng(99).uniform(-2, 2, (3, 50, n))
-    beta = base.combination @ BODIES.parameters(n)
-    Y = rigid_body.regressor(CHAIN, *other)[..., base.columns]
-    np.testing.assert_allclose(Y @ beta, rigid_body.inverse_dynamics(CHAIN, BODIES, *other), rtol=0, atol=1e-11)
-
-
-def test_base_parameters_are_as_many_as_the_regressor_s_rank_and_well_conditioned():
-    Y = rigid_body.regressor(CHAIN, *motions(3, 200))
-    base = rigid_body.base_parameters(Y)
-    assert len(base.columns) == np.linalg.matrix_rank(Y.reshape(-1, 100), rtol=1e-10)
-    assert base.condition < 1e3
-    np.testing.assert_array_equal(base.combination[:, base.columns], np.eye(len(base.columns)))
-    assert "m of 6" in base.names(CHAIN.names[1:])
-
-
-def test_parameters_and_bodies_are_two_ways_of_saying_the_same():
-    again = from_parameters(BODIES.parameters(7), BODIES.counts_from)
-    np.testing.assert_allclose(again.masses, BODIES.masses)
-    np.testing.assert_allclose(again.centres[1:], BODIES.centres[1:], atol=1e-15)
-    np.testing.assert_allclose(again.inertias, BODIES.inertias, atol=1e-15)
 
 
 def test_the_second_jaw_counts_with_the_seventh_coordinate_only():
@@ -166,10 +74,78 @@ def test_drives_add_reflected_inertia_and_friction():
     np.testing.assert_allclose(tau - bare, expected, rtol=1e-12)
     M = rigid_body.mass_matrix(CHAIN, BODIES, q, drives) - rigid_body.mass_matrix(CHAIN, BODIES, q)
     np.testing.assert_allclose(M, np.broadcast_to(np.diag([0.04, 0.04, 1.7956]), M.shape), atol=1e-12)
-    np.testing.assert_allclose(drives.motor_effort([200.0, 0, 1340]), [1, 0, 1])
 
 
-def test_the_motor_s_friction_is_felt_at_the_joint_through_the_gear():
-    viscous, coulomb = seen_at_joint([200.0, -10.0], 1e-5, 0.01)
-    np.testing.assert_allclose(viscous, [0.4, 1e-3])
-    np.testing.assert_allclose(coulomb, [2.0, 0.1])
+@SIZES
+def test_inverse_dynamics_is_the_sum_of_its_parts(n):
+    q, dq, ddq = motions(n)
+    inertial = (rigid_body.mass_matrix(CHAIN, BODIES, q) @ ddq[..., None])[..., 0]
+    parts = inertial + rigid_body.coriolis(CHAIN, BODIES, q, dq) + rigid_body.gravity(CHAIN, BODIES, q)
+    np.testing.assert_allclose(rigid_body.inverse_dynamics(CHAIN, BODIES, q, dq, ddq), parts, rtol=0, atol=1e-13)
+
+
+def branching(seed: int = 7) -> Chain:
+    """A chain that no table describes: placements at random, of links that share coordinates, branch and slide."""
+    random = np.random.default_rng(seed)
+    parent = np.array([0, 1, 2, 2, 4, 0, 6])
+    placement = np.tile(np.eye(4), (7, 1, 1))
+    placement[:, :3, :3] = np.linalg.qr(random.normal(size=(7, 3, 3)))[0]
+    placement[:, :3, :3] *= np.linalg.det(placement[:, :3, :3])[:, None, None]
+    placement[:, :3, 3] = random.uniform(-0.5, 0.5, (7, 3))
+    names = tuple("abcdefg")
+    return Chain(
+        links=names, parent=parent, placement=placement, slides=np.array([0, 1, 0, 0, 1, 0, 0], bool),
+        coordinate=np.array([0, 1, 2, 1, 3, 2, 0]), names=("0", *names), body=np.arange(8),
+        offset=np.tile(np.eye(4), (8, 1, 1)), before=np.append(0, parent), tip="g", n=4,
+    )  # fmt: skip
+
+
+# A coordinate may turn one link and slide another: c and b of `branching` share the second one.
+OTHERS = {
+    "dvrk": (dvrk_psm_chain.CHAIN, lagrangian.random_bodies(11)),
+    "placements": (branching(), lagrangian.random_bodies(7)),
+}
+
+
+@pytest.mark.parametrize(("chain", "bodies", "n"), [(*OTHERS[k], n) for k, n in
+    (("dvrk", 3), ("dvrk", 5), ("dvrk", 6), ("placements", 2), ("placements", 4))])  # fmt: skip
+def test_any_chain_has_the_dynamics_of_its_lagrangian(chain: Chain, bodies: Bodies, n: int):
+    q, dq, ddq = motions(n, 40)
+    M, G = lagrangian.mass(chain, bodies, q), lagrangian.gravity(chain, bodies, q)
+    V = lagrangian.coriolis(chain, bodies, q, dq)
+    size = np.abs(V).max() + np.abs(G).max()
+    np.testing.assert_allclose(rigid_body.mass_matrix(chain, bodies, q), M, rtol=0, atol=1e-13 * np.abs(M).max())
+    np.testing.assert_allclose(rigid_body.gravity(chain, bodies, q), G, rtol=0, atol=1e-11 * size)
+    np.testing.assert_allclose(rigid_body.coriolis(chain, bodies, q, dq), V, rtol=0, atol=1e-10 * size)
+    tau = (M @ ddq[..., None])[..., 0] + V + G
+    Y = rigid_body.regressor(chain, q, dq, ddq)
+    np.testing.assert_allclose(Y @ bodies.parameters(n), tau, rtol=0, atol=1e-10 * np.abs(tau).max())
+
+
+@SIZES
+def test_power_is_the_rate_of_energy(n):
+    q, dq, ddq = motions(n, 20)
+    h = 1e-5
+
+    def energy(s: float) -> np.ndarray:
+        at, rates = q + s * h * dq + h**2 / 2 * ddq, dq + s * h * ddq
+        return lagrangian.kinetic(CHAIN, BODIES, at, rates) + lagrangian.potential(CHAIN, BODIES, at)
+
+    power = np.sum(rigid_body.inverse_dynamics(CHAIN, BODIES, q, dq, ddq) * dq, axis=1)
+    np.testing.assert_allclose((energy(1) - energy(-1)) / (2 * h), power, rtol=1e-7, atol=1e-7)
+
+
+def test_bodies_are_the_same_in_whatever_frames_they_are_given():
+    given = in_table_frames()
+    np.testing.assert_allclose(BODIES.masses, given.masses)
+    for i, T in enumerate(CHAIN.of_links):
+        np.testing.assert_allclose(T @ np.append(given.centres[i], 1.0), np.append(BODIES.centres[i], 1.0), atol=1e-16)
+        R = T[:3, :3]
+        np.testing.assert_allclose(R.T @ BODIES.inertias[i] @ R, given.inertias[i], atol=1e-15)
+
+
+def test_parameters_and_bodies_are_two_ways_of_saying_the_same():
+    again = lagrangian.from_parameters(BODIES.parameters(7))
+    np.testing.assert_allclose(again.masses, BODIES.masses)
+    np.testing.assert_allclose(again.centres, BODIES.centres, atol=1e-15)
+    np.testing.assert_allclose(again.inertias, BODIES.inertias, atol=1e-15)

@@ -18,7 +18,7 @@ from scipy.optimize import LinearConstraint, minimize
 from pipeline.maths.arrays import Array
 from pipeline.maths.excitation.fourier import Fourier, basis, instants, turning_points
 from pipeline.maths.excitation.joint import CRITERIA, GRID, ExcitationProblem, design, inequalities, within
-from pipeline.maths.mechanics.kinematics import Chain
+from pipeline.maths.mechanics.chain import Chain
 from pipeline.maths.mechanics.rigid_body import base_parameters, regressor
 
 RICH = 200  # random samples that show which columns depend on others

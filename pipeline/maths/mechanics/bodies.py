@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from pipeline.maths.arrays import Array
 
@@ -36,6 +36,12 @@ class Bodies:
         """The same bodies of another density, as a compensator that knows the masses badly has them.  Section 5.2"""
         return replace(self, masses=self.masses * factor, inertias=self.inertias * factor)
 
+    def within(self, T: Array) -> "Bodies":
+        """The same bodies in other frames, in which those they are given in are at T (L, 4, 4) [m]."""
+        R = T[:, :3, :3]
+        centres = np.einsum("lij,lj->li", R, self.centres) + T[:, :3, 3]
+        return replace(self, centres=centres, inertias=R @ self.inertias @ R.swapaxes(1, 2))
+
     def about_frames(self) -> Array:
         """Inertias (L, 3, 3) about the origins of the links' frames [kg m^2], by the parallel axis theorem."""
         c = self.centres
@@ -54,21 +60,6 @@ def cylinder(mass: float, height: float, radius: float, axis: int) -> Array:
     """The inertia (3, 3) [kg m^2] of a uniform cylinder about its centre; `axis` 0, 1 or 2 is its own.  (4.23)"""
     across = mass * height**2 / 12.0 + mass * radius**2 / 4.0
     return np.diag([mass * radius**2 / 2.0 if i == axis else across for i in range(3)])
-
-
-def from_parameters(parameters: ArrayLike, counts_from: NDArray[np.int64]) -> Bodies:
-    """The bodies that have these inertial parameters (10 L,): the inverse of `Bodies.parameters`.
-
-    A link without mass has its centre at its frame's origin.
-    """
-    rows = np.asarray(parameters, float).reshape(-1, 10)
-    m = rows[:, 0]
-    centres = rows[:, 1:4] / np.where(m == 0.0, 1.0, m)[:, None]
-    inertias = np.zeros((len(rows), 3, 3))
-    inertias[:, *_UPPER] = rows[:, 4:]
-    inertias = inertias + np.triu(inertias, 1).swapaxes(1, 2)
-    points = Bodies(m, centres, np.zeros((len(rows), 3, 3)), counts_from).about_frames()
-    return Bodies(m, centres, inertias - points, counts_from)
 
 
 def pseudo_inertias(parameters: Array) -> Array:

@@ -17,7 +17,7 @@ from pipeline.maths.arrays import Array
 class Drives:
     """One drive a coordinate (n,): everything at the joint's side except the motor's own inertia.
 
-    `viscous` and `coulomb` are those of joint and motor together; `seen_at_joint` gives the motor's part.
+    `viscous` and `coulomb` are those of joint and motor together, as the joint feels them.  (A.11)
     """
 
     gear_ratio: Array  # eta [-], or [rad/m] for a prismatic joint
@@ -38,13 +38,3 @@ class Drives:
         """F (..., n) at the velocities dq (..., n).  (4.26)"""
         dq = np.asarray(dq, float)
         return np.asarray(self.viscous * dq + self.coulomb * np.sign(dq))
-
-    def motor_effort(self, tau: ArrayLike) -> Array:
-        """The torque of the motors [N m] that gives the effort tau (..., n) at the joints.  (A.7)"""
-        return np.asarray(np.asarray(tau, float) / self.gear_ratio)
-
-
-def seen_at_joint(gear_ratio: ArrayLike, viscous: ArrayLike, coulomb: ArrayLike) -> tuple[Array, Array]:
-    """The motors' own friction v_m, c_m as the joints feel it: eta^2 v_m and eta c_m.  (A.11)"""
-    eta = np.asarray(gear_ratio, float)
-    return np.asarray(eta**2 * viscous), np.asarray(np.abs(eta) * coulomb)

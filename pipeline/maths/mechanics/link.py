@@ -1,77 +1,37 @@
-"""The dynamics of one link on scalars, for the compiled kernels, which have them inlined.
+"""The dynamics of one link on numbers, which are floats, arrays of samples, or the compiled vectors of `vector`.
 
-Vectors are tuples of three; a `link` is a row of `lanes.PackedArm.links`; c, s and d are cos and sin of its theta
-and its d as they are now.  w, e, a: angular velocity, angular acceleration and acceleration of a frame's origin.
+Every link has a frame at its joint: it turns about, or slides along, that frame's z.  A `row` of `Tree.rows` holds what
+is constant: the rotation (by rows) and the place of this frame at q = 0 in its carrier, and the ten inertial
+parameters.  `turn` is (cos q, sin q).  Vectors are tuples of three, in a link's own axes; a motion is (w, e, a),
+angular velocity, angular acceleration and acceleration of the origin; a wrench is (force, moment about the origin).
 
 Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 2, 5 and 6.
 """
 
-from numba import njit
+from collections.abc import Sequence
+from typing import Any
+
+Number = Any
+Vector = tuple[Number, Number, Number]
+Motion = tuple[Vector, Vector, Vector]
+Wrench = tuple[Vector, Vector]
+Velocity = tuple[Vector, Vector]  # angular, and of the origin
+Turn = tuple[Number, Number]
+Inertia = tuple[Vector, Vector, Vector]  # first moment h; Ixx, Ixy, Ixz; Iyy, Iyz, Izz, about the origin
+Row = Sequence[float]
 
 
-@njit(inline="always")
-def cosine_sine(x):  # type: ignore[no-untyped-def]
-    """cos x and sin x to 1e-15 for |x| < 1e5, without branches, which the catalogue's functions have.
-
-    Reduced to |r| <= pi/4 in two parts of pi/2; polynomials of fdlibm's k_cos and k_sin (Sun Microsystems, 1993).
-    """
-    turns = (x * 0.6366197723675814 + 6755399441055744.0) - 6755399441055744.0  # rounded to the nearest integer
-    r = (x - turns * 1.57079632673412561417) - turns * 6.07710050650619224932e-11
-    z = r * r
-    s = z * (-2.50507602534068634195e-08 + z * 1.58969099521155010221e-10)
-    s = z * (8.33333333332248946124e-03 + z * (-1.98412698298579493134e-04 + z * (2.75573137070700676789e-06 + s)))
-    s = r + r * z * (-1.66666666666666324348e-01 + s)
-    c = z * (-2.75573143513906633035e-07 + z * (2.08757232129817482790e-09 - z * 1.13596475577881948265e-11))
-    c = z * z * (4.16666666666666019037e-02 + z * (-1.38888888888741095749e-03 + z * (2.48015872894767294178e-05 + c)))
-    c = 1.0 - 0.5 * z + c
-    quarter = turns * 0.25
-    quarter = quarter - ((quarter + 6755399441055744.0) - 6755399441055744.0)  # 0, 1/4, +-1/2, -1/4
-    odd = abs(quarter) == 0.25
-    cosine = s if odd else c
-    sine = c if odd else s
-    cosine = -cosine if (quarter > 0.1) or (quarter < -0.3) else cosine
-    sine = -sine if (quarter < 0.0) or (quarter > 0.3) else sine
-    return cosine, sine
+def plus(a: Vector, b: Vector) -> Vector:
+    """The sum of two vectors."""
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
 
 
-@njit(inline="always")
-def into_link(c, s, ca, sa, x, y, z):  # type: ignore[no-untyped-def]
-    """A vector in the axes of the frame that carries a link, in the link's.  (3.7)"""
-    across = c * y - s * x
-    return c * x + s * y, ca * across + sa * z, ca * z - sa * across
+def cross(a: Vector, b: Vector) -> Vector:
+    """The cross product of two vectors."""
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
-@njit(inline="always")
-def out_of_link(c, s, ca, sa, x, y, z):  # type: ignore[no-untyped-def]
-    """A vector in a link's axes, in those of the frame that carries it."""
-    across = ca * y - sa * z
-    return c * x - s * across, s * x + c * across, sa * y + ca * z
-
-
-@njit(inline="always")
-def motion(w, e, a, c, s, d, dt, dd, ddt, ddd, link):  # type: ignore[no-untyped-def]
-    """Angular velocity, angular acceleration and acceleration of a link's origin from those of its carrier.
-
-    The link turns at dt, ddt about z of its carrier, or slides along it at dd, ddd.
-    """
-    ca, sa = link[2], link[3]
-    w_ = into_link(c, s, ca, sa, w[0], w[1], w[2] + dt)
-    e_ = into_link(c, s, ca, sa, e[0] + w[1] * dt, e[1] - w[0] * dt, e[2] + ddt)
-    a_ = into_link(c, s, ca, sa, a[0] + 2.0 * dd * w[1], a[1] - 2.0 * dd * w[0], a[2] + ddd)
-    A = turning(w_, e_)
-    r = link[4], d * sa, d * ca
-    return w_, e_, plus(a_, times(A, r))
-
-
-@njit(inline="always")
-def turning(w, e):  # type: ignore[no-untyped-def]
-    """[e]x + [w]x [w]x by rows: what turns a point's place into its acceleration."""
-    xy, xz, yz, xx, yy, zz = w[0] * w[1], w[0] * w[2], w[1] * w[2], w[0] * w[0], w[1] * w[1], w[2] * w[2]
-    return -yy - zz, xy - e[2], xz + e[1], xy + e[2], -xx - zz, yz - e[0], xz - e[1], yz + e[0], -xx - yy
-
-
-@njit(inline="always")
-def times(A, r):  # type: ignore[no-untyped-def]
+def times(A: Sequence[Number], r: Vector) -> Vector:
     """A matrix, given by rows, times a vector."""
     return (
         A[0] * r[0] + A[1] * r[1] + A[2] * r[2],
@@ -80,65 +40,137 @@ def times(A, r):  # type: ignore[no-untyped-def]
     )
 
 
-@njit(inline="always")
-def plus(a, b):  # type: ignore[no-untyped-def]
-    """The sum of two vectors."""
-    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+def place(row: Row) -> Vector:
+    """Where the joint is in the carrier's axes."""
+    return row[9], row[10], row[11]
 
 
-@njit(inline="always")
-def cross(a, b):  # type: ignore[no-untyped-def]
-    """The cross product of two vectors."""
-    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+def into(row: Row, x: Vector) -> Vector:
+    """A vector in the carrier's axes, in those of the joint at q = 0."""
+    return (
+        row[0] * x[0] + row[3] * x[1] + row[6] * x[2],
+        row[1] * x[0] + row[4] * x[1] + row[7] * x[2],
+        row[2] * x[0] + row[5] * x[1] + row[8] * x[2],
+    )
 
 
-@njit(inline="always")
-def wrench(w, e, a, link):  # type: ignore[no-untyped-def]
-    """The force and the moment about its origin that give a link this motion: Newton and Euler."""
-    h = link[7], link[8], link[9]
-    inertia = link[10], link[11], link[12], link[11], link[13], link[14], link[12], link[14], link[15]
-    f = times(turning(w, e), h)
-    f = f[0] + link[6] * a[0], f[1] + link[6] * a[1], f[2] + link[6] * a[2]
+def turned(turn: Turn, x: Vector) -> Vector:
+    """A vector in the axes of a joint at q = 0, in those of the link."""
+    return turn[0] * x[0] + turn[1] * x[1], turn[0] * x[1] - turn[1] * x[0], x[2]
+
+
+def turned_back(turn: Turn, x: Vector) -> Vector:
+    """A vector in a link's axes, in those of its joint at q = 0."""
+    return turn[0] * x[0] - turn[1] * x[1], turn[1] * x[0] + turn[0] * x[1], x[2]
+
+
+def rates(w: Vector, e: Vector) -> tuple[Number, ...]:
+    """[e]x + [w]x [w]x by rows: what turns a point's place into its acceleration."""
+    xy, xz, yz, xx, yy, zz = w[0] * w[1], w[0] * w[2], w[1] * w[2], w[0] * w[0], w[1] * w[1], w[2] * w[2]
+    return -yy - zz, xy - e[2], xz + e[1], xy + e[2], -xx - zz, yz - e[0], xz - e[1], yz + e[0], -xx - yy
+
+
+def moved(row: Row, slides: bool, turn: Turn, q: Number, dq: Number, ddq: Number, motion: Motion) -> Motion:
+    """The motion of a link from that of its carrier."""
+    w, e, a = motion
+    a = into(row, plus(a, times(rates(w, e), place(row))))
+    w, e = into(row, w), into(row, e)
+    if slides:
+        x = a[0] + q * (w[0] * w[2] + e[1]) + 2.0 * dq * w[1]
+        y = a[1] + q * (w[1] * w[2] - e[0]) - 2.0 * dq * w[0]
+        return w, e, (x, y, a[2] - q * (w[0] * w[0] + w[1] * w[1]) + ddq)
+    e = e[0] + w[1] * dq, e[1] - w[0] * dq, e[2] + ddq
+    return turned(turn, (w[0], w[1], w[2] + dq)), turned(turn, e), turned(turn, a)
+
+
+def moved_velocity(row: Row, slides: bool, turn: Turn, q: Number, dq: Number, velocity: Velocity) -> Velocity:
+    """The velocity of a link from that of its carrier."""
+    w, v = into(row, velocity[0]), into(row, plus(velocity[1], cross(velocity[0], place(row))))
+    if slides:
+        return w, (v[0] + w[1] * q, v[1] - w[0] * q, v[2] + dq)
+    return turned(turn, (w[0], w[1], w[2] + dq)), turned(turn, v)
+
+
+def wrench_of(row: Row, motion: Motion) -> Wrench:
+    """What gives a link this motion: f = m a + (e x + w x w x) h, n = h x a + I e + w x I w.  (4.9)"""
+    w, e, a = motion
+    h = row[13], row[14], row[15]
+    inertia = row[16], row[17], row[18], row[17], row[19], row[20], row[18], row[20], row[21]
+    f = times(rates(w, e), h)
+    f = f[0] + row[12] * a[0], f[1] + row[12] * a[1], f[2] + row[12] * a[2]
     return f, plus(cross(h, a), plus(times(inertia, e), cross(w, times(inertia, w))))
 
 
-@njit(inline="always")
-def carried(c, s, d, link, f, n):  # type: ignore[no-untyped-def]
-    """A force and a moment on a link, as its carrier feels them at its own origin."""
-    ca, sa = link[2], link[3]
-    n = plus(n, cross((link[4], d * sa, d * ca), f))
-    return out_of_link(c, s, ca, sa, f[0], f[1], f[2]), out_of_link(c, s, ca, sa, n[0], n[1], n[2])
+def carried(row: Row, slides: bool, turn: Turn, q: Number, wrench: Wrench) -> Wrench:
+    """A wrench on a link, as its carrier feels it at its own origin."""
+    f, n = wrench
+    if slides:
+        n = n[0] - q * f[1], n[1] + q * f[0], n[2]
+    else:
+        f, n = turned_back(turn, f), turned_back(turn, n)
+    f, n = times(row, f), times(row, n)
+    return f, plus(n, cross(place(row), f))
 
 
-@njit(inline="always")
-def composite(c, s, d, link, m, h, inertia):  # type: ignore[no-untyped-def]
-    """First moment and inertia of what a link carries, itself included, about its carrier's origin in its axes.
+def along(slides: bool, wrench: Wrench) -> Number:
+    """What a joint has to exert of a wrench on its link."""
+    return wrench[0][2] if slides else wrench[1][2]
 
-    `inertia` is [Ixx, Ixy, Ixz, Iyy, Iyz, Izz]: shifted by r, then turned about x by alpha and about z by theta.
-    """
-    ca, sa = link[2], link[3]
-    r = link[4], d * sa, d * ca
+
+def unit_wrench(slides: bool, m: float, inertia: Inertia) -> Wrench:
+    """What gives a body of mass m one unit of its joint's acceleration."""
+    h, (_, _, xz), (_, yz, zz) = inertia
+    zero = 0.0 * zz
+    if slides:
+        return (zero, zero, zero + m), (h[1], -h[0], zero)
+    return (-h[1], h[0], zero), (xz, yz, zz)
+
+
+def turned_inertia(turn: Turn, inertia: Inertia) -> Inertia:
+    """The inertia of a link that turns, in the axes of its joint at q = 0."""
+    (c, s), (h, (xx, xy, xz), (yy, yz, zz)) = turn, inertia
+    cc, cs, ss, both = c * c, c * s, s * s, 2.0 * c * s * xy
+    mixed = cs * (xx - yy) + (cc - ss) * xy
+    upper, lower = (cc * xx - both + ss * yy, mixed, c * xz - s * yz), (ss * xx + both + cc * yy, s * xz + c * yz, zz)
+    return turned_back(turn, h), upper, lower
+
+
+def shifted_inertia(m: float, r: Vector, inertia: Inertia) -> Inertia:
+    """The inertia of a body of mass m about another origin, from which its own one is at r."""
+    h, (xx, xy, xz), (yy, yz, zz) = inertia
     g = h[0] + 0.5 * m * r[0], h[1] + 0.5 * m * r[1], h[2] + 0.5 * m * r[2]
-    xx, yy, zz = g[0] * r[0], g[1] * r[1], g[2] * r[2]
-    ixx, ixy, ixz = (
-        inertia[0] + 2.0 * (yy + zz),
-        inertia[1] - g[0] * r[1] - g[1] * r[0],
-        inertia[2] - g[0] * r[2] - g[2] * r[0],
-    )
-    iyy, iyz, izz = inertia[3] + 2.0 * (xx + zz), inertia[4] - g[1] * r[2] - g[2] * r[1], inertia[5] + 2.0 * (xx + yy)
-    ixy, ixz = ca * ixy - sa * ixz, sa * ixy + ca * ixz
-    iyy, iyz, izz = turned(ca, sa, iyy, iyz, izz)
-    ixz, iyz = c * ixz - s * iyz, s * ixz + c * iyz
-    ixx, ixy, iyy = turned(c, s, ixx, ixy, iyy)
-    h = out_of_link(c, s, ca, sa, h[0] + m * r[0], h[1] + m * r[1], h[2] + m * r[2])
-    return h, (ixx, ixy, ixz, iyy, iyz, izz)
+    x, y, z = 2.0 * g[0] * r[0], 2.0 * g[1] * r[1], 2.0 * g[2] * r[2]
+    upper = xx + y + z, xy - g[0] * r[1] - g[1] * r[0], xz - g[0] * r[2] - g[2] * r[0]
+    lower = yy + x + z, yz - g[1] * r[2] - g[2] * r[1], zz + x + y
+    return (h[0] + m * r[0], h[1] + m * r[1], h[2] + m * r[2]), upper, lower
 
 
-@njit(inline="always")
-def turned(c, s, aa, ab, bb):  # type: ignore[no-untyped-def]
-    """The part of an inertia in the plane of two axes, after a turn in that plane."""
+def carried_inertia(row: Row, slides: bool, turn: Turn, q: Number, m: float, inertia: Inertia) -> Inertia:
+    """The inertia of what a link carries, itself included, about its carrier's origin in its carrier's axes."""
+    inertia = shifted_inertia(m, (0.0 * q, 0.0 * q, q), inertia) if slides else turned_inertia(turn, inertia)
+    h, (xx, xy, xz), (yy, yz, zz) = inertia
+    x, y, z = times(row, (xx, xy, xz)), times(row, (xy, yy, yz)), times(row, (xz, yz, zz))  # columns of R I
+    a, b, c = times(row, (x[0], y[0], z[0])), times(row, (x[1], y[1], z[1])), times(row, (x[2], y[2], z[2]))
+    return shifted_inertia(m, place(row), (times(row, h), a, (b[1], b[2], c[2])))
+
+
+def columns(motion: Motion, J: Velocity) -> tuple[Number, ...]:
+    """The effort by each of a link's parameters (`bodies.PARAMETERS`), where the coordinate moves it with J.
+
+    It is `wrench_of` projected on J: (w x u) . J = u . (J x w).
+    """
+    (w, e, a), (J_w, J_v) = motion, J
+    along, w_J = w[0] * w[0] + w[1] * w[1] + w[2] * w[2], w[0] * J_v[0] + w[1] * J_v[1] + w[2] * J_v[2]
+    h, g = plus(cross(J_v, e), cross(a, J_w)), cross(J_w, w)
     return (
-        c * c * aa - 2.0 * c * s * ab + s * s * bb,
-        c * s * (aa - bb) + (c * c - s * s) * ab,
-        (s * s * aa + 2.0 * c * s * ab + c * c * bb),
+        a[0] * J_v[0] + a[1] * J_v[1] + a[2] * J_v[2],
+        h[0] + w[0] * w_J - along * J_v[0],
+        h[1] + w[1] * w_J - along * J_v[1],
+        h[2] + w[2] * w_J - along * J_v[2],
+        e[0] * J_w[0] + w[0] * g[0],
+        e[1] * J_w[0] + e[0] * J_w[1] + w[1] * g[0] + w[0] * g[1],
+        e[2] * J_w[0] + e[0] * J_w[2] + w[2] * g[0] + w[0] * g[2],
+        e[1] * J_w[1] + w[1] * g[1],
+        e[2] * J_w[1] + e[1] * J_w[2] + w[2] * g[1] + w[1] * g[2],
+        e[2] * J_w[2] + w[2] * g[2],
     )

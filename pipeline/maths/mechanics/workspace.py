@@ -3,13 +3,12 @@
 tau_ext = J_v' f                                                                          (7.25), (7.26)
 """
 
-from itertools import product
-
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from pipeline.maths.arrays import Array
-from pipeline.maths.mechanics.kinematics import Chain, frames, jacobian, tip
+from pipeline.maths.mechanics.chain import Chain
+from pipeline.maths.mechanics.kinematics import jacobian
 
 # Above this condition number a pose counts as singular: the first three joints leave one direction of the force
 # undetermined in practice.  It is 0.1 mm from an exact singularity; in the box of Table 6.2 it reaches 60.
@@ -47,15 +46,3 @@ def singular_slides(chain: Chain, q_pitch: float) -> Array:
     size = max(abs(square), abs(linear), abs(middle))
     roots = np.roots([0.0 if abs(x) < 1e-12 * size else x for x in (square, linear, middle)])
     return np.sort(roots[np.abs(roots.imag) < DOUBLE].real)
-
-
-def points(chain: Chain, limits: ArrayLike, count: int) -> Array:
-    """Places of the tip (count^n, 3) [m] on a grid over the limits (n, 2) of the first n coordinates."""
-    axes = [np.linspace(low, high, count) for low, high in np.asarray(limits, float)]
-    return tip(chain, np.array(list(product(*axes))))
-
-
-def segments(chain: Chain, q: ArrayLike) -> Array:
-    """The arm as lines to draw (..., L, 2, 3) [m]: from each carrier's origin to that of the link's frame.  Fig 3.5"""
-    origins = frames(chain, q)[..., :3, 3]
-    return np.stack([origins[..., chain.parent, :], origins[..., 1:, :]], axis=-2)

@@ -4,8 +4,8 @@ import numpy as np
 
 from pipeline.maths.constants import GRAVITY
 from pipeline.maths.mechanics.bodies import Bodies
+from pipeline.maths.mechanics.chain import Chain
 from pipeline.maths.mechanics.drives import Drives
-from pipeline.maths.mechanics.kinematics import Chain
 from pipeline.maths.mechanics.rigid_body import gravity, mass_matrix
 from pipeline.maths.models import terms
 
