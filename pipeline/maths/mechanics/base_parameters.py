@@ -15,7 +15,9 @@ from scipy.linalg import qr, solve_triangular
 from pipeline.maths.arrays import Array
 from pipeline.maths.mechanics.bodies import PARAMETERS
 
-NEGLIGIBLE = 1e-9  # of the largest pivot: rounding makes 1e-15, and the smallest true one of the da Vinci is 1e-3
+# Of a column's own size, what has to be left of it when the columns taken before are subtracted: rounding leaves 1e-15
+# times the condition number of those, and the least that is left of a true one of the arms here is 1e-3.
+NEGLIGIBLE = 1e-9
 
 
 class BaseParameters(NamedTuple):
@@ -31,24 +33,26 @@ class BaseParameters(NamedTuple):
 
 
 def base_parameters(Y: Array) -> BaseParameters:
-    """Reduce the regressor (..., 10 L) of a motion to independent columns, by QR with pivoting on scaled columns.
+    """Reduce the regressor (..., 10 L) of a motion to independent columns.
 
-    The motion must be rich (random poses, velocities and accelerations will do): what it does not show is left out.
+    They are taken in the order of Y, from the base outwards, each that does not depend on those before it: the same
+    ones whatever the motion, as in the grouping by hand (Khalil and Kleinfinger 1987).  The motion must be rich (random
+    poses, velocities and accelerations will do): what it does not show is left out.
     """
-    triangle = _triangle(Y.reshape(-1, Y.shape[-1]))
-    scale = np.linalg.norm(triangle, axis=0)
+    (R,) = qr(Y.reshape(-1, Y.shape[-1]), mode="r")  # it has the dependences of Y's columns, in as many rows
+    scale = np.linalg.norm(R, axis=0)
     seen = np.flatnonzero(scale > NEGLIGIBLE * scale.max())
-    _, R, order = qr(triangle[:, seen] / scale[seen], mode="economic", pivoting=True)
-    p = int(np.sum(np.abs(np.diag(R)) > NEGLIGIBLE * abs(R[0, 0])))
-    base, others = seen[order[:p]], seen[order[p:]]
-    K = np.zeros((p, len(scale)))
-    K[np.arange(p), base] = 1.0
-    K[:, others] = solve_triangular(R[:p, :p], R[:p, p:]) * scale[others] / scale[base][:, None]
-    by_link = np.argsort(base)
-    return BaseParameters(base[by_link], K[by_link], float(np.linalg.cond(R[:p, :p])))
-
-
-def _triangle(Y: Array) -> Array:
-    """R of Y = Q R: it has the dependences of Y's columns, in as many rows as there are columns."""
-    (R,) = qr(Y, mode="r")
-    return np.asarray(R[: Y.shape[1]], float)
+    unit = R[:, seen] / scale[seen]
+    Q = np.empty((len(unit), 0))
+    taken = list[int]()
+    for column, x in enumerate(unit.T):
+        left = x - Q @ (Q.T @ x)
+        left -= Q @ (Q.T @ left)  # once more, for what the first has left by rounding
+        if (size := np.linalg.norm(left)) > NEGLIGIBLE:
+            Q = np.column_stack([Q, left / size])
+            taken.append(column)
+    triangle = np.triu(Q.T @ unit[:, taken])
+    K = np.zeros((len(taken), len(scale)))
+    K[:, seen] = solve_triangular(triangle, Q.T @ unit) * scale[seen] / scale[seen[taken]][:, None]
+    K[:, seen[taken]] = np.eye(len(taken))
+    return BaseParameters(seen[taken], K, float(np.linalg.cond(triangle)))
