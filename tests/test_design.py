@@ -117,4 +117,22 @@ def test_every_coordinate_of_the_da_vinci_has_a_name_and_a_drive():
 
 
 def test_a_robot_without_geometry_or_published_excitation_has_nothing_to_design():
-    assert list(design.run(dvrk_psm.ROBOT)) == []
+    assert list(design.run(replace(dvrk_psm.ROBOT, chain=None))) == []
+
+
+def test_a_robot_whose_masses_are_not_known_has_a_geometry_and_no_control_studies():
+    made = list(design.run(dvrk_psm.ROBOT))
+    [links] = of(made, Links)
+    assert np.isnan(links.mass[list(links.link).index("end_link")])
+    assert links.moved_by[list(links.link).index("back_link_corner")] == 0
+    assert links.a[list(links.link).index("end_link")] == 0.516
+    assert of(made, Workspace)
+    assert not of(made, Control)
+
+
+def test_a_chain_that_no_table_describes_has_links_without_parameters():
+    chain = replace(davinci.ROBOT.chain, table=())
+    [links] = of(design.run(replace(davinci.ROBOT, chain=chain, control=())), Links)
+    assert np.isnan(links.alpha).all()
+    assert links.mass[0] == 0.0
+    assert links.mass[1] == 0.5

@@ -59,11 +59,11 @@ def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]
     import numpy as np
 
     from pipeline.errors import BadRequest
-    from pipeline.maths.mechanics import kinematics, rigid_body, workspace
+    from pipeline.maths.mechanics import kinematics, workspace
 
-    chain, bodies = robot.chain, robot.bodies
-    if chain is None or bodies is None:
-        raise BadRequest(f"robot {robot.name} has no chain: its geometry and masses are not known; davinci has one")
+    chain = robot.chain
+    if chain is None:
+        raise BadRequest(f"robot {robot.name} has no chain: its geometry is not known; davinci has one")
     counts = sorted({len(robot.joints), chain.n - 1, chain.n})
     if len(q) not in counts:
         numbers = f"{', '.join(map(str, counts[:-1]))} or {counts[-1]}"
@@ -82,11 +82,22 @@ def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]
         "tip": kinematics.tip(chain, pose).tolist(),
         "jacobian_v": J_v.tolist(),
         "jacobian_w": J_w.tolist(),
-        "mass": rigid_body.mass_matrix(chain, bodies, pose).tolist(),
-        "coriolis": rigid_body.coriolis(chain, bodies, pose, rates).tolist(),
-        "gravity": rigid_body.gravity(chain, bodies, pose).tolist(),
-        "condition": None if singular else float(workspace.condition(J_v)),
+        **_dynamics(robot, pose, rates),
+        "condition": None if singular else float(workspace.condition(J_v[..., : workspace.ARM])),
         "warnings": _outside(robot, q) + ([_singular(chain, q)] if singular else []),
+    }
+
+
+def _dynamics(robot: "Robot", q: Any, dq: Any) -> dict[str, Any]:
+    """M, C dq and G, of a robot whose masses are known."""
+    from pipeline.maths.mechanics import rigid_body
+
+    if robot.chain is None or robot.bodies is None:
+        return {"mass": None, "coriolis": None, "gravity": None}
+    return {
+        "mass": rigid_body.mass_matrix(robot.chain, robot.bodies, q).tolist(),
+        "coriolis": rigid_body.coriolis(robot.chain, robot.bodies, q, dq).tolist(),
+        "gravity": rigid_body.gravity(robot.chain, robot.bodies, q).tolist(),
     }
 
 
@@ -116,13 +127,16 @@ def _format_text(robot: "Robot", q: list[float], document: dict[str, Any]) -> st
     """The result for people: numbers in columns, everything in the base axes and SI units; rounding errors are 0."""
     lines = [f"{robot.title} at q = {_numbers(q)}"]
     lines += [f"warning: {text}" for text in document["warnings"]]
-    lines += ["", "frame   origin [m]"]
-    lines += [f"{name:>5}   {_numbers(frame['origin'])}" for name, frame in document["frames"].items()]
+    width = max(map(len, ("frame", *document["frames"])))
+    lines += ["", f"{'frame':>{width}}   origin [m]"]
+    lines += [f"{name:>{width}}   {_numbers(frame['origin'])}" for name, frame in document["frames"].items()]
     lines += ["", f"tip [m]   {_numbers(document['tip'])}"]
     titles = {"jacobian_v": "J_v of the tip", "jacobian_w": "J_omega", "mass": "M"}
     for key, title in titles.items():
-        lines += ["", title, *(f"  {_numbers(row)}" for row in document[key])]
-    lines += ["", f"C dq   {_numbers(document['coriolis'])}", f"G      {_numbers(document['gravity'])}"]
+        if document[key] is not None:
+            lines += ["", title, *(f"  {_numbers(row)}" for row in document[key])]
+    if document["mass"] is not None:
+        lines += ["", f"C dq   {_numbers(document['coriolis'])}", f"G      {_numbers(document['gravity'])}"]
     condition = document["condition"]
     return "\n".join([*lines, "", f"condition of J_v   {'singular' if condition is None else f'{condition:.4g}'}"])
 

@@ -11,6 +11,7 @@ class Links(Record):
     """The links of a robot: Denavit-Hartenberg parameters and masses.  Tables 3.1 and 4.2"""
 
     KEY = ("robot",)
+    UNKNOWN = ("alpha", "a", "d", "offset", "mass")
     ROWS = "link"
 
     robot: str

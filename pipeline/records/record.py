@@ -46,6 +46,7 @@ class Record:
     """What all records share; never made itself."""
 
     KEY: ClassVar[Names] = ("log", "joint")
+    UNKNOWN: ClassVar[Names] = ()  # columns in which NaN says that a number is not known
     ROWS: ClassVar[str] = ""  # the column that names the rows, where rows have names
     origin: ClassVar[Origin | None] = None  # set on the instances that `store` read
 
@@ -107,7 +108,7 @@ class Record:
     def _check_finite(self) -> None:
         for name in self.columns():
             column = getattr(self, name)
-            if column.dtype.kind == "f" and not np.isfinite(column).all():
+            if column.dtype.kind == "f" and name not in self.UNKNOWN and not np.isfinite(column).all():
                 bad = np.flatnonzero(~np.isfinite(column))
                 raise BadRecord(f"{self}: {name} has {len(bad)} values that are not finite, the first at row {bad[0]}")
 

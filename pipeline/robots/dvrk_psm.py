@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from pipeline.robots import davinci
+from pipeline.robots.dvrk_psm_chain import CHAIN
 from pipeline.robots.robot import Robot
 
 # Excitation trajectories of the public identification data have six harmonics (Wang et al. 2019).
@@ -15,4 +16,6 @@ ROBOT = Robot(
         replace(joint, gear_ratio=1.0, torque_constant=1.0, harmonics=HARMONICS, published=())
         for joint in davinci.ROBOT.joints
     ),
+    chain=CHAIN,
+    wrist=("instrument_roll", "instrument_pitch", "instrument_yaw"),
 )

@@ -44,7 +44,7 @@ def test_the_json_holds_what_the_library_computes(n):
     np.testing.assert_array_equal(found["mass"], rigid_body.mass_matrix(CHAIN, BODIES, q))
     np.testing.assert_array_equal(found["coriolis"], rigid_body.coriolis(CHAIN, BODIES, q, dq))
     np.testing.assert_array_equal(found["gravity"], rigid_body.gravity(CHAIN, BODIES, q))
-    assert found["condition"] == pytest.approx(np.linalg.cond(J_v))
+    assert found["condition"] == pytest.approx(np.linalg.cond(J_v[:, :3]))
     assert found["warnings"] == []
 
 

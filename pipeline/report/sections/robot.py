@@ -2,8 +2,6 @@
 
 from collections.abc import Iterator
 
-import numpy as np
-
 from pipeline.records import Links, Pose, Workspace
 from pipeline.report.content import Block, Figure3D, Line3D, Points3D, Prose, Section, Table, literal
 from pipeline.report.context import Context
@@ -21,10 +19,11 @@ def blocks(context: Context, links: Links) -> Iterator[Block]:
     """The section's content.  Tables 3.1, 4.2, Fig 3.5"""
     worst = context.results["robot.worst_condition"].number(3)
     yield Prose(
-        f"The {literal(context.study.robot.title)} as a Denavit-Hartenberg chain. The parallelogram's three links turn "
-        "by the same angle, so that the tool pivots about a remote centre that nothing holds. Forces at the tip follow "
-        f"from efforts at the joints through the Jacobian; its condition number reaches {worst} within the joints' "
-        "limits, and is what the uncertainty of an effort can be multiplied by on its way to a force."
+        f"The {literal(context.study.robot.title)} as a Denavit-Hartenberg chain. The parallelogram's links share the "
+        "coordinate of the pitch, so that the tool pivots about a remote centre that nothing holds. Forces at the tip "
+        "follow from efforts at the joints through the Jacobian; its condition number reaches "
+        f"{worst} within the joints' limits, and is what the uncertainty of an effort can be multiplied by on its way "
+        "to a force."
     )
     rows = tuple(
         (
@@ -40,6 +39,20 @@ def blocks(context: Context, links: Links) -> Iterator[Block]:
     yield chain(context)
 
 
+def walk(pose: Pose) -> list[int]:
+    """The frames in an order in which one line passes along every link: to and fro where the chain branches."""
+    number = {name: i for i, name in enumerate(pose.link)}
+    path = [0]
+    for i in range(1, len(pose.link)):
+        up, down = ([start] for start in (path[-1], i))
+        for way in (up, down):
+            while way[-1] != 0:
+                way.append(number[pose.parent[way[-1]]])
+        meet = next(frame for frame in up if frame in down)
+        path += up[1 : up.index(meet) + 1] + down[: down.index(meet)][::-1]
+    return path
+
+
 def chain(context: Context) -> Figure3D:
     """The chain at three configurations, and the places that its tip reaches."""
     colours = {"zero": "black", "low": "blue", "high": "vermillion"}
@@ -48,7 +61,7 @@ def chain(context: Context) -> Figure3D:
     for workspace in context.catalogue.all(Workspace):
         marks.append(Points3D(workspace.x, workspace.y, workspace.z, "places of the tip", "sky"))
     for pose in context.catalogue.all(Pose):
-        path = np.flatnonzero(pose.link != "9R")  # the two jaws lie on each other
+        path = walk(pose)
         marks.append(
             Line3D(pose.x[path], pose.y[path], pose.z[path], configurations[pose.pose], colours[pose.pose])  # type: ignore[arg-type]
         )
