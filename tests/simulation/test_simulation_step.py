@@ -152,3 +152,9 @@ def test_a_push_that_does_not_break_the_bristles_is_followed_by_the_return():
     assert 0.2 / 1e3 < state.q[0] < 1.3 * 0.2 / 1e3
     run(state, [0.0], 1e-4, 20_000, what)
     assert abs(state.q[0]) < 0.3 * 0.2 / 1e3
+
+
+def test_bristles_are_of_first_order():
+    what = friction(coulomb=2.0, stiffness=500.0)
+    q = [run(at([0.0]), [1.0], h, round(0.05 / h), what).q[0] for h in (4e-4, 2e-4, 1e-4)]
+    assert (q[0] - q[1]) / (q[1] - q[2]) == pytest.approx(2.0, rel=0.1)

@@ -3,9 +3,10 @@
     M(q) ddq + b(q, dq) + v dq + friction + tau_ext = tau                                          (4.40), (A.16)
 
 The step is the midpoint rule, implicit in friction, with the bias at where the middle of the step is foreseen to be:
-Moreau and Jean's scheme for systems with dry friction, of second order where nothing sticks.  The velocity at its end
-minimises dq^T A dq / 2 - r^T dq + h sum_i g_i |dq_i|, which is strictly convex, so a joint that friction holds comes
-out with a velocity of exactly zero.  Jean, Computer Methods in Applied Mechanics and Engineering 177 (1999) 235-257.
+Moreau and Jean's scheme for systems with dry friction, of second order where nothing sticks; bristles, taken at the
+end of the step so that they may be stiff, are of first order (`friction.bristle`).  The velocity at its end minimises
+dq^T A dq / 2 - r^T dq + h sum_i g_i |dq_i|, which is strictly convex, so a joint that friction holds comes out with a
+velocity of exactly zero.  Jean, Computer Methods in Applied Mechanics and Engineering 177 (1999) 235-257.
 """
 
 from typing import Any, NamedTuple
