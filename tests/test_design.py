@@ -77,6 +77,12 @@ def test_the_lyapunov_function_starts_at_the_energy_of_the_stretched_controller(
         assert pytest.approx(e @ (np.array(study.proportional) * e) / 2, rel=1e-12) == lyapunov.V_0
 
 
+def test_an_error_between_two_steps_of_the_solver_is_that_of_the_motion():
+    t = np.array([0.0, 1.0, 7.0, 12.0])
+    run = design.watched(davinci.ROBOT.control[0], "hand_roll", t, t**3, 3 * t**2, 0.0, 1500.0)
+    assert run.error_10 == pytest.approx(500.0, rel=1e-12)
+
+
 def test_overshoot_and_settling_are_those_of_the_response():
     """A second-order response overshoots by exp(-pi zeta / sqrt(1 - zeta^2)), and stays in the band once it settles."""
     zeta, w = 0.4, 3.0
