@@ -17,6 +17,7 @@ from pipeline.report.content import (
     Line3D,
     Listing,
     Number,
+    OnScreen,
     Panel,
     Points,
     Points3D,
@@ -118,6 +119,11 @@ def document(simulated: bool = True) -> Document:
             method,
         ),
     )
-    return Document(
-        "Report", f"Study {HOSTILE}", simulated, (first, Section("Second", "second", (zoomable(400, "zoom"),)))
-    )
+    folded = OnScreen(f"Folded {hostile}", "folded", (Prose("Only here."), zoomable(40, "folded-zoom"), table_of_one()))
+    second = Section("Second", "second", (zoomable(400, "zoom"), folded, Prose("See [@folded] and [@folded-zoom].")))
+    return Document("Report", f"Study {HOSTILE}", simulated, (first, second))
+
+
+def table_of_one() -> Table:
+    """A table of one number."""
+    return Table("One.", ("name", "value"), (("a", Number(1, "m", key="one.a")),))

@@ -24,7 +24,7 @@ from pipeline.report.writers import html, pdf
 
 def test_every_mark_is_drawn_into_well_formed_svg_of_the_width_of_the_page(full: Document) -> None:
     figures = [block for block in walk(full) if isinstance(block, Figure | Figure3D)]
-    assert len(figures) == 3
+    assert len(figures) == 4
     for figure in figures:
         root = ElementTree.fromstring(svg(figure))
         assert root.attrib["width"] == "481.889764pt"  # 170 mm

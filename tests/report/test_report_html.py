@@ -148,7 +148,7 @@ def test_what_is_drawn_has_words_for_those_who_do_not_see_it(page: Page) -> None
     assert {"x is K times y", "Two panels of traces.", "Chain.", HOSTILE, "theta_1", "x^2"} <= set(words)
     assert all(words)
     assert ("html", {"lang": "en", "class": "simulated"}) in page.elements
-    assert sum(tag == "th" and a["scope"] == "col" for tag, a in page.elements) == 3
+    assert sum(tag == "th" and a["scope"] == "col" for tag, a in page.elements) == 5
 
 
 def test_a_dozen_long_traces_stay_under_five_megabytes() -> None:

@@ -52,6 +52,14 @@ def test_every_page_of_simulated_data_says_so(source: bytes) -> None:
 
 
 @poppler
+def test_what_is_on_screen_only_is_named_and_left_out(source: bytes) -> None:
+    text = re.sub(r"\s+", " ", read(source).replace("\N{ZERO WIDTH SPACE}", ""))
+    assert "In the HTML report: Folded <script>" in text
+    assert "Figure S1 (in the HTML report)" in text
+    assert "Only here." not in text
+
+
+@poppler
 def test_both_files_print_the_same_numbers(source: bytes, full: Document) -> None:
     text = read(source)
     for name in ("Figure 1.", "Figure 2.", "Figure 3.", "Table 1.", "(1)", "1.1"):

@@ -3,6 +3,7 @@
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from report_documents import HOSTILE
 
 from pipeline.report.content import Document, Equation, Number, Prose, Section, Table, literal, numbers
 from pipeline.report.content.inline import Span, parse, printable
@@ -49,6 +50,8 @@ def test_sections_equations_figures_and_tables_are_numbered_in_reading_order(ful
         "still": "Figure 1",
         "zoom": "Figure 3",
         "update": "Eq. (1)",
+        "folded": f"“Folded {printable(HOSTILE)}”",
+        "folded-zoom": "Figure S1",
     }
 
 
@@ -69,7 +72,7 @@ def test_a_table_whose_rows_do_not_fit_its_header_is_refused() -> None:
 
 
 def test_the_numbers_of_a_document_are_found_in_reading_order(full: Document) -> None:
-    assert [number.key for number in numbers(full)] == ["fit.a", None, None, None]
+    assert [number.key for number in numbers(full)] == ["fit.a", None, None, None, "one.a"]
 
 
 def test_a_unit_that_a_column_shares_moves_to_its_header_and_others_stay() -> None:

@@ -10,6 +10,7 @@ from pipeline.report.content.document import (
     Figure3D,
     Level,
     Listing,
+    OnScreen,
     Prose,
     Section,
     Table,
@@ -40,6 +41,6 @@ from pipeline.report.content.number import Number
 
 __all__ = [
     "AnyMark", "Band", "Bars", "Block", "Bullets", "Cell", "Document", "Equation", "Figure", "Figure3D", "HBand",
-    "HLine", "Histogram", "Level", "Line", "Line3D", "Listing", "Number", "Panel", "Points", "Points3D", "Prose",
+    "HLine", "Histogram", "Level", "Line", "Line3D", "Listing", "Number", "OnScreen", "Panel", "Points", "Points3D", "Prose",
     "Reference", "Section", "Stems", "Table", "VLine", "VSpan", "Verdict", "literal", "name_of", "numbers", "walk",
 ]  # fmt: skip

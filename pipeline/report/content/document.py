@@ -118,7 +118,19 @@ class Section:
     blocks: tuple["Block", ...]
 
 
-Block = Prose | Bullets | Listing | Verdict | Equation | Table | Figure | Figure3D | Section
+@dataclass(frozen=True)
+class OnScreen:
+    """What only a screen has room for: folded in HTML until it is asked for; the PDF names its title and leaves it out.
+
+    Figures, tables and equations in it are numbered S1, S2, ..., so that those of the PDF follow each other.
+    """
+
+    title: str
+    anchor: str
+    blocks: tuple["Block", ...]
+
+
+Block = Prose | Bullets | Listing | Verdict | Equation | Table | Figure | Figure3D | Section | OnScreen
 
 
 @dataclass(frozen=True)
@@ -139,17 +151,17 @@ class Document:
             raise ValueError(f"labels and anchors must differ; used more than once: {twice}")
 
 
-def walk(parent: Document | Section) -> Iterator[Block]:
+def walk(parent: Document | Section | OnScreen) -> Iterator[Block]:
     """Every block in reading order, sections before what they hold."""
     for block in parent.sections if isinstance(parent, Document) else parent.blocks:
         yield block
-        if isinstance(block, Section):
+        if isinstance(block, Section | OnScreen):
             yield from walk(block)
 
 
 def name_of(block: Block) -> str | None:
-    """What references call a block: its label, or the anchor of a section."""
-    return block.anchor if isinstance(block, Section) else getattr(block, "label", None)
+    """What references call a block: its label, or the anchor of a section or of what is on screen only."""
+    return block.anchor if isinstance(block, Section | OnScreen) else getattr(block, "label", None)
 
 
 def numbers(document: Document) -> Iterator[Number]:

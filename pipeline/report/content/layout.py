@@ -13,6 +13,7 @@ from pipeline.report.content.document import (
     Figure,
     Figure3D,
     Listing,
+    OnScreen,
     Prose,
     Section,
     Table,
@@ -34,6 +35,7 @@ TEXTS: dict[type, Callable[[Any], tuple[str, ...]]] = {
     Figure: lambda figure: (figure.caption,),
     Figure3D: lambda figure: (figure.caption,),
     Section: lambda section: (section.title,),
+    OnScreen: lambda folded: (folded.title,),
 }
 
 
@@ -50,7 +52,8 @@ class Placed:
 
 
 def place(document: Document) -> tuple[Placed, ...]:
-    """The sections of a document, numbered: sections 1, 1.1; figures, tables and equations 1, 2, 3.
+    """The sections of a document, numbered: sections 1, 1.1; figures, tables and equations 1, 2, 3, and S1, S2, S3
+    where they are on screen only.
 
     Raises
     ------
@@ -68,8 +71,19 @@ def references(placed: tuple[Placed, ...]) -> dict[str, str]:
     for item in placed:
         if item.number and name_of(item.block):
             printed[item.anchor] = NAMES[item.kind].format(item.number)
+        elif isinstance(item.block, OnScreen):
+            printed[item.anchor] = f"“{''.join(span.text for span in parse(item.block.title))}”"
         printed |= references(item.blocks)
     return printed
+
+
+def on_screen(placed: tuple[Placed, ...]) -> frozenset[str]:
+    """The anchors of all that the PDF leaves out."""
+    left: set[str] = set()
+    for item in placed:
+        inside = on_screen(item.blocks) | {child.anchor for child in item.blocks}
+        left |= inside | {item.anchor} if item.kind == "onscreen" else on_screen(item.blocks)
+    return frozenset(left - {""})
 
 
 def marked_texts(document: Document, kind: Kind) -> Iterator[str]:
@@ -99,15 +113,19 @@ def _section(section: Section, number: str, depth: int, counters: Counter[str]) 
             counters[number] += 1
             children.append(_section(block, f"{number}.{counters[number]}", depth + 1, counters))
         else:
-            children.append(_block(block, counters))
+            children.append(_block(block, counters, ""))
     return Placed(section, "section", number, section.anchor, depth, tuple(children))
 
 
-def _block(block: Block, counters: Counter[str]) -> Placed:
+def _block(block: Block, counters: Counter[str], series: str) -> Placed:
+    """A block that is no section; `series` comes before its number."""
+    if isinstance(block, OnScreen):
+        inside = tuple(_block(child, counters, "S") for child in block.blocks)
+        return Placed(block, "onscreen", anchor=block.anchor, blocks=inside)
     kind = KINDS.get(type(block), "")
     if not kind:
         return Placed(block, type(block).__name__.lower())
-    counters[kind] += 1
-    number = str(counters[kind])
+    counters[series + kind] += 1
+    number = f"{series}{counters[series + kind]}"
     # A capital letter cannot be confused with a label, which has none.
     return Placed(block, kind, number, name_of(block) or f"{kind.capitalize()}-{number}")

@@ -11,13 +11,14 @@ from pipeline.report.content import (
     Figure,
     Figure3D,
     Listing,
+    OnScreen,
     Prose,
     Section,
     Table,
     Verdict,
 )
 from pipeline.report.content.inline import parse, printable
-from pipeline.report.content.layout import Placed, place, references
+from pipeline.report.content.layout import Placed, on_screen, place, references
 from pipeline.report.content.tables import columns
 from pipeline.report.figures.svg import svg
 from pipeline.report.writers.typesetting import typeset
@@ -44,6 +45,7 @@ def render(document: Document) -> bytes:
         "simulated": document.simulated,
         "edition": printable(document.edition),
         "references": references(placed),
+        "onscreen": sorted(on_screen(placed)),
         "blocks": [_placed(item) for item in placed],
     }
     return typeset(TEMPLATE, content, "pdf")[0]
@@ -51,7 +53,8 @@ def render(document: Document) -> bytes:
 
 def _placed(item: Placed) -> Json:
     common = {"kind": item.kind, "number": item.number, "anchor": item.anchor, "depth": item.depth}
-    return common | block_data(item.block) | {"blocks": [_placed(child) for child in item.blocks]}
+    children = item.blocks if item.kind == "section" else ()
+    return common | block_data(item.block) | {"blocks": [_placed(child) for child in children]}
 
 
 def _inline(text: str) -> list[Json]:
@@ -70,6 +73,11 @@ def block_data(block: Any) -> Json:
 @block_data.register(Section)
 def _(section: Section) -> Json:
     return {"title": _inline(section.title)}
+
+
+@block_data.register(OnScreen)
+def _(folded: OnScreen) -> Json:
+    return {"title": _inline(folded.title)}
 
 
 @block_data.register(Prose)
