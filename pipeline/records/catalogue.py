@@ -15,6 +15,7 @@ class Provenance:
     raw: dict[str, str]
     processed: dict[str, str]
     failures: dict[str, str]
+    study: str = ""  # the study file, as it was read
 
 
 class Catalogue:

@@ -1,6 +1,6 @@
 """What every section is handed: the records, the results, and how to name things."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from pipeline.records import Fit, Record, Track
 from pipeline.records.catalogue import Catalogue, Provenance
@@ -23,9 +23,19 @@ class Context:
         """The result of that key as a cell, or a dash where there is none."""
         return self.results[key].number(digits) if key in self.results else "–"
 
+    def probability(self, key: str) -> Number | str:
+        """A probability as a cell: below 0.001 it is only said to be."""
+        number = self.number(key, 2)
+        return number if isinstance(number, str) else replace(number, least=0.001)
+
     def count(self, key: str) -> Number | str:
         """The result of that key, which is a whole number, as a cell."""
         return self.number(key, len(str(round(self.results[key].value))) if key in self.results else 1)
+
+    def size(self, record: Record, field: str, value: float, digits: int = 2) -> str:
+        """A value of a record's field with its unit, in words of a sentence."""
+        unit = record.origin.units.get(field, "") if record.origin else ""
+        return str(Number(value, format_unit(unit), digits=digits))
 
     def used_fit(self, joint: str) -> str:
         """`<model>.<estimator>` of the fit that the filter ran with."""
@@ -42,6 +52,11 @@ def most_telling(tracks: list[Track], most: int) -> list[Track]:
     moving = [track for track in tracks if not track.at_rest]
     ranked = sorted(moving, key=lambda track: order.index(track.role) if track.role in order else len(order))
     return [track for track in moving if track in ranked[:most]]
+
+
+def count(number: int, noun: str) -> str:
+    """A number with its noun: '1 run', '3 runs'."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def title(name: str) -> str:

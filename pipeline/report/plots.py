@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pipeline.records import Column, Whiteness
+from pipeline.records import Column, Counts, Whiteness
 from pipeline.report.content import HBand, Panel, Stems
 
 
@@ -38,3 +38,21 @@ def autocorrelation(w: Whiteness, heading: str) -> Panel:
     reach = max(4 * w.band, 0.1)
     low, high = min(-reach, 1.1 * float(acf.min())), max(reach, min(1.1 * float(acf.max()), 1.0))
     return Panel(heading, "lag [samples]", "autocorrelation", marks, y_range=(low, high))
+
+
+def binned_means(x: Column, y: Column, bins: int = 40) -> tuple[Column, Column, Column]:
+    """Middles of equal ranges of x that hold samples, the mean of y in each, and its standard error."""
+    edges = np.linspace(x.min(), x.max(), bins + 1)
+    place = np.clip(np.digitize(x, edges) - 1, 0, bins - 1)
+    held = [y[place == i] for i in range(bins)]
+    full = [i for i, values in enumerate(held) if len(values)]
+    means = np.array([held[i].mean() for i in full])
+    stds = np.array([held[i].std() / np.sqrt(len(held[i])) for i in full])
+    return (edges[:-1] + edges[1:])[full] / 2, means, stds
+
+
+def correlation(x: Column, y: Column, lags: Counts) -> Column:
+    """The correlation of x(k) with y(k + lag) of periodic signals of one length, at every lag."""
+    x, y = x - x.mean(), y - y.mean()
+    scale = float(np.linalg.norm(x) * np.linalg.norm(y)) or 1.0
+    return np.array([x @ np.roll(y, -int(lag)) for lag in lags]) / scale

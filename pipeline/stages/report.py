@@ -1,12 +1,12 @@
-"""Write the report of a study: report.html, report.pdf and results.json."""
+"""Write the reports of a study: report and robot, each as HTML and PDF, and results.json."""
 
 import hashlib
 
 from pipeline.records.catalogue import Catalogue, Provenance
-from pipeline.report.content import Document
+from pipeline.report.content import Document, Section
 from pipeline.report.context import Context
 from pipeline.report.results import collect
-from pipeline.report.sections import SECTIONS, section_builder
+from pipeline.report.sections import DOCUMENTS, section_builder
 from pipeline.report.writers import WRITERS, renderer
 from pipeline.study import Study
 
@@ -14,17 +14,23 @@ from pipeline.study import Study
 def run(catalogue: Catalogue, study: Study, provenance: Provenance) -> dict[str, bytes]:
     """The files of the report, by name; what is shown and results.json come from the same numbers."""
     context = Context(catalogue, study, collect(catalogue), provenance)
-    built = [section_builder(name)(context) for name in SECTIONS]
-    sections = tuple(section for section in built if section is not None)
+    built = {name: (title, sections(context, names)) for name, (title, names) in DOCUMENTS.items()}
     results = context.results.json()
-    document = Document(
-        title="Contact forces without a force sensor",
-        study=study.title,
-        simulated=study.simulated,
-        sections=sections,
-        edition=f"report ID {identity(provenance, results)} · davinci-forces {provenance.version}",
-    )
-    return {file: renderer(file)(document) for file in WRITERS} | {"results.json": results}
+    edition = f"report ID {identity(provenance, results)} · davinci-forces {provenance.version}"
+    documents = {
+        name: Document(title, study.title, study.simulated, content, edition)
+        for name, (title, content) in built.items()
+        if content
+    }
+    pages = {
+        f"{name}.{ending}": renderer(ending)(document) for name, document in documents.items() for ending in WRITERS
+    }
+    return pages | {"results.json": results}
+
+
+def sections(context: Context, names: tuple[str, ...]) -> tuple[Section, ...]:
+    """The sections of a document that the study has something to say on."""
+    return tuple(section for name in names if (section := section_builder(name)(context)) is not None)
 
 
 def identity(provenance: Provenance, results: bytes) -> str:

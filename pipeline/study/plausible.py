@@ -9,6 +9,7 @@ PLAUSIBLE = {
     "skip": (0.0, 1e6, "s"),
     "lowpass": (1e-6, 1e5, "Hz"),
     "harmonics": (0, 100, ""),
+    "effort": (1e-9, 1e6, "N m or N"),
     "q_tau": (0.0, 1e6, "effort/s^0.5"),
 }
 
@@ -18,9 +19,9 @@ def optional(table: TomlTable, key: str) -> float | None:
     return checked(table, key, table.number(key)) if key in table else None
 
 
-def checked(table: TomlTable, key: str, value: float) -> float:
-    """A number as it is, noted where it is not plausible."""
-    least, most, unit = PLAUSIBLE[key]
+def checked(table: TomlTable, key: str, value: float, kind: str = "") -> float:
+    """A number as it is, noted where it is not plausible; `kind` says as what, where the key is a name."""
+    least, most, unit = PLAUSIBLE[kind or key]
     if value < 0 or (value == 0 and least > 0):
         table.problem(f"{key} must be positive, not {shown(value)}", key)
     elif value < least or value > most:

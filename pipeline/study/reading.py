@@ -42,7 +42,7 @@ def study_of(table: TomlTable, folder: Path) -> Study:
     title, robot, simulated = table.text("title", name), _robot(table, folder), table.flag("simulated", False)
     overrides = table.table("robot_overrides")
     robot = _overridden(robot, overrides) if robot else None
-    settings = _settings(table.table("settings"))
+    settings = _settings(table.table("settings"), robot)
     logs = entries_of(table, robot)
     table.close()
     lines = lines_of_files(table, logs)
@@ -92,10 +92,21 @@ def _overridden(robot: Robot, overrides: TomlTable) -> Robot:
     return replace(robot, joints=tuple(joints.values()))
 
 
-def _settings(table: TomlTable) -> Settings:
-    values = {field.name: _setting(table, field) for field in fields(Settings)}
+def _settings(table: TomlTable, robot: Robot | None) -> Settings:
+    values = {field.name: _setting(table, field) for field in fields(Settings) if field.name != "effort"}
+    efforts = table.table("effort")
     table.close()
-    return Settings(**values)
+    return Settings(**values, effort=_sought(efforts, robot))
+
+
+def _sought(efforts: TomlTable, robot: Robot | None) -> tuple[tuple[str, float], ...]:
+    """The effort that the user wants to see on each joint."""
+    known = [joint.name for joint in robot.joints] if robot else list(efforts.values)
+    for name in efforts.values:
+        if name not in known:
+            efforts.problem(f"{robot.name if robot else ''} has no joint {name!r}; it has {', '.join(known)}", name)
+    named = [name for name in efforts.values if name in known]
+    return tuple((name, checked(efforts, name, efforts.number(name), "effort")) for name in named)
 
 
 def _setting(table: TomlTable, field: Field[Any]) -> Any:

@@ -13,7 +13,7 @@ class Number:
     """A value with its unit, standard error and key in results.json.
 
     Printed as value ± std with two significant digits of std, else with `digits` significant digits; far from one, with
-    a power of ten.  What is not finite is printed as a dash.
+    a power of ten.  What is not finite is printed as a dash, what is below `least` as less than it.
     """
 
     value: float
@@ -21,6 +21,7 @@ class Number:
     std: float | None = None
     key: str | None = None
     digits: int = 4
+    least: float | None = None  # below which no more is said: of a probability, 0.001
 
     def __str__(self) -> str:
         """The number with its unit."""
@@ -31,6 +32,8 @@ class Number:
         """The number without its unit."""
         if not math.isfinite(self.value):
             return MISSING
+        if self.least is not None and self.value < self.least:
+            return f"< {self.least:g}"
         if self.std is not None and math.isfinite(self.std) and self.std > 0:
             return _with_std(self.value, self.std)
         return _significant(self.value, self.digits)

@@ -9,10 +9,15 @@ from importlib import import_module
 from pipeline.report.content import Section
 from pipeline.report.context import Context
 
-SECTIONS = (
-    "summary", "recorded", "noise", "identification", "prediction", "filter", "ground_truth", "robot", "control",
-    "excitation", "methods", "provenance",
-)  # fmt: skip
+# A file, its title, and its sections: each answers one question.
+DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "report": (
+        "Contact forces without a force sensor",
+        ("summary", "contacts", "joints", "prediction", "noise", "runs", "ground_truth", "methods", "provenance"),
+    ),
+    "robot": ("The robot, its control and its excitation", ("robot", "control", "excitation")),
+}
+SECTIONS = tuple(name for _, names in DOCUMENTS.values() for name in names)
 
 
 def section_builder(name: str) -> Callable[[Context], Section | None]:

@@ -7,10 +7,11 @@ import numpy as np
 
 from pipeline.records import Fit, Track
 from pipeline.records.record import slug
-from pipeline.report.content import Block, Figure, Line, Panel, Prose, Section, Table, Verdict, literal
-from pipeline.report.context import Context, label, title
+from pipeline.report.content import Block, Figure, Line, OnScreen, Panel, Prose, Section, Table, Verdict, literal
+from pipeline.report.context import Context, count, label, title
 
 LIMIT = 4.0  # standard errors that an estimate may be off before it is called wrong
+SHOWN = 3  # figures; the others are on screen
 SHAPES = {"triangle": ((0.0, 0.0), (0.5, 1.0), (1.0, 0.0)), "pulse": ((0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0))}
 
 
@@ -30,11 +31,16 @@ def blocks(context: Context) -> Iterator[Block]:
     )
     for joint, path, theta in true_parameters(context):
         yield from parameters(context, joint, path, theta)
+    figures: list[Figure] = []
     for log in context.study.truth.get("log", []):
         for joint in dict.fromkeys(push.get("joint") for push in log.get("push", [])):
             tracks = context.catalogue.about(Track, log=log["name"], joint=str(joint))
             pushes = [push for push in log["push"] if push.get("joint") == joint]
-            yield from (effort_figure(track, pushes) for track in tracks)
+            figures += [effort_figure(track, pushes) for track in tracks]
+    yield from figures[:SHOWN]
+    if figures[SHOWN:]:
+        name = f"{count(len(figures) - SHOWN, 'more comparison')} of tracked and true effort"
+        yield OnScreen(name, "more-truth", tuple(figures[SHOWN:]))
 
 
 def true_parameters(context: Context) -> Iterator[tuple[str, tuple[str, ...], dict[str, float]]]:

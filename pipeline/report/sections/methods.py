@@ -3,13 +3,76 @@
 from collections.abc import Iterator
 
 from pipeline.records import Fit
-from pipeline.report.content import Block, Equation, Prose, Section
+from pipeline.report.content import Block, Bullets, Equation, Listing, Prose, Section, Table
 from pipeline.report.context import Context
+from pipeline.report.verdicts import thresholds
+
+SYMBOLS = (
+    ("$q, dot(q), dot.double(q)$", "position, velocity and acceleration of a joint", "rad or m"),
+    ("$tau$", "effort of a joint: torque where it turns, force where it slides", "N m or N"),
+    ('$tau_"ext"$', "external effort: what the robot exerts on its environment, joint by joint", "N m or N"),
+    ("$theta, hat(theta)$", "parameters of a joint's model, and their estimates", "as listed"),
+    ("$Phi$", "regressor: effort is $Phi theta$", ""),
+    ("$M, V, F, G$", "inertia, velocity terms, friction and gravity", ""),
+    ("$W$", "weights of weighted least squares", ""),
+    ("$i, K_m, eta$", "motor current, torque constant and gear ratio", "A, N m/A, –"),
+    ("$theta_m$", "motor angle", "rad"),
+    ("$N_p$", "number of periods that are averaged", ""),
+    ("$sigma$", "standard deviation of noise, of the signal named beside it", ""),
+    ("$T_s$", "sampling time", "s"),
+    ("$x, y, hat(x), tilde(y)$", "state and measurement of the filter, estimated state, innovation", ""),
+    ("$P, R, S, K$", "covariance of the state, of the measurement noise and of the innovation; Kalman gain", ""),
+    ("$w$", "process noise", ""),
+)
+REFERENCES = (
+    "Force Feedback in the da Vinci Surgical Robot. Master's thesis, Aalborg University: the models, the "
+    "identification and the filter that this analysis starts from.",
+    "Y. Wang, R. Gondokaryono, A. Munawar, G. S. Fischer: A convex optimization-based dynamic model identification "
+    "package for the da Vinci Research Kit. IEEE Robotics and Automation Letters 4 (4), 2019.",
+    "W. K. Newey, K. D. West: A simple, positive semi-definite, heteroskedasticity and autocorrelation consistent "
+    "covariance matrix. Econometrica 55 (3), 1987.",
+    "D. W. K. Andrews: Heteroskedasticity and autocorrelation consistent covariance matrix estimation. Econometrica "
+    "59 (3), 1991.",
+    "G. M. Ljung, G. E. P. Box: On a measure of lack of fit in time series models. Biometrika 65 (2), 1978.",
+    "C. M. Jarque, A. K. Bera: A test for normality of observations and regression residuals. International "
+    "Statistical Review 55 (2), 1987.",
+    "H. R. Künsch: The jackknife and the bootstrap for general stationary observations. The Annals of Statistics "
+    "17 (3), 1989.",
+    "Y. Bar-Shalom, X. R. Li, T. Kirubarajan: Estimation with Applications to Tracking and Navigation. Wiley, 2001.",
+)
 
 
 def section(context: Context) -> Section:
-    """Prose and equations, in the order of the stages."""
-    return Section("Methods", "methods", tuple(blocks(context)))
+    """Prose and equations in the order of the stages; symbols, thresholds, a paragraph for a paper, and references."""
+    symbols = Table(
+        "Symbols.", ("Symbol", "Is", "Unit"), tuple((s, m, u or "–") for s, m, u in SYMBOLS), "symbols", "lll"
+    )
+    judged = Table(
+        "Every threshold that a verdict of this report rests on.",
+        ("Judged", "By", "Good", "Caution", "Problem"), thresholds(), "thresholds", "lllll",
+    )  # fmt: skip
+    paragraph = Section("A paragraph for a paper", "paragraph", (Listing(paragraph_for_paper(context)),))
+    references = Section("References", "references", (Bullets(REFERENCES),))
+    return Section("Methods", "methods", (*blocks(context), judged, symbols, paragraph, references))
+
+
+def paragraph_for_paper(context: Context) -> str:
+    """What was done, with this study's numbers, to be pasted."""
+    settings, robot = context.study.settings, context.study.robot
+    fits = context.catalogue.all(Fit)
+    joints = ", ".join(dict.fromkeys(fit.group.replace("_", " ") for fit in fits)) or "no joint"
+    logs = sorted({log for fit in fits for log in fit.logs})
+    random_walk = f"{settings.q_tau:g} (effort/s^0.5)" if settings.q_tau else "the robot's own setting"
+    return (
+        f"External efforts of the {robot.title} ({joints}) were estimated from motor efforts and joint positions with "
+        f"davinci-forces {context.provenance.version}. Dynamic parameters were identified from {len(logs)} periodic "
+        f"excitation recording{'' if len(logs) == 1 else 's'} ({', '.join(logs)}), averaged over periods and "
+        f"differentiated in the frequency domain; the model used was {settings.fit}. Motion that does not repeat was "
+        f"low-pass filtered at {settings.lowpass:g} Hz with zero phase. The external effort was tracked by an extended "
+        f"Kalman filter with position, velocity and external effort as states, the last as a random walk of intensity "
+        f"{random_walk}. Standard errors allow for autocorrelated residuals (Newey and West, 1987); levels of free "
+        "motion were bootstrapped over blocks (Künsch, 1989)."
+    )
 
 
 def blocks(context: Context) -> Iterator[Block]:
@@ -27,12 +90,12 @@ def blocks(context: Context) -> Iterator[Block]:
     yield Prose(
         "**Periods.** The period is the shortest lag after which all moving joints repeat, refined until the "
         "harmonics of the excitation fit the positions best. A sample rarely falls on a phase of the averaged period "
-        "exactly: a smooth harmonic fit carries it there, and what the fit leaves is averaged over the $M$ periods. "
-        "The variance between periods is that of one period; the mean's is smaller by $M$."
+        "exactly: a smooth harmonic fit carries it there, and what the fit leaves is averaged over the $N_p$ periods. "
+        "The variance between periods is that of one period; the mean's is smaller by $N_p$."
     )
     yield Equation(
-        "overline(x)(k) = 1/M sum_(m=1)^M x_m (k), "
-        "quad sigma_x^2 (k) = 1/(M-1) sum_(m=1)^M (x_m (k) - overline(x)(k))^2",
+        "overline(x)(k) = 1/N_p sum_(m=1)^(N_p) x_m (k), "
+        "quad sigma_x^2 (k) = 1/(N_p - 1) sum_(m=1)^(N_p) (x_m (k) - overline(x)(k))^2",
         "the mean over periods, and the variance between them",
         "averaging",
     )
@@ -62,7 +125,7 @@ def blocks(context: Context) -> Iterator[Block]:
         "estimation",
     )
     if any(fit.estimator == "wlse" for fit in context.catalogue.all(Fit)):
-        yield Prose('The weights are $W = "diag"(M \\/ sigma_tau^2)$; with fewer than four periods they are left out.')
+        yield Prose('The weights are $W = "diag"(N_p \\/ sigma_tau^2)$; below four periods they are left out.')
     yield Prose(
         "**Filtering.** The state holds position, velocity and external effort, the last as a random walk. Each "
         "sample is first corrected with its measurement and then carried to the next; the covariance is corrected in "

@@ -4,26 +4,34 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.records import Average, PeriodResidual, Signal, Spectrum, Trajectory, Whiteness
+from pipeline.records import Average, Column, PeriodResidual, Signal, Spectrum, Trajectory, Whiteness
 from pipeline.report.content import (
+    Bars,
     Block,
+    Cell,
     Figure,
     Histogram,
     Line,
+    OnScreen,
     Panel,
     Points,
     Prose,
     Reference,
     Section,
     Table,
+    Verdict,
     literal,
 )
-from pipeline.report.context import Context, label, title
+from pipeline.report.context import Context, count, label, title
 from pipeline.report.plots import autocorrelation, histogram, normal_scores
+
+SIGNALS = {"q_noise": "position", "dq_noise": "velocity", "tau_noise": "effort"}
+OUTLIER = 3.0  # times the median period's noise, from which on a period is named
+BARS = 24  # periods at most that are drawn one by one
 
 
 def section(context: Context) -> Section | None:
-    """A table of standard deviations, and for each identification log and joint what averaging removed."""
+    """A table of standard deviations, the tests of the noise, and what averaging removed from each log."""
     averages = context.catalogue.all(Average)
     if not averages:
         return None
@@ -48,16 +56,67 @@ def blocks(context: Context, averages: list[Average]) -> Iterator[Block]:
         for a in averages
     )
     header = ("Log", "Joint", "Period", "Periods", "Position noise", "Velocity noise", "Effort noise")
-    yield Table(
-        "Noise between periods (standard deviations of one sample). The standard error of a period takes what its "
-        "harmonics leave as white, and is too small where it is not.",
+    yield Table("Noise between periods (standard deviations of one sample).", header, rows, "noise-table", "llrrrrr")
+    yield tests(context, averages)
+    for average in averages:
+        yield from outliers(context, average)
+    folded = tuple(
+        OnScreen(f"{title(a.joint)} in {literal(a.log)}", f"noise-{a.log}-{a.joint}", figures)
+        for a in averages
+        if (figures := tuple(average_figures(context, a)))
+    )
+    if folded:
+        yield OnScreen("One period of each joint, its spectrum and derivatives, and its noise", "periods", folded)
+
+
+def tests(context: Context, averages: list[Average]) -> Table:
+    """Whether the noise is white and normal, signal by signal."""
+    header = ("Log", "Joint", "Signal", "ACF(1)", "White, $p$", "Normal, $p$", "Skewness", "Kurtosis")
+    rows = tuple(
+        (literal(a.log), title(a.joint), meaning, *statistics(context, f"whiteness.{a.log}.{a.joint}.{signal}"))
+        for a in averages
+        for signal, meaning in SIGNALS.items()
+    )
+    return Table(
+        "Is the noise white and normal? First autocorrelation, and the probabilities of a larger Ljung-Box and "
+        "Jarque-Bera statistic if it were; below 0.01 it is not. Noise of motion that is not white is what a real "
+        "encoder, its derivative and a jittering clock leave; the filter takes it as white.",
         header,
         rows,
-        "noise-table",
-        "llrrrrr",
+        "noise-tests",
+        "lllrrrrr",
     )
-    for average in averages:
-        yield from average_figures(context, average)
+
+
+def statistics(context: Context, prefix: str) -> tuple[Cell, ...]:
+    """The tests of one signal."""
+    return (
+        context.number(f"{prefix}.acf1", 2),
+        *(context.probability(f"{prefix}.{name}") for name in ("ljung_box_p", "jarque_bera_p")),
+        *(context.number(f"{prefix}.{name}", 2) for name in ("skewness", "kurtosis")),
+    )
+
+
+def outliers(context: Context, average: Average) -> Iterator[Verdict]:
+    """Periods that are noisier than the others."""
+    for residual in context.catalogue.about(PeriodResidual, log=average.log, joint=average.joint):
+        for signal, meaning in SIGNALS.items():
+            rms = by_period(residual, average, getattr(residual, signal))
+            loud = [i for i, value in enumerate(rms, 1) if len(rms) > 2 and value > OUTLIER * np.median(rms)]
+            if loud:
+                times = ", ".join(f"{rms[i - 1] / np.median(rms):.1f}" for i in loud[:5])
+                name = f"**{title(average.joint)} in {literal(average.log)}**"
+                which = f"period{'' if len(loud) == 1 else 's'} {', '.join(map(str, loud[:5]))} of {len(rms)}"
+                said = f"{name}: {meaning} noise of {which} is {times} times that of the median period"
+                settle = "; the arm may still have been settling: see `skip`." if loud[0] == 1 else "."
+                yield Verdict("warn", said + settle)
+
+
+def by_period(residual: PeriodResidual, average: Average, noise: Column) -> Column:
+    """The root mean square of the noise in each period (M,)."""
+    number = np.minimum(((residual.t - residual.t[0]) / average.period + 1e-9).astype(int), average.periods - 1)
+    squares = np.bincount(number, noise**2, average.periods)
+    return np.sqrt(squares / np.maximum(np.bincount(number, minlength=average.periods), 1))
 
 
 def average_figures(context: Context, average: Average) -> Iterator[Block]:
@@ -74,19 +133,19 @@ def average_figures(context: Context, average: Average) -> Iterator[Block]:
         f"{name}: the mean of {average.periods} periods and the first of them; the position's spectrum with the "
         "harmonics that are kept; velocity and acceleration from those harmonics and from differences of the logged "
         "position and velocity.",
-        f"Four panels for {name}: averaged effort, spectrum of the position, velocity and acceleration.",
+        f"{name}: the mean of {count(average.periods, 'period')}, the spectrum of its position, and its derivatives.",
         (one_period(average, signals[0]), spectrum(spectra[0]), *derivatives(average, trajectories[0])),
         columns=2,
-        height=45,
+        height=42,
     )
     yield Figure(
-        f"{name}: what averaging removed. Histogram of the effort noise with the normal density of the same "
-        "standard deviation; normal probability plot of the position noise; autocorrelation of the velocity noise with "
-        "the 95 % band of white noise.",
-        f"Three panels for {name}: histogram, normal probability plot and autocorrelation of the noise.",
-        tuple(noise_panels(period_residuals[0], whiteness)),
-        columns=3,
-        height=45,
+        f"{name}: what averaging removed. Noise period by period, over that of the median period; histogram of the "
+        "effort noise with the normal density of the same standard deviation; normal probability plot of the position "
+        "noise; autocorrelation of the velocity noise with the 95 % band of white noise.",
+        f"{name}: the noise of each period, and its distribution and autocorrelation.",
+        tuple(noise_panels(period_residuals[0], average, whiteness)),
+        columns=2,
+        height=42,
     )
 
 
@@ -127,16 +186,26 @@ def derivatives(average: Average, trajectory: Trajectory) -> tuple[Panel, Panel]
     )
 
 
-def noise_panels(period_residual: PeriodResidual, whiteness: dict[str, Whiteness]) -> Iterator[Panel]:
-    """Histogram, normal probability plot and autocorrelation of what averaging removed.  Fig 6.7, 6.10, 6.11"""
-    edges, densities, grid, normal = histogram(period_residual.tau_noise)
-    bars = (Histogram(edges, densities, "", "sky"), Line(grid, normal, "normal", "vermillion"))
-    yield Panel("Effort noise", label(period_residual, "tau_noise", "effort"), "density", bars)
-    scores, ordered, slope, middle = normal_scores(period_residual.q_noise)
+def noise_panels(residual: PeriodResidual, average: Average, whiteness: dict[str, Whiteness]) -> Iterator[Panel]:
+    """Noise by period, histogram, normal probability plot and autocorrelation of what averaging removed.
+
+    Fig 6.7, 6.10, 6.11
+    """
+    periods = min(average.periods, BARS)
+    names = tuple(str(i) for i in range(1, periods + 1))
+    bars = []
+    for signal, meaning in SIGNALS.items():
+        rms = by_period(residual, average, getattr(residual, signal))
+        bars.append(Bars(names, rms[:periods] / (np.median(rms) or 1.0), meaning))
+    yield Panel("Noise by period", "period", "over the median period", tuple(bars))
+    edges, densities, grid, normal = histogram(residual.tau_noise)
+    shape = (Histogram(edges, densities, "", "sky"), Line(grid, normal, "normal", "vermillion"))
+    yield Panel("Effort noise", label(residual, "tau_noise", "effort"), "density", shape)
+    scores, ordered, slope, middle = normal_scores(residual.q_noise)
     yield Panel(
         "Position noise",
         "normal quantile",
-        label(period_residual, "q_noise", "position"),
+        label(residual, "q_noise", "position"),
         (Points(scores, ordered, "", "blue"), Reference(slope, middle, "normal", "vermillion")),
     )
     if w := whiteness.get("dq_noise"):

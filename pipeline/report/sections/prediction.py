@@ -3,14 +3,13 @@
 from collections.abc import Iterator
 
 from pipeline.records import Prediction
-from pipeline.report.content import Block, Figure, Line, Panel, Prose, Section, Table, VSpan, literal
+from pipeline.report.content import Block, Cell, Figure, Line, OnScreen, Panel, Prose, Section, Table, VSpan, literal
 from pipeline.report.context import Context, label, title
-
-FIGURES = 4  # predictions that are drawn, the worst ones
+from pipeline.report.verdicts import percent
 
 
 def section(context: Context) -> Section | None:
-    """Scores of all fits on all logs, and the predictions themselves."""
+    """Scores of the fit that the filter uses on every log, the estimators compared once, and the worst predictions."""
     predictions = context.catalogue.all(Prediction)
     if not predictions:
         return None
@@ -22,27 +21,72 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     yield Prose(
         "A fit is judged on data that it has not seen: validation logs, contact logs outside their contact windows, "
         "and identification logs predicted from refits that leave the log out or, where a joint has only one, each "
-        "of its periods in turn. Scores are of the raw effort; the relative error compares low-passed efforts."
+        "of its periods in turn. On the path that was fitted the model's error repeats, so such a score flatters. "
+        '$R^2$ is of the raw effort, and noise alone keeps it below its ceiling $1 - sigma^2 \\/ "var"(tau)$; the '
+        "model error is what differs beyond noise."
     )
+    used = [p for p in predictions if f"{p.model}.{p.estimator}" == context.used_fit(p.joint)]
+    header = ("Log", "Joint", "Left out", "Path", "Model error", "Of effort", "$R^2$", "Ceiling")
+    caption = "Prediction of unseen effort by the fit that the filter runs with, one row a run."
+    yield Table(caption, header, tuple(row(context, p) for p in used), "prediction-table", "llllrrrr")
+    yield from estimators(context, predictions)
+    yield OnScreen("Every score of every fit in every run", "all-scores", (every_score(context, predictions),))
+    joints = dict.fromkeys(p.joint for p in used)
+    unseen = [p for p in used if p.role != "identification"] or used
+    worst = [
+        max((p for p in unseen if p.joint == joint), key=lambda p: p.model_error)
+        for joint in joints
+        if any(p.joint == joint for p in unseen)
+    ]
+    yield from (figure(context, p) for p in worst)
+
+
+def row(context: Context, p: Prediction) -> tuple[Cell, ...]:
+    """The scores of one run."""
+    share = percent(p.model_error / p.effort_rms if p.effort_rms > 0 else float("nan"))
+    how = {"leave one log out": "the log", "leave one period out": "a period"}.get(p.scheme, "never fitted")
+    error, r2, ceiling = (context.number(f"{p.prefix}.{name}", 2) for name in ("model_error", "r2", "r2_ceiling"))
+    return literal(p.log), title(p.joint), how, p.path.removesuffix(" path"), error, share, r2, ceiling
+
+
+def every_score(context: Context, predictions: list[Prediction]) -> Table:
+    """All scores of all fits."""
+    names = ("rmse", "nrmse", "r2", "r2_ceiling", "model_error", "relative_error")
     rows = tuple(
         (
             literal(p.log),
             title(p.joint),
-            p.estimator.upper(),
-            p.scheme,
-            *(context.number(f"{p.prefix}.{name}", 3) for name in ("rmse", "nrmse", "r2", "relative_error")),
+            f"{p.model}, {p.estimator.upper()}",
+            *(context.number(f"{p.prefix}.{name}", 3) for name in names),
         )
         for p in predictions
     )
-    header = ("Log", "Joint", "Fit", "Unseen data", "RMSE", "RMSE over range", "$R^2$", "Relative error")
-    yield Table("Prediction of unseen effort.", header, rows, "prediction-table", "llllrrrr")
-    drawn = [
-        p for p in predictions if p.role != "identification" and f"{p.model}.{p.estimator}" == context.used_fit(p.joint)
-    ]
-    worst = sorted(drawn, key=lambda p: p.r2)[:FIGURES]
-    if len(drawn) > FIGURES:
-        yield Prose(f"Figures show the {FIGURES} of {len(drawn)} predictions that explain the least.")
-    yield from (figure(context, p) for p in drawn if p in worst)
+    header = ("Log", "Joint", "Fit", "RMSE", "RMSE over range", "$R^2$", "Ceiling", "Model error", "Relative error")
+    caption = "Scores of raw effort, and the relative error, which compares low-passed efforts."
+    return Table(caption, header, rows, "scores-table", "lllrrrrrr")
+
+
+def estimators(context: Context, predictions: list[Prediction]) -> Iterator[Table]:
+    """The worst model error of every fit, joint by joint: which estimator predicts best."""
+    fits = list(dict.fromkeys((p.model, p.estimator) for p in predictions))
+    joints = list(dict.fromkeys(p.joint for p in predictions))
+    if len(fits) < 2:
+        return
+    rows = tuple(
+        (f"{model}, {estimator.upper()}", *(worst(context, predictions, joint, model, estimator) for joint in joints))
+        for model, estimator in fits
+    )
+    caption = "Every fit compared: its model error in the worst unseen run of each joint."
+    yield Table(caption, ("Fit", *map(title, joints)), rows, "estimators-table", "l" + "r" * len(joints))
+
+
+def worst(context: Context, predictions: list[Prediction], joint: str, model: str, estimator: str) -> Cell:
+    """The model error of one fit in the worst run of a joint that was not fitted."""
+    own = [p for p in predictions if (p.joint, p.model, p.estimator) == (joint, model, estimator)]
+    unseen = [p for p in own if p.role != "identification"] or own
+    if not unseen:
+        return "–"
+    return context.number(f"{max(unseen, key=lambda p: p.model_error).prefix}.model_error", 3)
 
 
 def figure(context: Context, p: Prediction) -> Figure:
@@ -52,16 +96,19 @@ def figure(context: Context, p: Prediction) -> Figure:
         VSpan(start, end, "contact" if i == 0 else "")
         for i, (start, end) in enumerate(context.study.log(p.log).contact)
     )
+    error = context.size(p, "model_error", p.model_error)
     return Figure(
-        f"{name}: measured effort and the {p.estimator.upper()} model's, and their difference.",
-        f"Two panels for {name}: measured and predicted effort over time, and the difference.",
+        f"{name}, the worst run of this joint: measured effort and the {p.estimator.upper()} model's, and their "
+        "difference.",
+        f"{name}: the model's effort differs from the measured one by {error} beyond noise.",
         (
             Panel(
                 "Effort", "time [s]", effort,
-                (*windows, Line(p.t, p.tau, "measured", "sky"), Line(p.t, p.tau_hat, "model", "vermillion")),
+                (*windows, Line(p.t, p.tau, "measured", "sky"), Line(p.t, p.tau_hat, "model", "vermillion", "dashed")),
             ),
             Panel("Measured minus model", "time [s]", effort, (*windows, Line(p.t, p.tau - p.tau_hat, "", "blue"))),
         ),
+        f"prediction-figure-{p.log}-{p.joint}",
         zoomable=True,
-        height=40,
+        height=32,
     )  # fmt: skip

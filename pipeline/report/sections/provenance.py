@@ -3,7 +3,7 @@
 from dataclasses import asdict
 
 from pipeline.records import LogSummary
-from pipeline.report.content import Block, Listing, Prose, Section, Table, literal
+from pipeline.report.content import Block, Listing, OnScreen, Prose, Section, Table, literal
 from pipeline.report.context import Context
 
 
@@ -14,7 +14,9 @@ def section(context: Context) -> Section:
     versions = tuple(provenance.packages.items())
     blocks: list[Block] = [
         Prose(
-            f"Made by davinci-forces {provenance.version}. Every number of the tables is in `results.json` under a "
+            f"Made by davinci-forces {provenance.version}. The report ID on page one is the first half of the SHA-256 "
+            "of the list of raw files, study file, processed files and results.json, each with its own; two reports of "
+            "one ID say the same. Every number of the tables is in `results.json` under a "
             "key of its own, with the processed file and field that it stands in; `davinci-forces verify` follows "
             "them back to the raw files."
         ),
@@ -32,7 +34,10 @@ def section(context: Context) -> Section:
     )
     summaries = context.catalogue.all(LogSummary)
     if summaries:
-        blocks.append(Section("Channels", "channels", (start_times(summaries), channels(summaries))))
+        tables = (start_times(summaries), channels(summaries))
+        blocks.append(OnScreen("Files, dates and channels of every log", "channels", tables))
+    if provenance.study:
+        blocks.append(OnScreen("The study file", "study-file", (Listing(provenance.study),)))
     return Section("Provenance", "provenance", tuple(blocks))
 
 

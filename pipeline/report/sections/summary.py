@@ -1,7 +1,7 @@
 """The answer: the external effort, how far to trust it, and what to look at first."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -22,34 +22,19 @@ from pipeline.report.content import (
     VSpan,
     literal,
 )
-from pipeline.report.context import Context, label, title
-
-GOOD, CAUTION = 0.10, 0.25  # model error over the effort's root mean square
-COVERED = (0.90, 0.98)  # coverage of a 95 % band that is right
-WORDS = {"good": "● Good", "warn": "▲ Caution", "bad": "✖ Problem"}
-
-
-@dataclass(frozen=True)
-class Trust:
-    """What is known of how far the external effort of one joint can be trusted: its worst unseen run."""
-
-    joint: str
-    prediction: Prediction | None
-    space: FreeSpace | None
-
-    @property
-    def share(self) -> float:
-        """Model error over the root mean square of the effort."""
-        p = self.prediction
-        return p.model_error / p.effort_rms if p is not None and p.effort_rms > 0 else float("nan")
-
-    @property
-    def level(self) -> str:
-        """Good, caution or problem; never good on the path that was fitted, where the model's error repeats."""
-        if self.prediction is None or np.isnan(self.share):
-            return "warn"
-        level = "good" if self.share <= GOOD else "warn" if self.share <= CAUTION else "bad"
-        return "warn" if level == "good" and self.prediction.path == "same path" else level
+from pipeline.report.context import Context, count, label, title
+from pipeline.report.verdicts import (
+    CAUTION,
+    COVERED,
+    DETECTABLE,
+    DETECTED,
+    GOOD,
+    WORDS,
+    Trust,
+    band,
+    band_in_words,
+    percent,
+)
 
 
 def section(context: Context) -> Section:
@@ -78,12 +63,23 @@ def blocks(context: Context) -> Iterator[Block]:
             height=32,
         )
     yield trust_table(context, trusts)
+    yield Prose(thresholds_in_words(trusts))
     yield from first_looks(context, trusts)
     yield Prose("Reviewed by ______________________ on ______________   ☐ accept   ☐ accept with remarks   ☐ reject")
-    yield Prose(
-        f"Rows show the worst run of each joint that was not fitted. Good: error at most {percent(GOOD)} of the "
-        f"effort's root mean square, on a path that was not fitted; caution: at most {percent(CAUTION)}, or the same "
-        f"path. A band is right when it covers {percent(COVERED[0])} to {percent(COVERED[1])}."
+
+
+def thresholds_in_words(trusts: list[Trust]) -> str:
+    """From where on the verdicts of the table are what they are."""
+    by_error = (
+        f"error at most {percent(GOOD)} of the effort's root mean square, on a path that was not fitted (caution: "
+        f"at most {percent(CAUTION)}, or the same path)"
+    )
+    by_level = "detection level at most a third of the effort sought (caution: up to it; set as `effort` in study.toml)"
+    asked = [trust.sought is not None for trust in trusts]
+    rule = by_level if all(asked) else f"{by_level}, else {by_error}" if any(asked) else by_error
+    return (
+        f"Of each joint, the worst run that was not fitted. Good: {rule}. A band is right where it covers "
+        f"{percent(COVERED[0])} to {percent(COVERED[1])}. All thresholds: [@thresholds]."
     )
 
 
@@ -116,6 +112,7 @@ def trust(context: Context, joint: str) -> Trust:
         joint,
         max(unseen, key=lambda p: p.model_error, default=None),
         max(spaces, key=lambda space: space.detection_level, default=None),
+        context.study.settings.sought(joint),
     )
 
 
@@ -137,16 +134,6 @@ def opening(context: Context, trusts: list[Trust], contacts: list[Contact]) -> s
         f"**{above} of {count(windows, 'window')} of contact, counted joint by joint, stand out from free space.** "
         "Efforts below the detection level in the table cannot be told from the model's error."
     )
-
-
-def percent(share: float) -> str:
-    """A share as it is printed."""
-    return f"{100 * share:.0f} %"
-
-
-def count(number: int, noun: str) -> str:
-    """A number with its noun: '1 run', '3 runs'."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
@@ -194,33 +181,34 @@ def spoken(contact: Contact) -> str:
 
 def trust_table(context: Context, trusts: list[Trust]) -> Table:
     """One row a joint."""
-    header = ("Joint", "Verdict", "Model error", "Of effort", "$R^2$", "At most", "Detection level", "Covered")
+    sought = ("Sought",) if any(trust.sought for trust in trusts) else ()
+    header = ("Joint", "Verdict", "Model error", "Of effort", "$R^2$", "At most", "Detection level", *sought, "Covered")
     return Table(
         "How far to trust it: the model's error beyond noise, $R^2$ and the most that noise leaves of it, the "
         "detection level that 99 % of free-space samples stay below, and how many of them the 95 % band covers.",
         header,
-        tuple(trust_row(context, trusted) for trusted in trusts),
+        tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts),
         label="trust-table",
-        align="llrrrrrr",
+        align="ll" + "r" * (len(header) - 2),
     )
 
 
-def trust_row(context: Context, trusted: Trust) -> tuple[Cell, ...]:
+def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell, ...]:
     """The numbers of one joint, with the runs that they are of."""
     p, space = trusted.prediction, trusted.space
-    same = ", same path" if p is not None and p.path == "same path" else ""
-    row: list[Cell] = [title(trusted.joint), WORDS[trusted.level] + same]
+    row: list[Cell] = [title(trusted.joint), WORDS[trusted.level] + (", same path" if trusted.same_path else "")]
     if p is None:
         row += ["–"] * 4
     else:
         r2, ceiling = (context.number(f"{p.prefix}.{name}", 2) for name in ("r2", "r2_ceiling"))
         row += [context.number(f"{p.prefix}.model_error", 2), percent(trusted.share), r2, ceiling]
-    if space is None:
-        row += ["–"] * 2
-    else:
-        key = f"{space.filter}.{space.log}.{space.joint}"
-        row += [context.number(f"{key}.detection_level", 2), percent(space.coverage)]
-    return tuple(row)
+    key = f"{space.filter}.{space.log}.{space.joint}" if space is not None else ""
+    row.append(context.number(f"{key}.detection_level", 2))
+    if with_sought:
+        row.append(
+            context.size(space, "detection_level", trusted.sought, 3) if space is not None and trusted.sought else "–"
+        )
+    return *row, f"{percent(space.coverage)}, {band_in_words(space.coverage)}" if space is not None else "–"
 
 
 def first_looks(context: Context, trusts: list[Trust]) -> Iterator[Block]:
@@ -232,24 +220,41 @@ def first_looks(context: Context, trusts: list[Trust]) -> Iterator[Block]:
 
 
 def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:
-    """What deserves a look, with how much."""
-    predicted, tracked = see(context, Prediction, "prediction"), see(context, Track, "filter")
+    """What deserves a look, with how much: 1 is where caution begins."""
     for trusted in trusts:
-        p, space, name = trusted.prediction, trusted.space, title(trusted.joint)
-        if p is not None and trusted.share > GOOD:
-            error = context.results[f"{p.prefix}.model_error"].number(2)
-            errs = f"the model errs by {error}, {percent(trusted.share)} of the effort."
-            yield trusted.share / GOOD, f"**{name}, {literal(p.log)}**: {errs}{predicted}"
-        if p is not None and p.path == "same path":
-            repeats = f"judged on the path that was fitted ({literal(p.log)}), where the model's error repeats; "
-            yield 4.0, f"**{name}**: {repeats}record a validation log on another path.{predicted}"
-        if space is not None and space.coverage < COVERED[0]:
-            narrow = f"the 95 % band is too narrow, it covers {percent(space.coverage)} of free-space samples; "
-            remedy = f"judge contacts by the detection level.{tracked}"
-            yield 1.0 + 10 * (COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {narrow}{remedy}"
+        yield from looks_at_model(context, trusted)
+        yield from looks_at_band(context, trusted)
     for diagnostic in context.catalogue.all(Diagnostic):
         for text in warning_texts(diagnostic):
             yield 1.5, literal(text)
+
+
+def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
+    """How far the model errs, and on which path that was found."""
+    p, name, see_runs = trusted.prediction, title(trusted.joint), see(context, Prediction, "prediction")
+    if p is not None and trusted.share > GOOD:
+        error = context.results[f"{p.prefix}.model_error"].number(2)
+        errs = f"the model errs by {error}, {percent(trusted.share)} of the effort."
+        yield trusted.share / GOOD, f"**{name}, {literal(p.log)}**: {errs}{see_runs}"
+    if p is not None and trusted.same_path:
+        repeats = f"judged on the path that was fitted ({literal(p.log)}), where the model's error repeats; "
+        yield 4.0, f"**{name}**: {repeats}record a validation log on another path.{see_runs}"
+
+
+def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
+    """Whether the effort that is sought can be seen, and whether the band covers."""
+    space, name, see_runs = trusted.space, title(trusted.joint), see(context, Track, "runs")
+    if space is None:
+        return
+    if trusted.sought and trusted.fineness > DETECTED:
+        level, sought = (context.size(space, "detection_level", x) for x in (space.detection_level, trusted.sought))
+        hides = "hides efforts of" if trusted.fineness > DETECTABLE else "is more than a third of"
+        told = f"the detection level of {level} {hides} {sought}, which the study seeks."
+        yield 3 * trusted.fineness, f"**{name}, {literal(space.log)}**: {told}{see_runs}"
+    if band(space.coverage) == "bad":
+        narrow = f"the 95 % band is too narrow, it covers {percent(space.coverage)} of free-space samples; "
+        judge = f"judge contacts by the detection level.{see_runs}"
+        yield 1.0 + 10 * (COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {narrow}{judge}"
 
 
 def see(context: Context, kind: type[Record], anchor: str) -> str:

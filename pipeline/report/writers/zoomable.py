@@ -17,7 +17,7 @@ Json = dict[str, Any]
 PIXELS = 96 / 25.4  # of CSS in a millimetre
 HEAD = 34  # [px] that the legend takes
 TOOLS = "xpan,xbox_zoom,box_zoom,xwheel_zoom,reset,save"
-DASHES = {"solid": "solid", "dashed": [6, 3], "dotted": [1.5, 2.5]}
+DASHES = {"solid": "solid", "dashed": [6, 3], "dotted": [2, 3]}
 
 
 @cache

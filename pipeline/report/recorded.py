@@ -1,27 +1,23 @@
-"""What was recorded, and what the readers noticed."""
+"""What was recorded, and what the readers noticed: the beginning of the section on runs."""
 
 from collections.abc import Iterator
 from dataclasses import replace
 
 from pipeline.records import Diagnostic, LogSummary, Signal
-from pipeline.report.content import Block, Bullets, Number, Prose, Section, Table, Verdict, literal
-from pipeline.report.context import Context
+from pipeline.report.content import Block, Bullets, Number, Prose, Table, Verdict, literal
+from pipeline.report.context import Context, count
 
 
-def section(context: Context) -> Section | None:
-    """One table over all logs, then each log's channels and remarks."""
-    summaries = context.catalogue.all(LogSummary)
+def recorded(context: Context, summaries: list[LogSummary]) -> Iterator[Block]:
+    """One table over all logs, and what the readers and the first stages remarked."""
     if not summaries:
-        return None
-    return Section("What was recorded", "recorded", tuple(blocks(context, summaries)))
-
-
-def blocks(context: Context, summaries: list[LogSummary]) -> Iterator[Block]:
-    """The section's content."""
+        return
     yield overview(context, summaries)
     clean = [summary for summary in summaries if not remarks(summary)]
     if clean:
-        yield Verdict("good", f"Read without a remark: {', '.join(literal(summary.log) for summary in clean)}.")
+        all_of_them = len(clean) == len(summaries)
+        which = "Every log was" if all_of_them else f"{len(clean)} of {count(len(summaries), 'log')} were"
+        yield Verdict("good", f"{which} read without a remark.")
     yield from (
         Verdict("warn", f"**{literal(summary.log)}**: {literal('; '.join(remarks(summary)))}.")
         for summary in summaries

@@ -1,0 +1,118 @@
+"""Every contact: what the robot exerted, with its error, against the detection level; and what is not analysed."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from pipeline.records import Contact, Track
+from pipeline.report.content import (
+    Block,
+    Cell,
+    Figure,
+    HBand,
+    Panel,
+    Points,
+    Prose,
+    Section,
+    Table,
+    literal,
+)
+from pipeline.report.context import Context, count, label, title
+from pipeline.study import LogEntry
+
+
+def section(context: Context) -> Section | None:
+    """All windows of contact, and what was recorded without being analysed."""
+    found = tuple(blocks(context))
+    return Section("Contacts", "contacts", found) if found else None
+
+
+def blocks(context: Context) -> Iterator[Block]:
+    """The section's content."""
+    contacts = context.catalogue.all(Contact)
+    if contacts:
+        yield Prose(
+            "Each window of contact that the study states, on each joint that moved in it: the largest external "
+            "effort, its mean and its impulse (effort times time). Their standard errors are the spread of the same "
+            "quantities over windows of the same length in free space. A peak counts as told from free space where it "
+            "is above the joint's detection level, which 99 % of the samples of its worst free run stay below."
+        )
+        yield peaks(contacts)
+        yield Table(
+            "Contacts, log by log; told says whether the peak is above the detection level.",
+            ("Log", "Joint", "Window [s]", "Peak", "Mean", "Impulse", "Told"),
+            tuple(row for contact in contacts for row in rows(context, contact)),
+            "contact-table",
+            "llrrrrl",
+        )
+    unused = tuple((literal(name), joint, why) for name, joint, why in not_analysed(context))
+    if unused:
+        yield Table(
+            "Recorded, and not analysed for contact.",
+            ("Log", "Joint", "Why, and what would change it"),
+            unused,
+            "not-analysed",
+        )
+
+
+def rows(context: Context, contact: Contact) -> Iterator[tuple[Cell, ...]]:
+    """One row a window."""
+    for i, above in enumerate(contact.above, 1):
+        key = f"contact.{contact.log}.{contact.joint}.{i}"
+        window = f"{contact.onset[i - 1]:.4g} to {contact.release[i - 1]:.4g}"
+        efforts = (context.number(f"{key}.{name}", 3) for name in ("peak", "mean", "impulse"))
+        yield (literal(contact.log), title(contact.joint), window, *efforts, "yes" if above else "no")
+
+
+def peaks(contacts: list[Contact]) -> Figure:
+    """The peak of every window beside the detection level of its joint."""
+    joints = list(dict.fromkeys(contact.joint for contact in contacts))
+    missed = sum(int((contact.above == 0).sum()) for contact in contacts)
+    total = sum(len(contact) for contact in contacts)
+    caption = (
+        "The peak of every window with its standard error; in the grey band, below the detection level, it cannot be "
+        "told from free space. Windows are in the order of [@contact-table]."
+    )
+    alt = f"Peaks of {count(total, 'window')}, joint by joint; {missed} lie below the detection level."
+    panels = tuple(peak_panel([c for c in contacts if c.joint == joint], i == 0) for i, joint in enumerate(joints))
+    return Figure(caption, alt, panels, "contact-peaks", columns=min(len(panels), 3), height=45)
+
+
+def peak_panel(contacts: list[Contact], named: bool) -> Panel:
+    """The peaks of one joint, in the order of the logs."""
+    peak, std = (np.concatenate([getattr(c, name) for c in contacts]) for name in ("peak", "peak_std"))
+    level = max(contact.detection_level for contact in contacts)
+    marks = (
+        HBand(-level, level, "detection level" if named else ""),
+        Points(np.arange(1.0, len(peak) + 1), peak, "peak" if named else "", "vermillion", y_std=std),
+    )
+    return Panel(title(contacts[0].joint), "window", label(contacts[0], "peak", "effort"), marks)
+
+
+def not_analysed(context: Context) -> Iterator[tuple[str, str, str]]:
+    """Log, joint and reason of what was recorded and tells nothing of contact here."""
+    measured = {(contact.log, contact.joint) for contact in context.catalogue.all(Contact)}
+    tracked = {(track.log, track.joint): track for track in context.catalogue.all(Track)}
+    for entry in context.study.logs:
+        if entry.role not in ("contact", "weight", "tissue", "friction"):
+            continue
+        joints = [joint for joint in entry.joints if (entry.name, joint) not in measured]
+        reasons: dict[str, list[str]] = {}
+        for joint in joints:
+            track = tracked.get((entry.name, joint))
+            reasons.setdefault(reason(entry, track), []).append(title(joint))
+        yield from ((entry.name, ", ".join(names), why) for why, names in reasons.items())
+
+
+def reason(entry: LogEntry, track: Track | None) -> str:
+    """Why a joint of a log has no contact measured."""
+    if track is None:
+        return "no fit of the joint to compare with: record an identification log of it"
+    if track.at_rest:
+        return (
+            "at rest: friction takes any value up to its Coulomb level, so effort up to that level cannot be told from "
+            "it; move the joint"
+        )
+    if entry.role != "contact":
+        return f"a log of role “{entry.role}” is tracked, and its windows are not measured"
+    return "no window is stated, and none is searched for: write `contact = [[start, end]]` in study.toml"

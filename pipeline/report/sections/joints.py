@@ -1,0 +1,231 @@
+"""A page a joint: its equation, its parameters, and what the fit leaves unexplained."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.records import Column, Fit, Residual, Trajectory, Whiteness
+from pipeline.records.record import slug
+from pipeline.report.content import (
+    Block,
+    Cell,
+    Equation,
+    Figure,
+    Line,
+    OnScreen,
+    Panel,
+    Points,
+    Prose,
+    Section,
+    Stems,
+    Table,
+    Verdict,
+    literal,
+)
+from pipeline.report.context import Context, label, title
+from pipeline.report.plots import autocorrelation, binned_means, correlation
+from pipeline.report.results import format_unit
+
+NAMES = {"lse": "least squares", "wlse": "weighted least squares"}
+LAGS = 50  # of the cross-correlation, each way
+SEEN = 0.2  # correlation of a residual with a motion from which on it is worth a sentence
+
+
+def section(context: Context) -> Section | None:
+    """One subsection per joint."""
+    fits = context.catalogue.all(Fit)
+    if not fits:
+        return None
+    joints = dict.fromkeys(fit.group for fit in fits)
+    parts = (
+        Section(title(joint), f"fit-{joint}", tuple(joint_blocks(context, [f for f in fits if f.group == joint])))
+        for joint in joints
+    )
+    return Section("Joints", "joints", (intro(), *parts))
+
+
+def intro() -> Prose:
+    """How to read the tables."""
+    return Prose(
+        "The parameters of each joint come from the averaged periods of all its identification logs together. The "
+        "standard error after each value allows for residuals that are correlated (Newey and West); the classical one "
+        "takes them as independent. Where the two differ much, the model misses something that repeats in every "
+        "period. $z$ is the value over its standard error: a parameter with $abs(z) < 2$ cannot be told from zero."
+    )
+
+
+def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
+    """The content about one joint."""
+    first = next((f for f in fits if f"{f.model}.{f.estimator}" == context.used_fit(f.group)), fits[0])
+    terms = " + ".join(f"theta_{i} {phi}" for i, phi in enumerate(first.phi, start=1))
+    yield Equation(f"tau = {terms}", f"effort is the sum of {', '.join(first.parameter)}, each times its parameter")
+    yield parameters(context, first)
+    residuals = context.catalogue.about(Residual, joint=first.group, model=first.model, estimator=first.estimator)
+    for i, residual in enumerate(residuals):
+        shown = tuple(residual_blocks(context, residual))
+        if i == 0:
+            yield from shown
+        else:
+            yield OnScreen(
+                f"{title(residual.joint)} in {literal(residual.log)}",
+                f"residual-{residual.log}-{residual.joint}",
+                shown,
+            )
+    yield from implausible(fits)
+    yield compared(context, fits)
+
+
+def implausible(fits: list[Fit]) -> Iterator[Verdict]:
+    """Parameters that no mechanism has."""
+    for fit in fits:
+        negative = [
+            f"{name} ({value:.2g} ± {std:.1g})"
+            for name, value, std in zip(fit.parameter, fit.theta, fit.theta_std_hac, strict=True)
+            if value < 0 and physical(name)
+        ]
+        if negative:
+            who = f"{NAMES.get(fit.estimator, fit.estimator)} ({fit.model})"
+            yield Verdict("warn", f"{who} finds a negative {', '.join(negative)}, which no mechanism has.")
+
+
+def physical(name: str) -> bool:
+    """Whether a parameter cannot be negative."""
+    return name in ("inertia", "lifted mass", "viscous friction", "Coulomb friction")
+
+
+def parameters(context: Context, fit: Fit) -> Table:
+    """Parameters with their standard errors and how far they are from zero.  Tables 6.4-6.6"""
+    rows: list[tuple[Cell, ...]] = []
+    for i, name in enumerate(fit.parameter):
+        key = ".".join(("fit", *fit.key, slug(name)))
+        z = fit.theta[i] / fit.theta_std_hac[i] if fit.theta_std_hac[i] > 0 else np.nan
+        unit = format_unit(fit.unit[i]) or "–"
+        values = (unitless(context, name) for name in (key, f"{key}.std_classical"))
+        rows.append((f"$theta_{i + 1}$", name, unit, *values, f"{z:.1f}" if np.isfinite(z) else "–"))
+    mse = context.number(f"{'.'.join(('fit', *fit.key))}.mse", 3)
+    return Table(
+        f"Parameters of the {literal(fit.group.replace('_', ' '))} ({fit.model}, "
+        f"{NAMES.get(fit.estimator, fit.estimator)}), which the filter runs with, from {literal(', '.join(fit.logs))}; "
+        f"mean squared error {mse} of the averaged effort.",
+        ("Symbol", "Parameter", "Unit", "Value", "Classical standard error", "$z$"),
+        tuple(rows),
+        label=f"theta-{fit.group}",
+        align="lllrrr",
+    )
+
+
+def unitless(context: Context, key: str) -> Cell:
+    """A number whose unit stands in a column of its own."""
+    number = context.number(key, 2)
+    return number if isinstance(number, str) else replace(number, unit="")
+
+
+def compared(context: Context, fits: list[Fit]) -> Block:
+    """Parameters of all fits side by side, and how well each describes the averaged periods."""
+    names = list(dict.fromkeys(name for fit in fits for name in fit.parameter))
+    rows: list[tuple[Cell, ...]] = []
+    for fit in fits:
+        key = ".".join(("fit", *fit.key))
+        values = (context.number(f"{key}.{slug(name)}", 3) for name in names)
+        scores = (context.number(f"{key}.{name}", 3) for name in ("mse", "r2", "condition"))
+        rows.append((f"{fit.model}, {fit.estimator.upper()}", *scores, *values))
+    group = fits[0].group
+    caption = (
+        f"Every fit of the {literal(group.replace('_', ' '))}: mean squared error of the averaged effort, share of its "
+        "variance explained, condition number of the regressor, and the parameters."
+    )
+    header = ("Fit", "MSE", "$R^2$", "Condition", *(name[:1].upper() + name[1:] for name in names))
+    table = Table(caption, header, tuple(rows), f"fits-{group}", "l" + "r" * (len(header) - 1))
+    return OnScreen(f"{title(group)}: all fits side by side", f"all-fits-{group}", (table,))
+
+
+def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
+    """What a fit leaves of one log: over time, against the motion, and against itself."""
+    name = f"{title(residual.joint)} in {literal(residual.log)}"
+    errors, effort = residual.tau - residual.tau_hat, label(residual, "tau", "effort")
+    who = f"{residual.model}, {residual.estimator.upper()}"
+    yield Figure(
+        f"{name}: averaged effort and model ({who}), and what the model leaves of it.",
+        f"{name}: the model follows the averaged effort up to {errors.std():.2g} (root mean square).",
+        (
+            Panel(
+                "Averaged effort and model", "time [s]", effort,
+                (
+                    Line(residual.t, residual.tau, "measured", "sky"),
+                    Line(residual.t, residual.tau_hat, "model", "vermillion", "dashed"),
+                ),
+            ),
+            Panel("Residual", "time [s]", effort, (Line(residual.t, errors, "", "blue"),)),
+        ),
+        f"fit-figure-{residual.log}-{residual.joint}",
+        columns=2,
+        height=42,
+    )  # fmt: skip
+    moved = context.catalogue.about(Trajectory, log=residual.log, joint=residual.joint)
+    q = moved[0].q if moved and len(moved[0].q) == len(errors) else None
+    against = [motion_panel(residual, errors, residual.dq, label(residual, "dq", "velocity"))]
+    if q is not None:
+        against.insert(0, motion_panel(residual, errors, q, label(moved[0], "q", "position")))
+    tests = [*against, *correlations(context, residual, errors)]
+    yield Figure(
+        f"{name}: the residual against position and velocity (points: means of 1/40 of the range, bars: their "
+        "standard errors), its autocorrelation, and its cross-correlation with velocity and direction.",
+        f"{name}: {in_words(residual, errors, q)}",
+        tuple(tests),
+        f"residual-figure-{residual.log}-{residual.joint}",
+        columns=2,
+        height=38,
+    )
+    yield Prose(in_words(residual, errors, q))
+
+
+def motion_panel(residual: Residual, errors: Column, x: Column, x_label: str) -> Panel:
+    """Means of the residual over ranges of one motion, flat at zero where no term is missing."""
+    middle, mean, std = binned_means(x, errors)
+    heading = f"Against {x_label.partition(' [')[0]}"
+    return Panel(heading, x_label, label(residual, "tau", "residual"), (Points(middle, mean, "", "blue", y_std=std),))
+
+
+def correlations(context: Context, residual: Residual, errors: Column) -> Iterator[Panel]:
+    """The residual's correlation with itself and with the motion."""
+    signal = f"tau.{residual.model}.{residual.estimator}"
+    for w in context.catalogue.about(Whiteness, log=residual.log, joint=residual.joint, signal=signal):
+        yield autocorrelation(w, "Autocorrelation")
+    lags = np.arange(-min(LAGS, len(errors) // 4), min(LAGS, len(errors) // 4) + 1)
+    shown = lags.astype(np.float64)
+    marks = (
+        Stems(shown, correlation(errors, residual.dq, lags), "with velocity", "sky"),
+        Line(shown, correlation(errors, np.sign(residual.dq), lags), "with direction", "vermillion"),
+    )
+    yield Panel("Cross-correlation", "lag [samples]", "correlation", marks, y_range=(-1.0, 1.0))
+
+
+def in_words(residual: Residual, errors: Column, q: Column | None) -> str:
+    """What the residual goes along with, and what to try; a correlation is no cause, and is not called one."""
+    zero = np.zeros(1, int)
+    motions = {"velocity": residual.dq, "direction": np.sign(residual.dq)} | ({} if q is None else {"position": q})
+    seen = {name: float(correlation(errors, x, zero)[0]) for name, x in motions.items()}
+    strong = sorted(((abs(r), name, r) for name, r in seen.items() if abs(r) > SEEN), reverse=True)
+    if strong:
+        _, name, r = strong[0]
+        advice = {"position": "a spring or gravity term", "velocity": "another friction term"}
+        wanted = advice.get(name, "friction that differs by direction")
+        return f"The residual goes along with the {name} (correlation {r:+.2f}): try {wanted}."
+    within = share_within_reversals(errors, residual.dq)
+    listing = ", ".join(f"{r:+.2f} with {name}" for name, r in seen.items())
+    if within > 2.0:
+        return (
+            f"No straight line in the motion is left (correlations {listing}), but around reversals the residual is "
+            f"{within:.1f} times as large as elsewhere: try friction with presliding."
+        )
+    return f"No straight line in the motion is left in the residual (correlations {listing})."
+
+
+def share_within_reversals(errors: Column, dq: Column) -> float:
+    """Root mean square of the residual while slow, over that while fast; slow is a tenth of the rms velocity."""
+    slow = np.abs(dq) < 0.1 * float(np.sqrt(np.mean(dq**2)) or 1.0)
+    if not slow.any() or slow.all():
+        return 1.0
+    near, far = (float(np.sqrt(np.mean(errors[which] ** 2))) for which in (slow, ~slow))
+    return near / far if far else 1.0

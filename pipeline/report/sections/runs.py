@@ -1,0 +1,214 @@
+"""Every run: how it was recorded, what the filter tracked in it, and its traces."""
+
+from collections.abc import Iterator
+
+from pipeline.records import FreeSpace, LogSummary, Track, Whiteness
+from pipeline.report.content import (
+    Band,
+    Block,
+    Cell,
+    Figure,
+    Line,
+    OnScreen,
+    Panel,
+    Prose,
+    Section,
+    Table,
+    VSpan,
+    literal,
+)
+from pipeline.report.context import Context, count, label, title
+from pipeline.report.plots import autocorrelation
+from pipeline.report.recorded import recorded
+from pipeline.report.verdicts import band_in_words
+
+LEVELS = ("free_rms", "detection_level")
+
+
+def section(context: Context) -> Section | None:
+    """What was recorded, a table over all tracks, the worst run of each joint, and every run on demand."""
+    tracks = context.catalogue.all(Track)
+    summaries = context.catalogue.all(LogSummary)
+    if not (tracks or summaries):
+        return None
+    found = (
+        (*recorded(context, summaries), *tracked(context, tracks)) if tracks else tuple(recorded(context, summaries))
+    )
+    return Section("Runs", "runs", found)
+
+
+def tracked(context: Context, tracks: list[Track]) -> Iterator[Block]:
+    """The external effort of all runs, the worst of each joint drawn, the others on demand."""
+    if not tracks:
+        return
+    yield from intro(tracks)
+    yield scores(context, tracks)
+    drawn = {(t.log, t.joint) for t in worst_runs(context, tracks)}
+    for t in tracks:
+        if (t.log, t.joint) in drawn:
+            yield trace(context, t, "the worst free run of this joint")
+            yield innovations(context, t)
+    yield OnScreen(
+        "What the filter assumes of noise, and its innovations, run by run",
+        "filter-assumptions",
+        (assumptions(context, tracks), consistency(context, tracks)),
+    )
+    others = [t for t in tracks if (t.log, t.joint) not in drawn and not t.at_rest]
+    if others:
+        folded = tuple(
+            OnScreen(f"{title(t.joint)} in {literal(t.log)}", f"track-{t.log}-{t.joint}", (trace(context, t, ""),))
+            for t in others
+        )
+        yield OnScreen(f"Traces of {count(len(others), 'other run')}", "other-runs", folded)
+
+
+def intro(tracks: list[Track]) -> Iterator[Prose]:
+    """What the filter does, and which joints it cannot say much about."""
+    yield Prose(
+        "An extended Kalman filter follows position, velocity and external effort of each joint by itself. It takes "
+        "the noise of its measurements from the spread between periods; how fast the external effort may wander is a "
+        "choice ([@filter-assumptions]). Its innovations, what each measurement adds to what was predicted, are "
+        "white where the model and the choice fit the data: then the normalised innovation squared (NIS) is 2 on "
+        "average. Whiteness is tested over the whole run but its first second, contacts and reversals included."
+    )
+    at_rest = [f"{title(t.joint)} in {literal(t.log)}" for t in tracks if t.at_rest]
+    if at_rest:
+        yield Prose(
+            f"Joints at rest are in the tables only ({', '.join(at_rest)}): at standstill friction takes any value up "
+            "to its Coulomb level, and external effort up to that level cannot be told from it."
+        )
+
+
+def worst_runs(context: Context, tracks: list[Track]) -> Iterator[Track]:
+    """Of each joint, the free run with the highest detection level that was not fitted."""
+    for joint in dict.fromkeys(track.joint for track in tracks):
+        spaces = context.catalogue.about(FreeSpace, joint=joint)
+        unseen = [space for space in spaces if space.role != "identification"] or spaces
+        if unseen:
+            log = max(unseen, key=lambda space: space.detection_level).log
+            yield from (track for track in tracks if (track.log, track.joint) == (log, joint))
+
+
+def scores(context: Context, tracks: list[Track]) -> Table:
+    """The external effort of every track in free space, and whether its band covers it."""
+    rows = tuple(
+        (
+            literal(t.log),
+            title(t.joint),
+            *(context.number(f"{t.filter}.{t.log}.{t.joint}.{name}", 2) for name in LEVELS),
+            *covered(context, t),
+        )
+        for t in tracks
+    )
+    header = ("Log", "Joint", "RMS", "Detection level", "Covered", "Band")
+    caption = (
+        "External effort where nothing touches the robot: its root mean square, the level that 99 % of samples stay "
+        "below, and the share that the 95 % band covers. Where contact is not known, nothing is said."
+    )
+    return Table(caption, header, rows, "free-space-table", "llrrrl")
+
+
+def covered(context: Context, t: Track) -> tuple[Cell, Cell]:
+    """Coverage of a run's band, and what it means."""
+    spaces = context.catalogue.about(FreeSpace, log=t.log, joint=t.joint, filter=t.filter)
+    said = band_in_words(spaces[0].coverage) if spaces else "–"
+    return context.number(f"{t.filter}.{t.log}.{t.joint}.coverage", 2), said
+
+
+def consistency(context: Context, tracks: list[Track]) -> Table:
+    """Consistency and whiteness of every track."""
+    rows = tuple((literal(t.log), title(t.joint), *statistics(context, f"ekf.{t.log}.{t.joint}")) for t in tracks)
+    header = ("Log", "Joint", "NIS", "ACF(1) of $q$", "ACF(1) of $dot(q)$", "$p$ of $q$", "$p$ of $dot(q)$")
+    return Table(
+        "The filter's innovations: normalised innovation squared (expected: 2), first autocorrelation, and the "
+        "probability of a larger Ljung-Box statistic if they were white.",
+        header,
+        rows,
+        "innovation-table",
+        align="llrrrrr",
+    )
+
+
+def statistics(context: Context, prefix: str) -> tuple[Cell, ...]:
+    """The numbers of one run's innovations."""
+    return (
+        *(context.number(f"{prefix}.{name}", 2) for name in ("nis_mean", "acf1_q", "acf1_dq")),
+        *(context.probability(f"{prefix}.{name}") for name in ("ljung_box_p_q", "ljung_box_p_dq")),
+    )
+
+
+def assumptions(context: Context, tracks: list[Track]) -> Table:
+    """What the filter assumed of noise."""
+    names = ("r_q", "r_dq", "q_q", "q_dq", "q_tau")
+    rows = tuple(
+        (literal(t.log), title(t.joint), *(context.number(f"ekf.{t.log}.{t.joint}.{name}", 3) for name in names))
+        for t in tracks
+    )
+    return Table(
+        "Noise that the filter assumes (standard deviations): of the measured position and velocity, from the spread "
+        "between periods; of their process noise per sample, from what forward Euler leaves out and from the noise of "
+        "the effort; and of the random walk of the external effort, chosen.",
+        ("Log", "Joint", "Position", "Velocity", "Process, $q$", "Process, $dot(q)$", "Random walk"),
+        rows,
+        "filter-noise",
+        "llrrrrr",
+    )
+
+
+def trace(context: Context, t: Track, why: str) -> Figure:
+    """One run over time.  Fig 7.6-7.11"""
+    name, entry = f"{title(t.joint)} in {literal(t.log)}", context.study.log(t.log)
+    windows = tuple(
+        VSpan(start, end, "stated contact" if i == 0 else "") for i, (start, end) in enumerate(entry.contact)
+    )
+    sigma = 2 * t.tau_ext_std
+    # The first samples know nothing yet: their band would set the scale of the whole plot.
+    shown = slice(min(int(0.25 * t.rate), len(t) // 10), None)
+    largest = float(abs(t.tau_ext[shown]).max()) if len(t.tau_ext[shown]) else 0.0
+    return Figure(
+        f"{name}{f', {why}' if why else ''}: position; effort measured and modelled; external effort tracked by the "
+        "filter with two of its standard deviations, and measured minus modelled effort.",
+        f"{name}: the tracked external effort reaches {context.size(t, 'tau_ext', largest)}.",
+        (
+            Panel("Trajectory", "time [s]", label(t, "q", "position"), (*windows, Line(t.t, t.q, "", "blue"))),
+            Panel(
+                "Effort", "time [s]", label(t, "tau", "effort"),
+                (*windows, Line(t.t, t.tau, "measured", "sky"), Line(t.t, t.tau_hat, "model", "vermillion", "dashed")),
+            ),
+            Panel(
+                "External effort", "time [s]", label(t, "tau_ext", "external effort"),
+                (
+                    *windows,
+                    Line(t.t[shown], t.tau_ext_direct[shown], "measured minus model", "grey", "dotted"),
+                    Band(t.t[shown], (t.tau_ext - sigma)[shown], (t.tau_ext + sigma)[shown], "± 2 σ", "sky"),
+                    Line(t.t[shown], t.tau_ext[shown], "filter", "vermillion"),
+                ),
+            ),
+        ),
+        f"track-figure-{t.log}-{t.joint}",
+        zoomable=True,
+        height=30,
+    )  # fmt: skip
+
+
+def innovations(context: Context, t: Track) -> Figure:
+    """Innovations over time and their autocorrelation."""
+    name = f"{title(t.joint)} in {literal(t.log)}"
+    late = t.t - t.t[0] >= 1.0 if t.t[-1] - t.t[0] > 5 else t.t >= t.t[0]
+    panels, firsts = [], []
+    for field, meaning in (("innovation_q", "position innovation"), ("innovation_dq", "velocity innovation")):
+        values = getattr(t, field)[late]
+        panels.append(
+            Panel(meaning.capitalize(), "time [s]", label(t, field, meaning), (Line(t.t[late], values, "", "blue"),))
+        )
+        for w in context.catalogue.about(Whiteness, log=t.log, joint=t.joint, signal=field):
+            panels.append(autocorrelation(w, f"ACF of the {meaning}"))
+            firsts.append(f"{w.acf1:.2f}")
+    return Figure(
+        f"{name}: innovations of position and velocity, and their autocorrelation with the 95 % band of white noise.",
+        f"{name}: the innovations have first autocorrelations of {' and '.join(firsts) or 'unknown size'}.",
+        tuple(panels),
+        f"innovations-{t.log}-{t.joint}",
+        columns=2,
+        height=30,
+    )

@@ -1,0 +1,26 @@
+"""Records with nothing in them but what a test is about."""
+
+from typing import Any
+
+import numpy as np
+
+from pipeline.records import FreeSpace, Prediction
+
+NOTHING = np.zeros(0)
+
+
+def prediction(**scores: Any) -> Prediction:
+    """A prediction of a run; its effort has a root mean square of 1."""
+    names = ("rmse", "nrmse", "r2", "r2_ceiling", "model_error", "model_error_std", "relative_error")
+    about = {"log": "run", "joint": "roll", "model": "independent", "estimator": "lse", "role": "validation"}
+    about |= {"scheme": "validation", "path": "another path"}
+    values = about | dict.fromkeys(names, 0.0) | {"effort_rms": 1.0, "t": NOTHING, "tau": NOTHING, "tau_hat": NOTHING}
+    return Prediction(**(values | scores))  # type: ignore[arg-type]
+
+
+def free_space(**levels: Any) -> FreeSpace:
+    """The free space of a run."""
+    names = ("free_rms", "free_level", "detection_level", "coverage")
+    about = {"log": "run", "joint": "roll", "filter": "ekf", "role": "validation", "tested": 100}
+    values = about | dict.fromkeys((*names, *(f"{name}_std" for name in names)), 0.0)
+    return FreeSpace(**(values | levels))  # type: ignore[arg-type]
