@@ -58,9 +58,9 @@ def blocks(context: Context) -> Iterator[Block]:
         yield Figure(
             caption(contacts),
             f"External effort over time, one panel a joint: {'; '.join(map(spoken, contacts[:3])) or 'no contact'}.",
-            tuple(panel if i == 0 else unlabelled(panel) for i, panel in enumerate(panels)),
+            tuple(in_column(panels)),
             label="answer-figure",
-            height=32,
+            height=31,
         )
     yield trust_table(context, trusts)
     yield Prose(thresholds_in_words(trusts))
@@ -71,15 +71,15 @@ def blocks(context: Context) -> Iterator[Block]:
 def thresholds_in_words(trusts: list[Trust]) -> str:
     """From where on the verdicts of the table are what they are."""
     by_error = (
-        f"error at most {percent(GOOD)} of the effort's root mean square, on a path that was not fitted (caution: "
-        f"at most {percent(CAUTION)}, or the same path)"
+        f"error at most {percent(GOOD)} of the effort's root mean square on another path (caution: at most "
+        f"{percent(CAUTION)}, or the same path)"
     )
     by_level = "detection level at most a third of the effort sought (caution: up to it; set as `effort` in study.toml)"
     asked = [trust.sought is not None for trust in trusts]
     rule = by_level if all(asked) else f"{by_level}, else {by_error}" if any(asked) else by_error
     return (
-        f"Of each joint, the worst run that was not fitted. Good: {rule}. A band is right where it covers "
-        f"{percent(COVERED[0])} to {percent(COVERED[1])}. All thresholds: [@thresholds]."
+        f"Of each joint, the worst run not fitted. Good: {rule}. A band is right at {percent(COVERED[0])} to "
+        f"{percent(COVERED[1])}. See [@thresholds]."
     )
 
 
@@ -132,7 +132,7 @@ def opening(context: Context, trusts: list[Trust], contacts: list[Contact]) -> s
         return text + "The study states no contact windows, so no contact is measured."
     return text + (
         f"**{above} of {count(windows, 'window')} of contact, counted joint by joint, stand out from free space.** "
-        "Efforts below the detection level in the table cannot be told from the model's error."
+        "Efforts below the detection level cannot be told from the model's error."
     )
 
 
@@ -154,9 +154,11 @@ def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
         yield Panel(heading, "time [s]", effort, (*spans, *level, line, *peaks))
 
 
-def unlabelled(panel: Panel) -> Panel:
-    """A panel without the legend that the first of its figure has already."""
-    return replace(panel, marks=tuple(replace(mark, label="") for mark in panel.marks))
+def in_column(panels: list[Panel]) -> Iterator[Panel]:
+    """Panels below each other: the first has the legend, the last names the time."""
+    for i, panel in enumerate(panels):
+        marks = panel.marks if i == 0 else tuple(replace(mark, label="") for mark in panel.marks)
+        yield replace(panel, marks=marks, x_label=panel.x_label if i == len(panels) - 1 else "")
 
 
 def joints_touched(context: Context, contact: Contact) -> list[Contact]:
@@ -184,8 +186,8 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
     sought = ("Sought",) if any(trust.sought for trust in trusts) else ()
     header = ("Joint", "Verdict", "Model error", "Of effort", "$R^2$", "At most", "Detection level", *sought, "Covered")
     return Table(
-        "How far to trust it: the model's error beyond noise, $R^2$ and the most that noise leaves of it, the "
-        "detection level that 99 % of free-space samples stay below, and how many of them the 95 % band covers.",
+        "How far to trust it: the model's error beyond noise, $R^2$ and the most that noise leaves of it, the level "
+        "that 99 % of free-space samples stay below, and how many of them the 95 % band covers.",
         header,
         tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts),
         label="trust-table",
