@@ -56,3 +56,17 @@ def correlation(x: Column, y: Column, lags: Counts) -> Column:
     x, y = x - x.mean(), y - y.mean()
     scale = float(np.linalg.norm(x) * np.linalg.norm(y)) or 1.0
     return np.array([x @ np.roll(y, -int(lag)) for lag in lags]) / scale
+
+
+def explained_by(x: Column, y: Column, bins: int = 40) -> float:
+    """The share of the variance of y that its means over ranges of x explain, less what chance explains.
+
+    The correlation ratio with Wherry's correction, 0 where y does not depend on x, however crookedly.
+    """
+    place = np.digitize(x, np.linspace(x.min(), x.max(), bins + 1)[1:-1])
+    counts = np.bincount(place, minlength=bins)
+    means = np.bincount(place, y, bins) / np.maximum(counts, 1)
+    left, ranges, spread = float(np.sum((y - means[place]) ** 2)), int((counts > 0).sum()), float(y.var() * len(y))
+    if not spread or len(y) <= ranges:
+        return 0.0
+    return 1.0 - left / spread * (len(y) - 1) / (len(y) - ranges)

@@ -24,12 +24,14 @@ from pipeline.report.content import (
     literal,
 )
 from pipeline.report.context import Context, label, title
-from pipeline.report.plots import autocorrelation, binned_means, correlation
+from pipeline.report.plots import autocorrelation, binned_means, correlation, explained_by
 from pipeline.report.results import format_unit
+from pipeline.report.verdicts import percent
 
 NAMES = {"lse": "least squares", "wlse": "weighted least squares"}
 LAGS = 50  # of the cross-correlation, each way
-SEEN = 0.2  # correlation of a residual with a motion from which on it is worth a sentence
+SEEN = 0.1  # share of a residual's variance that a motion explains, from which on the residual follows it
+REVERSALS = 2.0  # times as large around reversals as elsewhere, from which on that is said
 
 
 def section(context: Context) -> Section | None:
@@ -202,24 +204,25 @@ def correlations(context: Context, residual: Residual, errors: Column) -> Iterat
 
 
 def in_words(residual: Residual, errors: Column, q: Column | None) -> str:
-    """What the residual goes along with, and what to try; a correlation is no cause, and is not called one."""
-    zero = np.zeros(1, int)
-    motions = {"velocity": residual.dq, "direction": np.sign(residual.dq)} | ({} if q is None else {"position": q})
-    seen = {name: float(correlation(errors, x, zero)[0]) for name, x in motions.items()}
-    strong = sorted(((abs(r), name, r) for name, r in seen.items() if abs(r) > SEEN), reverse=True)
-    if strong:
-        _, name, r = strong[0]
-        advice = {"position": "a spring or gravity term", "velocity": "another friction term"}
-        wanted = advice.get(name, "friction that differs by direction")
-        return f"The residual goes along with the {name} (correlation {r:+.2f}): try {wanted}."
+    """What the residual follows, and what to try.
+
+    Least squares leave no straight line in any motion that is a column of the model, so means over ranges are asked.
+    """
+    motions = {"velocity": residual.dq} | ({} if q is None else {"position": q})
+    shares = {name: explained_by(x, errors) for name, x in motions.items()}
+    said = " and ".join(f"{percent(max(share, 0.0))} by {name}" for name, share in shares.items())
+    follows = max(shares, key=lambda name: shares[name])
+    text = f"Of the residual's variance, its means over ranges explain {said}"
+    if shares[follows] > SEEN:
+        tries = {
+            "position": "a spring, gravity or friction that varies with position, or the coupling to other joints",
+            "velocity": "friction with another shape, or coupling to other joints",
+        }
+        return f"{text}: it follows the {follows}. Worth trying: {tries[follows]}."
     within = share_within_reversals(errors, residual.dq)
-    listing = ", ".join(f"{r:+.2f} with {name}" for name, r in seen.items())
-    if within > 2.0:
-        return (
-            f"No straight line in the motion is left (correlations {listing}), but around reversals the residual is "
-            f"{within:.1f} times as large as elsewhere: try friction with presliding."
-        )
-    return f"No straight line in the motion is left in the residual (correlations {listing})."
+    if within > REVERSALS:
+        return f"{text}, but around reversals it is {within:.1f} times as large as elsewhere. Worth trying: presliding."
+    return f"{text}: no term of one motion is missing that these plots could show."
 
 
 def share_within_reversals(errors: Column, dq: Column) -> float:
