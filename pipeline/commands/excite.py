@@ -95,5 +95,8 @@ def _lines(e: "ExcitationTrajectory") -> list[str]:
 
 def _spread(starts: dict[str, float | None]) -> str:
     """How far the starts agree: a search that has found the best there is finds it more than once."""
-    optima = (f"{name} {starts[name]:.4f}" if starts[name] is not None else f"{name} none" for name in ("best", "median", "worst"))
+    optima = (
+        f"{name} {starts[name]:.4f}" if starts[name] is not None else f"{name} none"
+        for name in ("best", "median", "worst")
+    )
     return f"  {starts['number']} starts of the search: {', '.join(optima)}"
