@@ -13,7 +13,7 @@ from pipeline.runner.reuse import reused
 from pipeline.stages import design
 
 TASK = Task("design", "design")
-SAME = Fingerprint({}, {"robot": "a"}, {"shape": (1, 2)}, {"design.py": "b"}, "1")
+SAME = Fingerprint({}, {"robot": "a"}, {"shape": [1, 2]}, {"design.py": "b"}, "1")
 LINKS, POSE = "processed/links/arm.parquet", "processed/pose/arm.parquet"
 
 
@@ -46,7 +46,7 @@ def test_files_and_entry_of_the_same_task_are_copied_and_what_was_there_before_g
     ("fingerprint", "failed", "altered"),
     [
         (replace(SAME, given={"robot": "another"}), "", False),
-        (replace(SAME, settings={"shape": (1, 3)}), "", False),
+        (replace(SAME, settings={"shape": [1, 3]}), "", False),
         (replace(SAME, code={"design.py": "new"}), "", False),
         (SAME, "it failed", False),
         (SAME, "", True),

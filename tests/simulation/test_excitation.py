@@ -84,6 +84,11 @@ def test_columns_that_depend_on_each_other_are_worth_nothing(criterion):
 
 
 @pytest.mark.parametrize("criterion", [determinant, condition])
+def test_fewer_samples_than_columns_are_worth_nothing(criterion):
+    assert criterion(np.random.default_rng(0).normal(size=(3, 4))) == np.inf
+
+
+@pytest.mark.parametrize("criterion", [determinant, condition])
 def test_the_criterion_of_many_regressors_is_that_of_each(criterion):
     F = np.random.default_rng(0).normal(size=(3, 40, 4))
     F[1, :, 0] = F[1, :, 3]

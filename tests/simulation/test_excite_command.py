@@ -84,7 +84,8 @@ def test_the_table_begins_at_rest_and_runs_into_the_period_without_a_jump(tmp_pa
 
 
 def test_a_run_in_that_cannot_keep_the_limits_is_refused(tmp_path):
-    words = ("--evaluate", "0,0.1,0", "--period", "1", "--ddq", "-0.63,0.63")
+    """Where the period begins, acceleration is at its limit and velocity is not 0."""
+    words = ("--evaluate", "0,0.1,0.1,0,0.1", "--ddq", "-0.192,0.192")
     with pytest.raises(BadRequest, match="--no-run-in"):
         call("davinci", "hand_pitch", *words, "--csv", str(tmp_path / "t.csv"))
     call("davinci", "hand_pitch", *words, "--no-run-in", "--csv", str(tmp_path / "t.csv"))

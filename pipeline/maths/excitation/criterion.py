@@ -25,8 +25,10 @@ def condition(F: Array) -> Array:
 
 
 def _where_full_rank(F: Array, smallest: Array, largest: Array, value: Callable[[], Array]) -> Array:
+    samples, parameters = F.shape[-2:]
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(smallest > F.shape[-2] * np.finfo(float).eps * largest, value(), np.inf)
+        full = (samples >= parameters) & (smallest > samples * np.finfo(float).eps * largest)
+        return np.where(full, value(), np.inf)
 
 
 CRITERIA: dict[str, Criterion] = {"determinant": determinant, "condition": condition}
