@@ -62,7 +62,7 @@ def extremes(c: Array, period: float) -> tuple[Array, Array]:
     harmonics = c.shape[1] // 2
     grid = c @ _grid(period, harmonics)
     before, values, after = grid[..., :-2], grid[..., 1:-1].copy(), grid[..., 2:]
-    turning = np.nonzero((values >= before) == (values >= after))
+    turning = np.unravel_index(np.flatnonzero((values >= before) == (values >= after)), values.shape)
     rise, bend = after[turning] - before[turning], before[turning] - 2 * values[turning] + after[turning]
     step = np.divide(-rise, 2 * bend, out=np.zeros_like(rise), where=bend != 0)
     values[turning] = _values(c, period, turning[0], turning[1], (turning[2] + step) / (GRID * harmonics))
@@ -72,8 +72,12 @@ def extremes(c: Array, period: float) -> tuple[Array, Array]:
 def _values(c: Array, period: float, derivative: Array, of: Array, where: Array) -> Array:
     """Position (0), velocity (1) or acceleration (2) of the series `of` (P,) of c `where` (P,) in the period."""
     jw = 2j * np.pi / period * np.arange(1, c.shape[1] // 2 + 1)
-    phasors = (c[:, ::2] - 1j * c[:, 1::2])[None] * np.array([1 / jw, np.ones_like(jw), jw])[:, None]
-    return np.asarray((phasors[derivative, of] * np.exp(period * jw * where[:, None])).real.sum(axis=1))
+    phasors = (c[:, ::2] - 1j * c[:, 1::2]).T * np.array([1 / jw, np.ones_like(jw), jw])[..., None]
+    turn = np.exp(2j * np.pi * where)
+    total = np.zeros_like(turn)
+    for phasor in reversed(np.swapaxes(phasors, 0, 1)):  # Horner's scheme
+        total = (total + phasor[derivative, of]) * turn
+    return total.real
 
 
 @lru_cache(maxsize=8)
