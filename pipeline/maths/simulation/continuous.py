@@ -39,13 +39,10 @@ def regulate(
     n = len(q)
     M, tau, b = np.empty((n, n)), np.empty(n), np.empty(n)
 
-    def look(state: Array) -> None:
-        _forces(plant.data, known.data, law, target, np.ascontiguousarray(state), M, tau, b)
-
     def slope(_: float, state: Array) -> Array:
-        look(state)
-        dq = state[n : 2 * n]
-        return np.concatenate([dq, np.linalg.solve(M, tau - b - viscous * dq), target - state[:n]])
+        rate = np.empty(3 * n)
+        _slope(plant.data, known.data, law, target, viscous, np.ascontiguousarray(state), M, tau, b, rate)
+        return rate
 
     start = np.concatenate([q, np.zeros(2 * n)])
     solution = solve_ivp(slope, (0.0, duration), start, method="Radau", rtol=RELATIVE, atol=ABSOLUTE)
@@ -54,7 +51,7 @@ def regulate(
     q_t, dq_t = solution.y[:n].T, solution.y[n : 2 * n].T
     V, efforts = np.empty(len(q_t)), np.empty(q_t.shape)
     for k, state in enumerate(solution.y.T):
-        look(state)
+        _forces(plant.data, known.data, law, target, np.ascontiguousarray(state), M, tau, b)
         V[k] = lyapunov(M, dq_t[k], law.proportional, target - q_t[k])
         efforts[k] = tau
     return Regulated(solution.t, q_t, dq_t, efforts, V)
@@ -69,6 +66,19 @@ def _forces(body: Any, known: Any, law: Any, target: Any, state: Any, M: Any, ta
     error = target - q
     tau[:] = law.proportional * error - law.derivative * dq + law.gravity * b + law.integral * state[2 * n :]  # (5.17)
     arms.dynamics(body, q, dq, M, b)
+
+
+@cached(arms, kernels, link, recursions, vector)
+def _slope(
+    body: Any, known: Any, law: Any, target: Any, viscous: Any, state: Any, M: Any, tau: Any, b: Any, rate: Any
+) -> None:
+    """Fill the derivative of a state.  (4.28)"""
+    n = len(target)
+    _forces(body, known, law, target, state, M, tau, b)
+    dq = state[n : 2 * n]
+    rate[:n] = dq
+    rate[n : 2 * n] = np.linalg.solve(M, tau - b - viscous * dq)
+    rate[2 * n :] = target - state[:n]
 
 
 def at(plant: Plant, q: Array, dq: Array) -> tuple[Array, Array]:
