@@ -23,18 +23,22 @@ def run(
     q: Annotated[str | None, typer.Option(help="Limits of position, lower,upper, instead of the joint's.")] = None,
     dq: Annotated[str | None, typer.Option(help="Limits of velocity.")] = None,
     ddq: Annotated[str | None, typer.Option(help="Limits of acceleration.")] = None,
-    starts: Annotated[int, typer.Option(min=1, help="Random starts of the search.")] = 24,
+    starts: Annotated[int, typer.Option(min=1, help="Starts of the search; half as many for an arm.")] = 24,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the starts.")] = 0,
     samples: Annotated[int, typer.Option(min=2, help="K, the instants of a period that the criterion looks at.")] = 300,
     rate: Annotated[float, typer.Option(help="Rate of the controller's table [Hz].")] = 100.0,
-    csv: Annotated[Path | None, typer.Option(help="Write it for the controller: t, q, dq, ddq.")] = None,
+    csv: Annotated[Path | None, typer.Option(help="Write its table for the controller: t, q, dq, ddq.")] = None,
     run_in: Annotated[
-        bool, typer.Option(help="Begin the table at rest, before t = 0; or leave this out: one period from t = 0.")
+        bool, typer.Option(help="Begin the table at rest, before t = 0; else it is the period alone.")
     ] = True,
     plot: Annotated[Path | None, typer.Option(help="Draw the trajectory: .svg, .png or .pdf.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Minimise -log10 det(F'F) over a Fourier series whose limits hold at every instant."""
+    """Minimise -log10 det(F'F) over a Fourier series whose limits hold at every instant.
+
+    The best, the median and the worst of the starts tell whether the search is to be trusted: where they differ, more
+    starts may find more. All joints of an arm take minutes; each start is told of when it is done.
+    """
     from pipeline.errors import BadRequest
     from pipeline.excitation import table, trajectory
     from pipeline.excitation.request import Request, answer

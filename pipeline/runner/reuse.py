@@ -17,10 +17,10 @@ def reused(ledger: Ledger, task: Task, fingerprint: Fingerprint) -> str:
     for other in sorted(processed.parent.iterdir()):
         there = replace(ledger.folders, processed=other)
         entry = None if other == processed else Ledger(there).entry(task.stage, task.name)
-        if entry and not entry.failed and entry.fingerprint == json.loads(json.dumps(asdict(fingerprint))):
-            if contents := _contents(there, entry):
-                _take(ledger, entry, contents)
-                return other.name
+        same = entry and not entry.failed and entry.fingerprint == json.loads(json.dumps(asdict(fingerprint)))
+        if entry and same and (contents := _contents(there, entry)):
+            _take(ledger, entry, contents)
+            return other.name
     return ""
 
 

@@ -83,6 +83,17 @@ def test_columns_that_depend_on_each_other_are_worth_nothing(criterion):
     assert criterion(np.column_stack([once, 2 * once])) == np.inf
 
 
+def test_the_determinant_is_the_same_whether_or_not_columns_nearly_depend_on_each_other():
+    """Two are 1e-2 to 1e-5 of their length apart; squared, that is on both sides of where the method changes."""
+    random = np.random.default_rng(0)
+    for apart in (1e-2, 1e-3, 1e-4, 1e-5):
+        F = random.normal(size=(50, 3)) * (1.0, 1e-3, 1e5)
+        F[:, 1] = 2e-3 * F[:, 0] + apart * F[:, 1]
+        exact = -2 * np.log10(np.linalg.svd(F / np.linalg.norm(F, axis=0), compute_uv=False)).sum()
+        exact -= 2 * np.log10(np.linalg.norm(F, axis=0)).sum()
+        assert determinant(F) == pytest.approx(exact, abs=1e-9)
+
+
 @pytest.mark.parametrize("criterion", [determinant, condition])
 def test_fewer_samples_than_columns_are_worth_nothing(criterion):
     assert criterion(np.random.default_rng(0).normal(size=(3, 4))) == np.inf

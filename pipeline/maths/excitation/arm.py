@@ -50,7 +50,7 @@ def arm_problem(chain: Chain, joints: Sequence[ExcitationProblem]) -> ArmExcitat
 
 def arm_observation(problem: ArmExcitationProblem, series: Sequence[Fourier]) -> Array:
     """F (K n, p) of the base parameters over one period, the joints of a sample below each other.  (6.19)"""
-    return _observations(problem, [one.x[None] for one in series])[0]
+    return np.asarray(_observations(problem, [one.x[None] for one in series])[0])
 
 
 def design_together(problem: ArmExcitationProblem, starts: int, seed: int, tell: Tell = nothing) -> ArmDesign:

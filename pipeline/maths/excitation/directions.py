@@ -10,10 +10,12 @@ such an instant.
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.maths.arrays import Array
 from pipeline.maths.excitation.fourier import Range, basis
 
+Indices = NDArray[np.intp]
 GRID = 96  # instants a harmonic at which an extreme is looked for, and found to 1e-7 of it
 
 
@@ -69,7 +71,7 @@ def extremes(c: Array, period: float) -> tuple[Array, Array]:
     return values.min(axis=-1), values.max(axis=-1)
 
 
-def _values(c: Array, period: float, derivative: Array, of: Array, where: Array) -> Array:
+def _values(c: Array, period: float, derivative: Indices, of: Indices, where: Array) -> Array:
     """Position (0), velocity (1) or acceleration (2) of the series `of` (P,) of c `where` (P,) in the period."""
     jw = 2j * np.pi / period * np.arange(1, c.shape[1] // 2 + 1)
     phasors = (c[:, ::2] - 1j * c[:, 1::2]).T * np.array([1 / jw, np.ones_like(jw), jw])[..., None]
@@ -77,12 +79,12 @@ def _values(c: Array, period: float, derivative: Array, of: Array, where: Array)
     total = np.zeros_like(turn)
     for phasor in reversed(np.swapaxes(phasors, 0, 1)):  # Horner's scheme
         total = (total + phasor[derivative, of]) * turn
-    return total.real
+    return np.asarray(total.real)
 
 
 @lru_cache(maxsize=8)
 def _grid(period: float, harmonics: int) -> Array:
     """Bases of position, velocity and acceleration (3, 2 N_f, G + 2) over a period and a step to both sides."""
     steps = GRID * harmonics
-    t = np.arange(-1, steps + 1) * (period / steps)
+    t = np.arange(-1.0, steps + 1, dtype=np.float64) * (period / steps)
     return np.stack([B[:, 1:].T for B in basis(period, harmonics, t)])

@@ -70,6 +70,7 @@ def _steps(z: Array, best: Array, random: np.random.Generator) -> Array:
 
 def _spread(best: Array, n: int, random: np.random.Generator) -> Array:
     """A population (n, d) about its best, which stays in it."""
-    size = 10 ** random.uniform(*np.log10(SPREAD), size=(n, 1))
+    smallest, largest = np.log10(SPREAD).tolist()
+    size = 10 ** random.uniform(smallest, largest, size=(n, 1))
     size[0] = 0.0
     return np.asarray(best + size * random.normal(size=(n, len(best))))

@@ -84,10 +84,13 @@ def regressor(chain: Chain, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Arra
 
 
 def compiled_regressor(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
-    """Y (..., n, 10 L) of `regressor` however few the samples, but at least LANES, for those who ask often."""
+    """Y (..., n, 10 L) of `regressor` by the kernels however few the samples, for those who ask often."""
     from pipeline.maths.mechanics.kernels import regressors
+    from pipeline.maths.mechanics.vector import LANES
 
     n, L = q.shape[-1], len(chain.parent)
+    if q.size < LANES * n:  # they cannot do fewer
+        return regressor(chain, q, dq, ddq)
     Y = np.zeros((*q.shape, 10 * L))
     tree = tree_of(chain.reduced(n), np.zeros((L, 10)))
     regressors(tree, GRAVITY, _rows(q), _rows(dq), _rows(ddq), Y.reshape(-1, n, 10 * L))

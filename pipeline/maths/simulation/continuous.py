@@ -33,8 +33,9 @@ def regulate(
 ) -> Regulated:
     """Drive the arm from rest at q (n,) to `target` (n,) under PD or PID with gravity compensation.
 
-    `known` is the arm as the compensator knows it, `viscous` (n,) the friction.  The samples are the solver's own
-    steps, so that V is compared where it was computed and not where it was interpolated.  (5.8), (5.9), (5.17)
+    Both are an `arm`'s, `known` as the compensator knows it; `viscous` (n,) is the friction.  The samples are the
+    solver's own steps, so that V is compared where it was computed and not where it was interpolated.  (5.8),
+    (5.9), (5.17)
     """
     n = len(q)
     M, tau, b = np.empty((n, n)), np.empty(n), np.empty(n)
