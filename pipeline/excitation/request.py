@@ -1,23 +1,23 @@
 """What is asked of an excitation, as options of a command line, and the trajectories that answer it."""
 
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import cast
+from typing import NamedTuple
 
 import numpy as np
 
 from pipeline import robots
 from pipeline.errors import BadRequest
 from pipeline.excitation.trajectory import PERIODS, ExcitationTrajectory, coefficient_names, designed, problem_of
-from pipeline.maths.excitation.arm import arm_observation, arm_problem, design_together
-from pipeline.maths.excitation.fourier import Fourier, Range, condition
-from pipeline.maths.excitation.joint import CRITERIA, ExcitationProblem
-from pipeline.maths.mechanics.chain import Chain
+from pipeline.maths.excitation.arm import ArmExcitationProblem, arm_observation, arm_problem, design_together
+from pipeline.maths.excitation.criterion import CRITERIA, condition
+from pipeline.maths.excitation.fourier import Fourier, Range
+from pipeline.maths.excitation.joint import ExcitationProblem
+from pipeline.maths.excitation.search import Tell, nothing
 from pipeline.robots.robot import Joint, Robot
 
-STARTS_OF_ARM = 12  # starts of one joint for one of the arm, which takes as much longer
+STARTS_OF_ARM = 2  # starts of one joint for one of the arm, which takes longer
 
 
 @dataclass(frozen=True)
@@ -33,10 +33,27 @@ class Request:
     limits: tuple[str | None, str | None, str | None]  # of position, velocity and acceleration: "lower,upper"
     starts: int
     seed: int
+    samples: int  # K, instants of a period that the criterion looks at
 
 
-def answer(request: Request) -> list[ExcitationTrajectory]:
-    """A trajectory for each joint asked for: designed, or the given one.
+class ArmExcitation(NamedTuple):
+    """What all joints together tell about the arm, and the criterion that each start of the search has come to."""
+
+    objective: float
+    condition: float
+    base_parameters: int
+    optima: tuple[float, ...]
+
+
+class Answer(NamedTuple):
+    """A trajectory for each joint asked for; of all joints together, what they are worth where the links are known."""
+
+    trajectories: list[ExcitationTrajectory]
+    arm: ArmExcitation | None = None
+
+
+def answer(request: Request, tell: Tell = nothing) -> Answer:
+    """A trajectory for each joint asked for: designed, or the given one; `tell` hears of each start for an arm.
 
     Joints that move together share a period.  Where the arm's links are known, their trajectories are the best ones for
     the arm as a whole; else the joints' models are independent, and the best for all of them is the best of each.
@@ -58,26 +75,26 @@ def answer(request: Request) -> list[ExcitationTrajectory]:
     period = request.period or max(PERIODS[joint.kind] for joint in joints)
     problems = [_problem(request, joint, period) for joint in joints]
     if together and robot.chain is not None:
-        return _of_arm(request, robot, problems)
-    return [_excitation(request, joint, problem) for joint, problem in zip(joints, problems, strict=True)]
+        return _of_arm(request, robot, arm_problem(robot.chain, problems), tell)
+    return Answer([_excitation(request, *each) for each in zip(joints, problems, strict=True)])
 
 
-def arm_of(robot: Robot, trajectories: Sequence[ExcitationTrajectory]) -> tuple[float, float, int] | None:
-    """Objective, condition number and number of base parameters of all joints together, where the links are known."""
-    if robot.chain is None or len(trajectories) < len(robot.joints):
-        return None
-    problem = arm_problem(robot.chain, [trajectory.problem for trajectory in trajectories])
-    F = arm_observation(problem, [trajectory.series for trajectory in trajectories])
-    return CRITERIA[problem.joints[0].criterion](F)[0], float(10 ** condition(F)[0]), F.shape[1]
-
-
-def _of_arm(request: Request, robot: Robot, problems: list[ExcitationProblem]) -> list[ExcitationTrajectory]:
+def _of_arm(request: Request, robot: Robot, problem: ArmExcitationProblem, tell: Tell) -> Answer:
     try:
-        together = arm_problem(cast(Chain, robot.chain), problems)
-        series = design_together(together, max(1, request.starts // STARTS_OF_ARM), request.seed)
+        found = design_together(problem, max(1, request.starts // STARTS_OF_ARM), request.seed, tell)
     except ValueError as error:
         raise BadRequest(f"{robot.name}: {error}") from None
-    return [ExcitationTrajectory(*each) for each in zip(robot.joints, problems, series, strict=True)]
+    F = arm_observation(problem, found.series)
+    parts = zip(robot.joints, problem.joints, found.series, strict=True)
+    return Answer(
+        [ExcitationTrajectory(*part) for part in parts],
+        ArmExcitation(
+            float(CRITERIA[request.criterion](F)),
+            float(10 ** condition(F)),
+            F.shape[-1],
+            tuple(found.optima.tolist()),
+        ),
+    )
 
 
 def load(robot: str) -> Robot:
@@ -86,7 +103,7 @@ def load(robot: str) -> Robot:
 
 
 def _problem(request: Request, joint: Joint, period: float) -> ExcitationProblem:
-    problem = problem_of(joint, period, request.harmonics, request.criterion)
+    problem = problem_of(joint, period, request.harmonics, request.criterion, request.samples)
     given = zip(("--q", "--dq", "--ddq"), request.limits, problem.limits, strict=True)
     q, dq, ddq = (_limits(option, text) if text else own for option, text, own in given)
     return replace(problem, limits=(q, dq, ddq))

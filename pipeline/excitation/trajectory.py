@@ -1,6 +1,5 @@
-"""An excitation trajectory for people and for controllers: its properties, its table over one period, its plot."""
+"""An excitation trajectory for people: its properties and its plot."""
 
-import io
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -11,8 +10,9 @@ import numpy as np
 
 from pipeline.errors import BadRequest
 from pipeline.maths.arrays import Array
-from pipeline.maths.excitation.fourier import Fourier, condition, motion, observation, ranges
-from pipeline.maths.excitation.joint import CRITERIA, ExcitationProblem, design
+from pipeline.maths.excitation.criterion import CRITERIA, condition
+from pipeline.maths.excitation.fourier import Fourier, motion, observation, ranges
+from pipeline.maths.excitation.joint import ExcitationProblem, design
 from pipeline.robots.robot import Joint, Kind
 
 PERIODS = {Kind.REVOLUTE: 10.0, Kind.PRISMATIC: 5.0}  # [s] of Table 6.1
@@ -26,16 +26,17 @@ class ExcitationTrajectory:
     joint: Joint
     problem: ExcitationProblem
     series: Fourier
+    optima: tuple[float, ...] = ()  # the criterion that each start of a search for it has come to
 
     @property
     def objective(self) -> float:
         """The criterion: -log10 det(F^T F), or log10 of the condition number.  (6.20)"""
-        return CRITERIA[self.problem.criterion](self._F())[0]
+        return float(CRITERIA[self.problem.criterion](self._F()))
 
     @property
     def condition(self) -> float:
         """The condition number of F."""
-        return float(10 ** condition(self._F())[0])
+        return float(10 ** condition(self._F()))
 
     @property
     def broken(self) -> list[str]:
@@ -63,10 +64,18 @@ class ExcitationTrajectory:
             "ranges": {s: list(r) for s, r in zip(symbols, ranges(self.series), strict=True)},
             "limits": {s: list(r) for s, r in zip(symbols, self.problem.limits, strict=True)},
             "within_limits": not self.broken,
+            **({"starts": spread(self.optima)} if self.optima else {}),
         }
 
     def _F(self) -> Array:
         return observation(self.problem.terms, self.series, self.problem.samples)
+
+
+def spread(optima: Sequence[float]) -> dict[str, float | int | None]:
+    """How far the starts of a search agree: their number, and the best, the median and the worst optimum."""
+    ordered = [finite(value) for value in sorted(optima)]
+    best, median, worst = ordered[0], ordered[(len(ordered) - 1) // 2], ordered[-1]
+    return {"number": len(optima), "best": best, "median": median, "worst": worst}
 
 
 def finite(value: float) -> float | None:
@@ -79,12 +88,13 @@ def coefficient_names(harmonics: int) -> list[str]:
     return ["a0", *(f"{letter}{k}" for k in range(1, harmonics + 1) for letter in "ab")]
 
 
-def problem_of(joint: Joint, period: float | None, harmonics: int | None, criterion: str) -> ExcitationProblem:
+def problem_of(
+    joint: Joint, period: float | None, harmonics: int | None, criterion: str, samples: int
+) -> ExcitationProblem:
     """What the excitation of a joint is asked for, with its own limits."""
     limits = (joint.limits.q, joint.limits.dq, joint.limits.ddq)
-    return ExcitationProblem(
-        joint.terms, limits, period or PERIODS[joint.kind], harmonics or joint.harmonics, criterion
-    )
+    period = period or PERIODS[joint.kind]
+    return ExcitationProblem(joint.terms, limits, period, harmonics or joint.harmonics, criterion, samples)
 
 
 def designed(joint: Joint, problem: ExcitationProblem, starts: int, seed: int) -> ExcitationTrajectory:
@@ -96,37 +106,10 @@ def designed(joint: Joint, problem: ExcitationProblem, starts: int, seed: int) -
         If the limits of the joint cannot be kept, or no trajectory tells its parameters apart.
     """
     try:
-        return ExcitationTrajectory(joint, problem, design(problem, starts, seed))
+        found = design(problem, starts, seed)
+        return ExcitationTrajectory(joint, problem, found.series, tuple(found.optima.tolist()))
     except ValueError as error:
         raise BadRequest(f"{joint.name}: {error}") from None
-
-
-def csv(excitations: Sequence[ExcitationTrajectory], rate: float) -> str:
-    """One period of the trajectories at the controller's rate [Hz]: t, q, dq, ddq, with SI units.
-
-    Raises
-    ------
-    BadRequest
-        If the periods differ, or a period is no whole number of samples.
-    """
-    if not (math.isfinite(rate) and rate > 0):
-        raise BadRequest(f"--rate must be positive, not {rate:g}")
-    period = excitations[0].series.period
-    samples = round(period * rate)
-    if any(e.series.period != period for e in excitations):
-        raise BadRequest("joints that move together need one period; say which with --period")
-    if abs(period * rate - samples) > 1e-9 * samples or samples < 1:
-        raise BadRequest(
-            f"a period of {period:g} s is {period * rate:g} samples at {rate:g} Hz; choose a period or a rate that "
-            "gives a whole number, so that the trajectory repeats exactly"
-        )
-    t = np.arange(samples) / rate
-    prefixes = [f"{e.joint.name}." if len(excitations) > 1 else "" for e in excitations]
-    header = ",".join(["t", *(f"{p}{symbol}" for p in prefixes for symbol in ("q", "dq", "ddq"))])
-    text = io.StringIO()
-    table = np.column_stack([t, *(column for e in excitations for column in motion(e.series, t))])
-    np.savetxt(text, table, "%.12g", delimiter=",", header=header, comments="", newline="\n")
-    return text.getvalue()
 
 
 def plot(excitations: Sequence[ExcitationTrajectory], path: Path) -> None:

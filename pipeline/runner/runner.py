@@ -12,6 +12,7 @@ from pipeline.runner.execution import Outcome, perform
 from pipeline.runner.ledger import Entry, Fingerprint, Folders, Ledger
 from pipeline.runner.lock import locked
 from pipeline.runner.plan import Plan, Task
+from pipeline.runner.reuse import reused
 from pipeline.runner.signature import declaration
 from pipeline.stages import STAGES
 from pipeline.study import Study
@@ -92,16 +93,21 @@ class Runner:
                 self.ledger.remove(entry)
         due: dict[str, tuple[Task, Fingerprint]] = {}
         tasks_by_reason: dict[str, list[str]] = {}
+        copied = 0
         for task in tasks:
             now = self.plan.fingerprint(asks, task)
             reasons = ["--force"] if self.force else self.ledger.reasons(self.ledger.entry(name, task.name), now)
-            if reasons:
+            if reasons and not self.force and (other := reused(self.ledger, task, now)):
+                self.console.say(f"{name}: copied from {other}, which has the same robot and settings")
+                self.ran += 1
+                copied += 1
+            elif reasons:
                 due[task.name] = task, now
                 tasks_by_reason.setdefault(_brief(reasons), []).append(task.name)
         for reason, names in tasks_by_reason.items():
             self.console.say(f"{name}: {_listed(names)}: {reason}")
         self._perform(name, due)
-        current = len(tasks) - len(due)
+        current = len(tasks) - len(due) - copied
         if current:
             self.console.say(f"{name}: {current} of {len(tasks)} current")
 

@@ -6,7 +6,7 @@ from itertools import product
 import numpy as np
 from scipy.interpolate import CubicHermiteSpline
 
-from pipeline.maths.excitation import fourier
+from pipeline.maths.excitation import criterion, fourier
 from pipeline.maths.excitation.fourier import Fourier
 from pipeline.maths.excitation.joint import ExcitationProblem, design
 from pipeline.maths.mechanics import workspace
@@ -131,7 +131,7 @@ def excitations(joint: Joint) -> Iterator[Excitation]:
         yield described(
             joint,
             "found",
-            design(ExcitationProblem(joint.terms, limits_of(joint), period, 2, "determinant"), STARTS, 0),
+            design(ExcitationProblem(joint.terms, limits_of(joint), period, 2, "determinant"), STARTS, 0).series,
         )
 
 
@@ -151,8 +151,8 @@ def described(joint: Joint, source: str, series: Fourier) -> Excitation:
         joint=joint.name,
         source=source,
         period=series.period,
-        objective=float(fourier.determinant(F)[0]),
-        condition=float(10 ** fourier.condition(F)[0]),
+        objective=float(criterion.determinant(F)),
+        condition=float(10 ** criterion.condition(F)),
         coefficients=tuple(series.x.tolist()),
         excess_q=excess[0],
         excess_dq=excess[1],

@@ -2,9 +2,11 @@
 
 from dataclasses import dataclass, replace
 
+import numpy as np
 import pytest
 
 from pipeline.maths.excitation.fourier import Fourier
+from pipeline.maths.excitation.joint import Design
 from pipeline.maths.simulation import continuous
 from pipeline.records import KINDS, Record, store
 from pipeline.records.catalogue import Catalogue
@@ -64,7 +66,12 @@ def shorten(patch: pytest.MonkeyPatch) -> None:
     """Leave out what takes long of a design, and none of the kinds of record that it makes."""
     patch.setattr(continuous, "RELATIVE", 1e-4)
     patch.setattr(continuous, "ABSOLUTE", 1e-6)
-    patch.setattr(design, "design", lambda problem, *_: Fourier(0.0, (0.1, 0.05), (0.05, 0.1), problem.period))
+    patch.setattr(design, "design", lambda problem, *_: Design(series(problem.period), np.zeros(1)))
+
+
+def series(period: float) -> Fourier:
+    """Any trajectory."""
+    return Fourier(0.0, (0.1, 0.05), (0.05, 0.1), period)
 
 
 @pytest.fixture(scope="session")

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from pipeline.maths.models import kernels, terms
 from pipeline.maths.models.bias import bias as bias_of
-from pipeline.maths.models.independent import combined, inertia_of, regressor, slopes
+from pipeline.maths.models.independent import combined, inertia_of, regressor
 from pipeline.maths.models.terms import TERMS, Term
 from pipeline.report.writers.equations import Formula, draw_formulas
 from pipeline.robots.robot import Kind
@@ -59,13 +59,6 @@ def test_all_terms_together_are_one_model_in_the_regressor_and_in_the_loop():
         [phi] = regressor(model, np.array([q]), np.array([dq]), np.zeros(1))
         assert kernels.bias(c, q, dq, 0.0)[0] == pytest.approx(phi @ theta, rel=1e-14)
         assert_allclose(kernels.bias(c, q, dq, 0.0), bias_of(c, q, dq, 0.0), rtol=1e-14)
-
-
-@TERM
-def test_slopes_of_the_regressor_are_those_of_the_loop(term):
-    """Excitation is optimised with them."""
-    by_q, by_dq = slopes((term,), Q, DQ)
-    assert_allclose([by_q[:, 0], by_dq[:, 0]], bias(term, Q, DQ)[1:], rtol=1e-14, atol=1e-15)
 
 
 @TERM

@@ -50,6 +50,14 @@ def test_many_samples_have_the_regressors_that_few_have(n, compiled):
     np.testing.assert_allclose(many, few, rtol=0, atol=1e-12)
 
 
+@pytest.mark.parametrize("samples", range(1, 10))
+def test_the_kernels_give_the_regressors_of_ever_so_few_samples(samples):
+    """They do four at a time."""
+    motion = motions(3)[:, :samples]
+    expected = rigid_body.regressor(CHAIN, *motion)
+    np.testing.assert_allclose(rigid_body.compiled_regressor(CHAIN, *motion), expected, rtol=0, atol=1e-12)
+
+
 def test_many_samples_have_the_coriolis_efforts_and_gravity_that_few_have(compiled):
     q, dq, _ = motions(6)
     both = compiled(lambda: [rigid_body.coriolis(CHAIN, BODIES, q, dq), rigid_body.gravity(CHAIN, BODIES, q)])

@@ -44,7 +44,17 @@ def test_a_trajectory_that_tells_nothing_is_worth_null():
 
 
 def test_the_table_for_the_controller_is_one_period_of_the_motion(tmp_path):
-    call("davinci", "instrument_slide", "--evaluate", "0.02,0.1,0.0", "--rate", "200", "--csv", str(tmp_path / "t.csv"))
+    call(
+        "davinci",
+        "instrument_slide",
+        "--evaluate",
+        "0.02,0.1,0.0",
+        "--rate",
+        "200",
+        "--no-run-in",
+        "--csv",
+        str(tmp_path / "t.csv"),
+    )
     lines = (tmp_path / "t.csv").read_text().splitlines()
     t, q, dq, ddq = np.loadtxt(lines[1:], delimiter=",").T
     w = 2 * np.pi / 5
@@ -53,6 +63,51 @@ def test_the_table_for_the_controller_is_one_period_of_the_motion(tmp_path):
     assert np.allclose(q, 0.02 + 0.1 / w * np.sin(w * t))
     assert np.allclose(dq, 0.1 * np.cos(w * t))
     assert np.allclose(ddq, -0.1 * w * np.sin(w * t))
+
+
+def table(path, *words):
+    call("davinci", "hand_pitch", "--evaluate", PITCH, *words, "--csv", str(path))
+    return np.loadtxt(path, delimiter=",", skiprows=1).T
+
+
+def test_the_table_begins_at_rest_and_runs_into_the_period_without_a_jump(tmp_path):
+    t, q, dq, ddq = table(tmp_path / "t.csv")
+    period = table(tmp_path / "period.csv", "--no-run-in")
+    assert np.array([t, q, dq, ddq])[:, t >= 0] == pytest.approx(period)
+    assert -10 <= t[0] <= -2.5
+    assert (dq[0], ddq[0]) == (0, 0)
+    assert np.allclose(np.diff(t), 0.01)
+    assert np.abs(np.diff(q) - (dq[1:] + dq[:-1]) / 2 * 0.01).max() < 1e-6  # the trapezium's error, h^3 / 12 of jerk
+    assert np.abs(np.diff(dq) - (ddq[1:] + ddq[:-1]) / 2 * 0.01).max() < 1e-6
+    assert np.abs(q).max() <= 0.601  # what the period itself takes
+    assert np.abs(ddq).max() <= 1.2
+
+
+def test_a_run_in_that_cannot_keep_the_limits_is_refused(tmp_path):
+    """Where the period begins, acceleration is at its limit and velocity is not 0."""
+    words = ("--evaluate", "0,0.1,0.1,0,0.1", "--ddq", "-0.192,0.192")
+    with pytest.raises(BadRequest, match="--no-run-in"):
+        call("davinci", "hand_pitch", *words, "--csv", str(tmp_path / "t.csv"))
+    call("davinci", "hand_pitch", *words, "--no-run-in", "--csv", str(tmp_path / "t.csv"))
+
+
+def test_more_samples_of_a_period_are_worth_more():
+    """det(F'F) of p columns grows with K^p."""
+    few, many = (
+        json.loads(call("davinci", "hand_pitch", "--evaluate", PITCH, "--samples", k, "--json"))
+        for k in ("300", "3000")
+    )
+    assert (few["samples"], many["samples"]) == (300, 3000)
+    assert few["objective"] - many["objective"] == pytest.approx(5, abs=0.01)
+
+
+def test_how_far_the_starts_of_a_search_agree_is_said(laboratory):
+    found = json.loads(call(laboratory, "shoulder", "--starts", "3", "--json"))
+    assert found["starts"]["number"] == 3
+    assert found["starts"]["best"] == pytest.approx(found["objective"], abs=1e-6)
+    assert found["starts"]["best"] <= found["starts"]["median"] <= found["starts"]["worst"]
+    assert "3 starts of the search: best" in call(laboratory, "shoulder", "--starts", "3")
+    assert "starts" not in json.loads(call("davinci", "hand_pitch", "--evaluate", PITCH, "--json"))
 
 
 ARM = """

@@ -7,23 +7,22 @@ The columns that no motion tells apart are left out, so the criterion is that of
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
-from scipy.optimize import LinearConstraint, minimize
 
 from pipeline.maths.arrays import Array
-from pipeline.maths.excitation.fourier import Fourier, basis, instants, turning_points
-from pipeline.maths.excitation.joint import CRITERIA, GRID, ExcitationProblem, design, inequalities, within
+from pipeline.maths.excitation.criterion import CRITERIA
+from pipeline.maths.excitation.directions import delayed, fitted, from_standstill
+from pipeline.maths.excitation.fourier import Fourier, basis, instants
+from pipeline.maths.excitation.joint import ExcitationProblem, impossible, within
+from pipeline.maths.excitation.search import Tell, lowest, nothing
 from pipeline.maths.mechanics.chain import Chain
-from pipeline.maths.mechanics.rigid_body import base_parameters, regressor
+from pipeline.maths.mechanics.rigid_body import base_parameters, compiled_regressor
 
 RICH = 200  # random samples that show which columns depend on others
-STEP = 1e-7  # of a coefficient, for derivatives of F
-EXCHANGES = 2  # times that the instants where a limit was exceeded are added
+AT_ONCE = 8  # trajectories, whose regressors fit into a processor's cache
 
 
 @dataclass(frozen=True)
@@ -35,79 +34,77 @@ class ArmExcitationProblem:
     columns: NDArray[np.int64]  # of all columns, those of the base parameters (p,)
 
 
+class ArmDesign(NamedTuple):
+    """The designed trajectory of each joint, and the lowest criterion that each start has come to (starts,)."""
+
+    series: list[Fourier]
+    optima: Array
+
+
 def arm_problem(chain: Chain, joints: Sequence[ExcitationProblem]) -> ArmExcitationProblem:
     """The problem, with the base parameters of the arm."""
     q, dq, ddq = np.random.default_rng(0).uniform(-1, 1, (3, RICH, len(joints)))
-    return ArmExcitationProblem(chain, tuple(joints), base_parameters(_all_columns(chain, q, dq, ddq)).columns)
+    all_columns = np.arange(10 * len(chain.parent) + 3 * len(joints))
+    return ArmExcitationProblem(chain, tuple(joints), base_parameters(_columns(chain, q, dq, ddq, all_columns)).columns)
 
 
 def arm_observation(problem: ArmExcitationProblem, series: Sequence[Fourier]) -> Array:
     """F (K n, p) of the base parameters over one period, the joints of a sample below each other.  (6.19)"""
-    return _observation(problem, np.concatenate([one.x for one in series]))
+    return np.asarray(_observations(problem, [one.x[None] for one in series])[0])
 
 
-def design_together(problem: ArmExcitationProblem, starts: int, seed: int) -> list[Fourier]:
-    """The best of several local optima; each start is the joints' own best trajectories of another seed.
+def design_together(problem: ArmExcitationProblem, starts: int, seed: int, tell: Tell = nothing) -> ArmDesign:
+    """The best of several optima, each of a population of its own.
 
     Raises
     ------
     ValueError
         If a joint's limits cannot be kept, or if no trajectory tells its terms apart.
     """
-    optima = [_local(problem, [design(joint, 4, seed + i) for joint in problem.joints]) for i in range(starts)]
-    return min(optima, key=lambda series: CRITERIA[problem.joints[0].criterion](arm_observation(problem, series))[0])
+    if reason := next(filter(None, (impossible(joint.limits) for joint in problem.joints)), ""):
+        raise ValueError(reason)
+    criterion = CRITERIA[problem.joints[0].criterion]
+
+    def objective(z: Array) -> Array:
+        chunks = (z[i : i + AT_ONCE] for i in range(0, len(z), AT_ONCE))
+        return np.concatenate([criterion(_observations(problem, _trajectories(problem, chunk))) for chunk in chunks])
+
+    best = lowest(objective, sum(1 + 2 * joint.harmonics for joint in problem.joints), starts, seed, tell)
+    if not np.isfinite(best.values).any():
+        raise ValueError("no trajectory of these harmonics tells the base parameters of the arm apart")
+    parts = zip(problem.joints, _trajectories(problem, best.z[None]), strict=True)
+    return ArmDesign([within(joint, Fourier.of(x[0], joint.period)) for joint, x in parts], best.values)
 
 
-def _local(problem: ArmExcitationProblem, series: list[Fourier]) -> list[Fourier]:
+def _trajectories(problem: ArmExcitationProblem, z: Array) -> list[Array]:
+    """Coefficients (S, 1 + 2 N_f) of each joint within its limits; the first one stands still when time starts."""
     first = problem.joints[0]
-    times = [[instants(first.period, GRID * joint.harmonics)] * 3 for joint in problem.joints]
-    for _ in range(EXCHANGES):
-        A, low, high = zip(*(inequalities(j, t) for j, t in zip(problem.joints, times, strict=True)), strict=True)
-        kept = LinearConstraint(block_diag(*A), np.concatenate(low), np.concatenate(high))
-        options: Any = {"maxiter": 40, "ftol": 1e-6}
-        x = np.concatenate([one.x for one in series])
-        result = minimize(partial(_cost, problem), x, jac=True, method="SLSQP", constraints=[kept], options=options)
-        if not np.isfinite(result.x).all() or not np.isfinite(result.fun):
-            break
-        series = [Fourier.of(part, first.period) for part in _parts(problem, result.x)]
-        times = [
-            [np.concatenate([t, more]) for t, more in zip(known, turning_points(one), strict=True)]
-            for known, one in zip(times, series, strict=True)
-        ]
-    return [within(joint, one) for joint, one in zip(problem.joints, series, strict=True)]
+    ends = np.cumsum([1 + 2 * joint.harmonics for joint in problem.joints])
+    own, *others = np.split(z, ends[:-1], axis=1)
+    own, phase = from_standstill(own, first.samples)
+    parts = zip(problem.joints, (own, *others), strict=True)
+    return [fitted(delayed(part, phase), joint.limits, first.period) for joint, part in parts]
 
 
-def _cost(problem: ArmExcitationProblem, x: Array) -> tuple[float, Array]:
-    """The criterion and its gradient; the jumps of friction at dq = 0 have no derivative and are left out."""
-    F = _observation(problem, x)
-    value, by_F = CRITERIA[problem.joints[0].criterion](F)
-    smooth = problem.columns < 10 * len(problem.chain.parent) + 2 * len(problem.joints)
-    gradient = np.empty_like(x)
-    for i in range(len(x)):
-        ahead = x.copy()
-        ahead[i] += STEP
-        gradient[i] = (by_F * (_observation(problem, ahead) - F))[:, smooth].sum() / STEP
-    return value, gradient
-
-
-def _observation(problem: ArmExcitationProblem, x: Array) -> Array:
+def _observations(problem: ArmExcitationProblem, x: Sequence[Array]) -> Array:
+    """F (S, K n, p) of many trajectories by the coefficients (S, 1 + 2 N_f) of each joint."""
     first = problem.joints[0]
     t = instants(first.period, first.samples)
     bases = [basis(first.period, joint.harmonics, t) for joint in problem.joints]
-    parts = _parts(problem, x)
-    q, dq, ddq = (np.column_stack([B[i] @ part for B, part in zip(bases, parts, strict=True)]) for i in range(3))
-    return _all_columns(problem.chain, q, dq, ddq).reshape(-1, 10 * len(problem.chain.parent) + 3 * q.shape[1])[
-        :, problem.columns
-    ]
+    q, dq, ddq = (np.stack([part @ B[i].T for B, part in zip(bases, x, strict=True)], axis=-1) for i in range(3))
+    return _columns(problem.chain, q, dq, ddq, problem.columns)
 
 
-def _all_columns(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
-    """The links' inertial parameters, then rotors, viscous and Coulomb friction of the n joints (K, n, 10 L + 3 n)."""
-    each = np.eye(q.shape[1])
-    drives = [values[:, :, None] * each for values in (ddq, dq, np.sign(dq))]
-    return np.concatenate([regressor(chain, q, dq, ddq), *drives], axis=2)
+def _columns(chain: Chain, q: Array, dq: Array, ddq: Array, columns: NDArray[np.int64]) -> Array:
+    """Some columns (..., K n, p) of the links' inertial parameters, then rotors, viscous and Coulomb friction.
 
-
-def _parts(problem: ArmExcitationProblem, x: Array) -> list[Array]:
-    ends = np.cumsum([1 + 2 * joint.harmonics for joint in problem.joints])
-    return np.split(x, ends[:-1])
+    With q, dq and ddq (..., K, n), all columns are 10 L + 3 n.
+    """
+    links = 10 * len(chain.parent)
+    of_links = columns[columns < links]
+    F = np.zeros((*q.shape, len(columns)))
+    F[..., : len(of_links)] = compiled_regressor(chain, q, dq, ddq)[..., of_links]
+    for i in range(len(of_links), len(columns)):
+        kind, joint = divmod(columns[i] - links, q.shape[-1])
+        F[..., joint, i] = (ddq, dq, np.sign(dq))[kind][..., joint]
+    return F.reshape(*q.shape[:-2], -1, len(columns))

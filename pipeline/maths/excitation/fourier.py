@@ -86,24 +86,6 @@ def observation(terms: Sequence[Term], series: Fourier, samples: int = SAMPLES) 
     return regressor(terms, *motion(series, instants(series.period, samples)))
 
 
-def determinant(F: Array) -> tuple[float, Array]:
-    """-log10 det(F^T F) and its derivative by the entries of F (K, p); infinite where F has no full rank.  (6.20)"""
-    Q, R = np.linalg.qr(F)
-    diagonal = np.abs(np.diag(R))
-    if diagonal.min() <= len(F) * np.finfo(float).eps * diagonal.max():
-        return np.inf, np.zeros_like(F)
-    return float(-2 * np.log10(diagonal).sum()), -2 / np.log(10) * np.linalg.solve(R, Q.T).T
-
-
-def condition(F: Array) -> tuple[float, Array]:
-    """log10 of the condition number of F (K, p), and its derivative by the entries of F."""
-    U, s, Vt = np.linalg.svd(F, full_matrices=False)
-    if s[-1] <= len(F) * np.finfo(float).eps * s[0]:
-        return np.inf, np.zeros_like(F)
-    derivative = np.outer(U[:, 0], Vt[0]) / s[0] - np.outer(U[:, -1], Vt[-1]) / s[-1]
-    return float(np.log10(s[0] / s[-1])), derivative / np.log(10)
-
-
 def _columns(constant: float, sines: Array, cosines: Array) -> Array:
     pairs = np.stack([sines, cosines], axis=2).reshape(len(sines), -1)
     return np.column_stack([np.full(len(sines), constant), pairs])

@@ -67,15 +67,11 @@ def inverse_dynamics(
 def regressor(chain: Chain, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Array:
     """Y (..., n, 10 L) with tau = Y pi, pi the inertial parameters of all links (`Bodies.parameters`).  (6.3)"""
     q, dq, ddq = np.broadcast_arrays(*(np.asarray(x, float) for x in (q, dq, ddq)))
+    if _many(q):
+        return compiled_regressor(chain, q, dq, ddq)
     n, L = q.shape[-1], len(chain.parent)
     N = q.size // n
     tree = tree_of(chain.reduced(n), np.zeros((L, 10)))
-    if _many(q):
-        from pipeline.maths.mechanics.kernels import regressors
-
-        Y = np.zeros((*q.shape, 10 * L))
-        regressors(tree, GRAVITY, _rows(q), _rows(dq), _rows(ddq), Y.reshape(-1, n, 10 * L))
-        return Y
     entries: list[Any] = [None] * (n * L)
     lists, at = tree.lists(), _numbers(q)
     work = recursions.work_space(lists, 0.0, n + 1)
@@ -85,6 +81,20 @@ def regressor(chain: Chain, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Arra
         if entry is not None:
             ten[:] = np.reshape(entry, (10, N))
     return np.moveaxis(Y, -1, 0).reshape(*q.shape, 10 * L)
+
+
+def compiled_regressor(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
+    """Y (..., n, 10 L) of `regressor` by the kernels however few the samples, for those who ask often."""
+    from pipeline.maths.mechanics.kernels import regressors
+    from pipeline.maths.mechanics.vector import LANES
+
+    n, L = q.shape[-1], len(chain.parent)
+    if q.size < LANES * n:  # they cannot do fewer
+        return regressor(chain, q, dq, ddq)
+    Y = np.zeros((*q.shape, 10 * L))
+    tree = tree_of(chain.reduced(n), np.zeros((L, 10)))
+    regressors(tree, GRAVITY, _rows(q), _rows(dq), _rows(ddq), Y.reshape(-1, n, 10 * L))
+    return Y
 
 
 def moving(chain: Chain, bodies: Bodies, n: int) -> Tree:

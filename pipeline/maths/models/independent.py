@@ -1,6 +1,6 @@
 """The model of a joint that moves by itself, or is taken to: a sum of terms.  Section 6.1"""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,6 +10,16 @@ from pipeline.maths.models.bias import Coefficients, bias
 from pipeline.maths.models.memory import deflection
 from pipeline.maths.models.model import JointDynamics, Motion, Parameter, Regressor
 from pipeline.maths.models.terms import Term
+
+FUNCTIONS: dict[str, Callable[[Array, Array], Array | float]] = {  # those of `bias`, of q and dq; z is 0
+    "1": lambda q, dq: 1.0,
+    "sin q": lambda q, dq: np.sin(q),
+    "cos q": lambda q, dq: np.cos(q),
+    "q": lambda q, dq: q,
+    "dq": lambda q, dq: dq,
+    "sign(dq)": lambda q, dq: np.sign(dq),
+    "z": lambda q, dq: 0.0,
+}
 
 
 @dataclass(frozen=True)
@@ -68,19 +78,17 @@ def column(term: Term, q: Array, dq: Array, ddq: Array, z: Array) -> Array:
 
 
 def regressor(terms: Sequence[Term], q: Array, dq: Array, ddq: Array) -> Array:
-    """Phi (K, p) of terms without memory; q, dq and ddq (K,) in the joint's units.  (6.9), (6.12), (6.14)"""
-    return np.stack([column(term, q, dq, ddq, np.zeros_like(q)) for term in terms], axis=-1)
+    """Phi (..., K, p) of terms without memory; q, dq and ddq (..., K) in the joint's units.  (6.9), (6.12), (6.14)
 
-
-def slopes(terms: Sequence[Term], q: Array, dq: Array) -> tuple[Array, Array]:
-    """The derivatives of the columns of Phi by q and dq, (K, p) each; friction's jump has none and counts as 0."""
-    by_q, by_dq = (np.stack(columns, axis=-1) for columns in zip(*(_slopes(t, q, dq) for t in terms), strict=True))
-    return by_q, by_dq
-
-
-def _slopes(term: Term, q: Array, dq: Array) -> tuple[Array, Array]:
-    _, b_q, b_dq = bias(term.coefficients, q, dq, np.zeros_like(q))
-    return b_q + np.zeros_like(q), b_dq + np.zeros_like(q)
+    The same as `column`, but without the functions that a term has not, for those who ask for thousands.
+    """
+    Phi = np.zeros((len(terms), *q.shape))
+    for phi, term in zip(Phi, terms, strict=True):
+        if term.a:
+            phi += term.a * ddq
+        for name, coefficient in term.b.items():
+            phi += coefficient * FUNCTIONS[name](q, dq)
+    return np.moveaxis(Phi, 0, -1)
 
 
 def inertia_of(terms: Sequence[Term], theta: Array) -> float:

@@ -122,11 +122,6 @@ def read(motors: Any, q: Any, angle: Any) -> None:
             angle[j] = motors.encoder_step[j] * np.round(angle[j] / motors.encoder_step[j])
 
 
-def pd_gravity(law: Regulator, error: Array, dq: Array, G: Array) -> Array:
-    """The effort of PD with gravity compensation.  (5.17)"""
-    return law.proportional * error - law.derivative * dq + law.gravity * G
-
-
 def lyapunov(M: Array, dq: Array, proportional: Array, error: Array) -> float:
     """V = dq^T M dq / 2 + e^T K_p e / 2, which PD with gravity compensation never lets rise.  (5.9)"""
     return float(dq @ M @ dq / 2 + error @ (proportional * error) / 2)

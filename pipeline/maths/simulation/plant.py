@@ -33,11 +33,11 @@ def arm(chain: Chain, bodies: Bodies, rotors: Array) -> Plant:
     data = PlantData(
         tree_of(chain, parameters), np.zeros(n), rotors.astype(np.float64), int(chain.body[frame]), (x, y, z)
     )
-    return Plant(_dynamics, _tip, data)
+    return Plant(dynamics, _tip, data)
 
 
 @compiled
-def _dynamics(body: Any, q: Any, dq: Any, M: Any, b: Any) -> None:
+def dynamics(body: Any, q: Any, dq: Any, M: Any, b: Any) -> None:
     """Fill M, with the rotors', and b = C dq + G.  (A.12)"""
     mass_and_bias(body.tree, GRAVITY, q, dq, body.rest, M, b)
     for i in range(len(q)):

@@ -22,7 +22,8 @@ def blocks(context: Context, excitations: list[Excitation]) -> Iterator[Block]:
     yield Prose(
         "A trajectory tells the parameters apart the better, the smaller $-log_10 det(F^T F)$ over 300 samples of a "
         "period. Position, velocity and acceleration have to keep their limits at every instant: the extremes are "
-        "computed, not sampled."
+        "computed, not sampled. Those designed here are the best of several searches, which know no limits: the "
+        "harmonics are scaled until they touch one, and the mean lies anywhere in the slack that they leave."
     )
     yield Table(
         "Objective and condition of published trajectories and of those designed here, and how far each exceeds its "
