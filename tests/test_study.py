@@ -107,6 +107,9 @@ def test_a_good_study_means_what_it_says(tmp_path):
         ('hand_roll.i = "Current"', "hand_roll.i = -1", "must be a name, or a column number from 0, not -1"),
         ("[[log]]", "[settings]\nlowpass = 0\n[[log]]", "4: settings: lowpass must be positive, not 0.0"),
         ("[[log]]", "[settings]\nlow = 0\n[[log]]", "4: settings: unknown key 'low'; known are lowpass"),
+        ("[[log]]", "[settings.effort]\nelbow = 1\n[[log]]", "4: settings.effort: davinci has no joint"),
+        ("[[log]]", "[settings.effort]\nhand_roll = 0\n[[log]]", "4: settings.effort: hand_roll must be positive"),
+        ("[[log]]", "[settings]\neffort = 3\n[[log]]", "4: settings.effort: must be a table, not 3"),
         (
             "[[log]]",
             "[robot_overrides.elbow]\ngear_ratio = 1\n[[log]]",
@@ -348,3 +351,9 @@ def test_what_is_wrong_with_a_robot_is_said(tmp_path, old, new, says):
     with pytest.raises(BadRobot) as caught:
         robots.load("arm.toml", tmp_path)
     assert says in str(caught.value)
+
+
+def test_the_effort_that_is_sought_is_read_joint_by_joint(tmp_path):
+    made = read(tmp_path, GOOD.replace("[[log]]", "[settings]\neffort = { hand_roll = 0.5 }\n[[log]]"))
+    assert made.settings.effort == {"hand_roll": 0.5}
+    assert read(tmp_path, GOOD).settings.effort == {}

@@ -99,14 +99,14 @@ def _settings(table: TomlTable, robot: Robot | None) -> Settings:
     return Settings(**values, effort=_sought(efforts, robot))
 
 
-def _sought(efforts: TomlTable, robot: Robot | None) -> tuple[tuple[str, float], ...]:
+def _sought(efforts: TomlTable, robot: Robot | None) -> dict[str, float]:
     """The effort that the user wants to see on each joint."""
     known = [joint.name for joint in robot.joints] if robot else list(efforts.values)
     for name in efforts.values:
         if name not in known:
             efforts.problem(f"{robot.name if robot else ''} has no joint {name!r}; it has {', '.join(known)}", name)
     named = [name for name in efforts.values if name in known]
-    return tuple((name, checked(efforts, name, efforts.number(name), "effort")) for name in named)
+    return {name: checked(efforts, name, efforts.number(name), "effort") for name in named}
 
 
 def _setting(table: TomlTable, field: Field[Any]) -> Any:

@@ -16,11 +16,7 @@ class Settings:
     harmonics: int = 0  # of the excitation; 0 takes the robot's
     fit: str = "independent.lse"  # the Fit that the filter runs with
     q_tau: float = 0.0  # random walk of the external effort [effort/s^0.5]; 0 takes the robot's
-    effort: tuple[tuple[str, float], ...] = ()  # what the user wants to see on each joint [effort]
-
-    def sought(self, joint: str) -> float | None:
-        """The effort that the user wants to see on a joint, or None where none is stated."""
-        return dict(self.effort).get(joint)
+    effort: dict[str, float] = field(default_factory=dict)  # what the user wants to see on each joint [effort]
 
 
 @dataclass(frozen=True)

@@ -112,7 +112,7 @@ def trust(context: Context, joint: str) -> Trust:
         joint,
         max(unseen, key=lambda p: p.model_error, default=None),
         max(spaces, key=lambda space: space.detection_level, default=None),
-        context.study.settings.sought(joint),
+        context.study.settings.effort.get(joint),
     )
 
 
