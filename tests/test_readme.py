@@ -13,7 +13,7 @@ import typer
 from typer.testing import CliRunner
 
 import pipeline
-from pipeline import commands, stages
+from pipeline import commands, robots, stages
 from pipeline.cli import app
 from pipeline.maths.units import SI, UNITS
 from pipeline.records import COLUMN_DTYPES, KINDS, Control, Excitation, Links, Lyapunov, Origin, Record
@@ -69,6 +69,13 @@ def test_settings_are_those_that_there_are_with_their_defaults():
     defaults = {spans(name)[0]: tomllib.loads(f"x = {default}")["x"] for name, default, *_ in table}
     assert list(defaults.items()) == list(asdict(Settings()).items())
     assert [type(value) for value in defaults.values()] == [type(value) for value in asdict(Settings()).values()]
+
+
+def test_the_robot_that_is_shown_is_one(tmp_path):
+    [text] = [block for block in re.findall(r"```toml\n(.*?)```", README, re.S) if "[[joint]]" in block]
+    (tmp_path / "my_arm.toml").write_text(text)
+    robot = robots.load("my_arm.toml", tmp_path)
+    assert [joint.name for joint in robot.joints] == ["shoulder"]
 
 
 def test_roles_are_those_that_there_are():
@@ -232,7 +239,7 @@ def test_the_lines_of_python_run_as_they_are_written(analysed, tmp_path, capsys)
 def test_the_study_file_of_the_readme_is_one(tmp_path):
     (tmp_path / "study.toml").write_text(README.partition("```toml\n")[2].partition("```")[0])
     study = reading.read(tmp_path)
-    assert study.settings == Settings()
+    assert study.settings == Settings(effort={"hand_roll": 0.5})  # the others as they are by default
     assert study.logs[0].joints == ("hand_roll",)
 
 

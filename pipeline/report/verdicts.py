@@ -11,7 +11,6 @@ DETECTED, DETECTABLE = 1 / 3, 1.0  # detection level over the effort that the us
 COVERED = (0.90, 0.98)  # coverage of a 95 % band that is right
 WITHIN = 4.0  # standard errors that an estimate may be off the truth
 WORDS: dict[Level, str] = {"good": "● Good", "warn": "▲ Caution", "bad": "✖ Problem", "info": "○ Note"}
-SEVERITY: dict[Level, int] = {"good": 0, "info": 1, "warn": 2, "bad": 3}
 
 
 @dataclass(frozen=True)

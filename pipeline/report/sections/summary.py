@@ -215,10 +215,15 @@ def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell
 
 def first_looks(context: Context, trusts: list[Trust]) -> Iterator[Block]:
     """The three things to look at first, worst first."""
-    looks = sorted(looks_at(context, trusts), key=lambda look: -look[0])
+    looks = first_looks_in_order(context, trusts)
     if looks:
         yield Prose("**Look at these first.**")
-        yield Bullets(tuple(text for _, text in looks[:3]))
+        yield Bullets(looks)
+
+
+def first_looks_in_order(context: Context, trusts: list[Trust]) -> tuple[str, ...]:
+    """The same as marked texts."""
+    return tuple(text for _, text in sorted(looks_at(context, trusts), key=lambda look: -look[0])[:3])
 
 
 def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:
