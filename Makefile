@@ -30,9 +30,9 @@ STAGES := design ingest resample average differentiate fit predict ekf assess me
 # resample      : Recording -> Signal Diagnostic
 # average       : Signal -> Average PeriodResidual Diagnostic
 # differentiate : Average -> Trajectory Spectrum Diagnostic
-# fit           : Trajectory -> Fit Residual Diagnostic
-# predict       : Signal Trajectory Fit -> Prediction Diagnostic
-# ekf           : Signal Fit Average -> Track Diagnostic
+# fit           : Trajectory -> Fit CrossFit MeasurementNoise Residual Diagnostic
+# predict       : Signal Trajectory Fit CrossFit -> Prediction Diagnostic
+# ekf           : Signal Fit MeasurementNoise -> Track Diagnostic
 # assess        : Track -> FreeSpace
 # measure       : Track FreeSpace -> Contact
 # whiteness     : PeriodResidual Residual Track -> Whiteness

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from pipeline.estimators import estimator
 from pipeline.estimators.problem import Regression, correlation_lags
 from pipeline.estimators.wlse import pooled
-from pipeline.records import Average, Diagnostic, Fit, Prediction, Residual, Trajectory
+from pipeline.records import Average, CrossFit, Diagnostic, Fit, Prediction, Residual, Trajectory
 from pipeline.stages import average, differentiate, fit, predict
 from tests import arm
 from tests.test_averaging import entry
@@ -155,8 +155,9 @@ def test_a_harmonic_that_is_left_out_is_remarked_on():
 
 def predictions(signal, role, fitted, trajectories=(), **changes):
     own = next((t for t in trajectories if t.log == signal.log), None)
+    cross_fits = [r for r in fit.run(trajectories, arm.ARM) if isinstance(r, CrossFit)]
     about = entry(name=signal.log, role=role, **changes)
-    return list(predict.run(signal, own, trajectories, fitted, about, arm.joint(signal.joint), lowpass=17.0))
+    return list(predict.run(signal, own, trajectories, fitted, cross_fits, about, arm.joint(signal.joint), lowpass=17.0))
 
 
 def test_a_validation_log_is_predicted_down_to_its_noise():
