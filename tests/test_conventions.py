@@ -221,6 +221,15 @@ def test_every_field_of_every_record_is_a_quantity_and_every_quantity_is_used():
     assert set(QUANTITIES) <= named | {"value"}
 
 
+def test_a_record_is_a_declaration_and_what_it_does_is_for_the_report_alone():
+    """A stage's fingerprint holds the fields of records; their code is not in it."""
+    for kind in KINDS.values():
+        made = set(vars(kind)) - {f.name for f in fields(kind)}
+        assert {name for name in made if not name.startswith("_")} <= {"KEY", "ROWS", "published", "prefix"}, kind
+    code = "".join(s.read_text() for room in ("stages", "estimators", "filters") for s in (ROOT / room).rglob("*.py"))
+    assert not re.findall(r"(?<!joint)\.(?:published|prefix)\b|QUANTITIES", code)
+
+
 def test_every_record_is_listed():
     from pipeline import records
 

@@ -1,15 +1,19 @@
 """Parameters: those put in come out, as well as they claim to."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from pipeline.estimators import estimator
-from pipeline.estimators.problem import Regression, correlation_lags
+from pipeline.errors import NotIdentifiable
+from pipeline.estimators import ESTIMATORS, estimator
+from pipeline.estimators.folds import folds
+from pipeline.estimators.problem import Regression, bartlett, correlation_lags
 from pipeline.estimators.wlse import pooled
-from pipeline.records import Average, CrossFit, Diagnostic, Fit, Prediction, Residual, Trajectory
+from pipeline.records import Average, CrossFit, Diagnostic, Fit, MeasurementNoise, Prediction, Residual, Trajectory
 from pipeline.stages import average, differentiate, fit, predict
 from tests import arm
 from tests.test_averaging import entry
@@ -187,6 +191,62 @@ def test_an_identification_log_is_predicted_from_the_others_or_from_its_other_pe
     for made in (by_log, by_period):
         assert isinstance(made, Prediction)
         assert made.rmse == pytest.approx(arm.NOISE["hand_roll"], rel=0.05)
+
+
+def refit_without(trajectories, *logs) -> np.ndarray:
+    rest = [t for t in trajectories if t.log not in logs]
+    return next(r for r in fit.run(rest, arm.ARM) if isinstance(r, Fit)).theta
+
+
+def test_every_log_is_left_out_once_by_refits_to_all_the_others():
+    every = [trajectory(arm.signal(seed=i, log=f"log-{i}", periods=4)) for i in range(3)]
+    cross = next(r for r in fit.run(every, arm.ARM) if isinstance(r, CrossFit))
+    for t in every:
+        assert_allclose(cross.theta[cross.left_out == t.log], refit_without(every, t.log), rtol=1e-12)
+    assert len(cross) == 3 * 4
+
+
+def test_many_logs_are_left_out_in_twenty_folds_of_neighbours():
+    assert folds(20) == list(range(20))
+    for count in (21, 45, 400):
+        fold = np.array(folds(count))
+        assert (np.diff(fold) >= 0).all()
+        assert set(fold) == set(range(20))
+        assert np.ptp(np.bincount(fold)) <= 1
+    one = trajectory(arm.signal(periods=4, rate=20.0))
+    every = [replace(one, log=f"log-{i}", tau=one.tau * (1 + 0.01 * i)) for i in range(30)]
+    cross = next(r for r in fit.run(every, arm.ARM) if isinstance(r, CrossFit))
+    assert list(dict.fromkeys(cross.left_out))[:3] == ["log-0, log-1", "log-2", "log-3, log-4"]
+    assert_allclose(cross.theta[:4], refit_without(every, "log-0", "log-1"), rtol=1e-12)
+    [made, _] = predictions(arm.signal(log="log-4", rate=20.0), "identification", [], every)
+    assert made.scheme == "leave 2 logs out"
+
+
+def test_a_log_that_no_refit_can_do_without_has_no_leave_out_score_and_it_is_said():
+    """Only one of the logs holds periods enough for weights, and without the others' there are none."""
+    every = [trajectory(arm.signal(seed=i, log=f"log-{i}", periods=p)) for i, p in enumerate((5, 3))]
+    made = list(fit.run(every, arm.ARM))
+    lse, wlse = (r for r in made if isinstance(r, CrossFit))
+    assert (set(lse.left_out), set(wlse.left_out)) == ({"log-0", "log-1"}, {"log-1"})
+    said = " ".join(text for r in made if isinstance(r, Diagnostic) for text in r.text)
+    assert "hand_roll: wlse has no leave-out score of log-0, because a refit is not possible: weights need" in said
+    kept = predictions(arm.signal(seed=0, log="log-0"), "identification", [], every)
+    assert [r.estimator for r in kept] == ["lse"]
+
+
+def test_the_noise_of_a_joint_is_that_of_its_logs_together():
+    every = [trajectory(arm.signal(seed=i, log=f"log-{i}", noise=noise)) for i, noise in enumerate((1.0, 2.0))]
+    noise = next(r for r in fit.run(every, arm.ARM) if isinstance(r, MeasurementNoise))
+    assert noise.sigma_tau == pytest.approx(arm.NOISE["hand_roll"] * np.sqrt(2.5), rel=0.05)
+    assert noise.sigma_q == pytest.approx(1e-4 * np.sqrt(2.5), rel=0.05)
+
+
+@pytest.mark.parametrize("lags", [0, 1, 30, 99])
+def test_moving_sums_give_the_sum_of_autocovariances_that_statsmodels_gives(lags):
+    from statsmodels.stats.sandwich_covariance import S_hac_simple
+
+    scores = np.cumsum(np.random.default_rng(lags).normal(size=(100, 3)), axis=0)
+    assert_allclose(bartlett(scores, lags), S_hac_simple(scores, nlags=lags), rtol=1e-9)
 
 
 def test_a_period_that_differs_from_the_others_is_predicted_badly():

@@ -15,7 +15,7 @@ The signature of `run` is the declaration of everything it needs:
 
 "About the same" is about the log and the joint of the call, as far as the call and the record are about any: a call for
 a log and a joint gets the fits of its joint, and one that is about neither gets all there are.  So what a call reads
-does not grow with the study, unless it is the only one of its stage.
+does not grow with the study, unless it is the only one of its stage.  The report is no stage: it reads everything.
 """
 
 STAGES = (
