@@ -235,10 +235,10 @@ def test_a_log_that_no_refit_can_do_without_has_no_leave_out_score_and_it_is_sai
 
 
 def test_the_noise_of_a_joint_is_that_of_its_logs_together():
-    every = [trajectory(arm.signal(seed=i, log=f"log-{i}", noise=noise)) for i, noise in enumerate((1.0, 2.0))]
+    every = [trajectory(arm.signal(seed=i, log=f"log-{i}", noise=noise)) for i, noise in enumerate((1.0, 3.0))]
     noise = next(r for r in fit.run(every, arm.ARM) if isinstance(r, MeasurementNoise))
-    assert noise.sigma_tau == pytest.approx(arm.NOISE["hand_roll"] * np.sqrt(2.5), rel=0.05)
-    assert noise.sigma_q == pytest.approx(1e-4 * np.sqrt(2.5), rel=0.05)
+    assert noise.sigma_tau == pytest.approx(arm.NOISE["hand_roll"] * np.sqrt(5), rel=0.05)
+    assert noise.sigma_q == pytest.approx(1e-4 * np.sqrt(5), rel=0.05)
 
 
 @pytest.mark.parametrize("lags", [0, 1, 30, 99])

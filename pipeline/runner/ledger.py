@@ -14,6 +14,7 @@ from typing import Any
 
 from pipeline.records import store
 from pipeline.runner.canonical import hash_of_text
+from pipeline.runner.fingerprint import Fingerprint, differences
 
 
 @dataclass(frozen=True)
@@ -28,18 +29,6 @@ class Folders:
         """The file that a name in the ledger stands for."""
         root, _, path = name.partition("/")
         return Path(getattr(self, root)) / path
-
-
-@dataclass(frozen=True)
-class Fingerprint:
-    """Everything that the outputs of a task depend on."""
-
-    inputs: dict[str, str]  # file -> sha256
-    given: dict[str, str]  # what the stage was given besides records -> sha256
-    settings: dict[str, Any]
-    schemas: dict[str, str]  # kind of record read or made -> sha256 of its declaration
-    code: dict[str, str]  # module -> sha256
-    version: str
 
 
 @dataclass(frozen=True)
@@ -72,7 +61,7 @@ class Ledger:
             entry = _read(file)
             if entry:
                 # The code of a stage is the same for all its tasks, and most of what an entry holds.
-                code = entry.fingerprint["code"]
+                code = entry.fingerprint.get("code", {})
                 entry.fingerprint["code"] = shared.setdefault(tuple(code.items()), code)
                 entries.setdefault(file.parent.name, {})[file.stem] = entry
         return entries
@@ -123,29 +112,6 @@ class Ledger:
             return ["it failed last time"]
         altered = [f"{name} was altered" for name, sha in entry.outputs.items() if self.digest(name) != sha]
         return altered + differences(entry.fingerprint, now)
-
-
-REASONS = {  # part of a fingerprint -> what is said of what changed in it
-    "given": "the {} changed",
-    "schemas": "the declaration of {} changed",
-    "code": "the code of {} changed",
-    "inputs": "{} changed",
-}
-
-
-def differences(then: dict[str, Any], now: Fingerprint) -> list[str]:
-    """What changed between the fingerprint of an entry and that of now, in words."""
-    if then == vars(now):
-        return []
-    changed = []
-    if then.get("version") != now.version:
-        changed.append(f"version {then.get('version')} became {now.version}")
-    old = then.get("settings", {})
-    changed += [f"{k} = {old.get(k)!r} became {v!r}" for k, v in now.settings.items() if old.get(k) != v]
-    for what, reason in REASONS.items():
-        old, new = then.get(what, {}), getattr(now, what)
-        changed += [reason.format(name) for name in sorted(old.keys() | new.keys()) if old.get(name) != new.get(name)]
-    return changed
 
 
 def file_name(task: str) -> str:

@@ -10,7 +10,8 @@ from pipeline.records import KINDS
 from pipeline.robots.robot import Kind
 from pipeline.runner.canonical import hash_of
 from pipeline.runner.code import code
-from pipeline.runner.ledger import Fingerprint, Ledger
+from pipeline.runner.fingerprint import Fingerprint
+from pipeline.runner.ledger import Ledger
 from pipeline.runner.places import Located, Places, about
 from pipeline.runner.schemas import schemas
 from pipeline.runner.signature import Declaration

@@ -10,7 +10,8 @@ from pipeline.report import REPORT
 from pipeline.runner.canonical import hash_of
 from pipeline.runner.code import code
 from pipeline.runner.execution import Outcome, said_of, without_folders
-from pipeline.runner.ledger import Fingerprint, Ledger
+from pipeline.runner.fingerprint import Fingerprint
+from pipeline.runner.ledger import Ledger
 from pipeline.runner.places import Located
 from pipeline.runner.plan import VERSION, Plan, Task
 from pipeline.study import Study
