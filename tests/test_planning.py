@@ -1,7 +1,6 @@
 """Which tasks a study gives, and what each of them is handed: what is about its own log and joint, and nothing else."""
 
 import pickle
-from pathlib import Path
 
 import pytest
 
@@ -51,7 +50,7 @@ def plan(tmp_path) -> Plan:
     ],
 )
 def test_a_place_says_what_its_record_is_about(kind, place, log, joint):
-    assert about(kind, Path(place)) == (log, joint)
+    assert about(kind, place) == (log, joint)
 
 
 def test_records_come_in_the_order_of_the_studys_logs_and_the_robots_joints(plan):

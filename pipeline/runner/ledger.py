@@ -67,7 +67,7 @@ class Ledger:
         return entries
 
     def _files(self) -> list[Path]:
-        return sorted(file for file in (self.folders.processed / "tasks").rglob("*.json") if file.is_file())
+        return sorted(file for file in (self.folders.processed / "tasks").glob("*/*.json") if file.is_file())
 
     def entry(self, stage: str, task: str) -> Entry | None:
         """The entry of a task, or None when it has not run or its entry cannot be read."""

@@ -24,7 +24,8 @@ class Places:
                 root, _, path = name.partition("/")
                 if root == "processed":
                     self._names.setdefault(path.partition("/")[0], []).append(path)
-        self._indices: dict[tuple[str, bool, bool], dict[tuple[str, str], tuple[Located, ...]]] = {}
+        self._indices: dict[tuple[str, bool, bool], dict[tuple[str, str], list[Located]]] = {}
+        self._ranked: dict[str, list[tuple[str, str, Located]]] = {}
 
     def of(self, kinds: Kinds, log: str = ANY, joint: str = ANY) -> tuple[Located, ...]:
         """Files of these kinds about a log and a joint; a kind that is about no log or joint is about every one."""
@@ -32,36 +33,36 @@ class Places:
         for kind in sorted(kinds, key=list(KINDS.values()).index):
             by_log, by_joint = bool(log) and is_about_log(kind), bool(joint) and is_about_joint(kind)
             index = self._index(kind, by_log, by_joint)
-            located += index.get((log if by_log else ANY, joint if by_joint else ANY), ())
+            located += tuple(index.get((log if by_log else ANY, joint if by_joint else ANY), ()))
         return located
 
-    def _index(self, kind: type[Record], by_log: bool, by_joint: bool) -> dict[tuple[str, str], tuple[Located, ...]]:
+    def _index(self, kind: type[Record], by_log: bool, by_joint: bool) -> dict[tuple[str, str], list[Located]]:
         """All files of a kind, by the log and by the joint that they are about, or by either, or in one."""
         which = (kind.__name__, by_log, by_joint)
         if which not in self._indices:
-            grouped: dict[tuple[str, str], list[Located]] = {}
-            for place in self._sorted(kind):
-                log, joint = about(kind, place)
-                grouped.setdefault((log if by_log else ANY, joint if by_joint else ANY), []).append(
-                    (kind.__name__, place)
-                )
-            self._indices[which] = {key: tuple(located) for key, located in grouped.items()}
+            index = self._indices[which] = {}
+            for log, joint, located in self._sorted(kind):
+                index.setdefault((log if by_log else ANY, joint if by_joint else ANY), []).append(located)
         return self._indices[which]
 
-    def _sorted(self, kind: type[Record]) -> list[Path]:
-        """The files of a kind, without those about a log that has left the study."""
-        ranked = []
-        for name in self._names.get(kind.folder(), []):
-            log, joint = about(kind, Path(name))
-            if log == ANY or log in self._logs:
-                ranks = self._logs.get(log, len(self._logs)), self._joints.get(joint, len(self._joints))
-                ranked.append((*ranks, name))
-        return [Path(name) for *_, name in sorted(ranked)]
+    def _sorted(self, kind: type[Record]) -> list[tuple[str, str, Located]]:
+        """The files of a kind with what they are about, without those about a log that has left the study."""
+        if kind.__name__ not in self._ranked:
+            ranked = []
+            for name in self._names.get(kind.folder(), []):
+                log, joint = about(kind, name)
+                if log == ANY or log in self._logs:
+                    ranks = self._logs.get(log, len(self._logs)), self._joints.get(joint, len(self._joints))
+                    ranked.append((*ranks, name, log, joint))
+            self._ranked[kind.__name__] = [
+                (log, joint, (kind.__name__, Path(name))) for *_, name, log, joint in sorted(ranked)
+            ]
+        return self._ranked[kind.__name__]
 
 
-def about(kind: type[Record], place: Path) -> tuple[str, str]:
+def about(kind: type[Record], name: str) -> tuple[str, str]:
     """The log and the joint that a file is about: `track/<log>/<joint>.parquet`; "" where it is about none."""
-    first, *others = place.with_suffix("").parts[1:]
+    first, *others = name.removesuffix(".parquet").split("/")[1:]
     key = dict(zip(kind.KEY, (first, *(part for other in others for part in other.split("."))), strict=False))
     return key.get("log", ANY), key.get("joint", key.get("group", ANY))
 

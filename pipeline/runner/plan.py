@@ -63,7 +63,7 @@ class Plan:
     def _each_record(self, asks: Declaration, places: Places) -> Iterator[Task]:
         [(parameter, kinds)] = asks.each.items()
         for kind, place in places.of(kinds):
-            log, joint = about(KINDS[kind], place)
+            log, joint = about(KINDS[kind], place.as_posix())
             others = {p: places.of(k, log, joint) for p, k in (asks.optional | asks.every).items()}
             name = _task_name(kind, place, len(kinds))
             yield self._task(asks, name, {parameter: ((kind, place),), **others}, log, joint)
@@ -84,7 +84,7 @@ class Plan:
         if "log" in asks.given.values():
             inputs |= {f"raw/{file}" for file in self._entries[log].files}
         hashes = {
-            what: self._hash(what, log if what == "entry" else joint, given[p])
+            what: self._hash(what, {"entry": log, "joint": joint}.get(what, ""), given[p])
             for p, what in asks.given.items()
             if what != "log"
         }

@@ -21,8 +21,9 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     """The section's content."""
     yield Prose(
         "A fit is judged on data that it has not seen: validation logs, contact logs outside their contact windows, "
-        "and identification logs predicted from refits that leave the log out or, where a joint has only one, each "
-        "of its periods in turn. Scores are of the raw effort; the relative error compares low-passed efforts."
+        "and identification logs predicted from refits that leave the log out, with its neighbours where a joint has "
+        "more than 20, or, where it has only one, each of its periods in turn. Scores are of the raw effort; the "
+        "relative error compares low-passed efforts."
     )
     rows = tuple(
         (
