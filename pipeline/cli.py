@@ -17,12 +17,11 @@ from typer.core import TyperCommand
 from pipeline.commands import COMMANDS
 from pipeline.errors import PipelineError
 from pipeline.report import REPORT
+from pipeline.runner import STEPS
 from pipeline.stages import STAGES
 
 if TYPE_CHECKING:
     from pipeline.runner.runs import Verbosity
-
-STEPS = (*STAGES, REPORT)  # everything that a run does, in order
 
 app = typer.Typer(
     no_args_is_help=True,

@@ -8,12 +8,21 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from pipeline.errors import NotIdentifiable
-from pipeline.estimators import ESTIMATORS, estimator
+from pipeline.estimators import estimator
 from pipeline.estimators.folds import folds
 from pipeline.estimators.problem import Regression, bartlett, correlation_lags
 from pipeline.estimators.wlse import pooled
-from pipeline.records import Average, CrossFit, Diagnostic, Fit, MeasurementNoise, Prediction, Residual, Trajectory
+from pipeline.records import (
+    Average,
+    CrossFit,
+    Diagnostic,
+    Fit,
+    FittedPaths,
+    MeasurementNoise,
+    Prediction,
+    Residual,
+    Trajectory,
+)
 from pipeline.stages import average, differentiate, fit, predict
 from tests import arm
 from tests.test_averaging import entry
@@ -159,9 +168,11 @@ def test_a_harmonic_that_is_left_out_is_remarked_on():
 
 def predictions(signal, role, fitted, trajectories=(), **changes):
     own = next((t for t in trajectories if t.log == signal.log), None)
-    cross_fits = [r for r in fit.run(trajectories, arm.ARM) if isinstance(r, CrossFit)]
+    made = list(fit.run(trajectories, arm.ARM))
+    paths = next((r for r in made if isinstance(r, FittedPaths)), None)
+    cross_fits = [r for r in made if isinstance(r, CrossFit)]
     about = entry(name=signal.log, role=role, **changes)
-    return list(predict.run(signal, own, trajectories, fitted, cross_fits, about, arm.joint(signal.joint), lowpass=17.0))
+    return list(predict.run(signal, own, paths, fitted, cross_fits, about, arm.joint(signal.joint), lowpass=17.0))
 
 
 def test_a_validation_log_is_predicted_down_to_its_noise():
@@ -232,6 +243,32 @@ def test_a_log_that_no_refit_can_do_without_has_no_leave_out_score_and_it_is_sai
     assert "hand_roll: wlse has no leave-out score of log-0, because a refit is not possible: weights need" in said
     kept = predictions(arm.signal(seed=0, log="log-0"), "identification", [], every)
     assert [r.estimator for r in kept] == ["lse"]
+
+
+def test_a_recording_is_told_to_follow_a_path_that_was_fitted():
+    fitted, seen = fits(arm.signal()), [trajectory(arm.signal(log="seen"))]
+    again, other = arm.signal(seed=9, log="again"), arm.signal(seed=9, log="other", period=7.3)
+    other = replace(other, q=other.q * np.cos(0.3 * other.t))
+    for signal, path in ((again, "same path"), (other, "another path")):
+        assert {r.path for r in predictions(signal, "validation", fitted.values(), seen)} == {path}
+
+
+def test_of_many_fitted_paths_those_that_differ_most_are_kept_and_it_is_said_when_they_do_not_stand_for_all():
+    one = trajectory(arm.signal(periods=4, rate=20.0))
+    phase = 2 * np.pi * one.t / one.period
+
+    def kept(paths: int) -> tuple[set[int], str]:
+        every = [replace(one, log=f"log-{i}", q=np.sin((1 + i % paths) * phase)) for i in range(60)]
+        made = list(fit.fitted_paths(every))
+        [kept] = (r for r in made if isinstance(r, FittedPaths))
+        logs = [int(log.removeprefix("log-")) % paths for log in dict.fromkeys(kept.source)]
+        assert len(logs) == 20
+        return set(logs), " ".join(text for r in made if isinstance(r, Diagnostic) for text in r.text)
+
+    assert kept(15) == (set(range(15)), "")
+    indices, said = kept(30)
+    assert len(indices) == 20
+    assert "hand_roll: its identification logs follow more than 20 paths" in said
 
 
 def test_the_noise_of_a_joint_is_that_of_its_logs_together():

@@ -33,7 +33,8 @@ def plan(tmp_path) -> Plan:
         write("differentiate", log, *(f"trajectory/{log}/{joint}" for joint in (PITCH, ROLL)))
     joints = (PITCH, ROLL)
     pooled = [f"{kind}/{joint}/independent.lse" for kind in ("fit", "cross_fit") for joint in joints]
-    write("fit", "fit", *pooled, *(f"measurement_noise/{joint}" for joint in joints))
+    noise = [f"{kind}/{joint}" for kind in ("fitted_paths", "measurement_noise") for joint in joints]
+    write("fit", "fit", *pooled, *noise)
     return Plan(Study(folders.raw, "T", dvrk_psm.ROBOT, False, Settings(), entries), Ledger(folders))
 
 
@@ -68,6 +69,7 @@ def test_a_call_gets_the_records_about_its_own_log_and_joint(plan):
     handed = {p: [place.as_posix() for _, place in r] for p, r in tasks[f"zebra/{PITCH}"].records.items()}
     assert handed == {
         "signal": [f"signal/zebra/{PITCH}.parquet"],
+        "paths": [f"fitted_paths/{PITCH}.parquet"],
         "trajectory": [f"trajectory/zebra/{PITCH}.parquet"],
         "fits": [f"fit/{PITCH}/independent.lse.parquet"],
         "cross_fits": [f"cross_fit/{PITCH}/independent.lse.parquet"],
@@ -95,7 +97,8 @@ def test_what_is_read_counts_by_name_type_and_unit_and_what_is_written_by_meanin
     from pipeline.records.quantities import QUANTITIES
 
     before = {stage: schemas(stage) for stage in ("predict", "fit", "whiteness")}
-    assert before["predict"].keys() == {"Signal", "Trajectory", "Fit", "CrossFit", "Prediction", "Diagnostic"}
+    read = {"Signal", "Trajectory", "FittedPaths", "Fit", "CrossFit"}
+    assert before["predict"].keys() == {*read, "Prediction", "Diagnostic"}
 
     def changed(**what: str) -> set[tuple[str, str]]:
         schemas.cache_clear()

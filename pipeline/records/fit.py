@@ -1,4 +1,4 @@
-"""Records of what all identification logs say together: parameters, what they leave of the effort, and noise."""
+"""Records of what all identification logs say together: parameters, what they leave of the effort, paths and noise."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -52,6 +52,19 @@ class CrossFit(Record):
     parameter: Labels
     unit: Labels
     theta: Column
+
+
+@dataclass(frozen=True, eq=False)
+class FittedPaths(Record):
+    """The paths that were fitted on a joint, one period of each in turn; of many, those that differ most."""
+
+    KEY = ("joint",)
+
+    joint: str
+    source: Labels  # the log that follows the path
+    period: Column
+    t: Column
+    q: Column
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,7 @@ from multiprocessing import get_context
 from pipeline.errors import PipelineError
 from pipeline.records import KINDS, store
 from pipeline.report import REPORT
-from pipeline.runner import reporting
+from pipeline.runner import STEPS, reporting
 from pipeline.runner.execution import Outcome, perform
 from pipeline.runner.ledger import Entry, Folders, Ledger, file_name
 from pipeline.runner.lock import locked
@@ -77,7 +77,7 @@ class Runner:
         obsolete = [
             entry
             for entry in list(self.ledger.entries())
-            if entry.stage not in (*STAGES, REPORT) or not {_folder(name) for name in entry.outputs} - {""} <= folders
+            if entry.stage not in STEPS or not {_folder(name) for name in entry.outputs} - {""} <= folders
         ]
         for entry in obsolete:
             self.ledger.remove(entry)

@@ -23,7 +23,7 @@ def schemas(stage: str) -> dict[str, str]:
 
 def _hash(kind: type[Record], described: Callable[[str, Any], tuple[str, ...]]) -> str:
     declared = [described(f.name, f.type) for f in fields(kind)]  # type: ignore[arg-type]
-    return hash_of((kind.__name__, kind.KEY, declared))
+    return hash_of((kind.__name__, kind.KEY, kind.UNKNOWN, declared))
 
 
 def _as_read(name: str, type_: Any) -> tuple[str, ...]:

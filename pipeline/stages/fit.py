@@ -11,14 +11,17 @@ from pipeline.estimators.problem import Estimate, Regression
 from pipeline.estimators.regression import averaged_motion, pose, predicted
 from pipeline.maths.arrays import Array
 from pipeline.maths.models.model import Model
-from pipeline.records import CrossFit, Diagnostic, Fit, MeasurementNoise, Residual, Trajectory, diagnostic
+from pipeline.maths.signals.path import SAME_PATH, most_different
+from pipeline.records import CrossFit, Diagnostic, Fit, FittedPaths, MeasurementNoise, Residual, Trajectory, diagnostic
 from pipeline.robots.models import independent
 from pipeline.robots.robot import Robot
+
+PATHS = 20  # at most, that a recording is compared with
 
 
 def run(
     trajectories: Iterable[Trajectory], robot: Robot
-) -> Iterator[Fit | CrossFit | MeasurementNoise | Residual | Diagnostic]:
+) -> Iterator[Fit | CrossFit | FittedPaths | MeasurementNoise | Residual | Diagnostic]:
     """One Fit per joint and estimator; an estimator that cannot be used says why, and the rest goes on.
 
     A joint of several logs has a CrossFit, too, by which each of its logs can be predicted from others.
@@ -44,6 +47,7 @@ def run(
         if len(own) > 1:
             for name in ESTIMATORS:
                 yield from cross_fits([t.log for t in own], model, name, regression)
+        yield from fitted_paths(own)
         yield noise(own)
 
 
@@ -97,6 +101,23 @@ def cross_fits(logs: Sequence[str], model: Model, name: str, regression: Regress
         parameter=np.array([parameter.name for parameter in parameters] * refitted, object),
         unit=np.array([parameter.unit for parameter in parameters] * refitted, object),
         theta=np.concatenate([[], *thetas]),
+    )
+
+
+def fitted_paths(own: Sequence[Trajectory]) -> Iterator[FittedPaths | Diagnostic]:
+    """The paths of a joint's logs, or of many logs those that differ most."""
+    joint = own[0].joint
+    chosen, likeness = most_different([(t.t, t.q, t.period) for t in own], PATHS)
+    if likeness < SAME_PATH:
+        said = f"{joint}: its identification logs follow more than {PATHS} paths; recordings are compared with {PATHS}"
+        yield diagnostic("fit", joint, "note", f"{said} that differ most, and may be said to follow another path")
+    kept = [own[i] for i in chosen]
+    yield FittedPaths(
+        joint=joint,
+        source=np.repeat(np.array([t.log for t in kept], object), [len(t) for t in kept]),
+        period=np.repeat([t.period for t in kept], [len(t) for t in kept]),
+        t=np.concatenate([t.t for t in kept]),
+        q=np.concatenate([t.q for t in kept]),
     )
 
 

@@ -1,6 +1,6 @@
 """Predict the effort of logs that a fit has not seen, and score it; identification logs by leaving data out."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -13,21 +13,19 @@ from pipeline.maths.arrays import Booleans
 from pipeline.maths.models.model import Model, Motion
 from pipeline.maths.signals import averaging, harmonics
 from pipeline.maths.signals.noise import model_error, noise_std, smoothed
-from pipeline.maths.signals.path import likeness
+from pipeline.maths.signals.path import SAME_PATH, likeness
 from pipeline.maths.signals.smoothing import segments, share_passed
 from pipeline.maths.signals.windows import outside
-from pipeline.records import Column, CrossFit, Diagnostic, Fit, Prediction, Signal, Trajectory, diagnostic
+from pipeline.records import Column, CrossFit, Diagnostic, Fit, FittedPaths, Prediction, Signal, Trajectory, diagnostic
 from pipeline.robots.models import independent
 from pipeline.robots.robot import Joint
 from pipeline.study import LogEntry
-
-SAME_PATH = 0.95  # correlation of positions above which two recordings follow the same path
 
 
 def run(
     signal: Signal,
     trajectory: Trajectory | None,
-    trajectories: Iterable[Trajectory],
+    paths: FittedPaths | None,
     fits: Iterable[Fit],
     cross_fits: Iterable[CrossFit],
     entry: LogEntry,
@@ -50,7 +48,7 @@ def run(
             yield diagnostic("predict", f"{signal.log}.{joint.name}", "warning", said)
             return
         motion = measured_motion(signal, lowpass)
-        path = "same path" if follows(signal, [t for t in trajectories if t.joint == joint.name]) else "another path"
+        path = "same path" if paths is not None and follows(signal, paths) else "another path"
         for fit in fits:
             if fit.group == joint.name:
                 tau_hat = predicted(model, fit.theta, motion)
@@ -64,11 +62,14 @@ def run(
             yield from without_a_period(signal, trajectory, model, lowpass)
 
 
-def follows(signal: Signal, trajectories: Sequence[Trajectory]) -> bool:
-    """Whether a recording follows the path of one that a fit has seen, on which the model's error repeats."""
+def follows(signal: Signal, paths: FittedPaths) -> bool:
+    """Whether a recording follows a path that was fitted, on which the model's error repeats."""
     part = max(segments(signal.segment), key=lambda s: s.stop - s.start)
-    likenesses = [likeness(signal.t[part], signal.q[part], t.q, t.period) for t in trajectories]
-    return max(likenesses, default=0.0) > SAME_PATH
+    each = [np.flatnonzero(paths.source == log) for log in dict.fromkeys(paths.source)]
+    likenesses = [
+        likeness(signal.t[part], signal.q[part], paths.q[rows], float(paths.period[rows[0]])) for rows in each
+    ]
+    return max(likenesses) > SAME_PATH
 
 
 def without_the_log(
