@@ -24,17 +24,18 @@ LOCK := uv pip compile -q --universal --python-version 3.11 --generate-hashes --
 UPGRADE ?=
 
 # One line a stage: what it reads, and what it makes.
-STAGES := design ingest resample average differentiate fit predict ekf assess measure whiteness report
+STAGES := design ingest resample average differentiate fit predict ekf assess threshold measure whiteness report
 # design        : robot -> Links Pose Workspace Control Lyapunov Excitation
 # ingest        : logs -> Recording LogSummary Diagnostic
 # resample      : Recording -> Signal Diagnostic
 # average       : Signal -> Average PeriodResidual Diagnostic
 # differentiate : Average -> Trajectory Spectrum Diagnostic
-# fit           : Trajectory -> Fit Residual Diagnostic
-# predict       : Signal Trajectory Fit -> Prediction Diagnostic
-# ekf           : Signal Fit Average -> Track Diagnostic
+# fit           : Trajectory -> Fit CrossFit FittedPaths MeasurementNoise Residual Diagnostic
+# predict       : Signal Trajectory FittedPaths Fit CrossFit -> Prediction Diagnostic
+# ekf           : Signal Fit MeasurementNoise -> Track Diagnostic
 # assess        : Track -> FreeSpace
-# measure       : Track FreeSpace -> Contact
+# threshold     : FreeSpace -> Threshold
+# measure       : Track Threshold -> Contact
 # whiteness     : PeriodResidual Residual Track -> Whiteness
 # report        : everything -> report.html report.pdf results.json
 

@@ -29,7 +29,7 @@ def read(study: str | Path, record: str, **about: str) -> "pd.DataFrame":
 
 
 def run(study: str | Path, *stages: str, force: bool = False, jobs: int = 1, quiet: bool = False) -> bool:
-    """Run stages on a study, in their order, or all where none is named; whether every task succeeded.
+    """Run stages on a study, and the report, in their order, or all where none is named; whether every task succeeded.
 
     What is current is skipped, as on the command line.  `jobs` is the number of processes.
 
@@ -41,14 +41,14 @@ def run(study: str | Path, *stages: str, force: bool = False, jobs: int = 1, qui
         If the study is wrong, another run is working on it, or a stage has nothing to work on.
     """
     from pipeline.errors import BadRequest
-    from pipeline.stages import STAGES
+    from pipeline.runner import STEPS
 
-    unknown = [name for name in stages if name not in STAGES]
+    unknown = [name for name in stages if name not in STEPS]
     if unknown:
-        raise BadRequest(f"there is no stage {unknown[0]!r}; there are {', '.join(STAGES)}")
+        raise BadRequest(f"there is no stage {unknown[0]!r}; there are {', '.join(STEPS)}")
     from pipeline.runner import runs
 
-    names = [name for name in STAGES if name in stages] or STAGES
+    names = [name for name in STEPS if name in stages] or STEPS
     return runs.run(Path(study), names, force=force, jobs=jobs, verbosity="quiet" if quiet else "normal")
 
 

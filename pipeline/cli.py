@@ -16,6 +16,8 @@ from typer.core import TyperCommand
 
 from pipeline.commands import COMMANDS
 from pipeline.errors import PipelineError
+from pipeline.report import REPORT
+from pipeline.runner import STEPS
 from pipeline.stages import STAGES
 
 if TYPE_CHECKING:
@@ -127,10 +129,10 @@ def run_stages(study: Path, names: tuple[str, ...], *how: Any) -> bool:
         return False
 
 
-def add_stage(name: str) -> None:
-    """Make a stage a command of the same name, explained by its own docstring."""
+def add_step(name: str, module: str) -> None:
+    """Make a step of a run a command, explained by the docstring of its module."""
 
-    @app.command(name, help=docstring(f"stages/{name}"), rich_help_panel="Stages, in order", cls=ShownAsWritten)
+    @app.command(name, help=docstring(module), rich_help_panel="Stages, in order", cls=ShownAsWritten)
     @guarded
     def command(
         study: StudyFolder,
@@ -159,12 +161,12 @@ def run_all(
     quiet: Quiet = False,
     verbose: Verbose = False,
 ) -> None:
-    """Run every stage, on the studies named or on all in raw/ whose logs are there."""
+    """Run every stage and the report, on the studies named or on all in raw/ whose logs are there."""
     from pipeline.runner import runs
 
     says = verbosity(quiet, verbose)
     named = runs.studies(studies or [], says)
-    good = [run_stages(study, STAGES, processed, reports, force, jobs, says) for study in named]
+    good = [run_stages(study, STEPS, processed, reports, force, jobs, says) for study in named]
     if not all(good):
         raise typer.Exit(1)
 
@@ -176,7 +178,8 @@ def docstring(module: str) -> str:
 
 
 for stage in STAGES:
-    add_stage(stage)
+    add_step(stage, f"stages/{stage}")
+add_step(REPORT, "report/report")
 for other in COMMANDS:
     module = import_module(f"pipeline.commands.{other}")
     added = app.command(other, help=module.__doc__, rich_help_panel="Other commands", cls=ShownAsWritten)

@@ -15,10 +15,10 @@ import typer
 from typer.testing import CliRunner
 
 import pipeline
-from pipeline import commands, stages
+from pipeline import commands
 from pipeline.cli import app
 from pipeline.errors import BadRequest, BadStudy, MissingRecord
-from pipeline.runner import runs
+from pipeline.runner import STEPS, runs
 from tests.arm import write_study
 
 EVERY = typer.main.get_command(app).commands
@@ -98,7 +98,7 @@ def test_importing_the_package_imports_nothing_heavy():
 def test_a_quiet_run_says_nothing_where_all_is_well(study, tmp_path, monkeypatch):
     assert call("ingest", study, "--quiet") == ""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("pipeline.cli.STAGES", ("ingest", "resample"))
+    monkeypatch.setattr("pipeline.cli.STEPS", ("ingest", "resample"))
     elsewhere = tmp_path / "raw" / "elsewhere"  # whose logs are not there
     shutil.copytree(study, elsewhere, ignore=shutil.ignore_patterns("*.csv"))
     assert call("all", "--quiet") == ""
@@ -137,7 +137,7 @@ def test_a_pattern_that_the_shell_left_is_expanded(study, tmp_path, monkeypatch)
     shutil.copytree(study, tmp_path / "raw" / "other")
     (tmp_path / "raw" / "notes.txt").touch()
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("pipeline.cli.STAGES", ("ingest",))
+    monkeypatch.setattr("pipeline.cli.STEPS", ("ingest",))
     call("all", "raw/*")
     assert {folder.name for folder in (tmp_path / "processed").iterdir()} == {"arm", "other"}
     said = call("ingest", "raw/*", code=1)
@@ -208,4 +208,4 @@ def test_results_that_are_not_what_the_report_wrote_say_so(study, text):
 
 
 def test_every_stage_and_command_is_there():
-    assert set(EVERY) == {"all", *stages.STAGES, *commands.COMMANDS}
+    assert set(EVERY) == {"all", *STEPS, *commands.COMMANDS}

@@ -9,11 +9,11 @@ from pipeline.maths.contact.free_space import levels
 from pipeline.maths.contact.window import mean_size, summarise
 from pipeline.maths.signals.bootstrap import blocks, standard_error
 from pipeline.maths.signals.noise import model_error, noise_std, smoothed
-from pipeline.maths.signals.path import likeness
+from pipeline.maths.signals.path import likeness, most_different
 from pipeline.maths.signals.smoothing import lowpass, share_passed
 from pipeline.maths.signals.windows import free_space
-from pipeline.records import Track
-from pipeline.stages import assess, measure
+from pipeline.records import Threshold, Track
+from pipeline.stages import assess, measure, threshold
 from tests.test_averaging import entry
 
 RATE = 100.0
@@ -93,7 +93,7 @@ def test_a_contact_stands_out_when_its_peak_exceeds_the_level_of_unseen_free_spa
         *assess.run(track(noise(2, 5.0), log="fitted", role="identification"), entry(role="identification")),
         *assess.run(track(noise(3, 9.0), joint="hand_pitch", role="validation"), entry(role="validation")),
     ]
-    [contact] = measure.run(track(noise(0) + push), spaces, entry(role="contact", contact=windows))
+    [contact] = measure.run(track(noise(0) + push), threshold.run(spaces), entry(role="contact", contact=windows))
     assert contact.level_from == "check"  # neither what was fitted nor another joint
     assert list(contact.above) == [1, int(abs(contact.peak[1]) > contact.detection_level)]
     assert contact.peak[0] == pytest.approx(2.0, abs=0.5)
@@ -106,7 +106,9 @@ def test_nothing_is_said_of_a_joint_at_rest_or_of_a_contact_log_without_windows(
     assert not list(assess.run(track(noise(), at_rest=1), entry(role="contact", contact=((9.0, 11.0),))))
     assert not list(assess.run(track(noise()), entry(role="contact")))
     [space] = assess.run(track(noise()), entry(role="validation"))
-    assert not list(measure.run(track(noise(), at_rest=1), [space], entry(role="contact", contact=((9.0, 11.0),))))
+    about = entry(role="contact", contact=((9.0, 11.0),))
+    assert list(measure.run(track(noise()), threshold.run([space]), about))
+    assert not list(measure.run(track(noise(), at_rest=1), threshold.run([space]), about))
 
 
 def test_noise_is_told_from_the_error_of_a_model():
@@ -140,6 +142,25 @@ def test_the_same_path_is_recognised_wherever_it_starts(shift, same):
     q = path(t + shift) if shift is not None else np.sin(phase * 1.31 * t) + 0.5 * np.cos(2.1 * phase * t)
     found = likeness(t, q, path(np.arange(650) / 650 * length), length)
     assert found > 0.99 if same else found < 0.8
+
+
+def test_paths_that_differ_most_stand_for_all():
+    """Of many logs on three paths, one each; where there is room, every one."""
+    phase = 2 * np.pi * np.arange(200) / 200
+    paths = [(phase, np.sin(k * phase + shift), 2 * np.pi) for shift in (0.0, 1.0) for k in (1, 1, 2, 3)]
+    chosen, likeness_of_the_rest = most_different(paths, 3)
+    assert [i % 4 for i in chosen] == [0, 2, 3]
+    assert likeness_of_the_rest > 0.999
+    assert most_different(paths, 2)[1] < 0.1
+    assert most_different(paths, 20) == (list(range(8)), 1.0)
+
+
+def test_a_contact_is_judged_by_the_threshold_of_its_joint_and_filter():
+    about = entry(role="contact", contact=((9.0, 11.0),))
+    theirs = [Threshold("hand_pitch", "ekf", 1.0, "a"), Threshold("hand_roll", "rts", 1.0, "b")]
+    assert not list(measure.run(track(noise()), theirs, about))
+    [contact] = measure.run(track(noise()), [*theirs, Threshold("hand_roll", "ekf", 0.01, "c")], about)
+    assert (contact.level_from, contact.detection_level, *contact.above) == ("c", 0.01, 1)
 
 
 def test_a_track_knows_when_it_was_not_touched_in_its_own_words():

@@ -16,7 +16,7 @@ from typer.testing import CliRunner
 
 import pipeline
 from pipeline import commands, estimators, filters, logs, robots, stages
-from pipeline.cli import app
+from pipeline.cli import STEPS, app
 from pipeline.records import KINDS, Record
 from pipeline.records.quantities import QUANTITIES
 from pipeline.report import sections, writers
@@ -221,6 +221,16 @@ def test_every_field_of_every_record_is_a_quantity_and_every_quantity_is_used():
     assert set(QUANTITIES) <= named | {"value"}
 
 
+def test_a_record_is_a_declaration_and_what_it_does_is_for_the_report_alone():
+    """A stage's fingerprint holds the fields of records; their code is not in it."""
+    for kind in KINDS.values():
+        made = set(vars(kind)) - {f.name for f in fields(kind)}
+        public = {name for name in made if not name.startswith("_")}
+        assert public <= {"KEY", "ROWS", "UNKNOWN", "published", "prefix"}, kind
+    code = "".join(s.read_text() for room in ("stages", "estimators", "filters") for s in (ROOT / room).rglob("*.py"))
+    assert not re.findall(r"(?<!joint)\.(?:published|prefix)\b|QUANTITIES", code)
+
+
 def test_every_record_is_listed():
     from pipeline import records
 
@@ -251,30 +261,28 @@ def test_every_setting_is_asked_for_by_a_stage_but_for_what_the_user_wants_to_se
 def test_the_makefile_says_what_the_signatures_say():
     text = (HOME / "Makefile").read_text()
     lines = dict(re.findall(r"^# (\w+) *: (.*)$", text, re.M))
-    assert list(lines) == list(stages.STAGES)
-    assert re.search(r"^STAGES := (.*)$", text, re.M)[1].split() == list(stages.STAGES)
-    for name, line in lines.items():
+    assert list(lines) == list(STEPS)
+    assert re.search(r"^STAGES := (.*)$", text, re.M)[1].split() == list(STEPS)
+    for name in stages.STAGES:
         asks = declaration(name)
-        reads, makes = (set(part.split()) for part in line.split(" -> "))
-        if name == "report":
-            continue
+        reads, makes = (set(part.split()) for part in lines[name].split(" -> "))
         assert makes == {k.__name__ for k in asks.makes}, name
         given = {"logs" if "log" in asks.given.values() else "robot"}
         assert reads == ({k.__name__ for k in asks.reads} or given), name
 
 
-@pytest.mark.parametrize("name", [*stages.STAGES, *commands.COMMANDS])
+@pytest.mark.parametrize("name", [*STEPS, *commands.COMMANDS])
 def test_every_stage_and_command_explains_itself(name):
     shown = CliRunner().invoke(app, [name, "--help"], env={"COLUMNS": "200", "TERM": "dumb"})
     assert shown.exit_code == 0
-    package = "stages" if name in stages.STAGES else "commands"
+    package = "stages" if name in stages.STAGES else "report" if name in STEPS else "commands"
     said = " ".join(import_module(f"pipeline.{package}.{name}").__doc__.split())
     assert said in " ".join(shown.output.split())
 
 
 def test_the_readme_names_every_command():
     text = (HOME / "README.md").read_text()
-    for name in ("all", *stages.STAGES, *commands.COMMANDS):
+    for name in ("all", *STEPS, *commands.COMMANDS):
         assert f"`{name}`" in text or f"davinci-forces {name}" in text, name
 
 

@@ -1,5 +1,7 @@
 """Parameters: those put in come out, as well as they claim to."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -7,9 +9,20 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from pipeline.estimators import estimator
-from pipeline.estimators.problem import Regression, correlation_lags
+from pipeline.estimators.folds import folds
+from pipeline.estimators.problem import Regression, bartlett, correlation_lags
 from pipeline.estimators.wlse import pooled
-from pipeline.records import Average, Diagnostic, Fit, Prediction, Residual, Trajectory
+from pipeline.records import (
+    Average,
+    CrossFit,
+    Diagnostic,
+    Fit,
+    FittedPaths,
+    MeasurementNoise,
+    Prediction,
+    Residual,
+    Trajectory,
+)
 from pipeline.stages import average, differentiate, fit, predict
 from tests import arm
 from tests.test_averaging import entry
@@ -155,8 +168,11 @@ def test_a_harmonic_that_is_left_out_is_remarked_on():
 
 def predictions(signal, role, fitted, trajectories=(), **changes):
     own = next((t for t in trajectories if t.log == signal.log), None)
+    made = list(fit.run(trajectories, arm.ARM))
+    paths = next((r for r in made if isinstance(r, FittedPaths)), None)
+    cross_fits = [r for r in made if isinstance(r, CrossFit)]
     about = entry(name=signal.log, role=role, **changes)
-    return list(predict.run(signal, own, trajectories, fitted, about, arm.joint(signal.joint), lowpass=17.0))
+    return list(predict.run(signal, own, paths, fitted, cross_fits, about, arm.joint(signal.joint), lowpass=17.0))
 
 
 def test_a_validation_log_is_predicted_down_to_its_noise():
@@ -186,6 +202,88 @@ def test_an_identification_log_is_predicted_from_the_others_or_from_its_other_pe
     for made in (by_log, by_period):
         assert isinstance(made, Prediction)
         assert made.rmse == pytest.approx(arm.NOISE["hand_roll"], rel=0.05)
+
+
+def refit_without(trajectories, *logs) -> np.ndarray:
+    rest = [t for t in trajectories if t.log not in logs]
+    return next(r for r in fit.run(rest, arm.ARM) if isinstance(r, Fit)).theta
+
+
+def test_every_log_is_left_out_once_by_refits_to_all_the_others():
+    every = [trajectory(arm.signal(seed=i, log=f"log-{i}", periods=4)) for i in range(3)]
+    cross = next(r for r in fit.run(every, arm.ARM) if isinstance(r, CrossFit))
+    for t in every:
+        assert_allclose(cross.theta[cross.left_out == t.log], refit_without(every, t.log), rtol=1e-12)
+    assert len(cross) == 3 * 4
+
+
+def test_many_logs_are_left_out_in_twenty_folds_of_neighbours():
+    assert folds(20) == list(range(20))
+    for count in (21, 45, 400):
+        fold = np.array(folds(count))
+        assert (np.diff(fold) >= 0).all()
+        assert set(fold) == set(range(20))
+        assert np.ptp(np.bincount(fold)) <= 1
+    one = trajectory(arm.signal(periods=4, rate=20.0))
+    every = [replace(one, log=f"log-{i}", tau=one.tau * (1 + 0.01 * i)) for i in range(30)]
+    cross = next(r for r in fit.run(every, arm.ARM) if isinstance(r, CrossFit))
+    assert list(dict.fromkeys(cross.left_out))[:3] == ["log-0, log-1", "log-2", "log-3, log-4"]
+    assert_allclose(cross.theta[:4], refit_without(every, "log-0", "log-1"), rtol=1e-12)
+    [made, _] = predictions(arm.signal(log="log-4", rate=20.0), "identification", [], every)
+    assert made.scheme == "leave 2 logs out"
+
+
+def test_a_log_that_no_refit_can_do_without_has_no_leave_out_score_and_it_is_said():
+    """Only one of the logs holds periods enough for weights, and without the others' there are none."""
+    every = [trajectory(arm.signal(seed=i, log=f"log-{i}", periods=p)) for i, p in enumerate((5, 3))]
+    made = list(fit.run(every, arm.ARM))
+    lse, wlse = (r for r in made if isinstance(r, CrossFit))
+    assert (set(lse.left_out), set(wlse.left_out)) == ({"log-0", "log-1"}, {"log-1"})
+    said = " ".join(text for r in made if isinstance(r, Diagnostic) for text in r.text)
+    assert "hand_roll: wlse has no leave-out score of log-0, because a refit is not possible: weights need" in said
+    kept = predictions(arm.signal(seed=0, log="log-0"), "identification", [], every)
+    assert [r.estimator for r in kept] == ["lse"]
+
+
+def test_a_recording_is_told_to_follow_a_path_that_was_fitted():
+    fitted, seen = fits(arm.signal()), [trajectory(arm.signal(log="seen"))]
+    again, other = arm.signal(seed=9, log="again"), arm.signal(seed=9, log="other", period=7.3)
+    other = replace(other, q=other.q * np.cos(0.3 * other.t))
+    for signal, path in ((again, "same path"), (other, "another path")):
+        assert {r.path for r in predictions(signal, "validation", fitted.values(), seen)} == {path}
+
+
+def test_of_many_fitted_paths_those_that_differ_most_are_kept_and_it_is_said_when_they_do_not_stand_for_all():
+    one = trajectory(arm.signal(periods=4, rate=20.0))
+    phase = 2 * np.pi * one.t / one.period
+
+    def kept(paths: int) -> tuple[set[int], str]:
+        every = [replace(one, log=f"log-{i}", q=np.sin((1 + i % paths) * phase)) for i in range(60)]
+        made = list(fit.fitted_paths(every))
+        [kept] = (r for r in made if isinstance(r, FittedPaths))
+        logs = [int(log.removeprefix("log-")) % paths for log in dict.fromkeys(kept.source)]
+        assert len(logs) == 20
+        return set(logs), " ".join(text for r in made if isinstance(r, Diagnostic) for text in r.text)
+
+    assert kept(15) == (set(range(15)), "")
+    indices, said = kept(30)
+    assert len(indices) == 20
+    assert "hand_roll: its identification logs follow more than 20 paths" in said
+
+
+def test_the_noise_of_a_joint_is_that_of_its_logs_together():
+    every = [trajectory(arm.signal(seed=i, log=f"log-{i}", noise=noise)) for i, noise in enumerate((1.0, 3.0))]
+    noise = next(r for r in fit.run(every, arm.ARM) if isinstance(r, MeasurementNoise))
+    assert noise.sigma_tau == pytest.approx(arm.NOISE["hand_roll"] * np.sqrt(5), rel=0.05)
+    assert noise.sigma_q == pytest.approx(1e-4 * np.sqrt(5), rel=0.05)
+
+
+@pytest.mark.parametrize("lags", [0, 1, 30, 99])
+def test_moving_sums_give_the_sum_of_autocovariances_that_statsmodels_gives(lags):
+    from statsmodels.stats.sandwich_covariance import S_hac_simple
+
+    scores = np.cumsum(np.random.default_rng(lags).normal(size=(100, 3)), axis=0)
+    assert_allclose(bartlett(scores, lags), S_hac_simple(scores, nlags=lags), rtol=1e-9)
 
 
 def test_a_period_that_differs_from_the_others_is_predicted_badly():

@@ -20,6 +20,7 @@ from pipeline.records import COLUMN_DTYPES, KINDS, Control, Excitation, Links, L
 from pipeline.records.catalogue import Catalogue
 from pipeline.report.results import collect
 from pipeline.robots.robot import Joint
+from pipeline.runner import STEPS
 from pipeline.runner.signature import declaration
 from pipeline.study import LogEntry, Settings, Weight, reading
 from pipeline.study.channels import OF_A_JOINT, OF_THE_LOG
@@ -116,7 +117,7 @@ def test_keys_of_a_study_and_its_logs_are_all_told():
 
 
 def test_stages_commands_and_options_are_those_that_there_are():
-    assert named(rows("stage", "does")) == list(stages.STAGES)
+    assert named(rows("stage", "does")) == list(STEPS)
     assert named(rows("command", "does")) == list(commands.COMMANDS)
     options = {o for p in typer.main.get_command(app).commands["fit"].params for o in p.opts if o.startswith("--")}
     assert {option.split()[0] for option in named(rows("option", "does"))} == options - {"--help"}

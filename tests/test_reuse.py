@@ -7,12 +7,13 @@ import pytest
 from typer.testing import CliRunner
 
 from pipeline.cli import app
-from pipeline.runner.ledger import Entry, Fingerprint, Folders, Ledger, hash_of_text
+from pipeline.runner.canonical import hash_of_text
+from pipeline.runner.fingerprint import Fingerprint
+from pipeline.runner.ledger import Entry, Folders, Ledger
 from pipeline.runner.plan import Task
 from pipeline.runner.reuse import reused
 from pipeline.stages import design
 
-TASK = Task("design", "design")
 SAME = Fingerprint({}, {"robot": "a"}, {"shape": [1, 2]}, {"design.py": "b"}, "1")
 LINKS, POSE = "processed/links/arm.parquet", "processed/pose/arm.parquet"
 
@@ -35,7 +36,7 @@ def make(lab: Path, study: str, fingerprint: Fingerprint, failed: str = "", **fi
 def test_files_and_entry_of_the_same_task_are_copied_and_what_was_there_before_goes(tmp_path):
     there = make(tmp_path, "one", SAME, links="the links")
     here = make(tmp_path, "two", replace(SAME, version="0"), pose="an old pose")
-    assert reused(here, TASK, SAME) == "one"
+    assert reused(here, Task("design", "design", SAME)) == "one"
     assert here.folders.file(LINKS).read_text() == "the links"
     assert not here.folders.file(POSE).exists()
     assert here.entry("design", "design") == there.entry("design", "design")
@@ -57,14 +58,14 @@ def test_what_differs_or_failed_or_was_altered_is_not_copied(tmp_path, fingerpri
     if altered:
         there.folders.file(LINKS).write_text("other links")
     here = ledger(tmp_path, "two")
-    assert reused(here, TASK, SAME) == ""
+    assert reused(here, Task("design", "design", SAME)) == ""
     assert here.entry("design", "design") is None
 
 
 def test_a_task_that_reads_something_of_its_study_is_never_copied(tmp_path):
     fingerprint = replace(SAME, inputs={"raw/log.csv": "c"})
     make(tmp_path, "one", fingerprint, links="the links")
-    assert reused(ledger(tmp_path, "two"), TASK, fingerprint) == ""
+    assert reused(ledger(tmp_path, "two"), Task("design", "design", fingerprint)) == ""
 
 
 def test_a_second_study_of_a_robot_copies_its_design_and_says_so_in_one_line(tmp_path, monkeypatch):

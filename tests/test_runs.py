@@ -2,10 +2,12 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
 import time
+from collections import Counter
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +18,11 @@ from typer.testing import CliRunner
 import pipeline
 from pipeline.cli import app
 from pipeline.errors import BadRequest, MissingRecord
+from pipeline.records import store
+from pipeline.runner import ledger
 from pipeline.stages import STAGES
 from tests.arm import write_robot, write_study
 
-BEFORE_REPORT = STAGES[:-1]
 FIRST = '[[log]]\nname = "roll"'  # how the first log of the study begins
 
 
@@ -29,7 +32,7 @@ def call(*arguments, code=0) -> str:
     return result.output
 
 
-def stages(study: Path, *options, names=BEFORE_REPORT) -> str:
+def stages(study: Path, *options, names=STAGES) -> str:
     return "".join(call(name, study, *options) for name in names)
 
 
@@ -130,29 +133,81 @@ def test_an_altered_processed_file_is_made_again(finished):
     assert target.read_bytes() == good
 
 
-def test_editing_a_term_of_the_model_makes_the_fit_run_again_and_says_why(finished, tmp_path):
-    """The package is copied, so that its code can be edited."""
-    code = tmp_path / "code"
-    shutil.copytree(Path(pipeline.__file__).parent, code / "pipeline", ignore=shutil.ignore_patterns("__pycache__"))
+@pytest.fixture
+def package(tmp_path) -> Path:
+    """A copy of the package, so that its code can be edited."""
+    copy = tmp_path / "code" / "pipeline"
+    return shutil.copytree(Path(pipeline.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
 
-    def fit() -> str:
-        environment = {**os.environ, "PYTHONPATH": str(code)}
-        done = subprocess.run(
-            [sys.executable, "-m", "pipeline", "fit", finished],
-            env=environment,
-            cwd=code,
-            capture_output=True,
-            text=True,
-        )
-        assert done.returncode == 0, done.stderr
-        return done.stdout
 
-    assert "fit: 1 of 1 current" in fit()
-    terms = code / "pipeline" / "maths" / "models" / "terms.py"
-    terms.write_text(terms.read_text().replace('b={"sign(dq)": 1.0}', 'b={"sign(dq)": 2.0}'))
-    said = fit()
+def run_by(package: Path, *arguments: object) -> str:
+    """What a copy of the package says."""
+    command = [sys.executable, "-m", "pipeline", *map(str, arguments)]
+    environment = {**os.environ, "PYTHONPATH": str(package.parent)}
+    done = subprocess.run(command, env=environment, cwd=package.parent, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def edit(file: Path, old: str, new: str) -> None:
+    text = file.read_text()
+    assert old in text
+    file.write_text(text.replace(old, new))
+
+
+def test_editing_a_term_of_the_model_makes_the_fit_run_again_and_says_why(finished, package):
+    assert "fit: 1 of 1 current" in run_by(package, "fit", finished)
+    edit(package / "maths" / "models" / "terms.py", 'b={"sign(dq)": 1.0}', 'b={"sign(dq)": 2.0}')
+    said = run_by(package, "fit", finished)
     assert "the robot changed" in said
     assert "the code of pipeline/maths/models/terms.py changed" in said
+
+
+def test_a_reworded_meaning_runs_what_stores_it_and_what_reads_that(finished, package):
+    edit(package / "records" / "quantities.py", "standard deviation of the external effort", "how uncertain it is")
+    edit(package / "records" / "predict.py", "The scores.", "How good it is.")
+    said = run_by(package, "all", finished)
+    for stage in ("design", "ingest", "resample", "average", "differentiate", "fit", "predict"):
+        [line] = [line for line in said.splitlines() if line.startswith(f"{stage}: ")]
+        assert line.endswith(" current"), line
+    assert re.search(r"^ekf: .* and 1 more: the declaration of Track changed$", said, re.M), said
+    assert re.search(r"^whiteness: track/.*: processed/track/.*parquet changed$", said, re.M), said
+    assert re.search(r"^report: report: the code of pipeline/records/predict.py changed", said, re.M), said
+
+
+def test_entries_and_files_are_read_once_a_run(finished, monkeypatch):
+    hashed, read = Counter(), Counter()
+    digest, entry = store.digest, ledger._read
+    monkeypatch.setattr(store, "digest", lambda file: hashed.update([file]) or digest(file))
+    monkeypatch.setattr(ledger, "_read", lambda file: read.update([file]) or entry(file))
+    assert "nothing to do" in call("all", finished)
+    assert set(processed(finished).rglob("*.parquet")) <= set(hashed)
+    assert set(hashed.values()) == {1}
+    assert set(read) == set((processed(finished) / "tasks").rglob("*.json"))
+    assert set(read.values()) == {1}
+
+
+def test_the_report_is_written_again_when_what_it_shows_or_it_itself_changed(finished):
+    page = reports(finished) / "report.html"
+    good = page.read_bytes()
+    page.write_bytes(b"")
+    assert "report: report: reports/report.html was altered" in call("report", finished)
+    assert page.read_bytes() == good
+    edit(finished / "study.toml", 'title = "A test"', 'title = "A trial"')
+    assert "report: report: the study changed; raw/study.toml changed" in call("report", finished)
+    assert "report: 1 of 1 current" in call("report", finished)
+
+
+def test_a_report_that_fails_says_so_costs_no_stage_and_is_tried_again(finished, monkeypatch):
+    def fail(*_):
+        raise ZeroDivisionError("for a test")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("pipeline.report.report.collect", fail)
+        edit(finished / "study.toml", 'title = "A test"', 'title = "A trial"')
+        assert "report: error: ZeroDivisionError: for a test (test_runs.py:" in call("report", finished, code=1)
+    assert "report: report: it failed last time" in call("report", finished)
+    assert "are unchanged" in call("verify", finished)
 
 
 def test_a_log_that_leaves_the_study_takes_its_records_with_it(finished):
@@ -257,7 +312,7 @@ def flip(file: Path, at: int) -> None:
 @pytest.mark.parametrize("where", ["raw", "processed", "reports"])
 def test_verify_names_a_file_in_which_one_byte_was_altered(finished, where, seed):
     rng = np.random.default_rng(seed)
-    files = sorted(f for f in (finished.parent.parent / where).rglob("*") if f.is_file())
+    files = sorted(f for f in (finished.parent.parent / where).rglob("*") if f.is_file() and f.stat().st_size)
     target = files[rng.integers(len(files))]
     flip(target, int(rng.integers(target.stat().st_size)))
     said = " ".join(call("verify", finished, code=1).split())
@@ -292,7 +347,7 @@ def test_all_takes_the_studies_of_raw_and_skips_those_without_logs(study, monkey
     other.mkdir()
     write_robot(other)
     (other / "study.toml").write_text((study / "study.toml").read_text())
-    monkeypatch.setattr("pipeline.cli.STAGES", ("ingest",))
+    monkeypatch.setattr("pipeline.cli.STEPS", ("ingest",))
     said = call("all")
     assert "raw/elsewhere: skipped, its logs are not here (roll.csv ...)" in said
     assert (tmp_path / "processed" / "arm" / "recording" / "roll" / "hand_roll.parquet").exists()

@@ -91,9 +91,18 @@ def correlation_lags(residual: Array, starts: tuple[int, ...]) -> int:
 
 def _newey_west(F: Array, residual: Array, bread: Array, starts: tuple[int, ...], lags: int) -> Array:
     """The covariance that allows for residuals correlated over `lags` samples, log by log."""
-    from statsmodels.stats.sandwich_covariance import S_hac_simple
-
-    scores = np.split(F * residual[:, None], starts[1:])
-    meat = sum(S_hac_simple(part, nlags=lags) for part in scores)
+    meat = sum(bartlett(part, lags) for part in np.split(F * residual[:, None], starts[1:]))
     K, p = int(F.any(axis=1).sum()), F.shape[1]
     return np.asarray(bread @ meat @ bread * K / (K - p))
+
+
+def bartlett(scores: Array, lags: int) -> Array:
+    """The sum (p, p) of the autocovariances of scores (K, p) under a Bartlett window that ends after so many lags.
+
+    That window is the autocorrelation of a box, so the sum is that of the squares of moving sums, however many lags.
+    """
+    K = len(scores)
+    total = np.vstack([np.zeros_like(scores[:1]), np.cumsum(scores, axis=0)])
+    ends = np.arange(1, K + lags + 1)
+    moving = total[np.minimum(ends, K)] - total[np.maximum(ends - lags - 1, 0)]
+    return np.asarray(moving.T @ moving / (lags + 1))

@@ -6,25 +6,27 @@ from pipeline.records.design import Control, Excitation, Links, Lyapunov, Pose, 
 from pipeline.records.diagnostic import Diagnostic, diagnostic
 from pipeline.records.differentiate import Spectrum, Trajectory
 from pipeline.records.ekf import Track
-from pipeline.records.fit import Fit, Residual
+from pipeline.records.fit import CrossFit, Fit, FittedPaths, MeasurementNoise, Residual
 from pipeline.records.ingest import LogSummary, Recording
 from pipeline.records.measure import Contact
 from pipeline.records.predict import Prediction
 from pipeline.records.record import COLUMN_DTYPES, AnyRecord, Column, Counts, Labels, Names, Origin, Record
 from pipeline.records.resample import Signal
+from pipeline.records.threshold import Threshold
 from pipeline.records.whiteness import Whiteness
 
 __all__ = [
-    "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Column", "Contact", "Control", "Counts", "Diagnostic",
-    "Excitation", "Fit", "FreeSpace", "Labels", "Links", "LogSummary", "Lyapunov", "Names", "Origin",
-    "PeriodResidual", "Pose", "Prediction", "Record", "Recording", "Residual", "Signal", "Spectrum", "Track",
-    "Trajectory", "Whiteness", "Workspace", "diagnostic",
+    "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Column", "Contact", "Control", "Counts", "CrossFit",
+    "Diagnostic", "Excitation", "Fit", "FittedPaths", "FreeSpace", "Labels", "Links", "LogSummary", "Lyapunov",
+    "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Record", "Recording", "Residual",
+    "Signal", "Spectrum", "Threshold", "Track", "Trajectory", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
     kind.__name__: kind
     for kind in (
         Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Signal, Average, PeriodResidual,
-        Trajectory, Spectrum, Fit, Residual, Prediction, Track, FreeSpace, Contact, Whiteness, Diagnostic,
+        Trajectory, Spectrum, Fit, CrossFit, FittedPaths, MeasurementNoise, Residual, Prediction, Track, FreeSpace,
+        Threshold, Contact, Whiteness, Diagnostic,
     )
 }  # fmt: skip

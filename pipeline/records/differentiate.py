@@ -7,7 +7,7 @@ from pipeline.records.record import Column, Counts, Record
 
 @dataclass(frozen=True, eq=False)
 class Trajectory(Record):
-    """One averaged period with its velocity and acceleration, free of noise."""
+    """One averaged period with its velocity and acceleration, free of noise, and how large that was."""
 
     log: str
     joint: str
@@ -16,6 +16,9 @@ class Trajectory(Record):
     periods: int
     harmonics: int
     method: str
+    sigma_q: float
+    sigma_dq: float
+    sigma_tau: float
     t: Column
     q: Column
     dq: Column

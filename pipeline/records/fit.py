@@ -1,4 +1,4 @@
-"""Records of the parameters of a model, and what they leave of the effort."""
+"""Records of what all identification logs say together: parameters, what they leave of the effort, paths and noise."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -37,6 +37,46 @@ class Fit(Record):
             yield Published(f"{prefix}.{slug(parameter)}", "theta", std="theta_std_hac", row=i)
             yield Published(f"{prefix}.{slug(parameter)}.std_classical", "theta_std", row=i)
         yield from self.publish(prefix, "mse", "r2", "condition", "samples", "periods", "hac_lags")
+
+
+@dataclass(frozen=True, eq=False)
+class CrossFit(Record):
+    """The parameters of a model, estimated without some of the identification logs, each left out once."""
+
+    KEY = ("group", "model", "estimator")
+
+    group: str
+    model: str
+    estimator: str
+    left_out: Labels  # separated by ", "
+    parameter: Labels
+    unit: Labels
+    theta: Column
+
+
+@dataclass(frozen=True, eq=False)
+class FittedPaths(Record):
+    """The paths that were fitted on a joint, one period of each in turn; of many, those that differ most."""
+
+    KEY = ("joint",)
+
+    joint: str
+    source: Labels  # the log that follows the path
+    period: Column
+    t: Column
+    q: Column
+
+
+@dataclass(frozen=True, eq=False)
+class MeasurementNoise(Record):
+    """The noise of a joint between periods, the root mean square over its identification logs."""
+
+    KEY = ("joint",)
+
+    joint: str
+    sigma_q: float
+    sigma_dq: float
+    sigma_tau: float
 
 
 @dataclass(frozen=True, eq=False)

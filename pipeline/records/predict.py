@@ -17,7 +17,7 @@ class Prediction(Record):
     model: str
     estimator: str
     role: str
-    scheme: str  # "validation", "contact", "leave one log out" or "leave one period out"
+    scheme: str  # "validation", "contact", "leave one log out", "leave 5 logs out" or "leave one period out"
     path: str  # "another path" than what was fitted, or the "same path", on which the model's error repeats
     rmse: float
     nrmse: float

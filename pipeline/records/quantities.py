@@ -27,6 +27,7 @@ QUANTITIES = {
     "filter": Quantity("how the external effort was tracked", ""),
     "signal": Quantity("which signal was tested", ""),
     "logs": Quantity("recordings that were pooled", ""),
+    "left_out": Quantity("recordings that a fit has not seen", ""),
     "scheme": Quantity("which data the prediction had not seen", ""),
     "stage": Quantity("stage that made a note", ""),
     "subject": Quantity("what a note is about", ""),

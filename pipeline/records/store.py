@@ -100,8 +100,8 @@ def schema(kind: type[Record], unit: Unit) -> pa.Schema:
     )
 
 
-def read(kind: type[AnyRecord], folder: Path, place: Path) -> AnyRecord:
-    """Read a record back, with its origin.
+def read(kind: type[AnyRecord], folder: Path, place: Path, sha256: str = "") -> AnyRecord:
+    """Read a record back, with its origin; a file whose hash is known already is not hashed again.
 
     Raises
     ------
@@ -127,7 +127,7 @@ def read(kind: type[AnyRecord], folder: Path, place: Path) -> AnyRecord:
             f"{whole}: not a {kind.__name__} as this version writes it ({error}); run with --force"
         ) from error
     units = json.loads(metadata["units"]) | {f.name: f.metadata[b"unit"].decode() for f in table.schema}
-    object.__setattr__(record, "origin", Origin(place.as_posix(), digest(whole), units))
+    object.__setattr__(record, "origin", Origin(place.as_posix(), sha256 or digest(whole), units))
     return record
 
 

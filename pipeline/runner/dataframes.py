@@ -56,7 +56,8 @@ def as_frame(record: Record) -> pd.DataFrame:
     scalars = {name: getattr(record, name) for name in record.scalars()}
     repeated = {name: value for name, value in scalars.items() if not isinstance(value, tuple)}
     columns = {name: getattr(record, name) for name in record.columns()}
-    return pd.DataFrame({**{k: [v] * len(record) for k, v in repeated.items()}, **columns})
+    rows = len(record) if columns else 1
+    return pd.DataFrame({**{k: [v] * rows for k, v in repeated.items()}, **columns})
 
 
 def units(records: list[Any]) -> dict[str, str | dict[str, str]]:

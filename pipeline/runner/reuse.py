@@ -5,19 +5,20 @@ from dataclasses import asdict, replace
 from hashlib import sha256
 
 from pipeline.records import store
-from pipeline.runner.ledger import Entry, Fingerprint, Folders, Ledger
+from pipeline.runner.ledger import Entry, Folders, Ledger
 from pipeline.runner.plan import Task
 
 
-def reused(ledger: Ledger, task: Task, fingerprint: Fingerprint) -> str:
+def reused(ledger: Ledger, task: Task) -> str:
     """Copy the files of this task from a study beside this one that made them of the same; its name, or ""."""
     processed = ledger.folders.processed
-    if fingerprint.inputs:
+    if task.fingerprint.inputs:
         return ""
+    now = json.loads(json.dumps(asdict(task.fingerprint)))
     for other in sorted(processed.parent.iterdir()):
         there = replace(ledger.folders, processed=other)
-        entry = None if other == processed else Ledger(there).entry(task.stage, task.name)
-        same = entry and not entry.failed and entry.fingerprint == json.loads(json.dumps(asdict(fingerprint)))
+        entry = None if other == processed else Ledger(there).read(task.stage, task.name)
+        same = entry and not entry.failed and entry.fingerprint == now
         if entry and same and (contents := _contents(there, entry)):
             _take(ledger, entry, contents)
             return other.name

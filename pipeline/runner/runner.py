@@ -4,18 +4,23 @@ from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Future, ProcessPoolExecutor, as_completed
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
+from functools import partial
 from multiprocessing import get_context
 
 from pipeline.errors import PipelineError
 from pipeline.records import KINDS, store
+from pipeline.report import REPORT
+from pipeline.runner import STEPS, reporting
 from pipeline.runner.execution import Outcome, perform
-from pipeline.runner.ledger import Entry, Fingerprint, Folders, Ledger
+from pipeline.runner.ledger import Entry, Folders, Ledger, file_name
 from pipeline.runner.lock import locked
 from pipeline.runner.plan import Plan, Task
 from pipeline.runner.reuse import reused
 from pipeline.runner.signature import declaration
 from pipeline.stages import STAGES
 from pipeline.study import Study
+
+Perform = Callable[[Task], Outcome]
 
 
 @dataclass
@@ -45,7 +50,7 @@ class Runner:
         self._pool: ProcessPoolExecutor | None = None
 
     def run(self, names: Iterable[str]) -> bool:
-        """Run these stages in order; whether every task of theirs succeeded.
+        """Run these stages, and the report, in order; whether every task of theirs succeeded.
 
         Raises
         ------
@@ -61,7 +66,10 @@ class Runner:
                 leftover.unlink()
             self._remove_obsolete()
             for name in names:
-                self._stage(name, alone=len(names) == 1)
+                if name == REPORT:
+                    self._bring_up_to_date(name, [reporting.task(self.plan)], partial(reporting.perform, self.ledger))
+                else:
+                    self._stage(name, alone=len(names) == 1)
         return self.failures == 0
 
     def _remove_obsolete(self) -> None:
@@ -70,7 +78,7 @@ class Runner:
         obsolete = [
             entry
             for entry in list(self.ledger.entries())
-            if entry.stage not in STAGES or not {_folder(name) for name in entry.outputs} - {""} <= folders
+            if entry.stage not in STEPS or not {_folder(name) for name in entry.outputs} - {""} <= folders
         ]
         for entry in obsolete:
             self.ledger.remove(entry)
@@ -87,53 +95,54 @@ class Runner:
             raise PipelineError(
                 f"{name} has nothing to work on: there are no {kinds} records; run {_before(name)} first"
             )
-        planned = {task.name.replace("/", ".") for task in tasks}
-        for entry in list(self.ledger.entries(name)):
-            if entry.task.replace("/", ".") not in planned:
-                self.ledger.remove(entry)
-        due: dict[str, tuple[Task, Fingerprint]] = {}
+        self._bring_up_to_date(name, tasks, partial(perform, self.folders))
+
+    def _bring_up_to_date(self, name: str, tasks: list[Task], perform: Perform) -> None:
+        """Perform what is not current of all the tasks there are, and forget those that are no more."""
+        planned = {file_name(task.name) for task in tasks}
+        for obsolete in [entry for entry in self.ledger.entries(name) if file_name(entry.task) not in planned]:
+            self.ledger.remove(obsolete)
+        due: list[Task] = []
         tasks_by_reason: dict[str, list[str]] = {}
         copied = 0
         for task in tasks:
-            now = self.plan.fingerprint(asks, task)
-            reasons = ["--force"] if self.force else self.ledger.reasons(self.ledger.entry(name, task.name), now)
-            if reasons and not self.force and (other := reused(self.ledger, task, now)):
+            entry = self.ledger.entry(name, task.name)
+            reasons = ["--force"] if self.force else self.ledger.reasons(entry, task.fingerprint)
+            if reasons and not self.force and (other := reused(self.ledger, task)):
                 self.console.say(f"{name}: copied from {other}, which has the same robot and settings")
                 self.ran += 1
                 copied += 1
             elif reasons:
-                due[task.name] = task, now
+                due.append(task)
                 tasks_by_reason.setdefault(_brief(reasons), []).append(task.name)
         for reason, names in tasks_by_reason.items():
             self.console.say(f"{name}: {_listed(names)}: {reason}")
-        self._perform(name, due)
-        current = len(tasks) - len(due) - copied
-        if current:
+        for done, outcome in enumerate(self._outcomes(due, perform), start=1):
+            self._record(outcome)
+            self.console.progress(name, done, len(due))
+        if current := len(tasks) - len(due) - copied:
             self.console.say(f"{name}: {current} of {len(tasks)} current")
 
-    def _perform(self, name: str, due: dict[str, tuple[Task, Fingerprint]]) -> None:
-        for done, outcome in enumerate(self._outcomes(due), start=1):
-            task, fingerprint = due[outcome.task.name]
-            before = self.ledger.entry(name, task.name)
-            for stale in set(before.outputs if before else ()) - set(outcome.outputs):
-                self.folders.file(stale).unlink(missing_ok=True)
-            hashes = {made: self.ledger.digest(made, fresh=True) for made in outcome.outputs}
-            self.ledger.write(Entry(name, task.name, asdict(fingerprint), hashes, outcome.failed))
-            self.ran += 1
-            self.failures += bool(outcome.failed)
-            for line in outcome.messages:
-                self.console.warn(f"{name}: {line}")
-            self.console.progress(name, done, len(due))
+    def _record(self, outcome: Outcome) -> None:
+        """Remember what a task made, and remove what it made before and does no more."""
+        task = outcome.task
+        before = self.ledger.entry(task.stage, task.name)
+        for stale in set(before.outputs if before else ()) - set(outcome.outputs):
+            self.folders.file(stale).unlink(missing_ok=True)
+        hashes = {made: self.ledger.digest(made, fresh=True) for made in outcome.outputs}
+        self.ledger.write(Entry(task.stage, task.name, asdict(task.fingerprint), hashes, outcome.failed))
+        self.ran += 1
+        self.failures += bool(outcome.failed)
+        for line in outcome.messages:
+            self.console.warn(f"{task.stage}: {line}")
 
-    def _outcomes(self, due: dict[str, tuple[Task, Fingerprint]]) -> Iterator[Outcome]:
-        calls = [(self.study, self.folders, task, asdict(fingerprint)) for task, fingerprint in due.values()]
-        if self.jobs == 1 or len(calls) == 1:
-            for call in calls:
-                yield perform(*call)
+    def _outcomes(self, due: list[Task], perform: Perform) -> Iterator[Outcome]:
+        if self.jobs == 1 or len(due) == 1:
+            yield from map(perform, due)
             return
         if self._pool is None:
             self._pool = self._stack.enter_context(ProcessPoolExecutor(self.jobs, mp_context=get_context("spawn")))
-        futures: list[Future[Outcome]] = [self._pool.submit(perform, *call) for call in calls]
+        futures: list[Future[Outcome]] = [self._pool.submit(perform, task) for task in due]
         for future in as_completed(futures):
             yield future.result()
 

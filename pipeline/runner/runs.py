@@ -10,10 +10,11 @@ from typing import Literal
 import typer
 
 from pipeline.errors import BadStudy
+from pipeline.report import REPORT
 from pipeline.runner.execution import Outcome
-from pipeline.runner.ledger import Fingerprint, Folders
+from pipeline.runner.ledger import Folders
 from pipeline.runner.plan import Task
-from pipeline.runner.runner import Console, Runner
+from pipeline.runner.runner import Console, Perform, Runner
 from pipeline.study import Study, reading
 
 Verbosity = Literal["quiet", "normal", "verbose"]
@@ -122,7 +123,7 @@ def run(
         speaks.say(f"{folder}: nothing to do, every stage is current")
     for file in ("report.html", "report.pdf"):
         made = runner.folders.reports / file
-        if "report" in names and made.exists():
+        if REPORT in names and made.exists():
             speaks.say(f"{folder}: see {made}")
     if not good:
         typer.secho(f"{folder}: {runner.failures} of {runner.ran} tasks failed", fg="red", err=True)
@@ -132,10 +133,10 @@ def run(
 class Narrator(Runner):
     """A runner that says of every task, too, when it is done: how long it took, or how far its stage then was."""
 
-    def _outcomes(self, due: dict[str, tuple[Task, Fingerprint]]) -> Iterator[Outcome]:
+    def _outcomes(self, due: list[Task], perform: Perform) -> Iterator[Outcome]:
         together = self.jobs > 1 and len(due) > 1
         start = perf_counter()
-        for outcome in super()._outcomes(due):
+        for outcome in super()._outcomes(due, perform):
             seconds = perf_counter() - start
             when = f"done {seconds:.2f} s into the stage" if together else f"took {seconds:.2f} s"
             self.console.say(f"{outcome.task.stage}: {outcome.task.name}: {when}")

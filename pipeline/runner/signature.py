@@ -10,12 +10,11 @@ from typing import Any, get_args, get_origin, get_type_hints
 
 from pipeline.logs.log import Log
 from pipeline.records import Record
-from pipeline.records.catalogue import Catalogue, Provenance
 from pipeline.robots.robot import Joint, Robot
-from pipeline.study import LogEntry, Settings, Study
+from pipeline.study import LogEntry, Settings
 
 Kinds = tuple[type[Record], ...]
-GIVEN = {Log: "log", LogEntry: "entry", Joint: "joint", Robot: "robot", Study: "study"}
+GIVEN = {Log: "log", LogEntry: "entry", Joint: "joint", Robot: "robot"}
 SETTINGS = tuple(f.name for f in fields(Settings))
 
 
@@ -26,9 +25,9 @@ class Declaration:
     name: str
     each: dict[str, Kinds]  # called once for each record of these kinds
     per_log: dict[str, Kinds]  # called once a log, with all its records of these kinds
-    optional: dict[str, Kinds]  # the record about the same log and joint, or None
-    every: dict[str, Kinds]  # all records
-    given: dict[str, str]  # parameter -> "log", "entry", "joint", "robot" or "study"
+    optional: dict[str, Kinds]  # the record about the same, or None
+    every: dict[str, Kinds]  # all records about the same
+    given: dict[str, str]  # parameter -> "log", "entry", "joint" or "robot"
     settings: tuple[str, ...]
     makes: Kinds
 
@@ -47,8 +46,6 @@ def declaration(name: str) -> Declaration:
     declared = Declaration(name, {}, {}, {}, {}, {}, _settings(name, run), _kinds(_inner(hints.pop("return"))))
     for parameter, hint in hints.items():
         if parameter in declared.settings:
-            continue
-        if hint in (Catalogue, Provenance):
             continue
         if hint in GIVEN:
             declared.given[parameter] = GIVEN[hint]

@@ -4,18 +4,21 @@ A stage is a module whose docstring says what it does and whose `run` is a pure 
 The signature of `run` is the declaration of everything it needs:
 
     signal: Signal              called once for each record of that kind; `Track | Residual` takes either kind
-    average: Average | None     the record of that kind about the same log and joint, where there is one
     signals: Sequence[Signal]   called once a log, with the records of all its joints
-    fits: Iterable[Fit]         all records of that kind; the stage waits for them
     log: Log                    called once for each log of the study, opened
+    average: Average | None     the record of that kind about the same, where there is one
+    fits: Iterable[Fit]         all records of that kind about the same; the stage waits for them
     entry: LogEntry             what the study says of the log
     joint: Joint, robot: Robot  what the robot is
-    study: Study                the whole study
     *, lowpass: float           a setting of the study, by name
     -> Iterator[Average | Diagnostic] the kinds of record it makes
+
+"About the same" is about the log and the joint of the call, as far as the call and the record are about any: a call for
+a log and a joint gets the fits of its joint, and one that is about neither gets all there are.  So what a call reads
+does not grow with the study, unless it is the only one of its stage.  The report is no stage: it reads everything.
 """
 
 STAGES = (
-    "design", "ingest", "resample", "average", "differentiate", "fit", "predict", "ekf", "assess", "measure",
-    "whiteness", "report",
+    "design", "ingest", "resample", "average", "differentiate", "fit", "predict", "ekf", "assess", "threshold",
+    "measure", "whiteness",
 )  # fmt: skip

@@ -11,7 +11,7 @@ from pipeline.filters.problem import NoiseModel, Tracked
 from pipeline.maths.models.model import JointDynamics, Motion
 from pipeline.maths.signals.smoothing import segments
 from pipeline.maths.signals.windows import outside, settled
-from pipeline.records import Average, Column, Diagnostic, Fit, Signal, Track, diagnostic
+from pipeline.records import Column, Diagnostic, Fit, MeasurementNoise, Signal, Track, diagnostic
 from pipeline.robots.models import independent
 from pipeline.robots.robot import Joint
 from pipeline.study import LogEntry
@@ -22,7 +22,7 @@ FILTER = "ekf"
 def run(
     signal: Signal,
     fits: Iterable[Fit],
-    averages: Iterable[Average],
+    between_periods: MeasurementNoise | None,
     entry: LogEntry,
     joint: Joint,
     *,
@@ -34,7 +34,7 @@ def run(
     if entry.role == "friction":
         return
     own = [f for f in fits if f.group == joint.name]
-    if not own:
+    if not own or between_periods is None:
         yield diagnostic(
             "ekf", f"{signal.log}.{joint.name}", "note",
             f"{signal.log}/{joint.name}: no identification log moves this joint, so its external effort is not tracked",
@@ -54,13 +54,13 @@ def run(
         )  # fmt: skip
         return
     q_tau = q_tau or joint.q_tau
-    noise = assumed([a for a in averages if a.joint == joint.name], dynamics, motion, signal, q_tau)
+    noise = assumed(between_periods, dynamics, motion, signal, q_tau)
     tau_hat = predicted(model, chosen.theta, motion)
     yield tracked(signal, chosen, dynamics, tau_hat, noise, entry, q_tau)
 
 
 def assumed(
-    averages: list[Average], dynamics: JointDynamics, motion: Motion, signal: Signal, q_tau: float
+    between_periods: MeasurementNoise, dynamics: JointDynamics, motion: Motion, signal: Signal, q_tau: float
 ) -> NoiseModel:
     """What the filter assumes of noise: all measured, except for the walk of the external effort.
 
@@ -69,15 +69,14 @@ def assumed(
     finer than that, so it is process noise, too.
     """
     T_s = 1.0 / signal.rate
-    r_q, r_dq, sigma_tau = (
-        float(np.sqrt(np.mean([getattr(a, name) ** 2 for a in averages])))
-        for name in ("sigma_q", "sigma_dq", "sigma_tau")
-    )
     # A noiseless log would leave the innovations without a covariance to be judged by.
-    r_q, r_dq = (max(r, 1e-9 * np.ptp(x), 1e-12) for r, x in ((r_q, signal.q), (r_dq, signal.dq)))
+    r_q, r_dq = (
+        max(r, 1e-9 * np.ptp(x), 1e-12)
+        for r, x in ((between_periods.sigma_q, signal.q), (between_periods.sigma_dq, signal.dq))
+    )
     ddq = motion.ddq[:, 0]
     euler_q, euler_dq = (0.5 * T_s**2 * float(np.sqrt(np.mean(x**2))) for x in (ddq, np.gradient(ddq, T_s)))
-    driven = T_s * sigma_tau / float(np.mean(dynamics.inertia))
+    driven = T_s * between_periods.sigma_tau / float(np.mean(dynamics.inertia))
     return NoiseModel(r_q, r_dq, euler_q, float(np.hypot(driven, euler_dq)), q_tau * np.sqrt(T_s))
 
 

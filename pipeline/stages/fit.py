@@ -1,4 +1,4 @@
-"""Fit the parameters of every joint to all identification logs together, with every estimator."""
+"""Fit the parameters of every joint to all identification logs together, and without some, with every estimator."""
 
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -6,17 +6,26 @@ import numpy as np
 
 from pipeline.errors import NotIdentifiable
 from pipeline.estimators import ESTIMATORS, estimator
+from pipeline.estimators.folds import folds, refits
 from pipeline.estimators.problem import Estimate, Regression
 from pipeline.estimators.regression import averaged_motion, pose, predicted
 from pipeline.maths.arrays import Array
 from pipeline.maths.models.model import Model
-from pipeline.records import Diagnostic, Fit, Residual, Trajectory, diagnostic
+from pipeline.maths.signals.path import SAME_PATH, most_different
+from pipeline.records import CrossFit, Diagnostic, Fit, FittedPaths, MeasurementNoise, Residual, Trajectory, diagnostic
 from pipeline.robots.models import independent
 from pipeline.robots.robot import Robot
 
+PATHS = 20  # at most, that a recording is compared with
 
-def run(trajectories: Iterable[Trajectory], robot: Robot) -> Iterator[Fit | Residual | Diagnostic]:
-    """One Fit per joint and estimator; an estimator that cannot be used says why, and the rest goes on."""
+
+def run(
+    trajectories: Iterable[Trajectory], robot: Robot
+) -> Iterator[Fit | CrossFit | FittedPaths | MeasurementNoise | Residual | Diagnostic]:
+    """One Fit per joint and estimator; an estimator that cannot be used says why, and the rest goes on.
+
+    A joint of several logs has a CrossFit, too, by which each of its logs can be predicted from others.
+    """
     every = list(trajectories)
     for joint in robot.joints:
         own = [trajectory for trajectory in every if trajectory.joint == joint.name]
@@ -35,6 +44,11 @@ def run(trajectories: Iterable[Trajectory], robot: Robot) -> Iterator[Fit | Resi
                 yield diagnostic("fit", joint.name, "warning", finds)
             yield summarised(own, model, name, regression, estimate)
             yield from residuals(own, model, name, estimate)
+        if len(own) > 1:
+            for name in ESTIMATORS:
+                yield from cross_fits([t.log for t in own], model, name, regression)
+        yield from fitted_paths(own)
+        yield noise(own)
 
 
 def has_positive_inertia(model: Model, theta: Array, trajectories: Sequence[Trajectory]) -> bool:
@@ -64,6 +78,55 @@ def summarised(own: Sequence[Trajectory], model: Model, name: str, regression: R
         theta_std=estimate.theta_std,
         theta_std_hac=estimate.theta_std_hac,
     )
+
+
+def cross_fits(logs: Sequence[str], model: Model, name: str, regression: Regression) -> Iterator[CrossFit | Diagnostic]:
+    """The parameters without each fold of the logs, and which logs no refit can do without."""
+    fold = folds(len(logs))
+    left_out, thetas = [], []
+    for out, theta in enumerate(refits(regression, estimator(name))):
+        names = ", ".join(log for log, own in zip(logs, fold, strict=True) if own == out)
+        if isinstance(theta, NotIdentifiable):
+            said = f"{model.group}: {name} has no leave-out score of {names}, because a refit is not possible: {theta}"
+            yield diagnostic("fit", model.group, "note", said)
+        else:
+            left_out.append(names)
+            thetas.append(theta)
+    parameters, refitted = model.parameters, len(thetas)
+    yield CrossFit(
+        group=model.group,
+        model=model.name,
+        estimator=name,
+        left_out=np.repeat(np.array(left_out, object), len(parameters)),
+        parameter=np.array([parameter.name for parameter in parameters] * refitted, object),
+        unit=np.array([parameter.unit for parameter in parameters] * refitted, object),
+        theta=np.concatenate([[], *thetas]),
+    )
+
+
+def fitted_paths(own: Sequence[Trajectory]) -> Iterator[FittedPaths | Diagnostic]:
+    """The paths of a joint's logs, or of many logs those that differ most."""
+    joint = own[0].joint
+    chosen, likeness = most_different([(t.t, t.q, t.period) for t in own], PATHS)
+    if likeness < SAME_PATH:
+        said = f"{joint}: its identification logs follow more than {PATHS} paths; recordings are compared with {PATHS}"
+        yield diagnostic("fit", joint, "note", f"{said} that differ most, and may be said to follow another path")
+    kept = [own[i] for i in chosen]
+    yield FittedPaths(
+        joint=joint,
+        source=np.repeat(np.array([t.log for t in kept], object), [len(t) for t in kept]),
+        period=np.repeat([t.period for t in kept], [len(t) for t in kept]),
+        t=np.concatenate([t.t for t in kept]),
+        q=np.concatenate([t.q for t in kept]),
+    )
+
+
+def noise(own: Sequence[Trajectory]) -> MeasurementNoise:
+    """The noise between periods over all logs of a joint."""
+    sigma_q, sigma_dq, sigma_tau = (
+        float(np.sqrt(np.mean([getattr(t, name) ** 2 for t in own]))) for name in ("sigma_q", "sigma_dq", "sigma_tau")
+    )
+    return MeasurementNoise(own[0].joint, sigma_q, sigma_dq, sigma_tau)
 
 
 def residuals(own: Sequence[Trajectory], model: Model, name: str, estimate: Estimate) -> Iterator[Residual]:

@@ -6,14 +6,14 @@ import numpy as np
 
 from pipeline.maths.contact.window import summarise
 from pipeline.maths.signals.windows import free_space
-from pipeline.records import Contact, FreeSpace, Track
+from pipeline.records import Contact, Threshold, Track
 from pipeline.study import LogEntry
 
 
-def run(track: Track, spaces: Iterable[FreeSpace], entry: LogEntry) -> Iterator[Contact]:
+def run(track: Track, thresholds: Iterable[Threshold], entry: LogEntry) -> Iterator[Contact]:
     """The windows of contact that the study states, on one joint that moves."""
-    judge = worst([space for space in spaces if space.joint == track.joint])
-    if track.at_rest or judge is None or not entry.contact:
+    own = [t for t in thresholds if (t.joint, t.filter) == (track.joint, track.filter)]
+    if track.at_rest or not own or not entry.contact:
         return
     free = free_space(track.t, entry.contact, track.rate)
     summaries = [(window, summarise(track.t, track.tau_ext, window, free)) for window in sorted(entry.contact)]
@@ -26,16 +26,10 @@ def run(track: Track, spaces: Iterable[FreeSpace], entry: LogEntry) -> Iterator[
         log=track.log,
         joint=track.joint,
         filter=track.filter,
-        detection_level=judge.detection_level,
-        level_from=judge.log,
+        detection_level=own[0].detection_level,
+        level_from=own[0].level_from,
         onset=np.array(onset),
         release=np.array(release),
-        above=np.array([int(abs(row.peak) > judge.detection_level) for row in measured]),
+        above=np.array([int(abs(row.peak) > own[0].detection_level) for row in measured]),
         **columns,
     )
-
-
-def worst(spaces: list[FreeSpace]) -> FreeSpace | None:
-    """The free space with the highest detection level, of logs that no parameter was fitted to where there are any."""
-    unseen = [space for space in spaces if space.role != "identification"]
-    return max(unseen or spaces, key=lambda space: space.detection_level, default=None)

@@ -1,34 +1,33 @@
 """Predict the effort of logs that a fit has not seen, and score it; identification logs by leaving data out."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import replace
 
 import numpy as np
 
 from pipeline.errors import NotIdentifiable
 from pipeline.estimators import ESTIMATORS, estimator
+from pipeline.estimators.folds import folds
 from pipeline.estimators.regression import measured_motion, pose, predicted
 from pipeline.maths.arrays import Booleans
 from pipeline.maths.models.model import Model, Motion
 from pipeline.maths.signals import averaging, harmonics
 from pipeline.maths.signals.noise import model_error, noise_std, smoothed
-from pipeline.maths.signals.path import likeness
+from pipeline.maths.signals.path import SAME_PATH, likeness
 from pipeline.maths.signals.smoothing import segments, share_passed
 from pipeline.maths.signals.windows import outside
-from pipeline.records import Column, Diagnostic, Fit, Prediction, Signal, Trajectory, diagnostic
+from pipeline.records import Column, CrossFit, Diagnostic, Fit, FittedPaths, Prediction, Signal, Trajectory, diagnostic
 from pipeline.robots.models import independent
 from pipeline.robots.robot import Joint
 from pipeline.study import LogEntry
-
-SAME_PATH = 0.95  # correlation of positions above which two recordings follow the same path
-PARTS = 20  # at most: periods are left out one at a time, or in as many groups
 
 
 def run(
     signal: Signal,
     trajectory: Trajectory | None,
-    trajectories: Iterable[Trajectory],
+    paths: FittedPaths | None,
     fits: Iterable[Fit],
+    cross_fits: Iterable[CrossFit],
     entry: LogEntry,
     joint: Joint,
     *,
@@ -49,41 +48,45 @@ def run(
             yield diagnostic("predict", f"{signal.log}.{joint.name}", "warning", said)
             return
         motion = measured_motion(signal, lowpass)
-        path = "same path" if follows(signal, [t for t in trajectories if t.joint == joint.name]) else "another path"
+        path = "same path" if paths is not None and follows(signal, paths) else "another path"
         for fit in fits:
             if fit.group == joint.name:
                 tau_hat = predicted(model, fit.theta, motion)
                 prediction = scored(signal, fit.model, fit.estimator, entry.role, tau_hat, free, lowpass)
                 yield replace(prediction, path=path)
     elif trajectory is not None:
-        others = [t for t in trajectories if t.joint == joint.name and t.log != signal.log]
-        if others:
-            yield from without_the_log(signal, trajectory, others, model, lowpass)
+        own = [fit for fit in cross_fits if fit.group == joint.name]
+        if own:
+            yield from without_the_log(signal, trajectory, own, model, lowpass)
         else:
             yield from without_a_period(signal, trajectory, model, lowpass)
 
 
-def follows(signal: Signal, trajectories: Sequence[Trajectory]) -> bool:
-    """Whether a recording follows the path of one that a fit has seen, on which the model's error repeats."""
+def follows(signal: Signal, paths: FittedPaths) -> bool:
+    """Whether a recording follows a path that was fitted, on which the model's error repeats."""
     part = max(segments(signal.segment), key=lambda s: s.stop - s.start)
-    likenesses = [likeness(signal.t[part], signal.q[part], t.q, t.period) for t in trajectories]
-    return max(likenesses, default=0.0) > SAME_PATH
+    each = [np.flatnonzero(paths.source == log) for log in dict.fromkeys(paths.source)]
+    likenesses = [
+        likeness(signal.t[part], signal.q[part], paths.q[rows], float(paths.period[rows[0]])) for rows in each
+    ]
+    return max(likenesses) > SAME_PATH
 
 
 def without_the_log(
-    signal: Signal, own: Trajectory, others: Sequence[Trajectory], model: Model, lowpass: float
-) -> Iterator[Prediction | Diagnostic]:
-    """Predict a log from fits to the other identification logs."""
+    signal: Signal, own: Trajectory, cross_fits: Iterable[CrossFit], model: Model, lowpass: float
+) -> Iterator[Prediction]:
+    """Predict a log from fits to other identification logs."""
     part = at(signal, whole(signal, own))
     motion = motion_at(own, part.t - signal.t[0])
-    for name in ESTIMATORS:
-        try:
-            theta = estimator(name)(pose(model, others)).theta
-        except NotIdentifiable as error:
-            yield not_predicted(signal, name, error)
-            continue
-        everywhere = np.ones(len(part.t), dtype=bool)
-        yield scored(part, model.name, name, "leave one log out", predicted(model, theta, motion), everywhere, lowpass)
+    everywhere = np.ones(len(part.t), dtype=bool)
+    for fit in cross_fits:
+        left_out = [str(names).split(", ") for names in fit.left_out]
+        rows = [row for row, names in enumerate(left_out) if signal.log in names]
+        if rows:
+            number = len(left_out[rows[0]])
+            scheme = "leave one log out" if number == 1 else f"leave {number} logs out"
+            tau_hat = predicted(model, fit.theta[rows], motion)
+            yield scored(part, fit.model, fit.estimator, scheme, tau_hat, everywhere, lowpass)
 
 
 def without_a_period(
@@ -93,7 +96,7 @@ def without_a_period(
     part = at(signal, whole(signal, own))
     since = part.t - signal.t[0]
     number = np.minimum((since / own.period + 1e-9).astype(int), own.periods - 1)
-    group = number * min(own.periods, PARTS) // own.periods
+    group = np.array(folds(own.periods))[number]
     Phi = model.regressor(motion_at(own, since)).Phi[:, 0]
     tau_hat = {name: np.empty(len(since)) for name in ESTIMATORS}
     rests = averaging.left_out(part.t, part.tau, own.period, len(own.t), group)

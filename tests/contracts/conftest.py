@@ -37,7 +37,7 @@ class Lab:
     plan: Plan
 
     def records(self, kind: type[Record]) -> list[Record]:
-        return [store.read(kind, self.folders.processed, place) for _, place in self.plan.places((kind,))]
+        return [store.read(kind, self.folders.processed, place) for _, place in self.plan.places().of((kind,))]
 
 
 def robot() -> Robot:
@@ -52,12 +52,15 @@ def robot() -> Robot:
 @pytest.fixture(scope="session")
 def lab(tmp_path_factory) -> Lab:
     folder = arm.write_study(tmp_path_factory.mktemp("contracts") / "raw" / "arm")
+    arm.write_csv(folder / "again.csv", [arm.signal("hand_roll", period=2.0, periods=5, rate=50.0, seed=2)])
+    with (folder / "study.toml").open("a") as file:
+        file.write(arm.log_table("again", "again.csv", "identification", ["hand_roll"]))
     study = replace(reading.read(folder), robot=robot(), truth=TRUTH)
     said: list[str] = []
     runner = Runner(study, folders(folder, None, None), Console(lambda line: None, said.append))
     with pytest.MonkeyPatch.context() as shorter:
         shorten(shorter)
-        good = runner.run(name for name in STAGES if name != "report")
+        good = runner.run(STAGES)
     assert good, "\n".join(said)
     return Lab(study, runner.folders, Plan(study, Ledger(runner.folders)))
 

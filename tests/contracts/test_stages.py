@@ -12,14 +12,14 @@ from numpy.testing import assert_array_equal
 
 from pipeline.records import Diagnostic, Record
 from pipeline.records.catalogue import Catalogue, Provenance
-from pipeline.runner.execution import _argument, _given
+from pipeline.report import report
+from pipeline.runner import execution
 from pipeline.runner.plan import Task
 from pipeline.runner.signature import declaration
 from pipeline.stages import STAGES
 from tests.contracts.conftest import Lab, shorten
 
 STAGE = pytest.mark.parametrize("name", STAGES)
-OF_RECORDS = pytest.mark.parametrize("name", [name for name in STAGES if name != "report"])
 
 
 @STAGE
@@ -31,18 +31,16 @@ def test_the_declaration_parses_and_the_stage_says_what_it_does(name: str):
     groups = [asks.each, asks.per_log, asks.every]
     assert len(asks.each) <= 1  # of two, the runner could not tell how often to call it
     assert [parameter for group in groups for parameter, kinds in group.items() if not kinds] == []
-    assert bool(asks.makes) is (name != "report")
+    assert asks.makes
 
 
 def arguments(lab: Lab, task: Task) -> dict[str, Any]:
     """What the runner would hand to a stage; records that cannot be written into."""
-    asks = declaration(task.stage)
-    found = {parameter: _argument(asks, lab.folders, task, parameter) for parameter in task.records}
-    for record in [r for value in found.values() for r in (value if isinstance(value, list) else [value]) if r]:
+    handed = execution.arguments(lab.folders, task)
+    for record in [r for p in task.records for r in (handed[p] if isinstance(handed[p], list) else [handed[p]]) if r]:
         for column in record.columns():
             getattr(record, column).setflags(write=False)
-    found |= {parameter: _given(what, lab.study, task) for parameter, what in asks.given.items()}
-    return found | {setting: getattr(lab.study.settings, setting) for setting in asks.settings}
+    return handed
 
 
 @contextmanager
@@ -66,7 +64,7 @@ def same(one: Record, other: Record) -> None:
         assert_array_equal(getattr(one, name), getattr(other, name), err_msg=f"{one}: {name}")
 
 
-@OF_RECORDS
+@STAGE
 def test_the_same_records_give_the_same_records_and_nothing_else_is_read(name: str, lab: Lab, monkeypatch):
     """Twice on the very same arguments, which stay as they are, and with the study's files moved away meanwhile."""
     shorten(monkeypatch)
@@ -88,9 +86,8 @@ def test_the_same_records_give_the_same_records_and_nothing_else_is_read(name: s
 
 def test_the_report_of_the_same_records_is_the_same(lab: Lab, catalogue: Catalogue, monkeypatch):
     """Its numbers; the writers are slow, and `test_runs` compares what they write."""
-    stage = import_module("pipeline.stages.report")
-    monkeypatch.setattr(stage, "WRITERS", {})
+    monkeypatch.setattr(report, "WRITERS", {})
     with away(lab.folders.processed, lab.study.folder):
-        first, second = (stage.run(catalogue, lab.study, Provenance("1", {}, {}, {}, {})) for _ in range(2))
+        first, second = (report.write(catalogue, lab.study, Provenance("1", {}, {}, {}, {})) for _ in range(2))
     assert first["results.json"] == second["results.json"]
     assert b'"fit.hand_roll.independent.lse.inertia"' in first["results.json"]

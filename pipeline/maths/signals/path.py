@@ -1,8 +1,12 @@
 """Whether two recordings follow the same path."""
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from pipeline.maths.arrays import Array
+
+SAME_PATH = 0.95  # likeness above which two recordings follow the same path
 
 
 def likeness(t: Array, q: Array, period: Array, length: float) -> float:
@@ -20,3 +24,19 @@ def likeness(t: Array, q: Array, period: Array, length: float) -> float:
     products = np.fft.irfft(np.conj(np.fft.rfft(shape)) * np.fft.rfft(sums), K)
     size = np.linalg.norm(q - q.mean()) * np.sqrt(len(q) / K) * np.linalg.norm(shape)
     return float(products.max() / size) if size > 0 else 0.0
+
+
+def most_different(periods: Sequence[tuple[Array, Array, float]], most: int) -> tuple[list[int], float]:
+    """Which periods (t (K,) [s], q (K,), length [s]) stand for all, and the least likeness of any to these.
+
+    The first does, and then, as long as they are not `most`, the one that is least like any of them.
+    """
+    chosen, nearest = [0], np.full(len(periods), -1.0)
+    while True:
+        _, q, length = periods[chosen[-1]]
+        nearest = np.maximum(nearest, [likeness(t, other, q, length) for t, other, _ in periods])
+        nearest[chosen] = 1.0
+        if len(chosen) == min(most, len(periods)):
+            return sorted(chosen), float(nearest.min())
+        rest = np.setdiff1d(np.arange(len(periods)), chosen)
+        chosen.append(int(rest[np.argmin(nearest[rest])]))

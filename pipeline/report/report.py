@@ -11,7 +11,7 @@ from pipeline.report.writers import WRITERS, renderer
 from pipeline.study import Study
 
 
-def run(catalogue: Catalogue, study: Study, provenance: Provenance) -> dict[str, bytes]:
+def write(catalogue: Catalogue, study: Study, provenance: Provenance) -> dict[str, bytes]:
     """The files of the report, by name; what is shown and results.json come from the same numbers."""
     context = Context(catalogue, study, collect(catalogue), provenance)
     built = {name: (title, sections(context, names)) for name, (title, names) in DOCUMENTS.items()}

@@ -1,0 +1,17 @@
+"""Records of how large an external effort has to be to stand out from free space."""
+
+from dataclasses import dataclass
+
+from pipeline.records.record import Record
+
+
+@dataclass(frozen=True, eq=False)
+class Threshold(Record):
+    """The detection level that contacts on a joint are judged by: that of its worst free space."""
+
+    KEY = ("joint", "filter")
+
+    joint: str
+    filter: str
+    detection_level: float
+    level_from: str  # the log whose free space it is

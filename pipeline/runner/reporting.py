@@ -1,0 +1,75 @@
+"""The last reader of a run: the report, of every record that there is."""
+
+import importlib.metadata
+from dataclasses import asdict, replace
+from pathlib import Path
+
+from pipeline.records import KINDS, Record, store
+from pipeline.records.catalogue import Catalogue, Provenance
+from pipeline.report import REPORT
+from pipeline.runner.canonical import hash_of
+from pipeline.runner.code import code
+from pipeline.runner.execution import Outcome, said_of, without_folders
+from pipeline.runner.fingerprint import Fingerprint
+from pipeline.runner.ledger import Ledger
+from pipeline.runner.places import Located
+from pipeline.runner.plan import VERSION, Plan, Task
+from pipeline.study import Study
+
+PACKAGES = ("numpy", "scipy", "pandas", "pyarrow", "statsmodels", "numba", "matplotlib", "bokeh", "typst", "npTDMS")
+
+
+def task(plan: Plan) -> Task:
+    """What there is to report on one study, and all that the report depends on."""
+    study, ledger = plan.study, plan.ledger
+    located = plan.places().of(tuple(KINDS.values()))
+    inputs = [f"processed/{place.as_posix()}" for _, place in located] + [f"raw/{file}" for file in study_files(study)]
+    fingerprint = Fingerprint(
+        inputs={name: ledger.digest(name) for name in sorted(inputs)},
+        given={"study": hash_of(replace(study, folder=Path(study.name)))},
+        settings=asdict(study.settings),
+        schemas={},
+        code=code("pipeline.report.report", "pipeline.records.store"),
+        version=VERSION,
+    )
+    return Task(REPORT, REPORT, fingerprint, {"records": located}, {"study": study})
+
+
+def perform(ledger: Ledger, task: Task) -> Outcome:
+    """Write the report; what went wrong is its outcome."""
+    try:
+        from pipeline.report.report import write
+
+        study, located = task.given["study"], task.records["records"]
+        files = write(catalogue(ledger, located), study, provenance(study, ledger, located))
+        for name, content in files.items():
+            store.write_bytes(ledger.folders.reports / name, content)
+        return Outcome(task, tuple(f"reports/{name}" for name in files))
+    except Exception as error:
+        said = said_of(error)
+        return Outcome(task, (), without_folders(said, ledger.folders), (f"error: {said}",))
+
+
+def catalogue(ledger: Ledger, located: tuple[Located, ...]) -> Catalogue:
+    """The records at these places, each read when it is asked for."""
+
+    def read(kind: type[Record]) -> list[Record]:
+        places = [place for name, place in located if name == kind.__name__]
+        digests = [ledger.digest(f"processed/{place.as_posix()}") for place in places]
+        return [store.read(kind, ledger.folders.processed, *each) for each in zip(places, digests, strict=True)]
+
+    return Catalogue(read)
+
+
+def provenance(study: Study, ledger: Ledger, located: tuple[Located, ...]) -> Provenance:
+    """Versions, every file with its hash, and what failed."""
+    files = (*study_files(study), *(file for entry in study.logs for file in entry.files))
+    raw = {f"raw/{study.name}/{file}": ledger.digest(f"raw/{file}") for file in files}
+    processed = {place.as_posix(): ledger.digest(f"processed/{place.as_posix()}") for _, place in located}
+    failures = {f"{e.stage} {e.task}": e.failed for e in ledger.entries() if e.failed and e.stage != REPORT}
+    return Provenance(VERSION, {p: importlib.metadata.version(p) for p in PACKAGES}, raw, processed, failures)
+
+
+def study_files(study: Study) -> tuple[str, ...]:
+    """The files of a study besides its logs."""
+    return tuple(file for file in ("study.toml", study.robot_file, "truth.toml" if study.truth else "") if file)

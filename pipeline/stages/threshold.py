@@ -1,0 +1,21 @@
+"""Set the threshold of every joint: the detection level of its worst free space, above which contacts stand out."""
+
+from collections.abc import Iterable, Iterator
+
+from pipeline.records import FreeSpace, Threshold
+
+
+def run(spaces: Iterable[FreeSpace]) -> Iterator[Threshold]:
+    """One Threshold per joint and filter of which there is any free space."""
+    every: dict[tuple[str, str], list[FreeSpace]] = {}
+    for space in spaces:
+        every.setdefault((space.joint, space.filter), []).append(space)
+    for (joint, name), own in every.items():
+        judge = worst(own)
+        yield Threshold(joint, name, judge.detection_level, judge.log)
+
+
+def worst(spaces: list[FreeSpace]) -> FreeSpace:
+    """The free space with the highest detection level, of logs that no parameter was fitted to where there are any."""
+    unseen = [space for space in spaces if space.role != "identification"]
+    return max(unseen or spaces, key=lambda space: space.detection_level)

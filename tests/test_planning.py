@@ -1,0 +1,114 @@
+"""Which tasks a study gives, and what each of them is handed: what is about its own log and joint, and nothing else."""
+
+import pickle
+
+import pytest
+
+from pipeline.records import KINDS, Fit, LogSummary, MeasurementNoise, Signal, Track, Whiteness
+from pipeline.robots import dvrk_psm
+from pipeline.runner.ledger import Entry, Folders, Ledger
+from pipeline.runner.places import about
+from pipeline.runner.plan import Plan
+from pipeline.runner.schemas import schemas
+from pipeline.runner.signature import declaration
+from pipeline.study import LogEntry, Settings, Study
+
+ROLL, PITCH = (joint.name for joint in dvrk_psm.ROBOT.joints[:2])
+LOGS = ("zebra", "aardvark")
+
+
+@pytest.fixture
+def plan(tmp_path) -> Plan:
+    """Two logs of two joints, in another order than their names', as the stages before the predictions leave them."""
+    folders = Folders(tmp_path / "raw", tmp_path / "processed", tmp_path / "reports")
+    entries = tuple(LogEntry(log, (f"{log}.csv",), "identification", ()) for log in LOGS)
+    ledger = Ledger(folders)
+
+    def write(stage: str, task: str, *names: str) -> None:
+        outputs = {f"processed/{name}.parquet": "0" for name in names}
+        ledger.write(Entry(stage, task, {"code": {}}, outputs))
+
+    for log in (*LOGS, "gone"):
+        write("resample", log, *(f"signal/{log}/{joint}" for joint in (PITCH, ROLL)))
+        write("differentiate", log, *(f"trajectory/{log}/{joint}" for joint in (PITCH, ROLL)))
+    joints = (PITCH, ROLL)
+    pooled = [f"{kind}/{joint}/independent.lse" for kind in ("fit", "cross_fit") for joint in joints]
+    noise = [f"{kind}/{joint}" for kind in ("fitted_paths", "measurement_noise") for joint in joints]
+    write("fit", "fit", *pooled, *noise)
+    return Plan(Study(folders.raw, "T", dvrk_psm.ROBOT, False, Settings(), entries), Ledger(folders))
+
+
+@pytest.mark.parametrize(
+    ("kind", "place", "log", "joint"),
+    [
+        (Signal, "signal/a/roll.parquet", "a", "roll"),
+        (Whiteness, "whiteness/a/roll.tau.independent.lse.parquet", "a", "roll"),
+        (Fit, "fit/roll/independent.lse.parquet", "", "roll"),
+        (MeasurementNoise, "measurement_noise/roll.parquet", "", "roll"),
+        (LogSummary, "log_summary/a.parquet", "a", ""),
+        (KINDS["Excitation"], "excitation/roll/published.parquet", "", "roll"),
+        (KINDS["Diagnostic"], "diagnostic/fit/roll.parquet", "", ""),
+    ],
+)
+def test_a_place_says_what_its_record_is_about(kind, place, log, joint):
+    assert about(kind, place) == (log, joint)
+
+
+def test_records_come_in_the_order_of_the_studys_logs_and_the_robots_joints(plan):
+    names = [place.as_posix() for _, place in plan.places().of((Track, Signal))]
+    assert names == [f"signal/{log}/{joint}.parquet" for log in LOGS for joint in (ROLL, PITCH)]
+
+
+def test_a_log_that_has_left_the_study_has_no_records(plan):
+    assert not [place for _, place in plan.places().of(tuple(KINDS.values())) if "gone" in place.parts]
+
+
+def test_a_call_gets_the_records_about_its_own_log_and_joint(plan):
+    tasks = {task.name: task for task in plan.tasks(declaration("predict"))}
+    assert list(tasks) == [f"{log}/{joint}" for log in LOGS for joint in (ROLL, PITCH)]
+    handed = {p: [place.as_posix() for _, place in r] for p, r in tasks[f"zebra/{PITCH}"].records.items()}
+    assert handed == {
+        "signal": [f"signal/zebra/{PITCH}.parquet"],
+        "paths": [f"fitted_paths/{PITCH}.parquet"],
+        "trajectory": [f"trajectory/zebra/{PITCH}.parquet"],
+        "fits": [f"fit/{PITCH}/independent.lse.parquet"],
+        "cross_fits": [f"cross_fit/{PITCH}/independent.lse.parquet"],
+    }
+    [whole] = plan.tasks(declaration("fit"))
+    assert len(whole.records["trajectories"]) == len(LOGS) * 2
+
+
+@pytest.mark.parametrize("stage", ["ingest", "average", "resample", "predict", "ekf"])
+def test_a_task_knows_nothing_of_other_logs(plan, stage):
+    tasks = list(plan.tasks(declaration(stage)))
+    assert tasks or stage == "resample"
+    for task in tasks:
+        sent = pickle.dumps(task)
+        assert [log for log in LOGS if log.encode() in sent] == [task.name.partition("/")[0]]
+
+
+def test_a_stage_depends_on_the_settings_and_things_that_its_signature_names(plan):
+    task = next(plan.tasks(declaration("predict")))
+    assert task.settings == {"lowpass": Settings().lowpass} == task.fingerprint.settings
+    assert task.given.keys() == {"entry", "joint"} == task.fingerprint.given.keys()
+
+
+def test_what_is_read_counts_by_name_type_and_unit_and_what_is_written_by_meaning_too(monkeypatch):
+    from pipeline.records.quantities import QUANTITIES
+
+    before = {stage: schemas(stage) for stage in ("predict", "fit", "whiteness")}
+    read = {"Signal", "Trajectory", "FittedPaths", "Fit", "CrossFit"}
+    assert before["predict"].keys() == {*read, "Prediction", "Diagnostic"}
+
+    def changed(**what: str) -> set[tuple[str, str]]:
+        schemas.cache_clear()
+        with monkeypatch.context() as patch:
+            patch.setitem(QUANTITIES, "theta", QUANTITIES["theta"]._replace(**what))
+            now = {stage: schemas(stage) for stage in before}
+        schemas.cache_clear()
+        return {
+            (stage, kind) for stage, kinds in now.items() for kind, sha in kinds.items() if sha != before[stage][kind]
+        }
+
+    assert changed(meaning="in other words") == {("fit", "Fit"), ("fit", "CrossFit")}
+    assert changed(unit="kg") == {(stage, kind) for stage in ("fit", "predict") for kind in ("Fit", "CrossFit")}
