@@ -14,7 +14,7 @@ from pipeline.runner.plan import Task
 from pipeline.runner.reuse import reused
 from pipeline.stages import design
 
-SAME = Fingerprint({}, {"robot": "a"}, {"shape": [1, 2]}, {"design.py": "b"}, "1")
+SAME = Fingerprint({}, {"robot": "a"}, {"shape": [1, 2]}, {}, {"design.py": "b"}, "1")
 LINKS, POSE = "processed/links/arm.parquet", "processed/pose/arm.parquet"
 
 

@@ -21,7 +21,8 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     yield Prose(
         "A fit is judged on data that it has not seen: validation logs, contact logs outside their contact windows, "
         "and identification logs predicted from refits that leave the log out, with its neighbours where a joint has "
-        "more than 20, or, where it has only one, each of its periods in turn. On the path that was fitted the model's error repeats, so such a score flatters. "
+        "more than 20, or, where it has only one, each of its periods in turn. On the path that was fitted the model's "
+        "error repeats, so such a score flatters. "
         '$R^2$ is of the raw effort, and noise alone keeps it below its ceiling $1 - sigma^2 \\/ "var"(tau)$; the '
         "model error is what differs beyond noise."
     )
