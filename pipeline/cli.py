@@ -21,7 +21,7 @@ from pipeline.runner import STEPS
 from pipeline.stages import STAGES
 
 if TYPE_CHECKING:
-    from pipeline.runner.runs import Verbosity
+    from pipeline.runner.console import Verbosity
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -36,6 +36,7 @@ Processed = Annotated[Path | None, typer.Option(help="Folder for processed files
 Reports = Annotated[Path | None, typer.Option(help="Folder for reports, instead of reports/ beside raw/.")]
 Force = Annotated[bool, typer.Option("--force", help="Run what is current, too.")]
 Jobs = Annotated[int, typer.Option(min=1, help="Processes to spread the work over.")]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what would run and why, and change nothing.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say only what went wrong, or may have.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say of each task, too, when it is done and its time.")]
 
@@ -142,11 +143,12 @@ def add_step(name: str, module: str) -> None:
         jobs: Jobs = 1,
         quiet: Quiet = False,
         verbose: Verbose = False,
+        dry_run: DryRun = False,
     ) -> None:
         from pipeline.runner import runs
 
         says = verbosity(quiet, verbose)
-        if not run_stages(runs.one(study), (name,), processed, reports, force, jobs, says):
+        if not run_stages(runs.one(study), (name,), processed, reports, force, jobs, says, dry_run):
             raise typer.Exit(1)
 
 
@@ -160,13 +162,14 @@ def run_all(
     jobs: Jobs = 1,
     quiet: Quiet = False,
     verbose: Verbose = False,
+    dry_run: DryRun = False,
 ) -> None:
     """Run every stage and the report, on the studies named or on all in raw/ whose logs are there."""
     from pipeline.runner import runs
 
     says = verbosity(quiet, verbose)
     named = runs.studies(studies or [], says)
-    good = [run_stages(study, STEPS, processed, reports, force, jobs, says) for study in named]
+    good = [run_stages(study, STEPS, processed, reports, force, jobs, says, dry_run) for study in named]
     if not all(good):
         raise typer.Exit(1)
 

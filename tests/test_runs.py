@@ -75,6 +75,32 @@ def test_a_second_run_runs_no_stage_and_says_so(finished):
     assert contents(processed(finished)) | contents(reports(finished)) == before
 
 
+def test_a_dry_run_says_what_would_run_and_why_and_changes_nothing(study, finished):
+    new = write_study(study.parent / "new")
+    said = call("all", new, "--dry-run")
+    assert "design: would run: it has not run yet" in said
+    assert "resample: waits for what ingest makes" in said
+    assert not processed(new).exists()
+    assert "would run" not in call("all", finished, "--dry-run")
+    log = next(study.glob("*.csv"))
+    log.write_bytes(log.read_bytes() + b"\n")
+    before = contents(processed(finished))
+    said = call("all", finished, "--dry-run")
+    assert re.search(r"^ingest: \S+: would run: raw/\S+ changed$", said, re.M), said
+    assert contents(processed(finished)) == before
+
+
+def test_a_run_ends_with_the_answer_the_times_and_where_it_is(finished):
+    said = call("all", finished, "--force")
+    answer = (reports(finished) / "summary.txt").read_text()
+    assert answer in said
+    assert answer.startswith("joint")
+    assert re.search(r"^took \d+\.\d s: ", said[said.index(answer) :], re.M)
+    for file in ("report.html", "report.pdf", "results.json"):
+        assert str(reports(finished) / file) in said
+    assert "design: design" not in said
+
+
 def test_the_same_data_give_the_same_bytes_whatever_the_number_of_processes(study, analysed):
     call("all", study, "--jobs", 2)
     assert contents(processed(study)) == contents(processed(analysed))
@@ -172,7 +198,7 @@ def test_a_reworded_meaning_runs_what_stores_it_and_what_reads_that(finished, pa
         assert line.endswith(" current"), line
     assert re.search(r"^ekf: .* and 1 more: the declaration of Track changed$", said, re.M), said
     assert re.search(r"^whiteness: track/.*: processed/track/.*parquet changed$", said, re.M), said
-    assert re.search(r"^report: report: the code of pipeline/records/predict.py changed", said, re.M), said
+    assert re.search(r"^report: the code of pipeline/records/predict.py changed", said, re.M), said
 
 
 def test_entries_and_files_are_read_once_a_run(finished, monkeypatch):
@@ -191,10 +217,10 @@ def test_the_report_is_written_again_when_what_it_shows_or_it_itself_changed(fin
     page = reports(finished) / "report.html"
     good = page.read_bytes()
     page.write_bytes(b"")
-    assert "report: report: reports/report.html was altered" in call("report", finished)
+    assert "report: reports/report.html was altered" in call("report", finished)
     assert page.read_bytes() == good
     edit(finished / "study.toml", 'title = "A test"', 'title = "A trial"')
-    assert "report: report: the study changed; raw/study.toml changed" in call("report", finished)
+    assert "report: the study changed; raw/study.toml changed" in call("report", finished)
     assert "report: 1 of 1 current" in call("report", finished)
 
 
@@ -206,7 +232,7 @@ def test_a_report_that_fails_says_so_costs_no_stage_and_is_tried_again(finished,
         patch.setattr("pipeline.report.report.collect", fail)
         edit(finished / "study.toml", 'title = "A test"', 'title = "A trial"')
         assert "report: error: ZeroDivisionError: for a test (test_runs.py:" in call("report", finished, code=1)
-    assert "report: report: it failed last time" in call("report", finished)
+    assert "report: it failed last time" in call("report", finished)
     assert "are unchanged" in call("verify", finished)
 
 

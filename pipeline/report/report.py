@@ -1,4 +1,4 @@
-"""Write the reports of a study: report and robot, each as HTML and PDF, and results.json."""
+"""Write the reports of a study: report and robot, each as HTML and PDF, results.json, and the answer as text."""
 
 import hashlib
 
@@ -7,6 +7,7 @@ from pipeline.report.content import Document, Section
 from pipeline.report.context import Context
 from pipeline.report.results import collect
 from pipeline.report.sections import DOCUMENTS, section_builder
+from pipeline.report.terminal import answer
 from pipeline.report.writers import WRITERS, renderer
 from pipeline.study import Study
 
@@ -25,7 +26,7 @@ def write(catalogue: Catalogue, study: Study, provenance: Provenance) -> dict[st
     pages = {
         f"{name}.{ending}": renderer(ending)(document) for name, document in documents.items() for ending in WRITERS
     }
-    return pages | {"results.json": results}
+    return pages | {"results.json": results, "summary.txt": answer(context).encode()}
 
 
 def sections(context: Context, names: tuple[str, ...]) -> tuple[Section, ...]:

@@ -67,7 +67,9 @@ def provenance(study: Study, ledger: Ledger, located: tuple[Located, ...]) -> Pr
     raw = {f"raw/{study.name}/{file}": ledger.digest(f"raw/{file}") for file in files}
     processed = {place.as_posix(): ledger.digest(f"processed/{place.as_posix()}") for _, place in located}
     failures = {f"{e.stage} {e.task}": e.failed for e in ledger.entries() if e.failed and e.stage != REPORT}
-    return Provenance(VERSION, {p: importlib.metadata.version(p) for p in PACKAGES}, raw, processed, failures)
+    versions = {p: importlib.metadata.version(p) for p in PACKAGES}
+    text = (study.folder / "study.toml").read_text(encoding="utf-8", errors="replace")
+    return Provenance(VERSION, versions, raw, processed, failures, text)
 
 
 def study_files(study: Study) -> tuple[str, ...]:

@@ -6,11 +6,13 @@ from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from functools import partial
 from multiprocessing import get_context
+from time import perf_counter
 
 from pipeline.errors import PipelineError
 from pipeline.records import KINDS, store
 from pipeline.report import REPORT
 from pipeline.runner import STEPS, reporting
+from pipeline.runner.console import Console
 from pipeline.runner.execution import Outcome, perform
 from pipeline.runner.ledger import Entry, Folders, Ledger, file_name
 from pipeline.runner.lock import locked
@@ -21,15 +23,6 @@ from pipeline.stages import STAGES
 from pipeline.study import Study
 
 Perform = Callable[[Task], Outcome]
-
-
-@dataclass
-class Console:
-    """How a run speaks: a line at a time, and how far it is."""
-
-    say: Callable[[str], None]
-    warn: Callable[[str], None]
-    progress: Callable[[str, int, int], None] = lambda stage, done, total: None
 
 
 @dataclass
@@ -47,6 +40,7 @@ class Runner:
         self.plan = Plan(self.study, self.ledger)
         self.failures = 0
         self.ran = 0
+        self.seconds: dict[str, float] = {}  # that each step took
         self._pool: ProcessPoolExecutor | None = None
 
     def run(self, names: Iterable[str]) -> bool:
@@ -66,11 +60,30 @@ class Runner:
                 leftover.unlink()
             self._remove_obsolete()
             for name in names:
+                start = perf_counter()
                 if name == REPORT:
                     self._bring_up_to_date(name, [reporting.task(self.plan)], partial(reporting.perform, self.ledger))
                 else:
                     self._stage(name, alone=len(names) == 1)
+                self.seconds[name] = perf_counter() - start
         return self.failures == 0
+
+    def preview(self, names: Iterable[str]) -> Iterator[str]:
+        """What a run of these stages would do and why, as far as that is known before it: it changes nothing."""
+        before: list[str] = []
+        for name in names:
+            tasks = [reporting.task(self.plan)] if name == REPORT else list(self.plan.tasks(declaration(name)))
+            by_reason: dict[str, list[str]] = {}
+            for task in tasks:
+                entry = self.ledger.entry(name, task.name)
+                if reasons := ["--force"] if self.force else self.ledger.reasons(entry, task.fingerprint):
+                    by_reason.setdefault(_brief(reasons), []).append(task.name)
+            yield from (f"{_listed(name, due)}: would run: {reason}" for reason, due in by_reason.items())
+            if before and not by_reason:
+                yield f"{name}: waits for what {before[-1]} makes"
+            elif len(tasks) > (due := sum(map(len, by_reason.values()))):
+                yield f"{name}: {len(tasks) - due} of {len(tasks)} current"
+            before += [name] if by_reason else []
 
     def _remove_obsolete(self) -> None:
         """Remove what an earlier version made under the names of stages and records that there are no more."""
@@ -116,7 +129,7 @@ class Runner:
                 due.append(task)
                 tasks_by_reason.setdefault(_brief(reasons), []).append(task.name)
         for reason, names in tasks_by_reason.items():
-            self.console.say(f"{name}: {_listed(names)}: {reason}")
+            self.console.say(f"{_listed(name, names)}: {reason}")
         for done, outcome in enumerate(self._outcomes(due, perform), start=1):
             self._record(outcome)
             self.console.progress(name, done, len(due))
@@ -157,8 +170,11 @@ def _brief(reasons: list[str]) -> str:
     return "; ".join(reasons[:2]) + (f"; and {len(reasons) - 2} more" if len(reasons) > 2 else "")
 
 
-def _listed(tasks: list[str]) -> str:
-    return ", ".join(tasks[:3]) + (f" and {len(tasks) - 3} more" if len(tasks) > 3 else "")
+def _listed(stage: str, tasks: list[str]) -> str:
+    """A stage and its tasks; one that is called once is not named twice."""
+    if tasks == [stage]:
+        return stage
+    return f"{stage}: " + ", ".join(tasks[:3]) + (f" and {len(tasks) - 3} more" if len(tasks) > 3 else "")
 
 
 def _before(stage: str) -> str:

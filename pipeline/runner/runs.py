@@ -1,23 +1,20 @@
 """Runs of the stages on studies: where their folders are, which of them can run, and how a run speaks."""
 
-import sys
 from collections.abc import Iterator, Sequence
 from glob import glob
 from pathlib import Path
 from time import perf_counter
-from typing import Literal
 
 import typer
 
 from pipeline.errors import BadStudy
 from pipeline.report import REPORT
+from pipeline.runner.console import Verbosity, console, durations, printable
 from pipeline.runner.execution import Outcome
 from pipeline.runner.ledger import Folders
 from pipeline.runner.plan import Task
-from pipeline.runner.runner import Console, Perform, Runner
+from pipeline.runner.runner import Perform, Runner
 from pipeline.study import Study, reading
-
-Verbosity = Literal["quiet", "normal", "verbose"]
 
 
 def folders(study: Path, processed: Path | None, reports: Path | None) -> Folders:
@@ -111,23 +108,39 @@ def run(
     force: bool = False,
     jobs: int = 1,
     verbosity: Verbosity = "normal",
+    dry_run: bool = False,
 ) -> bool:
-    """Run stages on one study and say what was done; whether every task succeeded."""
+    """Run stages on one study and say what was done, or only what would be; whether every task succeeded."""
     study = load(folder)
     speaks = console(verbosity)
     kind = Narrator if verbosity == "verbose" else Runner
     runner = kind(study, folders(folder, processed, reports), speaks, force, jobs)
     speaks.say(typer.style(f"{folder}: {study.title}{' (SIMULATED)' if study.simulated else ''}", bold=True))
+    if dry_run:
+        for line in runner.preview(names):
+            speaks.say(line)
+        return True
     good = runner.run(names)
     if not runner.ran:
         speaks.say(f"{folder}: nothing to do, every stage is current")
-    for file in ("report.html", "report.pdf"):
-        made = runner.folders.reports / file
-        if REPORT in names and made.exists():
-            speaks.say(f"{folder}: see {made}")
+    if REPORT in names:
+        conclude(runner, folder)
     if not good:
         typer.secho(f"{folder}: {runner.failures} of {runner.ran} tasks failed", fg="red", err=True)
     return good
+
+
+def conclude(runner: Runner, folder: Path) -> None:
+    """Say what came out: the answer, how long it took, and where it is."""
+    answer = runner.folders.reports / "summary.txt"
+    if answer.exists():
+        runner.console.say(printable(answer.read_text(encoding="utf-8").rstrip()))
+    if runner.ran:
+        runner.console.say(durations(runner.seconds))
+    for file in ("report.html", "report.pdf", "robot.html", "results.json"):
+        made = runner.folders.reports / file
+        if made.exists():
+            runner.console.say(f"{folder}: see {made}")
 
 
 class Narrator(Runner):
@@ -142,21 +155,3 @@ class Narrator(Runner):
             self.console.say(f"{outcome.task.stage}: {outcome.task.name}: {when}")
             yield outcome
             start = start if together else perf_counter()
-
-
-def console(verbosity: Verbosity) -> Console:
-    """Lines for a log; on a terminal, a bar as well.  Warnings are never left out."""
-
-    def progress(stage: str, done: int, total: int) -> None:
-        if verbosity == "normal" and sys.stderr.isatty():
-            width = 30
-            full = width * done // total
-            end = "\n" if done == total else ""
-            sys.stderr.write(f"\r{stage:14s} [{'#' * full}{'.' * (width - full)}] {done}/{total}{end}")
-            sys.stderr.flush()
-
-    def say(line: str) -> None:
-        if verbosity != "quiet":
-            typer.echo(line)
-
-    return Console(say, lambda line: typer.secho(line, fg="yellow", err=True), progress)

@@ -7,9 +7,10 @@ from pathlib import Path
 import pytest
 
 from pipeline.robots import dvrk_psm
+from pipeline.runner.console import Console
 from pipeline.runner.ledger import Entry, Folders, Ledger
 from pipeline.runner.plan import Plan
-from pipeline.runner.runner import Console, Runner
+from pipeline.runner.runner import Runner
 from pipeline.runner.runs import folders
 from pipeline.runner.signature import declaration
 from pipeline.stages import STAGES

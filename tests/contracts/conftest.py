@@ -12,9 +12,10 @@ from pipeline.records import KINDS, Record, store
 from pipeline.records.catalogue import Catalogue
 from pipeline.robots import Robot, davinci
 from pipeline.robots.davinci_chain import BODIES, CHAIN
+from pipeline.runner.console import Console
 from pipeline.runner.ledger import Folders, Ledger
 from pipeline.runner.plan import Plan
-from pipeline.runner.runner import Console, Runner
+from pipeline.runner.runner import Runner
 from pipeline.runner.runs import folders
 from pipeline.stages import STAGES, design
 from pipeline.study import Study, reading

@@ -1,0 +1,78 @@
+"""How a run speaks: lines for a log, on a terminal a bar as well, and at its end the answer, times and files."""
+
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Literal
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.progress import Progress
+
+Verbosity = Literal["quiet", "normal", "verbose"]
+
+
+@dataclass
+class Console:
+    """How a run speaks: a line at a time, and how far it is."""
+
+    say: Callable[[str], None]
+    warn: Callable[[str], None]
+    progress: Callable[[str, int, int], None] = lambda stage, done, total: None
+
+
+def console(verbosity: Verbosity) -> Console:
+    """Lines for a log; on a terminal, a bar as well.  Warnings are never left out."""
+    bar = Bar() if verbosity == "normal" and sys.stderr.isatty() else None
+
+    def say(line: str) -> None:
+        if verbosity != "quiet":
+            typer.echo(line)
+
+    def warn(line: str) -> None:
+        typer.secho(line, fg="yellow", err=True)
+
+    return Console(say, warn, bar.show) if bar else Console(say, warn)
+
+
+class Bar:
+    """How far a stage is, on the last line of a terminal; gone when the stage is done."""
+
+    def __init__(self) -> None:
+        self._progress: Progress | None = None
+
+    def show(self, stage: str, done: int, total: int) -> None:
+        """Draw the bar of a stage, and take it away with its last task."""
+        if self._progress is None:
+            self._progress = self._new(stage, total)
+        self._progress.update(self._progress.task_ids[0], completed=done)
+        if done == total:
+            self._progress.stop()
+            self._progress = None
+
+    @staticmethod
+    def _new(stage: str, total: int) -> "Progress":
+        from rich.console import Console as Terminal
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        columns = (TextColumn("{task.description:14s}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+        progress = Progress(*columns, console=Terminal(stderr=True), transient=True)
+        progress.add_task(stage, total=total)
+        progress.start()
+        return progress
+
+
+def durations(seconds: dict[str, float]) -> str:
+    """How long each stage took, those of under a tenth of a second left out."""
+    long = [f"{name} {took:.1f} s" for name, took in seconds.items() if took >= 0.1]
+    return f"took {sum(seconds.values()):.1f} s" + (f": {', '.join(long)}" if long else "")
+
+
+def printable(text: str) -> str:
+    """A text as this terminal can show it: its marks as letters where it knows none."""
+    with suppress(UnicodeEncodeError, LookupError):
+        text.encode(sys.stdout.encoding or "utf-8")
+        return text
+    return text.encode("ascii", "replace").decode()
