@@ -81,7 +81,7 @@ class Ledger:
 
     def read(self, stage: str, task: str) -> Entry | None:
         """The same, of one file alone: what another study has made is asked of one task."""
-        return _read(self.place(stage, task))
+        return _read(str(self.place(stage, task)))
 
     def entries(self, stage: str | None = None) -> Iterator[Entry]:
         """Every entry, or every one of a stage, in order."""
