@@ -1,5 +1,6 @@
 """Parameters: those put in come out, as well as they claim to."""
 
+from collections import Counter
 from dataclasses import replace
 
 import numpy as np
@@ -8,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from pipeline.estimators import estimator
+from pipeline.estimators import ESTIMATORS, estimator
 from pipeline.estimators.folds import folds
 from pipeline.estimators.problem import Regression, bartlett, correlation_lags
 from pipeline.estimators.wlse import pooled
@@ -231,6 +232,18 @@ def test_many_logs_are_left_out_in_twenty_folds_of_neighbours():
     assert_allclose(cross.theta[:4], refit_without(every, "log-0", "log-1"), rtol=1e-12)
     [made, _] = predictions(arm.signal(log="log-4", rate=20.0), "identification", [], every)
     assert made.scheme == "leave 2 logs out"
+
+
+def test_a_joint_is_fitted_anew_at_most_twenty_times_however_many_its_logs_are(monkeypatch):
+    one = trajectory(arm.signal(periods=4, rate=20.0))
+    calls = []
+    monkeypatch.setattr(
+        "pipeline.stages.fit.estimator", lambda name: lambda p: calls.append(name) or estimator(name)(p)
+    )
+    for logs in (20, 30, 60):
+        calls.clear()
+        list(fit.run([replace(one, log=f"log-{i}", tau=one.tau * (1 + 0.01 * i)) for i in range(logs)], arm.ARM))
+        assert Counter(calls) == dict.fromkeys(ESTIMATORS, 1 + 20)
 
 
 def test_a_log_that_no_refit_can_do_without_has_no_leave_out_score_and_it_is_said():

@@ -1,6 +1,8 @@
 """Which tasks a study gives, and what each of them is handed: what is about its own log and joint, and nothing else."""
 
 import pickle
+import sys
+from collections import Counter
 
 import pytest
 
@@ -11,7 +13,9 @@ from pipeline.runner.places import about
 from pipeline.runner.plan import Plan
 from pipeline.runner.schemas import schemas
 from pipeline.runner.signature import declaration
+from pipeline.stages import STAGES
 from pipeline.study import LogEntry, Settings, Study
+from tests import many
 
 ROLL, PITCH = (joint.name for joint in dvrk_psm.ROBOT.joints[:2])
 LOGS = ("zebra", "aardvark")
@@ -55,18 +59,18 @@ def test_a_place_says_what_its_record_is_about(kind, place, log, joint):
 
 
 def test_records_come_in_the_order_of_the_studys_logs_and_the_robots_joints(plan):
-    names = [place.as_posix() for _, place in plan.places().of((Track, Signal))]
+    names = [place for _, place in plan.places().of((Track, Signal))]
     assert names == [f"signal/{log}/{joint}.parquet" for log in LOGS for joint in (ROLL, PITCH)]
 
 
 def test_a_log_that_has_left_the_study_has_no_records(plan):
-    assert not [place for _, place in plan.places().of(tuple(KINDS.values())) if "gone" in place.parts]
+    assert not [place for _, place in plan.places().of(tuple(KINDS.values())) if "gone" in place]
 
 
 def test_a_call_gets_the_records_about_its_own_log_and_joint(plan):
     tasks = {task.name: task for task in plan.tasks(declaration("predict"))}
     assert list(tasks) == [f"{log}/{joint}" for log in LOGS for joint in (ROLL, PITCH)]
-    handed = {p: [place.as_posix() for _, place in r] for p, r in tasks[f"zebra/{PITCH}"].records.items()}
+    handed = {p: [place for _, place in r] for p, r in tasks[f"zebra/{PITCH}"].records.items()}
     assert handed == {
         "signal": [f"signal/zebra/{PITCH}.parquet"],
         "paths": [f"fitted_paths/{PITCH}.parquet"],
@@ -112,3 +116,33 @@ def test_what_is_read_counts_by_name_type_and_unit_and_what_is_written_by_meanin
 
     assert changed(meaning="in other words") == {("fit", "Fit"), ("fit", "CrossFit")}
     assert changed(unit="kg") == {(stage, kind) for stage in ("fit", "predict") for kind in ("Fit", "CrossFit")}
+
+
+@pytest.fixture
+def few_and_many(tmp_path) -> list[tuple[Study, Folders]]:
+    return [many.study(tmp_path / str(logs), logs) for logs in (20, 200)]
+
+
+def test_what_a_call_reads_does_not_grow_with_the_logs(few_and_many):
+    """Unless it is the only call of its stage."""
+    reads = []
+    for study, folders in few_and_many:
+        plan = Plan(study, Ledger(folders))
+        tasks = {stage: list(plan.tasks(declaration(stage))) for stage in STAGES}
+        reads.append({s: max(len(t.fingerprint.inputs) for t in every) for s, every in tasks.items() if len(every) > 1})
+        assert {s for s, every in tasks.items() if len(every) == 1} == {"design", "fit", "threshold"}
+    assert reads[0] == reads[1]
+
+
+def test_planning_takes_steps_in_proportion_to_the_logs(few_and_many):
+    """Calls of functions are counted, as seconds depend on what else a machine does."""
+    steps = []
+    for lab in [few_and_many[0], *few_and_many]:  # first, what is worked out once a process
+        calls = Counter[str]()
+        sys.setprofile(lambda frame, event, _, calls=calls: calls.update([event]))
+        try:
+            many.planned(*lab)
+        finally:
+            sys.setprofile(None)
+        steps.append(calls["call"] + calls["c_call"])
+    assert steps[2] < 10.5 * steps[1]

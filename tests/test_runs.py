@@ -204,8 +204,8 @@ def test_a_reworded_meaning_runs_what_stores_it_and_what_reads_that(finished, pa
 def test_entries_and_files_are_read_once_a_run(finished, monkeypatch):
     hashed, read = Counter(), Counter()
     digest, entry = store.digest, ledger._read
-    monkeypatch.setattr(store, "digest", lambda file: hashed.update([file]) or digest(file))
-    monkeypatch.setattr(ledger, "_read", lambda file: read.update([file]) or entry(file))
+    monkeypatch.setattr(store, "digest", lambda file: hashed.update([Path(file)]) or digest(file))
+    monkeypatch.setattr(ledger, "_read", lambda file: read.update([Path(file)]) or entry(file))
     assert "nothing to do" in call("all", finished)
     assert set(processed(finished).rglob("*.parquet")) <= set(hashed)
     assert set(hashed.values()) == {1}

@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+PLAIN = (str, float, int, bool, type(None))
+
 
 def hash_of_text(text: str) -> str:
     """The sha256 of a text."""
@@ -28,6 +30,8 @@ def canonical(value: Any) -> str:
     TypeError
         If the value holds something of which that cannot be said.
     """
+    if type(value) in PLAIN:  # most of what anything holds
+        return repr(value)
     if is_dataclass(value) and not isinstance(value, type):
         items = (f"{f.name}={canonical(getattr(value, f.name))}" for f in fields(value))
         return f"{type(value).__name__}({', '.join(items)})"
@@ -43,6 +47,6 @@ def canonical(value: Any) -> str:
         return f"path({value.as_posix()!r})"
     if isinstance(value, np.generic):
         return canonical(value.item())
-    if value is None or isinstance(value, bool | int | float | str | date | time):
+    if isinstance(value, int | float | str | date | time):
         return repr(value)
     raise TypeError(f"a {type(value).__name__} has no canonical text")

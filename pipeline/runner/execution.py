@@ -88,14 +88,14 @@ def arguments(folders: Folders, task: Task) -> dict[str, Any]:
 
 def _record(folders: Folders, task: Task, located: Located) -> Record:
     kind, place = located
-    sha256 = task.fingerprint.inputs[f"processed/{place.as_posix()}"]
+    sha256 = task.fingerprint.inputs[f"processed/{place}"]
     # What is about a joint is read by the tasks of all its logs, and is small.
     read = _read if is_about_log(KINDS[kind]) else _kept
     return read(kind, folders.processed, place, sha256)
 
 
-def _read(kind: str, folder: Path, place: Path, sha256: str) -> Record:
-    return store.read(KINDS[kind], folder, place, sha256)
+def _read(kind: str, folder: Path, place: str, sha256: str) -> Record:
+    return store.read(KINDS[kind], folder, Path(place), sha256)
 
 
 _kept = lru_cache(maxsize=256)(_read)

@@ -5,10 +5,12 @@ content of its outputs are what its entry says.  Comparing an old entry with a n
 """
 
 import json
+import os
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
+from glob import glob
 from pathlib import Path
 from typing import Any
 
@@ -48,6 +50,7 @@ class Ledger:
     def __init__(self, folders: Folders) -> None:
         self.folders = folders
         self._digests: dict[str, str] = {}
+        self.changes = 0  # entries written or removed
 
     def place(self, stage: str, task: str) -> Path:
         """Where the entry of a task is."""
@@ -57,17 +60,20 @@ class Ledger:
     def _entries(self) -> dict[str, dict[str, Entry]]:
         entries: dict[str, dict[str, Entry]] = {}
         shared: dict[tuple[tuple[str, str], ...], dict[str, str]] = {}
-        for file in self._files():
+        for stage, name, file in self._files():
             entry = _read(file)
             if entry:
                 # The code of a stage is the same for all its tasks, and most of what an entry holds.
                 code = entry.fingerprint.get("code", {})
                 entry.fingerprint["code"] = shared.setdefault(tuple(code.items()), code)
-                entries.setdefault(file.parent.name, {})[file.stem] = entry
+                entries.setdefault(stage, {})[name] = entry
         return entries
 
-    def _files(self) -> list[Path]:
-        return sorted(file for file in (self.folders.processed / "tasks").glob("*/*.json") if file.is_file())
+    def _files(self) -> Iterator[tuple[str, str, str]]:
+        """Stage, task and file of every entry; as text, since paths would take as long as hashing what was made."""
+        home = os.path.join(self.folders.processed, "tasks")
+        for name in sorted(glob("*/*.json", root_dir=home)):
+            yield os.path.dirname(name), os.path.basename(name).removesuffix(".json"), f"{home}{os.sep}{name}"
 
     def entry(self, stage: str, task: str) -> Entry | None:
         """The entry of a task, or None when it has not run or its entry cannot be read."""
@@ -75,7 +81,7 @@ class Ledger:
 
     def read(self, stage: str, task: str) -> Entry | None:
         """The same, of one file alone: what another study has made is asked of one task."""
-        return _read(self.place(stage, task))
+        return _read(str(self.place(stage, task)))
 
     def entries(self, stage: str | None = None) -> Iterator[Entry]:
         """Every entry, or every one of a stage, in order."""
@@ -87,14 +93,18 @@ class Ledger:
         """Record what a task made."""
         store.write_bytes(self.place(entry.stage, entry.task), sealed(entry).encode())
         self._entries.setdefault(entry.stage, {})[file_name(entry.task)] = entry
+        self.changes += 1
 
     def broken(self) -> Iterator[Path]:
         """Entries that are not as they were written; other files there are no concern of ours."""
-        return (file for file in self._files() if self.entry(file.parent.name, file.stem) is None)
+        for stage, name, file in self._files():
+            if self.entry(stage, name) is None and os.path.isfile(file):
+                yield Path(file)
 
     def remove(self, entry: Entry) -> None:
         """Forget a task, and remove what it made, with the folders that this leaves empty."""
         self._entries.get(entry.stage, {}).pop(file_name(entry.task), None)
+        self.changes += 1
         for file in (*map(self.folders.file, entry.outputs), self.place(entry.stage, entry.task)):
             file.unlink(missing_ok=True)
             with suppress(OSError):  # a folder that holds more stays
@@ -104,8 +114,9 @@ class Ledger:
     def digest(self, name: str, fresh: bool = False) -> str:
         """The hash of a file, read once a run; "" when it is not there."""
         if fresh or name not in self._digests:
-            file = self.folders.file(name)
-            self._digests[name] = store.digest(file) if file.is_file() else ""
+            root, _, path = name.partition("/")
+            file = f"{getattr(self.folders, root)}{os.sep}{path}"
+            self._digests[name] = _digest(file)
         return self._digests[name]
 
     def reasons(self, entry: Entry | None, now: Fingerprint) -> list[str]:
@@ -138,8 +149,18 @@ def unsealed(text: str) -> Entry | None:
     return Entry(**json.loads(content)) if text.endswith(SEAL.format(hash_of_text(content))) else None
 
 
-def _read(file: Path) -> Entry | None:
+def _read(file: str) -> Entry | None:
     try:
-        return unsealed(file.read_bytes().decode())
+        with open(file, "rb") as stream:
+            return unsealed(stream.read().decode())
     except (OSError, ValueError, TypeError):
         return None
+
+
+def _digest(file: str) -> str:
+    try:
+        return store.digest(file)
+    except OSError:  # it is asked afterwards what is wrong, as nearly every file is there
+        if os.path.isfile(file):
+            raise
+        return ""

@@ -1,15 +1,15 @@
 """Where the records of a study are: an index of their files by kind, and by the log and joint that they are about."""
 
 from collections.abc import Iterable
-from pathlib import Path
 
 from pipeline.records import KINDS, Record
 from pipeline.runner.ledger import Entry
 from pipeline.runner.signature import Kinds
 from pipeline.study import Study
 
-Located = tuple[str, Path]  # kind of record, file below the processed folder
+Located = tuple[str, str]  # kind of record, file below the processed folder: a Path costs ten times what a name does
 ANY = ""  # log or joint
+ORDER = {kind: i for i, kind in enumerate(KINDS.values())}
 
 
 class Places:
@@ -30,7 +30,7 @@ class Places:
     def of(self, kinds: Kinds, log: str = ANY, joint: str = ANY) -> tuple[Located, ...]:
         """Files of these kinds about a log and a joint; a kind that is about no log or joint is about every one."""
         located: tuple[Located, ...] = ()
-        for kind in sorted(kinds, key=list(KINDS.values()).index):
+        for kind in sorted(kinds, key=ORDER.__getitem__) if len(kinds) > 1 else kinds:
             by_log, by_joint = bool(log) and is_about_log(kind), bool(joint) and is_about_joint(kind)
             index = self._index(kind, by_log, by_joint)
             located += tuple(index.get((log if by_log else ANY, joint if by_joint else ANY), ()))
@@ -55,7 +55,7 @@ class Places:
                     ranks = self._logs.get(log, len(self._logs)), self._joints.get(joint, len(self._joints))
                     ranked.append((*ranks, name, log, joint))
             self._ranked[kind.__name__] = [
-                (log, joint, (kind.__name__, Path(name))) for *_, name, log, joint in sorted(ranked)
+                (log, joint, (kind.__name__, name)) for *_, name, log, joint in sorted(ranked)
             ]
         return self._ranked[kind.__name__]
 

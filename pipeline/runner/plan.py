@@ -3,7 +3,6 @@
 import importlib.metadata
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from pipeline.records import KINDS
@@ -41,10 +40,13 @@ class Plan:
         self._entries = {entry.name: entry for entry in study.logs}
         self._joints = {joint.name: joint.kind for joint in study.robot.joints}
         self._hashes: dict[tuple[str, str], str] = {}
+        self._places: tuple[int, Places] | None = None  # and how often the ledger had changed
 
     def places(self) -> Places:
         """Where the records are that there are now."""
-        return Places(self.study, self.ledger.entries())
+        if self._places is None or self._places[0] != self.ledger.changes:
+            self._places = self.ledger.changes, Places(self.study, self.ledger.entries())
+        return self._places[1]
 
     def tasks(self, asks: Declaration) -> Iterator[Task]:
         """Every call of a stage that the study and the records that are there give."""
@@ -63,7 +65,7 @@ class Plan:
     def _each_record(self, asks: Declaration, places: Places) -> Iterator[Task]:
         [(parameter, kinds)] = asks.each.items()
         for kind, place in places.of(kinds):
-            log, joint = about(KINDS[kind], place.as_posix())
+            log, joint = about(KINDS[kind], place)
             others = {p: places.of(k, log, joint) for p, k in (asks.optional | asks.every).items()}
             name = _task_name(kind, place, len(kinds))
             yield self._task(asks, name, {parameter: ((kind, place),), **others}, log, joint)
@@ -80,7 +82,7 @@ class Plan:
     ) -> Task:
         given = {p: self._given(what, log, joint) for p, what in asks.given.items()}
         settings = {name: getattr(self.study.settings, name) for name in asks.settings}
-        inputs = {f"processed/{place.as_posix()}" for located in records.values() for _, place in located}
+        inputs = {f"processed/{place}" for located in records.values() for _, place in located}
         if "log" in asks.given.values():
             inputs |= {f"raw/{file}" for file in self._entries[log].files}
         hashes = {
@@ -115,6 +117,6 @@ def code_of(asks: Declaration) -> dict[str, str]:
     return code(f"pipeline.stages.{asks.name}", *RECORDS, *opens, without="pipeline.records")
 
 
-def _task_name(kind: str, place: Path, kinds: int) -> str:
-    name = "/".join(place.with_suffix("").parts[1:])
+def _task_name(kind: str, place: str, kinds: int) -> str:
+    name = place.removesuffix(".parquet").partition("/")[2]
     return f"{KINDS[kind].folder()}/{name}" if kinds > 1 else name

@@ -23,7 +23,7 @@ def task(plan: Plan) -> Task:
     """What there is to report on one study, and all that the report depends on."""
     study, ledger = plan.study, plan.ledger
     located = plan.places().of(tuple(KINDS.values()))
-    inputs = [f"processed/{place.as_posix()}" for _, place in located] + [f"raw/{file}" for file in study_files(study)]
+    inputs = [f"processed/{place}" for _, place in located] + [f"raw/{file}" for file in study_files(study)]
     fingerprint = Fingerprint(
         inputs={name: ledger.digest(name) for name in sorted(inputs)},
         given={"study": hash_of(replace(study, folder=Path(study.name)))},
@@ -55,8 +55,9 @@ def catalogue(ledger: Ledger, located: tuple[Located, ...]) -> Catalogue:
 
     def read(kind: type[Record]) -> list[Record]:
         places = [place for name, place in located if name == kind.__name__]
-        digests = [ledger.digest(f"processed/{place.as_posix()}") for place in places]
-        return [store.read(kind, ledger.folders.processed, *each) for each in zip(places, digests, strict=True)]
+        digests = [ledger.digest(f"processed/{place}") for place in places]
+        processed = ledger.folders.processed
+        return [store.read(kind, processed, Path(place), sha) for place, sha in zip(places, digests, strict=True)]
 
     return Catalogue(read)
 
@@ -65,7 +66,7 @@ def provenance(study: Study, ledger: Ledger, located: tuple[Located, ...]) -> Pr
     """Versions, every file with its hash, and what failed."""
     files = (*study_files(study), *(file for entry in study.logs for file in entry.files))
     raw = {f"raw/{study.name}/{file}": ledger.digest(f"raw/{file}") for file in files}
-    processed = {place.as_posix(): ledger.digest(f"processed/{place.as_posix()}") for _, place in located}
+    processed = {place: ledger.digest(f"processed/{place}") for _, place in located}
     failures = {f"{e.stage} {e.task}": e.failed for e in ledger.entries() if e.failed and e.stage != REPORT}
     versions = {p: importlib.metadata.version(p) for p in PACKAGES}
     text = (study.folder / "study.toml").read_text(encoding="utf-8", errors="replace")

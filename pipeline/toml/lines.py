@@ -3,6 +3,7 @@
 import re
 import tomllib
 from collections.abc import Iterator
+from functools import cache
 
 KeyPath = tuple[str | int, ...]  # keys from the top of the file, and numbers in lists from 0
 
@@ -25,6 +26,12 @@ def _tokens(text: str) -> Iterator[tuple[int, str]]:
         line, before = line + text.count("\n", before, match.start()), match.start()
         if match[1]:
             yield line, match[1]
+
+
+@cache
+def _unquoted(key: str) -> str:
+    """A quoted key, of which there are few, however often they are used."""
+    return str(tomllib.loads(f"key = {key}")["key"])
 
 
 class _Scanner:
@@ -77,7 +84,7 @@ class _Scanner:
         line, words = self.left[-1][0], ""
         while not self.skipped(end):
             words += self.left.pop()[1]
-        return line, [tomllib.loads(f"key = {part[0]}")["key"] if part[1] else part[0] for part in PART.finditer(words)]
+        return line, [_unquoted(part[0]) if part[1] else part[0] for part in PART.finditer(words)]
 
     def value(self, path: KeyPath) -> None:
         """One word; or a list, whose elements have lines of their own, or an inline table, whose pairs do."""

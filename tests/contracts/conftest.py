@@ -1,6 +1,7 @@
 """A small study, analysed once: records of every kind, for the contracts of stages and sections."""
 
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -38,7 +39,8 @@ class Lab:
     plan: Plan
 
     def records(self, kind: type[Record]) -> list[Record]:
-        return [store.read(kind, self.folders.processed, place) for _, place in self.plan.places().of((kind,))]
+        places = [Path(place) for _, place in self.plan.places().of((kind,))]
+        return [store.read(kind, self.folders.processed, place) for place in places]
 
 
 def robot() -> Robot:
