@@ -192,6 +192,30 @@ def test_the_transient_is_skipped_and_the_clock_kept(lab):
     assert bad["t"].iloc[0] == 1.0
 
 
+def test_a_log_ends_where_the_study_says_whatever_comes_after(lab):
+    """`until` counts from the log's first sample, as `skip` does; a recorder may die as it pleases after it."""
+    import pipeline
+
+    describe(lab, more="skip = 1.0\nuntil = 6.5")
+    edit(lab, lambda lines: cell(cell(lines, 400, 0, "0.5"), 401, 2, "nan"))
+    said = call("ingest", lab)
+    bad = pipeline.read(lab, "Recording", log="bad")
+    assert (bad["t"].iloc[0], bad["t"].iloc[-1]) == (1.0, 6.5)
+    assert pipeline.read(lab, "LogSummary", log="bad")["duration"].iloc[0] == 6.5
+    assert "until" not in said
+
+
+def test_an_end_that_the_log_does_not_reach_is_remarked_on(lab):
+    describe(lab, more="until = 61.0")
+    said = " ".join(call("ingest", lab).split())
+    assert "bad: until = 61 s leaves nothing out, because the log ends after 9.98 s" in said
+
+
+def test_too_little_before_the_end_is_refused(lab):
+    describe(lab, more="until = 0.005")
+    assert "1 samples are too few, with 0 s skipped at the start and what comes after 0.005 s left out" in run(lab)
+
+
 def test_a_gap_is_marked_and_not_bridged(lab):
     import pipeline
 

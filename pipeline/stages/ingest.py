@@ -29,6 +29,8 @@ def run(log: Log, entry: LogEntry, robot: Robot) -> Iterator[Recording | LogSumm
     reading = Reading(log, entry, robot)
     for block in log.blocks(reading.names):
         yield from reading.recordings(block)
+        if reading.ended:
+            break
     yield reading.intake()
     remarks = [*log.warnings, *reading.remarks()]
     if remarks:
@@ -45,6 +47,7 @@ class Reading:
     clock: ClockStatistics = field(default_factory=ClockStatistics)
     rows: int = 0
     lost: int = 0  # at the end of a file that was cut
+    ended: bool = False  # where the study says that the log ends
 
     def __post_init__(self) -> None:
         self.channels = {s.quantity: self.log.find(s.channel) for s in self.entry.channels}
@@ -87,7 +90,7 @@ class Reading:
 
     def recordings(self, block: Block) -> Iterator[Recording]:
         """The joints of one block, after the transient that the study skips."""
-        block = self.without_cut_end(block)
+        block = self.until_the_end(self.without_cut_end(block))
         if not len(block[self.names[0]]):
             return
         for name in self.names:
@@ -126,6 +129,17 @@ class Reading:
         end = int(rows[-1]) + 1 if len(rows) else 0
         self.lost += len(whole) - end
         return {name: values[:end] for name, values in block.items()}
+
+    def until_the_end(self, block: Block) -> Block:
+        """A block without the rows after the time at which the study says that the log ends, whatever they hold."""
+        if self.entry.until is None or not len(block[self.names[0]]):
+            return block
+        t = self.times(block)
+        after = np.flatnonzero(t - (self.clock.first if self.rows else t[0]) > self.entry.until + 1e-9)
+        if not len(after):
+            return block
+        self.ended = True
+        return {name: values[: int(after[0])] for name, values in block.items()}
 
     def times(self, block: Block) -> Column:
         """Time of each row [s], by the study's time channel, its rate, the log's time channel or the log's clock."""
@@ -189,8 +203,10 @@ class Reading:
         """
         clock, log = self.clock, self.log
         if clock.samples < 2 or clock.last - clock.first <= self.entry.skip:
+            until = f" and what comes after {self.entry.until:g} s left out" if self.ended else ""
             raise BadLog(
                 f"{log.path}: {clock.samples} samples are too few, with {self.entry.skip:g} s skipped at the start"
+                f"{until}"
             )
         feeds: dict[str, list[str]] = {}
         for quantity, channel in self.channels.items():
@@ -234,6 +250,11 @@ class Reading:
                     f"{self.entry.skip:g} to {clock.last - clock.first:g} s; contact times count from the log's first "
                     "sample"
                 )
+        if self.entry.until is not None and not self.ended and clock.last - clock.first < self.entry.until - GAP / clock.rate:
+            yield (
+                f"until = {self.entry.until:g} s leaves nothing out, because the log ends after "
+                f"{clock.last - clock.first:g} s; both count from its first sample"
+            )
         if self.lost:
             yield f"the file is cut, and its last {self.lost} rows lack some channels: they are left out"
         if clock.duplicates > MOST_REPEATED * clock.samples:
