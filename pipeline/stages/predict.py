@@ -75,7 +75,7 @@ def without_the_log(
 ) -> Iterator[Prediction | Diagnostic]:
     """Predict a log from fits to the other identification logs."""
     part = at(signal, whole(signal, own))
-    motion = motion_at(own, part.t - signal.t[0])
+    motion = motion_at(own, part.t - own.t_start)
     for name in ESTIMATORS:
         try:
             theta = estimator(name)(pose(model, others)).theta
@@ -91,7 +91,7 @@ def without_a_period(
 ) -> Iterator[Prediction | Diagnostic]:
     """Predict each period of a log from fits to the other periods; only the effort is left out, not the path."""
     part = at(signal, whole(signal, own))
-    since = part.t - signal.t[0]
+    since = part.t - own.t_start
     number = np.minimum((since / own.period + 1e-9).astype(int), own.periods - 1)
     group = number * min(own.periods, PARTS) // own.periods
     Phi = model.regressor(motion_at(own, since)).Phi[:, 0]
@@ -118,8 +118,9 @@ def not_predicted(signal: Signal, name: str, error: NotIdentifiable) -> Diagnost
 
 
 def whole(signal: Signal, own: Trajectory) -> Booleans:
-    """Which samples belong to whole periods."""
-    return signal.t - float(signal.t[0]) < own.periods * own.period - 0.5 / signal.rate
+    """Which samples belong to the whole periods that were averaged."""
+    since = signal.t - own.t_start
+    return np.asarray((since >= 0.0) & (since < own.periods * own.period - 0.5 / signal.rate))
 
 
 def at(signal: Signal, which: Booleans) -> Signal:
