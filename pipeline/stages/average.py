@@ -125,9 +125,9 @@ def left_out(
     said = [f"{' and '.join(sides)} do not, as in a stop, a ramp or another motion{at_gaps(first, span)}"] * bool(sides)
     for name, d in odd:
         if d.inside or t[kept.start] - t[span.start] > BRIEF * period.length or not sides:
-            differs = f"period {d.period + 1} of {d.periods} differs from the others, {d.ratio:.1f} times more than noise"
-            what = ", and is kept, because it is not at an end" if d.inside else ", as a transient does"
-            said.append(f"{differs} explains, by {d.rms:.3g} rms in {name}{what}")
+            differs = f"period {d.period + 1} of {d.periods} differs from the others by {d.rms:.3g} rms in {name}"
+            what = ", and is kept, because it is not at an end" if d.inside else ", as in a transient"
+            said.append(f"{differs}, {d.ratio:.1f} times what noise explains{what}")
     keys = [f"skip = {np.floor(t[kept.start] * 1e4 + 1e-3) / 1e4:.10g}"] * (kept.start > 0)
     keys += [f"until = {np.ceil(t[kept.stop - 1] * 1e4 - 1e-3) / 1e4:.10g}"] * (kept.stop < len(t))
     advice = f"; the rest is left out: write {' and '.join(keys)} in study.toml to say so" if keys else ""

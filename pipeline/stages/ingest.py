@@ -8,6 +8,7 @@ import numpy as np
 from pipeline.errors import BadLog
 from pipeline.logs.log import Block, Channel, Log
 from pipeline.maths.signals.clock import GAP, ClockStatistics
+from pipeline.maths.signals.steps import REACH, steps
 from pipeline.maths.units import SI, UNITS, canonical, measures, size
 from pipeline.records import Column, Diagnostic, LogSummary, Recording, diagnostic
 from pipeline.robots.robot import Joint, Robot
@@ -27,7 +28,7 @@ def run(log: Log, entry: LogEntry, robot: Robot) -> Iterator[Recording | LogSumm
         time does not increase.
     """
     reading = Reading(log, entry, robot)
-    for block in log.blocks(reading.names):
+    for block in reading.mended(log.blocks(reading.names)):
         yield from reading.recordings(block)
         if reading.ended:
             break
@@ -48,6 +49,7 @@ class Reading:
     rows: int = 0
     lost: int = 0  # at the end of a file that was cut
     ended: bool = False  # where the study says that the log ends
+    jumps: list[tuple[float, float]] = field(default_factory=list)  # when the clock stepped, and how far
 
     def __post_init__(self) -> None:
         self.channels = {s.quantity: self.log.find(s.channel) for s in self.entry.channels}
@@ -88,9 +90,41 @@ class Reading:
             )
         return size(unit)
 
+    def mended(self, blocks: Iterator[Block]) -> Iterator[Block]:
+        """The blocks with steps of the clock taken out of its channel, where the motion tells that no time passed.
+
+        Of identification logs only: others lose nothing by a gap, and their contact windows count on their clock.
+        The end of a block waits for the next, which says how the motion goes on.
+        """
+        name = self.channels["time"].name if "time" in self.channels else self.own_time
+        whole = (self.without_cut_end(block) for block in blocks)
+        if not name or self.entry.role != "identification":
+            yield from whole
+            return
+        scale = self.sources["time"].sign * self.scales["time"] if "time" in self.sources else 1.0
+        passed = 0.0  # by the channel, in its unit, while nothing moved on
+        waiting: Block = {}
+        for block in whole:
+            late = block | {name: block[name] - passed} if passed else block
+            joined = {key: np.concatenate([waiting[key], late[key]]) for key in late} if waiting else late
+            for i, jump in steps(self.times(joined), self.positions(joined)):
+                joined = joined | {name: joined[name] - np.where(np.arange(len(joined[name])) < i, 0.0, jump / scale)}
+                passed += jump / scale
+                self.jumps.append((float(self.times(joined)[i - 1]), jump))
+            ready = max(len(joined[name]) - 2 * REACH, 0)
+            waiting = {key: values[ready:] for key, values in joined.items()}
+            yield {key: values[:ready] for key, values in joined.items()}
+        if waiting:
+            yield waiting
+
+    def positions(self, block: Block) -> Column:
+        """The positions of all joints at the joints, one a row."""
+        either = [self.of_joint(block, self.robot.joint(name), ("q", "theta_m")) for name in self.entry.joints]
+        return np.array([q for q in either if q is not None])
+
     def recordings(self, block: Block) -> Iterator[Recording]:
         """The joints of one block, after the transient that the study skips."""
-        block = self.until_the_end(self.without_cut_end(block))
+        block = self.until_the_end(block)
         if not len(block[self.names[0]]):
             return
         for name in self.names:
@@ -243,6 +277,12 @@ class Reading:
     def remarks(self) -> Iterator[str]:
         """What a reviewer should know about the clock and the rows."""
         clock = self.clock
+        if self.jumps:
+            when = ", ".join(f"{jump:.6g} s after {t - clock.first:.3f} s" for t, jump in self.jumps[:5])
+            yield (
+                f"the clock jumps while the motion goes on, by {when}{' ...' if len(self.jumps) > 5 else ''}: the times "
+                "after it are set back; find out why the recorder does so"
+            )
         for start, end in self.entry.contact:
             if start >= clock.last - clock.first or end <= self.entry.skip:
                 yield (
