@@ -23,6 +23,7 @@ SEEMING = (2, 3)  # times: a motion may all but repeat within its period
 BRIEF = 0.1  # of a period: how much more is left out beside a stop, without a word about it
 QUANTITIES = ("q", "dq", "tau")
 
+
 def run(
     signals: Sequence[Signal], entry: LogEntry, robot: Robot, *, harmonics: int
 ) -> Iterator[Average | PeriodResidual | Diagnostic]:
@@ -118,7 +119,7 @@ def multiples(length: float, stated: float | None, M: int) -> list[int]:
 def left_out(
     first: Signal, span: slice, kept: slice, period: Period, odd: Sequence[tuple[str, Difference]]
 ) -> list[str]:
-    """What does not repeat, or not as well as the rest, and what to write in the study so that this need not be said."""
+    """What does not repeat, or not as well as the rest, and what to write in the study so that it need not be said."""
     t = first.t
     sides = [f"the {t[kept.start] - t[0]:.2f} s before"] * (span.start > 0)
     sides += [f"the {t[-1] - t[kept.stop - 1]:.2f} s after"] * (span.stop < len(t))

@@ -279,9 +279,10 @@ class Reading:
         clock = self.clock
         if self.jumps:
             when = ", ".join(f"{jump:.6g} s after {t - clock.first:.3f} s" for t, jump in self.jumps[:5])
+            more = " ..." if len(self.jumps) > 5 else ""
             yield (
-                f"the clock jumps while the motion goes on, by {when}{' ...' if len(self.jumps) > 5 else ''}: the times "
-                "after it are set back; find out why the recorder does so"
+                f"the clock jumps while the motion goes on, by {when}{more}: the times after it are set back; find out "
+                "why the recorder does so"
             )
         for start, end in self.entry.contact:
             if start >= clock.last - clock.first or end <= self.entry.skip:
@@ -290,7 +291,11 @@ class Reading:
                     f"{self.entry.skip:g} to {clock.last - clock.first:g} s; contact times count from the log's first "
                     "sample"
                 )
-        if self.entry.until is not None and not self.ended and clock.last - clock.first < self.entry.until - GAP / clock.rate:
+        if (
+            self.entry.until is not None
+            and not self.ended
+            and clock.last - clock.first < self.entry.until - GAP / clock.rate
+        ):
             yield (
                 f"until = {self.entry.until:g} s leaves nothing out, because the log ends after "
                 f"{clock.last - clock.first:g} s; both count from its first sample"

@@ -31,7 +31,13 @@ class Difference(NamedTuple):
 
 
 def alike(
-    t: Array, positions: Sequence[Array], signals: Sequence[Array], span: slice, period: Period, rate: float, orders: int
+    t: Array,
+    positions: Sequence[Array],
+    signals: Sequence[Array],
+    span: slice,
+    period: Period,
+    rate: float,
+    orders: int,
 ) -> tuple[slice, Period, list[Difference]]:
     """The stretch without the first and last periods that differ from the others, its period, and what differed.
 
@@ -81,8 +87,8 @@ def alternating(t: Array, x: Array, length: float, rate: float, k: int) -> bool:
 
 def _sums(place: Integers, x: Array, rows: int, K: int) -> tuple[NDArray[np.int64], Array]:
     """How many samples fall on each place, and their sums, (rows, K)."""
-    counts = np.bincount(place, minlength=rows * K).reshape(rows, K)
-    return counts, np.bincount(place, x, rows * K).reshape(rows, K)
+    counts: NDArray[np.int64] = np.bincount(place, minlength=rows * K).astype(np.int64)
+    return counts.reshape(rows, K), np.asarray(np.bincount(place, x, rows * K).reshape(rows, K), dtype=np.float64)
 
 
 def _lag_one(noise: Array) -> float:

@@ -6,7 +6,7 @@ from pipeline.maths.arrays import Array
 from pipeline.maths.signals.clock import GAP
 
 REACH = 10  # samples on either side of a step that say whether the motion goes on
-ORDER = 3  # of the polynomial that a motion follows over so few samples
+ORDER = 4  # of the polynomial that a motion follows over so few samples
 CHANCE = 1e-3  # that noise breaks a motion that goes on
 TELLS = 10.0  # standard errors that a motion has to cover in the time that is in question
 
@@ -43,7 +43,10 @@ def goes_on(x: Array, lost: float) -> bool:
     noise = np.maximum(two / degrees, 1e-24 * np.maximum(x.var(axis=1), 1e-300))
     if np.any((one - two) / 2 / noise > f.isf(CHANCE, 2, degrees)):
         return False
-    per_sample = np.abs(np.linalg.lstsq(whole, x.T, rcond=None)[0][1]) / REACH
+    c = np.linalg.lstsq(broken, x.T, rcond=None)[0]
+    before, behind = c[1], c[1] + c[ORDER + 2]
+    # A motion that turns here need not be far away when time has passed, and tells nothing.
+    per_sample = np.where(before * behind > 0, np.minimum(np.abs(before), np.abs(behind)), 0.0) / REACH
     jump_std = np.sqrt(noise * np.linalg.inv(broken.T @ broken)[ORDER + 1, ORDER + 1])
     return bool(np.any(per_sample * min(lost, REACH) > TELLS * jump_std))
 

@@ -43,7 +43,7 @@ def blocks(context: Context, averages: list[Average]) -> Iterator[Block]:
     yield Prose(
         "Every identification log repeats one period. Its periods are averaged, and what differs between them is "
         "taken as noise: its standard deviations set what the filter assumes of its measurements. The period itself is "
-        "estimated from the joints' motion."
+        "estimated from the longest stretch in which the joints' motion repeats; the remarks say what is left out."
     )
     rows = tuple(
         (
