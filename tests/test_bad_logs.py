@@ -192,6 +192,30 @@ def test_the_transient_is_skipped_and_the_clock_kept(lab):
     assert bad["t"].iloc[0] == 1.0
 
 
+def test_a_log_ends_where_the_study_says_whatever_comes_after(lab):
+    """`until` counts from the log's first sample, as `skip` does; a recorder may die as it pleases after it."""
+    import pipeline
+
+    describe(lab, more="skip = 1.0\nuntil = 6.5")
+    edit(lab, lambda lines: cell(cell(lines, 400, 0, "0.5"), 401, 2, "nan"))
+    said = call("ingest", lab)
+    bad = pipeline.read(lab, "Recording", log="bad")
+    assert (bad["t"].iloc[0], bad["t"].iloc[-1]) == (1.0, 6.5)
+    assert pipeline.read(lab, "LogSummary", log="bad")["duration"].iloc[0] == 6.5
+    assert "until" not in said
+
+
+def test_an_end_that_the_log_does_not_reach_is_remarked_on(lab):
+    describe(lab, more="until = 61.0")
+    said = " ".join(call("ingest", lab).split())
+    assert "bad: until = 61 s leaves nothing out, because the log ends after 9.98 s" in said
+
+
+def test_too_little_before_the_end_is_refused(lab):
+    describe(lab, more="until = 0.005")
+    assert "1 samples are too few, with 0 s skipped at the start and what comes after 0.005 s left out" in run(lab)
+
+
 def test_a_gap_is_marked_and_not_bridged(lab):
     import pipeline
 
@@ -203,6 +227,53 @@ def test_a_gap_is_marked_and_not_bridged(lab):
     assert signal["gaps"].iloc[0] == 1
     assert list(np.unique(signal["segment"])) == [0, 1]
     assert np.diff(signal["t"]).max() == pytest.approx(0.32)
+
+
+@pytest.mark.parametrize("jump", [3.0, 1.7e9])
+def test_a_clock_that_jumps_while_the_motion_goes_on_is_set_back_and_said_to_be(lab, jump):
+    import pipeline
+
+    signal = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5)
+    arm.write_csv(lab / "bad.csv", [replace(signal, t=signal.t + np.where(signal.t < 4.2, 0.0, jump))])
+    said = run(lab)
+    assert f"bad: the clock jumps while the motion goes on, by {jump:.6g} s after 4.180 s" in said
+    assert "gap" not in said
+    good, bad = (pipeline.read(lab, "Recording", log=name) for name in ("good", "bad"))
+    np.testing.assert_allclose(bad["t"], good["t"], atol=1e-6)
+    assert pipeline.read(lab, "Average", log="bad")["period"].iloc[0] == pytest.approx(2.0, abs=1e-4)
+
+
+def test_a_clock_that_jumps_in_a_log_of_another_role_has_a_gap(lab):
+    """Windows of contact count on the log's own clock."""
+    import pipeline
+
+    describe(lab, role="validation")
+    signal = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5)
+    arm.write_csv(lab / "bad.csv", [replace(signal, t=signal.t + np.where(signal.t < 4.2, 0.0, 3.0))])
+    call("ingest", lab)
+    assert np.diff(pipeline.read(lab, "Recording", log="bad")["t"]).max() == pytest.approx(3.02)
+
+
+@pytest.mark.parametrize("rows", [7, 20, 64, 100])
+def test_a_clock_is_set_back_wherever_the_blocks_of_a_log_end(tmp_path, rows):
+    from pipeline.logs import open_log
+    from pipeline.stages.ingest import Reading
+    from pipeline.study import reading as study
+
+    signal = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5)
+    speed = np.abs(arm.excitation("hand_roll", signal.t, 2.0)[1])
+    describe(tmp_path)
+    entry = study.read(tmp_path).log("bad")
+    for at in range(180, 260, 3):
+        late = signal.t + np.where(np.arange(len(signal)) < at, 0.0, 3.0)
+        arm.write_csv(tmp_path / "bad.csv", [replace(signal, t=late)])
+        log = open_log(tmp_path / "bad.csv")
+        reading = Reading(log, entry, arm.ARM)
+        [whole] = log.blocks(reading.names)
+        parts = [{k: v[i : i + rows] for k, v in whole.items()} for i in range(0, len(signal), rows)]
+        t = np.concatenate([block["time"] for block in reading.mended(iter(parts))])
+        if speed[at] > 0.1:
+            np.testing.assert_allclose(t, signal.t, atol=1e-9)
 
 
 def test_an_uneven_clock_is_made_uniform_and_said_to_be(lab):

@@ -66,5 +66,52 @@ def test_page_one_says_that_the_band_is_too_narrow_and_that_the_path_is_the_one_
     assert "SIMULATED" not in page
 
 
+@pytest.fixture(scope="module")
+def ur10e(data, tmp_path_factory):
+    """A joint of an arm of another kind: a slow start, five periods of 10 s, and a stop."""
+    study = tmp_path_factory.mktemp("ur10e") / "raw" / "ur10e"
+    study.mkdir(parents=True)
+    (study / "joint_1.csv").symlink_to(data / "ur10e" / "joint_1.csv")
+    (study / "ur10e.toml").write_text(
+        'name = "ur10e"\ntitle = "UR10e"\n[[joint]]\nname = "shoulder_pan"\ntitle = "Shoulder pan"\nkind = "revolute"\n'
+        'terms = ["inertia", "viscous friction", "Coulomb friction", "offset"]\nharmonics = 5\nq_tau = 0.5\n'
+        "limits = { q = [-6.2832, 6.2832], dq = [-2.1, 2.1], ddq = [-10.0, 10.0] }\n"
+        "gear_ratio = 1.0\ntorque_constant = 1.0\n"
+    )
+    channels = '[log.channels]\ntime = 0\n"shoulder_pan.q" = 1\n"shoulder_pan.dq" = 7\n"shoulder_pan.tau" = 13\n'
+    logs = [
+        f'[[log]]\nname = "{name}"\nfile = "joint_1.csv"\nrole = "identification"\n{more}{channels}'
+        for name, more in (("skipped", "skip = 11\n"), ("ended", "skip = 11\nuntil = 60.4\n"))
+    ]
+    (study / "study.toml").write_text('robot = "ur10e.toml"\n' + logs[0])
+    stages = ("ingest", "resample", "average", "differentiate", "fit", "predict")
+    said = [call(stage, study) for stage in stages][2]
+    (study / "study.toml").write_text('robot = "ur10e.toml"\n' + "".join(logs))
+    return study, said, [call(stage, study) for stage in stages[:3]][2]
+
+
+def test_the_period_of_a_log_that_ends_in_a_stop_is_that_of_its_motion(ur10e):
+    import pipeline
+
+    for log in ("skipped", "ended"):
+        average = pipeline.read(ur10e[0], "Average", log=log)
+        assert average["period"].iloc[0] == pytest.approx(10.0, abs=0.002)
+        assert average["periods"].iloc[0] == 4
+
+
+def test_one_remark_says_what_the_stop_costs_and_none_where_the_study_says_it(ur10e):
+    _, skipped, both = (" ".join(said.split()) if isinstance(said, str) else said for said in ur10e)
+    assert skipped.count("warning") == 1
+    assert "the 2.44 s after do not, as in a stop, a ramp or another motion" in skipped
+    assert "write until = 60." in skipped
+    assert "warning: ended" not in both
+
+
+def test_what_a_log_that_ends_in_a_stop_says_of_the_joint_predicts_its_periods(ur10e):
+    import pipeline
+
+    assert pipeline.read(ur10e[0], "Prediction", log="skipped")["relative_error"].max() < 0.06
+
+
 def test_verify_passes(dvrk):
     assert "are unchanged" in call("verify", dvrk)

@@ -17,6 +17,7 @@ class Average(Record):
     period_std: float
     stated_period: float
     periods: int
+    t_start: float
     sigma_q: float
     sigma_dq: float
     sigma_tau: float

@@ -14,6 +14,7 @@ class Trajectory(Record):
     rate: float
     period: float
     periods: int
+    t_start: float
     harmonics: int
     method: str
     sigma_q: float

@@ -72,6 +72,7 @@ QUANTITIES = {
     "period_std": Quantity("standard error of the period", "s"),
     "stated_period": Quantity("length of one period as the study states it; 0 where it does not", "s"),
     "periods": Quantity("number of periods averaged, M"),
+    "t_start": Quantity("time of the first sample that is averaged", "s"),
     "count": Quantity("samples averaged at this phase"),
     "q_var": Quantity("variance of the position between periods", "{position}^2"),
     "dq_var": Quantity("variance of the velocity between periods", "({position}/s)^2"),

@@ -5,22 +5,29 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from pipeline.errors import NotPeriodic
-from pipeline.maths.signals import averaging, period
-from pipeline.maths.signals.averaging import Folded
+from pipeline.maths.signals import averaging
+from pipeline.maths.signals.agreement import Difference, alike, alternating
+from pipeline.maths.signals.averaging import Folded, whole_periods
+from pipeline.maths.signals.period import Period, refine
+from pipeline.maths.signals.repetition import Repetition, repetition
 from pipeline.maths.signals.smoothing import segments
+from pipeline.maths.signals.stretch import stretch
 from pipeline.records import Average, Column, Diagnostic, PeriodResidual, Signal, diagnostic
 from pipeline.robots.robot import Robot
 from pipeline.study import LogEntry
 
-DIFFERS = 0.01  # of the motion's standard deviation: a smaller difference between periods is not worth a remark
-ODD = 2.0  # times the usual difference from the mean: a period that differs by more stands out
 MISMATCH = 5e-4  # a stated period is wrong by more than this share when the data disagree with it
+EXCLUDED = 4.0  # standard errors from the period found, beyond which the data exclude a stated one
+TRIED = 5  # segments, the longest first, in which a repetition is looked for
+SEEMING = (2, 3)  # times: a motion may all but repeat within its period
+BRIEF = 0.1  # of a period: how much more is left out beside a stop, without a word about it
+QUANTITIES = ("q", "dq", "tau")
 
 
 def run(
     signals: Sequence[Signal], entry: LogEntry, robot: Robot, *, harmonics: int
 ) -> Iterator[Average | PeriodResidual | Diagnostic]:
-    """One period of each joint that moves; the joints of a log share the period."""
+    """One period of each joint that moves, of the longest stretch that repeats; the joints of a log share both."""
     if entry.role != "identification":
         return
     moving = [signal for signal in signals if not signal.at_rest]
@@ -34,90 +41,133 @@ def run(
             f"{entry.name}: no joint moves, so there is nothing to identify; check its channels and units"
         )
     orders = max(harmonics or robot.joint(signal.joint).harmonics for signal in moving)
-    moving, guess, remarks = repeating(moving, entry)
-    found, more = shared_period(moving, guess, entry, orders)
-    remarks += more
+    moving, found, remarks = repeating(moving, entry)
+    span, period = longest(moving, found, orders, entry)
+    names = [f"{symbol} of {signal.joint}" for signal in moving for symbol in QUANTITIES]
+    columns = [getattr(signal, symbol) for signal in moving for symbol in QUANTITIES]
+    positions = [signal.q for signal in moving]
+    kept, period, odd = alike(moving[0].t, positions, columns, span, period, moving[0].rate, orders)
+    remarks += left_out(moving[0], span, kept, period, [(names[d.signal], d) for d in odd])
+    period, more = honoured(period, entry)
     for signal in moving:
-        for record in averaged(signal, found, entry.period or 0.0):
-            yield record
-            if isinstance(record, PeriodResidual):
-                remarks += odd_period(record, signal, found.length)
-    if remarks:
-        yield diagnostic("average", entry.name, "warning", *remarks)
+        yield from averaged(signal, kept, period, entry.period or 0.0)
+    if remarks + more:
+        yield diagnostic("average", entry.name, "warning", *remarks, *more)
 
 
-def repeating(moving: list[Signal], entry: LogEntry) -> tuple[list[Signal], float | None, list[str]]:
-    """The joints that repeat, after how many samples they do so together, and what there is to say of the others."""
-    guess = guessed(moving)
-    alone = [signal for signal in moving if guessed([signal]) is not None] if guess is None else []
-    if not alone:
-        return moving, guess, []
-    out = [signal.joint for signal in moving if signal not in alone]
-    said = [f"{entry.name}: {joint} does not repeat, unlike the other joints, and is left out" for joint in out]
-    return alone, guessed(alone), said
-
-
-def guessed(signals: Sequence[Signal]) -> float | None:
-    """The shortest lag [samples] after which joints repeat together, or None where they do not."""
-    return period.guess([signal.q[longest(signal)] for signal in signals])
-
-
-def longest(signal: Signal) -> slice:
-    """The longest segment without a gap."""
-    return max(segments(signal.segment), key=lambda s: s.stop - s.start)
-
-
-def odd_period(noise: PeriodResidual, signal: Signal, length: float) -> list[str]:
-    """Whether one of the periods differs from the others, as a transient at the start or a stop at the end does."""
-    number = ((noise.t - noise.t[0]) / length + 1e-9).astype(int)
-    size = np.sqrt(np.bincount(number, noise.q_noise**2) / np.maximum(np.bincount(number), 1))
-    worst, usual = int(size.argmax()), float(np.median(size))
-    if size[worst] < DIFFERS * float(signal.q.std()) or (len(size) > 2 and size[worst] < ODD * usual):
-        return []
-    which = f"period {worst + 1} of {len(size)}" if len(size) > 2 else "the periods"
-    return [
-        f"{noise.log}/{noise.joint}: {which} differs from the mean by {size[worst]:.3g} rms, "
-        f"{size[worst] / signal.q.std():.1%} of the motion: skip a transient at the start (skip = ... in study.toml), "
-        "or cut off a stop at the end"
-    ]
-
-
-def shared_period(
-    signals: Sequence[Signal], guess: float | None, entry: LogEntry, harmonics: int
-) -> tuple[period.Period, list[str]]:
-    """The period that all moving joints repeat with, and what there is to say about the one the study states.
+def repeating(moving: list[Signal], entry: LogEntry) -> tuple[list[Signal], Repetition, list[str]]:
+    """The joints that repeat, where and after how many samples they do so together, and what to say of the others.
 
     Raises
     ------
     NotPeriodic
-        If the joints do not repeat, or fewer than two periods were recorded.
+        If no joint repeats.
     """
-    first = signals[0]
-    seconds = first.t[-1] - first.t[0] + 1.0 / first.rate
-    if guess is None:
+    found = together(moving)
+    alone = [signal for signal in moving if together([signal]) is not None] if found is None else moving
+    found = together(alone) if found is None and alone else found
+    if found is None:
+        first = moving[0]
+        seconds = first.t[-1] - first.t[0] + 1.0 / first.rate
         stated = f"; the study states {entry.period} s" if entry.period else ""
         raise NotPeriodic(
             f"{entry.name}: {seconds:.2f} s hold no motion that repeats at least twice{stated}; record more periods, "
-            "skip the transient at the start, or give the log another role"
+            "leave out what comes before and after them (skip and until in study.toml), or give the log another role"
         )
-    remarks = []
-    found = period.refine(first.t - first.t[0], [signal.q for signal in signals], guess / first.rate, harmonics)
-    if entry.period and abs(entry.period - found.length) > max(MISMATCH * entry.period, 5 * found.std):
-        remarks.append(
-            f"{entry.name}: the study states a period of {entry.period} s, but the joints repeat every "
-            f"{found.length:.4f} s (+- {found.std:.1g} s); the latter is used: "
-            "correct the period in study.toml, or leave it out"
-        )
-    if averaging.whole_periods(first.t, found.length, first.rate) < 2:
-        raise NotPeriodic(f"{entry.name}: {seconds:.2f} s hold fewer than two periods of {found.length:.4f} s")
-    return found, remarks
+    out = [signal.joint for signal in moving if signal not in alone]
+    return alone, found, [f"{entry.name}: {j} does not repeat, unlike the other joints, and is left out" for j in out]
 
 
-def averaged(signal: Signal, found: period.Period, stated: float) -> Iterator[Average | PeriodResidual]:
-    """Fold one joint at a period."""
+def together(signals: Sequence[Signal]) -> Repetition | None:
+    """Where joints repeat together, in the longest segment in which they do."""
+    parts = sorted(segments(signals[0].segment), key=lambda part: part.start - part.stop)
+    for part in parts[:TRIED]:
+        if found := repetition([signal.q[part] for signal in signals]):
+            return found._replace(core=part.start + found.core)
+    return None
+
+
+def longest(signals: Sequence[Signal], found: Repetition, orders: int, entry: LogEntry) -> tuple[slice, Period]:
+    """The longest stretch around what was found that repeats with one period.
+
+    Raises
+    ------
+    NotPeriodic
+        If it holds fewer than two periods.
+    """
+    t, rate, positions = signals[0].t, signals[0].rate, [signal.q for signal in signals]
+    core = slice(found.core, min(found.core + round(2 * found.lag), len(t)))
+    span, period = stretch(t, positions, found.lag / rate, core, orders)
+    for k in multiples(period.length, entry.period, whole_periods(t[span], period.length, rate)):
+        if any(alternating(t[span], x[span], period.length, rate, k) for x in positions):
+            period = refine(t[span], [x[span] for x in positions], k * period.length, orders)
+            break
+    if whole_periods(t[span], period.length, rate) < 2:
+        raise NotPeriodic(
+            f"{entry.name}: the motion repeats from {t[span][0]:.2f} to {t[span][-1]:.2f} s only, which is fewer than "
+            f"two periods of {period.length:.4f} s; record more of them"
+        )
+    return span, period
+
+
+def multiples(length: float, stated: float | None, M: int) -> list[int]:
+    """By how much the period may be longer than it seems: what the study states first."""
+    said = [round(stated / length)] if stated else []
+    return [k for k in dict.fromkeys([*said, *SEEMING]) if 2 <= k <= M // 2]
+
+
+def left_out(
+    first: Signal, span: slice, kept: slice, period: Period, odd: Sequence[tuple[str, Difference]]
+) -> list[str]:
+    """What does not repeat, or not as well as the rest, and what to write in the study so that it need not be said."""
+    t = first.t
+    sides = [f"the {t[kept.start] - t[0]:.2f} s before"] * (span.start > 0)
+    sides += [f"the {t[-1] - t[kept.stop - 1]:.2f} s after"] * (span.stop < len(t))
+    said = [f"{' and '.join(sides)} do not, as in a stop, a ramp or another motion{at_gaps(first, span)}"] * bool(sides)
+    for name, d in odd:
+        if d.inside or t[kept.start] - t[span.start] > BRIEF * period.length or not sides:
+            differs = f"period {d.period + 1} of {d.periods} differs from the others by {d.rms:.3g} rms in {name}"
+            what = ", and is kept, because it is not at an end" if d.inside else ", as in a transient"
+            said.append(f"{differs}, {d.ratio:.1f} times what noise explains{what}")
+    keys = [f"skip = {np.floor(t[kept.start] * 1e4 + 1e-3) / 1e4:.10g}"] * (kept.start > 0)
+    keys += [f"until = {np.ceil(t[kept.stop - 1] * 1e4 - 1e-3) / 1e4:.10g}"] * (kept.stop < len(t))
+    advice = f"; the rest is left out: write {' and '.join(keys)} in study.toml to say so" if keys else ""
+    return [
+        f"{first.log}: {t[kept.start]:.2f} to {t[kept.stop - 1]:.2f} s are evaluated, which repeat every "
+        f"{period.length:.4f} s; {'; '.join(said)}{advice}"
+    ] * bool(said)
+
+
+def at_gaps(signal: Signal, span: slice) -> str:
+    """That a stretch ends where the clock has a gap, if it does: the gap is then not as long as the clock says."""
+    t, segment = signal.t, signal.segment
+    edges = [i for i in (span.start, span.stop) if 0 < i < len(t) and segment[i] != segment[i - 1]]
+    gaps = [f"{t[i] - t[i - 1]:.4g} s after {t[i - 1]:.2f} s" for i in edges]
+    return f"; the motion is not where it should be after the clock's gap of {' and of '.join(gaps)}" if gaps else ""
+
+
+def honoured(found: Period, entry: LogEntry) -> tuple[Period, list[str]]:
+    """The stated period unless the data exclude it, with its standard error from them; what to say where they do."""
+    stated = entry.period
+    if not stated:
+        return found, []
+    off = abs(stated - found.length)
+    if off <= EXCLUDED * found.std:
+        return Period(stated, found.std), []
+    if off <= MISMATCH * stated:
+        return found, []
+    return found, [
+        f"{entry.name}: the study states a period of {stated} s, but the joints repeat every "
+        f"{found.length:.4f} s (+- {found.std:.1g} s); the latter is used: "
+        "correct the period in study.toml, or leave it out"
+    ]
+
+
+def averaged(signal: Signal, span: slice, found: Period, stated: float) -> Iterator[Average | PeriodResidual]:
+    """Fold one joint at a period, from the first sample of a stretch on."""
     K = averaging.phases(found.length, signal.rate)
-    M = averaging.whole_periods(signal.t, found.length, signal.rate)
-    used = signal.t - signal.t[0] < M * found.length - 0.5 / signal.rate
+    M = whole_periods(signal.t[span], found.length, signal.rate)
+    used = slice(span.start, averaging.end(signal.t, span, found.length, signal.rate))
     t = signal.t[used]
 
     def folded(x: Column) -> Folded:
@@ -132,6 +182,7 @@ def averaged(signal: Signal, found: period.Period, stated: float) -> Iterator[Av
         period_std=found.std,
         stated_period=stated,
         periods=M,
+        t_start=float(t[0]),
         sigma_q=averaging.noise_std(q),
         sigma_dq=averaging.noise_std(dq),
         sigma_tau=averaging.noise_std(tau),

@@ -23,6 +23,7 @@ def run(
         rate=average.rate,
         period=average.period,
         periods=average.periods,
+        t_start=average.t_start,
         harmonics=orders,
         method=derivative,
         sigma_q=average.sigma_q,

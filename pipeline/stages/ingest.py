@@ -8,6 +8,7 @@ import numpy as np
 from pipeline.errors import BadLog
 from pipeline.logs.log import Block, Channel, Log
 from pipeline.maths.signals.clock import GAP, ClockStatistics
+from pipeline.maths.signals.steps import REACH, steps
 from pipeline.maths.units import SI, UNITS, canonical, measures, size
 from pipeline.records import Column, Diagnostic, LogSummary, Recording, diagnostic
 from pipeline.robots.robot import Joint, Robot
@@ -27,8 +28,10 @@ def run(log: Log, entry: LogEntry, robot: Robot) -> Iterator[Recording | LogSumm
         time does not increase.
     """
     reading = Reading(log, entry, robot)
-    for block in log.blocks(reading.names):
+    for block in reading.mended(log.blocks(reading.names)):
         yield from reading.recordings(block)
+        if reading.ended:
+            break
     yield reading.intake()
     remarks = [*log.warnings, *reading.remarks()]
     if remarks:
@@ -45,6 +48,8 @@ class Reading:
     clock: ClockStatistics = field(default_factory=ClockStatistics)
     rows: int = 0
     lost: int = 0  # at the end of a file that was cut
+    ended: bool = False  # where the study says that the log ends
+    jumps: list[tuple[float, float]] = field(default_factory=list)  # when the clock stepped, and how far
 
     def __post_init__(self) -> None:
         self.channels = {s.quantity: self.log.find(s.channel) for s in self.entry.channels}
@@ -85,9 +90,41 @@ class Reading:
             )
         return size(unit)
 
+    def mended(self, blocks: Iterator[Block]) -> Iterator[Block]:
+        """The blocks with steps of the clock taken out of its channel, where the motion tells that no time passed.
+
+        Of identification logs only: others lose nothing by a gap, and their contact windows count on their clock.
+        The end of a block waits for the next, which says how the motion goes on.
+        """
+        name = self.channels["time"].name if "time" in self.channels else self.own_time
+        whole = (self.without_cut_end(block) for block in blocks)
+        if not name or self.entry.role != "identification":
+            yield from whole
+            return
+        scale = self.sources["time"].sign * self.scales["time"] if "time" in self.sources else 1.0
+        passed = 0.0  # by the channel, in its unit, while nothing moved on
+        waiting: Block = {}
+        for block in whole:
+            late = block | {name: block[name] - passed} if passed else block
+            joined = {key: np.concatenate([waiting[key], late[key]]) for key in late} if waiting else late
+            for i, jump in steps(self.times(joined), self.positions(joined)):
+                joined = joined | {name: joined[name] - np.where(np.arange(len(joined[name])) < i, 0.0, jump / scale)}
+                passed += jump / scale
+                self.jumps.append((float(self.times(joined)[i - 1]), jump))
+            ready = max(len(joined[name]) - 2 * REACH, 0)
+            waiting = {key: values[ready:] for key, values in joined.items()}
+            yield {key: values[:ready] for key, values in joined.items()}
+        if waiting:
+            yield waiting
+
+    def positions(self, block: Block) -> Column:
+        """The positions of all joints at the joints, one a row."""
+        either = [self.of_joint(block, self.robot.joint(name), ("q", "theta_m")) for name in self.entry.joints]
+        return np.array([q for q in either if q is not None])
+
     def recordings(self, block: Block) -> Iterator[Recording]:
         """The joints of one block, after the transient that the study skips."""
-        block = self.without_cut_end(block)
+        block = self.until_the_end(block)
         if not len(block[self.names[0]]):
             return
         for name in self.names:
@@ -126,6 +163,17 @@ class Reading:
         end = int(rows[-1]) + 1 if len(rows) else 0
         self.lost += len(whole) - end
         return {name: values[:end] for name, values in block.items()}
+
+    def until_the_end(self, block: Block) -> Block:
+        """A block without the rows after the time at which the study says that the log ends, whatever they hold."""
+        if self.entry.until is None or not len(block[self.names[0]]):
+            return block
+        t = self.times(block)
+        after = np.flatnonzero(t - (self.clock.first if self.rows else t[0]) > self.entry.until + 1e-9)
+        if not len(after):
+            return block
+        self.ended = True
+        return {name: values[: int(after[0])] for name, values in block.items()}
 
     def times(self, block: Block) -> Column:
         """Time of each row [s], by the study's time channel, its rate, the log's time channel or the log's clock."""
@@ -189,8 +237,10 @@ class Reading:
         """
         clock, log = self.clock, self.log
         if clock.samples < 2 or clock.last - clock.first <= self.entry.skip:
+            until = f" and what comes after {self.entry.until:g} s left out" if self.ended else ""
             raise BadLog(
                 f"{log.path}: {clock.samples} samples are too few, with {self.entry.skip:g} s skipped at the start"
+                f"{until}"
             )
         feeds: dict[str, list[str]] = {}
         for quantity, channel in self.channels.items():
@@ -227,6 +277,13 @@ class Reading:
     def remarks(self) -> Iterator[str]:
         """What a reviewer should know about the clock and the rows."""
         clock = self.clock
+        if self.jumps:
+            when = ", ".join(f"{jump:.6g} s after {t - clock.first:.3f} s" for t, jump in self.jumps[:5])
+            more = " ..." if len(self.jumps) > 5 else ""
+            yield (
+                f"the clock jumps while the motion goes on, by {when}{more}: the times after it are set back; find out "
+                "why the recorder does so"
+            )
         for start, end in self.entry.contact:
             if start >= clock.last - clock.first or end <= self.entry.skip:
                 yield (
@@ -234,6 +291,15 @@ class Reading:
                     f"{self.entry.skip:g} to {clock.last - clock.first:g} s; contact times count from the log's first "
                     "sample"
                 )
+        if (
+            self.entry.until is not None
+            and not self.ended
+            and clock.last - clock.first < self.entry.until - GAP / clock.rate
+        ):
+            yield (
+                f"until = {self.entry.until:g} s leaves nothing out, because the log ends after "
+                f"{clock.last - clock.first:g} s; both count from its first sample"
+            )
         if self.lost:
             yield f"the file is cut, and its last {self.lost} rows lack some channels: they are left out"
         if clock.duplicates > MOST_REPEATED * clock.samples:

@@ -77,7 +77,7 @@ def without_the_log(
 ) -> Iterator[Prediction]:
     """Predict a log from fits to other identification logs."""
     part = at(signal, whole(signal, own))
-    motion = motion_at(own, part.t - signal.t[0])
+    motion = motion_at(own, part.t - own.t_start)
     everywhere = np.ones(len(part.t), dtype=bool)
     for fit in cross_fits:
         left_out = [str(names).split(", ") for names in fit.left_out]
@@ -94,7 +94,7 @@ def without_a_period(
 ) -> Iterator[Prediction | Diagnostic]:
     """Predict each period of a log from fits to the other periods; only the effort is left out, not the path."""
     part = at(signal, whole(signal, own))
-    since = part.t - signal.t[0]
+    since = part.t - own.t_start
     number = np.minimum((since / own.period + 1e-9).astype(int), own.periods - 1)
     group = np.array(folds(own.periods))[number]
     Phi = model.regressor(motion_at(own, since)).Phi[:, 0]
@@ -121,8 +121,9 @@ def not_predicted(signal: Signal, name: str, error: NotIdentifiable) -> Diagnost
 
 
 def whole(signal: Signal, own: Trajectory) -> Booleans:
-    """Which samples belong to whole periods."""
-    return signal.t - float(signal.t[0]) < own.periods * own.period - 0.5 / signal.rate
+    """Which samples belong to the whole periods that were averaged."""
+    since = signal.t - own.t_start
+    return np.asarray((since >= 0.0) & (since < own.periods * own.period - 0.5 / signal.rate))
 
 
 def at(signal: Signal, which: Booleans) -> Signal:

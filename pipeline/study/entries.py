@@ -50,6 +50,7 @@ def _entry(study: TomlTable, index: int, table: TomlTable, robot: Robot | None) 
         period=optional(table, "period"),
         rate=optional(table, "rate"),
         skip=optional(table, "skip") or 0.0,
+        until=_end(table),
         contact=_windows(table),
         weight=_weight(table, robot),
         delimiter=_delimiter(table),
@@ -87,6 +88,16 @@ def _files(table: TomlTable) -> tuple[str, ...]:
 
 def _is_name(value: object) -> bool:
     return isinstance(value, str) and value != ""
+
+
+def _end(table: TomlTable) -> float | None:
+    """Where the log ends; noted where that is before what is skipped ends."""
+    until = optional(table, "until")
+    skip = table.values.get("skip", 0.0)
+    if until is not None and isinstance(skip, int | float) and 0 < until <= skip:
+        problem = f"until = {until:g} leaves nothing after skip = {skip:g}; both count in seconds from the log's first"
+        table.problem(f"{problem} sample", "until")
+    return until
 
 
 def _delimiter(table: TomlTable) -> str | None:

@@ -7,6 +7,7 @@ PLAUSIBLE = {
     "period": (1e-6, 1e6, "s"),
     "rate": (1e-3, 1e7, "Hz"),
     "skip": (0.0, 1e6, "s"),
+    "until": (1e-3, 1e6, "s"),
     "lowpass": (1e-6, 1e5, "Hz"),
     "harmonics": (0, 100, ""),
     "effort": (1e-9, 1e6, "N m or N"),

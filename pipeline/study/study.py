@@ -61,6 +61,7 @@ class LogEntry:
     period: float | None = None
     rate: float | None = None
     skip: float = 0.0
+    until: float | None = None
     contact: tuple[tuple[float, float], ...] = ()
     weight: Weight | None = None
     delimiter: str | None = None

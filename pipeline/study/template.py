@@ -58,6 +58,7 @@ def _log(file: Path, folder: Path, robot: Robot) -> Iterator[str]:
     if not log.clock and not log.time and not any(_is_time(c) for c in log.channels):
         yield "rate = 100.0  # [Hz] the log carries no clock: CORRECT THIS"
     yield "# skip = 1.0  # [s] start-up transient to leave out"
+    yield "# until = 60.0  # [s] where the log ends: what comes after, a stop for instance, is left out"
     yield "# contact = [[12.0, 14.5]]  # [s] known contact windows"
     yield "[log.channels]"
     yield from _channels(log, robot)

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from pipeline.records import store
-from pipeline.runner.ledger import Folders
 from pipeline.runner.console import Console
+from pipeline.runner.ledger import Folders
 from pipeline.runner.runner import Runner
 from pipeline.runner.runs import folders
 from pipeline.stages import STAGES

@@ -31,6 +31,13 @@ def whole_periods(t: Array, period: float, rate: float) -> int:
     return int(np.floor(((t[-1] - t[0]) * rate + 1.5) / (period * rate)))
 
 
+def end(t: Array, span: slice, period: float, rate: float, M: int | None = None) -> int:
+    """The sample after the last of the first M periods of a stretch; of all the whole ones that it covers."""
+    M = whole_periods(t[span], period, rate) if M is None else M
+    after = span.start + np.searchsorted(t[span] - t[span.start], M * period - 0.5 / rate)
+    return int(after)
+
+
 def fold(t: Array, x: Array, period: float, K: int) -> Folded:
     """Average the samples at each of K phases, from the first sample on.
 
@@ -39,7 +46,7 @@ def fold(t: Array, x: Array, period: float, K: int) -> Folded:
     noise stays as white as it was, and a jump of friction does not ring as it would under interpolation.  A phase that
     no sample falls on takes the fit and a count of 0.  `t`, `x` are (N,).  (6.30), (6.31)
     """
-    smooth, residual, bins = _carried(t, x, period, K)
+    smooth, residual, bins = carried(t, x, period, K)
     counts = np.bincount(bins, minlength=K)
     mean = np.bincount(bins, residual, K) / np.maximum(counts, 1)
     noise = residual - mean[bins]
@@ -52,7 +59,7 @@ def left_out(t: Array, x: Array, period: float, K: int, groups: Integers) -> Ite
 
     The smooth fit is that of all samples: it only carries each to the nearest phase.
     """
-    smooth, residual, bins = _carried(t, x, period, K)
+    smooth, residual, bins = carried(t, x, period, K)
     size = int(groups.max()) + 1
     place = groups * K + bins
     powers = (np.ones_like(residual), residual, residual * residual)
@@ -66,7 +73,7 @@ def left_out(t: Array, x: Array, period: float, K: int, groups: Integers) -> Ite
         yield Folded(mean + smooth, var, counts, np.empty(0))
 
 
-def _carried(t: Array, x: Array, period: float, K: int) -> tuple[Array, Array, Integers]:
+def carried(t: Array, x: Array, period: float, K: int) -> tuple[Array, Array, Integers]:
     """The smooth fit at the phases (K,), what it leaves of each sample (N,), and the phase of each sample (N,)."""
     omega, since = 2 * np.pi / period, t - t[0]
     c = project(since, x, omega, min(SMOOTH, K // 4))

@@ -43,7 +43,7 @@ def blocks(context: Context, averages: list[Average]) -> Iterator[Block]:
     yield Prose(
         "Every identification log repeats one period. Its periods are averaged, and what differs between them is "
         "taken as noise: its standard deviations set what the filter assumes of its measurements. The period itself is "
-        "estimated from the joints' motion."
+        "estimated from the longest stretch in which the joints' motion repeats; the remarks say what is left out."
     )
     rows = tuple(
         (
@@ -151,9 +151,10 @@ def average_figures(context: Context, average: Average) -> Iterator[Block]:
 
 def one_period(average: Average, signal: Signal) -> Panel:
     """The mean period and the first one.  Fig 6.6"""
-    first = signal.t - signal.t[0] < average.period
+    since = signal.t - average.t_start
+    first = (since >= 0.0) & (since < average.period)
     marks = (
-        Line(signal.t[first] - signal.t[0], signal.tau[first], "first period", "sky"),
+        Line(since[first], signal.tau[first], "first period", "sky"),
         Line(average.t, average.tau, "mean", "vermillion"),
     )
     return Panel("Effort", "time [s]", label(average, "tau", "effort"), marks)

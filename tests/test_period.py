@@ -1,0 +1,319 @@
+"""Where a motion repeats, how far, and which of its periods to trust: stops, transients, steps of the clock."""
+
+import tracemalloc
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter, sosfiltfilt
+
+from pipeline.errors import NotPeriodic
+from pipeline.maths.models.independent import regressor
+from pipeline.maths.signals import period
+from pipeline.maths.signals.agreement import differing
+from pipeline.maths.signals.repetition import repetition
+from pipeline.maths.signals.steps import REACH, steps
+from pipeline.maths.signals.stretch import stretch
+from pipeline.records import Average, Diagnostic, Fit, Signal, Trajectory
+from pipeline.stages import average, differentiate, fit
+from pipeline.study import LogEntry
+from tests import arm
+
+RATE = 100.0
+
+
+def moved(u, still=None, name="hand_roll", T=10.0, seed=0, noise=1.0) -> Signal:
+    """A joint that at each sample is where its excitation is at the time u [s]; `still` says where it stands."""
+    rng, rest = np.random.default_rng(seed), np.zeros(len(u), dtype=bool) if still is None else still
+    q, dq, ddq = arm.excitation(name, u, T)
+    dq, ddq = np.where(rest, 0.0, dq), np.where(rest, 0.0, ddq)
+    tau = regressor(arm.joint(name).terms, q, dq, ddq) @ arm.THETA[name] + noise * arm.NOISE[name] * rng.normal(
+        size=len(u)
+    )
+    q, dq = q + 1e-4 * rng.normal(size=len(u)), dq + 1e-3 * rng.normal(size=len(u))
+    t = np.arange(len(u)) / RATE
+    columns = {"t": t, "q": q, "dq": dq, "tau": tau, "segment": np.zeros(len(u), int)}
+    return Signal("run", name, "identification", RATE, "as recorded", "logged", 0, 0, **columns)
+
+
+def stopped(at, goes_on=True, rest=2.4, periods=5, **about) -> Signal:
+    """Periods of 10 s with a rest inside, after which the motion goes on, or has gone on in the meantime."""
+    t = np.arange(round((10.0 * periods + rest) * RATE)) / RATE
+    still = (t >= at) & (t < at + rest)
+    u = np.where(t < at, t, np.where(still, at, t - rest if goes_on else t))
+    return moved(u, still, **about)
+
+
+def entry(**changes) -> LogEntry:
+    return LogEntry(**{"name": "run", "files": ("x",), "role": "identification", "channels": (), **changes})
+
+
+def run(*signals, **changes) -> tuple[list[Average], list[str]]:
+    made = list(average.run(signals, entry(**changes), arm.ARM, harmonics=0))
+    said = [text for record in made if isinstance(record, Diagnostic) for text in record.text]
+    return [record for record in made if isinstance(record, Average)], said
+
+
+def fitted(mean: Average) -> Fit:
+    made = differentiate.run(mean, arm.joint(mean.joint), derivative="harmonics", harmonics=0)
+    [trajectory] = [record for record in made if isinstance(record, Trajectory)]
+    return next(record for record in fit.run([trajectory], arm.ARM) if isinstance(record, Fit))
+
+
+def stepped(signal: Signal, at: float, by: float) -> Signal:
+    """The same motion on a clock that jumps, which makes two segments of it."""
+    after = signal.t >= at
+    return replace(signal, gaps=1, t=signal.t + np.where(after, by, 0.0), segment=after.astype(int))
+
+
+def waves(t, T, amplitudes=(1.0, 0.5, 0.3)):
+    return sum(a * np.sin(2 * np.pi * (k + 1) * t / T + k) for k, a in enumerate(amplitudes))
+
+
+STOPS = pytest.mark.parametrize("goes_on", [True, False], ids=["goes on", "has gone on"])
+
+
+@STOPS
+@pytest.mark.parametrize("at", [0.0, 5.0, 10.0, 20.0, 25.0, 27.4, 30.0, 40.0, 45.0, 50.0])
+def test_a_stop_costs_what_it_covers_and_one_remark(at, goes_on):
+    [made], said = run(stopped(at, goes_on))
+    assert made.period == pytest.approx(10.0, abs=min(0.001, 5 * made.period_std))
+    assert made.periods == max(int(at // 10), int((50 - at) // 10), 2)
+    assert made.sigma_tau == pytest.approx(arm.NOISE["hand_roll"], rel=4 / np.sqrt(2 * 1000 * (made.periods - 1)))
+    assert len(said) == 1
+    assert "as in a stop, a ramp or another motion" in said[0]
+
+
+@STOPS
+@pytest.mark.parametrize("at", [0.0, 12.0, 25.0, 50.0])
+def test_parameters_are_within_three_standard_errors_beside_a_stop(at, goes_on):
+    [made], _ = run(stopped(at, goes_on))
+    found = fitted(made)
+    assert np.all(np.abs(found.theta - arm.THETA["hand_roll"]) < 3 * found.theta_std_hac)
+
+
+@pytest.mark.parametrize("at", [0.0, 25.0, 50.0])
+def test_a_stated_period_is_honoured_beside_a_stop(at):
+    [made], said = run(stopped(at), period=10.0)
+    assert made.period == 10.0
+    assert made.period_std > 0
+    assert not any("the study states" in text for text in said)
+
+
+def test_a_stated_period_that_the_data_exclude_is_not_used_even_where_it_needs_no_remark():
+    [made], said = run(moved(np.arange(5000) / RATE, T=9.997), period=10.0)
+    assert made.period == pytest.approx(9.997, abs=5 * made.period_std)
+    assert not said
+
+
+@pytest.mark.parametrize(("at", "key"), [(0.0, "skip"), (50.0, "until"), (25.0, "until"), (20.0, "skip")])
+def test_what_a_remark_says_to_write_leaves_nothing_to_remark_on(at, key):
+    signal = stopped(at)
+    [before], [text] = run(signal)
+    value = float(text.partition(f"write {key} = ")[2].partition(" ")[0])
+    kept = signal.t >= value - 1e-9 if key == "skip" else signal.t <= value + 1e-9
+    [after], said = run(replace(signal, **{name: getattr(signal, name)[kept] for name in signal.columns()}))
+    assert not said
+    assert (after.periods, after.t_start) == (before.periods, before.t_start)
+    assert after.period == pytest.approx(before.period, rel=1e-12)
+
+
+@pytest.mark.parametrize("T", [7.37, 13.1, 30.2])
+@pytest.mark.parametrize("periods", [2.0, 2.05, 2.6, 6.3, 200.0])
+def test_two_whole_periods_are_enough(T, periods):
+    t = np.arange(round(periods * T * RATE)) / RATE
+    found = repetition([waves(t, T) + 0.01 * np.random.default_rng(0).normal(size=len(t))])
+    assert found is not None
+    assert found.lag / RATE == pytest.approx(T, rel=3e-4)
+    assert (found.start, found.stop) == pytest.approx((0, len(t)), abs=0.1 * len(t))
+
+
+def test_less_than_two_periods_are_refused():
+    with pytest.raises(NotPeriodic, match=r"19.00 s hold no motion that repeats at least twice.*skip and until"):
+        run(moved(np.arange(1900) / RATE))
+
+
+@pytest.mark.parametrize("T", [100.7, 1000.3, 9999.0, 33_333.3])
+def test_the_period_of_a_long_log_is_found_however_many_there_are_and_no_multiple_of_it(T):
+    t = np.arange(300_000)
+    found = repetition([waves(t, T) + 0.01 * np.random.default_rng(1).normal(size=len(t))])
+    assert found is not None
+    assert found.lag == pytest.approx(T, rel=1e-3)
+
+
+def test_memory_and_work_of_a_search_grow_as_the_log_does():
+    def most(N):
+        x = waves(np.arange(N), 1000.3)
+        tracemalloc.start()
+        repetition([x])
+        peak = tracemalloc.get_traced_memory()[1]
+        tracemalloc.stop()
+        return peak
+
+    assert most(800_000) < 5 * 8 * 800_000 + 2 * most(50_000)
+
+
+@pytest.mark.parametrize("seed", range(10))
+def test_motion_at_random_does_not_repeat(seed):
+    from scipy.signal import butter
+
+    rng = np.random.default_rng(seed)
+    assert repetition([sosfiltfilt(butter(2, 0.02, output="sos"), rng.normal(size=6000))]) is None
+    assert repetition([np.cumsum(rng.normal(size=6000))]) is None
+
+
+def test_a_period_that_changes_halfway_is_that_of_the_longer_part_and_said_to_be():
+    t = np.arange(9000) / RATE
+    u = np.where(t < 50.0, t, 50.0 + (t - 50.0) * 10.0 / 8.0)
+    [made], [text] = run(moved(u))
+    assert made.period == pytest.approx(10.0, abs=5 * made.period_std)
+    assert made.periods == 5
+    assert "the 39." in text
+    assert "after do not, as in a stop, a ramp or another motion" in text
+
+
+@pytest.mark.parametrize("symbol", ["q", "dq", "tau"])
+@pytest.mark.parametrize("periods", [4, 10])
+def test_a_transient_at_the_start_is_left_out_whichever_quantity_shows_it(symbol, periods):
+    """Of a size that its period's noise is some three times that of the others."""
+    signal = moved(np.arange(1000 * periods) / RATE)
+    size = {"q": 1e-4, "dq": 1e-3, "tau": arm.NOISE["hand_roll"]}[symbol]
+    late = replace(signal, **{symbol: getattr(signal, symbol) + 12 * size * np.exp(-signal.t / 1.5)})
+    [made], [text] = run(late)
+    assert made.periods == periods - 1
+    assert made.t_start == pytest.approx(10.0, abs=0.011)
+    assert f"rms in {symbol} of hand_roll" in text
+    assert "write skip = 10 in study.toml" in text
+    degrees = 1000 * (periods - 2)
+    assert getattr(made, f"sigma_{symbol}") == pytest.approx(size, rel=4 / np.sqrt(2 * degrees))
+
+
+def test_what_does_not_fill_a_period_is_left_out_at_the_start_before_a_period_is():
+    signal = moved(np.arange(5600) / RATE)
+    late = replace(signal, tau=signal.tau + 5 * np.exp(-signal.t / 0.7))
+    [made], [text] = run(late)
+    assert made.periods == 5
+    assert made.t_start == pytest.approx(6.0, abs=0.011)
+    assert "write skip = 6" in text
+
+
+def test_an_odd_period_among_others_is_named_and_kept():
+    signal = moved(np.arange(8000) / RATE)
+    push = np.where((signal.t > 33) & (signal.t < 36), 1.0, 0.0)
+    [made], [text] = run(replace(signal, tau=signal.tau + push))
+    assert made.periods == 8
+    assert "period 4 of 8 differs from the others by" in text
+    assert "rms in tau of hand_roll" in text
+    assert "is kept, because it is not at an end" in text
+    assert "write" not in text
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.9, 0.99])
+def test_correlated_noise_is_no_transient(rho):
+    flagged = 0
+    for seed in range(40):
+        t = np.arange(5000) / RATE
+        x = waves(t, 10.0) + 0.01 * coloured(np.random.default_rng(seed), len(t), rho)
+        flagged += bool(differing(t, x, 10.0, RATE))
+    assert flagged <= 2
+
+
+def coloured(rng, N, rho):
+    """Noise of unit variance and this correlation from sample to sample."""
+    return lfilter([1], [1, -rho], rng.normal(size=N + 3000))[3000:] * np.sqrt(1 - rho**2)
+
+
+def test_intervals_of_the_period_cover_whatever_the_colour_of_the_noise():
+    """Pooled over colours and lengths; each setting by itself within what 100 draws allow around 88 to 100 %."""
+    T, inside = 10.0, []
+    for periods in (2, 3, 4.63, 10):
+        for rho in (0.0, 0.9, 0.99):
+            t = np.arange(int(periods * T * 50)) / 50
+            for seed in range(100):
+                rng = np.random.default_rng(seed)
+                x = waves(t, T, (1.0, 0.4)) + 0.01 * coloured(rng, len(t), rho)
+                found = period.refine(t, [x], T, 2)
+                inside.append(abs(found.length - T) < 1.96 * found.std)
+    settings = np.mean(np.reshape(inside, (-1, 100)), axis=1)
+    assert np.mean(inside) == pytest.approx(0.95, abs=0.02)
+    assert settings.min() > 0.85
+
+
+def test_noise_that_joints_share_is_not_counted_as_twice_the_knowledge():
+    T, t, z = 10.0, np.arange(2500) / 50, []
+    for seed in range(150):
+        rng = np.random.default_rng(seed)
+        shared = 0.01 * coloured(rng, len(t), 0.9)
+        found = period.refine(t, [waves(t, T) + shared] * 4, T, 3)
+        z.append((found.length - T) / found.std)
+    assert np.std(z) < 1.25
+
+
+@pytest.mark.parametrize("by", [2.5, 3.0, 5.0, 1.7e9])
+@pytest.mark.parametrize("at", [8.0, 23.45, 40.0])
+def test_a_step_of_the_clock_costs_the_shorter_side_at_most(by, at):
+    """As averaging sees it where reading could not mend it; 5 s are a whole period, across which the phase holds."""
+    signal = moved(np.arange(5000) / RATE, T=5.0)
+    tracemalloc.start()
+    [made], said = run(stepped(signal, at, by))
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert made.period == pytest.approx(5.0, abs=5 * made.period_std)
+    found = fitted(made)
+    assert np.all(np.abs(found.theta - arm.THETA["hand_roll"]) < 3 * found.theta_std_hac)
+    assert peak < 50e6
+    if by != 5.0:
+        [text] = said
+        assert made.periods == int(max(at, 50 - at) // 5)
+        assert f"after the clock's gap of {by + 0.01:.4g} s after {at - 0.01:.2f} s" in text
+
+
+def test_a_step_of_the_clock_that_leaves_less_than_two_periods_is_refused():
+    signal = moved(np.arange(2500) / RATE)
+    with pytest.raises(NotPeriodic):
+        run(stepped(signal, 12.5, 3.0))
+
+
+@pytest.mark.parametrize("name", ["hand_roll", "hand_pitch"])
+@pytest.mark.parametrize("by", [0.05, 2.5, 3.0, 1.7e9])
+def test_steps_are_told_from_gaps_wherever_the_joint_moves(name, by):
+    signal = moved(np.arange(3000) / RATE, name=name)
+    speed = np.abs(arm.excitation(name, signal.t, 10.0)[1])
+    for i in range(100, 2900, 173):
+        t = signal.t + np.where(np.arange(3000) < i, 0.0, by)
+        found = steps(t, signal.q[None])
+        if speed[i] > 0.1:
+            [(at, jump)] = found
+            assert at == i
+            assert jump == pytest.approx(by, abs=1e-6 * max(1.0, 1e-7 * by / 1e-6))
+        lost = np.delete(np.arange(3000), np.arange(i, min(i + 31, 2990)))
+        assert not steps(signal.t[lost], signal.q[None, lost])
+
+
+def test_nothing_is_said_of_a_gap_at_rest_or_at_an_end():
+    signal = moved(np.arange(3000) / RATE)
+    still = np.full((1, 3000), 0.3) + 1e-4 * np.random.default_rng(0).normal(size=3000)
+    for i, x in ((1500, still), (REACH - 1, signal.q[None]), (3000 - REACH + 1, signal.q[None])):
+        assert not steps(signal.t + np.where(np.arange(3000) < i, 0.0, 3.0), x)
+
+
+def test_one_joint_that_breaks_says_that_time_passed():
+    roll, pitch = moved(np.arange(3000) / RATE), moved(np.arange(3000) / RATE, name="hand_pitch")
+    broken = pitch.q + np.where(np.arange(3000) < 1200, 0.0, 0.05)
+    t = roll.t + np.where(np.arange(3000) < 1200, 0.0, 3.0)
+    assert steps(t, np.array([roll.q, pitch.q]))
+    assert not steps(t, np.array([roll.q, broken]))
+
+
+@pytest.mark.parametrize(("start", "stop"), [(700, 5200), (123, 4001), (0, 5555), (1900, 3800)])
+def test_a_stretch_ends_to_the_sample_where_the_motion_is_a_hundredth_away(start, stop):
+    t = np.arange(6000) / RATE
+    clean = waves(t, 8.0)
+    held = np.where(t < t[start], clean[start], np.where(t < t[stop], clean, clean[stop]))
+    away = np.abs(held - clean) > 0.01 * clean[start:stop].std()
+    x = held + 1e-4 * np.random.default_rng(0).normal(size=6000)
+    span, found = stretch(t, [x], 8.0, slice(2000, 3600), 3)
+    before, after = np.flatnonzero(away[:start]), stop + np.flatnonzero(away[stop:])
+    assert span.start == pytest.approx(before[-1] + 1 if len(before) else 0, abs=3)
+    assert span.stop == pytest.approx(after[0], abs=3)
+    assert found.length == pytest.approx(8.0, abs=5 * found.std)
