@@ -114,7 +114,7 @@ def outliers(context: Context, average: Average) -> Iterator[Verdict]:
 
 def by_period(residual: PeriodResidual, average: Average, noise: Column) -> Column:
     """The root mean square of the noise in each period (M,)."""
-    number = np.minimum(((residual.t - residual.t[0]) / average.period + 1e-9).astype(int), average.periods - 1)
+    number = np.minimum(((residual.t - average.t_start) / average.period + 1e-9).astype(int), average.periods - 1)
     squares = np.bincount(number, noise**2, average.periods)
     return np.sqrt(squares / np.maximum(np.bincount(number, minlength=average.periods), 1))
 
