@@ -86,13 +86,14 @@ def test_the_loop_is_the_same_compiled_and_as_it_is_written():
 def identified():
     signal = arm.signal()
     averages = [r for r in average.run([signal], entry(), arm.ARM, harmonics=0) if isinstance(r, Average)]
-    fits = [r for r in fit.run([trajectory(signal)], arm.ARM) if isinstance(r, Fit)]
+    fits = [r for r in fit.run([trajectory(signal)], [], arm.ARM, lowpass=17.0) if isinstance(r, Fit)]
     return fits, averages
 
 
 def tracked(identified, signal, **changes):
+    fits, averages = identified
     made = stage.run(
-        signal, *identified, entry(role=signal.role, **changes), arm.joint(signal.joint),
+        [signal], fits, [], averages, entry(role=signal.role, **changes), arm.ARM,
         fit=changes.pop("fit", "independent.lse"), lowpass=17.0, q_tau=0.0,
     )  # fmt: skip
     return list(made)
@@ -134,12 +135,12 @@ def test_a_joint_without_a_fit_is_noted_not_guessed(identified):
 
 def test_a_fit_that_does_not_exist_is_refused_with_those_there_are(identified):
     says = "no fit 'coupled.pso'; set fit in [settings] to one of independent.lse, "
+    fits, averages = identified
+    run = stage.run(
+        [arm.signal()], fits, [], averages, entry(), arm.ARM, fit="coupled.pso", lowpass=17.0, q_tau=0.0
+    )  # fmt: skip
     with pytest.raises(PipelineError, match=re.escape(says)):
-        list(
-            stage.run(
-                arm.signal(), *identified, entry(), arm.joint("hand_roll"), fit="coupled.pso", lowpass=17.0, q_tau=0.0
-            )
-        )
+        list(run)
 
 
 def test_white_noise_is_called_white_as_often_as_the_level_says():

@@ -35,6 +35,11 @@ def run(
         )
     orders = max(harmonics or robot.joint(signal.joint).harmonics for signal in moving)
     moving, guess, remarks = repeating(moving, entry)
+    if guess is None and not entry.period:
+        seconds = moving[0].t[-1] - moving[0].t[0] + 1.0 / moving[0].rate
+        said = f"{entry.name}: {seconds:.2f} s hold no motion that repeats at least twice, so nothing is averaged"
+        yield diagnostic("average", entry.name, "note", f"{said}; its parameters come from the low-passed samples")
+        return
     found, more = shared_period(moving, guess, entry, orders)
     remarks += more
     for signal in moving:

@@ -7,7 +7,7 @@ combinations of them that motion can tell.  A counterweight is a link like any o
 """
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cache
 
 import numpy as np
 
@@ -48,13 +48,10 @@ class CoupledArm:
         """The joints of the rows."""
         return tuple(self.joints[row] for row in self.rows)
 
-    @cached_property
+    @property
     def base(self) -> BaseParameters:
         """What a rich motion of all joints can tell of the links and drives, from the efforts of the rows."""
-        n, random = len(self.joints), np.random.default_rng(0)
-        q, dq, ddq = (random.uniform(-1.0, 1.0, (RICH, n)) for _ in range(3))
-        slides = self.chain.slides[[int(np.flatnonzero(self.chain.coordinate == i)[0]) for i in range(n)]]
-        return base_parameters(self._of_links(q * np.where(slides, 0.2, 1.0), 2.0 * dq, 5.0 * ddq))
+        return told(self.chain, len(self.joints), self.rows)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -78,11 +75,17 @@ class CoupledArm:
 
     def inertia(self, theta: Array, q: Array) -> Array:
         """M (N, m, m) at q (N, n).  (4.38)"""
+        return np.asarray(self.inertia_columns(q) @ theta)
+
+    def inertia_columns(self, q: Array) -> Array:
+        """What the parameters (p,) make of M at q (N, n), (N, m, m, p): M is linear in them."""
         still, base = np.zeros_like(q), self.base.columns
-        beta = theta[: len(base)]
-        gravity = self._of_links(q, still, still)[:, :, base] @ beta
-        unit = np.eye(q.shape[1])[list(self.rows)]
-        return np.stack([self._of_links(q, still, still + e)[:, :, base] @ beta - gravity for e in unit], axis=2)
+        columns = np.zeros((len(q), len(self.rows), len(self.rows), len(self.parameters)))
+        gravity = self._of_links(q, still, still)[:, :, base]
+        for j, row in enumerate(self.rows):
+            unit = np.eye(q.shape[1])[row]
+            columns[:, :, j, : len(base)] = self._of_links(q, still, still + unit)[:, :, base] - gravity
+        return columns
 
     def bias(self, theta: Array, motion: Motion) -> Array:
         """The effort (N, m) of this motion without what accelerates it.  (4.38)"""
@@ -103,11 +106,7 @@ class CoupledArm:
 
     def _of_links(self, q: Array, dq: Array, ddq: Array) -> Array:
         """The columns (N, m, 10 L + 3 m) of the inertial parameters, and of what drives and cables add to each row."""
-        rows = list(self.rows)
-        Y = regressor(self.chain, q, dq, ddq)[:, rows]
-        own = np.eye(len(rows))
-        added = (x[:, :, None] * own for x in (ddq[:, rows], q[:, rows], np.ones_like(q[:, rows])))
-        return np.concatenate([Y, *added], axis=2)
+        return of_links(self.chain, self.rows, q, dq, ddq)
 
     def _frictions(self) -> list[tuple[int, int, Term, int]]:
         """Row, joint, term and column of Phi of every term of friction."""
@@ -131,3 +130,20 @@ class CoupledArm:
     def _friction_parameter(self, row: int, term: Term) -> Parameter:
         unit = term.unit.format(**self.units[row])
         return Parameter(f"{term.name}{self._of(row)}", term.typst, unit, term.positive, term.scale)
+
+
+def of_links(chain: Chain, rows: tuple[int, ...], q: Array, dq: Array, ddq: Array) -> Array:
+    """The columns (N, m, 10 L + 3 m) of all links' parameters, and of what drives and cables add to each row."""
+    each = list(rows)
+    Y, own = regressor(chain, q, dq, ddq)[:, each], np.eye(len(each))
+    added = (x[:, :, None] * own for x in (ddq[:, each], q[:, each], np.ones_like(q[:, each])))
+    return np.concatenate([Y, *added], axis=2)
+
+
+@cache
+def told(chain: Chain, n: int, rows: tuple[int, ...]) -> BaseParameters:
+    """The base parameters of the first n coordinates of a chain, from the efforts of some of them."""
+    random = np.random.default_rng(0)
+    q, dq, ddq = (random.uniform(-1.0, 1.0, (RICH, n)) for _ in range(3))
+    slides = chain.slides[[int(np.flatnonzero(chain.coordinate == i)[0]) for i in range(n)]]
+    return base_parameters(of_links(chain, rows, q * np.where(slides, 0.2, 1.0), 2.0 * dq, 5.0 * ddq))

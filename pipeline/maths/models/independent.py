@@ -61,6 +61,10 @@ class IndependentJoint:
         """M (N, 1, 1), the same everywhere.  (6.5)"""
         return np.full((len(q), 1, 1), inertia_of(self.terms, theta))
 
+    def inertia_columns(self, q: Array) -> Array:
+        """What the parameters (p,) make of M at q (N, 1), (N, 1, 1, p)."""
+        return np.tile(np.array([term.a for term in self.terms]), (len(q), 1, 1, 1))
+
     def bias(self, theta: Array, motion: Motion) -> Array:
         """V + F + G (N, 1)."""
         still = motion._replace(ddq=np.zeros_like(motion.ddq))

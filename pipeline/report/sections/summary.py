@@ -96,7 +96,7 @@ def caption(contacts: list[Contact]) -> str:
 
 def fitted_joints(context: Context) -> list[str]:
     """The joints that have a fit, in the robot's order."""
-    return list(dict.fromkeys(fit.group for fit in context.catalogue.all(Fit)))
+    return list(dict.fromkeys(fit.group for fit in context.own_fits()))
 
 
 def trust(context: Context, joint: str) -> Trust:
