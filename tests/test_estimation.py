@@ -263,7 +263,8 @@ def test_of_many_fitted_paths_those_that_differ_most_are_kept_and_it_is_said_whe
 
     def kept(paths: int) -> tuple[set[int], str]:
         every = [replace(one, log=f"log-{i}", q=np.sin((1 + i % paths) * phase)) for i in range(60)]
-        made = list(fit.fitted_paths("hand_roll", [fit.repeated(independent(arm.joint("hand_roll")), t) for t in every]))
+        model = independent(arm.joint("hand_roll"))
+        made = list(fit.fitted_paths("hand_roll", [fit.repeated(model, t) for t in every]))
         [kept] = (r for r in made if isinstance(r, FittedPaths))
         logs = [int(log.removeprefix("log-")) % paths for log in dict.fromkeys(kept.source)]
         assert len(logs) == 20

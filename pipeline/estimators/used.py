@@ -26,5 +26,5 @@ def used(robot: Robot, fits: Sequence[Fit], choices: Sequence[Choice], joint: st
     by_name = {f"{f.model}.{f.estimator}": f for f in describing(robot, fits, joint)}
     if setting != CHOSEN:
         return by_name.get(setting)
-    names = [choice.fit for choice in choices if choice.group in (joint, ARM)]
+    names = [f"{choice.model}.{choice.estimator}" for choice in choices if choice.group in (joint, ARM)]
     return next((by_name[name] for name in (*names, FALLBACK) if name in by_name), None)

@@ -31,11 +31,6 @@ class Choice(Record):
     training: Column
     over_periods: Column
 
-    @property
-    def fit(self) -> str:
-        """`<model>.<estimator>` of its Fit."""
-        return f"{self.model}.{self.estimator}"
-
     def published(self) -> Iterator[Published]:
         """The scores of every candidate."""
         for i, candidate in enumerate(self.candidate):

@@ -15,7 +15,16 @@ from pipeline.maths.arrays import Array
 from pipeline.maths.models.model import Model
 from pipeline.maths.signals.path import SAME_PATH, most_different
 from pipeline.records import (
-    Column, CrossFit, Diagnostic, Fit, FittedPaths, MeasurementNoise, Residual, Smoothed, Trajectory, diagnostic,
+    Column,
+    CrossFit,
+    Diagnostic,
+    Fit,
+    FittedPaths,
+    MeasurementNoise,
+    Residual,
+    Smoothed,
+    Trajectory,
+    diagnostic,
 )  # fmt: skip
 from pipeline.robots.models import independent
 from pipeline.robots.robot import Robot

@@ -20,7 +20,16 @@ from pipeline.maths.signals.path import SAME_PATH, likeness
 from pipeline.maths.signals.smoothing import segments
 from pipeline.maths.signals.windows import outside
 from pipeline.records import (
-    Choice, CrossFit, Diagnostic, Fit, FittedPaths, Prediction, Signal, Smoothed, Trajectory, diagnostic,
+    Choice,
+    CrossFit,
+    Diagnostic,
+    Fit,
+    FittedPaths,
+    Prediction,
+    Signal,
+    Smoothed,
+    Trajectory,
+    diagnostic,
 )  # fmt: skip
 from pipeline.records.predict import CHOSEN
 from pipeline.robots.models import independent
