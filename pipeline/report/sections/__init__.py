@@ -24,7 +24,7 @@ DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
             "ground_truth",
             "methods",
             "provenance",
-        ),  # fmt: skip
+        ),
     ),
     "robot": ("The robot, its control and its excitation", ("robot", "control", "excitation")),
 }
