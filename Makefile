@@ -24,15 +24,17 @@ LOCK := uv pip compile -q --universal --python-version 3.11 --generate-hashes --
 UPGRADE ?=
 
 # One line a stage: what it reads, and what it makes.
-STAGES := design ingest resample average differentiate fit predict ekf assess threshold measure whiteness report
+STAGES := design ingest resample average differentiate smooth fit choose predict ekf assess threshold measure whiteness report
 # design        : robot -> Links Pose Workspace Control Lyapunov Excitation
 # ingest        : logs -> Recording LogSummary Diagnostic
 # resample      : Recording -> Signal Diagnostic
 # average       : Signal -> Average PeriodResidual Diagnostic
 # differentiate : Average -> Trajectory Spectrum Diagnostic
-# fit           : Trajectory -> Fit CrossFit FittedPaths MeasurementNoise Residual Diagnostic
-# predict       : Signal Trajectory FittedPaths Fit CrossFit -> Prediction Diagnostic
-# ekf           : Signal Fit MeasurementNoise -> Track Diagnostic
+# smooth        : Signal -> Smoothed
+# fit           : Trajectory Smoothed -> Fit CrossFit FittedPaths MeasurementNoise Residual Diagnostic
+# choose        : Smoothed Average -> Choice Fit Prediction Diagnostic
+# predict       : Signal Smoothed Trajectory FittedPaths Fit CrossFit Choice -> Prediction Diagnostic
+# ekf           : Signal Fit Choice MeasurementNoise -> Track Diagnostic
 # assess        : Track -> FreeSpace
 # threshold     : FreeSpace -> Threshold
 # measure       : Track Threshold -> Contact

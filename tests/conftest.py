@@ -32,7 +32,7 @@ MEDIUM: dict[str, tuple[str, ...]] = {
     ),
     "models/test_model.py": (
         "test_a_filter_tracks_each_joint_of_a_coupled_arm_with_what_the_model_says_of_it",
-        "test_the_protocol_describes_a_coupled_arm_whose_friction_remembers",
+        "test_the_effort_of_a_coupled_arm_is_that_of_its_links_drives_and_friction",
     ),
     "robot/test_kernels.py": (),
     "logs/test_labview_files.py": (

@@ -145,13 +145,23 @@ def test_the_joints_of_a_log_share_one_period_and_one_at_rest_is_noted():
 @pytest.mark.parametrize(
     ("signals", "says"),
     [
-        ([arm.signal(periods=1.4)], "run: 14.00 s hold no motion that repeats at least twice"),
         ([arm.signal("hand_roll", noise=0, periods=0.01)], "no joint moves"),
     ],
 )
-def test_a_log_that_does_not_repeat_is_refused_by_name(signals, says):
+def test_a_log_in_which_nothing_moves_is_refused_by_name(signals, says):
     with pytest.raises(NotPeriodic, match=says):
         run(signals)
+
+
+def test_a_log_that_does_not_repeat_is_not_averaged_and_says_so():
+    made, [note] = run([arm.signal(periods=1.4)])
+    assert made == []
+    assert "run: 14.00 s hold no motion that repeats at least twice, so nothing is averaged" in note.text[0]
+
+
+def test_a_stated_period_that_the_data_do_not_have_is_refused():
+    with pytest.raises(NotPeriodic, match=r"the study states 3\.0 s"):
+        run([arm.signal(periods=1.4)], period=3.0)
 
 
 def test_what_averaging_removes_is_the_noise():

@@ -11,9 +11,9 @@ from pipeline.filters import ekf
 from pipeline.filters.problem import NoiseModel
 from pipeline.maths.models.bias import bias
 from pipeline.maths.models.independent import combined, inertia_of
-from pipeline.records import Average, Diagnostic, Fit, Track, Whiteness
-from pipeline.stages import average, fit, whiteness
+from pipeline.records import Diagnostic, Fit, MeasurementNoise, Track, Whiteness
 from pipeline.stages import ekf as stage
+from pipeline.stages import fit, whiteness
 from tests import arm
 from tests.test_averaging import entry
 from tests.test_estimation import trajectory
@@ -85,14 +85,14 @@ def test_the_loop_is_the_same_compiled_and_as_it_is_written():
 @pytest.fixture(scope="module")
 def identified():
     signal = arm.signal()
-    averages = [r for r in average.run([signal], entry(), arm.ARM, harmonics=0) if isinstance(r, Average)]
-    fits = [r for r in fit.run([trajectory(signal)], arm.ARM) if isinstance(r, Fit)]
-    return fits, averages
+    made = list(fit.run([trajectory(signal)], [], arm.ARM, lowpass=17.0))
+    return [r for r in made if isinstance(r, Fit)], [r for r in made if isinstance(r, MeasurementNoise)]
 
 
 def tracked(identified, signal, **changes):
+    fits, noises = identified
     made = stage.run(
-        signal, *identified, entry(role=signal.role, **changes), arm.joint(signal.joint),
+        [signal], fits, [], noises, entry(role=signal.role, **changes), arm.ARM,
         fit=changes.pop("fit", "independent.lse"), lowpass=17.0, q_tau=0.0,
     )  # fmt: skip
     return list(made)
@@ -134,12 +134,12 @@ def test_a_joint_without_a_fit_is_noted_not_guessed(identified):
 
 def test_a_fit_that_does_not_exist_is_refused_with_those_there_are(identified):
     says = "no fit 'coupled.pso'; set fit in [settings] to one of independent.lse, "
+    fits, noises = identified
+    run = stage.run(
+        [arm.signal()], fits, [], noises, entry(), arm.ARM, fit="coupled.pso", lowpass=17.0, q_tau=0.0
+    )  # fmt: skip
     with pytest.raises(PipelineError, match=re.escape(says)):
-        list(
-            stage.run(
-                arm.signal(), *identified, entry(), arm.joint("hand_roll"), fit="coupled.pso", lowpass=17.0, q_tau=0.0
-            )
-        )
+        list(run)
 
 
 def test_white_noise_is_called_white_as_often_as_the_level_says():

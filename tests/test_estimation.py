@@ -24,7 +24,8 @@ from pipeline.records import (
     Residual,
     Trajectory,
 )
-from pipeline.stages import average, differentiate, fit, predict
+from pipeline.robots.models import independent
+from pipeline.stages import average, differentiate, fit, predict, smooth
 from tests import arm
 from tests.test_averaging import entry
 
@@ -37,7 +38,7 @@ def trajectory(signal) -> Trajectory:
 
 
 def fits(*signals) -> dict[str, Fit]:
-    made = fit.run([trajectory(s) for s in signals], arm.ARM)
+    made = fitted_to([trajectory(s) for s in signals])
     return {r.estimator: r for r in made if isinstance(r, Fit)}
 
 
@@ -111,7 +112,7 @@ def test_any_other_parameters_have_the_error_that_the_normal_equations_predict(s
 
 
 def test_few_periods_leave_the_weights_out_and_the_rest_goes_on():
-    made = list(fit.run([trajectory(arm.signal(periods=3))], arm.ARM))
+    made = fitted_to([trajectory(arm.signal(periods=3))])
     estimators = {r.estimator for r in made if isinstance(r, Fit)}
     assert "lse" in estimators
     assert "wlse" not in estimators
@@ -168,12 +169,15 @@ def test_a_harmonic_that_is_left_out_is_remarked_on():
 
 
 def predictions(signal, role, fitted, trajectories=(), **changes):
-    own = next((t for t in trajectories if t.log == signal.log), None)
-    made = list(fit.run(trajectories, arm.ARM))
-    paths = next((r for r in made if isinstance(r, FittedPaths)), None)
-    cross_fits = [r for r in made if isinstance(r, CrossFit)]
-    about = entry(name=signal.log, role=role, **changes)
-    return list(predict.run(signal, own, paths, fitted, cross_fits, about, arm.joint(signal.joint), lowpass=17.0))
+    made, about = fitted_to(trajectories), entry(name=signal.log, role=role, **changes)
+    paths, cross_fits = ([r for r in made if isinstance(r, kind)] for kind in (FittedPaths, CrossFit))
+    own, smoothed = [t for t in trajectories if t.log == signal.log], smooth.run(signal, about, lowpass=17.0)
+    every = predict.run([signal], smoothed, own, paths, fitted, cross_fits, [], about, arm.ARM, lowpass=17.0)
+    return [r for r in every if not isinstance(r, Prediction) or r.model != "chosen"]
+
+
+def fitted_to(trajectories, smoothed=()):
+    return list(fit.run(trajectories, smoothed, arm.ARM, lowpass=17.0))
 
 
 def test_a_validation_log_is_predicted_down_to_its_noise():
@@ -207,12 +211,12 @@ def test_an_identification_log_is_predicted_from_the_others_or_from_its_other_pe
 
 def refit_without(trajectories, *logs) -> np.ndarray:
     rest = [t for t in trajectories if t.log not in logs]
-    return next(r for r in fit.run(rest, arm.ARM) if isinstance(r, Fit)).theta
+    return next(r for r in fitted_to(rest) if isinstance(r, Fit)).theta
 
 
 def test_every_log_is_left_out_once_by_refits_to_all_the_others():
     every = [trajectory(arm.signal(seed=i, log=f"log-{i}", periods=4)) for i in range(3)]
-    cross = next(r for r in fit.run(every, arm.ARM) if isinstance(r, CrossFit))
+    cross = next(r for r in fitted_to(every) if isinstance(r, CrossFit))
     for t in every:
         assert_allclose(cross.theta[cross.left_out == t.log], refit_without(every, t.log), rtol=1e-12)
     assert len(cross) == 3 * 4
@@ -227,7 +231,7 @@ def test_many_logs_are_left_out_in_twenty_folds_of_neighbours():
         assert np.ptp(np.bincount(fold)) <= 1
     one = trajectory(arm.signal(periods=4, rate=20.0))
     every = [replace(one, log=f"log-{i}", tau=one.tau * (1 + 0.01 * i)) for i in range(30)]
-    cross = next(r for r in fit.run(every, arm.ARM) if isinstance(r, CrossFit))
+    cross = next(r for r in fitted_to(every) if isinstance(r, CrossFit))
     assert list(dict.fromkeys(cross.left_out))[:3] == ["log-0, log-1", "log-2", "log-3, log-4"]
     assert_allclose(cross.theta[:4], refit_without(every, "log-0", "log-1"), rtol=1e-12)
     [made, _] = predictions(arm.signal(log="log-4", rate=20.0), "identification", [], every)
@@ -249,7 +253,7 @@ def test_a_joint_is_fitted_anew_at_most_twenty_times_however_many_its_logs_are(m
 def test_a_log_that_no_refit_can_do_without_has_no_leave_out_score_and_it_is_said():
     """Only one of the logs holds periods enough for weights, and without the others' there are none."""
     every = [trajectory(arm.signal(seed=i, log=f"log-{i}", periods=p)) for i, p in enumerate((5, 3))]
-    made = list(fit.run(every, arm.ARM))
+    made = fitted_to(every)
     lse, wlse = (r for r in made if isinstance(r, CrossFit))
     assert (set(lse.left_out), set(wlse.left_out)) == ({"log-0", "log-1"}, {"log-1"})
     said = " ".join(text for r in made if isinstance(r, Diagnostic) for text in r.text)
@@ -272,7 +276,8 @@ def test_of_many_fitted_paths_those_that_differ_most_are_kept_and_it_is_said_whe
 
     def kept(paths: int) -> tuple[set[int], str]:
         every = [replace(one, log=f"log-{i}", q=np.sin((1 + i % paths) * phase)) for i in range(60)]
-        made = list(fit.fitted_paths(every))
+        model = independent(arm.joint("hand_roll"))
+        made = list(fit.fitted_paths("hand_roll", [fit.repeated(model, t) for t in every]))
         [kept] = (r for r in made if isinstance(r, FittedPaths))
         logs = [int(log.removeprefix("log-")) % paths for log in dict.fromkeys(kept.source)]
         assert len(logs) == 20
@@ -286,7 +291,7 @@ def test_of_many_fitted_paths_those_that_differ_most_are_kept_and_it_is_said_whe
 
 def test_the_noise_of_a_joint_is_that_of_its_logs_together():
     every = [trajectory(arm.signal(seed=i, log=f"log-{i}", noise=noise)) for i, noise in enumerate((1.0, 3.0))]
-    noise = next(r for r in fit.run(every, arm.ARM) if isinstance(r, MeasurementNoise))
+    noise = next(r for r in fitted_to(every) if isinstance(r, MeasurementNoise))
     assert noise.sigma_tau == pytest.approx(arm.NOISE["hand_roll"] * np.sqrt(5), rel=0.05)
     assert noise.sigma_q == pytest.approx(1e-4 * np.sqrt(5), rel=0.05)
 
@@ -309,7 +314,7 @@ def test_a_period_that_differs_from_the_others_is_predicted_badly():
 
 
 def test_residuals_are_what_the_fit_leaves():
-    made = list(fit.run([trajectory(arm.signal())], arm.ARM))
+    made = fitted_to([trajectory(arm.signal())])
     lse = next(r for r in made if isinstance(r, Fit))
     residual = next(r for r in made if isinstance(r, Residual))
     assert np.mean((residual.tau - residual.tau_hat) ** 2) == pytest.approx(lse.mse)

@@ -167,7 +167,7 @@ def test_no_study_file_however_odd_ends_in_anything_but_a_message(data, tmp_path
     ("old", "new", "says"),
     [
         ("[[log]]", '[settings]\nfit = "coupled.x"\n[[log]]',
-         "4: settings: fit must be one of independent.lse, "),
+         "4: settings: fit must be one of chosen, independent.lse, "),
         ("[[log]]", "[settings]\nharmonics = 101\n[[log]]",
          "4: settings: harmonics must lie between 0 and 100, not 101"),
         ("[[log]]", "[settings]\nharmonics = -1\n[[log]]", "harmonics must be positive, not -1"),

@@ -24,6 +24,19 @@ def pose(model: Model, trajectories: Sequence[Trajectory]) -> Regression:
     )
 
 
+def joined(parts: Sequence[Regression]) -> Regression:
+    """The least squares problem of several parts together."""
+    ends = np.cumsum([0, *(len(p.tau) for p in parts[:-1])]).tolist()
+    return Regression(
+        Phi=np.concatenate([p.Phi for p in parts]),
+        tau=np.concatenate([p.tau for p in parts]),
+        tau_var=np.concatenate([p.tau_var for p in parts]),
+        periods=np.concatenate([p.periods for p in parts]),
+        starts=tuple(end + start for end, p in zip(ends, parts, strict=True) for start in p.starts),
+        names=parts[0].names,
+    )
+
+
 def averaged_motion(trajectory: Trajectory) -> Motion:
     """One averaged period of a joint, which repeats."""
     columns = (trajectory.q, trajectory.dq, trajectory.ddq)
@@ -38,9 +51,15 @@ def measured_motion(signal: Signal, lowpass: float) -> Motion:
     return Motion(q, dq, ddq, 1.0 / signal.rate, signal.segment)
 
 
-def predicted(model: Model, theta: Array, motion: Motion) -> Array:
-    """The effort (N,) of a joint that moves so."""
-    return np.asarray(model.regressor(motion).Phi[:, 0] @ theta)
+def of_joints(motions: Sequence[Motion]) -> Motion:
+    """The motion of several joints of one recording, in this order."""
+    q, dq, ddq = (np.concatenate(columns, axis=1) for columns in zip(*(m[:3] for m in motions), strict=True))
+    return motions[0]._replace(q=q, dq=dq, ddq=ddq)
+
+
+def predicted(model: Model, theta: Array, motion: Motion, effort: int = 0) -> Array:
+    """One of the model's efforts (N,) along a motion."""
+    return np.asarray(model.regressor(motion).Phi[:, effort] @ theta)
 
 
 def _smoothed(signal: Signal, part: slice, lowpass: float) -> tuple[Array, Array, Array]:

@@ -2,6 +2,7 @@
 
 from pipeline.records.assess import FreeSpace
 from pipeline.records.average import Average, PeriodResidual
+from pipeline.records.choose import Choice
 from pipeline.records.design import Control, Excitation, Links, Lyapunov, Pose, Workspace
 from pipeline.records.diagnostic import Diagnostic, diagnostic
 from pipeline.records.differentiate import Spectrum, Trajectory
@@ -12,21 +13,22 @@ from pipeline.records.measure import Contact
 from pipeline.records.predict import Prediction
 from pipeline.records.record import COLUMN_DTYPES, AnyRecord, Column, Counts, Labels, Names, Origin, Record
 from pipeline.records.resample import Signal
+from pipeline.records.smooth import Smoothed
 from pipeline.records.threshold import Threshold
 from pipeline.records.whiteness import Whiteness
 
 __all__ = [
-    "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Column", "Contact", "Control", "Counts", "CrossFit",
+    "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Choice", "Column", "Contact", "Control", "Counts", "CrossFit",
     "Diagnostic", "Excitation", "Fit", "FittedPaths", "FreeSpace", "Labels", "Links", "LogSummary", "Lyapunov",
     "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Record", "Recording", "Residual",
-    "Signal", "Spectrum", "Threshold", "Track", "Trajectory", "Whiteness", "Workspace", "diagnostic",
+    "Signal", "Smoothed", "Spectrum", "Threshold", "Track", "Trajectory", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
     kind.__name__: kind
     for kind in (
         Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Signal, Average, PeriodResidual,
-        Trajectory, Spectrum, Fit, CrossFit, FittedPaths, MeasurementNoise, Residual, Prediction, Track, FreeSpace,
-        Threshold, Contact, Whiteness, Diagnostic,
+        Trajectory, Spectrum, Smoothed, Fit, CrossFit, FittedPaths, MeasurementNoise, Residual, Choice, Prediction,
+        Track, FreeSpace, Threshold, Contact, Whiteness, Diagnostic,
     )
 }  # fmt: skip

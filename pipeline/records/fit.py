@@ -26,6 +26,7 @@ class Fit(Record):
     parameter: Labels
     phi: Labels
     unit: Labels
+    scale: Column
     theta: Column
     theta_std: Column
     theta_std_hac: Column

@@ -2,8 +2,9 @@
 
 from dataclasses import dataclass, replace
 
-from pipeline.records import Fit, Record, Track
+from pipeline.records import Fit, Prediction, Record, Track
 from pipeline.records.catalogue import Catalogue, Provenance
+from pipeline.records.predict import CHOSEN
 from pipeline.records.quantities import QUANTITIES
 from pipeline.report.content import Number, literal
 from pipeline.report.results import Results, format_unit
@@ -38,9 +39,20 @@ class Context:
         return str(Number(value, format_unit(unit), digits=digits))
 
     def used_fit(self, joint: str) -> str:
-        """`<model>.<estimator>` of the fit that the filter ran with."""
-        names = [f"{fit.model}.{fit.estimator}" for fit in self.catalogue.all(Fit) if fit.group == joint]
+        """`<model>.<estimator>` of the fit that the filter ran with, as its predictions go by: `chosen.<fit>`."""
+        chosen = [f"{p.model}.{p.estimator}" for p in self.catalogue.about(Prediction, joint=joint, model=CHOSEN)]
+        if self.study.settings.fit == CHOSEN and chosen:
+            return chosen[0]
+        return self.own_fit(joint)
+
+    def own_fit(self, joint: str) -> str:
+        """`<model>.<estimator>` of the fit of a joint by itself: the one that the settings name, or the first."""
+        names = [f"{fit.model}.{fit.estimator}" for fit in self.own_fits() if fit.group == joint]
         return self.study.settings.fit if self.study.settings.fit in names or not names else names[0]
+
+    def own_fits(self) -> list[Fit]:
+        """The fits of the joints' own terms, one joint at a time."""
+        return self.catalogue.about(Fit, model="independent")
 
 
 def most_telling(tracks: list[Track], most: int) -> list[Track]:

@@ -41,6 +41,7 @@ def run(
             f"{entry.name}: no joint moves, so there is nothing to identify; check its channels and units"
         )
     orders = max(harmonics or robot.joint(signal.joint).harmonics for signal in moving)
+<<<<<<< HEAD
     moving, found, remarks = repeating(moving, entry)
     span, period = longest(moving, found, orders, entry)
     names = [f"{symbol} of {signal.joint}" for signal in moving for symbol in QUANTITIES]
@@ -49,6 +50,16 @@ def run(
     kept, period, odd = alike(moving[0].t, positions, columns, span, period, moving[0].rate, orders)
     remarks += left_out(moving[0], span, kept, period, [(names[d.signal], d) for d in odd])
     period, more = honoured(period, entry)
+=======
+    moving, guess, remarks = repeating(moving, entry)
+    if guess is None and not entry.period:
+        seconds = moving[0].t[-1] - moving[0].t[0] + 1.0 / moving[0].rate
+        said = f"{entry.name}: {seconds:.2f} s hold no motion that repeats at least twice, so nothing is averaged"
+        yield diagnostic("average", entry.name, "note", f"{said}; its parameters come from the low-passed samples")
+        return
+    found, more = shared_period(moving, guess, entry, orders)
+    remarks += more
+>>>>>>> e368be82e25c6d8852e297cd8db2c7b717fa2d80
     for signal in moving:
         yield from averaged(signal, kept, period, entry.period or 0.0)
     if remarks + more:

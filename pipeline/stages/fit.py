@@ -1,72 +1,123 @@
 """Fit the parameters of every joint to all identification logs together, and without some, with every estimator."""
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
 from pipeline.errors import NotIdentifiable
 from pipeline.estimators import ESTIMATORS, estimator
 from pipeline.estimators.folds import folds, refits
+from pipeline.estimators.observations import observed, pose_samples
 from pipeline.estimators.problem import Estimate, Regression
-from pipeline.estimators.regression import averaged_motion, pose, predicted
+from pipeline.estimators.regression import joined, pose
 from pipeline.maths.arrays import Array
 from pipeline.maths.models.model import Model
 from pipeline.maths.signals.path import SAME_PATH, most_different
-from pipeline.records import CrossFit, Diagnostic, Fit, FittedPaths, MeasurementNoise, Residual, Trajectory, diagnostic
+from pipeline.records import (
+    Column,
+    CrossFit,
+    Diagnostic,
+    Fit,
+    FittedPaths,
+    MeasurementNoise,
+    Residual,
+    Smoothed,
+    Trajectory,
+    diagnostic,
+)  # fmt: skip
 from pipeline.robots.models import independent
 from pipeline.robots.robot import Robot
 
 PATHS = 20  # at most, that a recording is compared with
 
 
+class Part(NamedTuple):
+    """What one log tells of a joint: an averaged period, or low-passed samples of a motion that does not repeat."""
+
+    log: str
+    rate: float
+    periods: int
+    period: float  # [s], or the duration of what does not repeat
+    noise: tuple[float, float, float]  # standard deviations of q, dq and tau
+    t: Column
+    q: Column
+    dq: Column
+    regression: Regression
+
+
 def run(
-    trajectories: Iterable[Trajectory], robot: Robot
+    trajectories: Iterable[Trajectory], smoothed: Iterable[Smoothed], robot: Robot, *, lowpass: float
 ) -> Iterator[Fit | CrossFit | FittedPaths | MeasurementNoise | Residual | Diagnostic]:
     """One Fit per joint and estimator; an estimator that cannot be used says why, and the rest goes on.
 
     A joint of several logs has a CrossFit, too, by which each of its logs can be predicted from others.
     """
-    every = list(trajectories)
+    averaged, samples = list(trajectories), list(smoothed)
     for joint in robot.joints:
-        own = [trajectory for trajectory in every if trajectory.joint == joint.name]
-        if not own:
-            continue
         model = independent(joint)
-        regression = pose(model, own)
+        parts = [repeated(model, t) for t in averaged if t.joint == joint.name]
+        known = {part.log for part in parts}
+        once = [s for s in samples if s.joint == joint.name and not s.at_rest and s.log not in known]
+        parts += [unrepeated(model, s, lowpass) for s in once]
+        if parts:
+            yield from of_joint(model, parts)
+
+
+def of_joint(
+    model: Model, parts: Sequence[Part]
+) -> Iterator[Fit | CrossFit | FittedPaths | MeasurementNoise | Residual | Diagnostic]:
+    """The fits of one joint, what they leave, and what its logs have in common."""
+    regression = joined([part.regression for part in parts])
+    for name in ESTIMATORS:
+        try:
+            estimate = estimator(name)(regression)
+        except NotIdentifiable as error:
+            yield diagnostic("fit", model.group, "warning", f"{model.group}: {name} is left out: {error}")
+            continue
+        if not has_positive_inertia(model, estimate.theta, parts):
+            finds = f"{model.group}: {name} finds an inertia that is not positive"
+            yield diagnostic("fit", model.group, "warning", finds)
+        yield summarised(parts, model, name, regression, estimate)
+        yield from residuals(parts, model, name, estimate)
+    if len(parts) > 1:
         for name in ESTIMATORS:
-            try:
-                estimate = estimator(name)(regression)
-            except NotIdentifiable as error:
-                yield diagnostic("fit", joint.name, "warning", f"{joint.name}: {name} is left out: {error}")
-                continue
-            if not has_positive_inertia(model, estimate.theta, own):
-                finds = f"{joint.name}: {name} finds an inertia that is not positive"
-                yield diagnostic("fit", joint.name, "warning", finds)
-            yield summarised(own, model, name, regression, estimate)
-            yield from residuals(own, model, name, estimate)
-        if len(own) > 1:
-            for name in ESTIMATORS:
-                yield from cross_fits([t.log for t in own], model, name, regression)
-        yield from fitted_paths(own)
-        yield noise(own)
+            yield from cross_fits([part.log for part in parts], model, name, regression)
+    yield from fitted_paths(model.group, parts)
+    yield noise(model.group, parts)
 
 
-def has_positive_inertia(model: Model, theta: Array, trajectories: Sequence[Trajectory]) -> bool:
+def repeated(model: Model, t: Trajectory) -> Part:
+    """An averaged period."""
+    sigmas = (t.sigma_q, t.sigma_dq, t.sigma_tau)
+    return Part(t.log, t.rate, t.periods, t.period, sigmas, t.t, t.q, t.dq, pose(model, [t]))
+
+
+def unrepeated(model: Model, record: Smoothed, lowpass: float) -> Part:
+    """Samples, motion and effort through one low-pass."""
+    regression, kept = pose_samples(model, observed([record], (), lowpass, 0))
+    step = float(np.median(np.diff(kept))) if len(kept) > 1 else 1.0
+    t, q, dq = (x[kept] for x in (record.t, record.q, record.dq))
+    sigmas = (record.sigma_q, record.sigma_dq, record.sigma_tau)
+    return Part(record.log, record.rate / step, 1, float(t[-1] - t[0]), sigmas, t, q, dq, regression)
+
+
+def has_positive_inertia(model: Model, theta: Array, parts: Sequence[Part]) -> bool:
     """Whether M is positive definite along the trajectories; where it is not, no motion follows from the model."""
-    return all(np.linalg.eigvalsh(model.inertia(theta, averaged_motion(t).q)).min() > 0 for t in trajectories)
+    return all(np.linalg.eigvalsh(model.inertia(theta, part.q[:, None])).min() > 0 for part in parts)
 
 
-def summarised(own: Sequence[Trajectory], model: Model, name: str, regression: Regression, estimate: Estimate) -> Fit:
-    """A Fit with how well it describes the averaged periods."""
+def summarised(parts: Sequence[Part], model: Model, name: str, regression: Regression, estimate: Estimate) -> Fit:
+    """A Fit with how well it describes what it was fitted to."""
     residual = regression.tau - regression.Phi @ estimate.theta
     spread = regression.tau - regression.tau.mean()
     return Fit(
         group=model.group,
         model=model.name,
         estimator=name,
-        logs=tuple(t.log for t in own),
+        logs=tuple(part.log for part in parts),
         samples=len(regression.tau),
-        periods=min(t.periods for t in own),
+        periods=min(part.periods for part in parts),
         mse=float(np.mean(residual**2)),
         r2=float(1 - residual @ residual / (spread @ spread)),
         condition=float(np.linalg.cond(regression.Phi)),
@@ -74,6 +125,7 @@ def summarised(own: Sequence[Trajectory], model: Model, name: str, regression: R
         parameter=np.array([parameter.name for parameter in model.parameters], object),
         phi=np.array([parameter.typst for parameter in model.parameters], object),
         unit=np.array([parameter.unit for parameter in model.parameters], object),
+        scale=np.array([parameter.scale for parameter in model.parameters]),
         theta=estimate.theta,
         theta_std=estimate.theta_std,
         theta_std_hac=estimate.theta_std_hac,
@@ -104,33 +156,30 @@ def cross_fits(logs: Sequence[str], model: Model, name: str, regression: Regress
     )
 
 
-def fitted_paths(own: Sequence[Trajectory]) -> Iterator[FittedPaths | Diagnostic]:
+def fitted_paths(joint: str, parts: Sequence[Part]) -> Iterator[FittedPaths | Diagnostic]:
     """The paths of a joint's logs, or of many logs those that differ most."""
-    joint = own[0].joint
-    chosen, likeness = most_different([(t.t, t.q, t.period) for t in own], PATHS)
+    chosen, likeness = most_different([(part.t, part.q, part.period) for part in parts], PATHS)
     if likeness < SAME_PATH:
         said = f"{joint}: its identification logs follow more than {PATHS} paths; recordings are compared with {PATHS}"
         yield diagnostic("fit", joint, "note", f"{said} that differ most, and may be said to follow another path")
-    kept = [own[i] for i in chosen]
+    kept = [parts[i] for i in chosen]
     yield FittedPaths(
         joint=joint,
-        source=np.repeat(np.array([t.log for t in kept], object), [len(t) for t in kept]),
-        period=np.repeat([t.period for t in kept], [len(t) for t in kept]),
-        t=np.concatenate([t.t for t in kept]),
-        q=np.concatenate([t.q for t in kept]),
+        source=np.repeat(np.array([part.log for part in kept], object), [len(part.t) for part in kept]),
+        period=np.repeat([part.period for part in kept], [len(part.t) for part in kept]),
+        t=np.concatenate([part.t for part in kept]),
+        q=np.concatenate([part.q for part in kept]),
     )
 
 
-def noise(own: Sequence[Trajectory]) -> MeasurementNoise:
-    """The noise between periods over all logs of a joint."""
-    sigma_q, sigma_dq, sigma_tau = (
-        float(np.sqrt(np.mean([getattr(t, name) ** 2 for t in own]))) for name in ("sigma_q", "sigma_dq", "sigma_tau")
-    )
-    return MeasurementNoise(own[0].joint, sigma_q, sigma_dq, sigma_tau)
+def noise(joint: str, parts: Sequence[Part]) -> MeasurementNoise:
+    """The noise between periods, or beyond the low-pass, over all logs of a joint."""
+    sigma_q, sigma_dq, sigma_tau = np.sqrt(np.mean([np.square(part.noise) for part in parts], axis=0)).tolist()
+    return MeasurementNoise(joint, sigma_q, sigma_dq, sigma_tau)
 
 
-def residuals(own: Sequence[Trajectory], model: Model, name: str, estimate: Estimate) -> Iterator[Residual]:
-    """What the fit leaves of each log's averaged effort.  (6.54)"""
-    for t in own:
-        tau_hat = predicted(model, estimate.theta, averaged_motion(t))
-        yield Residual(t.log, t.joint, model.name, name, t.rate, t=t.t, dq=t.dq, tau=t.tau, tau_hat=tau_hat)
+def residuals(parts: Sequence[Part], model: Model, name: str, estimate: Estimate) -> Iterator[Residual]:
+    """What the fit leaves of each log's effort.  (6.54)"""
+    for part in parts:
+        tau_hat, tau = part.regression.Phi @ estimate.theta, part.regression.tau
+        yield Residual(part.log, model.group, model.name, name, part.rate, part.t, part.dq, tau, tau_hat)

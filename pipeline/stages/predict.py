@@ -1,6 +1,6 @@
 """Predict the effort of logs that a fit has not seen, and score it; identification logs by leaving data out."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -8,58 +8,118 @@ import numpy as np
 from pipeline.errors import NotIdentifiable
 from pipeline.estimators import ESTIMATORS, estimator
 from pipeline.estimators.folds import folds
-from pipeline.estimators.regression import measured_motion, pose, predicted
-from pipeline.maths.arrays import Booleans
+from pipeline.estimators.observations import observed, pose_samples
+from pipeline.estimators.regression import measured_motion, of_joints, pose, predicted
+from pipeline.estimators.scores import scored
+from pipeline.estimators.used import describing, model_of, used
+from pipeline.maths.arrays import Array, Booleans
 from pipeline.maths.models.model import Model, Motion
-from pipeline.maths.signals import averaging, harmonics
-from pipeline.maths.signals.noise import model_error, noise_std, smoothed
+from pipeline.maths.selection.blocks import BLOCKS
+from pipeline.maths.signals import averaging
 from pipeline.maths.signals.path import SAME_PATH, likeness
-from pipeline.maths.signals.smoothing import segments, share_passed
+from pipeline.maths.signals.smoothing import segments
 from pipeline.maths.signals.windows import outside
-from pipeline.records import Column, CrossFit, Diagnostic, Fit, FittedPaths, Prediction, Signal, Trajectory, diagnostic
+from pipeline.records import (
+    Choice,
+    CrossFit,
+    Diagnostic,
+    Fit,
+    FittedPaths,
+    Prediction,
+    Signal,
+    Smoothed,
+    Trajectory,
+    diagnostic,
+)  # fmt: skip
+from pipeline.records.predict import CHOSEN
 from pipeline.robots.models import independent
-from pipeline.robots.robot import Joint
+from pipeline.robots.robot import Robot
 from pipeline.study import LogEntry
 
 
 def run(
-    signal: Signal,
-    trajectory: Trajectory | None,
-    paths: FittedPaths | None,
+    signals: Sequence[Signal],
+    smoothed: Iterable[Smoothed],
+    trajectories: Iterable[Trajectory],
+    paths: Iterable[FittedPaths],
     fits: Iterable[Fit],
     cross_fits: Iterable[CrossFit],
+    choices: Iterable[Choice],
     entry: LogEntry,
-    joint: Joint,
+    robot: Robot,
     *,
     lowpass: float,
 ) -> Iterator[Prediction | Diagnostic]:
-    """One Prediction per fit of the joint; the prediction of an identification log comes from refits without it.
+    """One Prediction per joint and fit; those of an identification log come from refits without some of it.
 
-    A joint at rest is not predicted: at standstill friction takes any value up to its Coulomb level.
+    A joint at rest is not predicted: at standstill friction takes any value up to its Coulomb level.  What the chosen
+    model says of identification logs comes with the choice.
     """
-    if signal.at_rest:
-        return
-    model = independent(joint)
+    moving = [signal for signal in signals if not signal.at_rest]
+    by_joint = {p.joint: p for p in paths}
     if entry.role in ("validation", "contact"):
-        free = outside(signal.t, entry.contact)
-        if not free.any():
-            name = f"{signal.log}/{joint.name}"
-            said = f"{name}: its contact windows cover the whole log, so nothing is left to score a prediction on"
-            yield diagnostic("predict", f"{signal.log}.{joint.name}", "warning", said)
-            return
-        motion = measured_motion(signal, lowpass)
-        path = "same path" if paths is not None and follows(signal, paths) else "another path"
-        for fit in fits:
-            if fit.group == joint.name:
-                tau_hat = predicted(model, fit.theta, motion)
-                prediction = scored(signal, fit.model, fit.estimator, entry.role, tau_hat, free, lowpass)
-                yield replace(prediction, path=path)
-    elif trajectory is not None:
-        own = [fit for fit in cross_fits if fit.group == joint.name]
-        if own:
-            yield from without_the_log(signal, trajectory, own, model, lowpass)
-        else:
-            yield from without_a_period(signal, trajectory, model, lowpass)
+        every, chosen = list(fits), list(choices)
+        for signal in moving:
+            own = by_joint.get(signal.joint)
+            yield from unseen(signal, signals, own, every, chosen, entry, robot, lowpass)
+    elif entry.role == "identification":
+        averaged, samples = {t.joint: t for t in trajectories}, {s.joint: s for s in smoothed}
+        refits = list(cross_fits)
+        for signal in moving:
+            model, joint = independent(robot.joint(signal.joint)), signal.joint
+            own_fits = [fit for fit in refits if fit.group == joint]
+            if own_fits:
+                yield from without_the_log(signal, averaged.get(joint), own_fits, model, lowpass)
+            elif joint in averaged:
+                yield from without_a_period(signal, averaged[joint], model, lowpass)
+            elif joint in samples:
+                yield from without_a_segment(samples[joint], model, lowpass)
+
+
+def unseen(
+    signal: Signal,
+    signals: Sequence[Signal],
+    paths: FittedPaths | None,
+    fits: Sequence[Fit],
+    choices: Sequence[Choice],
+    entry: LogEntry,
+    robot: Robot,
+    lowpass: float,
+) -> Iterator[Prediction | Diagnostic]:
+    """Predict a joint of a log that no parameter was fitted to, by its own fits and by the chosen one."""
+    name, free = f"{signal.log}/{signal.joint}", outside(signal.t, entry.contact)
+    if not free.any():
+        said = f"{name}: its contact windows cover the whole log, so nothing is left to score a prediction on"
+        yield diagnostic("predict", f"{signal.log}.{signal.joint}", "warning", said)
+        return
+    path = "same path" if paths is not None and follows(signal, paths) else "another path"
+    own = [f for f in fits if f.group == signal.joint and f.model == "independent"]
+    chosen = used(robot, describing(robot, fits, signal.joint), choices, signal.joint, CHOSEN)
+    if chosen is not None and not is_held(chosen, signals, robot):
+        missing = f"{name}: the log does not hold the other joints that the chosen model needs"
+        said = f"{missing}, so independent.lse stands in for it; add their channels"
+        yield diagnostic("predict", f"{signal.log}.{signal.joint}", "note", said)
+        chosen = next((f for f in own if f.estimator == "lse"), None)
+    named = [(f.model, f.estimator, f) for f in own]
+    if chosen is not None:
+        named.append((CHOSEN, f"{chosen.model}.{chosen.estimator}", chosen))
+    for model, by, fit in named:
+        tau_hat = along(fit, signal, signals, robot, lowpass)
+        yield scored(signal, model, by, entry.role, entry.role, path, tau_hat, free, lowpass)
+
+
+def is_held(fit: Fit, signals: Sequence[Signal], robot: Robot) -> bool:
+    """Whether a log holds all the joints, on one clock, that a fit needs the motion of."""
+    lengths = {s.joint: len(s) for s in signals}
+    needed = {lengths.get(joint, 0) for joint in model_of(robot, fit).joints}
+    return len(needed) == 1 and 0 not in needed
+
+
+def along(fit: Fit, signal: Signal, signals: Sequence[Signal], robot: Robot, lowpass: float) -> Array:
+    """The effort (N,) that a fit gives for a joint along a log that holds all the joints it needs."""
+    model, by_joint = model_of(robot, fit), {s.joint: s for s in signals}
+    motion = of_joints([measured_motion(by_joint[joint], lowpass) for joint in model.joints])
+    return predicted(model, fit.theta, motion, model.efforts.index(signal.joint))
 
 
 def follows(signal: Signal, paths: FittedPaths) -> bool:
@@ -73,12 +133,18 @@ def follows(signal: Signal, paths: FittedPaths) -> bool:
 
 
 def without_the_log(
-    signal: Signal, own: Trajectory, cross_fits: Iterable[CrossFit], model: Model, lowpass: float
+    signal: Signal, own: Trajectory | None, cross_fits: Iterable[CrossFit], model: Model, lowpass: float
 ) -> Iterator[Prediction]:
     """Predict a log from fits to other identification logs."""
+<<<<<<< HEAD
     part = at(signal, whole(signal, own))
     motion = motion_at(own, part.t - own.t_start)
     everywhere = np.ones(len(part.t), dtype=bool)
+=======
+    kept = whole(signal, own) if own is not None else np.ones(len(signal), np.bool_)
+    part, motion = at(signal, kept), kept_motion(signal, kept, lowpass)
+    everywhere = np.ones(len(part.t), np.bool_)
+>>>>>>> e368be82e25c6d8852e297cd8db2c7b717fa2d80
     for fit in cross_fits:
         left_out = [str(names).split(", ") for names in fit.left_out]
         rows = [row for row, names in enumerate(left_out) if signal.log in names]
@@ -86,34 +152,59 @@ def without_the_log(
             number = len(left_out[rows[0]])
             scheme = "leave one log out" if number == 1 else f"leave {number} logs out"
             tau_hat = predicted(model, fit.theta[rows], motion)
-            yield scored(part, fit.model, fit.estimator, scheme, tau_hat, everywhere, lowpass)
+            about = (fit.model, fit.estimator, signal.role, scheme, "another path")
+            yield scored(part, *about, tau_hat, everywhere, lowpass)
 
 
 def without_a_period(
     signal: Signal, own: Trajectory, model: Model, lowpass: float
 ) -> Iterator[Prediction | Diagnostic]:
     """Predict each period of a log from fits to the other periods; only the effort is left out, not the path."""
+<<<<<<< HEAD
     part = at(signal, whole(signal, own))
     since = part.t - own.t_start
+=======
+    kept = whole(signal, own)
+    part = at(signal, kept)
+    since = part.t - signal.t[0]
+>>>>>>> e368be82e25c6d8852e297cd8db2c7b717fa2d80
     number = np.minimum((since / own.period + 1e-9).astype(int), own.periods - 1)
     group = np.array(folds(own.periods))[number]
-    Phi = model.regressor(motion_at(own, since)).Phi[:, 0]
+    Phi = model.regressor(kept_motion(signal, kept, lowpass)).Phi[:, 0]
     tau_hat = {name: np.empty(len(since)) for name in ESTIMATORS}
     rests = averaging.left_out(part.t, part.tau, own.period, len(own.t), group)
     for out, rest in enumerate(rests):
-        unseen = group == out
-        kept = replace(own, tau=rest.mean, tau_var=rest.var, count=rest.counts)
+        left = group == out
+        others = replace(own, tau=rest.mean, tau_var=rest.var, count=rest.counts)
         for name in list(tau_hat):
             try:
-                tau_hat[name][unseen] = Phi[unseen] @ estimator(name)(pose(model, [kept])).theta
+                tau_hat[name][left] = Phi[left] @ estimator(name)(pose(model, [others])).theta
             except NotIdentifiable as error:
                 yield not_predicted(signal, name, error)
                 del tau_hat[name]
+    everywhere, scheme = np.ones(len(since), np.bool_), "leave one period out"
     for name, effort in tau_hat.items():
-        yield scored(part, model.name, name, "leave one period out", effort, np.ones(len(since), dtype=bool), lowpass)
+        yield scored(part, model.name, name, signal.role, scheme, "same path", effort, everywhere, lowpass)
 
 
-def not_predicted(signal: Signal, name: str, error: NotIdentifiable) -> Diagnostic:
+def without_a_segment(own: Smoothed, model: Model, lowpass: float) -> Iterator[Prediction | Diagnostic]:
+    """Predict each sixth of a log that does not repeat from fits to the other five."""
+    log = observed([own], (), lowpass, 0)
+    Phi = model.regressor(log.motion).Phi[:, 0]
+    everywhere, about = np.ones(len(own), np.bool_), ("identification", "leave a segment out", "another path")
+    for name in ESTIMATORS:
+        tau_hat = np.empty(len(own))
+        try:
+            for block in range(BLOCKS):
+                left = log.block == block
+                tau_hat[left] = Phi[left] @ estimator(name)(pose_samples(model, log, ~left)[0]).theta
+        except NotIdentifiable as error:
+            yield not_predicted(own, name, error)
+            continue
+        yield scored(own, model.name, name, *about, tau_hat, everywhere, lowpass)
+
+
+def not_predicted(signal: Signal | Smoothed, name: str, error: NotIdentifiable) -> Diagnostic:
     """Why an estimator has no leave-out score."""
     about = f"{signal.log}/{signal.joint}"
     said = f"{about}: {name} has no leave-out score, because a refit is not possible: {error}"
@@ -132,45 +223,7 @@ def at(signal: Signal, which: Booleans) -> Signal:
     return replace(signal, **columns)
 
 
-def motion_at(own: Trajectory, since: Column) -> Motion:
-    """The trajectory's motion at any time since its start, as one segment."""
-    omega = 2 * np.pi / own.period
-    c = harmonics.project(own.t, own.q, omega, own.harmonics)
-    dc = harmonics.derivative(c, omega)
-    ddc = harmonics.derivative(dc, omega)
-    q, dq, ddq = (harmonics.evaluate(x, since, omega)[:, None] for x in (c, dc, ddc))
-    return Motion(q, dq, ddq, 1.0 / own.rate, np.zeros(len(since), np.int64))
-
-
-def scored(
-    signal: Signal, model: str, name: str, scheme: str, tau_hat: Column, free: Booleans, lowpass: float
-) -> Prediction:
-    """A prediction with its scores, over the samples where nothing touched the robot."""
-    tau, error = signal.tau[free], (signal.tau - tau_hat)[free]
-    spread = tau - tau.mean()
-    smooth, smooth_error = (
-        smoothed(x, signal.segment, signal.rate, lowpass)[free] for x in (signal.tau, signal.tau - tau_hat)
-    )
-    rmse = float(np.sqrt(np.mean(error**2)))
-    noise = noise_std(signal.tau - tau_hat, signal.segment, signal.rate, lowpass)
-    beyond_noise, beyond_noise_std = model_error(smooth_error, noise * np.sqrt(share_passed(signal.rate, lowpass)))
-    return Prediction(
-        log=signal.log,
-        joint=signal.joint,
-        model=model,
-        estimator=name,
-        role=signal.role,
-        scheme=scheme,
-        path="same path" if scheme == "leave one period out" else "another path",
-        rmse=rmse,
-        nrmse=rmse / float(np.ptp(tau) or 1.0),
-        r2=float(1 - error @ error / ((spread @ spread) or 1.0)),
-        r2_ceiling=1.0 - noise**2 / (float(tau.var()) or 1.0),
-        model_error=beyond_noise,
-        model_error_std=beyond_noise_std,
-        effort_rms=float(np.sqrt(np.mean(smooth**2))),
-        relative_error=float(np.linalg.norm(smooth_error) / (np.linalg.norm(smooth) or 1.0)),
-        t=signal.t,
-        tau=signal.tau,
-        tau_hat=tau_hat,
-    )
+def kept_motion(signal: Signal, which: Booleans, lowpass: float) -> Motion:
+    """The measured motion of a recording at some of its samples."""
+    q, dq, ddq, T_s, segment, periodic = measured_motion(signal, lowpass)
+    return Motion(q[which], dq[which], ddq[which], T_s, segment[which], periodic)

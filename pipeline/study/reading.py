@@ -9,15 +9,20 @@ from pipeline import robots, toml
 from pipeline.errors import BadRobot, BadStudy
 from pipeline.estimators import ESTIMATORS
 from pipeline.robots import Robot, from_toml
-from pipeline.robots.models import MODELS
+from pipeline.robots.models import VARIANTS
 from pipeline.study import Settings, Study
 from pipeline.study.entries import entries_of, inside, lines_of_files
 from pipeline.study.plausible import checked
 from pipeline.toml import TomlTable
 
+# Variants by the estimators that they can be chosen with: a coupled arm needs a ridge.
+BEYOND = tuple(
+    f"{variant}.{how}" for variant in VARIANTS for how in ("lse", "ridge")
+    if how == "ridge" or variant.startswith("independent+")
+)  # fmt: skip
 CHOICES = {
     "derivative": ("harmonics", "fft"),
-    "fit": tuple(f"{model}.{estimator}" for model in MODELS for estimator in ESTIMATORS),
+    "fit": ("chosen", *(f"independent.{estimator}" for estimator in ESTIMATORS), *BEYOND),
 }
 
 

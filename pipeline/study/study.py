@@ -14,7 +14,7 @@ class Settings:
     lowpass: float = 17.0  # [Hz] zero-phase low-pass where velocities and accelerations are differences
     derivative: str = "harmonics"  # how periodic motion is differentiated: "harmonics" or "fft"
     harmonics: int = 0  # of the excitation; 0 takes the robot's
-    fit: str = "independent.lse"  # the Fit that the filter runs with
+    fit: str = "chosen"  # the Fit that the filter runs with
     q_tau: float = 0.0  # random walk of the external effort [effort/s^0.5]; 0 takes the robot's
     effort: dict[str, float] = field(default_factory=dict)  # what the user wants to see on each joint [effort]
 

@@ -1,6 +1,6 @@
-"""The protocol of a model, tried on the joints that there are and on a coupled arm with friction that remembers."""
+"""Models: of joints by themselves and of a coupled arm, with friction that remembers and without."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -9,55 +9,27 @@ from numpy.testing import assert_allclose
 from pipeline.filters import FILTERS, tracker
 from pipeline.filters.problem import NoiseModel
 from pipeline.maths.mechanics.rigid_body import inverse_dynamics, mass_matrix
-from pipeline.maths.mechanics.rigid_body import regressor as rigid_body_regressor
 from pipeline.maths.models import bias as derivation
 from pipeline.maths.models import kernels, terms
+from pipeline.maths.models.bias import bias
+from pipeline.maths.models.coupled import CoupledArm
 from pipeline.maths.models.independent import IndependentJoint
-from pipeline.maths.models.memory import deflection
-from pipeline.maths.models.model import JointDynamics, Motion, Parameter, Regressor
+from pipeline.maths.models.memory import deflection, driven
+from pipeline.maths.models.model import Motion
 from pipeline.robots.davinci_chain import BODIES, CHAIN
 
-DAHL = terms.Term("presliding friction", "z", "{effort}", b={"z": 1.0}, displacement=0.01)
+DAHL = terms.presliding(0.01)
 T_S = 0.005
 
 
-@dataclass(frozen=True)
-class CoupledArm:
-    """Two joints of an arm: its links' inertial parameters, viscous friction, and a Dahl state in the first joint."""
+UNITS = {"inertia": "kg m^2", "effort": "N m", "position": "rad"}
+FRICTION = ((terms.viscous, terms.presliding(0.02)), (terms.viscous, terms.coulomb))
 
-    x_0: float
-    name: str = "coupled+dahl"
-    group: str = "arm"
-    joints: tuple[str, ...] = ("one", "two")
 
-    @property
-    def parameters(self):
-        names = [f"pi {i}" for i in range(10 * len(CHAIN.parent))] + ["viscous one", "viscous two", "dahl one"]
-        return tuple(Parameter(name, "x", "1", False) for name in names)
-
-    def regressor(self, motion):
-        z, known = deflection(motion, 0, self.x_0)
-        Y = rigid_body_regressor(CHAIN, motion.q, motion.dq, motion.ddq)
-        friction = motion.dq[:, :, None] * np.eye(2)
-        presliding = np.stack([z, 0.0 * z], axis=1)[:, :, None]
-        return Regressor(np.concatenate([Y, friction, presliding], axis=2), known)
-
-    def inertia(self, theta, q):
-        still, L = np.zeros_like(q), 10 * len(CHAIN.parent)
-        gravity = rigid_body_regressor(CHAIN, q, still, still) @ theta[:L]
-        pushed = [rigid_body_regressor(CHAIN, q, still, still + e) @ theta[:L] - gravity for e in np.eye(2)]
-        return np.stack(pushed, axis=2)
-
-    def bias(self, theta, motion):
-        return self.regressor(motion._replace(ddq=0.0 * motion.ddq)).Phi @ theta
-
-    def joint_dynamics(self, theta, motion):
-        M, tau = self.inertia(theta, motion.q), self.regressor(motion).Phi @ theta
-        views = []
-        for i, v in enumerate(theta[-3:-1]):
-            known = tau[:, i] - M[:, i, i] * motion.ddq[:, i] - v * motion.dq[:, i]
-            views.append(JointDynamics(M[:, i, i], (0.0, 0.0, 0.0, 0.0, float(v), 0.0, 0.0), known))
-        return tuple(views)
+def coupled(rows=(0, 1), group="arm"):
+    """The first two joints of an arm that friction holds back, which remembers in the first of them."""
+    friction, units = tuple(FRICTION[row] for row in rows), (UNITS,) * len(rows)
+    return CoupledArm(group, ("one", "two"), rows, CHAIN, friction, units)
 
 
 def wandering(N, seed=0, segments=1, periodic=False):
@@ -70,35 +42,89 @@ def wandering(N, seed=0, segments=1, periodic=False):
     return Motion(q, dq, ddq, T_S, np.arange(N) * segments // N, periodic)
 
 
-def truth():
-    return np.concatenate([BODIES.parameters(2), [1.0, 0.8, 0.5]])
+ROTOR, SPRING, OFFSET = np.array([0.3, 0.2]), np.array([1.5, 0.0]), np.array([0.0, -0.4])
+OF_FRICTION = np.array([1.0, 0.5, 0.8, 0.3])
 
 
-def test_the_protocol_describes_a_coupled_arm_whose_friction_remembers():
-    model, motion, theta = CoupledArm(0.02), wandering(4000), truth()
+def truth(model):
+    """The parameters of the arm: those of its links and drives, combined, and of its friction."""
+    added = np.concatenate([BODIES.parameters(2), ROTOR, SPRING, OFFSET])
+    return np.concatenate([model.base.combination @ added, OF_FRICTION])
+
+
+def true_effort(motion):
+    tau = inverse_dynamics(CHAIN, BODIES, motion.q, motion.dq, motion.ddq) + ROTOR * motion.ddq
+    tau += SPRING * motion.q + OFFSET + motion.dq * [1.0, 0.8]
+    tau[:, 0] += 0.5 * deflection(motion, 0, 0.02)[0]
+    tau[:, 1] += 0.3 * np.sign(motion.dq[:, 1])
+    return tau
+
+
+def test_the_effort_of_a_coupled_arm_is_that_of_its_links_drives_and_friction():
+    model, motion = coupled(), wandering(4000)
     Phi, known = model.regressor(motion)
-    assert Phi.shape == (4000, 2, len(model.parameters))
-    tau = inverse_dynamics(CHAIN, BODIES, motion.q, motion.dq, motion.ddq) + motion.dq * theta[-3:-1]
-    tau[:, 0] += theta[-1] * deflection(motion, 0, 0.02)[0]
-    assert_allclose(Phi @ theta, tau, rtol=1e-11, atol=1e-11)
-    assert_allclose(model.inertia(theta, motion.q), mass_matrix(CHAIN, BODIES, motion.q), rtol=1e-10, atol=1e-12)
-    M_ddq = np.einsum("nij,nj->ni", model.inertia(theta, motion.q), motion.ddq)
-    assert_allclose(model.bias(theta, motion) + M_ddq, tau, rtol=1e-10, atol=1e-10)
+    theta = truth(model)
+    assert Phi.shape == (4000, 2, len(model.parameters)) == (4000, 2, len(theta))
+    assert_allclose(Phi @ theta, true_effort(motion), rtol=1e-9, atol=1e-9)
+    M = model.inertia(theta, motion.q)
+    assert_allclose(M, mass_matrix(CHAIN, BODIES, motion.q) + np.diag(ROTOR), rtol=1e-9, atol=1e-10)
+    assert_allclose(M, M.swapaxes(1, 2), atol=1e-10)
+    whole = model.bias(theta, motion) + np.einsum("nij,nj->ni", M, motion.ddq)
+    assert_allclose(whole, true_effort(motion), rtol=1e-9, atol=1e-9)
     assert 0 < np.flatnonzero(known)[0] < 400
+
+
+def test_the_columns_of_a_coupled_arm_are_independent_and_no_fewer_than_its_links_need():
+    """Of a motion that the base parameters were not told by."""
+    model = coupled()
+    Phi, _ = model.regressor(wandering(2000, seed=3))
+    scaled = Phi.reshape(-1, Phi.shape[2]) / np.linalg.norm(Phi, axis=(0, 1))
+    assert np.linalg.svd(scaled, compute_uv=False)[-1] > 1e-4
+    names = [parameter.name for parameter in model.parameters]
+    assert len(set(names)) == len(names)
+    assert {"viscous friction of one", "presliding friction 1 of one", "Coulomb friction of two"} < set(names)
+
+
+def test_a_joint_of_a_coupled_arm_has_the_same_effort_by_parameters_of_its_own():
+    """Fitted alone, it finds what the whole arm says of it, though it needs fewer parameters."""
+    alone, motion = coupled((1,), "two"), wandering(3000)
+    assert alone.efforts == ("two",)
+    assert len(alone.parameters) < len(coupled().parameters)
+    Phi = alone.regressor(motion).Phi[:, 0]
+    tau = true_effort(motion)[:, 1]
+    scale = np.linalg.norm(Phi, axis=0)
+    theta = np.linalg.lstsq(Phi / scale, tau, rcond=None)[0] / scale
+    assert_allclose(Phi @ theta, tau, atol=1e-8)
+    M = mass_matrix(CHAIN, BODIES, motion.q)[:, 1, 1] + ROTOR[1]
+    assert_allclose(alone.inertia(theta, motion.q)[:, 0, 0], M, rtol=1e-4)
+
+
+def test_what_a_filter_is_told_of_a_coupled_arm_is_its_effort():
+    model, motion = coupled(), wandering(3000)
+    theta = truth(model)
+    for i, told in enumerate(model.joint_dynamics(theta, motion)):
+        own = bias(told.coefficients, motion.q[:, i], motion.dq[:, i], 0.0)[0]
+        tau = told.inertia * motion.ddq[:, i] + own + told.known
+        assert_allclose(tau, true_effort(motion)[:, i], rtol=1e-9, atol=1e-9)
+        assert told.coefficients[4] == [1.0, 0.8][i]
 
 
 @pytest.mark.parametrize("name", FILTERS)
 def test_a_filter_tracks_each_joint_of_a_coupled_arm_with_what_the_model_says_of_it(name):
-    model, motion, theta = CoupledArm(0.02), wandering(4000), truth()
-    tau, t = model.regressor(motion).Phi @ theta, np.arange(4000) * T_S
+    model, motion = coupled(), wandering(4000)
+    theta, tau, t = truth(model), true_effort(motion), np.arange(4000) * T_S
     noise, rng = NoiseModel(1e-5, 1e-4, 1e-5, 2e-4, 0.02), np.random.default_rng(1)
     for i, joint in enumerate(model.joint_dynamics(theta, motion)):
         push = np.where((t > 8) & (t < 12), 1.0, 0.0)
         y = (motion.q[:, i] + 1e-5 * rng.normal(size=4000), motion.dq[:, i] + 1e-4 * rng.normal(size=4000))
-        made = tracker(name)(joint, *y, tau[:, i] + push, T_S, noise, 1.0)
+        made, untold = (
+            tracker(name)(told, *y, tau[:, i] + push, T_S, noise, 1.0)
+            for told in (joint, joint._replace(known=np.zeros(4000)))
+        )
         inside, outside = (t > 9) & (t < 12), (t > 1) & (t < 8)
-        # A filter that knew nothing of the other joint and of the deflection would be off by what they make of tau.
-        assert np.abs(made.tau_ext[outside]).mean() < 0.15 < 0.3 * np.abs(joint.known).max()
+        # One that knows nothing of gravity, the other joint and the deflection is off by what they make of tau.
+        assert np.abs(made.tau_ext[outside]).mean() < 0.15
+        assert np.abs(made.tau_ext[outside]).mean() < 0.6 * np.abs(untold.tau_ext[outside]).mean()
         assert made.tau_ext[inside].mean() == pytest.approx(1.0, abs=0.05)
 
 
@@ -157,5 +183,19 @@ def test_a_deflection_of_a_period_ends_where_it_starts():
 def test_a_term_of_an_unknown_function_or_without_its_displacement_is_refused():
     with pytest.raises(ValueError, match="no functions \\['sin dq'\\]"):
         terms.Term("odd", "x", "1", b={"sin dq": 1.0})
-    with pytest.raises(ValueError, match="displacement"):
+    with pytest.raises(ValueError, match="one displacement"):
         replace(DAHL, displacement=0.0)
+    with pytest.raises(ValueError, match="one displacement"):
+        replace(DAHL, width=0.1)
+
+
+def test_a_smooth_sign_and_stribeck_s_peak_are_the_sign_far_from_and_near_standstill():
+    motion = column(wandering(2000))
+    dq = motion.dq[:, 0]
+    smooth, _ = driven(motion, 0, terms.smooth_sign(1e-3))
+    peak, _ = driven(motion, 0, terms.stribeck(1e-3))
+    fast = np.abs(dq) > 5e-3
+    assert_allclose(smooth[fast], np.sign(dq[fast]), atol=1e-4)  # 1 - tanh(5)
+    assert_allclose(peak[fast], 0.0, atol=1e-10)  # exp(-25)
+    assert_allclose(driven(motion, 0, terms.smooth_sign(1e3))[0], dq / 1e3, rtol=1e-5)
+    assert_allclose(driven(motion, 0, terms.stribeck(1e3))[0], np.sign(dq), rtol=1e-5)

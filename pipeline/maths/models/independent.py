@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline.maths.arrays import Array
 from pipeline.maths.models.bias import Coefficients, bias
-from pipeline.maths.models.memory import deflection
+from pipeline.maths.models.memory import driven
 from pipeline.maths.models.model import JointDynamics, Motion, Parameter, Regressor
 from pipeline.maths.models.terms import Term
 
@@ -37,20 +37,23 @@ class IndependentJoint:
         return (self.group,)
 
     @property
+    def efforts(self) -> tuple[str, ...]:
+        """The joint's own."""
+        return self.joints
+
+    @property
     def parameters(self) -> tuple[Parameter, ...]:
         """One a term."""
         pairs = zip(self.terms, self.units, strict=True)
-        return tuple(Parameter(term.name, term.typst, unit, term.positive) for term, unit in pairs)
+        return tuple(Parameter(term.name, term.typst, unit, term.positive, term.scale) for term, unit in pairs)
 
     def regressor(self, motion: Motion) -> Regressor:
         """Phi (N, 1, p).  (6.9), (6.12), (6.14)"""
         q, dq, ddq = (x[:, 0] for x in motion[:3])
         known, columns = np.ones(len(q), np.bool_), []
         for term in self.terms:
-            z = np.zeros_like(q)
-            if term.displacement:
-                z, started = deflection(motion, 0, term.displacement)
-                known &= started
+            z, started = driven(motion, 0, term)
+            known &= started
             columns.append(column(term, q, dq, ddq, z))
         return Regressor(np.stack(columns, axis=-1)[:, None, :], known)
 
@@ -58,16 +61,20 @@ class IndependentJoint:
         """M (N, 1, 1), the same everywhere.  (6.5)"""
         return np.full((len(q), 1, 1), inertia_of(self.terms, theta))
 
+    def inertia_columns(self, q: Array) -> Array:
+        """What the parameters (p,) make of M at q (N, 1), (N, 1, 1, p)."""
+        return np.tile(np.array([term.a for term in self.terms]), (len(q), 1, 1, 1))
+
     def bias(self, theta: Array, motion: Motion) -> Array:
         """V + F + G (N, 1)."""
         still = motion._replace(ddq=np.zeros_like(motion.ddq))
         return np.asarray(self.regressor(still).Phi @ theta)
 
     def joint_dynamics(self, theta: Array, motion: Motion) -> tuple[JointDynamics]:
-        """The terms of the joint's own state as coefficients, those with a memory as known effort."""
+        """The terms of the joint's own state as coefficients, those that measured motion drives as known effort."""
         c = combined(self.terms, theta)
-        with_memory = [theta_i * bool(term.displacement) for theta_i, term in zip(theta, self.terms, strict=True)]
-        known = self.bias(np.array(with_memory), motion)[:, 0] if any(with_memory) else np.zeros(len(motion.q))
+        of_z = [theta_i * bool(term.scale) for theta_i, term in zip(theta, self.terms, strict=True)]
+        known = self.bias(np.array(of_z), motion)[:, 0] if any(of_z) else np.zeros(len(motion.q))
         return (JointDynamics(np.full(len(motion.q), inertia_of(self.terms, theta)), c, known),)
 
 
@@ -97,7 +104,7 @@ def inertia_of(terms: Sequence[Term], theta: Array) -> float:
 
 
 def combined(terms: Sequence[Term], theta: Array) -> Coefficients:
-    """The coefficients of b = sum_i theta_i b_i, for `bias`; terms with a memory are left out."""
-    rows = np.array([term.coefficients if not term.displacement else np.zeros(7) for term in terms])
+    """The coefficients of b = sum_i theta_i b_i, for `bias`; terms of z are left out."""
+    rows = np.array([term.coefficients if not term.scale else np.zeros(7) for term in terms])
     one, sine, cosine, linear, viscous, coulomb, presliding = (np.asarray(theta) @ rows).tolist()
     return one, sine, cosine, linear, viscous, coulomb, presliding

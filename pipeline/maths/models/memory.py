@@ -1,4 +1,4 @@
-"""Friction that remembers where it came from: the deflection that the measured motion drives."""
+"""Friction that the measured motion drives: with a memory of where it came from, or of a velocity's shape."""
 
 from itertools import pairwise
 
@@ -7,8 +7,25 @@ import numpy as np
 from pipeline.maths.arrays import Array, Booleans
 from pipeline.maths.models.bias import deflect
 from pipeline.maths.models.model import Motion
+from pipeline.maths.models.terms import Term
 
 RUN_IN = 3.0  # displacements of travel after which a deflection has forgotten how it started, to exp(-2 RUN_IN)
+
+
+def driven(motion: Motion, joint: int, term: Term) -> tuple[Array, Booleans]:
+    """z (N,) of a term of one joint, and where it is known (N,): a deflection, a smooth sign or Stribeck's peak.
+
+    A term without z has 0, known everywhere.
+    """
+    dq = motion.dq[:, joint]
+    if term.displacement:
+        return deflection(motion, joint, term.displacement)
+    known = np.ones(len(dq), np.bool_)
+    if term.width:
+        return np.tanh(dq / term.width), known
+    if term.faded:
+        return np.sign(dq) * np.exp(-((dq / term.faded) ** 2)), known
+    return np.zeros(len(dq)), known
 
 
 def deflection(motion: Motion, joint: int, x_0: float) -> tuple[Array, Booleans]:

@@ -3,7 +3,7 @@
     tau = Phi(q, dq, ddq) theta,        tau = M(q) ddq + b(q, dq) + tau_ext                            (6.8), (7.8)
 
 Identification asks for Phi, prediction for Phi theta; a filter tracks each joint by itself and asks what it is to know
-of it.  Shapes: N samples, n joints, p parameters.
+of it.  Shapes: N samples, n joints, m efforts, p parameters.
 """
 
 from typing import NamedTuple, Protocol
@@ -19,6 +19,7 @@ class Parameter(NamedTuple):
     typst: str  # what it multiplies, in Typst's maths
     unit: str
     positive: bool  # whether physics knows its sign
+    scale: float = 0.0  # the displacement or velocity that its column depends on, in the joint's units; 0 for none
 
 
 class Motion(NamedTuple):
@@ -35,7 +36,7 @@ class Motion(NamedTuple):
 class Regressor(NamedTuple):
     """Phi of a motion, and the samples at which it is known: memory starts unknown after each gap."""
 
-    Phi: Array  # (N, n, p)
+    Phi: Array  # (N, m, p)
     known: Booleans  # (N,)
 
 
@@ -66,6 +67,11 @@ class Model(Protocol):
         ...
 
     @property
+    def efforts(self) -> tuple[str, ...]:
+        """The joints whose effort it gives, in the order of the axis m: its joints, or some of them."""
+        ...
+
+    @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Its parameters, in the order of theta."""
         ...
@@ -75,13 +81,13 @@ class Model(Protocol):
         ...
 
     def inertia(self, theta: Array, q: Array) -> Array:
-        """M (N, n, n) at q (N, n).  (6.5)"""
+        """M (N, m, m) at q (N, n), of the joints whose effort it gives.  (6.5)"""
         ...
 
     def bias(self, theta: Array, motion: Motion) -> Array:
-        """The effort (N, n) of this motion without what accelerates it.  (4.38)"""
+        """The effort (N, m) of this motion without what accelerates it.  (4.38)"""
         ...
 
     def joint_dynamics(self, theta: Array, motion: Motion) -> tuple[JointDynamics, ...]:
-        """Each joint as a filter takes it.  (7.15), (7.16)"""
+        """Each joint whose effort it gives, as a filter takes it.  (7.15), (7.16)"""
         ...

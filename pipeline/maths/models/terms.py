@@ -20,8 +20,9 @@ class Term:
     """One column of the regressor: phi = a ddq + sum of b[f] f(q, dq) over functions f of `COEFFICIENTS`.
 
     `unit` is that of the parameter, with {inertia}, {effort} and {position} left to the joint; `typst` is phi in
-    Typst's maths, for equations; a `positive` parameter is one whose sign physics knows.  A term of z has a
-    `displacement`, in the joint's units.
+    Typst's maths, for equations; a `positive` parameter is one whose sign physics knows.  A term of z says what z is by
+    one of three, in the joint's units: the `displacement` of a deflection, the `width` [velocity] of a smooth sign, or
+    the velocity at which Stribeck's peak has `faded`; see `driven`.
     """
 
     name: str
@@ -31,12 +32,20 @@ class Term:
     b: Mapping[str, float] = field(default_factory=dict, hash=False)
     positive: bool = False
     displacement: float = 0.0
+    width: float = 0.0
+    faded: float = 0.0
 
     def __post_init__(self) -> None:
         if unknown := sorted(set(self.b) - set(COEFFICIENTS)):
             raise ValueError(f"term {self.name!r}: no functions {unknown}; there are {', '.join(COEFFICIENTS)}")
-        if ("z" in self.b) != (self.displacement > 0):
-            raise ValueError(f"term {self.name!r}: a term of z, and no other, has a displacement greater than 0")
+        if sum(scale > 0 for scale in (self.displacement, self.width, self.faded)) != int("z" in self.b):
+            said = "a term of z, and no other, has one displacement, width or velocity greater than 0"
+            raise ValueError(f"term {self.name!r}: {said}")
+
+    @property
+    def scale(self) -> float:
+        """The displacement or velocity that z depends on, in the joint's units; 0 for a term without z."""
+        return self.displacement or self.width or self.faded
 
     @property
     def coefficients(self) -> Coefficients:
@@ -53,6 +62,23 @@ viscous = Term("viscous friction", "dot(q)", "{effort} s/{position}", b={"dq": 1
 coulomb = Term("Coulomb friction", 'op("sign")(dot(q))', "{effort}", b={"sign(dq)": 1.0}, positive=True)
 offset = Term("offset", "1", "{effort}", b={"1": 1.0})
 stiffness = Term("stiffness", "q", "{effort}/{position}", b={"q": 1.0})
+
+
+def presliding(displacement: float, number: int = 1) -> Term:
+    """Friction of bristles that turn over within a displacement, in the joint's units; several are numbered from 1."""
+    return Term(f"presliding friction {number}", f"z_{number}", "{effort}", b={"z": 1.0}, displacement=displacement)
+
+
+def smooth_sign(width: float) -> Term:
+    """Friction that turns over within velocities of +- `width`, in the joint's units."""
+    return Term("smooth friction", 'tanh(dot(q) \\/ dot(q)_"w")', "{effort}", b={"z": 1.0}, width=width)
+
+
+def stribeck(faded: float) -> Term:
+    """What friction is more near standstill; the velocity, in the joint's units, takes e-fold of it away."""
+    phi = 'op("sign")(dot(q)) e^(-(dot(q) \\/ dot(q)_"s")^2)'
+    return Term("Stribeck friction", phi, "{effort}", b={"z": 1.0}, faded=faded)
+
 
 TERMS = {
     term.name: term for term in (inertia, lifted_mass, gravity_sin, gravity_cos, viscous, coulomb, offset, stiffness)

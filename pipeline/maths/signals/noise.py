@@ -23,7 +23,7 @@ def noise_std(residual: Array, segment: Integers, rate: float, cutoff: float) ->
 
 
 def smoothed(x: Array, segment: Integers, rate: float, cutoff: float) -> Array:
-    """The low-pass of each segment (N,)."""
+    """The low-pass of each segment of a signal (N,), or of columns (N, ...)."""
     return np.concatenate([lowpass(x[part], rate, cutoff) for part in segments(segment)])
 
 

@@ -11,16 +11,17 @@ ORDER = 4  # of the Butterworth filter, run forwards and backwards
 
 
 def lowpass(x: Array, rate: float, cutoff: float) -> Array:
-    """Low-pass a signal (N,) without delay; `cutoff` [Hz] is where the two passes together have halved the power twice.
+    """Low-pass a signal (N,), or columns (N, ...), without delay.
 
-    A cutoff at or above 0.4 of the sampling rate leaves the signal as it is.
+    `cutoff` [Hz] is where the two passes together have halved the power twice.  One at or above 0.4 of the sampling
+    rate leaves the signal as it is.
     """
     if cutoff >= 0.4 * rate or len(x) < 2:
         return x
     from scipy.signal import butter, sosfiltfilt
 
     sos = butter(ORDER, cutoff, fs=rate, output="sos")
-    return np.asarray(sosfiltfilt(sos, x, padlen=min(3 * round(rate / cutoff) + 3, len(x) - 1)))
+    return np.asarray(sosfiltfilt(sos, x, axis=0, padlen=min(3 * round(rate / cutoff) + 3, len(x) - 1)))
 
 
 def share_passed(rate: float, cutoff: float) -> float:

@@ -13,7 +13,18 @@ from pipeline.report.context import Context
 DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
     "report": (
         "Contact forces without a force sensor",
-        ("summary", "contacts", "joints", "prediction", "noise", "runs", "ground_truth", "methods", "provenance"),
+        (
+            "summary",
+            "contacts",
+            "joints",
+            "choice",
+            "prediction",
+            "noise",
+            "runs",
+            "ground_truth",
+            "methods",
+            "provenance",
+        ),
     ),
     "robot": ("The robot, its control and its excitation", ("robot", "control", "excitation")),
 }

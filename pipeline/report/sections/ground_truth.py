@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.records import Fit, Track
+from pipeline.records import Track
 from pipeline.records.record import slug
 from pipeline.report.content import Block, Figure, Line, OnScreen, Panel, Prose, Section, Table, Verdict, literal
 from pipeline.report.context import Context, count, label, title
@@ -45,7 +45,7 @@ def blocks(context: Context) -> Iterator[Block]:
 
 def true_parameters(context: Context) -> Iterator[tuple[str, tuple[str, ...], dict[str, float]]]:
     """Joint, path in truth.toml and true parameters of every joint that has a fit."""
-    fitted = {fit.group for fit in context.catalogue.all(Fit)}
+    fitted = {fit.group for fit in context.own_fits()}
     theta: dict[str, Any] = context.study.truth.get("theta", {})
     for name, entry in theta.items():
         if name in fitted:
@@ -59,7 +59,7 @@ def parameters(context: Context, joint: str, path: tuple[str, ...], theta: dict[
     sha256 = context.provenance.raw.get(f"raw/{context.study.name}/truth.toml", "")
     rows, errors = [], []
     for name, value in theta.items():
-        estimate = context.results.get(f"fit.{joint}.{context.used_fit(joint)}.{slug(name)}")
+        estimate = context.results.get(f"fit.{joint}.{context.own_fit(joint)}.{slug(name)}")
         if estimate is None or not estimate.std:
             continue
         key = f"truth.{joint}.{slug(name)}"

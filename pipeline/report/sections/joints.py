@@ -36,7 +36,7 @@ REVERSALS = 2.0  # times as large around reversals as elsewhere, from which on t
 
 def section(context: Context) -> Section | None:
     """One subsection per joint."""
-    fits = context.catalogue.all(Fit)
+    fits = context.own_fits()
     if not fits:
         return None
     joints = dict.fromkeys(fit.group for fit in fits)
@@ -59,7 +59,7 @@ def intro() -> Prose:
 
 def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
     """The content about one joint."""
-    first = next((f for f in fits if f"{f.model}.{f.estimator}" == context.used_fit(f.group)), fits[0])
+    first = next((f for f in fits if f"{f.model}.{f.estimator}" == context.own_fit(f.group)), fits[0])
     terms = " + ".join(f"theta_{i} {phi}" for i, phi in enumerate(first.phi, start=1))
     yield Equation(f"tau = {terms}", f"effort is the sum of {', '.join(first.parameter)}, each times its parameter")
     yield parameters(context, first)

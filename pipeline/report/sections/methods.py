@@ -59,7 +59,7 @@ def section(context: Context) -> Section:
 def paragraph_for_paper(context: Context) -> str:
     """What was done, with this study's numbers, to be pasted."""
     settings, robot = context.study.settings, context.study.robot
-    fits = context.catalogue.all(Fit)
+    fits = context.own_fits()
     joints = ", ".join(dict.fromkeys(fit.group.replace("_", " ") for fit in fits)) or "no joint"
     logs = sorted({log for fit in fits for log in fit.logs})
     random_walk = f"{settings.q_tau:g} (effort/s^0.5)" if settings.q_tau else "the robot's own setting"

@@ -7,6 +7,13 @@ from pipeline.report.content import Block, Cell, Figure, Line, OnScreen, Panel, 
 from pipeline.report.context import Context, label, title
 from pipeline.report.verdicts import percent
 
+LEFT_OUT = {
+    "leave one log out": "the log",
+    "leave one period out": "a period",
+    "leave a block of path out": "a block of path",
+    "leave a segment out": "a segment",
+}
+
 
 def section(context: Context) -> Section | None:
     """Scores of the fit that the filter uses on every log, the estimators compared once, and the worst predictions."""
@@ -45,7 +52,7 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
 def row(context: Context, p: Prediction) -> tuple[Cell, ...]:
     """The scores of one run."""
     share = percent(p.model_error / p.effort_rms if p.effort_rms > 0 else float("nan"))
-    how = {"leave one log out": "the log", "leave one period out": "a period"}.get(p.scheme, "never fitted")
+    how = LEFT_OUT.get(p.scheme, "never fitted")
     error, r2, ceiling = (context.number(f"{p.prefix}.{name}", 2) for name in ("model_error", "r2", "r2_ceiling"))
     return literal(p.log), title(p.joint), how, p.path.removesuffix(" path"), error, share, r2, ceiling
 

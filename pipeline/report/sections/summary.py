@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.records import Contact, Diagnostic, Fit, FreeSpace, Prediction, Record, Track
+from pipeline.records import Contact, Diagnostic, FreeSpace, Prediction, Record, Track
 from pipeline.report.content import (
     Block,
     Bullets,
@@ -45,7 +45,7 @@ def section(context: Context) -> Section:
 def blocks(context: Context) -> Iterator[Block]:
     """The section's content."""
     yield from failures(context)
-    if not context.catalogue.all(Fit):
+    if not context.own_fits():
         yield Verdict(
             "bad", "No joint could be identified: there is no usable identification log, so no effort was tracked."
         )
@@ -96,7 +96,7 @@ def caption(contacts: list[Contact]) -> str:
 
 def fitted_joints(context: Context) -> list[str]:
     """The joints that have a fit, in the robot's order."""
-    return list(dict.fromkeys(fit.group for fit in context.catalogue.all(Fit)))
+    return list(dict.fromkeys(fit.group for fit in context.own_fits()))
 
 
 def trust(context: Context, joint: str) -> Trust:

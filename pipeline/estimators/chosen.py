@@ -1,0 +1,178 @@
+"""Choosing among candidates, the parameters of the chosen one, and what it predicts of the data that it left out."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.estimators.candidates import Candidate, Library
+from pipeline.estimators.observations import Observed
+from pipeline.estimators.scores import scored
+from pipeline.maths.arrays import Array, Booleans
+from pipeline.maths.models.model import Model
+from pipeline.maths.selection.blocks import BLOCKS, MOST, left_out
+from pipeline.maths.selection.cross_validation import Judged, preferred, standard_error
+from pipeline.maths.selection.ridge import covariance, scaled_equations
+from pipeline.records import Prediction
+from pipeline.records.predict import CHOSEN
+from pipeline.robots.models import Reach
+from pipeline.robots.robot import Robot
+
+SCHEME = "leave a block of path out"
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """Candidates with their scores, one of them chosen."""
+
+    candidates: tuple[Candidate, ...]
+    physical: tuple[bool, ...]
+    score: Array
+    score_std: Array
+    training: Array
+    over_periods: Array  # NaN where no path repeats
+    chosen: Candidate
+    best: Candidate
+    why: str
+
+
+class BlockEstimate(NamedTuple):
+    """Parameters (p,) with their standard errors: residuals taken as uncorrelated, and from blocks left out."""
+
+    theta: Array
+    theta_std: Array
+    theta_std_blocks: Array
+    samples: int
+    mse: float
+    r2: float
+    condition: float
+
+
+def selected(candidates: Sequence[Candidate], reaches: dict[str, Reach], count: int) -> Selection | None:
+    """Judge every candidate on the same groups, and choose one; None where none can be judged."""
+    schemes = possible(candidates, count)
+    judged = [(c, made) for c in candidates if (made := judge(c, schemes, reaches)) is not None] if schemes else []
+    if not judged:
+        return None
+    kept, verdicts = (list(column) for column in zip(*judged, strict=True))
+    physical = [c.is_physical(reaches) for c in kept]
+    eligible = physical if any(physical) else [True] * len(kept)
+    sizes = [c.size(reaches) for c in kept]
+    chosen, best = preferred(verdicts, sizes, eligible)
+    return Selection(
+        candidates=tuple(kept),
+        physical=tuple(physical),
+        score=np.array([verdict.score for verdict in verdicts]),
+        score_std=np.array([standard_error(verdict) for verdict in verdicts]),
+        training=np.array([verdict.training.mean() for verdict in verdicts]),
+        over_periods=np.array([over_periods(c, reaches, count) for c in kept]),
+        chosen=kept[chosen],
+        best=kept[best],
+        why=reason(kept, verdicts, sizes, chosen, best),
+    )
+
+
+def judge(candidate: Candidate, schemes: Sequence[Booleans], reaches: dict[str, Reach]) -> Judged | None:
+    """A candidate's errors on what is left out; None where the rest does not tell its parameters apart."""
+    try:
+        return candidate.judged(schemes, reaches)
+    except np.linalg.LinAlgError:
+        return None
+
+
+def possible(candidates: Sequence[Candidate], count: int) -> list[Booleans]:
+    """The schemes of leaving out in which something of every effort is left in each refit."""
+    log, block = np.repeat(np.arange(count), BLOCKS), np.tile(np.arange(BLOCKS), count)
+    every = {id(library): library.by_block.squares for c in candidates for library in c.libraries}
+    squares = np.concatenate(list(every.values()), axis=1)
+    return [groups for groups in left_out(log, block) if all(bool((squares[~g].sum(axis=0) > 0).all()) for g in groups)]
+
+
+def over_periods(candidate: Candidate, reaches: dict[str, Reach], count: int) -> float:
+    """The score on periods left out, which repeat the path of those that are kept; NaN where a path does not."""
+    number = np.tile(np.arange(MOST), count)
+    squares = np.concatenate([library.by_period.squares for library in candidate.libraries], axis=1)
+    groups = np.array([number == k for k in range(MOST) if squares[number == k].any()])
+    if len(groups) < 2 or not all((squares[~group].sum(axis=0) > 0).all() for group in groups):
+        return float("nan")
+    try:
+        return candidate.judged([groups], reaches, by_period=True).score
+    except np.linalg.LinAlgError:
+        return float("nan")
+
+
+def reason(candidates: Sequence[Candidate], verdicts: Sequence[Judged], sizes: Sequence[int], i: int, best: int) -> str:
+    """Why a candidate was chosen, in words, and whether a larger one only fitted better."""
+    own = f"{candidates[i].name} errs by {verdicts[i].score:.4f} of the effort where it was not fitted"
+    if i == best:
+        said = f"{own}, less than any other"
+    else:
+        behind = verdicts[i].score - verdicts[best].score
+        doubt = standard_error(verdicts[i], verdicts[best])
+        said = (
+            f"{own}; the best, {candidates[best].name}, by {behind:.4f} less, which with a standard error of "
+            f"{doubt:.4f} is not clearly better, and it has {sizes[best]} parameters for {sizes[i]}"
+        )
+    training = [verdict.training.mean() for verdict in verdicts]
+    closest = int(np.argmin(training))
+    if verdicts[closest].score > verdicts[i].score:
+        said += (
+            f"; {candidates[closest].name} fits better ({training[closest]:.4f} for {training[i]:.4f}) and predicts "
+            f"worse ({verdicts[closest].score:.4f}): it overfits"
+        )
+    return said
+
+
+def parameters(
+    candidate: Candidate, robot: Robot, reaches: dict[str, Reach], count: int
+) -> Iterator[tuple[Model, Library, BlockEstimate]]:
+    """What a candidate's parameters are, one model at a time, from all data."""
+    block = np.tile(np.arange(BLOCKS), count)
+    whole = candidate.parameters(reaches)
+    without = [candidate.parameters(reaches, block == b) for b in range(BLOCKS)]
+    for i, (model, library) in enumerate(zip(candidate.models(robot, reaches), candidate.libraries, strict=True)):
+        theta, thetas = whole[i], np.array([part[i] for part in without])
+        cells = library.by_block.columns(library.columns(candidate.friction, reaches))
+        ridge = list(candidate.ridges())[i]
+        together = cells.of(np.ones(len(cells.gram), np.bool_))
+        errors, squares = together.errors(theta)[0], together.squares[0]
+        samples = library.samples
+        jackknife = (BLOCKS - 1) / BLOCKS * ((thetas - thetas.mean(axis=0)) ** 2).sum(axis=0)
+        yield (
+            model,
+            library,
+            BlockEstimate(
+                theta=theta,
+                theta_std=np.sqrt(np.diag(covariance(together, ridge, errors / samples))),
+                theta_std_blocks=np.sqrt(jackknife),
+                samples=samples,
+                mse=float(errors.sum() / samples),
+                r2=float(1.0 - errors.sum() / squares.sum()),
+                condition=float(np.sqrt(np.linalg.cond(scaled_equations(together, ridge)[0]))),
+            ),
+        )
+
+
+def held_out(
+    chosen: Candidate, log: Observed, robot: Robot, reaches: dict[str, Reach], count: int
+) -> Iterator[Prediction]:
+    """The effort of each joint of a log in every block of its path, by the refit that had not seen it."""
+    block = np.tile(np.arange(BLOCKS), count)
+    without = [chosen.parameters(reaches, block == b) for b in range(BLOCKS)]
+    name = f"{chosen.variant}.{chosen.estimator}"
+    for i, (model, library) in enumerate(zip(chosen.models(robot, reaches), chosen.libraries, strict=True)):
+        own = next((seen for seen in library.logs if seen.number == log.number), None)
+        if own is None:
+            continue
+        Phi = model.regressor(own.motion).Phi
+        tau_hat = np.einsum("nmp,np->nm", Phi, np.array([part[i] for part in without])[own.block])
+        names = [record.joint for record in own.records]
+        for m, effort in enumerate(model.efforts):
+            record = own.records[names.index(effort)]
+            if not record.at_rest:
+                everywhere = np.ones(len(record), np.bool_)
+                yield scored(
+                    record, CHOSEN, name, "identification", SCHEME, "another path", tau_hat[:, m], everywhere,
+                    log.lowpass,
+                )  # fmt: skip

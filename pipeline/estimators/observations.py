@@ -1,0 +1,93 @@
+"""What was observed of the joints of one identification log together, ready for normal equations of any model."""
+
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.estimators.problem import Regression
+from pipeline.maths.arrays import Array, Booleans, Integers
+from pipeline.maths.models.model import Model, Motion
+from pipeline.maths.selection.blocks import BLOCKS, MOST, path_blocks, repetitions
+from pipeline.maths.selection.equations import Equations, added, gathered
+from pipeline.maths.signals.noise import smoothed
+from pipeline.records import Average, Smoothed
+
+PER_CUTOFF = 3  # samples kept per period of the low-pass's cutoff: more of them say nothing new
+
+
+class Observed(NamedTuple):
+    """The joints of one log on one clock."""
+
+    records: tuple[Smoothed, ...]  # of n joints
+    motion: Motion
+    tau: Array  # (N, n) effort, low-passed; NaN of a joint at rest, whose friction takes any value
+    block: Integers  # (N,) of the path
+    period: Integers  # (N,) which repetition of the path; -1 where it does not repeat
+    lowpass: float  # [Hz]
+    number: int  # of the log, from 0
+
+    @property
+    def moving(self) -> Booleans:
+        """Which of its joints move (n,)."""
+        return np.array([not record.at_rest for record in self.records])
+
+    def alone(self, joint: int) -> "Observed":
+        """One joint by itself."""
+        one = slice(joint, joint + 1)
+        motion = self.motion._replace(**{name: getattr(self.motion, name)[:, one] for name in ("q", "dq", "ddq")})
+        return self._replace(records=self.records[one], motion=motion, tau=self.tau[:, one])
+
+    def rows(self, model: Model) -> tuple[Array, Array, Integers]:
+        """Phi (K, m, p) and tau (K, m) of a model of these joints, through one low-pass, and the samples (K,) kept."""
+        names, rate = [record.joint for record in self.records], self.records[0].rate
+        Phi, known = model.regressor(self.motion)
+        step = max(1, int(rate / (PER_CUTOFF * self.lowpass)))
+        kept = np.flatnonzero(known & (np.arange(len(known)) % step == 0))
+        smooth = np.zeros((len(kept), *Phi.shape[1:]))
+        some = Phi.any(axis=0)  # most columns are of one effort only
+        smooth[:, some] = smoothed(Phi[:, some], self.motion.segment, rate, self.lowpass)[kept]
+        return smooth, self.tau[kept][:, [names.index(effort) for effort in model.efforts]], kept
+
+
+def observed(records: Sequence[Smoothed], averages: Iterable[Average], lowpass: float, number: int) -> Observed:
+    """The joints of one log, in their order, which share a clock."""
+    first = records[0]
+    period = next((a.period for a in averages if a.log == first.log), 0.0)
+    q, dq, ddq = (np.stack([getattr(r, name) for r in records], axis=1) for name in ("q", "dq", "ddq"))
+    tau = np.stack(
+        [np.full(len(r), np.nan) if r.at_rest else smoothed(r.tau, r.segment, r.rate, lowpass) for r in records], axis=1
+    )
+    motion = Motion(q, dq, ddq, 1.0 / first.rate, first.segment)
+    repetition = repetitions(first.t, period) if period else np.full(len(first), -1)
+    whole = int((first.t[-1] - first.t[0]) * (1 + 1e-9) / period) if period else 0
+    # At most so many groups of whole periods; what is left of one at the end goes with the last.
+    group = np.minimum(repetition, whole - 1) * min(whole, MOST) // whole if whole > 1 else np.full(len(first), -1)
+    return Observed(tuple(records), motion, tau, path_blocks(first.t, period), group, lowpass, number)
+
+
+def pose_samples(model: Model, log: Observed, which: Booleans | None = None) -> tuple[Regression, Integers]:
+    """The least squares problem of a joint of a log that does not repeat, and the samples (K,) that it is of.
+
+    `which` (N,) samples are taken, all where it is left out.  Each counts as one period.
+    """
+    Phi, tau, kept = log.rows(model)
+    if which is not None:
+        Phi, tau, kept = Phi[which[kept]], tau[which[kept]], kept[which[kept]]
+    names, ones = tuple(parameter.name for parameter in model.parameters), np.ones(len(kept), np.int64)
+    return Regression(Phi[:, 0], tau[:, 0], np.zeros(len(kept)), ones, (0,), names), kept
+
+
+def equations(model: Model, logs: Sequence[Observed], count: int) -> tuple[int, Equations, Equations]:
+    """The normal equations in cells of the paths (6 a log) and of the periods (20 a log) of all `count` logs.
+
+    And how many samples of each effort they are made of.
+    """
+    samples, by_block, by_period = 0, [], []
+    for log in logs:
+        Phi, tau, kept = log.rows(model)
+        samples += len(kept)
+        block, period = log.block[kept] + BLOCKS * log.number, log.period[kept] + MOST * log.number
+        by_block.append(gathered(Phi, tau, block, BLOCKS * count))
+        by_period.append(gathered(Phi, tau, np.where(log.period[kept] < 0, -1, period), MOST * count))
+    return samples, added(by_block), added(by_period)

@@ -1,0 +1,129 @@
+"""Choose a model of the arm by leaving out blocks of path, and fit it to all identification logs."""
+
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from pipeline.estimators.candidates import Candidate, candidates, reach_of
+from pipeline.estimators.chosen import Selection, held_out, parameters, selected
+from pipeline.estimators.observations import Observed, observed
+from pipeline.records import Average, Choice, Diagnostic, Fit, Prediction, Smoothed, diagnostic
+from pipeline.robots.models import Reach
+from pipeline.robots.robot import Robot
+
+
+def run(
+    smoothed: Iterable[Smoothed], averages: Iterable[Average], robot: Robot, *, fit: str, lowpass: float
+) -> Iterator[Choice | Fit | Prediction | Diagnostic]:
+    """One model for the whole arm: its parameters, and its predictions of what each refit had not seen.
+
+    Where a log moves several joints, and the robot has a chain, the joints that move are described together; joints
+    that move in other logs only keep their own terms.  A fit that the settings name is made, too.
+    """
+    logs = by_log(smoothed, averages, robot, lowpass)
+    separate, arm = to_describe(logs, robot)
+    if not separate:
+        return
+    reaches = {name: reach_of(own, name) for name, own in separate.items()}
+    every = candidates(robot, separate, arm, reaches, len(logs))
+    selection = selected(every, reaches, len(logs))
+    if selection is None:
+        said = "no model could be chosen: no candidate can be fitted with a part of the path left out"
+        yield diagnostic("choose", "arm", "warning", f"{said}; record more of the path, or more periods")
+        return
+    yield from choice(selection, reaches, logs)
+    worth = {f"{c.variant}.{c.estimator}": c for c in (*leading(selection), *named(selection, fit), selection.chosen)}
+    for candidate in (c for name, c in worth.items() if name != "independent.lse"):
+        yield from fits(candidate, robot, reaches, len(logs))
+    for log in logs:
+        yield from held_out(selection.chosen, log, robot, reaches, len(logs))
+
+
+def by_log(smoothed: Iterable[Smoothed], averages: Iterable[Average], robot: Robot, lowpass: float) -> list[Observed]:
+    """The joints of each log, in the robot's order; of several clocks, the first joint's is kept."""
+    joints, every = [joint.name for joint in robot.joints], list(averages)
+    records: dict[str, list[Smoothed]] = defaultdict(list)
+    for record in smoothed:
+        records[record.log].append(record)
+    logs: list[Observed] = []
+    for own in records.values():
+        ordered = sorted(own, key=lambda record: joints.index(record.joint))
+        logs.append(observed([r for r in ordered if len(r) == len(ordered[0])], every, lowpass, len(logs)))
+    return logs
+
+
+def to_describe(logs: Sequence[Observed], robot: Robot) -> tuple[dict[str, tuple[Observed, ...]], tuple[Observed, ...]]:
+    """The logs of each joint that is to be described, by itself; and those of all joints, where some move together."""
+    whole = tuple(log for log in logs if len(log.records) == len(robot.joints) and log.moving.any())
+    arm = whole if robot.chain is not None and any(log.moving.sum() > 1 for log in whole) else ()
+    separate: dict[str, list[Observed]] = defaultdict(list)
+    for log in arm or logs:
+        for i, record in enumerate(log.records):
+            if not record.at_rest:
+                separate[record.joint].append(log.alone(i))
+    order = [joint.name for joint in robot.joints if joint.name in separate]
+    return {name: tuple(separate[name]) for name in order}, arm
+
+
+def choice(selection: Selection, reaches: dict[str, Reach], logs: Sequence[Observed]) -> Iterator[Choice]:
+    """What was chosen, and from among what; one a group that the chosen model describes by itself."""
+    chosen = selection.chosen
+    for library in chosen.libraries:
+        yield Choice(
+            group=library.model.group,
+            model=chosen.variant,
+            friction=str(chosen.friction),
+            estimator=chosen.estimator,
+            chosen=chosen.name,
+            best=selection.best.name,
+            why=selection.why,
+            logs=tuple(log.records[0].log for log in logs),
+            candidate=np.array([c.name for c in selection.candidates], object),
+            variant=np.array([c.variant for c in selection.candidates], object),
+            parameters=np.array([c.size(reaches) for c in selection.candidates]),
+            physical=np.array(selection.physical, int),
+            score=selection.score,
+            score_std=selection.score_std,
+            training=selection.training,
+            over_periods=selection.over_periods,
+        )
+
+
+def leading(selection: Selection) -> list[Candidate]:
+    """The best candidate of each structure with something added to the joints' own terms, to compare with."""
+    scores = dict(zip((c.name for c in selection.candidates), selection.score.tolist(), strict=True))
+    more = [c for c in selection.candidates if c.variant != "independent"]
+    structures = dict.fromkeys(c.structure for c in more)
+    return [min((c for c in more if c.structure == s), key=lambda c: scores[c.name]) for s in structures]
+
+
+def named(selection: Selection, fit: str) -> list[Candidate]:
+    """The best candidate of the variant and estimator that the settings name, where they name one."""
+    own = [i for i, c in enumerate(selection.candidates) if f"{c.variant}.{c.estimator}" == fit]
+    return [selection.candidates[min(own, key=lambda i: float(selection.score[i]))]] if own else []
+
+
+def fits(candidate: Candidate, robot: Robot, reaches: dict[str, Reach], count: int) -> Iterator[Fit]:
+    """The parameters of a candidate, from all logs."""
+    for model, library, estimate in parameters(candidate, robot, reaches, count):
+        about = model.parameters
+        yield Fit(
+            group=model.group,
+            model=candidate.variant,
+            estimator=candidate.estimator,
+            logs=tuple(log.records[0].log for log in library.logs),
+            samples=estimate.samples,
+            periods=0,
+            mse=estimate.mse,
+            r2=estimate.r2,
+            condition=estimate.condition,
+            hac_lags=0,
+            parameter=np.array([parameter.name for parameter in about], object),
+            phi=np.array([parameter.typst for parameter in about], object),
+            unit=np.array([parameter.unit for parameter in about], object),
+            scale=np.array([parameter.scale for parameter in about]),
+            theta=estimate.theta,
+            theta_std=estimate.theta_std,
+            theta_std_hac=estimate.theta_std_blocks,
+        )
