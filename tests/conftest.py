@@ -40,8 +40,8 @@ MEDIUM: dict[str, tuple[str, ...]] = {
     ),
     "report/test_report_figures.py": ("test_another_process_gives_the_same_bytes",),
     "report/test_report_html.py": (
-        "test_a_browser_opens_it_without_a_word_and_draws_the_traces",
         "test_a_dozen_long_traces_stay_under_five_megabytes",
+        "test_hundreds_of_small_figures_leave_room_and_each_takes_three_kilobytes",
     ),
     "robot/test_rigid_body.py": (
         "test_mass_matrix_coriolis_and_gravity_are_those_of_an_independent_lagrangian[6]",

@@ -16,7 +16,7 @@ from pipeline.runner.places import Located
 from pipeline.runner.plan import VERSION, Plan, Task
 from pipeline.study import Study
 
-PACKAGES = ("numpy", "scipy", "pandas", "pyarrow", "statsmodels", "numba", "matplotlib", "bokeh", "typst", "npTDMS")
+PACKAGES = ("numpy", "scipy", "pandas", "pyarrow", "statsmodels", "numba", "matplotlib", "typst", "npTDMS")
 
 
 def task(plan: Plan) -> Task:

@@ -81,7 +81,8 @@ class Table:
 class Figure:
     """Panels under one caption; `zoomable` ones zoom and pan in HTML with the x axes of all panels linked.
 
-    `height` is that of one row of panels [mm], on a page whose text is 170 mm wide.
+    `height` is that of one row of panels [mm], on a page whose text is 170 mm wide.  A `small` one takes at most 3 kB
+    of the HTML: its lines are drawn in few points, without axes, and their numbers do not come along.
     """
 
     caption: str
@@ -91,6 +92,11 @@ class Figure:
     zoomable: bool = False
     columns: int = 1
     height: float = 48.0
+    small: bool = False
+
+    def __post_init__(self) -> None:
+        if self.small and self.zoomable:
+            raise ValueError(f"figure {self.caption!r}: a small figure has not the samples to zoom into")
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,13 +141,20 @@ Block = Prose | Bullets | Listing | Verdict | Equation | Table | Figure | Figure
 
 @dataclass(frozen=True)
 class Document:
-    """A whole report, its first section before the contents; a `simulated` one says so at the top of every page."""
+    """A whole report, its first section before the contents; a `simulated` one says so at the top of every page.
+
+    Its files are `file`.html and `file`.pdf, which lead to each other and to the files of `links`, by what they hold.
+    """
 
     title: str
     study: str
     simulated: bool
     sections: tuple[Section, ...]
     edition: str = ""  # which report this is: its ID and the version that made it
+    file: str = "report"
+    links: tuple[tuple[str, str], ...] = (("Numbers", "results.json"),)
+    author: str = "davinci-forces"
+    keywords: tuple[str, ...] = ("da Vinci", "contact force", "system identification", "Kalman filter")
 
     def __post_init__(self) -> None:
         names = [name for block in walk(self) if (name := name_of(block))]

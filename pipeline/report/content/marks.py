@@ -8,7 +8,7 @@ import numpy as np
 from pipeline.maths.arrays import Array
 
 Colour = Literal["", "black", "blue", "vermillion", "green", "orange", "sky", "purple", "yellow", "grey"]
-Style = Literal["solid", "dashed", "dotted"]
+Style = Literal["", "solid", "dashed", "dotted", "dashdot"]
 
 
 class Mark:
@@ -35,7 +35,7 @@ class Line(Mark):
     y: Array
     label: str = ""
     colour: Colour = ""  # "" takes the next of the palette
-    style: Style = "solid"
+    style: Style = ""  # "" takes the next style, so that lines of a panel differ without colours, too
 
 
 @dataclass(frozen=True, eq=False)
@@ -187,7 +187,7 @@ class Line3D(Mark):
     z: Array
     label: str = ""
     colour: Colour = ""
-    style: Style = "solid"
+    style: Style = ""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,11 +1,13 @@
-"""The colours of the report, distinguishable without colour vision: Okabe and Ito, Color Universal Design (2008)."""
+"""The looks of marks: colours that differ without colour vision, and line styles that differ without any colour."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import cycle
-from typing import Protocol, TypeVar
+from typing import Any, TypeVar
 
-from pipeline.report.content.marks import Colour
+from pipeline.report.content.marks import Line, Line3D
 
+# Okabe and Ito, Color Universal Design (2008); on a dark page the same hues, lighter.
 COLOURS: dict[str, str] = {
     "black": "#1a1a1a",
     "blue": "#0072b2",
@@ -17,22 +19,35 @@ COLOURS: dict[str, str] = {
     "yellow": "#f0e442",
     "grey": "#7a7a7a",
 }
-TURN: tuple[str, ...] = ("blue", "vermillion", "green", "purple", "orange", "sky", "black")
+DARK: dict[str, str] = {
+    "black": "#e8ecf0",
+    "blue": "#4ba3e3",
+    "vermillion": "#f2803a",
+    "green": "#2fc498",
+    "orange": "#f0b429",
+    "sky": "#85cdf5",
+    "purple": "#e39cc4",
+    "yellow": "#f0e442",
+    "grey": "#9aa3ad",
+}
+# What surrounds the marks: the same in every figure, by what it is for.
+SURROUNDINGS: dict[str, tuple[str, str]] = {  # on a light page, on a dark one
+    "words": ("#222222", "#e4e8ed"),
+    "axes": ("#555555", "#a3adb8"),
+    "grid": ("#e4e4e4", "#2c343d"),
+    "paper": ("#ffffff", "#14181d"),
+}
+TURN = ("blue", "vermillion", "green", "purple", "orange", "sky", "black")
+STYLES = ("solid", "dashed", "dotted", "dashdot")
+
+M = TypeVar("M", bound=Any)
 
 
-class Coloured(Protocol):
-    """Any mark: it names a colour, or none."""
-
-    @property
-    def colour(self) -> Colour:
-        """One of COLOURS, or ""."""
-
-
-M = TypeVar("M", bound=Coloured)
-
-
-def assign_colours(marks: Sequence[M]) -> Iterator[tuple[M, str]]:
-    """Each mark with its colour; those that name none take turns."""
-    turn = cycle(TURN)
+def assign_looks(marks: Sequence[M]) -> Iterator[M]:
+    """Each mark with a colour and, if it is a line, a style; those that name none take turns."""
+    colours, styles = cycle(TURN), cycle(STYLES)
     for mark in marks:
-        yield mark, COLOURS[str(mark.colour) or next(turn)]
+        look = {} if mark.colour else {"colour": next(colours)}
+        if isinstance(mark, Line | Line3D) and not mark.style:
+            look["style"] = next(styles)
+        yield replace(mark, **look) if look else mark

@@ -1,48 +1,91 @@
 """Drawing one panel with matplotlib: its marks, its axes, and its title and legend above them."""
 
 import textwrap
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from pipeline.report.content.marks import AnyMark, Bars, Line, Panel, Points, Stems
 from pipeline.report.figures.draw import draw_bars, draw_mark, unescape_label
-from pipeline.report.figures.palette import assign_colours
+from pipeline.report.figures.palette import assign_looks
 from pipeline.report.figures.ticks import scale_ticks, set_log_ticks
 from pipeline.report.figures.traces import is_sorted, thin_mark
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
 VERTICES, LOOP_VERTICES, SYMBOLS = 8, 30, 3  # of one mark in a millimetre: finer than its lines and symbols are wide
 LETTER = 1.65  # [mm] that a letter of a label takes
-LEGEND_ROW = 3.9  # [mm]
+LINE = 3.9  # [mm] that a line of a label, a row of a legend takes
+SAMPLE = 10.0  # [mm] that the sample before a legend entry takes, with the gaps about it
+
+NAME = 4.5  # [mm] above or below a point that its name takes
+ABOUT = 18.0  # [mm] of a panel's height that its words above and below take
+
+
+@dataclass(frozen=True)
+class Heading:
+    """What stands above a panel: its title in lines, and the labels and entries of its legend, so many side by side."""
+
+    title: str
+    labels: tuple[str, ...]
+    entries: tuple[str, ...]
+    columns: int
+
+    @property
+    def height(self) -> float:
+        """Height of all of it [mm]."""
+        # Entries that stand side by side have one line each.
+        rows = -(-len(self.entries) // self.columns) if self.columns > 1 else sum(map(_lines, self.entries))
+        return LINE * (rows + (_lines(self.title) if self.title else 0)) + 1.5
+
+
+def plan_heading(panel: Panel, room: float) -> Heading:
+    """The heading of a panel whose axes are this wide [mm]."""
+    labels = tuple(mark.label for mark in panel.marks if mark.label)
+    longest = max(map(len, labels), default=0)
+    columns = max(1, min(len(labels), int(room / (SAMPLE + LETTER * longest))))
+    entries = tuple(_wrap(label, room - SAMPLE) for label in labels)
+    return Heading(_wrap(panel.title, 0.9 * room), labels, entries, columns)  # bold letters are wider
+
+
+def _lines(text: str) -> int:
+    return text.count("\n") + 1
 
 
 def draw_panel(axes: "Axes", panel: Panel, width: float, height: float, x_label: bool) -> None:
-    """Draw a panel into a cell of this width and height [mm], the legend's rows after the first not counted."""
+    """Draw a panel into a cell of this width and height [mm], without what stands above it."""
     _draw_marks(axes, panel, width)
-    if panel.x_range:
-        axes.set_xlim(*panel.x_range)
-    if panel.y_range:
-        axes.set_ylim(*panel.y_range)
+    _set_ranges(axes, panel, height)
     bars = any(isinstance(mark, Bars) for mark in panel.marks)
     across = panel.x_label if bars else _ticks(axes, "x", panel.x_log, panel.x_label, 4 if width < 70 else 8)
     up = _ticks(axes, "y", panel.y_log, panel.y_label, 5)
     axes.set_xlabel(wrap_label(across, width - 18) if x_label else "", parse_math=False)
-    axes.set_ylabel(wrap_label(up, height - 18), parse_math=False)
-    draw_heading(axes, panel.title, width)
+    axes.set_ylabel(wrap_label(up, height - ABOUT), parse_math=False)
 
 
 def _draw_marks(axes: "Axes", panel: Panel, width: float) -> None:
-    marks = list(assign_colours(panel.marks))
-    draw_bars([(mark, colour) for mark, colour in marks if isinstance(mark, Bars)], axes)
-    for order, (mark, colour) in enumerate(marks):
+    marks = list(assign_looks(panel.marks))
+    draw_bars([mark for mark in marks if isinstance(mark, Bars)], axes)
+    for order, mark in enumerate(marks):
         if not isinstance(mark, Bars):
-            draw_mark(thin_mark(mark, _max_points(mark, width)), axes, colour, 2 + 0.01 * order)
+            draw_mark(thin_mark(mark, max_points(mark, width)), axes, 2 + 0.01 * order)
     if any(isinstance(mark, Points | Stems) for mark in panel.marks):
         axes.margins(x=0.03)  # room for symbols at the ends
 
 
-def _max_points(mark: AnyMark, width: float) -> int:
+def _set_ranges(axes: "Axes", panel: Panel, height: float) -> None:
+    if panel.x_range:
+        axes.set_xlim(*panel.x_range)
+    if panel.y_range:
+        axes.set_ylim(*panel.y_range)
+    elif any(isinstance(mark, Points) and mark.names for mark in panel.marks):
+        low, high = axes.get_ylim()
+        room = NAME / max(height - ABOUT - 2 * NAME, NAME) * (high - low)
+        axes.set_ylim(low - room, high + room)
+
+
+def max_points(mark: AnyMark, width: float) -> int:
     """Points beyond which more of them cannot be seen in a panel of this width [mm]."""
     if isinstance(mark, Points | Stems):
         return round(SYMBOLS * width)
@@ -72,37 +115,27 @@ def _wrap(text: str, room: float) -> str:
     return textwrap.fill(text, max(int(room / LETTER), 1), break_long_words=False, break_on_hyphens=False)
 
 
-def legend_columns(labels: list[str], width: float) -> int:
-    """Entries side by side that fit above a panel of this width [mm]."""
-    return max(1, min(len(labels), int((width - 20) / (10 + LETTER * max(map(len, labels))))))
-
-
-def legend_rows(panel: Panel, width: float) -> int:
-    """Rows of the legend above a panel of this width [mm]."""
-    labels = [mark.label for mark in panel.marks if mark.label]
-    columns = legend_columns(labels, width) if labels else 1
-    if columns > 1:
-        return -(-len(labels) // columns)
-    return sum(_wrap_entry(label, width).count("\n") + 1 for label in labels)
-
-
-def _wrap_entry(label: str, width: float) -> str:
-    return _wrap(label, width - 32)
-
-
-def draw_heading(axes: "Axes", title: str, width: float) -> None:
-    """Title and legend above the axes, where they cover no data."""
+def draw_heading(axes: "Axes", heading: Heading, room: float, height: float) -> None:
+    """Title at the top of `room` [mm] above axes of a height [mm], and the legend right above them."""
+    if heading.title:
+        axes.text(
+            0, 1 + (room - 0.5) / height, heading.title, transform=axes.transAxes, va="top", fontsize=9,
+            fontweight="bold", parse_math=False,
+        )  # fmt: skip
     handles, labels = axes.get_legend_handles_labels()
-    title = _wrap(title, 0.9 * (width - 18))  # bold letters are wider
-    if not handles:
-        axes.set_title(title, loc="left", fontsize=9, fontweight="bold", pad=4, parse_math=False)
-        return
+    if handles:
+        # In the order of the marks, which is not that of matplotlib's kinds of artists.
+        ranks = [heading.labels.index(unescape_label(label)) for label in labels]
+        handles = [handle for _, handle in sorted(zip(ranks, handles, strict=True), key=lambda pair: pair[0])]
+        draw_legend(axes, handles, heading)
+
+
+def draw_legend(axes: "Axes", handles: list["Artist"], heading: Heading) -> None:
+    """The legend above the axes, where it covers no data."""
     legend = axes.legend(
-        handles, [" "] * len(labels), loc="lower left", bbox_to_anchor=(0, 1.0), ncols=legend_columns(labels, width),
-        title=title, frameon=False, alignment="left", borderpad=0, borderaxespad=0.25, handlelength=1.6,
-        columnspacing=1.4, labelspacing=0.3, handletextpad=0.5, title_fontproperties={"weight": "bold", "size": 9},
+        handles, [" "] * len(handles), loc="lower left", bbox_to_anchor=(0, 1.0), ncols=heading.columns, frameon=False,
+        borderpad=0, borderaxespad=0.25, handlelength=2.6, columnspacing=1.4, labelspacing=0.3, handletextpad=0.5,
     )  # fmt: skip
-    legend.get_title().set_parse_math(False)
     # Set afterwards: matplotlib leaves out a label that begins with an underscore, and reads dollars as maths.
-    for text, label in zip(legend.get_texts(), labels, strict=True):
-        text.set(text=_wrap_entry(unescape_label(label), width), parse_math=False)
+    for text, entry in zip(legend.get_texts(), heading.entries, strict=True):
+        text.set(text=entry, parse_math=False)

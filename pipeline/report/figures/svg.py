@@ -1,8 +1,7 @@
-"""Figures as SVG, drawn by matplotlib: the same bytes for the same figure, text as outlines, no date."""
+"""Figures as SVG, drawn by matplotlib: the same bytes for the same figure, no date, words as words."""
 
 import io
 import re
-import warnings
 from functools import singledispatch
 from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
@@ -10,74 +9,100 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from pipeline.report.content import Figure, Figure3D
+from pipeline.report.content.marks import Panel
 from pipeline.report.figures.draw import draw_mark_3d
-from pipeline.report.figures.palette import assign_colours
-from pipeline.report.figures.panels import LEGEND_ROW, draw_heading, draw_panel, legend_rows
+from pipeline.report.figures.grid import INCH, WIDTH, arrange
+from pipeline.report.figures.palette import SURROUNDINGS, assign_looks
+from pipeline.report.figures.panels import draw_heading, draw_panel, plan_heading
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure as Canvas
 
-WIDTH = 170.0  # [mm] of the text on an A4 page
-INCH = 25.4  # [mm]
+WORDS, AXES, GRID = (SURROUNDINGS[part][0] for part in ("words", "axes", "grid"))
 STYLE: Any = {
     "axes.axisbelow": True,
     "axes.formatter.useoffset": False,
-    "axes.edgecolor": "#555555",
+    "axes.edgecolor": AXES,
     "axes.grid": True,
-    "axes.labelcolor": "#222222",
+    "axes.labelcolor": WORDS,
     "axes.labelsize": 8.5,
     "axes.linewidth": 0.6,
     "axes.spines.right": False,
     "axes.spines.top": False,
     "axes.unicode_minus": True,
     "axes.xmargin": 0.01,
+    "figure.facecolor": "none",
+    "axes.facecolor": "none",
     "font.family": ["DejaVu Sans"],
     "font.size": 8.5,
-    "grid.color": "#e4e4e4",
+    "grid.color": GRID,
     "grid.linewidth": 0.5,
     "legend.fontsize": 8.5,
-    "svg.fonttype": "path",
+    "svg.fonttype": "none",  # words stay words, which either writer sets in a font of its own
     "svg.hashsalt": "davinci-forces",
-    "xtick.color": "#555555",
-    "xtick.labelcolor": "#222222",
+    "text.color": WORDS,
+    "xtick.color": AXES,
+    "xtick.labelcolor": WORDS,
     "xtick.labelsize": 8,
-    "ytick.color": "#555555",
-    "ytick.labelcolor": "#222222",
+    "ytick.color": AXES,
+    "ytick.labelcolor": WORDS,
     "ytick.labelsize": 8,
 }
+LONG = 400  # letters of a path from which it is written in steps
 drawn: "WeakKeyDictionary[Figure | Figure3D, str]" = WeakKeyDictionary()
 
 
 def svg(figure: Figure | Figure3D) -> str:
     """The figure as an SVG element; drawn once, however many reports show it."""
     if figure not in drawn:
-        import matplotlib as mpl
-
-        with mpl.rc_context(STYLE), warnings.catch_warnings():
-            # A character that the font lacks is drawn as a box; the name is in the tables as well.
-            warnings.filterwarnings("ignore", message="Glyph .* missing from")
-            drawn[figure] = _to_svg(draw_figure(figure))
+        drawn[figure] = draw_svg(figure)
     return drawn[figure]
 
 
-def _to_svg(canvas: "Canvas") -> str:
-    file = io.StringIO()
-    canvas.savefig(file, format="svg", metadata={"Date": None, "Creator": None, "Format": None, "Type": None})
+def draw_svg(figure: Figure | Figure3D) -> str:
+    """The figure as an SVG element, drawn anew."""
+    import matplotlib as mpl
+
+    with mpl.rc_context(STYLE):
+        file = io.StringIO()
+        metadata = {"Date": None, "Creator": None, "Format": None, "Type": None}
+        draw_figure(figure).savefig(file, format="svg", metadata=metadata)
     text = file.getvalue()
     return _round_coordinates(text[text.index("<svg") :])
 
 
 def _round_coordinates(text: str) -> str:
-    """Coordinates to a hundredth of a point, in long paths to a tenth: a third of the size, and it cannot be seen."""
+    """Coordinates to a hundredth of a point, in long paths to a tenth: a fifth of the size, and it cannot be seen."""
     text = re.sub(r'(?<= [xy]=")-?\d+\.\d{3,}', lambda n: f"{float(n[0]):.2f}", text)
     return re.sub(r' d="[^"]*"', lambda path: _round_path(path[0]), text)
 
 
 def _round_path(path: str) -> str:
-    decimals = 1 if len(path) > 2000 else 2
-    path = re.sub(r"-?\d+\.\d{2,}", lambda n: f"{float(n[0]):.{decimals}f}", path)
+    if len(path) > LONG and not re.search(r"[A-KN-Za-z]", path[4:-1]):
+        return f' d="{_steps(path)}"'
+    path = re.sub(r"-?\d+\.\d{2,}", lambda n: f"{float(n[0]):.2f}", path)
     return re.sub(r"\s*([A-Za-z])\s+", r"\1", path)
+
+
+def _steps(path: str) -> str:
+    """A path of straight lines as steps in tenths of a point: half the letters of its corners."""
+    parts: list[str] = []
+    here = (0, 0)
+    for letter, x, y in re.findall(r"([ML])\s*(-?[\d.]+) (-?[\d.]+)", path):
+        there = (round(10 * float(x)), round(10 * float(y)))
+        if letter == "M":
+            parts.append(f"M{there[0] / 10:g} {there[1] / 10:g}l")
+        elif there != here:
+            parts.append(f"{_tenths(there[0] - here[0])}{_tenths(there[1] - here[1])}")
+        here = there
+    return re.sub(r"l(?=M|$)|(?<=l) ", "", "".join(parts))
+
+
+def _tenths(number: int) -> str:
+    """A number of tenths as it follows another number: ` 1.2`, ` .3`, `-4`."""
+    text = f"{number / 10:g}".replace("0.", ".", 1) if abs(number) < 10 else f"{number / 10:g}"
+    return text if text.startswith("-") else f" {text}"
 
 
 @singledispatch
@@ -88,17 +113,15 @@ def draw_figure(figure: Any) -> "Canvas":
 
 @draw_figure.register(Figure)
 def _(figure: Figure) -> "Canvas":
-    rows = -(-len(figure.panels) // figure.columns)
+    canvas = _canvas(figure.height)
     width = WIDTH / figure.columns
-    extra = LEGEND_ROW * max(0, max(legend_rows(panel, width) for panel in figure.panels) - 1)
-    canvas = _canvas(rows * (figure.height + extra))
     shared: Axes | None = None
     for place, panel in enumerate(figure.panels):
-        axes = canvas.add_subplot(rows, figure.columns, place + 1, sharex=shared)
+        axes = canvas.add_axes((0, 0, 1, 1), sharex=shared, label=str(place))
         shared = axes if figure.zoomable else None
         last = place + figure.columns >= len(figure.panels)
         draw_panel(axes, panel, width, figure.height, x_label=last or not figure.zoomable)
-    canvas.align_ylabels()
+    arrange(canvas, figure)
     return canvas
 
 
@@ -106,10 +129,8 @@ def _canvas(height: float) -> "Canvas":
     """An empty canvas of the page's width, made without pyplot and its global state."""
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure as Canvas
-    from matplotlib.layout_engine import ConstrainedLayoutEngine
 
-    layout = ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.04, hspace=0.03, wspace=0.03)
-    canvas = Canvas(figsize=(WIDTH / INCH, height / INCH), dpi=72, layout=layout)
+    canvas = Canvas(figsize=(WIDTH / INCH, height / INCH), dpi=72)
     FigureCanvasSVG(canvas)  # words are laid out by the sizes they have in SVG, not in pixels
     return canvas
 
@@ -117,15 +138,17 @@ def _canvas(height: float) -> "Canvas":
 @draw_figure.register(Figure3D)
 def _(figure: Figure3D) -> "Canvas":
     canvas = _canvas(figure.height)
-    axes: Any = canvas.add_subplot(projection="3d")
-    for mark, colour in assign_colours(figure.marks):
-        draw_mark_3d(mark, axes, colour)
+    legend = plan_heading(Panel("", "", "", figure.marks), WIDTH)  # type: ignore[arg-type]
+    height = figure.height - legend.height
+    axes: Any = canvas.add_axes((0, 0, 1, height / figure.height), projection="3d")
+    for mark in assign_looks(figure.marks):
+        draw_mark_3d(mark, axes)
     _set_equal_ranges(axes, figure)
     axes.set_xlabel(figure.x_label)
     axes.set_ylabel(figure.y_label)
     axes.set_zlabel(figure.z_label)
     axes.view_init(elev=figure.elevation, azim=figure.azimuth)
-    draw_heading(axes, "", WIDTH)
+    draw_heading(axes, legend, legend.height, height)
     return canvas
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.maths.arrays import Array
-from pipeline.report.content import Figure
+from pipeline.report.content import Figure, Figure3D
 from pipeline.report.content.marks import AnyMark, Band, Line, Points, Stems
 
 Indices = NDArray[np.intp]
@@ -17,7 +17,7 @@ Indices = NDArray[np.intp]
 class ThinnedFigure:
     """A figure of few enough points, and how many it had."""
 
-    figure: Figure
+    figure: Figure | Figure3D
     samples: int
     shown: int
 
@@ -29,8 +29,14 @@ class ThinnedFigure:
         return f"Min–max envelope of {_group_digits(self.samples)} samples in {_group_digits(self.shown)} points."
 
 
-def thin_figure(figure: Figure, limit: int) -> ThinnedFigure:
-    """Share `limit` points fairly between the marks of a figure; marks that need less than their share keep all."""
+def thin_figure(figure: Figure | Figure3D, limit: int) -> ThinnedFigure:
+    """Share `limit` points fairly between the marks of a figure; marks that need less than their share keep all.
+
+    One in space is left as it is.
+    """
+    if isinstance(figure, Figure3D):
+        samples = sum(len(mark.x) for mark in figure.marks)
+        return ThinnedFigure(figure, samples, samples)
     sizes = [_size(mark) for panel in figure.panels for mark in panel.marks]
     shares = iter(_share_points(sizes, limit))
     panels = tuple(

@@ -2,7 +2,6 @@
 
 import base64
 import hashlib
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,10 +10,12 @@ from pipeline.report.content import Document, Equation, Figure, Figure3D, walk
 from pipeline.report.content.inline import Span, parse, printable
 from pipeline.report.content.layout import Placed, marked_texts, place, references
 from pipeline.report.content.tables import columns
+from pipeline.report.figures.svg import svg
 from pipeline.report.figures.traces import ThinnedFigure, thin_figure
 from pipeline.report.writers.equations import Drawing, Formula, draw_formulas
-from pipeline.report.writers.vectors import inline_svg
-from pipeline.report.writers.zoomable import Json, bokeh_script, embed_items
+from pipeline.report.writers.miniature import miniature
+from pipeline.report.writers.numbers import Json, numbers_json
+from pipeline.report.writers.pictures import address, looks, shrink
 
 if TYPE_CHECKING:
     from markupsafe import Markup
@@ -23,11 +24,9 @@ TEMPLATES = Path(__file__).parent / "templates"
 LARGEST = 4_700_000  # [bytes] of a file, of which the traces get what everything else leaves
 POINT_BYTES = 11  # of a point of a trace: two numbers in single precision, in base 64
 MOST_POINTS, FEWEST_POINTS = 20_000, 2_000  # of one zoomable figure
-START = """
-const traces = JSON.parse(document.getElementById("Traces").textContent);
-Bokeh.logger.set_level("error");
-Bokeh.embed.embed_items(traces.documents, traces.items);
-"""
+STILL_POINTS = 2_000  # of a figure that does not zoom, for those who want its numbers
+SCRIPTS = ("contents.js", "figures.js", "tables.js")
+TRACE_SCRIPTS = ("axes.js", "marks.js", "traces.js")
 
 
 def render(document: Document) -> bytes:
@@ -42,16 +41,22 @@ def render(document: Document) -> bytes:
     """
     placed = place(document)
     figures = {item.anchor: item.block for item in _flatten(placed) if isinstance(item.block, Figure | Figure3D)}
-    letters: dict[str, str] = {}
     zooms = {name: f for name, f in figures.items() if isinstance(f, Figure) and f.zoomable}
-    drawn = {n: inline_svg(f, f"F{i}", letters) for i, (n, f) in enumerate(figures.items()) if n not in zooms}
     formulas, symbols = draw_formulas(_formulas(document))
     page: Json = {
-        "document": document, "placed": placed, "references": references(placed), "figures": drawn,
-        "formulas": formulas, "letters": "".join(letters[n] for n in sorted(letters)) + symbols,
+        "document": document, "placed": placed, "references": references(placed), "formulas": formulas,
+        "pictures": {name: _picture(figure) for name, figure in figures.items()}, "symbols": symbols,
+        "looks": looks(), "scripts": [_script(name) for name in SCRIPTS + (TRACE_SCRIPTS if zooms else ())],
     }  # fmt: skip
-    traces = _thin_figures(zooms, LARGEST - len(_fill(page, {}, "").encode()) - len(bokeh_script()))
-    return _fill(page, traces, _traces_json(traces)).encode()
+    still = {name: f for name, f in figures.items() if name not in zooms and not (isinstance(f, Figure) and f.small)}
+    numbers = {name: thin_figure(figure, STILL_POINTS) for name, figure in still.items()}
+    traces = _thin_figures(zooms, LARGEST - len(_fill(page, numbers).encode()))
+    return _fill(page, numbers | traces).encode()
+
+
+def _picture(figure: Figure | Figure3D) -> str:
+    """The address of a figure's picture."""
+    return address(miniature(figure) if isinstance(figure, Figure) and figure.small else shrink(svg(figure)))
 
 
 def _thin_figures(zooms: dict[str, Figure], room: int) -> dict[str, ThinnedFigure]:
@@ -61,12 +66,8 @@ def _thin_figures(zooms: dict[str, Figure], room: int) -> dict[str, ThinnedFigur
     return {name: thin_figure(figure, limit) for name, figure in zooms.items()}
 
 
-def _traces_json(traces: dict[str, ThinnedFigure]) -> str:
-    """The traces as JSON in which nothing can end the element that holds it."""
-    if not traces:
-        return ""
-    content = embed_items({f"Traces-{name}": trace.figure for name, trace in traces.items()})
-    return json.dumps(content, separators=(",", ":")).replace("<", "\\u003c")
+def _script(name: str) -> str:
+    return (TEMPLATES / name).read_text(encoding="utf-8")
 
 
 def _formulas(document: Document) -> list[Formula]:
@@ -78,7 +79,7 @@ def _flatten(placed: tuple[Placed, ...]) -> list[Placed]:
     return [item for parent in placed for item in (parent, *_flatten(parent.blocks))]
 
 
-def _fill(page: Json, traces: dict[str, ThinnedFigure], data: str) -> str:
+def _fill(page: Json, thinned: dict[str, ThinnedFigure]) -> str:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
 
@@ -86,17 +87,22 @@ def _fill(page: Json, traces: dict[str, ThinnedFigure], data: str) -> str:
         loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
         lstrip_blocks=True, finalize=_finalize,
     )  # fmt: skip
-    environment.filters |= {"inline": _inline(page), "columns": columns, "raw": Markup}
-    scripts = [bokeh_script().replace("</script", "<\\/script"), START] if data else []
-    return environment.get_template("report.html").render(
-        page, traces=traces, data=Markup(data), scripts=[Markup(text) for text in scripts],
-        hashes=[_hash(text) for text in scripts],
-    )  # fmt: skip
+    environment.filters |= {"inline": _inline(page), "columns": columns, "raw": Markup, "attribute": _attribute}
+    numbers = {name: (Markup(numbers_json(one.figure)), one.note) for name, one in thinned.items()}
+    hashes = [_hash(text) for text in page["scripts"]]
+    return environment.get_template("report.html").render(page, numbers=numbers, hashes=hashes)
 
 
 def _finalize(value: Any) -> Any:
     """Text that is not HTML yet, without what no page can hold."""
     return printable(value) if isinstance(value, str) and not hasattr(value, "__html__") else value
+
+
+def _attribute(text: str) -> "Markup":
+    """An address as an attribute holds it; it has no quotation mark, and `<` may stay."""
+    from markupsafe import Markup
+
+    return Markup(text.replace("&", "&amp;"))
 
 
 def _hash(text: str) -> str:

@@ -44,6 +44,8 @@ def render(document: Document) -> bytes:
         "study": printable(document.study),
         "simulated": document.simulated,
         "edition": printable(document.edition),
+        "author": printable(document.author),
+        "keywords": [printable(word) for word in document.keywords],
         "references": references(placed),
         "onscreen": sorted(on_screen(placed)),
         "blocks": [_placed(item) for item in placed],
@@ -112,6 +114,7 @@ def _(table: Table) -> Json:
     return {
         "caption": _inline(table.caption),
         "size": fitted.size,
+        "inset": fitted.inset,
         "widths": fitted.widths,
         "aligns": [column.align for column in shown],
         "header": [fitted.cell(i, column.head) for i, column in enumerate(shown)],

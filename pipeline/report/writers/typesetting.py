@@ -13,6 +13,13 @@ class NotTypeset(PipelineError):
     """Typst refuses the report, or warns about it."""
 
 
+def _drawing_fonts() -> str:
+    """The folder of the fonts that figures are drawn with, the same on every machine."""
+    import matplotlib as mpl
+
+    return str(Path(mpl.get_data_path()) / "fonts/ttf")
+
+
 def typeset(template: Path, content: Any, output: Literal["pdf", "svg"]) -> list[bytes]:
     """Compile a template that reads `content` as data, never as markup; one item per page of SVG, one for a PDF.
 
@@ -23,12 +30,14 @@ def typeset(template: Path, content: Any, output: Literal["pdf", "svg"]) -> list
     """
     import typst
 
+    fonts: list[Any] = [_drawing_fonts()] if output == "pdf" else []
     try:
         pages: Any
         pages, warnings = typst.compile_with_warnings(
             template.read_bytes(),
             format=output,
             ignore_system_fonts=True,
+            font_paths=fonts,
             sys_inputs={"content": json.dumps(content, ensure_ascii=False)},
             timestamp=EPOCH,
         )

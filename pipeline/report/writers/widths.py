@@ -1,25 +1,30 @@
 """Fitting tables to the page: character counts stand for widths, generously, so that nothing runs over the edge."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import inf
+from math import ceil, inf
 
 from pipeline.report.content.inline import Span, parse
 
 PAGE = 482.0  # [pt] of the text on an A4 page
-INSET = 10.0  # [pt] between the columns
+INSETS = (10.0, 6.0)  # [pt] between the columns, and where there is little room
 EM = 0.5  # mean width of a letter [em]: digits and most words are narrower, capitals wider
 SLACK = 2  # letters that a column may be wider than its mean letters say
-SIZES = (9.0, 8.0, 7.0, 6.0)  # [pt]
+SIZES = (9.0, 8.5, 8.0)  # [pt]
 LONG = 44  # letters that no line of prose has trouble with
+HEAD_LINES = 3  # of a header, before the cells below it have to break
+BOLD = 1.1  # how much wider the letters of a header are
 BREAK = "\N{ZERO WIDTH SPACE}"
 
 
 @dataclass(frozen=True)
 class FittedTable:
-    """How a table is set: the letters [pt], and each column's width [pt] (None: as wide as its words) and letters."""
+    """How a table is set: the letters [pt], the gap between columns [pt], each column's width [pt] (None: as wide as
+    its words) and letters."""
 
     size: float
+    inset: float
     widths: tuple[float | None, ...]
     letters: tuple[float, ...]
 
@@ -33,28 +38,63 @@ class FittedTable:
         ]
 
 
+@dataclass(frozen=True)
+class Wants:
+    """Letters that a column wants: with nothing broken, with its header in lines, and for its longest word."""
+
+    whole: int
+    headed: int
+    word: int
+
+
 def fit_columns(cells: list[list[str]]) -> FittedTable:
-    """The largest letters at which the columns fit as they are; else columns that share the page, in smaller ones."""
-    natural = [max(map(_letters, column), default=0) + SLACK for column in cells]
-    for size in SIZES[:2]:
-        if sum(natural) * EM * size + INSET * len(natural) <= PAGE:
-            return FittedTable(size, (None,) * len(natural), (inf,) * len(natural))
-    longest = [max((len(word) for text in column for word in _split_words(text)), default=0) for column in cells]
-    for size in SIZES[1:]:
-        room = (PAGE - INSET * len(natural)) / (EM * size)
-        letters = share_room(natural, room)
-        if size == SIZES[-1] or all(width >= min(word, 14) for width, word in zip(letters, longest, strict=True)):
-            break
-    return FittedTable(size, tuple(n * EM * size + INSET for n in letters), tuple(max(n - SLACK, 1) for n in letters))
+    """The largest letters at which columns, each with its header first, fit; in the smallest, cells may break."""
+    wants = [_wants(column) for column in cells]
+    for size in SIZES:
+        if sum(want.whole for want in wants) <= _room(size, INSETS[0], len(cells)):
+            return FittedTable(size, INSETS[0], (None,) * len(cells), (inf,) * len(cells))
+    for inset in INSETS:
+        for size in SIZES:
+            if sum(want.headed for want in wants) <= _room(size, inset, len(cells)):
+                return _set(size, inset, wants, [want.headed for want in wants])
+    size, inset = SIZES[-1], INSETS[-1]
+    words = [want.word for want in wants]
+    if sum(words) > _room(size, inset, len(cells)):
+        return _set(size, inset, wants, share_room(words, _room(size, inset, len(cells))))
+    return _set(size, inset, wants, words)
 
 
-def share_room(wanted: list[int], room: float) -> list[float]:
+def _room(size: float, inset: float, columns: int) -> float:
+    """Letters that all columns have together."""
+    return (PAGE - inset * columns) / (EM * size)
+
+
+def _set(size: float, inset: float, wants: list[Wants], letters: list[float] | list[int]) -> FittedTable:
+    """Columns of so many letters at least, what is left shared by those that want more."""
+    left = _room(size, inset, len(wants)) - sum(letters)
+    more = share_room([max(want.whole - given, 0) for want, given in zip(wants, letters, strict=True)], left)
+    given = [least + extra for least, extra in zip(letters, more, strict=True)]
+    rooms = tuple(inf if g >= want.word else max(g - SLACK, 1) for g, want in zip(given, wants, strict=True))
+    return FittedTable(size, inset, tuple(g * EM * size + inset for g in given), rooms)
+
+
+def _wants(column: list[str]) -> Wants:
+    head, *cells = column
+    words = max((len(word) for text in cells for word in _split_words(text)), default=0)
+    head_word = max((ceil(BOLD * len(word)) for word in _split_words(head)), default=0)
+    head_letters = ceil(BOLD * _letters(head))
+    widest = max(map(_letters, cells), default=0)
+    in_lines = max(head_word, ceil(head_letters / HEAD_LINES))
+    whole, headed, word = max(widest, head_letters), max(widest, in_lines), max(words, head_word)
+    return Wants(whole + SLACK, min(headed, whole) + SLACK, min(word, whole) + SLACK)
+
+
+def share_room(wanted: Sequence[float], room: float) -> list[float]:
     """Room for each: what it wants while that is below an equal share of what the greedier ones leave."""
     shares, left = [0.0] * len(wanted), room
     order = sorted(range(len(wanted)), key=lambda i: wanted[i])
     for rank, i in enumerate(order):
-        equal = left / (len(order) - rank)
-        shares[i] = min(float(wanted[i]), equal) if rank < len(order) - 1 else equal
+        shares[i] = min(float(wanted[i]), left / (len(order) - rank))
         left -= shares[i]
     return shares
 

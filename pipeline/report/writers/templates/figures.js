@@ -1,0 +1,76 @@
+"use strict";
+// What a figure is drawn from: its columns, decoded when they are asked for, and handed out as CSV.
+
+const numbersOfFigures = new Map();
+
+function numbersOf(figure) {
+  if (!numbersOfFigures.has(figure)) {
+    const numbers = JSON.parse(figure.querySelector("script.numbers").textContent);
+    numbers.columns = numbers.columns.map(decode);
+    numbersOfFigures.set(figure, numbers);
+  }
+  return numbersOfFigures.get(figure);
+}
+
+// A column is [start, step, count], or single (f) or double (d) precision in base 64.
+function decode(column) {
+  if (Array.isArray(column)) {
+    const [start, step, count] = column;
+    return Float64Array.from({ length: count }, (_, i) => start + i * step);
+  }
+  const bytes = Uint8Array.from(atob(column.slice(1)), (letter) => letter.charCodeAt(0));
+  return column[0] === "f" ? new Float32Array(bytes.buffer) : new Float64Array(bytes.buffer);
+}
+
+function csv(numbers) {
+  const quote = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
+  const print = (value, column) =>
+    typeof value === "string" ? quote(value) : Number.isFinite(value) ? String(Number(value.toPrecision(column instanceof Float32Array ? 7 : 12))) : "";
+  const columns = [];
+  for (const panel of numbers.panels)
+    for (const mark of panel.marks) {
+      const head = (field, label) => [panel.title, mark.label || mark.kind, field, label].filter(Boolean).join(" | ");
+      if (mark.names?.length) columns.push({ head: head("name"), values: mark.names });
+      for (const [field, place] of Object.entries(mark.columns))
+        columns.push({ head: head(field, field === "x" ? panel.x_label : panel.y_label), values: numbers.columns[place] });
+    }
+  const rows = [columns.map((column) => quote(column.head)).join(",")];
+  const length = Math.max(0, ...columns.map((column) => column.values.length));
+  for (let i = 0; i < length; i++)
+    rows.push(columns.map(({ values }) => (i < values.length ? print(values[i], values) : "")).join(","));
+  return rows.join("\r\n") + "\r\n";
+}
+
+function save(text, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(new Blob(["\uFEFF", text], { type: "text/csv" }));
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
+}
+
+function newButton(words, label, act) {
+  const button = document.createElement("button");
+  button.type = "button";
+  button.textContent = words;
+  if (label) button.setAttribute("aria-label", label);
+  button.addEventListener("click", act);
+  return button;
+}
+
+// A row of buttons right after a figure's drawing, made when the first of them is.
+function toolsOf(figure) {
+  let tools = figure.querySelector(":scope > .tools");
+  if (!tools) {
+    tools = document.createElement("div");
+    tools.className = "tools";
+    figure.querySelector(".drawing").after(tools);
+  }
+  return tools;
+}
+
+for (const figure of document.querySelectorAll("figure:has(> script.numbers)")) {
+  const name = figure.querySelector("figcaption a").textContent.replace(/\W+$/, "");
+  const file = `${document.title.split(" – ")[0]}-${name}.csv`.toLowerCase().replace(/[^a-z0-9.]+/g, "-");
+  toolsOf(figure).append(newButton("CSV", `Numbers of ${name} as CSV`, () => save(csv(numbersOf(figure)), file)));
+}
