@@ -41,8 +41,11 @@ def run(
             f"{entry.name}: no joint moves, so there is nothing to identify; check its channels and units"
         )
     orders = max(harmonics or robot.joint(signal.joint).harmonics for signal in moving)
-<<<<<<< HEAD
     moving, found, remarks = repeating(moving, entry)
+    if found is None:
+        said = f"{lasting(moving[0], entry)}, so nothing is averaged"
+        yield diagnostic("average", entry.name, "note", f"{said}; its parameters come from the low-passed samples")
+        return
     span, period = longest(moving, found, orders, entry)
     names = [f"{symbol} of {signal.joint}" for signal in moving for symbol in QUANTITIES]
     columns = [getattr(signal, symbol) for signal in moving for symbol in QUANTITIES]
@@ -50,43 +53,39 @@ def run(
     kept, period, odd = alike(moving[0].t, positions, columns, span, period, moving[0].rate, orders)
     remarks += left_out(moving[0], span, kept, period, [(names[d.signal], d) for d in odd])
     period, more = honoured(period, entry)
-=======
-    moving, guess, remarks = repeating(moving, entry)
-    if guess is None and not entry.period:
-        seconds = moving[0].t[-1] - moving[0].t[0] + 1.0 / moving[0].rate
-        said = f"{entry.name}: {seconds:.2f} s hold no motion that repeats at least twice, so nothing is averaged"
-        yield diagnostic("average", entry.name, "note", f"{said}; its parameters come from the low-passed samples")
-        return
-    found, more = shared_period(moving, guess, entry, orders)
-    remarks += more
->>>>>>> e368be82e25c6d8852e297cd8db2c7b717fa2d80
     for signal in moving:
         yield from averaged(signal, kept, period, entry.period or 0.0)
     if remarks + more:
         yield diagnostic("average", entry.name, "warning", *remarks, *more)
 
 
-def repeating(moving: list[Signal], entry: LogEntry) -> tuple[list[Signal], Repetition, list[str]]:
+def repeating(moving: list[Signal], entry: LogEntry) -> tuple[list[Signal], Repetition | None, list[str]]:
     """The joints that repeat, where and after how many samples they do so together, and what to say of the others.
 
     Raises
     ------
     NotPeriodic
-        If no joint repeats.
+        If no joint repeats, and the study states a period.
     """
     found = together(moving)
     alone = [signal for signal in moving if together([signal]) is not None] if found is None else moving
     found = together(alone) if found is None and alone else found
-    if found is None:
-        first = moving[0]
-        seconds = first.t[-1] - first.t[0] + 1.0 / first.rate
-        stated = f"; the study states {entry.period} s" if entry.period else ""
+    if found is None and entry.period:
         raise NotPeriodic(
-            f"{entry.name}: {seconds:.2f} s hold no motion that repeats at least twice{stated}; record more periods, "
+            f"{lasting(moving[0], entry)}; the study states {entry.period} s; record more periods, "
             "leave out what comes before and after them (skip and until in study.toml), or give the log another role"
         )
+    if found is None:
+        return moving, None, []
     out = [signal.joint for signal in moving if signal not in alone]
     return alone, found, [f"{entry.name}: {j} does not repeat, unlike the other joints, and is left out" for j in out]
+
+
+def lasting(first: Signal, entry: LogEntry) -> str:
+    """How long a log lasts without repeating."""
+    return (
+        f"{entry.name}: {first.t[-1] - first.t[0] + 1.0 / first.rate:.2f} s hold no motion that repeats at least twice"
+    )
 
 
 def together(signals: Sequence[Signal]) -> Repetition | None:

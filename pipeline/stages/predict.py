@@ -136,15 +136,9 @@ def without_the_log(
     signal: Signal, own: Trajectory | None, cross_fits: Iterable[CrossFit], model: Model, lowpass: float
 ) -> Iterator[Prediction]:
     """Predict a log from fits to other identification logs."""
-<<<<<<< HEAD
-    part = at(signal, whole(signal, own))
-    motion = motion_at(own, part.t - own.t_start)
-    everywhere = np.ones(len(part.t), dtype=bool)
-=======
     kept = whole(signal, own) if own is not None else np.ones(len(signal), np.bool_)
     part, motion = at(signal, kept), kept_motion(signal, kept, lowpass)
     everywhere = np.ones(len(part.t), np.bool_)
->>>>>>> e368be82e25c6d8852e297cd8db2c7b717fa2d80
     for fit in cross_fits:
         left_out = [str(names).split(", ") for names in fit.left_out]
         rows = [row for row, names in enumerate(left_out) if signal.log in names]
@@ -160,14 +154,9 @@ def without_a_period(
     signal: Signal, own: Trajectory, model: Model, lowpass: float
 ) -> Iterator[Prediction | Diagnostic]:
     """Predict each period of a log from fits to the other periods; only the effort is left out, not the path."""
-<<<<<<< HEAD
-    part = at(signal, whole(signal, own))
-    since = part.t - own.t_start
-=======
     kept = whole(signal, own)
     part = at(signal, kept)
-    since = part.t - signal.t[0]
->>>>>>> e368be82e25c6d8852e297cd8db2c7b717fa2d80
+    since = part.t - own.t_start
     number = np.minimum((since / own.period + 1e-9).astype(int), own.periods - 1)
     group = np.array(folds(own.periods))[number]
     Phi = model.regressor(kept_motion(signal, kept, lowpass)).Phi[:, 0]
