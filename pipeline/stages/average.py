@@ -21,7 +21,7 @@ EXCLUDED = 4.0  # standard errors from the period found, beyond which the data e
 TRIED = 5  # segments, the longest first, in which a repetition is looked for
 SEEMING = (2, 3)  # times: a motion may all but repeat within its period
 BRIEF = 0.1  # of a period: how much more is left out beside a stop, without a word about it
-QUANTITIES = ("q", "dq", "tau")
+MEASURED = ("q", "dq", "tau")
 
 
 def run(
@@ -47,8 +47,8 @@ def run(
         yield diagnostic("average", entry.name, "note", f"{said}; its parameters come from the low-passed samples")
         return
     span, period = longest(moving, found, orders, entry)
-    names = [f"{symbol} of {signal.joint}" for signal in moving for symbol in QUANTITIES]
-    columns = [getattr(signal, symbol) for signal in moving for symbol in QUANTITIES]
+    names = [f"{symbol} of {signal.joint}" for signal in moving for symbol in MEASURED]
+    columns = [getattr(signal, symbol) for signal in moving for symbol in MEASURED]
     positions = [signal.q for signal in moving]
     kept, period, odd = alike(moving[0].t, positions, columns, span, period, moving[0].rate, orders)
     remarks += left_out(moving[0], span, kept, period, [(names[d.signal], d) for d in odd])
