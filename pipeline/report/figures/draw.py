@@ -34,6 +34,7 @@ DASHES: dict[str, Any] = {
     "dashdot": (0, (5, 1.4, 1, 1.4)),
 }
 WIDTH = 0.9  # [pt] of a line
+MANY = 60  # stems, beyond which they are thin and have no heads, so that what is behind them can be seen
 
 
 def escape_label(text: str) -> str:
@@ -90,9 +91,13 @@ def _(mark: Band, axes: "Axes", order: float) -> None:
 
 @draw_mark.register(Stems)
 def _(mark: Stems, axes: "Axes", order: float) -> None:
-    colour = COLOURS[mark.colour]
-    axes.vlines(mark.x, 0.0, mark.y, color=colour, linewidth=WIDTH, label=escape_label(mark.label), zorder=order)
-    axes.plot(mark.x, mark.y, "o", color=colour, markersize=2.2, markeredgewidth=0, zorder=order)
+    colour, many = COLOURS[mark.colour], len(mark.x) > MANY
+    axes.vlines(
+        mark.x, 0.0, mark.y, color=colour, linewidth=0.5 if many else WIDTH, label=escape_label(mark.label),
+        zorder=order,
+    )  # fmt: skip
+    if not many:
+        axes.plot(mark.x, mark.y, "o", color=colour, markersize=2.2, markeredgewidth=0, zorder=order)
     axes.axhline(0.0, color=SURROUNDINGS["axes"][0], linewidth=0.6, zorder=1)
 
 
@@ -118,7 +123,7 @@ def _(mark: VLine, axes: "Axes", order: float) -> None:
 def _(mark: HBand, axes: "Axes", order: float) -> None:
     axes.axhspan(mark.lower, mark.upper, **_fill(mark, 0.22, 1.2))
     for edge in (mark.lower, mark.upper):  # above the marks, which would hide a narrow band
-        axes.axhline(edge, color=COLOURS[mark.colour], linewidth=0.6, linestyle=DASHES["dashed"], zorder=3)
+        axes.axhline(edge, color=COLOURS[mark.colour], linewidth=0.5, zorder=3)
 
 
 @draw_mark.register(VSpan)

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from pipeline.report.content import Figure
-from pipeline.report.figures.panels import LINE, draw_heading, plan_heading
+from pipeline.report.figures.panels import LINE, draw_heading, make_room_for_names, plan_heading
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,8 +31,9 @@ def arrange(canvas: "Canvas", figure: Figure) -> None:
     headings = [plan_heading(panel, wide) for panel in figure.panels]
     rooms = [max(h.height for h in headings[i : i + columns]) for i in range(0, len(headings), columns)]
     below = [max(_room_below(axes) for axes in row) for row in rows]
-    # One line of title, one of legend and the lowest margin are part of the height that a figure asks for.
-    high = max(figure.height - max(below) - ROW_ABOVE, LEAST)
+    # What a figure asks for holds its words, of headings two lines.
+    asked = figure.height * len(rows) + sum(max(room - ROW_ABOVE, 0) for room in rooms)
+    high = max((asked - sum(rooms) - sum(below)) / len(rows), LEAST)
     total = sum(rooms) + sum(below) + high * len(rows)
     canvas.set_size_inches(WIDTH / INCH, total / INCH)
     bottom = total
@@ -43,6 +44,7 @@ def arrange(canvas: "Canvas", figure: Figure) -> None:
             # Where a label is stands fixed: matplotlib would measure the numbers of every axis for it, twice.
             axes.yaxis.set_label_coords(-(TICK + numbers) / wide, 0.5)
             axes.xaxis.set_label_coords(0.5, -(TICK + _lines_of_numbers(axes.xaxis) * NUMBERS) / high)
+            make_room_for_names(axes, figure.panels[i * columns + j], high)
             draw_heading(axes, headings[i * columns + j], room, high)
         bottom -= below[i]
 

@@ -2,7 +2,7 @@
 
 import textwrap
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from pipeline.report.content.marks import AnyMark, Bars, Line, Panel, Points, Stems
 from pipeline.report.figures.draw import draw_bars, draw_mark, unescape_label
@@ -19,25 +19,30 @@ LETTER = 1.65  # [mm] that a letter of a label takes
 LINE = 3.9  # [mm] that a line of a label, a row of a legend takes
 SAMPLE = 10.0  # [mm] that the sample before a legend entry takes, with the gaps about it
 
-NAME = 4.5  # [mm] above or below a point that its name takes
+NAME = 3.6  # [mm] above or below a point that its name takes
 ABOUT = 18.0  # [mm] of a panel's height that its words above and below take
 
 
 @dataclass(frozen=True)
 class Heading:
-    """What stands above a panel: its title in lines, and the labels and entries of its legend, so many side by side."""
+    """What stands above a panel: its title in lines, and the labels and entries of its legend, so many side by side.
+
+    A legend of one row stands `beside` the title if both fit.
+    """
 
     title: str
     labels: tuple[str, ...]
     entries: tuple[str, ...]
     columns: int
+    beside: bool
 
     @property
     def height(self) -> float:
         """Height of all of it [mm]."""
         # Entries that stand side by side have one line each.
         rows = -(-len(self.entries) // self.columns) if self.columns > 1 else sum(map(_lines, self.entries))
-        return LINE * (rows + (_lines(self.title) if self.title else 0)) + 1.5
+        lines = rows * (not self.beside) + (_lines(self.title) if self.title else 0)
+        return LINE * lines + 1.5
 
 
 def plan_heading(panel: Panel, room: float) -> Heading:
@@ -46,7 +51,10 @@ def plan_heading(panel: Panel, room: float) -> Heading:
     longest = max(map(len, labels), default=0)
     columns = max(1, min(len(labels), int(room / (SAMPLE + LETTER * longest))))
     entries = tuple(_wrap(label, room - SAMPLE) for label in labels)
-    return Heading(_wrap(panel.title, 0.9 * room), labels, entries, columns)  # bold letters are wider
+    title = _wrap(panel.title, 0.9 * room)  # bold letters are wider
+    row = sum(SAMPLE + LETTER * len(label) for label in labels) + 3
+    beside = bool(title and labels) and columns == len(labels) and 1.2 * LETTER * len(title) + row <= room
+    return Heading(title, labels, entries, columns, beside)
 
 
 def _lines(text: str) -> int:
@@ -56,7 +64,7 @@ def _lines(text: str) -> int:
 def draw_panel(axes: "Axes", panel: Panel, width: float, height: float, x_label: bool) -> None:
     """Draw a panel into a cell of this width and height [mm], without what stands above it."""
     _draw_marks(axes, panel, width)
-    _set_ranges(axes, panel, height)
+    _set_ranges(axes, panel)
     bars = any(isinstance(mark, Bars) for mark in panel.marks)
     across = panel.x_label if bars else _ticks(axes, "x", panel.x_log, panel.x_label, 4 if width < 70 else 8)
     up = _ticks(axes, "y", panel.y_log, panel.y_label, 5)
@@ -74,14 +82,18 @@ def _draw_marks(axes: "Axes", panel: Panel, width: float) -> None:
         axes.margins(x=0.03)  # room for symbols at the ends
 
 
-def _set_ranges(axes: "Axes", panel: Panel, height: float) -> None:
+def _set_ranges(axes: "Axes", panel: Panel) -> None:
     if panel.x_range:
         axes.set_xlim(*panel.x_range)
     if panel.y_range:
         axes.set_ylim(*panel.y_range)
-    elif any(isinstance(mark, Points) and mark.names for mark in panel.marks):
+
+
+def make_room_for_names(axes: "Axes", panel: Panel, height: float) -> None:
+    """Widen the range of y so that the names of points fit into axes of a height [mm]."""
+    if panel.y_range is None and any(isinstance(mark, Points) and mark.names for mark in panel.marks):
         low, high = axes.get_ylim()
-        room = NAME / max(height - ABOUT - 2 * NAME, NAME) * (high - low)
+        room = NAME / max(height - 2 * NAME, NAME) * (high - low)
         axes.set_ylim(low - room, high + room)
 
 
@@ -116,7 +128,7 @@ def _wrap(text: str, room: float) -> str:
 
 
 def draw_heading(axes: "Axes", heading: Heading, room: float, height: float) -> None:
-    """Title at the top of `room` [mm] above axes of a height [mm], and the legend right above them."""
+    """Title at the top of `room` [mm] above axes of a height [mm], and the legend right above them or beside it."""
     if heading.title:
         axes.text(
             0, 1 + (room - 0.5) / height, heading.title, transform=axes.transAxes, va="top", fontsize=9,
@@ -127,13 +139,15 @@ def draw_heading(axes: "Axes", heading: Heading, room: float, height: float) -> 
         # In the order of the marks, which is not that of matplotlib's kinds of artists.
         ranks = [heading.labels.index(unescape_label(label)) for label in labels]
         handles = [handle for _, handle in sorted(zip(ranks, handles, strict=True), key=lambda pair: pair[0])]
-        draw_legend(axes, handles, heading)
+        anchor = (1.0, 1 + (room - LINE - 1.0) / height) if heading.beside else (0.0, 1.0)
+        draw_legend(axes, handles, heading, anchor)
 
 
-def draw_legend(axes: "Axes", handles: list["Artist"], heading: Heading) -> None:
-    """The legend above the axes, where it covers no data."""
+def draw_legend(axes: "Axes", handles: list["Artist"], heading: Heading, anchor: tuple[float, float]) -> None:
+    """The legend above the axes, where it covers no data; its corner, left or right, at the anchor."""
+    place: Any = "lower right" if heading.beside else "lower left"
     legend = axes.legend(
-        handles, [" "] * len(handles), loc="lower left", bbox_to_anchor=(0, 1.0), ncols=heading.columns, frameon=False,
+        handles, [" "] * len(handles), loc=place, bbox_to_anchor=anchor, ncols=heading.columns, frameon=False,
         borderpad=0, borderaxespad=0.25, handlelength=2.6, columnspacing=1.4, labelspacing=0.3, handletextpad=0.5,
     )  # fmt: skip
     # Set afterwards: matplotlib leaves out a label that begins with an underscore, and reads dollars as maths.

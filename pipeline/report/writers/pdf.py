@@ -19,7 +19,7 @@ from pipeline.report.content import (
 )
 from pipeline.report.content.inline import parse, printable
 from pipeline.report.content.layout import Placed, on_screen, place, references
-from pipeline.report.content.tables import columns
+from pipeline.report.content.tables import NO_BREAK, columns
 from pipeline.report.figures.svg import svg
 from pipeline.report.writers.typesetting import typeset
 from pipeline.report.writers.widths import allow_breaks, fit_columns
@@ -110,7 +110,8 @@ def _(equation: Equation) -> Json:
 @block_data.register(Table)
 def _(table: Table) -> Json:
     shown = columns(table)
-    fitted = fit_columns([[column.head, *(cell.text for cell in column.cells)] for column in shown])
+    cells = [[_unbroken(cell.text, column.align) for cell in column.cells] for column in shown]
+    fitted = fit_columns([[column.head, *texts] for column, texts in zip(shown, cells, strict=True)])
     return {
         "caption": _inline(table.caption),
         "size": fitted.size,
@@ -118,10 +119,13 @@ def _(table: Table) -> Json:
         "widths": fitted.widths,
         "aligns": [column.align for column in shown],
         "header": [fitted.cell(i, column.head) for i, column in enumerate(shown)],
-        "rows": [
-            [fitted.cell(i, column.cells[row].text) for i, column in enumerate(shown)] for row in range(len(table.rows))
-        ],
+        "rows": [[fitted.cell(i, texts[row]) for i, texts in enumerate(cells)] for row in range(len(table.rows))],
     }
+
+
+def _unbroken(text: str, align: str) -> str:
+    """A cell as its column has it: what stands to the right is a number, of which the unit is not parted."""
+    return text.replace(" ", NO_BREAK) if align == "r" else text
 
 
 @block_data.register(Figure)

@@ -1,27 +1,43 @@
-"""Fitting tables to the page: character counts stand for widths, generously, so that nothing runs over the edge."""
+"""Fitting tables to the page, by the widths that the letters of the report's font have."""
 
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import ceil, inf
+from math import inf
 
-from pipeline.report.content.inline import Span, parse
+from pipeline.report.content.inline import parse
 
 PAGE = 482.0  # [pt] of the text on an A4 page
 INSETS = (10.0, 6.0)  # [pt] between the columns, and where there is little room
-EM = 0.5  # mean width of a letter [em]: digits and most words are narrower, capitals wider
-SLACK = 2  # letters that a column may be wider than its mean letters say
+SLACK = 0.6  # [em] that a column is wider than its letters
 SIZES = (9.0, 8.5, 8.0)  # [pt]
 LONG = 44  # letters that no line of prose has trouble with
 HEAD_LINES = 3  # of a header, before the cells below it have to break
-BOLD = 1.1  # how much wider the letters of a header are
+BOLD = 1.08  # how much wider the letters of a header are
+CODE, SYMBOL, OTHER = 0.51, 0.6, 0.65  # [em] of a letter of code, of a sign of maths, of a letter not known here
+LETTERS: dict[str, float] = {  # [em] of a letter, Libertinus Serif to a twentieth
+    letter: width
+    for width, letters in (
+        (0.25, " \N{NO-BREAK SPACE}',.|:;ijl·°"),
+        (0.3, "!()/IJ\\ft{}⁰¹²³⁴⁵⁶⁷⁸⁹⁻"),
+        (0.35, '"*-[]r'),
+        (0.4, "`sz"),
+        (0.47, "#$0123456789?ace~τé"),
+        (0.5, "FS^_bdgkopqvxyθµ"),
+        (0.55, "+<=>ELPhnu±×−–σ"),
+        (0.7, "&ADGNOQ"),
+        (0.8, "Hmw"),
+        (0.95, "M@W"),
+    )
+    for letter in letters
+}
 BREAK = "\N{ZERO WIDTH SPACE}"
 
 
 @dataclass(frozen=True)
 class FittedTable:
     """How a table is set: the letters [pt], the gap between columns [pt], each column's width [pt] (None: as wide as
-    its words) and letters."""
+    its words) and the letters after which a word in it may break."""
 
     size: float
     inset: float
@@ -40,11 +56,11 @@ class FittedTable:
 
 @dataclass(frozen=True)
 class Wants:
-    """Letters that a column wants: with nothing broken, with its header in lines, and for its longest word."""
+    """Width that a column wants [em]: with nothing broken, with its header in lines, and for its longest word."""
 
-    whole: int
-    headed: int
-    word: int
+    whole: float
+    headed: float
+    word: float
 
 
 def fit_columns(cells: list[list[str]]) -> FittedTable:
@@ -58,35 +74,36 @@ def fit_columns(cells: list[list[str]]) -> FittedTable:
             if sum(want.headed for want in wants) <= _room(size, inset, len(cells)):
                 return _set(size, inset, wants, [want.headed for want in wants])
     size, inset = SIZES[-1], INSETS[-1]
-    words = [want.word for want in wants]
-    if sum(words) > _room(size, inset, len(cells)):
-        return _set(size, inset, wants, share_room(words, _room(size, inset, len(cells))))
-    return _set(size, inset, wants, words)
+    words, room = [want.word for want in wants], _room(size, inset, len(cells))
+    return _set(size, inset, wants, words if sum(words) <= room else share_room(words, room))
 
 
 def _room(size: float, inset: float, columns: int) -> float:
-    """Letters that all columns have together."""
-    return (PAGE - inset * columns) / (EM * size)
+    """Width that all columns have together [em]."""
+    return (PAGE - inset * columns) / size
 
 
-def _set(size: float, inset: float, wants: list[Wants], letters: list[float] | list[int]) -> FittedTable:
-    """Columns of so many letters at least, what is left shared by those that want more."""
-    left = _room(size, inset, len(wants)) - sum(letters)
-    more = share_room([max(want.whole - given, 0) for want, given in zip(wants, letters, strict=True)], left)
-    given = [least + extra for least, extra in zip(letters, more, strict=True)]
-    rooms = tuple(inf if g >= want.word else max(g - SLACK, 1) for g, want in zip(given, wants, strict=True))
-    return FittedTable(size, inset, tuple(g * EM * size + inset for g in given), rooms)
+def _set(size: float, inset: float, wants: list[Wants], least: list[float]) -> FittedTable:
+    """Columns of these widths at least [em], what is left shared by those that want more."""
+    left = _room(size, inset, len(wants)) - sum(least)
+    more = share_room([max(want.whole - width, 0) for want, width in zip(wants, least, strict=True)], left)
+    widths = [width + extra for width, extra in zip(least, more, strict=True)]
+    letters = tuple(
+        inf if width >= want.word - 1e-9 else max((width - SLACK) / CODE, 1)
+        for width, want in zip(widths, wants, strict=True)
+    )
+    return FittedTable(size, inset, tuple(width * size + inset for width in widths), letters)
 
 
 def _wants(column: list[str]) -> Wants:
     head, *cells = column
-    words = max((len(word) for text in cells for word in _split_words(text)), default=0)
-    head_word = max((ceil(BOLD * len(word)) for word in _split_words(head)), default=0)
-    head_letters = ceil(BOLD * _letters(head))
-    widest = max(map(_letters, cells), default=0)
-    in_lines = max(head_word, ceil(head_letters / HEAD_LINES))
-    whole, headed, word = max(widest, head_letters), max(widest, in_lines), max(words, head_word)
-    return Wants(whole + SLACK, min(headed, whole) + SLACK, min(word, whole) + SLACK)
+    head_words = [BOLD * width for width in _words(head)]
+    head_width = BOLD * _width(head)
+    widest = max(map(_width, cells), default=0)
+    in_lines = max(*head_words, head_width / (HEAD_LINES - 1), 0) if head_words else 0
+    whole = max(widest, head_width)
+    word = max([width for text in cells for width in _words(text)] + head_words, default=0)
+    return Wants(whole + SLACK, max(widest, min(in_lines, head_width)) + SLACK, min(word, whole) + SLACK)
 
 
 def share_room(wanted: Sequence[float], room: float) -> list[float]:
@@ -109,14 +126,23 @@ def allow_breaks(text: str, longest: int = LONG) -> str:
     return re.sub(rf"\S{{{longest + 1},}}", cut, text)
 
 
-def _letters(text: str) -> int:
-    return sum(_length(span) for span in parse(text))
+def _width(text: str) -> float:
+    """Width of a marked text on one line [em]."""
+    return sum(_span_width(span.kind, span.text) for span in parse(text))
 
 
-def _length(span: Span) -> int:
-    """Letters of a span; maths prints fewer than it is written with."""
-    return len(span.text) if span.kind != "maths" else len(re.sub(r"[a-z]{2,}|[^a-z]", "x", span.text))
+def _span_width(kind: str, text: str) -> float:
+    if kind == "maths":  # prints fewer signs than it is written with
+        return SYMBOL * len(re.sub(r"[a-z]{2,}|[^a-z]", "x", text))
+    if kind == "code":
+        return CODE * len(text)
+    return sum(LETTERS.get(letter, OTHER) for letter in text) * (BOLD if kind == "bold" else 1)
 
 
-def _split_words(text: str) -> list[str]:
-    return [word for span in parse(text) if span.kind != "maths" for word in span.text.split()]
+def _words(text: str) -> list[float]:
+    """Widths of the words of a text, which may not break [em]; words that different marks share break between them."""
+    words: list[float] = []
+    for span in parse(text):
+        parts = [span.text] if span.kind == "maths" else re.findall(r"[^ \t\n]+", span.text)
+        words += [_span_width(span.kind, part) for part in parts]
+    return words
