@@ -66,6 +66,14 @@ def most_telling(tracks: list[Track], most: int) -> list[Track]:
     return [track for track in moving if track in ranked[:most]]
 
 
+def fit_name(model: str, estimator: str) -> str:
+    """A fit as a reader knows it: 'independent, LSE'; the chosen one with what was chosen."""
+    if model != CHOSEN:
+        return f"{model}, {estimator.upper()}"
+    structure, _, by = estimator.rpartition(".")
+    return f"chosen: {structure}, {by.upper()}"
+
+
 def count(number: int, noun: str) -> str:
     """A number with its noun: '1 run', '3 runs'."""
     return f"{number} {noun}{'' if number == 1 else 's'}"

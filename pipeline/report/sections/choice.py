@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.records import Choice, Prediction
+from pipeline.records import Choice, Fit, Prediction
 from pipeline.records.predict import CHOSEN
 from pipeline.records.record import slug
 from pipeline.report.content import (
@@ -20,8 +20,9 @@ from pipeline.report.content import (
     Verdict,
     literal,
 )
-from pipeline.report.context import Context, title
+from pipeline.report.context import Context, fit_name, title
 
+SHOWN = 9  # runs at most in the PDF
 SAME = 1e-9  # relative errors closer than this are one
 
 
@@ -53,6 +54,7 @@ def blocks(context: Context, choice: Choice) -> Iterator[Block]:
     )  # fmt: skip
     yield from overfitting(choice)
     yield from unseen(context)
+    yield from parameters(context)
 
 
 def leading(choice: Choice) -> list[int]:
@@ -96,7 +98,7 @@ def figure(choice: Choice) -> Figure:
         "Relative error over number of parameters: falling where fitted, not always where data were left out.",
         (Panel("Candidates", "parameters", "relative error", (*marks, *repeated)),),
         label="choice-figure",
-        height=60,
+        height=46,
     )
 
 
@@ -128,4 +130,23 @@ def unseen(context: Context) -> Iterator[Block]:
         for p in predictions
     )
     header = ("Log", "Joint", "Path", "Chosen", "Joint by itself")
-    yield Table("Relative error on logs that no parameter was fitted to.", header, rows, "choice-unseen", "lllrr")
+    table = Table("Relative error on logs that no parameter was fitted to.", header, rows, "choice-unseen", "lllrr")
+    long = len(rows) > SHOWN
+    yield OnScreen("The chosen model beside each joint by itself, run by run", "unseen", (table,)) if long else table
+
+
+def parameters(context: Context) -> Iterator[Block]:
+    """The parameters of the chosen fits, where they are not those of a joint by itself."""
+    used = {context.used_fit(joint) for joint in (j.name for j in context.study.robot.joints)}
+    fits = [f for f in context.catalogue.all(Fit) if f"{CHOSEN}.{f.model}.{f.estimator}" in used]
+    tables = tuple(parameter_table(context, fit) for fit in fits if fit.model != "independent")
+    if tables:
+        yield OnScreen("Parameters of the chosen model", "chosen-parameters", tables)
+
+
+def parameter_table(context: Context, fit: Fit) -> Table:
+    """Every parameter with its standard error."""
+    key = ".".join(("fit", *fit.key))
+    rows = tuple((literal(str(name)), context.number(f"{key}.{slug(str(name))}", 2)) for name in fit.parameter)
+    caption = f"{title(fit.group)}: {fit_name(fit.model, fit.estimator)}, from {literal(', '.join(fit.logs))}."
+    return Table(caption, ("Parameter", "Value"), rows, f"chosen-{fit.group}", "lr")

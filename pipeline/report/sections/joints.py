@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from pipeline.records import Column, Fit, Residual, Trajectory, Whiteness
+from pipeline.records.predict import CHOSEN
 from pipeline.records.record import slug
 from pipeline.report.content import (
     Block,
@@ -23,7 +24,7 @@ from pipeline.report.content import (
     Verdict,
     literal,
 )
-from pipeline.report.context import Context, label, title
+from pipeline.report.context import Context, fit_name, label, title
 from pipeline.report.plots import autocorrelation, binned_means, correlation, explained_by
 from pipeline.report.results import format_unit
 from pipeline.report.verdicts import percent
@@ -108,13 +109,21 @@ def parameters(context: Context, fit: Fit) -> Table:
     mse = context.number(f"{'.'.join(('fit', *fit.key))}.mse", 3)
     return Table(
         f"Parameters of the {literal(fit.group.replace('_', ' '))} ({fit.model}, "
-        f"{NAMES.get(fit.estimator, fit.estimator)}), which the filter runs with, from {literal(', '.join(fit.logs))}; "
+        f"{NAMES.get(fit.estimator, fit.estimator)}), {standing(context, fit)}, from {literal(', '.join(fit.logs))}; "
         f"mean squared error {mse} of the averaged effort.",
         ("Symbol", "Parameter", "Unit", "Value", "Classical standard error", "$z$"),
         tuple(rows),
         label=f"theta-{fit.group}",
         align="lllrrr",
     )
+
+
+def standing(context: Context, fit: Fit) -> str:
+    """Whether the filter runs with a fit, or with what."""
+    used = context.used_fit(fit.group)
+    if used.removeprefix(f"{CHOSEN}.") == f"{fit.model}.{fit.estimator}":
+        return "which the filter runs with"
+    return f"beside which the filter runs with {fit_name(*used.split('.', 1))}"
 
 
 def unitless(context: Context, key: str) -> Cell:
@@ -131,7 +140,7 @@ def compared(context: Context, fits: list[Fit]) -> Block:
         key = ".".join(("fit", *fit.key))
         values = (context.number(f"{key}.{slug(name)}", 3) for name in names)
         scores = (context.number(f"{key}.{name}", 3) for name in ("mse", "r2", "condition"))
-        rows.append((f"{fit.model}, {fit.estimator.upper()}", *scores, *values))
+        rows.append((fit_name(fit.model, fit.estimator), *scores, *values))
     group = fits[0].group
     caption = (
         f"Every fit of the {literal(group.replace('_', ' '))}: mean squared error of the averaged effort, share of its "
@@ -146,7 +155,7 @@ def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
     """What a fit leaves of one log: over time, against the motion, and against itself."""
     name = f"{title(residual.joint)} in {literal(residual.log)}"
     errors, effort = residual.tau - residual.tau_hat, label(residual, "tau", "effort")
-    who = f"{residual.model}, {residual.estimator.upper()}"
+    who = fit_name(residual.model, residual.estimator)
     yield Figure(
         f"{name}: averaged effort and model ({who}), and what the model leaves of it.",
         f"{name}: the model follows the averaged effort up to {errors.std():.2g} (root mean square).",

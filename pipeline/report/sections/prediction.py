@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from pipeline.records import Prediction
 from pipeline.report.content import Block, Cell, Figure, Line, OnScreen, Panel, Prose, Section, Table, VSpan, literal
-from pipeline.report.context import Context, label, title
+from pipeline.report.context import Context, fit_name, label, title
 from pipeline.report.verdicts import percent
 
 LEFT_OUT = {
@@ -64,7 +64,7 @@ def every_score(context: Context, predictions: list[Prediction]) -> Table:
         (
             literal(p.log),
             title(p.joint),
-            f"{p.model}, {p.estimator.upper()}",
+            fit_name(p.model, p.estimator),
             *(context.number(f"{p.prefix}.{name}", 3) for name in names),
         )
         for p in predictions
@@ -81,7 +81,7 @@ def estimators(context: Context, predictions: list[Prediction]) -> Iterator[Tabl
     if len(fits) < 2:
         return
     rows = tuple(
-        (f"{model}, {estimator.upper()}", *(worst(context, predictions, joint, model, estimator) for joint in joints))
+        (fit_name(model, estimator), *(worst(context, predictions, joint, model, estimator) for joint in joints))
         for model, estimator in fits
     )
     caption = "Every fit compared: its model error in the worst unseen run of each joint."
@@ -106,8 +106,8 @@ def figure(context: Context, p: Prediction) -> Figure:
     )
     error = context.size(p, "model_error", p.model_error)
     return Figure(
-        f"{name}, the worst run of this joint: measured effort and the {p.estimator.upper()} model's, and their "
-        "difference.",
+        f"{name}, the worst run of this joint: measured effort and the model's ({fit_name(p.model, p.estimator)}), "
+        "and their difference.",
         f"{name}: the model's effort differs from the measured one by {error} beyond noise.",
         (
             Panel(
