@@ -69,14 +69,17 @@ def test_a_log_that_has_left_the_study_has_no_records(plan):
 
 def test_a_call_gets_the_records_about_its_own_log_and_joint(plan):
     tasks = {task.name: task for task in plan.tasks(declaration("predict"))}
-    assert list(tasks) == [f"{log}/{joint}" for log in LOGS for joint in (ROLL, PITCH)]
-    handed = {p: [place for _, place in r] for p, r in tasks[f"zebra/{PITCH}"].records.items()}
+    assert list(tasks) == list(LOGS)
+    handed = {p: [str(place) for _, place in r] for p, r in tasks["zebra"].records.items()}
+    joints = (ROLL, PITCH)
     assert handed == {
-        "signal": [f"signal/zebra/{PITCH}.parquet"],
-        "paths": [f"fitted_paths/{PITCH}.parquet"],
-        "trajectory": [f"trajectory/zebra/{PITCH}.parquet"],
-        "fits": [f"fit/{PITCH}/independent.lse.parquet"],
-        "cross_fits": [f"cross_fit/{PITCH}/independent.lse.parquet"],
+        "signals": [f"signal/zebra/{joint}.parquet" for joint in joints],
+        "smoothed": [],
+        "trajectories": [f"trajectory/zebra/{joint}.parquet" for joint in joints],
+        "paths": [f"fitted_paths/{joint}.parquet" for joint in joints],
+        "fits": [f"fit/{joint}/independent.lse.parquet" for joint in joints],
+        "cross_fits": [f"cross_fit/{joint}/independent.lse.parquet" for joint in joints],
+        "choices": [],
     }
     [whole] = plan.tasks(declaration("fit"))
     assert len(whole.records["trajectories"]) == len(LOGS) * 2
@@ -94,14 +97,14 @@ def test_a_task_knows_nothing_of_other_logs(plan, stage):
 def test_a_stage_depends_on_the_settings_and_things_that_its_signature_names(plan):
     task = next(plan.tasks(declaration("predict")))
     assert task.settings == {"lowpass": Settings().lowpass} == task.fingerprint.settings
-    assert task.given.keys() == {"entry", "joint"} == task.fingerprint.given.keys()
+    assert task.given.keys() == {"entry", "robot"} == task.fingerprint.given.keys()
 
 
 def test_what_is_read_counts_by_name_type_and_unit_and_what_is_written_by_meaning_too(monkeypatch):
     from pipeline.records.quantities import QUANTITIES
 
     before = {stage: schemas(stage) for stage in ("predict", "fit", "whiteness")}
-    read = {"Signal", "Trajectory", "FittedPaths", "Fit", "CrossFit"}
+    read = {"Signal", "Trajectory", "FittedPaths", "Fit", "CrossFit", "Smoothed", "Choice"}
     assert before["predict"].keys() == {*read, "Prediction", "Diagnostic"}
 
     def changed(**what: str) -> set[tuple[str, str]]:
@@ -130,7 +133,7 @@ def test_what_a_call_reads_does_not_grow_with_the_logs(few_and_many):
         plan = Plan(study, Ledger(folders))
         tasks = {stage: list(plan.tasks(declaration(stage))) for stage in STAGES}
         reads.append({s: max(len(t.fingerprint.inputs) for t in every) for s, every in tasks.items() if len(every) > 1})
-        assert {s for s, every in tasks.items() if len(every) == 1} == {"design", "fit", "threshold"}
+        assert {s for s, every in tasks.items() if len(every) == 1} == {"design", "fit", "choose", "threshold"}
     assert reads[0] == reads[1]
 
 
