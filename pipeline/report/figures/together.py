@@ -9,7 +9,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
-import pipeline
 from pipeline.report.content import Figure, Figure3D
 from pipeline.report.figures.svg import draw_svg, drawn
 
@@ -47,7 +46,7 @@ def _draw(figures: list[Figure | Figure3D]) -> None:
 
 def _ask(share: list[Figure | Figure3D]) -> "subprocess.Popen[bytes]":
     """Have another process draw a share.  It starts anew: a fork would inherit locks of threads that it has not."""
-    path = os.pathsep.join(filter(None, [str(Path(pipeline.__file__).parents[1]), os.environ.get("PYTHONPATH")]))
+    path = os.pathsep.join(filter(None, [str(Path(__file__).parents[3]), os.environ.get("PYTHONPATH")]))
     process = subprocess.Popen(
         [sys.executable, "-P", "-c", PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
         env=os.environ | {"PYTHONPATH": path},
