@@ -7,8 +7,7 @@ from pipeline.report.content import Document, Section
 from pipeline.report.context import Context
 from pipeline.report.results import collect
 from pipeline.report.sections import DOCUMENTS, section_builder
-from pipeline.report.terminal import answer
-from pipeline.report.writers import WRITERS, renderer
+from pipeline.report.writers import render_all
 from pipeline.study import Study
 
 
@@ -18,15 +17,18 @@ def write(catalogue: Catalogue, study: Study, provenance: Provenance) -> dict[st
     built = {name: (title, sections(context, names)) for name, (title, names) in DOCUMENTS.items()}
     results = context.results.json()
     edition = f"report ID {identity(provenance, results)} · davinci-forces {provenance.version}"
-    documents = {
-        name: Document(title, study.title, study.simulated, content, edition)
+    documents = tuple(
+        Document(title, study.title, study.simulated, content, edition, name, links_beside(name, built))
         for name, (title, content) in built.items()
         if content
-    }
-    pages = {
-        f"{name}.{ending}": renderer(ending)(document) for name, document in documents.items() for ending in WRITERS
-    }
-    return pages | {"results.json": results, "summary.txt": answer(context).encode()}
+    )
+    return render_all(documents) | {"results.json": results}
+
+
+def links_beside(name: str, built: dict[str, tuple[str, tuple[Section, ...]]]) -> tuple[tuple[str, str], ...]:
+    """The other documents of a report, by their titles, and its numbers."""
+    others = [(title, f"{other}.html") for other, (title, content) in built.items() if content and other != name]
+    return (*others, ("Numbers", "results.json"))
 
 
 def sections(context: Context, names: tuple[str, ...]) -> tuple[Section, ...]:

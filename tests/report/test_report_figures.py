@@ -6,6 +6,7 @@ import os
 import re
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -15,9 +16,11 @@ import pytest
 from matplotlib.text import Text
 from report_documents import HOSTILE, still, zoomable
 
+from pipeline.report import writers
 from pipeline.report.content import Document, Figure, Figure3D, Histogram, Line, Panel, walk
+from pipeline.report.figures import together
 from pipeline.report.figures.panels import wrap_label
-from pipeline.report.figures.svg import STYLE, draw_figure, svg
+from pipeline.report.figures.svg import STYLE, draw_figure, draw_svg, svg
 from pipeline.report.figures.ticks import power_of_ten
 from pipeline.report.writers import html, pdf
 
@@ -84,6 +87,17 @@ def test_a_figure_is_drawn_once() -> None:
     assert svg(figure) is svg(figure)
 
 
+@pytest.mark.parametrize("program", [together.PROGRAM, "raise SystemExit(3)"])
+def test_figures_drawn_by_several_processes_are_the_same_bytes_and_none_is_missing_when_one_ends(
+    program: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(together, "PROGRAM", program)
+    monkeypatch.setattr(os, "cpu_count", lambda: 2)
+    figures = [zoomable(40 + i, f"z{i}") for i in range(2 * together.FEWEST)]
+    together.draw_together(figures)
+    assert [svg(figure) for figure in figures] == [draw_svg(figure) for figure in figures]
+
+
 def test_a_figure_of_a_million_samples_stays_small() -> None:
     assert len(svg(zoomable(1_000_000, "z"))) < 200_000
 
@@ -100,6 +114,16 @@ def test_another_process_gives_the_same_bytes(full: Document) -> None:
         [sys.executable, "-c", program], capture_output=True, text=True, check=True, env=environment, timeout=120
     )
     assert result.stdout.split() == [hashlib.sha256(writer.render(full)).hexdigest() for writer in (pdf, html)]
+
+
+def test_all_files_written_side_by_side_are_those_written_alone(full: Document) -> None:
+    robot = replace(full, file="robot", links=(("Report", "report.html"),))
+    files = writers.render_all((full, robot))
+    assert list(files) == ["report.html", "report.pdf", "robot.html", "robot.pdf"]
+    assert files["report.html"] == html.render(full)
+    assert files["report.pdf"] == pdf.render(full) == files["robot.pdf"]
+    assert b'<a href="robot.pdf">PDF</a>' in files["robot.html"]
+    assert b'<a href="report.html">Report</a>' in files["robot.html"]
 
 
 def test_importing_the_content_imports_no_drawing_catalogue() -> None:
