@@ -65,7 +65,7 @@ TIERS = (
 )
 # The same inside maths, where what is computed from motion stands above what motion is.
 MATHS = (
-    ("simulation", "excitation", "contact", "selection"),
+    ("simulation", "excitation", "contact", "selection", "estimation"),
     ("models",),
     ("mechanics", "signals"),
     ("arrays", "compiled", "constants", "units"),

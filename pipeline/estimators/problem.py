@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -9,6 +10,11 @@ from numpy.typing import NDArray
 
 from pipeline.errors import NotIdentifiable
 from pipeline.maths.arrays import Array
+from pipeline.maths.estimation.correlation import correlated
+from pipeline.maths.estimation.least_squares import Triangle, triangle
+
+ROUNDING = 1e-13  # of the longest column, below which one is nothing but rounding
+CONDITION = 1e10  # of scaled columns, above which rounding tells them apart as much as the motion does
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,86 +29,92 @@ class Regression:
     names: tuple[str, ...]  # of the parameters
 
 
-class Estimate(NamedTuple):
-    """Parameters with two standard deviations: residuals taken as uncorrelated, and allowed to be correlated."""
+class Spread(NamedTuple):
+    """How far parameters may be off."""
+
+    classical: Array  # (p,) standard errors, residuals taken as uncorrelated and as large everywhere
+    stated: Array  # (p,) allowing for residuals that are neither
+    lags: float  # the sum of the residuals' correlations over all lags but 0
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Parameters with two standard errors, which are computed when they are first asked for: refits do not ask."""
 
     theta: Array  # (p,)
-    theta_std: Array  # (p,)
-    theta_std_hac: Array  # (p,)
-    hac_lags: int
+    judge: Callable[[], Spread]
+
+    @cached_property
+    def spread(self) -> Spread:
+        """How far the parameters may be off."""
+        return self.judge()
+
+    @property
+    def theta_std(self) -> Array:
+        """Standard errors (p,) that take residuals as uncorrelated and as large everywhere."""
+        return self.spread.classical
+
+    @property
+    def theta_std_hac(self) -> Array:
+        """Standard errors (p,) that allow for residuals that are correlated, and larger here than there."""
+        return self.spread.stated
+
+    @property
+    def hac_lags(self) -> int:
+        """Over how many lags residuals are correlated, each counting by its correlation."""
+        return round(self.spread.lags)
 
 
 Estimator = Callable[[Regression], Estimate]
 
 
 def solve(problem: Regression, weight: Array) -> Estimate:
-    """Minimise the sum of weight (tau - Phi theta)^2, by QR of the scaled rows.  (6.42), (6.46)
+    """Minimise the sum of weight (tau - Phi theta)^2, by QR of the weighted rows.  (6.42), (6.46)
 
-    `weight` is (K,), 0 where there is nothing.  The standard deviations take their scale from the residuals, so a
-    model that does not fit has wider ones, whatever the noise.
+    `weight` is (K,), 0 where there is nothing.  The standard errors take their scale from the residuals, so a model
+    that does not fit has wider ones, whatever the noise.  Raises what `factored` does.
+    """
+    R = factored(problem, weight)
+    return Estimate(R.theta, lambda: spread(problem, weight, R, R.theta))
+
+
+def factored(problem: Regression, weight: Array) -> Triangle:
+    """What the rows, each counting by its weight (K,), say of the parameters.
 
     Raises
     ------
     NotIdentifiable
-        If the columns of Phi are linearly dependent, there are no more samples than parameters, or the effort does
-        not vary.
+        If a weight or a sample is not a number, the effort does not vary, there are no more samples than parameters, or
+        the columns of Phi are linearly dependent.
     """
     K, p = int((weight > 0).sum()), problem.Phi.shape[1]
+    for what, column in (("weight", weight), ("effort", problem.tau), ("motion", problem.Phi)):
+        if not np.isfinite(column).all() or (column is weight and (column < 0).any()):
+            row = int(np.argwhere(~np.isfinite(column) | ((column is weight) & (column < 0)))[0, 0])
+            raise NotIdentifiable(f"the {what} of sample {row} of {len(problem.tau)} is not a number to fit to")
     if not np.ptp(problem.tau) > 0:
         raise NotIdentifiable("the effort is the same throughout: check its channel")
-    root = np.sqrt(weight)[:, None]
-    scale = np.linalg.norm(problem.Phi * root, axis=0)
-    if p >= K or (scale == 0).any():
-        still = [name for name, size in zip(problem.names, scale, strict=True) if size == 0]
-        raise NotIdentifiable(f"{K} samples for {p} parameters; nothing in the motion excites {still or 'them'}")
-    F, z = problem.Phi * root / scale, problem.tau * root[:, 0]
-    Q, R = np.linalg.qr(F)
-    condition = np.linalg.cond(R)
-    if condition > 1e8:
+    if p >= K:
+        raise NotIdentifiable(f"{K} samples for {p} parameters: record more of the motion")
+    R = triangle(problem.Phi, problem.tau, weight)
+    still = [name for name, size in zip(problem.names, R.scale, strict=True) if size <= ROUNDING * R.scale.max()]
+    if still:
+        raise NotIdentifiable(f"nothing in the motion excites {', '.join(still)}")
+    if (condition := np.linalg.cond(R.U)) > CONDITION:
         raise NotIdentifiable(
             f"the motion does not tell {', '.join(problem.names)} apart: "
             f"condition number {condition:.1e} of scaled columns"
         )
-    scaled = np.linalg.solve(R, Q.T @ z)
-    bread = np.linalg.inv(R.T @ R)
-    residual = z - F @ scaled
-    variance = residual @ residual / (K - p)
-    lags = correlation_lags(residual, problem.starts)
-    hac = _newey_west(F, residual, bread, problem.starts, lags)
-    return Estimate(
-        theta=scaled / scale,
-        theta_std=np.sqrt(variance * np.diag(bread)) / scale,
-        theta_std_hac=np.sqrt(np.diag(hac)) / scale,
-        hac_lags=lags,
-    )
+    return R
 
 
-def correlation_lags(residual: Array, starts: tuple[int, ...]) -> int:
-    """How many lags of correlation to allow for, from the residuals' first autocorrelation.
-
-    The bandwidth for a Bartlett window under a first-order autoregression.  (D. Andrews, 1991, (6.2), (6.4))
-    """
-    parts = np.split(residual, starts[1:])
-    first = sum(float(x[1:] @ x[:-1]) for x in parts) / max(float(residual @ residual), 1e-300)
-    rho = float(np.clip(first, -0.97, 0.97))
-    alpha = 4 * rho**2 / ((1 - rho) ** 2 * (1 + rho) ** 2)
-    return min(int(np.ceil(1.1447 * (alpha * len(residual)) ** (1 / 3))), min(map(len, parts)) // 3)
-
-
-def _newey_west(F: Array, residual: Array, bread: Array, starts: tuple[int, ...], lags: int) -> Array:
-    """The covariance that allows for residuals correlated over `lags` samples, log by log."""
-    meat = sum(bartlett(part, lags) for part in np.split(F * residual[:, None], starts[1:]))
-    K, p = int(F.any(axis=1).sum()), F.shape[1]
-    return np.asarray(bread @ meat @ bread * K / (K - p))
-
-
-def bartlett(scores: Array, lags: int) -> Array:
-    """The sum (p, p) of the autocovariances of scores (K, p) under a Bartlett window that ends after so many lags.
-
-    That window is the autocorrelation of a box, so the sum is that of the squares of moving sums, however many lags.
-    """
-    K = len(scores)
-    total = np.vstack([np.zeros_like(scores[:1]), np.cumsum(scores, axis=0)])
-    ends = np.arange(1, K + lags + 1)
-    moving = total[np.minimum(ends, K)] - total[np.maximum(ends - lags - 1, 0)]
-    return np.asarray(moving.T @ moving / (lags + 1))
+def spread(problem: Regression, weight: Array, R: Triangle, theta: Array) -> Spread:
+    """The standard errors of parameters that are those of least squares, or close to them."""
+    inverse = np.linalg.inv(R.U)
+    root = np.sqrt(weight)
+    Q = problem.Phi * root[:, None] @ (inverse / R.scale[:, None])
+    residual = root * (problem.tau - problem.Phi @ theta)
+    degrees = int((weight > 0).sum()) - len(theta)
+    classical = np.sqrt(residual @ residual / degrees * (inverse**2).sum(axis=1)) / R.scale
+    found = correlated(Q, residual, problem.starts, inverse / R.scale[:, None], degrees)
+    return Spread(classical, np.sqrt(found.variance), found.lags)

@@ -91,11 +91,11 @@ QUANTITIES = {
     "phi": Quantity("the model term, in Typst's mathematics", ""),
     "theta": Quantity("parameter of the model term", PER_ROW),
     "theta_std": Quantity("standard error of theta, residuals taken as uncorrelated", PER_ROW),
-    "theta_std_hac": Quantity("standard error of theta, allowing for correlated residuals (Newey-West)", PER_ROW),
+    "theta_std_hac": Quantity("standard error of theta, residuals allowed to be correlated and uneven", PER_ROW),
     "mse": Quantity("mean squared error of the averaged effort", "({effort})^2"),
     "condition": Quantity("condition number of the regressor"),
     "samples": Quantity("number of samples fitted, K"),
-    "hac_lags": Quantity("lags that the Newey-West standard errors allow for"),
+    "hac_lags": Quantity("lags over which residuals are correlated, each counting by its correlation"),
     "scale": Quantity("displacement or velocity that the term depends on, in the joint's units; 0 for none"),
     # the choice of a model
     "friction": Quantity("friction that is added to the model's structure", ""),

@@ -62,7 +62,7 @@ def test_without_noise_the_parameters_come_out_to_rounding(estimate: Estimator, 
     p = frozen(replace(problem(), tau_var=np.full(K, tau_var)))
     found = estimate(p)
     agree(found.theta, THETA)
-    assert np.isfinite(np.concatenate(found[:3])).all()
+    assert np.isfinite([found.theta, found.theta_std, found.theta_std_hac]).all()
 
 
 @ESTIMATOR
@@ -135,8 +135,9 @@ def test_a_sample_that_no_period_was_recorded_at_counts_for_nothing(estimate: Es
 
 @ESTIMATOR
 def test_the_same_data_give_the_same_bits(estimate: Estimator):
-    for one, other in zip(estimate(problem(seed=3)), estimate(problem(seed=3)), strict=True):
-        assert_array_equal(one, other)
+    one, other = estimate(problem(seed=3)), estimate(problem(seed=3))
+    for name in ("theta", "theta_std", "theta_std_hac", "hac_lags"):
+        assert_array_equal(getattr(one, name), getattr(other, name))
 
 
 @ESTIMATOR

@@ -52,7 +52,7 @@ def intro() -> Prose:
     """How to read the tables."""
     return Prose(
         "The parameters of each joint come from the averaged periods of all its identification logs together. The "
-        "standard error after each value allows for residuals that are correlated (Newey and West); the classical one "
+        "standard error after each value allows for residuals that are correlated; the classical one "
         "takes them as independent. Where the two differ much, the model misses something that repeats in every "
         "period. $z$ is the value over its standard error: a parameter with $abs(z) < 2$ cannot be told from zero."
     )

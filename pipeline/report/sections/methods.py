@@ -29,10 +29,10 @@ REFERENCES = (
     "identification and the filter that this analysis starts from.",
     "Y. Wang, R. Gondokaryono, A. Munawar, G. S. Fischer: A convex optimization-based dynamic model identification "
     "package for the da Vinci Research Kit. IEEE Robotics and Automation Letters 4 (4), 2019.",
-    "W. K. Newey, K. D. West: A simple, positive semi-definite, heteroskedasticity and autocorrelation consistent "
-    "covariance matrix. Econometrica 55 (3), 1987.",
-    "D. W. K. Andrews: Heteroskedasticity and autocorrelation consistent covariance matrix estimation. Econometrica "
-    "59 (3), 1991.",
+    "H. D. Patterson, R. Thompson: Recovery of inter-block information when block sizes are unequal. Biometrika 58 "
+    "(3), 1971.",
+    "H. White: A heteroskedasticity-consistent covariance matrix estimator and a direct test for heteroskedasticity. "
+    "Econometrica 48 (4), 1980.",
     "G. M. Ljung, G. E. P. Box: On a measure of lack of fit in time series models. Biometrika 65 (2), 1978.",
     "C. M. Jarque, A. K. Bera: A test for normality of observations and regression residuals. International "
     "Statistical Review 55 (2), 1987.",
@@ -70,7 +70,8 @@ def paragraph_for_paper(context: Context) -> str:
         f"differentiated in the frequency domain; the model used was {settings.fit}. Motion that does not repeat was "
         f"low-pass filtered at {settings.lowpass:g} Hz with zero phase. The external effort was tracked by an extended "
         f"Kalman filter with position, velocity and external effort as states, the last as a random walk of intensity "
-        f"{random_walk}. Standard errors allow for autocorrelated residuals (Newey and West, 1987); levels of free "
+        f"{random_walk}. Standard errors allow for autocorrelated residuals, by restricted likelihood (Patterson and "
+        "Thompson, 1971); levels of free "
         "motion were bootstrapped over blocks (Künsch, 1989)."
     )
 

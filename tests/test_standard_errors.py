@@ -1,0 +1,97 @@
+"""Intervals of 95 % hold the truth 95 times in 100, however the noise is correlated."""
+
+import numpy as np
+import pytest
+from scipy.signal import lfilter
+
+from pipeline.estimators import estimator
+from pipeline.estimators.problem import Regression
+from pipeline.estimators.regression import pose
+from pipeline.maths.signals import averaging
+from pipeline.records import Average, Signal, Trajectory
+from pipeline.robots.dvrk_psm import ROBOT
+from pipeline.robots.models import independent
+from pipeline.stages import average, differentiate
+from tests.test_averaging import entry
+
+JOINTS = tuple(joint.name for joint in ROBOT.joints)
+SEEDS = 200
+RATE = 200.0
+NOISE = 0.05  # of the raw effort
+
+
+@pytest.fixture(scope="module")
+def one(data) -> list[Average]:
+    """The averaged periods of an arm of which all joints move."""
+    table = np.loadtxt(data / "dvrk_wpi" / "one.csv", delimiter=",")
+    N = len(table)
+    signals = []
+    for i, joint in enumerate(JOINTS):
+        columns = {"t": np.arange(N) / RATE, "q": table[:, i], "dq": table[:, 7 + i], "tau": table[:, 14 + i]}
+        columns["segment"] = np.zeros(N, int)
+        signals.append(Signal("one", joint, "identification", RATE, "as recorded", "logged", 0, 0, **columns))
+    return [r for r in average.run(signals, entry(name="one"), ROBOT, harmonics=0) if isinstance(r, Average)]
+
+
+def problems(averages: list[Average]) -> dict[str, Regression]:
+    """The regression of every joint."""
+    made = {}
+    for mean in averages:
+        joint = ROBOT.joint(mean.joint)
+        records = differentiate.run(mean, joint, derivative="harmonics", harmonics=0)
+        made[joint.name] = pose(independent(joint), [r for r in records if isinstance(r, Trajectory)])
+    return made
+
+
+def averaged_noise(mean: Average, rho: float, seed: int, white: float = 0.0) -> averaging.Folded:
+    """Noise of a first-order autoregression on the raw effort, of variance one, and some that is white, averaged."""
+    rng = np.random.default_rng(seed)
+    N = int(mean.periods * mean.period * RATE)
+    e = lfilter([np.sqrt(1 - rho**2)], [1, -rho], rng.normal(size=N + 2000))[2000:] + white * rng.normal(size=N)
+    return averaging.fold(np.arange(N) / RATE, e, mean.period, len(mean))
+
+
+def scores(averages: list[Average], rho: float, white: float = 0.0, seeds: int = SEEDS, name: str = "lse"):
+    """Errors over stated standard errors (seeds, p) of every joint, and over the classical ones."""
+    stated, classical = ({joint: [] for joint in JOINTS} for _ in range(2))
+    posed = problems(averages)
+    for seed in range(seeds):
+        noise = averaged_noise(averages[0], rho, seed, white)
+        for joint, p in posed.items():
+            theta = np.linalg.lstsq(p.Phi, p.tau, rcond=None)[0]
+            tau, var = p.Phi @ theta + NOISE * noise.mean, NOISE**2 * noise.var
+            found = estimator(name)(Regression(p.Phi, tau, var, p.periods, p.starts, p.names))
+            stated[joint].append((found.theta - theta) / found.theta_std_hac)
+            classical[joint].append((found.theta - theta) / found.theta_std)
+    return stated, classical
+
+
+def coverage(scores) -> dict[str, float]:
+    """The share of intervals of 95 % that hold the truth, pooled over a joint's parameters."""
+    return {joint: float(np.mean(np.abs(own) < 1.96)) for joint, own in scores.items()}
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("rho", [0.0, 0.97])
+def test_intervals_cover_what_they_say_where_noise_is_correlated(one, rho):
+    """Of 50 seeds; the classical ones do not."""
+    stated, classical = map(coverage, scores(one, rho, seeds=50))
+    assert min(stated.values()) > 0.90
+    assert (min(classical.values()) > 0.90) == (rho == 0.0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("rho", "least", "most"), [
+    (0.0, 0.92, 0.98), (0.5, 0.92, 0.98), (0.9, 0.92, 0.98), (0.97, 0.92, 0.98), (0.99, 0.88, 1.0),
+])  # fmt: skip
+def test_intervals_cover_between_92_and_98_percent_up_to_a_correlation_of_97_percent(one, rho, least, most):
+    stated, _ = scores(one, rho)
+    assert all(least <= share <= most for share in coverage(stated).values()), coverage(stated)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("white", [0.3, 1.0])
+def test_intervals_cover_where_a_slow_error_hides_in_white_noise(one, white):
+    """One autoregression for both would be that of the faster, and cover half of it."""
+    stated, _ = scores(one, 0.97, white)
+    assert min(coverage(stated).values()) > 0.91
