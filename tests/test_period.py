@@ -210,11 +210,13 @@ def test_an_odd_period_among_others_is_named_and_kept():
     assert "write" not in text
 
 
-@pytest.mark.parametrize("rho", [0.0, 0.9, 0.99])
-def test_correlated_noise_is_no_transient(rho):
+@pytest.mark.parametrize("periods", [3, 5])
+@pytest.mark.parametrize("rho", [0.0, 0.9, 0.99, 0.997])
+def test_correlated_noise_is_no_transient(rho, periods):
+    """Of three periods, noise of so few independent samples makes one twice as large as the others one time in six."""
     flagged = 0
-    for seed in range(40):
-        t = np.arange(5000) / RATE
+    for seed in range(60):
+        t = np.arange(1000 * periods) / RATE
         x = waves(t, 10.0) + 0.01 * coloured(np.random.default_rng(seed), len(t), rho)
         flagged += bool(differing(t, x, 10.0, RATE))
     assert flagged <= 2
@@ -295,8 +297,18 @@ def test_steps_are_told_from_gaps_wherever_the_joint_moves(name, by):
 def test_nothing_is_said_of_a_gap_at_rest_or_at_an_end():
     signal = moved(np.arange(3000) / RATE)
     still = np.full((1, 3000), 0.3) + 1e-4 * np.random.default_rng(0).normal(size=3000)
-    for i, x in ((1500, still), (REACH - 1, signal.q[None]), (3000 - REACH + 1, signal.q[None])):
+    at_rest = [(i, still) for i in range(100, 2900, 100)]
+    for i, x in (*at_rest, (REACH - 1, signal.q[None]), (3000 - REACH + 1, signal.q[None])):
         assert not steps(signal.t + np.where(np.arange(3000) < i, 0.0, 3.0), x)
+
+
+@pytest.mark.parametrize("lost", [3, 5, 8, 12, 30])
+def test_few_lost_samples_are_a_gap_even_where_a_noisy_motion_turns(lost):
+    signal = moved(np.arange(5000) / RATE, T=5.0)
+    q = signal.q + 1e-3 * np.random.default_rng(3).normal(size=5000)
+    for i in range(100, 4900, 7):
+        kept = np.delete(np.arange(5000), np.arange(i, i + lost))
+        assert not steps(signal.t[kept], q[None, kept])
 
 
 def test_one_joint_that_breaks_says_that_time_passed():
@@ -305,6 +317,25 @@ def test_one_joint_that_breaks_says_that_time_passed():
     t = roll.t + np.where(np.arange(3000) < 1200, 0.0, 3.0)
     assert steps(t, np.array([roll.q, pitch.q]))
     assert not steps(t, np.array([roll.q, broken]))
+
+
+def test_a_glitch_is_not_the_end_of_a_motion():
+    t = np.arange(4000) / RATE
+    x = waves(t, 8.0)
+    x[[333, 2900, 2901, 3500]] += 0.5
+    span, _ = stretch(t, [x], 8.0, slice(800, 2400), 3)
+    assert (span.start, span.stop) == (0, 4000)
+
+
+def test_no_motion_is_followed_across_a_gap_beyond_which_its_phase_is_not_known():
+    """Even where it happens to be right there: so many periods later, it can only be by chance."""
+    t = np.arange(6000) / RATE
+    x = waves(t, 8.0) + 1e-3 * np.random.default_rng(0).normal(size=6000)
+    found = period.refine(t[:3000], [x[:3000]], 8.0, 3)
+    for gap, bridged in ((1000, True), (100_000_000, False)):
+        late = t + np.where(t < 30.0, 0.0, gap * found.length)
+        span, _ = stretch(late, [x], 8.0, slice(0, 3000), 3)
+        assert (span.stop > 3000) == bridged
 
 
 @pytest.mark.parametrize(("start", "stop"), [(700, 5200), (123, 4001), (0, 5555), (1900, 3800)])

@@ -41,16 +41,18 @@ def alike(
 ) -> tuple[slice, Period, list[Difference]]:
     """The stretch without the first and last periods that differ from the others, its period, and what differed.
 
-    What does not fill a period is left out at the start rather than at the end, before a period is.  `t` (N,) [s];
-    `positions`, whose harmonics give the period, and `signals`, which are compared, (N,) each.
+    What does not fill a period is left out at the start rather than at the end, before a period is; of the periods
+    never more than half, as they could be the ones that are right.  `t` (N,) [s]; `positions`, whose harmonics give
+    the period, and `signals`, which are compared, (N,) each.
     """
     left_out: list[Difference] = []
+    fewest = (whole_periods(t[span], period.length, rate) + 1) // 2
     while True:
         M = whole_periods(t[span], period.length, rate)
         used = slice(span.start, end(t, span, period.length, rate))
         odd = [d for i, x in enumerate(signals) for d in differing(t[used], x[used], period.length, rate, i)]
         at_the_edges = sorted((d for d in odd if not d.inside), key=lambda d: -d.ratio)
-        if not at_the_edges:
+        if not at_the_edges or fewest >= M:
             return span, period, left_out + sorted(odd, key=lambda d: -d.ratio)[:1]
         left_out.append(at_the_edges[0])
         span = _without(t, span, at_the_edges[0], M, period.length, rate)

@@ -15,6 +15,7 @@ AS_GOOD = 2.0  # times the smallest difference: a lag this good is a period, too
 AS_CLEAN = 20.0  # times the smallest difference, and at least `CLEAN`: where a stretch that repeats ends
 CLEAN = 2e-3
 ROUNDED = 1e-5  # difference that is left of a lag between two points
+FINE = 200  # parts of a lag, between which its difference is taken as a parabola
 FEW = 4.2  # periods that are searched for a shorter one
 AS_LONG = 0.8  # of the longest stretch: one this long counts as long as it
 ENOUGH = 0.25  # of a recording: a shorter stretch may repeat by chance
@@ -100,10 +101,11 @@ def _searched(x: Array) -> Repetition | None:
 
 def _shortest(lags: list[int], x: Array) -> float:
     """The shortest of the lags after which two periods (J, n) of the last of them repeat about as well as after it."""
-    least = [_vertex(*(_apart(x, near) for near in (lag - 1, lag, lag + 1))) for lag in lags]
-    for lag, (shift, value) in zip(lags, least, strict=True):
+    steps = [max(1, lag // FINE) for lag in lags]
+    least = [_vertex(*(_apart(x, lag + d) for d in (-step, 0, step))) for lag, step in zip(lags, steps, strict=True)]
+    for lag, step, (shift, value) in zip(lags, steps, least, strict=True):
         if value <= AS_GOOD * least[-1][1] + ROUNDED:
-            return lag + shift
+            return lag + step * shift
     raise AssertionError("the last lag is as good as itself")
 
 
@@ -113,12 +115,15 @@ def _apart(x: Array, lag: int) -> float:
 
 
 def _vertex(left: float, middle: float, right: float) -> tuple[float, float]:
-    """The lowest point of the parabola through three neighbours: how far from the middle one, and how low."""
+    """The lowest point of the parabola through three neighbours: how far from the middle one, and how low.
+
+    No further than the neighbours: beyond them it is noise that says where.
+    """
     curvature = left - 2 * middle + right
     if not 0 < curvature < np.inf:
         return 0.0, middle
-    shift = 0.5 * (left - right) / curvature
-    return shift, max(middle - 0.5 * curvature * shift**2, 0.0)
+    shift = float(np.clip(0.5 * (left - right) / curvature, -1.0, 1.0))
+    return shift, max(middle + 0.5 * shift * (right - left + curvature * shift), 0.0)
 
 
 def _lags(x: Array) -> Iterator[Lag]:
