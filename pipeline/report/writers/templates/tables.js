@@ -18,8 +18,9 @@ function prepareTable(region) {
     return shown;
   };
   if (rows.length >= SORTED_FROM) for (const head of region.querySelectorAll("thead th")) makeSortable(head, body, rows, update);
-  const name = region.getAttribute("aria-label");
-  if (rows.length >= SEARCHED_FROM) region.before(newSearch(name, rows.length, state, update));
+  const scroll = region.querySelector(".scroll");
+  const name = scroll.getAttribute("aria-label");
+  if (rows.length >= SEARCHED_FROM) scroll.before(newSearch(name, rows.length, state, update));
   if (!state.folded) return;
   const fold = newButton("", "", () => {
     state.folded = !state.folded;
@@ -31,7 +32,7 @@ function prepareTable(region) {
     fold.setAttribute("aria-expanded", String(!state.folded));
   };
   fold.className = "fold";
-  region.after(fold);
+  scroll.after(fold);
   region.addEventListener("unfold", () => {
     Object.assign(state, { folded: false, words: "" });
     said();
