@@ -23,23 +23,8 @@ PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n $(WORKERS) --dist 
 LOCK := uv pip compile -q --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header
 UPGRADE ?=
 
-# One line a stage: what it reads, and what it makes.
-STAGES := design ingest resample average differentiate smooth fit choose predict ekf assess threshold measure whiteness report
-# design        : robot -> Links Pose Workspace Control Lyapunov Excitation
-# ingest        : logs -> Recording LogSummary Diagnostic
-# resample      : Recording -> Signal Diagnostic
-# average       : Signal -> Average PeriodResidual Diagnostic
-# differentiate : Average -> Trajectory Spectrum Diagnostic
-# smooth        : Signal -> Smoothed
-# fit           : Trajectory Smoothed -> Fit CrossFit FittedPaths MeasurementNoise Residual Diagnostic
-# choose        : Smoothed Average -> Choice Fit Prediction Diagnostic
-# predict       : Signal Smoothed Trajectory FittedPaths Fit CrossFit Choice -> Prediction Diagnostic
-# ekf           : Signal Fit Choice MeasurementNoise -> Track Diagnostic
-# assess        : Track -> FreeSpace
-# threshold     : FreeSpace -> Threshold
-# measure       : Track Threshold -> Contact
-# whiteness     : PeriodResidual Residual Track -> Whiteness
-# report        : everything -> report.html report.pdf results.json
+# Every module of pipeline/stages is a stage; the report follows them.  README.md says what each makes, in their order.
+STAGES := $(filter-out __init__,$(basename $(notdir $(wildcard pipeline/stages/*.py)))) report
 
 .PHONY: all quick test check format lint types oracles bench locks demo clean help $(STAGES)
 

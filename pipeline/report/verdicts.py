@@ -10,7 +10,15 @@ GOOD, CAUTION = 0.10, 0.25  # model error over the root mean square of the measu
 DETECTED, DETECTABLE = 1 / 3, 1.0  # detection level over the effort that the user wants to see
 COVERED = (0.90, 0.98)  # coverage of a 95 % band that is right
 WITHIN = 4.0  # standard errors that an estimate may be off the truth
-WORDS: dict[Level, str] = {"good": "● Good", "warn": "▲ Caution", "bad": "✖ Problem", "info": "○ Note"}
+WORDS: dict[Level, str] = {  # the mark and its word stay on one line
+    "good": "●\N{NO-BREAK SPACE}Good",
+    "warn": "▲\N{NO-BREAK SPACE}Caution",
+    "bad": "✖\N{NO-BREAK SPACE}Problem",
+}
+    "good": "●\N{NO-BREAK SPACE}Good",
+    "warn": "▲\N{NO-BREAK SPACE}Caution",
+    "bad": "✖\N{NO-BREAK SPACE}Problem",
+}
 
 
 @dataclass(frozen=True)
