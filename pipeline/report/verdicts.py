@@ -15,10 +15,6 @@ WORDS: dict[Level, str] = {  # the mark and its word stay on one line
     "warn": "▲\N{NO-BREAK SPACE}Caution",
     "bad": "✖\N{NO-BREAK SPACE}Problem",
 }
-    "good": "●\N{NO-BREAK SPACE}Good",
-    "warn": "▲\N{NO-BREAK SPACE}Caution",
-    "bad": "✖\N{NO-BREAK SPACE}Problem",
-}
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,114 @@
+"""Choosing a model: refits without parts of the path against refits from scratch, ridges, and which candidate wins."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pipeline.maths.selection.blocks import BLOCKS, MOST, left_out, path_blocks
+from pipeline.maths.selection.cross_validation import Judged, judged, preferred, standard_error, together
+from pipeline.maths.selection.equations import gathered
+from pipeline.maths.selection.ridge import Ridge, covariance, penalty, solve
+
+RNG = np.random.default_rng(3)
+N, P, CELLS = 600, 4, 6
+PHI = RNG.normal(size=(N, 1, P))
+TAU = PHI @ np.array([1.0, -2.0, 0.5, 3.0]) + 0.1 * RNG.normal(size=(N, 1))
+CELL = RNG.integers(0, CELLS, N)
+PLAIN = Ridge(0.0, np.ones(1), np.zeros((0, 0)))
+
+
+def test_leaving_cells_out_is_least_squares_on_the_other_rows():
+    equations = gathered(PHI, TAU, CELL, CELLS)
+    out = np.arange(CELLS) < 2
+    kept = ~out[CELL]
+    theta, *_ = np.linalg.lstsq(PHI[kept, 0], TAU[kept, 0])
+    assert_allclose(solve(equations.without(out), PLAIN), theta, rtol=1e-10)
+    error = TAU[~kept, 0] - PHI[~kept, 0] @ theta
+    assert equations.of(out).errors(theta)[0, 0] == pytest.approx(error @ error, rel=1e-9)
+
+
+def test_what_is_predicted_has_not_been_seen():
+    """Effort that only one cell holds is predicted from the others, which know nothing of it."""
+    tau = TAU + 100.0 * (CELL == 0)[:, None] * PHI[:, :, 0]
+    schemes = [np.eye(CELLS, dtype=bool)]
+    by_itself = judged(gathered(PHI, tau, CELL, CELLS), PLAIN, schemes)
+    kept = CELL != 0
+    theta, *_ = np.linalg.lstsq(PHI[kept, 0], tau[kept, 0])
+    error = tau[~kept, 0] - PHI[~kept, 0] @ theta
+    assert by_itself.unseen[0][0, 0] == pytest.approx(error @ error / (tau[:, 0] @ tau[:, 0]), rel=1e-9)
+
+
+def test_a_ridge_is_least_squares_with_rows_of_scaled_columns():
+    equations = gathered(PHI, TAU, CELL, 1 + CELL.max()).of(np.ones(CELLS, bool))
+    size = np.linalg.norm(PHI[:, 0], axis=0)
+    rows = np.vstack([PHI[:, 0], np.sqrt(0.3) * np.diag(size)])
+    theta, *_ = np.linalg.lstsq(rows, np.append(TAU[:, 0], np.zeros(P)))
+    assert_allclose(solve(equations, PLAIN._replace(strength=0.3)), theta, rtol=1e-10)
+
+
+def test_the_penalty_of_combinations_is_that_of_the_smallest_parts_they_can_have():
+    K = RNG.normal(size=(3, 7))
+    G = np.cov(RNG.normal(size=(3, 50)))
+    beta, D = RNG.normal(size=3), ((G @ K) * K).sum(axis=0)
+    smallest, *_ = np.linalg.lstsq(K / np.sqrt(D), beta)  # of least sum D pi^2 among all pi with K pi = beta
+    assert beta @ penalty(G, K) @ beta == pytest.approx(smallest @ smallest, rel=1e-9)
+
+
+def test_dependent_columns_are_refused_unless_a_ridge_tells_them_apart():
+    twice = np.concatenate([PHI, PHI[:, :, :1]], axis=2)
+    equations = gathered(twice, TAU, CELL, CELLS).of(np.ones(CELLS, bool))
+    with pytest.raises(np.linalg.LinAlgError, match="dependent"):
+        solve(equations, PLAIN)
+    theta = solve(equations, PLAIN._replace(strength=1e-6))
+    assert theta[0] == pytest.approx(theta[-1], rel=1e-6)
+
+
+def test_the_covariance_of_parameters_is_the_textbook_s_without_a_ridge():
+    equations = gathered(PHI, TAU, CELL, CELLS).of(np.ones(CELLS, bool))
+    expected = 0.01 * np.linalg.inv(PHI[:, 0].T @ PHI[:, 0])
+    assert_allclose(covariance(equations, PLAIN, np.array([0.01])), expected, rtol=1e-9)
+
+
+def test_blocks_are_sixths_of_the_period_or_of_the_recording():
+    t = np.arange(1200) / 100.0
+    blocks = path_blocks(t, 3.0)
+    assert_allclose(np.bincount(blocks), 200, atol=4)  # a sample on an edge may fall to either side in each period
+    assert np.mean(blocks[:300] == blocks[900:]) > 0.99
+    assert blocks[150] == 3
+    once = path_blocks(t, 0.0)
+    assert_allclose(np.bincount(once), 200)
+    assert (np.diff(once) >= 0).all()
+
+
+@pytest.mark.parametrize("logs", [1, 2, 7, 100])
+def test_every_scheme_leaves_every_cell_out_once_in_few_groups(logs):
+    log, block = np.repeat(np.arange(logs), BLOCKS), np.tile(np.arange(BLOCKS), logs)
+    schemes = left_out(log, block)
+    assert len(schemes) == (2 if logs == 1 else 3)
+    for groups in schemes:
+        assert_allclose(groups.sum(axis=0), 1)
+    assert sum(map(len, schemes)) <= MOST
+
+
+def worth(error: float, spread: float = 0.0, seed: int = 0) -> Judged:
+    """A candidate of this relative error, its groups' errors scattered by this share."""
+    shares = 1.0 + spread * np.random.default_rng(seed).uniform(-1, 1, (6, 1))
+    return Judged((error**2 * shares / shares.sum(),), np.array([error]))
+
+
+def test_the_smallest_is_preferred_unless_it_is_clearly_worse():
+    doubtful = [worth(0.100, 0.9, 1), worth(0.101, 0.9, 2), worth(0.5)]
+    assert standard_error(doubtful[1], doubtful[0]) > 0.001
+    assert preferred(doubtful, [20, 10, 5], [True] * 3) == (1, 0)
+    certain = [worth(0.100), worth(0.101), worth(0.5)]  # all groups alike: a difference is one
+    assert preferred(certain, [20, 10, 5], [True] * 3) == (0, 0)
+
+
+def test_a_candidate_that_physics_forbids_is_not_chosen_however_good():
+    assert preferred([worth(0.01), worth(0.1)], [3, 3], [False, True]) == (1, 1)
+    with pytest.raises(ValueError, match="empty"):
+        preferred([worth(0.1)], [3], [False])
+
+
+def test_fits_of_different_efforts_make_one_candidate_of_their_mean_error():
+    assert together([worth(0.1), worth(0.3)]).score == pytest.approx(0.2)
