@@ -26,7 +26,7 @@ UPGRADE ?=
 # Every module of pipeline/stages is a stage; the report follows them.  README.md says what each makes, in their order.
 STAGES := $(filter-out __init__,$(basename $(notdir $(wildcard pipeline/stages/*.py)))) report
 
-.PHONY: all quick test check format lint types oracles bench locks demo clean help $(STAGES)
+.PHONY: all quick test check format lint types oracles bench locks demo pictures clean help $(STAGES)
 
 all: $(READY) ## analyse every study in raw/ whose logs are here (STUDY=raw/x for one, JOBS=n for processes)
 	$(RUN) all $(STUDY) --jobs $(JOBS)
@@ -67,6 +67,10 @@ locks: ## pin anew what the project needs, by uv (UPGRADE=--upgrade for newer ve
 
 demo: $(READY) ## simulate the demonstration study anew
 	$(RUN) simulate davinci-demo raw/davinci-demo --force
+
+pictures: ## draw the README's pictures anew, from the report of the demonstration study (needs pdftoppm)
+	pdftoppm -r 65 -f 1 -singlefile -png reports/davinci-demo/report.pdf pipeline/report/pictures/page-one
+	pdftoppm -r 65 -f 5 -singlefile -png reports/davinci-demo/report.pdf pipeline/report/pictures/joint
 
 clean: ## remove what was made: processed files, reports, environment
 	rm -rf .venv build *.egg-info processed/* reports/*
