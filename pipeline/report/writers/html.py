@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 from pipeline.report.content import Document, Equation, Figure, Figure3D, walk
 from pipeline.report.content.inline import Span, parse, printable
-from pipeline.report.content.layout import Placed, marked_texts, place, references
+from pipeline.report.content.layout import Placed, marked_texts, on_screen, place, references
 from pipeline.report.content.tables import columns
 from pipeline.report.figures.svg import svg
 from pipeline.report.figures.traces import ThinnedFigure, thin_figure
 from pipeline.report.writers.equations import Drawing, Formula, draw_formulas
-from pipeline.report.writers.miniature import miniature
+from pipeline.report.writers.miniature import LARGER, SMALL, miniature
 from pipeline.report.writers.numbers import Json, numbers_json
 from pipeline.report.writers.pictures import address, looks, shrink
 
@@ -42,10 +42,11 @@ def render(document: Document) -> bytes:
     placed = place(document)
     figures = {item.anchor: item.block for item in _flatten(placed) if isinstance(item.block, Figure | Figure3D)}
     zooms = {name: f for name, f in figures.items() if isinstance(f, Figure) and f.zoomable}
+    folded = on_screen(placed)
     formulas, symbols = draw_formulas(_formulas(document))
     page: Json = {
         "document": document, "placed": placed, "references": references(placed), "formulas": formulas,
-        "pictures": {name: _picture(figure) for name, figure in figures.items()}, "symbols": symbols,
+        "pictures": {name: _picture(figure, name in folded) for name, figure in figures.items()}, "symbols": symbols,
         "looks": looks(), "scripts": [_script(name) for name in SCRIPTS + (TRACE_SCRIPTS if zooms else ())],
     }  # fmt: skip
     still = {name: f for name, f in figures.items() if name not in zooms and not (isinstance(f, Figure) and f.small)}
@@ -54,9 +55,11 @@ def render(document: Document) -> bytes:
     return _fill(page, numbers | traces).encode()
 
 
-def _picture(figure: Figure | Figure3D) -> str:
-    """The address of a figure's picture."""
-    return address(miniature(figure) if isinstance(figure, Figure) and figure.small else shrink(svg(figure)))
+def _picture(figure: Figure | Figure3D, on_screen_only: bool) -> str:
+    """The address of a figure's picture; that of a trace which is not printed stands in for it only."""
+    if isinstance(figure, Figure) and (figure.small or (figure.zoomable and on_screen_only)):
+        return address(miniature(figure, SMALL if figure.small else LARGER))
+    return address(shrink(svg(figure)))
 
 
 def _thin_figures(zooms: dict[str, Figure], room: int) -> dict[str, ThinnedFigure]:
