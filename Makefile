@@ -26,7 +26,7 @@ UPGRADE ?=
 # Every module of pipeline/stages is a stage; the report follows them.  README.md says what each makes, in their order.
 STAGES := $(filter-out __init__,$(basename $(notdir $(wildcard pipeline/stages/*.py)))) report
 
-.PHONY: all quick test check format lint types oracles bench locks demo pictures clean help $(STAGES)
+.PHONY: all quick test check format lint types oracles axe bench locks demo pictures clean help $(STAGES)
 
 all: $(READY) ## analyse every study in raw/ whose logs are here (STUDY=raw/x for one, JOBS=n for processes)
 	$(RUN) all $(STUDY) --jobs $(JOBS)
@@ -40,7 +40,7 @@ quick: $(READY_TO_TEST) ## run the tests that take moments, for while you work
 test: $(READY_TO_TEST) ## run the tests (TESTS=--slow for the longest studies, too; WORKERS=n for processes)
 	$(PYTEST) $(TESTS)
 
-check: lint types oracles ## what continuous integration checks: format, lint, types, and every test
+check: lint types oracles axe ## what continuous integration checks: format, lint, types, and every test
 	$(MAKE) --no-print-directory test TESTS=--slow
 
 format: $(READY_TO_CHECK) ## lay out the code, and mend what the linter can
@@ -55,6 +55,9 @@ types: $(READY_TO_CHECK) ## check the types
 	$(BIN)/mypy
 
 oracles: $(READY_TO_COMPARE) ## install what tests compare with, where it is there: Pinocchio
+
+axe: ## install what tests judge the accessibility of a report with, where npm is there
+	@if command -v npm >/dev/null; then npm ci --silent --prefix tests/report; else echo "no npm, so no axe"; fi
 
 bench: $(READY_TO_TEST) $(READY_TO_COMPARE) ## the benchmarks at full size, against their rivals
 	$(BIN)/python -m pytest tests/benchmarks --full -s

@@ -72,7 +72,7 @@ def test_continuous_integration_checks_what_make_check_checks():
     script = (ROOT / ".ci" / "run").read_text()
     assert re.search(r"^make check\b", script, re.M)
     assert re.search(r"^make all\b", script, re.M)
-    assert TARGETS["check"].split() == ["lint", "types", "oracles"]
+    assert TARGETS["check"].split() == ["lint", "types", "oracles", "axe"]
     assert "test TESTS=--slow" in MAKEFILE
 
 

@@ -3,6 +3,7 @@
 import re
 import shutil
 import subprocess
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -105,6 +106,34 @@ def test_a_wide_equation_and_a_long_word_stay_on_the_page() -> None:
     )
     edges = [float(x) for x in re.findall(r'xMax="([\d.]+)"', read(rendered, "-bbox"))]
     assert max(edges) <= (210 - 20) * MILLIMETRE + 0.5
+
+
+@poppler
+def test_an_equation_stays_on_the_page_of_the_table_that_follows_it() -> None:
+    table = Table("Parameters.", ("symbol", "value"), tuple((f"${x}$", Number(1)) for x in "abcdefgh"))
+    pages = []
+    for lines in range(20, 40):
+        filling = Prose("\n\n".join(["filling"] * lines))
+        read_pages = read(pdf.render(one(filling, Equation("a + b", "sum"), table))).split("\f")
+        pages.append([next(i for i, page in enumerate(read_pages) if words in page) for words in ("(1)", "Table 1.")])
+    assert {tuple(both) for both in pages} == {(0, 0), (1, 1)}
+
+
+@poppler
+def test_a_name_stays_whole_while_a_header_can_take_lines() -> None:
+    names = [f"realistic-tip-contact-of-run-{i}" for i in range(4)]
+    header = ("log", *(f"a long header of many words {i}" for i in range(6)))
+    rows = tuple((name, *(Number(-1.25, "N m", 0.01) if name[-1] == "0" else "–" for _ in range(6))) for name in names)
+    text = read(pdf.render(one(Table("Logs.", header, rows)))).replace("\N{NO-BREAK SPACE}", " ")
+    assert all(name in text for name in names)
+    assert text.count("−1.250 ± 0.010") == 6
+
+
+def test_the_file_says_what_it_is_of_whom_and_on_what() -> None:
+    made = replace(one(Prose("text")), author="A Laboratory", keywords=("friction", "da Vinci"), edition="report ID 77")
+    source = pdf.render(made)
+    for words in (b"A Laboratory", b"friction", b"report ID 77"):
+        assert words in source
 
 
 def test_a_warning_of_typst_is_an_error(tmp_path: Path) -> None:

@@ -85,8 +85,9 @@ def test_a_unit_that_a_column_shares_moves_to_its_header_and_others_stay() -> No
 
 
 @given(st.lists(st.lists(st.text("abc _", max_size=90), min_size=2, max_size=2), min_size=1, max_size=12))
-def test_fitted_columns_never_add_up_to_more_than_the_page(cells: list[list[str]]) -> None:
+def test_fitted_columns_never_add_up_to_more_than_the_page_and_can_be_read(cells: list[list[str]]) -> None:
     fitted = fit_columns(cells)
+    assert fitted.size >= 8
     widths = [w for w in fitted.widths if w is not None]
     assert sum(widths) <= PAGE + 1e-6
     assert len(widths) in (0, len(cells))

@@ -86,10 +86,17 @@ def envelope(x: Array, y: Array, bins: int) -> Indices:
     x (N,) must not decrease; returns (n,) indices, n <= 2 bins.
     """
     starts = _range_starts(x, bins)
+    ranges = np.repeat(np.arange(len(starts)), np.diff(starts, append=len(x)))
     below, above = np.where(np.isnan(y), np.inf, y), np.where(np.isnan(y), -np.inf, y)
-    ends = np.append(starts[1:], len(x))
-    indices = [(i + below[i:j].argmin(), i + above[i:j].argmax()) for i, j in zip(starts, ends, strict=True)]
-    return np.unique(np.array(indices))
+    least = below == np.minimum.reduceat(below, starts)[ranges]
+    greatest = above == np.maximum.reduceat(above, starts)[ranges]
+    return np.unique(np.concatenate([_first_of_each(least, ranges), _first_of_each(greatest, ranges)]))
+
+
+def _first_of_each(chosen: NDArray[np.bool_], ranges: Indices) -> Indices:
+    """The first chosen sample of each range."""
+    places = np.flatnonzero(chosen)
+    return places[np.unique(ranges[places], return_index=True)[1]]
 
 
 def _range_starts(x: Array, bins: int) -> Indices:

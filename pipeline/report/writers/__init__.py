@@ -27,9 +27,14 @@ def render_all(documents: tuple[Document, ...]) -> dict[str, bytes]:
 
 
 def figures_to_draw(parent: Document | Section | OnScreen, printed: bool = True) -> Iterator[Figure | Figure3D]:
-    """What matplotlib draws of a document: small figures only for the PDF, where that prints them."""
+    """What matplotlib draws of a document: all that is printed, and on screen what is neither small nor zoomable."""
     for block in parent.sections if isinstance(parent, Document) else parent.blocks:
         if isinstance(block, Section | OnScreen):
             yield from figures_to_draw(block, printed and isinstance(block, Section))
-        elif isinstance(block, Figure3D) or (isinstance(block, Figure) and (printed or not block.small)):
+        elif isinstance(block, Figure3D | Figure) and (printed or not _is_light(block)):
             yield block
+
+
+def _is_light(figure: Figure | Figure3D) -> bool:
+    """Whether the HTML has no picture by matplotlib of a figure that is on screen only."""
+    return isinstance(figure, Figure) and (figure.small or figure.zoomable)

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 from pipeline.report.content import Document, Equation, Figure, Figure3D, walk
 from pipeline.report.content.inline import Span, parse, printable
-from pipeline.report.content.layout import Placed, marked_texts, place, references
+from pipeline.report.content.layout import Placed, marked_texts, on_screen, place, references
 from pipeline.report.content.tables import columns
 from pipeline.report.figures.svg import svg
 from pipeline.report.figures.traces import ThinnedFigure, thin_figure
 from pipeline.report.writers.equations import Drawing, Formula, draw_formulas
-from pipeline.report.writers.miniature import miniature
+from pipeline.report.writers.miniature import LARGER, SMALL, miniature
 from pipeline.report.writers.numbers import Json, numbers_json
 from pipeline.report.writers.pictures import address, looks, shrink
 
@@ -25,6 +25,7 @@ LARGEST = 4_700_000  # [bytes] of a file, of which the traces get what everythin
 POINT_BYTES = 11  # of a point of a trace: two numbers in single precision, in base 64
 MOST_POINTS, FEWEST_POINTS = 20_000, 2_000  # of one zoomable figure
 STILL_POINTS = 2_000  # of a figure that does not zoom, for those who want its numbers
+SIGN = "\0"  # which no text can hold: it is not printable
 SCRIPTS = ("contents.js", "figures.js", "tables.js")
 TRACE_SCRIPTS = ("axes.js", "marks.js", "traces.js")
 
@@ -42,21 +43,37 @@ def render(document: Document) -> bytes:
     placed = place(document)
     figures = {item.anchor: item.block for item in _flatten(placed) if isinstance(item.block, Figure | Figure3D)}
     zooms = {name: f for name, f in figures.items() if isinstance(f, Figure) and f.zoomable}
+    folded = on_screen(placed)
     formulas, symbols = draw_formulas(_formulas(document))
     page: Json = {
         "document": document, "placed": placed, "references": references(placed), "formulas": formulas,
-        "pictures": {name: _picture(figure) for name, figure in figures.items()}, "symbols": symbols,
+        "pictures": {name: _picture(figure, name in folded) for name, figure in figures.items()}, "symbols": symbols,
         "looks": looks(), "scripts": [_script(name) for name in SCRIPTS + (TRACE_SCRIPTS if zooms else ())],
     }  # fmt: skip
     still = {name: f for name, f in figures.items() if name not in zooms and not (isinstance(f, Figure) and f.small)}
     numbers = {name: thin_figure(figure, STILL_POINTS) for name, figure in still.items()}
-    traces = _thin_figures(zooms, LARGEST - len(_fill(page, numbers).encode()))
-    return _fill(page, numbers | traces).encode()
+    kept = {name: (numbers_json(one.figure), one.note) for name, one in numbers.items()}
+    text = _fill(page, [*kept, *zooms])
+    room = LARGEST - len(text.encode()) - sum(len(content) for content, _ in kept.values())
+    traces = _thin_figures(zooms, room)
+    kept |= {name: (numbers_json(one.figure), one.note) for name, one in traces.items()}
+    return _put_in(text, kept).encode()
 
 
-def _picture(figure: Figure | Figure3D) -> str:
-    """The address of a figure's picture."""
-    return address(miniature(figure) if isinstance(figure, Figure) and figure.small else shrink(svg(figure)))
+def _put_in(text: str, kept: dict[str, tuple[str, str]]) -> str:
+    """The page with its numbers and notes where `_fill` left signs for them, once it is known what room there is."""
+    parts = text.split(SIGN)
+    for i in range(1, len(parts), 2):
+        part, _, name = parts[i].partition(" ")
+        parts[i] = kept[name][part == "note"]
+    return "".join(parts)
+
+
+def _picture(figure: Figure | Figure3D, on_screen_only: bool) -> str:
+    """The address of a figure's picture; that of a trace which is not printed stands in for it only."""
+    if isinstance(figure, Figure) and (figure.small or (figure.zoomable and on_screen_only)):
+        return address(miniature(figure, SMALL if figure.small else LARGER))
+    return address(shrink(svg(figure)))
 
 
 def _thin_figures(zooms: dict[str, Figure], room: int) -> dict[str, ThinnedFigure]:
@@ -79,7 +96,8 @@ def _flatten(placed: tuple[Placed, ...]) -> list[Placed]:
     return [item for parent in placed for item in (parent, *_flatten(parent.blocks))]
 
 
-def _fill(page: Json, thinned: dict[str, ThinnedFigure]) -> str:
+def _fill(page: Json, names: list[str]) -> str:
+    """The page, with signs where the numbers of the named figures belong, and the notes on them."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
 
@@ -88,7 +106,7 @@ def _fill(page: Json, thinned: dict[str, ThinnedFigure]) -> str:
         lstrip_blocks=True, finalize=_finalize,
     )  # fmt: skip
     environment.filters |= {"inline": _inline(page), "columns": columns, "raw": Markup, "attribute": _attribute}
-    numbers = {name: (Markup(numbers_json(one.figure)), one.note) for name, one in thinned.items()}
+    numbers = {name: [Markup(f"{SIGN}{part} {name}{SIGN}") for part in ("numbers", "note")] for name in names}
     hashes = [_hash(text) for text in page["scripts"]]
     return environment.get_template("report.html").render(page, numbers=numbers, hashes=hashes)
 

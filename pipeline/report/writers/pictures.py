@@ -8,8 +8,8 @@ from pipeline.report.figures.palette import COLOURS, DARK, SURROUNDINGS
 
 NAMES = {light: name for name, light in COLOURS.items()} | {light: name for name, (light, _) in SURROUNDINGS.items()}
 FONT = "system-ui,-apple-system,'Segoe UI',Roboto,Arial,'DejaVu Sans',sans-serif"
-# What an address may hold as it is; all else is written by its number.
-PLAIN = " <>/=:;,.'()&*+!?@-_~[]{}|"
+# What an address cannot hold as it is, and is written by its number.
+ESCAPED = re.compile(r"[^ !&'()*+,./:;<=>?@\[\]_{|}~0-9A-Za-z-]+")
 
 
 def looks() -> tuple[str, str]:
@@ -25,7 +25,7 @@ def _variables(values: dict[str, str]) -> str:
 
 def address(svg: str) -> str:
     """The SVG as an address that holds all of it; `<` and `>` in it need no escape in an attribute, `&` does."""
-    return "data:image/svg+xml," + quote(svg, safe=PLAIN)
+    return "data:image/svg+xml," + ESCAPED.sub(lambda signs: quote(signs[0]), svg)
 
 
 def shrink(svg: str) -> str:

@@ -25,6 +25,3 @@ for (const section of document.querySelectorAll("section[aria-labelledby]")) rea
 contents.addEventListener("click", (event) => {
   if (event.target.closest("a") && !beside.matches) contents.open = false;
 });
-window.addEventListener("beforeprint", () => {
-  for (const part of document.querySelectorAll("main details")) part.open = true;
-});

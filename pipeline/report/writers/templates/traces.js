@@ -2,6 +2,7 @@
 // Traces that zoom: drawn when they come into view, over the picture that is there without any script.
 
 const [RIGHT, TOP, NUMBERS, LABEL] = [14, 6, 20, 18]; // [px] about the axes
+const LOWEST = 125; // [px] of a panel
 const FONT = "12px system-ui, sans-serif";
 const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue(name);
 
@@ -113,7 +114,7 @@ class Panel {
     const context = this.clear();
     const across = this.frame.x.to(x);
     if (!(across >= this.frame.left && across <= this.frame.right)) return;
-    const print = (value) => (Number.isFinite(value) ? printNumber(value, this.steps.y / 20) : "–");
+    const print = (value) => (Number.isFinite(value) ? printNumber(value, this.steps.y / 100) : "–");
     const lines = first ? [{ words: `${this.x_label.replace(/ \[(.*)\]$/, "")} ${printNumber(x, this.steps.x / 100)}${unit(this.x_label)}` }] : [];
     for (const mark of this.marks) {
       if (mark.hidden || !MARKS[mark.kind]?.say || !mark.sorted || !mark.data.x.length) continue;
@@ -153,7 +154,7 @@ class Plot {
     this.panels = numbers.panels.map((panel) => new Panel(panel, numbers.columns, this));
     this.panels.forEach((panel, i) => {
       panel.last = i + numbers.across >= this.panels.length;
-      panel.area.style.height = `${numbers.height - 34 + (panel.last ? LABEL : 0)}px`;
+      panel.area.style.height = `${Math.max(numbers.height - 34, LOWEST) + (panel.last ? LABEL : 0)}px`;
       this.listen(panel);
     });
     this.element.append(...this.panels.map((panel) => panel.element));
