@@ -57,7 +57,7 @@ types: $(READY_TO_CHECK) ## check the types
 oracles: $(READY_TO_COMPARE) ## install what tests compare with, where it is there: Pinocchio
 
 axe: ## install what tests judge the accessibility of a report with, where npm is there
-	@if command -v npm >/dev/null; then npm ci --silent --prefix tests/report; else echo "no npm, so no axe"; fi
+	@if command -v npm >/dev/null; then npm ci --silent --prefix tests/report || echo "axe could not be installed"; else echo "no npm, so no axe"; fi
 
 bench: $(READY_TO_TEST) $(READY_TO_COMPARE) ## the benchmarks at full size, against their rivals
 	$(BIN)/python -m pytest tests/benchmarks --full -s
