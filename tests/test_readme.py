@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 import pipeline
 from pipeline import commands, robots, stages
 from pipeline.cli import app
+from pipeline.estimators import ESTIMATORS
 from pipeline.maths.units import SI, UNITS
 from pipeline.records import COLUMN_DTYPES, KINDS, Control, Excitation, Links, Lyapunov, Origin, Record
 from pipeline.records.catalogue import Catalogue
@@ -252,3 +253,7 @@ def test_what_python_is_offered_is_what_the_readme_shows():
 def test_the_readme_leads_to_files_that_are_there():
     for file in re.findall(r"`((?:pipeline|tests|raw/d)[\w./-]*\.(?:py|md|toml))`", README):
         assert Path(ROOT / file).is_file(), file
+
+
+def test_estimators_are_those_that_there_are():
+    assert named(rows("estimator", "finds")) == list(ESTIMATORS)

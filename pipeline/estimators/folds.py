@@ -1,6 +1,7 @@
 """Estimates from a part of the data: what is left out in turn, and the fits to the rest."""
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -32,11 +33,11 @@ def part(problem: Regression, logs: Sequence[int]) -> Regression:
     ends = (*problem.starts[1:], len(problem.tau))
     rows = [np.arange(problem.starts[i], ends[i]) for i in logs]
     kept = np.concatenate(rows)
-    return Regression(
+    return replace(
+        problem,
         Phi=problem.Phi[kept],
         tau=problem.tau[kept],
         tau_var=problem.tau_var[kept],
         periods=problem.periods[kept],
         starts=tuple(np.cumsum([0, *map(len, rows[:-1])]).tolist()),
-        names=problem.names,
     )

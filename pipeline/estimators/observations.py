@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.estimators.problem import Regression
+from pipeline.estimators.problem import NOTHING, Known, Regression
 from pipeline.maths.arrays import Array, Booleans, Integers
 from pipeline.maths.models.model import Model, Motion
 from pipeline.maths.selection.blocks import BLOCKS, MOST, path_blocks, repetitions
@@ -66,7 +66,9 @@ def observed(records: Sequence[Smoothed], averages: Iterable[Average], lowpass: 
     return Observed(tuple(records), motion, tau, path_blocks(first.t, period), group, lowpass, number)
 
 
-def pose_samples(model: Model, log: Observed, which: Booleans | None = None) -> tuple[Regression, Integers]:
+def pose_samples(
+    model: Model, log: Observed, which: Booleans | None = None, known: Known = NOTHING
+) -> tuple[Regression, Integers]:
     """The least squares problem of a joint of a log that does not repeat, and the samples (K,) that it is of.
 
     `which` (N,) samples are taken, all where it is left out.  Each counts as one period.
@@ -75,7 +77,7 @@ def pose_samples(model: Model, log: Observed, which: Booleans | None = None) -> 
     if which is not None:
         Phi, tau, kept = Phi[which[kept]], tau[which[kept]], kept[which[kept]]
     names, ones = tuple(parameter.name for parameter in model.parameters), np.ones(len(kept), np.int64)
-    return Regression(Phi[:, 0], tau[:, 0], np.zeros(len(kept)), ones, (0,), names), kept
+    return Regression(Phi[:, 0], tau[:, 0], np.zeros(len(kept)), ones, (0,), names, known), kept
 
 
 def equations(model: Model, logs: Sequence[Observed], count: int) -> tuple[int, Equations, Equations]:

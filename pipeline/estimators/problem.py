@@ -9,12 +9,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import NotIdentifiable
-from pipeline.maths.arrays import Array
+from pipeline.maths.arrays import Array, Booleans
 from pipeline.maths.estimation.correlation import correlated
 from pipeline.maths.estimation.least_squares import Triangle, triangle
+from pipeline.maths.models.physical import Box
 
 ROUNDING = 1e-13  # of the longest column, below which one is nothing but rounding
 CONDITION = 1e10  # of scaled columns, above which rounding tells them apart as much as the motion does
+
+
+class Known(NamedTuple):
+    """What is known of p parameters before anything is measured."""
+
+    positive: Booleans | None = None  # (p,) whether physics knows that they are not negative
+    box: Box | None = None  # of the physical parameters that they are made of
+    guess: Array | None = None  # (p,)
+
+    def signs(self, p: int) -> Booleans:
+        """Which of the parameters (p,) are known not to be negative."""
+        return np.zeros(p, np.bool_) if self.positive is None else self.positive
+
+
+NOTHING = Known()
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +43,7 @@ class Regression:
     periods: NDArray[np.int64]  # (K,) how many periods each sample is the mean of, M; 0 where none was recorded
     starts: tuple[int, ...]  # where each log begins
     names: tuple[str, ...]  # of the parameters
+    known: Known = NOTHING
 
 
 class Spread(NamedTuple):
@@ -37,17 +54,36 @@ class Spread(NamedTuple):
     lags: float  # the sum of the residuals' correlations over all lags but 0
 
 
+class Search(NamedTuple):
+    """A search for parameters, and how it went."""
+
+    walls: str  # what they did to particles
+    seed: int
+    particles: int
+    searched: int  # parameters, n
+    swarms: int
+    excess: float  # of the squared error over the least that the known signs allow, as a share of it
+    history: Array  # (I,) mean squared error after each iteration
+    theta: Array  # (p,)
+
+
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Parameters with two standard errors, which are computed when they are first asked for: refits do not ask."""
+    """Parameters; standard errors and searches are computed when they are first asked for, which refits never do."""
 
     theta: Array  # (p,)
     judge: Callable[[], Spread]
+    look: Callable[[], tuple[Search, ...]] = tuple
 
     @cached_property
     def spread(self) -> Spread:
         """How far the parameters may be off."""
         return self.judge()
+
+    @property
+    def searches(self) -> tuple[Search, ...]:
+        """How the parameters were searched for, and how others would have been."""
+        return self.look()
 
     @property
     def theta_std(self) -> Array:
@@ -87,16 +123,18 @@ def factored(problem: Regression, weight: Array) -> Triangle:
         If a weight or a sample is not a number, the effort does not vary, there are no more samples than parameters, or
         the columns of Phi are linearly dependent.
     """
-    K, p = int((weight > 0).sum()), problem.Phi.shape[1]
-    for what, column in (("weight", weight), ("effort", problem.tau), ("motion", problem.Phi)):
-        if not np.isfinite(column).all() or (column is weight and (column < 0).any()):
-            row = int(np.argwhere(~np.isfinite(column) | ((column is weight) & (column < 0)))[0, 0])
-            raise NotIdentifiable(f"the {what} of sample {row} of {len(problem.tau)} is not a number to fit to")
-    if not np.ptp(problem.tau) > 0:
+    K, p = int(np.count_nonzero(weight)), problem.Phi.shape[1]
+    if np.ptp(problem.tau) == 0:
         raise NotIdentifiable("the effort is the same throughout: check its channel")
     if p >= K:
         raise NotIdentifiable(f"{K} samples for {p} parameters: record more of the motion")
     R = triangle(problem.Phi, problem.tau, weight)
+    if not np.isfinite(R.squares):
+        columns = {"weight": np.where(weight >= 0, weight, np.nan), "effort": problem.tau, "motion": problem.Phi.sum(1)}
+        what, row = next((name, np.argmin(np.isfinite(x))) for name, x in columns.items() if not np.isfinite(x).all())
+        raise NotIdentifiable(
+            f"the {what} of sample {row + 1} of {len(problem.tau)} is not a number: check its channel"
+        )
     still = [name for name, size in zip(problem.names, R.scale, strict=True) if size <= ROUNDING * R.scale.max()]
     if still:
         raise NotIdentifiable(f"nothing in the motion excites {', '.join(still)}")
@@ -108,12 +146,16 @@ def factored(problem: Regression, weight: Array) -> Triangle:
     return R
 
 
-def spread(problem: Regression, weight: Array, R: Triangle, theta: Array) -> Spread:
-    """The standard errors of parameters that are those of least squares, or close to them."""
+def spread(problem: Regression, weight: Array, R: Triangle, theta: Array, residual: Array | None = None) -> Spread:
+    """The standard errors of parameters that are those of least squares, or close to them.
+
+    They come from the weighted residuals, or from others (K,) that stand in for them.
+    """
     inverse = np.linalg.inv(R.U)
     root = np.sqrt(weight)
     Q = problem.Phi * root[:, None] @ (inverse / R.scale[:, None])
-    residual = root * (problem.tau - problem.Phi @ theta)
+    if residual is None:
+        residual = root * (problem.tau - problem.Phi @ theta)
     degrees = int((weight > 0).sum()) - len(theta)
     classical = np.sqrt(residual @ residual / degrees * (inverse**2).sum(axis=1)) / R.scale
     found = correlated(Q, residual, problem.starts, inverse / R.scale[:, None], degrees)

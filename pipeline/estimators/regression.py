@@ -4,14 +4,14 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from pipeline.estimators.problem import Regression
+from pipeline.estimators.problem import NOTHING, Known, Regression
 from pipeline.maths.arrays import Array
 from pipeline.maths.models.model import Model, Motion
 from pipeline.maths.signals.smoothing import motion, segments
 from pipeline.records import Signal, Trajectory
 
 
-def pose(model: Model, trajectories: Sequence[Trajectory]) -> Regression:
+def pose(model: Model, trajectories: Sequence[Trajectory], known: Known = NOTHING) -> Regression:
     """The least squares problem of one joint: the averaged periods of all its logs, one after the other.  (6.37)"""
     lengths = [len(t) for t in trajectories]
     return Regression(
@@ -21,6 +21,7 @@ def pose(model: Model, trajectories: Sequence[Trajectory]) -> Regression:
         periods=np.concatenate([t.count for t in trajectories]),
         starts=tuple(np.cumsum([0, *lengths[:-1]]).tolist()),
         names=tuple(parameter.name for parameter in model.parameters),
+        known=known,
     )
 
 
@@ -34,6 +35,7 @@ def joined(parts: Sequence[Regression]) -> Regression:
         periods=np.concatenate([p.periods for p in parts]),
         starts=tuple(end + start for end, p in zip(ends, parts, strict=True) for start in p.starts),
         names=parts[0].names,
+        known=parts[0].known,
     )
 
 

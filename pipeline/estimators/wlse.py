@@ -1,14 +1,17 @@
-"""Weighted least squares: samples where the periods disagree count less."""
+"""Weighted least squares: samples where the periods disagree count less, as far as noise is what the model leaves."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.errors import NotIdentifiable
-from pipeline.estimators.problem import Estimate, Regression, solve
+from pipeline.estimators.problem import Estimate, Regression, factored, spread
 from pipeline.maths.arrays import Array
 
 FEWEST = 4  # periods: fewer say too little about their own spread
 DEGREES = 200  # degrees of freedom behind each weight, which leave it uncertain by 10 %
+CLEARLY = 3.0  # standard errors by which residuals have to exceed the noise,
+WORTH = 0.05  # and share of it: the pooled variance itself is not known better
+STEPS = 100
 
 
 def estimate(problem: Regression) -> Estimate:
@@ -16,7 +19,9 @@ def estimate(problem: Regression) -> Estimate:
 
     The variance between M periods at one sample has M - 1 degrees of freedom; weights of its inverse are so uncertain
     that they do worse than none.  It is therefore pooled over neighbouring samples of the period until `DEGREES`
-    degrees of freedom stand behind every weight.  The variance of the mean is that of one period over M.
+    degrees of freedom stand behind every weight.  The variance of the mean is that of one period over M.  Where a model
+    leaves more than noise, its error has a variance of its own, the same everywhere, which makes weights more equal:
+    they would trust quiet samples, at which the model errs as it does at loud ones.
 
     Raises
     ------
@@ -27,22 +32,56 @@ def estimate(problem: Regression) -> Estimate:
     if fewest < FEWEST:
         raise NotIdentifiable(f"weights need at least {FEWEST} periods in every log, and one holds {fewest}")
     parts = (np.split(column, problem.starts[1:]) for column in (problem.tau_var, problem.periods))
-    return solve(problem, np.concatenate([M / pooled(var, M) for var, M in zip(*parts, strict=True)]))
+    weight = np.concatenate([M / pooled(var, M) for var, M in zip(*parts, strict=True)])
+    R = factored(problem, weight)
+    degrees = int(np.count_nonzero(problem.periods)) - len(R.y)
+    if R.squares > degrees * (1.0 + max(WORTH, CLEARLY * np.sqrt(2.0 / degrees))):
+        weight = shrunk(weight, problem.tau - problem.Phi @ R.theta, degrees)
+        R = factored(problem, weight)
+    return Estimate(R.theta, lambda: spread(problem, weight, R, R.theta))
+
+
+def shrunk(weight: Array, residual: Array, degrees: int) -> Array:
+    """Weights (K,) that allow for the model's error: 1/w + s^2 in place of 1/w, so that they sum to the degrees.
+
+    f = sum of r^2 / (1/w + s^2) = K - p.  (Paule and Mandel, 1982)  Newton's method on 1/f, which is concave in s^2 and
+    a straight line where 1/w is the same everywhere, gets there from below.
+    """
+    seen = weight > 0
+    noise, squares, s2 = 1.0 / weight[seen], residual[seen] ** 2, 0.0
+    for _ in range(STEPS):
+        share = squares / (noise + s2)
+        f = float(share.sum())
+        step = f / degrees * (f - degrees) / float((share / (noise + s2)).sum())
+        s2 += step
+        if step <= 1e-12 * s2:
+            break
+    out = np.zeros_like(weight)
+    out[seen] = 1.0 / (noise + s2)
+    return out
 
 
 def pooled(var: Array, M: NDArray[np.int64]) -> Array:
     """The variance (K,) of one period averaged around the period, over as many samples as `DEGREES` degrees need.
 
-    Each sample counts by its degrees of freedom, one less than the M (K,) periods that it is the mean of.
+    Each sample counts by its degrees of freedom, one less than the M (K,) periods that it is the mean of.  Where
+    periods do not differ at all, every sample is as good as any other.
     """
-    K, degrees = len(var), np.maximum(M - 1, 0).astype(float)
-    reach = min(int(np.ceil(DEGREES / max(float(np.median(degrees)), 1.0))) // 2, (K - 1) // 2)
-    smooth = around(var * degrees, reach) / np.maximum(around(degrees, reach), 1.0)
-    return np.asarray(np.maximum(smooth, 1e-12 * var.mean() + 1e-300))
+    K, least, most = len(var), max(int(M.min()) - 1, 0), max(int(M.max()) - 1, 0)
+    degrees = np.maximum(M - 1, 0).astype(float)
+    usual = float(least if least == most else np.median(degrees))
+    reach = min(int(np.ceil(DEGREES / max(usual, 1.0))) // 2, (K - 1) // 2)
+    if least == most:
+        smooth = around(var, reach) / (2 * reach + 1)
+    else:
+        smooth = around(var * degrees, reach) / np.maximum(around(degrees, reach), 1.0)
+    return np.asarray(np.maximum(smooth, 1e-12 * var.mean())) if var.any() else np.ones(K)
 
 
 def around(x: Array, reach: int) -> Array:
     """The sum (K,) of each sample and its neighbours, the last being next to the first."""
     K = len(x)
-    total = np.cumsum(np.concatenate([[0.0], x[K - reach :], x, x[:reach]]))
+    total = np.empty(K + 2 * reach + 1)
+    total[0] = 0.0
+    np.cumsum(np.concatenate([x[K - reach :], x, x[:reach]]) if reach else x, out=total[1:])
     return np.asarray(total[2 * reach + 1 :] - total[:K])

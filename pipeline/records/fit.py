@@ -56,6 +56,30 @@ class CrossFit(Record):
 
 
 @dataclass(frozen=True, eq=False)
+class SwarmSearch(Record):
+    """How a swarm searched for the parameters of a model: the best it knew after each iteration."""
+
+    KEY = ("group", "model", "estimator", "walls")
+
+    group: str
+    model: str
+    estimator: str
+    walls: str
+    seed: int
+    particles: int
+    searched: int
+    swarms: int
+    iterations: int
+    excess: float
+    mse: float
+    best_mse: Column
+
+    def published(self) -> Iterator[Published]:
+        """What it reached, and in how many iterations."""
+        yield from self.publish(".".join(("search", *self.key)), "mse", "excess", "searched", "swarms", "iterations")
+
+
+@dataclass(frozen=True, eq=False)
 class FittedPaths(Record):
     """The paths that were fitted on a joint, one period of each in turn; of many, those that differ most."""
 

@@ -97,6 +97,15 @@ QUANTITIES = {
     "samples": Quantity("number of samples fitted, K"),
     "hac_lags": Quantity("lags over which residuals are correlated, each counting by its correlation"),
     "scale": Quantity("displacement or velocity that the term depends on, in the joint's units; 0 for none"),
+    # searches
+    "walls": Quantity("what the walls of the box did to particles", ""),
+    "seed": Quantity("seed of the random numbers"),
+    "particles": Quantity("particles of a swarm"),
+    "searched": Quantity("parameters that were searched"),
+    "swarms": Quantity("swarms that searched before two agreed"),
+    "iterations": Quantity("iterations of the swarm that found most"),
+    "excess": Quantity("share by which the squared error exceeds the least that the known signs allow"),
+    "best_mse": Quantity("least mean squared error known after each iteration", "({effort})^2"),
     # the choice of a model
     "friction": Quantity("friction that is added to the model's structure", ""),
     "chosen": Quantity("candidate that was chosen", ""),

@@ -1,6 +1,7 @@
 """The first-generation da Vinci arm of the thesis: hand roll, hand pitch and instrument slide."""
 
 from pipeline.maths.models.terms import coulomb, gravity_cos, gravity_sin, inertia, lifted_mass, viscous
+from pipeline.robots import davinci_physical
 from pipeline.robots.davinci_chain import BODIES, CHAIN, DRIVES, WRIST
 from pipeline.robots.davinci_control import CONTROL
 from pipeline.robots.robot import Joint, Kind, Limits, Robot
@@ -34,6 +35,7 @@ ROBOT = Robot(
             torque_constant=TORQUE_CONSTANT,
             q_tau=0.5,
             published=ROLL,
+            physical=davinci_physical.ROLL,
         ),
         Joint(
             name="hand_pitch",
@@ -45,6 +47,7 @@ ROBOT = Robot(
             torque_constant=TORQUE_CONSTANT,
             q_tau=0.5,
             published=PITCH,
+            physical=davinci_physical.PITCH,
         ),
         Joint(
             name="instrument_slide",
@@ -56,6 +59,7 @@ ROBOT = Robot(
             torque_constant=TORQUE_CONSTANT,
             q_tau=3.0,
             published=INSERTION,
+            physical=davinci_physical.SLIDE,
         ),
     ),
     chain=CHAIN,

@@ -8,6 +8,7 @@ from pipeline.errors import BadRobot
 from pipeline.maths.mechanics.bodies import Bodies
 from pipeline.maths.mechanics.chain import Chain
 from pipeline.maths.mechanics.drives import Drives
+from pipeline.maths.models.physical import PhysicalTable
 from pipeline.maths.models.terms import Term
 
 
@@ -50,6 +51,7 @@ class Joint:
     # How fast the external effort may wander: the intensity of its random walk, a standard deviation per square root
     # of a second [effort/s^0.5].  A choice, not a measurement; the report says so.
     q_tau: float = 1.0
+    physical: PhysicalTable | None = None  # what the parameters of its terms are made of, where that is known
 
     def unit(self, template: str) -> str:
         """Fill in the joint's units."""

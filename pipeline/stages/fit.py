@@ -8,8 +8,9 @@ import numpy as np
 from pipeline.errors import NotIdentifiable
 from pipeline.estimators import ESTIMATORS, estimator
 from pipeline.estimators.folds import folds, refits
+from pipeline.estimators.known import known_of
 from pipeline.estimators.observations import observed, pose_samples
-from pipeline.estimators.problem import Estimate, Regression
+from pipeline.estimators.problem import NOTHING, Estimate, Known, Regression, Search
 from pipeline.estimators.regression import joined, pose
 from pipeline.maths.arrays import Array
 from pipeline.maths.models.model import Model
@@ -23,6 +24,7 @@ from pipeline.records import (
     MeasurementNoise,
     Residual,
     Smoothed,
+    SwarmSearch,
     Trajectory,
     diagnostic,
 )  # fmt: skip
@@ -48,25 +50,25 @@ class Part(NamedTuple):
 
 def run(
     trajectories: Iterable[Trajectory], smoothed: Iterable[Smoothed], robot: Robot, *, lowpass: float
-) -> Iterator[Fit | CrossFit | FittedPaths | MeasurementNoise | Residual | Diagnostic]:
+) -> Iterator[Fit | CrossFit | FittedPaths | MeasurementNoise | Residual | SwarmSearch | Diagnostic]:
     """One Fit per joint and estimator; an estimator that cannot be used says why, and the rest goes on.
 
     A joint of several logs has a CrossFit, too, by which each of its logs can be predicted from others.
     """
     averaged, samples = list(trajectories), list(smoothed)
     for joint in robot.joints:
-        model = independent(joint)
-        parts = [repeated(model, t) for t in averaged if t.joint == joint.name]
+        model, prior = independent(joint), known_of(joint)
+        parts = [repeated(model, t, prior) for t in averaged if t.joint == joint.name]
         known = {part.log for part in parts}
         once = [s for s in samples if s.joint == joint.name and not s.at_rest and s.log not in known]
-        parts += [unrepeated(model, s, lowpass) for s in once]
+        parts += [unrepeated(model, s, lowpass, prior) for s in once]
         if parts:
             yield from of_joint(model, parts)
 
 
 def of_joint(
     model: Model, parts: Sequence[Part]
-) -> Iterator[Fit | CrossFit | FittedPaths | MeasurementNoise | Residual | Diagnostic]:
+) -> Iterator[Fit | CrossFit | FittedPaths | MeasurementNoise | Residual | SwarmSearch | Diagnostic]:
     """The fits of one joint, what they leave, and what its logs have in common."""
     regression = joined([part.regression for part in parts])
     for name in ESTIMATORS:
@@ -80,6 +82,7 @@ def of_joint(
             yield diagnostic("fit", model.group, "warning", finds)
         yield summarised(parts, model, name, regression, estimate)
         yield from residuals(parts, model, name, estimate)
+        yield from (swarm_search(model, name, search) for search in estimate.searches)
     if len(parts) > 1:
         for name in ESTIMATORS:
             yield from cross_fits([part.log for part in parts], model, name, regression)
@@ -87,15 +90,15 @@ def of_joint(
     yield noise(model.group, parts)
 
 
-def repeated(model: Model, t: Trajectory) -> Part:
+def repeated(model: Model, t: Trajectory, known: Known = NOTHING) -> Part:
     """An averaged period."""
     sigmas = (t.sigma_q, t.sigma_dq, t.sigma_tau)
-    return Part(t.log, t.rate, t.periods, t.period, sigmas, t.t, t.q, t.dq, pose(model, [t]))
+    return Part(t.log, t.rate, t.periods, t.period, sigmas, t.t, t.q, t.dq, pose(model, [t], known))
 
 
-def unrepeated(model: Model, record: Smoothed, lowpass: float) -> Part:
+def unrepeated(model: Model, record: Smoothed, lowpass: float, known: Known) -> Part:
     """Samples, motion and effort through one low-pass."""
-    regression, kept = pose_samples(model, observed([record], (), lowpass, 0))
+    regression, kept = pose_samples(model, observed([record], (), lowpass, 0), known=known)
     step = float(np.median(np.diff(kept))) if len(kept) > 1 else 1.0
     t, q, dq = (x[kept] for x in (record.t, record.q, record.dq))
     sigmas = (record.sigma_q, record.sigma_dq, record.sigma_tau)
@@ -129,6 +132,24 @@ def summarised(parts: Sequence[Part], model: Model, name: str, regression: Regre
         theta=estimate.theta,
         theta_std=estimate.theta_std,
         theta_std_hac=estimate.theta_std_hac,
+    )
+
+
+def swarm_search(model: Model, name: str, search: Search) -> SwarmSearch:
+    """A search with its history.  Fig 6.14"""
+    return SwarmSearch(
+        group=model.group,
+        model=model.name,
+        estimator=name,
+        walls=search.walls,
+        seed=search.seed,
+        particles=search.particles,
+        searched=search.searched,
+        swarms=search.swarms,
+        iterations=len(search.history),
+        excess=search.excess,
+        mse=float(search.history[-1]),
+        best_mse=search.history,
     )
 
 

@@ -8,7 +8,9 @@ import numpy as np
 from pipeline.errors import NotIdentifiable
 from pipeline.estimators import ESTIMATORS, estimator
 from pipeline.estimators.folds import folds
+from pipeline.estimators.known import known_of
 from pipeline.estimators.observations import observed, pose_samples
+from pipeline.estimators.problem import Known
 from pipeline.estimators.regression import measured_motion, of_joints, pose, predicted
 from pipeline.estimators.scores import scored
 from pipeline.estimators.used import describing, model_of, used
@@ -67,13 +69,14 @@ def run(
         refits = list(cross_fits)
         for signal in moving:
             model, joint = independent(robot.joint(signal.joint)), signal.joint
+            known = known_of(robot.joint(joint))
             own_fits = [fit for fit in refits if fit.group == joint]
             if own_fits:
                 yield from without_the_log(signal, averaged.get(joint), own_fits, model, lowpass)
             elif joint in averaged:
-                yield from without_a_period(signal, averaged[joint], model, lowpass)
+                yield from without_a_period(signal, averaged[joint], model, known, lowpass)
             elif joint in samples:
-                yield from without_a_segment(samples[joint], model, lowpass)
+                yield from without_a_segment(samples[joint], model, known, lowpass)
 
 
 def unseen(
@@ -151,7 +154,7 @@ def without_the_log(
 
 
 def without_a_period(
-    signal: Signal, own: Trajectory, model: Model, lowpass: float
+    signal: Signal, own: Trajectory, model: Model, known: Known, lowpass: float
 ) -> Iterator[Prediction | Diagnostic]:
     """Predict each period of a log from fits to the other periods; only the effort is left out, not the path."""
     kept = whole(signal, own)
@@ -167,7 +170,7 @@ def without_a_period(
         others = replace(own, tau=rest.mean, tau_var=rest.var, count=rest.counts)
         for name in list(tau_hat):
             try:
-                tau_hat[name][left] = Phi[left] @ estimator(name)(pose(model, [others])).theta
+                tau_hat[name][left] = Phi[left] @ estimator(name)(pose(model, [others], known)).theta
             except NotIdentifiable as error:
                 yield not_predicted(signal, name, error)
                 del tau_hat[name]
@@ -176,7 +179,7 @@ def without_a_period(
         yield scored(part, model.name, name, signal.role, scheme, "same path", effort, everywhere, lowpass)
 
 
-def without_a_segment(own: Smoothed, model: Model, lowpass: float) -> Iterator[Prediction | Diagnostic]:
+def without_a_segment(own: Smoothed, model: Model, known: Known, lowpass: float) -> Iterator[Prediction | Diagnostic]:
     """Predict each sixth of a log that does not repeat from fits to the other five."""
     log = observed([own], (), lowpass, 0)
     Phi = model.regressor(log.motion).Phi[:, 0]
@@ -186,7 +189,7 @@ def without_a_segment(own: Smoothed, model: Model, lowpass: float) -> Iterator[P
         try:
             for block in range(BLOCKS):
                 left = log.block == block
-                tau_hat[left] = Phi[left] @ estimator(name)(pose_samples(model, log, ~left)[0]).theta
+                tau_hat[left] = Phi[left] @ estimator(name)(pose_samples(model, log, ~left, known)[0]).theta
         except NotIdentifiable as error:
             yield not_predicted(own, name, error)
             continue

@@ -101,7 +101,8 @@ def weighed(bands: Bands, S: Array, degrees: int) -> tuple[Array, Array]:
     squares = 1 / S @ bands.power - np.einsum("gi,gij,gj->g", moved, normal, moved)
     squares = np.maximum(squares, SMALLEST)
     logarithm = np.log(S) @ bands.number + np.linalg.slogdet(normal)[1] + degrees * np.log(squares)
-    share = np.exp(0.5 * (logarithm.min() - logarithm))
+    even = np.where(np.arange(G) < len(WHITE), (G - len(WHITE)) / len(WHITE), 1.0)  # correlated or not: even odds
+    share = even * np.exp(0.5 * (logarithm.min() - logarithm))
     return share / share.sum(), squares / degrees
 
 

@@ -57,3 +57,60 @@ def triangularise(Phi: Any, tau: Any, weight: Any, R: Any) -> None:
                 for i in range(n):
                     column[i] -= factor * v[i]
             R[k, k] = -size if first > 0 else size
+
+
+@inlined
+def beyond(x: Any, factors: Any, C: Any, y: Any, monomials: Any) -> float:
+    """|C m(x) - y|^2, of n parameters x (n + 1,), the last of which is 1; `monomials` (T,) is overwritten."""
+    for t in range(len(factors)):
+        monomials[t] = x[factors[t, 0]] * x[factors[t, 1]] * x[factors[t, 2]]
+    total = 0.0
+    for i in range(len(y)):
+        e = dot(C[i], monomials, len(monomials)) - y[i]
+        total += e * e
+    return total
+
+
+@cached()
+def fly(
+    x: Any,
+    v: Any,
+    best: Any,
+    costs: Any,
+    lower: Any,
+    upper: Any,
+    factors: Any,
+    C: Any,
+    y: Any,
+    r: Any,
+    w: Any,
+    cognitive: float,
+    social: float,
+    reflects: bool,
+    history: Any,
+) -> None:
+    """Move particles x (S, n + 1) by velocities v (S, n), once for each r (I, S, n, 2) in [0, 1) and weight w (I,).
+
+    `best` (S, n + 1) and `costs` (S,) are what each particle has found; the least of them after each move is written to
+    `history` (I,).
+    """
+    S, n = v.shape
+    monomials = np.empty(len(factors))
+    for k in range(len(w)):
+        leader = best[np.argmin(costs)].copy()
+        for s in range(S):
+            for i in range(n):
+                towards = cognitive * r[k, s, i, 0] * (best[s, i] - x[s, i])
+                v[s, i] = w[k] * v[s, i] + towards + social * r[k, s, i, 1] * (leader[i] - x[s, i])
+                x[s, i] += v[s, i]
+                if x[s, i] < lower[i] or x[s, i] > upper[i]:
+                    wall = lower[i] if x[s, i] < lower[i] else upper[i]
+                    if reflects:
+                        x[s, i] = 2.0 * wall - x[s, i]
+                        v[s, i] = -v[s, i]
+                    x[s, i] = min(max(x[s, i], lower[i]), upper[i])
+            cost = beyond(x[s], factors, C, y, monomials)
+            if cost < costs[s]:
+                costs[s] = cost
+                best[s] = x[s]
+        history[k] = costs.min()

@@ -29,7 +29,15 @@ from pipeline.report.plots import autocorrelation, binned_means, correlation, ex
 from pipeline.report.results import format_unit
 from pipeline.report.verdicts import percent
 
-NAMES = {"lse": "least squares", "wlse": "weighted least squares"}
+NAMES = {
+    "lse": "least squares",
+    "wlse": "weighted least squares",
+    "pso": "particle swarm",
+    "bounded": "bounded least squares",
+    "prior": "least squares with a prior",
+    "huber": "robust least squares",
+    "iv": "instrumental variables",
+}
 LAGS = 50  # of the cross-correlation, each way
 SEEN = 0.1  # share of a residual's variance that a motion explains, from which on the residual follows it
 REVERSALS = 2.0  # times as large around reversals as elsewhere, from which on that is said

@@ -1,0 +1,20 @@
+"""What is known of a joint's parameters before anything is measured."""
+
+import numpy as np
+
+from pipeline.estimators.problem import Known
+from pipeline.maths.models.lumping import lumping
+from pipeline.maths.models.physical import Box
+from pipeline.robots.robot import Joint
+
+
+def known_of(joint: Joint) -> Known:
+    """The signs that physics knows; where the robot has a table of it, what the parameters are made of, and a guess."""
+    positive = np.array([term.positive for term in joint.terms])
+    if joint.physical is None:
+        return Known(positive)
+    made = lumping(joint.physical, joint.gear_ratio, [term.name for term in joint.terms])
+    if made is None:
+        return Known(positive)
+    guess, lower, upper = np.array([(x.guess, x.lower, x.upper) for x in joint.physical.parameters]).T
+    return Known(positive, Box(lower, upper, made), made.theta(guess))

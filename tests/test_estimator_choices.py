@@ -1,0 +1,118 @@
+"""What each estimator is for: where it does better than least squares, and that it gives nothing away elsewhere."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.optimize import nnls
+
+from pipeline.errors import NotIdentifiable
+from pipeline.estimators import estimator
+from pipeline.estimators.problem import Known, Regression, solve
+from pipeline.estimators.wlse import pooled
+from pipeline.maths.models.independent import regressor
+from tests import arm
+from tests.contracts.test_estimators import NAMES, PHI, SEEDS, THETA, K, problem
+
+TERMS = arm.joint("hand_roll").terms
+POSITIVE = np.array([term.positive for term in TERMS])
+
+
+def errors(name: str, problems) -> np.ndarray:
+    """Root mean square error of each parameter."""
+    return np.sqrt(np.mean([(estimator(name)(p).theta - THETA) ** 2 for p in problems], axis=0))
+
+
+def test_far_samples_hardly_move_robust_parameters():
+    def struck(seed):
+        p, random = problem(seed), np.random.default_rng([seed, 1])
+        return replace(p, tau=p.tau + 3.0 * (random.random(K) < 0.05) * random.normal(size=K))
+
+    problems = [struck(seed) for seed in range(50)]
+    assert (errors("huber", problems) < 0.5 * errors("lse", problems)).all()
+
+
+def test_without_far_samples_robust_parameters_are_nearly_as_good():
+    problems = [problem(seed) for seed in range(SEEDS)]
+    assert (errors("huber", problems) < 1.1 * errors("lse", problems)).all()
+
+
+def test_noise_of_the_motion_pulls_least_squares_and_not_instrumental_variables():
+    """Noise of the measured position, velocity and acceleration, as where no periods are averaged."""
+    t = 10.0 * np.arange(4 * K) / K / 4
+
+    def measured(seed):
+        random = np.random.default_rng(seed)
+        q, dq, ddq = arm.excitation("hand_roll", t)
+        tau = regressor(TERMS, q, dq, ddq) @ THETA + 0.01 * random.normal(size=len(t))
+        noisy = (x + 0.2 * x.std() * random.normal(size=len(t)) for x in (q, dq, ddq))
+        Phi, var = regressor(TERMS, *noisy), np.full(len(t), 1e-4)
+        return Regression(Phi, tau, var, np.ones(len(t), int), (0,), NAMES)
+
+    def bias(name):
+        found = [estimator(name)(measured(seed)) for seed in range(40)]
+        theta = np.array([each.theta for each in found])
+        return np.abs(theta.mean(axis=0) - THETA) / theta.std(axis=0) * np.sqrt(40)
+
+    assert bias("lse")[0] > 10.0
+    assert bias("iv")[0] < 4.0
+    assert bias("iv")[1] < 4.0
+
+
+def test_a_bound_is_met_exactly_and_the_rest_is_the_best_there_is():
+    theta = np.array([-0.05, 0.0103, 0.3706, 0.21968])
+    p = replace(problem(seed=1), tau=PHI @ theta, known=Known(POSITIVE))
+    found = estimator("bounded")(p)
+    assert found.theta[0] == 0.0
+    rest = np.linalg.lstsq(PHI[:, 1:], p.tau, rcond=None)[0]
+    assert_allclose(found.theta[1:], rest, rtol=1e-9)
+    everything = replace(p, known=Known(np.ones(len(NAMES), bool)))
+    assert_allclose(estimator("bounded")(everything).theta, nnls(PHI, p.tau)[0], atol=1e-9)
+
+
+def test_where_no_bound_holds_bounded_least_squares_are_least_squares():
+    p = replace(problem(seed=1), known=Known(POSITIVE))
+    assert_allclose(estimator("bounded")(p).theta, estimator("lse")(p).theta, rtol=0, atol=0)
+
+
+def test_what_the_motion_hardly_shows_is_drawn_to_the_guess_and_the_rest_is_not():
+    """The acceleration is a thousandth of what it is, so noise leaves the inertia open."""
+    weak = PHI * [1e-3, 1.0, 1.0, 1.0]
+    guess = Known(guess=np.array([0.4, 0.0, 0.3, 0.2]))
+    problems = [
+        replace(p, Phi=weak, tau=p.tau - PHI @ THETA + weak @ THETA, known=guess) for p in map(problem, range(50))
+    ]
+    drawn, lse = errors("prior", problems), errors("lse", problems)
+    assert drawn[0] < 0.1 * lse[0]
+    assert (drawn[1:] < 1.2 * lse[1:]).all()
+
+
+def test_what_the_model_leaves_beyond_noise_makes_weights_equal():
+    """Weights of the noise alone trust the quiet half, where the model errs as it does elsewhere."""
+    quiet = np.where(np.arange(K) < K // 2, 1.0, 0.03)
+    wrong = 0.3 * np.sin(2 * np.pi * 5 * np.arange(K) / K)
+    weigh = {"noise": lambda p: solve(p, p.periods / pooled(p.tau_var, p.periods)).theta}
+    weigh |= {name: lambda p, name=name: estimator(name)(p).theta for name in ("lse", "wlse")}
+
+    def off(name, error):
+        """Root mean square of the effort that parameters are off by."""
+        problems = (problem(seed, 0.3 * quiet) for seed in range(50))
+        thetas = [weigh[name](replace(p, tau=p.tau + error)) for p in problems]
+        return np.sqrt(np.mean([(PHI @ (theta - THETA)) ** 2 for theta in thetas]))
+
+    assert off("wlse", 0.0) < 0.3 * off("lse", 0.0)
+    assert off("noise", wrong) > 1.5 * off("lse", wrong)
+    assert off("wlse", wrong) < 1.1 * off("lse", wrong)
+
+
+def test_weights_that_are_not_numbers_are_refused():
+    var = np.full(K, 0.1)
+    var[3] = np.nan
+    with pytest.raises(NotIdentifiable, match="the weight of sample"):
+        estimator("wlse")(replace(problem(seed=1), tau_var=var))
+
+
+def test_weights_of_three_periods_are_refused():
+    with pytest.raises(NotIdentifiable, match="at least 4 periods in every log, and one holds 3"):
+        estimator("wlse")(replace(problem(seed=1), periods=np.full(K, 3)))
