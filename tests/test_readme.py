@@ -112,7 +112,7 @@ def test_keys_of_a_study_and_its_logs_are_all_told():
     told = set(re.findall(r"\b(\w+) = ", code + " ".join(spans(said))))
     told |= set(re.findall(r"\[+(?:log\.)?(\w+)", code)) | {span for span in spans(said) if span.isidentifier()}
     assert {f.name for f in fields(LogEntry)} | {f.name for f in fields(Weight)} | {"file"} <= told
-    changeable = {f.name for f in fields(Joint)} - {"name", "kind", "published"}
+    changeable = {f.name for f in fields(Joint)} - {"name", "kind", "published", "physical"}
     assert {"title", "robot", "simulated", "settings", "log"} | changeable <= told
     assert "[robot_overrides." in said
 
