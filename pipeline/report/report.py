@@ -7,6 +7,7 @@ from pipeline.report.content import Document, Section
 from pipeline.report.context import Context
 from pipeline.report.results import collect
 from pipeline.report.sections import DOCUMENTS, section_builder
+from pipeline.report.terminal import answer
 from pipeline.report.writers import render_all
 from pipeline.study import Study
 
@@ -22,7 +23,7 @@ def write(catalogue: Catalogue, study: Study, provenance: Provenance) -> dict[st
         for name, (title, content) in built.items()
         if content
     )
-    return render_all(documents) | {"results.json": results}
+    return render_all(documents) | {"results.json": results, "summary.txt": answer(context).encode()}
 
 
 def links_beside(name: str, built: dict[str, tuple[str, tuple[Section, ...]]]) -> tuple[tuple[str, str], ...]:
