@@ -23,8 +23,11 @@ SIZES = [(1440, False), (1024, True), (390, False), (390, True)]
 
 def many_rows() -> Document:
     """The document with a long table in a folded part after it."""
-    rows = tuple((f"run-{i}", Number((-1) ** i * 10.0 ** (i - 12), "N", key=f"run.{i}"), "a/b" * 20) for i in range(24))
-    long = Table("Runs.", ("run", "effort", "file"), rows, label="runs")
+    efforts = [Number((-1) ** i * 10.0 ** (i - 12), "N", key=f"run.{i}") for i in range(24)]
+    rows = tuple(
+        (f"run-{i}", effort, "a/b" * 20, *[Number(-1.25, "N m", 0.01)] * 6) for i, effort in enumerate(efforts)
+    )
+    long = Table("Runs.", ("run", "effort", "file", *(f"mean {i}" for i in range(6))), rows, label="runs")
     full = document()
     return replace(full, sections=(*full.sections, Section("Third", "third", (Prose("All:"), long))))
 
