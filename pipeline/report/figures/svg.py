@@ -144,6 +144,8 @@ def _(figure: Figure3D) -> "Canvas":
     for mark in assign_looks(figure.marks):
         draw_mark_3d(mark, axes)
     _set_equal_ranges(axes, figure)
+    for axis in (axes.xaxis, axes.yaxis, axes.zaxis):
+        axis.set_pane_color((1.0, 1.0, 1.0, 0.0))  # the page's own colour, dark or light
     axes.set_xlabel(figure.x_label)
     axes.set_ylabel(figure.y_label)
     axes.set_zlabel(figure.z_label)
