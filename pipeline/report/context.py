@@ -10,6 +10,8 @@ from pipeline.report.content import Number, literal
 from pipeline.report.results import Results, format_unit
 from pipeline.study import Study
 
+PLAIN = "independent.lse"  # the fit that every other one is compared with
+
 
 @dataclass(frozen=True)
 class Context:
@@ -46,9 +48,11 @@ class Context:
         return self.own_fit(joint)
 
     def own_fit(self, joint: str) -> str:
-        """`<model>.<estimator>` of the fit of a joint by itself: the one that the settings name, or the first."""
+        """`<model>.<estimator>` of the fit of a joint by itself: the one that the filter ran with, or least squares."""
         names = [f"{fit.model}.{fit.estimator}" for fit in self.own_fits() if fit.group == joint]
-        return self.study.settings.fit if self.study.settings.fit in names or not names else names[0]
+        chosen = [p.estimator for p in self.catalogue.about(Prediction, joint=joint, model=CHOSEN)]
+        wanted = (*chosen[:1], PLAIN) if self.study.settings.fit == CHOSEN else (self.study.settings.fit, PLAIN)
+        return next((name for name in (*wanted, *names) if name in names), self.study.settings.fit)
 
     def own_fits(self) -> list[Fit]:
         """The fits of the joints' own terms, one joint at a time."""
