@@ -18,6 +18,7 @@ from typer.testing import CliRunner
 import pipeline
 from pipeline.cli import app
 from pipeline.errors import BadRequest, MissingRecord
+from pipeline.estimators import ESTIMATORS
 from pipeline.records import store
 from pipeline.runner import ledger
 from pipeline.stages import STAGES
@@ -262,7 +263,7 @@ def test_a_run_that_is_killed_resumes_to_the_same_bytes(study, analysed):
 
 def test_a_stage_out_of_order_says_what_to_run(study):
     said = call("fit", study, code=1)
-    assert "fit has nothing to work on: there are no Trajectory records; run differentiate first" in said
+    assert "fit has nothing to work on: there are no Trajectory or Smoothed records; run smooth first" in said
 
 
 def test_units_meanings_and_origins_travel_with_the_file(analysed):
@@ -296,7 +297,9 @@ def test_a_study_is_read_back_as_a_frame_with_its_units(analysed):
     assert frame.attrs["units"]["tau_ext"] == "N m"
     both = pipeline.read(analysed, "Track")
     assert both.attrs["units"]["q"] == {"hand_roll": "rad", "instrument_slide": "m"}
-    assert len(pipeline.read(analysed, "Fit")) == 2 * (4 + 4)
+    own = pipeline.read(analysed, "Fit", model="independent")
+    assert set(own["estimator"]) >= set(ESTIMATORS)
+    assert len(own[own["estimator"] == "lse"]) == 4 + 4
 
 
 def test_reading_what_is_not_there_says_what_there_is(analysed, study):

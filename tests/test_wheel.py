@@ -60,7 +60,8 @@ def test_the_wheel_holds_every_file_of_the_package(wheel):
         held = {name for name in archive.namelist() if name.startswith("pipeline/")}
     assert held == wanted
     assert {"pipeline/py.typed", "pipeline/simulation/shipped/davinci-joints.toml"} <= held
-    assert {Path(name).suffix for name in held} == {".py", ".toml", ".html", ".typ", ".css", ".typed"}
+    suffixes = {Path(name).suffix for name in held}
+    assert suffixes == {".py", ".toml", ".html", ".typ", ".css", ".js", ".png", ".typed"}
 
 
 @pytest.mark.slow
@@ -72,6 +73,6 @@ def test_an_installed_package_simulates_and_analyses_in_an_empty_folder(installe
     run(program, "simulate", "davinci-joints", "raw/joints", cwd=tmp_path)
     run(program, "all", "--jobs", os.cpu_count() or 1, cwd=tmp_path)
     assert {file.name for file in (tmp_path / "reports" / "joints").iterdir()} == {
-        "report.html", "report.pdf", "results.json"
+        "report.html", "report.pdf", "robot.html", "robot.pdf", "results.json", "summary.txt"
     }  # fmt: skip
     assert "are unchanged" in run(program, "verify", "raw/joints", cwd=tmp_path)

@@ -231,9 +231,21 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
     for trusted in trusts:
         yield from looks_at_model(context, trusted)
         yield from looks_at_band(context, trusted)
+    yield from looks_at_paths(context, trusts)
     for diagnostic in context.catalogue.all(Diagnostic):
         for text in warning_texts(diagnostic):
             yield 1.5, literal(text)
+
+
+def looks_at_paths(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:
+    """The joints that were judged on the path that was fitted, together."""
+    same = [trusted for trusted in trusts if trusted.same_path]
+    if same:
+        logs = dict.fromkeys(literal(trusted.prediction.log) for trusted in same if trusted.prediction is not None)
+        names, which = ", ".join(title(trusted.joint) for trusted in same), ", ".join(logs)
+        repeats = f"judged on the path that was fitted ({which}), where the model's error repeats; "
+        remedy = f"record a validation log on another path.{see(context, Prediction, 'prediction')}"
+        yield 4.0, f"**{names}**: {repeats}{remedy}"
 
 
 def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
@@ -243,9 +255,6 @@ def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, st
         error = context.results[f"{p.prefix}.model_error"].number(2)
         errs = f"the model errs by {error}, {percent(trusted.share)} of the effort."
         yield trusted.share / GOOD, f"**{name}, {literal(p.log)}**: {errs}{see_runs}"
-    if p is not None and trusted.same_path:
-        repeats = f"judged on the path that was fitted ({literal(p.log)}), where the model's error repeats; "
-        yield 4.0, f"**{name}**: {repeats}record a validation log on another path.{see_runs}"
 
 
 def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
