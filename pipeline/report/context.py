@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from pipeline.records import Fit, Prediction, Record, Track
+from pipeline.records import Fit, FreeSpace, Prediction, Record
 from pipeline.records.catalogue import Catalogue, Provenance
 from pipeline.records.predict import CHOSEN
 from pipeline.records.quantities import QUANTITIES
@@ -54,20 +54,15 @@ class Context:
         wanted = (*chosen[:1], PLAIN) if self.study.settings.fit == CHOSEN else (self.study.settings.fit, PLAIN)
         return next((name for name in (*wanted, *names) if name in names), self.study.settings.fit)
 
+    def worst_space(self, joint: str) -> FreeSpace | None:
+        """The free space of a joint with the highest detection level, of a log not fitted where there is one."""
+        spaces = self.catalogue.about(FreeSpace, joint=joint)
+        unseen = [space for space in spaces if space.role != "identification"]
+        return max(unseen or spaces, key=lambda space: space.detection_level, default=None)
+
     def own_fits(self) -> list[Fit]:
         """The fits of the joints' own terms, one joint at a time."""
         return self.catalogue.about(Fit, model="independent")
-
-
-def most_telling(tracks: list[Track], most: int) -> list[Track]:
-    """The tracks that figures are spent on, in their order: contacts first, then validation, then identification.
-
-    A report of many logs would otherwise be too large to open, and its contacts hard to find.
-    """
-    order = ("contact", "weight", "tissue", "validation", "identification")
-    moving = [track for track in tracks if not track.at_rest]
-    ranked = sorted(moving, key=lambda track: order.index(track.role) if track.role in order else len(order))
-    return [track for track in moving if track in ranked[:most]]
 
 
 def fit_name(model: str, estimator: str) -> str:

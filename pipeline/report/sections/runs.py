@@ -82,11 +82,8 @@ def intro(tracks: list[Track]) -> Iterator[Prose]:
 def worst_runs(context: Context, tracks: list[Track]) -> Iterator[Track]:
     """Of each joint, the free run with the highest detection level that was not fitted."""
     for joint in dict.fromkeys(track.joint for track in tracks):
-        spaces = context.catalogue.about(FreeSpace, joint=joint)
-        unseen = [space for space in spaces if space.role != "identification"] or spaces
-        if unseen:
-            log = max(unseen, key=lambda space: space.detection_level).log
-            yield from (track for track in tracks if (track.log, track.joint) == (log, joint))
+        if (space := context.worst_space(joint)) is not None:
+            yield from (track for track in tracks if (track.log, track.joint) == (space.log, joint))
 
 
 def scores(context: Context, tracks: list[Track]) -> Table:

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.records import Contact, Diagnostic, FreeSpace, Prediction, Record, Track
+from pipeline.records import Contact, Diagnostic, Prediction, Record, Track
 from pipeline.report.content import (
     Block,
     Bullets,
@@ -106,12 +106,10 @@ def trust(context: Context, joint: str) -> Trust:
     scored = [p for p in scored if p.role != "contact" or context.study.log(p.log).contact]
     others = [p for p in scored if p.role != "identification"] or scored
     unseen = [p for p in others if p.path == "another path"] or others
-    spaces = [space for space in context.catalogue.all(FreeSpace) if space.joint == joint]
-    spaces = [space for space in spaces if space.role != "identification"] or spaces
     return Trust(
         joint,
         max(unseen, key=lambda p: p.model_error, default=None),
-        max(spaces, key=lambda space: space.detection_level, default=None),
+        context.worst_space(joint),
         context.study.settings.effort.get(joint),
     )
 
