@@ -247,7 +247,7 @@ def looks_at_paths(context: Context, trusts: list[Trust]) -> Iterator[tuple[floa
 
 
 def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
-    """How far the model errs, and on which path that was found."""
+    """How far the model errs."""
     p, name, see_runs = trusted.prediction, title(trusted.joint), see(context, Prediction, "prediction")
     if p is not None and trusted.share > GOOD:
         error = context.results[f"{p.prefix}.model_error"].number(2)
