@@ -2,6 +2,8 @@
 
 from pipeline.records.assess import FreeSpace
 from pipeline.records.average import Average, PeriodResidual
+from pipeline.records.bound import ErrorBand
+from pipeline.records.calibrate import FreeMotion
 from pipeline.records.choose import Choice
 from pipeline.records.design import Control, Excitation, Links, Lyapunov, Pose, Workspace
 from pipeline.records.diagnostic import Diagnostic, diagnostic
@@ -13,23 +15,26 @@ from pipeline.records.measure import Contact
 from pipeline.records.predict import Prediction
 from pipeline.records.record import COLUMN_DTYPES, AnyRecord, Column, Counts, Labels, Names, Origin, Record
 from pipeline.records.resample import Signal
+from pipeline.records.settle import FilterNoise
 from pipeline.records.smooth import Smoothed
 from pipeline.records.threshold import Threshold
+from pipeline.records.tune import Tuning
 from pipeline.records.whiteness import Whiteness
 
 __all__ = [
-    "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Choice", "Column", "Contact", "Control", "Counts", "CrossFit",
-    "Diagnostic", "Excitation", "Fit", "FittedPaths", "FreeSpace", "Labels", "Links", "LogSummary", "Lyapunov",
-    "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Record", "Recording", "Residual",
-    "Signal", "Smoothed", "Spectrum", "SwarmSearch", "Threshold", "Track", "Trajectory", "Whiteness",
-    "Workspace", "diagnostic",
+    "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Choice", "Column", "Contact", "Control", "Counts",
+    "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "FilterNoise", "Fit", "FittedPaths", "FreeMotion",
+    "FreeSpace", "Labels", "Links", "LogSummary", "Lyapunov", "MeasurementNoise", "Names", "Origin",
+    "PeriodResidual", "Pose", "Prediction", "Record", "Recording", "Residual", "Signal", "Smoothed", "Spectrum",
+    "SwarmSearch", "Threshold", "Track", "Trajectory", "Tuning", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
     kind.__name__: kind
     for kind in (
-        Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Signal, Average, PeriodResidual,
-        Trajectory, Spectrum, Smoothed, Fit, CrossFit, FittedPaths, MeasurementNoise, Residual, SwarmSearch, Choice,
-        Prediction, Track, FreeSpace, Threshold, Contact, Whiteness, Diagnostic,
+        Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Signal, Average,
+        PeriodResidual, Trajectory, Spectrum, Smoothed, Fit, CrossFit, FittedPaths, MeasurementNoise, Residual,
+        SwarmSearch, Choice, Prediction, Tuning, FilterNoise, FreeMotion, ErrorBand, Track, FreeSpace,
+        Threshold, Contact, Whiteness, Diagnostic,
     )
 }  # fmt: skip

@@ -51,7 +51,8 @@ def _entry(study: TomlTable, index: int, table: TomlTable, robot: Robot | None) 
         rate=optional(table, "rate"),
         skip=optional(table, "skip") or 0.0,
         until=_end(table),
-        contact=_windows(table),
+        contact=_windows(table, "contact"),
+        free=_windows(table, "free"),
         weight=_weight(table, robot),
         delimiter=_delimiter(table),
         decimal=table.text("decimal", choices=(".", ",")) if "decimal" in table else None,
@@ -107,11 +108,11 @@ def _delimiter(table: TomlTable) -> str | None:
     return table.text("delimiter") if "delimiter" in table else None
 
 
-def _windows(table: TomlTable) -> tuple[tuple[float, float], ...]:
-    windows = table.pairs("contact", WINDOWS, [])
+def _windows(table: TomlTable, key: str) -> tuple[tuple[float, float], ...]:
+    windows = table.pairs(key, WINDOWS, [])
     for i, (start, end) in enumerate(windows):
         if not 0 <= start < end:
-            table.problem(f"contact must be {WINDOWS}, not [{start:g}, {end:g}]", "contact", i)
+            table.problem(f"{key} must be {WINDOWS}, not [{start:g}, {end:g}]", key, i)
     return windows
 
 

@@ -15,7 +15,7 @@ class Settings:
     derivative: str = "harmonics"  # how periodic motion is differentiated: "harmonics" or "fft"
     harmonics: int = 0  # of the excitation; 0 takes the robot's
     fit: str = "chosen"  # the Fit that the filter runs with
-    q_tau: float = 0.0  # random walk of the external effort [effort/s^0.5]; 0 takes the robot's
+    q_tau: float = 0.0  # random walk of the external effort [effort/s^0.5]; 0 is the slowest that shows a push
     effort: dict[str, float] = field(default_factory=dict)  # what the user wants to see on each joint [effort]
 
 
@@ -63,6 +63,7 @@ class LogEntry:
     skip: float = 0.0
     until: float | None = None
     contact: tuple[tuple[float, float], ...] = ()
+    free: tuple[tuple[float, float], ...] = ()
     weight: Weight | None = None
     delimiter: str | None = None
     decimal: str | None = None
