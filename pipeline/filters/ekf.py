@@ -104,8 +104,8 @@ def _pass(
 
 @cached(derivation, belief)
 def _likelihood(
-    settle: int, s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float, Q_qq: float,
-    Q_qd: float, Q_dd: float, Q_tau: float,
+    settle: int, s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float,
+    Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float,
 ) -> float:  # fmt: skip
     total = 0.0
     for k in range(len(y_q)):

@@ -24,11 +24,11 @@ from pipeline.maths.models.kernels import bias
 def track(recording: Driven, noise: NoiseModel) -> Tracked:
     """Filter a recording: correct with y_k, then predict with tau_k.  (7.6), (7.7)"""
     out, T_s = np.empty((7, len(recording.q))), recording.T_s
-    *motion, _, _, _, _, _, _ = arguments(recording, noise)
+    motion = arguments(recording, noise)[:7]
     jerk = np.gradient(recording.ddq, T_s) if len(recording.q) > 1 else np.zeros(1)
     left_q, left_dq = (0.25 * T_s**4 * float(np.mean(x**2)) for x in (recording.ddq, jerk))
     Q = (noise.q_q**2 + left_q, noise.q_dq**2 + left_dq, noise.q_tau**2)
-    _pass(*motion, *(noise.r_q**2, noise.r_dq**2, *Q), *out)
+    _pass(*(*motion, noise.r_q**2, noise.r_dq**2, *Q), *out)
     return Tracked(*out)
 
 

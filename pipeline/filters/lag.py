@@ -11,18 +11,14 @@ from pipeline.maths.models.driven import Driven
 from pipeline.maths.models.model import JointDynamics
 
 
-def lag(recordings: Sequence[Driven], noise: NoiseModel) -> Array:
-    """The smoothed external effort (N,) of all recordings, less what the filter makes of it.
+def lag(recordings: Sequence[Driven], noise: NoiseModel) -> tuple[Array, Array]:
+    """The smoothed external effort (N,) of all recordings, and that less what the filter makes of it.
 
     The filter sees it as the effort of a joint at rest, where it is linear: position and velocity stay 0.
     """
-    return np.concatenate([missed(recording, noise) for recording in recordings])
-
-
-def missed(recording: Driven, noise: NoiseModel) -> Array:
-    """The same of one recording without a gap."""
-    smooth = rts.track(recording, noise).tau_ext
-    return np.asarray(smooth - ekf.track(pushed(recording, smooth), noise).tau_ext)
+    smooth = [rts.track(recording, noise).tau_ext for recording in recordings]
+    followed = [ekf.track(pushed(part, x), noise).tau_ext for part, x in zip(recordings, smooth, strict=True)]
+    return np.concatenate(smooth), np.concatenate(smooth) - np.concatenate(followed)
 
 
 def pushed(recording: Driven, tau_ext: Array) -> Driven:

@@ -15,6 +15,7 @@ from pipeline.maths.models.model import JointDynamics
 DURATION = 1.0  # [s] of the push
 SHARE, DELAY = 0.9, 0.1  # of its peak that is returned, and how late at most [s]
 BEFORE, AFTER = 2.0, 1.0  # [s] around it, when it is tried on a joint at rest
+VISCOUS = 4  # of a bias' coefficients
 WIDEST, STEPS = (1e-8, 1e6), 60  # of a walk, over what the filter believes of the joint's own noise; bisections
 
 
@@ -46,6 +47,17 @@ def at_rest(track: Filter, inertia: float, viscous: float, T_s: float, noise: No
     joint = JointDynamics(np.full(len(t), inertia), (0.0, 0.0, 0.0, 0.0, viscous, 0.0, 0.0), still)
     pushed = Driven(joint, still, still, still, half_sine(t, BEFORE), T_s, first_std=1.0)
     return response(track(pushed, noise).tau_ext, t, BEFORE, 1.0)
+
+
+def rise(track: Filter, recording: Driven, noise: NoiseModel) -> float:
+    """The time [s] over which a filter spreads a step: 1 over its steepest rise, at a joint that stands still."""
+    T_s, joint = recording.T_s, recording.joint
+    t = np.asarray(T_s * np.arange(round(2.0 * BEFORE / T_s) + 1), np.float64)
+    still, inertia = np.zeros(len(t)), np.full(len(t), float(np.mean(joint.inertia)))
+    at = JointDynamics(inertia, (0.0, 0.0, 0.0, 0.0, joint.coefficients[VISCOUS], 0.0, 0.0), still)
+    step = np.where(t >= BEFORE, 1.0, 0.0)
+    followed = track(Driven(at, still, still, still, step, T_s, first_std=1.0), noise).tau_ext
+    return float(T_s / max(np.diff(followed).max(), 1e-9))
 
 
 def slowest(track: Filter, inertia: float, viscous: float, T_s: float, noise: NoiseModel) -> float:

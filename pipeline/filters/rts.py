@@ -34,8 +34,8 @@ def track(recording: Driven, noise: NoiseModel) -> Tracked:
 
 @cached(derivation, belief, ekf)
 def _forwards(
-    stored: Any, s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float, Q_qq: float,
-    Q_qd: float, Q_dd: float, Q_tau: float, out_iq: Any, out_idq: Any, out_nis: Any,
+    stored: Any, s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float,
+    Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float, out_iq: Any, out_idq: Any, out_nis: Any,
 ) -> None:  # fmt: skip
     for k in range(len(y_q)):
         for i in range(9):

@@ -34,6 +34,7 @@ class Track(Record):
     filter_part: float
     model_part: float
     lag_part: float
+    smooth_rise: float
     band_from: str
     t: Column
     q: Column
@@ -43,6 +44,7 @@ class Track(Record):
     tau_ext: Column
     tau_ext_std: Column
     tau_ext_std_filter: Column
+    tau_ext_smooth: Column
     tau_ext_direct: Column
     innovation_q: Column
     innovation_dq: Column

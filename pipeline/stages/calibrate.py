@@ -81,7 +81,7 @@ def free_motion(
     if not np.isfinite(made.tau_ext).all():
         return
     _, block, speed_bin, count, mean_square, filter_square, _ = cells(
-        made.tau_ext[free], (made.tau_ext_std**2 + lag(own.parts, noise) ** 2)[free], signal.dq[free], settled.speed
+        made.tau_ext[free], (made.tau_ext_std**2 + lag(own.parts, noise)[1] ** 2)[free], signal.dq[free], settled.speed
     )
     yield FreeMotion(
         log=signal.log, joint=signal.joint, path=path, scheme=scheme, tested=int(free.sum()),

@@ -8,10 +8,11 @@ from pipeline.estimators.driving import Driving, driving, named
 from pipeline.estimators.error_bands import model_variance
 from pipeline.estimators.paths import ANOTHER_PATH, SAME_PATH, follows
 from pipeline.estimators.used import describing
-from pipeline.filters import DEFAULT, through
+from pipeline.filters import DEFAULT, rts, through
 from pipeline.filters.assumed import assumed
 from pipeline.filters.lag import lag
 from pipeline.filters.problem import NoiseModel
+from pipeline.filters.response import rise
 from pipeline.maths.arrays import Array
 from pipeline.maths.contact.day_offset import DayOffset, day_offset
 from pipeline.maths.signals.smoothing import segments
@@ -91,7 +92,7 @@ def tracked(
         yield diverged(signal, float(np.mean(made.nis)))
         if not np.isfinite(made.tau_ext).all():
             return
-    late = lag(parts, noise)
+    smooth, late = lag(parts, noise)
     offset = day_offset(signal.t, signal.tau - own.tau_hat, entry.free)
     if offset.drifts:
         yield drifting(signal, offset)
@@ -122,6 +123,7 @@ def tracked(
         filter_part=rms(made.tau_ext_std[calm]),
         model_part=float(np.sqrt(np.mean(model))),
         lag_part=rms(late[calm]),
+        smooth_rise=rise(rts.track, parts[0], noise),
         band_from=band_from,
         t=signal.t,
         q=made.q,
@@ -131,6 +133,7 @@ def tracked(
         tau_ext=made.tau_ext - offset.value,
         tau_ext_std=np.sqrt(total),
         tau_ext_std_filter=made.tau_ext_std,
+        tau_ext_smooth=smooth - offset.value,
         tau_ext_direct=signal.tau - own.tau_hat - offset.value,
         innovation_q=made.innovation_q,
         innovation_dq=made.innovation_dq,
