@@ -12,13 +12,14 @@ from pipeline.maths.compiled import compiled
 Belief = tuple[float, float, float, float, float, float, float, float, float]
 Transition = tuple[float, float, float, float, float, float]  # F = [f11 f12 f13; f21 f22 f23; 0 0 1], row by row
 
-# Nothing is known of the first position and velocity: 10^3 times as uncertain as the measurement noise and more.
-FIRST = 1e3
+# The first position and velocity are as measured, and count for nothing beside what is measured: 10^6 times the
+# variance.  More than that would leave the smoother without digits.
+FIRST = 1e6
 
 
-def first(r_q: float, r_dq: float, first_std: float) -> Belief:
-    """Before the first sample.  Not the printed P = Q_0 alone: it is broad, so that the first sample sets q and dq."""
-    return 0.0, 0.0, 0.0, 1.0 + FIRST * r_q * r_q, 0.0, 0.0, 1.0 + FIRST * r_dq * r_dq, 0.0, first_std * first_std
+def first(q: float, dq: float, r_q: float, r_dq: float, first_std: float) -> Belief:
+    """Before the first sample, at its position and velocity; not the printed x = 0 and P = Q_0.  (7.6)"""
+    return q, dq, 0.0, FIRST * r_q * r_q, 0.0, 0.0, FIRST * r_dq * r_dq, 0.0, first_std * first_std
 
 
 @compiled

@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.filters import belief
+from pipeline.filters import belief, stepping
 from pipeline.filters.belief import Belief, corrected, spread
 from pipeline.filters.problem import NoiseModel, Tracked
-from pipeline.maths.compiled import cached, compiled
+from pipeline.filters.stepping import arguments, covariances, transition
+from pipeline.maths.compiled import cached
 from pipeline.maths.models import bias as derivation
 from pipeline.maths.models.bias import Coefficients
 from pipeline.maths.models.driven import Driven
-from pipeline.maths.models.kernels import bias
 from pipeline.maths.signals.windows import SETTLE
 
 LOG_2_PI = float(np.log(2.0 * np.pi))
@@ -52,32 +52,7 @@ def step(
     return now, after
 
 
-def arguments(recording: Driven, noise: NoiseModel) -> tuple[Any, ...]:
-    """A recording and its noise as the compiled passes take them."""
-    joint = recording.joint
-    columns = (recording.q, recording.dq, recording.tau - joint.known, joint.inertia)
-    before = belief.first(noise.r_q, noise.r_dq, recording.first_std)
-    contiguous = [np.ascontiguousarray(x, float) for x in columns]
-    return (before, *contiguous, joint.coefficients, recording.T_s, *covariances(noise, recording.T_s))
-
-
-def covariances(noise: NoiseModel, T_s: float) -> tuple[float, float, float, float, float, float]:
-    """R of q and dq, and Q: of q, of q and dq together, of dq, and of the external effort."""
-    r_q, r_dq, q_q, q_dq, q_tau = map(float, noise)
-    return r_q**2, r_dq**2, q_q**2 + (0.5 * T_s * q_dq) ** 2, 0.5 * T_s * q_dq**2, q_dq**2, q_tau**2
-
-
-@compiled
-def transition(q: float, dq: float, tau_ext: float, drive: float, M: float, c_b: Any, T_s: float) -> Any:
-    """Position and velocity one sample later, and F."""
-    b, b_q, b_dq = bias(c_b, q, dq, 0.0)
-    a_q, a_dq, a_tau, h = -b_q / M, -b_dq / M, -1.0 / M, 0.5 * T_s * T_s
-    ddq, of_dq = (drive - b - tau_ext) / M, T_s + h * a_dq
-    F = (1.0 + h * a_q, of_dq, h * a_tau, of_dq * a_q, 1.0 + of_dq * a_dq + h * a_q, of_dq * a_tau)
-    return q + T_s * dq + h * ddq, dq + T_s * ddq + h * (a_q * dq + a_dq * ddq), F
-
-
-@cached(derivation, belief)
+@cached(derivation, belief, stepping)
 def _step(
     s: Any, y_q: float, y_dq: float, drive: float, M: float, c_b: Any, T_s: float, R_q: float, R_dq: float,
     Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float,
@@ -87,7 +62,7 @@ def _step(
     return now, spread(now, q, dq, F, Q_qq, Q_qd, Q_dd, Q_tau)
 
 
-@cached(derivation, belief)
+@cached(derivation, belief, stepping)
 def _pass(
     s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float, Q_qq: float,
     Q_qd: float, Q_dd: float, Q_tau: float, out_q: Any, out_dq: Any, out_tau: Any, out_std: Any, out_iq: Any,
@@ -102,7 +77,7 @@ def _pass(
         s = spread(s, q, dq, F, Q_qq, Q_qd, Q_dd, Q_tau)
 
 
-@cached(derivation, belief)
+@cached(derivation, belief, stepping)
 def _likelihood(
     settle: int, s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float,
     Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float,

@@ -13,8 +13,8 @@ import numpy as np
 
 from pipeline.filters import belief
 from pipeline.filters.belief import corrected, spread
-from pipeline.filters.ekf import arguments
 from pipeline.filters.problem import NoiseModel, Tracked
+from pipeline.filters.stepping import arguments
 from pipeline.maths.compiled import cached
 from pipeline.maths.models import bias as derivation
 from pipeline.maths.models.driven import Driven

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from pipeline.filters.belief import FIRST
-from pipeline.filters.ekf import covariances
 from pipeline.filters.problem import NoiseModel, Tracked
+from pipeline.filters.stepping import covariances
 from pipeline.maths.compiled import cached
 from pipeline.maths.models import bias as derivation
 from pipeline.maths.models.driven import Driven
@@ -28,7 +28,7 @@ def track(recording: Driven, noise: NoiseModel) -> Tracked:
     Q = np.zeros((STATES, STATES))
     Q[:2, :2] = [[Q_qq, Q_qd], [Q_qd, Q_dd]]
     Q[2:, 2:] = walk * np.array([[T_s**2 / 3.0, T_s / 2.0], [T_s / 2.0, 1.0]])
-    P = np.diag([1.0 + FIRST * R_q, 1.0 + FIRST * R_dq, first_std**2, first_std**2])
+    P = np.diag([FIRST * R_q, FIRST * R_dq, first_std**2, first_std**2])
     out = np.empty((7, len(q)))
     y_q, y_dq, drive, inertia = (np.ascontiguousarray(x, float) for x in (q, dq, tau - joint.known, joint.inertia))
     _pass(y_q, y_dq, drive, inertia, joint.coefficients, T_s, R_q, R_dq, Q, P, *out)
@@ -41,7 +41,7 @@ def _pass(
     out_q: Any, out_dq: Any, out_tau: Any, out_std: Any, out_iq: Any, out_idq: Any, out_nis: Any,
 ) -> None:  # fmt: skip
     n, h = STATES, 0.5 * T_s * T_s
-    x, K, F, G = np.zeros(n), np.zeros((n, 2)), np.eye(n), np.zeros((n, n))
+    x, K, F, G = np.array([y_q[0], y_dq[0], 0.0, 0.0]), np.zeros((n, 2)), np.eye(n), np.zeros((n, n))
     for k in range(len(y_q)):
         i_q, i_dq = y_q[k] - x[0], y_dq[k] - x[1]
         s_qq, s_qd, s_dd = P[0, 0] + R_q, P[0, 1], P[1, 1] + R_dq

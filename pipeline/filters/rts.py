@@ -11,15 +11,16 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.filters import belief, ekf
+from pipeline.filters import belief, stepping
 from pipeline.filters.belief import corrected, gains, spread
-from pipeline.filters.ekf import arguments, transition
 from pipeline.filters.problem import NoiseModel, Tracked
+from pipeline.filters.stepping import arguments, transition
 from pipeline.maths.arrays import Array
 from pipeline.maths.compiled import cached
 from pipeline.maths.models import bias as derivation
 from pipeline.maths.models.driven import Driven
 
+LEFT = 1e-12  # of a variance, below which a difference from it is rounding
 STORED = 15  # of each sample: what was predicted, and the transition to the next
 
 
@@ -32,7 +33,7 @@ def track(recording: Driven, noise: NoiseModel) -> Tracked:
     return Tracked(*out)
 
 
-@cached(derivation, belief, ekf)
+@cached(derivation, belief, stepping)
 def _forwards(
     stored: Any, s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float,
     Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float, out_iq: Any, out_idq: Any, out_nis: Any,
@@ -74,7 +75,7 @@ def _backwards(
         out_dq[k] = row[1] - b * l1 - d * l2 - e * l3
         out_tau[k] = row[2] - c * l1 - e * l2 - f * l3
         told = c * (c * L11 + 2 * (e * L12 + f * L13)) + e * (e * L22 + 2 * f * L23) + f * f * L33
-        out_std[k] = max(f - told, 0.0) ** 0.5
+        out_std[k] = max(f - told, LEFT * f) ** 0.5
         if k > 0:
             before = stored[k - 1]
             f11, f12, f13, f21, f22, f23 = before[9], before[10], before[11], before[12], before[13], before[14]

@@ -79,7 +79,7 @@ def runs(t: Array, side: Array) -> Iterator[tuple[int, int]]:
 
 
 def edge(t: Array, size: Array, std: Array, start: int, stop: int, inwards: int, rise: float) -> tuple[float, float]:
-    """Where a contact, above the level from `start` to `stop`, begins (inwards 1) or ends (-1), and its standard error."""
+    """Where a contact, above the level from `start` to `stop`, begins (inwards 1) or ends (-1), and its error."""
     k, peak = (start if inwards > 0 else stop - 1), float(size[start:stop].max())
     middle = reached(t, size, k, inwards, 0.5 * peak)
     upper, lower = reached(t, size, k, inwards, 0.75 * peak), left(t, size, k, inwards, 0.25 * peak)
