@@ -22,14 +22,22 @@ class Driving(NamedTuple):
     signal: Signal
     fit: Fit
     joint: JointDynamics
-    ddq: Array
+    motion: tuple[Array, Array, Array]  # q, dq and ddq, low-passed without delay
     tau_hat: Array
 
     @property
     def parts(self) -> list[Driven]:
-        """Its segments; a gap starts a filter anew."""
+        """Its segments as recorded; a gap starts a filter anew."""
+        return self._parts(self.signal.q, self.signal.dq)
+
+    @property
+    def smooth_parts(self) -> list[Driven]:
+        """The same with the motion low-passed."""
+        return self._parts(*self.motion[:2])
+
+    def _parts(self, q: Array, dq: Array) -> list[Driven]:
         s = self.signal
-        whole = Driven(self.joint, s.q, s.dq, self.ddq, s.tau, 1.0 / s.rate, float(np.std(s.tau)) or 1.0)
+        whole = Driven(self.joint, q, dq, self.motion[2], s.tau, 1.0 / s.rate, float(np.std(s.tau)) or 1.0)
         return [whole.part(part) for part in segments(s.segment)]
 
     def by(self, tau_hat: Array) -> "Driving":
@@ -46,7 +54,8 @@ def driving(signal: Signal, signals: Sequence[Signal], fit: Fit, robot: Robot, l
     motion = of_joints([motions[name] for name in model.joints])
     row, place = model.efforts.index(signal.joint), model.joints.index(signal.joint)
     dynamics = model.joint_dynamics(fit.theta, motion)[row]
-    return Driving(signal, fit, dynamics, motion.ddq[:, place], predicted(model, fit.theta, motion, row))
+    own = (motion.q[:, place], motion.dq[:, place], motion.ddq[:, place])
+    return Driving(signal, fit, dynamics, own, predicted(model, fit.theta, motion, row))
 
 
 def named(

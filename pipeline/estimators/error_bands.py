@@ -4,7 +4,7 @@ import numpy as np
 
 from pipeline.estimators.paths import ANOTHER_PATH
 from pipeline.maths.arrays import Array, Booleans
-from pipeline.maths.contact.error_band import BLOCKS, Cells, centred, excess, speed_bin
+from pipeline.maths.contact.error_band import BLOCKS, SpeedCells, centred, excess, speed_bin
 from pipeline.records import ErrorBand
 
 OWN = "its own other blocks"  # where there is nothing else
@@ -30,9 +30,11 @@ def model_variance(band: ErrorBand, log: str, path: str, dq: Array, is_centred: 
     return variance, OWN
 
 
-def rows(band: ErrorBand, which: Booleans, is_centred: bool) -> Cells:
+def rows(band: ErrorBand, which: Booleans, is_centred: bool) -> SpeedCells:
     """Some of the cells of a band."""
     _, source = np.unique(np.asarray(band.source).astype(str), return_inverse=True)
-    every = Cells(source, band.block, band.speed_bin, band.count, band.mean_square, band.filter_square, band.log_mean)
+    every = SpeedCells(
+        source, band.block, band.speed_bin, band.count, band.mean_square, band.filter_square, band.log_mean
+    )
     some = every.those(which)
     return centred(some) if is_centred else some

@@ -43,10 +43,10 @@ def _forwards(
             stored[k, i] = s[i]
         s, i_q, i_dq, nis, _ = corrected(s, y_q[k], y_dq[k], R_q, R_dq)
         out_iq[k], out_idq[k], out_nis[k] = i_q, i_dq, nis
-        q, dq, F = transition(s[0], s[1], s[2], drive[k], inertia[k], c_b, T_s)
+        q, dq, F, unsure = transition(s[0], s[1], s[2], s[6], drive[k], inertia[k], c_b, T_s)
         for i in range(6):
             stored[k, 9 + i] = F[i]
-        s = spread(s, q, dq, F, Q_qq, Q_qd, Q_dd, Q_tau)
+        s = spread(s, q, dq, F, Q_qq, Q_qd, Q_dd + unsure, Q_tau)
 
 
 @cached(belief)

@@ -4,6 +4,7 @@ f(x, u) = [dq, (u - b(q, dq) - tau_ext) / M, 0],    A = df/dx
 x[k+1] = x + T_s f + T_s^2 / 2 A f + w,    F = I + T_s A + T_s^2 / 2 A^2          (7.11)-(7.16), stepped further
 """
 
+import math
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,9 @@ from pipeline.filters.problem import NoiseModel
 from pipeline.maths.compiled import compiled
 from pipeline.maths.models.driven import Driven
 from pipeline.maths.models.kernels import bias
+
+COULOMB = 5  # of a bias' coefficients
+TINY = 1e-300
 
 
 def arguments(recording: Driven, noise: NoiseModel) -> tuple[Any, ...]:
@@ -31,10 +35,13 @@ def covariances(noise: NoiseModel, T_s: float) -> tuple[float, float, float, flo
 
 
 @compiled
-def transition(q: float, dq: float, tau_ext: float, drive: float, M: float, c_b: Any, T_s: float) -> Any:
-    """Position and velocity one sample later, and F."""
+def transition(q: float, dq: float, tau_ext: float, dq_var: float, drive: float, M: float, c_b: Any, T_s: float) -> Any:
+    """Position and velocity one sample later, F, and the variance that a doubtful sign adds to the velocity."""
     b, b_q, b_dq = bias(c_b, q, dq, 0.0)
+    likely = math.erf(dq / math.sqrt(2.0 * dq_var + TINY))
+    b += c_b[COULOMB] * (likely - np.sign(dq))
+    unsure = (T_s * c_b[COULOMB] / M) ** 2 * (1.0 - likely * likely)
     a_q, a_dq, a_tau, h = -b_q / M, -b_dq / M, -1.0 / M, 0.5 * T_s * T_s
     ddq, of_dq = (drive - b - tau_ext) / M, T_s + h * a_dq
     F = (1.0 + h * a_q, of_dq, h * a_tau, of_dq * a_q, 1.0 + of_dq * a_dq + h * a_q, of_dq * a_tau)
-    return q + T_s * dq + h * ddq, dq + T_s * ddq + h * (a_q * dq + a_dq * ddq), F
+    return q + T_s * dq + h * ddq, dq + T_s * ddq + h * (a_q * dq + a_dq * ddq), F, unsure

@@ -62,3 +62,16 @@ def first(recording: Driven) -> Driven:
     return recording._replace(
         joint=short, q=recording.q[few], dq=recording.dq[few], ddq=recording.ddq[few], tau=recording.tau[few]
     )
+
+
+def likeliest_walk(recordings: Sequence[Driven], noise: NoiseModel) -> float:
+    """The walk of a sample that makes the innovations likeliest: where effort is present, as in section 7.3."""
+    from scipy.optimize import minimize_scalar
+
+    def unlikely(logarithm: float) -> float:
+        walk = noise._replace(q_tau=float(np.exp(logarithm)))
+        return -sum(ekf.log_likelihood(part, walk) for part in recordings)
+
+    own = noise.q_tau or float(np.std(recordings[0].tau)) * recordings[0].T_s
+    found = minimize_scalar(unlikely, bounds=(np.log(own) - FARTHEST, np.log(own) + FARTHEST), method="bounded")
+    return float(np.exp(found.x))

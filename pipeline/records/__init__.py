@@ -5,6 +5,7 @@ from pipeline.records.average import Average, PeriodResidual
 from pipeline.records.bound import ErrorBand
 from pipeline.records.calibrate import FreeMotion
 from pipeline.records.choose import Choice
+from pipeline.records.compare import Comparison
 from pipeline.records.design import Control, Excitation, Links, Lyapunov, Pose, Workspace
 from pipeline.records.diagnostic import Diagnostic, diagnostic
 from pipeline.records.differentiate import Spectrum, Trajectory
@@ -22,9 +23,9 @@ from pipeline.records.tune import Tuning
 from pipeline.records.whiteness import Whiteness
 
 __all__ = [
-    "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Choice", "Column", "Contact", "Control", "Counts",
-    "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "FilterNoise", "Fit", "FittedPaths", "FreeMotion",
-    "FreeSpace", "Labels", "Links", "LogSummary", "Lyapunov", "MeasurementNoise", "Names", "Origin",
+    "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Choice", "Column", "Comparison", "Contact", "Control",
+    "Counts", "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "FilterNoise", "Fit", "FittedPaths",
+    "FreeMotion", "FreeSpace", "Labels", "Links", "LogSummary", "Lyapunov", "MeasurementNoise", "Names", "Origin",
     "PeriodResidual", "Pose", "Prediction", "Record", "Recording", "Residual", "Signal", "Smoothed", "Spectrum",
     "SwarmSearch", "Threshold", "Track", "Trajectory", "Tuning", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
@@ -35,6 +36,6 @@ KINDS: dict[str, type[Record]] = {
         Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Signal, Average,
         PeriodResidual, Trajectory, Spectrum, Smoothed, Fit, CrossFit, FittedPaths, MeasurementNoise, Residual,
         SwarmSearch, Choice, Prediction, Tuning, FilterNoise, FreeMotion, ErrorBand, Track, FreeSpace,
-        Threshold, Contact, Whiteness, Diagnostic,
+        Threshold, Contact, Comparison, Whiteness, Diagnostic,
     )
 }  # fmt: skip

@@ -195,6 +195,10 @@ QUANTITIES = {
     "log_mean": Quantity("mean external effort of the log", "{effort}"),
     "path_of": Quantity("whether the log follows a path that was fitted", ""),
     "q_tau": Quantity("random walk of the external effort that the filter assumes", "{effort}/s^0.5"),
+    "default": Quantity("1 for the filter whose external effort is reported, else 0"),
+    "push": Quantity("peak of the push that was added in software", "{effort}"),
+    "push_share": Quantity("share of the push's peak that the filter shows"),
+    "push_delay": Quantity("delay of the peak that the filter shows", "s"),
     # the robot, its controllers and its excitation
     "robot": Quantity("name of the robot", ""),
     "pose": Quantity("name of a configuration", ""),

@@ -20,5 +20,5 @@ does not grow with the study, unless it is the only one of its stage.  The repor
 
 STAGES = (
     "design", "ingest", "resample", "average", "differentiate", "smooth", "fit", "choose", "predict", "tune",
-    "settle", "calibrate", "bound", "ekf", "assess", "threshold", "measure", "whiteness",
+    "settle", "calibrate", "bound", "ekf", "assess", "threshold", "measure", "compare", "whiteness",
 )  # fmt: skip

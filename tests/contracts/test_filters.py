@@ -1,5 +1,7 @@
-"""Every filter: what is external and what is not, and numbers that stay numbers.  Those that state a model of chance, on a
-joint that is linear in its state: there each is the batch solution, and as good as it says.
+"""Every filter: what is external and what is not, and numbers that stay numbers.
+
+Those that state a model of chance, on a joint that is linear in its state: there each is the batch solution, and as
+good as it says.
 """
 
 from importlib import import_module

@@ -15,7 +15,7 @@ BINS = len(EDGES) + 1
 BLOCKS = 6
 
 
-class Cells(NamedTuple):
+class SpeedCells(NamedTuple):
     """Blocks of logs at ranges of speed, (C,) each."""
 
     source: Integers  # which log
@@ -26,9 +26,9 @@ class Cells(NamedTuple):
     filter_square: Array  # mean of the variance that the filter accounts for, its lag included
     log_mean: Array  # of the external effort over the whole log
 
-    def those(self, which: Booleans) -> "Cells":
+    def those(self, which: Booleans) -> "SpeedCells":
         """Some of the cells."""
-        return Cells(*(column[which] for column in self))  # type: ignore[arg-type]
+        return SpeedCells(*(column[which] for column in self))  # type: ignore[arg-type]
 
 
 def speed_bin(dq: Array, speed: float) -> Integers:
@@ -36,7 +36,7 @@ def speed_bin(dq: Array, speed: float) -> Integers:
     return np.searchsorted(np.array(EDGES) * speed, np.abs(dq))
 
 
-def cells(tau_ext: Array, variance: Array, dq: Array, speed: float) -> Cells:
+def cells(tau_ext: Array, variance: Array, dq: Array, speed: float) -> SpeedCells:
     """The cells of one log's free motion: external effort (N,), the filter's variance (N,) and velocity (N,)."""
     block, bins = np.empty(len(dq), np.int64), speed_bin(dq, speed)
     for number, part in enumerate(np.array_split(np.arange(len(dq)), BLOCKS)):
@@ -44,15 +44,15 @@ def cells(tau_ext: Array, variance: Array, dq: Array, speed: float) -> Cells:
     cell, inverse, count = np.unique(block * BINS + bins, return_inverse=True, return_counts=True)
     squares, own = (np.bincount(inverse, weights=x) / count for x in (tau_ext**2, variance))
     mean = np.full(len(cell), tau_ext.mean())
-    return Cells(np.zeros(len(cell), np.int64), cell // BINS, cell % BINS, count, squares, own, mean)
+    return SpeedCells(np.zeros(len(cell), np.int64), cell // BINS, cell % BINS, count, squares, own, mean)
 
 
-def centred(of: Cells) -> Cells:
+def centred(of: SpeedCells) -> SpeedCells:
     """Of efforts whose offset of the day was taken off."""
     return of._replace(mean_square=of.mean_square - of.log_mean**2)
 
 
-def excess(of: Cells) -> Array:
+def excess(of: SpeedCells) -> Array:
     """The variance (BINS,) beyond the filter's own; the same at all speeds where speed does not tell more."""
     if not len(of.samples):
         return np.zeros(BINS)
@@ -60,7 +60,7 @@ def excess(of: Cells) -> Array:
     return np.maximum(by_speed, 0.0)
 
 
-def means(of: Cells, values: Array, together: bool) -> Array:
+def means(of: SpeedCells, values: Array, together: bool) -> Array:
     """The mean (BINS,) of values of cells in each range, logs counting alike; of all ranges where `together`.
 
     A range that no log was in takes the mean of all.
@@ -72,7 +72,7 @@ def means(of: Cells, values: Array, together: bool) -> Array:
     return np.array([_balanced(of, values, own) if own.any() else total for own in each])
 
 
-def depends_on_speed(of: Cells) -> bool:
+def depends_on_speed(of: SpeedCells) -> bool:
     """Whether variances by range of speed make blocks that are left out more likely than one variance does."""
     units = list(dict.fromkeys(zip(of.source.tolist(), of.block.tolist(), strict=True)))
     if len(units) < 3:
@@ -87,7 +87,7 @@ def depends_on_speed(of: Cells) -> bool:
     return gain > 0.0
 
 
-def _balanced(of: Cells, values: Array, which: Booleans) -> float:
+def _balanced(of: SpeedCells, values: Array, which: Booleans) -> float:
     """The mean over logs of each log's mean over its samples."""
     sources = of.source[which]
     return float(np.mean([
