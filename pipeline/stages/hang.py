@@ -13,7 +13,7 @@ from pipeline.maths.signals.period import guess, refine
 from pipeline.maths.signals.smoothing import segments
 from pipeline.records import Diagnostic, Load, Prediction, Signal, Track, diagnostic
 from pipeline.robots.robot import Robot
-from pipeline.study import LogEntry, Weighings, Weight
+from pipeline.study import HungMass, LogEntry, Weighings
 
 FREE = ("identification", "validation")  # roles of logs in which nothing touches the arm
 PER_CUTOFF = 6.0  # rows kept per period of the low-pass's cutoff
@@ -101,7 +101,7 @@ def left(prediction: Prediction, signal: Signal, lowpass: float) -> Array:
     return smoothed(prediction.tau - prediction.tau_hat, segment, signal.rate, lowpass)
 
 
-def asked(chain: Chain, robot: Robot, weight: Weight, motion: tuple[Array, Array, Array]) -> tuple[Array, Array]:
+def asked(chain: Chain, robot: Robot, weight: HungMass, motion: tuple[Array, Array, Array]) -> tuple[Array, Array]:
     """What a kilogram asks of the joints (N, n) where the study has it, and on the other side of its link."""
     link = carrier(chain, robot, weight.moves_with)
     own, other = (unit_load(chain, link, at, *motion) for at in (weight.position, mirrored(weight.position)))

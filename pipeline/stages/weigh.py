@@ -9,6 +9,7 @@ import numpy as np
 
 from pipeline.maths.arrays import Array
 from pipeline.maths.contact.weighing import (
+    PARTS,
     Rows,
     Weighed,
     better,
@@ -18,7 +19,6 @@ from pipeline.maths.contact.weighing import (
     weighed,
     widening,
 )
-from pipeline.maths.selection.blocks import BLOCKS
 from pipeline.maths.signals.shift import circular, rolled, straight
 from pipeline.records import Diagnostic, FreeWeight, Load, Weight, diagnostic
 from pipeline.robots.robot import Robot
@@ -154,9 +154,7 @@ def where_unseen(load: Load) -> Load | None:
 def rows_of(loads: Sequence[Load], sigma: dict[str, float], column: str) -> list[Rows]:
     """What the joints of a log say of the mass, each weighted by its model's error."""
     return [
-        Rows(
-            getattr(load, column), load.tau_ext, np.arange(len(load)) * BLOCKS // len(load), sigma.get(load.joint, 1.0)
-        )
+        Rows(getattr(load, column), load.tau_ext, np.arange(len(load)) * PARTS // len(load), sigma.get(load.joint, 1.0))
         for load in loads
     ]
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pipeline.robots import Robot
 from pipeline.robots.from_toml import wrong_name
-from pipeline.study import LogEntry, Weight
+from pipeline.study import HungMass, LogEntry
 from pipeline.study.channels import Channels
 from pipeline.study.plausible import optional
 from pipeline.toml import TomlTable
@@ -135,7 +135,7 @@ def _wrong_tare(log: LogEntry, logs: Sequence[LogEntry]) -> str:
     return ""
 
 
-def _weight(table: TomlTable, robot: Robot | None) -> Weight | None:
+def _weight(table: TomlTable, robot: Robot | None) -> HungMass | None:
     if "weight" not in table:
         if table.values.get("role") == "weight":
             table.problem("a weight log says weight = { moves_with = ..., position = ... }, and mass = ... where known")
@@ -149,4 +149,4 @@ def _weight(table: TomlTable, robot: Robot | None) -> Weight | None:
         said = f"position must lie within {FARTHEST:g} m of the remote centre, not {list(position)}; it is in metres"
         weight.problem(said, "position")
     weight.close()
-    return Weight(moves_with, (position[0], position[1], position[2]), mass) if position else None
+    return HungMass(moves_with, (position[0], position[1], position[2]), mass) if position else None

@@ -42,7 +42,7 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Weight:
+class HungMass:
     """A mass hung on the arm, at a point fixed to a link.  Section 7.5"""
 
     moves_with: str  # a joint, for the link that turns about the remote centre with it, or a link
@@ -55,7 +55,7 @@ class Weighing:
     """A weight log as every log is asked about it."""
 
     log: str
-    weight: Weight
+    weight: HungMass
     tare: str  # the log to be subtracted, or ""
 
 
@@ -80,7 +80,7 @@ class LogEntry:
     until: float | None = None
     contact: tuple[tuple[float, float], ...] = ()
     free: tuple[tuple[float, float], ...] = ()
-    weight: Weight | None = None
+    weight: HungMass | None = None
     tare: str = ""  # the log of the same path that is subtracted from a weight log
     delimiter: str | None = None
     decimal: str | None = None

@@ -12,8 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.maths.arrays import Array, Booleans, Integers
-from pipeline.maths.selection.blocks import BLOCKS
 
+PARTS = 6  # of a path, as the choice of a model leaves them out
 # The share of a column's power that an offset has to leave: with less, it would more than double the standard error.
 LEAST_VARYING = 0.25
 
@@ -50,8 +50,8 @@ def weighed(rows: Sequence[Rows]) -> Weighed:
     What a model leaves repeats with the path: sixths of it are about independent of each other, samples and periods are
     not.  (Jackknife; Efron and Tibshirani, An Introduction to the Bootstrap, 1993, chapter 11)
     """
-    without = np.array([_mass(rows, block) for block in range(BLOCKS)])
-    spread = (BLOCKS - 1) / BLOCKS * np.sum((without - without.mean()) ** 2)
+    without = np.array([_mass(rows, block) for block in range(PARTS)])
+    spread = (PARTS - 1) / PARTS * np.sum((without - without.mean()) ** 2)
     return Weighed(_mass(rows), float(np.sqrt(spread)))
 
 
@@ -82,14 +82,14 @@ def model_errors(rows: Sequence[Rows]) -> float:
 def better(rows: Sequence[Rows], others: Sequence[Rows]) -> float:
     """By how many standard errors one column explains the same efforts better than another does; negative if worse."""
     apart = _squares(others) - _squares(rows)
-    spread = np.sqrt(BLOCKS / (BLOCKS - 1) * np.sum((apart - apart.mean()) ** 2))
+    spread = np.sqrt(PARTS / (PARTS - 1) * np.sum((apart - apart.mean()) ** 2))
     return float(apart.sum() / spread) if spread > 0 else 0.0
 
 
 def _squares(rows: Sequence[Rows]) -> Array:
     """The weighted squares that the best mass leaves in each block (B,)."""
     mass = _mass(rows)
-    return np.asarray(np.sum([np.bincount(r.block, (residual(r, mass) / r.sigma) ** 2, BLOCKS) for r in rows], axis=0))
+    return np.asarray(np.sum([np.bincount(r.block, (residual(r, mass) / r.sigma) ** 2, PARTS) for r in rows], axis=0))
 
 
 def widening(free: Sequence[Weighed], common: float) -> float:
