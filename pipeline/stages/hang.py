@@ -54,8 +54,8 @@ def run(
         sides = asked(robot.chain, robot, weighing.weight, motion)
         for track in tracked:
             column = [joint.name for joint in robot.joints].index(track.joint)
-            first, last = float(track.t[0]), float(track.t[-1])
-            length = period or (last - first) + 1.0 / track.rate
+            first = float(track.t[0]) - 0.5 / track.rate  # a sample is in the middle of its time
+            length = period or float(track.t[-1]) + 0.5 / track.rate - first
             count = max(int(length * min(track.rate, PER_CUTOFF * lowpass) * (1 + 1e-9)), 1)
             loads = [smoothed(side[:, column], signals[0].segment, track.rate, lowpass) for side in sides]
             columns = {

@@ -19,7 +19,7 @@ from pipeline.maths.contact.weighing import (
     weighed,
     widening,
 )
-from pipeline.maths.signals.shift import circular, rolled, straight
+from pipeline.maths.signals.shift import circular, straight
 from pipeline.records import Diagnostic, FreeWeight, Load, Weight, diagnostic
 from pipeline.robots.robot import Robot
 from pipeline.study import Weighing, Weighings
@@ -27,6 +27,7 @@ from pipeline.study import Weighing, Weighings
 CARRIES = 1e-6  # effort of a kilogram, below which a joint does not carry it
 FEWEST = 60  # rows of a path that tell anything
 TOGETHER = 0.1  # of the range of motion, by how much a tare may be off the path
+PHASES = 1000  # of a period, at which two paths are compared
 SAME_PERIOD = 0.01  # of a period, by how much a tare's may differ
 TELLS = 2.0  # standard errors by which one side of a link has to explain the effort better
 
@@ -169,35 +170,32 @@ def tared(own: Sequence[Load], tare: Sequence[Load]) -> tuple[list[Load], str]:
     (first, its), *_ = pairs
     if abs(first.period - its.period) > SAME_PERIOD * first.period:
         return [], f"repeats every {its.period:.4g} s and not every {first.period:.4g} s (0: not at all)"
-    others = {name: [resampled(load, other, name) for load, other in pairs] for name in ("q", "tau_ext")}
-    q, other_q = np.stack([load.q for load in own], axis=1), np.stack(others["q"], axis=1)
+    q, other_q = (np.stack([evenly(load) for load in loads], axis=1) for loads in zip(*pairs, strict=True))
     shift = circular(q, other_q) if first.period else straight(q, other_q)
     if shift.apart.max() > TOGETHER:
         worst = own[int(shift.apart.argmax())].joint
         share = f"{shift.apart.max():.2g} of the standard deviation of {worst}"
         return [], f"is not on the same path: at best it is off by {share}, and may be by {TOGETHER:g}"
-    efforts = np.stack(others["tau_ext"], axis=1)
-    if first.period:
-        return [less(load, rolled(effort, shift.samples)) for load, effort in zip(own, efforts.T, strict=True)], ""
-    lag = round(shift.samples)
-    kept = slice(max(0, -lag), min(len(q), len(other_q) - lag))
-    return [
-        less(part(load, kept), effort[kept.start + lag : kept.stop + lag])
-        for load, effort in zip(own, efforts.T, strict=True)
-    ], ""
+    return [subtracted(load, other, shift.samples) for load, other in pairs], ""
 
 
-def resampled(load: Load, tare: Load, name: str) -> Array:
-    """A column of a tare at the sampling of the log: a whole period of it, or all of it."""
-    values = getattr(tare, name)
+def evenly(load: Load) -> Array:
+    """Where a joint is: so many times a period, or as often as its rate says."""
     if load.period:
-        return np.asarray(np.interp(load.t / load.period, tare.t / tare.period, values, period=1.0))
-    return np.asarray(np.interp(np.arange(tare.t[0], tare.t[-1], 1.0 / load.rate), tare.t, values))
+        phase = (np.arange(PHASES) + 0.5) / PHASES
+        return np.asarray(np.interp(phase, load.t / load.period, load.q, period=1.0))
+    return np.asarray(np.interp(np.arange(load.t[0], load.t[-1], 1.0 / load.rate), load.t, load.q))
 
 
-def part(load: Load, kept: slice) -> Load:
-    """Some rows of a load."""
-    return replace(load, **{name: getattr(load, name)[kept] for name in load.columns()})
+def subtracted(load: Load, tare: Load, samples: float) -> Load:
+    """A load without the effort of its tare, which is so many samples later; where the tare is there, too."""
+    if load.period:
+        phase = load.t / load.period + samples / PHASES
+        return less(load, np.interp(phase, tare.t / tare.period, tare.tau_ext, period=1.0))
+    t = load.t - load.t[0] + tare.t[0] + samples / load.rate
+    there = (t >= tare.t[0]) & (t <= tare.t[-1])
+    kept = replace(load, **{name: getattr(load, name)[there] for name in load.columns()})
+    return less(kept, np.interp(t[there], tare.t, tare.tau_ext))
 
 
 def less(load: Load, tau_ext: Array) -> Load:
