@@ -266,3 +266,10 @@ def test_a_tare_of_a_motion_that_does_not_repeat_is_subtracted_too(monkeypatch):
     for tare, closer in (("", False), ("empty", True)):
         weight, _, _ = analysed(logs, Weighing("heavy", HUNG, tare))
         assert (weight.tare == tare, weight.left_rms.max() < 0.06) == (True, closer)  # of it 0.04 is noise
+
+
+def test_a_model_without_any_error_tells_the_mass_exactly(monkeypatch):
+    monkeypatch.setattr("tests.test_weighing.left_by_the_model", lambda t, seed: np.zeros((len(t), 3)))
+    weight, free, _ = study(0)
+    assert weight.mass == pytest.approx(MASS, rel=1e-9)
+    assert max(abs(f.free_mass) for f in free.values()) < 1e-12

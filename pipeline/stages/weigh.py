@@ -25,7 +25,7 @@ from pipeline.robots.robot import Robot
 from pipeline.study import Weighing, Weighings
 
 CARRIES = 1e-6  # effort of a kilogram, below which a joint does not carry it
-FEWEST = 60  # rows of a path that tell anything
+FEWEST = 2 * PARTS  # rows of a path that tell anything
 TOGETHER = 0.1  # of the range of motion, by how much a tare may be off the path
 PHASES = 1000  # of a period, at which two paths are compared
 SAME_PERIOD = 0.01  # of a period, by how much a tare's may differ

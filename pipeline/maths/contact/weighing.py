@@ -76,7 +76,9 @@ def residual(row: Rows, mass: float) -> Array:
 
 def model_errors(rows: Sequence[Rows]) -> float:
     """The root mean square of what free motion leaves of one joint, over its recordings, each counting alike."""
-    return float(np.sqrt(np.mean([np.mean(residual(row, 0.0) ** 2) for row in rows])))
+    squares = [np.mean(residual(row, 0.0) ** 2) for row in rows]
+    exact = 1e-9 * max(float(np.abs(row.x).max()) for row in rows)  # of a model without any error
+    return max(float(np.sqrt(np.mean(squares))), exact)
 
 
 def better(rows: Sequence[Rows], others: Sequence[Rows]) -> float:
