@@ -220,7 +220,7 @@ def test_an_offset_of_the_day_costs_no_mass():
     logs[1] = log("heavy", "weight", 2, HUNG.position)
     still, _, _ = analysed(logs, Weighing("heavy", HUNG, ""))
     assert off.mass == pytest.approx(still.mass, abs=1e-9)
-    assert_allclose(off.day_offset - still.day_offset, 0.3)
+    assert_allclose(off.joint_offset - still.joint_offset, 0.3)
 
 
 def test_a_mass_that_nobody_states_is_found_and_has_no_scale():
@@ -271,5 +271,6 @@ def test_a_tare_of_a_motion_that_does_not_repeat_is_subtracted_too(monkeypatch):
 def test_a_model_without_any_error_tells_the_mass_exactly(monkeypatch):
     monkeypatch.setattr("tests.test_weighing.left_by_the_model", lambda t, seed: np.zeros((len(t), 3)))
     weight, free, _ = study(0)
-    assert weight.mass == pytest.approx(MASS, rel=1e-9)
+    # Central differences err by (w T_s)^2 / 6, 2e-4 of what the fastest acceleration asks for.
+    assert weight.mass == pytest.approx(MASS, rel=2e-4)
     assert max(abs(f.free_mass) for f in free.values()) < 1e-12

@@ -26,8 +26,8 @@ from pipeline.records.whiteness import Whiteness
 __all__ = [
     "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Choice", "Column", "Contact", "Control", "Counts",
     "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "FilterNoise", "Fit", "FittedPaths", "FreeMotion",
-    "FreeSpace", "FreeWeight", "Labels", "Links", "Load", "LogSummary", "Lyapunov", "MeasurementNoise", "Names", "Origin",
-    "PeriodResidual", "Pose", "Prediction", "Record", "Recording", "Residual", "Signal", "Smoothed", "Spectrum",
+    "FreeSpace", "FreeWeight", "Labels", "Links", "Load", "LogSummary", "Lyapunov", "MeasurementNoise", "Names",
+    "Origin", "PeriodResidual", "Pose", "Prediction", "Record", "Recording", "Residual", "Signal", "Smoothed", "Spectrum",
     "SwarmSearch", "Threshold", "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
 

@@ -196,7 +196,7 @@ QUANTITIES = {
     "loaded": Quantity("joint that carries the mass", ""),
     "mass_alone": Quantity("mass by one joint alone", "kg"),
     "mass_alone_std": Quantity("standard error of the mass by one joint alone", "kg"),
-    "day_offset": Quantity("offset of the joint's effort beside the mass", PER_ROW),
+    "joint_offset": Quantity("offset of the joint's effort beside the mass", PER_ROW),
     "left_rms": Quantity("root mean square of the effort that mass and offset leave", PER_ROW),
     "free_error": Quantity("root mean square of the model's error along free motion", PER_ROW),
     "free_mass": Quantity("mass that seems to hang there, where none does", "kg"),

@@ -33,7 +33,7 @@ class Weight(Record):
     unit: Labels
     mass_alone: Column
     mass_alone_std: Column
-    day_offset: Column
+    joint_offset: Column
     left_rms: Column
     free_error: Column
 
@@ -45,7 +45,7 @@ class Weight(Record):
         yield from self.publish(f"weight.{self.log}", "run_std", "fit_std", "widening")
         for i, joint in enumerate(self.loaded):
             yield Published(f"weight.{self.log}.{joint}.mass", "mass_alone", std="mass_alone_std", row=i)
-            for name in ("day_offset", "left_rms", "free_error"):
+            for name in ("joint_offset", "left_rms", "free_error"):
                 yield Published(f"weight.{self.log}.{joint}.{name}", name, row=i)
 
 

@@ -102,7 +102,7 @@ def of_log(
         unit=np.array([units[load.joint] for load in kept], object),
         mass_alone=np.array([w.mass for w in alone]),
         mass_alone_std=np.array([w.std for w in alone]),
-        day_offset=np.array([offset(row, mass) for row in sides[0]]),
+        joint_offset=np.array([offset(row, mass) for row in sides[0]]),
         left_rms=np.array(left),
         free_error=np.array([free.sigma[load.joint] for load in kept]),
     )

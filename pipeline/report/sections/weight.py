@@ -108,7 +108,7 @@ def figure(weight: Weight, loads: list[Load]) -> Figure:
     """The external effort of each joint beside what the mass asks of it.  Fig 7.12"""
     mass = weight.mass if math.isnan(weight.stated_mass) else weight.stated_mass
     by = "found" if math.isnan(weight.stated_mass) else "stated"
-    offsets = dict(zip(weight.loaded, weight.day_offset, strict=True))
+    offsets = dict(zip(weight.loaded, weight.joint_offset, strict=True))
     name, subtracted = literal(weight.log), ", before the tare is subtracted" if weight.tare else ""
     once = "over one period, averaged" if loads[0].period else "over the run"
     return Figure(
@@ -133,7 +133,7 @@ def figure(weight: Weight, loads: list[Load]) -> Figure:
 
 def by_joint(context: Context, weight: Weight) -> Table:
     """What each joint says of the mass."""
-    names = ("mass", "day_offset", "left_rms", "free_error")
+    names = ("mass", "joint_offset", "left_rms", "free_error")
     rows = tuple(
         (title(joint), *(context.number(f"weight.{weight.log}.{joint}.{name}", 3) for name in names))
         for joint in weight.loaded
