@@ -27,8 +27,9 @@ __all__ = [
     "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Choice", "Column", "Contact", "Control", "Counts",
     "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "FilterNoise", "Fit", "FittedPaths", "FreeMotion",
     "FreeSpace", "FreeWeight", "Labels", "Links", "Load", "LogSummary", "Lyapunov", "MeasurementNoise", "Names",
-    "Origin", "PeriodResidual", "Pose", "Prediction", "Record", "Recording", "Residual", "Signal", "Smoothed", "Spectrum",
-    "SwarmSearch", "Threshold", "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace", "diagnostic",
+    "Origin", "PeriodResidual", "Pose", "Prediction", "Record", "Recording", "Residual", "Signal", "Smoothed",
+    "Spectrum", "SwarmSearch", "Threshold", "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace",
+    "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
