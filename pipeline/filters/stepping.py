@@ -1,7 +1,10 @@
 """The second-order step of a joint's motion, and how recordings and noise enter the compiled passes.
 
-f(x, u) = [dq, (u - b(q, dq) - tau_ext) / M, 0],    A = df/dx
-x[k+1] = x + T_s f + T_s^2 / 2 A f + w,    F = I + T_s A + T_s^2 / 2 A^2          (7.11)-(7.16), stepped further
+    f(x, u) = [dq, (u - b(q, dq) - tau_ext) / M, 0],    A = df/dx
+    x[k+1] = x + T_s f + T_s^2 / 2 A f + w,    F = I + T_s A + T_s^2 / 2 A^2          (7.11)-(7.16), stepped further
+
+Where the velocity passes through 0, nobody knows the sign of Coulomb friction: it is c_f erf(dq / sqrt(2 P_dq)) on
+average, and c_f^2 (1 - erf^2) about that, which counts as noise of the drive.
 """
 
 import math

@@ -11,6 +11,7 @@ from pipeline.records.diagnostic import Diagnostic, diagnostic
 from pipeline.records.differentiate import Spectrum, Trajectory
 from pipeline.records.ekf import Track
 from pipeline.records.fit import CrossFit, Fit, FittedPaths, MeasurementNoise, Residual, SwarmSearch
+from pipeline.records.hang import Load
 from pipeline.records.ingest import LogSummary, Recording
 from pipeline.records.measure import Contact
 from pipeline.records.predict import Prediction
@@ -20,14 +21,16 @@ from pipeline.records.settle import FilterNoise
 from pipeline.records.smooth import Smoothed
 from pipeline.records.threshold import Threshold
 from pipeline.records.tune import Tuning
+from pipeline.records.weigh import FreeWeight, Weight
 from pipeline.records.whiteness import Whiteness
 
 __all__ = [
     "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Choice", "Column", "Comparison", "Contact", "Control",
     "Counts", "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "FilterNoise", "Fit", "FittedPaths",
-    "FreeMotion", "FreeSpace", "Labels", "Links", "LogSummary", "Lyapunov", "MeasurementNoise", "Names", "Origin",
-    "PeriodResidual", "Pose", "Prediction", "Record", "Recording", "Residual", "Signal", "Smoothed", "Spectrum",
-    "SwarmSearch", "Threshold", "Track", "Trajectory", "Tuning", "Whiteness", "Workspace", "diagnostic",
+    "FreeMotion", "FreeSpace", "FreeWeight", "Labels", "Links", "Load", "LogSummary", "Lyapunov",
+    "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Record", "Recording",
+    "Residual", "Signal", "Smoothed", "Spectrum", "SwarmSearch", "Threshold", "Track", "Trajectory", "Tuning",
+    "Weight", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
@@ -36,6 +39,6 @@ KINDS: dict[str, type[Record]] = {
         Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Signal, Average,
         PeriodResidual, Trajectory, Spectrum, Smoothed, Fit, CrossFit, FittedPaths, MeasurementNoise, Residual,
         SwarmSearch, Choice, Prediction, Tuning, FilterNoise, FreeMotion, ErrorBand, Track, FreeSpace,
-        Threshold, Contact, Comparison, Whiteness, Diagnostic,
+        Threshold, Contact, Comparison, Whiteness, Diagnostic, Load, Weight, FreeWeight,
     )
 }  # fmt: skip

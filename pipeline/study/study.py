@@ -42,12 +42,28 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Weight:
-    """A known mass hung on the arm, at a point fixed to a link.  Section 7.5"""
+class HungMass:
+    """A mass hung on the arm, at a point fixed to a link.  Section 7.5"""
 
-    mass: float  # [kg]
-    moves_with: str
-    position: tuple[float, float, float]  # [m] from the remote centre, in axes that at q = 0 are the base axes
+    moves_with: str  # a joint, for the link that turns about the remote centre with it, or a link
+    position: tuple[float, float, float]  # [m] from the remote centre, in the link's axes that at q = 0 are the base's
+    mass: float | None = None  # [kg] where it is known
+
+
+@dataclass(frozen=True)
+class Weighing:
+    """A weight log as every log is asked about it."""
+
+    log: str
+    weight: HungMass
+    tare: str  # the log to be subtracted, or ""
+
+
+@dataclass(frozen=True)
+class Weighings:
+    """All weight logs of a study that say where the mass hangs."""
+
+    each: tuple[Weighing, ...]
 
 
 @dataclass(frozen=True)
@@ -64,7 +80,8 @@ class LogEntry:
     until: float | None = None
     contact: tuple[tuple[float, float], ...] = ()
     free: tuple[tuple[float, float], ...] = ()
-    weight: Weight | None = None
+    weight: HungMass | None = None
+    tare: str = ""  # the log of the same path that is subtracted from a weight log
     delimiter: str | None = None
     decimal: str | None = None
     header: bool | None = None
@@ -99,6 +116,13 @@ class Study:
     def log(self, name: str) -> LogEntry:
         """The log of that name."""
         return next(entry for entry in self.logs if entry.name == name)
+
+    @property
+    def weighings(self) -> Weighings:
+        """The weight logs."""
+        return Weighings(
+            tuple(Weighing(e.name, e.weight, e.tare) for e in self.logs if e.weight and e.role == "weight")
+        )
 
     @property
     def files(self) -> int:

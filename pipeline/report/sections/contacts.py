@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.records import Contact, Track
+from pipeline.records import Contact, Track, Weight
 from pipeline.report.content import (
     Block,
     Cell,
@@ -101,9 +101,10 @@ def peak_panel(contacts: list[Contact], named: bool) -> Panel:
 def not_analysed(context: Context) -> Iterator[tuple[str, str, str]]:
     """Log, joint and reason of what was recorded and tells nothing of contact here."""
     measured = {(contact.log, contact.joint) for contact in context.catalogue.all(Contact)}
+    weighed = {weight.log for weight in context.catalogue.all(Weight)}
     tracked = {(track.log, track.joint): track for track in context.catalogue.all(Track)}
     for entry in context.study.logs:
-        if entry.role not in ("contact", "weight", "tissue", "friction"):
+        if entry.role not in ("contact", "weight", "tissue", "friction") or entry.name in weighed:
             continue
         joints = [joint for joint in entry.joints if (entry.name, joint) not in measured]
         reasons: dict[str, list[str]] = {}
