@@ -39,6 +39,6 @@ KINDS: dict[str, type[Record]] = {
         Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Signal, Average,
         PeriodResidual, Trajectory, Spectrum, Smoothed, Fit, CrossFit, FittedPaths, MeasurementNoise, Residual,
         SwarmSearch, Choice, Prediction, Tuning, FilterNoise, FreeMotion, ErrorBand, Track, FreeSpace,
-        Threshold, Contact, Comparison, Whiteness, Diagnostic, Load, Weight, FreeWeight,
+        Threshold, Contact, Load, Weight, FreeWeight, Comparison, Whiteness, Diagnostic,
     )
 }  # fmt: skip
