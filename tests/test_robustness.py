@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 
 from pipeline.errors import BadRequest
+from pipeline.records import Diagnostic, Recording
 from pipeline.robots import davinci
 from pipeline.runner.canonical import canonical, hash_of
 from pipeline.runner.code import code
 from pipeline.runner.lock import locked
+from pipeline.stages import resample
 from tests import arm
 from tests.test_runs import call, processed, reports
 
@@ -220,6 +222,7 @@ def test_many_runs_at_once_hold_the_lock_one_after_the_other(tmp_path):
 import sys, time
 from pathlib import Path
 from pipeline.errors import BadRequest
+from pipeline.records import Diagnostic, Recording
 from pipeline.runner.lock import locked
 folder, done = Path(sys.argv[1]), 0
 while done < 40:
@@ -286,3 +289,52 @@ def test_verify_compares_a_file_with_what_every_task_knew_of_it(finished):
     said = flat(call("verify", finished, code=1))
     line = said.partition("recording/one/hand_roll.parquet was altered")[2].partition("was altered")[0]
     assert "for report report" in line
+
+
+def remarked(damage, q_limits=(-0.6, 0.6)) -> str:
+    """What is said of a recording of the roll after something was done to it."""
+    signal = arm.signal("hand_roll", rate=100.0, periods=2)
+    columns = {"t": signal.t, "q": signal.q.copy(), "dq": signal.dq.copy(), "tau": signal.tau.copy()}
+    damage(columns)
+    recording = Recording("run", "hand_roll", "identification", 100.0, "logged", **columns)
+    made = resample.run(recording, arm.joint("hand_roll"), lowpass=17.0)
+    return " ".join(text for record in made if isinstance(record, Diagnostic) for text in record.text)
+
+
+def stop_sensor(columns):
+    columns["q"][500:600] = columns["q"][500]
+
+
+def rest(columns):
+    """A joint that stands still for a second goes on from where it stood."""
+    columns["q"][500:600] = columns["q"][500]
+    columns["q"][600:] -= columns["q"][600] - columns["q"][599]
+    columns["dq"][500:600] = 0.0
+
+
+def test_a_stuck_sensor_a_saturated_drive_and_a_wrong_unit_are_said():
+    assert remarked(lambda columns: None) == ""
+    assert "stands still from 5.000 to 5.990 s and then jumps" in remarked(stop_sensor)
+    assert "stands still" not in remarked(rest)
+    limit = np.quantile(arm.signal("hand_roll", rate=100.0, periods=2).tau, 0.9)
+    assert "was saturated" in remarked(lambda c: c.update(tau=np.minimum(c["tau"], limit)))
+    in_mrad = remarked(lambda c: c.update(q=1000.0 * c["q"], dq=1000.0 * c["dq"]))
+    assert "check the unit of the position" in in_mrad
+
+
+def test_what_one_joint_of_a_log_suffers_costs_no_other_joint_or_log(raw):
+    """A log whose velocity is in other units than it says is remarked on, and the rest comes out as without it."""
+    alone, beside = small(raw / "alone", ("one", "two")), small(raw / "beside", ("one", "two"))
+    wrong = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5, seed=3)
+    object.__setattr__(wrong, "q", 1000.0 * wrong.q)
+    arm.write_csv(beside / "wrong.csv", [wrong])
+    with (beside / "study.toml").open("a") as study:
+        study.write(arm.log_table("wrong", "wrong.csv", "validation", ["hand_roll"]))
+    call("all", alone)
+    said = flat(call("all", beside))
+    assert "wrong/hand_roll: positions reach" in said
+    theirs, ours = (json.loads((reports(folder) / "results.json").read_text()) for folder in (alone, beside))
+    values = {row["key"]: row["value"] for row in ours}
+    tracked = [row for row in theirs if row["key"].startswith(("fit.", "ekf."))]
+    assert tracked
+    assert all(values[row["key"]] == row["value"] for row in tracked if "white" not in row["key"])

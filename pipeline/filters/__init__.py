@@ -10,6 +10,7 @@ from pipeline.maths.models.driven import Driven
 
 FILTERS = ("ekf", "ekf_euler", "rts", "rate", "momentum", "direct")
 DEFAULT = "ekf"  # the others are compared with it
+DIVERGED = 50.0  # times what a consistent filter has of normalised innovations squared, on average
 
 
 def tracker(name: str) -> Filter:
@@ -23,3 +24,8 @@ def through(name: str, recordings: Sequence[Driven], noise: NoiseModel) -> Track
     track = tracker(name)
     passes = [track(recording, noise) for recording in recordings]
     return Tracked(*(np.concatenate(columns) for columns in zip(*passes, strict=True)))
+
+
+def diverges(made: Tracked) -> bool:
+    """Whether a pass is nothing like what its filter assumes, so that nothing may be concluded from it."""
+    return not np.isfinite(made.tau_ext).all() or float(np.mean(made.nis)) > 2.0 * DIVERGED

@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.estimators.driving import Driving, driving, named
 from pipeline.estimators.paths import ANOTHER_PATH, SAME_PATH, follows
 from pipeline.estimators.used import describing
-from pipeline.filters import DEFAULT, through
+from pipeline.filters import DEFAULT, diverges, through
 from pipeline.filters.assumed import assumed
 from pipeline.filters.lag import lag
 from pipeline.maths.contact.error_band import cells
@@ -79,7 +79,7 @@ def free_motion(
         return
     noise = assumed(settled, 1.0 / signal.rate, q_tau)
     made = through(DEFAULT, own.parts, noise)
-    if not np.isfinite(made.tau_ext).all():
+    if diverges(made):
         return
     _, block, speed_bin, count, mean_square, filter_square, _ = cells(
         made.tau_ext[free], (made.tau_ext_std**2 + lag(own.parts, noise)[1] ** 2)[free], signal.dq[free], settled.speed

@@ -8,7 +8,7 @@ from pipeline.estimators.driving import Driving, driving, named
 from pipeline.estimators.error_bands import model_variance
 from pipeline.estimators.paths import ANOTHER_PATH, SAME_PATH, follows
 from pipeline.estimators.used import describing
-from pipeline.filters import DEFAULT, rts, through
+from pipeline.filters import DEFAULT, diverges, rts, through
 from pipeline.filters.assumed import assumed
 from pipeline.filters.lag import lag
 from pipeline.filters.problem import NoiseModel
@@ -30,8 +30,6 @@ from pipeline.records import (
 )
 from pipeline.robots.robot import Robot
 from pipeline.study import LogEntry
-
-DIVERGED = 50.0  # times what a consistent filter has of normalised innovations, on average
 
 
 def run(
@@ -89,7 +87,7 @@ def tracked(
     """The Track of one joint of a log."""
     signal, parts, model = own.signal, own.parts, np.zeros(len(own.signal))
     made = through(DEFAULT, parts, noise)
-    if not np.isfinite(made.tau_ext).all() or np.mean(made.nis) > 2.0 * DIVERGED:
+    if diverges(made):
         yield diverged(signal, float(np.mean(made.nis)))
         if not np.isfinite(made.tau_ext).all():
             return

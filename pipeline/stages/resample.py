@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from pipeline.errors import BadLog
 from pipeline.maths.signals.clock import GAP
+from pipeline.maths.signals.faults import saturated, stuck
 from pipeline.maths.signals.smoothing import lowpass as lowpass_of
 from pipeline.maths.signals.smoothing import motion, segments
 from pipeline.records import Column, Diagnostic, Recording, Signal, diagnostic
@@ -17,6 +18,7 @@ Indices = NDArray[np.intp]
 EVEN = 0.02  # of a sampling time: clocks that stray less than this from a uniform one are taken as uniform
 AT_REST = 0.01  # share of a joint's range, or of 1 rad or 1 m where it has no limits, below which it is at rest
 SLOW = 5.0  # [Hz] below which a logged velocity is compared with that of the position
+FAR = 20.0  # times its limits, beyond which no position of a joint is
 AGREES = 0.1  # how far their ratio may be from 1
 FEWEST = 4  # samples that a cubic spline needs; a shorter segment is left out
 
@@ -66,7 +68,7 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
         segment=segment,
     )
     yield from remarks(recording, method, cuts, sum(map(len, parts)))
-    wrong = [] if at_rest else disagreement(recording, q, dq, segment, 1.0 / T_s)
+    wrong = [] if at_rest else [*disagreement(recording, q, dq, segment, 1.0 / T_s), *faults(recording, joint)]
     if wrong:
         yield diagnostic("resample", f"{recording.log}.{recording.joint}", "warning", *wrong)
 
@@ -93,6 +95,25 @@ def disagreement(recording: Recording, q: Column, dq: Column, segment: Indices, 
         f"{recording.log}/{recording.joint}: the logged velocity is {slope:.3g} times that of the logged position; "
         "check the sign, unit or column of either, and the rate of the clock"
     ]
+
+
+def faults(recording: Recording, joint: Joint) -> Iterator[str]:
+    """What the recording shows of a sensor that was stuck, a drive at its limit, or a unit that is not as stated."""
+    name, far = f"{recording.log}/{recording.joint}", max(map(abs, joint.limits.q))
+    for one in stuck(recording.t, recording.q):
+        yield (
+            f"{name}: the position stands still from {one.start:.3f} to {one.end:.3f} s and then jumps by "
+            f"{one.jump:.3g}, as of a sensor that was stuck; leave that out by `skip` and `until`, or record it again"
+        )
+    if samples := saturated(recording.tau):
+        yield (
+            f"{name}: the effort is exactly at its largest or least value in {samples} samples: the drive, or what "
+            "measures it, was saturated, and more was asked of the joint than the log says; record with less effort"
+        )
+    reach = float(np.percentile(np.abs(recording.q), 99.0))
+    if np.isfinite(far) and reach > FAR * far:
+        said = f"{name}: positions reach {reach:.3g}, {reach / far:.0f} times the joint's limits"
+        yield f"{said}; check the unit of the position"
 
 
 def is_even(t: Column, parts: list[Indices], T_s: float) -> bool:
