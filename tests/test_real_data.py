@@ -59,6 +59,16 @@ def test_a_hung_mass_is_seen_on_the_joints_that_carry_it_and_not_on_the_slide(re
     assert louder("instrument_slide") < 1.2
 
 
+def test_the_ridge_that_is_chosen_lies_within_those_that_were_tried(dvrk):
+    """At an edge, a stronger or weaker one might have done better."""
+    import pipeline
+    from pipeline.estimators.candidates import RIDGES
+
+    name = str(pipeline.read(dvrk, "Choice")["chosen"].iloc[0])
+    assert name.startswith("coupled+dahl")
+    assert min(RIDGES["coupled"]) < float(name.partition(", ridge ")[2]) < max(RIDGES["coupled"])
+
+
 def test_page_one_says_that_the_band_is_too_narrow_and_that_the_path_is_the_one_that_was_fitted(dvrk):
     page = (dvrk.parent.parent / "reports" / "dvrk-psm" / "report.html").read_text()
     assert "the 95 % band is too narrow" in page

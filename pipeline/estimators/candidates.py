@@ -20,7 +20,7 @@ from pipeline.maths.selection.ridge import Ridge, solve
 from pipeline.robots.models import ARM, AddedFriction, Reach, coupled, frictions, independent, rounded
 from pipeline.robots.robot import Robot
 
-RIDGES = {"independent": (0.0, 1e-3), "coupled": (1e-4, 1e-3, 1e-2)}
+RIDGES = {"independent": (0.0, 1e-3), "coupled": (1e-4, 1e-3, 1e-2, 3e-2)}
 WEIGHED_BY = Ridge(1e-3, np.ones(1), np.empty((0, 0)))
 POSES = 50  # of each log, at which an inertia has to be positive definite
 
