@@ -86,17 +86,17 @@ class Estimate:
         return self.look()
 
     @property
-    def theta_std(self) -> Array:
+    def theta_std_classical(self) -> Array:
         """Standard errors (p,) that take residuals as uncorrelated and as large everywhere."""
         return self.spread.classical
 
     @property
-    def theta_std_hac(self) -> Array:
+    def theta_std(self) -> Array:
         """Standard errors (p,) that allow for residuals that are correlated, and larger here than there."""
         return self.spread.stated
 
     @property
-    def hac_lags(self) -> int:
+    def correlated_lags(self) -> int:
         """Over how many lags residuals are correlated, each counting by its correlation."""
         return round(self.spread.lags)
 

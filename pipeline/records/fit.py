@@ -22,22 +22,23 @@ class Fit(Record):
     mse: float
     r2: float
     condition: float
-    hac_lags: int
+    correlated_lags: int
     parameter: Labels
     phi: Labels
     unit: Labels
     scale: Column
     theta: Column
     theta_std: Column
-    theta_std_hac: Column
+    theta_std_classical: Column
 
     def published(self) -> Iterator[Published]:
         """The parameters with both standard errors, and the fit to the averaged effort."""
         prefix = ".".join(("fit", *self.key))
         for i, parameter in enumerate(self.parameter):
-            yield Published(f"{prefix}.{slug(parameter)}", "theta", std="theta_std_hac", row=i)
-            yield Published(f"{prefix}.{slug(parameter)}.std_classical", "theta_std", row=i)
-        yield from self.publish(prefix, "mse", "r2", "condition", "samples", "periods", "hac_lags")
+            yield Published(f"{prefix}.{slug(parameter)}", "theta", std="theta_std", row=i)
+            yield Published(f"{prefix}.{slug(parameter)}.std_classical", "theta_std_classical", row=i)
+        yield from self.publish(prefix, "mse", "r2", "condition", "samples", "periods")
+        yield Published(f"{prefix}.hac_lags", "correlated_lags")  # the key that results.json had before the field
 
 
 @dataclass(frozen=True, eq=False)

@@ -124,14 +124,14 @@ def summarised(parts: Sequence[Part], model: Model, name: str, regression: Regre
         mse=float(np.mean(residual**2)),
         r2=float(1 - residual @ residual / (spread @ spread)),
         condition=float(np.linalg.cond(regression.Phi)),
-        hac_lags=estimate.hac_lags,
+        correlated_lags=estimate.correlated_lags,
         parameter=np.array([parameter.name for parameter in model.parameters], object),
         phi=np.array([parameter.typst for parameter in model.parameters], object),
         unit=np.array([parameter.unit for parameter in model.parameters], object),
         scale=np.array([parameter.scale for parameter in model.parameters]),
         theta=estimate.theta,
         theta_std=estimate.theta_std,
-        theta_std_hac=estimate.theta_std_hac,
+        theta_std_classical=estimate.theta_std_classical,
     )
 
 

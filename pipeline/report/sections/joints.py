@@ -92,7 +92,7 @@ def implausible(fits: list[Fit]) -> Iterator[Verdict]:
     for fit in fits:
         negative = [
             f"{name} ({value:.2g} ± {std:.1g})"
-            for name, value, std in zip(fit.parameter, fit.theta, fit.theta_std_hac, strict=True)
+            for name, value, std in zip(fit.parameter, fit.theta, fit.theta_std, strict=True)
             if value < 0 and physical(name)
         ]
         if negative:
@@ -110,7 +110,7 @@ def parameters(context: Context, fit: Fit) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for i, name in enumerate(fit.parameter):
         key = ".".join(("fit", *fit.key, slug(name)))
-        z = fit.theta[i] / fit.theta_std_hac[i] if fit.theta_std_hac[i] > 0 else np.nan
+        z = fit.theta[i] / fit.theta_std[i] if fit.theta_std[i] > 0 else np.nan
         unit = format_unit(fit.unit[i]) or "–"
         values = (unitless(context, name) for name in (key, f"{key}.std_classical"))
         rows.append((f"$theta_{i + 1}$", name, unit, *values, f"{z:.1f}" if np.isfinite(z) else "–"))
