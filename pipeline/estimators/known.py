@@ -11,7 +11,7 @@ from pipeline.robots.robot import Joint
 def known_of(joint: Joint) -> Known:
     """The signs that physics knows; where the robot has a table of it, what the parameters are made of, and a guess."""
     positive = np.array([term.positive for term in joint.terms])
-    if joint.physical is None:
+    if joint.physical is None or joint.effort:  # a current does not say how much its motor pushes
         return Known(positive)
     made = lumping(joint.physical, joint.gear_ratio, [term.name for term in joint.terms])
     if made is None:
