@@ -7,7 +7,7 @@ from pipeline.records.design import Control, Excitation, Links, Lyapunov, Pose, 
 from pipeline.records.diagnostic import Diagnostic, diagnostic
 from pipeline.records.differentiate import Spectrum, Trajectory
 from pipeline.records.ekf import Track
-from pipeline.records.fit import CrossFit, Fit, FittedPaths, MeasurementNoise, Residual, SwarmSearch
+from pipeline.records.fit import CrossFit, Fit, FittedPaths, Identifiability, MeasurementNoise, Residual, SwarmSearch
 from pipeline.records.ingest import LogSummary, Recording
 from pipeline.records.measure import Contact
 from pipeline.records.predict import Prediction
@@ -19,9 +19,9 @@ from pipeline.records.whiteness import Whiteness
 
 __all__ = [
     "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Choice", "Column", "Contact", "Control", "Counts", "CrossFit",
-    "Diagnostic", "Excitation", "Fit", "FittedPaths", "FreeSpace", "Labels", "Links", "LogSummary", "Lyapunov",
-    "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Record", "Recording", "Residual",
-    "Signal", "Smoothed", "Spectrum", "SwarmSearch", "Threshold", "Track", "Trajectory", "Whiteness",
+    "Diagnostic", "Excitation", "Fit", "FittedPaths", "FreeSpace", "Identifiability", "Labels", "Links", "LogSummary",
+    "Lyapunov", "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Record", "Recording",
+    "Residual", "Signal", "Smoothed", "Spectrum", "SwarmSearch", "Threshold", "Track", "Trajectory", "Whiteness",
     "Workspace", "diagnostic",
 ]  # fmt: skip
 
@@ -29,7 +29,7 @@ KINDS: dict[str, type[Record]] = {
     kind.__name__: kind
     for kind in (
         Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Signal, Average, PeriodResidual,
-        Trajectory, Spectrum, Smoothed, Fit, CrossFit, FittedPaths, MeasurementNoise, Residual, SwarmSearch, Choice,
-        Prediction, Track, FreeSpace, Threshold, Contact, Whiteness, Diagnostic,
+        Trajectory, Spectrum, Smoothed, Fit, CrossFit, Identifiability, FittedPaths, MeasurementNoise, Residual,
+        SwarmSearch, Choice, Prediction, Track, FreeSpace, Threshold, Contact, Whiteness, Diagnostic,
     )
 }  # fmt: skip

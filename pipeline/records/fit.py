@@ -81,6 +81,31 @@ class SwarmSearch(Record):
 
 
 @dataclass(frozen=True, eq=False)
+class Identifiability(Record):
+    """What the identification logs tell of a model's parameters: each beside each, and what follows in words."""
+
+    KEY = ("group", "model")
+
+    group: str
+    model: str
+    scaled_condition: float
+    together: Names
+    not_seen: Names
+    advice: str
+    parameter: Labels
+    beside: Labels
+    correlation: Column
+
+    def published(self) -> Iterator[Published]:
+        """The condition number, and the correlation of every pair of parameters, once."""
+        yield Published(f"identifiability.{'.'.join(self.key)}.condition", "scaled_condition")
+        names = list(dict.fromkeys(self.parameter))
+        for i, (one, other) in enumerate(zip(self.parameter, self.beside, strict=True)):
+            if names.index(one) < names.index(other):
+                yield Published(f"correlation.{'.'.join(self.key)}.{slug(one)}.{slug(other)}", "correlation", row=i)
+
+
+@dataclass(frozen=True, eq=False)
 class FittedPaths(Record):
     """The paths that were fitted on a joint, one period of each in turn; of many, those that differ most."""
 

@@ -97,6 +97,13 @@ QUANTITIES = {
     "samples": Quantity("number of samples fitted, K"),
     "correlated_lags": Quantity("lags over which residuals are correlated, each counting by its correlation"),
     "scale": Quantity("displacement or velocity that the term depends on, in the joint's units; 0 for none"),
+    # what the data tell of parameters
+    "scaled_condition": Quantity("condition number of the regressor's columns, each scaled to unit length"),
+    "together": Quantity("parameters that the data tell only together", ""),
+    "not_seen": Quantity("parameters that cannot be told from zero", ""),
+    "advice": Quantity("what to record next", ""),
+    "beside": Quantity("parameter that another is compared with", ""),
+    "correlation": Quantity("correlation of the errors of two estimated parameters"),
     # searches
     "walls": Quantity("what the walls of the box did to particles", ""),
     "seed": Quantity("seed of the random numbers"),

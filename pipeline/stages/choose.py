@@ -33,6 +33,9 @@ def run(
         yield diagnostic("choose", "arm", "warning", f"{said}; record more of the path, or more periods")
         return
     yield from choice(selection, reaches, logs)
+    if not any(selection.physical):
+        said = "no candidate's inertia is positive definite along the paths, so the choice goes by scores alone"
+        yield diagnostic("choose", "arm", "warning", f"{said}; what fit says of each joint's inertia tells why")
     worth = {f"{c.variant}.{c.estimator}": c for c in (*leading(selection), *named(selection, fit), selection.chosen)}
     for candidate in (c for name, c in worth.items() if name != "independent.lse"):
         yield from fits(candidate, robot, reaches, len(logs))

@@ -25,6 +25,7 @@ from pipeline.report.content import (
     literal,
 )
 from pipeline.report.context import Context, fit_name, label, title
+from pipeline.report.identified import correlations, wanting
 from pipeline.report.plots import autocorrelation, binned_means, correlation, explained_by
 from pipeline.report.results import format_unit
 from pipeline.report.verdicts import percent
@@ -72,6 +73,7 @@ def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
     terms = " + ".join(f"theta_{i} {phi}" for i, phi in enumerate(first.phi, start=1))
     yield Equation(f"tau = {terms}", f"effort is the sum of {', '.join(first.parameter)}, each times its parameter")
     yield parameters(context, first)
+    yield from wanting(context, first.group)
     residuals = context.catalogue.about(Residual, joint=first.group, model=first.model, estimator=first.estimator)
     for i, residual in enumerate(residuals):
         shown = tuple(residual_blocks(context, residual))
@@ -156,7 +158,8 @@ def compared(context: Context, fits: list[Fit]) -> Block:
     )
     header = ("Fit", "MSE", "$R^2$", "Condition", *(name[:1].upper() + name[1:] for name in names))
     table = Table(caption, header, tuple(rows), f"fits-{group}", "l" + "r" * (len(header) - 1))
-    return OnScreen(f"{title(group)}: all fits side by side", f"all-fits-{group}", (table,))
+    more = correlations(context, group)
+    return OnScreen(f"{title(group)}: all fits, and what they rest on", f"all-fits-{group}", (table, *more))
 
 
 def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
@@ -186,7 +189,7 @@ def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
     against = [motion_panel(residual, errors, residual.dq, label(residual, "dq", "velocity"))]
     if q is not None:
         against.insert(0, motion_panel(residual, errors, q, label(moved[0], "q", "position")))
-    tests = [*against, *correlations(context, residual, errors)]
+    tests = [*against, *own_correlations(context, residual, errors)]
     yield Figure(
         f"{name}: the residual against position and velocity (points: means of 1/40 of the range, bars: their "
         "standard errors), its autocorrelation, and its cross-correlation with velocity and direction.",
@@ -206,7 +209,7 @@ def motion_panel(residual: Residual, errors: Column, x: Column, x_label: str) ->
     return Panel(heading, x_label, label(residual, "tau", "residual"), (Points(middle, mean, "", "blue", y_std=std),))
 
 
-def correlations(context: Context, residual: Residual, errors: Column) -> Iterator[Panel]:
+def own_correlations(context: Context, residual: Residual, errors: Column) -> Iterator[Panel]:
     """The residual's correlation with itself and with the motion."""
     signal = f"tau.{residual.model}.{residual.estimator}"
     for w in context.catalogue.about(Whiteness, log=residual.log, joint=residual.joint, signal=signal):
