@@ -3,7 +3,7 @@
 import numpy as np
 
 from pipeline.estimators.problem import Known
-from pipeline.maths.models.lumping import lumping
+from pipeline.maths.models.lumping import ROUNDING, lumping
 from pipeline.maths.models.physical import Box
 from pipeline.robots.robot import Joint
 
@@ -17,4 +17,6 @@ def known_of(joint: Joint) -> Known:
     if made is None:
         return Known(positive)
     guess, lower, upper = np.array([(x.guess, x.lower, x.upper) for x in joint.physical.parameters]).T
-    return Known(positive, Box(lower, upper, made), made.theta(guess))
+    theta = made.theta(guess)
+    # What masses leave of each other by rounding is no guess; taken for one, it would be believed to all its digits.
+    return Known(positive, Box(lower, upper, made), np.where(np.abs(theta) > ROUNDING, theta, 0.0))

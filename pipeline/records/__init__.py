@@ -2,12 +2,22 @@
 
 from pipeline.records.assess import FreeSpace
 from pipeline.records.average import Average, PeriodResidual
+from pipeline.records.chart import FrictionMap
 from pipeline.records.choose import Choice
 from pipeline.records.design import Control, Excitation, Links, Lyapunov, Pose, Workspace
 from pipeline.records.diagnostic import Diagnostic, diagnostic
 from pipeline.records.differentiate import Spectrum, Trajectory
 from pipeline.records.ekf import Track
-from pipeline.records.fit import CrossFit, Fit, FittedPaths, Identifiability, MeasurementNoise, Residual, SwarmSearch
+from pipeline.records.fit import (
+    CrossFit,
+    Fit,
+    FittedPaths,
+    Guess,
+    Identifiability,
+    MeasurementNoise,
+    Residual,
+    SwarmSearch,
+)
 from pipeline.records.ingest import LogSummary, Recording
 from pipeline.records.measure import Contact
 from pipeline.records.predict import Prediction
@@ -19,10 +29,10 @@ from pipeline.records.whiteness import Whiteness
 
 __all__ = [
     "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Choice", "Column", "Contact", "Control", "Counts", "CrossFit",
-    "Diagnostic", "Excitation", "Fit", "FittedPaths", "FreeSpace", "Identifiability", "Labels", "Links", "LogSummary",
-    "Lyapunov", "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Record", "Recording",
-    "Residual", "Signal", "Smoothed", "Spectrum", "SwarmSearch", "Threshold", "Track", "Trajectory", "Whiteness",
-    "Workspace", "diagnostic",
+    "Diagnostic", "Excitation", "Fit", "FittedPaths", "FreeSpace", "FrictionMap", "Guess", "Identifiability",
+    "Labels", "Links", "LogSummary", "Lyapunov", "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose",
+    "Prediction", "Record", "Recording", "Residual", "Signal", "Smoothed", "Spectrum", "SwarmSearch", "Threshold",
+    "Track", "Trajectory", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
@@ -30,6 +40,7 @@ KINDS: dict[str, type[Record]] = {
     for kind in (
         Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Signal, Average, PeriodResidual,
         Trajectory, Spectrum, Smoothed, Fit, CrossFit, Identifiability, FittedPaths, MeasurementNoise, Residual,
-        SwarmSearch, Choice, Prediction, Track, FreeSpace, Threshold, Contact, Whiteness, Diagnostic,
+        SwarmSearch, Guess, Choice, FrictionMap, Prediction, Track, FreeSpace, Threshold, Contact, Whiteness,
+        Diagnostic,
     )
 }  # fmt: skip

@@ -42,6 +42,26 @@ class Fit(Record):
 
 
 @dataclass(frozen=True, eq=False)
+class Guess(Record):
+    """What a joint's parameters were guessed to be before anything was measured, and how well that fits."""
+
+    KEY = ("group",)
+    ROWS = "parameter"
+
+    group: str
+    mse: float
+    parameter: Labels
+    unit: Labels
+    theta: Column
+
+    def published(self) -> Iterator[Published]:
+        """The parameters, and the mean squared error that they leave."""
+        for i, parameter in enumerate(self.parameter):
+            yield Published(f"guess.{self.group}.{slug(parameter)}", "theta", row=i)
+        yield from self.publish(f"guess.{self.group}", "mse")
+
+
+@dataclass(frozen=True, eq=False)
 class CrossFit(Record):
     """The parameters of a model, estimated without some of the identification logs, each left out once."""
 

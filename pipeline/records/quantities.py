@@ -113,6 +113,11 @@ QUANTITIES = {
     "iterations": Quantity("iterations of the swarm that found most"),
     "excess": Quantity("share by which the squared error exceeds the least that the known signs allow"),
     "best_mse": Quantity("least mean squared error known after each iteration", "({effort})^2"),
+    # friction over velocity
+    "gaining": Quantity("1 where the joint gains speed, 0 where it loses speed"),
+    "tau_friction": Quantity("effort that is left when all other terms of the model are taken off", "{effort}"),
+    "tau_friction_std": Quantity("standard deviation of that effort", "{effort}"),
+    "tau_friction_hat": Quantity("effort of the model's friction", "{effort}"),
     # the choice of a model
     "friction": Quantity("friction that is added to the model's structure", ""),
     "chosen": Quantity("candidate that was chosen", ""),

@@ -3,6 +3,7 @@
 import re
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import NamedTuple
 
 from pipeline.errors import BadRobot
 from pipeline.maths.mechanics.bodies import Bodies
@@ -42,6 +43,22 @@ class Limits:
     ddq: tuple[float, float]
 
 
+class PrintedColumn(NamedTuple):
+    """What a publication prints of one way to find a joint's parameters: the estimator, or "" for first guesses."""
+
+    estimator: str
+    theta: tuple[float, ...]  # in the order of the joint's terms
+    mse: float  # of the averaged effort
+
+
+class Printed(NamedTuple):
+    """The table of a publication that states a joint's parameters, and its misprints in words."""
+
+    name: str
+    columns: tuple[PrintedColumn, ...]
+    misprints: tuple[str, ...]
+
+
 @dataclass(frozen=True)
 class Joint:
     """One joint: its motor (Table 6.3), the terms of its model (6.7-6.14), and how it is excited and filtered."""
@@ -61,6 +78,7 @@ class Joint:
     # of a second [effort/s^0.5].  A choice, not a measurement; the report says so.
     q_tau: float = 1.0
     physical: PhysicalTable | None = None  # what the parameters of its terms are made of, where that is known
+    printed: Printed | None = None  # parameters that were published for it
 
     def unit(self, template: str) -> str:
         """Fill in the joint's units."""

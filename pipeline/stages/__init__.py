@@ -19,6 +19,6 @@ does not grow with the study, unless it is the only one of its stage.  The repor
 """
 
 STAGES = (
-    "design", "ingest", "resample", "average", "differentiate", "smooth", "fit", "choose", "predict", "ekf",
+    "design", "ingest", "resample", "average", "differentiate", "smooth", "fit", "choose", "chart", "predict", "ekf",
     "assess", "threshold", "measure", "whiteness",
 )  # fmt: skip

@@ -32,6 +32,7 @@ from pipeline.records import (
     Diagnostic,
     Fit,
     FittedPaths,
+    Guess,
     Identifiability,
     MeasurementNoise,
     Residual,
@@ -62,7 +63,9 @@ class Part(NamedTuple):
 
 def run(
     trajectories: Iterable[Trajectory], smoothed: Iterable[Smoothed], robot: Robot, *, lowpass: float
-) -> Iterator[Fit | CrossFit | FittedPaths | Identifiability | MeasurementNoise | Residual | SwarmSearch | Diagnostic]:
+) -> Iterator[
+    Fit | CrossFit | FittedPaths | Guess | Identifiability | MeasurementNoise | Residual | SwarmSearch | Diagnostic
+]:
     """One Fit per joint and estimator; an estimator that cannot be used says why, and the rest goes on.
 
     A joint of several logs has a CrossFit, too, by which each of its logs can be predicted from others.
@@ -82,7 +85,9 @@ def run(
 
 def of_joint(
     model: Model, parts: Sequence[Part], robot: Robot, joint: Joint, others: Sequence[str]
-) -> Iterator[Fit | CrossFit | FittedPaths | Identifiability | MeasurementNoise | Residual | SwarmSearch | Diagnostic]:
+) -> Iterator[
+    Fit | CrossFit | FittedPaths | Guess | Identifiability | MeasurementNoise | Residual | SwarmSearch | Diagnostic
+]:
     """The fits of one joint, what they leave, and what its logs have in common; `others` move in them, too."""
     regression = joined([part.regression for part in parts])
     estimates: dict[str, Estimate] = {}
@@ -100,6 +105,7 @@ def of_joint(
     if len(parts) > 1:
         for name in ESTIMATORS:
             yield from cross_fits([part.log for part in parts], model, name, regression)
+    yield from guesses(model, regression)
     yield from fitted_paths(model.group, parts)
     yield noise(model.group, parts)
 
@@ -198,6 +204,21 @@ def summarised(parts: Sequence[Part], model: Model, name: str, regression: Regre
         theta=estimate.theta,
         theta_std=estimate.theta_std,
         theta_std_classical=estimate.theta_std_classical,
+    )
+
+
+def guesses(model: Model, regression: Regression) -> Iterator[Guess]:
+    """What the robot's tables make of the parameters, where it has any.  (6.7), (6.10), (6.13)"""
+    theta = regression.known.guess
+    if theta is None:
+        return
+    residual = regression.tau - regression.Phi @ theta
+    yield Guess(
+        group=model.group,
+        mse=float(np.mean(residual**2)),
+        parameter=np.array([parameter.name for parameter in model.parameters], object),
+        unit=np.array([parameter.unit for parameter in model.parameters], object),
+        theta=theta,
     )
 
 
