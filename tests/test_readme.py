@@ -6,6 +6,7 @@ import shutil
 import tomllib
 from dataclasses import asdict, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -190,7 +191,7 @@ def told(keys: set[str]) -> tuple[set[str], set[str]]:
     )
 
 
-def made(kind: type[Record], **about: str) -> Record:
+def made(kind: type[Record], **about: Any) -> Record:
     """A record of a kind with whatever its fields may hold, as if it had been read."""
     rows = 2
     values = {str: "x", float: 1.0, int: 1, tuple[float, ...]: (1.0, 2.0, 3.0, 4.0, 5.0)}
@@ -205,7 +206,8 @@ ROBOT = ("robot.", "control.", "excitation.", "guess.")  # of robots that are kn
 
 def test_keys_of_a_robot_are_told_and_those_told_are_there():
     """Of records made by hand, as designing a robot takes half a minute."""
-    records = [made(Links), made(Control), made(Lyapunov), made(Excitation, source="table-6.1"), made(Guess)]
+    guess = made(Guess, parameter=np.array(["inertia", "offset"], object))
+    records = [made(Links), made(Control), made(Lyapunov), made(Excitation, source="table-6.1"), guess]
     keys = set(collect(Catalogue(lambda kind: [record for record in records if isinstance(record, kind)])))
     assert {key.partition(".")[0] + "." for key in keys} == set(ROBOT)
     untold, empty = told(keys)
