@@ -18,13 +18,25 @@ from pipeline import commands, robots, stages
 from pipeline.cli import app
 from pipeline.estimators import ESTIMATORS
 from pipeline.maths.units import SI, UNITS
-from pipeline.records import COLUMN_DTYPES, KINDS, Control, Excitation, Guess, Links, Lyapunov, Origin, Record
+from pipeline.records import (
+    COLUMN_DTYPES,
+    KINDS,
+    Control,
+    Excitation,
+    FreeWeight,
+    Guess,
+    Links,
+    Lyapunov,
+    Origin,
+    Record,
+    Weight,
+)
 from pipeline.records.catalogue import Catalogue
 from pipeline.report.results import collect
 from pipeline.robots.robot import Joint
 from pipeline.runner import STEPS
 from pipeline.runner.signature import declaration
-from pipeline.study import LogEntry, Settings, Weight, reading
+from pipeline.study import HungMass, LogEntry, Settings, reading
 from pipeline.study.channels import OF_A_JOINT, OF_THE_LOG
 from pipeline.study.entries import ROLES
 from tests.conftest import ROOT
@@ -112,7 +124,7 @@ def test_keys_of_a_study_and_its_logs_are_all_told():
     said = re.sub(r"```.*?```", "", README.partition("## In Python")[0], flags=re.S)
     told = set(re.findall(r"\b(\w+) = ", code + " ".join(spans(said))))
     told |= set(re.findall(r"\[+(?:log\.)?(\w+)", code)) | {span for span in spans(said) if span.isidentifier()}
-    assert {f.name for f in fields(LogEntry)} | {f.name for f in fields(Weight)} | {"file"} <= told
+    assert {f.name for f in fields(LogEntry)} | {f.name for f in fields(HungMass)} | {"file"} <= told
     changeable = {f.name for f in fields(Joint)} - {"name", "kind", "published", "physical", "printed"}
     assert {"title", "robot", "simulated", "settings", "log"} | changeable <= told
     assert "[robot_overrides." in said
@@ -201,18 +213,20 @@ def made(kind: type[Record], **about: Any) -> Record:
     return record
 
 
-ROBOT = ("robot.", "control.", "excitation.", "guess.")  # of robots that are known, which the arm of the tests is not
+ROBOT = ("robot.", "control.", "excitation.")
+BY_HAND = (*ROBOT, "weight.", "guess.")
 
 
-def test_keys_of_a_robot_are_told_and_those_told_are_there():
-    """Of records made by hand, as designing a robot takes half a minute."""
+def test_keys_of_a_robot_and_of_what_hangs_on_it_are_told_and_those_told_are_there():
+    """Of records made by hand, as designing a robot takes half a minute, and the arm of the tests has no chain."""
+    records = [made(Links), made(Control), made(Lyapunov), made(Excitation, source="table-6.1")]
     guess = made(Guess, parameter=np.array(["inertia", "offset"], object))
-    records = [made(Links), made(Control), made(Lyapunov), made(Excitation, source="table-6.1"), guess]
+    records += [made(Weight), made(FreeWeight), guess]
     keys = set(collect(Catalogue(lambda kind: [record for record in records if isinstance(record, kind)])))
-    assert {key.partition(".")[0] + "." for key in keys} == set(ROBOT)
+    assert {key.partition(".")[0] + "." for key in keys} == set(BY_HAND)
     untold, empty = told(keys)
     assert not untold
-    assert not {name for name in empty if name.startswith(ROBOT)}
+    assert not {name for name in empty if name.startswith(BY_HAND)}
 
 
 @pytest.mark.medium
@@ -226,7 +240,7 @@ def test_keys_of_a_study_are_told_and_those_told_are_there(analysed, tmp_path):
     assert "truth.hand_roll.inertia" in keys
     untold, empty = told(keys)
     assert not untold
-    assert not {name for name in empty if not name.startswith(ROBOT)}
+    assert not {name for name in empty if not name.startswith(BY_HAND)}
 
 
 @pytest.mark.medium

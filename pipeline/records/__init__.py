@@ -2,8 +2,11 @@
 
 from pipeline.records.assess import FreeSpace
 from pipeline.records.average import Average, PeriodResidual
+from pipeline.records.bound import ErrorBand
+from pipeline.records.calibrate import FreeMotion
 from pipeline.records.chart import FrictionMap
 from pipeline.records.choose import Choice
+from pipeline.records.compare import Comparison
 from pipeline.records.design import Control, Excitation, Links, Lyapunov, Pose, Workspace
 from pipeline.records.diagnostic import Diagnostic, diagnostic
 from pipeline.records.differentiate import Spectrum, Trajectory
@@ -18,21 +21,26 @@ from pipeline.records.fit import (
     Residual,
     SwarmSearch,
 )
+from pipeline.records.hang import Load
 from pipeline.records.ingest import LogSummary, Recording
 from pipeline.records.measure import Contact
 from pipeline.records.predict import Prediction
 from pipeline.records.record import COLUMN_DTYPES, AnyRecord, Column, Counts, Labels, Names, Origin, Record
 from pipeline.records.resample import Signal
+from pipeline.records.settle import FilterNoise
 from pipeline.records.smooth import Smoothed
 from pipeline.records.threshold import Threshold
+from pipeline.records.tune import Tuning
+from pipeline.records.weigh import FreeWeight, Weight
 from pipeline.records.whiteness import Whiteness
 
 __all__ = [
-    "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Choice", "Column", "Contact", "Control", "Counts", "CrossFit",
-    "Diagnostic", "Excitation", "Fit", "FittedPaths", "FreeSpace", "FrictionMap", "Guess", "Identifiability",
-    "Labels", "Links", "LogSummary", "Lyapunov", "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose",
-    "Prediction", "Record", "Recording", "Residual", "Signal", "Smoothed", "Spectrum", "SwarmSearch", "Threshold",
-    "Track", "Trajectory", "Whiteness", "Workspace", "diagnostic",
+    "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Choice", "Column", "Comparison", "Contact", "Control",
+    "Counts", "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "FilterNoise", "Fit", "FittedPaths", "FreeMotion",
+    "FreeSpace", "FreeWeight", "FrictionMap", "Guess", "Identifiability", "Labels", "Links", "Load", "LogSummary",
+    "Lyapunov", "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Record", "Recording",
+    "Residual", "Signal", "Smoothed", "Spectrum", "SwarmSearch", "Threshold", "Track", "Trajectory", "Tuning",
+    "Weight", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
@@ -40,7 +48,7 @@ KINDS: dict[str, type[Record]] = {
     for kind in (
         Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Signal, Average, PeriodResidual,
         Trajectory, Spectrum, Smoothed, Fit, CrossFit, Identifiability, FittedPaths, MeasurementNoise, Residual,
-        SwarmSearch, Guess, Choice, FrictionMap, Prediction, Track, FreeSpace, Threshold, Contact, Whiteness,
-        Diagnostic,
+        SwarmSearch, Guess, Choice, FrictionMap, Prediction, Tuning, FilterNoise, FreeMotion, ErrorBand, Track,
+        FreeSpace, Threshold, Contact, Load, Weight, FreeWeight, Comparison, Whiteness, Diagnostic,
     )
 }  # fmt: skip

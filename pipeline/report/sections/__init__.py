@@ -16,10 +16,12 @@ DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
         (
             "summary",
             "contacts",
+            "weight",
             "joints",
             "choice",
             "prediction",
             "noise",
+            "filters",
             "runs",
             "ground_truth",
             "methods",

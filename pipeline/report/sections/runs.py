@@ -65,10 +65,9 @@ def tracked(context: Context, tracks: list[Track]) -> Iterator[Block]:
 def intro(tracks: list[Track]) -> Iterator[Prose]:
     """What the filter does, and which joints it cannot say much about."""
     yield Prose(
-        "An extended Kalman filter follows position, velocity and external effort of each joint by itself. It takes "
-        "the noise of its measurements from the spread between periods; how fast the external effort may wander is a "
-        "choice ([@filter-assumptions]). Its innovations, what each measurement adds to what was predicted, are "
-        "white where the model and the choice fit the data: then the normalised innovation squared (NIS) is 2 on "
+        "An extended Kalman filter follows position, velocity and external effort of each joint by itself, tuned as "
+        "[@filter-tuning] says. Its innovations, what each measurement adds to what was predicted, are "
+        "white where the model and the tuning fit the data: then the normalised innovation squared (NIS) is 2 on "
         "average. Whiteness is tested over the whole run but its first second, contacts and reversals included."
     )
     at_rest = [f"{title(t.joint)} in {literal(t.log)}" for t in tracks if t.at_rest]
@@ -136,19 +135,19 @@ def statistics(context: Context, prefix: str) -> tuple[Cell, ...]:
 
 def assumptions(context: Context, tracks: list[Track]) -> Table:
     """What the filter assumed of noise."""
-    names = ("r_q", "r_dq", "q_q", "q_dq", "q_tau")
+    names = ("r_q", "r_dq", "q_dq", "q_tau")
     rows = tuple(
         (literal(t.log), title(t.joint), *(context.number(f"ekf.{t.log}.{t.joint}.{name}", 3) for name in names))
         for t in tracks
     )
     return Table(
-        "Noise that the filter assumes (standard deviations): of the measured position and velocity, from the spread "
-        "between periods; of their process noise per sample, from what forward Euler leaves out and from the noise of "
-        "the effort; and of the random walk of the external effort, chosen.",
-        ("Log", "Joint", "Position", "Velocity", "Process, $q$", "Process, $dot(q)$", "Random walk"),
+        "Noise that the filter assumes (standard deviations): of the measured position and velocity, and of what the "
+        "noise of the effort adds to the velocity in a sample, by the likelihood of the innovations of identification "
+        "logs; and of the random walk of the external effort, the slowest that shows a push.",
+        ("Log", "Joint", "Position", "Velocity", "Process, $dot(q)$", "Random walk"),
         rows,
         "filter-noise",
-        "llrrrrr",
+        "llrrrr",
     )
 
 
@@ -177,7 +176,7 @@ def trace(context: Context, t: Track, why: str) -> Figure:
                 (
                     *windows,
                     Line(t.t[shown], t.tau_ext_direct[shown], "measured minus model", "grey", "dotted"),
-                    Band(t.t[shown], (t.tau_ext - sigma)[shown], (t.tau_ext + sigma)[shown], "± 2 σ", "sky"),
+                    Band(t.t[shown], (t.tau_ext - sigma)[shown], (t.tau_ext + sigma)[shown], "± 2 σ, in total", "sky"),
                     Line(t.t[shown], t.tau_ext[shown], "filter", "vermillion"),
                 ),
             ),
