@@ -60,7 +60,7 @@ def test_parameters_are_found_as_well_as_they_claim_to_be():
     """Over many simulated recordings, errors over stated deviations have deviation one, for both estimators."""
     found = [fits(arm.signal(seed=seed)) for seed in range(60)]
     for name in ("lse", "wlse"):
-        for std in ("theta_std", "theta_std_hac"):
+        for std in ("theta_std_classical", "theta_std"):
             scores = np.array([(f[name].theta - arm.THETA["hand_roll"]) / getattr(f[name], std) for f in found])
             assert_allclose(scores.std(axis=0), 1.0, atol=0.3)
             assert_allclose(scores.mean(axis=0), 0.0, atol=4 / np.sqrt(60))
@@ -69,7 +69,7 @@ def test_parameters_are_found_as_well_as_they_claim_to_be():
 @pytest.mark.parametrize("name", arm.THETA)
 def test_every_joint_gives_back_its_parameters(name):
     lse = fits(arm.signal(name))["lse"]
-    assert (np.abs(lse.theta - arm.THETA[name]) < 4 * lse.theta_std).all()
+    assert (np.abs(lse.theta - arm.THETA[name]) < 4 * lse.theta_std_classical).all()
     assert list(lse.parameter) == [term.name for term in arm.joint(name).terms]
 
 
@@ -95,10 +95,10 @@ def test_weights_gain_where_noise_differs_over_the_period():
 
 def test_correlated_residuals_widen_the_stated_errors_to_those_there_are():
     answers = [(estimator("lse")(p), theta) for p, theta in (problem(seed=s, rho=0.9, K=2000) for s in range(200))]
-    hac = np.std([(a.theta - theta) / a.theta_std_hac for a, theta in answers], axis=0)
-    classical = np.std([(a.theta - theta) / a.theta_std for a, theta in answers], axis=0)
+    stated = np.std([(a.theta - theta) / a.theta_std for a, theta in answers], axis=0)
+    classical = np.std([(a.theta - theta) / a.theta_std_classical for a, theta in answers], axis=0)
     assert (classical[:2] > 2.0).all()
-    assert_allclose(hac[:2], 1.0, atol=4 / np.sqrt(2 * 200))
+    assert_allclose(stated[:2], 1.0, atol=4 / np.sqrt(2 * 200))
 
 
 @given(st.integers(0, 2**32 - 1), st.floats(0, 1e3))
@@ -132,14 +132,14 @@ def test_pooling_keeps_the_mean_variance_and_never_leaves_a_weight_infinite(K, M
 @pytest.mark.parametrize("rho", [0.0, 0.5, 0.9])
 def test_residuals_are_said_to_be_correlated_over_as_many_lags_as_they_are(rho):
     """The correlations of a first-order autoregression at all lags but 0 sum to 2 rho / (1 - rho)."""
-    lags = [estimator("lse")(problem(seed=s, rho=rho, K=2000)[0]).hac_lags for s in range(20)]
+    lags = [estimator("lse")(problem(seed=s, rho=rho, K=2000)[0]).correlated_lags for s in range(20)]
     assert np.median(lags) == pytest.approx(2 * rho / (1 - rho), rel=0.15, abs=0.5)
 
 
 def test_logs_of_a_joint_are_pooled():
     one, both = fits(arm.signal(seed=1)), fits(arm.signal(seed=1, log="a"), arm.signal(seed=2, log="b", period=8.0))
     assert both["lse"].logs == ("a", "b")
-    assert (both["lse"].theta_std < one["lse"].theta_std).all()
+    assert (both["lse"].theta_std_classical < one["lse"].theta_std_classical).all()
 
 
 def test_both_ways_of_differentiating_agree():

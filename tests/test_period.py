@@ -89,7 +89,7 @@ def test_a_stop_costs_what_it_covers_and_one_remark(at, goes_on):
 def test_parameters_are_within_three_standard_errors_beside_a_stop(at, goes_on):
     [made], _ = run(stopped(at, goes_on))
     found = fitted(made)
-    assert np.all(np.abs(found.theta - arm.THETA["hand_roll"]) < 3 * found.theta_std_hac)
+    assert np.all(np.abs(found.theta - arm.THETA["hand_roll"]) < 3 * found.theta_std)
 
 
 @pytest.mark.parametrize("at", [0.0, 25.0, 50.0])
@@ -264,7 +264,7 @@ def test_a_step_of_the_clock_costs_the_shorter_side_at_most(by, at):
     tracemalloc.stop()
     assert made.period == pytest.approx(5.0, abs=5 * made.period_std)
     found = fitted(made)
-    assert np.all(np.abs(found.theta - arm.THETA["hand_roll"]) < 3 * found.theta_std_hac)
+    assert np.all(np.abs(found.theta - arm.THETA["hand_roll"]) < 3 * found.theta_std)
     assert peak < 50e6
     if by != 5.0:
         [text] = said

@@ -6,6 +6,7 @@ import shutil
 import tomllib
 from dataclasses import asdict, fields
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -23,6 +24,7 @@ from pipeline.records import (
     Control,
     Excitation,
     FreeWeight,
+    Guess,
     Links,
     Lyapunov,
     Origin,
@@ -123,7 +125,7 @@ def test_keys_of_a_study_and_its_logs_are_all_told():
     told = set(re.findall(r"\b(\w+) = ", code + " ".join(spans(said))))
     told |= set(re.findall(r"\[+(?:log\.)?(\w+)", code)) | {span for span in spans(said) if span.isidentifier()}
     assert {f.name for f in fields(LogEntry)} | {f.name for f in fields(HungMass)} | {"file"} <= told
-    changeable = {f.name for f in fields(Joint)} - {"name", "kind", "published", "physical"}
+    changeable = {f.name for f in fields(Joint)} - {"name", "kind", "published", "physical", "printed"}
     assert {"title", "robot", "simulated", "settings", "log"} | changeable <= told
     assert "[robot_overrides." in said
 
@@ -201,7 +203,7 @@ def told(keys: set[str]) -> tuple[set[str], set[str]]:
     )
 
 
-def made(kind: type[Record], **about: str) -> Record:
+def made(kind: type[Record], **about: Any) -> Record:
     """A record of a kind with whatever its fields may hold, as if it had been read."""
     rows = 2
     values = {str: "x", float: 1.0, int: 1, tuple[float, ...]: (1.0, 2.0, 3.0, 4.0, 5.0)}
@@ -212,13 +214,14 @@ def made(kind: type[Record], **about: str) -> Record:
 
 
 ROBOT = ("robot.", "control.", "excitation.")
-BY_HAND = (*ROBOT, "weight.")
+BY_HAND = (*ROBOT, "weight.", "guess.")
 
 
 def test_keys_of_a_robot_and_of_what_hangs_on_it_are_told_and_those_told_are_there():
     """Of records made by hand, as designing a robot takes half a minute, and the arm of the tests has no chain."""
     records = [made(Links), made(Control), made(Lyapunov), made(Excitation, source="table-6.1")]
-    records += [made(Weight), made(FreeWeight)]
+    guess = made(Guess, parameter=np.array(["inertia", "offset"], object))
+    records += [made(Weight), made(FreeWeight), guess]
     keys = set(collect(Catalogue(lambda kind: [record for record in records if isinstance(record, kind)])))
     assert {key.partition(".")[0] + "." for key in keys} == set(BY_HAND)
     untold, empty = told(keys)

@@ -59,6 +59,16 @@ def test_a_hung_mass_is_seen_on_the_joints_that_carry_it_and_not_on_the_slide(re
     assert louder("instrument_slide") < 1.2
 
 
+def test_the_ridge_that_is_chosen_lies_within_those_that_were_tried(dvrk):
+    """At an edge, a stronger or weaker one might have done better."""
+    import pipeline
+    from pipeline.estimators.candidates import RIDGES
+
+    name = str(pipeline.read(dvrk, "Choice")["chosen"].iloc[0])
+    assert name.startswith("coupled+dahl")
+    assert min(RIDGES["coupled"]) < float(name.partition(", ridge ")[2]) < max(RIDGES["coupled"])
+
+
 def weight(study):
     import pipeline
 
@@ -136,9 +146,9 @@ def ur10e(data, tmp_path_factory):
         'name = "ur10e"\ntitle = "UR10e"\n[[joint]]\nname = "shoulder_pan"\ntitle = "Shoulder pan"\nkind = "revolute"\n'
         'terms = ["inertia", "viscous friction", "Coulomb friction", "offset"]\nharmonics = 5\n'
         "limits = { q = [-6.2832, 6.2832], dq = [-2.1, 2.1], ddq = [-10.0, 10.0] }\n"
-        "gear_ratio = 1.0\ntorque_constant = 1.0\n"
+        'effort = "A"\n'
     )
-    channels = '[log.channels]\ntime = 0\n"shoulder_pan.q" = 1\n"shoulder_pan.dq" = 7\n"shoulder_pan.tau" = 13\n'
+    channels = '[log.channels]\ntime = 0\n"shoulder_pan.q" = 1\n"shoulder_pan.dq" = 7\n"shoulder_pan.i" = 13\n'
     logs = [
         f'[[log]]\nname = "{name}"\nfile = "joint_1.csv"\nrole = "identification"\n{more}{channels}'
         for name, more in (("skipped", "skip = 11\n"), ("ended", "skip = 11\nuntil = 60.4\n"))
@@ -157,6 +167,16 @@ def test_the_period_of_a_log_that_ends_in_a_stop_is_that_of_its_motion(ur10e):
         average = pipeline.read(ur10e[0], "Average", log=log)
         assert average["period"].iloc[0] == pytest.approx(10.0, abs=0.002)
         assert average["periods"].iloc[0] == 4
+
+
+def test_effort_of_a_drive_of_unknown_gain_is_in_amperes_and_so_are_its_parameters(ur10e):
+    import pipeline
+
+    assert pipeline.read(ur10e[0], "Trajectory").attrs["units"]["tau"] == "A"
+    fit = pipeline.read(ur10e[0], "Fit", estimator="lse").set_index("parameter")
+    assert fit["unit"].to_dict() == {
+        "inertia": "A s^2/rad", "viscous friction": "A s/rad", "Coulomb friction": "A", "offset": "A",
+    }  # fmt: skip
 
 
 def test_one_remark_says_what_the_stop_costs_and_none_where_the_study_says_it(ur10e):

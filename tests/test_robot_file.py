@@ -38,6 +38,12 @@ def test_a_robot_that_is_written_out_reads_back_as_it_was(tmp_path):
             ":6: joint 1 (shoulder): gear_ratio must be a number other than 0",
         ),
         ("gear_ratio = 50.0", f"gear_ratio = {'1' * 5000}", "Exceeds the limit"),
+        ("gear_ratio = 50.0", 'effort = "N"', ":6: joint 1 (shoulder): effort must be one of A, not 'N'"),
+        (
+            "gear_ratio = 50.0",
+            'effort = "A"\ntorque_constant = 0.05',
+            ":7: joint 1 (shoulder): torque_constant is not used where effort is in A; leave one of them out",
+        ),
     ],
 )
 def test_what_is_wrong_with_a_robot_is_said_without_a_traceback(tmp_path, old, new, says):

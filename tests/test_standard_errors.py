@@ -61,8 +61,8 @@ def scores(averages: list[Average], rho: float, white: float = 0.0, seeds: int =
             theta = np.linalg.lstsq(p.Phi, p.tau, rcond=None)[0]
             tau, var = p.Phi @ theta + NOISE * noise.mean, NOISE**2 * noise.var
             found = estimator(name)(Regression(p.Phi, tau, var, p.periods, p.starts, p.names))
-            stated[joint].append((found.theta - theta) / found.theta_std_hac)
-            classical[joint].append((found.theta - theta) / found.theta_std)
+            stated[joint].append((found.theta - theta) / found.theta_std)
+            classical[joint].append((found.theta - theta) / found.theta_std_classical)
     return stated, classical
 
 

@@ -339,7 +339,7 @@ def test_a_robot_may_be_described_beside_the_study(tmp_path):
             "gear_ratio = 50.0",
             "gear = 50.0",
             "arm.toml:6: joint 1 (shoulder): unknown key 'gear'; known are name, kind, title, terms, limits, "
-            "gear_ratio, torque_constant, harmonics, q_tau; did you mean 'gear_ratio'?",
+            "gear_ratio, torque_constant, effort, harmonics, q_tau; did you mean 'gear_ratio'?",
         ),
         ("q = [-1, 1]", "q = [1, -1]", "arm.toml:7: joint 1 (shoulder).limits: q must be [lower, upper], not [1, -1]"),
         (

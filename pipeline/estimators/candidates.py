@@ -20,7 +20,7 @@ from pipeline.maths.selection.ridge import Ridge, solve
 from pipeline.robots.models import ARM, AddedFriction, Reach, coupled, frictions, independent, rounded
 from pipeline.robots.robot import Robot
 
-RIDGES = {"independent": (0.0, 1e-3), "coupled": (1e-4, 1e-3, 1e-2)}
+RIDGES = {"independent": (0.0, 1e-3), "coupled": (1e-4, 1e-3, 1e-2, 3e-2)}
 WEIGHED_BY = Ridge(1e-3, np.ones(1), np.empty((0, 0)))
 POSES = 50  # of each log, at which an inertia has to be positive definite
 
@@ -153,10 +153,15 @@ def candidates(
     each = {row: of_rows(robot, [row], arm, added, count) for row in rows}
     variance = {row: residual_variance(part, reaches) for row, part in each.items()}
     made += of("coupled", False, tuple(each.values()), tuple(np.ones(1) for _ in each))
-    if len(rows) > 1:
+    if share_parameters(robot, rows):
         weights = np.array([1.0 / variance[row] for row in rows])
         made += of("coupled", True, (of_rows(robot, rows, arm, added, count),), (weights,))
     return made
+
+
+def share_parameters(robot: Robot, rows: Sequence[int]) -> bool:
+    """Whether joints (indices) may have the parameters of links in common: not where a drive's gain is between."""
+    return len(rows) > 1 and not any(robot.joints[row].effort for row in rows)
 
 
 def of_rows(

@@ -41,8 +41,8 @@ class BlockEstimate(NamedTuple):
     """Parameters (p,) with their standard errors: residuals taken as uncorrelated, and from blocks left out."""
 
     theta: Array
+    theta_std_classical: Array
     theta_std: Array
-    theta_std_blocks: Array
     samples: int
     mse: float
     r2: float
@@ -144,8 +144,8 @@ def parameters(
             library,
             BlockEstimate(
                 theta=theta,
-                theta_std=np.sqrt(np.diag(covariance(together, ridge, errors / samples))),
-                theta_std_blocks=np.sqrt(jackknife),
+                theta_std_classical=np.sqrt(np.diag(covariance(together, ridge, errors / samples))),
+                theta_std=np.sqrt(jackknife),
                 samples=samples,
                 mse=float(errors.sum() / samples),
                 r2=float(1.0 - errors.sum() / squares.sum()),

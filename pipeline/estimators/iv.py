@@ -8,9 +8,10 @@ the excitation's harmonics kept, little noise is left, and both agree.
 import numpy as np
 
 from pipeline.errors import NotIdentifiable
-from pipeline.estimators.problem import CONDITION, Estimate, Regression, Spread, factored
+from pipeline.estimators.problem import ALIKE, CONDITION, Estimate, Regression, Spread, factored
 from pipeline.maths.arrays import Array
 from pipeline.maths.estimation.correlation import correlated
+from pipeline.maths.estimation.identifiability import not_told_apart
 
 LAG = 3  # samples before and after: beyond the reach of what a low-pass leaves of noise
 
@@ -30,7 +31,8 @@ def estimate(problem: Regression) -> Estimate:
     Q, _ = np.linalg.qr(instruments(problem) * root / R.scale)
     seen = Q.T @ F
     if (condition := np.linalg.cond(seen)) > CONDITION:
-        said = f"the motion {LAG} samples before and after does not tell {', '.join(problem.names)} apart"
+        alike = ", ".join(problem.names[i] for i in not_told_apart(seen, ALIKE))
+        said = f"the motion {LAG} samples before and after does not tell {alike} apart"
         raise NotIdentifiable(f"{said}: condition number {condition:.1e}")
     theta = np.linalg.solve(seen, Q.T @ (problem.tau * root[:, 0])) / R.scale
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from pipeline.estimators.problem import Known
-from pipeline.maths.models.lumping import lumping
+from pipeline.maths.models.lumping import ROUNDING, lumping
 from pipeline.maths.models.physical import Box
 from pipeline.robots.robot import Joint
 
@@ -11,10 +11,12 @@ from pipeline.robots.robot import Joint
 def known_of(joint: Joint) -> Known:
     """The signs that physics knows; where the robot has a table of it, what the parameters are made of, and a guess."""
     positive = np.array([term.positive for term in joint.terms])
-    if joint.physical is None:
+    if joint.physical is None or joint.effort:  # a current does not say how much its motor pushes
         return Known(positive)
     made = lumping(joint.physical, joint.gear_ratio, [term.name for term in joint.terms])
     if made is None:
         return Known(positive)
     guess, lower, upper = np.array([(x.guess, x.lower, x.upper) for x in joint.physical.parameters]).T
-    return Known(positive, Box(lower, upper, made), made.theta(guess))
+    theta = made.theta(guess)
+    # What masses leave of each other by rounding is no guess; taken for one, it would be believed to all its digits.
+    return Known(positive, Box(lower, upper, made), np.where(np.abs(theta) > ROUNDING, theta, 0.0))

@@ -11,10 +11,12 @@ from numpy.typing import NDArray
 from pipeline.errors import NotIdentifiable
 from pipeline.maths.arrays import Array, Booleans
 from pipeline.maths.estimation.correlation import correlated
+from pipeline.maths.estimation.identifiability import not_told_apart
 from pipeline.maths.estimation.least_squares import Triangle, triangle
 from pipeline.maths.models.physical import Box
 
 ROUNDING = 1e-13  # of the longest column, below which one is nothing but rounding
+ALIKE = 0.01  # of the square of what the columns tell least, from which on a parameter is named
 CONDITION = 1e10  # of scaled columns, above which rounding tells them apart as much as the motion does
 
 
@@ -86,17 +88,17 @@ class Estimate:
         return self.look()
 
     @property
-    def theta_std(self) -> Array:
+    def theta_std_classical(self) -> Array:
         """Standard errors (p,) that take residuals as uncorrelated and as large everywhere."""
         return self.spread.classical
 
     @property
-    def theta_std_hac(self) -> Array:
+    def theta_std(self) -> Array:
         """Standard errors (p,) that allow for residuals that are correlated, and larger here than there."""
         return self.spread.stated
 
     @property
-    def hac_lags(self) -> int:
+    def correlated_lags(self) -> int:
         """Over how many lags residuals are correlated, each counting by its correlation."""
         return round(self.spread.lags)
 
@@ -139,9 +141,9 @@ def factored(problem: Regression, weight: Array) -> Triangle:
     if still:
         raise NotIdentifiable(f"nothing in the motion excites {', '.join(still)}")
     if (condition := np.linalg.cond(R.U)) > CONDITION:
+        alike = ", ".join(problem.names[i] for i in not_told_apart(R.U, ALIKE))
         raise NotIdentifiable(
-            f"the motion does not tell {', '.join(problem.names)} apart: "
-            f"condition number {condition:.1e} of scaled columns"
+            f"the motion does not tell {alike} apart: condition number {condition:.1e} of scaled columns"
         )
     return R
 

@@ -28,7 +28,7 @@ def estimate(problem: Regression) -> Estimate:
     NotIdentifiable
         If a log holds fewer than `FEWEST` periods.
     """
-    fewest = min(int(np.median(M)) for M in np.split(problem.periods, problem.starts[1:]))
+    fewest = min(usual(M) for M in np.split(problem.periods, problem.starts[1:]))
     if fewest < FEWEST:
         raise NotIdentifiable(f"weights need at least {FEWEST} periods in every log, and one holds {fewest}")
     parts = (np.split(column, problem.starts[1:]) for column in (problem.tau_var, problem.periods))
@@ -68,14 +68,25 @@ def pooled(var: Array, M: NDArray[np.int64]) -> Array:
     periods do not differ at all, every sample is as good as any other.
     """
     K, least, most = len(var), max(int(M.min()) - 1, 0), max(int(M.max()) - 1, 0)
-    degrees = np.maximum(M - 1, 0).astype(float)
-    usual = float(least if least == most else np.median(degrees))
-    reach = min(int(np.ceil(DEGREES / max(usual, 1.0))) // 2, (K - 1) // 2)
     if least == most:
-        smooth = around(var, reach) / (2 * reach + 1)
+        reach = reach_of(least, K)
+        smooth = around(var, reach)
+        smooth /= 2 * reach + 1
     else:
+        degrees = np.maximum(M - 1, 0).astype(float)
+        reach = reach_of(float(np.median(degrees)), K)
         smooth = around(var * degrees, reach) / np.maximum(around(degrees, reach), 1.0)
-    return np.asarray(np.maximum(smooth, 1e-12 * var.mean())) if var.any() else np.ones(K)
+    return np.asarray(np.maximum(smooth, 1e-12 * var.mean(), out=smooth)) if var.any() else np.ones(K)
+
+
+def reach_of(degrees: float, K: int) -> int:
+    """How many samples on either side have `DEGREES` degrees of freedom together, so many each; at most the period."""
+    return min(int(np.ceil(DEGREES / max(degrees, 1.0))) // 2, (K - 1) // 2)
+
+
+def usual(M: NDArray[np.int64]) -> int:
+    """The median of periods (K,), of which most logs have one number."""
+    return int(M[0]) if M.min() == M.max() else int(np.median(M))
 
 
 def around(x: Array, reach: int) -> Array:
@@ -83,5 +94,6 @@ def around(x: Array, reach: int) -> Array:
     K = len(x)
     total = np.empty(K + 2 * reach + 1)
     total[0] = 0.0
-    np.cumsum(np.concatenate([x[K - reach :], x, x[:reach]]) if reach else x, out=total[1:])
+    total[1 : reach + 1], total[reach + 1 : reach + 1 + K], total[reach + 1 + K :] = x[K - reach :], x, x[:reach]
+    np.cumsum(total, out=total)
     return np.asarray(total[2 * reach + 1 :] - total[:K])

@@ -4,13 +4,23 @@ from pipeline.records.assess import FreeSpace
 from pipeline.records.average import Average, PeriodResidual
 from pipeline.records.bound import ErrorBand
 from pipeline.records.calibrate import FreeMotion
+from pipeline.records.chart import FrictionMap
 from pipeline.records.choose import Choice
 from pipeline.records.compare import Comparison
 from pipeline.records.design import Control, Excitation, Links, Lyapunov, Pose, Workspace
 from pipeline.records.diagnostic import Diagnostic, diagnostic
 from pipeline.records.differentiate import Spectrum, Trajectory
 from pipeline.records.ekf import Track
-from pipeline.records.fit import CrossFit, Fit, FittedPaths, MeasurementNoise, Residual, SwarmSearch
+from pipeline.records.fit import (
+    CrossFit,
+    Fit,
+    FittedPaths,
+    Guess,
+    Identifiability,
+    MeasurementNoise,
+    Residual,
+    SwarmSearch,
+)
 from pipeline.records.hang import Load
 from pipeline.records.ingest import LogSummary, Recording
 from pipeline.records.measure import Contact
@@ -26,9 +36,9 @@ from pipeline.records.whiteness import Whiteness
 
 __all__ = [
     "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Choice", "Column", "Comparison", "Contact", "Control",
-    "Counts", "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "FilterNoise", "Fit", "FittedPaths",
-    "FreeMotion", "FreeSpace", "FreeWeight", "Labels", "Links", "Load", "LogSummary", "Lyapunov",
-    "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Record", "Recording",
+    "Counts", "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "FilterNoise", "Fit", "FittedPaths", "FreeMotion",
+    "FreeSpace", "FreeWeight", "FrictionMap", "Guess", "Identifiability", "Labels", "Links", "Load", "LogSummary",
+    "Lyapunov", "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Record", "Recording",
     "Residual", "Signal", "Smoothed", "Spectrum", "SwarmSearch", "Threshold", "Track", "Trajectory", "Tuning",
     "Weight", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
@@ -36,9 +46,9 @@ __all__ = [
 KINDS: dict[str, type[Record]] = {
     kind.__name__: kind
     for kind in (
-        Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Signal, Average,
-        PeriodResidual, Trajectory, Spectrum, Smoothed, Fit, CrossFit, FittedPaths, MeasurementNoise, Residual,
-        SwarmSearch, Choice, Prediction, Tuning, FilterNoise, FreeMotion, ErrorBand, Track, FreeSpace,
-        Threshold, Contact, Load, Weight, FreeWeight, Comparison, Whiteness, Diagnostic,
+        Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Signal, Average, PeriodResidual,
+        Trajectory, Spectrum, Smoothed, Fit, CrossFit, Identifiability, FittedPaths, MeasurementNoise, Residual,
+        SwarmSearch, Guess, Choice, FrictionMap, Prediction, Tuning, FilterNoise, FreeMotion, ErrorBand, Track,
+        FreeSpace, Threshold, Contact, Load, Weight, FreeWeight, Comparison, Whiteness, Diagnostic,
     )
 }  # fmt: skip

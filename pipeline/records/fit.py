@@ -22,22 +22,43 @@ class Fit(Record):
     mse: float
     r2: float
     condition: float
-    hac_lags: int
+    correlated_lags: int
     parameter: Labels
     phi: Labels
     unit: Labels
     scale: Column
     theta: Column
     theta_std: Column
-    theta_std_hac: Column
+    theta_std_classical: Column
 
     def published(self) -> Iterator[Published]:
         """The parameters with both standard errors, and the fit to the averaged effort."""
         prefix = ".".join(("fit", *self.key))
         for i, parameter in enumerate(self.parameter):
-            yield Published(f"{prefix}.{slug(parameter)}", "theta", std="theta_std_hac", row=i)
-            yield Published(f"{prefix}.{slug(parameter)}.std_classical", "theta_std", row=i)
-        yield from self.publish(prefix, "mse", "r2", "condition", "samples", "periods", "hac_lags")
+            yield Published(f"{prefix}.{slug(parameter)}", "theta", std="theta_std", row=i)
+            yield Published(f"{prefix}.{slug(parameter)}.std_classical", "theta_std_classical", row=i)
+        yield from self.publish(prefix, "mse", "r2", "condition", "samples", "periods")
+        yield Published(f"{prefix}.hac_lags", "correlated_lags")  # the key that results.json had before the field
+
+
+@dataclass(frozen=True, eq=False)
+class Guess(Record):
+    """What a joint's parameters were guessed to be before anything was measured, and how well that fits."""
+
+    KEY = ("group",)
+    ROWS = "parameter"
+
+    group: str
+    mse: float
+    parameter: Labels
+    unit: Labels
+    theta: Column
+
+    def published(self) -> Iterator[Published]:
+        """The parameters, and the mean squared error that they leave."""
+        for i, parameter in enumerate(self.parameter):
+            yield Published(f"guess.{self.group}.{slug(parameter)}", "theta", row=i)
+        yield from self.publish(f"guess.{self.group}", "mse")
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,6 +98,31 @@ class SwarmSearch(Record):
     def published(self) -> Iterator[Published]:
         """What it reached, and in how many iterations."""
         yield from self.publish(".".join(("search", *self.key)), "mse", "excess", "searched", "swarms", "iterations")
+
+
+@dataclass(frozen=True, eq=False)
+class Identifiability(Record):
+    """What the identification logs tell of a model's parameters: each beside each, and what follows in words."""
+
+    KEY = ("group", "model")
+
+    group: str
+    model: str
+    scaled_condition: float
+    together: Names
+    not_seen: Names
+    advice: str
+    parameter: Labels
+    beside: Labels
+    correlation: Column
+
+    def published(self) -> Iterator[Published]:
+        """The condition number, and the correlation of every pair of parameters, once."""
+        yield Published(f"identifiability.{'.'.join(self.key)}.condition", "scaled_condition")
+        names = list(dict.fromkeys(self.parameter))
+        for i, (one, other) in enumerate(zip(self.parameter, self.beside, strict=True)):
+            if names.index(one) < names.index(other):
+                yield Published(f"correlation.{'.'.join(self.key)}.{slug(one)}.{slug(other)}", "correlation", row=i)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,7 +1,7 @@
 """The first-generation da Vinci arm of the thesis: hand roll, hand pitch and instrument slide."""
 
 from pipeline.maths.models.terms import coulomb, gravity_cos, gravity_sin, inertia, lifted_mass, viscous
-from pipeline.robots import davinci_physical
+from pipeline.robots import davinci_physical, davinci_printed
 from pipeline.robots.davinci_chain import BODIES, CHAIN, DRIVES, WRIST
 from pipeline.robots.davinci_control import CONTROL
 from pipeline.robots.robot import Joint, Kind, Limits, Robot
@@ -35,6 +35,7 @@ ROBOT = Robot(
             torque_constant=TORQUE_CONSTANT,
             published=ROLL,
             physical=davinci_physical.ROLL,
+            printed=davinci_printed.ROLL,
         ),
         Joint(
             name="hand_pitch",
@@ -46,6 +47,7 @@ ROBOT = Robot(
             torque_constant=TORQUE_CONSTANT,
             published=PITCH,
             physical=davinci_physical.PITCH,
+            printed=davinci_printed.PITCH,
         ),
         Joint(
             name="instrument_slide",
@@ -57,6 +59,7 @@ ROBOT = Robot(
             torque_constant=TORQUE_CONSTANT,
             published=INSERTION,
             physical=davinci_physical.SLIDE,
+            printed=davinci_printed.SLIDE,
         ),
     ),
     chain=CHAIN,

@@ -13,7 +13,9 @@ ROBOT = Robot(
     name="dvrk_psm",
     title="da Vinci Research Kit, patient-side manipulator",
     joints=tuple(
-        replace(joint, gear_ratio=1.0, torque_constant=1.0, harmonics=HARMONICS, published=(), physical=None)
+        replace(
+            joint, gear_ratio=1.0, torque_constant=1.0, harmonics=HARMONICS, published=(), physical=None, printed=None
+        )
         for joint in davinci.ROBOT.joints
     ),
     chain=CHAIN,

@@ -8,7 +8,7 @@ name = "shoulder"
 kind = "revolute"                       # or "prismatic"
 terms = ["inertia", "gravity, sine", "viscous friction", "Coulomb friction"]
 gear_ratio = 100.0                      # motor angle over joint position; 1 where logs give the joint side
-torque_constant = 0.05                  # [N m/A]
+torque_constant = 0.05                  # [N m/A]; or, where it is not known, effort = "A"
 harmonics = 5                           # of the excitation
 limits = { q = [-1.0, 1.0], dq = [-2.0, 2.0], ddq = [-5.0, 5.0] }
 """
@@ -96,11 +96,14 @@ def change(joint: Joint, table: TomlTable) -> Joint:
         limits=_limits(table) if "limits" in table else joint.limits,
         gear_ratio=_not_zero(table, "gear_ratio", joint.gear_ratio),
         torque_constant=_not_zero(table, "torque_constant", joint.torque_constant),
+        effort=table.text("effort", joint.effort, choices=("A",)) if "effort" in table else joint.effort,
         harmonics=table.take(
             "harmonics", joint.harmonics, (int,), "a whole number from 1 to 100", lambda x: 1 <= x <= 100
         ),
         q_tau=float(table.take("q_tau", joint.q_tau, (int, float), "a number from 0 on", lambda x: 0 <= x < math.inf)),
     )
+    if "effort" in table and "torque_constant" in table:
+        table.problem("torque_constant is not used where effort is in A; leave one of them out", "torque_constant")
     table.close()
     return changed
 

@@ -3,6 +3,7 @@
 import re
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import NamedTuple
 
 from pipeline.errors import BadRobot
 from pipeline.maths.mechanics.bodies import Bodies
@@ -18,10 +19,18 @@ class Kind(Enum):
     REVOLUTE = "revolute"
     PRISMATIC = "prismatic"
 
-    def unit(self, template: str) -> str:
-        """Fill in a unit of `quantities` or of a term: '{position}/s' is 'rad/s' for a revolute joint."""
+    def unit(self, template: str, measured: str = "") -> str:
+        """Fill in a unit of `quantities` or of a term: '{position}/s' is 'rad/s' for a revolute joint.
+
+        Where effort is `measured` in A, what multiplies a motion is in A over the motion's unit, and parameters of
+        links are as many times too large or small as the effort is.
+        """
         position, effort, inertia = ("rad", "N m", "kg m^2") if self is Kind.REVOLUTE else ("m", "N", "kg")
-        filled = template.format(position=position, effort=effort, inertia=inertia)
+        units = {"position": position, "effort": effort, "inertia": inertia, "mass_moment": "kg m", "gain": ""}
+        if measured:
+            units |= {"effort": measured, "inertia": f"{measured} s^2/{position}", "mass_moment": f"{measured} s^2/m"}
+            units["gain"] = f" {measured}/({effort})"
+        filled = template.format(**units)
         return re.sub(r"\((\w+)\)\^", r"\1^", filled)  # (N)^2 is N^2, but (N m)^2 is not N m^2
 
 
@@ -32,6 +41,22 @@ class Limits:
     q: tuple[float, float]
     dq: tuple[float, float]
     ddq: tuple[float, float]
+
+
+class PrintedColumn(NamedTuple):
+    """What a publication prints of one way to find a joint's parameters: the estimator, or "" for first guesses."""
+
+    estimator: str
+    theta: tuple[float, ...]  # in the order of the joint's terms
+    mse: float  # of the averaged effort
+
+
+class Printed(NamedTuple):
+    """The table of a publication that states a joint's parameters, and its misprints in words."""
+
+    name: str
+    columns: tuple[PrintedColumn, ...]
+    misprints: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -45,6 +70,7 @@ class Joint:
     limits: Limits
     gear_ratio: float = 1.0  # eta [-], or [rad/m] for a prismatic joint
     torque_constant: float = 1.0  # K_m [N m/A]
+    effort: str = ""  # "A" where no torque constant is known, and effort is the motor's current; "" where it is
     harmonics: int = 2  # N_f of the excitation
     # Published excitation trajectories by name: period, a0, a1, b1, a2, b2, ...
     published: tuple[tuple[str, tuple[float, ...]], ...] = ()
@@ -52,10 +78,11 @@ class Joint:
     # of a second [effort/s^0.5].  A choice, not a measurement; the report says so.
     q_tau: float = 0.0  # random walk of the external effort [effort/s^0.5]; 0 is the slowest that shows a push
     physical: PhysicalTable | None = None  # what the parameters of its terms are made of, where that is known
+    printed: Printed | None = None  # parameters that were published for it
 
     def unit(self, template: str) -> str:
         """Fill in the joint's units."""
-        return self.kind.unit(template)
+        return self.kind.unit(template, self.effort)
 
 
 @dataclass(frozen=True)

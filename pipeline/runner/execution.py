@@ -105,7 +105,8 @@ _kept = lru_cache(maxsize=256)(_read)
 def _writer(folders: Folders, task: Task) -> Iterator[store.Writer]:
     def unit(record: Record) -> store.Unit:
         name = getattr(record, "joint", getattr(record, "group", ""))
-        return task.joints.get(name, Kind.REVOLUTE).unit
+        kind, measured = task.joints.get(name, (Kind.REVOLUTE, ""))
+        return lambda template: kind.unit(template, measured)
 
     with store.Writer(folders.processed, unit, asdict(task.fingerprint)) as writer:
         yield writer

@@ -29,7 +29,7 @@ class Task:
     records: dict[str, tuple[Located, ...]] = field(default_factory=dict)  # by parameter
     given: dict[str, Any] = field(default_factory=dict)  # by parameter; for a log, its entry
     settings: dict[str, Any] = field(default_factory=dict)
-    joints: dict[str, Kind] = field(default_factory=dict)  # whose units its records are in
+    joints: dict[str, tuple[Kind, str]] = field(default_factory=dict)  # whose units its records are in
 
 
 class Plan:
@@ -38,7 +38,7 @@ class Plan:
     def __init__(self, study: Study, ledger: Ledger) -> None:
         self.study, self.ledger = study, ledger
         self._entries = {entry.name: entry for entry in study.logs}
-        self._joints = {joint.name: joint.kind for joint in study.robot.joints}
+        self._joints = {joint.name: (joint.kind, joint.effort) for joint in study.robot.joints}
         self._hashes: dict[tuple[str, str], str] = {}
         self._places: tuple[int, Places] | None = None  # and how often the ledger had changed
 

@@ -33,6 +33,9 @@ def run(
         yield diagnostic("choose", "arm", "warning", f"{said}; record more of the path, or more periods")
         return
     yield from choice(selection, reaches, logs)
+    if not any(selection.physical):
+        said = "no candidate's inertia is positive definite along the paths, so the choice goes by scores alone"
+        yield diagnostic("choose", "arm", "warning", f"{said}; what fit says of each joint's inertia tells why")
     worth = {f"{c.variant}.{c.estimator}": c for c in (*leading(selection), *named(selection, fit), selection.chosen)}
     for candidate in (c for name, c in worth.items() if name != "independent.lse"):
         yield from fits(candidate, robot, reaches, len(logs))
@@ -118,12 +121,12 @@ def fits(candidate: Candidate, robot: Robot, reaches: dict[str, Reach], count: i
             mse=estimate.mse,
             r2=estimate.r2,
             condition=estimate.condition,
-            hac_lags=0,
+            correlated_lags=0,
             parameter=np.array([parameter.name for parameter in about], object),
             phi=np.array([parameter.typst for parameter in about], object),
             unit=np.array([parameter.unit for parameter in about], object),
             scale=np.array([parameter.scale for parameter in about]),
             theta=estimate.theta,
             theta_std=estimate.theta_std,
-            theta_std_hac=estimate.theta_std_blocks,
+            theta_std_classical=estimate.theta_std_classical,
         )

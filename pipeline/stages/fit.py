@@ -8,11 +8,22 @@ import numpy as np
 from pipeline.errors import NotIdentifiable
 from pipeline.estimators import ESTIMATORS, estimator
 from pipeline.estimators.folds import folds, refits
+from pipeline.estimators.identifiability import (
+    advice,
+    flat,
+    hardly_described,
+    inertia_at_fault,
+    listed,
+    moving_with,
+    not_seen,
+    together,
+)
 from pipeline.estimators.known import known_of
 from pipeline.estimators.observations import observed, pose_samples
-from pipeline.estimators.problem import NOTHING, Estimate, Known, Regression, Search
+from pipeline.estimators.problem import NOTHING, Estimate, Known, Regression, Search, factored
 from pipeline.estimators.regression import joined, pose
 from pipeline.maths.arrays import Array
+from pipeline.maths.estimation.identifiability import Told, told
 from pipeline.maths.models.model import Model
 from pipeline.maths.signals.path import SAME_PATH, most_different
 from pipeline.records import (
@@ -21,6 +32,8 @@ from pipeline.records import (
     Diagnostic,
     Fit,
     FittedPaths,
+    Guess,
+    Identifiability,
     MeasurementNoise,
     Residual,
     Smoothed,
@@ -29,7 +42,7 @@ from pipeline.records import (
     diagnostic,
 )  # fmt: skip
 from pipeline.robots.models import independent
-from pipeline.robots.robot import Robot
+from pipeline.robots.robot import Joint, Robot
 
 PATHS = 20  # at most, that a recording is compared with
 
@@ -50,12 +63,15 @@ class Part(NamedTuple):
 
 def run(
     trajectories: Iterable[Trajectory], smoothed: Iterable[Smoothed], robot: Robot, *, lowpass: float
-) -> Iterator[Fit | CrossFit | FittedPaths | MeasurementNoise | Residual | SwarmSearch | Diagnostic]:
+) -> Iterator[
+    Fit | CrossFit | FittedPaths | Guess | Identifiability | MeasurementNoise | Residual | SwarmSearch | Diagnostic
+]:
     """One Fit per joint and estimator; an estimator that cannot be used says why, and the rest goes on.
 
     A joint of several logs has a CrossFit, too, by which each of its logs can be predicted from others.
     """
     averaged, samples = list(trajectories), list(smoothed)
+    moving = [(s.log, s.joint) for s in samples if not s.at_rest]
     for joint in robot.joints:
         model, prior = independent(joint), known_of(joint)
         parts = [repeated(model, t, prior) for t in averaged if t.joint == joint.name]
@@ -63,31 +79,88 @@ def run(
         once = [s for s in samples if s.joint == joint.name and not s.at_rest and s.log not in known]
         parts += [unrepeated(model, s, lowpass, prior) for s in once]
         if parts:
-            yield from of_joint(model, parts)
+            others = moving_with(joint.name, [part.log for part in parts], moving)
+            yield from of_joint(model, parts, robot, joint, others)
 
 
 def of_joint(
-    model: Model, parts: Sequence[Part]
-) -> Iterator[Fit | CrossFit | FittedPaths | MeasurementNoise | Residual | SwarmSearch | Diagnostic]:
-    """The fits of one joint, what they leave, and what its logs have in common."""
+    model: Model, parts: Sequence[Part], robot: Robot, joint: Joint, others: Sequence[str]
+) -> Iterator[
+    Fit | CrossFit | FittedPaths | Guess | Identifiability | MeasurementNoise | Residual | SwarmSearch | Diagnostic
+]:
+    """The fits of one joint, what they leave, and what its logs have in common; `others` move in them, too."""
     regression = joined([part.regression for part in parts])
+    estimates: dict[str, Estimate] = {}
     for name in ESTIMATORS:
         try:
             estimate = estimator(name)(regression)
         except NotIdentifiable as error:
             yield diagnostic("fit", model.group, "warning", f"{model.group}: {name} is left out: {error}")
             continue
-        if not has_positive_inertia(model, estimate.theta, parts):
-            finds = f"{model.group}: {name} finds an inertia that is not positive"
-            yield diagnostic("fit", model.group, "warning", finds)
+        estimates[name] = estimate
         yield summarised(parts, model, name, regression, estimate)
         yield from residuals(parts, model, name, estimate)
         yield from (swarm_search(model, name, search) for search in estimate.searches)
+    yield from identifiability(model, parts, regression, estimates, robot, joint, others)
     if len(parts) > 1:
         for name in ESTIMATORS:
             yield from cross_fits([part.log for part in parts], model, name, regression)
+    yield from guesses(model, regression)
     yield from fitted_paths(model.group, parts)
     yield noise(model.group, parts)
+
+
+def identifiability(
+    model: Model,
+    parts: Sequence[Part],
+    regression: Regression,
+    estimates: dict[str, Estimate],
+    robot: Robot,
+    joint: Joint,
+    others: Sequence[str],
+) -> Iterator[Identifiability | Diagnostic]:
+    """What the logs of a joint tell of its parameters, and whose inertia is not positive, and why."""
+    plain = estimates.get("lse")
+    if plain is None:
+        return
+    seen = told(factored(regression, regression.periods.astype(float)))
+    names = [parameter.name for parameter in model.parameters]
+    wanting = (*together(names, seen), *not_seen(regression, plain))
+    yield summary_of(model, names, seen, regression, plain, advice(robot, joint, wanting))
+    wrong = [name for name, estimate in estimates.items() if not has_positive_inertia(model, estimate.theta, parts)]
+    if wrong:
+        least = plain if "lse" in wrong else estimates[wrong[0]]
+        verb = "finds" if len(wrong) == 1 else "find"
+        why = inertia_at_fault(robot, joint, least, seen, others)
+        said = f"{model.group}: {listed(wrong)} {verb} an inertia that is not positive: {why}"
+        yield diagnostic("fit", model.group, "warning", said)
+    if said := hardly_described(joint, explained(regression, plain), others):
+        yield diagnostic("fit", model.group, "warning", f"{model.group}: {said}")
+
+
+def summary_of(
+    model: Model, names: Sequence[str], seen: Told, regression: Regression, plain: Estimate, next_motion: str
+) -> Identifiability:
+    """The correlations of a joint's parameters, and what follows from them."""
+    p = len(names)
+    return Identifiability(
+        group=model.group,
+        model=model.name,
+        scaled_condition=seen.condition,
+        together=tuple(together(names, seen)),
+        not_seen=tuple(not_seen(regression, plain)),
+        advice=next_motion,
+        parameter=np.repeat(np.array(names, object), p),
+        beside=np.tile(np.array(names, object), p),
+        correlation=flat(seen),
+    )
+
+
+def explained(regression: Regression, estimate: Estimate) -> float:
+    """The share of the effort's variance that a fit explains, R2."""
+    residual = regression.tau - regression.Phi @ estimate.theta
+    spread = regression.tau - regression.tau.mean()
+    return float(1 - residual @ residual / (spread @ spread))
 
 
 def repeated(model: Model, t: Trajectory, known: Known = NOTHING) -> Part:
@@ -113,7 +186,6 @@ def has_positive_inertia(model: Model, theta: Array, parts: Sequence[Part]) -> b
 def summarised(parts: Sequence[Part], model: Model, name: str, regression: Regression, estimate: Estimate) -> Fit:
     """A Fit with how well it describes what it was fitted to."""
     residual = regression.tau - regression.Phi @ estimate.theta
-    spread = regression.tau - regression.tau.mean()
     return Fit(
         group=model.group,
         model=model.name,
@@ -122,16 +194,31 @@ def summarised(parts: Sequence[Part], model: Model, name: str, regression: Regre
         samples=len(regression.tau),
         periods=min(part.periods for part in parts),
         mse=float(np.mean(residual**2)),
-        r2=float(1 - residual @ residual / (spread @ spread)),
+        r2=explained(regression, estimate),
         condition=float(np.linalg.cond(regression.Phi)),
-        hac_lags=estimate.hac_lags,
+        correlated_lags=estimate.correlated_lags,
         parameter=np.array([parameter.name for parameter in model.parameters], object),
         phi=np.array([parameter.typst for parameter in model.parameters], object),
         unit=np.array([parameter.unit for parameter in model.parameters], object),
         scale=np.array([parameter.scale for parameter in model.parameters]),
         theta=estimate.theta,
         theta_std=estimate.theta_std,
-        theta_std_hac=estimate.theta_std_hac,
+        theta_std_classical=estimate.theta_std_classical,
+    )
+
+
+def guesses(model: Model, regression: Regression) -> Iterator[Guess]:
+    """What the robot's tables make of the parameters, where it has any.  (6.7), (6.10), (6.13)"""
+    theta = regression.known.guess
+    if theta is None:
+        return
+    residual = regression.tau - regression.Phi @ theta
+    yield Guess(
+        group=model.group,
+        mse=float(np.mean(residual**2)),
+        parameter=np.array([parameter.name for parameter in model.parameters], object),
+        unit=np.array([parameter.unit for parameter in model.parameters], object),
+        theta=theta,
     )
 
 

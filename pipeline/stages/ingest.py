@@ -202,7 +202,9 @@ class Reading:
             return None
         value = self.converted(block, at_motor)
         ratio = joint.gear_ratio
-        return value * ratio * joint.torque_constant if either[1] == "i" else value / ratio
+        if either[1] != "i":
+            return value / ratio
+        return value if joint.effort else value * ratio * joint.torque_constant
 
     def require_numbers(self, name: str, values: Column) -> None:
         """Refuse a channel with samples that are missing or not numbers."""

@@ -77,11 +77,13 @@ class Channels:
         if self.robot is None:
             return None
         try:
-            kind = self.robot.joint(joint).kind
+            kind, effort_in = self.robot.joint(joint).kind, self.robot.joint(joint).effort
         except BadRobot as error:
             self.log.problem(str(error), *keys)
             return None
         position, effort = ("angle", "torque") if kind is Kind.REVOLUTE else ("length", "force")
+        if effort_in:
+            effort = str(measures(effort_in))
         return OF_A_JOINT[symbol].format(position=position, effort=effort)
 
 

@@ -11,7 +11,7 @@ from pipeline.maths.excitation.joint import Design
 from pipeline.maths.simulation import continuous
 from pipeline.records import KINDS, Record, store
 from pipeline.records.catalogue import Catalogue
-from pipeline.robots import Robot, davinci
+from pipeline.robots import Robot, davinci, davinci_physical, davinci_printed
 from pipeline.robots.davinci_chain import BODIES, CHAIN
 from pipeline.runner.console import Console
 from pipeline.runner.ledger import Folders, Ledger
@@ -48,7 +48,10 @@ def robot() -> Robot:
     roll, *others = arm.ARM.joints
     published = (("table-6.1-corrected", arm.EXCITATION["hand_roll"]),)
     short = tuple(replace(study, duration=0.05) for study in davinci.ROBOT.control)
-    joints, wrist = (replace(roll, published=published), *others), davinci.ROBOT.wrist
+    joints, wrist = (
+        (replace(roll, published=published, physical=davinci_physical.ROLL, printed=davinci_printed.ROLL), *others),
+        davinci.ROBOT.wrist,
+    )
     return replace(arm.ARM, joints=joints, chain=CHAIN, bodies=BODIES, wrist=wrist, control=short)
 
 

@@ -6,27 +6,29 @@ from pipeline.maths.constants import GRAVITY
 from pipeline.maths.models.terms import Term
 from pipeline.robots.robot import Kind
 
-Powers = tuple[int, int, int]
-BASE: dict[str, Powers] = {"1": (0, 0, 0), "rad": (0, 0, 0), "kg": (1, 0, 0), "m": (0, 1, 0), "s": (0, 0, 1)}
-BASE["N"] = (1, 1, -2)
+Powers = tuple[int, int, int, int]
+BASE: dict[str, Powers] = {
+    "1": (0, 0, 0, 0), "rad": (0, 0, 0, 0), "kg": (1, 0, 0, 0), "m": (0, 1, 0, 0), "s": (0, 0, 1, 0), "A": (0, 0, 0, 1),
+}  # fmt: skip
+BASE["N"] = (1, 1, -2, 0)
 
 
 @dataclass(frozen=True)
 class Dimension:
-    """Powers of kg, m and s; an angle has none, and neither has a bare number."""
+    """Powers of kg, m, s and A; an angle has none, and neither has a bare number."""
 
-    powers: Powers = (0, 0, 0)
+    powers: Powers = (0, 0, 0, 0)
 
     def __mul__(self, other: "Dimension"):
-        kg, m, s = (a + b for a, b in zip(self.powers, other.powers, strict=True))
-        return Dimension((kg, m, s))
+        kg, m, s, A = (a + b for a, b in zip(self.powers, other.powers, strict=True))
+        return Dimension((kg, m, s, A))
 
     def __truediv__(self, other: "Dimension"):
         return self * other**-1
 
     def __pow__(self, n: int):
-        kg, m, s = (n * a for a in self.powers)
-        return Dimension((kg, m, s))
+        kg, m, s, A = (n * a for a in self.powers)
+        return Dimension((kg, m, s, A))
 
     def __add__(self, other: "Dimension"):
         if self != other:
@@ -73,7 +75,7 @@ def has_a_dimension(term: Term, kind: Kind) -> bool:
     return True
 
 
-def is_effort(term: Term, kind: Kind) -> bool:
-    """Whether parameter times term is an effort of this kind of joint."""
-    effort = of_unit(kind.unit("{effort}"))
-    return has_a_dimension(term, kind) and of_unit(kind.unit(term.unit)) * of_phi(term, kind) == effort
+def is_effort(term: Term, kind: Kind, measured: str = "") -> bool:
+    """Whether parameter times term is an effort of this kind of joint, as it is measured."""
+    effort = of_unit(kind.unit("{effort}", measured))
+    return has_a_dimension(term, kind) and of_unit(kind.unit(term.unit, measured)) * of_phi(term, kind) == effort

@@ -83,6 +83,7 @@ def test_the_unit_is_that_of_an_effort_over_the_term(term):
     kinds = [kind for kind in Kind if has_a_dimension(term, kind)]
     assert kinds
     assert [kind for kind in kinds if not is_effort(term, kind)] == []
+    assert [kind for kind in kinds if not is_effort(term, kind, "A")] == []
 
 
 def test_every_term_can_be_typeset():

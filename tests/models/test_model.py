@@ -22,7 +22,7 @@ DAHL = terms.presliding(0.01)
 T_S = 0.005
 
 
-UNITS = {"inertia": "kg m^2", "effort": "N m", "position": "rad"}
+UNITS = {"inertia": "kg m^2", "effort": "N m", "position": "rad", "gain": ""}
 FRICTION = ((terms.viscous, terms.presliding(0.02)), (terms.viscous, terms.coulomb))
 
 

@@ -26,6 +26,7 @@ from pipeline.report.content import (
     Section,
     Stems,
     Table,
+    Tiles,
     Verdict,
     VLine,
     VSpan,
@@ -71,7 +72,7 @@ def zoomable(samples: int, label: str) -> Figure:
 
 
 def still() -> Figure:
-    """A figure of four panels that hold every mark between them."""
+    """A figure of five panels that hold every mark between them."""
     x = np.linspace(0.1, 1, 50)
     return Figure(
         f"Still, $theta_1$ of {literal(HOSTILE)}.",
@@ -80,6 +81,7 @@ def still() -> Figure:
             Panel("Lines", "$x$ [s]", HOSTILE, (Line(x, x, "_under $y$"), Line(x, x**2, style="dotted"), HLine(0.5))),
             Panel("", "x", "n", (Histogram([0, 1, 2], [3, 4], "counts"), VLine(1.5), VSpan(0, 1), Band(x, x, x + 1))),
             Panel("Log", "x", "y", (Points(x, x, y_std=0.1), Reference(1), HBand(0.1, 0.2), Stems(x, x)), x_log=True),
+            Panel("", "", "", (Tiles([1.0, -0.5, -0.5, 1.0], ("θ1 $a$", "θ2 b")),)),
             Panel("", "", "θ", (Bars(("a", "b"), [1, 2], "LSE", std=[0.1, 0.1]), Bars(("a", "b"), [2, 3], "WLSE"))),
         ),
         label="still",

@@ -17,7 +17,7 @@ from matplotlib.text import Text
 from report_documents import HOSTILE, still, zoomable
 
 from pipeline.report import writers
-from pipeline.report.content import Document, Figure, Figure3D, Histogram, Line, Panel, walk
+from pipeline.report.content import Document, Figure, Figure3D, Histogram, Line, Panel, Tiles, walk
 from pipeline.report.figures import together
 from pipeline.report.figures.panels import wrap_label
 from pipeline.report.figures.svg import STYLE, draw_figure, draw_svg, svg
@@ -134,3 +134,14 @@ def test_importing_the_content_imports_no_drawing_catalogue() -> None:
     root = str(Path(__file__).parents[2])
     result = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=root)
     assert result.stdout.strip() == "[]"
+
+
+def test_a_matrix_is_tiles_with_their_numbers_and_names() -> None:
+    tiles = Tiles([1.0, -0.95, -0.95, 1.0], ("θ1 inertia", "θ2 gravity, sine"))
+    drawn = svg(Figure("Matrix.", "Two by two.", (Panel("", "", "", (tiles,)),)))
+    assert drawn.count("−0.95") == 2
+    for words in ("θ1 inertia", "θ2 gravity, sine", ">θ1<", ">θ2<"):
+        assert words in drawn
+    assert drawn.count("opacity") >= 4
+    with pytest.raises(ValueError, match="2 names need their square of numbers, not 3"):
+        Tiles([1.0, 2.0, 3.0], ("a", "b"))

@@ -40,7 +40,7 @@ class CoupledArm:
     rows: tuple[int, ...]
     chain: Chain
     friction: tuple[tuple[Term, ...], ...]
-    units: tuple[dict[str, str], ...]  # of a row: what {inertia}, {effort} and {position} are
+    units: tuple[dict[str, str], ...]  # of a row: what {inertia}, {effort}, {position} and {gain} are
     name: str = "coupled"
 
     @property
@@ -120,7 +120,12 @@ class CoupledArm:
     def _link_parameter(self, column: int) -> Parameter:
         link, which = self.chain.links[column // 10], PARAMETERS[column % 10]
         symbol = f'{which[0]}_({which[1:]},"{link}")' if which != "m" else f'm_"{link}"'
-        return Parameter(f"{which} of {link}", f"partial tau \\/ partial {symbol}", LINK_UNITS[column % 10], False)
+        return Parameter(
+            f"{which} of {link}",
+            f"partial tau \\/ partial {symbol}",
+            LINK_UNITS[column % 10] + self.units[0]["gain"],
+            False,
+        )
 
     def _added_parameter(self, column: int) -> Parameter:
         which, row = divmod(column, len(self.rows))

@@ -19,10 +19,10 @@ from pipeline.maths.models.bias import COEFFICIENTS, Coefficients
 class Term:
     """One column of the regressor: phi = a ddq + sum of b[f] f(q, dq) over functions f of `COEFFICIENTS`.
 
-    `unit` is that of the parameter, with {inertia}, {effort} and {position} left to the joint; `typst` is phi in
-    Typst's maths, for equations; a `positive` parameter is one whose sign physics knows.  A term of z says what z is by
-    one of three, in the joint's units: the `displacement` of a deflection, the `width` [velocity] of a smooth sign, or
-    the velocity at which Stribeck's peak has `faded`; see `driven`.
+    `unit` is that of the parameter, with {inertia}, {mass_moment}, {effort} and {position} left to the joint; `typst`
+    is phi in Typst's maths, for equations; a `positive` parameter is one whose sign physics knows. A term of z says
+    what z is by one of three, in the joint's units: the `displacement` of a deflection, the `width` [velocity] of a
+    smooth sign, or the velocity at which Stribeck's peak has `faded`; see `driven`.
     """
 
     name: str
@@ -56,8 +56,8 @@ class Term:
 
 inertia = Term("inertia", "dot.double(q)", "{inertia}", a=1.0, positive=True)
 lifted_mass = Term("lifted mass", "(dot.double(q) - g)", "{inertia}", a=1.0, b={"1": -GRAVITY}, positive=True)
-gravity_sin = Term("gravity, sine", "g sin(q)", "kg m", b={"sin q": GRAVITY})
-gravity_cos = Term("gravity, cosine", "g cos(q)", "kg m", b={"cos q": GRAVITY})
+gravity_sin = Term("gravity, sine", "g sin(q)", "{mass_moment}", b={"sin q": GRAVITY})
+gravity_cos = Term("gravity, cosine", "g cos(q)", "{mass_moment}", b={"cos q": GRAVITY})
 viscous = Term("viscous friction", "dot(q)", "{effort} s/{position}", b={"dq": 1.0}, positive=True)
 coulomb = Term("Coulomb friction", 'op("sign")(dot(q))', "{effort}", b={"sign(dq)": 1.0}, positive=True)
 offset = Term("offset", "1", "{effort}", b={"1": 1.0})

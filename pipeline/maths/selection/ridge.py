@@ -16,6 +16,7 @@ from pipeline.maths.arrays import Array
 from pipeline.maths.selection.equations import Equations
 
 UNSEEN = 1e-12  # of the largest column's square, below which a column is nothing but rounding
+ROUNDING = 1e-12  # of the largest column, below which rounding is all that there is of one
 DEPENDENT = 1e12  # condition of the equations of scaled columns, the square of the columns' own
 
 
@@ -43,7 +44,10 @@ def scaled_equations(equations: Equations, ridge: Ridge) -> tuple[Array, Array]:
     """G + lambda P (p, p) of columns scaled to unit length, and their lengths (p,); raises as `solve` does."""
     G = np.einsum("m,mpq->pq", ridge.weights, equations.gram[0])
     size = np.sqrt(np.diag(G))
-    if not (size > 0).all():
+    # Scaled up, and told apart by a ridge, rounding would look like any other column.  Of an arm's base parameters some
+    # are never seen where a joint is held, and the others are none the worse for it.
+    least = 0.0 if len(ridge.combination) else ROUNDING * size.max()
+    if not (size > least).all():
         raise np.linalg.LinAlgError("a column is zero throughout")
     scaled = (G + ridge.strength * penalty(G, ridge.combination)) / size / size[:, None]
     if ridge.strength == 0.0 and np.linalg.cond(scaled) > DEPENDENT:

@@ -34,6 +34,7 @@ from pipeline.report.content.marks import (
     Points3D,
     Reference,
     Stems,
+    Tiles,
     VLine,
     VSpan,
 )
@@ -42,6 +43,6 @@ from pipeline.report.content.number import Number
 __all__ = [
     "AnyMark", "Band", "Bars", "Block", "Bullets", "Cell", "Document", "Equation", "Figure", "Figure3D", "HBand",
     "HLine", "Histogram", "Level", "Line", "Line3D", "Listing", "Number", "OnScreen", "Panel", "Points", "Points3D",
-    "Prose", "Reference", "Section", "Stems", "Table", "VLine", "VSpan", "Verdict", "literal", "name_of", "numbers",
-    "walk",
+    "Prose", "Reference", "Section", "Stems", "Table", "Tiles", "VLine", "VSpan", "Verdict", "literal", "name_of",
+    "numbers", "walk",
 ]  # fmt: skip

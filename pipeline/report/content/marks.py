@@ -93,6 +93,22 @@ class Histogram:
 
 
 @dataclass(frozen=True, eq=False)
+class Tiles(Mark):
+    """A square matrix of numbers from -1 to 1, row by row, each on a tile that is tinted by it, and its names."""
+
+    value: Array  # (n^2,)
+    names: tuple[str, ...]  # (n,) of rows, and of columns, at which their first words stand
+    label: str = ""
+    colour: Colour = "blue"  # of positive numbers; negative ones are `opposite`
+    opposite: Colour = "vermillion"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if len(self.value) != len(self.names) ** 2:
+            raise ValueError(f"Tiles: {len(self.names)} names need their square of numbers, not {len(self.value)}")
+
+
+@dataclass(frozen=True, eq=False)
 class Bars:
     """One bar per name; several Bars in a panel share the names and stand side by side."""
 
@@ -161,7 +177,7 @@ class Reference:
     style: Style = "dashed"
 
 
-AnyMark = Line | Points | Band | Stems | Histogram | Bars | HLine | VLine | HBand | VSpan | Reference
+AnyMark = Line | Points | Band | Stems | Histogram | Bars | Tiles | HLine | VLine | HBand | VSpan | Reference
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,9 +18,11 @@ from pipeline.report.content.marks import (
     Points3D,
     Reference,
     Stems,
+    Tiles,
     VLine,
     VSpan,
 )
+from pipeline.report.content.number import MINUS
 from pipeline.report.figures.palette import COLOURS, SURROUNDINGS
 
 if TYPE_CHECKING:
@@ -134,6 +136,23 @@ def _(mark: VSpan, axes: "Axes", order: float) -> None:
 @draw_mark.register(Reference)
 def _(mark: Reference, axes: "Axes", order: float) -> None:
     axes.axline((0.0, mark.intercept), slope=mark.slope, **_stroke(mark, order))
+
+
+@draw_mark.register(Tiles)
+def _(mark: Tiles, axes: "Axes", order: float) -> None:
+    n = len(mark.names)
+    for k, value in enumerate(mark.value.tolist()):
+        row, column = divmod(k, n)
+        colour = COLOURS[mark.colour if value >= 0 else mark.opposite]
+        corners = [column - 0.48, column + 0.48], [row - 0.48] * 2, [row + 0.48] * 2
+        axes.fill_between(*corners, color=colour, alpha=0.6 * min(abs(value), 1.0), linewidth=0, zorder=order)
+        axes.text(
+            column, row, f"{round(value, 2) + 0.0:.2f}".replace("-", MINUS), ha="center", va="center", zorder=order + 1
+        )
+    axes.set_xticks(range(n), [name.partition(" ")[0] for name in mark.names], parse_math=False)
+    axes.set_yticks(range(n), mark.names, parse_math=False)
+    axes.set(xlim=(-0.5, n - 0.5), ylim=(n - 0.5, -0.5))
+    axes.grid(visible=False)
 
 
 def draw_bars(bars: Sequence[Bars], axes: "Axes") -> None:

@@ -4,7 +4,7 @@ import textwrap
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from pipeline.report.content.marks import AnyMark, Bars, Line, Panel, Points, Stems
+from pipeline.report.content.marks import AnyMark, Bars, Line, Panel, Points, Stems, Tiles
 from pipeline.report.figures.draw import draw_bars, draw_mark, unescape_label
 from pipeline.report.figures.palette import assign_looks
 from pipeline.report.figures.ticks import scale_ticks, set_log_ticks
@@ -66,8 +66,10 @@ def draw_panel(axes: "Axes", panel: Panel, width: float, height: float, x_label:
     _draw_marks(axes, panel, width)
     _set_ranges(axes, panel)
     bars = any(isinstance(mark, Bars) for mark in panel.marks)
-    across = panel.x_label if bars else _ticks(axes, "x", panel.x_log, panel.x_label, 4 if width < 70 else 8)
-    up = _ticks(axes, "y", panel.y_log, panel.y_label, 5)
+    tiles = any(isinstance(mark, Tiles) for mark in panel.marks)
+    named = bars or tiles
+    across = panel.x_label if named else _ticks(axes, "x", panel.x_log, panel.x_label, 4 if width < 70 else 8)
+    up = panel.y_label if tiles else _ticks(axes, "y", panel.y_log, panel.y_label, 5)
     axes.set_xlabel(wrap_label(across, width - 18) if x_label else "", parse_math=False)
     axes.set_ylabel(wrap_label(up, height - ABOUT), parse_math=False)
 

@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.records import Track
+from pipeline.records import Prediction, Track
 from pipeline.records.record import slug
 from pipeline.report.content import Block, Figure, Line, OnScreen, Panel, Prose, Section, Table, Verdict, literal
-from pipeline.report.context import Context, count, label, title
+from pipeline.report.context import PLAIN, Context, count, fit_name, label, title
 
 LIMIT = 4.0  # standard errors that an estimate may be off before it is called wrong
 SHOWN = 3  # figures; the others are on screen
@@ -29,6 +29,7 @@ def blocks(context: Context) -> Iterator[Block]:
         "this section compares with it: parameters where the simulated friction is what the model says, and external "
         "efforts everywhere."
     )
+    yield from of_friction(context)
     for joint, path, theta in true_parameters(context):
         yield from parameters(context, joint, path, theta)
     figures: list[Figure] = []
@@ -41,6 +42,41 @@ def blocks(context: Context) -> Iterator[Block]:
     if figures[SHOWN:]:
         name = f"{count(len(figures) - SHOWN, 'more comparison')} of tracked and true effort"
         yield OnScreen(name, "more-truth", tuple(figures[SHOWN:]))
+
+
+def of_friction(context: Context) -> Iterator[Block]:
+    """What friction does to a fit, where parameters are fitted to recordings of another friction than the models'."""
+    family = {log["name"]: log.get("family", "") for log in context.study.truth.get("log", [])}
+    matched = [name for name in context.study.truth.get("theta", {}) if name in family.values()]
+    fitted = sorted({family.get(log, "") for fit in context.own_fits() for log in fit.logs})
+    if not matched or not fitted or set(fitted) & set(matched):
+        return
+    yield Prose(
+        f"**What friction does to a fit.** Parameters are identified from the recordings {literal(', '.join(fitted))}, "
+        "whose friction differs by direction, rises near rest and gives way before it slides. The true parameters "
+        f"below are those of the recordings {literal(', '.join(matched))}, which differ in nothing but friction: there "
+        "it is what the models say. So what an estimate is off by is what such friction does to it, and the standard "
+        "errors are as wide as they are because the residual repeats in every period."
+    )
+    yield errors_by_family(context, family)
+
+
+def errors_by_family(context: Context, family: dict[str, str]) -> Table:
+    """The model error of each joint in logs that nobody fitted, by what their friction is."""
+    unseen = [p for p in context.catalogue.all(Prediction) if p.role != "identification"]
+    used = [p for p in unseen if f"{p.model}.{p.estimator}" in (context.used_fit(p.joint), PLAIN)]
+    rows = tuple(
+        (
+            title(p.joint),
+            literal(family.get(p.log, "") or "–"),
+            fit_name(p.model, p.estimator),
+            context.number(f"{p.prefix}.model_error", 2),
+            context.number(f"{p.prefix}.effort_rms", 2),
+        )
+        for p in sorted(used, key=lambda p: (p.joint, p.model, family.get(p.log, "")))
+    )
+    header = ("Joint", "Friction", "Fit", "Model error", "Effort")
+    return Table("Model error by the friction of logs that nobody fitted.", header, rows, "error-by-friction", "lllrr")
 
 
 def true_parameters(context: Context) -> Iterator[tuple[str, tuple[str, ...], dict[str, float]]]:

@@ -25,7 +25,11 @@ from pipeline.report.content import (
     literal,
 )
 from pipeline.report.context import Context, fit_name, label, title
+from pipeline.report.friction import friction_maps
+from pipeline.report.identified import correlations, wanting
+from pipeline.report.overlaid import convergence, estimators
 from pipeline.report.plots import autocorrelation, binned_means, correlation, explained_by
+from pipeline.report.printed import printed_beside
 from pipeline.report.results import format_unit
 from pipeline.report.verdicts import percent
 
@@ -72,6 +76,7 @@ def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
     terms = " + ".join(f"theta_{i} {phi}" for i, phi in enumerate(first.phi, start=1))
     yield Equation(f"tau = {terms}", f"effort is the sum of {', '.join(first.parameter)}, each times its parameter")
     yield parameters(context, first)
+    yield from wanting(context, first.group)
     residuals = context.catalogue.about(Residual, joint=first.group, model=first.model, estimator=first.estimator)
     for i, residual in enumerate(residuals):
         shown = tuple(residual_blocks(context, residual))
@@ -92,7 +97,7 @@ def implausible(fits: list[Fit]) -> Iterator[Verdict]:
     for fit in fits:
         negative = [
             f"{name} ({value:.2g} ± {std:.1g})"
-            for name, value, std in zip(fit.parameter, fit.theta, fit.theta_std_hac, strict=True)
+            for name, value, std in zip(fit.parameter, fit.theta, fit.theta_std, strict=True)
             if value < 0 and physical(name)
         ]
         if negative:
@@ -110,7 +115,7 @@ def parameters(context: Context, fit: Fit) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for i, name in enumerate(fit.parameter):
         key = ".".join(("fit", *fit.key, slug(name)))
-        z = fit.theta[i] / fit.theta_std_hac[i] if fit.theta_std_hac[i] > 0 else np.nan
+        z = fit.theta[i] / fit.theta_std[i] if fit.theta_std[i] > 0 else np.nan
         unit = format_unit(fit.unit[i]) or "–"
         values = (unitless(context, name) for name in (key, f"{key}.std_classical"))
         rows.append((f"$theta_{i + 1}$", name, unit, *values, f"{z:.1f}" if np.isfinite(z) else "–"))
@@ -156,7 +161,15 @@ def compared(context: Context, fits: list[Fit]) -> Block:
     )
     header = ("Fit", "MSE", "$R^2$", "Condition", *(name[:1].upper() + name[1:] for name in names))
     table = Table(caption, header, tuple(rows), f"fits-{group}", "l" + "r" * (len(header) - 1))
-    return OnScreen(f"{title(group)}: all fits side by side", f"all-fits-{group}", (table,))
+    first = next((fit for fit in fits if fit.estimator == "lse"), fits[0])
+    more = (
+        *estimators(context, first),
+        *printed_beside(context, first),
+        *convergence(context, group),
+        *correlations(context, group),
+        *friction_maps(context, group),
+    )
+    return OnScreen(f"{title(group)}: all fits, and what they rest on", f"all-fits-{group}", (table, *more))
 
 
 def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
@@ -183,13 +196,13 @@ def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
     )  # fmt: skip
     moved = context.catalogue.about(Trajectory, log=residual.log, joint=residual.joint)
     q = moved[0].q if moved and len(moved[0].q) == len(errors) else None
-    against = [motion_panel(residual, errors, residual.dq, label(residual, "dq", "velocity"))]
+    against = [motion_panel(residual, errors, residual.dq, label(residual, "dq", "velocity"), by_direction=True)]
     if q is not None:
         against.insert(0, motion_panel(residual, errors, q, label(moved[0], "q", "position")))
-    tests = [*against, *correlations(context, residual, errors)]
+    tests = [*against, *own_correlations(context, residual, errors, q)]
     yield Figure(
         f"{name}: the residual against position and velocity (points: means of 1/40 of the range, bars: their "
-        "standard errors), its autocorrelation, and its cross-correlation with velocity and direction.",
+        "standard errors) and direction (its mean), its autocorrelation, and its cross-correlation with the motion.",
         f"{name}: {in_words(residual, errors, q)}",
         tuple(tests),
         f"residual-figure-{residual.log}-{residual.joint}",
@@ -199,23 +212,35 @@ def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
     yield Prose(in_words(residual, errors, q))
 
 
-def motion_panel(residual: Residual, errors: Column, x: Column, x_label: str) -> Panel:
+def motion_panel(residual: Residual, errors: Column, x: Column, x_label: str, by_direction: bool = False) -> Panel:
     """Means of the residual over ranges of one motion, flat at zero where no term is missing."""
     middle, mean, std = binned_means(x, errors)
-    heading = f"Against {x_label.partition(' [')[0]}"
-    return Panel(heading, x_label, label(residual, "tau", "residual"), (Points(middle, mean, "", "blue", y_std=std),))
+    heading = f"Against {x_label.partition(' [')[0]}{' and direction' if by_direction else ''}"
+    points = Points(middle, mean, "", "blue", y_std=std)
+    lines = direction_means(x, errors) if by_direction else ()
+    return Panel(heading, x_label, label(residual, "tau", "residual"), (points, *lines))
 
 
-def correlations(context: Context, residual: Residual, errors: Column) -> Iterator[Panel]:
+def direction_means(dq: Column, errors: Column) -> Iterator[Line]:
+    """The residual's mean in each direction of motion: against sign(dq)."""
+    for i, side in enumerate((dq < 0, dq > 0)):
+        if side.any():
+            ends, mean = np.array([0.0, dq[side][np.abs(dq[side]).argmax()]]), float(errors[side].mean())
+            yield Line(ends, np.full(2, mean), "" if i else "mean", "vermillion", "solid")
+
+
+def own_correlations(context: Context, residual: Residual, errors: Column, q: Column | None) -> Iterator[Panel]:
     """The residual's correlation with itself and with the motion."""
     signal = f"tau.{residual.model}.{residual.estimator}"
     for w in context.catalogue.about(Whiteness, log=residual.log, joint=residual.joint, signal=signal):
         yield autocorrelation(w, "Autocorrelation")
     lags = np.arange(-min(LAGS, len(errors) // 4), min(LAGS, len(errors) // 4) + 1)
     shown = lags.astype(np.float64)
+    position = () if q is None else (Line(shown, correlation(errors, q, lags), "with position", "green", "dashed"),)
     marks = (
         Stems(shown, correlation(errors, residual.dq, lags), "with velocity", "sky"),
         Line(shown, correlation(errors, np.sign(residual.dq), lags), "with direction", "vermillion"),
+        *position,
     )
     yield Panel("Cross-correlation", "lag [samples]", "correlation", marks, y_range=(-1.0, 1.0))
 

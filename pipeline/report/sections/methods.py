@@ -76,12 +76,21 @@ def paragraph_for_paper(context: Context) -> str:
     )
 
 
+def in_current(context: Context) -> str:
+    """Which joints' effort is a current, because no torque constant is known."""
+    joints = [joint.title.lower() for joint in context.study.robot.joints if joint.effort]
+    if not joints:
+        return ""
+    said = f" Of the {', '.join(joints)} no torque constant is known: effort is the motor's current, in A,"
+    return f"{said} and so are external effort and levels."
+
+
 def blocks(context: Context) -> Iterator[Block]:
     """The section's content."""
     settings = context.study.settings
     yield Prose(
         "**From the motor to the joint.** Logs of the motor side are carried to the joint through the gear ratio "
-        "$eta$ and the torque constant $K_m$; logs of the joint side are used as they are."
+        f"$eta$ and the torque constant $K_m$; logs of the joint side are used as they are.{in_current(context)}"
     )
     yield Equation(
         "q = theta_m / eta, quad tau = eta K_m i",

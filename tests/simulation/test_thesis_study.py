@@ -1,0 +1,94 @@
+"""The study that shows what friction does to a fit: two families that differ in nothing else."""
+
+import json
+
+import pytest
+
+import pipeline
+from pipeline.robots.davinci import ROBOT
+from pipeline.simulation.scenario.reading import load
+from pipeline.stages import STAGES
+from tests.test_runs import call
+
+PERIODS = 10
+
+
+def printed_mse(joint) -> float:
+    return next(column.mse for column in joint.printed.columns if column.estimator == "lse")
+
+
+def test_a_sample_has_the_variance_of_ten_periods_mean_ten_times():
+    families = load("davinci-thesis").arm.families
+    for family in families.values():
+        for joint in ROBOT.joints:
+            assert family.noise[joint.name].tau ** 2 == pytest.approx(PERIODS * printed_mse(joint), rel=1e-4)
+
+
+def test_the_families_differ_in_nothing_but_friction():
+    scenario = load("davinci-thesis")
+    matched, realistic = (scenario.arm.families[name] for name in ("matched", "realistic"))
+    assert matched.noise == realistic.noise
+    fitted = {log.family for log in scenario.logs if log.role == "identification"}
+    assert fitted == {"realistic"}
+    for joint in ROBOT.joints:
+        moving = [log for log in scenario.logs if joint.name in log.moves]
+        assert {(log.role, log.family) for log in moving} == {
+            ("identification", "realistic"), ("validation", "realistic"), ("validation", "matched"),
+            ("friction", "matched"),
+        }  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def study(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("lab") / "raw" / "davinci-thesis"
+    call("simulate", "davinci-thesis", folder)
+    for stage in STAGES[STAGES.index("ingest") : STAGES.index("predict") + 1]:
+        call(stage, folder)
+    call("report", folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def results(study):
+    file = study.parent.parent / "reports" / "davinci-thesis" / "results.json"
+    return {r["key"]: r["value"] for r in json.loads(file.read_text())}
+
+
+@pytest.mark.medium
+def test_averaged_effort_has_the_printed_error_beyond_what_friction_adds(study, results):
+    for joint in ROBOT.joints:
+        noise = results[f"noise.realistic-{joint.name.split('_')[1]}-excitation.{joint.name}.sigma_tau"]
+        assert noise**2 / PERIODS == pytest.approx(printed_mse(joint), rel=0.1)
+        assert results[f"fit.{joint.name}.independent.lse.mse"] > printed_mse(joint)
+
+
+@pytest.mark.medium
+def test_friction_takes_from_coulomb_s_and_gives_to_the_viscous_and_is_seen_over_velocity(study, results):
+    for joint in ROBOT.joints:
+        found, true = (
+            {name: results[f"{key}.{joint.name}.{more}{name}"] for name in ("viscous_friction", "coulomb_friction")}
+            for key, more in (("fit", "independent.lse."), ("truth", ""))
+        )
+        assert found["viscous_friction"] > 1.1 * true["viscous_friction"]
+        assert found["coulomb_friction"] < 0.95 * true["coulomb_friction"]
+        charts = pipeline.read(study, "FrictionMap", joint=joint.name, model="independent")
+        assert {log.partition("-")[0] for log in charts["log"].unique()} == {"matched", "realistic"}
+
+
+@pytest.mark.medium
+def test_a_model_with_memory_is_chosen_and_predicts_such_friction_better(results):
+    chosen = {key.split(".")[2] for key in results if key.startswith("fit.") and "+dahl" in key}
+    assert chosen
+    for joint in ROBOT.joints:
+        log = f"realistic-{joint.name.split('_')[1]}-validation"
+        better, plain = (
+            results[f"predict.{log}.{joint.name}.{fit}.model_error"] for fit in ("chosen", "independent.lse")
+        )
+        assert better < plain
+
+
+@pytest.mark.medium
+def test_the_report_says_what_friction_does(study):
+    page = (study.parent.parent / "reports" / "davinci-thesis" / "report.html").read_text()
+    assert "What friction does to a fit." in page
+    assert "Model error by the friction of logs that nobody fitted." in page

@@ -1,0 +1,156 @@
+"""What the data tell of parameters, and whom messages blame for an inertia that is not positive."""
+
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pipeline.estimators import estimator
+from pipeline.estimators.identifiability import advice, hardly_described, inertia_at_fault, not_seen, together
+from pipeline.estimators.problem import Estimate, Spread, factored
+from pipeline.maths.estimation.identifiability import combinations, deviation, pairs, told
+from pipeline.maths.estimation.least_squares import triangle
+from pipeline.records import Diagnostic, Identifiability
+from pipeline.records.catalogue import Catalogue
+from pipeline.report.identified import wanting
+from pipeline.robots.davinci import ROBOT
+from pipeline.stages import fit
+from tests import arm
+from tests.contracts.test_estimators import NAMES, PHI, SIGMA, THETA, K, M, problem
+from tests.test_estimation import trajectory
+
+ROLL = arm.joint("hand_roll")
+
+
+def of(Phi: np.ndarray):
+    return told(triangle(Phi, PHI @ THETA, np.ones(len(Phi))))
+
+
+def test_the_correlation_of_parameters_is_that_of_their_errors():
+    found = told(factored(problem(seed=0), np.full(K, float(M))))
+    thetas = np.array([estimator("lse")(problem(seed)).theta for seed in range(1000)])
+    assert_allclose(found.correlation, np.corrcoef(thetas.T), atol=4 / np.sqrt(1000))
+    assert_allclose(np.diag(found.correlation), 1.0, rtol=1e-12)
+
+
+def test_the_condition_is_that_of_scaled_columns_whatever_their_units():
+    assert of(PHI * [1e6, 1.0, 1e-6, 1.0]).condition == pytest.approx(of(PHI).condition, rel=1e-9)
+    assert of(PHI).condition == pytest.approx(np.linalg.cond(PHI / np.linalg.norm(PHI, axis=0)), rel=1e-9)
+
+
+def test_the_deviation_of_a_sum_of_parameters_is_that_of_its_errors():
+    weights, seeds = np.array([1.0, 2.0, 0.0, -1.0]), 2000
+    found = told(factored(problem(seed=0), np.full(K, float(M))))
+    std = SIGMA / np.sqrt(M) * np.sqrt(np.diag(np.linalg.inv(PHI.T @ PHI)))
+    sums = [estimator("lse")(problem(seed)).theta @ weights for seed in range(seeds)]
+    assert deviation(found.correlation, std, weights) == pytest.approx(np.std(sums), rel=4 / np.sqrt(2 * seeds))
+
+
+def test_parameters_that_move_together_are_named_with_their_correlation():
+    near = np.column_stack([PHI, PHI[:, 1] * (1 + 0.1 * np.random.default_rng(0).normal(size=K))])
+    found = of(near)
+    ((i, j, r),) = pairs(found, 0.95)
+    assert (i, j) == (1, 4)
+    names = [*NAMES, "gravity, cosine"]
+    assert f"gravity, sine and gravity, cosine move together: correlation {r:.2f}" in together(names, found)
+    assert together(NAMES, of(PHI)) == []
+
+
+def test_a_combination_of_three_is_named_where_no_two_of_them_are_alike():
+    sum_of_three = PHI[:, 0] / np.linalg.norm(PHI[:, 0]) + PHI[:, 2] / np.linalg.norm(PHI[:, 2])
+    random = np.random.default_rng(0)
+    found = of(np.column_stack([PHI, sum_of_three + 1e-3 * random.normal(size=K)]))
+    ((members, ratio),) = combinations(found, 20.0, 0.1)
+    assert members == (0, 2, 4)
+    assert ratio == pytest.approx(found.condition)
+
+
+def test_a_parameter_that_cannot_be_told_from_zero_is_not_seen_and_its_share_is_bounded():
+    """Gravity, of which there is none."""
+    p = problem(seed=0)
+    p = replace(p, tau=p.tau - PHI[:, 1] * THETA[1])
+    found = estimator("lse")(p)
+    (said,) = [text for text in not_seen(p, found) if text.startswith("gravity, sine")]
+    most = (abs(found.theta[1]) + 2 * found.theta_std[1]) * np.linalg.norm(PHI[:, 1]) / np.linalg.norm(p.tau)
+    assert said.endswith(f"at most {100 * most:.2g} % of the effort")
+    assert not_seen(problem(), estimator("lse")(problem())) == []
+
+
+def test_advice_is_a_command_for_that_joint_and_only_where_something_is_wanting():
+    assert advice(ROBOT, ROBOT.joint("hand_pitch"), ()) == ""
+    assert "`davinci-forces excite davinci hand_pitch`" in advice(ROBOT, ROBOT.joint("hand_pitch"), ("x is not seen",))
+    assert "`davinci-forces excite arm.toml hand_roll`" in advice(arm.ARM, ROLL, ("x is not seen",))
+
+
+def guess(theta, std) -> Estimate:
+    std = np.array(std)
+    return Estimate(np.array(theta), lambda: Spread(std, std, 0.0))
+
+
+def blamed(theta, std, others=()) -> str:
+    return inertia_at_fault(arm.ARM, ROLL, guess(theta, std), of(PHI), others)
+
+
+def test_an_inertia_that_was_not_excited_is_not_blamed_on_signs():
+    said = blamed([-0.07, 0.01, 0.37, 0.22], [0.25, 0.01, 0.01, 0.01])
+    assert "-0.07 ± 0.2 kg m^2 cannot be told from a positive one" in said
+    assert "accelerating more: `davinci-forces excite arm.toml hand_roll`" in said
+    assert "sign" not in said
+
+
+def test_an_effort_against_the_motion_is_blamed_on_a_sign():
+    said = blamed([-0.45, 0.01, -0.37, -0.22], [0.01] * 4)
+    assert "and so is friction" in said
+    assert "correct the `sign`" in said
+
+
+def test_an_inertia_that_is_negative_alone_is_blamed_on_what_the_model_leaves_out():
+    said = blamed([-0.45, 0.01, 0.37, 0.22], [0.01] * 4)
+    assert "the signs are right" in said
+    assert "logged at different times" in said
+    coupled = blamed([-0.45, 0.01, 0.37, 0.22], [0.01] * 4, ["pan", "lift"])
+    assert "pan and lift move in the same logs" in coupled
+    assert "record it by itself" in coupled
+
+
+def test_an_effort_that_its_own_terms_do_not_describe_is_said_to_be_one():
+    assert hardly_described(ROLL, 0.9, ["pan"]) == ""
+    assert "pan moves in the same logs" in hardly_described(ROLL, 0.26, ["pan"])
+    assert "explain 26 % of the effort's variance: check" in hardly_described(ROLL, 0.26, [])
+
+
+def made(signal, kind) -> list:
+    return [record for record in fit.run([trajectory(signal)], [], arm.ARM, lowpass=17.0) if isinstance(record, kind)]
+
+
+def test_a_fit_comes_with_what_its_data_tell():
+    (found,) = made(arm.signal("hand_pitch"), Identifiability)
+    names = [term.name for term in arm.joint("hand_pitch").terms]
+    assert found.parameter.tolist() == [name for name in names for _ in names]
+    assert found.beside.tolist() == names * len(names)
+    assert found.scaled_condition > 1.0
+    keys = {p.key: p for p in found.published()}
+    assert len(keys) == 1 + len(names) * (len(names) - 1) // 2
+    row = keys["correlation.hand_pitch.independent.inertia.gravity_sine"].row
+    assert (found.parameter[row], found.beside[row]) == ("inertia", "gravity, sine")
+
+
+def test_the_report_says_what_is_wanting_and_what_to_record_next():
+    def about(**changes):
+        (found,) = made(arm.signal("hand_pitch"), Identifiability)
+        told = replace(found, **{"together": (), "not_seen": (), "advice": "", **changes})
+        return list(wanting(SimpleNamespace(catalogue=Catalogue(lambda kind: [told])), "hand_pitch"))
+
+    assert about() == []
+    (said,) = about(not_seen=("inertia is not seen: 0.1 ± 0.2",), advice="`davinci-forces excite a b` designs a motion")
+    assert said.text == "Inertia is not seen: 0.1 ± 0.2. `davinci-forces excite a b` designs a motion."
+
+
+def test_effort_of_the_wrong_sign_is_said_once_for_all_estimators():
+    signal = arm.signal("hand_roll")
+    said = [text for d in made(replace(signal, tau=-signal.tau), Diagnostic) for text in d.text]
+    (wrong,) = [text for text in said if "not positive" in text]
+    assert wrong.startswith("hand_roll: lse, wlse,")
+    assert "the effort pushes against the motion" in wrong

@@ -1,0 +1,76 @@
+"""Data that do not tell what is asked of them: a clear statement from every stage, never a silently wrong number."""
+
+import numpy as np
+import pytest
+
+from pipeline.records import Choice, Diagnostic, Fit, Signal
+from pipeline.stages import choose, fit, smooth
+from tests import arm
+from tests.test_averaging import entry
+from tests.test_estimation import trajectory
+
+RATE = 100.0
+
+
+def recording(q, dq, seed=0, name="hand_roll") -> Signal:
+    """A joint that goes so, with the arm's friction and gravity and its noise."""
+    tau = arm.THETA[name][-2] * dq + arm.THETA[name][-1] * np.sign(dq) + 0.1 * np.sin(q)
+    tau = tau + 0.05 * np.random.default_rng(seed).normal(size=len(q))
+    t = np.arange(len(q)) / RATE
+    return Signal(
+        "run", name, "identification", RATE, "as recorded", "logged", 0, 0, t, q, dq, tau, np.zeros(len(q), int)
+    )
+
+
+def constant(samples: int) -> Signal:
+    return recording(0.2 * np.arange(samples) / RATE, np.full(samples, 0.2))
+
+
+def said(stage, *signals) -> tuple[list, str]:
+    """What a stage makes of signals that do not repeat, and what it says."""
+    smoothed = [record for s in signals for record in smooth.run(s, entry(), lowpass=17.0)]
+    settings = {"lowpass": 17.0, **({"fit": "chosen"} if stage is choose else {})}
+    made = list(stage.run(*(([], smoothed) if stage is fit else (smoothed, [])), arm.ARM, **settings))
+    texts = [text for record in made if isinstance(record, Diagnostic) for text in record.text]
+    return [record for record in made if not isinstance(record, Diagnostic)], " ".join(texts)
+
+
+def test_a_constant_velocity_is_named_as_what_does_not_excite_the_inertia():
+    made, text = said(fit, constant(1000))
+    assert [record for record in made if isinstance(record, Fit)] == []
+    for name in ("lse", "pso", "bounded", "prior", "huber", "iv"):
+        assert f"hand_roll: {name} is left out: " in text
+    assert "inertia" in text
+
+
+def test_nothing_is_chosen_from_a_constant_velocity_and_it_is_said():
+    made, text = said(choose, constant(1000))
+    assert [record for record in made if isinstance(record, Choice | Fit)] == []
+    assert "no model could be chosen" in text
+
+
+@pytest.mark.parametrize("samples", [30, 60])
+def test_too_few_samples_are_counted_against_the_parameters(samples):
+    t = np.arange(samples) / RATE
+    signal = recording(0.3 * np.sin(6 * t), 1.8 * np.cos(6 * t))
+    made, text = said(fit, signal)
+    for record in made:
+        if isinstance(record, Fit):
+            assert record.samples > len(record.theta)
+            assert np.isfinite(record.theta_std).all()
+    made, text = said(choose, signal)
+    assert text or [record for record in made if isinstance(record, Choice)]
+
+
+def test_a_handful_of_samples_is_refused_with_both_numbers():
+    t = np.arange(4) / RATE
+    _, text = said(fit, recording(0.3 * np.sin(20 * t), 6.0 * np.cos(20 * t)))
+    assert "samples for 4 parameters: record more of the motion" in text
+
+
+def test_three_periods_have_no_weights_and_are_fitted_otherwise():
+    found = fit.run([trajectory(arm.signal("hand_roll", periods=3))], [], arm.ARM, lowpass=17.0)
+    made = list(found)
+    texts = [text for record in made if isinstance(record, Diagnostic) for text in record.text]
+    assert any("wlse is left out: weights need at least 4 periods" in text for text in texts)
+    assert "lse" in {record.estimator for record in made if isinstance(record, Fit)}
