@@ -8,8 +8,9 @@ from pipeline.records.diagnostic import Diagnostic, diagnostic
 from pipeline.records.differentiate import Spectrum, Trajectory
 from pipeline.records.ekf import Track
 from pipeline.records.fit import CrossFit, Fit, FittedPaths, MeasurementNoise, Residual, SwarmSearch
-from pipeline.records.ingest import LogSummary, Recording
+from pipeline.records.ingest import LogSummary, Recording, Touch
 from pipeline.records.measure import Contact
+from pipeline.records.palpate import Push, Tissue, TissueModel
 from pipeline.records.predict import Prediction
 from pipeline.records.record import COLUMN_DTYPES, AnyRecord, Column, Counts, Labels, Names, Origin, Record
 from pipeline.records.resample import Signal
@@ -20,16 +21,17 @@ from pipeline.records.whiteness import Whiteness
 __all__ = [
     "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Choice", "Column", "Contact", "Control", "Counts", "CrossFit",
     "Diagnostic", "Excitation", "Fit", "FittedPaths", "FreeSpace", "Labels", "Links", "LogSummary", "Lyapunov",
-    "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Record", "Recording", "Residual",
-    "Signal", "Smoothed", "Spectrum", "SwarmSearch", "Threshold", "Track", "Trajectory", "Whiteness",
-    "Workspace", "diagnostic",
+    "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Push", "Record", "Recording",
+    "Residual", "Signal", "Smoothed", "Spectrum", "SwarmSearch", "Threshold", "Tissue", "TissueModel", "Touch", "Track",
+    "Trajectory", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
     kind.__name__: kind
     for kind in (
-        Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Signal, Average, PeriodResidual,
+        Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Touch, Signal, Average, PeriodResidual,
         Trajectory, Spectrum, Smoothed, Fit, CrossFit, FittedPaths, MeasurementNoise, Residual, SwarmSearch, Choice,
-        Prediction, Track, FreeSpace, Threshold, Contact, Whiteness, Diagnostic,
+        Prediction, Track, FreeSpace, Threshold, Contact, Push, Tissue, TissueModel,
+        Whiteness, Diagnostic,
     )
 }  # fmt: skip

@@ -20,5 +20,5 @@ does not grow with the study, unless it is the only one of its stage.  The repor
 
 STAGES = (
     "design", "ingest", "resample", "average", "differentiate", "smooth", "fit", "choose", "predict", "ekf",
-    "assess", "threshold", "measure", "whiteness",
+    "assess", "threshold", "measure", "palpate", "whiteness",
 )  # fmt: skip

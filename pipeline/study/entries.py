@@ -6,13 +6,14 @@ from pathlib import Path
 
 from pipeline.robots import Robot
 from pipeline.robots.from_toml import wrong_name
-from pipeline.study import LogEntry, Weight
+from pipeline.study import WHOLE, LogEntry, Weight
 from pipeline.study.channels import Channels
 from pipeline.study.plausible import optional
 from pipeline.toml import TomlTable
 
 ROLES = ("identification", "validation", "contact", "weight", "tissue", "friction")
 WINDOWS = "a list of [start, end] in seconds, from 0 on"
+ALL = "all"  # of a tissue log: every sample is one of contact
 
 
 def entries_of(study: TomlTable, robot: Robot | None) -> tuple[LogEntry, ...]:
@@ -108,6 +109,11 @@ def _delimiter(table: TomlTable) -> str | None:
 
 
 def _windows(table: TomlTable) -> tuple[tuple[float, float], ...]:
+    if table.values.get("contact") == ALL and "contact" in table:
+        if table.values.get("role") != "tissue":
+            problem = f'contact = "{ALL}" is for logs of role tissue; say the windows, {WINDOWS}'
+            table.problem(problem, "contact")
+        return WHOLE
     windows = table.pairs("contact", WINDOWS, [])
     for i, (start, end) in enumerate(windows):
         if not 0 <= start < end:

@@ -1,10 +1,14 @@
 """A study: what was recorded, and how it is to be analysed."""
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from pipeline.robots.robot import Robot
+
+
+WHOLE = ((0.0, math.inf),)  # the windows of a log that is in contact throughout
 
 
 @dataclass(frozen=True)
@@ -62,7 +66,7 @@ class LogEntry:
     rate: float | None = None
     skip: float = 0.0
     until: float | None = None
-    contact: tuple[tuple[float, float], ...] = ()
+    contact: tuple[tuple[float, float], ...] = ()  # [s] known windows; WHOLE where all samples are of contact
     weight: Weight | None = None
     delimiter: str | None = None
     decimal: str | None = None
@@ -73,6 +77,11 @@ class LogEntry:
     def joints(self) -> tuple[str, ...]:
         """The joints that the log has channels of, in the order of the file."""
         return tuple(dict.fromkeys(source.joint for source in self.channels if source.joint))
+
+    @property
+    def needs_clock(self) -> bool:
+        """Whether its samples say nothing without the time between them; pushes of depth and force do."""
+        return self.role != "tissue" or bool(self.joints)
 
 
 @dataclass(frozen=True)
