@@ -67,9 +67,8 @@ def stands_out(bend: Hinge, depth: Array) -> bool:
     """Whether the force changes with depth (N,) by more than it scatters."""
     if len(depth) <= FEWEST:
         return False
-    change = abs(bend.slope) * (float(depth.max()) - bend.onset)
     noise = np.sqrt(bend.squares / (len(depth) - FEWEST))
-    return bend.explained >= EXPLAINED and change > STANDS_OUT * noise
+    return bend.explained >= EXPLAINED and abs(bend.rise) > STANDS_OUT * noise
 
 
 def bends(bend: Hinge) -> bool:

@@ -8,7 +8,7 @@ import numpy as np
 from pipeline.maths.arrays import Array
 from pipeline.maths.contact.indentation import WHOLE, Indentation, all_of, found
 from pipeline.maths.contact.probing import Probing, moves, parts, turned, ways
-from pipeline.maths.contact.stiffness import Line, slope_error, straight, work
+from pipeline.maths.contact.stiffness import Line, slope, slope_error, straight, work
 from pipeline.maths.signals.smoothing import lowpass
 
 USUAL = 0.95  # quantile of the speeds of a push that stands for its usual one
@@ -25,8 +25,8 @@ class Pushed(NamedTuple):
     place: Array  # (n, 3) [m]
     contact: Indentation
     line: Line | None  # through all of the contact; None where there is none
-    line_in: Line | None  # through loading
-    line_out: Line | None  # through unloading
+    k_loading: float  # [N/m] slope of loading alone, NaN where it is too short
+    k_unloading: float
     k_std_model: float  # [N/m] by the error of the force that a joint's model leaves
 
     @property
@@ -43,7 +43,7 @@ class Pushed(NamedTuple):
         The loop is closed where it ends, along the force there.
         """
         inside, loading = self.contact.inside, self.contact.loading
-        if self.line_out is None:
+        if not np.isfinite(self.k_unloading):
             return float("nan"), float("nan")
         force = self.force - self.force[inside].min()
         into, out = (work(self.depth[part], force[part]) for part in (inside & loading, inside & ~loading))
@@ -82,7 +82,7 @@ def _pushed(
     contact = all_of(depth, counted, WHOLE) if stated else found(depth, force, counted)
     d_rate = np.gradient(lowpass(depth, rate, cutoff), given.t[part]) if rate and len(depth) > 1 else np.zeros(len(depth))
     inside, loading = contact.inside, contact.loading
-    lines = [straight(depth[i], force[i]) for i in (inside, inside & loading, inside & ~loading)]
-    error = slope_error(depth[inside], float(np.sqrt(np.mean(given.std[part][inside] ** 2)))) if lines[0] else 0.0
-    whole = lines if contact.touched else [None] * 3
-    return Pushed(number, given.t[part], depth, force, d_rate, given.place[part], contact, *whole, error)
+    line = straight(depth[inside], force[inside]) if contact.touched else None
+    error = slope_error(depth[inside], float(np.sqrt(np.mean(given.std[part][inside] ** 2)))) if line else 0.0
+    slopes = [slope(depth[i], force[i]) for i in (inside & loading, inside & ~loading)]
+    return Pushed(number, given.t[part], depth, force, d_rate, given.place[part], contact, line, *slopes, error)

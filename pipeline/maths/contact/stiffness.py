@@ -39,6 +39,14 @@ def straight(depth: Array, force: Array) -> Line | None:
     return Line(float(k), float(np.sqrt(variance[1])), float(c - k * depth.mean()), 1.0 - float(residual @ residual) / away)
 
 
+def slope(depth: Array, force: Array) -> float:
+    """The slope [N/m] of the ordinary line alone; NaN where there is none."""
+    if len(depth) < FEWEST or not np.ptp(depth) > 0:
+        return float("nan")
+    away = depth - depth.mean()
+    return float(away @ force / (away @ away))
+
+
 def slope_error(depth: Array, std: float) -> float:
     """Standard deviation [N/m] of a line's slope by an error of the force that varies with depth (N,), of `std` [N].
 
