@@ -58,9 +58,7 @@ def run(
 
 def sliding(tracks: Sequence[Track], robot: Robot) -> Track | None:
     """The joint that pushes: of those that slide and move, the one that goes farthest."""
-    slides = [
-        t for t in tracks if robot.joint(t.joint).kind is Kind.PRISMATIC and not t.at_rest and t.filter == FILTER
-    ]
+    slides = [t for t in tracks if robot.joint(t.joint).kind is Kind.PRISMATIC and not t.at_rest and t.filter == FILTER]
     return max(slides, key=lambda track: float(np.ptp(track.q)), default=None)
 
 

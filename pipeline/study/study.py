@@ -7,7 +7,6 @@ from typing import Any
 
 from pipeline.robots.robot import Robot
 
-
 WHOLE = ((0.0, math.inf),)  # the windows of a log that is in contact throughout
 
 

@@ -37,7 +37,7 @@ class Hinge(NamedTuple):
     @property
     def rise(self) -> float:
         """By how much the force changes from first contact to the deepest sample."""
-        return self.slope * self.reach**self.exponent
+        return float(self.slope * self.reach**self.exponent)
 
     @property
     def explained(self) -> float:
@@ -69,9 +69,7 @@ def hinge_of(depth: Array, force: Array, exponent: float) -> Hinge:
     level = float(np.mean(f) - slope * np.mean(past))
     line = float(_profile(d, f, np.array([low]), 1.0)[0][0])
     constant = float(np.sum((f - f.mean()) ** 2))
-    return Hinge(
-        onset, slope, exponent, level, float(squares[i]), line, constant, high - onset, int((d < onset).sum())
-    )
+    return Hinge(onset, slope, exponent, level, float(squares[i]), line, constant, high - onset, int((d < onset).sum()))
 
 
 def onset_std(depth: Array, force: Array, found: Hinge) -> float:

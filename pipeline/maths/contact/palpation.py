@@ -80,9 +80,12 @@ def _pushed(
     (depth, force), speed = way, given.speed[part]
     counted = moves(speed, float(np.quantile(np.abs(speed), USUAL)), reach)
     contact = all_of(depth, counted, WHOLE) if stated else found(depth, force, counted)
-    d_rate = np.gradient(lowpass(depth, rate, cutoff), given.t[part]) if rate and len(depth) > 1 else np.zeros(len(depth))
+    d_rate = (
+        np.gradient(lowpass(depth, rate, cutoff), given.t[part]) if rate and len(depth) > 1 else np.zeros(len(depth))
+    )
     inside, loading = contact.inside, contact.loading
     line = straight(depth[inside], force[inside]) if contact.touched else None
     error = slope_error(depth[inside], float(np.sqrt(np.mean(given.std[part][inside] ** 2)))) if line else 0.0
-    slopes = [slope(depth[i], force[i]) for i in (inside & loading, inside & ~loading)]
-    return Pushed(number, given.t[part], depth, force, d_rate, given.place[part], contact, line, *slopes, error)
+    loaded, unloaded = (slope(depth[i], force[i]) for i in (inside & loading, inside & ~loading))
+    place = given.place[part]
+    return Pushed(number, given.t[part], depth, force, d_rate, place, contact, line, loaded, unloaded, error)

@@ -39,7 +39,7 @@ class Probing(NamedTuple):
 def known(given: Probing) -> Probing:
     """The samples at which both depth and force are known."""
     whole = np.isfinite(given.depth).all(axis=1) & np.isfinite(given.force).all(axis=1)
-    return given if whole.all() else Probing(*(column[whole] for column in given))
+    return given if whole.all() else Probing._make(column[whole] for column in given)
 
 
 def moves(speed: Array, usual: float, reach: int) -> Booleans:

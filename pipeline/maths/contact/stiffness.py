@@ -36,7 +36,9 @@ def straight(depth: Array, force: Array) -> Line | None:
     if not away > 0:
         return Line(0.0, 0.0, float(c), 0.0)
     variance = correlated(Q, residual, (0,), np.linalg.inv(R), len(depth) - 2).variance
-    return Line(float(k), float(np.sqrt(variance[1])), float(c - k * depth.mean()), 1.0 - float(residual @ residual) / away)
+    return Line(
+        float(k), float(np.sqrt(variance[1])), float(c - k * depth.mean()), 1.0 - float(residual @ residual) / away
+    )
 
 
 def slope(depth: Array, force: Array) -> float:
@@ -52,7 +54,9 @@ def slope_error(depth: Array, std: float) -> float:
 
     A constant error is the intercept's, and one that changes from sample to sample averages out; one in between does
     most.  How fast a model's error changes with depth is not known, so the worst is taken, over correlations that fall
-    off exponentially:  k_std = std max over l of sqrt(a' C a),  C = exp(-|d_i - d_j| / l),  a = (d - mean) / sum of squares.
+    off exponentially, with a the weights of a slope:
+
+        k_std = std max over l of sqrt(a' C a),    C = exp(-|d_i - d_j| / l),    a = (d - mean(d)) / |d - mean(d)|^2
     """
     few = np.sort(depth)[np.linspace(0, len(depth) - 1, min(len(depth), MOST)).round().astype(int)]
     away = few - few.mean()
@@ -70,7 +74,7 @@ def work(depth: Array, force: Array) -> float:
 def median_std(k: Array, random: Array, common: float) -> float:
     """Standard error of the median of stiffnesses (n,), each with its own error (n,) and all with a `common` one.
 
-    What they differ by beyond their errors is the tissue's; a median of more than two is pi/2 less efficient than a mean.
+    What they differ by beyond their errors is the tissue's.  The variance of a median is pi/2 that of a mean.
     """
     n = len(k)
     between = max(float(np.var(k, ddof=1)) - float(np.mean(random**2)), 0.0) if n > 1 else 0.0

@@ -129,7 +129,10 @@ def chosen(candidates: Sequence[Judged]) -> tuple[Judged, str]:
         if candidate is best:
             return best, "it predicts pushes left out best"
         if float(np.mean(worse)) < standard_error(_mean, worse):
-            return candidate, f"no other predicts pushes left out better by more than chance ({best.law.name} does by less)"
+            return (
+                candidate,
+                f"no other predicts pushes left out better by more than chance ({best.law.name} does by less)",
+            )
     raise AssertionError("the best is one of the candidates")
 
 

@@ -64,7 +64,7 @@ def _units(touched: Sequence[Pushed]) -> Iterator[str]:
     elif k > STIFFEST:
         yield (
             f"pushes are {1e3 * deep:.3g} mm deep and meet {k:.3g} N/m: no tissue does so, and the depth is likelier to "
-            'be in m than in mm; correct the unit of its channel, or look at that of the force'
+            "be in m than in mm; correct the unit of its channel, or look at that of the force"
         )
 
 
