@@ -17,7 +17,18 @@ from pipeline import commands, robots, stages
 from pipeline.cli import app
 from pipeline.estimators import ESTIMATORS
 from pipeline.maths.units import SI, UNITS
-from pipeline.records import COLUMN_DTYPES, KINDS, Control, Excitation, Links, Lyapunov, Origin, Record
+from pipeline.records import (
+    COLUMN_DTYPES,
+    KINDS,
+    Control,
+    Excitation,
+    Links,
+    Lyapunov,
+    Origin,
+    Record,
+    Tissue,
+    TissueModel,
+)
 from pipeline.records.catalogue import Catalogue
 from pipeline.report.results import collect
 from pipeline.robots.robot import Joint
@@ -200,17 +211,18 @@ def made(kind: type[Record], **about: str) -> Record:
     return record
 
 
-ROBOT = ("robot.", "control.", "excitation.")
+BY_HAND = ("robot.", "control.", "excitation.", "tissue.")
 
 
-def test_keys_of_a_robot_are_told_and_those_told_are_there():
-    """Of records made by hand, as designing a robot takes half a minute."""
+def test_keys_of_a_robot_and_of_tissue_are_told_and_those_told_are_there():
+    """Of records made by hand, as designing a robot takes half a minute, and the small study pushes into no tissue."""
     records = [made(Links), made(Control), made(Lyapunov), made(Excitation, source="table-6.1")]
+    records += [made(Tissue), made(TissueModel)]
     keys = set(collect(Catalogue(lambda kind: [record for record in records if isinstance(record, kind)])))
-    assert {key.partition(".")[0] + "." for key in keys} == set(ROBOT)
+    assert {key.partition(".")[0] + "." for key in keys} == set(BY_HAND)
     untold, empty = told(keys)
     assert not untold
-    assert not {name for name in empty if name.startswith(ROBOT)}
+    assert not {name for name in empty if name.startswith(BY_HAND)}
 
 
 @pytest.mark.medium
@@ -224,7 +236,7 @@ def test_keys_of_a_study_are_told_and_those_told_are_there(analysed, tmp_path):
     assert "truth.hand_roll.inertia" in keys
     untold, empty = told(keys)
     assert not untold
-    assert not {name for name in empty if not name.startswith(ROBOT)}
+    assert not {name for name in empty if not name.startswith(BY_HAND)}
 
 
 @pytest.mark.medium

@@ -29,9 +29,9 @@ __all__ = [
 KINDS: dict[str, type[Record]] = {
     kind.__name__: kind
     for kind in (
-        Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Touch, Signal, Average, PeriodResidual,
-        Trajectory, Spectrum, Smoothed, Fit, CrossFit, FittedPaths, MeasurementNoise, Residual, SwarmSearch, Choice,
-        Prediction, Track, FreeSpace, Threshold, Contact, Push, Tissue, TissueModel,
-        Whiteness, Diagnostic,
+        Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Touch, Signal, Average,
+        PeriodResidual, Trajectory, Spectrum, Smoothed, Fit, CrossFit, FittedPaths, MeasurementNoise, Residual,
+        SwarmSearch, Choice, Prediction, Track, FreeSpace, Threshold, Contact, Push, Tissue, TissueModel, Whiteness,
+        Diagnostic,
     )
 }  # fmt: skip

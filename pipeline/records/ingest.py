@@ -43,7 +43,7 @@ class LogSummary(Record):
 
 @dataclass(frozen=True, eq=False)
 class Touch(Record):
-    """What the channels of one log beyond its joints say of contact, as recorded; NaN where there is no such channel."""
+    """What the channels of one log beyond its joints say of contact, as recorded; NaN without such a channel."""
 
     KEY = ("log",)
     UNKNOWN = ("t", "depth", "force", "force_x", "force_y", "force_z", "x", "y", "z")

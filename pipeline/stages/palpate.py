@@ -1,6 +1,7 @@
 """Palpate tissue: find every push of a tissue log, how stiff what it meets is, and which model predicts its force."""
 
 from collections.abc import Iterator, Sequence
+from itertools import pairwise
 
 import numpy as np
 
@@ -8,7 +9,7 @@ from pipeline.maths.arrays import Array
 from pipeline.maths.contact.palpation import Pushed, palpated
 from pipeline.maths.contact.probing import Probing, known
 from pipeline.maths.contact.stiffness import median_std
-from pipeline.maths.contact.tissue import LAWS, Judged, chosen, force_of, judged, moments, tangent
+from pipeline.maths.contact.tissue import LAWS, FittedLaw, chosen, force_of, judged, moments, tangent
 from pipeline.maths.contact.wrong import remarks
 from pipeline.maths.signals.smoothing import lowpass as lowpass_of
 from pipeline.records import Column, Diagnostic, Push, Tissue, TissueModel, Touch, Track, diagnostic
@@ -108,7 +109,7 @@ def place_of(touch: Touch) -> Array:
 def runs_of(t: Column, rate: float) -> list[slice]:
     """The runs of samples without a gap between them; `rate` [Hz]."""
     edges = [0, *(np.flatnonzero(np.diff(t) > 1.5 / rate) + 1).tolist(), len(t)]
-    return [slice(a, b) for a, b in zip(edges[:-1], edges[1:], strict=True)]
+    return [slice(a, b) for a, b in pairwise(edges)]
 
 
 def rate_of(t: Column) -> float:
@@ -116,8 +117,8 @@ def rate_of(t: Column) -> float:
     return 1.0 / float(np.median(np.diff(t))) if np.isfinite(t).all() else 0.0
 
 
-def judged_on(pushes: Sequence[Pushed], *, clocked: bool) -> tuple[list[Judged], Judged | None, str]:
-    """Every model of the tissue by the pushes that it has not seen, and the one that is chosen; of two pushes at least."""
+def judged_on(pushes: Sequence[Pushed], *, clocked: bool) -> tuple[list[FittedLaw], FittedLaw | None, str]:
+    """Every model of the tissue by pushes that it has not seen, and the chosen one with why; of two pushes at least."""
     long = [push for push in pushes if push.contact.inside.sum() >= FEWEST]
     if len(long) < 2:
         return [], None, ""
@@ -127,7 +128,7 @@ def judged_on(pushes: Sequence[Pushed], *, clocked: bool) -> tuple[list[Judged],
     return models, *chosen(models)
 
 
-def record_of(push: Pushed, log: str, best: Judged | None) -> Push:
+def record_of(push: Pushed, log: str, best: FittedLaw | None) -> Push:
     """One push, with the force that the model gives; where none was chosen, the straight line's."""
     inside, line = push.contact.inside, push.line
     assert line is not None
@@ -195,7 +196,7 @@ def tissue_of(pushes: Sequence[Pushed], log: str, source: str, swings: int) -> T
     )
 
 
-def model_of(models: Sequence[Judged], best: Judged, why: str, pushes: Sequence[Pushed], log: str) -> TissueModel:
+def model_of(models: Sequence[FittedLaw], best: FittedLaw, why: str, pushes: Sequence[Pushed], log: str) -> TissueModel:
     """What each model of the tissue comes to, at half the usual depth."""
     middle = float(np.median([push.below[push.contact.inside].max() for push in pushes])) / 2
     stiff, damping = np.array([tangent(model, middle) for model in models]).T

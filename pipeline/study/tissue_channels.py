@@ -24,7 +24,7 @@ def words_of(channel: Channel) -> list[str]:
 
 
 def tissue_channels(channels: Sequence[Channel]) -> dict[str, str]:
-    """Quantity by name of the channel, of those channels that tell of pushes; a vector counts only where it is whole."""
+    """Quantity by name of the channel, of those that tell of pushes; a vector counts only where it is whole."""
     numbers = [channel for channel in channels if channel.kind == "number" and not channel.derived]
     several: dict[str, list[Channel]] = {}
     for channel in numbers:

@@ -58,6 +58,7 @@ def lab(tmp_path_factory) -> Lab:
     arm.write_csv(folder / "again.csv", [arm.signal("hand_roll", period=2.0, periods=5, rate=50.0, seed=2)])
     with (folder / "study.toml").open("a") as file:
         file.write(arm.log_table("again", "again.csv", "identification", ["hand_roll"]))
+        file.write(arm.write_pushes(folder / "pushes.csv"))
     study = replace(reading.read(folder), robot=robot(), truth=TRUTH)
     said: list[str] = []
     runner = Runner(study, folders(folder, None, None), Console(lambda line: None, said.append))

@@ -8,7 +8,7 @@ import numpy as np
 from pipeline.maths.arrays import Array
 from pipeline.maths.contact.indentation import WHOLE, Indentation, all_of, found
 from pipeline.maths.contact.probing import Probing, moves, parts, turned, ways
-from pipeline.maths.contact.stiffness import Line, slope, slope_error, straight, work
+from pipeline.maths.contact.stiffness import StraightLine, slope, slope_error, straight, work
 from pipeline.maths.signals.smoothing import lowpass
 
 USUAL = 0.95  # quantile of the speeds of a push that stands for its usual one
@@ -24,7 +24,7 @@ class Pushed(NamedTuple):
     rate: Array  # (n,) [m/s] of the depth; 0 without a clock
     place: Array  # (n, 3) [m]
     contact: Indentation
-    line: Line | None  # through all of the contact; None where there is none
+    line: StraightLine | None  # through all of the contact; None where there is none
     k_loading: float  # [N/m] slope of loading alone, NaN where it is too short
     k_unloading: float
     k_std_model: float  # [N/m] by the error of the force that a joint's model leaves

@@ -12,7 +12,7 @@ SHORTEST, LONGEST, LENGTHS = 0.05, 50.0, 25  # correlation lengths of a model's 
 MOST = 200  # samples that the error of a model is followed through
 
 
-class Line(NamedTuple):
+class StraightLine(NamedTuple):
     """f = c + k d, by least squares."""
 
     k: float  # [N/m]
@@ -21,7 +21,7 @@ class Line(NamedTuple):
     r2: float
 
 
-def straight(depth: Array, force: Array) -> Line | None:
+def straight(depth: Array, force: Array) -> StraightLine | None:
     """The ordinary line through forces (N,) [N] at depths (N,) [m], in order of time; None where there is none.  (8.1)
 
     Its intercept is what the force is at no depth: the weight that a sensor carries, what friction is taken wrongly.
@@ -34,9 +34,9 @@ def straight(depth: Array, force: Array) -> Line | None:
     c, k = np.linalg.solve(R, y)
     away = float(np.sum((force - force.mean()) ** 2))
     if not away > 0:
-        return Line(0.0, 0.0, float(c), 0.0)
+        return StraightLine(0.0, 0.0, float(c), 0.0)
     variance = correlated(Q, residual, (0,), np.linalg.inv(R), len(depth) - 2).variance
-    return Line(
+    return StraightLine(
         float(k), float(np.sqrt(variance[1])), float(c - k * depth.mean()), 1.0 - float(residual @ residual) / away
     )
 

@@ -56,7 +56,7 @@ class Moments(NamedTuple):
     squares: Array  # (P,)
 
 
-class Judged(NamedTuple):
+class FittedLaw(NamedTuple):
     """How well a model predicts pushes that it has not seen, and what it is when fitted to all of them."""
 
     law: ForceLaw
@@ -68,7 +68,7 @@ class Judged(NamedTuple):
 
 
 def moments(pushes: Sequence[tuple[Array, Array, Array]]) -> Moments:
-    """The moments of pushes, each the depth below first contact (N,) [m], its rate (N,) [m/s] and the force (N,) [N]."""
+    """The moments of pushes, each the depth below first contact [m], its rate [m/s] and the force [N], (N,)."""
     A, b, squares = [], [], []
     for x, v, f in pushes:
         columns, away = _columns(x, v, EXPONENTS), f - f.mean()
@@ -79,7 +79,7 @@ def moments(pushes: Sequence[tuple[Array, Array, Array]]) -> Moments:
     return Moments(np.array(A), np.array(b), np.array(squares))
 
 
-def judged(given: Moments, law: ForceLaw) -> Judged:
+def judged(given: Moments, law: ForceLaw) -> FittedLaw:
     """A model by cross-validation over pushes: by leaving out one at a time, or a twentieth of them."""
     parts = blocks(len(given.squares), FOLDS)
     A, b, _ = (column.sum(axis=0) for column in given)
@@ -90,7 +90,7 @@ def judged(given: Moments, law: ForceLaw) -> Judged:
         errors[i] = sizes[i] - 2 * theta @ b_out[e] + theta @ A_out[e] @ theta
     theta, e = fitted(A, b, law)
     pairs = list(zip(errors.tolist(), sizes.tolist(), strict=True))
-    return Judged(law, errors, _relative(pairs), standard_error(_relative, pairs), theta, float(EXPONENTS[e]))
+    return FittedLaw(law, errors, _relative(pairs), standard_error(_relative, pairs), theta, float(EXPONENTS[e]))
 
 
 def fitted(A: Array, b: Array, law: ForceLaw) -> tuple[Array, int]:
@@ -104,12 +104,12 @@ def fitted(A: Array, b: Array, law: ForceLaw) -> tuple[Array, int]:
     return theta, best
 
 
-def force_of(model: Judged, x: Array, v: Array) -> Array:
+def force_of(model: FittedLaw, x: Array, v: Array) -> Array:
     """The force (N,) of a model at depths below first contact (N,) and their rates (N,), without the push's own c."""
     return np.asarray(_columns(x, v, np.array([model.exponent]))[:, 0] @ model.theta)
 
 
-def tangent(model: Judged, x: float) -> tuple[float, float]:
+def tangent(model: FittedLaw, x: float) -> tuple[float, float]:
     """Stiffness [N/m] at rest and damping [N s/m] of a model at a depth below first contact [m]."""
     k, b, b_x = model.theta
     return float(k * model.exponent * x ** (model.exponent - 1)), float(b + b_x * x**model.exponent)
@@ -121,18 +121,15 @@ def _columns(x: Array, v: Array, exponents: Array) -> Array:
     return np.stack([power, np.broadcast_to(v[:, None], power.shape), power * v[:, None]], axis=2)
 
 
-def chosen(candidates: Sequence[Judged]) -> tuple[Judged, str]:
-    """The model of the fewest parameters that predicts pushes left out no worse than the best, within what chance does."""
+def chosen(candidates: Sequence[FittedLaw]) -> tuple[FittedLaw, str]:
+    """The model of the fewest parameters that predicts pushes left out no worse than chance; and why."""
     best = min(candidates, key=lambda c: c.score)
     for candidate in sorted(candidates, key=lambda c: (c.law.parameters, c.score)):
         worse = (candidate.errors - best.errors).tolist()
         if candidate is best:
             return best, "it predicts pushes left out best"
         if float(np.mean(worse)) < standard_error(_mean, worse):
-            return (
-                candidate,
-                f"no other predicts pushes left out better by more than chance ({best.law.name} does by less)",
-            )
+            return candidate, f"{best.law.name} predicts pushes left out better, but by no more than chance does"
     raise AssertionError("the best is one of the candidates")
 
 

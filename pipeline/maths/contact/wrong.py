@@ -24,8 +24,8 @@ def remarks(pushes: Sequence[Pushed]) -> Iterator[str]:
     if falling:
         worst = min(push.line.k for push in falling if push.line is not None)
         yield (
-            f"{_which(falling, pushes)}: the force falls as the depth grows, by up to {-worst:.4g} N/m, which no tissue "
-            "does; write sign = -1 for the channel of the depth or for that of the force"
+            f"{_which(falling, pushes)}: the force falls as the depth grows, by up to {-worst:.4g} N/m, as no "
+            "tissue has it; write sign = -1 for the channel of the depth or for that of the force"
         )
     if not any(push.line is not None and push.line.r2 > COUNTS for push in touched):
         best = max(push.line.r2 for push in touched if push.line is not None)
@@ -63,8 +63,8 @@ def _units(touched: Sequence[Pushed]) -> Iterator[str]:
         )
     elif k > STIFFEST:
         yield (
-            f"pushes are {1e3 * deep:.3g} mm deep and meet {k:.3g} N/m: no tissue does so, and the depth is likelier to "
-            "be in m than in mm; correct the unit of its channel, or look at that of the force"
+            f"pushes are {1e3 * deep:.3g} mm deep and meet {k:.3g} N/m: no tissue does so, and the depth is likelier "
+            "to be in m than in mm; correct the unit of its channel, or look at that of the force"
         )
 
 

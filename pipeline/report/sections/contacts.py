@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.records import Contact, Track
+from pipeline.records import Contact, Tissue, Track
 from pipeline.report.content import (
     Block,
     Cell,
@@ -93,8 +93,9 @@ def not_analysed(context: Context) -> Iterator[tuple[str, str, str]]:
     """Log, joint and reason of what was recorded and tells nothing of contact here."""
     measured = {(contact.log, contact.joint) for contact in context.catalogue.all(Contact)}
     tracked = {(track.log, track.joint): track for track in context.catalogue.all(Track)}
+    palpated = {tissue.log for tissue in context.catalogue.all(Tissue)}
     for entry in context.study.logs:
-        if entry.role not in ("contact", "weight", "tissue", "friction"):
+        if entry.name in palpated or entry.role not in ("contact", "weight", "tissue", "friction"):
             continue
         joints = [joint for joint in entry.joints if (entry.name, joint) not in measured]
         reasons: dict[str, list[str]] = {}
