@@ -84,7 +84,8 @@ def thresholds() -> tuple[tuple[Cell, ...], ...]:
          f"{percent(COVERED[0])} to {percent(COVERED[1])}", f"above {percent(COVERED[1])}: too wide",
          f"below {percent(COVERED[0])}: too narrow"),
         ("Stiffness of tissue", "its standard error over it",
-         f"at most {percent(STIFF)}, of two pushes at least", f"at most {percent(STIFFER)}", "beyond, or no push counts"),
+         f"at most {percent(STIFF)}, of two pushes at least", f"at most {percent(STIFFER)}",
+         "beyond, or no push counts"),
         ("Parameter of a simulated study", "standard errors from the truth", f"at most {WITHIN:g}", "–", "beyond"),
         ("White noise", "probability of a larger Ljung-Box statistic over 20 lags", "above 1 %", "–", "–"),
     )  # fmt: skip

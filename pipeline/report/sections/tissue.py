@@ -13,7 +13,6 @@ from pipeline.report.content import (
     Figure,
     Histogram,
     HLine,
-    Level,
     Line,
     OnScreen,
     Panel,
@@ -31,8 +30,9 @@ from pipeline.report.verdicts import STIFF, STIFFER, graded
 
 THESIS = ("davinci", 457.24)  # robot, and the stiffness [N/m] that section 8.2 states of it
 NORMAL_95 = 1.96
-SHOWN = 2  # figures; the others are on screen
+SHOWN = 1  # figures of force, and maps; the others are on screen
 TOGETHER = 8  # pushes in one panel
+SAMPLES = 60  # of a push in a panel of several
 MANY = 20  # pushes, beyond which their spread says more than one loop
 EVEN = 1e-3  # [m] between places, below which there is no map
 CLASSES: tuple[Colour, ...] = ("blue", "sky", "orange", "vermillion")
@@ -49,19 +49,24 @@ def blocks(context: Context, tissues: list[Tissue]) -> Iterator[Block]:
     """The section's content."""
     yield from (verdict(context, tissue) for tissue in tissues)
     yield Prose(
-        "Where contact begins is found from force and depth, on the way in and on the way out. The stiffness is the "
-        "slope of an ordinary straight line, with an intercept, through all samples of the contact; that of a log is "
-        "the median over the pushes of which the line explains more than 90 %. Intervals are of 95 %: they allow for "
-        "residuals that are correlated, for tissue that differs from place to place, and, where the force is that of a "
-        "joint, for the error of its model, taken to change with depth in whatever way moves the slope most. At rest "
-        "friction takes any value, so a joint's samples at rest do not count; its effort less the model's is low-passed"
-        " without delay, because the filter's estimate lags behind the depth and would open a loop."
+        "The stiffness of a push is the slope of an ordinary straight line, with an intercept, through its contact, "
+        "which begins and ends where the force bends; of a log, the median over pushes of which the line explains 90 %. "
+        "The error allows for correlated residuals, for tissue that differs from place to place, and for the error of "
+        "a joint's model, in whatever way along the depth it moves the slope most. A joint's force is its effort less "
+        "the model's, low-passed without delay, as the filter's would come late; at rest, where friction takes any "
+        "value, it does not count."
     )
     yield comparison(context, tissues)
-    figures = [figure for tissue in tissues for figure in figures_of(context, tissue)]
-    yield from figures[:SHOWN]
+    forces = [figure for tissue in tissues for figure in force_figures(context, tissue)]
+    maps = [surface_map(tissue) for tissue in tissues if spread(tissue) > EVEN]
+    yield from (*forces[:SHOWN], *maps[:SHOWN])
     models = context.catalogue.all(TissueModel)
-    details: tuple[Block, ...] = (*figures[SHOWN:], *each_push(context, tissues), *model_tables(context, models))
+    details: tuple[Block, ...] = (
+        *forces[SHOWN:],
+        *maps[SHOWN:],
+        *each_push(context, tissues),
+        *model_tables(context, models),
+    )
     if details:
         yield OnScreen("More on the tissue: other logs, every push, and models", "more-tissue", details)
 
@@ -71,25 +76,20 @@ def verdict(context: Context, tissue: Tissue) -> Verdict:
     name = f"**{literal(tissue.log)}**"
     if not tissue.pushes:
         return Verdict("bad", f"{name}: a straight line explains 90 % of the force in none of {pushes(len(tissue))}.")
-    level = graded(tissue.stiffness_std / abs(tissue.stiffness), STIFF, STIFFER) if tissue.stiffness > 0 else "bad"
-    levels: dict[bool, Level] = {True: "warn", False: level}
-    number = context.results[f"tissue.{tissue.log}.stiffness"].number()
-    model = f", by {literal(context_model)}" if (context_model := chosen(context, tissue.log)) else ""
-    return Verdict(
-        levels[level == "good" and tissue.pushes == 1],
-        f"{name}: {number}, from {tissue.pushes} of {pushes(len(tissue))} in contact{true_words(context, tissue)}; "
-        f"the force is {'a sensor’s' if tissue.source == 'force sensor' else 'that of ' + title(tissue.source).lower()}"
-        f"{', and is best predicted' + model if model else ''}.",
-    )
+    level = graded(tissue.stiffness_std / tissue.stiffness, STIFF, STIFFER) if tissue.stiffness > 0 else "bad"
+    stiffness = context.results[f"tissue.{tissue.log}.stiffness"].number()
+    model = f"; {chosen(context, tissue.log)}" if chosen(context, tissue.log) else ""
+    text = f"{name}: {stiffness}, {tissue.pushes} of {pushes(len(tissue))}{model}{true_words(context, tissue)}."
+    return Verdict("warn" if level == "good" and tissue.pushes == 1 else level, text)
 
 
 def true_words(context: Context, tissue: Tissue) -> str:
-    """Whether the interval holds what is true of a simulated log."""
+    """Whether the interval of 95 % holds what is true of a simulated log."""
     value = true_stiffness(context, tissue.log)
     if value is None:
         return ""
     held = abs(tissue.stiffness - value) <= NORMAL_95 * tissue.stiffness_std
-    return f"; the true {value:g} N/m {'lies' if held else 'does **not** lie'} in the interval"
+    return f"; {'holds' if held else 'does **not** hold'} the true {value:g} N/m"
 
 
 def true_stiffness(context: Context, log: str) -> float | None:
@@ -118,20 +118,24 @@ def comparison(context: Context, tissues: Sequence[Tissue]) -> Table:
         for tissue in tissues
     ]
     if context.study.robot.name == THESIS[0]:
-        rows.append(("thesis, section 8.2", "Instrument slide", f"{THESIS[1]} N/m", "–", "–", "1", "1 of 1"))
-    header = ("Log", "Force of", "Stiffness", "Lower quartile", "Upper quartile", "Pushes that count", "In contact")
-    return Table("Stiffness of the tissue.", header, tuple(rows), "tissue-table", "llrrrrr")
+        rows.append(("thesis, section 8.2", "Instrument slide", f"{THESIS[1]}", "–", "–", "1", "1 of 1"))
+    header = ("Log", "Force of", "Stiffness", "Quartile 1", "Quartile 3", "Count", "In contact")
+    return Table(
+        "Stiffness of the tissue; how many pushes count, and in how many of those looked at there is contact.",
+        header,
+        tuple(rows),
+        "tissue-table",
+        "llrrrrr",
+    )
 
 
-def figures_of(context: Context, tissue: Tissue) -> Iterator[Figure]:
-    """Force against depth of one log, and the map of its surface where places differ."""
+def force_figures(context: Context, tissue: Tissue) -> Iterator[Figure]:
+    """Force against depth of one log, where its pushes are at hand."""
     own = {push.push: push for push in context.catalogue.about(Push, log=tissue.log)}
     typical = own.get(int(tissue.push[nearest(tissue)]))
     if typical is not None:
         few = np.linspace(0, len(tissue) - 1, min(len(tissue), TOGETHER)).round().astype(int)
         yield force_figure(tissue, [own[number] for number in tissue.push[few].tolist() if number in own], typical)
-    if spread(tissue) > EVEN:
-        yield surface_map(tissue)
 
 
 def nearest(tissue: Tissue) -> int:
@@ -153,7 +157,7 @@ def force_figure(tissue: Tissue, pushes: Sequence[Push], typical: Push) -> Figur
         (line_panel(pushes, typical), residual_panel(typical), last),
         f"tissue-{tissue.log}",
         columns=3,
-        height=52,
+        height=46,
     )
 
 
@@ -161,13 +165,14 @@ def line_panel(pushes: Sequence[Push], typical: Push) -> Panel:
     """Force against depth of several pushes, and the line of the typical one with its interval."""
     marks: list[AnyMark] = []
     for push in pushes:
-        inside, first = push.inside == 1, push is pushes[0]
-        marks.append(Points(MM * push.depth[inside], push.force[inside], "contact" if first else "", "sky"))
+        contact = np.flatnonzero(push.inside)
+        few = contact[:: max(len(contact) // SAMPLES, 1)]
+        marks.append(Points(MM * push.depth[few], push.force[few], "contact" if push is pushes[0] else "", "sky"))
     depth = typical.depth[typical.inside == 1]
     x = np.linspace(depth.min(), depth.max(), 50)
     y = typical.intercept + typical.k_t * x
     wide = NORMAL_95 * typical.k_t_std * np.abs(x - depth.mean())
-    marks += [Band(MM * x, y - wide, y + wide, "95 %", "vermillion"), Line(MM * x, y, "line", "vermillion", "solid")]
+    marks += [Band(MM * x, y - wide, y + wide, "95 %", "vermillion"), Line(MM * x, y, "line", "black", "solid")]
     return Panel("Force against depth", "depth [mm]", "force [N]", tuple(marks))
 
 
@@ -176,7 +181,7 @@ def residual_panel(push: Push) -> Panel:
     inside, loading = push.inside == 1, push.loading == 1
     left = push.force - push.intercept - push.k_t * push.depth
     marks: tuple[AnyMark, ...] = (HLine(0.0), *in_and_out(MM * push.depth, left, inside, loading))
-    return Panel("What the line leaves", "depth [mm]", "force [N]", marks)
+    return Panel("Residual", "depth [mm]", "force [N]", marks)
 
 
 def loop_panel(push: Push) -> Panel:
@@ -189,10 +194,9 @@ def loop_panel(push: Push) -> Panel:
 
 def in_and_out(x: Column, y: Column, inside: Booleans, loading: Booleans) -> tuple[Points, ...]:
     """The samples of contact on the way in and on the way out."""
-    ways = ((loading, "in", "blue"), (~loading, "out", "orange"))
-    return tuple(
-        Points(x[inside & way], y[inside & way], name, colour) for way, name, colour in ways if (inside & way).any()
-    )
+    into, out = inside & loading, inside & ~loading
+    first = Points(x[into], y[into], "in", "blue")
+    return (first, Points(x[out], y[out], "out", "orange")) if out.any() else (first,)
 
 
 def spread_panel(tissue: Tissue) -> Panel:
@@ -212,21 +216,20 @@ def surface_map(tissue: Tissue) -> Figure:
     """The stiffness over the surface, in four classes of as many pushes each, along its two longest axes."""
     places = {"x": tissue.x, "y": tissue.y, "z": tissue.z}
     across, along = sorted(sorted(places, key=lambda name: -float(np.ptp(places[name])))[:2])
-    kept = tissue.counted == 1 if tissue.pushes > 3 else np.ones(len(tissue), bool)
-    k = tissue.k_t[kept]
+    k = tissue.k_t
     edges = np.quantile(k, [0.0, 0.25, 0.5, 0.75, 1.0])
     place = np.clip(np.searchsorted(edges, k, side="right") - 1, 0, 3)
     marks = tuple(
         Points(
-            MM * places[across][kept][place == i], MM * places[along][kept][place == i],
+            MM * places[across][place == i], MM * places[along][place == i],
             f"{edges[i]:.0f} to {edges[i + 1]:.0f} N/m", colour,
         )
         for i, colour in enumerate(CLASSES)
     )  # fmt: skip
     name = literal(tissue.log)
     return Figure(
-        f"{name}: stiffness over the surface, at the deepest sample of each push that counts.",
-        f"Where {pushes(int(kept.sum()))} of {name}, coloured by stiffness, from {edges[0]:.0f} to {edges[4]:.0f} N/m.",
+        f"{name}: stiffness over the surface, at the deepest sample of each push in contact.",
+        f"Where {pushes(len(tissue))} of {name}, coloured by stiffness, from {edges[0]:.0f} to {edges[4]:.0f} N/m.",
         (Panel("Stiffness", f"{across} [mm]", f"{along} [mm]", marks),),
         f"tissue-map-{tissue.log}",
         height=70,
