@@ -50,8 +50,8 @@ def blocks(context: Context, tissues: list[Tissue]) -> Iterator[Block]:
     yield from (verdict(context, tissue) for tissue in tissues)
     yield Prose(
         "The stiffness of a push is the slope of an ordinary straight line, with an intercept, through its contact, "
-        "which begins and ends where the force bends; of a log, the median over pushes of which the line explains 90 %. "
-        "The error allows for correlated residuals, for tissue that differs from place to place, and for the error of "
+        "which begins and ends where the force bends; of a log, the median over pushes of which the line explains 90 %."
+        " The error allows for correlated residuals, for tissue that differs from place to place, and for the error of "
         "a joint's model, in whatever way along the depth it moves the slope most. A joint's force is its effort less "
         "the model's, low-passed without delay, as the filter's would come late; at rest, where friction takes any "
         "value, it does not count."
