@@ -17,7 +17,7 @@ CANDIDATES = 41  # onsets of a round; each further round looks between the neigh
 ROUNDS = 3
 MOST = 4000  # samples that a search goes through; of more, evenly spaced ones
 EXPONENTS = (1.5, 2.0)
-CURVED = 1.1  # by how much a straight line must leave more squares than a curve that is believed
+CURVED = 1.5  # by how much a straight line must leave more squares than a curve that is believed
 FEWEST = 3  # samples on either side of an onset, below which it is not known
 
 
