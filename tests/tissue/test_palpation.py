@@ -167,6 +167,7 @@ def test_the_interval_of_the_slide_carries_the_error_of_its_model():
     assert small.stiffness_std_model == 0
     # The worst that an error of 1 N can do over 40 mm; a constant one does nothing, one along the depth 1 N / 11.5 mm.
     assert 0.2 / 0.0115 < large.stiffness_std_model < 1 / 0.0115
+    np.testing.assert_allclose(large.onset_depth_std, np.hypot(small.onset_depth_std, 1 / K), rtol=0.02)
     assert large.stiffness_std == pytest.approx(np.hypot(small.stiffness_std, large.stiffness_std_model))
 
 

@@ -85,7 +85,10 @@ def _pushed(
     )
     inside, loading = contact.inside, contact.loading
     line = straight(depth[inside], force[inside]) if contact.touched else None
-    error = slope_error(depth[inside], float(np.sqrt(np.mean(given.std[part][inside] ** 2)))) if line else 0.0
+    common = float(np.sqrt(np.mean(given.std[part][inside] ** 2))) if line else 0.0
+    error = slope_error(depth[inside], common) if line else 0.0
+    if line and line.k:  # a force that is wrong by this bends as much deeper, or less deep
+        contact = contact._replace(onset_std=float(np.hypot(contact.onset_std, common / abs(line.k))))
     loaded, unloaded = (slope(depth[i], force[i]) for i in (inside & loading, inside & ~loading))
     place = given.place[part]
     return Pushed(number, given.t[part], depth, force, d_rate, place, contact, line, loaded, unloaded, error)
