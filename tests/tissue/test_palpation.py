@@ -5,9 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.maths.contact.indentation import NONE, found
 from pipeline.maths.contact.onset import hinge, onset_std
 from pipeline.maths.contact.pushes import between_troughs, runs
 from pipeline.maths.contact.stiffness import median_std, slope_error, straight, work
+from pipeline.maths.contact.tissue import LAWS, judged, moments
 from pipeline.study import WHOLE
 from tests.tissue.pushing import APPROACH, SURFACE, TWICE, K, coloured, motion, palpated, pressed, sensed, slid, touch
 
@@ -132,6 +134,32 @@ def test_the_model_that_made_the_force_is_chosen_by_pushes_it_has_not_seen(law, 
     assert models.exponent[row] == pytest.approx(n, abs=0.2)
 
 
+def test_models_are_judged_by_pushes_that_they_were_not_fitted_to():
+    """As refits without each push in turn say, which small matrices stand for."""
+    t = np.arange(200) / 100
+    pushes = []
+    for seed, k in enumerate((300.0, 450.0, 600.0)):
+        x = 0.01 * np.sin(np.pi * t / 2 + 0.2 * seed) ** 2
+        pushes.append((x, np.gradient(x, t), k * x + coloured(np.random.default_rng(seed), 200, 0.1, 0.5)))
+    squares = []
+    for i in range(3):
+        others = [p for j, p in enumerate(pushes) if j != i]
+        Phi = np.vstack([np.column_stack([x - x.mean(), v - v.mean()]) for x, v, _ in others])
+        theta = np.linalg.lstsq(Phi, np.concatenate([f - f.mean() for *_, f in others]), rcond=None)[0]
+        x, v, f = pushes[i]
+        left = f - x * theta[0] - v * theta[1]
+        squares.append(np.sum((left - left.mean()) ** 2))
+    found = judged(moments(pushes), next(law for law in LAWS if law.name == "Kelvin-Voigt"))
+    np.testing.assert_allclose(found.errors, squares, rtol=1e-6)
+
+
+def test_noise_is_no_contact():
+    """Of a hundred pushes of ten samples each that meet nothing; a hinge bends with some of the noise."""
+    rng, depth = np.random.default_rng(0), np.linspace(0, 2e-3, 10)
+    states = [found(depth, rng.normal(size=10), np.ones(10, bool)).state for _ in range(100)]
+    assert states.count(NONE) >= 80
+
+
 def test_a_push_into_a_slope_goes_along_the_force_that_it_meets():
     """The tip of an arm, in three axes, on a surface that leans, with the force as the sensor on the tool gives it."""
     normal = np.array([0.6, 0.0, 0.8])
@@ -168,6 +196,9 @@ def test_the_interval_of_the_slide_carries_the_error_of_its_model():
     # The worst that an error of 1 N can do over 40 mm; a constant one does nothing, one along the depth 1 N / 11.5 mm.
     assert 0.2 / 0.0115 < large.stiffness_std_model < 1 / 0.0115
     np.testing.assert_allclose(large.onset_depth_std, np.hypot(small.onset_depth_std, 1 / K), rtol=0.02)
+    push = palpated(tracks=[slid(total=1.0)])[1][0]
+    assert (push.k_t_std, push.onset_depth_std) == (large.k_t_std[0], large.onset_depth_std[0])
+    assert push.k_t_std > push.k_t_std_model > 0
     assert large.stiffness_std == pytest.approx(np.hypot(small.stiffness_std, large.stiffness_std_model))
 
 

@@ -7,7 +7,6 @@ import numpy as np
 from pipeline.maths.arrays import Array, Booleans
 from pipeline.maths.contact.onset import FEWEST, Hinge, hinge, onset_std
 
-EXPLAINED = 0.5  # of the force's variance, by a hinge that is believed
 STANDS_OUT = 4.0  # standard deviations of what it leaves that the force must rise by
 BETTER = 1.05  # by how much a line must leave more squares than a hinge that is believed to bend
 ENOUGH = 6  # samples that a hinge is found from
@@ -68,7 +67,7 @@ def stands_out(bend: Hinge, depth: Array) -> bool:
     if len(depth) <= FEWEST:
         return False
     noise = np.sqrt(bend.squares / (len(depth) - FEWEST))
-    return bend.explained >= EXPLAINED and abs(bend.rise) > STANDS_OUT * noise
+    return bool(abs(bend.rise) > STANDS_OUT * noise)
 
 
 def bends(bend: Hinge) -> bool:

@@ -22,7 +22,7 @@ FEWEST = 3  # samples on either side of an onset, below which it is not known
 
 
 class Hinge(NamedTuple):
-    """The force before and after contact, with the squares that it leaves and those that simpler curves leave."""
+    """The force before and after contact, with the squares that it leaves and those that a straight line does."""
 
     onset: float  # d0
     slope: float  # k
@@ -30,7 +30,6 @@ class Hinge(NamedTuple):
     level: float  # c, the force before contact
     squares: float
     squares_line: float  # of a straight line throughout
-    squares_level: float  # of a constant
     reach: float  # depth of the deepest sample below the onset
     before: int  # samples, of those looked at, that are not as deep as the onset
 
@@ -38,11 +37,6 @@ class Hinge(NamedTuple):
     def rise(self) -> float:
         """By how much the force changes from first contact to the deepest sample."""
         return float(self.slope * self.reach**self.exponent)
-
-    @property
-    def explained(self) -> float:
-        """The share of the force's variance that the hinge explains; 0 of a force that does not vary."""
-        return 1.0 - self.squares / self.squares_level if self.squares_level > 0 else 0.0
 
 
 def hinge(depth: Array, force: Array) -> Hinge:
@@ -68,8 +62,7 @@ def hinge_of(depth: Array, force: Array, exponent: float) -> Hinge:
     past = np.clip(d - onset, 0.0, None) ** exponent
     level = float(np.mean(f) - slope * np.mean(past))
     line = float(_profile(d, f, np.array([low]), 1.0)[0][0])
-    constant = float(np.sum((f - f.mean()) ** 2))
-    return Hinge(onset, slope, exponent, level, float(squares[i]), line, constant, high - onset, int((d < onset).sum()))
+    return Hinge(onset, slope, exponent, level, float(squares[i]), line, high - onset, int((d < onset).sum()))
 
 
 def onset_std(depth: Array, force: Array, found: Hinge) -> float:
