@@ -7,55 +7,187 @@ import pytest
 from numpy.testing import assert_allclose
 
 from pipeline.errors import PipelineError
-from pipeline.filters import ekf
+from pipeline.filters import belief, ekf, rts, tracker
+from pipeline.filters.lag import lag
 from pipeline.filters.problem import NoiseModel
+from pipeline.filters.response import at_rest, slowest
+from pipeline.filters.stepping import covariances
+from pipeline.filters.tuning import likeliest_walk, tuned
 from pipeline.maths.models.bias import bias
+from pipeline.maths.models.driven import Driven
 from pipeline.maths.models.independent import combined, inertia_of
-from pipeline.records import Diagnostic, Fit, MeasurementNoise, Track, Whiteness
+from pipeline.records import Diagnostic, ErrorBand, Fit, MeasurementNoise, Track, Whiteness
 from pipeline.stages import ekf as stage
-from pipeline.stages import fit, whiteness
+from pipeline.stages import fit, settle, tune, whiteness
 from tests import arm
 from tests.test_averaging import entry
 from tests.test_estimation import trajectory
 
 T_S = 0.01
-NOISE = NoiseModel(r_q=1e-3, r_dq=8e-3, q_q=1e-5, q_dq=1e-4, q_tau=0.05)
+NOISE = NoiseModel(r_q=1e-3, r_dq=8e-3, q_q=0.0, q_dq=1e-4, q_tau=0.05)
 
 
-def simulate(used, theta, tau_ext, tau, noise, seed=0, x=(0.1, -0.2)):
-    """Measurements of the model as it is printed: forward Euler, with the noises that the filter assumes."""
+def simulate(used, theta, tau_ext, tau, noise, seed=0, x=(0.1, -0.2), finer=20):
+    """Measurements of a joint that moves between samples, its effort held over each, with the filter's noises.
+
+    The motion is stepped so finely that its own error does not count.
+    """
     rng, (q, dq), rows = np.random.default_rng(seed), x, []
-    M, c = inertia_of(used, theta), combined(used, theta)
+    M, c, h = inertia_of(used, theta), combined(used, theta), T_S / finer
     for k in range(len(tau)):
         rows.append((q + noise.r_q * rng.normal(), dq + noise.r_dq * rng.normal()))
-        acceleration = (tau[k] - bias(c, q, dq, 0.0)[0] - tau_ext[k]) / M
-        w_q, w_dq = rng.normal(size=2) * (noise.q_q, noise.q_dq)
-        q, dq = q + T_S * dq + w_q, dq + T_S * acceleration + w_dq
+        pushed = noise.q_dq / T_S * rng.normal()  # an acceleration that is constant over the sample
+        for _ in range(finer):
+            half = dq + 0.5 * h * ((tau[k] - bias(c, q, dq, 0.0)[0] - tau_ext[k]) / M + pushed)
+            q, dq = q + h * half, dq + h * ((tau[k] - bias(c, q, half, 0.0)[0] - tau_ext[k]) / M + pushed)
     return np.array(rows).T
+
+
+def recorded(used, theta, y, tau, first_std=1.0) -> Driven:
+    return Driven(arm.dynamics(used, theta, len(tau)), *y, np.zeros(len(tau)), tau, T_S, first_std)
 
 
 def walk(N, step, seed=1):
     return np.cumsum(step * np.random.default_rng(seed).normal(size=N))
 
 
-@pytest.mark.parametrize("name", arm.THETA)
-def test_innovations_of_a_matched_model_are_white_and_as_large_as_stated(name):
+def matched(name, seed=0, N=6000):
+    """A joint whose external effort walks as the filter believes, without Coulomb friction, and what it walks."""
     used, theta = arm.joint(name).terms, arm.THETA[name].copy()
     theta[-1] = 0.0  # Coulomb friction jumps at reversals, where no linearisation holds
-    N = 6000
+    tau_ext = walk(N, NOISE.q_tau, seed + 1000)
     t = np.arange(N) * T_S
-    tau_ext = walk(N, NOISE.q_tau)
     tau = tau_ext + 3 * inertia_of(used, theta) * np.sin(2 * t) + combined(used, theta)[0]
-    y = simulate(used, theta, tau_ext, tau, NOISE)
-    made = ekf.track(arm.dynamics(used, theta, N), *y, tau, T_S, NOISE, first_std=1.0)
-    kept = slice(200, None)
-    assert made.nis[kept].mean() == pytest.approx(2.0, abs=4 * 2 / np.sqrt(N - 200))
+    return recorded(used, theta, simulate(used, theta, tau_ext, tau, NOISE, seed), tau), tau_ext
+
+
+@pytest.mark.parametrize("name", arm.THETA)
+def test_innovations_of_a_matched_model_are_white_and_as_large_as_stated(name):
+    recording, tau_ext = matched(name)
+    made, kept = ekf.track(recording, NOISE), slice(200, None)
+    # NIS of two measurements has a variance of 4; four standard errors of its mean are let.
+    assert made.nis[kept].mean() == pytest.approx(2.0, abs=4 * 2 / np.sqrt(5800))
     for x, r in ((made.innovation_q[kept], NOISE.r_q), (made.innovation_dq[kept], NOISE.r_dq)):
-        found = whiteness.statistics(x)
-        assert found["ljung_box_p"] > 1e-3
+        assert whiteness.statistics(x)["ljung_box_p"] > 1e-3
         assert x.std() >= 0.99 * r
     errors = (made.tau_ext - tau_ext)[kept] / made.tau_ext_std[kept]
     assert errors.std() == pytest.approx(1.0, abs=0.2)
+
+
+@pytest.mark.slow
+def test_stated_deviations_and_innovations_of_two_hundred_matched_runs_are_right():
+    """Section 7.3: deviations within 10 % of the errors, NIS 2.00 +- 0.05, at least 90 % of the runs white."""
+    errors, nis, white = [], [], []
+    for seed in range(200):
+        recording, tau_ext = matched("hand_pitch", seed, 2000)
+        made, kept = ekf.track(recording, NOISE), slice(200, None)
+        errors.append(((made.tau_ext - tau_ext) / made.tau_ext_std)[kept])
+        nis.append(made.nis[kept].mean())
+        white.append(whiteness.statistics(made.innovation_dq[kept])["ljung_box_p"] > 0.05)
+    assert np.std(errors) == pytest.approx(1.0, abs=0.1)
+    assert np.mean(nis) == pytest.approx(2.0, abs=0.05)
+    # Of 200 fair tests at 5 %, more than 32 fail once in a hundred thousand; the issue is one in ten.
+    assert np.mean(white) >= 0.9
+
+
+def test_the_steady_state_is_the_riccati_solution():
+    from scipy.linalg import solve_discrete_are
+
+    used, theta = arm.joint("hand_pitch").terms, np.array([0.2384, 0.0, 0.0, 0.9064, 0.0])
+    still = np.zeros(4000)
+    made = ekf.track(recorded(used, theta, (still, still), still), NOISE)
+    R_q, R_dq, Q_qq, Q_qd, Q_dd, Q_tau = covariances(NOISE, T_S)
+    A = np.array([[0, 1, 0], [0, -theta[3] / theta[0], -1 / theta[0]], [0, 0, 0]])
+    F, H = np.eye(3) + T_S * A + 0.5 * T_S**2 * A @ A, np.eye(2, 3)
+    Q, R = np.array([[Q_qq, Q_qd, 0], [Q_qd, Q_dd, 0], [0, 0, Q_tau]]), np.diag([R_q, R_dq])
+    P = solve_discrete_are(F.T, H.T, Q, R)
+    after = P - P @ H.T @ np.linalg.solve(H @ P @ H.T + R, H @ P)
+    assert made.tau_ext_std[-1] == pytest.approx(np.sqrt(after[2, 2]), rel=1e-6)
+
+
+def test_one_sample_at_a_time_is_the_whole_recording_at_once():
+    recording, _ = matched("hand_roll", N=500)
+    made = ekf.track(recording, NOISE)
+    s = belief.first(recording.q[0], recording.dq[0], NOISE.r_q, NOISE.r_dq, recording.first_std)
+    joint = recording.joint
+    for k, y in enumerate(zip(recording.q, recording.dq, strict=True)):
+        drive = recording.tau[k] - joint.known[k]
+        now, s = ekf.step(s, y, drive, joint.inertia[k], joint.coefficients, T_S, NOISE)
+        assert now[2] == made.tau_ext[k]
+        assert now[8] ** 0.5 == made.tau_ext_std[k]
+
+
+def thesis_triangle(seed=0):
+    """Section 7.3 by simulation: hand pitch follows .3 sin(2 pi .1 t) by PD 500/50 on true states; a push of 1 N m."""
+    theta, used = np.array([0.2384, 0.1343, 0.0705, 0.9064, 0.4155]), arm.joint("hand_pitch").terms
+    finer, N = 50, 6000
+    h, rng, (q, dq) = T_S / finer, np.random.default_rng(seed), (0.0, 0.06 * np.pi)
+    M, c, w = inertia_of(used, theta), combined(used, theta), 0.2 * np.pi
+    tau_ext, rows = np.clip(1 - np.abs(np.arange(N) * T_S - 30.0) / 5.0, 0, None), []
+    for k in range(N):
+        for i in range(finer):
+            t = k * T_S + i * h
+            tau = 500 * (0.3 * np.sin(w * t) - q) + 50 * (0.3 * w * np.cos(w * t) - dq)
+            if i == 0:
+                rows.append((q + 0.01 * rng.normal(), dq + 0.008 * rng.normal(), tau))
+            dq += h * (tau - bias(c, q, dq, 0.0)[0] - tau_ext[k]) / M
+            q += h * dq
+    y_q, y_dq, tau = np.array(rows).T
+    return recorded(used, theta, (y_q, y_dq), tau), tau_ext
+
+
+def test_the_push_of_section_7_3_is_found_as_well_as_any_walk_would_and_smoothed_twice_as_well():
+    recording, tau_ext = thesis_triangle()
+    kept = slice(200, None)
+    noise = NoiseModel(r_q=0.01, r_dq=0.008, q_q=0.0, q_dq=1e-4, q_tau=1e-3)
+
+    def rmse(track, walk_of):
+        return np.sqrt(np.mean((track(recording, noise._replace(q_tau=walk_of)).tau_ext - tau_ext)[kept] ** 2))
+
+    tried = np.geomspace(1e-4, 1.0, 33)
+    best = min(rmse(ekf.track, q_tau) for q_tau in tried)
+    found = likeliest_walk([recording], noise)
+    assert rmse(ekf.track, found) <= 1.02 * best
+    assert rmse(rts.track, found) <= 0.5 * rmse(ekf.track, found)
+
+
+def test_tuning_finds_the_noise_that_was_put_in():
+    """Deviations of position and velocity within a tenth, from three times and a third of them."""
+    true = NoiseModel(r_q=2e-4, r_dq=3e-3, q_q=0.0, q_dq=2e-3, q_tau=0.0)
+    used, theta = arm.joint("hand_roll").terms, np.array([0.4528, 0.0103, 0.3706, 0.0])
+    N = 6000
+    tau = 1.5 * np.sin(2 * T_S * np.arange(N))
+    y = simulate(used, theta, np.zeros(N), tau, true)
+    start = true._replace(r_q=6e-4, r_dq=1e-3, q_dq=6e-3)
+    found = tuned([recorded(used, theta, y, tau)], start, theta[0], theta[2])
+    assert_allclose(found[:2], true[:2], rtol=0.1)
+    # The walk that a push needs explains some of what moves the joint.
+    assert 0.8 * true.q_dq < found.q_dq < true.q_dq
+    assert found.q_tau == slowest(ekf.track, theta[0], theta[2], T_S, found)
+
+
+def test_the_slowest_walk_is_the_least_with_which_a_push_is_shown():
+    for name in ("ekf", "ekf_euler", "rts", "rate", "momentum"):
+        walk_of = slowest(tracker(name), 0.4, 0.3, T_S, NOISE)
+        shown, slower = (
+            at_rest(tracker(name), 0.4, 0.3, T_S, NOISE._replace(q_tau=x)) for x in (walk_of, 0.98 * walk_of)
+        )
+        assert shown.share >= 0.9, name
+        assert shown.delay <= 0.1, name
+        assert slower.share < 0.9 or slower.delay > 0.1, name
+
+
+def test_the_lag_is_what_the_filter_misses_of_a_push():
+    """On a joint at rest, without noise: the filter's error is its lag."""
+    t = np.arange(2000) * T_S
+    push, still = np.clip(1 - np.abs(t - 10.0), 0, None), np.zeros(2000)
+    fast = NOISE._replace(q_tau=1.0)
+    recording = recorded(arm.joint("hand_roll").terms, np.array([0.4528, 0.0, 0.3706, 0.0]), (still, still), push)
+    smooth, late = lag([recording], fast)
+    missed = push - ekf.track(recording, fast).tau_ext
+    assert np.abs(missed).max() > 0.01
+    assert_allclose(late, missed, atol=0.35 * np.abs(missed).max())  # the smoother rounds the corners
+    assert np.abs(smooth - push).max() < np.abs(missed).max()
 
 
 def test_a_mass_hung_on_the_slide_gives_a_negative_effort():
@@ -66,41 +198,38 @@ def test_a_mass_hung_on_the_slide_gives_a_negative_effort():
     drive = 4.5 * np.sin(3 * t)
     held = -theta[0] * 9.81 - weight  # gravity pulls the slide along +q
     y = simulate(used, theta, np.full(N, -weight), drive + held, NOISE)
-    made = ekf.track(arm.dynamics(used, theta, N), *y, drive + held, T_S, NOISE, first_std=5.0)
+    made = ekf.track(recorded(used, theta, y, drive + held, 5.0), NOISE)
     assert made.tau_ext[1000:].mean() == pytest.approx(-weight, abs=0.05)
-
-
-def test_the_loop_is_the_same_compiled_and_as_it_is_written():
-    used, theta = arm.joint("hand_pitch").terms, arm.THETA["hand_pitch"]
-    signal = arm.signal("hand_pitch", periods=2)
-    told = arm.dynamics(used, theta, len(signal))
-    compiled = ekf.track(told, signal.q, signal.dq, signal.tau, T_S, NOISE, 1.0)
-    written = np.empty((7, len(signal)))
-    motion = (told.inertia, signal.q, signal.dq, signal.tau)
-    ekf._pass.py_func(told.coefficients, *motion, T_S, *NOISE, 1.0, ekf.FIRST, *written)
-    for a, b in zip(compiled, written, strict=True):
-        assert_allclose(a, b, rtol=1e-12, atol=1e-12 * np.abs(a).max())
 
 
 @pytest.fixture(scope="module")
 def identified():
+    """The fits of the roll, and what its filter assumes, from one excitation."""
     signal = arm.signal()
     made = list(fit.run([trajectory(signal)], [], arm.ARM, lowpass=17.0))
-    return [r for r in made if isinstance(r, Fit)], [r for r in made if isinstance(r, MeasurementNoise)]
+    fits, noises = ([r for r in made if isinstance(r, kind)] for kind in (Fit, MeasurementNoise))
+    about = (entry(), arm.ARM)
+    tunings = list(tune.run([signal], fits, [], noises, *about, fit="independent.lse", lowpass=17.0))
+    return fits, list(settle.run(tunings))
 
 
-def tracked(identified, signal, **changes):
+def tracked(identified, signal, bands=(), **changes):
     fits, noises = identified
     made = stage.run(
-        [signal], fits, [], noises, entry(role=signal.role, **changes), arm.ARM,
-        fit=changes.pop("fit", "independent.lse"), lowpass=17.0, q_tau=0.0,
+        [signal], fits, [], noises, bands, [], entry(role=signal.role, **changes), arm.ARM, fit="independent.lse",
+        lowpass=17.0, q_tau=0.0,
     )  # fmt: skip
     return list(made)
 
 
+def pushed(**changes):
+    """Another run of the roll, pushed by 1 N m from 20 to 30 s."""
+    changes = {"seed": 5, "period": 7.3, "role": "contact"} | changes
+    return arm.signal(external=lambda t: np.where((t > 20) & (t < 30), 1.0, 0.0), **changes)
+
+
 def test_the_stage_finds_a_push_where_it_was(identified):
-    pushed = arm.signal(seed=5, period=7.3, role="contact", external=lambda t: np.where((t > 20) & (t < 30), 1.0, 0.0))
-    [made] = tracked(identified, pushed, contact=((20.0, 30.0),))
+    [made] = tracked(identified, pushed(), contact=((20.0, 30.0),))
     assert isinstance(made, Track)
     inside = (made.t > 21) & (made.t < 29)
     assert made.tau_ext[inside].mean() == pytest.approx(1.0, abs=0.1)
@@ -108,14 +237,12 @@ def test_the_stage_finds_a_push_where_it_was(identified):
     assert np.corrcoef(made.tau_ext_direct, made.tau_ext)[0, 1] > 0.8
 
 
-def test_the_filter_takes_its_noise_from_the_periods(identified):
+def test_the_filters_noise_is_that_of_the_recording(identified):
+    [noise] = identified[1]
+    assert noise.r_q == pytest.approx(1e-4, rel=0.1)
+    assert noise.r_dq == pytest.approx(1e-3, rel=0.2)  # the motion is prescribed, and the effort's noise drives nothing
     [made] = tracked(identified, arm.signal(seed=5))
-    assert made.r_q == pytest.approx(1e-4, rel=0.05)
-    assert made.r_dq == pytest.approx(1e-3, rel=0.05)
-    ddq = arm.excitation("hand_roll", made.t)[2]
-    assert made.q_q == pytest.approx(0.5e-4 * np.sqrt(np.mean(ddq**2)), rel=0.05)
-    driven = 0.01 * arm.NOISE["hand_roll"] / arm.THETA["hand_roll"][0]
-    assert made.q_dq == pytest.approx(driven, rel=0.1)
+    assert (made.r_q, made.r_dq) == (noise.r_q, noise.r_dq)
 
 
 def test_a_gap_starts_the_filter_anew(identified):
@@ -124,6 +251,51 @@ def test_a_gap_starts_the_filter_anew(identified):
     [made] = tracked(identified, signal)
     first = np.flatnonzero(signal.t > 50)[0]
     assert made.tau_ext_std[first] > 1.5 * made.tau_ext_std[first - 1]
+
+
+def band_of(*logs, square, path="another path"):
+    """What free motion of other logs says, every block and speed alike."""
+    N = len(logs)
+    return ErrorBand(
+        joint="hand_roll", speed=0.3, band_rms=1.0, source=np.array(logs, object), path_of=np.array([path] * N, object),
+        block=np.arange(N), speed_bin=np.zeros(N, int), count=np.full(N, 100), mean_square=np.full(N, square),
+        filter_square=np.zeros(N), log_mean=np.zeros(N),
+    )  # fmt: skip
+
+
+def test_the_band_is_the_error_that_other_logs_had_and_never_the_logs_own(identified):
+    signal = arm.signal(seed=5, period=7.3, role="validation", log="run")
+    [alone] = tracked(identified, signal)
+    [made] = tracked(identified, signal, [band_of("other", square=4.0)])
+    assert_allclose(made.tau_ext_std**2 - alone.tau_ext_std**2, 4.0)
+    assert made.band_from == "other"
+    assert (made.tau_ext_std > made.tau_ext_std_filter).all()
+    both = band_of("run", "other", square=4.0)
+    both.mean_square[0] = 1e6
+    [made] = tracked(identified, signal, [both])
+    assert_allclose(made.tau_ext_std**2 - alone.tau_ext_std**2, 4.0)
+
+
+def test_an_offset_of_the_day_is_taken_off_and_its_error_stated(identified):
+    signal = arm.signal(seed=5, period=7.3, role="validation", external=lambda t: 0.5 + 0 * t)
+    [without] = tracked(identified, signal)
+    [made] = tracked(identified, signal, free=((0.0, 20.0),))
+    assert made.day_offset == pytest.approx(0.5, abs=4 * made.day_offset_std)
+    assert_allclose(without.tau_ext - made.tau_ext, made.day_offset)
+    assert_allclose(made.tau_ext_std**2 - without.tau_ext_std**2, made.day_offset_std**2, rtol=1e-6)
+
+
+def test_an_offset_that_drifts_is_remarked_on(identified):
+    signal = arm.signal(seed=5, period=7.3, role="validation", external=lambda t: 0.02 * t)
+    *_, said = sorted(tracked(identified, signal, free=((0.0, 60.0),)), key=lambda r: isinstance(r, Diagnostic))
+    assert "drifts within the free windows" in said.text[0]
+
+
+def test_a_clock_that_is_wrong_by_a_thousand_is_said_and_not_believed(identified):
+    signal = arm.signal(seed=5, period=7.3, role="validation")
+    object.__setattr__(signal, "q", 1000.0 * signal.q)
+    said = [r for r in tracked(identified, signal) if isinstance(r, Diagnostic)]
+    assert "check the units, signs and clock" in said[0].text[0]
 
 
 def test_a_joint_without_a_fit_is_noted_not_guessed(identified):
@@ -135,9 +307,8 @@ def test_a_joint_without_a_fit_is_noted_not_guessed(identified):
 def test_a_fit_that_does_not_exist_is_refused_with_those_there_are(identified):
     says = "no fit 'coupled.pso'; set fit in [settings] to one of independent.lse, "
     fits, noises = identified
-    run = stage.run(
-        [arm.signal()], fits, [], noises, entry(), arm.ARM, fit="coupled.pso", lowpass=17.0, q_tau=0.0
-    )  # fmt: skip
+    about = (entry(), arm.ARM)
+    run = stage.run([arm.signal()], fits, [], noises, [], [], *about, fit="coupled.pso", lowpass=17.0, q_tau=0.0)
     with pytest.raises(PipelineError, match=re.escape(says)):
         list(run)
 

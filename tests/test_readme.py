@@ -22,19 +22,21 @@ from pipeline.records import (
     KINDS,
     Control,
     Excitation,
+    FreeWeight,
     Links,
     Lyapunov,
     Origin,
     Record,
     Tissue,
     TissueModel,
+    Weight,
 )
 from pipeline.records.catalogue import Catalogue
 from pipeline.report.results import collect
 from pipeline.robots.robot import Joint
 from pipeline.runner import STEPS
 from pipeline.runner.signature import declaration
-from pipeline.study import LogEntry, Settings, Weight, reading
+from pipeline.study import HungMass, LogEntry, Settings, reading
 from pipeline.study.channels import OF_A_JOINT, OF_THE_LOG
 from pipeline.study.entries import ROLES
 from tests.conftest import ROOT
@@ -122,7 +124,7 @@ def test_keys_of_a_study_and_its_logs_are_all_told():
     said = re.sub(r"```.*?```", "", README.partition("## In Python")[0], flags=re.S)
     told = set(re.findall(r"\b(\w+) = ", code + " ".join(spans(said))))
     told |= set(re.findall(r"\[+(?:log\.)?(\w+)", code)) | {span for span in spans(said) if span.isidentifier()}
-    assert {f.name for f in fields(LogEntry)} | {f.name for f in fields(Weight)} | {"file"} <= told
+    assert {f.name for f in fields(LogEntry)} | {f.name for f in fields(HungMass)} | {"file"} <= told
     changeable = {f.name for f in fields(Joint)} - {"name", "kind", "published", "physical"}
     assert {"title", "robot", "simulated", "settings", "log"} | changeable <= told
     assert "[robot_overrides." in said
@@ -211,13 +213,14 @@ def made(kind: type[Record], **about: str) -> Record:
     return record
 
 
-BY_HAND = ("robot.", "control.", "excitation.", "tissue.")
+ROBOT = ("robot.", "control.", "excitation.")
+BY_HAND = (*ROBOT, "weight.", "tissue.")
 
 
-def test_keys_of_a_robot_and_of_tissue_are_told_and_those_told_are_there():
-    """Of records made by hand, as designing a robot takes half a minute, and the small study pushes into no tissue."""
+def test_keys_of_a_robot_and_of_what_hangs_on_it_are_told_and_those_told_are_there():
+    """Of records made by hand, as designing a robot takes half a minute, and the arm of the tests has no chain."""
     records = [made(Links), made(Control), made(Lyapunov), made(Excitation, source="table-6.1")]
-    records += [made(Tissue), made(TissueModel)]
+    records += [made(Weight), made(FreeWeight), made(Tissue), made(TissueModel)]
     keys = set(collect(Catalogue(lambda kind: [record for record in records if isinstance(record, kind)])))
     assert {key.partition(".")[0] + "." for key in keys} == set(BY_HAND)
     untold, empty = told(keys)

@@ -59,6 +59,43 @@ def test_a_hung_mass_is_seen_on_the_joints_that_carry_it_and_not_on_the_slide(re
     assert louder("instrument_slide") < 1.2
 
 
+def weight(study):
+    import pipeline
+
+    [row] = pipeline.read(study, "Weight").drop_duplicates("log").to_dict("records")
+    return row
+
+
+def test_the_mass_that_hangs_on_the_arm_is_found_within_four_percent_and_its_interval(dvrk, results):
+    found = weight(dvrk)
+    assert found["mass"] == pytest.approx(0.205, rel=0.04)
+    assert abs(found["mass"] - 0.205) < 1.96 * found["mass_std"]
+    assert found["mass_std"] < 0.04 * 0.205  # an interval that says something
+    assert results["weight.one-205g.scale"] == pytest.approx(found["mass"] / 0.205)
+
+
+def test_nothing_hangs_on_the_arm_in_runs_of_free_motion(dvrk):
+    import pipeline
+
+    free = pipeline.read(dvrk, "FreeWeight")
+    assert set(free["log"]) == {"one", "one-noweight"}
+    assert (free["free_mass"].abs() < 1.96 * free["free_mass_std"]).all()
+
+
+def test_a_run_without_the_mass_as_its_tare_brings_it_closer(dvrk, tmp_path):
+    home = tmp_path / "tared"
+    for folder in ("raw", "processed"):
+        shutil.copytree(dvrk.parent.parent / folder, home / folder, symlinks=True)
+    file = home / "raw" / "dvrk-psm" / "study.toml"
+    file.write_text(file.read_text().replace("weight = { mass", 'tare = "one-noweight"\nweight = { mass'))
+    call("weigh", file.parent)
+    found, without = weight(file.parent), weight(dvrk)
+    assert found["tare"] == "one-noweight"
+    assert found["mass"] == pytest.approx(0.205, rel=0.02)
+    assert abs(found["mass"] - 0.205) < 1.96 * found["mass_std"]
+    assert found["mass_std"] < without["mass_std"]
+
+
 def test_page_one_says_that_the_band_is_too_narrow_and_that_the_path_is_the_one_that_was_fitted(dvrk):
     page = (dvrk.parent.parent / "reports" / "dvrk-psm" / "report.html").read_text()
     assert "the 95 % band is too narrow" in page

@@ -360,3 +360,56 @@ def test_the_effort_that_is_sought_is_read_joint_by_joint(tmp_path):
     made = read(tmp_path, GOOD.replace("[[log]]", "[settings]\neffort = { hand_roll = 0.5 }\n[[log]]"))
     assert made.settings.effort == {"hand_roll": 0.5}
     assert read(tmp_path, GOOD).settings.effort == {}
+
+
+HUNG = (
+    GOOD.replace("identification", "weight")
+    + """[[log]]
+name = "empty"
+file = "b.csv"
+role = "validation"
+[log.channels]
+time = "Time"
+hand_roll.q = "q"
+hand_roll.i = "Current"
+"""
+)
+HANGS = 'weight = { moves_with = "5", position = [0, 0.1, 0.2] }'
+
+
+def hung(tmp_path, says: str):
+    """A study with a weight log that says so, on line 8."""
+    return read(tmp_path, HUNG.replace("contact = [[1, 2]]", says).replace("period = 10", "skip = 0"))
+
+
+def test_a_mass_may_be_left_out_and_move_with_a_link_or_a_joint(tmp_path):
+    [weighing] = hung(tmp_path, HANGS + '\ntare = "empty"').weighings.each
+    assert (weighing.log, weighing.tare) == ("a", "empty")
+    assert (weighing.weight.mass, weighing.weight.moves_with, weighing.weight.position) == (None, "5", (0.0, 0.1, 0.2))
+    said = HANGS.replace("moves_with", "mass = 0.2, moves_with").replace('"5"', '"hand_pitch"')
+    [weighing] = hung(tmp_path, said).weighings.each
+    assert (weighing.weight.mass, weighing.weight.moves_with, weighing.tare) == (0.2, "hand_pitch", "")
+
+
+@pytest.mark.parametrize(
+    ("written", "says"),
+    [
+        ("", "3: log 'a': a weight log says weight = { moves_with = ..., position = ... }, and mass = ... where known"),
+        (HANGS.replace('"5"', '"elbow"'), "8: log 'a'.weight: moves_with must be one of hand_roll, hand_pitch, "),
+        (HANGS.replace("0.2]", "200]"), "8: log 'a'.weight: position must lie within 3 m of the remote centre, not "),
+        (HANGS.replace("0.2]", "0.2], mass = -1"), "8: log 'a'.weight: mass must be finite and greater than 0, not -1"),
+        (HANGS.replace("0.2]", "0.2], masss = 1"), "unknown key 'masss'; known are mass, moves_with, position"),
+        (HANGS + '\ntare = "b"', "9: log 'a': tare = 'b' is not a log of this study; it has a, empty"),
+        (HANGS + '\ntare = "a"', "9: log 'a': its tare 'a' has the role weight; a tare is free motion along the same "),
+        (HANGS + "\ntare = 3", "9: log 'a': tare must be text, not 3"),
+    ],
+)
+def test_what_is_wrong_with_a_weight_is_said_with_its_line(tmp_path, written, says):
+    with pytest.raises(BadStudy) as caught:
+        hung(tmp_path, written)
+    assert says in str(caught.value)
+
+
+def test_only_weight_logs_have_a_tare(tmp_path):
+    with pytest.raises(BadStudy, match="log 'a': tare = 'a' is for logs of role weight, and this one's is ident"):
+        read(tmp_path, GOOD.replace("contact = [[1, 2]]", 'tare = "a"'))

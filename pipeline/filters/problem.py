@@ -4,7 +4,7 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 from pipeline.maths.arrays import Array
-from pipeline.maths.models.model import JointDynamics
+from pipeline.maths.models.driven import Driven
 
 
 class NoiseModel(NamedTuple):
@@ -13,12 +13,15 @@ class NoiseModel(NamedTuple):
     r_q: float
     r_dq: float
     q_q: float
-    q_dq: float
+    q_dq: float  # by an acceleration that is constant over the sample, which moves q by half of T_s q_dq
     q_tau: float  # of one step of the random walk
 
 
 class Tracked(NamedTuple):
-    """The filter's pass over (N,) samples: corrected state, its uncertainty, and how surprising each sample was."""
+    """A filter's pass over (N,) samples: its state, how uncertain it is, and how surprising each sample was.
+
+    A filter without innovations leaves them 0, and `nis`, too.
+    """
 
     q: Array
     dq: Array
@@ -29,5 +32,5 @@ class Tracked(NamedTuple):
     nis: Array
 
 
-# track(joint, q, dq, tau, T_s, noise, first_std)
-Filter = Callable[[JointDynamics, Array, Array, Array, float, NoiseModel, float], Tracked]
+# track(recording, noise)
+Filter = Callable[[Driven, NoiseModel], Tracked]

@@ -2,28 +2,36 @@
 
 from pipeline.records.assess import FreeSpace
 from pipeline.records.average import Average, PeriodResidual
+from pipeline.records.bound import ErrorBand
+from pipeline.records.calibrate import FreeMotion
 from pipeline.records.choose import Choice
+from pipeline.records.compare import Comparison
 from pipeline.records.design import Control, Excitation, Links, Lyapunov, Pose, Workspace
 from pipeline.records.diagnostic import Diagnostic, diagnostic
 from pipeline.records.differentiate import Spectrum, Trajectory
 from pipeline.records.ekf import Track
 from pipeline.records.fit import CrossFit, Fit, FittedPaths, MeasurementNoise, Residual, SwarmSearch
+from pipeline.records.hang import Load
 from pipeline.records.ingest import LogSummary, Recording, Touch
 from pipeline.records.measure import Contact
 from pipeline.records.palpate import Push, Tissue, TissueModel
 from pipeline.records.predict import Prediction
 from pipeline.records.record import COLUMN_DTYPES, AnyRecord, Column, Counts, Labels, Names, Origin, Record
 from pipeline.records.resample import Signal
+from pipeline.records.settle import FilterNoise
 from pipeline.records.smooth import Smoothed
 from pipeline.records.threshold import Threshold
+from pipeline.records.tune import Tuning
+from pipeline.records.weigh import FreeWeight, Weight
 from pipeline.records.whiteness import Whiteness
 
 __all__ = [
-    "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Choice", "Column", "Contact", "Control", "Counts", "CrossFit",
-    "Diagnostic", "Excitation", "Fit", "FittedPaths", "FreeSpace", "Labels", "Links", "LogSummary", "Lyapunov",
+    "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Choice", "Column", "Comparison", "Contact", "Control",
+    "Counts", "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "FilterNoise", "Fit", "FittedPaths",
+    "FreeMotion", "FreeSpace", "FreeWeight", "Labels", "Links", "Load", "LogSummary", "Lyapunov",
     "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Push", "Record", "Recording",
-    "Residual", "Signal", "Smoothed", "Spectrum", "SwarmSearch", "Threshold", "Tissue", "TissueModel", "Touch", "Track",
-    "Trajectory", "Whiteness", "Workspace", "diagnostic",
+    "Residual", "Signal", "Smoothed", "Spectrum", "SwarmSearch", "Threshold", "Tissue", "TissueModel", "Touch", "Track", "Trajectory", "Tuning",
+    "Weight", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
@@ -31,7 +39,7 @@ KINDS: dict[str, type[Record]] = {
     for kind in (
         Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Touch, Signal, Average,
         PeriodResidual, Trajectory, Spectrum, Smoothed, Fit, CrossFit, FittedPaths, MeasurementNoise, Residual,
-        SwarmSearch, Choice, Prediction, Track, FreeSpace, Threshold, Contact, Push, Tissue, TissueModel, Whiteness,
-        Diagnostic,
+        SwarmSearch, Choice, Prediction, Tuning, FilterNoise, FreeMotion, ErrorBand, Track, FreeSpace,
+        Threshold, Contact, Push, Tissue, TissueModel, Comparison, Whiteness, Diagnostic, Load, Weight, FreeWeight,
     )
 }  # fmt: skip

@@ -23,6 +23,9 @@ class FreeSpace(Record):
     detection_level_std: float
     coverage: float
     coverage_std: float
+    smooth_rms: float
+    smooth_max: float
+    crossings: float
 
     def published(self) -> Iterator[Published]:
         """The levels, and the coverage of the stated band."""

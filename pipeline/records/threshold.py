@@ -1,8 +1,9 @@
 """Records of how large an external effort has to be to stand out from free space."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
-from pipeline.records.record import Record
+from pipeline.records.record import Published, Record
 
 
 @dataclass(frozen=True, eq=False)
@@ -14,4 +15,9 @@ class Threshold(Record):
     joint: str
     filter: str
     detection_level: float
+    alarm_level: float
     level_from: str  # the log whose free space it is
+
+    def published(self) -> Iterator[Published]:
+        """Both levels."""
+        yield from self.publish(f"threshold.{self.joint}", "detection_level", "alarm_level")

@@ -50,6 +50,8 @@ class Plan:
 
     def tasks(self, asks: Declaration) -> Iterator[Task]:
         """Every call of a stage that the study and the records that are there give."""
+        if "weighings" in asks.given.values() and not self.study.weighings.each:
+            return
         places = self.places()
         if asks.each:
             yield from self._each_record(asks, places)
@@ -98,6 +100,8 @@ class Plan:
         """What a task is handed besides records; of a log, what says how to open it."""
         if what in ("log", "entry"):
             return self._entries[log]
+        if what == "weighings":
+            return self.study.weighings
         return self.study.robot.joint(joint) if what == "joint" else self.study.robot
 
     def _hash(self, what: str, name: str, value: Any) -> str:

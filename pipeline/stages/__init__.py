@@ -10,6 +10,7 @@ The signature of `run` is the declaration of everything it needs:
     fits: Iterable[Fit]         all records of that kind about the same; the stage waits for them
     entry: LogEntry             what the study says of the log
     joint: Joint, robot: Robot  what the robot is
+    weighings: Weighings        the masses of all weight logs; where the study has none, the stage is not called
     *, lowpass: float           a setting of the study, by name
     -> Iterator[Average | Diagnostic] the kinds of record it makes
 
@@ -19,6 +20,7 @@ does not grow with the study, unless it is the only one of its stage.  The repor
 """
 
 STAGES = (
-    "design", "ingest", "resample", "average", "differentiate", "smooth", "fit", "choose", "predict", "ekf",
-    "assess", "threshold", "measure", "palpate", "whiteness",
+    "design", "ingest", "resample", "average", "differentiate", "smooth", "fit", "choose", "predict", "tune",
+    "settle", "calibrate", "bound", "ekf", "assess", "threshold", "measure", "palpate", "hang", "weigh", "compare",
+    "whiteness",
 )  # fmt: skip

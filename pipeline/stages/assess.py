@@ -4,8 +4,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from pipeline.maths.contact.detection import quiet
 from pipeline.maths.contact.free_space import levels
-from pipeline.maths.signals.windows import free_space
+from pipeline.maths.signals.windows import SETTLE, free_space
 from pipeline.records import FreeSpace, Track
 from pipeline.study import LogEntry
 
@@ -21,6 +22,9 @@ def run(track: Track, entry: LogEntry) -> Iterator[FreeSpace]:
     free = free_space(track.t, entry.contact, track.rate)
     if track.at_rest or not known or int(free.sum()) < FEWEST:
         return
+    # The smoother sees a contact coming.
+    calm = free_space(track.t, [(start - SETTLE, end) for start, end in entry.contact], track.rate)
+    smooth = quiet(track.tau_ext_smooth, calm if calm.any() else free, track.rate)
     space = levels(track.tau_ext[free], track.tau_ext_std[free])
     yield FreeSpace(
         log=track.log,
@@ -36,4 +40,7 @@ def run(track: Track, entry: LogEntry) -> Iterator[FreeSpace]:
         detection_level_std=space.level_99_std,
         coverage=space.coverage,
         coverage_std=space.coverage_std,
+        smooth_rms=smooth.rms,
+        smooth_max=smooth.largest,
+        crossings=smooth.crossings,
     )

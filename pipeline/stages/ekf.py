@@ -4,27 +4,43 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from pipeline.errors import PipelineError
-from pipeline.estimators.regression import measured_motion, of_joints, predicted
-from pipeline.estimators.used import FALLBACK, describing, model_of, used
-from pipeline.filters import tracker
-from pipeline.filters.problem import NoiseModel, Tracked
+from pipeline.estimators.driving import Driving, driving, named
+from pipeline.estimators.error_bands import model_variance
+from pipeline.estimators.paths import ANOTHER_PATH, SAME_PATH, follows
+from pipeline.estimators.used import describing
+from pipeline.filters import DEFAULT, rts, through
+from pipeline.filters.assumed import assumed
+from pipeline.filters.lag import lag
+from pipeline.filters.problem import NoiseModel
+from pipeline.filters.response import rise
 from pipeline.maths.arrays import Array
-from pipeline.maths.models.model import JointDynamics
+from pipeline.maths.contact.day_offset import DayOffset, day_offset
 from pipeline.maths.signals.smoothing import segments
-from pipeline.maths.signals.windows import outside, settled
-from pipeline.records import Choice, Column, Diagnostic, Fit, MeasurementNoise, Signal, Track, diagnostic
+from pipeline.maths.signals.windows import free_space, settled
+from pipeline.records import (
+    Choice,
+    Diagnostic,
+    ErrorBand,
+    FilterNoise,
+    Fit,
+    FittedPaths,
+    Signal,
+    Track,
+    diagnostic,
+)
 from pipeline.robots.robot import Robot
 from pipeline.study import LogEntry
 
-FILTER = "ekf"
+DIVERGED = 50.0  # times what a consistent filter has of normalised innovations, on average
 
 
 def run(
     signals: Sequence[Signal],
     fits: Iterable[Fit],
     choices: Iterable[Choice],
-    noises: Iterable[MeasurementNoise],
+    noises: Iterable[FilterNoise],
+    bands: Iterable[ErrorBand],
+    paths: Iterable[FittedPaths],
     entry: LogEntry,
     robot: Robot,
     *,
@@ -43,130 +59,107 @@ def run(
     """
     if entry.role == "friction":
         return
-    every, chosen, by_joint = list(fits), list(choices), {noise.joint: noise for noise in noises}
+    every, chosen = list(fits), list(choices)
+    noise_of, band_of = {noise.joint: noise for noise in noises}, {band.joint: band for band in bands}
+    path_of = {path.joint: path for path in paths}
     for signal in signals:
-        own, noise = describing(robot, every, signal.joint), by_joint.get(signal.joint)
-        if not own or noise is None:
-            name = f"{signal.log}/{signal.joint}"
-            said = f"{name}: no identification log moves this joint, so its external effort is not tracked"
-            yield diagnostic("ekf", f"{signal.log}.{signal.joint}", "note", said)
+        about, name = f"{signal.log}.{signal.joint}", f"{signal.log}/{signal.joint}"
+        if not describing(robot, every, signal.joint) or signal.joint not in noise_of:
+            said = "no identification log moves this joint, so its external effort is not tracked"
+            yield diagnostic("ekf", about, "note", f"{name}: {said}")
             continue
-        kept, said = named(signal, signals, own, chosen, robot, fit)
+        kept, said = named(signal, signals, every, chosen, robot, fit)
         if said:
-            yield diagnostic("ekf", f"{signal.log}.{signal.joint}", "note", f"{signal.log}/{signal.joint}: {said}")
-        yield from of_joint(signal, signals, kept, noise, entry, robot, lowpass, q_tau)
-
-
-def named(
-    signal: Signal, signals: Sequence[Signal], own: Sequence[Fit], choices: Sequence[Choice], robot: Robot, fit: str
-) -> tuple[Fit, str]:
-    """The fit that a joint of a log is tracked with, and why it is not the one that is named where it is not."""
-    kept = used(robot, own, choices, signal.joint, fit)
-    if kept is None:
-        there = ", ".join(f"{f.model}.{f.estimator}" for f in own)
-        raise PipelineError(f"{signal.joint}: there is no fit {fit!r}; set fit in [settings] to one of {there}")
-    stand_in = used(robot, own, (), signal.joint, FALLBACK)
-    if stand_in is None or set(model_of(robot, kept).joints) <= {s.joint for s in signals if len(s) == len(signal)}:
-        return kept, ""
-    needs = f"the log does not hold the other joints that {kept.model}.{kept.estimator} needs"
-    return stand_in, f"{needs}, so {FALLBACK} is used; add their channels"
-
-
-def of_joint(
-    signal: Signal,
-    signals: Sequence[Signal],
-    fit: Fit,
-    between_periods: MeasurementNoise,
-    entry: LogEntry,
-    robot: Robot,
-    lowpass: float,
-    q_tau: float,
-) -> Iterator[Track | Diagnostic]:
-    """The Track of one joint of a log."""
-    joint, model = robot.joint(signal.joint), model_of(robot, fit)
-    motions = {s.joint: measured_motion(s, lowpass) for s in signals if s.joint in model.joints}
-    motion = of_joints([motions[name] for name in model.joints])
-    row, place = model.efforts.index(joint.name), model.joints.index(joint.name)
-    dynamics = model.joint_dynamics(fit.theta, motion)[row]
-    if dynamics.inertia.min() <= 0:
-        yield diagnostic(
-            "ekf", f"{signal.log}.{joint.name}", "warning",
-            f"{signal.log}/{joint.name}: the fit's inertia is not positive, so no motion follows from it and nothing "
-            "is tracked; check the signs of the effort and of the position",
-        )  # fmt: skip
-        return
-    q_tau = q_tau or joint.q_tau
-    noise = assumed(between_periods, dynamics, motion.ddq[:, place], signal, q_tau)
-    tau_hat = predicted(model, fit.theta, motion, row)
-    yield tracked(signal, fit, dynamics, tau_hat, noise, entry, q_tau)
-
-
-def assumed(
-    between_periods: MeasurementNoise, dynamics: JointDynamics, ddq: Array, signal: Signal, q_tau: float
-) -> NoiseModel:
-    """What the filter assumes of noise: all measured, except for the walk of the external effort.
-
-    The measured effort drives the model, so its noise is process noise of the velocity, scaled by T_s / M.  Forward
-    Euler leaves out half of T_s^2 times the next derivative in each step of position and velocity; encoders are often
-    finer than that, so it is process noise, too.
-    """
-    T_s = 1.0 / signal.rate
-    # A noiseless log would leave the innovations without a covariance to be judged by.
-    r_q, r_dq = (
-        max(r, 1e-9 * np.ptp(x), 1e-12)
-        for r, x in ((between_periods.sigma_q, signal.q), (between_periods.sigma_dq, signal.dq))
-    )
-    euler_q, euler_dq = (0.5 * T_s**2 * float(np.sqrt(np.mean(x**2))) for x in (ddq, np.gradient(ddq, T_s)))
-    driven = T_s * between_periods.sigma_tau / float(np.mean(dynamics.inertia))
-    return NoiseModel(r_q, r_dq, euler_q, float(np.hypot(driven, euler_dq)), q_tau * np.sqrt(T_s))
+            yield diagnostic("ekf", about, "note", f"{name}: {said}")
+        own = driving(signal, signals, kept, robot, lowpass)
+        if own.joint.inertia.min() <= 0:
+            said = f"{name}: nothing is tracked: the inertia of {kept.model}.{kept.estimator} is not positive along it"
+            yield diagnostic("ekf", about, "warning", f"{said}; see what is said of tuning")
+            continue
+        path = path_of.get(signal.joint)
+        fitted = entry.role == "identification" or (path is not None and follows(signal, path))
+        noise = assumed(noise_of[signal.joint], 1.0 / signal.rate, q_tau)
+        yield from tracked(own, noise, band_of.get(signal.joint), SAME_PATH if fitted else ANOTHER_PATH, entry)
 
 
 def tracked(
-    signal: Signal, fit: Fit, dynamics: JointDynamics, tau_hat: Column, noise: NoiseModel, entry: LogEntry, q_tau: float
-) -> Track:
-    """Filter every segment of a signal; a gap starts the filter anew."""
-    first_std = max(float(np.std(signal.tau)), noise.q_tau)
-    track = tracker(FILTER)
-    passes = [
-        track(
-            dynamics._replace(inertia=dynamics.inertia[part], known=dynamics.known[part]),
-            signal.q[part],
-            signal.dq[part],
-            signal.tau[part],
-            1.0 / signal.rate,
-            noise,
-            first_std,
-        )
-        for part in segments(signal.segment)
-    ]
-    together = Tracked(*(np.concatenate(columns) for columns in zip(*passes, strict=True)))
+    own: Driving, noise: NoiseModel, band: ErrorBand | None, path: str, entry: LogEntry
+) -> Iterator[Track | Diagnostic]:
+    """The Track of one joint of a log."""
+    signal, parts, model = own.signal, own.parts, np.zeros(len(own.signal))
+    made = through(DEFAULT, parts, noise)
+    if not np.isfinite(made.tau_ext).all() or np.mean(made.nis) > 2.0 * DIVERGED:
+        yield diverged(signal, float(np.mean(made.nis)))
+        if not np.isfinite(made.tau_ext).all():
+            return
+    smooth, late = lag(parts, noise)
+    offset = day_offset(signal.t, signal.tau - own.tau_hat, entry.free)
+    if offset.drifts:
+        yield drifting(signal, offset)
+    band_from = ""
+    if band is not None:
+        model, band_from = model_variance(band, signal.log, path, signal.dq, bool(entry.free))
+    total = made.tau_ext_std**2 + model + late**2 + offset.std**2
     calm = np.concatenate([settled(signal.t[part]) for part in segments(signal.segment)])
-    counted = outside(signal.t, entry.contact) & calm
-    return Track(
+    free = free_space(signal.t, entry.contact, signal.rate)
+    yield Track(
         log=signal.log,
         joint=signal.joint,
-        model=fit.model,
-        estimator=fit.estimator,
-        filter=FILTER,
+        model=own.fit.model,
+        estimator=own.fit.estimator,
+        filter=DEFAULT,
         role=signal.role,
+        path=path,
         at_rest=signal.at_rest,
         rate=signal.rate,
-        tau_ext_rms=float(np.sqrt(np.mean(together.tau_ext[counted] ** 2))) if counted.any() else float("nan"),
-        nis_mean=float(np.mean(together.nis[calm])),
+        tau_ext_rms=rms((made.tau_ext - offset.value)[free]),
+        nis_mean=float(np.mean(made.nis[calm])),
         r_q=noise.r_q,
         r_dq=noise.r_dq,
-        q_q=noise.q_q,
         q_dq=noise.q_dq,
-        q_tau=q_tau,
+        q_tau=noise.q_tau * signal.rate**0.5,
+        day_offset=offset.value,
+        day_offset_std=offset.std,
+        filter_part=rms(made.tau_ext_std[calm]),
+        model_part=float(np.sqrt(np.mean(model))),
+        lag_part=rms(late[calm]),
+        smooth_rise=rise(rts.track, parts[0], noise),
+        band_from=band_from,
         t=signal.t,
-        q=together.q,
-        dq=together.dq,
+        q=made.q,
+        dq=made.dq,
         tau=signal.tau,
-        tau_hat=tau_hat,
-        tau_ext=together.tau_ext,
-        tau_ext_std=together.tau_ext_std,
-        tau_ext_direct=signal.tau - tau_hat,
-        innovation_q=together.innovation_q,
-        innovation_dq=together.innovation_dq,
-        nis=together.nis,
+        tau_hat=own.tau_hat,
+        tau_ext=made.tau_ext - offset.value,
+        tau_ext_std=np.sqrt(total),
+        tau_ext_std_filter=made.tau_ext_std,
+        tau_ext_smooth=smooth - offset.value,
+        tau_ext_direct=signal.tau - own.tau_hat - offset.value,
+        innovation_q=made.innovation_q,
+        innovation_dq=made.innovation_dq,
+        nis=made.nis,
     )
+
+
+def rms(x: Array) -> float:
+    """Root mean square, NaN of nothing."""
+    return float(np.sqrt(np.mean(x**2))) if len(x) else float("nan")
+
+
+def diverged(signal: Signal, nis: float) -> Diagnostic:
+    """A filter whose innovations are nothing like what it assumes."""
+    said = (
+        f"{signal.log}/{signal.joint}: the filter's innovations are {np.sqrt(nis / 2.0):.3g} times what it assumes: "
+        "the measured motion does not follow from the effort; check the units, signs and clock of its channels, and "
+        "whether a sensor was stuck"
+    )
+    return diagnostic("ekf", f"{signal.log}.{signal.joint}", "warning", said)
+
+
+def drifting(signal: Signal, offset: DayOffset) -> Diagnostic:
+    """An offset that is not the same in all that is said to be free."""
+    said = (
+        f"{signal.log}/{signal.joint}: the offset drifts within the free windows by {offset.drift:.3g}, with a "
+        f"standard error of {offset.drift_std:.2g}; shorten the log, or state a free window nearer to the contact"
+    )
+    return diagnostic("ekf", f"{signal.log}.{signal.joint}", "warning", said)

@@ -10,6 +10,7 @@ from pipeline.estimators import ESTIMATORS, estimator
 from pipeline.estimators.folds import folds
 from pipeline.estimators.known import known_of
 from pipeline.estimators.observations import observed, pose_samples
+from pipeline.estimators.paths import ANOTHER_PATH, SAME_PATH, follows
 from pipeline.estimators.problem import Known
 from pipeline.estimators.regression import measured_motion, of_joints, pose, predicted
 from pipeline.estimators.scores import scored
@@ -18,8 +19,6 @@ from pipeline.maths.arrays import Array, Booleans
 from pipeline.maths.models.model import Model, Motion
 from pipeline.maths.selection.blocks import BLOCKS
 from pipeline.maths.signals import averaging
-from pipeline.maths.signals.path import SAME_PATH, likeness
-from pipeline.maths.signals.smoothing import segments
 from pipeline.maths.signals.windows import outside
 from pipeline.records import (
     Choice,
@@ -95,7 +94,7 @@ def unseen(
         said = f"{name}: its contact windows cover the whole log, so nothing is left to score a prediction on"
         yield diagnostic("predict", f"{signal.log}.{signal.joint}", "warning", said)
         return
-    path = "same path" if paths is not None and follows(signal, paths) else "another path"
+    path = SAME_PATH if paths is not None and follows(signal, paths) else ANOTHER_PATH
     own = [f for f in fits if f.group == signal.joint and f.model == "independent"]
     chosen = used(robot, describing(robot, fits, signal.joint), choices, signal.joint, CHOSEN)
     if chosen is not None and not is_held(chosen, signals, robot):
@@ -125,16 +124,6 @@ def along(fit: Fit, signal: Signal, signals: Sequence[Signal], robot: Robot, low
     return predicted(model, fit.theta, motion, model.efforts.index(signal.joint))
 
 
-def follows(signal: Signal, paths: FittedPaths) -> bool:
-    """Whether a recording follows a path that was fitted, on which the model's error repeats."""
-    part = max(segments(signal.segment), key=lambda s: s.stop - s.start)
-    each = [np.flatnonzero(paths.source == log) for log in dict.fromkeys(paths.source)]
-    likenesses = [
-        likeness(signal.t[part], signal.q[part], paths.q[rows], float(paths.period[rows[0]])) for rows in each
-    ]
-    return max(likenesses) > SAME_PATH
-
-
 def without_the_log(
     signal: Signal, own: Trajectory | None, cross_fits: Iterable[CrossFit], model: Model, lowpass: float
 ) -> Iterator[Prediction]:
@@ -149,7 +138,7 @@ def without_the_log(
             number = len(left_out[rows[0]])
             scheme = "leave one log out" if number == 1 else f"leave {number} logs out"
             tau_hat = predicted(model, fit.theta[rows], motion)
-            about = (fit.model, fit.estimator, signal.role, scheme, "another path")
+            about = (fit.model, fit.estimator, signal.role, scheme, ANOTHER_PATH)
             yield scored(part, *about, tau_hat, everywhere, lowpass)
 
 
@@ -176,14 +165,14 @@ def without_a_period(
                 del tau_hat[name]
     everywhere, scheme = np.ones(len(since), np.bool_), "leave one period out"
     for name, effort in tau_hat.items():
-        yield scored(part, model.name, name, signal.role, scheme, "same path", effort, everywhere, lowpass)
+        yield scored(part, model.name, name, signal.role, scheme, SAME_PATH, effort, everywhere, lowpass)
 
 
 def without_a_segment(own: Smoothed, model: Model, known: Known, lowpass: float) -> Iterator[Prediction | Diagnostic]:
     """Predict each sixth of a log that does not repeat from fits to the other five."""
     log = observed([own], (), lowpass, 0)
     Phi = model.regressor(log.motion).Phi[:, 0]
-    everywhere, about = np.ones(len(own), np.bool_), ("identification", "leave a segment out", "another path")
+    everywhere, about = np.ones(len(own), np.bool_), ("identification", "leave a segment out", ANOTHER_PATH)
     for name in ESTIMATORS:
         tau_hat = np.empty(len(own))
         try:

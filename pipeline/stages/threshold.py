@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator
 
+from pipeline.maths.contact.detection import Quiet, alarm_level
 from pipeline.records import FreeSpace, Threshold
 
 
@@ -12,10 +13,15 @@ def run(spaces: Iterable[FreeSpace]) -> Iterator[Threshold]:
         every.setdefault((space.joint, space.filter), []).append(space)
     for (joint, name), own in every.items():
         judge = worst(own)
-        yield Threshold(joint, name, judge.detection_level, judge.log)
+        alarms = alarm_level([Quiet(s.smooth_rms, s.smooth_max, s.crossings) for s in unseen(own)])
+        yield Threshold(joint, name, judge.detection_level, alarms, judge.log)
 
 
 def worst(spaces: list[FreeSpace]) -> FreeSpace:
-    """The free space with the highest detection level, of logs that no parameter was fitted to where there are any."""
-    unseen = [space for space in spaces if space.role != "identification"]
-    return max(unseen or spaces, key=lambda space: space.detection_level)
+    """The free space with the highest detection level."""
+    return max(unseen(spaces), key=lambda space: space.detection_level)
+
+
+def unseen(spaces: list[FreeSpace]) -> list[FreeSpace]:
+    """Those of logs that no parameter was fitted to, where there are any."""
+    return [space for space in spaces if space.role != "identification"] or spaces

@@ -6,12 +6,14 @@ from pathlib import Path
 
 from pipeline.robots import Robot
 from pipeline.robots.from_toml import wrong_name
-from pipeline.study import WHOLE, LogEntry, Weight
+from pipeline.study import WHOLE, HungMass, LogEntry
 from pipeline.study.channels import Channels
 from pipeline.study.plausible import optional
 from pipeline.toml import TomlTable
 
 ROLES = ("identification", "validation", "contact", "weight", "tissue", "friction")
+TARES = ("validation", "identification")  # roles of logs in which nothing touches the arm
+FARTHEST = 3.0  # [m] from the remote centre, beyond which a position is more likely in another unit
 WINDOWS = "a list of [start, end] in seconds, from 0 on"
 ALL = "all"  # of a tissue log: every sample is one of contact
 
@@ -21,6 +23,9 @@ def entries_of(study: TomlTable, robot: Robot | None) -> tuple[LogEntry, ...]:
     tables = study.tables("log", "it has no [[log]] table, so there is nothing to analyse")
     logs = tuple(_entry(study, i, table, robot) for i, table in enumerate(tables))
     study.unique("log", "name", enumerate(log.name for log in logs), "two logs are named")
+    for i, log in enumerate(logs):
+        if log.tare and (wrong := _wrong_tare(log, logs)):
+            study.problem(f"log {log.name!r}: {wrong}", "log", i, "tare")
     return logs
 
 
@@ -52,8 +57,10 @@ def _entry(study: TomlTable, index: int, table: TomlTable, robot: Robot | None) 
         rate=optional(table, "rate"),
         skip=optional(table, "skip") or 0.0,
         until=_end(table),
-        contact=_windows(table),
+        contact=_windows(table, "contact"),
+        free=_windows(table, "free"),
         weight=_weight(table, robot),
+        tare=table.text("tare", ""),
         delimiter=_delimiter(table),
         decimal=table.text("decimal", choices=(".", ",")) if "decimal" in table else None,
         header=table.flag("header") if "header" in table else None,
@@ -108,27 +115,43 @@ def _delimiter(table: TomlTable) -> str | None:
     return table.text("delimiter") if "delimiter" in table else None
 
 
-def _windows(table: TomlTable) -> tuple[tuple[float, float], ...]:
-    if table.values.get("contact") == ALL and "contact" in table:
+def _windows(table: TomlTable, key: str) -> tuple[tuple[float, float], ...]:
+    if key == "contact" and key in table and table.values[key] == ALL:
         if table.values.get("role") != "tissue":
-            problem = f'contact = "{ALL}" is for logs of role tissue; say the windows, {WINDOWS}'
-            table.problem(problem, "contact")
+            table.problem(f'contact = "{ALL}" is for logs of role tissue; say the windows, {WINDOWS}', key)
         return WHOLE
-    windows = table.pairs("contact", WINDOWS, [])
+    windows = table.pairs(key, WINDOWS, [])
     for i, (start, end) in enumerate(windows):
         if not 0 <= start < end:
-            table.problem(f"contact must be {WINDOWS}, not [{start:g}, {end:g}]", "contact", i)
+            table.problem(f"{key} must be {WINDOWS}, not [{start:g}, {end:g}]", key, i)
     return windows
 
 
-def _weight(table: TomlTable, robot: Robot | None) -> Weight | None:
+def _wrong_tare(log: LogEntry, logs: Sequence[LogEntry]) -> str:
+    """What is wrong with a log's tare, or ""."""
+    if log.role != "weight":
+        return f"tare = {log.tare!r} is for logs of role weight, and this one's is {log.role}"
+    tare = next((other for other in logs if other.name == log.tare), None)
+    if tare is None:
+        return f"tare = {log.tare!r} is not a log of this study; it has {', '.join(other.name for other in logs)}"
+    if tare.role not in TARES:
+        role = f"its tare {log.tare!r} has the role {tare.role}"
+        return f"{role}; a tare is free motion along the same path, of role {' or '.join(TARES)}"
+    return ""
+
+
+def _weight(table: TomlTable, robot: Robot | None) -> HungMass | None:
     if "weight" not in table:
         if table.values.get("role") == "weight":
-            table.problem("a weight log says weight = { mass = ..., moves_with = ..., position = ... }")
+            table.problem("a weight log says weight = { moves_with = ..., position = ... }, and mass = ... where known")
         return None
     weight = table.table("weight")
-    mass = weight.number("mass", above=0.0, words="a number of kg")
-    moves_with = weight.text("moves_with", choices=[joint.name for joint in robot.joints] if robot else ())
+    mass = weight.number("mass", above=0.0, words="a number of kg") if "mass" in weight else None
+    links = robot.chain.links if robot and robot.chain else ()
+    moves_with = weight.text("moves_with", choices=[*(joint.name for joint in robot.joints), *links] if robot else ())
     position = weight.numbers("position", count=3, words="[x, y, z] in metres")
+    if position and max(map(abs, position)) > FARTHEST:
+        said = f"position must lie within {FARTHEST:g} m of the remote centre, not {list(position)}; it is in metres"
+        weight.problem(said, "position")
     weight.close()
-    return Weight(mass, moves_with, (position[0], position[1], position[2])) if position else None
+    return HungMass(moves_with, (position[0], position[1], position[2]), mass) if position else None

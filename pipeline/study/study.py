@@ -18,7 +18,7 @@ class Settings:
     derivative: str = "harmonics"  # how periodic motion is differentiated: "harmonics" or "fft"
     harmonics: int = 0  # of the excitation; 0 takes the robot's
     fit: str = "chosen"  # the Fit that the filter runs with
-    q_tau: float = 0.0  # random walk of the external effort [effort/s^0.5]; 0 takes the robot's
+    q_tau: float = 0.0  # random walk of the external effort [effort/s^0.5]; 0 is the slowest that shows a push
     effort: dict[str, float] = field(default_factory=dict)  # what the user wants to see on each joint [effort]
 
 
@@ -45,12 +45,28 @@ class Source:
 
 
 @dataclass(frozen=True)
-class Weight:
-    """A known mass hung on the arm, at a point fixed to a link.  Section 7.5"""
+class HungMass:
+    """A mass hung on the arm, at a point fixed to a link.  Section 7.5"""
 
-    mass: float  # [kg]
-    moves_with: str
-    position: tuple[float, float, float]  # [m] from the remote centre, in axes that at q = 0 are the base axes
+    moves_with: str  # a joint, for the link that turns about the remote centre with it, or a link
+    position: tuple[float, float, float]  # [m] from the remote centre, in the link's axes that at q = 0 are the base's
+    mass: float | None = None  # [kg] where it is known
+
+
+@dataclass(frozen=True)
+class Weighing:
+    """A weight log as every log is asked about it."""
+
+    log: str
+    weight: HungMass
+    tare: str  # the log to be subtracted, or ""
+
+
+@dataclass(frozen=True)
+class Weighings:
+    """All weight logs of a study that say where the mass hangs."""
+
+    each: tuple[Weighing, ...]
 
 
 @dataclass(frozen=True)
@@ -66,7 +82,9 @@ class LogEntry:
     skip: float = 0.0
     until: float | None = None
     contact: tuple[tuple[float, float], ...] = ()  # [s] known windows; WHOLE where all samples are of contact
-    weight: Weight | None = None
+    free: tuple[tuple[float, float], ...] = ()
+    weight: HungMass | None = None
+    tare: str = ""  # the log of the same path that is subtracted from a weight log
     delimiter: str | None = None
     decimal: str | None = None
     header: bool | None = None
@@ -106,6 +124,13 @@ class Study:
     def log(self, name: str) -> LogEntry:
         """The log of that name."""
         return next(entry for entry in self.logs if entry.name == name)
+
+    @property
+    def weighings(self) -> Weighings:
+        """The weight logs."""
+        return Weighings(
+            tuple(Weighing(e.name, e.weight, e.tare) for e in self.logs if e.weight and e.role == "weight")
+        )
 
     @property
     def files(self) -> int:

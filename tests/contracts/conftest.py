@@ -56,9 +56,13 @@ def robot() -> Robot:
 def lab(tmp_path_factory) -> Lab:
     folder = arm.write_study(tmp_path_factory.mktemp("contracts") / "raw" / "arm")
     arm.write_csv(folder / "again.csv", [arm.signal("hand_roll", period=2.0, periods=5, rate=50.0, seed=2)])
+    hung = arm.signal("hand_roll", period=2.0, periods=5, rate=50.0, seed=3, external=np.cos)
+    arm.write_csv(folder / "hung.csv", [hung])
+    weight = 'weight = { mass = 0.2, moves_with = "hand_roll", position = [0.02, 0.0, -0.3] }\ntare = "again"'
     with (folder / "study.toml").open("a") as file:
         file.write(arm.log_table("again", "again.csv", "identification", ["hand_roll"]))
         file.write(arm.write_pushes(folder / "pushes.csv"))
+        file.write(arm.log_table("hung", "hung.csv", "weight", ["hand_roll"], weight))
     study = replace(reading.read(folder), robot=robot(), truth=TRUTH)
     said: list[str] = []
     runner = Runner(study, folders(folder, None, None), Console(lambda line: None, said.append))

@@ -1,6 +1,7 @@
-"""Every filter, on a joint that is linear in its state: there it is the batch solution, and as good as it says.
+"""Every filter: what is external and what is not, and numbers that stay numbers.
 
-The model is that of (7.11)-(7.16): q and dq are measured, forward Euler steps them, and the external effort walks.
+Those that state a model of chance, on a joint that is linear in its state: there each is the batch solution, and as
+good as it says.
 """
 
 from importlib import import_module
@@ -12,8 +13,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.stats import chi2
 
-from pipeline.filters import FILTERS
+from pipeline.filters import FILTERS, tracker
+from pipeline.filters.belief import FIRST
 from pipeline.filters.problem import Filter, NoiseModel
+from pipeline.maths.models.driven import Driven
 from pipeline.maths.models.model import JointDynamics
 from pipeline.maths.models.terms import inertia, offset, stiffness, viscous
 from tests import arm
@@ -27,6 +30,13 @@ SEEDS = 100
 FILTER = pytest.mark.parametrize(
     "track", [import_module(f"pipeline.filters.{name}").track for name in FILTERS], ids=FILTERS
 )
+STEPPED = pytest.mark.parametrize("name", ["ekf", "ekf_euler"])
+STATED = pytest.mark.parametrize("name", ["ekf", "ekf_euler", "rts"])  # of the model of chance that is simulated
+
+
+def recording(joint: JointDynamics, q, dq, tau, first_std=FIRST_STD) -> Driven:
+    """What a filter is given of a joint whose acceleration nobody measured."""
+    return Driven(joint, q, dq, np.zeros(len(q)), tau, T_S, first_std)
 
 
 def swaying(N: int) -> JointDynamics:
@@ -36,14 +46,24 @@ def swaying(N: int) -> JointDynamics:
     return joint._replace(inertia=joint.inertia * (1 + 0.4 * np.sin(2 * t)), known=0.8 * np.cos(5 * t))
 
 
-def transition(joint: JointDynamics, k: int, tau: float) -> tuple[np.ndarray, np.ndarray]:
-    """F and u of x[k+1] = F x[k] + u, with the state x = [q, dq, tau_ext]."""
+def transition(joint: JointDynamics, k: int, tau: float, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """F and u of x[k+1] = F x[k] + u, with the state x = [q, dq, tau_ext], of first or of second order in T_s."""
     M, (_, v, c, f) = joint.inertia[k], THETA
-    F = np.array([[1, T_S, 0], [-T_S * c / M, 1 - T_S * v / M, -T_S / M], [0, 0, 1]])
-    return F, np.array([0, T_S * (tau - joint.known[k] - f) / M, 0])
+    A = np.array([[0, 1, 0], [-c / M, -v / M, -1 / M], [0, 0, 0]])
+    h = 0.0 if name == "ekf_euler" else 0.5 * T_S**2
+    driven = np.array([0, (tau - joint.known[k] - f) / M, 0])
+    return np.eye(3) + T_S * A + h * A @ A, (T_S * np.eye(3) + h * A) @ driven
 
 
-def simulate(N: int, noise: NoiseModel, seed: int, walks=True) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def process(noise: NoiseModel, name: str) -> np.ndarray:
+    """Q: of second order, what an acceleration adds to the velocity it adds to the position, half a sample long."""
+    if name == "ekf_euler":
+        return np.diag(np.square(noise[2:]))
+    along = np.array([0.5 * T_S, 1.0, 0.0]) * noise.q_dq
+    return np.outer(along, along) + np.diag([noise.q_q**2, 0.0, noise.q_tau**2])
+
+
+def simulate(N: int, noise: NoiseModel, seed: int, name="ekf", walks=True):
     """True states (N, 3), measurements (2, N) and effort (N,), with the noises that the filter is told of.
 
     The external effort starts as uncertain as the filter is told, unless it does not walk: it is then 0.7.
@@ -52,77 +72,133 @@ def simulate(N: int, noise: NoiseModel, seed: int, walks=True) -> tuple[np.ndarr
     tau = np.sin(3 * T_S * np.arange(N))
     x = np.empty((N, 3))
     x[0] = 0.1, -0.2, FIRST_STD * random.normal() if walks else 0.7
-    w = random.normal(size=(N, 3)) * (noise.q_q, noise.q_dq, noise.q_tau if walks else 0.0)
+    root = np.linalg.cholesky(process(noise, name) + 1e-30 * np.eye(3))
+    w = random.normal(size=(N, 3)) @ root.T * (1.0, 1.0, float(walks))
     for k in range(N - 1):
-        F, u = transition(joint, k, tau[k])
+        F, u = transition(joint, k, tau[k], name)
         x[k + 1] = F @ x[k] + u + w[k]
     return x, (x[:, :2] + random.normal(size=(N, 2)) * (noise.r_q, noise.r_dq)).T, tau
 
 
-def batch(y: np.ndarray, tau: np.ndarray, noise: NoiseModel) -> tuple[np.ndarray, np.ndarray]:
-    """The last state and its covariance, by weighted least squares on all measurements and steps at once.
+def batch(y: np.ndarray, tau: np.ndarray, noise: NoiseModel, name: str) -> tuple[np.ndarray, np.ndarray]:
+    """All states (N, 3) and their deviations (N, 3), by weighted least squares on all measurements and steps at once.
 
-    Nothing is known of the first position and velocity.
+    Of the first position and velocity is known what is measured, hardly.
     """
     N, joint = y.shape[1], swaying(y.shape[1])
-    A, b = np.zeros((1 + 2 * N + 3 * (N - 1), 3 * N)), np.zeros(1 + 2 * N + 3 * (N - 1))
-    A[0, 2] = 1 / FIRST_STD
-    weights, steps = 1 / np.array(noise[:2]), 1 / np.array(noise[2:])
+    A, b = np.zeros((3 + 2 * N + 3 * (N - 1), 3 * N)), np.zeros(3 + 2 * N + 3 * (N - 1))
+    A[:3, :3] = np.diag([*(1 / np.array(noise[:2]) / np.sqrt(FIRST)), 1 / FIRST_STD])
+    b[:2] = A[[0, 1], [0, 1]] * y[:, 0]
+    weights, steps = 1 / np.array(noise[:2]), np.linalg.inv(np.linalg.cholesky(process(noise, name)))
     for k in range(N):
-        rows = slice(1 + 2 * k, 3 + 2 * k)
+        rows = slice(3 + 2 * k, 5 + 2 * k)
         A[rows, 3 * k : 3 * k + 2], b[rows] = np.diag(weights), weights * y[:, k]
     for k in range(N - 1):
-        rows, (F, u) = slice(1 + 2 * N + 3 * k, 4 + 2 * N + 3 * k), transition(joint, k, tau[k])
-        A[rows, 3 * k : 3 * k + 6] = steps[:, None] * np.hstack([-F, np.eye(3)])
-        b[rows] = steps * u
+        rows, (F, u) = slice(3 + 2 * N + 3 * k, 6 + 2 * N + 3 * k), transition(joint, k, tau[k], name)
+        A[rows, 3 * k : 3 * k + 6] = steps @ np.hstack([-F, np.eye(3)])
+        b[rows] = steps @ u
     scale = np.linalg.norm(A, axis=0)
     Q, R = np.linalg.qr(A / scale)
-    root = np.linalg.inv(R)[-3:]
-    return (root @ (Q.T @ b)) / scale[-3:], root @ root.T / np.outer(scale[-3:], scale[-3:])
+    root = np.linalg.inv(R) / scale[:, None]
+    return (root @ (Q.T @ b)).reshape(N, 3), np.linalg.norm(root, axis=1).reshape(N, 3)
 
 
-@FILTER
+FINE = NoiseModel(r_q=1e-6, r_dq=1e-5, q_q=1e-7, q_dq=1e-6, q_tau=0.05)
+
+
+@STEPPED
 @pytest.mark.parametrize("N", [1, 2, 3, 10, 40])
-def test_the_last_state_is_the_batch_least_squares_estimate(track: Filter, N: int):
-    # So fine an encoder that what a filter believes of the first position does not matter: a variance of one beside
-    # the measurement's 1e-12 and 1e-10.
-    noise = NoiseModel(r_q=1e-6, r_dq=1e-5, q_q=1e-7, q_dq=1e-6, q_tau=0.05)
-    _, y, tau = simulate(N, noise, seed=N)
-    made = track(swaying(len(tau)), *y, tau, T_S, noise, FIRST_STD)
-    state, covariance = batch(y, tau, noise)
-    assert_allclose([made.q[-1], made.dq[-1]], state[:2], rtol=0, atol=1e-9)
-    assert_allclose(made.tau_ext[-1], state[2], rtol=0, atol=1e-8 * FIRST_STD)
-    assert made.tau_ext_std[-1] == pytest.approx(np.sqrt(covariance[2, 2]), rel=1e-8)
+def test_the_last_state_is_the_batch_least_squares_estimate(name: str, N: int):
+    _, y, tau = simulate(N, FINE, seed=N, name=name)
+    made = tracker(name)(recording(swaying(N), *y, tau), FINE)
+    states, deviations = batch(y, tau, FINE, name)
+    assert_allclose([made.q[-1], made.dq[-1]], states[-1, :2], rtol=0, atol=1e-9)
+    assert_allclose(made.tau_ext[-1], states[-1, 2], rtol=0, atol=1e-8 * FIRST_STD)
+    assert made.tau_ext_std[-1] == pytest.approx(deviations[-1, 2], rel=1e-8)
 
 
-@FILTER
-def test_innovations_are_as_large_as_stated(track: Filter):
+@pytest.mark.parametrize("N", [1, 2, 3, 10, 40])
+def test_every_smoothed_state_is_the_batch_least_squares_estimate(N: int):
+    _, y, tau = simulate(N, FINE, seed=N)
+    made = tracker("rts")(recording(swaying(N), *y, tau), FINE)
+    states, deviations = batch(y, tau, FINE, "rts")
+    assert_allclose(np.transpose([made.q, made.dq]), states[:, :2], rtol=0, atol=1e-9)
+    assert_allclose(made.tau_ext, states[:, 2], rtol=0, atol=1e-8 * FIRST_STD)
+    # A variance of 4 before anything is measured, less all but 10^-7 of it: seven digits, and what P costs beside.
+    assert_allclose(made.tau_ext_std, deviations[:, 2], rtol=1e-4)
+
+
+@STEPPED
+def test_innovations_are_as_large_as_stated(name: str):
     N, settled = 20_000, 10
-    _, y, tau = simulate(N, NOISE, seed=0)
-    nis = track(swaying(len(tau)), *y, tau, T_S, NOISE, FIRST_STD).nis[settled:]
+    _, y, tau = simulate(N, NOISE, 0, name)
+    nis = tracker(name)(recording(swaying(N), *y, tau), NOISE).nis[settled:]
     low, high = chi2.interval(0.9999, 2 * len(nis))  # two measurements a sample, independent of those before
     assert low < nis.sum() < high
 
 
-@FILTER
-def test_errors_of_the_external_effort_are_as_large_as_stated(track: Filter):
-    scores = []
+@STATED
+def test_errors_of_the_external_effort_are_as_large_as_stated(name: str):
+    scores, at = [], 75
     for seed in range(SEEDS):
-        x, y, tau = simulate(150, NOISE, seed)
-        made = track(swaying(len(tau)), *y, tau, T_S, NOISE, FIRST_STD)
-        scores.append((made.tau_ext[-1] - x[-1, 2]) / made.tau_ext_std[-1])
+        x, y, tau = simulate(150, NOISE, seed, name)
+        made = tracker(name)(recording(swaying(150), *y, tau), NOISE)
+        scores.append((made.tau_ext[at] - x[at, 2]) / made.tau_ext_std[at])
     # The standard error of a mean is 1/sqrt(n), that of a deviation 1/sqrt(2 n); four of each are let.
     assert np.mean(scores) == pytest.approx(0.0, abs=4 / np.sqrt(SEEDS))
     assert np.std(scores) == pytest.approx(1.0, abs=4 / np.sqrt(2 * SEEDS))
 
 
-@FILTER
-def test_a_constant_effort_that_no_sensor_measures_is_found_within_its_stated_deviation(track: Filter):
+@STATED
+def test_a_constant_effort_that_no_sensor_measures_is_found_within_its_stated_deviation(name: str):
     steady = NOISE._replace(q_tau=1e-6)
-    x, y, tau = simulate(3000, steady, seed=1, walks=False)
-    made = track(swaying(len(tau)), *y, tau, T_S, steady, FIRST_STD)
+    x, y, tau = simulate(3000, steady, seed=1, name=name, walks=False)
+    made = tracker(name)(recording(swaying(3000), *y, tau), steady)
     assert made.tau_ext_std[-1] < 0.02 * x[-1, 2]
     assert abs(made.tau_ext[-1] - x[-1, 2]) < 4 * made.tau_ext_std[-1]
+
+
+def ramp_error(name: str) -> float:
+    """By how much an external effort that rises by 1 a second is missed in the end, position and velocity exact."""
+    t = T_S * np.arange(4000)
+    still = np.zeros(len(t))
+    joint = arm.dynamics((inertia, viscous), THETA[:2], len(t))
+    return float((tracker(name)(recording(joint, still, still, t), NOISE).tau_ext - t)[-1])
+
+
+def test_a_ramp_is_followed_only_by_the_filter_that_has_its_rate_and_by_the_smoother():
+    assert ramp_error("ekf") < -0.01
+    assert ramp_error("momentum") < -0.01
+    # The motor holds its effort over a sample, in which the external effort goes on rising: half a sample is missed.
+    assert ramp_error("rate") == pytest.approx(-0.5 * T_S, rel=0.05)
+    t = T_S * np.arange(4000)
+    still, joint = np.zeros(len(t)), arm.dynamics((inertia, viscous), THETA[:2], len(t))
+    smooth = tracker("rts")(recording(joint, still, still, t), NOISE).tau_ext
+    assert smooth[2000] == pytest.approx(t[2000], abs=1e-6)  # as much behind as ahead
+
+
+def test_the_rates_own_walk_is_as_large_as_stated():
+    """A rate that gains q_tau / T_s a sample, on a joint at rest that its motor holds against it."""
+    N, scores, joint = 400, [], arm.dynamics((inertia, viscous), THETA[:2], 400)
+    step = NOISE.q_tau / T_S * 0.02
+    noise = NOISE._replace(q_tau=0.02 * NOISE.q_tau)
+    for seed in range(SEEDS):
+        random = np.random.default_rng(seed)
+        rate = np.cumsum(step * random.normal(size=N)) + FIRST_STD * random.normal()
+        tau_ext = np.cumsum(rate) * T_S
+        y = random.normal(size=(2, N)) * [[noise.r_q], [noise.r_dq]]
+        made = tracker("rate")(recording(joint, *y, tau_ext), noise)
+        scores.append((made.tau_ext[-1] - tau_ext[-1]) / made.tau_ext_std[-1])
+    assert np.std(scores) == pytest.approx(1.0, abs=4 / np.sqrt(2 * SEEDS))
+
+
+def test_the_momentum_observers_deviation_is_that_of_its_noise():
+    N, joint = 40_000, arm.dynamics((inertia, viscous), THETA[:2], 40_000)
+    noise, random = NOISE._replace(q_dq=2e-3), np.random.default_rng(0)
+    effort = THETA[0] * noise.q_dq / T_S * random.normal(size=N)
+    made = tracker("momentum")(recording(joint, np.zeros(N), noise.r_dq * random.normal(size=N), effort), noise)
+    # The viscous effort of the velocity's noise is small beside that of the effort.
+    assert made.tau_ext[1000:].std() == pytest.approx(made.tau_ext_std[-1], rel=0.05)
 
 
 @FILTER
@@ -130,7 +206,8 @@ def test_a_constant_effort_that_no_sensor_measures_is_found_within_its_stated_de
 def test_the_external_effort_is_what_the_robot_exerts_on_its_environment(track: Filter, pushed: float):
     """A motor that pushes against a wall, and does not move for it, exerts its whole effort on the wall."""
     still = np.zeros(4000)
-    made = track(arm.dynamics((inertia, viscous), THETA[:2], 4000), still, still, still + pushed, T_S, NOISE, FIRST_STD)
+    joint = arm.dynamics((inertia, viscous), THETA[:2], 4000)
+    made = track(recording(joint, still, still, still + pushed), NOISE)
     # Forty seconds, and the filter forgets within a second what it believed at first.
     assert made.tau_ext[-1] == pytest.approx(pushed, abs=1e-6)
 
@@ -140,7 +217,7 @@ def test_what_the_joint_needs_itself_is_not_external(track: Filter):
     """The same joint held by its spring and its offset, free of the wall."""
     q = np.full(4000, 0.2)
     held = THETA[2] * q + THETA[3]
-    made = track(arm.dynamics(TERMS, THETA, 4000), q, 0 * q, held, T_S, NOISE, FIRST_STD)
+    made = track(recording(arm.dynamics(TERMS, THETA, 4000), q, 0 * q, held), NOISE)
     assert made.tau_ext[-1] == pytest.approx(0.0, abs=1e-6)
 
 
@@ -155,7 +232,7 @@ def test_variances_stay_positive_and_numbers_finite(track: Filter, seed: int, M:
     random = np.random.default_rng(seed)
     y, tau = random.normal(size=(2, 200)), random.normal(size=200)
     noise = NoiseModel(r_q, r_dq, 0.0, 1e-6, 1e-3)
-    made = track(arm.dynamics((inertia, viscous), np.array([M, 0.1]), 200), *y, tau, T_S, noise, 1.0)
+    made = track(recording(arm.dynamics((inertia, viscous), np.array([M, 0.1]), 200), *y, tau, 1.0), noise)
     assert (made.tau_ext_std > 0).all()
     assert [column.shape for column in made] == [(200,)] * len(made)
     assert all(np.isfinite(column).all() for column in made)

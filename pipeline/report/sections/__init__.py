@@ -17,6 +17,7 @@ DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
             "summary",
             "contacts",
             "tissue",
+            "weight",
             "joints",
             "choice",
             "prediction",

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.records import Contact, Tissue, Track
+from pipeline.records import Contact, Tissue, Track, Weight
 from pipeline.report.content import (
     Block,
     Cell,
@@ -32,18 +32,21 @@ def blocks(context: Context) -> Iterator[Block]:
     contacts = context.catalogue.all(Contact)
     if contacts:
         yield Prose(
-            "Each window of contact that the study states, on each joint that moved in it: the largest external "
-            "effort, its mean and its impulse (effort times time). Their standard errors are the spread of the same "
-            "quantities over windows of the same length in free space. A peak counts as told from free space where it "
-            "is above the joint's detection level, which 99 % of the samples of its worst free run stay below."
+            "Each contact on each joint that moved in it, in the windows that the study states and wherever else the "
+            "smoothed external effort is above the alarm level, which free motion crosses at most once in ten minutes: "
+            "when it began and ended, the largest external effort, its mean and its impulse (effort times time). Their "
+            "standard errors are what the same quantities come to over windows of the same length in free space; of a "
+            "peak, its own deviation, too. A peak counts as told from free space where it is above the joint's "
+            "detection level, which 99 % of the samples of its worst free run stay below."
         )
         yield peaks(contacts)
         yield Table(
-            "Contacts, log by log; told says whether the peak is above the detection level.",
-            ("Log", "Joint", "Window [s]", "Peak", "Mean", "Impulse", "Told"),
+            "Contacts, log by log; told says whether the peak is above the detection level, and where no window of the "
+            "study says so that a contact was found.",
+            ("Log", "Joint", "Onset", "Release", "Peak", "Mean", "Impulse", "Told"),
             tuple(row for contact in contacts for row in rows(context, contact)),
             "contact-table",
-            "llrrrrl",
+            "llrrrrrl",
         )
     unused = tuple((literal(name), joint, why) for name, joint, why in not_analysed(context))
     if unused:
@@ -59,9 +62,15 @@ def rows(context: Context, contact: Contact) -> Iterator[tuple[Cell, ...]]:
     """One row a window."""
     for i, above in enumerate(contact.above, 1):
         key = f"contact.{contact.log}.{contact.joint}.{i}"
-        window = f"{contact.onset[i - 1]:.4g} to {contact.release[i - 1]:.4g}"
-        efforts = (context.number(f"{key}.{name}", 3) for name in ("peak", "mean", "impulse"))
-        yield (literal(contact.log), title(contact.joint), window, *efforts, "yes" if above else "no")
+        numbers = (context.number(f"{key}.{name}", 3) for name in ("onset", "release", "peak", "mean", "impulse"))
+        yield (literal(contact.log), title(contact.joint), *numbers, told(contact, i - 1, bool(above)))
+
+
+def told(contact: Contact, i: int, above: bool) -> str:
+    """Whether a contact stands out, and what of it is not as the study has it."""
+    if not contact.stated[i]:
+        return "found, not stated"
+    return ("yes" if contact.found[i] else "peak only") if above else "no"
 
 
 def peaks(contacts: list[Contact]) -> Figure:
@@ -92,10 +101,12 @@ def peak_panel(contacts: list[Contact], named: bool) -> Panel:
 def not_analysed(context: Context) -> Iterator[tuple[str, str, str]]:
     """Log, joint and reason of what was recorded and tells nothing of contact here."""
     measured = {(contact.log, contact.joint) for contact in context.catalogue.all(Contact)}
+    weighed = {weight.log for weight in context.catalogue.all(Weight)}
     tracked = {(track.log, track.joint): track for track in context.catalogue.all(Track)}
     palpated = {tissue.log for tissue in context.catalogue.all(Tissue)}
     for entry in context.study.logs:
-        if entry.name in palpated or entry.role not in ("contact", "weight", "tissue", "friction"):
+        analysed = entry.name in weighed | palpated
+        if entry.role not in ("contact", "weight", "tissue", "friction") or analysed:
             continue
         joints = [joint for joint in entry.joints if (entry.name, joint) not in measured]
         reasons: dict[str, list[str]] = {}
@@ -116,4 +127,4 @@ def reason(entry: LogEntry, track: Track | None) -> str:
         )
     if entry.role != "contact":
         return f"a log of role “{entry.role}” is tracked, and its windows are not measured"
-    return "no window is stated, and none is searched for: write `contact = [[start, end]]` in study.toml"
+    return "no contact was found above the alarm level; write `contact = [[start, end]]` where there was one"

@@ -62,7 +62,7 @@ def paragraph_for_paper(context: Context) -> str:
     fits = context.own_fits()
     joints = ", ".join(dict.fromkeys(fit.group.replace("_", " ") for fit in fits)) or "no joint"
     logs = sorted({log for fit in fits for log in fit.logs})
-    random_walk = f"{settings.q_tau:g} (effort/s^0.5)" if settings.q_tau else "the robot's own setting"
+    random_walk = f"{settings.q_tau:g} (effort/s^0.5)" if settings.q_tau else "the slowest that shows a push of 1 s"
     return (
         f"External efforts of the {robot.title} ({joints}) were estimated from motor efforts and joint positions with "
         f"davinci-forces {context.provenance.version}. Dynamic parameters were identified from {len(logs)} periodic "

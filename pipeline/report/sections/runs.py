@@ -136,19 +136,19 @@ def statistics(context: Context, prefix: str) -> tuple[Cell, ...]:
 
 def assumptions(context: Context, tracks: list[Track]) -> Table:
     """What the filter assumed of noise."""
-    names = ("r_q", "r_dq", "q_q", "q_dq", "q_tau")
+    names = ("r_q", "r_dq", "q_dq", "q_tau")
     rows = tuple(
         (literal(t.log), title(t.joint), *(context.number(f"ekf.{t.log}.{t.joint}.{name}", 3) for name in names))
         for t in tracks
     )
     return Table(
-        "Noise that the filter assumes (standard deviations): of the measured position and velocity, from the spread "
-        "between periods; of their process noise per sample, from what forward Euler leaves out and from the noise of "
-        "the effort; and of the random walk of the external effort, chosen.",
-        ("Log", "Joint", "Position", "Velocity", "Process, $q$", "Process, $dot(q)$", "Random walk"),
+        "Noise that the filter assumes (standard deviations): of the measured position and velocity, and of what the "
+        "noise of the effort adds to the velocity in a sample, by the likelihood of the innovations of identification "
+        "logs; and of the random walk of the external effort, the slowest that shows a push.",
+        ("Log", "Joint", "Position", "Velocity", "Process, $dot(q)$", "Random walk"),
         rows,
         "filter-noise",
-        "llrrrrr",
+        "llrrrr",
     )
 
 

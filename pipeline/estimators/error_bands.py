@@ -1,0 +1,40 @@
+"""Which errors on free motion tell how far a log's external effort may be off: never the log's own."""
+
+import numpy as np
+
+from pipeline.estimators.paths import ANOTHER_PATH
+from pipeline.maths.arrays import Array, Booleans
+from pipeline.maths.contact.error_band import BLOCKS, SpeedCells, centred, excess, speed_bin
+from pipeline.records import ErrorBand
+
+OWN = "its own other blocks"  # where there is nothing else
+
+
+def model_variance(band: ErrorBand, log: str, path: str, dq: Array, is_centred: bool) -> tuple[Array, str]:
+    """The variance (N,) of a log's external effort beyond the filter's own, along its velocity, and whose errors tell.
+
+    Of other logs those on a path of the same kind are taken, for on a fitted path a model's error repeats.  Where there
+    are none, those on another path, which are larger; and where this log is all there is, of each of its blocks the
+    other blocks.  `is_centred` is for efforts whose offset of the day was taken off.
+    """
+    source, others = np.asarray(band.source).astype(str), np.asarray(band.source).astype(str) != log
+    kinds = np.asarray(band.path_of).astype(str)
+    bins = speed_bin(dq, band.speed)
+    for which in (others & (kinds == path), others & (kinds == ANOTHER_PATH), others):
+        if which.any():
+            names = ", ".join(dict.fromkeys(source[which]))
+            return excess(rows(band, which, is_centred))[bins], names
+    variance = np.empty(len(dq))
+    for number, part in enumerate(np.array_split(np.arange(len(dq)), BLOCKS)):
+        variance[part] = excess(rows(band, band.block != number, is_centred))[bins[part]]
+    return variance, OWN
+
+
+def rows(band: ErrorBand, which: Booleans, is_centred: bool) -> SpeedCells:
+    """Some of the cells of a band."""
+    _, source = np.unique(np.asarray(band.source).astype(str), return_inverse=True)
+    every = SpeedCells(
+        source, band.block, band.speed_bin, band.count, band.mean_square, band.filter_square, band.log_mean
+    )
+    some = every.those(which)
+    return centred(some) if is_centred else some

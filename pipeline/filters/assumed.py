@@ -1,0 +1,18 @@
+"""What a filter assumes of a joint at a sampling rate, from what was settled for all of its logs."""
+
+from pipeline.filters import DEFAULT, tracker
+from pipeline.filters.problem import NoiseModel
+from pipeline.filters.response import slowest
+from pipeline.records import FilterNoise
+
+
+def assumed(settled: FilterNoise, T_s: float, q_tau: float = 0.0, name: str = DEFAULT) -> NoiseModel:
+    """The noise of a sample of T_s [s] for the filter of that name.
+
+    The effort's noise drives the model, as an acceleration that is constant over a sample.  `q_tau` is a walk of the
+    external effort [effort/s^0.5]; 0 is the slowest with which this filter shows a push.
+    """
+    noise = NoiseModel(settled.r_q, settled.r_dq, 0.0, settled.r_tau * T_s / settled.inertia, q_tau * T_s**0.5)
+    return noise if q_tau else noise._replace(
+        q_tau=slowest(tracker(name), settled.inertia, settled.viscous, T_s, noise)
+    )  # fmt: skip

@@ -1,0 +1,18 @@
+"""The effort that the model leaves of every sample, with accelerations from measured motion.
+
+tau_ext = tau - M ddq - b(q, dq)                                                                          (7.28)
+"""
+
+import numpy as np
+
+from pipeline.filters.problem import NoiseModel, Tracked
+from pipeline.maths.models.bias import bias
+from pipeline.maths.models.driven import Driven
+
+
+def track(recording: Driven, noise: NoiseModel) -> Tracked:
+    """As the motion that is handed over has it; its deviation is that of the noise of the effort."""
+    joint, q, dq, ddq, tau, T_s, _ = recording
+    tau_ext = tau - joint.inertia * ddq - bias(joint.coefficients, q, dq, 0.0)[0] - joint.known
+    nothing = np.zeros(len(q))
+    return Tracked(q, dq, tau_ext, joint.inertia * noise.q_dq / T_s, nothing, nothing, nothing)

@@ -1,0 +1,36 @@
+"""Bring together what the model's error was on free motion that no fit had seen, for the bands of all logs."""
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from pipeline.records import ErrorBand, FilterNoise, FreeMotion
+
+LOGS = 20  # at most, that a band is made of
+
+
+def run(motions: Iterable[FreeMotion], noises: Iterable[FilterNoise]) -> Iterator[ErrorBand]:
+    """One ErrorBand per joint of which there is any such motion."""
+    speeds = {noise.joint: noise.speed for noise in noises}
+    every: dict[str, list[FreeMotion]] = {}
+    for motion in motions:
+        every.setdefault(motion.joint, []).append(motion)
+    for joint, own in every.items():
+        some = [own[i] for i in np.unique(np.linspace(0, len(own) - 1, min(len(own), LOGS)).round().astype(int))]
+        yield band(joint, some, speeds[joint])
+
+
+def band(joint: str, own: list[FreeMotion], speed: float) -> ErrorBand:
+    """The rows of all its logs, one after the other."""
+    names = ("block", "speed_bin", "count", "mean_square", "filter_square")
+    columns = {name: np.concatenate([getattr(motion, name) for motion in own]) for name in names}
+    repeated = [len(motion) for motion in own]
+    return ErrorBand(
+        joint=joint,
+        speed=speed,
+        band_rms=float(np.sqrt(np.average(columns["mean_square"], weights=columns["count"]))),
+        source=np.repeat(np.array([motion.log for motion in own], object), repeated),
+        path_of=np.repeat(np.array([motion.path for motion in own], object), repeated),
+        log_mean=np.repeat([motion.free_mean for motion in own], repeated),
+        **columns,
+    )

@@ -1,0 +1,104 @@
+"""Compare filters: what each makes of free space, and of a push that is added to the recorded effort in software."""
+
+from collections.abc import Iterable, Iterator, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from pipeline.estimators.driving import Driving, driving, named
+from pipeline.estimators.used import FALLBACK, describing
+from pipeline.filters import DEFAULT, FILTERS, through
+from pipeline.filters.assumed import assumed
+from pipeline.filters.problem import NoiseModel
+from pipeline.filters.response import DURATION, Response, half_sine, response
+from pipeline.maths.arrays import Array, Booleans
+from pipeline.maths.contact.free_space import levels
+from pipeline.maths.models.driven import Driven
+from pipeline.maths.signals.windows import free_space
+from pipeline.records import Choice, Comparison, Diagnostic, FilterNoise, Fit, Signal, diagnostic
+from pipeline.robots.robot import Kind, Robot
+from pipeline.study import LogEntry
+
+PUSH = {Kind.REVOLUTE: 0.5, Kind.PRISMATIC: 2.0}  # [N m], [N]
+FEWEST = 100  # samples of free space, below which nothing is said
+INDEPENDENT = f"{DEFAULT}-independent"  # the default filter with the joint's own terms
+
+
+def run(
+    signals: Sequence[Signal],
+    fits: Iterable[Fit],
+    choices: Iterable[Choice],
+    noises: Iterable[FilterNoise],
+    entry: LogEntry,
+    robot: Robot,
+    *,
+    fit: str,
+    lowpass: float,
+    q_tau: float,
+) -> Iterator[Comparison | Diagnostic]:
+    """One Comparison per filter and joint that moves in a log that no parameter was fitted to.
+
+    Each filter has the slowest walk with which it shows a push, so that they are compared at the same speed.
+    """
+    if entry.role != "validation" and not (entry.role == "contact" and entry.contact):
+        return
+    every, chosen, settled = list(fits), list(choices), {noise.joint: noise for noise in noises}
+    for signal in signals:
+        if signal.at_rest or signal.joint not in settled or not describing(robot, every, signal.joint):
+            continue
+        free = free_space(signal.t, entry.contact, signal.rate)
+        if int(free.sum()) < FEWEST:
+            continue
+        kept, _ = named(signal, signals, every, chosen, robot, fit)
+        own = driving(signal, signals, kept, robot, lowpass)
+        alone, _ = named(signal, signals, every, chosen, robot, FALLBACK)
+        tried = [(name.replace("_", "-"), name, own) for name in FILTERS]
+        if own.fit.model != "independent":
+            tried.append((INDEPENDENT, DEFAULT, driving(signal, signals, alone, robot, lowpass)))
+        for label, name, by in tried:
+            if by.joint.inertia.min() > 0:
+                noise = assumed(settled[signal.joint], 1.0 / signal.rate, q_tau, name)
+                yield from compared(label, name, by, noise, free, PUSH[robot.joint(signal.joint).kind])
+
+
+def compared(
+    label: str, name: str, own: Driving, noise: NoiseModel, free: Booleans, push: float
+) -> Iterator[Comparison | Diagnostic]:
+    """What one filter makes of a joint of a log, and of the same with a push."""
+    signal, parts = own.signal, own.smooth_parts if name == "direct" else own.parts
+    made = through(name, parts, noise)
+    if not np.isfinite(made.tau_ext).all():
+        return
+    space, shown = levels(made.tau_ext[free], made.tau_ext_std[free]), pushed(name, own, parts, noise, free, push)
+    if label == DEFAULT and shown.share < 0.5:
+        said = (
+            f"{signal.log}/{signal.joint}: the filter is deaf: it shows {shown.share:.0%} of a push of {DURATION:g} s"
+        )
+        yield diagnostic("compare", f"{signal.log}.{signal.joint}", "warning", f"{said}; raise q_tau in [settings]")
+    yield Comparison(
+        log=signal.log, joint=signal.joint, filter=label, role=signal.role, default=int(label == DEFAULT),
+        free_rms=space.rms, free_rms_std=space.rms_std, free_level=space.level_95, free_level_std=space.level_95_std,
+        detection_level=space.level_99, detection_level_std=space.level_99_std, push_peak=push, push_share=shown.share,
+        push_delay=shown.delay, t=signal.t, tau_ext=made.tau_ext,
+    )  # fmt: skip
+
+
+def pushed(
+    name: str, own: Driving, parts: Sequence[Driven], noise: NoiseModel, free: Booleans, push: float
+) -> Response:
+    """How a filter shows a push in the middle of the longest free space, added to the recorded effort."""
+    t = own.signal.t
+    start = middle(t, free) - 0.5 * DURATION
+    added, first = push * half_sine(t, start), np.cumsum([0, *(len(part.q) for part in parts)])
+    touched = [
+        part._replace(tau=part.tau + added[a:b]) for part, (a, b) in zip(parts, pairwise(first.tolist()), strict=True)
+    ]
+    difference = through(name, touched, noise).tau_ext - through(name, parts, noise).tau_ext
+    return response(difference, t, start, push)
+
+
+def middle(t: Array, free: Booleans) -> float:
+    """The middle [s] of the longest run of free samples."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], free, [False]]))).reshape(-1, 2)
+    a, b = max(edges.tolist(), key=lambda run: run[1] - run[0])
+    return float(t[(a + b) // 2])

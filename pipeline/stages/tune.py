@@ -1,0 +1,91 @@
+"""Tune the filter's noise to identification logs: that of the greatest likelihood of its innovations."""
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from pipeline.estimators.driving import Driving, driving, named
+from pipeline.estimators.used import describing
+from pipeline.filters import ekf
+from pipeline.filters.problem import NoiseModel
+from pipeline.filters.tuning import tuned
+from pipeline.maths.signals.noise import noise_std
+from pipeline.records import Choice, Diagnostic, Fit, MeasurementNoise, Signal, Tuning, diagnostic
+from pipeline.robots.robot import Robot
+from pipeline.study import LogEntry
+
+FINEST = 1e-9  # of a range: a noiseless log would leave innovations without a covariance to be judged by
+VISCOUS = 4  # of a bias' coefficients
+
+
+def run(
+    signals: Sequence[Signal],
+    fits: Iterable[Fit],
+    choices: Iterable[Choice],
+    noises: Iterable[MeasurementNoise],
+    entry: LogEntry,
+    robot: Robot,
+    *,
+    fit: str,
+    lowpass: float,
+) -> Iterator[Tuning | Diagnostic]:
+    """One Tuning per joint that moves in an identification log, in which nothing touches the robot.  Section 7.3"""
+    if entry.role != "identification":
+        return
+    every, chosen, between = list(fits), list(choices), {noise.joint: noise for noise in noises}
+    for signal in signals:
+        if signal.at_rest or not describing(robot, every, signal.joint) or signal.joint not in between:
+            continue
+        kept, _ = named(signal, signals, every, chosen, robot, fit)
+        own = driving(signal, signals, kept, robot, lowpass)
+        if own.joint.inertia.min() <= 0:
+            yield not_positive(signal, kept)
+            continue
+        yield tuning(own, start(own, between[signal.joint], lowpass))
+
+
+def tuning(own: Driving, before: NoiseModel) -> Tuning:
+    """The noise of one joint of a log, and how much more likely it makes what was measured than where it began."""
+    parts, T_s, inertia = own.parts, 1.0 / own.signal.rate, float(own.joint.inertia.max())
+    viscous = own.joint.coefficients[VISCOUS]
+    noise = tuned(parts, before, inertia, viscous)
+    began, ended = (
+        sum(ekf.log_likelihood(part, n) for part in parts) for n in (before._replace(q_tau=noise.q_tau), noise)
+    )
+    return Tuning(
+        log=own.signal.log,
+        joint=own.signal.joint,
+        rate=own.signal.rate,
+        r_q=noise.r_q,
+        r_dq=noise.r_dq,
+        r_tau=noise.q_dq * inertia / T_s,
+        q_tau=noise.q_tau / T_s**0.5,
+        inertia=inertia,
+        viscous=viscous,
+        speed=float(np.sqrt(np.mean(own.signal.dq**2))),
+        likelihood_gain=ended - began,
+        tested=len(own.signal),
+    )
+
+
+def start(own: Driving, between: MeasurementNoise, lowpass: float) -> NoiseModel:
+    """What a low-pass takes out of each signal, so that what is slow, and no noise, does not count; the noise between
+    periods where the sampling rate leaves it nothing to take out.  Section 6.3.3
+    """
+    s = own.signal
+    pairs = ((s.q, between.sigma_q), (s.dq, between.sigma_dq), (s.tau - own.tau_hat, between.sigma_tau))
+    sizes = [
+        max(noise_std(x, s.segment, s.rate, lowpass) or slow, FINEST * float(np.ptp(x)), 1e-12) for x, slow in pairs
+    ]
+    return NoiseModel(sizes[0], sizes[1], 0.0, sizes[2] / s.rate / float(own.joint.inertia.mean()), 0.0)
+
+
+def not_positive(signal: Signal, fit: Fit) -> Diagnostic:
+    """Why nothing is tracked."""
+    name = f"{signal.log}/{signal.joint}"
+    said = (
+        f"{name}: the inertia of {fit.model}.{fit.estimator} is not positive, so no motion follows from it and nothing "
+        "is tracked: the identification's motion tells the inertia too little, or the effort's sign is opposite to the "
+        "position's; excite the joint faster, or correct `sign` in the study"
+    )
+    return diagnostic("tune", f"{signal.log}.{signal.joint}", "warning", said)

@@ -1,0 +1,276 @@
+"""Masses from external efforts: the regression, the path that a tare shares, and the stages on a simulated arm."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pipeline.maths.contact.weighing import PARTS, Rows, Weighed, better, offset, weighed, widening
+from pipeline.maths.mechanics.load import unit_load
+from pipeline.maths.signals.shift import circular, rolled, straight
+from pipeline.records import Diagnostic, FreeWeight, Load, Prediction, Signal, Track, Weight
+from pipeline.robots import dvrk_psm
+from pipeline.stages import hang, weigh
+from pipeline.study import HungMass, Weighing, Weighings
+from tests.arm import ARM
+from tests.test_averaging import entry
+
+RATE, PERIOD, PERIODS = 100.0, 5.0, 6
+T = np.arange(round(PERIODS * PERIOD * RATE)) / RATE
+ROBOT, MASS = dvrk_psm.ROBOT, 0.205
+JOINTS = ("hand_roll", "hand_pitch", "instrument_slide")
+HUNG = HungMass("hand_pitch", (0.0, -0.1, 0.5), MASS)
+
+
+def rows(x, y, sigma=1.0) -> Rows:
+    return Rows(x, y, np.arange(len(x)) * PARTS // len(x), sigma)
+
+
+# The regression
+
+
+def test_the_mass_of_several_joints_is_that_of_weighted_least_squares_with_an_offset_each():
+    rng = np.random.default_rng(0)
+    x, y = rng.normal(size=(2, 60)), rng.normal(size=(2, 60))
+    sigma = (0.5, 2.0)
+    A = np.zeros((120, 3))
+    A[:60, 0], A[60:, 0], A[:60, 1], A[60:, 2] = x[0], x[1], 1.0, 1.0
+    w = np.repeat(1 / np.array(sigma), 60)
+    want = np.linalg.lstsq(A * w[:, None], y.ravel() * w, rcond=None)[0]
+    each = [rows(x[j], y[j], sigma[j]) for j in range(2)]
+    found = weighed(each).mass
+    assert_allclose([found, *(offset(row, found) for row in each)], want, rtol=1e-10)
+
+
+def test_a_column_that_hardly_varies_is_given_no_offset():
+    x = -9.81 + 0.1 * np.sin(T)
+    assert weighed([rows(x, 0.1 * x)]).mass == pytest.approx(0.1)
+    assert offset(rows(x, 0.1 * x + 0.5), 0.1) == 0.0
+
+
+def test_intervals_hold_the_mass_where_what_the_model_leaves_is_as_slow_as_a_part_of_the_path():
+    """Errors correlated over 0.1 of a path: an interval of six parts holds the truth about as often as t says."""
+    x, held, draws = np.sin(2 * np.pi * np.arange(600) / 600), 0, 400
+    kernel = np.ones(60) / np.sqrt(60)
+    for seed in range(draws):
+        e = np.convolve(np.random.default_rng(seed).normal(size=659), kernel, mode="valid")
+        found = weighed([rows(x, 0.2 * x + 0.1 * e)])
+        held += abs(found.mass - 0.2) < 2.57 * found.std  # of Student's t with 5 degrees of freedom
+    assert 0.90 < held / draws < 0.99
+
+
+def test_masses_of_free_motion_that_exceed_their_errors_widen_them_and_others_do_not_narrow_them():
+    assert widening([Weighed(0.03, 0.01), Weighed(0.03, 0.01)], 0.0) == pytest.approx(3.0)
+    assert widening([Weighed(0.03, 0.01)], 0.02) == pytest.approx(3.0 / np.sqrt(5.0))
+    assert widening([Weighed(0.001, 0.01)], 0.0) == 1.0
+    assert widening([], 0.01) == 1.0
+
+
+def test_the_column_that_made_the_effort_explains_it_better():
+    rng = np.random.default_rng(1)
+    x, other = np.sin(6 * np.arange(600) / 100), np.cos(6 * np.arange(600) / 100)
+    y = x + 0.1 * rng.normal(size=600)
+    assert better([rows(x, y)], [rows(other, y)]) > 4
+    assert better([rows(other, y)], [rows(x, y)]) < -4
+
+
+# The path that a tare shares
+
+
+def test_a_period_is_found_wherever_the_other_recording_began():
+    phase = np.arange(500) / 500
+    q = np.stack([np.sin(2 * np.pi * phase), np.cos(4 * np.pi * phase + 0.3)], axis=1)
+    other = rolled(q, -123.4)
+    shift = circular(q, other)
+    assert shift.samples % 500 == pytest.approx(123.4, abs=0.05)
+    assert_allclose(rolled(other, shift.samples), q, atol=1e-3)
+    assert shift.apart.max() < 1e-3
+
+
+@pytest.mark.parametrize("lag", [-70, 0, 70])
+def test_a_motion_that_does_not_repeat_is_found_in_another_recording(lag):
+    long = np.cumsum(np.random.default_rng(2).normal(size=(900, 2)), axis=0)
+    q, other = long[100:800], long[100 - lag : 800 - lag]
+    shift = straight(q, other)
+    assert shift.samples == lag
+    assert_allclose(shift.apart, 0.0, atol=1e-9)
+
+
+def test_another_path_is_far_apart_at_best():
+    phase = 2 * np.pi * np.arange(500)[:, None] / 500
+    assert circular(np.sin(phase), np.sin(2 * phase)).apart.max() > 1
+
+
+# The stages, on a simulated arm whose model errs along its path
+
+
+def motion(path=0.0, t=T):
+    """Position, velocity and acceleration (N, 3) of a path."""
+    w = 2 * np.pi / PERIOD
+    size, k = np.array([0.5, 0.4, 0.04]), np.array([1, 2, 3])
+    angle = np.multiply.outer(w * t, k) + path
+    return size * np.sin(angle), size * w * k * np.cos(angle), -size * (w * k) ** 2 * np.sin(angle)
+
+
+def left_by_the_model(t, seed):
+    """What a model errs by (N, 3), which repeats with the path, of the size of a real one; and noise."""
+    rng = np.random.default_rng(seed)
+    a, b = rng.normal(size=(2, 12, 3))
+    slow = sum(a[k] * np.cos((k + 1) * 2 * np.pi / PERIOD * t[:, None] + 3 * b[k]) for k in range(12)) / np.sqrt(6)
+    return np.array([0.05, 0.1, 0.1]) * slow + 0.05 * np.random.default_rng(len(t)).normal(size=slow.shape)
+
+
+def log(name, role, seed, hung=None, path=0.0, day=0.0, t=T):
+    """Signals, tracks and predictions of one log; `hung` says what truly hangs."""
+    q, dq, ddq = motion(path, t)
+    tau = left_by_the_model(t, seed) + day
+    if hung is not None:
+        tau = tau + MASS * unit_load(ROBOT.chain, "end_link", hung, q, dq, ddq)
+    segment = np.zeros(len(t), int)
+    signals = [
+        Signal(name, joint, role, RATE, "as recorded", "logged", 0, 0, t=t, q=q[:, i], dq=dq[:, i], tau=tau[:, i],
+               segment=segment) for i, joint in enumerate(JOINTS)
+    ]  # fmt: skip
+    tracks, predictions = [], []
+    for i, joint in enumerate(JOINTS):
+        scalars = dict.fromkeys(Track.scalars(), 0.0) | {"log": name, "joint": joint, "role": role, "model": "m"}
+        scalars |= {"estimator": "e", "filter": "ekf", "at_rest": 0, "rate": RATE}
+        columns = dict.fromkeys(Track.columns(), np.zeros(len(t))) | {"t": t, "tau": tau[:, i], "q": q[:, i]}
+        tracks.append(Track(**scalars, **columns))
+        scores = dict.fromkeys(Prediction.scalars(), 0.0) | {"log": name, "joint": joint, "role": role}
+        scores |= {"model": "chosen", "estimator": "m.e", "scheme": "s", "path": "p"}
+        predictions.append(Prediction(**scores, t=t, tau=tau[:, i], tau_hat=np.zeros(len(t))))
+    return signals, tracks, predictions
+
+
+def analysed(logs, weighing, robot=ROBOT):
+    """What both stages make of logs: by kind."""
+    about = Weighings((weighing,))
+    loads, said = [], []
+    for signals, tracks, predictions in logs:
+        first = signals[0]
+        its = entry(name=first.log, role=first.role, weight=weighing.weight if first.log == weighing.log else None)
+        for record in hang.run(signals, tracks, predictions, its, robot, about, fit="chosen", lowpass=17.0):
+            (loads if isinstance(record, Load) else said).append(record)
+    made = list(weigh.run(loads, robot, about))
+    weights = [record for record in made if isinstance(record, Weight)]
+    free = {record.log: record for record in made if isinstance(record, FreeWeight)}
+    texts = [text for d in (*said, *made) if isinstance(d, Diagnostic) for text in d.text]
+    return (weights[0] if weights else None), free, texts
+
+
+def study(seed, tare="", position=HUNG.position, tare_path=0.0):
+    """A fit's log, a free log on another path, a weight log, and a run without the mass."""
+    logs = [
+        log("fitted", "identification", 100 + seed),
+        log("other", "validation", 200 + seed, path=0.8),
+        log("empty", "validation", 300 + seed, path=tare_path, t=T[: len(T) - 137] + 1.37),
+        log("heavy", "weight", 300 + seed, HUNG.position),
+    ]
+    return analysed(logs, Weighing("heavy", replace(HUNG, position=position), tare))
+
+
+def test_a_hung_mass_is_found_within_its_interval():
+    off = []
+    for seed in range(30):
+        weight, _, _ = study(seed)
+        off.append((weight.mass - MASS) / weight.mass_std)
+        assert list(weight.loaded) == ["hand_roll", "hand_pitch"]  # the slide carries none of it
+        assert weight.mass_scale == pytest.approx(weight.mass / MASS)
+    assert np.mean(np.abs(off) < 1.96) >= 0.85  # 30 draws of 95 % fall below 25 once in thousands
+    assert np.std(off) > 0.4  # nor are intervals so wide that nothing could miss them
+
+
+def test_a_run_of_free_motion_weighs_nothing_within_its_interval():
+    free = [study(seed)[1] for seed in range(15)]
+    off = [f.free_mass / f.free_mass_std for each in free for f in each.values()]
+    assert np.mean(np.abs(off) < 1.96) >= 0.9
+    assert {f.role for f in free[0].values()} == {"identification", "validation"}
+
+
+def test_a_tare_takes_away_what_repeats_along_the_path_wherever_it_began():
+    plain, tared = study(3)[0], study(3, tare="empty")[0]
+    assert abs(tared.mass - MASS) < 0.2 * abs(plain.mass - MASS)
+    assert abs(tared.mass - MASS) < 1.96 * tared.mass_std
+    assert tared.mass_std < 0.5 * plain.mass_std
+    assert tared.tare_mass == pytest.approx(plain.mass - tared.mass, abs=0.1 * plain.mass_std)
+    assert (tared.tare, plain.tare, np.isnan(plain.tare_mass)) == ("empty", "", True)
+
+
+def test_a_tare_of_another_path_is_not_subtracted_and_that_is_said():
+    weight, _, said = study(3, tare="empty", tare_path=0.8)
+    assert weight.tare == ""
+    assert np.isnan(weight.tare_mass)
+    assert any("heavy: its tare empty is not on the same path: at best it is off by" in text for text in said)
+
+
+def test_the_side_that_the_mass_does_not_hang_on_tells():
+    """0.1 m to the side of a point half a metre up is seen; the mass of the other side is another one."""
+    right, wrong = study(5), study(5, position=(0.0, 0.1, 0.5))
+    assert right[0].side == "as stated"
+    assert wrong[0].side == "the other one"
+    assert wrong[0].mass_mirrored == pytest.approx(right[0].mass)
+    assert right[0].mass_mirrored == pytest.approx(wrong[0].mass)
+
+
+def test_an_offset_of_the_day_costs_no_mass():
+    logs = [log("fitted", "identification", 1), log("heavy", "weight", 2, HUNG.position, day=0.3)]
+    off, _, _ = analysed(logs, Weighing("heavy", HUNG, ""))
+    logs[1] = log("heavy", "weight", 2, HUNG.position)
+    still, _, _ = analysed(logs, Weighing("heavy", HUNG, ""))
+    assert off.mass == pytest.approx(still.mass, abs=1e-9)
+    assert_allclose(off.joint_offset - still.joint_offset, 0.3)
+
+
+def test_a_mass_that_nobody_states_is_found_and_has_no_scale():
+    logs = [log("fitted", "identification", 1), log("heavy", "weight", 2, HUNG.position)]
+    weight, _, _ = analysed(logs, Weighing("heavy", replace(HUNG, mass=None), ""))
+    assert weight.mass == pytest.approx(MASS, abs=3 * weight.mass_std)
+    assert np.isnan(weight.mass_scale)
+
+
+def test_what_the_joints_that_move_do_not_carry_is_said_and_not_weighed():
+    logs = [tuple(part[2:] for part in log("heavy", "weight", 2, HUNG.position))]  # the slide alone
+    weight, _, said = analysed(logs, Weighing("heavy", HUNG, ""))
+    assert weight is None
+    assert any("heavy: no joint that moves carries what hangs on hand_pitch" in text for text in said)
+
+
+def test_a_robot_without_geometry_weighs_nothing_and_says_why():
+    logs = [log("heavy", "weight", 2, HUNG.position)]
+    weight, _, said = analysed(logs, Weighing("heavy", HUNG, ""), ARM)
+    assert weight is None
+    assert "heavy: arm has no chain, so what a mass asks of its joints is not known; nothing is weighed" in said
+
+
+def test_joints_count_by_how_well_their_models_do_in_free_motion():
+    """Ten times the noise on one of them hardly moves the mass, which the other then tells."""
+    weight, _, _ = study(7)
+    roll, pitch = weight.mass_alone
+    share = (weight.mass - pitch) / (roll - pitch)
+    power = [np.var(unit_load(ROBOT.chain, "end_link", HUNG.position, *motion())[:, i]) for i in range(2)]
+    want = power[0] / weight.free_error[0] ** 2 / sum(p / e**2 for p, e in zip(power, weight.free_error, strict=True))
+    assert share == pytest.approx(want, abs=0.02)
+    assert weight.free_error[1] > 1.5 * weight.free_error[0]
+
+
+def test_a_tare_of_a_motion_that_does_not_repeat_is_subtracted_too(monkeypatch):
+    monkeypatch.setattr(hang, "guess", lambda signals: None)
+    t = T[: len(T) - 300]
+    logs = [
+        log("fitted", "identification", 103),
+        log("empty", "validation", 303),
+        log("heavy", "weight", 303, HUNG.position, t=t + 2.0),
+    ]
+    for tare, closer in (("", False), ("empty", True)):
+        weight, _, _ = analysed(logs, Weighing("heavy", HUNG, tare))
+        assert (weight.tare == tare, weight.left_rms.max() < 0.06) == (True, closer)  # of it 0.04 is noise
+
+
+def test_a_model_without_any_error_tells_the_mass_exactly(monkeypatch):
+    monkeypatch.setattr("tests.test_weighing.left_by_the_model", lambda t, seed: np.zeros((len(t), 3)))
+    weight, free, _ = study(0)
+    # Central differences err by (w T_s)^2 / 6, 2e-4 of what the fastest acceleration asks for.
+    assert weight.mass == pytest.approx(MASS, rel=2e-4)
+    assert max(abs(f.free_mass) for f in free.values()) < 1e-12
