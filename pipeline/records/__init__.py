@@ -30,8 +30,8 @@ __all__ = [
     "Counts", "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "FilterNoise", "Fit", "FittedPaths",
     "FreeMotion", "FreeSpace", "FreeWeight", "Labels", "Links", "Load", "LogSummary", "Lyapunov",
     "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Push", "Record", "Recording",
-    "Residual", "Signal", "Smoothed", "Spectrum", "SwarmSearch", "Threshold", "Tissue", "TissueModel", "Touch", "Track", "Trajectory", "Tuning",
-    "Weight", "Whiteness", "Workspace", "diagnostic",
+    "Residual", "Signal", "Smoothed", "Spectrum", "SwarmSearch", "Threshold", "Tissue", "TissueModel", "Touch",
+    "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {

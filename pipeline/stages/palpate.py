@@ -90,7 +90,15 @@ def probing(touch: Touch | None, slide: Track | None, cutoff: float) -> Probing 
     if touch is not None:
         nearest = np.clip(np.searchsorted(touch.t, slide.t), 0, len(touch) - 1)
         push, place = touch.push[nearest], place_of(touch)[nearest]
-    return known(Probing(slide.t, push, depth, direct[:, None], place, dq, slide.tau_ext_std))
+    return known(Probing(slide.t, push, depth, direct[:, None], place, dq, model_std(slide)))
+
+
+def model_std(slide: Track) -> Column:
+    """Standard deviation (N,) of the error that pushes may share: the model's, and of that which is not known, all.
+
+    Noise is in what a line leaves, there is no lag, and the offset of the day is the line's intercept.
+    """
+    return np.full(len(slide), slide.model_part) if slide.band_from else slide.tau_ext_std
 
 
 def depth_of(touch: Touch | None, slide: Track | None, t: Column) -> Array | None:

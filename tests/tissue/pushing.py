@@ -58,7 +58,7 @@ def sensed(seed=0, corners=TWICE, rate=100.0, std=0.02, rho=0.0, surface=0.008, 
     return touch(t, depth=depth, force=force + 0.3 + coloured(np.random.default_rng(seed), len(t), std, rho))
 
 
-def slid(seed=0, std=0.5, total=0.1, lag=0.1, way=1.0, rest=6.0) -> Track:
+def slid(seed=0, std=0.5, model=0.1, lag=0.1, way=1.0, rest=6.0, band_from="free") -> Track:
     """The same by the slide: friction takes any value at rest, and the filter comes late."""
     t, depth = motion(APPROACH, 100.0)
     rng = np.random.default_rng(seed)
@@ -68,8 +68,9 @@ def slid(seed=0, std=0.5, total=0.1, lag=0.1, way=1.0, rest=6.0) -> Track:
     late = way * np.interp(t - lag, t, force)
     zero = np.zeros_like(t)
     columns = dict.fromkeys(Track.columns(), zero) | {"t": t, "q": way * depth, "dq": way * dq, "tau_ext": late}
-    columns |= {"tau_ext_direct": direct, "tau_ext_std": zero + total}
+    columns |= {"tau_ext_direct": direct, "tau_ext_std": zero + 3.0}
     scalars = dict.fromkeys(Track.scalars(), 0.0) | {"at_rest": 0, "rate": 100.0, "filter": "ekf"}
+    scalars |= {"model_part": model, "band_from": band_from}
     named = {"log": "run", "joint": "instrument_slide", "role": "tissue", "model": "m", "estimator": "e"}
     return Track(**columns, **scalars | named)
 

@@ -191,15 +191,17 @@ def test_the_slide_tells_by_its_effort_at_the_depth_it_belongs_to_and_not_at_res
 
 
 def test_the_interval_of_the_slide_carries_the_error_of_its_model():
-    small, large = (palpated(tracks=[slid(total=total)])[0] for total in (0.0, 1.0))
+    small, large = (palpated(tracks=[slid(model=model)])[0] for model in (0.0, 1.0))
     assert small.stiffness_std_model == 0
     # The worst that an error of 1 N can do over 40 mm; a constant one does nothing, one along the depth 1 N / 11.5 mm.
     assert 0.2 / 0.0115 < large.stiffness_std_model < 1 / 0.0115
     np.testing.assert_allclose(large.onset_depth_std, np.hypot(small.onset_depth_std, 1 / K), rtol=0.02)
-    push = palpated(tracks=[slid(total=1.0)])[1][0]
+    push = palpated(tracks=[slid(model=1.0)])[1][0]
     assert (push.k_t_std, push.onset_depth_std) == (large.k_t_std[0], large.onset_depth_std[0])
     assert push.k_t_std > push.k_t_std_model > 0
     assert large.stiffness_std == pytest.approx(np.hypot(small.stiffness_std, large.stiffness_std_model))
+    unknown = palpated(tracks=[slid(model=0.0, band_from="")])[0]  # then all that the filter states, 3 N
+    assert unknown.stiffness_std_model == pytest.approx(3 * large.stiffness_std_model)
 
 
 def test_a_slide_that_pushes_towards_lower_positions_meets_the_same_tissue():
