@@ -27,7 +27,7 @@ from pipeline.records import (
     Lyapunov,
     Origin,
     Record,
-    Tissue,
+    Stiffness,
     TissueModel,
     Weight,
 )
@@ -220,7 +220,7 @@ BY_HAND = (*ROBOT, "weight.", "tissue.")
 def test_keys_of_a_robot_and_of_what_hangs_on_it_are_told_and_those_told_are_there():
     """Of records made by hand, as designing a robot takes half a minute, and the arm of the tests has no chain."""
     records = [made(Links), made(Control), made(Lyapunov), made(Excitation, source="table-6.1")]
-    records += [made(Weight), made(FreeWeight), made(Tissue), made(TissueModel)]
+    records += [made(Weight), made(FreeWeight), made(Stiffness), made(TissueModel)]
     keys = set(collect(Catalogue(lambda kind: [record for record in records if isinstance(record, kind)])))
     assert {key.partition(".")[0] + "." for key in keys} == set(BY_HAND)
     untold, empty = told(keys)

@@ -14,7 +14,7 @@ from pipeline.records.fit import CrossFit, Fit, FittedPaths, MeasurementNoise, R
 from pipeline.records.hang import Load
 from pipeline.records.ingest import LogSummary, Recording, Touch
 from pipeline.records.measure import Contact
-from pipeline.records.palpate import Push, Tissue, TissueModel
+from pipeline.records.palpate import Push, Stiffness, TissueModel
 from pipeline.records.predict import Prediction
 from pipeline.records.record import COLUMN_DTYPES, AnyRecord, Column, Counts, Labels, Names, Origin, Record
 from pipeline.records.resample import Signal
@@ -29,9 +29,9 @@ __all__ = [
     "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Choice", "Column", "Comparison", "Contact", "Control",
     "Counts", "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "FilterNoise", "Fit", "FittedPaths",
     "FreeMotion", "FreeSpace", "FreeWeight", "Labels", "Links", "Load", "LogSummary", "Lyapunov",
-    "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Push", "Record", "Recording",
-    "Residual", "Signal", "Smoothed", "Spectrum", "SwarmSearch", "Threshold", "Tissue", "TissueModel", "Touch",
-    "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace", "diagnostic",
+    "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Push", "Record",
+    "Recording", "Residual", "Signal", "Smoothed", "Spectrum", "Stiffness", "SwarmSearch", "Threshold",
+    "TissueModel", "Touch", "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
@@ -40,6 +40,6 @@ KINDS: dict[str, type[Record]] = {
         Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Touch, Signal, Average,
         PeriodResidual, Trajectory, Spectrum, Smoothed, Fit, CrossFit, FittedPaths, MeasurementNoise, Residual,
         SwarmSearch, Choice, Prediction, Tuning, FilterNoise, FreeMotion, ErrorBand, Track, FreeSpace,
-        Threshold, Contact, Push, Tissue, TissueModel, Comparison, Whiteness, Diagnostic, Load, Weight, FreeWeight,
+        Threshold, Contact, Push, Stiffness, TissueModel, Comparison, Whiteness, Diagnostic, Load, Weight, FreeWeight,
     )
 }  # fmt: skip

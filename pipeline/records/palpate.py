@@ -38,7 +38,7 @@ class Push(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Tissue(Record):
+class Stiffness(Record):
     """How stiff the tissue of one log is: the pushes, one a row, and their median."""
 
     KEY = ("log",)

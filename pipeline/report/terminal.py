@@ -3,7 +3,7 @@
 import re
 from collections.abc import Sequence
 
-from pipeline.records import Tissue
+from pipeline.records import Stiffness
 from pipeline.report.content.inline import parse
 from pipeline.report.context import Context
 from pipeline.report.sections.summary import first_looks_in_order, fitted_joints, trust, trust_row
@@ -15,7 +15,7 @@ HEADER = ("joint", "verdict", "model error", "of effort", "R2", "at most", "dete
 def answer(context: Context) -> str:
     """The trust table and the three things to look at first, in plain text."""
     trusts = [trust(context, joint) for joint in fitted_joints(context)]
-    tissue = [f"tissue {plain(verdict(context, each).text)}" for each in context.catalogue.all(Tissue)]
+    tissue = [f"tissue {plain(verdict(context, each).text)}" for each in context.catalogue.all(Stiffness)]
     if not trusts:
         said = "no joint could be identified: there is no usable identification log, so no effort was tracked"
         return "\n".join([said, *tissue]) + "\n"

@@ -12,7 +12,7 @@ from pipeline.maths.contact.stiffness import median_std
 from pipeline.maths.contact.tissue import LAWS, FittedLaw, chosen, force_of, judged, moments, tangent
 from pipeline.maths.contact.wrong import remarks
 from pipeline.maths.signals.smoothing import lowpass as lowpass_of
-from pipeline.records import Column, Diagnostic, Push, Tissue, TissueModel, Touch, Track, diagnostic
+from pipeline.records import Column, Diagnostic, Push, Stiffness, TissueModel, Touch, Track, diagnostic
 from pipeline.robots.robot import Kind, Robot
 from pipeline.study import WHOLE, LogEntry
 
@@ -23,7 +23,7 @@ FILTER = "ekf"
 
 def run(
     touches: Sequence[Touch], tracks: Sequence[Track], entry: LogEntry, robot: Robot, *, lowpass: float
-) -> Iterator[Push | Tissue | TissueModel | Diagnostic]:
+) -> Iterator[Push | Stiffness | TissueModel | Diagnostic]:
     """The pushes of one tissue log, what they come to together, and what is wrong with them.
 
     The force is that of a sensor's channel.  Where there is none, it is what the joint that slides exerts: its effort
@@ -168,7 +168,7 @@ def record_of(push: Pushed, log: str, best: FittedLaw | None) -> Push:
     )
 
 
-def tissue_of(pushes: Sequence[Pushed], log: str, source: str, swings: int) -> Tissue:
+def tissue_of(pushes: Sequence[Pushed], log: str, source: str, swings: int) -> Stiffness:
     """The pushes of a log together: the median slope of those whose force is a straight line."""
     lines = [push.line for push in pushes if push.line is not None]
     k, own, r2 = (np.array([getattr(line, name) for line in lines]) for name in ("k", "k_std", "r2"))
@@ -178,7 +178,7 @@ def tissue_of(pushes: Sequence[Pushed], log: str, source: str, swings: int) -> T
     low, middle, high = np.quantile(k[counts], [0.25, 0.5, 0.75]) if counts.any() else [float("nan")] * 3
     std = median_std(k[counts], own[counts], common) if counts.any() else float("nan")
     lost = np.array([push.lost for push in pushes])
-    return Tissue(
+    return Stiffness(
         log=log,
         source=source,
         swings=swings,

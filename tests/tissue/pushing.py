@@ -3,7 +3,7 @@
 import numpy as np
 from scipy.signal import lfilter
 
-from pipeline.records import Diagnostic, Push, Tissue, TissueModel, Touch, Track
+from pipeline.records import Diagnostic, Push, Stiffness, TissueModel, Touch, Track
 from pipeline.stages import palpate
 from tests import arm
 from tests.test_averaging import entry
@@ -79,7 +79,7 @@ def palpated(touches=(), tracks=(), **changes):
     """What the stage makes: the tissue, the pushes, the models and the remarks; None and () where there are none."""
     about = entry(role="tissue", **changes)
     made = list(palpate.run(list(touches), list(tracks), about, arm.ARM, lowpass=17.0))
-    tissue = next((r for r in made if isinstance(r, Tissue)), None)
+    tissue = next((r for r in made if isinstance(r, Stiffness)), None)
     models = next((r for r in made if isinstance(r, TissueModel)), None)
     said = [text for r in made if isinstance(r, Diagnostic) for text in r.text]
     return tissue, [r for r in made if isinstance(r, Push)], models, said

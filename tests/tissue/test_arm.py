@@ -35,7 +35,7 @@ def found(tmp_path_factory):
         said: list[str] = []
         runner = Runner(reading.read(raw), folders(raw, None, None), Console(lambda _: None, said.append))
         assert runner.run(NEEDED), "\n".join(said)
-        tissue.append(pipeline.read(raw, "Tissue"))
+        tissue.append(pipeline.read(raw, "Stiffness"))
     return tissue
 
 

@@ -200,7 +200,7 @@ def test_real_probes_of_a_phantom(data, tmp_path):
     folder = study(tmp_path)
     (folder / "probes.csv").write_bytes((data / "palpation" / "phantom_T1_probes.csv").read_bytes())
     stages(folder, "ingest", "palpate")
-    tissue = pipeline.read(folder, "Tissue")
+    tissue = pipeline.read(folder, "Stiffness")
     counted = tissue[tissue["counted"] == 1]["k_t"]
     assert tissue["stiffness"].iloc[0] == pytest.approx(453, rel=0.05)
     assert counted.median() == pytest.approx(453, rel=0.05)
@@ -216,7 +216,7 @@ def test_real_pushes_over_a_surface_are_found_one_by_one(data, tmp_path):
     folder = study(tmp_path, text=text)
     (folder / "probes.csv").write_bytes((data / "palpation" / "ContPalpTrial1.csv").read_bytes())
     stages(folder, "ingest", "palpate")
-    tissue, pushes = pipeline.read(folder, "Tissue"), pipeline.read(folder, "Push")
+    tissue, pushes = pipeline.read(folder, "Stiffness"), pipeline.read(folder, "Push")
     assert 340 <= len(tissue) <= 380
     known = tissue.dropna(subset=["onset_depth"])
     assert len(known) > 0.6 * len(tissue)

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.records import Contact, Diagnostic, Prediction, Record, Tissue, Track
+from pipeline.records import Contact, Diagnostic, Prediction, Record, Stiffness, Track
 from pipeline.report.content import (
     Block,
     Bullets,
@@ -69,7 +69,7 @@ def blocks(context: Context) -> Iterator[Block]:
 def nothing_identified(context: Context) -> Verdict:
     """Why there is no effort to show, and what there is instead."""
     text = "No joint could be identified: there is no usable identification log, so no effort was tracked."
-    if context.catalogue.all(Tissue):
+    if context.catalogue.all(Stiffness):
         return Verdict("info", f"{text} What sensors say of tissue is in [@tissue].")
     return Verdict("bad", text)
 

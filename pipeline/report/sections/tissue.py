@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from pipeline.maths.arrays import Booleans
-from pipeline.records import Column, Push, Tissue, TissueModel
+from pipeline.records import Column, Push, Stiffness, TissueModel
 from pipeline.report.content import (
     Band,
     Block,
@@ -41,11 +41,11 @@ MM = 1e3
 
 def section(context: Context) -> Section | None:
     """All tissue logs; None of a study without any."""
-    tissues = context.catalogue.all(Tissue)
+    tissues = context.catalogue.all(Stiffness)
     return Section("Tissue", "tissue", tuple(blocks(context, tissues))) if tissues else None
 
 
-def blocks(context: Context, tissues: list[Tissue]) -> Iterator[Block]:
+def blocks(context: Context, tissues: list[Stiffness]) -> Iterator[Block]:
     """The section's content."""
     yield from (verdict(context, tissue) for tissue in tissues)
     yield Prose(
@@ -71,7 +71,7 @@ def blocks(context: Context, tissues: list[Tissue]) -> Iterator[Block]:
         yield OnScreen("More on the tissue: other logs, every push, and models", "more-tissue", details)
 
 
-def verdict(context: Context, tissue: Tissue) -> Verdict:
+def verdict(context: Context, tissue: Stiffness) -> Verdict:
     """How well one log tells the stiffness."""
     name = f"**{literal(tissue.log)}**"
     if not tissue.pushes:
@@ -83,7 +83,7 @@ def verdict(context: Context, tissue: Tissue) -> Verdict:
     return Verdict("warn" if level == "good" and tissue.pushes == 1 else level, text)
 
 
-def true_words(context: Context, tissue: Tissue) -> str:
+def true_words(context: Context, tissue: Stiffness) -> str:
     """Whether the interval of 95 % holds what is true of a simulated log."""
     value = true_stiffness(context, tissue.log)
     if value is None:
@@ -103,7 +103,7 @@ def chosen(context: Context, log: str) -> str:
     return next((model.chosen for model in context.catalogue.about(TissueModel, log=log)), "")
 
 
-def comparison(context: Context, tissues: Sequence[Tissue]) -> Table:
+def comparison(context: Context, tissues: Sequence[Stiffness]) -> Table:
     """One row a log, and what the thesis states of the same robot."""
     rows: list[tuple[Cell, ...]] = [
         (
@@ -129,7 +129,7 @@ def comparison(context: Context, tissues: Sequence[Tissue]) -> Table:
     )
 
 
-def force_figures(context: Context, tissue: Tissue) -> Iterator[Figure]:
+def force_figures(context: Context, tissue: Stiffness) -> Iterator[Figure]:
     """Force against depth of one log, where its pushes are at hand."""
     own = {push.push: push for push in context.catalogue.about(Push, log=tissue.log)}
     typical = own.get(int(tissue.push[nearest(tissue)]))
@@ -138,14 +138,14 @@ def force_figures(context: Context, tissue: Tissue) -> Iterator[Figure]:
         yield force_figure(tissue, [own[number] for number in tissue.push[few].tolist() if number in own], typical)
 
 
-def nearest(tissue: Tissue) -> int:
+def nearest(tissue: Stiffness) -> int:
     """The push whose stiffness is nearest to that of the log; where none counts, the one of the best line."""
     if not tissue.pushes:
         return int(np.argmax(tissue.r2))
     return int(np.argmin(np.where(tissue.counted == 1, np.abs(tissue.k_t - tissue.stiffness), np.inf)))
 
 
-def force_figure(tissue: Tissue, pushes: Sequence[Push], typical: Push) -> Figure:
+def force_figure(tissue: Stiffness, pushes: Sequence[Push], typical: Push) -> Figure:
     """Pushes with the typical line and its interval, what the line leaves, and the loop or the spread."""
     name = literal(tissue.log)
     last = spread_panel(tissue) if len(tissue) > MANY else loop_panel(typical)
@@ -199,20 +199,20 @@ def in_and_out(x: Column, y: Column, inside: Booleans, loading: Booleans) -> tup
     return (first, Points(x[out], y[out], "out", "orange")) if out.any() else (first,)
 
 
-def spread_panel(tissue: Tissue) -> Panel:
+def spread_panel(tissue: Stiffness) -> Panel:
     """How the stiffness of the pushes that count is spread, with its quartiles."""
     counts, edges = np.histogram(tissue.k_t[tissue.counted == 1], bins=40)
     quartiles = VSpan(tissue.stiffness_q1, tissue.stiffness_q3, "quartiles")
     return Panel("Stiffness of pushes", "stiffness [N/m]", "pushes", (quartiles, Histogram(edges, counts, "", "blue")))
 
 
-def spread(tissue: Tissue) -> float:
+def spread(tissue: Stiffness) -> float:
     """The second largest distance [m] between places that pushes go to, along x, y and z."""
     reach = [float(np.ptp(places)) if np.isfinite(places).all() else 0.0 for places in (tissue.x, tissue.y, tissue.z)]
     return sorted(reach)[1] if len(tissue) > 3 else 0.0
 
 
-def surface_map(tissue: Tissue) -> Figure:
+def surface_map(tissue: Stiffness) -> Figure:
     """The stiffness over the surface, in four classes of as many pushes each, along its two longest axes."""
     places = {"x": tissue.x, "y": tissue.y, "z": tissue.z}
     across, along = sorted(sorted(places, key=lambda name: -float(np.ptp(places[name])))[:2])
@@ -236,7 +236,7 @@ def surface_map(tissue: Tissue) -> Figure:
     )
 
 
-def each_push(context: Context, tissues: Sequence[Tissue]) -> Iterator[Table]:
+def each_push(context: Context, tissues: Sequence[Stiffness]) -> Iterator[Table]:
     """Every push of logs that hold few."""
     header = ("Push", "Stiffness", "R2", "First contact", "On the way in", "On the way out", "Energy lost", "Share")
     names = ("k_t", "r2", "onset_depth", "k_t_loading", "k_t_unloading", "lost", "lost_share")
