@@ -20,15 +20,15 @@ ARM = Robot(
     title="Arm of the tests",
     joints=(
         Joint(
-            "hand_roll", "Hand roll", Kind.REVOLUTE, (inertia, gravity_sin, viscous, coulomb), HAND, **MOTOR, q_tau=0.5
+            "hand_roll", "Hand roll", Kind.REVOLUTE, (inertia, gravity_sin, viscous, coulomb), HAND, **MOTOR
         ),
         Joint(
             "hand_pitch", "Hand pitch", Kind.REVOLUTE, (inertia, gravity_sin, gravity_cos, viscous, coulomb), HAND,
-            **MOTOR, q_tau=0.5,
+            **MOTOR,
         ),
         Joint(
             "instrument_slide", "Instrument slide", Kind.PRISMATIC, (lifted_mass, inertia, viscous, coulomb), SLIDE,
-            gear_ratio=1000.0, torque_constant=0.05, q_tau=3.0,
+            gear_ratio=1000.0, torque_constant=0.05,
         ),
     ),
 )  # fmt: skip
@@ -129,7 +129,7 @@ def write_robot(folder: Path) -> None:
             f'[[joint]]\nname = "{j.name}"\ntitle = "{j.title}"\nkind = "{j.kind.value}"\n'
             f"terms = {json.dumps([term.name for term in j.terms])}\nlimits = {{ {limits} }}\n"
             f"gear_ratio = {j.gear_ratio}\ntorque_constant = {j.torque_constant}\n"
-            f"harmonics = {j.harmonics}\nq_tau = {j.q_tau}\n"
+            f"harmonics = {j.harmonics}\n"
         )
     (folder / "arm.toml").write_text("\n".join(tables))
 

@@ -5,6 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from pipeline.maths.contact.day_offset import day_offset
+from pipeline.maths.contact.detection import FALSE_ALARMS, Quiet, alarm_level, events, quiet
+from pipeline.maths.contact.error_band import cells, excess
 from pipeline.maths.contact.free_space import levels
 from pipeline.maths.contact.window import mean_size, summarise
 from pipeline.maths.signals.bootstrap import blocks, standard_error
@@ -14,6 +17,7 @@ from pipeline.maths.signals.smoothing import lowpass, share_passed
 from pipeline.maths.signals.windows import free_space
 from pipeline.records import Threshold, Track
 from pipeline.stages import assess, measure, threshold
+from tests import arm
 from tests.test_averaging import entry
 
 RATE = 100.0
@@ -22,9 +26,15 @@ T = np.arange(4000) / RATE
 
 def track(tau_ext, std=0.1, joint="hand_roll", log="push", role="contact", at_rest=0) -> Track:
     zero = np.zeros_like(T)
-    columns = dict.fromkeys(Track.columns(), zero) | {"t": T, "tau_ext": tau_ext, "tau_ext_std": zero + std}
+    efforts = {"tau_ext": tau_ext, "tau_ext_smooth": tau_ext, "tau_ext_std": zero + std}
+    columns = dict.fromkeys(Track.columns(), zero) | {"t": T, **efforts}
     scalars = dict.fromkeys(Track.scalars(), 0.0) | {"at_rest": at_rest, "rate": RATE, "filter": "ekf"}
     return Track(**columns, **scalars | {"log": log, "joint": joint, "role": role, "model": "m", "estimator": "e"})
+
+
+def measured(track_, thresholds, about):
+    """What the stage makes of a track, without the fits that a joint at rest asks for."""
+    return list(measure.run(track_, thresholds, [], about, arm.ARM))
 
 
 def noise(seed=0, std=0.1):
@@ -60,11 +70,12 @@ def test_the_block_bootstrap_knows_that_correlated_samples_say_less():
 def test_a_triangle_has_its_peak_mean_and_impulse():
     push = 3.0 * np.clip(1 - np.abs(T - 10.0), 0, None)
     free = free_space(T, [(9.0, 11.0)], RATE)
-    found = summarise(T, noise(std=0.02) + push, (9.0, 11.0), free)
+    found = summarise(T, noise(std=0.02) + push, np.full(len(T), 0.05), (9.0, 11.0), free)
     assert found.peak == pytest.approx(3.0, abs=4 * 0.02)
     assert found.mean == pytest.approx(1.5, abs=0.02)
     assert found.impulse == pytest.approx(3.0, abs=0.04)
-    assert found.peak_std == pytest.approx(0.02, rel=0.1)
+    # The largest of 201 samples of noise is 2.8 of its deviations on average; the effort's own deviation counts, too.
+    assert found.peak_std == pytest.approx(np.hypot(0.05, 2.8 * 0.02), rel=0.1)
     assert found.mean_std == pytest.approx(0.02 / np.sqrt(201), rel=0.5)
     assert found.impulse_std == pytest.approx(2.0 * found.mean_std)
 
@@ -73,7 +84,7 @@ def test_a_bias_in_free_space_makes_means_uncertain_however_long_they_are():
     free = np.ones(len(T), bool)
     assert mean_size(noise() + 0.5, free, 1000) == pytest.approx(0.5, abs=0.02)
     assert np.isnan(mean_size(noise(), ~free, 10))
-    assert summarise(T, noise(), (100.0, 101.0), free) is None
+    assert summarise(T, noise(), noise() ** 2, (100.0, 101.0), free) is None
 
 
 def test_free_space_leaves_out_what_still_settles():
@@ -93,7 +104,7 @@ def test_a_contact_stands_out_when_its_peak_exceeds_the_level_of_unseen_free_spa
         *assess.run(track(noise(2, 5.0), log="fitted", role="identification"), entry(role="identification")),
         *assess.run(track(noise(3, 9.0), joint="hand_pitch", role="validation"), entry(role="validation")),
     ]
-    [contact] = measure.run(track(noise(0) + push), threshold.run(spaces), entry(role="contact", contact=windows))
+    [contact] = measured(track(noise(0) + push), threshold.run(spaces), entry(role="contact", contact=windows))
     assert contact.level_from == "check"  # neither what was fitted nor another joint
     assert list(contact.above) == [1, int(abs(contact.peak[1]) > contact.detection_level)]
     assert contact.peak[0] == pytest.approx(2.0, abs=0.5)
@@ -107,8 +118,9 @@ def test_nothing_is_said_of_a_joint_at_rest_or_of_a_contact_log_without_windows(
     assert not list(assess.run(track(noise()), entry(role="contact")))
     [space] = assess.run(track(noise()), entry(role="validation"))
     about = entry(role="contact", contact=((9.0, 11.0),))
-    assert list(measure.run(track(noise()), threshold.run([space]), about))
-    assert not list(measure.run(track(noise(), at_rest=1), threshold.run([space]), about))
+    assert measured(track(noise()), threshold.run([space]), about)
+    [hidden] = measured(track(noise(), at_rest=1), threshold.run([space]), about)
+    assert "the joint is at rest, where contact of up to its stiction cannot be told" in hidden.text[0]
 
 
 def test_noise_is_told_from_the_error_of_a_model():
@@ -157,9 +169,9 @@ def test_paths_that_differ_most_stand_for_all():
 
 def test_a_contact_is_judged_by_the_threshold_of_its_joint_and_filter():
     about = entry(role="contact", contact=((9.0, 11.0),))
-    theirs = [Threshold("hand_pitch", "ekf", 1.0, "a"), Threshold("hand_roll", "rts", 1.0, "b")]
-    assert not list(measure.run(track(noise()), theirs, about))
-    [contact] = measure.run(track(noise()), [*theirs, Threshold("hand_roll", "ekf", 0.01, "c")], about)
+    theirs = [Threshold("hand_pitch", "ekf", 1.0, 9.0, "a"), Threshold("hand_roll", "rts", 1.0, 9.0, "b")]
+    assert not measured(track(noise()), theirs, about)
+    [contact] = measured(track(noise()), [*theirs, Threshold("hand_roll", "ekf", 0.01, 9.0, "c")], about)
     assert (contact.level_from, contact.detection_level, *contact.above) == ("c", 0.01, 1)
 
 
@@ -168,3 +180,76 @@ def test_a_track_knows_when_it_was_not_touched_in_its_own_words():
     assert [n.key for n in space.published()] == [
         f"ekf.x.hand_roll.{name}" for name in ("free_rms", "free_level", "detection_level", "coverage")
     ]
+
+
+def slow_noise(std=0.05, seed=0, N=4000, cutoff=1.0):
+    """What a smoother leaves of free motion: normal, and slower than `cutoff` [Hz]."""
+    x = lowpass(np.random.default_rng(seed).normal(size=N + 2000), RATE, cutoff)[1000:-1000]  # without its ends
+    return std * x / x.std()
+
+
+def test_free_motion_crosses_the_alarm_level_as_seldom_as_it_says():
+    """Ten hours of normal noise: one upward crossing of either sign in ten minutes each, by Rice's formula."""
+    x = slow_noise(1.0, 0, 3_600_000)
+    space = quiet(x, np.ones(len(x), bool), RATE)
+    level = alarm_level([space._replace(largest=0.0)])
+    crossings = np.sum((x[:-1] < level) & (x[1:] >= level))
+    expected = len(x) / RATE * FALSE_ALARMS
+    assert abs(crossings - expected) < 4 * np.sqrt(expected)
+    assert alarm_level([Quiet(0.1, 0.2, 0.3), Quiet(0.1, 5.0, 0.3)]) == 5.0  # the most that was ever seen
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_ramp_and_a_step_begin_where_they_began(seed):
+    """A triangle from 9 to 11 s and a step from 20 to 23 s, as a smoother of a rise of 0.3 s spreads them."""
+    push = 3.0 * np.clip(1 - np.abs(T - 10.0), 0, None) - np.where((T >= 20) & (T <= 23), 2.0, 0.0)
+    spread = np.exp(-0.5 * ((np.arange(-100, 101) / RATE) / (0.3 / np.sqrt(2 * np.pi))) ** 2)
+    smooth = np.convolve(push, spread / spread.sum(), "same") + slow_noise(0.03, seed)
+    first, second = events(T, smooth, np.full(len(T), 0.03), 0.3, rise=0.3)
+    for found, true in zip((first.onset, first.release, second.onset, second.release), (9, 11, 20, 23), strict=True):
+        assert found == pytest.approx(true, abs=0.1)
+    assert first.onset_std == pytest.approx(0.01, rel=0.5)  # 0.03 over a slope of 3 a second
+
+
+def test_what_nearly_touches_is_one_contact_and_what_changes_sign_is_two():
+    x = np.where((T >= 5) & (T < 6), 1.0, 0.0) + np.where((T >= 6.1) & (T < 7), 1.0, 0.0)
+    x -= np.where((T >= 7) & (T < 8), 1.0, 0.0) + np.where((T >= 12) & (T < 13), 1.0, 0.0)
+    found = list(events(T, x, np.full(len(T), 0.1), 0.5, rise=0.0))
+    assert [round(e.onset, 1) for e in found] == [5.0, 7.0, 12.0]
+
+
+def test_a_contact_that_no_window_states_is_found_and_said_to_be():
+    push = np.where((T >= 20) & (T <= 22), 2.0, 0.0) + np.where((T >= 9) & (T <= 11), 1.5, 0.0)
+    quiet_threshold = [Threshold("hand_roll", "ekf", 0.3, 0.5, "c")]
+    about = entry(role="contact", contact=((9.0, 11.0), (30.0, 31.0)))
+    [contact] = measured(track(push + noise(std=0.01)), quiet_threshold, about)
+    assert contact.stated.tolist() == [1, 1, 0]
+    assert contact.found.tolist() == [1, 0, 1]
+    assert contact.onset[2] == pytest.approx(20.0, abs=0.05)
+    assert (contact.onset[1], contact.release[1]) == (30.0, 31.0)
+    [free] = measured(track(push, role="validation"), quiet_threshold, entry(role="validation"))
+    assert free.stated.tolist() == [0, 0]
+    assert not measured(track(noise(std=0.01), role="validation"), quiet_threshold, entry(role="validation"))
+
+
+def test_the_excess_is_the_variance_beyond_the_filters_own():
+    of = cells(noise(1, 0.5), np.full(len(T), 0.04), np.sin(T), speed=0.7)
+    assert excess(of) == pytest.approx(np.full(5, 0.25 - 0.04), rel=4 * np.sqrt(2 / len(T)))
+    assert (excess(cells(noise(1, 0.1), np.full(len(T), 0.04), np.sin(T), speed=0.7)) == 0).all()
+
+
+def test_the_band_is_by_speed_only_where_speed_tells_more():
+    dq = np.sin(T)
+    slow = np.abs(dq) < 0.25 * 0.5
+    found = excess(cells(noise(1) * np.where(slow, 10.0, 1.0), np.zeros(len(T)), dq, speed=0.5))
+    assert found[0] == pytest.approx(1.0, rel=0.3)
+    assert found[2:] == pytest.approx(np.full(3, 0.01), rel=0.3)
+
+
+def test_the_offset_of_free_windows_has_a_standard_error_and_a_drift():
+    found = day_offset(T, 0.3 + noise(1), [(0.0, 10.0), (20.0, 30.0)])
+    assert found.value == pytest.approx(0.3, abs=4 * 0.1 / np.sqrt(2000))
+    assert found.std == pytest.approx(0.1 / np.sqrt(2000), rel=0.6)
+    assert not found.drifts
+    assert day_offset(T, 0.3 + 0.1 * T, [(0.0, 10.0), (20.0, 30.0)]).drifts
+    assert day_offset(T, 0.3 + noise(1), [])[:2] == (0.0, 0.0)

@@ -111,7 +111,7 @@ def ur10e(data, tmp_path_factory):
     (study / "joint_1.csv").symlink_to(data / "ur10e" / "joint_1.csv")
     (study / "ur10e.toml").write_text(
         'name = "ur10e"\ntitle = "UR10e"\n[[joint]]\nname = "shoulder_pan"\ntitle = "Shoulder pan"\nkind = "revolute"\n'
-        'terms = ["inertia", "viscous friction", "Coulomb friction", "offset"]\nharmonics = 5\nq_tau = 0.5\n'
+        'terms = ["inertia", "viscous friction", "Coulomb friction", "offset"]\nharmonics = 5\n'
         "limits = { q = [-6.2832, 6.2832], dq = [-2.1, 2.1], ddq = [-10.0, 10.0] }\n"
         "gear_ratio = 1.0\ntorque_constant = 1.0\n"
     )

@@ -1,6 +1,8 @@
 """The effort that the model leaves of every sample, with accelerations from measured motion.
 
-tau_ext = tau - M ddq - b(q, dq)                                                                          (7.28)
+With the motion that is handed over, q, dq and ddq:
+
+    tau_ext = tau - M ddq - b(q, dq)                                                  (7.28)
 """
 
 import numpy as np

@@ -40,6 +40,6 @@ KINDS: dict[str, type[Record]] = {
         Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Touch, Signal, Average,
         PeriodResidual, Trajectory, Spectrum, Smoothed, Fit, CrossFit, FittedPaths, MeasurementNoise, Residual,
         SwarmSearch, Choice, Prediction, Tuning, FilterNoise, FreeMotion, ErrorBand, Track, FreeSpace,
-        Threshold, Contact, Push, Stiffness, TissueModel, Comparison, Whiteness, Diagnostic, Load, Weight, FreeWeight,
+        Threshold, Contact, Push, Stiffness, TissueModel, Load, Weight, FreeWeight, Comparison, Whiteness, Diagnostic,
     )
 }  # fmt: skip

@@ -10,7 +10,6 @@ terms = ["inertia", "gravity, sine", "viscous friction", "Coulomb friction"]
 gear_ratio = 100.0                      # motor angle over joint position; 1 where logs give the joint side
 torque_constant = 0.05                  # [N m/A]
 harmonics = 5                           # of the excitation
-q_tau = 2.0                             # random walk of the external effort [effort/s^0.5]
 limits = { q = [-1.0, 1.0], dq = [-2.0, 2.0], ddq = [-5.0, 5.0] }
 """
 
@@ -100,7 +99,7 @@ def change(joint: Joint, table: TomlTable) -> Joint:
         harmonics=table.take(
             "harmonics", joint.harmonics, (int,), "a whole number from 1 to 100", lambda x: 1 <= x <= 100
         ),
-        q_tau=float(table.take("q_tau", joint.q_tau, (int, float), "a positive number", lambda x: 0 < x < math.inf)),
+        q_tau=float(table.take("q_tau", joint.q_tau, (int, float), "a number from 0 on", lambda x: 0 <= x < math.inf)),
     )
     table.close()
     return changed

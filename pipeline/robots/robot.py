@@ -50,7 +50,7 @@ class Joint:
     published: tuple[tuple[str, tuple[float, ...]], ...] = ()
     # How fast the external effort may wander: the intensity of its random walk, a standard deviation per square root
     # of a second [effort/s^0.5].  A choice, not a measurement; the report says so.
-    q_tau: float = 1.0
+    q_tau: float = 0.0  # random walk of the external effort [effort/s^0.5]; 0 is the slowest that shows a push
     physical: PhysicalTable | None = None  # what the parameters of its terms are made of, where that is known
 
     def unit(self, template: str) -> str:

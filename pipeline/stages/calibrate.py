@@ -53,7 +53,8 @@ def run(
         elif signal.joint in fitted and follows(signal, fitted[signal.joint]):
             path = SAME_PATH
         if own.joint.inertia.min() > 0:
-            yield from free_motion(own, path, scheme, settled[signal.joint], entry, q_tau)
+            walk = q_tau or robot.joint(signal.joint).q_tau
+            yield from free_motion(own, path, scheme, settled[signal.joint], entry, walk)
 
 
 def left_out(own: Driving, predictions: Sequence[Prediction], fit: str) -> tuple[Driving, str, str] | None:

@@ -57,7 +57,8 @@ def run(
             tried.append((INDEPENDENT, DEFAULT, driving(signal, signals, alone, robot, lowpass)))
         for label, name, by in tried:
             if by.joint.inertia.min() > 0:
-                noise = assumed(settled[signal.joint], 1.0 / signal.rate, q_tau, name)
+                walk = q_tau or robot.joint(signal.joint).q_tau
+                noise = assumed(settled[signal.joint], 1.0 / signal.rate, walk, name)
                 yield from compared(label, name, by, noise, free, PUSH[robot.joint(signal.joint).kind])
 
 

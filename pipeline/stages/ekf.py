@@ -78,7 +78,8 @@ def run(
             continue
         path = path_of.get(signal.joint)
         fitted = entry.role == "identification" or (path is not None and follows(signal, path))
-        noise = assumed(noise_of[signal.joint], 1.0 / signal.rate, q_tau)
+        walk = q_tau or robot.joint(signal.joint).q_tau
+        noise = assumed(noise_of[signal.joint], 1.0 / signal.rate, walk)
         yield from tracked(own, noise, band_of.get(signal.joint), SAME_PATH if fitted else ANOTHER_PATH, entry)
 
 

@@ -1,12 +1,13 @@
-// The loop of filters/ekf.py once more, for comparison: one joint, states q, dq, tau_ext.
+// The loop of filters/ekf.py once more, for comparison: one joint, states q, dq, tau_ext, a second-order step.
 #include <cmath>
 
 extern "C" void pass(const double *c, const double *inertia, const double *y_q, const double *y_dq, const double *drive,
                      long N, double T, const double *noise, double first_std, double first, double *out) {
-  const double R_q = noise[0] * noise[0], R_dq = noise[1] * noise[1];
-  const double Q_q = noise[2] * noise[2], Q_dq = noise[3] * noise[3], Q_tau = noise[4] * noise[4];
-  double x1 = 0, x2 = 0, x3 = 0;
-  double a = 1 + first * R_q, b = 0, cc = 0, d = 1 + first * R_dq, e = 0, f = first_std * first_std;
+  const double R_q = noise[0] * noise[0], R_dq = noise[1] * noise[1], walk = noise[4] * noise[4];
+  const double Q_dd = noise[3] * noise[3], Q_qd = 0.5 * T * Q_dd;
+  const double Q_qq = noise[2] * noise[2] + (0.5 * T * noise[3]) * (0.5 * T * noise[3]), h = 0.5 * T * T;
+  double x1 = y_q[0], x2 = y_dq[0], x3 = 0;
+  double a = first * R_q, b = 0, cc = 0, d = first * R_dq, e = 0, f = first_std * first_std;
   for (long k = 0; k < N; ++k) {
     const double i1 = y_q[k] - x1, i2 = y_dq[k] - x2;
     const double s11 = a + R_q, s12 = b, s22 = d + R_dq, det = s11 * s22 - s12 * s12;
@@ -34,20 +35,23 @@ extern "C" void pass(const double *c, const double *inertia, const double *y_q, 
     out[3 * N + k] = std::sqrt(f);
     out[4 * N + k] = i1;
     out[5 * N + k] = i2;
-    const double s = std::sin(x1), co = std::cos(x1), sign = (x2 > 0) - (x2 < 0);
-    const double bias = c[0] + c[1] * s + c[2] * co + c[3] * x1 + c[4] * x2 + c[5] * sign;
-    const double b_q = c[1] * co - c[2] * s + c[3], b_dq = c[4], M = inertia[k];
-    const double g = -T * b_q / M, h = 1 - T * b_dq / M, l = -T / M;
-    const double q = x1 + T * x2;
-    x2 = x2 + T * (drive[k] - bias - x3) / M;
+    const double s = std::sin(x1), co = std::cos(x1), M = inertia[k];
+    const double likely = std::erf(x2 / std::sqrt(2 * d + 1e-300)), left = T * c[5] / M;
+    const double bias = c[0] + c[1] * s + c[2] * co + c[3] * x1 + c[4] * x2 + c[5] * likely;
+    const double a_q = -(c[1] * co - c[2] * s + c[3]) / M, a_dq = -c[4] / M, a_tau = -1 / M;
+    const double ddq = (drive[k] - bias - x3) / M, of_dq = T + h * a_dq;
+    const double f11 = 1 + h * a_q, f13 = h * a_tau, f21 = of_dq * a_q, f22 = 1 + of_dq * a_dq + h * a_q;
+    const double f23 = of_dq * a_tau, q = x1 + T * x2 + h * ddq;
+    x2 = x2 + T * ddq + h * (a_q * x2 + a_dq * ddq);
     x1 = q;
-    const double n11 = a + T * b, n12 = b + T * d, n13 = cc + T * e;
-    const double n21 = g * a + h * b + l * cc, n22 = g * b + h * d + l * e, n23 = g * cc + h * e + l * f;
-    a = n11 + T * n12 + Q_q;
-    b = g * n11 + h * n12 + l * n13;
-    d = g * n21 + h * n22 + l * n23 + Q_dq;
+    const double n11 = f11 * a + of_dq * b + f13 * cc, n12 = f11 * b + of_dq * d + f13 * e;
+    const double n13 = f11 * cc + of_dq * e + f13 * f, n21 = f21 * a + f22 * b + f23 * cc;
+    const double n22 = f21 * b + f22 * d + f23 * e, n23 = f21 * cc + f22 * e + f23 * f;
+    a = n11 * f11 + n12 * of_dq + n13 * f13 + Q_qq;
+    b = n21 * f11 + n22 * of_dq + n23 * f13 + Q_qd;
+    d = n21 * f21 + n22 * f22 + n23 * f23 + Q_dd + left * left * (1 - likely * likely);
     cc = n13;
     e = n23;
-    f = f + Q_tau;
+    f = f + walk;
   }
 }

@@ -1,4 +1,4 @@
-"""How fast the filter runs, beside the same loop in C++."""
+"""How fast the filter runs, beside the same loop in C++ and a filter of a well-known library."""
 
 import ctypes
 import shutil
@@ -10,9 +10,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipeline.filters.ekf import FIRST, track
+from pipeline.filters import rts
+from pipeline.filters.belief import FIRST
+from pipeline.filters.ekf import track
 from pipeline.filters.problem import NoiseModel
+from pipeline.filters.stepping import covariances
+from pipeline.maths.models.driven import Driven
 from pipeline.maths.models.model import JointDynamics
+from pipeline.records import Track
+from pipeline.records.store import Writer
 
 N = 1_000_000
 AT_MOST = 1.2  # times the time of C++ -O3
@@ -32,15 +38,26 @@ def rival(tmp_path_factory):
     return getattr(ctypes.CDLL(str(library)), "pass")
 
 
-def track_in_cpp(loop, joint, q, dq, tau):
+@pytest.fixture(scope="module")
+def recording() -> Driven:
+    """A million samples of a joint with gravity and friction."""
+    t = np.arange(N) * 1e-3
+    rng = np.random.default_rng(0)
+    q, dq = 0.4 * np.sin(t) + 1e-4 * rng.normal(size=N), 0.4 * np.cos(t) + 1e-3 * rng.normal(size=N)
+    tau = -0.2 * np.sin(t) + 0.3 * np.sign(np.cos(t)) + 0.1 * rng.normal(size=N)
+    joint = JointDynamics(np.full(N, 0.5), (0.1, 0.7, -0.2, 0.0, 0.3, 0.2, 0.0), np.zeros(N))
+    return Driven(joint, q, dq, -q, tau, 1e-3, 1.0)
+
+
+def track_in_cpp(loop, recording):
     """What `track` does, with the loop in C++: the same arrays made, the same arrays filled."""
-    drive, out = tau - joint.known, np.empty((7, len(q)))
+    joint = recording.joint
+    drive, out = recording.tau - joint.known, np.empty((7, N))
     short = np.array(joint.coefficients), np.array(NOISE)
-    c, noise, inertia, y_q, y_dq, u, into = (
-        x.ctypes.data_as(ctypes.c_void_p) for x in (*short, joint.inertia, q, dq, drive, out)
-    )
+    columns = (*short, joint.inertia, recording.q, recording.dq, drive, out)
+    c, noise, inertia, y_q, y_dq, u, into = (x.ctypes.data_as(ctypes.c_void_p) for x in columns)
     T_s, first_std, first = map(ctypes.c_double, (1e-3, 1.0, FIRST))
-    loop(c, inertia, y_q, y_dq, u, ctypes.c_long(len(q)), T_s, noise, first_std, first, into)
+    loop(c, inertia, y_q, y_dq, u, ctypes.c_long(N), T_s, noise, first_std, first, into)
     return out
 
 
@@ -50,24 +67,63 @@ def seconds(work) -> float:
     return time.perf_counter() - start
 
 
-def test_a_million_samples_take_at_most_a_fifth_longer_than_in_cpp(rival, capsys):
-    t = np.arange(N) * 1e-3
-    rng = np.random.default_rng(0)
-    q, dq = 0.4 * np.sin(t) + 1e-4 * rng.normal(size=N), 0.4 * np.cos(t) + 1e-3 * rng.normal(size=N)
-    tau = -0.2 * np.sin(t) + 0.3 * np.sign(np.cos(t)) + 0.1 * rng.normal(size=N)
-    joint = JointDynamics(np.full(N, 0.5), (0.1, 0.7, -0.2, 0.0, 0.3, 0.2, 0.0), np.zeros(N))
-    ours = track(joint, q, dq, tau, 1e-3, NOISE, 1.0)  # compiles, or reads what was compiled
-    theirs = track_in_cpp(rival, joint, q, dq, tau)
-    for a, b in zip(ours, theirs, strict=True):
-        assert_allclose(a, b, rtol=1e-9, atol=1e-9 * np.abs(b).max())
-    turns = [
-        (
-            seconds(lambda: track(joint, q, dq, tau, 1e-3, NOISE, 1.0)),
-            seconds(lambda: track_in_cpp(rival, joint, q, dq, tau)),
-        )
-        for _ in range(9)
-    ]
-    ratio = min(ours for ours, _ in turns) / min(theirs for _, theirs in turns)  # the others were disturbed
+def shortest(*works) -> list[float]:
+    """The shortest of nine turns of each work, taken alternately; the others were disturbed."""
+    return np.min([[seconds(work) for work in works] for _ in range(9)], axis=0).tolist()
+
+
+def said(capsys, text: str) -> None:
     with capsys.disabled():
-        print(f"\nfilter of 1e6 samples: {ratio:.2f} times the time of C++ -O3", end="")
-    assert ratio <= AT_MOST
+        print(f"\n{text}", end="")
+
+
+def test_a_million_samples_take_at_most_a_fifth_longer_than_in_cpp(rival, recording, capsys):
+    ours = track(recording, NOISE)  # compiles, or reads what was compiled
+    for a, b in zip(ours, track_in_cpp(rival, recording), strict=True):
+        assert_allclose(a, b, rtol=1e-9, atol=1e-9 * np.abs(b).max())
+    mine, theirs = shortest(lambda: track(recording, NOISE), lambda: track_in_cpp(rival, recording))
+    said(capsys, f"filter of 1e6 samples: {mine / theirs:.2f} times the time of C++ -O3")
+    assert mine <= AT_MOST * theirs
+
+
+def test_the_smoother_takes_at_most_two_and_a_half_times_as_long_as_the_filter(recording, capsys):
+    rts.track(recording, NOISE)
+    filtered, smoothed = shortest(lambda: track(recording, NOISE), lambda: rts.track(recording, NOISE))
+    said(capsys, f"filter and smoother of 1e6 samples: {smoothed / filtered:.2f} times the filter")
+    assert smoothed <= 2.5 * filtered
+
+
+def test_the_filter_is_five_hundred_times_as_fast_as_filterpys(recording, capsys):
+    kalman = pytest.importorskip("filterpy.kalman", reason="filterpy is not installed: `make oracles`")
+    few, joint = 3000, recording.joint
+    R_q, R_dq, Q_qq, Q_qd, Q_dd, Q_tau = covariances(NOISE, 1e-3)
+
+    def theirs():
+        """The linear part of the same step: fewer sums than ours."""
+        ekf = kalman.ExtendedKalmanFilter(dim_x=3, dim_z=2)
+        ekf.x, ekf.P = np.zeros((3, 1)), np.eye(3)
+        ekf.F = np.array([[1, 1e-3, 0], [0, 1 - 1e-3 * 0.3 / 0.5, -1e-3 / 0.5], [0, 0, 1]])
+        ekf.Q = np.array([[Q_qq, Q_qd, 0], [Q_qd, Q_dd, 0], [0, 0, Q_tau]])
+        ekf.R, H = np.diag([R_q, R_dq]), np.eye(2, 3)
+        for k in range(few):
+            ekf.update(np.array([[recording.q[k]], [recording.dq[k]]]), lambda x: H, lambda x: H @ x)
+            ekf.predict()
+
+    own, rival = seconds(lambda: track(recording, NOISE)) / N, seconds(theirs) / few
+    said(capsys, f"a sample of the filter: 1/{rival / own:.0f} of filterpy's; {len(joint.inertia)} samples")
+    assert rival >= 500 * own
+
+
+def test_storing_a_track_takes_at_most_six_times_as_long_as_filtering_it(recording, tmp_path, capsys):
+    made = track(recording, NOISE)
+    columns = dict.fromkeys(Track.columns(), recording.tau) | {"t": np.arange(N) * 1e-3} | made._asdict()
+    scalars = dict.fromkeys(Track.scalars(), 0.0) | dict.fromkeys(("log", "joint", "model", "estimator"), "x")
+    record = Track(**scalars | columns | {"filter": "ekf", "role": "contact", "path": "", "band_from": ""})
+
+    def store():
+        with Writer(tmp_path, lambda _: lambda unit: unit, {}) as writer:
+            writer.write(record)
+
+    filtered, stored = shortest(lambda: track(recording, NOISE), store)
+    said(capsys, f"storing a track of 1e6 samples: {stored / filtered:.1f} times filtering it")
+    assert stored <= 6 * filtered

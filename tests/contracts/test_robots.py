@@ -60,7 +60,7 @@ def test_limits_are_ordered_and_numbers_finite(joint: Joint):
     assert np.isfinite([joint.gear_ratio, joint.torque_constant, joint.q_tau]).all()
     assert joint.gear_ratio != 0
     assert joint.torque_constant != 0
-    assert joint.q_tau > 0
+    assert joint.q_tau >= 0
     assert joint.harmonics >= 1
 
 

@@ -23,5 +23,6 @@ def free_space(**levels: Any) -> FreeSpace:
     """The free space of a run."""
     names = ("free_rms", "free_level", "detection_level", "coverage")
     about = {"log": "run", "joint": "roll", "filter": "ekf", "role": "validation", "tested": 100}
-    values = about | dict.fromkeys((*names, *(f"{name}_std" for name in names)), 0.0)
+    of_smooth = ("smooth_rms", "smooth_max", "crossings")
+    values = about | dict.fromkeys((*names, *(f"{name}_std" for name in names), *of_smooth), 0.0)
     return FreeSpace(**(values | levels))  # type: ignore[arg-type]

@@ -58,8 +58,8 @@ def events(t: Array, tau_ext: Array, std: Array, level: float, rise: float) -> I
 
     `rise` [s] is how long the smoother makes a step.
     """
-    size = np.abs(tau_ext)
-    for start, stop in runs(t, np.where(size > level, np.sign(tau_ext), 0.0)):
+    for start, stop in runs(t, np.where(np.abs(tau_ext) > level, np.sign(tau_ext), 0.0)):
+        size = tau_ext * np.sign(tau_ext[start])
         onset, onset_std = edge(t, size, std, start, stop, 1, rise)
         release, release_std = edge(t, size, std, start, stop, -1, rise)
         yield Event(onset, onset_std, release, release_std)

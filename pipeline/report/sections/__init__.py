@@ -22,6 +22,7 @@ DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
             "choice",
             "prediction",
             "noise",
+            "filters",
             "runs",
             "ground_truth",
             "methods",

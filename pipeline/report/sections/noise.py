@@ -42,7 +42,7 @@ def blocks(context: Context, averages: list[Average]) -> Iterator[Block]:
     """The section's content."""
     yield Prose(
         "Every identification log repeats one period. Its periods are averaged, and what differs between them is "
-        "taken as noise: its standard deviations set what the filter assumes of its measurements. The period itself is "
+        "taken as noise, slow differences of the path included. The period itself is "
         "estimated from the longest stretch in which the joints' motion repeats; the remarks say what is left out."
     )
     rows = tuple(

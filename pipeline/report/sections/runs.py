@@ -65,10 +65,9 @@ def tracked(context: Context, tracks: list[Track]) -> Iterator[Block]:
 def intro(tracks: list[Track]) -> Iterator[Prose]:
     """What the filter does, and which joints it cannot say much about."""
     yield Prose(
-        "An extended Kalman filter follows position, velocity and external effort of each joint by itself. It takes "
-        "the noise of its measurements from the spread between periods; how fast the external effort may wander is a "
-        "choice ([@filter-assumptions]). Its innovations, what each measurement adds to what was predicted, are "
-        "white where the model and the choice fit the data: then the normalised innovation squared (NIS) is 2 on "
+        "An extended Kalman filter follows position, velocity and external effort of each joint by itself, tuned as "
+        "[@filter-tuning] says. Its innovations, what each measurement adds to what was predicted, are "
+        "white where the model and the tuning fit the data: then the normalised innovation squared (NIS) is 2 on "
         "average. Whiteness is tested over the whole run but its first second, contacts and reversals included."
     )
     at_rest = [f"{title(t.joint)} in {literal(t.log)}" for t in tracks if t.at_rest]
@@ -177,7 +176,7 @@ def trace(context: Context, t: Track, why: str) -> Figure:
                 (
                     *windows,
                     Line(t.t[shown], t.tau_ext_direct[shown], "measured minus model", "grey", "dotted"),
-                    Band(t.t[shown], (t.tau_ext - sigma)[shown], (t.tau_ext + sigma)[shown], "± 2 σ", "sky"),
+                    Band(t.t[shown], (t.tau_ext - sigma)[shown], (t.tau_ext + sigma)[shown], "± 2 σ, in total", "sky"),
                     Line(t.t[shown], t.tau_ext[shown], "filter", "vermillion"),
                 ),
             ),
