@@ -103,6 +103,17 @@ def write_csv(file: Path, signals, extra=None) -> None:
     file.write_text("\n".join(lines) + "\n")
 
 
+def write_pushes(file: Path, seed=0, rate=50.0, stiffness=450.0, surface=4e-3, noise=0.02) -> str:
+    """Three pushes 10 mm deep into a spring, as columns of text; returns their table of a study."""
+    t = np.arange(round(12 * rate)) / rate
+    depth = 5e-3 * (1 - np.cos(2 * np.pi * t / 4))
+    force = stiffness * np.clip(depth - surface, 0, None) + noise * np.random.default_rng(seed).normal(size=len(t))
+    lines = ["time,depth,force", *(",".join(map(repr, row)) for row in np.column_stack([t, depth, force]).tolist())]
+    file.write_text("\n".join(lines) + "\n")
+    channels = "".join(f'{name} = "{name}"\n' for name in ("time", "depth", "force"))
+    return f'[[log]]\nname = "{file.stem}"\nfile = "{file.name}"\nrole = "tissue"\n[log.channels]\n{channels}'
+
+
 def log_table(name: str, file: str, role: str, joints, more="") -> str:
     channels = "\n".join(f'"{j}.{s}" = "{j}.{s}"' for j in joints for s in ("q", "dq", "tau"))
     entry = f'[[log]]\nname = "{name}"\nfile = "{file}"\nrole = "{role}"\n{more}\n'

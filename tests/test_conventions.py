@@ -66,7 +66,8 @@ TIERS = (
 )
 # The same inside maths, where what is computed from motion stands above what motion is.
 MATHS = (
-    ("simulation", "excitation", "contact", "selection", "estimation"),
+    ("simulation", "excitation", "contact", "selection"),
+    ("estimation",),
     ("models",),
     ("mechanics", "signals"),
     ("arrays", "compiled", "constants", "units"),

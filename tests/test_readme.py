@@ -29,6 +29,8 @@ from pipeline.records import (
     Lyapunov,
     Origin,
     Record,
+    Stiffness,
+    TissueModel,
     Weight,
 )
 from pipeline.records.catalogue import Catalogue
@@ -214,14 +216,14 @@ def made(kind: type[Record], **about: Any) -> Record:
 
 
 ROBOT = ("robot.", "control.", "excitation.")
-BY_HAND = (*ROBOT, "weight.", "guess.")
+BY_HAND = (*ROBOT, "weight.", "tissue.", "guess.")
 
 
 def test_keys_of_a_robot_and_of_what_hangs_on_it_are_told_and_those_told_are_there():
     """Of records made by hand, as designing a robot takes half a minute, and the arm of the tests has no chain."""
     records = [made(Links), made(Control), made(Lyapunov), made(Excitation, source="table-6.1")]
     guess = made(Guess, parameter=np.array(["inertia", "offset"], object))
-    records += [made(Weight), made(FreeWeight), guess]
+    records += [made(Weight), made(FreeWeight), made(Stiffness), made(TissueModel), guess]
     keys = set(collect(Catalogue(lambda kind: [record for record in records if isinstance(record, kind)])))
     assert {key.partition(".")[0] + "." for key in keys} == set(BY_HAND)
     untold, empty = told(keys)

@@ -22,8 +22,9 @@ from pipeline.records.fit import (
     SwarmSearch,
 )
 from pipeline.records.hang import Load
-from pipeline.records.ingest import LogSummary, Recording
+from pipeline.records.ingest import LogSummary, Recording, Touch
 from pipeline.records.measure import Contact
+from pipeline.records.palpate import Push, Stiffness, TissueModel
 from pipeline.records.predict import Prediction
 from pipeline.records.record import COLUMN_DTYPES, AnyRecord, Column, Counts, Labels, Names, Origin, Record
 from pipeline.records.resample import Signal
@@ -36,19 +37,21 @@ from pipeline.records.whiteness import Whiteness
 
 __all__ = [
     "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Choice", "Column", "Comparison", "Contact", "Control",
-    "Counts", "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "FilterNoise", "Fit", "FittedPaths", "FreeMotion",
-    "FreeSpace", "FreeWeight", "FrictionMap", "Guess", "Identifiability", "Labels", "Links", "Load", "LogSummary",
-    "Lyapunov", "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Record", "Recording",
-    "Residual", "Signal", "Smoothed", "Spectrum", "SwarmSearch", "Threshold", "Track", "Trajectory", "Tuning",
-    "Weight", "Whiteness", "Workspace", "diagnostic",
+    "Counts", "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "FilterNoise", "Fit", "FittedPaths",
+    "FreeMotion", "FreeSpace", "FreeWeight", "FrictionMap", "Guess", "Identifiability", "Labels", "Links", "Load",
+    "LogSummary", "Lyapunov", "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction",
+    "Push", "Record", "Recording", "Residual", "Signal", "Smoothed", "Spectrum", "Stiffness", "SwarmSearch",
+    "Threshold", "TissueModel", "Touch", "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace",
+    "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
     kind.__name__: kind
     for kind in (
-        Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Signal, Average, PeriodResidual,
-        Trajectory, Spectrum, Smoothed, Fit, CrossFit, Identifiability, FittedPaths, MeasurementNoise, Residual,
-        SwarmSearch, Guess, Choice, FrictionMap, Prediction, Tuning, FilterNoise, FreeMotion, ErrorBand, Track,
-        FreeSpace, Threshold, Contact, Load, Weight, FreeWeight, Comparison, Whiteness, Diagnostic,
+        Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Signal, Average,
+        PeriodResidual, Trajectory, Spectrum, Smoothed, Fit, CrossFit, Identifiability, FittedPaths,
+        MeasurementNoise, Residual, SwarmSearch, Guess, Choice, FrictionMap, Prediction, Tuning, FilterNoise,
+        FreeMotion, ErrorBand, Track, FreeSpace, Threshold, Contact, Load, Weight, FreeWeight, Comparison,
+        Whiteness, Diagnostic, Touch, Push, Stiffness, TissueModel,
     )
 }  # fmt: skip

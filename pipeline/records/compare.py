@@ -26,7 +26,7 @@ class Comparison(Record):
     free_level_std: float
     detection_level: float
     detection_level_std: float
-    push: float
+    push_peak: float
     push_share: float
     push_delay: float
     t: Column

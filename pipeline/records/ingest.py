@@ -42,6 +42,28 @@ class LogSummary(Record):
 
 
 @dataclass(frozen=True, eq=False)
+class Touch(Record):
+    """What the channels of one log beyond its joints say of contact, as recorded; NaN without such a channel."""
+
+    KEY = ("log",)
+    UNKNOWN = ("t", "depth", "force", "force_x", "force_y", "force_z", "x", "y", "z")
+
+    log: str
+    role: str
+    sample: Counts
+    push: Counts
+    t: Column  # NaN of a log without a clock
+    depth: Column
+    force: Column
+    force_x: Column
+    force_y: Column
+    force_z: Column
+    x: Column
+    y: Column
+    z: Column
+
+
+@dataclass(frozen=True, eq=False)
 class Recording(Record):
     """One joint during one log, as recorded: at the log's own clock, in joint units."""
 

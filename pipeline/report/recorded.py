@@ -24,10 +24,11 @@ def recorded(context: Context, summaries: list[LogSummary]) -> Iterator[Block]:
         if remarks(summary)
     )
     methods = sorted({(s.method, s.velocity) for s in context.catalogue.all(Signal)})
-    yield Prose("How the recordings were put on a uniform clock, and where their velocities come from:")
-    yield Bullets(
-        tuple(f"clock: {method}; velocity: {velocity_source(velocity, context)}" for method, velocity in methods)
-    )
+    if methods:
+        yield Prose("How the recordings were put on a uniform clock, and where their velocities come from:")
+        yield Bullets(
+            tuple(f"clock: {method}; velocity: {velocity_source(velocity, context)}" for method, velocity in methods)
+        )
     remarks_of_stages = [
         literal(text)
         for diagnostic in context.catalogue.all(Diagnostic)

@@ -1,11 +1,13 @@
-"""The answer as a terminal shows it: a row a joint, and the things to look at first; also kept as summary.txt."""
+"""The answer as a terminal shows it: joints, the things to look at first, and tissue; also kept as summary.txt."""
 
 import re
 from collections.abc import Sequence
 
+from pipeline.records import Stiffness
 from pipeline.report.content.inline import parse
 from pipeline.report.context import Context
 from pipeline.report.sections.summary import first_looks_in_order, fitted_joints, trust, trust_row
+from pipeline.report.sections.tissue import verdict
 
 HEADER = ("joint", "verdict", "model error", "of effort", "R2", "at most", "detection level", "band covers")
 
@@ -13,11 +15,13 @@ HEADER = ("joint", "verdict", "model error", "of effort", "R2", "at most", "dete
 def answer(context: Context) -> str:
     """The trust table and the three things to look at first, in plain text."""
     trusts = [trust(context, joint) for joint in fitted_joints(context)]
+    tissue = [f"tissue {plain(verdict(context, each).text)}" for each in context.catalogue.all(Stiffness)]
     if not trusts:
-        return "no joint could be identified: there is no usable identification log, so no effort was tracked\n"
+        said = "no joint could be identified: there is no usable identification log, so no effort was tracked"
+        return "\n".join([said, *tissue]) + "\n"
     rows = [[plain(str(cell)) for cell in trust_row(context, trusted, False)] for trusted in trusts]
     looks = [f"{i}. {plain(text)}" for i, text in enumerate(first_looks_in_order(context, trusts), 1)]
-    lines = [*aligned([HEADER, *rows]), *(["look at these first:", *looks] if looks else [])]
+    lines = [*aligned([HEADER, *rows]), *(["look at these first:", *looks] if looks else []), *tissue]
     return "\n".join(lines) + "\n"
 
 

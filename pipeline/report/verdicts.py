@@ -8,6 +8,7 @@ from pipeline.report.content import Cell, Level
 
 GOOD, CAUTION = 0.10, 0.25  # model error over the root mean square of the measured effort
 DETECTED, DETECTABLE = 1 / 3, 1.0  # detection level over the effort that the user wants to see
+STIFF, STIFFER = 0.10, 0.25  # standard error of a stiffness over it
 COVERED = (0.90, 0.98)  # coverage of a 95 % band that is right
 WITHIN = 4.0  # standard errors that an estimate may be off the truth
 WORDS: dict[Level, str] = {  # the mark and its word stay on one line
@@ -82,6 +83,9 @@ def thresholds() -> tuple[tuple[Cell, ...], ...]:
         ("95 % band of the external effort", "share of free-space samples that it covers",
          f"{percent(COVERED[0])} to {percent(COVERED[1])}", f"above {percent(COVERED[1])}: too wide",
          f"below {percent(COVERED[0])}: too narrow"),
+        ("Stiffness of tissue", "its standard error over it",
+         f"at most {percent(STIFF)}, of two pushes at least", f"at most {percent(STIFFER)}",
+         "beyond, or no push counts"),
         ("Parameter of a simulated study", "standard errors from the truth", f"at most {WITHIN:g}", "–", "beyond"),
         ("White noise", "probability of a larger Ljung-Box statistic over 20 lags", "above 1 %", "–", "–"),
     )  # fmt: skip

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from pipeline.simulation import closed_loop
 from pipeline.simulation.motion import SimulatedRun
-from pipeline.simulation.scenario.scenario import Push, Scenario, SensorNoise, SimulatedLog
+from pipeline.simulation.scenario.scenario import Scenario, SensorNoise, SimulatedLog, SimulatedPush
 from pipeline.simulation.study_toml import toml
 
 
@@ -67,5 +67,5 @@ def _noise(place: str, noise: SensorNoise) -> list[str]:
     return ["", f"[{place}]", *(f"{key} = {toml(value)}" for key, value in vars(noise).items())]
 
 
-def _push(push: Push) -> list[str]:
+def _push(push: SimulatedPush) -> list[str]:
     return [f"{key} = {toml(getattr(push, key))}" for key in ("shape", "start", "end", "peak")]

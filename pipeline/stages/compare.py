@@ -79,7 +79,7 @@ def compared(
     yield Comparison(
         log=signal.log, joint=signal.joint, filter=label, role=signal.role, default=int(label == DEFAULT),
         free_rms=space.rms, free_rms_std=space.rms_std, free_level=space.level_95, free_level_std=space.level_95_std,
-        detection_level=space.level_99, detection_level_std=space.level_99_std, push=push, push_share=shown.share,
+        detection_level=space.level_99, detection_level_std=space.level_99_std, push_peak=push, push_share=shown.share,
         push_delay=shown.delay, t=signal.t, tau_ext=made.tau_ext,
     )  # fmt: skip
 

@@ -1,4 +1,4 @@
-"""Read every log into recordings, one per joint, in SI and at the joint's side of the gears."""
+"""Read every log into recordings, one per joint, in SI and at the joint's side of the gears; and what touched."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -7,19 +7,25 @@ import numpy as np
 
 from pipeline.errors import BadLog
 from pipeline.logs.log import Block, Channel, Log
+from pipeline.maths.arrays import Booleans
 from pipeline.maths.signals.clock import GAP, ClockStatistics
 from pipeline.maths.signals.steps import REACH, steps
 from pipeline.maths.units import SI, UNITS, canonical, measures, size
-from pipeline.records import Column, Diagnostic, LogSummary, Recording, diagnostic
+from pipeline.records import Column, Counts, Diagnostic, LogSummary, Recording, Touch, diagnostic
 from pipeline.robots.robot import Joint, Robot
-from pipeline.study import LogEntry, Source
+from pipeline.study import WHOLE, LogEntry, Source
 
 MOST_REPEATED = 0.1  # share of rows equal to the one before, above which the recorder was faster than the robot
 MOST_JITTER = 0.1  # of the sampling time
+# Channels of the log by the columns of a Touch; those of joints become recordings.
+TOUCHED = {
+    "depth": "depth", "force": "force", "force_x": "force_x", "force_y": "force_y", "force_z": "force_z",
+    "x": "tip_x", "y": "tip_y", "z": "tip_z",
+}  # fmt: skip
 
 
-def run(log: Log, entry: LogEntry, robot: Robot) -> Iterator[Recording | LogSummary | Diagnostic]:
-    """Recordings in consecutive blocks, then what the reader noticed.
+def run(log: Log, entry: LogEntry, robot: Robot) -> Iterator[Recording | Touch | LogSummary | Diagnostic]:
+    """Recordings and touches in consecutive blocks, then what the reader noticed.
 
     Raises
     ------
@@ -58,12 +64,22 @@ class Reading:
         names = [channel.name for channel in self.channels.values()]
         if self.own_time:
             names.append(self.own_time)
-        elif "time" not in self.sources and self.entry.rate is None and self.log.clock is None:
+        elif not self.clocked and self.entry.needs_clock:
             raise BadLog(
                 f"{self.log.path}: the log carries no clock; name its time channel in [log.channels], "
                 "or say rate = ... [Hz]"
             )
+        if not self.clocked and (self.entry.skip or self.entry.until or self.entry.contact not in ((), WHOLE)):
+            raise BadLog(
+                f"{self.log.path}: the log carries no clock, but skip, until and contact windows count in seconds; say "
+                'rate = ... [Hz], or leave them out: contact = "all" needs no clock'
+            )
         self.names = list(dict.fromkeys(names))
+
+    @property
+    def clocked(self) -> bool:
+        """Whether anything says when the samples were taken."""
+        return bool("time" in self.sources or self.entry.rate or self.own_time or self.log.clock)
 
     @property
     def own_time(self) -> str:
@@ -122,8 +138,8 @@ class Reading:
         either = [self.of_joint(block, self.robot.joint(name), ("q", "theta_m")) for name in self.entry.joints]
         return np.array([q for q in either if q is not None])
 
-    def recordings(self, block: Block) -> Iterator[Recording]:
-        """The joints of one block, after the transient that the study skips."""
+    def recordings(self, block: Block) -> Iterator[Recording | Touch]:
+        """The joints of one block, and what touched, after the transient that the study skips."""
         block = self.until_the_end(block)
         if not len(block[self.names[0]]):
             return
@@ -152,7 +168,41 @@ class Reading:
                 dq=np.zeros(int(kept.sum())) if dq is None else dq[kept],
                 tau=tau[kept],
             )
+        if touched := self.touched(block, t - first, kept):
+            yield touched
         self.rows += len(t)
+
+    def touched(self, block: Block, t: Column, kept: Booleans) -> Touch | None:
+        """What the channels of the log say of contact; NaN in columns that it has no channel of."""
+        if not set(self.sources) & {*TOUCHED.values(), "push"}:
+            return None
+        unknown = np.full(len(t), np.nan)
+        columns = {
+            name: self.converted(block, quantity) if quantity in self.sources else unknown
+            for name, quantity in TOUCHED.items()
+        }
+        return Touch(
+            log=self.entry.name,
+            role=self.entry.role,
+            sample=(self.rows + np.arange(len(t)))[kept],
+            push=self.pushes(block, len(t))[kept],
+            t=(t if self.clocked else unknown)[kept],
+            **{name: column[kept] for name, column in columns.items()},
+        )
+
+    def pushes(self, block: Block, rows: int) -> Counts:
+        """The numbers of the pushes, 0 throughout where the log does not count them."""
+        if "push" not in self.sources:
+            return np.zeros(rows, dtype=np.int64)
+        numbers = self.converted(block, "push")
+        odd = np.flatnonzero((numbers != np.round(numbers)) | (np.abs(numbers) >= 2**53))
+        if len(odd):
+            raise BadLog(
+                f"{self.log.path}: channel {self.channels['push'].name!r} holds {numbers[odd[0]]:g} at row "
+                f"{self.rows + int(odd[0])} (counted from 0), but the number of a push is a whole one; name another "
+                "channel, or leave push out, and pushes are found"
+            )
+        return numbers.astype(np.int64)
 
     def without_cut_end(self, block: Block) -> Block:
         """A block without the rows at the end of a file that was cut, which some channels no longer have."""
@@ -176,7 +226,9 @@ class Reading:
         return {name: values[: int(after[0])] for name, values in block.items()}
 
     def times(self, block: Block) -> Column:
-        """Time of each row [s], by the study's time channel, its rate, the log's time channel or the log's clock."""
+        """Time of each row [s], by the study's time channel, its rate, the log's time channel or the log's clock; of a
+        log without any, its number.
+        """
         if "time" in self.sources:
             return self.converted(block, "time")
         rows = self.rows + np.arange(len(block[self.names[0]]))
@@ -184,7 +236,8 @@ class Reading:
             return rows / self.entry.rate
         if self.own_time:
             return block[self.own_time]
-        assert self.log.clock is not None
+        if self.log.clock is None:  # samples are counted
+            return rows.astype(np.float64)
         return np.asarray(self.log.clock.start + rows * self.log.clock.step, dtype=np.float64)
 
     def converted(self, block: Block, quantity: str) -> Column:
@@ -237,7 +290,7 @@ class Reading:
         BadLog
             If nothing is left to analyse.
         """
-        clock, log = self.clock, self.log
+        clock, log, nan = self.clock, self.log, float("nan")
         if clock.samples < 2 or clock.last - clock.first <= self.entry.skip:
             until = f" and what comes after {self.entry.until:g} s left out" if self.ended else ""
             raise BadLog(
@@ -259,10 +312,10 @@ class Reading:
             started=log.started,
             zone=log.zone,
             rows=clock.samples,
-            rate=clock.rate,
-            duration=clock.last - clock.first,
-            jitter=clock.jitter,
-            longest_gap=clock.longest_gap,
+            rate=clock.rate if self.clocked else nan,
+            duration=clock.last - clock.first if self.clocked else nan,
+            jitter=clock.jitter if self.clocked else nan,
+            longest_gap=clock.longest_gap if self.clocked else nan,
             backward=clock.backward,
             repeated=clock.repeated,
             duplicates=clock.duplicates,

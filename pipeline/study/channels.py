@@ -19,6 +19,7 @@ OF_THE_LOG = {
     "time": "time", "depth": "length", "force": "force", "force_x": "force", "force_y": "force", "force_z": "force",
     "tip_x": "length", "tip_y": "length", "tip_z": "length", "push": "count",
 }  # fmt: skip
+TIP, FORCE = ("tip_x", "tip_y", "tip_z"), ("force_x", "force_y", "force_z")
 EITHER = ((("q", "theta_m"), "position"), (("tau", "i"), "effort"), (("dq", "dtheta_m"), ""))  # "": may be missing
 
 
@@ -49,6 +50,27 @@ class Channels:
                     self.log.problem(f"{joint} has no {needed}; give {joint}.{first} or {joint}.{second}")
                 if {first, second} <= has:
                     self.log.problem(f"{joint} has both {first} and {second}; leave one out")
+        self.complete_vectors({s.quantity for s in sources})
+        if self.log.values.get("role") == "tissue":
+            self.complete_tissue(sources)
+
+    def complete_vectors(self, has: set[str]) -> None:
+        """A position and a force have all their components or none."""
+        for names in (TIP, FORCE):
+            missing = [name for name in names if name not in has]
+            if missing and len(missing) < len(names):
+                self.log.problem(f"{', '.join(names)} belong together; give {' and '.join(missing)}, too")
+
+    def complete_tissue(self, sources: tuple[Source, ...]) -> None:
+        """A tissue log says how deep and how hard, by channels of its own or by a joint that slides."""
+        assert self.robot is not None
+        has = {s.quantity for s in sources}
+        if any(self.robot.joint(s.joint).kind is Kind.PRISMATIC for s in sources if s.joint):
+            return
+        for what, one, all_of in (("depth", "depth", TIP), ("force", "force", FORCE)):
+            if one not in has and not has & set(all_of):
+                either = f"{one}, or {', '.join(all_of)}, or a joint that slides"
+                self.log.problem(f"a tissue log needs a {what}; give {either}")
 
     def source(self, quantity: str, keys: tuple[str, ...], value: Any) -> Source | None:
         """The channel of one quantity, by name or number, or in a table that says more about it."""

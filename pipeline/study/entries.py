@@ -6,7 +6,7 @@ from pathlib import Path
 
 from pipeline.robots import Robot
 from pipeline.robots.from_toml import wrong_name
-from pipeline.study import HungMass, LogEntry
+from pipeline.study import WHOLE, HungMass, LogEntry
 from pipeline.study.channels import Channels
 from pipeline.study.plausible import optional
 from pipeline.toml import TomlTable
@@ -15,6 +15,7 @@ ROLES = ("identification", "validation", "contact", "weight", "tissue", "frictio
 TARES = ("validation", "identification")  # roles of logs in which nothing touches the arm
 FARTHEST = 3.0  # [m] from the remote centre, beyond which a position is more likely in another unit
 WINDOWS = "a list of [start, end] in seconds, from 0 on"
+ALL = "all"  # of a tissue log: every sample is one of contact
 
 
 def entries_of(study: TomlTable, robot: Robot | None) -> tuple[LogEntry, ...]:
@@ -115,6 +116,10 @@ def _delimiter(table: TomlTable) -> str | None:
 
 
 def _windows(table: TomlTable, key: str) -> tuple[tuple[float, float], ...]:
+    if key == "contact" and key in table and table.values[key] == ALL:
+        if table.values.get("role") != "tissue":
+            table.problem(f'contact = "{ALL}" is for logs of role tissue; say the windows, {WINDOWS}', key)
+        return WHOLE
     windows = table.pairs(key, WINDOWS, [])
     for i, (start, end) in enumerate(windows):
         if not 0 <= start < end:

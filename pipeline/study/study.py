@@ -1,10 +1,13 @@
 """A study: what was recorded, and how it is to be analysed."""
 
+import math
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from pipeline.robots.robot import Robot
+
+WHOLE = ((0.0, math.inf),)  # the windows of a log that is in contact throughout
 
 
 @dataclass(frozen=True)
@@ -78,7 +81,7 @@ class LogEntry:
     rate: float | None = None
     skip: float = 0.0
     until: float | None = None
-    contact: tuple[tuple[float, float], ...] = ()
+    contact: tuple[tuple[float, float], ...] = ()  # [s] known windows; WHOLE where all samples are of contact
     free: tuple[tuple[float, float], ...] = ()
     weight: HungMass | None = None
     tare: str = ""  # the log of the same path that is subtracted from a weight log
@@ -91,6 +94,11 @@ class LogEntry:
     def joints(self) -> tuple[str, ...]:
         """The joints that the log has channels of, in the order of the file."""
         return tuple(dict.fromkeys(source.joint for source in self.channels if source.joint))
+
+    @property
+    def needs_clock(self) -> bool:
+        """Whether its samples say nothing without the time between them; pushes of depth and force do."""
+        return self.role != "tissue" or bool(self.joints)
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,10 @@ from pipeline import robots
 from pipeline.errors import BadRequest
 from pipeline.logs import open_log
 from pipeline.logs.log import Channel, Log
-from pipeline.maths.units import canonical, measures
+from pipeline.maths.units import SI, canonical, measures
 from pipeline.robots.robot import Joint, Robot
+from pipeline.study.channels import OF_THE_LOG
+from pipeline.study.tissue_channels import is_tissue, tissue_channels, unit_of
 
 TIME = ("time", "t", "t_s", "elapsed", "x_value", "seconds")
 # Words of a channel's name that tell what it holds, the telling ones first.
@@ -49,25 +51,45 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str) -> str:
 
 def _log(file: Path, folder: Path, robot: Robot) -> Iterator[str]:
     log = open_log(file)
+    touching = _touching(log, robot)
+    tissue = is_tissue([*touching.values()])
     yield ""
     yield "[[log]]"
     yield f"name = {_text(re.sub(r'[^a-z0-9_-]+', '-', file.name.partition('.')[0].lower()).strip('-') or 'log')}"
     yield f"file = {_text(file.resolve().relative_to(folder.resolve()).as_posix())}"
-    yield 'role = "identification"  # identification, validation, contact, weight, tissue or friction'
-    yield "# period = 10.0  # [s] found from the data; a stated one is checked against them"
+    role = "tissue" if tissue else "identification"
+    yield f'role = "{role}"  # identification, validation, contact, weight, tissue or friction'
+    if not tissue:
+        yield "# period = 10.0  # [s] found from the data; a stated one is checked against them"
     if not log.clock and not log.time and not any(_is_time(c) for c in log.channels):
-        yield "rate = 100.0  # [Hz] the log carries no clock: CORRECT THIS"
+        needs = "pushes need none, but for the damping of the tissue" if tissue else "CORRECT THIS"
+        yield f"{'# ' if tissue else ''}rate = 100.0  # [Hz] the log carries no clock: {needs}"
     yield "# skip = 1.0  # [s] start-up transient to leave out"
     yield "# until = 60.0  # [s] where the log ends: what comes after, a stop for instance, is left out"
-    yield "# contact = [[12.0, 14.5]]  # [s] known contact windows"
+    if tissue:
+        yield '# contact = "all"  # where every sample is of contact; else contact is found'
+    else:
+        yield "# contact = [[12.0, 14.5]]  # [s] known contact windows"
     yield "[log.channels]"
-    yield from _channels(log, robot)
+    yield from _channels(log, robot, touching if tissue else {})
 
 
-def _channels(log: Log, robot: Robot) -> Iterator[str]:
+def _touching(log: Log, robot: Robot) -> dict[str, str]:
+    """Channels that tell of pushes into tissue, by name, where no channel is of a joint."""
+    return (
+        {}
+        if any(_guess(channel, robot) not in ("", "time") for channel in log.channels)
+        else tissue_channels([channel for channel in log.channels if not _is_time(channel)])
+    )
+
+
+def _channels(log: Log, robot: Robot, touching: dict[str, str]) -> Iterator[str]:
     taken: set[str] = set()
     for channel in log.channels:
         if channel.derived:
+            continue
+        if quantity := touching.get(channel.name):
+            yield _touched(channel, quantity)
             continue
         guess = _guess(channel, robot)
         known = f"  # in {channel.unit}" if channel.unit else "  # the log gives no unit: SI is taken"
@@ -77,6 +99,17 @@ def _channels(log: Log, robot: Robot) -> Iterator[str]:
         else:
             yield f'# "<joint>.<quantity>" = {_text(channel.name)}{known}'
     yield "# quantities of a joint: q or theta_m, dq or dtheta_m, tau or i"
+    yield "# of the log: time, and for tissue push, depth or tip_x, tip_y, tip_z, force or force_x, force_y, force_z"
+
+
+def _touched(channel: Channel, quantity: str) -> str:
+    if quantity == "push":
+        return f"push = {_text(channel.name)}  # number of the push"
+    unit = unit_of(channel, quantity)
+    where = "" if channel.unit else "  # by its name" if unit else "  # the log gives no unit: CHECK THIS"
+    return (
+        f"{quantity} = {{ channel = {_text(channel.name)}, unit = {_text(unit or SI[OF_THE_LOG[quantity]])} }}{where}"
+    )
 
 
 def _guess(channel: Channel, robot: Robot) -> str:

@@ -64,6 +64,7 @@ def lab(tmp_path_factory) -> Lab:
     weight = 'weight = { mass = 0.2, moves_with = "hand_roll", position = [0.02, 0.0, -0.3] }\ntare = "again"'
     with (folder / "study.toml").open("a") as file:
         file.write(arm.log_table("again", "again.csv", "identification", ["hand_roll"]))
+        file.write(arm.write_pushes(folder / "pushes.csv"))
         file.write(arm.log_table("hung", "hung.csv", "weight", ["hand_roll"], weight))
     study = replace(reading.read(folder), robot=robot(), truth=TRUTH)
     said: list[str] = []

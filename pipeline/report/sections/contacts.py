@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.records import Contact, Track, Weight
+from pipeline.records import Contact, Stiffness, Track, Weight
 from pipeline.report.content import (
     Block,
     Cell,
@@ -103,8 +103,10 @@ def not_analysed(context: Context) -> Iterator[tuple[str, str, str]]:
     measured = {(contact.log, contact.joint) for contact in context.catalogue.all(Contact)}
     weighed = {weight.log for weight in context.catalogue.all(Weight)}
     tracked = {(track.log, track.joint): track for track in context.catalogue.all(Track)}
+    palpated = {tissue.log for tissue in context.catalogue.all(Stiffness)}
     for entry in context.study.logs:
-        if entry.role not in ("contact", "weight", "tissue", "friction") or entry.name in weighed:
+        analysed = entry.name in weighed | palpated
+        if entry.role not in ("contact", "weight", "tissue", "friction") or analysed:
             continue
         joints = [joint for joint in entry.joints if (entry.name, joint) not in measured]
         reasons: dict[str, list[str]] = {}

@@ -11,7 +11,7 @@ from pipeline.report.content import Block, Figure, Line, OnScreen, Panel, Prose,
 from pipeline.report.context import PLAIN, Context, count, fit_name, label, title
 
 LIMIT = 4.0  # standard errors that an estimate may be off before it is called wrong
-SHOWN = 3  # figures; the others are on screen
+SHOWN = 1  # figure; the others are on screen
 SHAPES = {"triangle": ((0.0, 0.0), (0.5, 1.0), (1.0, 0.0)), "pulse": ((0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0))}
 
 

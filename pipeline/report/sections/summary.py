@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.records import Contact, Diagnostic, Prediction, Record, Track
+from pipeline.records import Contact, Diagnostic, Prediction, Record, Stiffness, Track
 from pipeline.report.content import (
     Block,
     Bullets,
@@ -46,9 +46,7 @@ def blocks(context: Context) -> Iterator[Block]:
     """The section's content."""
     yield from failures(context)
     if not context.own_fits():
-        yield Verdict(
-            "bad", "No joint could be identified: there is no usable identification log, so no effort was tracked."
-        )
+        yield nothing_identified(context)
         return
     trusts = [trust(context, joint) for joint in fitted_joints(context)]
     contacts = context.catalogue.all(Contact)
@@ -66,6 +64,14 @@ def blocks(context: Context) -> Iterator[Block]:
     yield Prose(thresholds_in_words(trusts))
     yield from first_looks(context, trusts)
     yield Prose("Reviewed by ______________________ on ______________   ☐ accept   ☐ accept with remarks   ☐ reject")
+
+
+def nothing_identified(context: Context) -> Verdict:
+    """Why there is no effort to show, and what there is instead."""
+    text = "No joint could be identified: there is no usable identification log, so no effort was tracked."
+    if context.catalogue.all(Stiffness):
+        return Verdict("info", f"{text} What sensors say of tissue is in [@tissue].")
+    return Verdict("bad", text)
 
 
 def thresholds_in_words(trusts: list[Trust]) -> str:

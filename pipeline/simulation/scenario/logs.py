@@ -10,7 +10,7 @@ import numpy as np
 from pipeline.maths.excitation.fourier import Fourier
 from pipeline.maths.simulation.surroundings import SHAPES
 from pipeline.robots.from_toml import NAME
-from pipeline.simulation.scenario.scenario import Path, Push, SimulatedJoint, SimulatedLog, Tissue
+from pipeline.simulation.scenario.scenario import Path, SimulatedJoint, SimulatedLog, SimulatedPush, Tissue
 from pipeline.study.entries import ROLES
 from pipeline.toml import TomlTable
 
@@ -121,7 +121,7 @@ def _move(table: TomlTable) -> Fourier | Path:
     return series
 
 
-def _push(table: TomlTable, duration: float, at_tip: bool) -> Push:
+def _push(table: TomlTable, duration: float, at_tip: bool) -> SimulatedPush:
     shape = table.text("shape", choices=SHAPES)
     start, end = table.number("start", low=0.0), table.number("end")
     direction = None
@@ -137,7 +137,7 @@ def _push(table: TomlTable, duration: float, at_tip: bool) -> Push:
     if end > duration and not math.isnan(duration):
         table.problem(f"end = {end:g} s is after the recording's {duration:g} s", "end")
     table.close()
-    return Push(shape, start, end, peak, direction)
+    return SimulatedPush(shape, start, end, peak, direction)
 
 
 def _tissue(table: TomlTable) -> Tissue:

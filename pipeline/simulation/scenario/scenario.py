@@ -29,7 +29,7 @@ class SensorNoise:
 
 
 @dataclass(frozen=True)
-class Push:
+class SimulatedPush:
     """An effort, or a force of the tip, that the robot exerts on its surroundings from start to end [s].  (7.8)"""
 
     shape: str  # of SHAPES
@@ -112,13 +112,13 @@ class SimulatedLog:
     duration: float  # [s]
     moves: dict[str, Fourier | Path]
     held: dict[str, float]
-    external: dict[str, tuple[Push, ...]]
+    external: dict[str, tuple[SimulatedPush, ...]]
     current_unit: str
     clock: str  # "channel", or "header" where the file itself says the step
     family: str = ""
     lead: float = 0.0  # [s] that the robot runs before the recording starts
     skip: float = 0.0  # [s] at the start that the study leaves out
-    tip: tuple[Push, ...] = ()
+    tip: tuple[SimulatedPush, ...] = ()
     mass: float = 0.0  # [kg] hung on the tip
     tissue: Tissue | None = None
 

@@ -1,0 +1,57 @@
+"""Tissue that a simulated arm pushes into, felt by its motor currents alone: of both families, over seeds."""
+
+import re
+from importlib.resources import files
+
+import numpy as np
+import pytest
+
+import pipeline
+from pipeline.runner.console import Console
+from pipeline.runner.runner import Runner
+from pipeline.runner.runs import folders
+from pipeline.simulation import study_folder
+from pipeline.simulation.scenario.reading import load
+from pipeline.stages import STAGES
+from pipeline.study import reading
+from tests.tissue.pushing import SURFACE, K
+
+SEEDS = 5
+LOGS = r'name = "(slide-excitation|tissue-approach|tissue-haptic)"'
+NEEDED = tuple(name for name in STAGES[: STAGES.index("palpate") + 1] if name != "design")
+
+
+@pytest.fixture(scope="module")
+def found(tmp_path_factory):
+    """The tissue of every seed: what the demonstration study has of the slide, simulated anew and analysed."""
+    text = (files("pipeline.simulation") / "shipped" / "davinci-demo.toml").read_text()
+    head, *logs = re.split(r"(?m)^\[\[log\]\]\n", text)
+    kept = head + "".join(f"[[log]]\n{log}" for log in logs if re.match(LOGS, log))
+    home, tissue = tmp_path_factory.mktemp("arm"), []
+    for seed in range(SEEDS):
+        (home / "slide.toml").write_text(re.sub(r"(?m)^seed = .*$", f"seed = {seed}", kept))
+        raw = home / "raw" / f"seed-{seed}"
+        study_folder.write(load(str(home / "slide.toml")), raw, False, lambda _: None)
+        said: list[str] = []
+        runner = Runner(reading.read(raw), folders(raw, None, None), Console(lambda _: None, said.append))
+        assert runner.run(NEEDED), "\n".join(said)
+        tissue.append(pipeline.read(raw, "Stiffness"))
+    return tissue
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("log", ["tissue-approach", "tissue-haptic"])
+@pytest.mark.parametrize("family", ["matched", "realistic"])
+def test_the_interval_holds_what_the_tissue_is_and_the_mean_is_near_it(found, family, log):
+    own = [tissue[tissue["log"] == f"{family}-{log}"].iloc[0] for tissue in found]
+    k, std = (np.array([row[name] for row in own]) for name in ("stiffness", "stiffness_std"))
+    assert np.all(np.abs(k - K) <= 1.96 * std)
+    # Five seeds have a mean that scatters by as much as one has, over the root of five.
+    assert abs(k.mean() - K) < 0.02 * K + 2 * k.std() / np.sqrt(SEEDS)
+    assert np.median(std) < 0.12 * K
+
+
+@pytest.mark.slow
+def test_first_contact_of_a_slow_approach_is_found_where_friction_is_what_the_model_says(found):
+    off = [t[t["log"] == "matched-tissue-approach"]["onset_depth"].to_numpy() - SURFACE for t in found]
+    assert np.max(np.abs(off)) < 1e-3
