@@ -5,7 +5,9 @@ from pipeline.records.average import Average, PeriodResidual
 from pipeline.records.bound import ErrorBand
 from pipeline.records.calibrate import FreeMotion
 from pipeline.records.choose import Choice
+from pipeline.records.combine import ArmCorrelation
 from pipeline.records.compare import Comparison
+from pipeline.records.correlate import JointCorrelation
 from pipeline.records.design import Control, Excitation, Links, Lyapunov, Pose, Workspace
 from pipeline.records.diagnostic import Diagnostic, diagnostic
 from pipeline.records.differentiate import Spectrum, Trajectory
@@ -17,6 +19,7 @@ from pipeline.records.measure import Contact
 from pipeline.records.predict import Prediction
 from pipeline.records.record import COLUMN_DTYPES, AnyRecord, Column, Counts, Labels, Names, Origin, Record
 from pipeline.records.resample import Signal
+from pipeline.records.resolve import TipBudget, TipContact, TipForce
 from pipeline.records.settle import FilterNoise
 from pipeline.records.smooth import Smoothed
 from pipeline.records.threshold import Threshold
@@ -25,12 +28,12 @@ from pipeline.records.weigh import FreeWeight, Weight
 from pipeline.records.whiteness import Whiteness
 
 __all__ = [
-    "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Choice", "Column", "Comparison", "Contact", "Control",
-    "Counts", "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "FilterNoise", "Fit", "FittedPaths",
-    "FreeMotion", "FreeSpace", "FreeWeight", "Labels", "Links", "Load", "LogSummary", "Lyapunov",
-    "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Record", "Recording",
-    "Residual", "Signal", "Smoothed", "Spectrum", "SwarmSearch", "Threshold", "Track", "Trajectory", "Tuning",
-    "Weight", "Whiteness", "Workspace", "diagnostic",
+    "COLUMN_DTYPES", "KINDS", "AnyRecord", "ArmCorrelation", "Average", "Choice", "Column", "Comparison", "Contact",
+    "Control", "Counts", "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "FilterNoise", "Fit", "FittedPaths",
+    "FreeMotion", "FreeSpace", "FreeWeight", "JointCorrelation", "Labels", "Links", "Load", "LogSummary",
+    "Lyapunov", "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Record",
+    "Recording", "Residual", "Signal", "Smoothed", "Spectrum", "SwarmSearch", "Threshold", "TipBudget",
+    "TipContact", "TipForce", "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
@@ -39,6 +42,7 @@ KINDS: dict[str, type[Record]] = {
         Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Signal, Average,
         PeriodResidual, Trajectory, Spectrum, Smoothed, Fit, CrossFit, FittedPaths, MeasurementNoise, Residual,
         SwarmSearch, Choice, Prediction, Tuning, FilterNoise, FreeMotion, ErrorBand, Track, FreeSpace,
-        Threshold, Contact, Load, Weight, FreeWeight, Comparison, Whiteness, Diagnostic,
+        Threshold, Contact, Load, Weight, FreeWeight, Comparison, JointCorrelation,
+        ArmCorrelation, TipForce, TipContact, TipBudget, Whiteness, Diagnostic,
     )
 }  # fmt: skip
