@@ -27,6 +27,9 @@ from pipeline.records import (
     Lyapunov,
     Origin,
     Record,
+    TipBudget,
+    TipContact,
+    TipForce,
     Weight,
 )
 from pipeline.records.catalogue import Catalogue
@@ -124,7 +127,7 @@ def test_keys_of_a_study_and_its_logs_are_all_told():
     told |= set(re.findall(r"\[+(?:log\.)?(\w+)", code)) | {span for span in spans(said) if span.isidentifier()}
     assert {f.name for f in fields(LogEntry)} | {f.name for f in fields(HungMass)} | {"file"} <= told
     changeable = {f.name for f in fields(Joint)} - {"name", "kind", "published", "physical"}
-    assert {"title", "robot", "simulated", "settings", "log"} | changeable <= told
+    assert {"title", "robot", "simulated", "settings", "log", "tool", "length"} | changeable <= told
     assert "[robot_overrides." in said
 
 
@@ -212,13 +215,13 @@ def made(kind: type[Record], **about: str) -> Record:
 
 
 ROBOT = ("robot.", "control.", "excitation.")
-BY_HAND = (*ROBOT, "weight.")
+BY_HAND = (*ROBOT, "weight.", "tip.")
 
 
-def test_keys_of_a_robot_and_of_what_hangs_on_it_are_told_and_those_told_are_there():
+def test_keys_of_a_robot_and_of_what_hangs_on_it_or_pushes_it_are_told_and_those_told_are_there():
     """Of records made by hand, as designing a robot takes half a minute, and the arm of the tests has no chain."""
     records = [made(Links), made(Control), made(Lyapunov), made(Excitation, source="table-6.1")]
-    records += [made(Weight), made(FreeWeight)]
+    records += [made(Weight), made(FreeWeight), made(TipForce), made(TipContact), made(TipBudget)]
     keys = set(collect(Catalogue(lambda kind: [record for record in records if isinstance(record, kind)])))
     assert {key.partition(".")[0] + "." for key in keys} == set(BY_HAND)
     untold, empty = told(keys)
