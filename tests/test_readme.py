@@ -30,6 +30,9 @@ from pipeline.records import (
     Origin,
     Record,
     Stiffness,
+    TipBudget,
+    TipContact,
+    TipForce,
     TissueModel,
     Weight,
 )
@@ -128,7 +131,7 @@ def test_keys_of_a_study_and_its_logs_are_all_told():
     told |= set(re.findall(r"\[+(?:log\.)?(\w+)", code)) | {span for span in spans(said) if span.isidentifier()}
     assert {f.name for f in fields(LogEntry)} | {f.name for f in fields(HungMass)} | {"file"} <= told
     changeable = {f.name for f in fields(Joint)} - {"name", "kind", "published", "physical", "printed"}
-    assert {"title", "robot", "simulated", "settings", "log"} | changeable <= told
+    assert {"title", "robot", "simulated", "settings", "log", "tool", "length"} | changeable <= told
     assert "[robot_overrides." in said
 
 
@@ -216,14 +219,15 @@ def made(kind: type[Record], **about: Any) -> Record:
 
 
 ROBOT = ("robot.", "control.", "excitation.")
-BY_HAND = (*ROBOT, "weight.", "tissue.", "guess.")
+BY_HAND = (*ROBOT, "weight.", "tissue.", "guess.", "tip.")
 
 
-def test_keys_of_a_robot_and_of_what_hangs_on_it_are_told_and_those_told_are_there():
+def test_keys_of_a_robot_and_of_what_hangs_on_it_or_pushes_it_are_told_and_those_told_are_there():
     """Of records made by hand, as designing a robot takes half a minute, and the arm of the tests has no chain."""
     records = [made(Links), made(Control), made(Lyapunov), made(Excitation, source="table-6.1")]
     guess = made(Guess, parameter=np.array(["inertia", "offset"], object))
     records += [made(Weight), made(FreeWeight), made(Stiffness), made(TissueModel), guess]
+    records += [made(TipForce), made(TipContact), made(TipBudget)]
     keys = set(collect(Catalogue(lambda kind: [record for record in records if isinstance(record, kind)])))
     assert {key.partition(".")[0] + "." for key in keys} == set(BY_HAND)
     untold, empty = told(keys)

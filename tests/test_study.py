@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 from pipeline import robots
 from pipeline.errors import BadRobot, BadStudy
+from pipeline.maths.mechanics.kinematics import tip
 from pipeline.robots.from_toml import RESERVED
 from pipeline.robots.robot import Kind
 from pipeline.study import reading
@@ -119,6 +120,10 @@ def test_a_good_study_means_what_it_says(tmp_path):
             "4: robot_overrides.hand_roll: gear_ratio must be a number other than 0, not 0"),
         ("[[log]]", "[robot_overrides.hand_roll]\ngears = 1\n[[log]]",
             "4: robot_overrides.hand_roll: unknown key 'gears'; known are title, terms"),
+        ("[[log]]", "tool = { length = 0.4 }\n[[log]]", "3: robot davinci does not say which part of its chain is the"),
+        ("[[log]]", "tool = { length = 416.2 }\n[[log]]", "3: tool: length must lie between 0.001 and 10 m, not 416.2"),
+        ("[[log]]", "tool = { long = 0.4 }\n[[log]]", "3: tool: unknown key 'long'; known are length"),
+        ("[[log]]", "tool = 0.4\n[[log]]", "3: tool: must be a table, not 0.4"),
         ('title = "T"', 'title = "T', "study.toml: Illegal character"),
     ],
 )  # fmt: skip
@@ -199,6 +204,15 @@ def test_what_is_not_plausible_is_refused(tmp_path, old, new, says):
     assert says in str(caught.value)
 
 
+def test_a_study_may_say_how_long_its_tool_was(tmp_path):
+    """And the report is told, as of all that a study changes of a robot."""
+    made = read(tmp_path, GOOD.replace('"davinci"', '"dvrk_psm"\ntool = { length = 0.5 }'))
+    assert made.robot.tool.length == 0.5
+    at, usual = (tip(robot.chain, [0.0, 0.0, 0.1]) for robot in (made.robot, robots.load("dvrk_psm", tmp_path)))
+    assert (usual - at)[2] == pytest.approx(0.5 - 0.4162)
+    assert made.changed == {"tool": {"length": 0.5}}
+
+
 @pytest.mark.parametrize("file", ["..x.csv", "...csv", "a/../b.csv"])
 def test_a_file_whose_name_begins_with_dots_lies_inside(tmp_path, file):
     (tmp_path / "study.toml").write_text(GOOD.replace("a.csv", file))
@@ -247,7 +261,7 @@ def problems(folder) -> list[str]:
 def test_nothing_that_is_wrong_hides_anything_else(tmp_path):
     text = GOOD.replace("title", "titel").replace("period = 10", "period = -10").replace("hand_roll.i", "hand_rol.i")
     (tmp_path / "study.toml").write_text(text)
-    known = "known are title, robot, simulated, robot_overrides, settings, log; did you mean 'title'?"
+    known = "known are title, robot, simulated, robot_overrides, tool, settings, log; did you mean 'title'?"
     assert problems(tmp_path) == [
         f"study.toml:1: unknown key 'titel'; {known}",
         "study.toml:5: file 'a.csv' is not in the folder",

@@ -6,7 +6,9 @@ from pipeline.records.bound import ErrorBand
 from pipeline.records.calibrate import FreeMotion
 from pipeline.records.chart import FrictionMap
 from pipeline.records.choose import Choice
+from pipeline.records.combine import ArmCorrelation
 from pipeline.records.compare import Comparison
+from pipeline.records.correlate import JointCorrelation
 from pipeline.records.design import Control, Excitation, Links, Lyapunov, Pose, Workspace
 from pipeline.records.diagnostic import Diagnostic, diagnostic
 from pipeline.records.differentiate import Spectrum, Trajectory
@@ -28,6 +30,7 @@ from pipeline.records.palpate import Push, Stiffness, TissueModel
 from pipeline.records.predict import Prediction
 from pipeline.records.record import COLUMN_DTYPES, AnyRecord, Column, Counts, Labels, Names, Origin, Record
 from pipeline.records.resample import Signal
+from pipeline.records.resolve import TipBudget, TipContact, TipForce
 from pipeline.records.settle import FilterNoise
 from pipeline.records.smooth import Smoothed
 from pipeline.records.threshold import Threshold
@@ -36,13 +39,13 @@ from pipeline.records.weigh import FreeWeight, Weight
 from pipeline.records.whiteness import Whiteness
 
 __all__ = [
-    "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Choice", "Column", "Comparison", "Contact", "Control",
-    "Counts", "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "FilterNoise", "Fit", "FittedPaths",
-    "FreeMotion", "FreeSpace", "FreeWeight", "FrictionMap", "Guess", "Identifiability", "Labels", "Links", "Load",
-    "LogSummary", "Lyapunov", "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction",
-    "Push", "Record", "Recording", "Residual", "Signal", "Smoothed", "Spectrum", "Stiffness", "SwarmSearch",
-    "Threshold", "TissueModel", "Touch", "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace",
-    "diagnostic",
+    "COLUMN_DTYPES", "KINDS", "AnyRecord", "ArmCorrelation", "Average", "Choice", "Column", "Comparison",
+    "Contact", "Control", "Counts", "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "FilterNoise", "Fit",
+    "FittedPaths", "FreeMotion", "FreeSpace", "FreeWeight", "FrictionMap", "Guess", "Identifiability",
+    "JointCorrelation", "Labels", "Links", "Load", "LogSummary", "Lyapunov", "MeasurementNoise", "Names",
+    "Origin", "PeriodResidual", "Pose", "Prediction", "Push", "Record", "Recording", "Residual", "Signal",
+    "Smoothed", "Spectrum", "Stiffness", "SwarmSearch", "Threshold", "TipBudget", "TipContact", "TipForce",
+    "TissueModel", "Touch", "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
@@ -52,6 +55,7 @@ KINDS: dict[str, type[Record]] = {
         PeriodResidual, Trajectory, Spectrum, Smoothed, Fit, CrossFit, Identifiability, FittedPaths,
         MeasurementNoise, Residual, SwarmSearch, Guess, Choice, FrictionMap, Prediction, Tuning, FilterNoise,
         FreeMotion, ErrorBand, Track, FreeSpace, Threshold, Contact, Load, Weight, FreeWeight, Comparison,
-        Whiteness, Diagnostic, Touch, Push, Stiffness, TissueModel,
+        Whiteness, Diagnostic, Touch, Push, Stiffness, TissueModel, JointCorrelation, ArmCorrelation, TipForce,
+        TipContact, TipBudget,
     )
 }  # fmt: skip

@@ -3,8 +3,8 @@
 from dataclasses import replace
 
 from pipeline.robots import davinci
-from pipeline.robots.dvrk_psm_chain import CHAIN
-from pipeline.robots.robot import Robot
+from pipeline.robots.dvrk_psm_chain import CHAIN, TOOL
+from pipeline.robots.robot import Robot, Tool
 
 # Excitation trajectories of the public identification data have six harmonics (Wang et al. 2019).
 HARMONICS = 6
@@ -20,4 +20,5 @@ ROBOT = Robot(
     ),
     chain=CHAIN,
     wrist=("instrument_roll", "instrument_pitch", "instrument_yaw"),
+    tool=Tool("tool_roll", TOOL),
 )

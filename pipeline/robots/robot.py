@@ -1,7 +1,7 @@
 """What a robot is: its joints, each with its motor, its model and its limits, and the chain that carries them."""
 
 import re
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import NamedTuple
 
@@ -105,6 +105,14 @@ class ControlStudy:
 
 
 @dataclass(frozen=True)
+class Tool:
+    """The tool on a chain: the link at the far end of its shaft, which turns about it, and the shaft's length."""
+
+    link: str
+    length: float  # [m]
+
+
+@dataclass(frozen=True)
 class Robot:
     """The joints of an arm, from the base outwards; with its chain and bodies where its geometry is known.
 
@@ -119,6 +127,20 @@ class Robot:
     wrist: tuple[str, ...] = ()
     drives: Drives | None = None  # of all coordinates of the chain
     control: tuple[ControlStudy, ...] = ()
+    tool: Tool | None = None  # where it is known which part of the chain it is, so that another may take its place
+
+    def with_tool(self, length: float) -> "Robot":
+        """The robot with a tool whose shaft is this long [m].
+
+        Raises
+        ------
+        BadRobot
+            If it is not known which part of its chain the tool is.
+        """
+        if self.tool is None or self.chain is None:
+            raise BadRobot(f"robot {self.name} does not say which part of its chain is the tool; leave its length out")
+        chain = self.chain.lengthened(self.tool.link, length - self.tool.length)
+        return replace(self, chain=chain, tool=replace(self.tool, length=length))
 
     @property
     def coordinates(self) -> tuple[str, ...]:

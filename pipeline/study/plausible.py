@@ -11,6 +11,7 @@ PLAUSIBLE = {
     "lowpass": (1e-6, 1e5, "Hz"),
     "harmonics": (0, 100, ""),
     "effort": (1e-9, 1e6, "N m or N"),
+    "tool": (1e-3, 10.0, "m"),
     "q_tau": (0.0, 1e6, "effort/s^0.5"),
 }
 

@@ -47,6 +47,7 @@ def study_of(table: TomlTable, folder: Path) -> Study:
     title, robot, simulated = table.text("title", name), _robot(table, folder), table.flag("simulated", False)
     overrides = table.table("robot_overrides")
     robot = _overridden(robot, overrides) if robot else None
+    robot = _with_tool(robot, table) if "tool" in table else robot
     settings = _settings(table.table("settings"), robot)
     logs = entries_of(table, robot)
     table.close()
@@ -59,7 +60,8 @@ def study_of(table: TomlTable, folder: Path) -> Study:
     assert robot is not None
     own = table.values["robot"] if table.values["robot"].endswith(".toml") else ""
     truth = _truth(folder) if simulated else {}
-    return Study(folder, title, robot, simulated, settings, logs, overrides.values, truth, own, lines)
+    changed = overrides.values | ({"tool": table.values["tool"]} if "tool" in table else {})
+    return Study(folder, title, robot, simulated, settings, logs, changed, truth, own, lines)
 
 
 def _truth(folder: Path) -> dict[str, Any]:
@@ -95,6 +97,18 @@ def _overridden(robot: Robot, overrides: TomlTable) -> Robot:
         else:
             overrides.problem(f"{robot.name} has no joint {name!r}; it has {', '.join(joints)}", name)
     return replace(robot, joints=tuple(joints.values()))
+
+
+def _with_tool(robot: Robot | None, table: TomlTable) -> Robot | None:
+    """The robot with the tool that a study says it had."""
+    tool = table.table("tool")
+    length = checked(tool, "length", tool.number("length", words="a number of metres"), "tool")
+    tool.close()
+    try:
+        return robot.with_tool(length) if robot and math.isfinite(length) else robot
+    except BadRobot as error:
+        table.problem(str(error), "tool")
+        return robot
 
 
 def _settings(table: TomlTable, robot: Robot | None) -> Settings:

@@ -42,6 +42,7 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str) -> str:
         f"title = {_text(folder.resolve().name)}",
         f"robot = {_text(robot_name)}  # {robot.title}: joints {', '.join(j.name for j in robot.joints)}",
         "simulated = false",
+        *([f"# tool = {{ length = {robot.tool.length} }}  # [m] of the shaft of the tool"] if robot.tool else []),
         "",
         "[settings]  # every key has a default; the report prints what was used",
         "# lowpass = 17.0  # [Hz] zero-phase, where velocities and accelerations are differences",

@@ -8,8 +8,10 @@ import pytest
 
 from pipeline.maths.excitation.fourier import Fourier
 from pipeline.maths.excitation.joint import Design
+from pipeline.maths.mechanics.kinematics import jacobian
 from pipeline.maths.simulation import continuous
-from pipeline.records import KINDS, Record, store
+from pipeline.maths.simulation.surroundings import triangle
+from pipeline.records import KINDS, Record, Signal, store
 from pipeline.records.catalogue import Catalogue
 from pipeline.robots import Robot, davinci, davinci_physical, davinci_printed
 from pipeline.robots.davinci_chain import BODIES, CHAIN
@@ -25,9 +27,13 @@ from tests import arm
 TRUTH = {
     "theta": {name: dict(zip((t.name for t in arm.joint(name).terms), theta.tolist(), strict=True))
               for name, theta in arm.THETA.items()},
-    "log": [{"name": "push", "push": [
-        {"joint": "hand_roll", "shape": "pulse", "start": 4.0, "end": 6.0, "peak": 1.0}]}],
+    "log": [
+        {"name": "push", "push": [{"joint": "hand_roll", "shape": "pulse", "start": 4.0, "end": 6.0, "peak": 1.0}]},
+        {"name": "tip", "push": [
+            {"direction": [0.6, 0.0, -0.8], "shape": "triangle", "start": 4.0, "end": 8.0, "peak": 20.0}]},
+    ],
 }  # fmt: skip
+ALL = tuple(joint.name for joint in arm.ARM.joints)
 
 
 @dataclass(frozen=True)
@@ -55,17 +61,32 @@ def robot() -> Robot:
     return replace(arm.ARM, joints=joints, chain=CHAIN, bodies=BODIES, wrist=wrist, control=short)
 
 
+def at_the_tip() -> list[Signal]:
+    """All joints moving while something is pushed by the tip, as TRUTH says."""
+    [push] = TRUTH["log"][1]["push"]
+    about = {"period": 2.6, "periods": 5, "rate": 50.0, "log": "tip", "role": "contact"}
+    t = arm.signal("hand_roll", **about).t
+    q = np.stack([arm.excitation(name, t, 2.6)[0] for name in ALL], axis=-1)
+    f = triangle(t, push["start"], push["end"], push["peak"])[:, None] * push["direction"]
+    tau = np.einsum("nij,ni->nj", jacobian(CHAIN, q)[0], f)
+    return [arm.signal(name, seed=i, external=lambda t, i=i: tau[:, i], **about) for i, name in enumerate(ALL)]
+
+
 @pytest.fixture(scope="session")
 def lab(tmp_path_factory) -> Lab:
     folder = arm.write_study(tmp_path_factory.mktemp("contracts") / "raw" / "arm")
     arm.write_csv(folder / "again.csv", [arm.signal("hand_roll", period=2.0, periods=5, rate=50.0, seed=2)])
     hung = arm.signal("hand_roll", period=2.0, periods=5, rate=50.0, seed=3, external=np.cos)
     arm.write_csv(folder / "hung.csv", [hung])
+    arm.write_csv(folder / "pitch.csv", [arm.signal("hand_pitch", period=2.0, periods=5, rate=50.0)])
+    arm.write_csv(folder / "tip.csv", at_the_tip())
     weight = 'weight = { mass = 0.2, moves_with = "hand_roll", position = [0.02, 0.0, -0.3] }\ntare = "again"'
     with (folder / "study.toml").open("a") as file:
         file.write(arm.log_table("again", "again.csv", "identification", ["hand_roll"]))
         file.write(arm.write_pushes(folder / "pushes.csv"))
         file.write(arm.log_table("hung", "hung.csv", "weight", ["hand_roll"], weight))
+        file.write(arm.log_table("pitch", "pitch.csv", "identification", ["hand_pitch"]))
+        file.write(arm.log_table("tip", "tip.csv", "contact", ALL, "contact = [[4.0, 8.0]]"))
     study = replace(reading.read(folder), robot=robot(), truth=TRUTH)
     said: list[str] = []
     runner = Runner(study, folders(folder, None, None), Console(lambda line: None, said.append))

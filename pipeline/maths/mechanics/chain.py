@@ -66,6 +66,16 @@ class Chain:
             raise ValueError(f"the chain has {self.n} coordinates, and q has {n}")
         return replace(self, n=n, coordinate=np.where(self.coordinate < n, self.coordinate, FIXED))
 
+    def lengthened(self, link: str, by: float) -> "Chain":
+        """The same arm with a link, and all that it carries, further out along its own axis [m].
+
+        A table says so in the d of that row, where the row has the link's axis: in modified parameters.
+        """
+        i, placement = self.links.index(link), self.placement.copy()
+        placement[i, :3, 3] += by * placement[i, :3, 2]
+        table = tuple(row._replace(d=row.d + by) if row.name == link else row for row in self.table)
+        return replace(self, placement=placement, table=table)
+
     @property
     def moved_by(self) -> NDArray[np.int64]:
         """The coordinate that moves each frame in the one before it, or FIXED (F,)."""

@@ -13,6 +13,9 @@ from pipeline.maths.mechanics.kinematics import jacobian
 # Above this condition number a pose counts as singular: the first three joints leave one direction of the force
 # undetermined in practice.  It is 0.1 mm from an exact singularity; in the box of Table 6.2 it reaches 60.
 SINGULAR = 1e4
+# Above this one a force is marked: one direction of it is a hundred times less well told than another, as where the
+# lever of a joint at the tip is about a centimetre.  The box of Table 6.2 stays below.
+NEAR_SINGULAR = 1e2
 DOUBLE = 1e-6  # [m] imaginary part that rounding, at its square root, gives to a double root
 ARM = 3  # coordinates of the reduced Jacobian
 

@@ -16,6 +16,7 @@ DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
         (
             "summary",
             "contacts",
+            "tip",
             "tissue",
             "weight",
             "joints",

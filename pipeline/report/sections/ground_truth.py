@@ -3,16 +3,14 @@
 from collections.abc import Iterator
 from typing import Any
 
-import numpy as np
-
 from pipeline.records import Prediction, Track
 from pipeline.records.record import slug
 from pipeline.report.content import Block, Figure, Line, OnScreen, Panel, Prose, Section, Table, Verdict, literal
 from pipeline.report.context import PLAIN, Context, count, fit_name, label, title
+from pipeline.report.pushed import tip_forces, true_effort
 
 LIMIT = 4.0  # standard errors that an estimate may be off before it is called wrong
 SHOWN = 1  # figure; the others are on screen
-SHAPES = {"triangle": ((0.0, 0.0), (0.5, 1.0), (1.0, 0.0)), "pulse": ((0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0))}
 
 
 def section(context: Context) -> Section | None:
@@ -38,6 +36,7 @@ def blocks(context: Context) -> Iterator[Block]:
             tracks = context.catalogue.about(Track, log=log["name"], joint=str(joint))
             pushes = [push for push in log["push"] if push.get("joint") == joint]
             figures += [effort_figure(track, pushes) for track in tracks]
+    yield from tip_forces(context)
     yield from figures[:SHOWN]
     if figures[SHOWN:]:
         name = f"{count(len(figures) - SHOWN, 'more comparison')} of tracked and true effort"
@@ -121,13 +120,3 @@ def effort_figure(track: Track, pushes: list[dict[str, Any]]) -> Figure:
         (Panel("External effort", "time [s]", label(track, "tau_ext", "external effort"), marks),),
         height=42,
     )
-
-
-def true_effort(pushes: list[dict[str, Any]], end: float) -> tuple[Any, Any]:
-    """Times [s] and values (n,) of the corners of the effort that was exerted."""
-    corners = [(0.0, 0.0)]
-    for push in sorted(pushes, key=lambda p: float(p["start"])):
-        span = push["end"] - push["start"]
-        corners += [(push["start"] + x * span, y * push["peak"]) for x, y in SHAPES[push["shape"]]]
-    corners.append((end, 0.0))
-    return np.array([x for x, _ in corners]), np.array([y for _, y in corners])
