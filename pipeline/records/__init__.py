@@ -51,11 +51,11 @@ __all__ = [
 KINDS: dict[str, type[Record]] = {
     kind.__name__: kind
     for kind in (
-        Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Signal, Average,
+        Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Touch, Signal, Average,
         PeriodResidual, Trajectory, Spectrum, Smoothed, Fit, CrossFit, Identifiability, FittedPaths,
         MeasurementNoise, Residual, SwarmSearch, Guess, Choice, FrictionMap, Prediction, Tuning, FilterNoise,
-        FreeMotion, ErrorBand, Track, FreeSpace, Threshold, Contact, Load, Weight, FreeWeight, Comparison,
-        Whiteness, Diagnostic, Touch, Push, Stiffness, TissueModel, JointCorrelation, ArmCorrelation, TipForce,
-        TipContact, TipBudget,
+        FreeMotion, ErrorBand, Track, FreeSpace, Threshold, Contact, Push, Stiffness, TissueModel, Load, Weight,
+        FreeWeight, Comparison, JointCorrelation, ArmCorrelation, TipForce, TipContact, TipBudget, Whiteness,
+        Diagnostic,
     )
 }  # fmt: skip
