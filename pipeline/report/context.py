@@ -1,16 +1,18 @@
 """What every section is handed: the records, the results, and how to name things."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 from pipeline.records import Fit, FreeSpace, Prediction, Record
 from pipeline.records.catalogue import Catalogue, Provenance
 from pipeline.records.predict import CHOSEN
 from pipeline.records.quantities import QUANTITIES
-from pipeline.report.content import Number, literal
+from pipeline.report.content import Block, Number, OnScreen, Table, literal
 from pipeline.report.results import Results, format_unit
 from pipeline.study import Study
 
 PLAIN = "independent.lse"  # the fit that every other one is compared with
+PAPER = 24  # rows of a table at most, in the PDF
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,12 @@ class Context:
     def own_fits(self) -> list[Fit]:
         """The fits of the joints' own terms, one joint at a time."""
         return self.catalogue.about(Fit, model="independent")
+
+
+def listed(table: Table) -> Iterator[Block]:
+    """A table as it is, or on screen where it has more rows than paper has room for."""
+    long = len(table.rows) > PAPER
+    yield OnScreen(table.caption.partition(";")[0].rstrip("."), f"all-{table.label}", (table,)) if long else table
 
 
 def fit_name(model: str, estimator: str) -> str:

@@ -5,14 +5,14 @@ from dataclasses import replace
 
 from pipeline.records import Diagnostic, LogSummary, Signal
 from pipeline.report.content import Block, Bullets, Number, Prose, Table, Verdict, literal
-from pipeline.report.context import Context, count
+from pipeline.report.context import Context, count, listed
 
 
 def recorded(context: Context, summaries: list[LogSummary]) -> Iterator[Block]:
     """One table over all logs, and what the readers and the first stages remarked."""
     if not summaries:
         return
-    yield overview(context, summaries)
+    yield from listed(overview(context, summaries))
     clean = [summary for summary in summaries if not remarks(summary)]
     if clean:
         all_of_them = len(clean) == len(summaries)

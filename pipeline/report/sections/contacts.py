@@ -17,7 +17,7 @@ from pipeline.report.content import (
     Table,
     literal,
 )
-from pipeline.report.context import Context, count, label, title
+from pipeline.report.context import Context, count, label, listed, title
 from pipeline.study import LogEntry
 
 
@@ -40,13 +40,15 @@ def blocks(context: Context) -> Iterator[Block]:
             "detection level, which 99 % of the samples of its worst free run stay below."
         )
         yield peaks(contacts)
-        yield Table(
-            "Contacts, log by log; told says whether the peak is above the detection level, and where no window of the "
-            "study says so that a contact was found.",
-            ("Log", "Joint", "Onset", "Release", "Peak", "Mean", "Impulse", "Told"),
-            tuple(row for contact in contacts for row in rows(context, contact)),
-            "contact-table",
-            "llrrrrrl",
+        yield from listed(
+            Table(
+                "Contacts, log by log; told says whether the peak is above the detection level, and where no window of "
+                "the study says so that a contact was found.",
+                ("Log", "Joint", "Onset", "Release", "Peak", "Mean", "Impulse", "Told"),
+                tuple(row for contact in contacts for row in rows(context, contact)),
+                "contact-table",
+                "llrrrrrl",
+            )
         )
     unused = tuple((literal(name), joint, why) for name, joint, why in not_analysed(context))
     if unused:

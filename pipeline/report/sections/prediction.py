@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from pipeline.records import Prediction
 from pipeline.report.content import Block, Cell, Figure, Line, OnScreen, Panel, Prose, Section, Table, VSpan, literal
-from pipeline.report.context import Context, fit_name, label, title
+from pipeline.report.context import Context, fit_name, label, listed, title
 from pipeline.report.verdicts import percent
 
 LEFT_OUT = {
@@ -36,7 +36,7 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     used = [p for p in predictions if f"{p.model}.{p.estimator}" == context.used_fit(p.joint)]
     header = ("Log", "Joint", "Left out", "Path", "Model error", "Of effort", "$R^2$", "Ceiling")
     caption = "Prediction of unseen effort by the fit that the filter runs with, one row a run."
-    yield Table(caption, header, tuple(row(context, p) for p in used), "prediction-table", "llllrrrr")
+    yield from listed(Table(caption, header, tuple(row(context, p) for p in used), "prediction-table", "llllrrrr"))
     yield from estimators(context, predictions)
     yield OnScreen("Every score of every fit in every run", "all-scores", (every_score(context, predictions),))
     joints = dict.fromkeys(p.joint for p in used)
@@ -46,7 +46,12 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
         for joint in joints
         if any(p.joint == joint for p in unseen)
     ]
-    yield from (figure(context, p) for p in worst)
+    # The worst of all on paper.
+    worst.sort(key=lambda p: -p.model_error / (p.effort_rms or 1.0))
+    yield from (figure(context, p) for p in worst[:1])
+    if worst[1:]:
+        others = tuple(figure(context, p) for p in worst[1:])
+        yield OnScreen("The worst predicted run of each other joint", "worst-predicted", others)
 
 
 def row(context: Context, p: Prediction) -> tuple[Cell, ...]:

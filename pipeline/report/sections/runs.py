@@ -17,7 +17,7 @@ from pipeline.report.content import (
     VSpan,
     literal,
 )
-from pipeline.report.context import Context, count, label, title
+from pipeline.report.context import Context, count, label, listed, title
 from pipeline.report.plots import autocorrelation
 from pipeline.report.recorded import recorded
 from pipeline.report.verdicts import band_in_words
@@ -42,7 +42,7 @@ def tracked(context: Context, tracks: list[Track]) -> Iterator[Block]:
     if not tracks:
         return
     yield from intro(tracks)
-    yield scores(context, tracks)
+    yield from listed(scores(context, tracks))
     drawn = {(t.log, t.joint) for t in worst_runs(context, tracks)}
     for t in tracks:
         if (t.log, t.joint) in drawn:

@@ -4,7 +4,20 @@ import math
 from collections.abc import Iterator
 
 from pipeline.records import FreeWeight, Load, Weight
-from pipeline.report.content import Block, Cell, Figure, Line, Number, Panel, Prose, Section, Table, Verdict, literal
+from pipeline.report.content import (
+    Block,
+    Cell,
+    Figure,
+    Line,
+    Number,
+    OnScreen,
+    Panel,
+    Prose,
+    Section,
+    Table,
+    Verdict,
+    literal,
+)
 from pipeline.report.context import Context, label, title
 
 LIMIT = 1.96  # standard errors that a mass may be off the one that is stated
@@ -16,8 +29,11 @@ def section(context: Context) -> Section | None:
     if not weights:
         return None
     found: list[Block] = [intro(), summary(context, weights)]
-    for weight in weights:
-        found += of_log(context, weight)
+    found += (verdict(context, weight) for weight in weights)
+    found += of_log(context, weights[0])
+    if weights[1:]:
+        others = tuple(block for weight in weights[1:] for block in of_log(context, weight))
+        found.append(OnScreen("The other runs with a mass", "other-masses", others))
     return Section("Hung masses", "weight", tuple(found))
 
 
@@ -59,7 +75,6 @@ def summary(context: Context, weights: list[Weight]) -> Table:
 
 def of_log(context: Context, weight: Weight) -> Iterator[Block]:
     """What is said of one log."""
-    yield verdict(context, weight)
     if weight.tare:
         yield disagreement(context, weight)
     if loads := carrying(context, weight):
