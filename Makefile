@@ -73,7 +73,7 @@ demo: $(READY) ## simulate the demonstration study anew
 
 pictures: ## draw the README's pictures anew, from the report of the demonstration study (needs pdftoppm)
 	pdftoppm -r 65 -f 1 -singlefile -png reports/davinci-demo/report.pdf pipeline/report/pictures/page-one
-	pdftoppm -r 65 -f 5 -singlefile -png reports/davinci-demo/report.pdf pipeline/report/pictures/joint
+	pdftoppm -r 65 -f 8 -singlefile -png reports/davinci-demo/report.pdf pipeline/report/pictures/joint
 
 clean: ## remove what was made: processed files, reports, environment
 	rm -rf .venv build *.egg-info processed/* reports/*

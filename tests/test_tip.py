@@ -1,5 +1,6 @@
 """The stages that resolve external efforts into the force at the tip, on efforts that a known force makes."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +19,8 @@ from pipeline.records import (
     TipForce,
     Track,
 )
+from pipeline.report import verdicts
+from pipeline.report.sections import tip
 from pipeline.robots import load
 from pipeline.stages import combine, correlate, resolve
 from tests.test_averaging import entry
@@ -228,3 +231,28 @@ def test_the_error_of_each_joint_at_the_tip_is_its_deviation_times_its_lever():
     np.testing.assert_allclose(budget.filter_force, 0.6 * STD * lever)
     np.testing.assert_allclose(budget.total_force, STD * lever)
     assert {number.key for number in budget.published()} >= {f"tip.push.{joint}.model_part" for joint in NAMES}
+
+
+def test_a_force_that_is_known_nowhere_is_still_shown():
+    """As it is where the whole log is at singular poses, and where it ends before the filter has settled."""
+    made = run("davinci", tracks("davinci", efforts("davinci", PUSH)))
+    force, contact = made[TipForce], made[TipContact]
+    unknown = replace(force, **dict.fromkeys(TipForce.UNKNOWN, np.full(len(T), np.nan)))
+    assert tip.component_panel(unknown, "x", None).y_range is None
+    low, high = tip.component_panel(force, "z", contact).y_range
+    assert low < 0.0
+    assert high > 12.0
+    assert verdicts.NEAR_SINGULAR == workspace.NEAR_SINGULAR
+    assert not tip.condition_panel(force).y_log
+    assert tip.condition_panel(replace(force, near_singular=np.ones(len(T), int))).y_log
+
+
+def test_forces_are_drawn_from_where_the_tip_is_and_to_scale():
+    made = run("davinci", tracks("davinci", efforts("davinci", PUSH)))
+    figure = tip.in_space(made[TipForce], made[TipContact])
+    [largest] = [mark for mark in figure.marks if mark.label == "where it is largest"]
+    drawn = np.array([largest.x[1] - largest.x[0], largest.y[1] - largest.y[0], largest.z[1] - largest.z[0]])
+    np.testing.assert_allclose(drawn / np.linalg.norm(drawn), np.array([3.0, -4.0, 12.0]) / 13.0, atol=1e-9)
+    per_newton = float(re.search(r"1 N is ([\d.]+) mm", figure.caption)[1])
+    assert 1e3 * np.linalg.norm(drawn) == pytest.approx(13.0 * per_newton, rel=0.05)  # two digits are printed
+    assert largest.x[0] == pytest.approx(made[TipContact].x[0])

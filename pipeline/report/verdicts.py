@@ -10,6 +10,7 @@ GOOD, CAUTION = 0.10, 0.25  # model error over the root mean square of the measu
 DETECTED, DETECTABLE = 1 / 3, 1.0  # detection level over the effort that the user wants to see
 STIFF, STIFFER = 0.10, 0.25  # standard error of a stiffness over it
 COVERED = (0.90, 0.98)  # coverage of a 95 % band that is right
+NEAR_SINGULAR = 100.0  # condition number of the tip's Jacobian, as the stage that finds the force marks it
 WITHIN = 4.0  # standard errors that an estimate may be off the truth
 WORDS: dict[Level, str] = {  # the mark and its word stay on one line
     "good": "●\N{NO-BREAK SPACE}Good",
@@ -86,6 +87,7 @@ def thresholds() -> tuple[tuple[Cell, ...], ...]:
         ("Stiffness of tissue", "its standard error over it",
          f"at most {percent(STIFF)}, of two pushes at least", f"at most {percent(STIFFER)}",
          "beyond, or no push counts"),
+        ("Pose of the tip", "condition number of its Jacobian", "–", f"above {NEAR_SINGULAR:g}: near singular", "–"),
         ("Parameter of a simulated study", "standard errors from the truth", f"at most {WITHIN:g}", "–", "beyond"),
         ("White noise", "probability of a larger Ljung-Box statistic over 20 lags", "above 1 %", "–", "–"),
     )  # fmt: skip

@@ -30,10 +30,9 @@ from pipeline.report.content import (
 from pipeline.report.content.marks import AnyMark, Colour
 from pipeline.report.content.number import MINUS
 from pipeline.report.context import Context, label, title
-from pipeline.report.verdicts import band, percent
+from pipeline.report.verdicts import NEAR_SINGULAR, band, percent
 
 AXES = {"x": "x0", "y": "y0, the roll axis", "z": "z0, up"}
-NEAR = 100.0  # condition number above which a pose is marked
 USUAL = 1.96  # standard deviations of a 95 % band
 PATH_POINTS = 600  # of the path in space
 SETTLE = 1.0  # [s] that the range of the force is not taken from
@@ -150,8 +149,8 @@ def level_table(context: Context, forces: Sequence[TipForce]) -> Table:
         "The size of the force at the tip where nothing touches the robot: root mean square, the levels that 95 % and "
         "99 % of samples stay below, and the share of samples whose 95 % ellipsoid holds no force. A force below the "
         "detection level cannot be told from free space. The condition number of the Jacobian, its median, says how "
-        f"much better the force is told in one direction than in another; above {NEAR:g}, as where the tip is within "
-        "about a centimetre of the remote centre, a sample is near singular and not judged.",
+        f"much better the force is told in one direction than in another; above {NEAR_SINGULAR:g}, as where the tip is "
+        "within about a centimetre of the remote centre, a sample is near singular and not judged.",
         ("Log", "Role", "RMS", "95 %", "Detection level", "Coverage", "Condition", "Near singular"),
         rows,
         "tip-levels",
@@ -197,11 +196,18 @@ def component_panel(force: TipForce, axis: str, contact: TipContact | None) -> P
         Band(force.t, f - USUAL * std, f + USUAL * std, "95 % band" if axis == "x" else "", "blue"),
         Line(force.t, f, "force" if axis == "x" else "", "vermillion", "solid"),
     )
-    calm = force.t >= force.t[0] + SETTLE  # at its start the filter knows nothing, and its band hides all else
-    low, high = np.nanmin((f - USUAL * std)[calm]), np.nanmax((f + USUAL * std)[calm])
-    room = 0.05 * float(high - low)
-    reach = (float(low) - room, float(high) + room)
-    return Panel(f"Along {AXES[axis]}", "time [s]", label(force, f"f_{axis}", "force"), marks, y_range=reach)
+    shown = reach(force, f - USUAL * std, f + USUAL * std)
+    return Panel(f"Along {AXES[axis]}", "time [s]", label(force, f"f_{axis}", "force"), marks, y_range=shown)
+
+
+def reach(force: TipForce, lower: Column, upper: Column) -> tuple[float, float] | None:
+    """What a band reaches over once the filter has settled: at its start it knows nothing, and would hide all else."""
+    values = np.concatenate([edge[force.t >= force.t[0] + SETTLE] for edge in (lower, upper)])
+    values = values[np.isfinite(values)]
+    if not len(values) or np.ptp(values) == 0.0:
+        return None
+    room = 0.05 * float(np.ptp(values))
+    return float(values.min()) - room, float(values.max()) + room
 
 
 def condition_panel(force: TipForce) -> Panel:
@@ -209,7 +215,7 @@ def condition_panel(force: TipForce) -> Panel:
     near = bool(force.near_singular.any())
     marks: tuple[AnyMark, ...] = (Line(force.t, np.minimum(force.condition, 1e6), "", "black"),)
     if near:
-        marks = (*marks, HLine(NEAR, "near singular"))
+        marks = (*marks, HLine(NEAR_SINGULAR, "near singular"))
     return Panel("Condition number of the Jacobian", "time [s]", "condition", marks, y_log=near)
 
 
