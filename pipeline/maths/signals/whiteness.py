@@ -67,21 +67,22 @@ def cumulative_periodogram(pieces: Sequence[Array]) -> Cumulative:
     from scipy.fft import rfft
 
     several = [_ordinates(np.asarray(rfft(x)), len(x)) for x in pieces if len(x) > 2]
-    frequency, ordinate = (np.concatenate(columns) for columns in zip(*several, strict=True))
+    frequency, ordinate = several[0]
     if len(several) > 1:
+        frequency, ordinate = (np.concatenate(columns) for columns in zip(*several, strict=True))
         order = np.argsort(frequency, kind="stable")
         frequency, ordinate = frequency[order], ordinate[order]
     total = np.cumsum(ordinate)
     share, q = total / total[-1], len(total)
-    j = np.arange(1, q)
-    above, below = share[:-1] - (j - 1) / (q - 1), j / (q - 1) - share[:-1]
-    distance = float(max(above.max(), below.max()))
+    step = 1.0 / (q - 1)
+    above = share[:-1] - step * np.arange(q - 1)  # a step of the straight line's samples lower, and higher
+    distance = float(max(above.max(), step - above.min()))
     return Cumulative(frequency, share, distance, chance_of(distance, q - 1))
 
 
 def _ordinates(X: Array, length: int) -> tuple[Array, Array]:
-    j = np.arange(1, (length - 1) // 2 + 1)
-    return j / length, (X.real[j] ** 2 + X.imag[j] ** 2) / length
+    inner = X[1 : (length - 1) // 2 + 1]
+    return np.arange(1, len(inner) + 1) / length, (inner.real**2 + inner.imag**2) / length
 
 
 def chance_of(distance: float, steps: int) -> float:
