@@ -10,6 +10,7 @@ from pipeline.records.design import Control, Excitation, Links, Lyapunov, Pose, 
 from pipeline.records.diagnostic import Diagnostic, diagnostic
 from pipeline.records.differentiate import Spectrum, Trajectory
 from pipeline.records.ekf import Track
+from pipeline.records.explain import Explanation, Innovation
 from pipeline.records.fit import CrossFit, Fit, FittedPaths, MeasurementNoise, Residual, SwarmSearch
 from pipeline.records.hang import Load
 from pipeline.records.ingest import LogSummary, Recording
@@ -26,8 +27,8 @@ from pipeline.records.whiteness import Whiteness
 
 __all__ = [
     "COLUMN_DTYPES", "KINDS", "AnyRecord", "Average", "Choice", "Column", "Comparison", "Contact", "Control",
-    "Counts", "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "FilterNoise", "Fit", "FittedPaths",
-    "FreeMotion", "FreeSpace", "FreeWeight", "Labels", "Links", "Load", "LogSummary", "Lyapunov",
+    "Counts", "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "Explanation", "FilterNoise", "Fit", "FittedPaths",
+    "FreeMotion", "FreeSpace", "FreeWeight", "Innovation", "Labels", "Links", "Load", "LogSummary", "Lyapunov",
     "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Record", "Recording",
     "Residual", "Signal", "Smoothed", "Spectrum", "SwarmSearch", "Threshold", "Track", "Trajectory", "Tuning",
     "Weight", "Whiteness", "Workspace", "diagnostic",
@@ -39,6 +40,6 @@ KINDS: dict[str, type[Record]] = {
         Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Signal, Average,
         PeriodResidual, Trajectory, Spectrum, Smoothed, Fit, CrossFit, FittedPaths, MeasurementNoise, Residual,
         SwarmSearch, Choice, Prediction, Tuning, FilterNoise, FreeMotion, ErrorBand, Track, FreeSpace,
-        Threshold, Contact, Comparison, Whiteness, Diagnostic, Load, Weight, FreeWeight,
+        Threshold, Contact, Comparison, Whiteness, Innovation, Explanation, Diagnostic, Load, Weight, FreeWeight,
     )
 }  # fmt: skip

@@ -22,4 +22,5 @@ does not grow with the study, unless it is the only one of its stage.  The repor
 STAGES = (
     "design", "ingest", "resample", "average", "differentiate", "smooth", "fit", "choose", "predict", "tune",
     "settle", "calibrate", "bound", "ekf", "assess", "threshold", "measure", "hang", "weigh", "compare", "whiteness",
+    "explain",
 )  # fmt: skip

@@ -125,3 +125,21 @@ def cross_correlation(x: Array, u: Array, lags: int) -> Array:
     products = irfft(rfft(x, length) * np.conj(rfft(u, length)), length)
     scale = float(np.linalg.norm(x) * np.linalg.norm(u)) or 1.0
     return np.asarray(np.concatenate([products[length - lags :], products[: lags + 1]]) / scale)
+
+
+def shape(x: Array) -> tuple[float, float, float]:
+    """Skewness, excess kurtosis, and the probability of a larger Jarque-Bera statistic if x (N,) were normal."""
+    from scipy.special import chdtrc
+
+    d = x - x.mean()
+    d2 = d * d
+    m2, m3, m4 = (float(np.mean(m)) for m in (d2, d2 * d, d2 * d2))
+    skewness, kurtosis = m3 / m2**1.5, m4 / m2**2 - 3.0
+    return skewness, kurtosis, float(chdtrc(2, len(x) / 6.0 * (skewness**2 + kurtosis**2 / 4.0)))
+
+
+def mean_square_band(N: int) -> tuple[float, float]:
+    """Where the mean square of N samples of white noise of variance 1 is in 95 of 100 cases: chi^2(N) / N."""
+    from scipy.special import chdtri
+
+    return float(chdtri(N, 0.975) / N), float(chdtri(N, 0.025) / N)
