@@ -18,7 +18,7 @@ from pipeline.filters.problem import NoiseModel
 from pipeline.filters.tuning import likeliest_walk
 from pipeline.maths.arrays import Array, Booleans
 from pipeline.maths.models.driven import Driven
-from pipeline.maths.signals.whiteness import probabilities, runs
+from pipeline.maths.signals.whiteness import runs, tests
 from pipeline.maths.signals.windows import SETTLE, settled
 
 LEVEL = 0.01  # below this probability a test rejects white noise
@@ -26,16 +26,20 @@ LAGS = 20  # of the Ljung-Box statistic
 CLEARLY = 10.0  # times, that the smallest probability has to grow by where a cause is taken away
 MOST = 50_000  # samples that the causes are looked for in
 FEWEST = 200  # samples, fewer than which are left of a run tell nothing
+NEAR = 0.95  # of the most that is explained
 TOGETHER = 3  # causes that are taken away at once, at most
 ELSEWHERE = 8  # other times at which as many samples are tested
 
 CONTACT, REVERSALS = "contact", "reversals"  # left out
-STEP, WALK, SIZES, COLOUR = "step", "walk", "sizes", "colour"  # mended; so is each model of another name
+STEP, WALK, SIZES, CLOCK, COLOUR = "step", "walk", "sizes", "clock", "colour"  # mended; so is each other model
 STEPS = {"ekf_euler": DEFAULT}  # a filter, and the one that leaves less out of a step
 
 
 class Subject(NamedTuple):
-    """A joint's run without a gap, as the filter takes it under each model, the one in use first; (N,) samples."""
+    """A joint's run without a gap, as the filter takes it under each model, the one in use first; (N,) samples.
+
+    With the times of its samples mended it counts as another model, `CLOCK`.
+    """
 
     models: Mapping[str, Driven]
     noise: NoiseModel
@@ -51,6 +55,7 @@ class Trial(NamedTuple):
     tested: int
     ljung_box: tuple[float, float]  # probabilities, of q and dq
     periodogram: tuple[float, float]
+    excess: float  # the sum of squared autocorrelations beyond that of white noise, of q and dq together
     walk: float  # over the one in use
 
     @property
@@ -69,6 +74,17 @@ class Search(NamedTuple):
 
     trials: list[Trial]
     explaining: list[Trial]
+
+    def share(self, trial: Trial) -> float:
+        """How much of the correlation is gone in a trial."""
+        whole = self.trials[0].excess
+        return 1.0 - trial.excess / whole if whole > 0.0 else 0.0
+
+    def nearest(self) -> Trial:
+        """Of those that come near to explaining the most, the one that takes least away."""
+        told = [trial for trial in self.trials if trial.tested >= FEWEST] or self.trials[:1]
+        most = max(map(self.share, told))
+        return next(trial for trial in told if self.share(trial) >= NEAR * most)
 
 
 def search(subject: Subject) -> Search:
@@ -110,12 +126,14 @@ def causes(subject: Subject) -> Iterator[str]:
 
 
 def possible(without: tuple[str, ...], subject: Subject, explaining: list[Trial]) -> bool:
-    """Whether these go together: one model, and no colour where sizes alone will do, or that of another model."""
-    others = sum(name in without for name in list(subject.models)[1:])
-    if COLOUR not in without:
-        return others <= 1
-    alone = {*without} - {COLOUR} | {SIZES}
-    return others == 0 and SIZES not in without and all(alone != {*trial.without} for trial in explaining)
+    """Whether these go together: one model at a time; sizes are part of colour and of the clock; no colour for
+    another model, nor where sizes alone will do.
+    """
+    others = {*list(subject.models)[1:]} & {*without}
+    if len(others) > 1 or len({SIZES, COLOUR} & {*without}) > 1 or {SIZES, CLOCK} <= {*without}:
+        return False
+    simpler = {*without} - {COLOUR} | (set() if CLOCK in without else {SIZES})
+    return COLOUR not in without or (others <= {CLOCK} and all(simpler != {*trial.without} for trial in explaining))
 
 
 def beginning(subject: Subject) -> Subject:
@@ -135,9 +153,12 @@ class Passes:
     def trial(self, without: tuple[str, ...]) -> Trial:
         """The tests without these causes."""
         pieces_q, pieces_dq = self.pieces(without, self.free(without), self.moving(without))
-        (box_q, wave_q), (box_dq, wave_dq) = (probabilities(x, LAGS) if x else (0.0, 0.0) for x in (pieces_q, pieces_dq))
+        (box_q, wave_q), (box_dq, wave_dq) = tests(pieces_q, LAGS), tests(pieces_dq, LAGS)
+        tested = sum(map(len, pieces_q))
+        excess = max(box_q.statistic + box_dq.statistic - 2.0 * LAGS, 0.0) / max(tested, 1)
         walk = self.noise(without).white.q_tau / self.subject.noise.q_tau if self.subject.noise.q_tau else 1.0
-        return Trial(without, sum(map(len, pieces_q)), (box_q, box_dq), (wave_q, wave_dq), walk)
+        probabilities = (box_q.probability, box_dq.probability)
+        return Trial(without, tested, probabilities, (wave_q, wave_dq), excess, walk)
 
     def fails_elsewhere(self, without: tuple[str, ...]) -> bool:
         """Whether as many samples at most other times fail, where samples were left out."""
@@ -148,7 +169,7 @@ class Passes:
         for i in range(1, ELSEWHERE + 1):
             later = round(len(free) * (i * 0.6180339887498949 % 1.0))  # at even distances that fit no period
             pieces = self.pieces(without, np.roll(free, later), np.roll(moving, later))
-            failed += min(p for x in pieces for p in (probabilities(x, LAGS) if x else (0.0, 0.0))) <= LEVEL
+            failed += any(min(box.probability, wave) <= LEVEL for box, wave in (tests(x, LAGS) for x in pieces))
         return failed > ELSEWHERE // 2
 
     def free(self, without: tuple[str, ...]) -> Booleans:
@@ -196,7 +217,7 @@ class Passes:
     def noise(self, without: tuple[str, ...]) -> coloured.Noise:
         """What is assumed: the noise in use, or what is likeliest of it where that is what is mended."""
         key = tuple(name for name in without if name != REVERSALS)
-        if not {WALK, SIZES, COLOUR} & {*key}:
+        if not {WALK, SIZES, CLOCK, COLOUR} & {*key}:
             return coloured.Noise(self.subject.noise, coloured.UNCOLOURED)
         if key not in self._noises:
             self._noises[key] = self._likeliest(key)
@@ -207,7 +228,7 @@ class Passes:
         parts = [driven.part(run) for run in self.runs(self.free(without))]
         if WALK in without:
             used = used._replace(q_tau=likeliest_walk(parts, used))
-        if not {SIZES, COLOUR} & {*without}:
+        if not {SIZES, CLOCK, COLOUR} & {*without}:
             return coloured.Noise(used, coloured.UNCOLOURED)
         longest = max(parts, key=lambda part: len(part.q))
         return coloured.likeliest(longest, used, WALK in without, COLOUR in without)

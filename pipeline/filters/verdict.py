@@ -1,15 +1,17 @@
 """What a search for causes found, in words."""
 
-from pipeline.filters.causes import COLOUR, CONTACT, REVERSALS, SIZES, STEP, WALK, Search, Trial
+from pipeline.filters.causes import CLOCK, COLOUR, CONTACT, REVERSALS, SIZES, STEP, WALK, Search, Trial
 
 WHITE, LEFT_OUT, MENDED, UNEXPLAINED = "white", "left out", "mended", "unexplained"
 LEAVING = (CONTACT, REVERSALS)
 SAID = {
     SIZES: "noise of another size than assumed",
     COLOUR: "coloured measurement noise",
+    CLOCK: "uneven times of the samples, as the other joints tell them",
     STEP: "what the filter's step leaves out",
 }
 NOTHING = "not white: no tested cause explains it"
+MOST_OF_IT = 0.5  # of the correlation, below which a cause is not worth its name
 
 
 def finding(search: Search) -> str:
@@ -25,7 +27,7 @@ def verdict(search: Search) -> str:
     """The same in words; where several would explain it, all of them."""
     if search.trials[0].white:
         return "white"
-    return "; or ".join(explained(trial) for trial in search.explaining) or NOTHING
+    return "; or ".join(explained(trial) for trial in search.explaining) or unexplained(search)
 
 
 def explained(trial: Trial) -> str:
@@ -36,6 +38,16 @@ def explained(trial: Trial) -> str:
     if not mended:
         return f"white {where}"
     return f"{' and '.join(mended)}{f', {where}' if where else ''}"
+
+
+def unexplained(search: Search) -> str:
+    """That nothing explains it, and what explains most of it."""
+    nearest = search.nearest()
+    share = search.share(nearest)
+    if share < MOST_OF_IT:
+        return NOTHING
+    names = " and ".join(name if name in LEAVING else cause(name, nearest.walk) for name in nearest.without)
+    return f"not white: {min(100 * share, 99):.0f} % of the correlation is explained by {names}, the rest by nothing tested"
 
 
 def cause(name: str, walk: float) -> str:

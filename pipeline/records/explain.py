@@ -41,6 +41,7 @@ class Explanation(Record):
     joint: str
     finding: str
     verdict: str
+    clock_std: float
     without: Labels
     explains: Counts
     left: Counts
@@ -49,3 +50,8 @@ class Explanation(Record):
     periodogram_p_q: Column
     periodogram_p_dq: Column
     walk: Column
+
+    def published(self) -> Iterator[Published]:
+        """By how much the times of samples are off, where other joints can tell."""
+        if self.clock_std > 0.0:
+            yield from self.publish(f"ekf.{self.log}.{self.joint}", "clock_std")

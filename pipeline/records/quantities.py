@@ -289,6 +289,7 @@ QUANTITIES = {
     "with_sign": Quantity("correlation with the sign of the velocity so many samples before"),
     "finding": Quantity("white, left out, mended, or unexplained", ""),
     "verdict": Quantity("whether the innovations are white, or by what they are when not", ""),
+    "clock_std": Quantity("root mean square error of the times of samples, as the other joints tell it", "s"),
     "without": Quantity("what was left out of the run, or mended of the filter, before testing", ""),
     "explains": Quantity("1 where the innovations are white without it, and it takes that"),
     "left": Quantity("number of samples that were left to test"),

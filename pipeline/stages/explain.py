@@ -6,10 +6,11 @@ import numpy as np
 
 from pipeline.estimators.driving import Driving, driving, named
 from pipeline.estimators.refitting import refitted
-from pipeline.estimators.used import FALLBACK, describing, model_of
+from pipeline.estimators.used import describing
 from pipeline.filters.assumed import assumed
-from pipeline.filters.causes import Search, Subject, search
+from pipeline.filters.causes import CLOCK, Search, Subject, search
 from pipeline.filters.innovations import Innovations, innovations
+from pipeline.filters.timing import delays, mended
 from pipeline.filters.verdict import finding, verdict
 from pipeline.maths.arrays import Array, Booleans
 from pipeline.maths.models.driven import Driven
@@ -21,7 +22,7 @@ from pipeline.robots.robot import Robot
 from pipeline.study import LogEntry
 
 LAGS = 100  # of the correlation with the motion
-MODELS = 2  # others that are tried
+UNSTATED = "; when it is touched is not stated, so contact could not be left out"
 THIS_LOG = "parameters of this log itself"
 
 
@@ -43,23 +44,30 @@ def run(
     """
     if entry.role == "friction":
         return
-    every, chosen, settled_noises = list(fits), list(choices), {noise.joint: noise for noise in noises}
+    every, chosen, assumes = list(fits), list(choices), {noise.joint: noise for noise in noises}
+    owns = []
     for signal in signals:
-        if signal.at_rest or signal.joint not in settled_noises or not describing(robot, every, signal.joint):
-            continue
-        kept, _ = named(signal, signals, every, chosen, robot, fit)
-        own = driving(signal, signals, kept, robot, lowpass)
-        if own.joint.inertia.min() <= 0:
-            continue
-        noise, run_ = assumed(settled_noises[signal.joint], 1.0 / signal.rate, q_tau), longest_run(signal.t, signal.rate)
-        free = outside(signal.t, entry.contact)
-        used, motion = longest(own), tuple(x[run_] for x in own.motion[1:])
-        yield from described(signal, used, innovations(used, noise), motion)
-        models = {"": own, **others(own, signals, every, robot, lowpass, free)}
-        subject = Subject(
-            {name: longest(by) for name, by in models.items()}, noise, free[run_], moving(motion[0], used.T_s)
-        )
-        yield explanation(signal, search(subject))
+        if not signal.at_rest and signal.joint in assumes and describing(robot, every, signal.joint):
+            own = driving(signal, signals, named(signal, signals, every, chosen, robot, fit)[0], robot, lowpass)
+            if own.joint.inertia.min() > 0:
+                owns.append((own, assumed(assumes[signal.joint], 1.0 / signal.rate, q_tau)))
+    every_innovation = [innovations(longest(own), noise) for own, noise in owns]
+    late = delays([along(own)[0] for own, _ in owns], [made.q for made in every_innovation])
+    for (own, noise), made, delay in zip(owns, every_innovation, late, strict=True):
+        signal, part = own.signal, longest_run(own.signal.t, own.signal.rate)
+        motion, free = along(own), outside(signal.t, entry.contact)
+        yield from described(own, made, motion)
+        models = {name: longest(by) for name, by in others(own, signals, every, robot, lowpass, free)}
+        if delay.any():
+            models[CLOCK] = mended(longest(own), *motion, delay)
+        subject = Subject(models, noise, free[part], moving(motion[0], 1.0 / signal.rate))
+        yield explanation(signal, search(subject), entry, float(np.std(delay)))
+
+
+def along(own: Driving) -> tuple[Array, Array]:
+    """Velocity and acceleration over the longest run, without noise."""
+    part = longest_run(own.signal.t, own.signal.rate)
+    return own.motion[1][part], own.motion[2][part]
 
 
 def longest(own: Driving) -> Driven:
@@ -69,26 +77,24 @@ def longest(own: Driving) -> Driven:
 
 def others(
     own: Driving, signals: Sequence[Signal], fits: Sequence[Fit], robot: Robot, lowpass: float, free: Booleans
-) -> dict[str, Driving]:
-    """The joint under other models: with parameters of this log itself, and of another structure."""
-    tried = {THIS_LOG: refitted(own, signals, robot, lowpass, free)}
-    for fit in describing(robot, fits, own.signal.joint):
-        if fit.model != own.fit.model and len(tried) <= MODELS and told(fit, own.signal, signals, robot):
-            tried.setdefault(fit.model, fit)
-    made = {name: driving(own.signal, signals, fit, robot, lowpass) for name, fit in tried.items()}
-    return {name: by for name, by in made.items() if by.joint.inertia.min() > 0}
+) -> Iterator[tuple[str, Driving]]:
+    """The joint under the model in use, and under others: with parameters of this log itself, and with a structure of its own that is
+    not the one in use.
+    """
+    yield "", own
+    yield THIS_LOG, own.by(refitted(own, signals, robot, lowpass, free))
+    joint = own.signal.joint
+    structures = [fit for fit in fits if fit.group == joint and fit.model != own.fit.model]
+    for fit in structures[:1]:
+        other = driving(own.signal, signals, fit, robot, lowpass)
+        if other.joint.inertia.min() > 0:
+            yield fit.model, other
 
 
-def told(fit: Fit, signal: Signal, signals: Sequence[Signal], robot: Robot) -> bool:
-    """Whether a log holds what a fit of another structure needs."""
-    if fit.model == "independent" and f"{fit.model}.{fit.estimator}" != FALLBACK:
-        return False
-    return set(model_of(robot, fit).joints) <= {s.joint for s in signals if len(s) == len(signal)}
-
-
-def described(signal: Signal, used: Driven, made: Innovations, motion: tuple[Array, ...]) -> Iterator[Innovation]:
+def described(own: Driving, made: Innovations, motion: tuple[Array, Array]) -> Iterator[Innovation]:
     """The size of both innovations, and their correlation with the motion before."""
-    kept = settled(used.T_s * np.arange(len(used.q)))
+    signal = own.signal
+    kept = settled(np.arange(len(made.q)) / signal.rate)
     dq, ddq = (x[kept] for x in motion)
     N = int(kept.sum())
     lags = min(LAGS, N // 4)
@@ -105,14 +111,16 @@ def described(signal: Signal, used: Driven, made: Innovations, motion: tuple[Arr
         )  # fmt: skip
 
 
-def explanation(signal: Signal, found: Search) -> Explanation:
+def explanation(signal: Signal, found: Search, entry: LogEntry, clock_std: float) -> Explanation:
     """What a search found, trial by trial."""
-    trials = found.trials
+    trials, touched = found.trials, entry.role in ("contact", "tissue") and not entry.contact
+    unstated = UNSTATED if touched and not (trials[0].white or found.explaining) else ""
     return Explanation(
         log=signal.log,
         joint=signal.joint,
         finding=finding(found),
-        verdict=verdict(found),
+        verdict=verdict(found) + unstated,
+        clock_std=clock_std,
         without=np.array([" + ".join(t.without) or "nothing" for t in trials], object),
         explains=np.array([t in found.explaining for t in trials], np.int64),
         left=np.array([t.tested for t in trials]),

@@ -4,7 +4,7 @@ import numpy as np
 
 from pipeline.maths.arrays import Array, Booleans
 
-BEFORE, AFTER = 0.1, 0.5  # [s] around a reversal that are left out: a filter needs the latter to forget it
+BEFORE, AFTER = 0.05, 0.25  # [s] around a reversal that are left out: by then a filter that shows pushes has forgotten it
 SLOW = 0.05  # of the root mean square of the velocity, below which friction may stick
 
 

@@ -99,15 +99,16 @@ def distance_of(probability: float, ordinates: int) -> float:
     return float(kstwo.isf(probability, max(ordinates - 1, 1)))
 
 
-def probabilities(pieces: Sequence[Array], lags: int) -> tuple[float, float]:
-    """Of a larger Ljung-Box statistic and of a farther straying cumulative periodogram; 0 where nothing can be said."""
+def tests(pieces: Sequence[Array], lags: int) -> tuple[LjungBox, float]:
+    """Ljung and Box's, and the probability of a cumulative periodogram that strays farther.
+
+    Both probabilities are 0 where nothing can be said.
+    """
     n = sum(len(x) for x in pieces)
     if n < FEWEST or max(map(len, pieces)) < 5 or all(np.ptp(x) == 0 for x in pieces):
-        return 0.0, 0.0
-    level = centred(pieces)
-    tested = min(lags, n // 5)
-    box = ljung_box(level, autocorrelation(level, tested), tested)
-    return box.probability, cumulative_periodogram(level).probability
+        return LjungBox(0.0, 0.0), 0.0
+    level, tested = centred(pieces), min(lags, n // 5)
+    return ljung_box(level, autocorrelation(level, tested), tested), cumulative_periodogram(level).probability
 
 
 def runs(which: Booleans) -> list[slice]:
