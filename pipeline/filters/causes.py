@@ -23,7 +23,7 @@ from pipeline.maths.signals.windows import SETTLE, settled
 
 LEVEL = 0.01  # below this probability a test rejects white noise
 LAGS = 20  # of the Ljung-Box statistic
-CLEARLY = 10.0  # times, that the smallest probability has to grow by where a cause is taken away
+CLEARLY = 100.0  # times, that the smallest probability has to grow by where a cause is taken away
 MOST = 50_000  # samples that the causes are looked for in
 FEWEST = 200  # samples, fewer than which are left of a run tell nothing
 NEAR = 0.95  # of the most that is explained
@@ -126,14 +126,16 @@ def causes(subject: Subject) -> Iterator[str]:
 
 
 def possible(without: tuple[str, ...], subject: Subject, explaining: list[Trial]) -> bool:
-    """Whether these go together: one model at a time; sizes are part of colour and of the clock; no colour for
-    another model, nor where sizes alone will do.
+    """Whether these go together: one model at a time; sizes are part of colour and of the clock, which are not tried
+    where sizes alone will do; and no colour for another model.
     """
     others = {*list(subject.models)[1:]} & {*without}
     if len(others) > 1 or len({SIZES, COLOUR} & {*without}) > 1 or {SIZES, CLOCK} <= {*without}:
         return False
-    simpler = {*without} - {COLOUR} | (set() if CLOCK in without else {SIZES})
-    return COLOUR not in without or (others <= {CLOCK} and all(simpler != {*trial.without} for trial in explaining))
+    if not {CLOCK, COLOUR} & {*without}:
+        return True
+    simpler = {*without} - {CLOCK, COLOUR} | {SIZES}
+    return others <= {CLOCK} and all(simpler != {*trial.without} for trial in explaining)
 
 
 def beginning(subject: Subject) -> Subject:
@@ -191,7 +193,7 @@ class Passes:
         for run in self.runs(free):
             part = self.driven(without).part(run)
             i_q, i_dq = self.innovations(without, part)
-            for piece in runs(settled(np.arange(len(i_q)) * part.T_s) & moving[run]):
+            for piece in runs(settled(np.asarray(np.arange(len(i_q)) * part.T_s, np.float64)) & moving[run]):
                 if piece.stop - piece.start > LAGS:
                     pieces_q.append(i_q[piece])
                     pieces_dq.append(i_dq[piece])

@@ -71,8 +71,11 @@ def likeliest(recording: Driven, start: NoiseModel, walks: bool, coloured: bool)
     # Starting points at a distance: the likelihood of one alone may be flat.
     size = len(names) + 2 * coloured
     simplex = np.vstack([np.zeros(size), np.diag([0.5] * len(names) + [1.0] * 2 * coloured)])
-    options = {"initial_simplex": simplex, "maxfev": TRIALS * size, "xatol": 1e-2, "fatol": 0.1}
-    return noise_at(minimize(unlikely, np.zeros(size), method="Nelder-Mead", options=options).x)
+    found = minimize(
+        unlikely, np.zeros(size), method="Nelder-Mead",
+        options={"initial_simplex": simplex, "maxfev": TRIALS * size, "xatol": 1e-2, "fatol": 0.1},
+    )  # fmt: skip
+    return noise_at(found.x)
 
 
 @cached(derivation, stepping)

@@ -1,6 +1,6 @@
 """The innovations of the default filter, each with the deviation that the filter states of it.
 
-    S = H P H' + R,    NIS_q = i_q^2 / S_qq,    NIS_dq = i_dq^2 / S_dd ~ chi^2(1), each by itself
+S = H P H' + R,    NIS_q = i_q^2 / S_qq,    NIS_dq = i_dq^2 / S_dd ~ chi^2(1), each by itself
 """
 
 from typing import Any, NamedTuple

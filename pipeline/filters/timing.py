@@ -21,14 +21,15 @@ def delays(velocities: Sequence[Array], innovations: Sequence[Array]) -> list[Ar
     told = [spread(dq, i) for dq, i in zip(velocities, innovations, strict=True)]
     top = [dq * i / rest for dq, i, (rest, _) in zip(velocities, innovations, told, strict=True)]
     bottom = [dq**2 / rest for dq, (rest, _) in zip(velocities, told, strict=True)]
-    made = []
+    made: list[Array] = []
     for j in range(len(velocities)):
         others = [i for i in range(len(velocities)) if i != j]
         variance = float(np.median([told[i][1] for i in others])) if others else 0.0
         if variance <= 0.0:
             made.append(np.zeros_like(velocities[j]))
             continue
-        made.append(sum(top[i] for i in others) / (1.0 / variance + sum(bottom[i] for i in others)))
+        above, below = (np.sum([each[i] for i in others], axis=0) for each in (top, bottom))
+        made.append(above / (1.0 / variance + below))
     return made
 
 

@@ -47,7 +47,8 @@ def unexplained(search: Search) -> str:
     if share < MOST_OF_IT:
         return NOTHING
     names = " and ".join(name if name in LEAVING else cause(name, nearest.walk) for name in nearest.without)
-    return f"not white: {min(100 * share, 99):.0f} % of the correlation is explained by {names}, the rest by nothing tested"
+    said = f"{min(100 * share, 99):.0f} % of the correlation is explained by {names}, the rest by nothing tested"
+    return f"not white: {said}"
 
 
 def cause(name: str, walk: float) -> str:

@@ -17,6 +17,7 @@ class Innovation(Record):
     signal: str
     tested: int
     band: float
+    band_99: float
     nis_own: float
     nis_low: float
     nis_high: float

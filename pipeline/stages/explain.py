@@ -15,7 +15,7 @@ from pipeline.filters.verdict import finding, verdict
 from pipeline.maths.arrays import Array, Booleans
 from pipeline.maths.models.driven import Driven
 from pipeline.maths.signals.reversals import moving
-from pipeline.maths.signals.whiteness import cross_correlation, mean_square_band
+from pipeline.maths.signals.whiteness import NORMAL_95, NORMAL_99, cross_correlation, mean_square_band
 from pipeline.maths.signals.windows import longest_run, outside, settled
 from pipeline.records import Choice, Explanation, FilterNoise, Fit, Innovation, Signal
 from pipeline.robots.robot import Robot
@@ -78,9 +78,7 @@ def longest(own: Driving) -> Driven:
 def others(
     own: Driving, signals: Sequence[Signal], fits: Sequence[Fit], robot: Robot, lowpass: float, free: Booleans
 ) -> Iterator[tuple[str, Driving]]:
-    """The joint under the model in use, and under others: with parameters of this log itself, and with a structure of its own that is
-    not the one in use.
-    """
+    """The joint under the model in use; with parameters of this log itself; and under another structure of its own."""
     yield "", own
     yield THIS_LOG, own.by(refitted(own, signals, robot, lowpass, free))
     joint = own.signal.joint
@@ -101,12 +99,10 @@ def described(own: Driving, made: Innovations, motion: tuple[Array, Array]) -> I
     low, high = mean_square_band(N)
     for name, x, std in (("innovation_q", made.q, made.q_std), ("innovation_dq", made.dq, made.dq_std)):
         normalised = (x / std)[kept]
-        with_dq, with_ddq, with_sign = (
-            cross_correlation(normalised, u, lags)[lags:] for u in (dq, ddq, np.sign(dq))
-        )
+        with_dq, with_ddq, with_sign = (cross_correlation(normalised, u, lags)[lags:] for u in (dq, ddq, np.sign(dq)))
         yield Innovation(
-            log=signal.log, joint=signal.joint, signal=name, tested=N, band=1.96 / N**0.5,
-            nis_own=float(np.mean(normalised**2)), nis_low=low, nis_high=high, lag=np.arange(lags + 1),
+            log=signal.log, joint=signal.joint, signal=name, tested=N, band=NORMAL_95 / N**0.5,
+            band_99=NORMAL_99 / N**0.5, nis_own=float(np.mean(normalised**2)), nis_low=low, nis_high=high, lag=np.arange(lags + 1),
             with_dq=with_dq, with_ddq=with_ddq, with_sign=with_sign,
         )  # fmt: skip
 

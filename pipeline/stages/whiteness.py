@@ -10,7 +10,6 @@ from pipeline.records import Column, PeriodResidual, Residual, Track, Whiteness
 
 LAGS = 100  # of the autocorrelation that is shown
 TESTED_LAGS = 20  # of the Ljung-Box statistic
-NORMAL_95, NORMAL_99 = 1.96, 2.576
 LEVEL = 0.01  # below this probability a signal is called not white
 
 
@@ -52,10 +51,10 @@ def statistics(x: Column) -> dict[str, object]:
     band, ordinates = 1.0 / np.sqrt(N), (N - 1) // 2
     return {
         "tested": N,
-        "band": float(NORMAL_95 * band),
-        "band_99": float(NORMAL_99 * band),
+        "band": float(whiteness.NORMAL_95 * band),
+        "band_99": float(whiteness.NORMAL_99 * band),
         "acf1": float(correlation[1]) if lags else 0.0,
-        "outside": float(np.mean(np.abs(correlation[1:]) > NORMAL_95 * band)) if lags else 0.0,
+        "outside": float(np.mean(np.abs(correlation[1:]) > whiteness.NORMAL_95 * band)) if lags else 0.0,
         "ljung_box": box.statistic,
         "ljung_box_lags": tested_lags,
         "ljung_box_p": box.probability,

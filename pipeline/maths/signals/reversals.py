@@ -4,7 +4,10 @@ import numpy as np
 
 from pipeline.maths.arrays import Array, Booleans
 
-BEFORE, AFTER = 0.05, 0.25  # [s] around a reversal that are left out: by then a filter that shows pushes has forgotten it
+BEFORE, AFTER = (
+    0.05,
+    0.25,
+)  # [s] around a reversal that are left out: by then a filter that shows pushes has forgotten it
 SLOW = 0.05  # of the root mean square of the velocity, below which friction may stick
 
 

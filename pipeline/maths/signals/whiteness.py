@@ -1,7 +1,7 @@
 """Whether a signal is white noise: its autocorrelation and its cumulative periodogram, over one or more pieces of it.
 
-    r_k = sum x_t x_(t+k) / sum x_t^2,    Q = n (n + 2) sum_k r_k^2 / n_k ~ chi^2                    Ljung and Box (1978)
-    C_j = sum_(i <= j) I_i / sum_i I_i,   D = sup |C - j / q| ~ Kolmogorov and Smirnov, q - 1 steps        Bartlett (1955)
+    r_k = sum x_t x_(t+k) / sum x_t^2,    Q = n (n + 2) sum_k r_k^2 / n_k ~ chi^2                  Ljung and Box (1978)
+    C_j = sum_(i <= j) I_i / sum_i I_i,   D = sup |C - j / q| ~ Kolmogorov and Smirnov, q - 1 steps      Bartlett (1955)
 
 n_k pairs of samples are k apart within a piece; the ordinates I of all pieces are taken in the order of their
 frequencies, because of white noise each of them is exponentially distributed with the same mean.
@@ -14,6 +14,7 @@ import numpy as np
 
 from pipeline.maths.arrays import Array, Booleans
 
+NORMAL_95, NORMAL_99 = 1.96, 2.576  # deviations that as much of the normal distribution is within
 FEWEST = 20  # samples, below which nothing can be said
 
 

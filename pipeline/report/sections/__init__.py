@@ -22,6 +22,7 @@ DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
             "prediction",
             "noise",
             "runs",
+            "innovations",
             "ground_truth",
             "methods",
             "provenance",
