@@ -102,8 +102,8 @@ def described(own: Driving, made: Innovations, motion: tuple[Array, Array]) -> I
         with_dq, with_ddq, with_sign = (cross_correlation(normalised, u, lags)[lags:] for u in (dq, ddq, np.sign(dq)))
         yield Innovation(
             log=signal.log, joint=signal.joint, signal=name, tested=N, band=NORMAL_95 / N**0.5,
-            band_99=NORMAL_99 / N**0.5, nis_own=float(np.mean(normalised**2)), nis_low=low, nis_high=high, lag=np.arange(lags + 1),
-            with_dq=with_dq, with_ddq=with_ddq, with_sign=with_sign,
+            band_99=NORMAL_99 / N**0.5, nis_own=float(np.mean(normalised**2)), nis_low=low, nis_high=high,
+            lag=np.arange(lags + 1), with_dq=with_dq, with_ddq=with_ddq, with_sign=with_sign,
         )  # fmt: skip
 
 

@@ -105,8 +105,8 @@ def tests(context: Context, explained: list[Explanation]) -> Table:
     header = ("Log", "Joint", "NIS", "ACF(1) of $q$", "of $dot(q)$", "Ljung-Box, $q$", "$dot(q)$")
     return Table(
         "The filter's innovations: normalised innovation squared of both (expected: 2), first autocorrelations, "
-        "the probabilities of a larger Ljung-Box statistic and of a cumulative periodogram that strays farther, if they "
-        "were white; and by how much the times of samples are off, where other joints of the log can tell.",
+        "the probabilities of a larger Ljung-Box statistic and of a cumulative periodogram that strays farther, if "
+        "they were white; and by how much the times of samples are off, where other joints of the log can tell.",
         (*header, "Periodogram, $q$", "$dot(q)$", "Times"),
         rows,
         "innovation-table",
@@ -154,7 +154,7 @@ def printed(probability: float) -> str:
 
 
 def figure(context: Context, e: Explanation, whole: bool) -> Figure:
-    """Autocorrelation, cumulative periodogram, correlation with the motion; over time, too, if `whole`.  Fig 7.9-7.11"""
+    """Autocorrelation, cumulative periodogram, correlation with the motion; over time, if `whole`.  Fig 7.9-7.11"""
     name, about = f"{title(e.joint)} in {literal(e.log)}", {"log": e.log, "joint": e.joint}
     white = {w.signal: w for w in context.catalogue.about(Whiteness, **about)}
     moved = {i.signal: i for i in context.catalogue.about(Innovation, **about)}
