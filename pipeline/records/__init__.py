@@ -13,6 +13,7 @@ from pipeline.records.design import Control, Excitation, Links, Lyapunov, Pose, 
 from pipeline.records.diagnostic import Diagnostic, diagnostic
 from pipeline.records.differentiate import Spectrum, Trajectory
 from pipeline.records.ekf import Track
+from pipeline.records.explain import Explanation, Innovation
 from pipeline.records.fit import (
     CrossFit,
     Fit,
@@ -40,12 +41,13 @@ from pipeline.records.whiteness import Whiteness
 
 __all__ = [
     "COLUMN_DTYPES", "KINDS", "AnyRecord", "ArmCorrelation", "Average", "Choice", "Column", "Comparison",
-    "Contact", "Control", "Counts", "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "FilterNoise", "Fit",
-    "FittedPaths", "FreeMotion", "FreeSpace", "FreeWeight", "FrictionMap", "Guess", "Identifiability",
-    "JointCorrelation", "Labels", "Links", "Load", "LogSummary", "Lyapunov", "MeasurementNoise", "Names",
-    "Origin", "PeriodResidual", "Pose", "Prediction", "Push", "Record", "Recording", "Residual", "Signal",
-    "Smoothed", "Spectrum", "Stiffness", "SwarmSearch", "Threshold", "TipBudget", "TipContact", "TipForce",
-    "TissueModel", "Touch", "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace", "diagnostic",
+    "Contact", "Control", "Counts", "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "Explanation",
+    "FilterNoise", "Fit", "FittedPaths", "FreeMotion", "FreeSpace", "FreeWeight", "FrictionMap", "Guess",
+    "Identifiability", "Innovation", "JointCorrelation", "Labels", "Links", "Load", "LogSummary", "Lyapunov",
+    "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Push", "Record", "Recording",
+    "Residual", "Signal", "Smoothed", "Spectrum", "Stiffness", "SwarmSearch", "Threshold", "TipBudget",
+    "TipContact", "TipForce", "TissueModel", "Touch", "Track", "Trajectory", "Tuning", "Weight", "Whiteness",
+    "Workspace", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
@@ -56,6 +58,6 @@ KINDS: dict[str, type[Record]] = {
         MeasurementNoise, Residual, SwarmSearch, Guess, Choice, FrictionMap, Prediction, Tuning, FilterNoise,
         FreeMotion, ErrorBand, Track, FreeSpace, Threshold, Contact, Push, Stiffness, TissueModel, Load, Weight,
         FreeWeight, Comparison, JointCorrelation, ArmCorrelation, TipForce, TipContact, TipBudget, Whiteness,
-        Diagnostic,
+        Innovation, Explanation, Diagnostic,
     )
 }  # fmt: skip

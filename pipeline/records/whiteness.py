@@ -17,11 +17,16 @@ class Whiteness(Record):
     signal: str
     tested: int
     band: float
+    band_99: float
     acf1: float
     outside: float
     ljung_box: float
     ljung_box_lags: int
     ljung_box_p: float
+    periodogram_d: float
+    periodogram_p: float
+    periodogram_band: float
+    periodogram_band_99: float
     jarque_bera_p: float
     skewness: float
     kurtosis: float
@@ -29,6 +34,8 @@ class Whiteness(Record):
     all_white: int
     lag: Counts
     acf: Column
+    cycles: Column
+    cumulated: Column
 
     def published(self) -> Iterator[Published]:
         """The tests, of innovations among the filter's own numbers."""
@@ -37,6 +44,6 @@ class Whiteness(Record):
             yield from self.publish(f"whiteness.{self.log}.{self.joint}.{self.signal}", *names)
             return
         prefix, signal = f"ekf.{self.log}.{self.joint}", self.signal.removeprefix("innovation_")
-        for name in ("acf1", "ljung_box_p", "jarque_bera_p"):
+        for name in ("acf1", "ljung_box_p", "periodogram_p", "jarque_bera_p"):
             yield Published(f"{prefix}.{name}_{signal}", name)
         yield Published(f"{prefix}.white", "all_white")

@@ -31,9 +31,10 @@ def histogram(x: Column, bins: int = 40) -> tuple[Column, Column, Column, Column
 
 
 def autocorrelation(w: Whiteness, heading: str) -> Panel:
-    """An autocorrelation with the band that white noise stays in."""
+    """An autocorrelation with the bands that white noise stays in."""
     acf = w.acf[1:]
-    marks = (HBand(-w.band, w.band, "95 % band"), Stems(w.lag[1:].astype(float), acf, "", "blue"))
+    bands = (HBand(-w.band_99, w.band_99, "99 % band", "sky"), HBand(-w.band, w.band, "95 % band"))
+    marks = (*bands, Stems(w.lag[1:].astype(float), acf, "", "blue"))
     # Small ones are drawn large enough to be told from the band, and always on both sides of zero.
     reach = max(4 * w.band, 0.1)
     low, high = min(-reach, 1.1 * float(acf.min())), max(reach, min(1.1 * float(acf.max()), 1.0))

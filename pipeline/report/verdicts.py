@@ -68,6 +68,16 @@ def band_in_words(coverage: float) -> str:
     return {"bad": "too narrow", "info": "too wide", "good": "right"}[band(coverage)]
 
 
+def findings_in_words() -> dict[str, str]:
+    """What was found of innovations, from the best to the least known."""
+    return {
+        "white": "white throughout",
+        "left out": "white outside contact or reversals",
+        "mended": "not white for a cause that was tested",
+        "unexplained": "not white for no tested cause alone",
+    }
+
+
 def percent(share: float) -> str:
     """A share as it is printed."""
     return "–" if math.isnan(share) else f"{100 * share:.0f} %"
@@ -90,4 +100,6 @@ def thresholds() -> tuple[tuple[Cell, ...], ...]:
         ("Pose of the tip", "condition number of its Jacobian", "–", f"above {NEAR_SINGULAR:g}: near singular", "–"),
         ("Parameter of a simulated study", "standard errors from the truth", f"at most {WITHIN:g}", "–", "beyond"),
         ("White noise", "probability of a larger Ljung-Box statistic over 20 lags", "above 1 %", "–", "–"),
+        ("Innovations of the filter", "that of position and velocity, and those of their cumulative periodograms",
+         "each above 1 %, of the whole run or outside contact and reversals", "with or without a tested cause", "–"),
     )  # fmt: skip

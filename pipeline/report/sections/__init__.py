@@ -25,6 +25,7 @@ DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
             "noise",
             "filters",
             "runs",
+            "innovations",
             "ground_truth",
             "methods",
             "provenance",

@@ -165,5 +165,6 @@ def blocks(context: Context) -> Iterator[Block]:
         "The measured effort drives the model, so its noise $sigma_tau$ is process noise of the velocity, with "
         "standard deviation $T_s sigma_tau \\/ M$. **Whiteness** is judged by the autocorrelation, its 95 % band "
         "$1.96 \\/ sqrt(N)$, and the Ljung-Box statistic over 20 lags; a signal is called white when its probability "
-        "exceeds 1 %."
+        "exceeds 1 %. Innovations have to pass by their cumulative periodograms, too, whose distance from a straight "
+        "line is that of Kolmogorov and Smirnov (Bartlett, 1955)."
     )

@@ -4,7 +4,7 @@ from dataclasses import asdict
 
 from pipeline.records import LogSummary
 from pipeline.report.content import Block, Listing, OnScreen, Prose, Section, Table, literal
-from pipeline.report.context import Context
+from pipeline.report.context import Context, listed
 
 
 def section(context: Context) -> Section:
@@ -20,7 +20,9 @@ def section(context: Context) -> Section:
             "key of its own, with the processed file and field that it stands in; `davinci-forces verify` follows "
             "them back to the raw files."
         ),
-        Table("Raw files, with the first 16 digits of their SHA-256.", ("File", "SHA-256"), raw, align="ll"),
+        *listed(
+            Table("Raw files, with the first 16 digits of their SHA-256.", ("File", "SHA-256"), raw, "raw-files", "ll")
+        ),
         Table("Versions.", ("Package", "Version"), versions, align="ll"),
         Prose("Settings used, defaults included:"),
         Listing("\n".join(f"{name} = {value!r}" for name, value in asdict(study.settings).items())),

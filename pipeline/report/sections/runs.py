@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from pipeline.records import FreeSpace, LogSummary, Track, Whiteness
+from pipeline.records import Explanation, FreeSpace, LogSummary, Track
 from pipeline.report.content import (
     Band,
     Block,
@@ -18,7 +18,6 @@ from pipeline.report.content import (
     literal,
 )
 from pipeline.report.context import Context, count, label, listed, title
-from pipeline.report.plots import autocorrelation
 from pipeline.report.recorded import recorded
 from pipeline.report.verdicts import band_in_words
 
@@ -41,17 +40,16 @@ def tracked(context: Context, tracks: list[Track]) -> Iterator[Block]:
     """The external effort of all runs, the worst of each joint drawn, the others on demand."""
     if not tracks:
         return
-    yield from intro(tracks)
+    yield from intro(context, tracks)
     yield from listed(scores(context, tracks))
     drawn = {(t.log, t.joint) for t in worst_runs(context, tracks)}
     for t in tracks:
         if (t.log, t.joint) in drawn:
             yield trace(context, t, "the worst free run of this joint")
-            yield innovations(context, t)
     yield OnScreen(
-        "What the filter assumes of noise, and its innovations, run by run",
+        "What the filter assumes of noise, run by run",
         "filter-assumptions",
-        (assumptions(context, tracks), consistency(context, tracks)),
+        (assumptions(context, tracks),),
     )
     others = [t for t in tracks if (t.log, t.joint) not in drawn and not t.at_rest]
     if others:
@@ -62,13 +60,13 @@ def tracked(context: Context, tracks: list[Track]) -> Iterator[Block]:
         yield OnScreen(f"Traces of {count(len(others), 'other run')}", "other-runs", folded)
 
 
-def intro(tracks: list[Track]) -> Iterator[Prose]:
+def intro(context: Context, tracks: list[Track]) -> Iterator[Prose]:
     """What the filter does, and which joints it cannot say much about."""
+    explained = context.catalogue.all(Explanation)
+    told = " Whether both fit the data is told by its innovations ([@innovations])." if explained else ""
     yield Prose(
         "An extended Kalman filter follows position, velocity and external effort of each joint by itself, tuned as "
-        "[@filter-tuning] says. Its innovations, what each measurement adds to what was predicted, are "
-        "white where the model and the tuning fit the data: then the normalised innovation squared (NIS) is 2 on "
-        "average. Whiteness is tested over the whole run but its first second, contacts and reversals included."
+        "[@filter-tuning] says." + told
     )
     at_rest = [f"{title(t.joint)} in {literal(t.log)}" for t in tracks if t.at_rest]
     if at_rest:
@@ -109,28 +107,6 @@ def covered(context: Context, t: Track) -> tuple[Cell, Cell]:
     spaces = context.catalogue.about(FreeSpace, log=t.log, joint=t.joint, filter=t.filter)
     said = band_in_words(spaces[0].coverage) if spaces else "–"
     return context.number(f"{t.filter}.{t.log}.{t.joint}.coverage", 2), said
-
-
-def consistency(context: Context, tracks: list[Track]) -> Table:
-    """Consistency and whiteness of every track."""
-    rows = tuple((literal(t.log), title(t.joint), *statistics(context, f"ekf.{t.log}.{t.joint}")) for t in tracks)
-    header = ("Log", "Joint", "NIS", "ACF(1) of $q$", "ACF(1) of $dot(q)$", "$p$ of $q$", "$p$ of $dot(q)$")
-    return Table(
-        "The filter's innovations: normalised innovation squared (expected: 2), first autocorrelation, and the "
-        "probability of a larger Ljung-Box statistic if they were white.",
-        header,
-        rows,
-        "innovation-table",
-        align="llrrrrr",
-    )
-
-
-def statistics(context: Context, prefix: str) -> tuple[Cell, ...]:
-    """The numbers of one run's innovations."""
-    return (
-        *(context.number(f"{prefix}.{name}", 2) for name in ("nis_mean", "acf1_q", "acf1_dq")),
-        *(context.probability(f"{prefix}.{name}") for name in ("ljung_box_p_q", "ljung_box_p_dq")),
-    )
 
 
 def assumptions(context: Context, tracks: list[Track]) -> Table:
@@ -185,26 +161,3 @@ def trace(context: Context, t: Track, why: str) -> Figure:
         zoomable=True,
         height=30,
     )  # fmt: skip
-
-
-def innovations(context: Context, t: Track) -> Figure:
-    """Innovations over time and their autocorrelation."""
-    name = f"{title(t.joint)} in {literal(t.log)}"
-    late = t.t - t.t[0] >= 1.0 if t.t[-1] - t.t[0] > 5 else t.t >= t.t[0]
-    panels, firsts = [], []
-    for field, meaning in (("innovation_q", "position innovation"), ("innovation_dq", "velocity innovation")):
-        values = getattr(t, field)[late]
-        panels.append(
-            Panel(meaning.capitalize(), "time [s]", label(t, field, meaning), (Line(t.t[late], values, "", "blue"),))
-        )
-        for w in context.catalogue.about(Whiteness, log=t.log, joint=t.joint, signal=field):
-            panels.append(autocorrelation(w, f"ACF of the {meaning}"))
-            firsts.append(f"{w.acf1:.2f}")
-    return Figure(
-        f"{name}: innovations of position and velocity, and their autocorrelation with the 95 % band of white noise.",
-        f"{name}: the innovations have first autocorrelations of {' and '.join(firsts) or 'unknown size'}.",
-        tuple(panels),
-        f"innovations-{t.log}-{t.joint}",
-        columns=2,
-        height=30,
-    )

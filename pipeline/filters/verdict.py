@@ -1,0 +1,58 @@
+"""What a search for causes found, in words."""
+
+from pipeline.filters.causes import CLOCK, COLOUR, CONTACT, REVERSALS, SIZES, STEP, WALK, Search, Trial
+
+WHITE, LEFT_OUT, MENDED, UNEXPLAINED = "white", "left out", "mended", "unexplained"
+LEAVING = (CONTACT, REVERSALS)
+SAID = {
+    SIZES: "noise of another size than assumed",
+    COLOUR: "coloured measurement noise",
+    CLOCK: "uneven times of the samples, as the other joints tell them",
+    STEP: "what the filter's step leaves out",
+}
+NOTHING = "not white: no tested cause explains it"
+MOST_OF_IT = 0.5  # of the correlation, below which a cause is not worth its name
+
+
+def finding(search: Search) -> str:
+    """White, white where something is left out, explained by something that can be mended, or unexplained."""
+    if search.trials[0].white:
+        return WHITE
+    if not search.explaining:
+        return UNEXPLAINED
+    return LEFT_OUT if any({*trial.without} <= {*LEAVING} for trial in search.explaining) else MENDED
+
+
+def verdict(search: Search) -> str:
+    """The same in words; where several would explain it, all of them."""
+    if search.trials[0].white:
+        return "white"
+    return "; or ".join(explained(trial) for trial in search.explaining) or unexplained(search)
+
+
+def explained(trial: Trial) -> str:
+    """What one trial shows: 'white outside contact', or the causes that were mended and where."""
+    left = [name for name in LEAVING if name in trial.without]
+    where = f"outside {' and '.join(left)}" if left else ""
+    mended = [cause(name, trial.walk) for name in trial.without if name not in LEAVING]
+    if not mended:
+        return f"white {where}"
+    return f"{' and '.join(mended)}{f', {where}' if where else ''}"
+
+
+def unexplained(search: Search) -> str:
+    """That nothing explains it, and what explains most of it."""
+    nearest = search.nearest()
+    share = search.share(nearest)
+    if share < MOST_OF_IT:
+        return NOTHING
+    names = " and ".join(name if name in LEAVING else cause(name, nearest.walk) for name in nearest.without)
+    said = f"{min(100 * share, 99):.0f} % of the correlation is explained by {names}, the rest by nothing tested"
+    return f"not white: {said}"
+
+
+def cause(name: str, walk: float) -> str:
+    """One cause that was mended."""
+    if name == WALK:
+        return f"a walk that is {'faster' if walk < 1.0 else 'slower'} than the data ask"
+    return SAID.get(name) or f"the model ({name} would do)"

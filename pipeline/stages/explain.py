@@ -1,0 +1,128 @@
+"""Explain why the filter's innovations are not white, by taking one cause after the other away."""
+
+from collections.abc import Iterable, Iterator, Sequence
+
+import numpy as np
+
+from pipeline.estimators.driving import Driving, driving, named
+from pipeline.estimators.refitting import refitted
+from pipeline.estimators.used import describing
+from pipeline.filters.assumed import assumed
+from pipeline.filters.causes import CLOCK, Search, Subject, search
+from pipeline.filters.innovations import Innovations, innovations
+from pipeline.filters.timing import delays, mended
+from pipeline.filters.verdict import finding, verdict
+from pipeline.maths.arrays import Array, Booleans
+from pipeline.maths.models.driven import Driven
+from pipeline.maths.signals.reversals import moving
+from pipeline.maths.signals.whiteness import NORMAL_95, NORMAL_99, cross_correlation, mean_square_band
+from pipeline.maths.signals.windows import longest_run, outside, settled
+from pipeline.records import Choice, Explanation, FilterNoise, Fit, Innovation, Signal
+from pipeline.robots.robot import Robot
+from pipeline.study import LogEntry
+
+LAGS = 100  # of the correlation with the motion
+UNSTATED = "; when it is touched is not stated, so contact could not be left out"
+THIS_LOG = "parameters of this log itself"
+
+
+def run(
+    signals: Sequence[Signal],
+    fits: Iterable[Fit],
+    choices: Iterable[Choice],
+    noises: Iterable[FilterNoise],
+    entry: LogEntry,
+    robot: Robot,
+    *,
+    fit: str,
+    lowpass: float,
+    q_tau: float,
+) -> Iterator[Innovation | Explanation]:
+    """Of each joint that is tracked and moves: its innovations over the longest run, and why they are not white.
+
+    A cause is named only where the innovations pass every test without it.  Section 7.4
+    """
+    if entry.role == "friction":
+        return
+    every, chosen, assumes = list(fits), list(choices), {noise.joint: noise for noise in noises}
+    owns = []
+    for signal in signals:
+        if not signal.at_rest and signal.joint in assumes and describing(robot, every, signal.joint):
+            own = driving(signal, signals, named(signal, signals, every, chosen, robot, fit)[0], robot, lowpass)
+            if own.joint.inertia.min() > 0:
+                owns.append((own, assumed(assumes[signal.joint], 1.0 / signal.rate, q_tau)))
+    every_innovation = [innovations(longest(own), noise) for own, noise in owns]
+    late = delays([along(own)[0] for own, _ in owns], [made.q for made in every_innovation])
+    for (own, noise), made, delay in zip(owns, every_innovation, late, strict=True):
+        signal, part = own.signal, longest_run(own.signal.t, own.signal.rate)
+        motion, free = along(own), outside(signal.t, entry.contact)
+        yield from described(own, made, motion)
+        models = {name: longest(by) for name, by in others(own, signals, every, robot, lowpass, free)}
+        if delay.any():
+            models[CLOCK] = mended(longest(own), *motion, delay)
+        subject = Subject(models, noise, free[part], moving(motion[0], 1.0 / signal.rate))
+        yield explanation(signal, search(subject), entry, float(np.std(delay)))
+
+
+def along(own: Driving) -> tuple[Array, Array]:
+    """Velocity and acceleration over the longest run, without noise."""
+    part = longest_run(own.signal.t, own.signal.rate)
+    return own.motion[1][part], own.motion[2][part]
+
+
+def longest(own: Driving) -> Driven:
+    """The longest run of a joint's recording."""
+    return max(own.parts, key=lambda part: len(part.q))
+
+
+def others(
+    own: Driving, signals: Sequence[Signal], fits: Sequence[Fit], robot: Robot, lowpass: float, free: Booleans
+) -> Iterator[tuple[str, Driving]]:
+    """The joint under the model in use; with parameters of this log itself; and under another structure of its own."""
+    yield "", own
+    yield THIS_LOG, own.by(refitted(own, signals, robot, lowpass, free))
+    joint = own.signal.joint
+    structures = [fit for fit in fits if fit.group == joint and fit.model != own.fit.model]
+    for fit in structures[:1]:
+        other = driving(own.signal, signals, fit, robot, lowpass)
+        if other.joint.inertia.min() > 0:
+            yield fit.model, other
+
+
+def described(own: Driving, made: Innovations, motion: tuple[Array, Array]) -> Iterator[Innovation]:
+    """The size of both innovations, and their correlation with the motion before."""
+    signal = own.signal
+    kept = settled(np.arange(len(made.q)) / signal.rate)
+    dq, ddq = (x[kept] for x in motion)
+    N = int(kept.sum())
+    lags = min(LAGS, N // 4)
+    low, high = mean_square_band(N)
+    for name, x, std in (("innovation_q", made.q, made.q_std), ("innovation_dq", made.dq, made.dq_std)):
+        normalised = (x / std)[kept]
+        with_dq, with_ddq, with_sign = (cross_correlation(normalised, u, lags)[lags:] for u in (dq, ddq, np.sign(dq)))
+        yield Innovation(
+            log=signal.log, joint=signal.joint, signal=name, tested=N, band=NORMAL_95 / N**0.5,
+            band_99=NORMAL_99 / N**0.5, nis_own=float(np.mean(normalised**2)), nis_low=low, nis_high=high,
+            lag=np.arange(lags + 1), with_dq=with_dq, with_ddq=with_ddq, with_sign=with_sign,
+        )  # fmt: skip
+
+
+def explanation(signal: Signal, found: Search, entry: LogEntry, clock_std: float) -> Explanation:
+    """What a search found, trial by trial."""
+    trials, touched = found.trials, entry.role in ("contact", "tissue") and not entry.contact
+    unstated = UNSTATED if touched and not (trials[0].white or found.explaining) else ""
+    return Explanation(
+        log=signal.log,
+        joint=signal.joint,
+        finding=finding(found),
+        verdict=verdict(found) + unstated,
+        clock_std=clock_std,
+        without=np.array([" + ".join(t.without) or "nothing" for t in trials], object),
+        explains=np.array([t in found.explaining for t in trials], np.int64),
+        left=np.array([t.tested for t in trials]),
+        ljung_box_p_q=np.array([t.ljung_box[0] for t in trials]),
+        ljung_box_p_dq=np.array([t.ljung_box[1] for t in trials]),
+        periodogram_p_q=np.array([t.periodogram[0] for t in trials]),
+        periodogram_p_dq=np.array([t.periodogram[1] for t in trials]),
+        walk=np.array([t.walk for t in trials]),
+    )
