@@ -69,7 +69,7 @@ class Trial(NamedTuple):
         return self.least > LEVEL
 
 
-class Search(NamedTuple):
+class CauseSearch(NamedTuple):
     """Every trial, the first of them with nothing taken away, and those that explain."""
 
     trials: list[Trial]
@@ -87,7 +87,7 @@ class Search(NamedTuple):
         return next(trial for trial in told if self.share(trial) >= NEAR * most)
 
 
-def search(subject: Subject) -> Search:
+def search(subject: Subject) -> CauseSearch:
     """The fewest causes without which the innovations are white."""
     first = next(iter(subject.models.values()))
     if len(first.q) > MOST:
@@ -108,8 +108,8 @@ def search(subject: Subject) -> Search:
             if trial.white and enough and passes.fails_elsewhere(without):
                 explaining.append(trial)
         if explaining:
-            return Search(trials, explaining)
-    return Search(trials, [])
+            return CauseSearch(trials, explaining)
+    return CauseSearch(trials, [])
 
 
 def causes(subject: Subject) -> Iterator[str]:

@@ -1,6 +1,6 @@
 """What a search for causes found, in words."""
 
-from pipeline.filters.causes import CLOCK, COLOUR, CONTACT, REVERSALS, SIZES, STEP, WALK, Search, Trial
+from pipeline.filters.causes import CLOCK, COLOUR, CONTACT, REVERSALS, SIZES, STEP, WALK, CauseSearch, Trial
 
 WHITE, LEFT_OUT, MENDED, UNEXPLAINED = "white", "left out", "mended", "unexplained"
 LEAVING = (CONTACT, REVERSALS)
@@ -14,7 +14,7 @@ NOTHING = "not white: no tested cause explains it"
 MOST_OF_IT = 0.5  # of the correlation, below which a cause is not worth its name
 
 
-def finding(search: Search) -> str:
+def finding(search: CauseSearch) -> str:
     """White, white where something is left out, explained by something that can be mended, or unexplained."""
     if search.trials[0].white:
         return WHITE
@@ -23,7 +23,7 @@ def finding(search: Search) -> str:
     return LEFT_OUT if any({*trial.without} <= {*LEAVING} for trial in search.explaining) else MENDED
 
 
-def verdict(search: Search) -> str:
+def verdict(search: CauseSearch) -> str:
     """The same in words; where several would explain it, all of them."""
     if search.trials[0].white:
         return "white"
@@ -40,7 +40,7 @@ def explained(trial: Trial) -> str:
     return f"{' and '.join(mended)}{f', {where}' if where else ''}"
 
 
-def unexplained(search: Search) -> str:
+def unexplained(search: CauseSearch) -> str:
     """That nothing explains it, and what explains most of it."""
     nearest = search.nearest()
     share = search.share(nearest)

@@ -8,7 +8,7 @@ from pipeline.estimators.driving import Driving, driving, named
 from pipeline.estimators.refitting import refitted
 from pipeline.estimators.used import describing
 from pipeline.filters.assumed import assumed
-from pipeline.filters.causes import CLOCK, Search, Subject, search
+from pipeline.filters.causes import CLOCK, CauseSearch, Subject, search
 from pipeline.filters.innovations import Innovations, innovations
 from pipeline.filters.timing import delays, mended
 from pipeline.filters.verdict import finding, verdict
@@ -107,7 +107,7 @@ def described(own: Driving, made: Innovations, motion: tuple[Array, Array]) -> I
         )  # fmt: skip
 
 
-def explanation(signal: Signal, found: Search, entry: LogEntry, clock_std: float) -> Explanation:
+def explanation(signal: Signal, found: CauseSearch, entry: LogEntry, clock_std: float) -> Explanation:
     """What a search found, trial by trial."""
     trials, touched = found.trials, entry.role in ("contact", "tissue") and not entry.contact
     unstated = UNSTATED if touched and not (trials[0].white or found.explaining) else ""
