@@ -12,7 +12,7 @@ from pipeline.report.results import Results, format_unit
 from pipeline.study import Study
 
 PLAIN = "independent.lse"  # the fit that every other one is compared with
-PAPER = 24  # rows of a table at most, in the PDF
+PAPER = 18  # rows of a table at most, in the PDF
 
 
 @dataclass(frozen=True)

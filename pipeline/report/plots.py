@@ -30,10 +30,11 @@ def histogram(x: Column, bins: int = 40) -> tuple[Column, Column, Column, Column
     return edges, densities, grid, normal
 
 
-def autocorrelation(w: Whiteness, heading: str) -> Panel:
-    """An autocorrelation with the bands that white noise stays in."""
+def autocorrelation(w: Whiteness, heading: str, named: bool = True) -> Panel:
+    """An autocorrelation with the bands that white noise stays in; `named` in a legend."""
     acf = w.acf[1:]
-    bands = (HBand(-w.band_99, w.band_99, "99 % band", "sky"), HBand(-w.band, w.band, "95 % band"))
+    names = ("99 % band", "95 % band") if named else ("", "")
+    bands = (HBand(-w.band_99, w.band_99, names[0], "sky"), HBand(-w.band, w.band, names[1]))
     marks = (*bands, Stems(w.lag[1:].astype(float), acf, "", "blue"))
     # Small ones are drawn large enough to be told from the band, and always on both sides of zero.
     reach = max(4 * w.band, 0.1)

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from pipeline.records import Explanation, Innovation, Track, Whiteness
+from pipeline.records import Column, Explanation, Innovation, Track, Whiteness
 from pipeline.report.content import (
     AnyMark,
     Block,
@@ -20,10 +20,11 @@ from pipeline.report.content import (
     Table,
     literal,
 )
-from pipeline.report.context import Context, count, label, title
+from pipeline.report.context import Context, count, label, listed, title
 from pipeline.report.plots import autocorrelation
 from pipeline.report.verdicts import findings_in_words
 
+UNEXPLAINED = "unexplained"  # a finding: no cause that was tried explains it
 SIGNALS = (("innovation_q", "position"), ("innovation_dq", "velocity"))
 
 
@@ -47,16 +48,19 @@ def blocks(context: Context, explained: list[Explanation]) -> Iterator[Block]:
         f"pushes{assumed}, which free motion does not ask for: that alone colours its innovations a little.\n\n"
         + summary(explained)
     )
-    yield verdicts(context, explained)
+    yield from listed(verdicts(context, explained))
     drawn = [e for e in explained if is_worst(context, e)]
-    for e in drawn:
-        yield figure(context, e, whole=True)
+    drawn.sort(key=lambda e: least_probability(e)[0])
+    yield from (figure(context, e, whole=True) for e in drawn[:1])
+    if drawn[1:]:
+        worst = tuple(figure(context, e, whole=True) for e in drawn[1:])
+        yield OnScreen("Innovations of the worst free run of each other joint", "innovations-worst", worst)
     yield OnScreen("Tests of the innovations, run by run", "innovation-tests", (tests(context, explained),))
     others = tuple(
         OnScreen(
             f"{title(e.joint)} in {literal(e.log)}",
             f"why-{e.log}-{e.joint}",
-            (trials(e),) if e in drawn else (figure(context, e, whole=False), trials(e)),
+            (trials(e),) if e in drawn or e.finding != UNEXPLAINED else (figure(context, e, whole=False), trials(e)),
         )
         for e in explained
     )
@@ -126,7 +130,7 @@ def statistics(context: Context, prefix: str) -> tuple[Cell, ...]:
 
 def trials(e: Explanation) -> Table:
     """What was taken away of a run, and what the tests then said; the most telling first."""
-    least = np.min([e.ljung_box_p_q, e.ljung_box_p_dq, e.periodogram_p_q, e.periodogram_p_dq], axis=0)
+    least = least_probability(e)
     order = [0, *sorted(range(1, len(e)), key=lambda i: -least[i])]
     rows = tuple(
         (
@@ -148,6 +152,11 @@ def trials(e: Explanation) -> Table:
     )
 
 
+def least_probability(e: Explanation) -> Column:
+    """The smallest probability of all tests, of the run as it is and then without each cause."""
+    return np.asarray(np.min([e.ljung_box_p_q, e.ljung_box_p_dq, e.periodogram_p_q, e.periodogram_p_dq], axis=0))
+
+
 def printed(probability: float) -> str:
     """A probability of a trial."""
     return f"{probability:.2g}" if probability >= 0.001 else "< 0.001"
@@ -159,17 +168,23 @@ def figure(context: Context, e: Explanation, whole: bool) -> Figure:
     white = {w.signal: w for w in context.catalogue.about(Whiteness, **about)}
     moved = {i.signal: i for i in context.catalogue.about(Innovation, **about)}
     tracks = context.catalogue.about(Track, **about) if whole else []
+    more = SIGNALS if whole else ()
     rows = [
         *(tuple(over_time(t, field, of) for field, of in SIGNALS) for t in tracks),
-        tuple(autocorrelation(white[field], f"ACF of the {of} innovation") for field, of in SIGNALS if field in white),
-        tuple(cumulated(white[field], of) for field, of in SIGNALS if field in white),
-        tuple(with_motion(moved[field], of) for field, of in SIGNALS if field in moved),
+        tuple(
+            autocorrelation(white[field], f"ACF of the {of} innovation", named=field == SIGNALS[0][0])
+            for field, of in SIGNALS
+            if field in white
+        ),
+        tuple(cumulated(white[field], of) for field, of in more if field in white),
+        tuple(with_motion(moved[field], of) for field, of in more if field in moved),
     ]
     firsts = " and ".join(f"{w.acf1:.2f}" for field, _ in SIGNALS if (w := white.get(field)))
     return Figure(
-        f"{name}{', the worst free run of this joint' if whole else ''}: {'innovations, their ' if whole else ''}"
-        "autocorrelation and cumulative periodogram with what 95 % (grey) and 99 % (blue) of white noise stay "
-        "within, and their correlation with the motion before.",
+        f"{name}, the worst free run of this joint: innovations, their autocorrelation and cumulative periodogram with "
+        "what 95 % (grey) and 99 % (blue) of white noise stay within, and their correlation with the motion before."
+        if whole
+        else f"{name}: autocorrelation of the innovations.",
         f"{name}: the innovations have first autocorrelations of {firsts or 'unknown size'}; verdict: {e.verdict}.",
         tuple(panel for row in rows for panel in row),
         f"innovations-{e.log}-{e.joint}",
@@ -188,8 +203,8 @@ def over_time(t: Track, field: str, of: str) -> Panel:
 def cumulated(w: Whiteness, of: str) -> Panel:
     """A cumulative periodogram less the straight line of white noise, with its bands."""
     marks: tuple[AnyMark, ...] = (
-        HBand(-w.periodogram_band_99, w.periodogram_band_99, "99 % band", "sky"),
-        HBand(-w.periodogram_band, w.periodogram_band, "95 % band"),
+        HBand(-w.periodogram_band_99, w.periodogram_band_99, "", "sky"),
+        HBand(-w.periodogram_band, w.periodogram_band, ""),
         Line(w.cycles, w.cumulated - 2.0 * w.cycles, "", "blue"),
     )
     return Panel(f"Periodogram of the {of} innovation", "frequency [1/sample]", "power up to it, less even", marks)
@@ -197,11 +212,14 @@ def cumulated(w: Whiteness, of: str) -> Panel:
 
 def with_motion(i: Innovation, of: str) -> Panel:
     """The correlation with velocity, acceleration and the sign of the velocity, as many samples before."""
+    lag = i.lag.astype(float)
+    # Both panels of a row show the same lines: the first names some, the second the rest.
+    names = ("velocity", "acceleration", "") if of == SIGNALS[0][1] else ("", "", "sign of velocity")
     marks: tuple[AnyMark, ...] = (
-        HBand(-i.band_99, i.band_99, "99 % band", "sky"),
-        HBand(-i.band, i.band, "95 % band"),
-        Line(i.lag.astype(float), i.with_dq, "velocity", "blue"),
-        Line(i.lag.astype(float), i.with_ddq, "acceleration", "vermillion"),
-        Line(i.lag.astype(float), i.with_sign, "sign of velocity", "green"),
+        HBand(-i.band_99, i.band_99, "", "sky"),
+        HBand(-i.band, i.band, ""),
+        Line(lag, i.with_dq, names[0], "blue", "solid"),
+        Line(lag, i.with_ddq, names[1], "vermillion", "dashed"),
+        Line(lag, i.with_sign, names[2], "green", "dotted"),
     )
     return Panel(f"Motion and {of} innovation", "lag [samples]", "correlation", marks)

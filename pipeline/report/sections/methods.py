@@ -39,6 +39,11 @@ REFERENCES = (
     "H. R. Künsch: The jackknife and the bootstrap for general stationary observations. The Annals of Statistics "
     "17 (3), 1989.",
     "Y. Bar-Shalom, X. R. Li, T. Kirubarajan: Estimation with Applications to Tracking and Navigation. Wiley, 2001.",
+    "G. J. Bierman: Fixed interval smoothing with discrete measurements. International Journal of Control 18 (1), 1973.",
+    "S. O. Rice: Mathematical analysis of random noise. Bell System Technical Journal 23 (3), 1944.",
+    "M. S. Bartlett: An Introduction to Stochastic Processes. Cambridge University Press, 1955.",
+    "A. De Luca, R. Mattone: Actuator failure detection and isolation using generalized momenta. IEEE International "
+    "Conference on Robotics and Automation, 2003.",
 )
 
 
@@ -143,10 +148,9 @@ def blocks(context: Context) -> Iterator[Block]:
         "slide gives a negative one."
     )
     yield Equation(
-        "q_(k+1) &= q_k + T_s dot(q)_k \\ "
-        'dot(q)_(k+1) &= dot(q)_k + T_s M^(-1) (tau_k - V - F - G - tau_("ext",k)) + w_k \\ '
-        'tau_("ext",k+1) &= tau_("ext",k) + w_(tau,k)',
-        "the discrete model of position, velocity and external effort",
+        'f(x, tau) = [dot(q), M^(-1) (tau - V - F - G - tau_"ext"), 0]^T, quad A = (partial f) / (partial x), quad '
+        "x_(k+1) = x_k + T_s f + 1/2 T_s^2 A f + w_k",
+        "the discrete model of position, velocity and external effort, to second order",
         "model",
     )
     yield Equation(
@@ -161,10 +165,11 @@ def blocks(context: Context) -> Iterator[Block]:
         "correction",
     )
     yield Prose(
-        "Forward Euler leaves out $1/2 T_s^2$ times the next derivative in each step, which counts as process noise. "
-        "The measured effort drives the model, so its noise $sigma_tau$ is process noise of the velocity, with "
-        "standard deviation $T_s sigma_tau \\/ M$. **Whiteness** is judged by the autocorrelation, its 95 % band "
-        "$1.96 \\/ sqrt(N)$, and the Ljung-Box statistic over 20 lags; a signal is called white when its probability "
+        "The measured effort drives the model, so its noise is process noise, as of an acceleration that is constant "
+        "over a sample. Where the velocity passes through zero, Coulomb friction is what it is on average, and the "
+        "doubt about its sign counts as noise. Contacts are found where the smoothed effort (Bierman, 1973) is above "
+        "what free motion crosses once in ten minutes (Rice, 1944).\n\n"
+        "**Whiteness** is judged by the autocorrelation, its 95 % band $1.96 \\/ sqrt(N)$, and the Ljung-Box statistic over 20 lags; a signal is called white when its probability "
         "exceeds 1 %. Innovations have to pass by their cumulative periodograms, too, whose distance from a straight "
         "line is that of Kolmogorov and Smirnov (Bartlett, 1955)."
     )

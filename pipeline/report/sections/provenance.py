@@ -23,7 +23,9 @@ def section(context: Context) -> Section:
         *listed(
             Table("Raw files, with the first 16 digits of their SHA-256.", ("File", "SHA-256"), raw, "raw-files", "ll")
         ),
-        Table("Versions.", ("Package", "Version"), versions, align="ll"),
+        OnScreen(
+            "Versions of packages", "versions", (Table("Versions.", ("Package", "Version"), versions, align="ll"),)
+        ),
         Prose("Settings used, defaults included:"),
         Listing("\n".join(f"{name} = {value!r}" for name, value in asdict(study.settings).items())),
     ]

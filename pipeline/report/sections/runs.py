@@ -21,6 +21,8 @@ from pipeline.report.context import Context, count, label, listed, title
 from pipeline.report.recorded import recorded
 from pipeline.report.verdicts import band_in_words
 
+WORST = "the worst free run of this joint"
+ON_PAPER = 2  # joints whose worst run is drawn in the PDF, too
 LEVELS = ("free_rms", "detection_level")
 
 
@@ -42,10 +44,12 @@ def tracked(context: Context, tracks: list[Track]) -> Iterator[Block]:
         return
     yield from intro(context, tracks)
     yield from listed(scores(context, tracks))
-    drawn = {(t.log, t.joint) for t in worst_runs(context, tracks)}
-    for t in tracks:
-        if (t.log, t.joint) in drawn:
-            yield trace(context, t, "the worst free run of this joint")
+    worst = list(worst_runs(context, tracks))
+    drawn = {(t.log, t.joint) for t in worst}
+    yield from (trace(context, t, WORST) for t in worst[:ON_PAPER])
+    if worst[ON_PAPER:]:
+        rest = tuple(trace(context, t, WORST) for t in worst[ON_PAPER:])
+        yield OnScreen("The worst free run of each other joint", "worst-runs", rest)
     yield OnScreen(
         "What the filter assumes of noise, run by run",
         "filter-assumptions",

@@ -184,7 +184,10 @@ def log_blocks(force: TipForce, contact: TipContact | None, budget: TipBudget | 
     if contact is not None:
         yield in_space(force, contact)
     if budget is not None:
-        yield budget_figure(force, budget)
+        shown = OnScreen(
+            "What each joint's error comes to at the tip", f"tip-parts-{force.log}", (budget_figure(force, budget),)
+        )
+        yield shown
 
 
 def component_panel(force: TipForce, axis: str, contact: TipContact | None) -> Panel:
@@ -245,7 +248,7 @@ def in_space(force: TipForce, contact: TipContact) -> Figure3D:
         f"The path of the tip in space in {literal(force.log)}, with the force in each contact as a line from it.",
         marks,
         f"tip-space-{force.log}",
-        height=105,
+        height=80,
     )
 
 
