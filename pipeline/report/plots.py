@@ -33,7 +33,7 @@ def histogram(x: Column, bins: int = 40) -> tuple[Column, Column, Column, Column
 def autocorrelation(w: Whiteness, heading: str) -> Panel:
     """An autocorrelation with the bands that white noise stays in."""
     acf = w.acf[1:]
-    bands = (HBand(-w.band_99, w.band_99, "99 % band", "sky"), HBand(-w.band, w.band, "95 % band"))
+    bands = (HBand(-w.band_99, w.band_99, "", "sky"), HBand(-w.band, w.band, "95, 99 % band"))
     marks = (*bands, Stems(w.lag[1:].astype(float), acf, "", "blue"))
     # Small ones are drawn large enough to be told from the band, and always on both sides of zero.
     reach = max(4 * w.band, 0.1)

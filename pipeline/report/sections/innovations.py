@@ -66,7 +66,11 @@ def blocks(context: Context, explained: list[Explanation]) -> Iterator[Block]:
 def summary(explained: list[Explanation]) -> str:
     """How many runs are white, and how many are explained."""
     counts = Counter(e.finding for e in explained)
-    said = [f"{counts[finding]} {words}" for finding, words in findings_in_words().items() if counts[finding]]
+    said = [
+        f"{counts[finding]} {'is' if counts[finding] == 1 else 'are'} {words}"
+        for finding, words in findings_in_words().items()
+        if counts[finding]
+    ]
     return f"Of {count(len(explained), 'run')} of moving joints, {', '.join(said)}."
 
 
@@ -161,15 +165,15 @@ def figure(context: Context, e: Explanation, whole: bool) -> Figure:
     tracks = context.catalogue.about(Track, **about) if whole else []
     rows = [
         *(tuple(over_time(t, field, of) for field, of in SIGNALS) for t in tracks),
-        tuple(autocorrelation(white[field], f"ACF of the {of} innovation") for field, of in SIGNALS if field in white),
+        tuple(autocorrelation(white[field], f"ACF, {of}") for field, of in SIGNALS if field in white),
         tuple(cumulated(white[field], of) for field, of in SIGNALS if field in white),
         tuple(with_motion(moved[field], of) for field, of in SIGNALS if field in moved),
     ]
     firsts = " and ".join(f"{w.acf1:.2f}" for field, _ in SIGNALS if (w := white.get(field)))
     return Figure(
         f"{name}{', the worst free run of this joint' if whole else ''}: {'innovations, their ' if whole else ''}"
-        "autocorrelation and cumulative periodogram with what 95 % (grey) and 99 % (blue) of white noise stay "
-        "within, and their correlation with the motion before.",
+        "autocorrelation (ACF), cumulative periodogram less that of white noise, with what 95 % (grey) and 99 % (blue) "
+        "of white noise stay within, and correlation with the motion before.",
         f"{name}: the innovations have first autocorrelations of {firsts or 'unknown size'}; verdict: {e.verdict}.",
         tuple(panel for row in rows for panel in row),
         f"innovations-{e.log}-{e.joint}",
@@ -182,26 +186,26 @@ def over_time(t: Track, field: str, of: str) -> Panel:
     """An innovation over time, settled."""
     late = t.t - t.t[0] >= 1.0 if t.t[-1] - t.t[0] > 5 else t.t >= t.t[0]
     marks = (Line(t.t[late], getattr(t, field)[late], "", "blue"),)
-    return Panel(f"{of.capitalize()} innovation", "time [s]", label(t, field, f"{of} innovation"), marks)
+    return Panel(f"{of.capitalize()} innovation", "time [s]", label(t, field, "innovation"), marks)
 
 
 def cumulated(w: Whiteness, of: str) -> Panel:
     """A cumulative periodogram less the straight line of white noise, with its bands."""
     marks: tuple[AnyMark, ...] = (
-        HBand(-w.periodogram_band_99, w.periodogram_band_99, "99 % band", "sky"),
-        HBand(-w.periodogram_band, w.periodogram_band, "95 % band"),
+        HBand(-w.periodogram_band_99, w.periodogram_band_99, "", "sky"),
+        HBand(-w.periodogram_band, w.periodogram_band, ""),
         Line(w.cycles, w.cumulated - 2.0 * w.cycles, "", "blue"),
     )
-    return Panel(f"Periodogram of the {of} innovation", "frequency [1/sample]", "power up to it, less even", marks)
+    return Panel(f"Periodogram, {of}", "frequency [1/sample]", "excess power", marks)
 
 
 def with_motion(i: Innovation, of: str) -> Panel:
     """The correlation with velocity, acceleration and the sign of the velocity, as many samples before."""
     marks: tuple[AnyMark, ...] = (
-        HBand(-i.band_99, i.band_99, "99 % band", "sky"),
-        HBand(-i.band, i.band, "95 % band"),
+        HBand(-i.band_99, i.band_99, "", "sky"),
+        HBand(-i.band, i.band, ""),
         Line(i.lag.astype(float), i.with_dq, "velocity", "blue"),
         Line(i.lag.astype(float), i.with_ddq, "acceleration", "vermillion"),
         Line(i.lag.astype(float), i.with_sign, "sign of velocity", "green"),
     )
-    return Panel(f"Motion and {of} innovation", "lag [samples]", "correlation", marks)
+    return Panel(f"Motion and {of}", "lag [samples]", "correlation", marks)
