@@ -182,8 +182,8 @@ def test_a_walk_faster_than_the_data_ask_is_named_and_so_is_one_that_is_too_slow
     slow = search(subject(run, NOISE._replace(q_tau=NOISE.q_tau / 30)))
     assert without(fast)[0] == {WALK}
     assert without(slow)[0] == {WALK}
-    assert "a walk that is faster than the data ask" in verdict(fast)
-    assert "a walk that is slower than the data ask" in verdict(slow)
+    assert "a walk faster than the data ask" in verdict(fast)
+    assert "a walk slower than the data ask" in verdict(slow)
     assert finding(fast) == "mended"
 
 
@@ -225,7 +225,7 @@ def test_coloured_measurement_noise_is_named_and_its_memory_found():
     run = measured(v_q=autoregressive(4, 0.7, NOISE.r_q), v_dq=autoregressive(5, 0.5, NOISE.r_dq))
     found = search(subject(run))
     assert without(found) == [{COLOUR}]
-    assert verdict(found) == "coloured measurement noise"
+    assert verdict(found) == "white but for coloured measurement noise"
     assert_allclose(coloured.likeliest(run, NOISE, walks=False, coloured=True).phi, (0.7, 0.5), atol=0.1)
 
 
@@ -248,20 +248,25 @@ def test_what_forward_euler_leaves_out_is_named_where_the_filter_steps_so():
     assert "what the filter's step leaves out" in verdict(found)
 
 
+FINE = 1e-4  # noise of a position, beside which the clock is what the filter's noise is tuned to
+
+
 def three_joints(late):
-    runs = [measured(seed=seed, late=late) for seed in range(3)]
+    runs = [measured(seed=seed, v_q=FINE * noise(seed + 50, N), late=late) for seed in range(3)]
     own = [(truth(seed)[1][1], np.gradient(truth(seed)[1][1], T_S)) for seed in range(3)]
     told = delays([dq for dq, _ in own], [innovations(run, NOISE).q for run in runs])
     return runs[0], mended(runs[0], *own[0], told[0]), told[0]
 
 
 def test_the_other_joints_tell_an_uneven_clock_and_it_is_named():
-    late = 5e-3 * np.where(np.arange(N) % 4 == 0, 1.0, -1 / 3)
+    late = 2e-3 * np.where(np.arange(N) % 4 == 0, 1.0, -1 / 3)
     run, even, told = three_joints(late)
     fast = np.abs(truth(0)[1][1]) > 1.0  # at a standstill no joint can tell
-    assert np.corrcoef(told[fast], late[fast])[0, 1] > 0.9
+    assert np.corrcoef(told[fast], late[fast])[0, 1] ** 2 > 0.64  # most of it, and the filter has taken the rest up
     found = search(subject(run, **{CLOCK: even}))
-    assert any(CLOCK in names for names in without(found))
+    # What the others tell has their noise in it, so a little of the correlation stays.
+    assert set(found.nearest().without) == {CLOCK}
+    assert found.share(found.nearest()) > 0.95
     assert "uneven times of the samples" in verdict(found)
 
 

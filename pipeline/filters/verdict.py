@@ -31,13 +31,11 @@ def verdict(search: CauseSearch) -> str:
 
 
 def explained(trial: Trial) -> str:
-    """What one trial shows: 'white outside contact', or the causes that were mended and where."""
+    """What one trial shows: 'white outside contact', 'white but for coloured measurement noise'."""
     left = [name for name in LEAVING if name in trial.without]
-    where = f"outside {' and '.join(left)}" if left else ""
+    where = f" outside {' and '.join(left)}" if left else ""
     mended = [cause(name, trial.walk) for name in trial.without if name not in LEAVING]
-    if not mended:
-        return f"white {where}"
-    return f"{' and '.join(mended)}{f', {where}' if where else ''}"
+    return f"white{where}" + (f" but for {' and '.join(mended)}" if mended else "")
 
 
 def unexplained(search: CauseSearch) -> str:
@@ -54,5 +52,5 @@ def unexplained(search: CauseSearch) -> str:
 def cause(name: str, walk: float) -> str:
     """One cause that was mended."""
     if name == WALK:
-        return f"a walk that is {'faster' if walk < 1.0 else 'slower'} than the data ask"
+        return f"a walk {'faster' if walk < 1.0 else 'slower'} than the data ask"
     return SAID.get(name) or f"the model ({name} would do)"

@@ -73,8 +73,8 @@ def findings_in_words() -> dict[str, str]:
     return {
         "white": "white throughout",
         "left out": "white outside contact or reversals",
-        "mended": "not white for a cause that was tested",
-        "unexplained": "not white for no tested cause alone",
+        "mended": "white but for a cause that was tested",
+        "unexplained": "not white, which no tested cause explains",
     }
 
 

@@ -70,7 +70,11 @@ def blocks(context: Context, explained: list[Explanation]) -> Iterator[Block]:
 def summary(explained: list[Explanation]) -> str:
     """How many runs are white, and how many are explained."""
     counts = Counter(e.finding for e in explained)
-    said = [f"{counts[finding]} {words}" for finding, words in findings_in_words().items() if counts[finding]]
+    said = [
+        f"{counts[finding]} {'is' if counts[finding] == 1 else 'are'} {words}"
+        for finding, words in findings_in_words().items()
+        if counts[finding]
+    ]
     return f"Of {count(len(explained), 'run')} of moving joints, {', '.join(said)}."
 
 
@@ -172,7 +176,7 @@ def figure(context: Context, e: Explanation, whole: bool) -> Figure:
     rows = [
         *(tuple(over_time(t, field, of) for field, of in SIGNALS) for t in tracks),
         tuple(
-            autocorrelation(white[field], f"ACF of the {of} innovation", named=field == SIGNALS[0][0])
+            autocorrelation(white[field], f"ACF, {of}", named=field == SIGNALS[0][0])
             for field, of in SIGNALS
             if field in white
         ),
@@ -197,7 +201,7 @@ def over_time(t: Track, field: str, of: str) -> Panel:
     """An innovation over time, settled."""
     late = t.t - t.t[0] >= 1.0 if t.t[-1] - t.t[0] > 5 else t.t >= t.t[0]
     marks = (Line(t.t[late], getattr(t, field)[late], "", "blue"),)
-    return Panel(f"{of.capitalize()} innovation", "time [s]", label(t, field, f"{of} innovation"), marks)
+    return Panel(f"{of.capitalize()} innovation", "time [s]", label(t, field, "innovation"), marks)
 
 
 def cumulated(w: Whiteness, of: str) -> Panel:
@@ -207,7 +211,7 @@ def cumulated(w: Whiteness, of: str) -> Panel:
         HBand(-w.periodogram_band, w.periodogram_band, ""),
         Line(w.cycles, w.cumulated - 2.0 * w.cycles, "", "blue"),
     )
-    return Panel(f"Periodogram of the {of} innovation", "frequency [1/sample]", "power up to it, less even", marks)
+    return Panel(f"Periodogram, {of}", "frequency [1/sample]", "excess power", marks)
 
 
 def with_motion(i: Innovation, of: str) -> Panel:
@@ -222,4 +226,4 @@ def with_motion(i: Innovation, of: str) -> Panel:
         Line(lag, i.with_ddq, names[1], "vermillion", "dashed"),
         Line(lag, i.with_sign, names[2], "green", "dotted"),
     )
-    return Panel(f"Motion and {of} innovation", "lag [samples]", "correlation", marks)
+    return Panel(f"Motion and {of}", "lag [samples]", "correlation", marks)

@@ -39,7 +39,8 @@ REFERENCES = (
     "H. R. Künsch: The jackknife and the bootstrap for general stationary observations. The Annals of Statistics "
     "17 (3), 1989.",
     "Y. Bar-Shalom, X. R. Li, T. Kirubarajan: Estimation with Applications to Tracking and Navigation. Wiley, 2001.",
-    "G. J. Bierman: Fixed interval smoothing with discrete measurements. International Journal of Control 18 (1), 1973.",
+    "G. J. Bierman: Fixed interval smoothing with discrete measurements. International Journal of Control 18 (1), "
+    "1973.",
     "S. O. Rice: Mathematical analysis of random noise. Bell System Technical Journal 23 (3), 1944.",
     "M. S. Bartlett: An Introduction to Stochastic Processes. Cambridge University Press, 1955.",
     "A. De Luca, R. Mattone: Actuator failure detection and isolation using generalized momenta. IEEE International "
@@ -169,7 +170,8 @@ def blocks(context: Context) -> Iterator[Block]:
         "over a sample. Where the velocity passes through zero, Coulomb friction is what it is on average, and the "
         "doubt about its sign counts as noise. Contacts are found where the smoothed effort (Bierman, 1973) is above "
         "what free motion crosses once in ten minutes (Rice, 1944).\n\n"
-        "**Whiteness** is judged by the autocorrelation, its 95 % band $1.96 \\/ sqrt(N)$, and the Ljung-Box statistic over 20 lags; a signal is called white when its probability "
+        "**Whiteness** is judged by the autocorrelation, its 95 % band $1.96 \\/ sqrt(N)$, and the Ljung-Box statistic "
+        "over 20 lags; a signal is called white when its probability "
         "exceeds 1 %. Innovations have to pass by their cumulative periodograms, too, whose distance from a straight "
         "line is that of Kolmogorov and Smirnov (Bartlett, 1955)."
     )
