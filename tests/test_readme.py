@@ -246,7 +246,8 @@ def test_keys_of_a_study_are_told_and_those_told_are_there(analysed, tmp_path):
     assert "truth.hand_roll.inertia" in keys
     untold, empty = told(keys)
     assert not untold
-    assert not {name for name in empty if not name.startswith(BY_HAND)}
+    of_several_joints = {"ekf.<log>.<joint>.clock_std"}  # that move in one log; here one does
+    assert not {name for name in empty - of_several_joints if not name.startswith(BY_HAND)}
 
 
 @pytest.mark.medium

@@ -13,6 +13,7 @@ from pipeline.maths.models import bias as derivation
 from pipeline.maths.models import kernels, terms
 from pipeline.maths.models.bias import bias
 from pipeline.maths.models.coupled import CoupledArm
+from pipeline.maths.models.driven import Driven
 from pipeline.maths.models.independent import IndependentJoint
 from pipeline.maths.models.memory import deflection, driven
 from pipeline.maths.models.model import Motion
@@ -118,7 +119,7 @@ def test_a_filter_tracks_each_joint_of_a_coupled_arm_with_what_the_model_says_of
         push = np.where((t > 8) & (t < 12), 1.0, 0.0)
         y = (motion.q[:, i] + 1e-5 * rng.normal(size=4000), motion.dq[:, i] + 1e-4 * rng.normal(size=4000))
         made, untold = (
-            tracker(name)(told, *y, tau[:, i] + push, T_S, noise, 1.0)
+            tracker(name)(Driven(told, *y, motion.ddq[:, i], tau[:, i] + push, T_S, 1.0), noise)
             for told in (joint, joint._replace(known=np.zeros(4000)))
         )
         inside, outside = (t > 9) & (t < 12), (t > 1) & (t < 8)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from pipeline.records import Explanation, FreeSpace, LogSummary, Track
+from pipeline.records import Explanation, FilterNoise, FreeSpace, LogSummary, Track
 from pipeline.report.content import (
     Band,
     Block,
@@ -67,10 +67,11 @@ def tracked(context: Context, tracks: list[Track]) -> Iterator[Block]:
 def intro(context: Context, tracks: list[Track]) -> Iterator[Prose]:
     """What the filter does, and which joints it cannot say much about."""
     explained = context.catalogue.all(Explanation)
+    tuned = ", tuned as [@filter-tuning] says" if context.catalogue.all(FilterNoise) else ""
     told = " Whether both fit the data is told by its innovations ([@innovations])." if explained else ""
     yield Prose(
-        "An extended Kalman filter follows position, velocity and external effort of each joint by itself, tuned as "
-        "[@filter-tuning] says." + told
+        f"An extended Kalman filter follows position, velocity and external effort of each joint by itself{tuned}."
+        + told
     )
     at_rest = [f"{title(t.joint)} in {literal(t.log)}" for t in tracks if t.at_rest]
     if at_rest:
