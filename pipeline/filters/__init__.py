@@ -8,7 +8,7 @@ import numpy as np
 from pipeline.filters.problem import Filter, NoiseModel, Tracked
 from pipeline.maths.models.driven import Driven
 
-FILTERS = ("ekf", "ekf_euler", "rts", "rate", "momentum", "direct")
+FILTERS = ("ekf", "ekf_euler", "ekf_adaptive", "rts", "rate", "momentum", "direct")
 DEFAULT = "ekf"  # the others are compared with it
 DIVERGED = 50.0  # times what a consistent filter has of normalised innovations squared, on average
 

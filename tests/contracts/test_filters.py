@@ -201,6 +201,17 @@ def test_the_momentum_observers_deviation_is_that_of_its_noise():
     assert made.tau_ext[1000:].std() == pytest.approx(made.tau_ext_std[-1], rel=0.05)
 
 
+def test_measurement_noise_that_grows_is_noticed_only_by_the_filter_that_adapts():
+    """Of a velocity whose noise grows tenfold halfway, its innovations stay as large as it says."""
+    N, random, joint = 8000, np.random.default_rng(0), arm.dynamics((inertia, viscous), THETA[:2], 8000)
+    louder = np.where(np.arange(N) < N // 2, 1.0, 10.0)
+    y = random.normal(size=N) * NOISE.r_q, random.normal(size=N) * NOISE.r_dq * louder
+    late = slice(N // 2 + 1000, None)
+    adapting, other = (tracker(name)(recording(joint, *y, np.zeros(N)), NOISE).nis for name in ("ekf_adaptive", "ekf"))
+    assert adapting[late].mean() == pytest.approx(2.0, abs=0.15)
+    assert other[late].mean() > 10.0
+
+
 @FILTER
 @pytest.mark.parametrize("pushed", [1.5, -1.5])
 def test_the_external_effort_is_what_the_robot_exerts_on_its_environment(track: Filter, pushed: float):

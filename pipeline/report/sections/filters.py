@@ -14,6 +14,7 @@ NAMES = {
     "ekf": "Extended Kalman filter",
     "ekf-euler": "The same, forward Euler",
     "ekf-independent": "The same, own terms only",
+    "ekf-adaptive": "The same, adaptive noise",
     "rts": "Smoother",
     "rate": "Kalman filter with rate",
     "momentum": "Momentum observer",
