@@ -1,8 +1,10 @@
 """Where the numbers come from: files and their hashes, versions, settings."""
 
+from collections import Counter
 from dataclasses import asdict
 
-from pipeline.records import LogSummary
+from pipeline.records import KINDS, LogSummary
+from pipeline.records.catalogue import Provenance
 from pipeline.report.content import Block, Listing, OnScreen, Prose, Section, Table, literal
 from pipeline.report.context import Context, listed
 
@@ -36,6 +38,8 @@ def section(context: Context) -> Section:
             f"{len(provenance.processed)} processed files stand behind this report; their hashes are in results.json."
         )
     )
+    if provenance.processed:
+        blocks.append(OnScreen("What was made, and what there was nothing to make of", "made", (made(provenance),)))
     summaries = context.catalogue.all(LogSummary)
     if summaries:
         tables = (start_times(summaries), channels(summaries))
@@ -43,6 +47,16 @@ def section(context: Context) -> Section:
     if provenance.study:
         blocks.append(OnScreen("The study file", "study-file", (Listing(provenance.study),)))
     return Section("Provenance", "provenance", tuple(blocks))
+
+
+def made(provenance: Provenance) -> Table:
+    """How many files there are of each kind of record; of what was skipped, none."""
+    folders = Counter(folder for place in provenance.processed for folder in place.split("/")[:-1])
+    rows = tuple(
+        (name, str(folders[kind.folder()]) if folders[kind.folder()] else "skipped: nothing to make it of")
+        for name, kind in KINDS.items()
+    )
+    return Table("Records, and how many files of each were made.", ("Record", "Files"), rows)
 
 
 def channels(summaries: list[LogSummary]) -> Table:
