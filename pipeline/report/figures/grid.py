@@ -25,6 +25,8 @@ def arrange(canvas: "Canvas", figure: Figure) -> None:
     columns = figure.columns
     width = WIDTH / columns
     rows = [canvas.axes[i : i + columns] for i in range(0, len(canvas.axes), columns)]
+    for axes, panel in zip(canvas.axes, figure.panels, strict=True):  # which may change the numbers beside the axes
+        make_room_for_names(axes, panel, max(figure.height - ROW_ABOVE - _room_below(axes), LEAST))
     numbers = max(_letters(axes.yaxis) for axes in canvas.axes) * DIGIT
     left = TICK + numbers + max(_lines(axes.get_ylabel()) for axes in canvas.axes) * LINE + 1
     wide = width - left - RIGHT
@@ -44,7 +46,6 @@ def arrange(canvas: "Canvas", figure: Figure) -> None:
             # Where a label is stands fixed: matplotlib would measure the numbers of every axis for it, twice.
             axes.yaxis.set_label_coords(-(TICK + numbers) / wide, 0.5)
             axes.xaxis.set_label_coords(0.5, -(TICK + _lines_of_numbers(axes.xaxis) * NUMBERS) / high)
-            make_room_for_names(axes, figure.panels[i * columns + j], high)
             draw_heading(axes, headings[i * columns + j], room, high)
         bottom -= below[i]
 

@@ -248,7 +248,7 @@ def in_space(force: TipForce, contact: TipContact) -> Figure3D:
         f"The path of the tip in space in {literal(force.log)}, with the force in each contact as a line from it.",
         marks,
         f"tip-space-{force.log}",
-        height=80,
+        height=88,
     )
 
 
