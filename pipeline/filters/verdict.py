@@ -1,6 +1,7 @@
 """What a search for causes found, in words."""
 
-from pipeline.filters.causes import CLOCK, COLOUR, CONTACT, REVERSALS, SIZES, STEP, WALK, CauseSearch, Trial
+from pipeline.filters.causes import CauseSearch
+from pipeline.filters.trials import CLOCK, COLOUR, CONTACT, REVERSALS, SIZES, STEP, WALK, Trial
 
 WHITE, LEFT_OUT, MENDED, UNEXPLAINED = "white", "left out", "mended", "unexplained"
 LEAVING = (CONTACT, REVERSALS)
