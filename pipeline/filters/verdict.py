@@ -1,6 +1,7 @@
 """What a search for causes found, in words."""
 
-from pipeline.filters.causes import CLOCK, COLOUR, CONTACT, REVERSALS, SIZES, STEP, WALK, CauseSearch, Trial
+from pipeline.filters.causes import CLEARLY, CauseSearch
+from pipeline.filters.trials import CLOCK, COLOUR, CONTACT, LEVEL, REVERSALS, SIZES, STEP, WALK, Trial
 
 WHITE, LEFT_OUT, MENDED, UNEXPLAINED = "white", "left out", "mended", "unexplained"
 LEAVING = (CONTACT, REVERSALS)
@@ -11,6 +12,7 @@ SAID = {
     STEP: "what the filter's step leaves out",
 }
 NOTHING = "not white: no tested cause explains it"
+BY_LITTLE = "not white, but by little, as one of many runs is by chance"
 MOST_OF_IT = 0.5  # of the correlation, below which a cause is not worth its name
 
 
@@ -40,6 +42,8 @@ def explained(trial: Trial) -> str:
 
 def unexplained(search: CauseSearch) -> str:
     """That nothing explains it, and what explains most of it."""
+    if search.trials[0].least > LEVEL / CLEARLY:
+        return BY_LITTLE
     nearest = search.nearest()
     share = search.share(nearest)
     if share < MOST_OF_IT:

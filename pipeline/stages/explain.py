@@ -8,9 +8,10 @@ from pipeline.estimators.driving import Driving, driving, named
 from pipeline.estimators.refitting import refitted
 from pipeline.estimators.used import describing
 from pipeline.filters.assumed import assumed
-from pipeline.filters.causes import CLOCK, CauseSearch, Subject, search
+from pipeline.filters.causes import CauseSearch, search
 from pipeline.filters.innovations import Innovations, innovations
 from pipeline.filters.timing import delays, mended
+from pipeline.filters.trials import CLOCK, Subject
 from pipeline.filters.verdict import finding, verdict
 from pipeline.maths.arrays import Array, Booleans
 from pipeline.maths.models.driven import Driven
