@@ -77,8 +77,10 @@ def causes(subject: Subject) -> Iterator[str]:
 
 def possible(without: tuple[str, ...], subject: Subject, explaining: list[Trial]) -> bool:
     """Whether these go together: one model at a time; sizes are part of colour and of the clock, which are not tried
-    where sizes alone will do; and no colour for another model.
+    where sizes alone will do; no colour for another model; and of three, two are samples that are left out.
     """
+    if len(without) == TOGETHER and not {CONTACT, REVERSALS} <= {*without}:
+        return False
     others = {*list(subject.models)[1:]} & {*without}
     if len(others) > 1 or len({SIZES, COLOUR} & {*without}) > 1 or {SIZES, CLOCK} <= {*without}:
         return False
