@@ -34,6 +34,10 @@ class Hand(NamedTuple):
         return self.b / (2.0 * float(np.sqrt(self.m * (self.k + k_t))))
 
 
+THESIS = Hand(1.0, 1.0, 100.0)  # m and b of section 8.3; it states no K_H, and 100 N/m is an arm held loosely
+THESIS_TISSUE = 457.24  # [N/m], section 8.2
+
+
 def mode(hand: Hand, k_t: float) -> Array:
     """The matrix (2, 2) of dx/dt = A x with a tissue of stiffness k_t [N/m]: A_1, and at 0 A_2.  (8.4), (8.6)"""
     return np.array([[0.0, 1.0], [-(hand.k + k_t) / hand.m, -hand.b / hand.m]])

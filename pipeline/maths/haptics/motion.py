@@ -26,7 +26,7 @@ EACH_PERIOD = 100  # samples of the quicker mode's period
 SWINGS = 60  # of the free hand, after which a motion has shown whether it grows
 FINE = 100  # samples of a delay that stands for a continuous one
 LIMIT_HALVINGS = 14
-BRACKET = (0.25, 16.0)  # times the limit of the hand in contact: where the limit of one that leaves it is looked for
+BRACKET = (0.25, 64.0)  # times the limit of the hand in contact: where the limit of one that leaves it is looked for
 
 
 class Motion(NamedTuple):
@@ -130,12 +130,15 @@ def grows(hand: Hand, motion: Motion) -> bool:
 def leaving_limit(hand: Hand, delay: float, contact_limit: float) -> float:
     """The K_T [N/m] from which a hand that nothing pushes bounces ever higher off the tissue, by simulation.
 
-    Its contact lasts part of each turn only; the limit of the hand in contact begins the search.
+    Its contact lasts part of each turn only; the limit of the hand in contact begins the search, and NaN says that
+    64 times that is not enough, as for a hand so damped that it hardly comes back.
     """
     rate = FINE / delay
     exact = delay - 0.5 / rate  # holding makes it half a sample later
     slow = 2.0 * math.pi / hand.frequency * SWINGS
     low, high = (share * contact_limit for share in BRACKET)
+    if not grows(hand, late(hand, high, exact, rate, 0.0, slow)):
+        return math.nan
     for _ in range(LIMIT_HALVINGS):
         middle = math.sqrt(low * high)
         growing = grows(hand, late(hand, middle, exact, rate, 0.0, slow))
