@@ -173,7 +173,9 @@ def test_arrays_are_named_once():
 @pytest.mark.parametrize("source", sorted((ROOT / "maths").rglob("*.py")), ids=lambda s: str(s.relative_to(ROOT)))
 def test_maths_is_numpy_scipy_and_numba_only(source):
     outside = {name.split(".")[0] for name in imports(source)}
-    assert outside - set(sys.stdlib_module_names) <= {"numpy", "scipy", "numba", "pipeline"} | SOLVERS.get(source.name, set())
+    assert outside - set(sys.stdlib_module_names) <= {"numpy", "scipy", "numba", "pipeline"} | SOLVERS.get(
+        source.name, set()
+    )
     assert rooms(source) <= {"maths", "errors"}
 
 

@@ -99,7 +99,7 @@ def _format_text(hand: "Hand", limits: Limits, delay: float | None, rate: float 
             f"force {' and '.join(how) or 'not late at all'}"
         ]
     lines += ["", f"The thesis's tissue, {THESIS_TISSUE:g} N/m, is {_against(limits, THESIS_TISSUE)}."]
-    if delay and THESIS_TISSUE >= (limits.get("k_t_delay") or THESIS_TISSUE):
+    if delay and (limits.get("k_t_delay") or THESIS_TISSUE) <= THESIS_TISSUE:
         needed = damping_needed(hand, THESIS_TISSUE, delay + (0.5 / rate if rate else 0.0))
         lines += [f"A hand damped by about {needed:.3g} N s/m would hold it."]
     return "\n".join(lines)

@@ -4,21 +4,24 @@ In contact, m ddx + b dx + K_H x + K_T x(t - d) = 0.  A root reaches the imagina
 
     K_T = |m w^2 - K_H - j b w|   and   w d = arg(m w^2 - K_H + j b w) + 2 pi n.
 
-The angle falls from pi to 0 while w d rises, so that each n has one w; the smallest K_T of all is the limit, below which
-no root ever crosses.  A computer that reads x once in T and holds the force that it makes of it, d later, is the same
-on the unit circle, z = exp(j w T), with the hand's exact response to a held force.
+The angle falls from pi to 0 while w d rises, so that each n has one w; the smallest K_T of all is the limit, below
+which no root ever crosses.  A computer that reads x once in T and holds the force that it makes of it, d later, is the
+same on the unit circle, z = exp(j w T), with the hand's exact response to a held force.
 
 Both are criteria of the hand that is pressed into tissue and stays in contact, which small motions about a steady push
 do: beyond the limit they grow.  A hand that nothing pushes leaves the tissue at every turn, where no force is late.
 """
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from pipeline.errors import BadRequest
 from pipeline.maths.arrays import Array
 from pipeline.maths.haptics.bimodal import Hand, mode
+
+Complex = NDArray[np.complex128]
 
 MOST_SAMPLES = 1000  # of delay, beyond which the held force is as good as continuous
 EACH_TURN = 40  # places of the unit circle that each sample of delay, and each width of the resonance, is looked at by
@@ -75,7 +78,7 @@ def sampled_limit(hand: Hand, delay: float, rate: float) -> float:
         raise BadRequest(f"{said} gone through; leave the rate out: the force is then as good as continuous")
     Phi, early, late, samples = discretised(hand, delay, rate)
 
-    def needed(theta: Array) -> Array:
+    def needed(theta: Array) -> Complex:
         """The complex K_T for which z = exp(j theta) is a root."""
         z = np.exp(1j * theta)
         determinant = z**2 - np.trace(Phi) * z + np.linalg.det(Phi)
@@ -93,9 +96,9 @@ def sampled_limit(hand: Hand, delay: float, rate: float) -> float:
     return float(stiffness[stiffness > 0.0].min())
 
 
-def response(Phi: Array, column: Array, z: Array) -> Array:
+def response(Phi: Array, column: Array, z: Complex) -> Complex:
     """The first row of adj(z I - Phi) times a column (2,), at places z (N,): the numerator of a position."""
-    return (z - Phi[1, 1]) * column[0] + Phi[0, 1] * column[1]
+    return np.asarray((z - Phi[1, 1]) * column[0] + Phi[0, 1] * column[1])
 
 
 def circle(hand: Hand, rate: float, samples: int) -> Array:

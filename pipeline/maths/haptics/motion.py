@@ -29,7 +29,7 @@ LIMIT_HALVINGS = 14
 BRACKET = (0.25, 64.0)  # times the limit of the hand in contact: where the limit of one that leaves it is looked for
 
 
-class Motion(NamedTuple):
+class Swing(NamedTuple):
     """Position and velocity (N,) of the hand over time."""
 
     t: Array  # [s]
@@ -47,15 +47,15 @@ def worst(x: float, dx: float) -> float:
     return -x * dx
 
 
-def switched(hand: Hand, k_t: float, start: State, duration: float, law: Law = at_contact) -> Motion:
+def switched(hand: Hand, k_t: float, start: State, duration: float, law: Law = at_contact) -> Swing:
     """The hand let go at `start`, with a tissue of k_t [N/m] that acts by a law, for a duration [s]."""
     step = 2.0 * math.pi / math.sqrt((hand.k + k_t) / hand.m) / EACH_PERIOD
-    t = np.arange(math.ceil(duration / step) + 1) * step
+    t = step * np.arange(math.ceil(duration / step) + 1, dtype=float)
     states = [start]
     for _ in t[1:]:
         states.append(stepped(hand, k_t, states[-1], step, law))
     x, dx = np.array(states).T
-    return Motion(t, x, dx)
+    return Swing(t, x, dx)
 
 
 def stepped(hand: Hand, k_t: float, state: State, step: float, law: Law) -> State:
@@ -90,7 +90,7 @@ def flow(hand: Hand, k_t: float, state: State, t: float) -> State:
     )
 
 
-def late(hand: Hand, k_t: float, delay: float, rate: float, push: float, duration: float) -> Motion:
+def late(hand: Hand, k_t: float, delay: float, rate: float, push: float, duration: float) -> Swing:
     """The hand with a force that is held at `rate` [Hz] and `delay` [s] late, of tissue on one side only.
 
     Where `push` > 0 [N], the hand presses into the tissue, rests, and is disturbed by a hundredth of its depth, so that
@@ -103,13 +103,11 @@ def late(hand: Hand, k_t: float, delay: float, rate: float, push: float, duratio
     held = np.full(samples + 2, -k_t * x_0)
     x[0], dx[0] = (1.01 * x_0 if push else -0.01), 0.0
     _late(Phi, early, after, (early + after) * push, k_t, held, x, dx)
-    return Motion(np.arange(ticks) / rate, x - x_0, dx)
+    return Swing(np.arange(ticks) / rate, x - x_0, dx)
 
 
 @cached()
-def _late(
-    Phi: Array, early: Array, after: Array, pushed: Array, k_t: float, held: Array, x: Array, dx: Array
-) -> None:
+def _late(Phi: Array, early: Array, after: Array, pushed: Array, k_t: float, held: Array, x: Array, dx: Array) -> None:
     """Fill x and dx (N,) from their first; `held` goes round, and holds the force of each of the ticks before."""
     n = len(held)
     for k in range(len(x) - 1):
@@ -119,7 +117,7 @@ def _late(
         dx[k + 1] = Phi[1, 0] * x[k] + Phi[1, 1] * dx[k] + early[1] * new + after[1] * old + pushed[1]
 
 
-def grows(hand: Hand, motion: Motion) -> bool:
+def grows(hand: Hand, motion: Swing) -> bool:
     """Whether a motion is larger at its end than before: its last quarter against the one before."""
     size = np.hypot(motion.x, motion.dx / hand.frequency)
     quarter = len(size) // 4

@@ -1,7 +1,7 @@
 """The stiffest tissue under arbitrary switching, exactly: where the worst switching law just closes on itself.
 
-The two modes differ in the force K_T x only, which pushes back.  The worst law leaves it out while the hand moves away,
-and puts it in while it comes back, so that it switches on both axes of the phase plane and does the same in both halves.
+The two modes differ in the force K_T x only, which pushes back.  The worst law leaves it out while the hand moves
+away, and puts it in while it comes back, so that it switches on both axes of the phase plane, and alike in both halves.
 With omega^2 = K/m and the damping ratio zeta, a mode takes a speed v to the displacement X, and X to the speed v':
 
     X  = v/omega   exp(-g(zeta)),        g = zeta/s  arccos(zeta)
