@@ -24,8 +24,8 @@ from pipeline.robots.robot import Kind, Robot
 CELLS = 30  # of the map, along either axis
 SOFTEST, STIFFEST = 1.0, 1e5  # [N/m] hands of the map
 TISSUES = (0.5, 2e3)  # [N/m] of the map
-DELAYS = np.geomspace(1e-3, 1.0, 37)  # [s]
-SIMULATED = slice(12, None, 6)  # of the delays, at which the hand that leaves the tissue is simulated
+DELAYS = np.geomspace(1e-3, 0.5, 55)  # [s]
+SIMULATED = slice(18, None, 9)  # of the delays, at which the hand that leaves the tissue is simulated
 LINK_RATE = 100.0  # [Hz] of messages, chapter 9
 BEYOND = 1.1  # times the limit of arbitrary switching, at which motions are shown
 TURNS = 8.0  # of the free hand, that they last

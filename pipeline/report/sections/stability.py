@@ -2,13 +2,15 @@
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from pipeline.records import DelayLimit, HapticMotion, StabilityLimit, StabilityMap, TissueLimit
 from pipeline.report.content import (
+    Band,
     Block,
     Figure,
     HLine,
     Line,
-    Number,
     OnScreen,
     Panel,
     Points,
@@ -41,7 +43,7 @@ def section(context: Context) -> Section | None:
 def blocks(context: Context, delayed: DelayLimit) -> Iterator[Block]:
     """The section's content.  Section 8.3"""
     tissues = context.catalogue.all(TissueLimit)
-    yield from (verdict(context, tissue) for tissue in tissues)
+    yield verdict(context, tissues)
     yield Prose(f"{model(context)}\n\n{red_region(context)}\n\n{what_limits(context, tissues)}")
     yield limits_figure(context, delayed, tissues)
     yield OnScreen(
@@ -51,26 +53,23 @@ def blocks(context: Context, delayed: DelayLimit) -> Iterator[Block]:
     )
 
 
-def verdict(context: Context, tissue: TissueLimit) -> Verdict:
-    """Whether the hand is stable against one tissue with the filter's lag."""
-    name, prefix = f"**{literal(tissue.log)}**", f"stability.{tissue.log}"
+def verdict(context: Context, tissues: list[TissueLimit]) -> Verdict:
+    """Against which of the tissues the hand is stable with the filter's lag."""
+    softest, stiffest = (choose(tissues, key=lambda tissue: tissue.stiffness) for choose in (min, max))
+    every = [context.results[f"tissue.{tissue.log}.stiffness"].number() for tissue in (softest, stiffest)]
+    measured = f"the tissue that was measured, {every[0]}" + f" to {every[1]}" * (softest is not stiffest)
+    prefix = f"stability.{stiffest.log}"
     if f"{prefix}.k_t_lag" not in context.results:
-        return Verdict("info", f"{name}: how late the filter is is not known, so no limit is.")
-    most, lag, damping = (context.results[f"{prefix}.{n}"] for n in ("k_t_lag", "force_lag", "damping_needed"))
-    stable = tissue.stiffness < tissue.k_t_lag
-    said = f"the thesis's hand is {'stable' if stable else '**not** stable'} against {stiffness(context, tissue)}"
+        return Verdict("info", f"Nothing is said of {measured}: no log tells how late the filter is.")
+    most, lag, damping = (
+        context.results[f"{prefix}.{n}"].number(2) for n in ("k_t_lag", "force_lag", "damping_needed")
+    )
+    stable = stiffest.stiffness < stiffest.k_t_lag
     return Verdict(
         "good" if stable else "warn",
-        f"{name}: {said}, the force {lag.number(2)} late, as of the {title(tissue.lag_of).lower()}, and by the link: "
-        f"at most {most.number(3)}, or a hand damped by {damping.number(2)}.",
-    )
-
-
-def stiffness(context: Context, tissue: TissueLimit) -> Number | str:
-    """The stiffness of the tissue that was measured."""
-    key = f"tissue.{tissue.log}.stiffness"
-    return (
-        context.results[key].number() if key in context.results else context.size(tissue, "stiffness", tissue.stiffness)
+        f"The thesis's hand is {'' if stable else '**not** '}stable against {measured}, where the force comes {lag} "
+        f"late, as the filter's of the {title(stiffest.lag_of).lower()} does, and over the link: at most against "
+        f"{most}. A hand damped by {damping} or more is.",
     )
 
 
@@ -90,9 +89,9 @@ def red_region(context: Context) -> str:
     return (
         "The thesis's map is red where no common quadratic Lyapunov function was found. Such a function exists exactly "
         f"where $K_T < b^2/m + 2 b sqrt(K_H/m)$, here below {proved}, and the solver's points agree. But the red "
-        "region is **not** a region of instability: it is where *this criterion* proves nothing. Even if the tissue "
+        "region is **not** a region of instability: it is where **this criterion** proves nothing. Even if the tissue "
         f"could switch on and off at any moment, it would do no harm below {switching}. And it cannot: it acts where "
-        "$x >= 0$ only. There $V = m dot(x)^2/2 + K_H x^2/2 + K_T max(x, 0)^2/2$ falls by $b dot(x)^2$, so that "
+        "$x >= 0$ only. There $V = 1/2 m dot(x)^2 + 1/2 K_H x^2 + 1/2 K_T max(x, 0)^2$ falls by $b dot(x)^2$, so that "
         "without delay **every** $K_T >= 0$ is stable, the whole red region with it."
     )
 
@@ -128,13 +127,9 @@ def limits_figure(context: Context, delayed: DelayLimit, tissues: list[TissueLim
 
 def map_panel(context: Context, tissues: list[TissueLimit]) -> Panel:
     """Fig 8.9 with the exact curves and the tissues."""
-    marks: list[AnyMark] = []
-    for cells in context.catalogue.all(StabilityMap):
-        for value, name, colour in ((1, "found", "sky"), (0, "not found", "orange")):
-            here = cells.has_cqlf == value
-            marks.append(Points(cells.k_h[here], cells.tissue_stiffness[here], f"LMI: {name}", colour))  # type: ignore[arg-type]
+    marks: list[AnyMark] = [mark for cells in context.catalogue.all(StabilityMap) for mark in solved(cells)]
     for limit in context.catalogue.all(StabilityLimit):
-        marks.append(Line(limit.k_h, limit.k_t_cqlf, "Lyapunov function", "black", "solid"))
+        marks.append(Line(limit.k_h, limit.k_t_cqlf, "the same, exactly", "black", "solid"))
         marks.append(Line(limit.k_h, limit.k_t_switching, "worst switching", "vermillion", "dashed"))
     return Panel(
         "Without delay",
@@ -146,11 +141,26 @@ def map_panel(context: Context, tissues: list[TissueLimit]) -> Panel:
     )
 
 
+def solved(cells: StabilityMap) -> tuple[AnyMark, ...]:
+    """Up to where the solver found a function and from where it did not, one column of cells after the other."""
+    k_h, found = np.unique(cells.k_h), cells.has_cqlf == 1
+    columns = [cells.k_h == k for k in k_h]
+    top = float(cells.tissue_stiffness.max())
+    last = np.array([cells.tissue_stiffness[column & found].max(initial=0.0) for column in columns])
+    first = np.array([cells.tissue_stiffness[column & ~found].min(initial=top) for column in columns])
+    some, fails = last > 0.0, first < top
+    return (
+        Band(k_h, first, np.full(len(k_h), top), "red in Fig 8.9", "vermillion"),
+        Points(k_h[some], last[some], "LMI holds up to", "blue"),
+        Points(k_h[fails], first[fails], "LMI fails from", "orange"),
+    )
+
+
 def tissue_lines(tissues: list[TissueLimit]) -> Iterator[HLine]:
     """The tissues that were measured, and the thesis's."""
     for i, tissue in enumerate(tissues):
-        yield HLine(tissue.stiffness, "" if i else "measured tissue", "green", "solid")
-    yield HLine(THESIS_TISSUE, "the thesis's", "black", "dotted")
+        yield HLine(tissue.stiffness, "" if i else "measured", "green", "solid")
+    yield HLine(THESIS_TISSUE, "thesis", "black", "dotted")
 
 
 def delay_panel(delayed: DelayLimit, tissues: list[TissueLimit]) -> Panel:
