@@ -339,7 +339,7 @@ QUANTITIES = {
     "k_t_lag": Quantity("stiffest tissue with that lag and the link", "N/m"),
     "damping_needed": Quantity("damping of the hand from which it is stable against the tissue, so late", "N s/m"),
     "switching": Quantity("where the tissue begins and ends to act", ""),
-    "hand_x": Quantity("position of the hand, into the tissue", "m"),
+    "hand_x": Quantity("position of the hand", "m"),
     "hand_dx": Quantity("velocity of the hand", "m/s"),
     # the robot, its controllers and its excitation
     "robot": Quantity("name of the robot", ""),

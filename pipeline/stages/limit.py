@@ -27,8 +27,8 @@ TISSUES = (0.5, 2e3)  # [N/m] of the map
 DELAYS = np.geomspace(1e-3, 0.5, 55)  # [s]
 SIMULATED = slice(18, None, 9)  # of the delays, at which the hand that leaves the tissue is simulated
 LINK_RATE = 100.0  # [Hz] of messages, chapter 9
-BEYOND = 1.1  # times the limit of arbitrary switching, at which motions are shown
-TURNS = 8.0  # of the free hand, that they last
+BEYOND = 1.5  # times the limit of arbitrary switching, at which motions are shown
+TURNS = 5.0  # of the free hand, that they last
 
 
 def run(

@@ -24,13 +24,13 @@ K = 457.24
 
 def stiffness(log="pushes", k=K, pushes=3) -> Stiffness:
     empty = np.zeros(0)
-    columns = {name: empty for name in Stiffness.columns()}
+    columns = dict.fromkeys(Stiffness.columns(), empty)
     about = {"log": log, "source": "force sensor", "swings": 3, "stiffness": k, "stiffness_std": 1.0}
     return Stiffness(**about, stiffness_std_model=0.0, stiffness_q1=k, stiffness_q3=k, pushes=pushes, **columns)
 
 
 def comparison(joint, delay, default=1) -> Comparison:
-    numbers = {name: 1.0 for name in Comparison.scalars()}
+    numbers = dict.fromkeys(Comparison.scalars(), 1.0)
     about = {"log": "a", "joint": joint, "filter": "ekf", "role": "validation", "default": default}
     return Comparison(**(numbers | about | {"push_delay": delay, "t": np.zeros(1), "tau_ext": np.zeros(1)}))
 

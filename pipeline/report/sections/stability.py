@@ -27,8 +27,8 @@ from pipeline.report.context import Context, label, title
 THESIS_TISSUE = 457.24  # [N/m], section 8.2
 MS = 1e3
 LAWS: dict[str, tuple[str, Colour]] = {
-    "worst": ("the worst switching", "vermillion"),
-    "at contact": ("at first contact, as it is", "blue"),
+    "worst": ("worst", "vermillion"),
+    "at contact": ("as it is", "blue"),
 }
 
 
@@ -43,7 +43,8 @@ def section(context: Context) -> Section | None:
 def blocks(context: Context, delayed: DelayLimit) -> Iterator[Block]:
     """The section's content.  Section 8.3"""
     tissues = context.catalogue.all(TissueLimit)
-    yield verdict(context, tissues)
+    if tissues:
+        yield verdict(context, tissues)
     yield Prose(f"{model(context)}\n\n{red_region(context)}\n\n{what_limits(context, tissues)}")
     yield limits_figure(context, delayed, tissues)
     yield OnScreen(
@@ -56,7 +57,7 @@ def blocks(context: Context, delayed: DelayLimit) -> Iterator[Block]:
 def verdict(context: Context, tissues: list[TissueLimit]) -> Verdict:
     """Against which of the tissues the hand is stable with the filter's lag."""
     softest, stiffest = (choose(tissues, key=lambda tissue: tissue.stiffness) for choose in (min, max))
-    every = [context.results[f"tissue.{tissue.log}.stiffness"].number() for tissue in (softest, stiffest)]
+    every = [stiffness(context, tissue) for tissue in (softest, stiffest)]
     measured = f"the tissue that was measured, {every[0]}" + f" to {every[1]}" * (softest is not stiffest)
     prefix = f"stability.{stiffest.log}"
     if f"{prefix}.k_t_lag" not in context.results:
@@ -71,6 +72,13 @@ def verdict(context: Context, tissues: list[TissueLimit]) -> Verdict:
         f"late, as the filter's of the {title(stiffest.lag_of).lower()} does, and over the link: at most against "
         f"{most}. A hand damped by {damping} or more is.",
     )
+
+
+def stiffness(context: Context, tissue: TissueLimit) -> str:
+    """The stiffness of a tissue that was measured, with its error where that is at hand."""
+    key = f"tissue.{tissue.log}.stiffness"
+    known = context.results[key].number() if key in context.results else None
+    return str(known) if known else context.size(tissue, "stiffness", tissue.stiffness)
 
 
 def model(context: Context) -> str:
@@ -226,7 +234,7 @@ def motions(context: Context) -> Iterator[Figure]:
         (
             Panel("Phase plane", label(runs[0], "hand_x"), label(runs[0], "hand_dx"), phase),
             Panel("Position", "time [s]", label(runs[0], "hand_x"), position),
-            Panel("Lyapunov function", "time [s]", label(runs[0], "V"), energy, y_log=True),
+            Panel("Energy", "time [s]", label(runs[0], "V"), energy, y_log=True),
         ),
         "stability-motion",
         columns=3,
