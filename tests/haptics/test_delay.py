@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose
 
 from pipeline.errors import BadRequest
 from pipeline.maths.haptics.bimodal import THESIS, Hand
-from pipeline.maths.haptics.delay import damping_needed, delay_limit, sampled_limit, spectral_radius
-from pipeline.maths.haptics.motion import FINE, grows, late, leaving_limit
+from pipeline.maths.haptics.delay import damping_needed, delay_limit, discretised, sampled_limit, spectral_radius
+from pipeline.maths.haptics.motion import FINE, flow, grows, late, leaving_limit
 
 PRESSED = 1.0  # [N]
 DELAYS = (0.005, 0.05, 0.3)
@@ -48,8 +48,26 @@ def test_small_delays_and_periods_cost_what_the_textbook_says():
     assert_allclose(delay_limit(THESIS, 1e-4) * 1e-4, THESIS.b, rtol=1e-4)
 
 
-def test_a_force_held_ever_more_often_is_a_delayed_one():
-    assert_allclose(sampled_limit(THESIS, 0.05, 10_000.0), delay_limit(THESIS, 0.05 + 0.5e-4), rtol=1e-6)
+@pytest.mark.parametrize("hand", [THESIS, Hand(0.1, 0.02, 3000.0), Hand(1.0, 0.1, 400.0)])
+def test_a_force_held_ever_more_often_is_a_delayed_one(hand):
+    """A hand that is hardly damped meets the limit after whole turns of its delay."""
+    for delay in (0.05, 0.17):
+        assert_allclose(sampled_limit(hand, delay, 5000.0), delay_limit(hand, delay + 1e-4), rtol=1e-3)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.05, 0.053, 0.0004])
+def test_a_sample_is_the_hand_s_motion_under_the_force_before_and_then_the_new_one(delay):
+    """The force of the sample before acts until the rest of the delay is over."""
+    rate, x, before, new = 100.0, (0.02, -0.3), 1.5, -4.0
+    rest = delay - int(delay * rate + 1e-9) / rate
+    state = x
+    for force, duration in ((before, rest), (new, 1.0 / rate - rest)):
+        still = force / THESIS.k  # where the hand would rest
+        at, dx = flow(THESIS, 0.0, (state[0] - still, state[1]), duration)
+        state = at + still, dx
+    Phi, early, after, samples = discretised(THESIS, delay, rate)
+    assert samples == round((delay - rest) * rate)
+    assert_allclose(Phi @ x + early * new + after * before, state, rtol=1e-9)
 
 
 def test_a_hand_that_nothing_presses_is_stable_for_stiffer_tissue():
