@@ -22,6 +22,7 @@ from pipeline.records import (
     COLUMN_DTYPES,
     KINDS,
     Control,
+    DelayLimit,
     Excitation,
     FreeWeight,
     Guess,
@@ -33,6 +34,7 @@ from pipeline.records import (
     TipBudget,
     TipContact,
     TipForce,
+    TissueLimit,
     TissueModel,
     Weight,
 )
@@ -219,14 +221,22 @@ def made(kind: type[Record], **about: Any) -> Record:
 
 
 ROBOT = ("robot.", "control.", "excitation.")
-BY_HAND = (*ROBOT, "weight.", "tissue.", "guess.", "tip.")
+BY_HAND = (*ROBOT, "weight.", "tissue.", "stability.", "guess.", "tip.")
 
 
 def test_keys_of_a_robot_and_of_what_hangs_on_it_or_pushes_it_are_told_and_those_told_are_there():
     """Of records made by hand, as designing a robot takes half a minute, and the arm of the tests has no chain."""
     records = [made(Links), made(Control), made(Lyapunov), made(Excitation, source="table-6.1")]
     guess = made(Guess, parameter=np.array(["inertia", "offset"], object))
-    records += [made(Weight), made(FreeWeight), made(Stiffness), made(TissueModel), guess]
+    records += [
+        made(Weight),
+        made(FreeWeight),
+        made(Stiffness),
+        made(TissueModel),
+        guess,
+        made(DelayLimit),
+        made(TissueLimit),
+    ]
     records += [made(TipForce), made(TipContact), made(TipBudget)]
     keys = set(collect(Catalogue(lambda kind: [record for record in records if isinstance(record, kind)])))
     assert {key.partition(".")[0] + "." for key in keys} == set(BY_HAND)

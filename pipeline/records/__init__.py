@@ -26,6 +26,7 @@ from pipeline.records.fit import (
 )
 from pipeline.records.hang import Load
 from pipeline.records.ingest import LogSummary, Recording, Touch
+from pipeline.records.limit import DelayLimit, HapticMotion, StabilityLimit, StabilityMap, TissueLimit
 from pipeline.records.measure import Contact
 from pipeline.records.palpate import Push, Stiffness, TissueModel
 from pipeline.records.predict import Prediction
@@ -40,14 +41,14 @@ from pipeline.records.weigh import FreeWeight, Weight
 from pipeline.records.whiteness import Whiteness
 
 __all__ = [
-    "COLUMN_DTYPES", "KINDS", "AnyRecord", "ArmCorrelation", "Average", "Choice", "Column", "Comparison",
-    "Contact", "Control", "Counts", "CrossFit", "Diagnostic", "ErrorBand", "Excitation", "Explanation",
+    "COLUMN_DTYPES", "KINDS", "AnyRecord", "ArmCorrelation", "Average", "Choice", "Column", "Comparison", "Contact",
+    "Control", "Counts", "CrossFit", "DelayLimit", "Diagnostic", "ErrorBand", "Excitation", "Explanation",
     "FilterNoise", "Fit", "FittedPaths", "FreeMotion", "FreeSpace", "FreeWeight", "FrictionMap", "Guess",
-    "Identifiability", "Innovation", "JointCorrelation", "Labels", "Links", "Load", "LogSummary", "Lyapunov",
-    "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Push", "Record", "Recording",
-    "Residual", "Signal", "Smoothed", "Spectrum", "Stiffness", "SwarmSearch", "Threshold", "TipBudget",
-    "TipContact", "TipForce", "TissueModel", "Touch", "Track", "Trajectory", "Tuning", "Weight", "Whiteness",
-    "Workspace", "diagnostic",
+    "HapticMotion", "Identifiability", "Innovation", "JointCorrelation", "Labels", "Links", "Load", "LogSummary",
+    "Lyapunov", "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Push", "Record",
+    "Recording", "Residual", "Signal", "Smoothed", "Spectrum", "StabilityLimit", "StabilityMap", "Stiffness",
+    "SwarmSearch", "Threshold", "TipBudget", "TipContact", "TipForce", "TissueLimit", "TissueModel", "Touch",
+    "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
@@ -57,7 +58,8 @@ KINDS: dict[str, type[Record]] = {
         PeriodResidual, Trajectory, Spectrum, Smoothed, Fit, CrossFit, Identifiability, FittedPaths,
         MeasurementNoise, Residual, SwarmSearch, Guess, Choice, FrictionMap, Prediction, Tuning, FilterNoise,
         FreeMotion, ErrorBand, Track, FreeSpace, Threshold, Contact, Push, Stiffness, TissueModel, Load, Weight,
-        FreeWeight, Comparison, JointCorrelation, ArmCorrelation, TipForce, TipContact, TipBudget, Whiteness,
-        Innovation, Explanation, Diagnostic,
+        FreeWeight, Comparison, StabilityMap, StabilityLimit, DelayLimit, TissueLimit, HapticMotion,
+        JointCorrelation, ArmCorrelation, TipForce, TipContact, TipBudget, Whiteness, Innovation, Explanation,
+        Diagnostic,
     )
 }  # fmt: skip

@@ -18,6 +18,7 @@ DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
             "contacts",
             "tip",
             "tissue",
+            "stability",
             "weight",
             "joints",
             "choice",

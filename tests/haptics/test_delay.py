@@ -1,0 +1,96 @@
+"""A hand against tissue whose force comes late, or late and held: on both sides of the border, by simulation."""
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pipeline.errors import BadRequest
+from pipeline.maths.haptics.bimodal import THESIS, Hand
+from pipeline.maths.haptics.delay import damping_needed, delay_limit, discretised, sampled_limit, spectral_radius
+from pipeline.maths.haptics.motion import FINE, flow, grows, late, leaving_limit
+
+PRESSED = 1.0  # [N]
+DELAYS = (0.005, 0.05, 0.3)
+
+
+def simulated(hand: Hand, k_t: float, delay: float, rate: float, push: float = PRESSED) -> bool:
+    """Whether a motion of the hand grows, after its slowest swing has come sixty times."""
+    return grows(hand, late(hand, k_t, delay, rate, push, 60.0 * 2.0 * np.pi / hand.frequency))
+
+
+@pytest.mark.parametrize("hand", [THESIS, Hand(1.0, 10.0, 300.0), Hand(0.5, 2.0, 50.0)])
+@pytest.mark.parametrize("delay", DELAYS)
+def test_a_pressed_hand_is_stable_below_the_limit_of_a_delay_and_not_beyond(hand, delay):
+    limit, rate = delay_limit(hand, delay), 4 * FINE / delay
+    exact = delay - 0.5 / rate  # a held force is half a sample later
+    assert [simulated(hand, share * limit, exact, rate) for share in (0.98, 1.02)] == [False, True]
+
+
+@pytest.mark.parametrize("hand", [THESIS, Hand(1.0, 10.0, 300.0), Hand(0.1, 0.2, 3000.0)])
+@pytest.mark.parametrize(("delay", "rate"), [(0.0, 100.0), (0.05, 100.0), (0.053, 100.0), (0.0004, 1000.0)])
+def test_a_pressed_hand_is_stable_below_the_limit_of_a_held_force_and_not_beyond(hand, delay, rate):
+    limit = sampled_limit(hand, delay, rate)
+    assert [simulated(hand, share * limit, delay, rate) for share in (0.98, 1.02)] == [False, True]
+
+
+@pytest.mark.parametrize("hand", [THESIS, Hand(0.1, 0.02, 3000.0), Hand(2.0, 40.0, 50.0)])
+@pytest.mark.parametrize(("delay", "rate"), [(0.0, 100.0), (0.053, 100.0), (0.02, 30.0), (0.2, 250.0)])
+def test_the_limit_of_a_held_force_is_the_first_at_which_a_root_leaves_the_unit_circle(hand, delay, rate):
+    limit = sampled_limit(hand, delay, rate)
+    below = [spectral_radius(hand, k_t, delay, rate) for k_t in np.linspace(1e-3, 0.999, 60) * limit]
+    assert max(below) < 1.0 < spectral_radius(hand, 1.001 * limit, delay, rate)
+
+
+def test_small_delays_and_periods_cost_what_the_textbook_says():
+    """b > K_T (T/2 + d), for a hand that is slow beside both."""
+    for delay, rate in ((0.001, 1000.0), (0.0, 2000.0), (0.0005, 4000.0)):
+        assert_allclose(sampled_limit(THESIS, delay, rate) * (0.5 / rate + delay), THESIS.b, rtol=2e-3)
+    assert_allclose(delay_limit(THESIS, 1e-4) * 1e-4, THESIS.b, rtol=1e-4)
+
+
+@pytest.mark.parametrize("hand", [THESIS, Hand(0.1, 0.02, 3000.0), Hand(1.0, 0.1, 400.0)])
+def test_a_force_held_ever_more_often_is_a_delayed_one(hand):
+    """A hand that is hardly damped meets the limit after whole turns of its delay."""
+    for delay in (0.05, 0.17):
+        assert_allclose(sampled_limit(hand, delay, 5000.0), delay_limit(hand, delay + 1e-4), rtol=1e-3)
+
+
+@pytest.mark.parametrize("delay", [0.0, 0.05, 0.053, 0.0004])
+def test_a_sample_is_the_hand_s_motion_under_the_force_before_and_then_the_new_one(delay):
+    """The force of the sample before acts until the rest of the delay is over."""
+    rate, x, before, new = 100.0, (0.02, -0.3), 1.5, -4.0
+    rest = delay - int(delay * rate + 1e-9) / rate
+    state = x
+    for force, duration in ((before, rest), (new, 1.0 / rate - rest)):
+        still = force / THESIS.k  # where the hand would rest
+        at, dx = flow(THESIS, 0.0, (state[0] - still, state[1]), duration)
+        state = at + still, dx
+    Phi, early, after, samples = discretised(THESIS, delay, rate)
+    assert samples == round((delay - rest) * rate)
+    assert_allclose(Phi @ x + early * new + after * before, state, rtol=1e-9)
+
+
+def test_a_hand_that_nothing_presses_is_stable_for_stiffer_tissue():
+    for delay in (0.02, 0.1):
+        pressed = delay_limit(THESIS, delay)
+        free = leaving_limit(THESIS, delay, pressed)
+        assert free > 1.5 * pressed
+        rate = 4 * FINE / delay
+        exact = delay - 0.5 / rate
+        assert [simulated(THESIS, share * free, exact, rate, 0.0) for share in (0.97, 1.03)] == [False, True]
+
+
+def test_a_hand_that_hardly_comes_back_has_no_such_limit_within_reach():
+    hand = Hand(1.0, 30.0, 20.0)
+    assert np.isnan(leaving_limit(hand, 0.1, delay_limit(hand, 0.1)))
+
+
+@pytest.mark.parametrize("delay", DELAYS)
+def test_the_damping_that_is_needed_puts_the_limit_at_the_tissue(delay):
+    needed = damping_needed(THESIS, 457.24, delay)
+    assert_allclose(delay_limit(THESIS._replace(b=needed), delay), 457.24, rtol=1e-6)
+
+
+def test_a_delay_of_too_many_samples_is_refused_with_a_remedy():
+    with pytest.raises(BadRequest, match=r"20 s is 20000 samples of 1000 Hz.*leave the rate out"):
+        sampled_limit(THESIS, 20.0, 1000.0)
