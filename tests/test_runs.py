@@ -263,7 +263,7 @@ def test_a_run_that_is_killed_resumes_to_the_same_bytes(study, analysed):
 
 def test_a_stage_out_of_order_says_what_to_run(study):
     said = call("fit", study, code=1)
-    assert "fit has nothing to work on: there are no Trajectory or Smoothed records; run smooth first" in said
+    assert "fit has nothing to work on: there are no Trajectory or Smoothed records; run ingest first" in said
 
 
 def test_units_meanings_and_origins_travel_with_the_file(analysed):

@@ -18,7 +18,7 @@ from pipeline.runner.ledger import Entry, Folders, Ledger, file_name
 from pipeline.runner.lock import locked
 from pipeline.runner.plan import Plan, Task
 from pipeline.runner.reuse import reused
-from pipeline.runner.signature import declaration
+from pipeline.runner.signature import Declaration, declaration
 from pipeline.stages import STAGES
 from pipeline.study import Study
 
@@ -104,11 +104,22 @@ class Runner:
         asks = declaration(name)
         tasks = list(self.plan.tasks(asks))
         if not tasks and alone:
-            kinds = " or ".join(k.__name__ for k in asks.reads)
-            raise PipelineError(
-                f"{name} has nothing to work on: there are no {kinds} records; run {_before(name)} first"
-            )
+            if awaited := self._awaits(asks):
+                kinds = " or ".join(k.__name__ for k in asks.reads)
+                raise PipelineError(f"{name} has nothing to work on: there are no {kinds} records; run {awaited} first")
+            self.console.say(f"{name}: the study holds nothing for it")
         self._bring_up_to_date(name, tasks, partial(perform, self.folders))
+
+    def _awaits(self, asks: Declaration) -> str:
+        """The first stage that has not been run and that this one needs, by way of others or itself; "" for none."""
+        for name in STAGES[: STAGES.index(asks.name)]:
+            maker = declaration(name)
+            if {*maker.makes} & {*asks.reads}:
+                if awaited := self._awaits(maker):
+                    return awaited
+                if any(self.ledger.entry(name, task.name) is None for task in self.plan.tasks(maker)):
+                    return name
+        return ""
 
     def _bring_up_to_date(self, name: str, tasks: list[Task], perform: Perform) -> None:
         """Perform what is not current of all the tasks there are, and forget those that are no more."""
@@ -175,8 +186,3 @@ def _listed(stage: str, tasks: list[str]) -> str:
     if tasks == [stage]:
         return stage
     return f"{stage}: " + ", ".join(tasks[:3]) + (f" and {len(tasks) - 3} more" if len(tasks) > 3 else "")
-
-
-def _before(stage: str) -> str:
-    index = STAGES.index(stage)
-    return STAGES[index - 1] if index else STAGES[0]
