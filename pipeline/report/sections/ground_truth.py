@@ -10,7 +10,6 @@ from pipeline.report.context import PLAIN, Context, count, fit_name, label, titl
 from pipeline.report.pushed import tip_forces, true_effort
 
 LIMIT = 4.0  # standard errors that an estimate may be off before it is called wrong
-SHOWN = 1  # figure; the others are on screen
 
 
 def section(context: Context) -> Section | None:
@@ -36,11 +35,13 @@ def blocks(context: Context) -> Iterator[Block]:
             tracks = context.catalogue.about(Track, log=log["name"], joint=str(joint))
             pushes = [push for push in log["push"] if push.get("joint") == joint]
             figures += [effort_figure(track, pushes) for track in tracks]
-    yield from tip_forces(context)
-    yield from figures[:SHOWN]
-    if figures[SHOWN:]:
-        name = f"{count(len(figures) - SHOWN, 'more comparison')} of tracked and true effort"
-        yield OnScreen(name, "more-truth", tuple(figures[SHOWN:]))
+    tip = list(tip_forces(context))
+    yield from tip
+    shown = 0 if tip else 1  # on paper, where no force at the tip shows the same
+    yield from figures[:shown]
+    if figures[shown:]:
+        name = f"{count(len(figures) - shown, 'comparison')} of tracked and true effort"
+        yield OnScreen(name, "more-truth", tuple(figures[shown:]))
 
 
 def of_friction(context: Context) -> Iterator[Block]:

@@ -8,12 +8,15 @@ from pipeline.records.catalogue import Provenance
 from pipeline.report.content import Block, Listing, OnScreen, Prose, Section, Table, literal
 from pipeline.report.context import Context, listed
 
+PER_LINE = 4  # settings
+
 
 def section(context: Context) -> Section:
     """Everything needed to tell whether a report is of these files and this code."""
     provenance, study = context.provenance, context.study
     raw = tuple((literal(file), f"`{sha[:16]}`") for file, sha in provenance.raw.items())
     versions = tuple(provenance.packages.items())
+    said = [f"{name} = {value!r}" for name, value in asdict(study.settings).items()]
     blocks: list[Block] = [
         Prose(
             f"Made by davinci-forces {provenance.version}. The report ID on page one is the first half of the SHA-256 "
@@ -29,7 +32,7 @@ def section(context: Context) -> Section:
             "Versions of packages", "versions", (Table("Versions.", ("Package", "Version"), versions, align="ll"),)
         ),
         Prose("Settings used, defaults included:"),
-        Listing("\n".join(f"{name} = {value!r}" for name, value in asdict(study.settings).items())),
+        Listing("\n".join("; ".join(said[i : i + PER_LINE]) for i in range(0, len(said), PER_LINE))),
     ]
     if study.changed:
         blocks += [Prose("Changes of the robot:"), Listing("\n".join(f"{k}: {v}" for k, v in study.changed.items()))]

@@ -82,7 +82,7 @@ def of_log(context: Context, weight: Weight) -> Iterator[Block]:
     yield by_joint(context, weight)
     free = context.catalogue.about(FreeWeight, weight=weight.log)
     if free:
-        yield free_motion(context, weight, free)
+        yield OnScreen("What free motion seems to weigh", f"free-{weight.log}", (free_motion(context, weight, free),))
 
 
 def verdict(context: Context, weight: Weight) -> Verdict:
