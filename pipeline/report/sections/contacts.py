@@ -120,6 +120,8 @@ def not_analysed(context: Context) -> Iterator[tuple[str, str, str]]:
 
 def reason(entry: LogEntry, track: Track | None) -> str:
     """Why a joint of a log has no contact measured."""
+    if entry.role == "friction":
+        return "a log of friction is charted, joint by joint, and not tracked"
     if track is None:
         return "no fit of the joint to compare with: record an identification log of it"
     if track.at_rest:
