@@ -6,10 +6,11 @@ import numpy as np
 
 from pipeline.maths.contact.detection import quiet
 from pipeline.maths.contact.free_space import levels
-from pipeline.maths.signals.windows import SETTLE, free_space
+from pipeline.maths.signals.windows import free_space
 from pipeline.records import FreeSpace, Track
 from pipeline.study import LogEntry
 
+FORESEEN = 0.5  # [s] before a contact, in which the smoother sees it coming
 FEWEST = 100  # samples of free space, below which nothing is said of its level
 
 
@@ -22,8 +23,7 @@ def run(track: Track, entry: LogEntry) -> Iterator[FreeSpace]:
     free = free_space(track.t, entry.contact, track.rate)
     if track.at_rest or not known or int(free.sum()) < FEWEST:
         return
-    # The smoother sees a contact coming.
-    calm = free_space(track.t, [(start - SETTLE, end) for start, end in entry.contact], track.rate)
+    calm = free_space(track.t, [(start - FORESEEN, end) for start, end in entry.contact], track.rate)
     smooth = quiet(track.tau_ext_smooth, calm if calm.any() else free, track.rate)
     space = levels(track.tau_ext[free], track.tau_ext_std[free])
     yield FreeSpace(
