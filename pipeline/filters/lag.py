@@ -7,8 +7,8 @@ import numpy as np
 from pipeline.filters import ekf, rts
 from pipeline.filters.problem import NoiseModel
 from pipeline.maths.arrays import Array
-from pipeline.maths.models.driven import Driven
-from pipeline.maths.models.model import JointDynamics
+from pipeline.maths.models.bias import VISCOUS
+from pipeline.maths.models.driven import Driven, standing
 
 
 def lag(recordings: Sequence[Driven], noise: NoiseModel) -> tuple[Array, Array]:
@@ -17,13 +17,9 @@ def lag(recordings: Sequence[Driven], noise: NoiseModel) -> tuple[Array, Array]:
     The filter sees it as the effort of a joint at rest, where it is linear: position and velocity stay 0.
     """
     smooth = [rts.track(recording, noise).tau_ext for recording in recordings]
-    followed = [ekf.track(pushed(part, x), noise).tau_ext for part, x in zip(recordings, smooth, strict=True)]
-    return np.concatenate(smooth), np.concatenate(smooth) - np.concatenate(followed)
-
-
-def pushed(recording: Driven, tau_ext: Array) -> Driven:
-    """A joint that holds still while its motor exerts an effort (N,) on the environment."""
-    still = np.zeros(len(tau_ext))
-    viscous = recording.joint.coefficients[4]
-    joint = JointDynamics(recording.joint.inertia, (0.0, 0.0, 0.0, 0.0, viscous, 0.0, 0.0), still)
-    return Driven(joint, still, still, still, tau_ext, recording.T_s, recording.first_std)
+    pushes = (
+        standing(part.joint.inertia, part.joint.coefficients[VISCOUS], tau_ext, part.T_s, part.first_std)
+        for part, tau_ext in zip(recordings, smooth, strict=True)
+    )
+    followed = np.concatenate([ekf.track(push, noise).tau_ext for push in pushes])
+    return np.concatenate(smooth), np.concatenate(smooth) - followed

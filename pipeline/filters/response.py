@@ -3,20 +3,21 @@
 The push is a half-sine of 1 s.  A filter shows it where it returns 90 % of its peak, at most 0.1 s late.
 """
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
 from pipeline.filters.problem import Filter, NoiseModel
 from pipeline.maths.arrays import Array
-from pipeline.maths.models.driven import Driven
-from pipeline.maths.models.model import JointDynamics
+from pipeline.maths.models.bias import VISCOUS
+from pipeline.maths.models.driven import Driven, standing
 
 DURATION = 1.0  # [s] of the push
 SHARE, DELAY = 0.9, 0.1  # of its peak that is returned, and how late at most [s]
 BEFORE, AFTER = 2.0, 1.0  # [s] around it, when it is tried on a joint at rest
-VISCOUS = 4  # of a bias' coefficients
 WIDEST, STEPS = (1e-8, 1e6), 60  # of a walk, over what the filter believes of the joint's own noise; bisections
+KEPT = 256  # walks that are remembered: every stage and log asks for those of the same joints
 
 
 class Response(NamedTuple):
@@ -43,9 +44,7 @@ def response(difference: Array, t: Array, start: float, peak: float) -> Response
 def at_rest(track: Filter, inertia: float, viscous: float, T_s: float, noise: NoiseModel) -> Response:
     """What a filter makes of a push at a joint that stands still, where it is linear."""
     t = np.asarray(T_s * np.arange(round((BEFORE + DURATION + AFTER) / T_s) + 1), np.float64)
-    still = np.zeros(len(t))
-    joint = JointDynamics(np.full(len(t), inertia), (0.0, 0.0, 0.0, 0.0, viscous, 0.0, 0.0), still)
-    pushed = Driven(joint, still, still, still, half_sine(t, BEFORE), T_s, first_std=1.0)
+    pushed = standing(np.full(len(t), inertia), viscous, half_sine(t, BEFORE), T_s, first_std=1.0)
     return response(track(pushed, noise).tau_ext, t, BEFORE, 1.0)
 
 
@@ -53,13 +52,12 @@ def rise(track: Filter, recording: Driven, noise: NoiseModel) -> float:
     """The time [s] over which a filter spreads a step: 1 over its steepest rise, at a joint that stands still."""
     T_s, joint = recording.T_s, recording.joint
     t = np.asarray(T_s * np.arange(round(2.0 * BEFORE / T_s) + 1), np.float64)
-    still, inertia = np.zeros(len(t)), np.full(len(t), float(np.mean(joint.inertia)))
-    at = JointDynamics(inertia, (0.0, 0.0, 0.0, 0.0, joint.coefficients[VISCOUS], 0.0, 0.0), still)
-    step = np.where(t >= BEFORE, 1.0, 0.0)
-    followed = track(Driven(at, still, still, still, step, T_s, first_std=1.0), noise).tau_ext
-    return float(T_s / max(np.diff(followed).max(), 1e-9))
+    inertia, step = np.full(len(t), float(np.mean(joint.inertia))), np.where(t >= BEFORE, 1.0, 0.0)
+    stepped = standing(inertia, joint.coefficients[VISCOUS], step, T_s, first_std=1.0)
+    return float(T_s / max(np.diff(track(stepped, noise).tau_ext).max(), 1e-9))
 
 
+@lru_cache(KEPT)
 def slowest(track: Filter, inertia: float, viscous: float, T_s: float, noise: NoiseModel) -> float:
     """The smallest `q_tau` of a sample with which a filter shows a push.
 

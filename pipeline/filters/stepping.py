@@ -15,10 +15,10 @@ import numpy as np
 from pipeline.filters import belief
 from pipeline.filters.problem import NoiseModel
 from pipeline.maths.compiled import compiled
+from pipeline.maths.models.bias import COULOMB
 from pipeline.maths.models.driven import Driven
 from pipeline.maths.models.kernels import bias
 
-COULOMB = 5  # of a bias' coefficients
 TINY = 1e-300
 
 

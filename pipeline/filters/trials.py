@@ -6,13 +6,12 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.filters import DEFAULT, coloured, tracker
-from pipeline.filters.innovations import innovations
 from pipeline.filters.problem import NoiseModel
 from pipeline.filters.tuning import likeliest_walk
 from pipeline.maths.arrays import Array, Booleans
 from pipeline.maths.models.driven import Driven
-from pipeline.maths.signals.whiteness import runs, tests
-from pipeline.maths.signals.windows import SETTLE, settled
+from pipeline.maths.signals.whiteness import tests
+from pipeline.maths.signals.windows import SETTLE, runs, settled
 
 LEVEL = 0.01  # below this probability a test rejects white noise
 LAGS = 20  # of the Ljung-Box statistic
@@ -123,8 +122,6 @@ class Passes:
         if COLOUR in without:
             return coloured.innovations(part, noise)
         name = STEPS[self.subject.filter] if STEP in without else self.subject.filter
-        if name == DEFAULT:
-            return innovations(part, noise.white)[:2]
         made = tracker(name)(part, noise.white)
         return made.innovation_q, made.innovation_dq
 

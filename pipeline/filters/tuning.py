@@ -28,7 +28,7 @@ def tuned(recordings: Sequence[Driven], start: NoiseModel, inertia: float, visco
     from scipy.optimize import minimize
 
     T_s = recordings[0].T_s
-    some = [first(recording) for recording in recordings]
+    some = [recording.part(slice(MOST)) for recording in recordings]
     noise, known = start, np.log([start.r_q, start.r_dq, start.q_dq])
     away = np.zeros(len(known))
     for _ in range(ROUNDS):
@@ -53,15 +53,6 @@ def of(logarithms: Array, q_tau: float) -> NoiseModel:
     """The noise by the logarithms of its deviations."""
     r_q, r_dq, q_dq = np.exp(logarithms).tolist()
     return NoiseModel(r_q, r_dq, 0.0, q_dq, q_tau)
-
-
-def first(recording: Driven) -> Driven:
-    """The first samples of a recording."""
-    joint, few = recording.joint, slice(MOST)
-    short = joint._replace(inertia=joint.inertia[few], known=joint.known[few])
-    return recording._replace(
-        joint=short, q=recording.q[few], dq=recording.dq[few], ddq=recording.ddq[few], tau=recording.tau[few]
-    )
 
 
 def likeliest_walk(recordings: Sequence[Driven], noise: NoiseModel) -> float:

@@ -12,6 +12,7 @@ from pipeline.report.results import Results, format_unit
 from pipeline.study import Study
 
 PLAIN = "independent.lse"  # the fit that every other one is compared with
+THESIS_TISSUE = 457.24  # [N/m], section 8.2
 PAPER = 18  # rows of a table at most, in the PDF
 
 

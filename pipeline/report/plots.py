@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from pipeline.maths.arrays import evenly
 from pipeline.records import Column, Counts, Whiteness
 from pipeline.report.content import HBand, Panel, Stems
 
@@ -15,7 +16,7 @@ def normal_scores(x: Column) -> tuple[Column, Column, float, float]:
 
     ordered = np.sort(x)
     scores = norm.ppf((np.arange(1, len(x) + 1) - 0.375) / (len(x) + 0.25))
-    shown = np.unique(np.linspace(0, len(x) - 1, min(len(x), 500)).round().astype(int))
+    shown = evenly(len(x), 500)
     low, high = np.quantile(x, [0.25, 0.75])
     slope = (high - low) / (2 * norm.ppf(0.75))
     return scores[shown], ordered[shown], float(slope), float((low + high) / 2)

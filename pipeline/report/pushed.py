@@ -9,10 +9,9 @@ from pipeline.records import TipContact, TipForce
 from pipeline.report.content import Block, Cell, Figure, Level, Line, OnScreen, Panel, Table, Verdict, literal
 from pipeline.report.content.number import MINUS
 from pipeline.report.context import Context, count, label
-from pipeline.report.verdicts import WITHIN
+from pipeline.report.verdicts import NORMAL_95, WITHIN
 
 SHAPES = {"triangle": ((0.0, 0.0), (0.5, 1.0), (1.0, 0.0)), "pulse": ((0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0))}
-USUAL = 1.96  # standard deviations of a 95 % interval
 COMPONENTS = ("f_x", "f_y", "f_z")
 Push = dict[str, Any]
 
@@ -85,7 +84,7 @@ def compared(context: Context, pairs: list[tuple[TipContact, int, Push]]) -> Tab
 
 def judged(errors: list[float]) -> Verdict:
     """Whether the stated deviations are what the errors are."""
-    inside = sum(error <= USUAL for error in errors)
+    inside = sum(error <= NORMAL_95 for error in errors)
     said = f"{inside} of {count(len(errors), 'component')} lie within their 95 % interval"
     level: Level = "good" if max(errors) < WITHIN else "bad"
     return Verdict(level, f"**Force at the tip**: {said}; the worst is {max(errors):.1f} standard deviations off.")

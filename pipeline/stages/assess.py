@@ -19,9 +19,8 @@ def run(track: Track, entry: LogEntry) -> Iterator[FreeSpace]:
 
     At rest, friction takes any value up to its Coulomb level, so a small external effort says nothing.
     """
-    known = entry.role in ("identification", "validation") or (entry.role == "contact" and entry.contact)
     free = free_space(track.t, entry.contact, track.rate)
-    if track.at_rest or not known or int(free.sum()) < FEWEST:
+    if track.at_rest or not entry.tells_free_space or int(free.sum()) < FEWEST:
         return
     calm = free_space(track.t, [(start - FORESEEN, end) for start, end in entry.contact], track.rate)
     smooth = quiet(track.tau_ext_smooth, calm if calm.any() else free, track.rate)

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from pipeline.maths.arrays import evenly
 from pipeline.records import ErrorBand, FilterNoise, FreeMotion
 
 LOGS = 20  # at most, that a band is made of
@@ -16,7 +17,7 @@ def run(motions: Iterable[FreeMotion], noises: Iterable[FilterNoise]) -> Iterato
     for motion in motions:
         every.setdefault(motion.joint, []).append(motion)
     for joint, own in every.items():
-        some = [own[i] for i in np.unique(np.linspace(0, len(own) - 1, min(len(own), LOGS)).round().astype(int))]
+        some = [own[i] for i in evenly(len(own), LOGS)]
         yield band(joint, some, speeds[joint])
 
 

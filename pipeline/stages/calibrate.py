@@ -35,7 +35,7 @@ def run(
     q_tau: float,
 ) -> Iterator[FreeMotion]:
     """One FreeMotion per joint that moves; of an identification log, by refits that left out what they predict."""
-    if entry.role not in ("identification", "validation", "contact") or (entry.role == "contact" and not entry.contact):
+    if not entry.tells_free_space:
         return
     every, chosen, unseen = list(fits), list(choices), list(predictions)
     settled, fitted = {noise.joint: noise for noise in noises}, {path.joint: path for path in paths}

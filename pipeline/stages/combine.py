@@ -4,6 +4,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from pipeline.maths.arrays import evenly
 from pipeline.records import ArmCorrelation, JointCorrelation
 from pipeline.robots.robot import Robot
 
@@ -15,7 +16,7 @@ def run(correlations: Iterable[JointCorrelation], robot: Robot) -> Iterator[ArmC
     own = list(correlations)
     if not own:
         return
-    some = [own[i] for i in np.unique(np.linspace(0, len(own) - 1, min(len(own), LOGS)).round().astype(int))]
+    some = [own[i] for i in evenly(len(own), LOGS)]
     yield ArmCorrelation(
         robot=robot.name,
         source=np.array([one.log for one in some], object),

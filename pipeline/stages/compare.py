@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -10,11 +11,11 @@ from pipeline.estimators.used import FALLBACK, describing
 from pipeline.filters import DEFAULT, FILTERS, through
 from pipeline.filters.assumed import assumed
 from pipeline.filters.problem import NoiseModel
-from pipeline.filters.response import DURATION, Response, half_sine, response
+from pipeline.filters.response import DURATION, half_sine, response
 from pipeline.maths.arrays import Array, Booleans
 from pipeline.maths.contact.free_space import levels
 from pipeline.maths.models.driven import Driven
-from pipeline.maths.signals.windows import free_space
+from pipeline.maths.signals.windows import free_space, runs
 from pipeline.records import Choice, Comparison, Diagnostic, FilterNoise, Fit, Signal, diagnostic
 from pipeline.robots.robot import Kind, Robot
 from pipeline.study import LogEntry
@@ -40,7 +41,7 @@ def run(
 
     Each filter has the slowest walk with which it shows a push, so that they are compared at the same speed.
     """
-    if entry.role != "validation" and not (entry.role == "contact" and entry.contact):
+    if entry.role == "identification" or not entry.tells_free_space:
         return
     every, chosen, settled = list(fits), list(choices), {noise.joint: noise for noise in noises}
     for signal in signals:
@@ -70,7 +71,8 @@ def compared(
     made = through(name, parts, noise)
     if not np.isfinite(made.tau_ext).all():
         return
-    space, shown = levels(made.tau_ext[free], made.tau_ext_std[free]), pushed(name, own, parts, noise, free, push)
+    space, added = levels(made.tau_ext[free], made.tau_ext_std[free]), pushed(own.signal.t, parts, free, push)
+    shown = response(through(name, added.parts, noise).tau_ext - made.tau_ext, own.signal.t, added.start, push)
     if label == DEFAULT and shown.share < 0.5:
         said = (
             f"{signal.log}/{signal.joint}: the filter is deaf: it shows {shown.share:.0%} of a push of {DURATION:g} s"
@@ -84,22 +86,24 @@ def compared(
     )  # fmt: skip
 
 
-def pushed(
-    name: str, own: Driving, parts: Sequence[Driven], noise: NoiseModel, free: Booleans, push: float
-) -> Response:
-    """How a filter shows a push in the middle of the longest free space, added to the recorded effort."""
-    t = own.signal.t
+class AddedPush(NamedTuple):
+    """A recording with a push that nobody exerted, from `start` [s] on."""
+
+    parts: list[Driven]
+    start: float
+
+
+def pushed(t: Array, parts: Sequence[Driven], free: Booleans, push: float) -> AddedPush:
+    """A push in the middle of the longest free space, added to the recorded effort."""
     start = middle(t, free) - 0.5 * DURATION
     added, first = push * half_sine(t, start), np.cumsum([0, *(len(part.q) for part in parts)])
     touched = [
         part._replace(tau=part.tau + added[a:b]) for part, (a, b) in zip(parts, pairwise(first.tolist()), strict=True)
     ]
-    difference = through(name, touched, noise).tau_ext - through(name, parts, noise).tau_ext
-    return response(difference, t, start, push)
+    return AddedPush(touched, start)
 
 
 def middle(t: Array, free: Booleans) -> float:
     """The middle [s] of the longest run of free samples."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], free, [False]]))).reshape(-1, 2)
-    a, b = max(edges.tolist(), key=lambda run: run[1] - run[0])
-    return float(t[(a + b) // 2])
+    longest = max(runs(free), key=lambda run: run.stop - run.start)
+    return float(t[(longest.start + longest.stop) // 2])

@@ -39,7 +39,7 @@ def run(
             yield diagnostic("resolve", entry.name, "note", f"{entry.name}: no force at the tip: {'; '.join(missing)}")
         return
     own, free = [by_joint[name] for name in names], np.zeros(len(by_joint[names[0]]), np.bool_)
-    if entry.role in ("identification", "validation") or (entry.role == "contact" and entry.contact):
+    if entry.tells_free_space:
         calm = [(start - SETTLE, end) for start, end in entry.contact]  # the smoother sees a contact coming
         free = free_space(own[0].t, calm, own[0].rate)
     rho, source = correlation(entry.name, correlations)

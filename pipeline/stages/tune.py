@@ -9,13 +9,13 @@ from pipeline.estimators.used import describing
 from pipeline.filters import ekf
 from pipeline.filters.problem import NoiseModel
 from pipeline.filters.tuning import tuned
+from pipeline.maths.models.bias import VISCOUS
 from pipeline.maths.signals.noise import noise_std
 from pipeline.records import Choice, Diagnostic, Fit, MeasurementNoise, Signal, Tuning, diagnostic
 from pipeline.robots.robot import Robot
 from pipeline.study import LogEntry
 
 FINEST = 1e-9  # of a range: a noiseless log would leave innovations without a covariance to be judged by
-VISCOUS = 4  # of a bias' coefficients
 
 
 def run(

@@ -91,6 +91,11 @@ class LogEntry:
     encoding: str | None = None
 
     @property
+    def tells_free_space(self) -> bool:
+        """Whether it is known when nothing touched the robot."""
+        return self.role in ("identification", "validation") or (self.role == "contact" and bool(self.contact))
+
+    @property
     def joints(self) -> tuple[str, ...]:
         """The joints that the log has channels of, in the order of the file."""
         return tuple(dict.fromkeys(source.joint for source in self.channels if source.joint))

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.maths.arrays import Array
+from pipeline.maths.arrays import Array, evenly
 from pipeline.maths.signals.bootstrap import blocks, standard_error
 
 DETECTED = 0.99  # share of free-space samples below the detection level
@@ -28,7 +28,7 @@ class FreeSpaceLevels(NamedTuple):
 
 def levels(tau_ext: Array, std: Array) -> FreeSpaceLevels:
     """The levels of an external effort (N,) whose stated standard deviation is `std` (N,), in free space."""
-    few = np.linspace(0, len(tau_ext) - 1, min(len(tau_ext), MOST)).round().astype(int)
+    few = evenly(len(tau_ext), MOST)
     size, inside = np.abs(tau_ext[few]), (np.abs(tau_ext[few]) <= NORMAL_95 * std[few]).astype(float)
     parts = blocks(len(few))
     sizes, insides = [size[part] for part in parts], [inside[part] for part in parts]

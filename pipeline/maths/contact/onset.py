@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.maths.arrays import Array
+from pipeline.maths.arrays import Array, evenly
 from pipeline.maths.estimation.correlation import correlated
 
 CANDIDATES = 41  # onsets of a round; each further round looks between the neighbours of the best
@@ -48,7 +48,7 @@ def hinge(depth: Array, force: Array) -> Hinge:
 
 def hinge_of(depth: Array, force: Array, exponent: float) -> Hinge:
     """The hinge of least squares through forces (N,) at depths (N,), that rises or falls with depth."""
-    few = np.linspace(0, len(depth) - 1, min(len(depth), MOST)).round().astype(int)
+    few = evenly(len(depth), MOST)
     d, f = depth[few], force[few]
     low, high = float(d.min()), float(d.max())
     best = np.linspace(low, high, CANDIDATES + 1)[:-1]

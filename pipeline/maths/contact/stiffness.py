@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.maths.arrays import Array
+from pipeline.maths.arrays import Array, evenly
 from pipeline.maths.estimation.correlation import correlated
 
 FEWEST = 5  # samples that a line is drawn through
@@ -58,7 +58,7 @@ def slope_error(depth: Array, std: float) -> float:
 
         k_std = std max over l of sqrt(a' C a),    C = exp(-|d_i - d_j| / l),    a = (d - mean(d)) / |d - mean(d)|^2
     """
-    few = np.sort(depth)[np.linspace(0, len(depth) - 1, min(len(depth), MOST)).round().astype(int)]
+    few = np.sort(depth)[evenly(len(depth), MOST)]
     away = few - few.mean()
     a = away / float(away @ away)
     apart = np.abs(few[:, None] - few)

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.maths.arrays import Array, Booleans
+from pipeline.maths.signals.windows import runs
 
 NEAR = 0.2  # [s] of a peak, within which a filter's lag passes through its largest
 
@@ -58,10 +59,9 @@ def largest_size(tau_ext: Array, free: Booleans, length: int) -> float:
 
 def _runs(tau_ext: Array, free: Booleans, length: int) -> list[tuple[Array, int]]:
     """The runs of free samples that are as long as that, or the longest where none is, with that length."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], free, [False]])))
-    runs = [tau_ext[start:stop] for start, stop in edges.reshape(-1, 2)]
-    length = min(length, max(map(len, runs), default=0))
-    return [(run, length) for run in runs if len(run) >= length > 0]
+    parts = [tau_ext[run] for run in runs(free)]
+    length = min(length, max(map(len, parts), default=0))
+    return [(part, length) for part in parts if len(part) >= length > 0]
 
 
 def _size(parts: list[Array]) -> float:

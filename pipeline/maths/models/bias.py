@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 COEFFICIENTS = ("1", "sin q", "cos q", "q", "dq", "sign(dq)", "z")
+VISCOUS, COULOMB = COEFFICIENTS.index("dq"), COEFFICIENTS.index("sign(dq)")
 Coefficients = tuple[float, float, float, float, float, float, float]
 
 

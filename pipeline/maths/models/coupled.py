@@ -16,6 +16,7 @@ from pipeline.maths.mechanics.base_parameters import BaseParameters, base_parame
 from pipeline.maths.mechanics.bodies import PARAMETERS
 from pipeline.maths.mechanics.chain import Chain
 from pipeline.maths.mechanics.rigid_body import regressor
+from pipeline.maths.models.bias import COULOMB, VISCOUS
 from pipeline.maths.models.memory import driven
 from pipeline.maths.models.model import JointDynamics, Motion, Parameter, Regressor
 from pipeline.maths.models.terms import Term
@@ -24,7 +25,6 @@ RICH = 200  # random poses, velocities and accelerations that tell the base para
 ADDED = ("rotor inertia", "spring", "offset")  # that the drive and the cables of each joint add to its links
 LINK_UNITS = ("kg", *["kg m"] * 3, *["kg m^2"] * 6)
 ADDED_UNITS = ("{inertia}", "{effort}/{position}", "{effort}")
-VISCOUS, COULOMB = 4, 5  # of the coefficients of a bias
 
 
 @dataclass(frozen=True)

@@ -2,7 +2,10 @@
 
 from typing import NamedTuple
 
+import numpy as np
+
 from pipeline.maths.arrays import Array
+from pipeline.maths.models.bias import COEFFICIENTS, VISCOUS
 from pipeline.maths.models.model import JointDynamics
 
 
@@ -25,3 +28,10 @@ class Driven(NamedTuple):
         joint = self.joint._replace(inertia=self.joint.inertia[which], known=self.joint.known[which])
         q, dq, ddq, tau = (x[which] for x in (self.q, self.dq, self.ddq, self.tau))
         return Driven(joint, q, dq, ddq, tau, self.T_s, self.first_std)
+
+
+def standing(inertia: Array, viscous: float, tau: Array, T_s: float, first_std: float) -> Driven:
+    """A joint that stands still while its motor exerts an effort (N,) on the environment: a filter is linear there."""
+    still = np.zeros(len(tau))
+    coefficients = tuple(viscous if i == VISCOUS else 0.0 for i in range(len(COEFFICIENTS)))
+    return Driven(JointDynamics(inertia, coefficients, still), still, still, still, tau, T_s, first_std)  # type: ignore[arg-type]

@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.maths.arrays import Array, Booleans
+from pipeline.maths.signals.windows import runs
 
 STUCK = 0.25  # [s] of one value, before a jump that is called one
 JUMP = 5.0  # times the largest usual step between samples
@@ -35,7 +36,7 @@ def stuck(t: Array, x: Array) -> list[Stuck]:
     usual = min(usual, float(np.median(moving)) * JUMP)
     return [
         Stuck(float(t[a]), float(t[b]), float(x[b + 1] - x[b]))
-        for a, b in runs(step == 0.0)
+        for a, b in repeated(step == 0.0)
         if t[b] - t[a] >= STUCK and b + 1 < len(x) and step[b] > JUMP * usual
     ]
 
@@ -45,12 +46,11 @@ def saturated(x: Array) -> int:
     return sum(
         b - a + 1
         for level in (x.max(), x.min())
-        for a, b in runs((x[:-1] == level) & (x[1:] == level))
+        for a, b in repeated((x[:-1] == level) & (x[1:] == level))
         if b - a + 1 >= SATURATED and level != 0.0
     )
 
 
-def runs(same: Booleans) -> list[tuple[int, int]]:
-    """The first and last sample of each run in which each sample is `same` (N-1,) as the next."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], same.astype(np.int64), [0]])))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+def repeated(same: Booleans) -> list[tuple[int, int]]:
+    """The first and last sample of each run in which each sample is the `same` (N-1,) as the next."""
+    return [(run.start, run.stop) for run in runs(same)]

@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.maths.arrays import Array, Booleans
+from pipeline.maths.arrays import Array
 
 NORMAL_95, NORMAL_99 = 1.96, 2.576  # deviations that as much of the normal distribution is within
 FEWEST = 20  # samples, below which nothing can be said
@@ -110,12 +110,6 @@ def tests(pieces: Sequence[Array], lags: int) -> tuple[LjungBox, float]:
         return LjungBox(0.0, 0.0), 0.0
     level, tested = centred(pieces), min(lags, n // 5)
     return ljung_box(level, autocorrelation(level, tested), tested), cumulative_periodogram(level).probability
-
-
-def runs(which: Booleans) -> list[slice]:
-    """The runs of samples (N,) that count."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], which, [False]]))).reshape(-1, 2)
-    return [slice(int(a), int(b)) for a, b in edges]
 
 
 def cross_correlation(x: Array, u: Array, lags: int) -> Array:

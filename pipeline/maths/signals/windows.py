@@ -33,6 +33,12 @@ def free_space(t: Array, windows: Sequence[tuple[float, float]], rate: float) ->
     return np.asarray(outside(t, after) & calm)
 
 
+def runs(which: Booleans) -> list[slice]:
+    """The runs of samples (N,) that count."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], which, [False]]))).reshape(-1, 2)
+    return [slice(start, stop) for start, stop in edges.tolist()]
+
+
 def longest_run(t: Array, rate: float) -> slice:
     """The longest segment, a run of samples without a gap; `rate` [Hz]."""
     edges = [0, *(np.flatnonzero(np.diff(t) > 1.5 / rate) + 1).tolist(), len(t)]

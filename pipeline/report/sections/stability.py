@@ -22,9 +22,8 @@ from pipeline.report.content import (
     literal,
 )
 from pipeline.report.content.marks import AnyMark, Colour
-from pipeline.report.context import Context, label, title
+from pipeline.report.context import THESIS_TISSUE, Context, label, title
 
-THESIS_TISSUE = 457.24  # [N/m], section 8.2
 MS = 1e3
 LAWS: dict[str, tuple[str, Colour]] = {
     "worst": ("worst", "vermillion"),

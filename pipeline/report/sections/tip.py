@@ -30,10 +30,9 @@ from pipeline.report.content import (
 from pipeline.report.content.marks import AnyMark, Colour
 from pipeline.report.content.number import MINUS
 from pipeline.report.context import Context, label, title
-from pipeline.report.verdicts import NEAR_SINGULAR, band, percent
+from pipeline.report.verdicts import NEAR_SINGULAR, NORMAL_95, band, percent
 
 AXES = {"x": "x0", "y": "y0, the roll axis", "z": "z0, up"}
-USUAL = 1.96  # standard deviations of a 95 % band
 PATH_POINTS = 600  # of the path in space
 SETTLE = 1.0  # [s] that the range of the force is not taken from
 SPACING = 0.2  # [s] between the vectors that are drawn in a contact
@@ -196,10 +195,10 @@ def component_panel(force: TipForce, axis: str, contact: TipContact | None) -> P
     spans = [] if contact is None else [VSpan(*window) for window in windows(contact)]
     marks: tuple[AnyMark, ...] = (
         *spans,
-        Band(force.t, f - USUAL * std, f + USUAL * std, "95 % band" if axis == "x" else "", "blue"),
+        Band(force.t, f - NORMAL_95 * std, f + NORMAL_95 * std, "95 % band" if axis == "x" else "", "blue"),
         Line(force.t, f, "force" if axis == "x" else "", "vermillion", "solid"),
     )
-    shown = reach(force, f - USUAL * std, f + USUAL * std)
+    shown = reach(force, f - NORMAL_95 * std, f + NORMAL_95 * std)
     return Panel(f"Along {AXES[axis]}", "time [s]", label(force, f"f_{axis}", "force"), marks, y_range=shown)
 
 
@@ -230,7 +229,7 @@ def in_space(force: TipForce, contact: TipContact) -> Figure3D:
     few = np.unique(np.linspace(0, len(path) - 1, PATH_POINTS).round().astype(int))
     at, f = sampled(force, contact)
     here, largest = (np.column_stack([getattr(contact, n) for n in names]) for names in (("x", "y", "z"), F))
-    weak = np.column_stack([contact.weak_x, contact.weak_y, contact.weak_z]) * USUAL * contact.sigma_1[:, None]
+    weak = np.column_stack([contact.weak_x, contact.weak_y, contact.weak_z]) * NORMAL_95 * contact.sigma_1[:, None]
     ends = here + per_newton * largest
     marks = (
         line(path[few], "path of the tip", "grey"),

@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from pipeline.maths.arrays import Booleans
+from pipeline.maths.arrays import Booleans, evenly
 from pipeline.records import Column, Push, Stiffness, TissueModel
 from pipeline.report.content import (
     Band,
@@ -25,11 +25,10 @@ from pipeline.report.content import (
     literal,
 )
 from pipeline.report.content.marks import AnyMark, Colour
-from pipeline.report.context import Context, title
-from pipeline.report.verdicts import STIFF, STIFFER, graded
+from pipeline.report.context import THESIS_TISSUE, Context, title
+from pipeline.report.verdicts import NORMAL_95, STIFF, STIFFER, graded
 
-THESIS = ("davinci", 457.24)  # robot, and the stiffness [N/m] that section 8.2 states of it
-NORMAL_95 = 1.96
+THESIS_ROBOT = "davinci"
 SHOWN = 1  # figures of force, and maps; the others are on screen
 TOGETHER = 8  # pushes in one panel
 SAMPLES = 60  # of a push in a panel of several
@@ -117,8 +116,8 @@ def comparison(context: Context, tissues: Sequence[Stiffness]) -> Table:
         )
         for tissue in tissues
     ]
-    if context.study.robot.name == THESIS[0]:
-        rows.append(("thesis, section 8.2", "Instrument slide", f"{THESIS[1]}", "–", "–", "1", "1 of 1"))
+    if context.study.robot.name == THESIS_ROBOT:
+        rows.append(("thesis, section 8.2", "Instrument slide", f"{THESIS_TISSUE}", "–", "–", "1", "1 of 1"))
     header = ("Log", "Force of", "Stiffness", "Quartile 1", "Quartile 3", "Count", "In contact")
     return Table(
         "Stiffness of the tissue; how many pushes count, and in how many of those looked at there is contact.",
@@ -134,7 +133,7 @@ def force_figures(context: Context, tissue: Stiffness) -> Iterator[Figure]:
     own = {push.push: push for push in context.catalogue.about(Push, log=tissue.log)}
     typical = own.get(int(tissue.push[nearest(tissue)]))
     if typical is not None:
-        few = np.linspace(0, len(tissue) - 1, min(len(tissue), TOGETHER)).round().astype(int)
+        few = evenly(len(tissue), TOGETHER)
         yield force_figure(tissue, [own[number] for number in tissue.push[few].tolist() if number in own], typical)
 
 

@@ -19,8 +19,7 @@ from pipeline.report.content import (
     literal,
 )
 from pipeline.report.context import Context, label, title
-
-LIMIT = 1.96  # standard errors that a mass may be off the one that is stated
+from pipeline.report.verdicts import NORMAL_95
 
 
 def section(context: Context) -> Section | None:
@@ -93,7 +92,7 @@ def verdict(context: Context, weight: Weight) -> Verdict:
         return Verdict("warn", f"{name}; on the other side of its link it explains them better: check its position.")
     if math.isnan(weight.stated_mass):
         return Verdict("info", f"{name}; the study states no mass, so the scale of the efforts is not known.")
-    within = abs(weight.mass - weight.stated_mass) <= LIMIT * weight.mass_std
+    within = abs(weight.mass - weight.stated_mass) <= NORMAL_95 * weight.mass_std
     stated, scale = Number(weight.stated_mass, "kg"), context.number(f"weight.{weight.log}.scale", 3)
     if within:
         return Verdict("good", f"{name}, and {stated} hang there: the scale, {scale}, cannot be told from 1.")
