@@ -1,6 +1,7 @@
 """The extended Kalman filter on joints with friction and gravity, its stage, and the tests of whiteness."""
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from numpy.testing import assert_allclose
 
 from pipeline.errors import PipelineError
 from pipeline.filters import belief, ekf, rts, tracker
+from pipeline.filters.assumed import assumed
 from pipeline.filters.lag import lag
 from pipeline.filters.problem import NoiseModel
 from pipeline.filters.response import at_rest, slowest
@@ -243,6 +245,15 @@ def test_the_filters_noise_is_that_of_the_recording(identified):
     assert noise.r_dq == pytest.approx(1e-3, rel=0.2)  # the motion is prescribed, and the effort's noise drives nothing
     [made] = tracked(identified, arm.signal(seed=5))
     assert (made.r_q, made.r_dq) == (noise.r_q, noise.r_dq)
+
+
+def test_the_walk_is_the_settings_else_the_joints_else_the_slowest_that_shows_a_push(identified):
+    [noise], joint = identified[1], arm.joint("hand_roll")
+    own = replace(joint, q_tau=0.3)
+    walks = [assumed(noise, which, T_S, q_tau).q_tau / np.sqrt(T_S) for which, q_tau in ((own, 0.7), (own, 0.0))]
+    assert_allclose(walks, [0.7, 0.3])
+    found = assumed(noise, joint, T_S, 0.0)
+    assert found.q_tau == slowest(ekf.track, noise.inertia, noise.viscous, T_S, found._replace(q_tau=0.0))
 
 
 def test_a_gap_starts_the_filter_anew(identified):

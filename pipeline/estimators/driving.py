@@ -10,10 +10,12 @@ from pipeline.estimators.regression import measured_motion, of_joints, predicted
 from pipeline.estimators.used import FALLBACK, describing, model_of, used
 from pipeline.maths.arrays import Array
 from pipeline.maths.models.driven import Driven
-from pipeline.maths.models.model import JointDynamics
+from pipeline.maths.models.model import JointDynamics, Motion
 from pipeline.maths.signals.smoothing import segments
 from pipeline.records import Choice, Fit, Signal
 from pipeline.robots.robot import Robot
+
+Motions = dict[str, Motion]  # by joint
 
 
 class Driving(NamedTuple):
@@ -47,10 +49,14 @@ class Driving(NamedTuple):
         )
 
 
-def driving(signal: Signal, signals: Sequence[Signal], fit: Fit, robot: Robot, lowpass: float) -> Driving:
+def motions_of(signals: Sequence[Signal], lowpass: float) -> Motions:
+    """The measured motion of every joint of a log, once for all that is driven by it."""
+    return {signal.joint: measured_motion(signal, lowpass) for signal in signals}
+
+
+def driving(signal: Signal, motions: Motions, fit: Fit, robot: Robot) -> Driving:
     """A joint of a log that holds all the joints that the fit needs the motion of."""
     model = model_of(robot, fit)
-    motions = {s.joint: measured_motion(s, lowpass) for s in signals if s.joint in model.joints}
     motion = of_joints([motions[name] for name in model.joints])
     row, place = model.efforts.index(signal.joint), model.joints.index(signal.joint)
     dynamics = model.joint_dynamics(fit.theta, motion)[row]

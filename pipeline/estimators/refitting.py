@@ -1,26 +1,22 @@
 """The effort by the parameters that a log itself would give, where a fit of other logs does not describe it."""
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from pipeline.estimators.driving import Driving
-from pipeline.estimators.regression import measured_motion, of_joints
+from pipeline.estimators.driving import Driving, Motions
+from pipeline.estimators.regression import of_joints
 from pipeline.estimators.used import model_of
 from pipeline.maths.arrays import Array, Booleans
-from pipeline.records import Signal
 from pipeline.robots.robot import Robot
 
 LEAST = 1e-3  # of the largest singular value: what a log tells less well stays as it was
 
 
-def refitted(own: Driving, signals: Sequence[Signal], robot: Robot, lowpass: float, free: Booleans) -> Array:
+def refitted(own: Driving, motions: Motions, robot: Robot, free: Booleans) -> Array:
     """tau_hat (N,) of a fit corrected by least squares of what it leaves of a joint's log, over the free samples (N,).
 
     Phi (theta + D d),    d = arg min |tau - tau_hat - Phi D d|,    D scales each column of Phi to length 1
     """
     model = model_of(robot, own.fit)
-    motions = {s.joint: measured_motion(s, lowpass) for s in signals if s.joint in model.joints}
     regressor = model.regressor(of_joints([motions[name] for name in model.joints]))
     told = free & regressor.known
     Phi = regressor.Phi[:, model.efforts.index(own.signal.joint)]

@@ -4,12 +4,13 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from pipeline.estimators.driving import Driving, driving, named
+from pipeline.estimators.driving import Driving, driving, motions_of, named
 from pipeline.estimators.paths import ANOTHER_PATH, SAME_PATH, follows
 from pipeline.estimators.used import describing
 from pipeline.filters import DEFAULT, diverges, through
 from pipeline.filters.assumed import assumed
 from pipeline.filters.lag import lag
+from pipeline.filters.problem import NoiseModel
 from pipeline.maths.contact.error_band import cells
 from pipeline.maths.signals.windows import free_space
 from pipeline.records import Choice, FilterNoise, Fit, FittedPaths, FreeMotion, Prediction, Signal
@@ -39,11 +40,12 @@ def run(
         return
     every, chosen, unseen = list(fits), list(choices), list(predictions)
     settled, fitted = {noise.joint: noise for noise in noises}, {path.joint: path for path in paths}
+    motions = motions_of(signals, lowpass)
     for signal in signals:
         if signal.at_rest or signal.joint not in settled or not describing(robot, every, signal.joint):
             continue
         kept, _ = named(signal, signals, every, chosen, robot, fit)
-        own = driving(signal, signals, kept, robot, lowpass)
+        own = driving(signal, motions, kept, robot)
         path, scheme = ANOTHER_PATH, entry.role
         if entry.role == "identification":
             refitted = left_out(own, unseen, fit)
@@ -53,8 +55,8 @@ def run(
         elif signal.joint in fitted and follows(signal, fitted[signal.joint]):
             path = SAME_PATH
         if own.joint.inertia.min() > 0:
-            walk = q_tau or robot.joint(signal.joint).q_tau
-            yield from free_motion(own, path, scheme, settled[signal.joint], entry, walk)
+            noise = assumed(settled[signal.joint], robot.joint(signal.joint), 1.0 / signal.rate, q_tau)
+            yield from free_motion(own, path, scheme, settled[signal.joint].speed, entry, noise)
 
 
 def left_out(own: Driving, predictions: Sequence[Prediction], fit: str) -> tuple[Driving, str, str] | None:
@@ -70,19 +72,18 @@ def left_out(own: Driving, predictions: Sequence[Prediction], fit: str) -> tuple
 
 
 def free_motion(
-    own: Driving, path: str, scheme: str, settled: FilterNoise, entry: LogEntry, q_tau: float
+    own: Driving, path: str, scheme: str, speed: float, entry: LogEntry, noise: NoiseModel
 ) -> Iterator[FreeMotion]:
     """The mean squares of what the filter makes of one joint of a log, outside of contacts."""
     signal = own.signal
     free = free_space(signal.t, entry.contact, signal.rate)
     if int(free.sum()) < FEWEST:
         return
-    noise = assumed(settled, 1.0 / signal.rate, q_tau)
     made = through(DEFAULT, own.parts, noise)
     if diverges(made):
         return
     _, block, speed_bin, count, mean_square, filter_square, _ = cells(
-        made.tau_ext[free], (made.tau_ext_std**2 + lag(own.parts, noise)[1] ** 2)[free], signal.dq[free], settled.speed
+        made.tau_ext[free], (made.tau_ext_std**2 + lag(own.parts, noise)[1] ** 2)[free], signal.dq[free], speed
     )
     yield FreeMotion(
         log=signal.log, joint=signal.joint, path=path, scheme=scheme, tested=int(free.sum()),

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.estimators.driving import Driving, driving, named
+from pipeline.estimators.driving import Driving, driving, motions_of, named
 from pipeline.estimators.used import FALLBACK, describing
 from pipeline.filters import DEFAULT, FILTERS, through
 from pipeline.filters.assumed import assumed
@@ -44,6 +44,7 @@ def run(
     if entry.role == "identification" or not entry.tells_free_space:
         return
     every, chosen, settled = list(fits), list(choices), {noise.joint: noise for noise in noises}
+    motions = motions_of(signals, lowpass)
     for signal in signals:
         if signal.at_rest or signal.joint not in settled or not describing(robot, every, signal.joint):
             continue
@@ -51,16 +52,16 @@ def run(
         if int(free.sum()) < FEWEST:
             continue
         kept, _ = named(signal, signals, every, chosen, robot, fit)
-        own = driving(signal, signals, kept, robot, lowpass)
+        own = driving(signal, motions, kept, robot)
         alone, _ = named(signal, signals, every, chosen, robot, FALLBACK)
         tried = [(name.replace("_", "-"), name, own) for name in FILTERS]
         if own.fit.model != "independent":
-            tried.append((INDEPENDENT, DEFAULT, driving(signal, signals, alone, robot, lowpass)))
+            tried.append((INDEPENDENT, DEFAULT, driving(signal, motions, alone, robot)))
         for label, name, by in tried:
             if by.joint.inertia.min() > 0:
-                walk = q_tau or robot.joint(signal.joint).q_tau
-                noise = assumed(settled[signal.joint], 1.0 / signal.rate, walk, name)
-                yield from compared(label, name, by, noise, free, PUSH[robot.joint(signal.joint).kind])
+                joint = robot.joint(signal.joint)
+                noise = assumed(settled[signal.joint], joint, 1.0 / signal.rate, q_tau, name)
+                yield from compared(label, name, by, noise, free, PUSH[joint.kind])
 
 
 def compared(

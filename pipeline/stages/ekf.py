@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from pipeline.estimators.driving import Driving, driving, named
+from pipeline.estimators.driving import Driving, driving, motions_of, named
 from pipeline.estimators.error_bands import model_variance
 from pipeline.estimators.paths import ANOTHER_PATH, SAME_PATH, follows
 from pipeline.estimators.used import describing
@@ -60,6 +60,7 @@ def run(
     every, chosen = list(fits), list(choices)
     noise_of, band_of = {noise.joint: noise for noise in noises}, {band.joint: band for band in bands}
     path_of = {path.joint: path for path in paths}
+    motions = motions_of(signals, lowpass)
     for signal in signals:
         about, name = f"{signal.log}.{signal.joint}", f"{signal.log}/{signal.joint}"
         if not describing(robot, every, signal.joint) or signal.joint not in noise_of:
@@ -69,15 +70,14 @@ def run(
         kept, said = named(signal, signals, every, chosen, robot, fit)
         if said:
             yield diagnostic("ekf", about, "note", f"{name}: {said}")
-        own = driving(signal, signals, kept, robot, lowpass)
+        own = driving(signal, motions, kept, robot)
         if own.joint.inertia.min() <= 0:
             said = f"{name}: nothing is tracked: the inertia of {kept.model}.{kept.estimator} is not positive along it"
             yield diagnostic("ekf", about, "warning", f"{said}; see what is said of tuning")
             continue
         path = path_of.get(signal.joint)
         fitted = entry.role == "identification" or (path is not None and follows(signal, path))
-        walk = q_tau or robot.joint(signal.joint).q_tau
-        noise = assumed(noise_of[signal.joint], 1.0 / signal.rate, walk)
+        noise = assumed(noise_of[signal.joint], robot.joint(signal.joint), 1.0 / signal.rate, q_tau)
         yield from tracked(own, noise, band_of.get(signal.joint), SAME_PATH if fitted else ANOTHER_PATH, entry)
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from pipeline.estimators.driving import Driving, driving, named
+from pipeline.estimators.driving import Driving, Motions, driving, motions_of, named
 from pipeline.estimators.refitting import refitted
 from pipeline.estimators.used import describing
 from pipeline.filters.assumed import assumed
@@ -46,19 +46,20 @@ def run(
     if entry.role == "friction":
         return
     every, chosen, assumes = list(fits), list(choices), {noise.joint: noise for noise in noises}
-    owns = []
+    owns, motions = [], motions_of(signals, lowpass)
     for signal in signals:
         if not signal.at_rest and signal.joint in assumes and describing(robot, every, signal.joint):
-            own = driving(signal, signals, named(signal, signals, every, chosen, robot, fit)[0], robot, lowpass)
+            own = driving(signal, motions, named(signal, signals, every, chosen, robot, fit)[0], robot)
             if own.joint.inertia.min() > 0:
-                owns.append((own, assumed(assumes[signal.joint], 1.0 / signal.rate, q_tau)))
+                joint = robot.joint(signal.joint)
+                owns.append((own, assumed(assumes[signal.joint], joint, 1.0 / signal.rate, q_tau)))
     every_innovation = [innovations(longest(own), noise) for own, noise in owns]
     late = delays([along(own)[0] for own, _ in owns], [made.q for made in every_innovation])
     for (own, noise), made, delay in zip(owns, every_innovation, late, strict=True):
         signal, part = own.signal, longest_run(own.signal.t, own.signal.rate)
         motion, free = along(own), outside(signal.t, entry.contact)
         yield from described(own, made, motion)
-        models = {name: longest(by) for name, by in others(own, signals, every, robot, lowpass, free)}
+        models = {name: longest(by) for name, by in others(own, motions, every, robot, free)}
         if delay.any():
             models[CLOCK] = mended(longest(own), *motion, delay)
         subject = Subject(models, noise, free[part], moving(motion[0], 1.0 / signal.rate))
@@ -77,15 +78,15 @@ def longest(own: Driving) -> Driven:
 
 
 def others(
-    own: Driving, signals: Sequence[Signal], fits: Sequence[Fit], robot: Robot, lowpass: float, free: Booleans
+    own: Driving, motions: Motions, fits: Sequence[Fit], robot: Robot, free: Booleans
 ) -> Iterator[tuple[str, Driving]]:
     """The joint under the model in use; with parameters of this log itself; and under another structure of its own."""
     yield "", own
-    yield THIS_LOG, own.by(refitted(own, signals, robot, lowpass, free))
+    yield THIS_LOG, own.by(refitted(own, motions, robot, free))
     joint = own.signal.joint
     structures = [fit for fit in fits if fit.group == joint and fit.model != own.fit.model]
     for fit in structures[:1]:
-        other = driving(own.signal, signals, fit, robot, lowpass)
+        other = driving(own.signal, motions, fit, robot)
         if other.joint.inertia.min() > 0:
             yield fit.model, other
 

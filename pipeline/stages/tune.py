@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from pipeline.estimators.driving import Driving, driving, named
+from pipeline.estimators.driving import Driving, driving, motions_of, named
 from pipeline.estimators.used import describing
 from pipeline.filters import ekf
 from pipeline.filters.problem import NoiseModel
@@ -33,11 +33,12 @@ def run(
     if entry.role != "identification":
         return
     every, chosen, between = list(fits), list(choices), {noise.joint: noise for noise in noises}
+    motions = motions_of(signals, lowpass)
     for signal in signals:
         if signal.at_rest or not describing(robot, every, signal.joint) or signal.joint not in between:
             continue
         kept, _ = named(signal, signals, every, chosen, robot, fit)
-        own = driving(signal, signals, kept, robot, lowpass)
+        own = driving(signal, motions, kept, robot)
         if own.joint.inertia.min() <= 0:
             yield not_positive(signal, kept)
             continue
