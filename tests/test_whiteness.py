@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pipeline.filters import coloured, ekf
-from pipeline.filters.causes import search
-from pipeline.filters.innovations import innovations
+from pipeline.filters import ekf
+from pipeline.filters.causes import coloured
+from pipeline.filters.causes.innovations import innovations
+from pipeline.filters.causes.search import search
+from pipeline.filters.causes.timing import delays, mended
+from pipeline.filters.causes.trials import CLOCK, COLOUR, CONTACT, REVERSALS, SIZES, STEP, WALK, Passes, Subject
+from pipeline.filters.causes.verdict import finding, verdict
 from pipeline.filters.problem import NoiseModel
-from pipeline.filters.timing import delays, mended
-from pipeline.filters.trials import CLOCK, COLOUR, CONTACT, REVERSALS, SIZES, STEP, WALK, Passes, Subject
-from pipeline.filters.verdict import finding, verdict
 from pipeline.maths.models.driven import Driven
 from pipeline.maths.models.independent import combined, inertia_of
 from pipeline.maths.signals import whiteness

@@ -8,11 +8,11 @@ from pipeline.estimators.driving import Driving, Motions, driving, motions_of, n
 from pipeline.estimators.refitting import refitted
 from pipeline.estimators.used import describing
 from pipeline.filters.assumed import assumed
-from pipeline.filters.causes import CauseSearch, search
-from pipeline.filters.innovations import Innovations, innovations
-from pipeline.filters.timing import delays, mended
-from pipeline.filters.trials import CLOCK, Subject
-from pipeline.filters.verdict import finding, verdict
+from pipeline.filters.causes.innovations import Innovations, innovations
+from pipeline.filters.causes.search import CauseSearch, search
+from pipeline.filters.causes.timing import delays, mended
+from pipeline.filters.causes.trials import CLOCK, Subject
+from pipeline.filters.causes.verdict import finding, verdict
 from pipeline.maths.arrays import Array, Booleans
 from pipeline.maths.models.driven import Driven
 from pipeline.maths.signals.reversals import moving

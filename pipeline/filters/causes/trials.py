@@ -5,7 +5,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from pipeline.filters import DEFAULT, coloured, tracker
+from pipeline.filters import DEFAULT, tracker
+from pipeline.filters.causes import coloured
 from pipeline.filters.problem import NoiseModel
 from pipeline.filters.tuning import likeliest_walk
 from pipeline.maths.arrays import Array, Booleans

@@ -1,7 +1,7 @@
 """What a search for causes found, in words."""
 
-from pipeline.filters.causes import CLEARLY, CauseSearch
-from pipeline.filters.trials import CLOCK, COLOUR, CONTACT, LEVEL, REVERSALS, SIZES, STEP, WALK, Trial
+from pipeline.filters.causes.search import CLEARLY, CauseSearch
+from pipeline.filters.causes.trials import CLOCK, COLOUR, CONTACT, LEVEL, REVERSALS, SIZES, STEP, WALK, Trial
 
 WHITE, LEFT_OUT, MENDED, UNEXPLAINED = "white", "left out", "mended", "unexplained"
 LEAVING = (CONTACT, REVERSALS)

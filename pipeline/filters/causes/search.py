@@ -10,7 +10,19 @@ from collections.abc import Iterator
 from itertools import combinations
 from typing import NamedTuple
 
-from pipeline.filters.trials import CLOCK, COLOUR, CONTACT, REVERSALS, SIZES, STEP, STEPS, WALK, Passes, Subject, Trial
+from pipeline.filters.causes.trials import (
+    CLOCK,
+    COLOUR,
+    CONTACT,
+    REVERSALS,
+    SIZES,
+    STEP,
+    STEPS,
+    WALK,
+    Passes,
+    Subject,
+    Trial,
+)
 
 CLEARLY = 100.0  # times, that the smallest probability has to grow by where a cause is taken away
 MOST = 50_000  # samples that the causes are looked for in
