@@ -41,7 +41,9 @@ def run(study: str | Path, *stages: str, force: bool = False, jobs: int = 1, qui
         If the study is wrong, another run is working on it, or a stage has nothing to work on.
     """
     from pipeline.errors import BadRequest
-    from pipeline.runner import STEPS
+    from pipeline.runner import STEPS, arithmetic
+
+    arithmetic.pin()
 
     unknown = [name for name in stages if name not in STEPS]
     if unknown:

@@ -17,7 +17,7 @@ from typer.core import TyperCommand
 from pipeline.commands import COMMANDS
 from pipeline.errors import PipelineError
 from pipeline.report import REPORT
-from pipeline.runner import STEPS
+from pipeline.runner import STEPS, arithmetic
 from pipeline.stages import STAGES
 
 if TYPE_CHECKING:
@@ -36,6 +36,9 @@ Processed = Annotated[Path | None, typer.Option(help="Folder for processed files
 Reports = Annotated[Path | None, typer.Option(help="Folder for reports, instead of reports/ beside raw/.")]
 Force = Annotated[bool, typer.Option("--force", help="Run what is current, too.")]
 Jobs = Annotated[int, typer.Option(min=1, help="Processes to spread the work over.")]
+Cluster = Annotated[
+    str, typer.Option(metavar="ADDRESS", help="Scheduler of a Dask cluster to spread the work over: tcp://host:8786.")
+]
 DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what would run and why, and change nothing.")]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say only what went wrong, or may have.")]
 Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say of each task, too, when it is done and its time.")]
@@ -54,6 +57,7 @@ class ShownAsWritten(TyperCommand):
 
 def main() -> None:
     """Run the command line."""
+    arithmetic.pin()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # names in logs need not fit the console's encoding
             stream.reconfigure(errors="replace")
@@ -141,6 +145,7 @@ def add_step(name: str, module: str) -> None:
         reports: Reports = None,
         force: Force = False,
         jobs: Jobs = 1,
+        cluster: Cluster = "",
         quiet: Quiet = False,
         verbose: Verbose = False,
         dry_run: DryRun = False,
@@ -148,7 +153,7 @@ def add_step(name: str, module: str) -> None:
         from pipeline.runner import runs
 
         says = verbosity(quiet, verbose)
-        if not run_stages(runs.one(study), (name,), processed, reports, force, jobs, says, dry_run):
+        if not run_stages(runs.one(study), (name,), processed, reports, force, jobs, says, dry_run, cluster):
             raise typer.Exit(1)
 
 
@@ -160,6 +165,7 @@ def run_all(
     reports: Reports = None,
     force: Force = False,
     jobs: Jobs = 1,
+    cluster: Cluster = "",
     quiet: Quiet = False,
     verbose: Verbose = False,
     dry_run: DryRun = False,
@@ -169,7 +175,7 @@ def run_all(
 
     says = verbosity(quiet, verbose)
     named = runs.studies(studies or [], says)
-    good = [run_stages(study, STEPS, processed, reports, force, jobs, says, dry_run) for study in named]
+    good = [run_stages(study, STEPS, processed, reports, force, jobs, says, dry_run, cluster) for study in named]
     if not all(good):
         raise typer.Exit(1)
 

@@ -6,12 +6,14 @@ from collections import defaultdict
 from collections.abc import Callable
 from pathlib import Path
 
-import matplotlib as mpl
 import pytest
 from hypothesis import settings
 from typer.testing import CliRunner
 
-mpl.use("Agg")
+from pipeline.runner import arithmetic
+
+arithmetic.pin()  # before anything loads numpy, as on the command line
+os.environ["MPLBACKEND"] = "Agg"
 settings.register_profile("project", deadline=None, derandomize=True)
 settings.register_profile("quick", settings.get_profile("project"), max_examples=20)
 settings.load_profile("project")

@@ -9,6 +9,7 @@ from time import perf_counter
 from pipeline.records import KINDS, Record, store
 from pipeline.records.catalogue import Catalogue, Provenance
 from pipeline.report import REPORT
+from pipeline.runner import arithmetic
 from pipeline.runner.canonical import hash_of
 from pipeline.runner.code import code
 from pipeline.runner.execution import Outcome, said_of, without_folders
@@ -83,7 +84,7 @@ def provenance(study: Study, ledger: Ledger, located: tuple[Located, ...]) -> Pr
     raw = {f"raw/{study.name}/{file}": ledger.digest(f"raw/{file}") for file in files}
     processed = {place: ledger.digest(f"processed/{place}") for _, place in located}
     failures = {f"{e.stage} {e.task}": e.failed for e in ledger.entries() if e.failed and e.stage != REPORT}
-    versions = {p: importlib.metadata.version(p) for p in PACKAGES}
+    versions = {p: importlib.metadata.version(p) for p in PACKAGES} | {"arithmetic": arithmetic.described()}
     text = (study.folder / "study.toml").read_text(encoding="utf-8", errors="replace")
     return Provenance(study.name, VERSION, versions, raw, processed, failures, text)
 

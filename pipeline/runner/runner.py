@@ -42,6 +42,7 @@ class Runner:
     console: Console
     force: bool = False
     workers: Callable[[], Executor] | None = None
+    perform: Callable[[Folders, Task], Outcome] = perform
 
     def __post_init__(self) -> None:
         self.ledger = Ledger(self.folders)
@@ -145,7 +146,7 @@ class Runner:
             for reason, named in progress.reasons.items():
                 self.console.say(f"{_listed(name, named)}: {reason}")
             progress.reasons.clear()
-        how = partial(reporting.perform, self.ledger) if name == REPORT else partial(perform, self.folders)
+        how = partial(reporting.perform, self.ledger) if name == REPORT else partial(self.perform, self.folders)
         for part, tasks in due.items():
             self._due[part] = len(tasks) + 1
             for task in tasks:

@@ -109,19 +109,20 @@ def run(
     jobs: int = 1,
     verbosity: Verbosity = "normal",
     dry_run: bool = False,
+    cluster: str = "",
 ) -> bool:
     """Run stages on one study and say what was done, or only what would be; whether every task succeeded."""
     study = load(folder)
     speaks = console(verbosity)
     kind = Narrator if verbosity == "verbose" else Runner
-    workers = partial(pool, jobs) if jobs > 1 else None
-    runner = kind(study, folders(folder, processed, reports), speaks, force, workers)
+    places = folders(folder.resolve() if cluster else folder, processed, reports)
+    runner = kind(study, places, speaks, force, partial(pool, jobs) if jobs > 1 else None)
     speaks.say(typer.style(f"{folder}: {study.title}{' (SIMULATED)' if study.simulated else ''}", bold=True))
     if dry_run:
         for line in runner.preview(names):
             speaks.say(line)
         return True
-    good = runner.run(names)
+    good = run_on_cluster(runner, names, cluster) if cluster else runner.run(names)
     if not runner.ran:
         speaks.say(f"{folder}: nothing to do, every stage is current")
     if REPORT in names:
@@ -129,6 +130,15 @@ def run(
     if not good:
         typer.secho(f"{folder}: {runner.failures} of {runner.ran} tasks failed", fg="red", err=True)
     return good
+
+
+def run_on_cluster(runner: Runner, names: Sequence[str], address: str) -> bool:
+    """Run stages with the workers of a Dask cluster; raises as `connected` does, and as any run."""
+    from pipeline.runner.cluster import connected, perform_there
+
+    with connected(address, runner.folders) as (executor, terms):
+        runner.workers, runner.perform = (lambda: executor), partial(perform_there, terms)
+        return runner.run(names)
 
 
 def conclude(runner: Runner, folder: Path) -> None:

@@ -90,7 +90,8 @@ class Crew:
         BrokenExecutor
             If the others were ended from outside too often.
         """
-        if self.start and (self._others or (self._worked > ALONE and len(self._waiting) > 1)):
+        alone = len(self._waiting) == 1 and not self._running  # whom others would have to wait for as well
+        if self.start and not alone and (self._others or self._worked > ALONE):
             self._others = self._others or self.start()
             self._hand_over()
             yield from self._finished()
@@ -109,6 +110,8 @@ class Crew:
 
     def _finished(self) -> Iterator[Outcome]:
         done, _ = wait_for(self._running, return_when=FIRST_COMPLETED)
+        if any(isinstance(future.exception(), BrokenExecutor) for future in done):
+            done, _ = wait_for(self._running)  # all that were handed over end with it
         for future in done:
             handed = self._running.pop(future)
             try:
@@ -133,5 +136,7 @@ class Crew:
     def close(self) -> None:
         """Let the others end."""
         if self._others is not None:
-            self._others.shutdown(cancel_futures=True)
+            for future in self._running:
+                future.cancel()
+            self._others.shutdown()
             self._others = None
