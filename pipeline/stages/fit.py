@@ -102,6 +102,7 @@ def of_joint(
         yield from residuals(parts, model, name, estimate)
         yield from (swarm_search(model, name, search) for search in estimate.searches)
     yield from identifiability(model, parts, regression, estimates, robot, joint, others)
+    yield from held_back(model.group, regression, estimates, joint.unit("{effort}"))
     if len(parts) > 1:
         for name in ESTIMATORS:
             yield from cross_fits([part.log for part in parts], model, name, regression)
@@ -136,6 +137,23 @@ def identifiability(
         yield diagnostic("fit", model.group, "warning", said)
     if said := hardly_described(joint, explained(regression, plain), others):
         yield diagnostic("fit", model.group, "warning", f"{model.group}: {said}")
+
+
+def held_back(group: str, regression: Regression, estimates: dict[str, Estimate], unit: str) -> Iterator[Diagnostic]:
+    """What it costs that parameters are those of some mechanism, where least squares' are not."""
+    if "lse" not in estimates or "consistent" not in estimates:
+        return
+    signs = regression.known.signs(len(regression.names))
+    wrong = [name for name, x, known in zip(regression.names, estimates["lse"].theta, signs, strict=True)
+             if known and x < 0]  # fmt: skip
+    if wrong:
+        rmse, before = (
+            np.sqrt(np.mean((regression.tau - regression.Phi @ estimates[name].theta) ** 2))
+            for name in ("consistent", "lse")
+        )
+        said = f"{group}: no mechanism has a negative {listed(wrong)}, as lse finds; parameters that one can have"
+        cost = f"leave {rmse:.3g} for {before:.3g} {unit} of the effort, root mean square"
+        yield diagnostic("fit", group, "note", f"{said} (consistent) {cost}")
 
 
 def summary_of(

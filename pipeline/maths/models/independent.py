@@ -7,6 +7,7 @@ import numpy as np
 
 from pipeline.maths.arrays import Array
 from pipeline.maths.models.bias import Coefficients, bias
+from pipeline.maths.models.mechanism import Mechanism, of_signs
 from pipeline.maths.models.memory import driven
 from pipeline.maths.models.model import JointDynamics, Motion, Parameter, Regressor
 from pipeline.maths.models.terms import Term
@@ -46,6 +47,11 @@ class IndependentJoint:
         """One a term."""
         pairs = zip(self.terms, self.units, strict=True)
         return tuple(Parameter(term.name, term.typst, unit, term.positive, term.scale) for term, unit in pairs)
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """Of a joint without bodies signs are known."""
+        return of_signs(np.array([term.positive for term in self.terms]))
 
     def regressor(self, motion: Motion) -> Regressor:
         """Phi (N, 1, p).  (6.9), (6.12), (6.14)"""
