@@ -50,6 +50,6 @@ def factor(equations: Equations, ridge: Ridge) -> Triangle:
     U' U = D^-1 (G + lambda P) D^-1, and U' y = D^-1 r
     """
     scaled, size = scaled_equations(equations, ridge)
-    U = np.linalg.cholesky(scaled).T
+    U = np.asarray(np.linalg.cholesky(scaled).T, np.float64)
     y = np.linalg.solve(U.T, ridge.weights @ equations.right[0] / size)
     return Triangle(U, y, max(float(ridge.weights @ equations.squares[0] - y @ y), 0.0), size)

@@ -141,7 +141,9 @@ def possible(
             units = [robot.joint(effort).unit("{effort}") for effort in model.efforts]
             each = zip(model.efforts, made.rmse, made.rmse_free, units, strict=True)
             costs = ", ".join(f"{rmse:.3g} for {before:.3g} {unit} of {joint}" for joint, rmse, before, unit in each)
-            said = f"{model.group}: no mechanism has the parameters of {name}; those that one can have (consistent) leave"
+            said = (
+                f"{model.group}: no mechanism has the parameters of {name}; those that one can have (consistent) leave"
+            )
             yield diagnostic("choose", model.group, "note", f"{said} {costs} where fitted, root mean square")
 
 

@@ -49,8 +49,8 @@ def run(loads: Iterable[Load], robot: Robot, weighings: Weighings) -> Iterator[W
             said = f"{weighing.log}: no joint that moves carries what hangs on {weighing.weight.moves_with}"
             yield diagnostic(
                 "weigh", weighing.log, "warning",
-                f"{said}, or none of them has a fit, or their efforts are currents; nothing is weighed: move a joint that "
-                "the mass loads, and state torque_constant where it is known",
+                f"{said}, or none of them has a fit, or their efforts are currents; nothing is weighed: move a joint "
+                "that the mass loads, and state torque_constant where it is known",
             )  # fmt: skip
             continue
         tare, wrong = tared(own, logs.get(weighing.tare, [])) if weighing.tare else ([], "")

@@ -63,6 +63,18 @@ class IndependentJoint:
             columns.append(column(term, q, dq, ddq, z))
         return Regressor(np.stack(columns, axis=-1)[:, None, :], known)
 
+    def sensitivity(self, motion: Motion) -> Array:
+        """By how much the regressor moves with the motion: its derivatives by q, dq and ddq, (N, 3, p).
+
+        The jump of sign(dq) has none, and what remembers the motion is taken as it stands.
+        """
+        q, dq = motion.q[:, 0], motion.dq[:, 0]
+        columns = []
+        for term in self.terms:
+            _, by_q, by_dq = bias(term.coefficients, q, dq, 0.0)
+            columns.append(np.stack([by_q + 0.0 * q, by_dq + 0.0 * q, term.a + 0.0 * q], axis=1))
+        return np.stack(columns, axis=-1)
+
     def inertia(self, theta: Array, q: Array) -> Array:
         """M (N, 1, 1), the same everywhere.  (6.5)"""
         return np.full((len(q), 1, 1), inertia_of(self.terms, theta))

@@ -41,6 +41,7 @@ NAMES = {
     "prior": "least squares with a prior",
     "huber": "robust least squares",
     "iv": "instrumental variables",
+    "tls": "total least squares",
     "consistent": "physically consistent least squares",
 }
 LAGS = 50  # of the cross-correlation, each way
