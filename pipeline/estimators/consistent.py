@@ -23,4 +23,4 @@ def estimate(problem: Regression) -> Estimate:
     weight = problem.periods.astype(float)
     R = factored(problem, weight)
     theta = nearest(R, of_signs(problem.known.signs(len(R.y)))).theta
-    return Estimate(theta, lambda: spread(problem, weight, R, theta))
+    return Estimate(theta, lambda: spread(problem, weight, R, R.theta))
