@@ -1,4 +1,4 @@
-"""Parameters that a mechanism can have: least squares' own where these can exist, else the nearest, and at what cost."""
+"""Parameters that a mechanism can have: least squares' own where these exist, else the nearest, and at what cost."""
 
 from dataclasses import replace
 
@@ -11,7 +11,7 @@ from pipeline.errors import NotIdentifiable
 from pipeline.estimators import estimator
 from pipeline.estimators.problem import Known
 from pipeline.maths.estimation import conic
-from pipeline.maths.estimation.conic import ENTRIES, GAP, nearest, scaled
+from pipeline.maths.estimation.conic import ENTRIES, nearest, scaled
 from pipeline.maths.estimation.least_squares import triangle
 from pipeline.maths.mechanics.bodies import of_pseudo_inertias, pseudo_inertias
 from pipeline.maths.models.mechanism import Mechanism, of_signs

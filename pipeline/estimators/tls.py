@@ -36,9 +36,11 @@ def estimate(problem: Regression) -> Estimate:
     """theta of the smallest singular value of columns and effort, each over its noise; least squares where none has.
 
     The effort's noise v is what parameters leave beyond the columns' own part, for a model errs, too; at least it is
-    what periods differ by.  The standard errors are those of the estimating equation (Phi' Phi - C) theta = Phi' tau
-    by residuals, which hold both noises, to first order in the columns' share of noise: noise of the columns times
-    itself is left out.
+    what periods differ by.  The standard errors are those of the estimating equation (Phi' Phi - C) theta = Phi' tau by
+    residuals, which hold both noises: right to first order for the classical ones.  The others ask of noise in columns
+    that it be as smooth as they are, as that of kept harmonics is.  White noise there explains the residual where
+    nothing else does, is taken for correlation, and makes them too large.  What noise does to the columns without
+    being left in the residual, none of them tells.
 
     Raises
     ------
@@ -68,7 +70,7 @@ def refuse_buried(problem: Regression, R: Triangle, C: Array) -> None:
     inverse = np.linalg.inv(R.U)
     share, axes = np.linalg.eigh(inverse.T @ C @ inverse)
     if share[-1] > BURIED:
-        part = np.abs(inverse @ axes[:, -1])
+        part = np.sqrt(np.diag(C)) * np.abs(inverse @ axes[:, -1])
         buried = ", ".join(name for name, x in zip(problem.names, part, strict=True) if x > 0.5 * part.max())
         said = f"noise makes {100 * share[-1]:.2g} % of what the motion shows of {buried}"
         raise NotIdentifiable(f"{said}; record more of it, or more periods")
