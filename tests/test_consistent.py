@@ -218,13 +218,13 @@ def test_held_parameters_are_no_further_from_the_truth_than_free_ones():
 
 
 def test_what_the_solver_does_not_reach_is_refused_with_how_far_it_came(monkeypatch):
-    def hasty(tolerance):
-        settings = conic_settings(tolerance)
+    def hasty():
+        settings = careful()
         settings.max_iter = 2
         return settings
 
-    conic_settings = conic.quiet
-    monkeypatch.setattr(conic, "quiet", hasty)
+    careful = conic.careful
+    monkeypatch.setattr(conic, "careful", hasty)
     R, *_ = pose(impossible(), 1e-3)
     with pytest.raises(NotIdentifiable, match=r"the conic program was not solved \(MaxIterations after 2 steps\)"):
         nearest(R, ARM.mechanism)

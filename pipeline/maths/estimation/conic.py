@@ -2,7 +2,7 @@
 
     theta = arg min |U D theta - y|^2,    theta = A x,    J_l(x) >= 0 of every link,    x_i >= 0 where physics knows it
 
-Sousa and Cortesao, Inertial tensor properties in robot dynamics identification: a linear matrix inequality approach,
+Sousa and Cortesao, Inertia tensor properties in robot dynamics identification: a linear matrix inequality approach,
 2019.  Of the x that make the same theta the lightest is taken, so that there is one: the traces of J have a price.
 Where the data ask for first moments without inertia, masses grow large, for the moment of an endless mass needs none;
 a solver that runs after them is called back by a higher price.
@@ -16,7 +16,6 @@ from scipy.sparse import csc_array, diags_array, eye_array, hstack, vstack
 from pipeline.errors import NotIdentifiable
 from pipeline.maths.arrays import Array, Integers
 from pipeline.maths.estimation.least_squares import Triangle
-from pipeline.maths.haptics.lmi import quiet
 from pipeline.maths.mechanics.bodies import of_pseudo_inertias
 from pipeline.maths.models.mechanism import Mechanism
 
@@ -148,10 +147,21 @@ def at_price(F: csc_array, y: Array, cones: Cones, price: float) -> tuple[Array,
     kinds: list[Any] = [clarabel.ZeroConeT(p), *[clarabel.PSDTriangleConeT(4)] * cones.links]
     kinds += [clarabel.NonnegativeConeT(len(cones.positive))] if len(cones.positive) else []
     bound = np.r_[y, np.zeros(len(held))]
-    settings = quiet(TOLERANCE)
-    settings.max_step_fraction = STEP
-    answer = clarabel.DefaultSolver(squares, cost, rows, bound, kinds, settings).solve()
+    answer = clarabel.DefaultSolver(squares, cost, rows, bound, kinds, careful()).solve()
     z = np.array(answer.x)[:n]
     z[held] = np.array(answer.s)[p:]  # which lies in the cones, and not just beside them
     gap = float(((F @ z - y) ** 2).sum() + cost[:n] @ z) - float(answer.obj_val_dual)  # no z is below the dual's value
     return z, gap if np.isfinite(gap) else np.inf, f"{answer.status} after {answer.iterations} steps"
+
+
+def careful() -> Any:
+    """The solver's settings: no words, one thread, so that the same problem has the same answer, and small steps."""
+    import clarabel
+
+    settings = clarabel.DefaultSettings()
+    settings.verbose = False
+    settings.max_threads = 1
+    settings.presolve_enable = False
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
+    settings.max_step_fraction = STEP
+    return settings

@@ -64,7 +64,7 @@ def lmi_limit(hand: Hand, high: float) -> float:
     return low
 
 
-def quiet(tolerance: float = TOLERANCE) -> Any:
+def quiet() -> Any:
     """The solver's settings: no words, one thread, so that the same problem has the same answer."""
     import clarabel
 
@@ -72,5 +72,5 @@ def quiet(tolerance: float = TOLERANCE) -> Any:
     settings.verbose = False
     settings.max_threads = 1
     settings.presolve_enable = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = tolerance
+    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
     return settings
