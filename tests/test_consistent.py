@@ -187,6 +187,7 @@ def test_signs_alone_are_non_negative_least_squares():
     p = replace(problem(seed=1), tau=PHI @ np.array([-0.05, 0.0103, -0.2, 0.21968]), known=Known(np.ones(4, bool)))
     found, free = (estimator(name)(p) for name in ("consistent", "lse"))
     assert_allclose(found.theta, nnls(PHI, p.tau)[0], atol=1e-6)
+    assert found.theta[0] == found.theta[2] == 0.0  # a bound that holds is met exactly
     assert (found.theta >= 0).all()
     assert (free.theta < 0).any()
 

@@ -26,6 +26,7 @@ FIRST = [k for k, (i, j) in enumerate(ENTRIES) if i < j == 3]
 DIAGONAL = [k for k, (i, j) in enumerate(ENTRIES) if i == j]
 NEGLIGIBLE = 1e-10  # of the longest column, below which the effort does not show what it multiplies
 PRICES = (1e-10, 1e-9, 1e-8, 1e-7)  # of the traces of J, where the square of the whole effort is 1
+AT_BOUND = 1e-8  # of the effort, below which a bound that holds is met exactly
 TOLERANCE = 1e-12  # asked of the solver
 STEP = 0.9  # share of the way to the edge of a cone that it goes at a time: nearer by, rounding stops it early
 GAP = 1e-8  # of the same squares, by which the best may be missed
@@ -150,6 +151,8 @@ def at_price(F: csc_array, y: Array, cones: Cones, price: float) -> tuple[Array,
     answer = clarabel.DefaultSolver(squares, cost, rows, bound, kinds, careful()).solve()
     z = np.array(answer.x)[:n]
     z[held] = np.array(answer.s)[p:]  # which lies in the cones, and not just beside them
+    own, multiplier = z[cones.positive], np.array(answer.z)[p + TEN * cones.links :]
+    z[cones.positive] = np.where((own < AT_BOUND) & (own < multiplier), 0.0, own)  # of the two one is 0
     gap = float(((F @ z - y) ** 2).sum() + cost[:n] @ z) - float(answer.obj_val_dual)  # no z is below the dual's value
     return z, gap if np.isfinite(gap) else np.inf, f"{answer.status} after {answer.iterations} steps"
 

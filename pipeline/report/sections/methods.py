@@ -31,8 +31,6 @@ REFERENCES = (
     "package for the da Vinci Research Kit. IEEE Robotics and Automation Letters 4 (4), 2019.",
     "C. D. Sousa, R. Cortesão: Inertia tensor properties in robot dynamics identification: a linear matrix inequality "
     "approach. IEEE/ASME Transactions on Mechatronics 24 (1), 2019.",
-    "P. M. Wensing, S. Kim, J.-J. E. Slotine: Linear matrix inequalities for physically consistent inertial parameter "
-    "identification. IEEE Robotics and Automation Letters 3 (1), 2018.",
     "H. D. Patterson, R. Thompson: Recovery of inter-block information when block sizes are unequal. Biometrika 58 "
     "(3), 1971.",
     "H. White: A heteroskedasticity-consistent covariance matrix estimator and a direct test for heteroskedasticity. "
@@ -137,8 +135,8 @@ def blocks(context: Context) -> Iterator[Block]:
         "**Identification.** The model of each joint is linear in its parameters. Least squares gives every averaged "
         "sample the same weight; weighted least squares gives it the inverse of its variance, pooled over "
         "neighbouring samples because the variance between few periods is itself uncertain. Both are solved by "
-        "orthogonal factorisation, never by the normal equations. Consistent parameters are the nearest that a "
-        "mechanism has: masses spread over space and nowhere negative (Sousa and Cortesão, 2019; Wensing et al., 2018)."
+        "orthogonal factorisation, never by the normal equations. Consistent parameters are the nearest that some "
+        "mechanism has (Sousa and Cortesão, 2019)."
     )
     yield Equation(
         "hat(theta) = arg min_theta norm(W^(1/2) (tau - Phi(q, dot(q), dot.double(q)) theta))^2",
