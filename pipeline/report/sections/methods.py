@@ -29,8 +29,6 @@ REFERENCES = (
     "identification and the filter that this analysis starts from.",
     "Y. Wang, R. Gondokaryono, A. Munawar, G. S. Fischer: A convex optimization-based dynamic model identification "
     "package for the da Vinci Research Kit. IEEE Robotics and Automation Letters 4 (4), 2019.",
-    "C. D. Sousa, R. Cortesão: Inertia tensor properties in robot dynamics identification: a linear matrix inequality "
-    "approach. IEEE/ASME Transactions on Mechatronics 24 (1), 2019.",
     "H. D. Patterson, R. Thompson: Recovery of inter-block information when block sizes are unequal. Biometrika 58 "
     "(3), 1971.",
     "H. White: A heteroskedasticity-consistent covariance matrix estimator and a direct test for heteroskedasticity. "
@@ -136,7 +134,7 @@ def blocks(context: Context) -> Iterator[Block]:
         "sample the same weight; weighted least squares gives it the inverse of its variance, pooled over "
         "neighbouring samples because the variance between few periods is itself uncertain. Both are solved by "
         "orthogonal factorisation, never by the normal equations. Consistent parameters are the nearest that some "
-        "mechanism has (Sousa and Cortesão, 2019)."
+        "mechanism has."
     )
     yield Equation(
         "hat(theta) = arg min_theta norm(W^(1/2) (tau - Phi(q, dot(q), dot.double(q)) theta))^2",
