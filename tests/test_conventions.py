@@ -74,7 +74,10 @@ MATHS = (
 )
 
 
-SOLVERS = {"lmi.py": {"clarabel"}}  # what one module of maths alone imports beside them, where it is called
+SOLVERS = {
+    "lmi.py": {"clarabel"},
+    "conic.py": {"clarabel"},
+}  # what one module of maths alone imports beside them, where it is called
 
 
 def imports(source: Path) -> set[str]:

@@ -215,6 +215,19 @@ def identified():
     return fits, list(settle.run(tunings))
 
 
+def test_an_inertia_that_is_not_positive_is_left_to_what_fit_says_of_it():
+    """A sign is one of its causes, and which it is nobody but the fit can tell."""
+    signal = arm.signal()
+    backward = replace(signal, tau=-signal.tau)
+    made = list(fit.run([trajectory(backward)], [], arm.ARM, lowpass=17.0))
+    fits, noises = ([r for r in made if isinstance(r, kind)] for kind in (Fit, MeasurementNoise))
+    said = list(tune.run([signal], fits, [], noises, entry(), arm.ARM, fit="independent.lse", lowpass=17.0))
+    (text,) = [text for diagnostic in said for text in diagnostic.text]
+    assert "the inertia of independent.lse is not positive" in text
+    assert "what `fit` says of hand_roll tells why" in text
+    assert any("hand_roll: " in t and "inertia" in t for r in made if isinstance(r, Diagnostic) for t in r.text)
+
+
 def tracked(identified, signal, bands=(), **changes):
     fits, noises = identified
     made = stage.run(

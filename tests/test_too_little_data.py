@@ -38,7 +38,7 @@ def said(stage, *signals) -> tuple[list, str]:
 def test_a_constant_velocity_is_named_as_what_does_not_excite_the_inertia():
     made, text = said(fit, constant(1000))
     assert [record for record in made if isinstance(record, Fit)] == []
-    for name in ("lse", "pso", "bounded", "prior", "huber", "iv"):
+    for name in ("lse", "pso", "bounded", "prior", "huber", "iv", "tls", "consistent"):
         assert f"hand_roll: {name} is left out: " in text
     assert "inertia" in text
 

@@ -237,6 +237,27 @@ def test_what_the_joints_that_move_do_not_carry_is_said_and_not_weighed():
     assert any("heavy: no joint that moves carries what hangs on hand_pitch" in text for text in said)
 
 
+def in_current(*names):
+    """The robot, with joints of whose effort only the current is known."""
+    return replace(ROBOT, joints=tuple(replace(j, effort="A") if j.name in names else j for j in ROBOT.joints))
+
+
+def test_a_joint_whose_effort_is_a_current_weighs_nothing_and_the_others_do():
+    logs = [log("fitted", "identification", 1), log("heavy", "weight", 2, HUNG.position)]
+    both, _, _ = analysed(logs, Weighing("heavy", HUNG, ""))
+    weight, _, said = analysed(logs, Weighing("heavy", HUNG, ""), in_current("hand_roll"))
+    assert (list(both.loaded), list(weight.loaded)) == (["hand_roll", "hand_pitch"], ["hand_pitch"])
+    assert weight.mass == pytest.approx(both.mass_alone[1], rel=1e-9)
+    assert [text for text in said if "heavy: the effort of hand_roll is a current, which weighs nothing" in text]
+
+
+def test_where_all_efforts_are_currents_nothing_is_weighed_and_the_remedy_is_said():
+    logs = [log("heavy", "weight", 2, HUNG.position)]
+    weight, _, said = analysed(logs, Weighing("heavy", HUNG, ""), in_current(*JOINTS))
+    assert weight is None
+    assert any("their efforts are currents; nothing is weighed" in text for text in said)
+
+
 def test_a_robot_without_geometry_weighs_nothing_and_says_why():
     logs = [log("heavy", "weight", 2, HUNG.position)]
     weight, _, said = analysed(logs, Weighing("heavy", HUNG, ""), ARM)

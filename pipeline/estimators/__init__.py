@@ -4,7 +4,7 @@ from importlib import import_module
 
 from pipeline.estimators.problem import Estimator
 
-ESTIMATORS = ("lse", "wlse", "pso", "bounded", "prior", "huber", "iv")
+ESTIMATORS = ("lse", "wlse", "pso", "bounded", "prior", "huber", "iv", "tls", "consistent")
 
 
 def estimator(name: str) -> Estimator:

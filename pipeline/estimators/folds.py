@@ -40,4 +40,5 @@ def part(problem: Regression, logs: Sequence[int]) -> Regression:
         tau_var=problem.tau_var[kept],
         periods=problem.periods[kept],
         starts=tuple(np.cumsum([0, *map(len, rows[:-1])]).tolist()),
+        Phi_cov=None if problem.Phi_cov is None else problem.Phi_cov[list(logs)],
     )

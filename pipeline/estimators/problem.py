@@ -46,6 +46,7 @@ class Regression:
     starts: tuple[int, ...]  # where each log begins
     names: tuple[str, ...]  # of the parameters
     known: Known = NOTHING
+    Phi_cov: Array | None = None  # (S, p, p) covariance of the errors of a row, the mean over each log; None: not known
 
 
 class Spread(NamedTuple):

@@ -6,12 +6,14 @@ import numpy as np
 
 from pipeline.estimators.problem import NOTHING, Known, Regression
 from pipeline.maths.arrays import Array
+from pipeline.maths.models.independent import IndependentJoint
 from pipeline.maths.models.model import Model, Motion
+from pipeline.maths.signals.harmonics import kept_noise
 from pipeline.maths.signals.smoothing import motion, segments
 from pipeline.records import Signal, Trajectory
 
 
-def pose(model: Model, trajectories: Sequence[Trajectory], known: Known = NOTHING) -> Regression:
+def pose(model: IndependentJoint, trajectories: Sequence[Trajectory], known: Known = NOTHING) -> Regression:
     """The least squares problem of one joint: the averaged periods of all its logs, one after the other.  (6.37)"""
     lengths = [len(t) for t in trajectories]
     return Regression(
@@ -22,12 +24,24 @@ def pose(model: Model, trajectories: Sequence[Trajectory], known: Known = NOTHIN
         starts=tuple(np.cumsum([0, *lengths[:-1]]).tolist()),
         names=tuple(parameter.name for parameter in model.parameters),
         known=known,
+        Phi_cov=np.array([row_covariance(model, t) for t in trajectories]),
     )
+
+
+def row_covariance(model: IndependentJoint, t: Trajectory) -> Array:
+    """The covariance (p, p) of the errors of a row of Phi, which noise of the averaged motion makes; its mean.
+
+    cov(Phi_k) = J_k cov(q, dq, ddq) J_k' / M,    J_k the derivatives of Phi by the motion.
+    """
+    J = model.sensitivity(averaged_motion(t))
+    noise = kept_noise(t.sigma_q, len(t.q), t.harmonics, 2 * np.pi / t.period) / t.periods
+    return np.asarray(np.einsum("kip,ij,kjq->pq", J, noise, J) / len(t.q))
 
 
 def joined(parts: Sequence[Regression]) -> Regression:
     """The least squares problem of several parts together."""
     ends = np.cumsum([0, *(len(p.tau) for p in parts[:-1])]).tolist()
+    noises = [p.Phi_cov for p in parts if p.Phi_cov is not None]
     return Regression(
         Phi=np.concatenate([p.Phi for p in parts]),
         tau=np.concatenate([p.tau for p in parts]),
@@ -36,6 +50,7 @@ def joined(parts: Sequence[Regression]) -> Regression:
         starts=tuple(end + start for end, p in zip(ends, parts, strict=True) for start in p.starts),
         names=parts[0].names,
         known=parts[0].known,
+        Phi_cov=np.concatenate(noises) if len(noises) == len(parts) else None,
     )
 
 

@@ -9,24 +9,38 @@ from pipeline.report.content import Figure, Line, Panel, literal
 from pipeline.report.content.marks import Colour
 from pipeline.report.context import Context, label, title
 
-LOOKS: dict[str, Colour] = {"lse": "vermillion", "wlse": "blue", "pso": "green"}
+LOOKS: dict[str, Colour] = {
+    "lse": "vermillion",
+    "wlse": "blue",
+    "pso": "green",
+    "consistent": "purple",
+    "tls": "orange",
+}
+MEANT_TO_DIFFER = ("consistent", "tls")  # where least squares cannot be: drawn only where they do
+ALIKE = 1e-3  # of the effort's deviation, below which two efforts are drawn as one
 REACHED = 1e-6  # of the squared error: what is less is none
 WALLS: dict[str, Colour] = {"reflecting": "green", "clipping": "vermillion"}
 
 
 def estimators(context: Context, fit: Fit) -> Iterator[Figure]:
-    """The efforts of least squares, weighted ones and the swarm over the averaged effort of a joint's first log."""
+    """The efforts of several estimators over the averaged effort of a joint's first log; those alike are named."""
     every = context.catalogue.about(Residual, joint=fit.group, model=fit.model, log=fit.logs[0])
     own = {residual.estimator: residual for residual in every if residual.estimator in LOOKS}
     if "lse" not in own or len(own) < 2:
         return
-    plain, others = own["lse"], [r for name, r in own.items() if name != "lse"]
+    plain = own["lse"]
+    same = [name for name in MEANT_TO_DIFFER if name in own and apart(own[name], plain) < ALIKE]
+    own = {name: r for name, r in own.items() if name not in same}
+    others = [r for name, r in own.items() if name != "lse"]
+    if not others:
+        return
     effort = label(plain, "tau", "effort")
     name = f"{title(fit.group)} in {literal(plain.log)}"
     named = ", ".join(estimator.upper() for estimator in own)
     largest = max(float(abs(r.tau_hat - plain.tau_hat).max()) for r in others)
     yield Figure(
-        f"{name}: averaged effort with the model's by {named}, and how far the others are from least squares.",
+        f"{name}: averaged effort with the model's by {named}, and how far the others are from least squares."
+        f"{alike(same)}",
         f"{name}: the estimators' efforts differ from least squares by {largest:.2g} at most.",
         (
             Panel(
@@ -45,6 +59,17 @@ def estimators(context: Context, fit: Fit) -> Iterator[Figure]:
         columns=2,
         height=46,
     )  # fmt: skip
+
+
+def apart(one: Residual, other: Residual) -> float:
+    """The largest difference of two models' efforts, in deviations of the effort."""
+    return float(abs(one.tau_hat - other.tau_hat).max() / (other.tau.std() or 1.0))
+
+
+def alike(names: list[str]) -> str:
+    """Which estimators are not drawn, as they say the same as least squares."""
+    verb = "is" if len(names) == 1 else "are"
+    return f" {' and '.join(name.upper() for name in names)} {verb} least squares' own." if names else ""
 
 
 def convergence(context: Context, joint: str) -> Iterator[Figure]:

@@ -5,9 +5,12 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from pipeline.estimators.candidates import Candidate, candidates, reach_of
-from pipeline.estimators.chosen import Selection, held_out, parameters, selected
+from pipeline.errors import NotIdentifiable
+from pipeline.estimators.candidates import Candidate, Library, candidates, reach_of
+from pipeline.estimators.chosen import BlockEstimate, Selection, held_out, parameters, selected
+from pipeline.estimators.mechanisms import NOTHING, held
 from pipeline.estimators.observations import Observed, observed
+from pipeline.maths.models.model import Model
 from pipeline.records import Average, Choice, Diagnostic, Fit, Prediction, Smoothed, diagnostic
 from pipeline.robots.models import Reach
 from pipeline.robots.robot import Robot
@@ -37,8 +40,13 @@ def run(
         said = "no candidate's inertia is positive definite along the paths, so the choice goes by scores alone"
         yield diagnostic("choose", "arm", "warning", f"{said}; what fit says of each joint's inertia tells why")
     worth = {f"{c.variant}.{c.estimator}": c for c in (*leading(selection), *named(selection, fit), selection.chosen)}
-    for candidate in (c for name, c in worth.items() if name != "independent.lse"):
-        yield from fits(candidate, robot, reaches, len(logs))
+    by_variant = {c.variant: name for name, c in worth.items()}
+    for name, candidate in worth.items():
+        if name != "independent.lse":
+            found = list(parameters(candidate, robot, reaches, len(logs)))
+            yield from (fitted(candidate, candidate.estimator, *part) for part in found)
+            if candidate.variant != "independent" and by_variant[candidate.variant] == name:
+                yield from possible(candidate, found, robot, reaches)
     for log in logs:
         yield from held_out(selection.chosen, log, robot, reaches, len(logs))
 
@@ -102,31 +110,62 @@ def leading(selection: Selection) -> list[Candidate]:
 
 
 def named(selection: Selection, fit: str) -> list[Candidate]:
-    """The best candidate of the variant and estimator that the settings name, where they name one."""
-    own = [i for i, c in enumerate(selection.candidates) if f"{c.variant}.{c.estimator}" == fit]
+    """The best candidate of the variant and estimator that the settings name, where they name one.
+
+    What a mechanism can have is found from the best of its variant, however that is estimated.
+    """
+    variant, _, estimator = fit.rpartition(".")
+    wanted = [i for i, c in enumerate(selection.candidates) if c.variant == variant]
+    own = [i for i in wanted if estimator in (selection.candidates[i].estimator, "consistent")]
     return [selection.candidates[min(own, key=lambda i: float(selection.score[i]))]] if own else []
 
 
-def fits(candidate: Candidate, robot: Robot, reaches: dict[str, Reach], count: int) -> Iterator[Fit]:
-    """The parameters of a candidate, from all logs."""
-    for model, library, estimate in parameters(candidate, robot, reaches, count):
-        about = model.parameters
-        yield Fit(
-            group=model.group,
-            model=candidate.variant,
-            estimator=candidate.estimator,
-            logs=tuple(log.records[0].log for log in library.logs),
-            samples=estimate.samples,
-            periods=0,
-            mse=estimate.mse,
-            r2=estimate.r2,
-            condition=estimate.condition,
-            correlated_lags=0,
-            parameter=np.array([parameter.name for parameter in about], object),
-            phi=np.array([parameter.typst for parameter in about], object),
-            unit=np.array([parameter.unit for parameter in about], object),
-            scale=np.array([parameter.scale for parameter in about]),
-            theta=estimate.theta,
-            theta_std=estimate.theta_std,
-            theta_std_classical=estimate.theta_std_classical,
-        )
+def possible(
+    candidate: Candidate,
+    found: Sequence[tuple[Model, Library, BlockEstimate]],
+    robot: Robot,
+    reaches: dict[str, Reach],
+) -> Iterator[Fit | Diagnostic]:
+    """A candidate's parameters held to what some mechanism has, and what that costs of how well they fit."""
+    name = f"{candidate.variant}.{candidate.estimator}"
+    for (model, library, free), ridge in zip(found, candidate.ridges(), strict=True):
+        cells = library.by_block.columns(library.columns(candidate.friction, reaches))
+        try:
+            made = held(model, library, cells.of(np.ones(len(cells.gram), np.bool_)), ridge, free)
+        except NotIdentifiable as error:
+            said = f"{model.group}: {candidate.variant}.consistent is left out: {error}"
+            yield diagnostic("choose", model.group, "warning", said)
+            continue
+        yield fitted(candidate, "consistent", model, library, made.estimate)
+        if made.excess > NOTHING:
+            units = [robot.joint(effort).unit("{effort}") for effort in model.efforts]
+            each = zip(model.efforts, made.rmse, made.rmse_free, units, strict=True)
+            costs = ", ".join(f"{rmse:.3g} for {before:.3g} {unit} of {joint}" for joint, rmse, before, unit in each)
+            said = (
+                f"{model.group}: no mechanism has the parameters of {name}; those that one can have (consistent) leave"
+            )
+            yield diagnostic("choose", model.group, "note", f"{said} {costs} where fitted, root mean square")
+
+
+def fitted(candidate: Candidate, estimator: str, model: Model, library: Library, estimate: BlockEstimate) -> Fit:
+    """Parameters of a candidate, from all logs."""
+    about = model.parameters
+    return Fit(
+        group=model.group,
+        model=candidate.variant,
+        estimator=estimator,
+        logs=tuple(log.records[0].log for log in library.logs),
+        samples=estimate.samples,
+        periods=0,
+        mse=estimate.mse,
+        r2=estimate.r2,
+        condition=estimate.condition,
+        correlated_lags=0,
+        parameter=np.array([parameter.name for parameter in about], object),
+        phi=np.array([parameter.typst for parameter in about], object),
+        unit=np.array([parameter.unit for parameter in about], object),
+        scale=np.array([parameter.scale for parameter in about]),
+        theta=estimate.theta,
+        theta_std=estimate.theta_std,
+        theta_std_classical=estimate.theta_std_classical,
+    )

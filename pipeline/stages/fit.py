@@ -24,7 +24,7 @@ from pipeline.estimators.problem import NOTHING, Estimate, Known, Regression, Se
 from pipeline.estimators.regression import joined, pose
 from pipeline.maths.arrays import Array
 from pipeline.maths.estimation.identifiability import Told, told
-from pipeline.maths.models.model import Model
+from pipeline.maths.models.independent import IndependentJoint
 from pipeline.maths.signals.path import SAME_PATH, most_different
 from pipeline.records import (
     Column,
@@ -84,7 +84,7 @@ def run(
 
 
 def of_joint(
-    model: Model, parts: Sequence[Part], robot: Robot, joint: Joint, others: Sequence[str]
+    model: IndependentJoint, parts: Sequence[Part], robot: Robot, joint: Joint, others: Sequence[str]
 ) -> Iterator[
     Fit | CrossFit | FittedPaths | Guess | Identifiability | MeasurementNoise | Residual | SwarmSearch | Diagnostic
 ]:
@@ -102,6 +102,7 @@ def of_joint(
         yield from residuals(parts, model, name, estimate)
         yield from (swarm_search(model, name, search) for search in estimate.searches)
     yield from identifiability(model, parts, regression, estimates, robot, joint, others)
+    yield from held_back(model.group, regression, estimates, joint.unit("{effort}"))
     if len(parts) > 1:
         for name in ESTIMATORS:
             yield from cross_fits([part.log for part in parts], model, name, regression)
@@ -111,7 +112,7 @@ def of_joint(
 
 
 def identifiability(
-    model: Model,
+    model: IndependentJoint,
     parts: Sequence[Part],
     regression: Regression,
     estimates: dict[str, Estimate],
@@ -138,8 +139,25 @@ def identifiability(
         yield diagnostic("fit", model.group, "warning", f"{model.group}: {said}")
 
 
+def held_back(group: str, regression: Regression, estimates: dict[str, Estimate], unit: str) -> Iterator[Diagnostic]:
+    """What it costs that parameters are those of some mechanism, where least squares' are not."""
+    if "lse" not in estimates or "consistent" not in estimates:
+        return
+    signs = regression.known.signs(len(regression.names))
+    wrong = [name for name, x, known in zip(regression.names, estimates["lse"].theta, signs, strict=True)
+             if known and x < 0]  # fmt: skip
+    if wrong:
+        rmse, before = (
+            np.sqrt(np.mean((regression.tau - regression.Phi @ estimates[name].theta) ** 2))
+            for name in ("consistent", "lse")
+        )
+        said = f"{group}: no mechanism has a negative {listed(wrong)}, as lse finds; parameters that one can have"
+        cost = f"leave {rmse:.3g} for {before:.3g} {unit} of the effort, root mean square"
+        yield diagnostic("fit", group, "note", f"{said} (consistent) {cost}")
+
+
 def summary_of(
-    model: Model, names: Sequence[str], seen: Told, regression: Regression, plain: Estimate, next_motion: str
+    model: IndependentJoint, names: Sequence[str], seen: Told, regression: Regression, plain: Estimate, next_motion: str
 ) -> Identifiability:
     """The correlations of a joint's parameters, and what follows from them."""
     p = len(names)
@@ -163,13 +181,13 @@ def explained(regression: Regression, estimate: Estimate) -> float:
     return float(1 - residual @ residual / (spread @ spread))
 
 
-def repeated(model: Model, t: Trajectory, known: Known = NOTHING) -> Part:
+def repeated(model: IndependentJoint, t: Trajectory, known: Known = NOTHING) -> Part:
     """An averaged period."""
     sigmas = (t.sigma_q, t.sigma_dq, t.sigma_tau)
     return Part(t.log, t.rate, t.periods, t.period, sigmas, t.t, t.q, t.dq, pose(model, [t], known))
 
 
-def unrepeated(model: Model, record: Smoothed, lowpass: float, known: Known) -> Part:
+def unrepeated(model: IndependentJoint, record: Smoothed, lowpass: float, known: Known) -> Part:
     """Samples, motion and effort through one low-pass."""
     regression, kept = pose_samples(model, observed([record], (), lowpass, 0), known=known)
     step = float(np.median(np.diff(kept))) if len(kept) > 1 else 1.0
@@ -178,12 +196,14 @@ def unrepeated(model: Model, record: Smoothed, lowpass: float, known: Known) -> 
     return Part(record.log, record.rate / step, 1, float(t[-1] - t[0]), sigmas, t, q, dq, regression)
 
 
-def has_positive_inertia(model: Model, theta: Array, parts: Sequence[Part]) -> bool:
+def has_positive_inertia(model: IndependentJoint, theta: Array, parts: Sequence[Part]) -> bool:
     """Whether M is positive definite along the trajectories; where it is not, no motion follows from the model."""
     return all(np.linalg.eigvalsh(model.inertia(theta, part.q[:, None])).min() > 0 for part in parts)
 
 
-def summarised(parts: Sequence[Part], model: Model, name: str, regression: Regression, estimate: Estimate) -> Fit:
+def summarised(
+    parts: Sequence[Part], model: IndependentJoint, name: str, regression: Regression, estimate: Estimate
+) -> Fit:
     """A Fit with how well it describes what it was fitted to."""
     residual = regression.tau - regression.Phi @ estimate.theta
     return Fit(
@@ -207,7 +227,7 @@ def summarised(parts: Sequence[Part], model: Model, name: str, regression: Regre
     )
 
 
-def guesses(model: Model, regression: Regression) -> Iterator[Guess]:
+def guesses(model: IndependentJoint, regression: Regression) -> Iterator[Guess]:
     """What the robot's tables make of the parameters, where it has any.  (6.7), (6.10), (6.13)"""
     theta = regression.known.guess
     if theta is None:
@@ -222,7 +242,7 @@ def guesses(model: Model, regression: Regression) -> Iterator[Guess]:
     )
 
 
-def swarm_search(model: Model, name: str, search: Search) -> SwarmSearch:
+def swarm_search(model: IndependentJoint, name: str, search: Search) -> SwarmSearch:
     """A search with its history.  Fig 6.14"""
     return SwarmSearch(
         group=model.group,
@@ -240,7 +260,9 @@ def swarm_search(model: Model, name: str, search: Search) -> SwarmSearch:
     )
 
 
-def cross_fits(logs: Sequence[str], model: Model, name: str, regression: Regression) -> Iterator[CrossFit | Diagnostic]:
+def cross_fits(
+    logs: Sequence[str], model: IndependentJoint, name: str, regression: Regression
+) -> Iterator[CrossFit | Diagnostic]:
     """The parameters without each fold of the logs, and which logs no refit can do without."""
     fold = folds(len(logs))
     left_out, thetas = [], []
@@ -286,7 +308,7 @@ def noise(joint: str, parts: Sequence[Part]) -> MeasurementNoise:
     return MeasurementNoise(joint, sigma_q, sigma_dq, sigma_tau)
 
 
-def residuals(parts: Sequence[Part], model: Model, name: str, estimate: Estimate) -> Iterator[Residual]:
+def residuals(parts: Sequence[Part], model: IndependentJoint, name: str, estimate: Estimate) -> Iterator[Residual]:
     """What the fit leaves of each log's effort.  (6.54)"""
     for part in parts:
         tau_hat, tau = part.regression.Phi @ estimate.theta, part.regression.tau

@@ -33,14 +33,20 @@ def run(
     """One Load per joint that moves and weight: a weight log's own one, and all of them in free motion.
 
     The effort is measured minus modelled, not the filter's: neither its lag nor its random walk bias the mass.
-    Joints that the log does not hold are taken to be at 0.
+    Joints that the log does not hold are taken to be at 0.  A current weighs nothing, so joints whose effort is in A
+    are left out.
     """
     hung = [w for w in weighings.each if entry.role in FREE or w.log == entry.name]
     if hung and robot.chain is None:
         said = f"{entry.name}: {robot.name} has no chain, so what a mass asks of its joints is not known"
         yield diagnostic("hang", entry.name, "note", f"{said}; nothing is weighed")
         return
-    tracked = [track for track in tracks if not track.at_rest and len(track) == len(signals[0])]
+    moving = [track for track in tracks if not track.at_rest and len(track) == len(signals[0])]
+    tracked = [track for track in moving if not robot.joint(track.joint).effort]
+    if entry.role not in FREE and len(tracked) < len(moving):
+        which = ", ".join(track.joint for track in moving if track not in tracked)
+        said = f"{entry.name}: the effort of {which} is a current, which weighs nothing, and is left out"
+        yield diagnostic("hang", entry.name, "note", f"{said}; state torque_constant where it is known")
     if not hung or not tracked or robot.chain is None:
         return
     motion = whole_motion(signals, robot, lowpass)

@@ -16,7 +16,8 @@ from pipeline.estimators.regression import measured_motion, of_joints, pose, pre
 from pipeline.estimators.scores import scored
 from pipeline.estimators.used import describing, model_of, used
 from pipeline.maths.arrays import Array, Booleans
-from pipeline.maths.models.model import Model, Motion
+from pipeline.maths.models.independent import IndependentJoint
+from pipeline.maths.models.model import Motion
 from pipeline.maths.selection.blocks import BLOCKS
 from pipeline.maths.signals import averaging
 from pipeline.maths.signals.windows import outside
@@ -125,7 +126,7 @@ def along(fit: Fit, signal: Signal, signals: Sequence[Signal], robot: Robot, low
 
 
 def without_the_log(
-    signal: Signal, own: Trajectory | None, cross_fits: Iterable[CrossFit], model: Model, lowpass: float
+    signal: Signal, own: Trajectory | None, cross_fits: Iterable[CrossFit], model: IndependentJoint, lowpass: float
 ) -> Iterator[Prediction]:
     """Predict a log from fits to other identification logs."""
     kept = whole(signal, own) if own is not None else np.ones(len(signal), np.bool_)
@@ -143,7 +144,7 @@ def without_the_log(
 
 
 def without_a_period(
-    signal: Signal, own: Trajectory, model: Model, known: Known, lowpass: float
+    signal: Signal, own: Trajectory, model: IndependentJoint, known: Known, lowpass: float
 ) -> Iterator[Prediction | Diagnostic]:
     """Predict each period of a log from fits to the other periods; only the effort is left out, not the path."""
     kept = whole(signal, own)
@@ -168,7 +169,9 @@ def without_a_period(
         yield scored(part, model.name, name, signal.role, scheme, SAME_PATH, effort, everywhere, lowpass)
 
 
-def without_a_segment(own: Smoothed, model: Model, known: Known, lowpass: float) -> Iterator[Prediction | Diagnostic]:
+def without_a_segment(
+    own: Smoothed, model: IndependentJoint, known: Known, lowpass: float
+) -> Iterator[Prediction | Diagnostic]:
     """Predict each sixth of a log that does not repeat from fits to the other five."""
     log = observed([own], (), lowpass, 0)
     Phi = model.regressor(log.motion).Phi[:, 0]

@@ -86,7 +86,7 @@ def not_positive(signal: Signal, fit: Fit) -> Diagnostic:
     name = f"{signal.log}/{signal.joint}"
     said = (
         f"{name}: the inertia of {fit.model}.{fit.estimator} is not positive, so no motion follows from it and nothing "
-        "is tracked: the identification's motion tells the inertia too little, or the effort's sign is opposite to the "
-        "position's; excite the joint faster, or correct `sign` in the study"
+        f"is tracked; what `fit` says of {signal.joint} tells why: a motion that hardly excites it, a sign, other "
+        "joints that move in the same logs, or what the model leaves out"
     )
     return diagnostic("tune", f"{signal.log}.{signal.joint}", "warning", said)

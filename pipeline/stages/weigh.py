@@ -33,10 +33,13 @@ TELLS = 2.0  # standard errors by which one side of a link has to explain the ef
 
 
 def run(loads: Iterable[Load], robot: Robot, weighings: Weighings) -> Iterator[Weight | FreeWeight | Diagnostic]:
-    """One Weight per weight log, and one FreeWeight per log of free motion, in which nothing hangs.  Section 7.5"""
+    """One Weight per weight log, and one FreeWeight per log of free motion, in which nothing hangs.  Section 7.5
+
+    A current weighs nothing, so joints whose effort is in A are left out.
+    """
     every = defaultdict(list)
     for load in loads:
-        if len(load) >= FEWEST and np.abs(load.load).max() > CARRIES:
+        if len(load) >= FEWEST and np.abs(load.load).max() > CARRIES and not robot.joint(load.joint).effort:
             every[load.weight, load.log].append(load)
     units = {joint.name: joint.unit("{effort}") for joint in robot.joints}
     for weighing in weighings.each:
@@ -46,7 +49,8 @@ def run(loads: Iterable[Load], robot: Robot, weighings: Weighings) -> Iterator[W
             said = f"{weighing.log}: no joint that moves carries what hangs on {weighing.weight.moves_with}"
             yield diagnostic(
                 "weigh", weighing.log, "warning",
-                f"{said}, or none of them has a fit; nothing is weighed: move a joint that the mass loads",
+                f"{said}, or none of them has a fit, or their efforts are currents; nothing is weighed: move a joint "
+                "that the mass loads, and state torque_constant where it is known",
             )  # fmt: skip
             continue
         tare, wrong = tared(own, logs.get(weighing.tare, [])) if weighing.tare else ([], "")

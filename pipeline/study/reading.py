@@ -17,8 +17,8 @@ from pipeline.toml import TomlTable
 
 # Variants by the estimators that they can be chosen with: a coupled arm needs a ridge.
 BEYOND = tuple(
-    f"{variant}.{how}" for variant in VARIANTS for how in ("lse", "ridge")
-    if how == "ridge" or variant.startswith("independent+")
+    f"{variant}.{how}" for variant in VARIANTS for how in ("lse", "ridge", "consistent")
+    if how == "ridge" or variant.startswith("independent+") or (how == "consistent" and variant != "independent")
 )  # fmt: skip
 CHOICES = {
     "derivative": ("harmonics", "fft"),

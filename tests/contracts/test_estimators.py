@@ -19,6 +19,7 @@ SEEDS = 200
 TERMS, THETA = arm.joint("hand_roll").terms, arm.THETA["hand_roll"]
 PHI = regressor(TERMS, *arm.excitation("hand_roll", 10.0 * np.arange(K) / K))
 NAMES = tuple(term.name for term in TERMS)
+EXACT = np.zeros((1, len(NAMES), len(NAMES)))  # covariance of the errors of the motion
 
 # Of its standard errors: an estimator that draws parameters to a guess is biased, and says so.
 BIASED = {"prior": 0.3}
@@ -31,14 +32,14 @@ ESTIMATOR = pytest.mark.parametrize(
 def problem(seed: int | None = None, sigma=SIGMA) -> Regression:
     """The averaged periods of a joint whose parameters are known; without a seed, free of noise.
 
-    No estimator may write into it.
+    The motion is exact, and known to be.  No estimator may write into it.
     """
     tau, tau_var = PHI @ THETA, np.zeros(K)
     if seed is not None:
         random, sigma = np.random.default_rng(seed), np.broadcast_to(sigma, K)
         tau = tau + sigma / np.sqrt(M) * random.normal(size=K)
         tau_var = sigma**2 * random.chisquare(M - 1, size=K) / (M - 1)
-    return frozen(Regression(PHI.copy(), tau, tau_var, np.full(K, M), (0,), NAMES))
+    return frozen(Regression(PHI.copy(), tau, tau_var, np.full(K, M), (0,), NAMES, Phi_cov=EXACT))
 
 
 def frozen(p: Regression) -> Regression:
@@ -129,7 +130,7 @@ def test_two_logs_tell_more_than_one(estimate: Estimator):
 
 def pooled(a: Regression, b: Regression) -> Regression:
     columns = (np.concatenate([getattr(a, n), getattr(b, n)]) for n in ("Phi", "tau", "tau_var", "periods"))
-    return frozen(Regression(*columns, (0, len(a.tau)), a.names))
+    return frozen(Regression(*columns, (0, len(a.tau)), a.names, Phi_cov=np.concatenate([EXACT, EXACT])))
 
 
 @ESTIMATOR

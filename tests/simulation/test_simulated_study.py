@@ -11,13 +11,16 @@ from typer.testing import CliRunner
 
 from pipeline.commands import simulate
 from pipeline.errors import BadRequest
+from pipeline.estimators import ESTIMATORS
 from pipeline.logs import open_log
 from pipeline.maths.excitation.fourier import motion
 from pipeline.maths.models.independent import regressor
+from pipeline.records import Average, Fit, Signal, Trajectory
 from pipeline.simulation import study_folder
 from pipeline.simulation.scenario.reading import load
 from pipeline.simulation.scenario.scenario import SensorNoise
 from pipeline.simulation.sensors import drift, generator, stepped
+from pipeline.stages import average, differentiate, fit
 from pipeline.study import Study, reading
 
 app = typer.Typer()
@@ -46,6 +49,8 @@ current_unit = "{3}"
 moves.hand_roll = {{ period = 5.0, a = [0.1], b = [0.2] }}
 external.hand_roll = [ {{ shape = "pulse", start = 2.0, end = 4.0, peak = 1.0 }} ]
 """
+EXCITED = [("roll", "hand_roll", 1.0), ("pitch", "hand_pitch", 1e-3), ("slide", "instrument_slide", 1.0)]
+BIASED = {"prior"}  # drawn to a guess
 KINDS = [("tdms", "channel", "A"), ("tdms", "header", "mA"), ("lvm", "channel", "mA"), ("lvm", "header", "A")]
 
 
@@ -90,10 +95,7 @@ def test_the_contact_windows_of_the_study_are_the_pushes_of_the_truth(demo):
         assert bool(pushes) == (entry.role == "contact")
 
 
-@pytest.mark.parametrize(
-    ("name", "joint", "size"),
-    [("roll", "hand_roll", 1.0), ("pitch", "hand_pitch", 1e-3), ("slide", "instrument_slide", 1.0)],
-)
+@pytest.mark.parametrize(("name", "joint", "size"), EXCITED)
 def test_least_squares_on_the_excitation_gives_the_truth_within_its_standard_errors(demo, name, joint, size):
     study, truth = reading.read(demo), tomllib.loads((demo / "truth.toml").read_text())["theta"][joint]
     it, columns = study.robot.joint(joint), channels(study, f"{name}-excitation")
@@ -106,6 +108,30 @@ def test_least_squares_on_the_excitation_gives_the_truth_within_its_standard_err
     std = np.sqrt(np.diag(np.linalg.inv(F.T @ F)) * residual[0] / (len(tau) - len(theta)))
     assert np.abs(theta - list(truth.values())).max() < 4 * std.max()
     assert (np.abs(theta - list(truth.values())) < 4 * std).all()
+
+
+@pytest.mark.parametrize(("name", "joint", "size"), EXCITED)
+def test_every_unbiased_estimator_finds_the_truth_of_averaged_periods_within_its_standard_errors(
+    demo, name, joint, size
+):
+    """All that the study's fits may state, but those that are drawn to a guess."""
+    study, truth = reading.read(demo), tomllib.loads((demo / "truth.toml").read_text())["theta"][joint]
+    it, columns = study.robot.joint(joint), channels(study, f"{name}-excitation")
+    tau = columns[f"{joint}.i"] * size * it.gear_ratio * it.torque_constant
+    q, t = columns[f"{joint}.theta_m"] / it.gear_ratio, np.arange(len(tau)) / 100.0
+    log, segment = f"{name}-excitation", np.zeros(len(t), int)
+    signal = Signal(log, joint, "identification", 100.0, "as recorded", "differences", 0, 0, t=t, q=q,
+                    dq=np.gradient(q, 0.01), tau=tau, segment=segment)  # fmt: skip
+    entry = study.log(log)
+    (average_of,) = [r for r in average.run([signal], entry, study.robot, harmonics=0) if isinstance(r, Average)]
+    made = differentiate.run(average_of, it, derivative="harmonics", harmonics=0)
+    trajectories = [r for r in made if isinstance(r, Trajectory)]
+    fits = {r.estimator: r for r in fit.run(trajectories, [], study.robot, lowpass=17.0) if isinstance(r, Fit)}
+    assert set(fits) == set(ESTIMATORS)
+    for estimator in set(ESTIMATORS) - BIASED:
+        found = fits[estimator]
+        off = found.theta - [truth[str(parameter)] for parameter in found.parameter]
+        assert (np.abs(off) < 4 * found.theta_std).all(), (estimator, off / found.theta_std)
 
 
 def test_every_way_of_recording_says_the_same_motion(tmp_path):

@@ -17,12 +17,14 @@ from pipeline.maths.mechanics.bodies import PARAMETERS
 from pipeline.maths.mechanics.chain import Chain
 from pipeline.maths.mechanics.rigid_body import regressor
 from pipeline.maths.models.bias import COULOMB, VISCOUS
+from pipeline.maths.models.mechanism import Mechanism
 from pipeline.maths.models.memory import driven
 from pipeline.maths.models.model import JointDynamics, Motion, Parameter, Regressor
 from pipeline.maths.models.terms import Term
 
 RICH = 200  # random poses, velocities and accelerations that tell the base parameters
 ADDED = ("rotor inertia", "spring", "offset")  # that the drive and the cables of each joint add to its links
+NOT_NEGATIVE = (True, True, False)  # of which physics knows the sign: a spring pulls back
 LINK_UNITS = ("kg", *["kg m"] * 3, *["kg m^2"] * 6)
 ADDED_UNITS = ("{inertia}", "{effort}/{position}", "{effort}")
 
@@ -59,6 +61,15 @@ class CoupledArm:
         L = 10 * len(self.chain.links)
         led = [self._link_parameter(c) if c < L else self._added_parameter(c - L) for c in self.base.columns.tolist()]
         return (*led, *(self._friction_parameter(i, term) for i, terms in enumerate(self.friction) for term in terms))
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """Base parameters by all links' and what is added to each row; friction by itself."""
+        K, L, terms = self.base.combination, len(self.chain.links), [term for own in self.friction for term in own]
+        A = np.zeros((len(K) + len(terms), K.shape[1] + len(terms)))
+        A[: len(K), : K.shape[1]], A[len(K) :, K.shape[1] :] = K, np.eye(len(terms))
+        added = np.repeat(NOT_NEGATIVE, len(self.rows))
+        return Mechanism(A, L, np.r_[np.zeros(10 * L, np.bool_), added, np.array([t.positive for t in terms], bool)])
 
     def regressor(self, motion: Motion) -> Regressor:
         """Phi (N, m, p).  (6.3), (6.9)"""

@@ -7,6 +7,7 @@ import numpy as np
 
 from pipeline.maths.arrays import Array
 from pipeline.maths.models.bias import Coefficients, bias
+from pipeline.maths.models.mechanism import Mechanism, of_signs
 from pipeline.maths.models.memory import driven
 from pipeline.maths.models.model import JointDynamics, Motion, Parameter, Regressor
 from pipeline.maths.models.terms import Term
@@ -47,6 +48,11 @@ class IndependentJoint:
         pairs = zip(self.terms, self.units, strict=True)
         return tuple(Parameter(term.name, term.typst, unit, term.positive, term.scale) for term, unit in pairs)
 
+    @property
+    def mechanism(self) -> Mechanism:
+        """Of a joint without bodies signs are known."""
+        return of_signs(np.array([term.positive for term in self.terms]))
+
     def regressor(self, motion: Motion) -> Regressor:
         """Phi (N, 1, p).  (6.9), (6.12), (6.14)"""
         q, dq, ddq = (x[:, 0] for x in motion[:3])
@@ -56,6 +62,18 @@ class IndependentJoint:
             known &= started
             columns.append(column(term, q, dq, ddq, z))
         return Regressor(np.stack(columns, axis=-1)[:, None, :], known)
+
+    def sensitivity(self, motion: Motion) -> Array:
+        """By how much the regressor moves with the motion: its derivatives by q, dq and ddq, (N, 3, p).
+
+        The jump of sign(dq) has none, and what remembers the motion is taken as it stands.
+        """
+        q, dq = motion.q[:, 0], motion.dq[:, 0]
+        columns = []
+        for term in self.terms:
+            _, by_q, by_dq = bias(term.coefficients, q, dq, 0.0)
+            columns.append(np.stack([by_q + 0.0 * q, by_dq + 0.0 * q, term.a + 0.0 * q], axis=1))
+        return np.stack(columns, axis=-1)
 
     def inertia(self, theta: Array, q: Array) -> Array:
         """M (N, 1, 1), the same everywhere.  (6.5)"""

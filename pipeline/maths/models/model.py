@@ -10,6 +10,7 @@ from typing import NamedTuple, Protocol
 
 from pipeline.maths.arrays import Array, Booleans, Integers
 from pipeline.maths.models.bias import Coefficients
+from pipeline.maths.models.mechanism import Mechanism
 
 
 class Parameter(NamedTuple):
@@ -74,6 +75,11 @@ class Model(Protocol):
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Its parameters, in the order of theta."""
+        ...
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """What its parameters are made of, and what of it no mechanism has."""
         ...
 
     def regressor(self, motion: Motion) -> Regressor:

@@ -69,3 +69,15 @@ def amplitudes(x: Array) -> Array:
     spectrum = np.abs(np.fft.rfft(x)) / len(x)
     spectrum[1:] *= 2.0
     return spectrum
+
+
+def kept_noise(sigma: float, K: int, harmonics: int, omega: float) -> Array:
+    """What the kept harmonics leave of white noise in K samples of a period: covariance (3, 3) of x, dx and ddx.
+
+    Each harmonic keeps 2 sigma^2 / K and the mean half of that; a derivative is a quarter of a turn ahead, so that only
+    x and ddx go together.
+    """
+    rate = omega * np.arange(1, harmonics + 1)
+    own = sigma**2 / K * (1.0 + 2.0 * harmonics)
+    of_dx, of_ddx = (2.0 * sigma**2 / K * float((rate**order).sum()) for order in (2, 4))
+    return np.array([[own, 0.0, -of_dx], [0.0, of_dx, 0.0], [-of_dx, 0.0, of_ddx]])

@@ -41,6 +41,8 @@ NAMES = {
     "prior": "least squares with a prior",
     "huber": "robust least squares",
     "iv": "instrumental variables",
+    "tls": "total least squares",
+    "consistent": "physically consistent least squares",
 }
 LAGS = 50  # of the cross-correlation, each way
 SEEN = 0.1  # share of a residual's variance that a motion explains, from which on the residual follows it

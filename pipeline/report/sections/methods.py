@@ -133,7 +133,8 @@ def blocks(context: Context) -> Iterator[Block]:
         "**Identification.** The model of each joint is linear in its parameters. Least squares gives every averaged "
         "sample the same weight; weighted least squares gives it the inverse of its variance, pooled over "
         "neighbouring samples because the variance between few periods is itself uncertain. Both are solved by "
-        "orthogonal factorisation, never by the normal equations."
+        "orthogonal factorisation, never by the normal equations. Consistent parameters are the nearest that some "
+        "mechanism has."
     )
     yield Equation(
         "hat(theta) = arg min_theta norm(W^(1/2) (tau - Phi(q, dot(q), dot.double(q)) theta))^2",
