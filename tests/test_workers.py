@@ -82,6 +82,20 @@ def test_a_worker_that_is_killed_is_replaced_and_its_task_runs_again(at_once, tm
         assert crew.breaks == 1
 
 
+def test_a_worker_that_is_killed_with_nothing_to_do_is_replaced(at_once):
+    with closing(Crew(partial(pool, 1))) as crew:
+        pids = set()
+        for names in (("1", "2"), ("3", "4")):
+            for name in names:
+                crew.submit(tell_process, task(name))
+            done = outcomes(crew)
+            assert {o.task.name for o in done} == {*names}
+            pids |= {o.outputs["pid"] for o in done}
+            os.kill(int(done[0].outputs["pid"]), signal.SIGKILL)
+            time.sleep(0.5)
+        assert len(pids) == 2
+
+
 def test_a_task_that_ends_every_worker_ends_the_run(at_once):
     with closing(Crew(partial(pool, 2))) as crew:
         for i in range(2):

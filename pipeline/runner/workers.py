@@ -93,8 +93,13 @@ class Crew:
         alone = len(self._waiting) == 1 and not self._running  # whom others would have to wait for as well
         if self.start and not alone and (self._others or self._worked > ALONE):
             self._others = self._others or self.start()
-            self._hand_over()
-            yield from self._finished()
+            try:
+                self._hand_over()
+            except BrokenExecutor:  # one was ended while it had nothing to do
+                if not self._running:
+                    self._replace()
+            if self._running:
+                yield from self._finished()
         else:
             perform, task = self._waiting.popleft()
             start = perf_counter()
@@ -105,21 +110,21 @@ class Crew:
     def _hand_over(self) -> None:
         assert self._others is not None
         while self._waiting:
-            perform, task = self._waiting.popleft()
+            perform, task = self._waiting[0]
             self._running[self._others.submit(perform, task)] = perform, task
+            self._waiting.popleft()
 
     def _finished(self) -> Iterator[Outcome]:
         done, _ = wait_for(self._running, return_when=FIRST_COMPLETED)
         if any(isinstance(future.exception(), BrokenExecutor) for future in done):
             done, _ = wait_for(self._running)  # all that were handed over end with it
-        for future in done:
-            handed = self._running.pop(future)
-            try:
-                yield future.result()
-            except BrokenExecutor:
-                self._waiting.append(handed)
-        if self._waiting:
+        lost = [self._running.pop(future) for future in done if isinstance(future.exception(), BrokenExecutor)]
+        if lost:
+            self._waiting.extendleft(reversed(lost))
             self._replace()
+        for future in done:
+            if self._running.pop(future, None):
+                yield future.result()
 
     def _replace(self) -> None:
         """Start others in place of those of whom one was ended, and have them do what is not done.
