@@ -26,7 +26,7 @@ from pipeline.study.haptics import SLIDE, SLIDE_NOISE, Body, HapticScenario, Noi
 FREE = np.zeros((0, 2))  # nobody puts the hand anywhere
 PRESS, MORE = 10.0, 0.3  # [N] that a hand presses with, and share of it that is let go of at once
 PRESSED, LET_GO = 1.0, 3.0  # [s] when it presses with both, and when it lets go
-SWINGS = 40.0  # of the free hand, in which a motion has shown whether it grows
+SWINGS = 30.0  # of the free hand, in which a motion has shown whether it grows
 FREQUENCIES = np.geomspace(0.2, 12.0, 14)  # [Hz] at which the response is taken
 DENT, SWAY = 0.012, 0.008  # [m] about which, and by which, the hand is then moved
 SETTLE, WATCH = 2.0, 2.0  # [s] before, and at least watched
@@ -59,7 +59,11 @@ class Response(NamedTuple):
 
 
 def filled(
-    scenario: HapticScenario, body: Body = SLIDE, noise: Noise = SLIDE_NOISE, stiffness: float = THESIS_TISSUE
+    scenario: HapticScenario,
+    body: Body = SLIDE,
+    noise: Noise = SLIDE_NOISE,
+    stiffness: float = THESIS_TISSUE,
+    q_tau: float = 0.0,
 ) -> HapticScenario:
     """The scenario with what it leaves open; the filter takes the body for what was found of it."""
     own = scenario.body or body
@@ -69,13 +73,14 @@ def filled(
         known=scenario.known or (body if scenario.body is None else own),
         noise=scenario.noise or noise,
         stiffness=scenario.stiffness or stiffness,
+        q_tau=scenario.q_tau or q_tau,
     )
 
 
 def felt(scenario: HapticScenario, hand: Hand) -> Felt:
     """The scenario's plan, with the noise of its seed."""
     ticks = round(scenario.duration / scenario.tick)
-    t = np.arange(ticks) * scenario.tick + scenario.plan[0][0]
+    t = scenario.tick * np.arange(ticks, dtype=float) + scenario.plan[0][0]
     path = Path(scenario.plan, ease=True)
     start = float(path.position(t[:1])[0])
     middle = t + 0.5 * scenario.tick
@@ -125,7 +130,7 @@ def response(scenario: HapticScenario) -> Response:
 def _answer(scenario: HapticScenario, frequency: float) -> complex:
     """T at one frequency [Hz]."""
     w, stiffness = 2.0 * math.pi * frequency, _parts(scenario)[0]
-    turns = max(math.ceil(WATCH * frequency), 2)
+    turns = math.ceil(WATCH * frequency)
     ticks = round((SETTLE + turns / frequency) / scenario.tick)
     t = np.arange(ticks + 1) * scenario.tick
     ease = 0.5 * (1.0 - np.cos(np.pi * np.clip(t / (0.5 * SETTLE), 0.0, 1.0)))
@@ -139,9 +144,7 @@ def _answer(scenario: HapticScenario, frequency: float) -> complex:
     return answer / (scenario.device.force * scenario.device.motion * (stiffness + 1j * w * scenario.damping))
 
 
-def _run(
-    scenario: HapticScenario, hand: Hand, push: Array, noise: Array, start: float, put: Array = FREE
-) -> Felt:
+def _run(scenario: HapticScenario, hand: Hand, push: Array, noise: Array, start: float, put: Array = FREE) -> Felt:
     """One run of the loop."""
     stiffness, _ = _parts(scenario)
     clocks = Clocks(
@@ -215,3 +218,30 @@ def assumed(scenario: HapticScenario) -> NoiseModel:
     own = NoiseModel(noise.q, noise.dq, 0.0, noise.tau * T_s / known.inertia, scenario.q_tau * T_s**0.5)
     walk = own.q_tau or slowest(ekf.track, known.inertia, known.viscous, T_s, own)
     return own._replace(q_tau=walk)
+
+
+class Experiment(NamedTuple):
+    """What one hand felt until the plan's end, or until it was thrown out of the device's reach; (K,) each."""
+
+    t: Array  # [s]
+    plan: Array  # [m]
+    x: Array
+    q: Array
+    true: Array  # [N]
+    felt: Array
+    thrown: bool  # out of the device's reach
+    error: float  # [N] root mean square of felt, at the tissue's scale, less true
+
+
+def experiment(scenario: HapticScenario, hand: Hand) -> Experiment:
+    """The scenario's plan at the controller's turns."""
+    run = felt(scenario, hand)
+    gone = np.flatnonzero(np.abs(run.x) > scenario.reach)
+    kept = slice(0, int(gone[0]) if len(gone) else len(run.t), round(1.0 / scenario.rate / scenario.tick))
+    t = run.t[kept] + scenario.plan[0][0]
+    plan = Path(scenario.plan, ease=True).position(t)
+    error = run.felt[kept] / (scenario.device.force or math.nan) - run.true[kept]
+    return Experiment(
+        t, plan, run.x[kept], run.q[kept], run.true[kept], run.felt[kept], bool(len(gone)),
+        float(np.sqrt(np.mean(error**2))),
+    )  # fmt: skip

@@ -54,6 +54,7 @@ SLIDE = Body(2.0036, -2.04048, 3.2723, (3.984, 3.984), (3.984, 3.984))
 SLIDE_NOISE = Noise(5e-7, 5e-4, 1.3454)
 MOTOR = Motors(*(np.array([x]) for x in (1340.0, 0.0438, 2.0, 3e-4, 5.0, 48.0, 9.587379924285257e-5)))
 LAW = Cascade(*(np.array([x]) for x in (30.0, 7.5, 0.0160, 4.02, 0.6, 2000.0, 4e-4)))
+DEVICE = Device(motion=1.0, force=1.0, strongest=math.inf, step=0.0)
 FIRM = Hand(1.0, 40.0, 500.0)  # an arm that is tensed
 # Section 8.4: fast in and out for 8 s, fast away from the tissue to 15 s, then slowly in.
 PLAN = (
@@ -70,7 +71,8 @@ class HapticScenario:
     title: str = "Section 8.4: in and out of tissue"
     seed: int = 8
     hands: tuple[tuple[str, Hand], ...] = (("thesis", THESIS), ("firm", FIRM))
-    device: Device = Device(1.0, 1.0, math.inf, 0.0)
+    device: Device = DEVICE
+    reach: float = 0.15  # [m] of the device to either side, from the tissue's surface
     link_rate: float = 100.0  # [Hz], chapter 9
     position_delay: float = 0.0  # [s] of the link, beside that of its rate
     force_delay: float = 0.0
@@ -88,7 +90,9 @@ class HapticScenario:
     stiffness: float | None = None  # [N/m]
     damping: float = 5.0  # [N s/m]
     friction: float = 0.05  # along the tool, over the force that presses
-    plan: tuple[tuple[float, float], ...] = PLAN  # where the hand would be if it felt nothing: [s], [m] from the surface
+    plan: tuple[tuple[float, float], ...] = (
+        PLAN  # where the hand would be if it felt nothing: [s], [m] from the surface
+    )
 
     @property
     def duration(self) -> float:
@@ -114,11 +118,14 @@ def scenario_of(table: TomlTable) -> HapticScenario:
     """The scenario that the whole of a file describes; its problems are noted."""
     usual = HapticScenario()
     link, arm, tissue = table.table("link"), table.table("arm"), table.table("tissue")
+    device = table.table("device")
+    filtered, q_tau, known = _filter(table.table("filter"))
     scenario = HapticScenario(
         title=table.text("title", usual.title),
         seed=table.whole("seed", usual.seed),
         hands=_hands(table) or usual.hands,
-        device=_device(table.table("device")),
+        device=_device(device),
+        reach=device.number("reach", usual.reach, above=0.0),
         link_rate=link.number("rate", usual.link_rate, above=0.0),
         position_delay=_delay(link, "position_delay"),
         force_delay=_delay(link, "force_delay"),
@@ -130,13 +137,15 @@ def scenario_of(table: TomlTable) -> HapticScenario:
         stops=_stops(arm, usual.stops),
         body=_body(arm.table("body")) if "body" in arm else None,
         noise=_noise(arm.table("noise")) if "noise" in arm else None,
-        **_filter(table.table("filter")),
+        known=known,
+        filtered=filtered,
+        q_tau=q_tau,
         stiffness=tissue.number("stiffness", above=0.0) if "stiffness" in tissue else None,
         damping=tissue.number("damping", usual.damping, low=0.0),
         friction=_below_one(tissue, "friction", usual.friction),
         plan=_plan(table),
     )
-    for part in (link, arm, tissue, table):
+    for part in (device, link, arm, tissue, table):
         part.close()
     _check_clocks(link, arm, scenario)
     if scenario.exact and scenario.filtered:
@@ -161,14 +170,12 @@ def _hands(table: TomlTable) -> tuple[tuple[str, Hand], ...]:
 
 def _device(table: TomlTable) -> Device:
     usual = HapticScenario().device
-    device = Device(
+    return Device(
         table.number("motion_scale", usual.motion, above=0.0),
         table.number("force_scale", usual.force, low=0.0),
         table.number("strongest", above=0.0) if "strongest" in table else usual.strongest,
         table.number("position_step", usual.step, low=0.0),
     )
-    table.close()
-    return device
 
 
 def _delay(table: TomlTable, key: str) -> float:
@@ -227,13 +234,13 @@ def _noise(table: TomlTable) -> Noise:
     return noise
 
 
-def _filter(table: TomlTable) -> dict[str, object]:
-    """What makes a force of the readings."""
+def _filter(table: TomlTable) -> tuple[bool, float, Body | None]:
+    """What makes a force of the readings: whether a filter does, its walk, and what it takes the body for."""
     filtered = table.text("use", "ekf", ("ekf", "none")) == "ekf"
     q_tau = table.number("q_tau", 0.0, low=0.0)
     known = _body(table.table("body")) if "body" in table else None
     table.close()
-    return {"filtered": filtered, "q_tau": q_tau, "known": known}
+    return filtered, q_tau, known
 
 
 def _below_one(table: TomlTable, key: str, default: float) -> float:
@@ -262,4 +269,3 @@ def _check_clocks(link: TomlTable, arm: TomlTable, scenario: HapticScenario) -> 
         if math.isfinite(turn) and (abs(turn - round(turn)) > 1e-6 or round(turn) < 1):
             said = f"a period of {rate:g} Hz must be whole ticks of {scenario.tick:g} s, not {turn:g} of them"
             table.problem(said, "rate")
-

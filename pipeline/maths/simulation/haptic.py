@@ -136,13 +136,13 @@ def simulate(
     loop = _Loop(np.array(start), state, loops, np.zeros((3, 1)), np.zeros((messages, 2)), np.zeros(messages))
     body = np.array([axis.inertia[0], axis.gravity, *axis.stops])
     fixed = _Fixed(np.array(axis.motors), np.array(axis.law), np.array(axis.friction), body, axis.exact)
-    out = Felt(np.arange(T) * clocks.tick, *np.zeros((5, T)), np.zeros((turns, 4)), np.zeros(turns))
-    ticks = np.zeros((T, 5))
+    readings, made, ticks = np.zeros((turns, 4)), np.zeros(turns), np.zeros((T, 5))
     for k in range(turns):
-        _sense(device, fixed, tissue, clocks, noise, loop, k, out.readings)
-        out.made[k] = loop.last[2, 0] = make(Reading(*out.readings[k].tolist()))
+        _sense(device, fixed, tissue, clocks, noise, loop, k, readings)
+        made[k] = loop.last[2, 0] = make(Reading(*readings[k].tolist()))
         _move(grip, device, fixed, tissue, clocks, push, loop, k, ticks)
-    return out._replace(x=ticks[:, 0], dx=ticks[:, 1], q=ticks[:, 2], true=ticks[:, 3], felt=ticks[:, 4])
+    x, dx, q, true, felt = ticks.T
+    return Felt(clocks.tick * np.arange(T, dtype=float), x, dx, q, true, felt, readings, made)
 
 
 @compiled
