@@ -19,9 +19,9 @@ from pipeline.maths.haptics.delay import held
 from pipeline.maths.haptics.feeling import Complex, harmonic, largest, response_limit, settles
 from pipeline.maths.models.bias import Coefficients
 from pipeline.maths.simulation.friction import Friction
-from pipeline.maths.simulation.haptic import Axis, Clocks, Felt, Grip, Reading, Tissue, simulate
+from pipeline.maths.simulation.haptic import Axis, Clocks, Felt, FeltTissue, Grip, Reading, simulate
 from pipeline.simulation.scenario.scenario import Path
-from pipeline.study.haptics import SLIDE, SLIDE_NOISE, Body, HapticScenario, Noise
+from pipeline.study.haptics import SLIDE, SLIDE_NOISE, AxisNoise, Body, HapticScenario
 
 FREE = np.zeros((0, 2))  # nobody puts the hand anywhere
 PRESS, MORE = 10.0, 0.3  # [N] that a hand presses with, and share of it that is let go of at once
@@ -61,7 +61,7 @@ class Response(NamedTuple):
 def filled(
     scenario: HapticScenario,
     body: Body = SLIDE,
-    noise: Noise = SLIDE_NOISE,
+    noise: AxisNoise = SLIDE_NOISE,
     stiffness: float = THESIS_TISSUE,
     q_tau: float = 0.0,
 ) -> HapticScenario:
@@ -154,7 +154,7 @@ def _run(scenario: HapticScenario, hand: Hand, push: Array, noise: Array, start:
         math.ceil(scenario.position_delay / scenario.tick - 1e-9),
         math.ceil(scenario.force_delay / scenario.tick - 1e-9),
     )
-    tissue = Tissue(stiffness, scenario.damping, scenario.friction)
+    tissue = FeltTissue(stiffness, scenario.damping, scenario.friction)
     grip = Grip(*held(hand, scenario.tick), put)
     maker = streaming(scenario) if scenario.filtered else _true_force
     return simulate(grip, scenario.device, _axis(scenario), tissue, clocks, push, noise, (start, 0.0), maker)
@@ -165,7 +165,7 @@ def _turns(scenario: HapticScenario, ticks: int) -> int:
     return math.ceil(ticks * scenario.tick * scenario.rate - 1e-6)
 
 
-def _parts(scenario: HapticScenario) -> tuple[float, Noise]:
+def _parts(scenario: HapticScenario) -> tuple[float, AxisNoise]:
     """The tissue's stiffness and the noise of a scenario that leaves nothing open."""
     assert scenario.stiffness is not None
     assert scenario.noise is not None

@@ -12,7 +12,7 @@ from pipeline.records import FilterNoise, Fit, HapticResponse, HapticRun, Stiffn
 from pipeline.robots.robot import Joint, Kind, Robot
 from pipeline.simulation import haptic
 from pipeline.study import HapticScenario
-from pipeline.study.haptics import SLIDE, SLIDE_NOISE, Body, Noise
+from pipeline.study.haptics import SLIDE, SLIDE_NOISE, AxisNoise, Body
 
 AT = 0.5  # [Hz] as fast as tissue is felt for, at which the rendered stiffness is stated
 FROM_FILE, FROM_THESIS = "the scenario", "the thesis"
@@ -55,9 +55,9 @@ def fitted(robot: Robot, fits: list[Fit], joint: Joint | None) -> tuple[Body, st
     return Body(inertia, dynamics.coefficients[0], viscous, (coulomb, coulomb), (coulomb, coulomb)), joint.name
 
 
-def noise_of(settled: FilterNoise) -> Noise:
+def noise_of(settled: FilterNoise) -> AxisNoise:
     """What the filter takes the noise of the joint for."""
-    return Noise(settled.r_q, settled.r_dq, settled.r_tau)
+    return AxisNoise(settled.r_q, settled.r_dq, settled.r_tau)
 
 
 def rendered(robot: Robot, arm_from: str, scenario: HapticScenario, answer: haptic.Response) -> HapticResponse:

@@ -40,7 +40,7 @@ class Body(NamedTuple):
     bristle_damping: float = 0.0  # [N s/m]
 
 
-class Noise(NamedTuple):
+class AxisNoise(NamedTuple):
     """Standard deviations of what is measured."""
 
     q: float  # [m]
@@ -51,7 +51,7 @@ class Noise(NamedTuple):
 # The instrument slide of the demonstration study, where neither a file nor a study says another: its links of Tables
 # 4.1 and 4.2 with the friction and the noise of Table 6.6.
 SLIDE = Body(2.0036, -2.04048, 3.2723, (3.984, 3.984), (3.984, 3.984))
-SLIDE_NOISE = Noise(5e-7, 5e-4, 1.3454)
+SLIDE_NOISE = AxisNoise(5e-7, 5e-4, 1.3454)
 MOTOR = Motors(*(np.array([x]) for x in (1340.0, 0.0438, 2.0, 3e-4, 5.0, 48.0, 9.587379924285257e-5)))
 LAW = Cascade(*(np.array([x]) for x in (30.0, 7.5, 0.0160, 4.02, 0.6, 2000.0, 4e-4)))
 DEVICE = Device(motion=1.0, force=1.0, strongest=math.inf, step=0.0)
@@ -83,7 +83,7 @@ class HapticScenario:
     law: Cascade = LAW
     stops: tuple[float, float] = (-0.13, 0.09)  # [m] from the tissue's surface
     body: Body | None = None
-    noise: Noise | None = None
+    noise: AxisNoise | None = None
     known: Body | None = None  # what the filter takes the body for
     filtered: bool = True  # by the extended Kalman filter; else the true force is sent
     q_tau: float = 0.0  # random walk of its external effort [N/s^0.5]; 0 is the slowest that shows a push
@@ -228,8 +228,8 @@ def _pair(table: TomlTable, key: str, default: tuple[float, float] | None) -> tu
     return up, down
 
 
-def _noise(table: TomlTable) -> Noise:
-    noise = Noise(*(table.number(key, above=0.0) for key in Noise._fields))
+def _noise(table: TomlTable) -> AxisNoise:
+    noise = AxisNoise(*(table.number(key, above=0.0) for key in AxisNoise._fields))
     table.close()
     return noise
 

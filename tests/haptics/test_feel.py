@@ -26,7 +26,7 @@ def fit(theta=THETA, estimator="lse") -> Fit:
     joint = davinci.ROBOT.joint("instrument_slide")
     names = np.array([term.name for term in joint.terms], object)
     numbers = dict.fromkeys(Fit.scalars(), 1)
-    columns = dict.fromkeys(Fit.columns(), np.zeros(4)) | {n: names for n in ("parameter", "phi", "unit")}
+    columns = dict.fromkeys(Fit.columns(), np.zeros(4)) | dict.fromkeys(("parameter", "phi", "unit"), names)
     about = {"group": joint.name, "model": "independent", "estimator": estimator, "logs": ("a",)}
     return Fit(**(numbers | columns | about | {"theta": np.array(theta)}))
 

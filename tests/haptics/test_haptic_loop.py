@@ -1,4 +1,4 @@
-"""The simulated haptic loop: what it becomes where parts of it are ideal, the filter in it, and where it is unstable."""
+"""The simulated haptic loop: what it becomes where parts of it are ideal, its filter, and where it is unstable."""
 
 from dataclasses import replace
 
@@ -13,15 +13,15 @@ from pipeline.maths.haptics.feeling import harmonic, response_limit
 from pipeline.maths.haptics.motion import switched
 from pipeline.maths.models.driven import Driven
 from pipeline.maths.models.model import JointDynamics
-from pipeline.maths.simulation.haptic import Clocks, Grip, Tissue, simulate
+from pipeline.maths.simulation.haptic import Clocks, FeltTissue, Grip, simulate
 from pipeline.simulation import haptic
-from pipeline.study.haptics import FIRM, SLIDE, HapticScenario, Noise
+from pipeline.study.haptics import FIRM, SLIDE, AxisNoise, HapticScenario
 
 K = 457.24
 NOBODY = np.zeros((0, 2))
 FULL = haptic.filled(HapticScenario())
 IDEAL = replace(FULL, exact=True, filtered=False, damping=0.0, friction=0.0)
-QUIET = replace(FULL, noise=Noise(5e-7, 5e-4, 1e-6))
+QUIET = replace(FULL, noise=AxisNoise(5e-7, 5e-4, 1e-6))
 SLOW = ((0.0, -0.02), (4.0, 0.04), (8.0, -0.02))
 
 
@@ -29,7 +29,7 @@ def let_go(tick: float):
     """The hand let go 1 cm from a spring, its force continuous but for the ticks."""
     T = round(2.0 / tick)
     clocks, grip = Clocks(tick, 1, 1, 0, 0), Grip(*held(THESIS, tick), NOBODY)
-    axis, tissue, noise = haptic._axis(IDEAL), Tissue(K, 0.0, 0.0), np.zeros((T, 3))
+    axis, tissue, noise = haptic._axis(IDEAL), FeltTissue(K, 0.0, 0.0), np.zeros((T, 3))
     return simulate(grip, IDEAL.device, axis, tissue, clocks, np.zeros(T), noise, (-0.01, 0.0), lambda r: r.force)
 
 

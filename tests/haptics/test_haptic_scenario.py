@@ -72,7 +72,7 @@ def test_the_shipped_file_says_what_is_taken_where_none_says_another(tmp_path):
         ("motion_scale = 1.0", "motion_scale = -1", (30, "device: motion_scale must be finite and greater than 0")),
         ("rate = 100.0         #", "rate = 300.0 #", (37, "link: a period of 300 Hz must be whole ticks of 0.0005 s")),
         ("force_delay = 0.0 ", "force_delay = 20 ", (39, "link: force_delay must be at most 5 s, not 20")),
-        ('"cascade" #', '"exactly" #', (42, 'an arm that follows exactly has no effort to make a force of; write use')),
+        ('"cascade" #', '"exactly" #', (42, "an arm that follows exactly has no effort to make a force of; write use")),
         ("stops = [-0.13, 0.09]", "stops = [0.1, 0]", (45, "arm: stops must be lower and upper, not 0.1 and 0")),
         ("tick = 5e-4 ", "tick = 5e-7 ", (43, "arm: 6e+07 ticks cannot be gone through; at most 2000000 can")),
         ("inductance = 3e-4", "inductance = 0", (51, "arm.motor: inductance must be finite and")),
@@ -94,9 +94,13 @@ def test_everything_wrong_with_a_scenario_is_said_with_its_place(tmp_path, old, 
 
 
 def test_all_problems_are_said_at_once(tmp_path):
-    wrong = SHIPPED.replace("mass = 1.0", "mass = -1").replace("strongest", "x\n# strongest").replace("tau = 1", "t = 1")
+    wrong = (
+        SHIPPED.replace("mass = 1.0", "mass = -1").replace("strongest", "x\n# strongest").replace("tau = 1", "t = 1")
+    )
     found = problems(tmp_path, wrong.replace('use = "ekf"', 'use = "no"').replace("# x", "x = 1"))
-    assert [words in problem for problem, words in zip(found, ("mass", "mass", "'x'", "tau", "'t'", "use"), strict=True)]
+    assert [
+        words in problem for problem, words in zip(found, ("mass", "mass", "'x'", "tau", "'t'", "use"), strict=True)
+    ]
 
 
 def test_a_file_that_is_not_there_or_is_no_toml_is_said(tmp_path):
@@ -174,7 +178,8 @@ def test_problems_of_that_file_are_said_with_those_of_the_study(study):
 
 
 @pytest.mark.parametrize(
-    ("value", "words"), [('"../mine.toml"', "must name a file inside the study"), ('"mine.toml"', "no such file"), ("3", "haptics")]
+    ("value", "words"),
+    [('"../mine.toml"', "must name a file inside the study"), ('"mine.toml"', "no such file"), ("3", "haptics")],
 )
 def test_a_study_that_names_no_such_file_is_told(study, value, words):
     with pytest.raises(BadStudy, match=words):

@@ -47,7 +47,7 @@ class Device(NamedTuple):
     step: float  # [m] of its position; 0 for none
 
 
-class Tissue(NamedTuple):
+class FeltTissue(NamedTuple):
     """What the tip of the arm touches beyond 0."""
 
     stiffness: float  # K_T [N/m]
@@ -121,7 +121,7 @@ class _Fixed(NamedTuple):
 
 
 def simulate(
-    grip: Grip, device: Device, axis: Axis, tissue: Tissue, clocks: Clocks, push: Array, noise: Array,
+    grip: Grip, device: Device, axis: Axis, tissue: FeltTissue, clocks: Clocks, push: Array, noise: Array,
     start: tuple[float, float], make: Callable[[Reading], float],
 ) -> Felt:  # fmt: skip
     """The loop over as many ticks as there is `push`, F_H (T,) [N], from a hand at `start` and an arm at rest there.

@@ -86,9 +86,10 @@ def told(context: Context, responses: list[HapticResponse]) -> str:
     return (
         f"{said}\n\nWhat slides is {arm}: the model's error on the real arm comes on top. Tissue of {true} feels like "
         f"{felt} to a hand that moves at {frequency}, {late} late. A hand in contact that no longer settles swings "
-        "ever further, or without end, when it lets go of a third of its push; the limit by simulation knows friction, "
-        "which makes the felt force hunt near rest, and the one by response takes the loop as linear. Your own "
-        "numbers: `davinci-forces haptics --help`."
+        "ever further, or without end, when it lets go of a quarter of its push. The limit by simulation knows the "
+        "arm's friction, which makes the felt force hunt near rest; the one by response takes the loop as linear. Both "
+        "count the damping of the tissue, which limits of delay alone leave out. Your own numbers: `davinci-forces "
+        "haptics --help`."
     )
 
 
