@@ -19,7 +19,7 @@ from pipeline.maths.haptics.delay import held
 from pipeline.maths.haptics.feeling import Complex, harmonic, largest, response_limit, settles
 from pipeline.maths.models.bias import Coefficients
 from pipeline.maths.simulation.friction import Friction
-from pipeline.maths.simulation.haptic import Axis, Clocks, Felt, FeltTissue, Grip, Reading, simulate
+from pipeline.maths.simulation.haptic import Axis, Clocks, Felt, FeltTissue, Grip, SensorReading, simulate
 from pipeline.simulation.scenario.scenario import Path
 from pipeline.study.haptics import SLIDE, SLIDE_NOISE, AxisNoise, Body, HapticScenario
 
@@ -41,7 +41,7 @@ class Margins(NamedTuple):
     delay: float  # [s] more of the force, up to which it settles; 0 where it does not as it is
 
 
-class Response(NamedTuple):
+class FeltResponse(NamedTuple):
     """What lies between hand and felt force, over frequencies (N,) [Hz]."""
 
     frequency: Array
@@ -104,7 +104,7 @@ def settled(scenario: HapticScenario, hand: Hand) -> bool:
     return settles(run.x[t >= LET_GO], MORE * PRESS / (hand.k + gain * _parts(scenario)[0]))
 
 
-def margins(scenario: HapticScenario, hand: Hand, response: Response) -> Margins:
+def margins(scenario: HapticScenario, hand: Hand, response: FeltResponse) -> Margins:
     """The limits of tissue and delay, each with all else as it is."""
     stiffness, _ = _parts(scenario)
     gain = scenario.device.force * scenario.device.motion
@@ -122,9 +122,9 @@ def margins(scenario: HapticScenario, hand: Hand, response: Response) -> Margins
     return Margins(limit, by_response, delay)
 
 
-def response(scenario: HapticScenario) -> Response:
+def response(scenario: HapticScenario) -> FeltResponse:
     """How the felt force answers a hand that is moved in the tissue, frequency by frequency; without noise."""
-    return Response(FREQUENCIES, np.array([_answer(scenario, f) for f in FREQUENCIES.tolist()]))
+    return FeltResponse(FREQUENCIES, np.array([_answer(scenario, f) for f in FREQUENCIES.tolist()]))
 
 
 def _answer(scenario: HapticScenario, frequency: float) -> complex:
@@ -185,18 +185,18 @@ def _axis(scenario: HapticScenario) -> Axis:
     )  # fmt: skip
 
 
-def _true_force(reading: Reading) -> float:
+def _true_force(reading: SensorReading) -> float:
     """The force as a sensor at the tip would send it."""
     return reading.force
 
 
-def streaming(scenario: HapticScenario) -> Callable[[Reading], float]:
+def streaming(scenario: HapticScenario) -> Callable[[SensorReading], float]:
     """The extended Kalman filter, which makes a force of one reading after the other.  (7.6), (7.7)"""
     known, T_s = scenario.known or SLIDE, 1.0 / scenario.rate
     noise, c_b = assumed(scenario), coefficients(known)
     predicted: belief.Belief | None = None
 
-    def make(reading: Reading) -> float:
+    def make(reading: SensorReading) -> float:
         nonlocal predicted
         if predicted is None:
             predicted = belief.first(reading.q, reading.dq, noise.r_q, noise.r_dq, _parts(scenario)[1].tau)

@@ -60,7 +60,7 @@ def noise_of(settled: FilterNoise) -> AxisNoise:
     return AxisNoise(settled.r_q, settled.r_dq, settled.r_tau)
 
 
-def rendered(robot: Robot, arm_from: str, scenario: HapticScenario, answer: haptic.Response) -> HapticResponse:
+def rendered(robot: Robot, arm_from: str, scenario: HapticScenario, answer: haptic.FeltResponse) -> HapticResponse:
     """The tissue as it is felt."""
     share = float(np.interp(AT, answer.frequency, answer.share))
     gain, stiffness = scenario.device.force * scenario.device.motion, scenario.stiffness or float("nan")
@@ -78,7 +78,7 @@ def rendered(robot: Robot, arm_from: str, scenario: HapticScenario, answer: hapt
     )
 
 
-def felt(name: str, hand: Hand, scenario: HapticScenario, answer: haptic.Response) -> HapticRun:
+def felt(name: str, hand: Hand, scenario: HapticScenario, answer: haptic.FeltResponse) -> HapticRun:
     """One hand: what it feels, and its margins."""
     run, margins = haptic.experiment(scenario, hand), haptic.margins(scenario, hand, answer)
     return HapticRun(

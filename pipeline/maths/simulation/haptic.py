@@ -77,7 +77,7 @@ class Clocks(NamedTuple):
     back: int  # how late a force is
 
 
-class Reading(NamedTuple):
+class SensorReading(NamedTuple):
     """What the sensors say at a turn of the controller."""
 
     q: float  # [m]
@@ -122,7 +122,7 @@ class _Fixed(NamedTuple):
 
 def simulate(
     grip: Grip, device: Device, axis: Axis, tissue: FeltTissue, clocks: Clocks, push: Array, noise: Array,
-    start: tuple[float, float], make: Callable[[Reading], float],
+    start: tuple[float, float], make: Callable[[SensorReading], float],
 ) -> Felt:  # fmt: skip
     """The loop over as many ticks as there is `push`, F_H (T,) [N], from a hand at `start` and an arm at rest there.
 
@@ -139,7 +139,7 @@ def simulate(
     readings, made, ticks = np.zeros((turns, 4)), np.zeros(turns), np.zeros((T, 5))
     for k in range(turns):
         _sense(device, fixed, tissue, clocks, noise, loop, k, readings)
-        made[k] = loop.last[2, 0] = make(Reading(*readings[k].tolist()))
+        made[k] = loop.last[2, 0] = make(SensorReading(*readings[k].tolist()))
         _move(grip, device, fixed, tissue, clocks, push, loop, k, ticks)
     x, dx, q, true, felt = ticks.T
     return Felt(clocks.tick * np.arange(T, dtype=float), x, dx, q, true, felt, readings, made)
