@@ -27,7 +27,6 @@ from pipeline.report.context import Context, title
 
 MM, MS = 1e3, 1e3
 SHOWN = 300  # samples of a run that are drawn
-UNSTATED = "–"
 
 
 def section(context: Context) -> Section | None:
@@ -54,13 +53,14 @@ def blocks(context: Context, runs: list[HapticRun]) -> Iterator[Block]:
 
 def verdict(context: Context, run: HapticRun) -> Verdict:
     """Whether a hand is stable against the tissue, and where its limit is."""
-    key = f"haptics.{run.hand}"
-    limit, margin = (context.number(f"{key}.{name}", 2) for name in ("k_t_settles", "stiffness_margin"))
-    name = f"**Simulated**, hand “{literal(run.hand)}”"
+    key, name = f"haptics.{run.hand}", f"**Simulated**, hand “{literal(run.hand)}”"
+    limit, margin = (context.number(f"{key}.{number}", 2) for number in ("k_t_settles", "stiffness_margin"))
     where = f"it settles against tissue up to {limit}, {margin} times the measured one"
+    if not run.k_t_settles > 0.0:
+        where = "no limit of the tissue's stiffness was found"
     if run.out_of_reach:
         return Verdict("warn", f"{name}: **unstable**, thrown out of the device's reach at {run.t[-1]:.1f} s; {where}.")
-    stable = not run.stiffness_margin < 1.0
+    stable = run.delay_margin != 0.0  # NaN where no delay was found that it does not bear
     off = context.number(f"{key}.felt_error", 2)
     said = "stable" if stable else "goes in and out within reach, but is **unstable** when it stays in the tissue"
     return Verdict("good" if stable else "warn", f"{name}: {said}; {where}; what it feels is off by {off} (rms).")
@@ -102,8 +102,8 @@ def traces(run: HapticRun) -> Figure:
     return Figure(
         f"Simulated, hand “{literal(run.hand)}” in and out of the tissue, contact shaded: where it would be if it felt "
         f"nothing, where it is and where the arm is, from the tissue's surface; and the true and the felt force.{ends}",
-        f"Positions of hand and arm and two forces over {run.t[-1] - run.t[0]:.0f} s; the felt force follows the true "
-        "one in every contact, late.",
+        f"Positions of hand and arm over {run.t[-1] - run.t[0]:.0f} s, and below them a true force of at most "
+        f"{run.true_peak:.2g} N and a felt one of at most {run.felt_peak:.2g} N.",
         (
             Panel(
                 "Position",
@@ -153,7 +153,8 @@ def response(one: HapticResponse) -> Figure:
     return Figure(
         "Simulated: the stiffness that a hand feels over the one that there is, by the frequency of its motion in the "
         "tissue; and how late.",
-        "Two curves over frequency: the felt share of the stiffness falls, and so does its delay.",
+        f"Two curves over frequency: the felt share of the stiffness, {one.felt_share.min():.2f} to "
+        f"{one.felt_share.max():.2f}, and its delay, at most {MS * one.felt_late.max():.0f} ms.",
         (
             panel("Felt stiffness over true", "share", one.felt_share, HLine(1.0)),
             panel("How late it is felt", "delay [ms]", MS * one.felt_late),
