@@ -134,7 +134,7 @@ def test_what_a_call_reads_does_not_grow_with_the_logs(few_and_many):
         plan = Plan(study, Ledger(folders))
         tasks = {stage: list(plan.tasks(declaration(stage))) for stage in STAGES}
         reads.append({s: max(len(t.fingerprint.inputs) for t in every) for s, every in tasks.items() if len(every) > 1})
-        pooled = {"design", "fit", "choose", "settle", "bound", "threshold", "combine", "limit"}
+        pooled = {"design", "fit", "choose", "settle", "bound", "threshold", "combine", "limit", "feel"}
         assert {s for s, every in tasks.items() if len(every) == 1} == pooled
     assert reads[0] == reads[1]
 

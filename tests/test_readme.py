@@ -26,6 +26,8 @@ from pipeline.records import (
     Excitation,
     FreeWeight,
     Guess,
+    HapticResponse,
+    HapticRun,
     Links,
     Lyapunov,
     Origin,
@@ -221,7 +223,7 @@ def made(kind: type[Record], **about: Any) -> Record:
 
 
 ROBOT = ("robot.", "control.", "excitation.")
-BY_HAND = (*ROBOT, "weight.", "tissue.", "stability.", "guess.", "tip.")
+BY_HAND = (*ROBOT, "weight.", "tissue.", "stability.", "haptics.", "guess.", "tip.")
 
 
 def test_keys_of_a_robot_and_of_what_hangs_on_it_or_pushes_it_are_told_and_those_told_are_there():
@@ -236,6 +238,8 @@ def test_keys_of_a_robot_and_of_what_hangs_on_it_or_pushes_it_are_told_and_those
         guess,
         made(DelayLimit),
         made(TissueLimit),
+        made(HapticResponse),
+        made(HapticRun),
     ]
     records += [made(TipForce), made(TipContact), made(TipBudget)]
     keys = set(collect(Catalogue(lambda kind: [record for record in records if isinstance(record, kind)])))

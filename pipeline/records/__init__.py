@@ -14,6 +14,7 @@ from pipeline.records.diagnostic import Diagnostic, diagnostic
 from pipeline.records.differentiate import Spectrum, Trajectory
 from pipeline.records.ekf import Track
 from pipeline.records.explain import Explanation, Innovation
+from pipeline.records.feel import HapticResponse, HapticRun
 from pipeline.records.fit import (
     CrossFit,
     Fit,
@@ -44,21 +45,21 @@ __all__ = [
     "COLUMN_DTYPES", "KINDS", "AnyRecord", "ArmCorrelation", "Average", "Choice", "Column", "Comparison", "Contact",
     "Control", "Counts", "CrossFit", "DelayLimit", "Diagnostic", "ErrorBand", "Excitation", "Explanation",
     "FilterNoise", "Fit", "FittedPaths", "FreeMotion", "FreeSpace", "FreeWeight", "FrictionMap", "Guess",
-    "HapticMotion", "Identifiability", "Innovation", "JointCorrelation", "Labels", "Links", "Load", "LogSummary",
-    "Lyapunov", "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Push", "Record",
-    "Recording", "Residual", "Signal", "Smoothed", "Spectrum", "StabilityLimit", "StabilityMap", "Stiffness",
-    "SwarmSearch", "Threshold", "TipBudget", "TipContact", "TipForce", "TissueLimit", "TissueModel", "Touch",
-    "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace", "diagnostic",
+    "HapticMotion", "HapticResponse", "HapticRun", "Identifiability", "Innovation", "JointCorrelation", "Labels",
+    "Links", "Load", "LogSummary", "Lyapunov", "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose",
+    "Prediction", "Push", "Record", "Recording", "Residual", "Signal", "Smoothed", "Spectrum", "StabilityLimit",
+    "StabilityMap", "Stiffness", "SwarmSearch", "Threshold", "TipBudget", "TipContact", "TipForce", "TissueLimit",
+    "TissueModel", "Touch", "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
     kind.__name__: kind
     for kind in (
         Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Touch, Signal, Average,
-        PeriodResidual, Trajectory, Spectrum, Smoothed, Fit, CrossFit, Identifiability, FittedPaths,
-        MeasurementNoise, Residual, SwarmSearch, Guess, Choice, FrictionMap, Prediction, Tuning, FilterNoise,
-        FreeMotion, ErrorBand, Track, FreeSpace, Threshold, Contact, Push, Stiffness, TissueModel, Load, Weight,
-        FreeWeight, Comparison, StabilityMap, StabilityLimit, DelayLimit, TissueLimit, HapticMotion,
+        PeriodResidual, Trajectory, Spectrum, Smoothed, Fit, CrossFit, Identifiability, FittedPaths, MeasurementNoise,
+        Residual, SwarmSearch, Guess, Choice, FrictionMap, Prediction, Tuning, FilterNoise, FreeMotion, ErrorBand,
+        Track, FreeSpace, Threshold, Contact, Push, Stiffness, TissueModel, Load, Weight, FreeWeight, Comparison,
+        StabilityMap, StabilityLimit, DelayLimit, TissueLimit, HapticMotion, HapticResponse, HapticRun,
         JointCorrelation, ArmCorrelation, TipForce, TipContact, TipBudget, Whiteness, Innovation, Explanation,
         Diagnostic,
     )

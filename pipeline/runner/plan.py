@@ -104,8 +104,8 @@ class Plan:
         """What a task is handed besides records; of a log, what says how to open it."""
         if what in ("log", "entry"):
             return self._entries[log]
-        if what == "weighings":
-            return self.study.weighings
+        if what in ("weighings", "haptics"):
+            return getattr(self.study, what)
         return self.study.robot.joint(joint) if what == "joint" else self.study.robot
 
     def _hash(self, what: str, name: str, value: Any) -> str:

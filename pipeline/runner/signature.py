@@ -11,10 +11,12 @@ from typing import Any, get_args, get_origin, get_type_hints
 from pipeline.logs.log import Log
 from pipeline.records import Record
 from pipeline.robots.robot import Joint, Robot
-from pipeline.study import LogEntry, Settings, Weighings
+from pipeline.study import HapticScenario, LogEntry, Settings, Weighings
 
 Kinds = tuple[type[Record], ...]
-GIVEN = {Log: "log", LogEntry: "entry", Joint: "joint", Robot: "robot", Weighings: "weighings"}
+GIVEN = {
+    Log: "log", LogEntry: "entry", Joint: "joint", Robot: "robot", Weighings: "weighings", HapticScenario: "haptics",
+}  # fmt: skip
 SETTINGS = tuple(f.name for f in fields(Settings))
 
 
@@ -27,7 +29,7 @@ class Declaration:
     per_log: dict[str, Kinds]  # called once a log, with all its records of these kinds
     optional: dict[str, Kinds]  # the record about the same, or None
     every: dict[str, Kinds]  # all records about the same
-    given: dict[str, str]  # parameter -> "log", "entry", "joint", "robot" or "weighings"
+    given: dict[str, str]  # parameter -> "log", "entry", "joint", "robot", "weighings" or "haptics"
     settings: tuple[str, ...]
     makes: Kinds
 

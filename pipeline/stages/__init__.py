@@ -11,6 +11,7 @@ The signature of `run` is the declaration of everything it needs:
     entry: LogEntry             what the study says of the log
     joint: Joint, robot: Robot  what the robot is
     weighings: Weighings        the masses of all weight logs; where the study has none, the stage is not called
+    haptics: HapticScenario     the simulated hand that feels the tissue
     *, lowpass: float           a setting of the study, by name
     -> Iterator[Average | Diagnostic] the kinds of record it makes
 
@@ -22,5 +23,5 @@ does not grow with the study, unless it is the only one of its stage.  The repor
 STAGES = (
     "design", "ingest", "resample", "average", "differentiate", "smooth", "fit", "choose", "chart", "predict", "tune",
     "settle", "calibrate", "bound", "ekf", "assess", "threshold", "measure", "palpate", "hang", "weigh", "compare",
-    "limit", "correlate", "combine", "resolve", "whiteness", "explain",
+    "limit", "feel", "correlate", "combine", "resolve", "whiteness", "explain",
 )  # fmt: skip

@@ -10,7 +10,7 @@ from pipeline.errors import BadRobot, BadStudy
 from pipeline.estimators import ESTIMATORS
 from pipeline.robots import Robot, from_toml
 from pipeline.robots.models import VARIANTS
-from pipeline.study import Settings, Study
+from pipeline.study import HapticScenario, Settings, Study, haptics
 from pipeline.study.entries import entries_of, inside, lines_of_files
 from pipeline.study.plausible import checked
 from pipeline.toml import TomlTable
@@ -49,6 +49,7 @@ def study_of(table: TomlTable, folder: Path) -> Study:
     robot = _overridden(robot, overrides) if robot else None
     robot = _with_tool(robot, table) if "tool" in table else robot
     settings = _settings(table.table("settings"), robot)
+    scenario = _haptics(table, folder) if "haptics" in table else HapticScenario()
     logs = entries_of(table, robot)
     table.close()
     lines = lines_of_files(table, logs)
@@ -61,7 +62,7 @@ def study_of(table: TomlTable, folder: Path) -> Study:
     own = table.values["robot"] if table.values["robot"].endswith(".toml") else ""
     truth = _truth(folder) if simulated else {}
     changed = overrides.values | ({"tool": table.values["tool"]} if "tool" in table else {})
-    return Study(folder, title, robot, simulated, settings, logs, changed, truth, own, lines)
+    return Study(folder, title, robot, simulated, settings, logs, changed, truth, scenario, own, lines)
 
 
 def _truth(folder: Path) -> dict[str, Any]:
@@ -87,6 +88,21 @@ def _robot(table: TomlTable, folder: Path) -> Robot | None:
         return None
     table.file.named.append(described.file)
     return from_toml.robot_of(described, Path(name).stem)
+
+
+def _haptics(table: TomlTable, folder: Path) -> HapticScenario:
+    """The scenario beside the study, its problems noted with the study's own."""
+    name = table.take("haptics", None, (str,), "a .toml file beside the study, as `davinci-forces haptics` takes it")
+    if name is None or not inside(name):
+        table.problem("haptics must name a file inside the study", "haptics")
+        return HapticScenario()
+    try:
+        described = toml.read(folder / name, BadStudy)
+    except BadStudy as error:
+        table.problem(str(error), "haptics")
+        return HapticScenario()
+    table.file.named.append(described.file)
+    return haptics.scenario_of(described)
 
 
 def _overridden(robot: Robot, overrides: TomlTable) -> Robot:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.robots.robot import Robot
+from pipeline.study.haptics import HapticScenario
 
 WHOLE = ((0.0, math.inf),)  # the windows of a log that is in contact throughout
 
@@ -118,6 +119,7 @@ class Study:
     logs: tuple[LogEntry, ...]
     changed: dict[str, Any] = field(default_factory=dict)  # what the study says of the robot, for the report
     truth: dict[str, Any] = field(default_factory=dict)  # ground truth of a simulated study: its truth.toml
+    haptics: HapticScenario = field(default_factory=HapticScenario)  # what is simulated of a hand that feels the tissue
     robot_file: str = ""  # the .toml in the study's folder that describes the robot, if there is one
     lines: dict[str, int] = field(default_factory=dict, compare=False)  # of study.toml, by the file of a log they name
 

@@ -19,6 +19,7 @@ DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
             "tip",
             "tissue",
             "stability",
+            "haptics",
             "weight",
             "joints",
             "choice",

@@ -1,0 +1,98 @@
+"""Stage `feel`: the simulated loop of a study, with what the study found of joint, noise and tissue."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from pipeline.maths.haptics.bimodal import Hand
+from pipeline.maths.haptics.delay import sampled_limit
+from pipeline.records import FilterNoise, Fit, HapticResponse, HapticRun
+from pipeline.robots import davinci
+from pipeline.simulation import haptic
+from pipeline.stages import feel
+from pipeline.study import HapticScenario
+from pipeline.study.haptics import SLIDE, SLIDE_NOISE
+from tests.haptics.test_limit import stiffness
+
+HAND = Hand(1.0, 10.0, 300.0)
+PLAN = ((0.0, -0.01), (1.0, 0.01), (2.0, -0.01))
+SCENARIO = HapticScenario(hands=(("one", HAND),), plan=PLAN, exact=True, filtered=False, damping=0.0, friction=0.0)
+THETA = (0.2, 1.8, 3.0, 4.5)
+
+
+def fit(theta=THETA, estimator="lse") -> Fit:
+    joint = davinci.ROBOT.joint("instrument_slide")
+    names = np.array([term.name for term in joint.terms], object)
+    numbers = dict.fromkeys(Fit.scalars(), 1)
+    columns = dict.fromkeys(Fit.columns(), np.zeros(4)) | dict.fromkeys(("parameter", "phi", "unit"), names)
+    about = {"group": joint.name, "model": "independent", "estimator": estimator, "logs": ("a",)}
+    return Fit(**(numbers | columns | about | {"theta": np.array(theta)}))
+
+
+def noise(joint="instrument_slide") -> FilterNoise:
+    numbers = dict.fromkeys(FilterNoise.scalars(), 1.0)
+    return FilterNoise(**(numbers | {"joint": joint, "logs": ("a",), "r_q": 1e-6, "r_dq": 2e-3, "r_tau": 0.7}))
+
+
+def made(tissues, fits=(), noises=(), scenario=SCENARIO) -> list:
+    return list(feel.run(tissues, fits, noises, scenario, davinci.ROBOT, q_tau=0.0))
+
+
+@pytest.fixture(scope="module")
+def records():
+    return made([stiffness(k=400.0), stiffness("other", 440.0), stiffness("third", 500.0)])
+
+
+def test_the_tissue_is_the_median_of_those_that_were_measured(records):
+    response = records[0]
+    assert isinstance(response, HapticResponse)
+    assert response.tissue_stiffness == 440.0
+    assert_allclose(response.rendered_stiffness, 440.0 * response.transparency)
+    assert_allclose(response.transparency, 1.0, atol=1e-3)
+    assert_allclose(response.felt_delay, 0.005, rtol=0.02)
+
+
+def test_each_hand_has_its_run_and_its_margins(records):
+    run = records[1]
+    assert isinstance(run, HapticRun)
+    assert (run.hand, run.hand_mass, run.hand_damping, run.hand_stiffness) == ("one", *HAND)
+    assert len(run) == 200
+    assert run.out_of_reach == 0
+    assert_allclose(run.k_t_settles, sampled_limit(HAND, 0.0, 100.0), rtol=0.03)
+    assert_allclose(run.stiffness_margin, run.k_t_settles / 440.0)
+    assert_allclose(run.true_peak, run.true_force.max())
+    assert run.delay_margin > 0.0
+
+
+def test_a_stated_stiffness_takes_the_place_of_the_measured_one():
+    response, _ = made([stiffness(k=400.0)], scenario=replace(SCENARIO, stiffness=123.0))
+    assert response.tissue_stiffness == 123.0
+
+
+def test_what_slides_is_the_joint_as_it_was_fitted():
+    body, arm_from = feel.fitted(davinci.ROBOT, [fit()], davinci.ROBOT.joint("instrument_slide"))
+    assert arm_from == "instrument_slide"
+    assert_allclose([body.inertia, body.viscous, *body.coulomb], [2.0, 3.0, 4.5, 4.5])
+    assert_allclose(body.gravity, -0.2 * 9.81)
+
+
+@pytest.mark.parametrize("fits", [[], [fit((-3.0, 1.0, 1.0, 1.0))]])
+def test_without_a_fit_that_can_be_it_is_the_thesis_s(fits):
+    assert feel.fitted(davinci.ROBOT, fits, davinci.ROBOT.joint("instrument_slide")) == (SLIDE, "the thesis")
+    assert feel.fitted(davinci.ROBOT, fits, None) == (SLIDE, "the thesis")
+
+
+def test_the_filter_s_noise_is_the_joint_s(monkeypatch):
+    taken = []
+    filled = haptic.filled
+    monkeypatch.setattr(haptic, "filled", lambda *given: (taken.append(given[2]), filled(*given))[1])
+    made([stiffness()], noises=[noise("hand_roll"), noise()])
+    made([stiffness()], noises=[noise("hand_roll")])
+    assert taken == [(1e-6, 2e-3, 0.7), SLIDE_NOISE]
+
+
+def test_nothing_is_made_where_no_tissue_was_measured():
+    assert made([], [fit()], [noise()]) == []
+    assert made([stiffness(pushes=0, k=float("nan")), stiffness(k=-3.0)]) == []

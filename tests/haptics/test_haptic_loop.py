@@ -1,0 +1,162 @@
+"""The simulated haptic loop: what it becomes where parts of it are ideal, its filter, and where it is unstable."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from pipeline.filters import ekf
+from pipeline.maths.haptics.bimodal import THESIS, Hand
+from pipeline.maths.haptics.delay import delay_limit, held, sampled_limit
+from pipeline.maths.haptics.feeling import harmonic, response_limit
+from pipeline.maths.haptics.motion import switched
+from pipeline.maths.models.driven import Driven
+from pipeline.maths.models.model import JointDynamics
+from pipeline.maths.simulation.haptic import Clocks, FeltTissue, Grip, simulate
+from pipeline.simulation import haptic
+from pipeline.study.haptics import FIRM, SLIDE, AxisNoise, HapticScenario
+
+K = 457.24
+NOBODY = np.zeros((0, 2))
+FULL = haptic.filled(HapticScenario())
+IDEAL = replace(FULL, exact=True, filtered=False, damping=0.0, friction=0.0)
+QUIET = replace(FULL, noise=AxisNoise(5e-7, 5e-4, 1e-6))
+SLOW = ((0.0, -0.02), (4.0, 0.04), (8.0, -0.02))
+
+
+def let_go(tick: float):
+    """The hand let go 1 cm from a spring, its force continuous but for the ticks."""
+    T = round(2.0 / tick)
+    clocks, grip = Clocks(tick, 1, 1, 0, 0), Grip(*held(THESIS, tick), NOBODY)
+    axis, tissue, noise = haptic._axis(IDEAL), FeltTissue(K, 0.0, 0.0), np.zeros((T, 3))
+    return simulate(grip, IDEAL.device, axis, tissue, clocks, np.zeros(T), noise, (-0.01, 0.0), lambda r: r.force)
+
+
+def test_with_an_ideal_arm_and_ever_smaller_ticks_the_hand_moves_as_the_bimodal_model_does():
+    exact, errors = switched(THESIS, K, (-0.01, 0.0), 2.0), []
+    for tick in (1e-3, 5e-4):
+        run = let_go(tick)
+        errors.append(np.abs(np.interp(run.t, exact.t, exact.x) - run.x).max())
+    assert errors[0] < 0.03 * 0.01
+    assert 1.8 < errors[0] / errors[1] < 2.2  # a force that is held is half a tick late
+
+
+@pytest.mark.parametrize("name", ["thesis", "firm"])
+def test_the_filter_in_the_loop_is_the_one_that_tracks_logs(name):
+    hand = dict(FULL.hands)[name]
+    scenario = replace(FULL, plan=SLOW, device=FULL.device._replace(force=0.0 if name == "thesis" else 1.0))
+    run = haptic.felt(scenario, hand)
+    q, dq, tau, _ = run.readings.T
+    nothing = np.zeros(len(q))
+    joint = JointDynamics(np.full(len(q), SLIDE.inertia), haptic.coefficients(SLIDE), nothing)
+    recorded = Driven(joint, q, dq, nothing, tau, 1.0 / scenario.rate, scenario.noise.tau)
+    assert run.made.max() > 5.0
+    assert_array_equal(run.made, ekf.track(recorded, haptic.assumed(scenario)).tau_ext)
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("hand", [THESIS, FIRM, Hand(1.0, 10.0, 300.0)])
+@pytest.mark.parametrize("delay", [0.0, 0.03])
+def test_with_an_ideal_arm_the_limit_is_that_of_a_held_force(hand, delay):
+    """Where a swing that shrinks by 3 % in a quarter of the time counts as lasting: that is within 3 %."""
+    scenario = replace(IDEAL, force_delay=delay)
+    margins = haptic.margins(scenario, hand, haptic.response(scenario))
+    assert_allclose(margins.stiffness, sampled_limit(hand, delay, 100.0), rtol=0.03)
+
+
+def test_the_response_of_an_ideal_arm_is_half_a_message_late_and_its_limit_that_of_the_delay():
+    answer = haptic.response(replace(IDEAL, position_delay=0.01, force_delay=0.02))
+    assert_allclose(answer.late[:8], 0.035, atol=2e-4)
+    assert_allclose(answer.share[:8], 1.0, atol=2e-3)
+    limit = response_limit(THESIS, 2.0 * np.pi * answer.frequency, answer.T, 0.0)
+    assert_allclose(limit, delay_limit(THESIS, 0.035), rtol=0.02)
+
+
+def test_tissue_that_damps_makes_the_limit_by_the_response_higher():
+    w = 2.0 * np.pi * np.geomspace(0.2, 12.0, 200)
+    T = np.exp(-0.05j * w)
+    plain, damped = (response_limit(THESIS, w, T, damping) for damping in (0.0, 2.0))
+    assert_allclose(plain, delay_limit(THESIS, 0.05), rtol=1e-3)
+    assert damped > 2.0 * plain
+
+
+def test_a_response_whose_hand_meets_no_limit_has_none():
+    assert np.isnan(response_limit(Hand(1.0, 1e3, 100.0), np.geomspace(1.0, 10.0, 9), np.ones(9) * 0.5j, 0.0))
+
+
+def test_the_harmonic_of_a_sine_is_its_amplitude():
+    t = np.arange(1000) / 1000.0
+    w = 2.0 * np.pi * 3.0
+    assert_allclose(harmonic(t, 5.0 + 0.2 * np.cos(w * t) + 0.3 * np.sin(w * t), w), 0.2 - 0.3j, atol=1e-12)
+
+
+def test_the_felt_peak_is_the_true_one_as_late_as_the_filter_and_the_link_are():
+    run = haptic.felt(replace(QUIET, plan=SLOW, friction=0.0), FIRM)
+    assert run.true.max() > 8.0
+    assert_allclose(run.felt.max(), run.true.max(), rtol=0.05)
+    rises, falls = ([float(run.t[np.flatnonzero(f > 4.0)[k]]) for f in (run.true, run.felt)] for k in (0, -1))
+    assert 0.03 < rises[1] - rises[0] < 0.16  # 0.1 s of the filter for a push of 1 s, and half a message
+    assert 0.03 < falls[1] - falls[0] < 0.16
+
+
+def test_a_sensor_in_place_of_the_filter_is_felt_at_the_next_message():
+    run = haptic.felt(replace(QUIET, plan=SLOW, filtered=False), FIRM)
+    turn = round(1.0 / QUIET.rate / QUIET.tick)
+    messages = run.true[::turn]
+    assert_allclose(run.felt[::turn], messages, atol=1e-12)
+    assert_allclose(run.felt[turn - 1 :: turn], messages, atol=1e-12)  # held until the next
+
+
+@pytest.mark.medium
+def test_a_later_force_leaves_a_smaller_margin():
+    limits = []
+    for delay in (0.0, 0.02, 0.05, 0.1):
+        scenario = replace(FULL, force_delay=delay)
+        limits.append(haptic.margins(scenario, FIRM, haptic.response(scenario)).stiffness)
+    assert (np.diff(limits) < 0.0).all(), limits
+
+
+@pytest.mark.medium
+def test_without_coulomb_friction_the_limit_by_simulation_and_by_response_agree():
+    """The response taken at the limit, as an arm gives way to stiff tissue; between few frequencies."""
+    smooth = SLIDE._replace(coulomb=(1e-9, 1e-9), static=(1e-9, 1e-9))
+    scenario = replace(FULL, body=smooth, known=smooth, friction=0.0, stiffness=1700.0)
+    margins = haptic.margins(scenario, FIRM, haptic.response(scenario))
+    assert_allclose(margins.stiffness, margins.by_response, rtol=0.03)
+
+
+@pytest.mark.medium
+def test_a_weaker_felt_force_bears_stiffer_tissue_in_proportion():
+    halved = replace(IDEAL, device=IDEAL.device._replace(force=0.5))
+    margins = haptic.margins(halved, THESIS, haptic.response(halved))
+    assert_allclose(margins.stiffness, 2.0 * sampled_limit(THESIS, 0.0, 100.0), rtol=0.03)
+
+
+def test_the_thesis_s_hand_is_thrown_out_of_reach_and_the_firm_one_is_not():
+    runs = {name: haptic.experiment(FULL, hand) for name, hand in FULL.hands}
+    assert runs["thesis"].thrown
+    assert not runs["firm"].thrown
+    assert len(runs["firm"].t) == 3000
+    assert np.abs(runs["thesis"].x).max() <= FULL.reach
+
+
+def test_a_device_makes_no_more_force_than_it_can():
+    weak = replace(FULL, device=FULL.device._replace(strongest=3.3), plan=SLOW)
+    run = haptic.felt(weak, FIRM)
+    assert_allclose(run.felt.max(), 3.3)
+    assert run.true.max() > 3.3
+
+
+def test_tissue_that_rubs_keeps_energy():
+    def lost(friction: float) -> float:
+        run = haptic.felt(replace(QUIET, plan=SLOW, friction=friction, damping=0.0), FIRM)
+        return float(np.sum(run.true * np.gradient(run.q)))
+
+    assert lost(0.2) > 0.01 > abs(lost(0.0))
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_one_others():
+    once, again, other = (haptic.felt(replace(FULL, seed=seed, plan=SLOW), FIRM) for seed in (3, 3, 4))
+    assert all(a.tobytes() == b.tobytes() for a, b in zip(once, again, strict=True))
+    assert not np.array_equal(once.felt, other.felt)
