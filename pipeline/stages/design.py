@@ -97,14 +97,14 @@ def watched(
     study: ControlStudy, joint: str, t: Column, q: Column, dq: Column, start: float, reference: float
 ) -> Control:
     """One joint of a study: how far it overshoots, when it settles, and its errors as time goes on."""
+    between = CubicHermiteSpline(t, q, dq)  # the solver's steps grow to seconds as the errors die out
     step = reference - start
+    overshoot = settling_time = float("nan")
     if step:
         overshoot = max(float(((q - reference) / step).max()), 0.0)
-        away = np.flatnonzero(np.abs(q - reference) > SETTLED * abs(step))
-        settling_time = float(t[away[-1] + 1]) if away[-1] + 1 < len(t) else float("nan")
-    else:
-        overshoot = settling_time = float("nan")
-    between = CubicHermiteSpline(t, q, dq)  # the solver's steps grow to seconds as the errors die out
+        if abs(q[-1] - reference) <= SETTLED * abs(step):
+            edges = (reference + side * SETTLED * step for side in (-1, 1))
+            settling_time = max(float(when) for edge in edges for when in between.solve(edge, extrapolate=False))
     later = [float(reference - between(when)) if when <= t[-1] else float("nan") for when in (10.0, 20.0)]
     return Control(
         controller=study.name,
