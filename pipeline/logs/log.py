@@ -35,6 +35,8 @@ class Options:
     decimal: str | None = None  # "." or ","
     header: bool | None = None  # the first row holds names
     encoding: str | None = None
+    dtype: str | None = None  # of raw binary numbers: "float64", "<i2"; big-endian where it does not say
+    columns: int | tuple[str, ...] | None = None  # of a row of raw binary numbers: how many, or their names
 
 
 @dataclass(frozen=True)
@@ -46,6 +48,7 @@ class Channel:
     kind: str = "number"  # or "text", "time" (what cannot be used as a quantity is still listed)
     derived: bool = False  # made by the reader, not written in the log ("write", "elapsed")
     time: str = ""  # the channel that says when its samples were taken; "" for the log's own: `Log.time`, else `.clock`
+    alias: str = ""  # another name that `find` knows it by: of a joint in place of its number, in another spelling
 
 
 @dataclass(frozen=True)
@@ -103,7 +106,8 @@ class Log(ABC):
         if isinstance(name, int):
             return self._numbered(name)
         exact = [channel for channel in self.channels if channel.name == name]
-        last = [channel for channel in self.channels if channel.name.endswith(f"/{name}")]
+        exact = exact or [channel for channel in self.channels if channel.alias == name]
+        last = [c for c in self.channels if c.name.endswith(f"/{name}") or c.alias.endswith(f"/{name}")]
         if len(exact or last) == 1:
             return (exact or last)[0]
         if last:
