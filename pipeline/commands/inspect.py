@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from pipeline.logs.log import Log
+    from pipeline.logs.log import Log, Options
     from pipeline.maths.signals.clock import ClockStatistics
     from pipeline.maths.signals.outline import Outline
 
@@ -17,21 +17,26 @@ MAX_SHARE = 0.1  # share of repeated rows, and of jitter in the sampling time, a
 
 
 def run(
-    file: Annotated[Path, typer.Argument(help="A log: TDMS, LVM, or columns of text.")],
+    file: Annotated[Path, typer.Argument(help="A log, of any format that the README lists.")],
     head: Annotated[int, typer.Option(min=0, help="Rows to show.")] = 5,
     json: Annotated[bool, typer.Option("--json", help="Print it for a program to read.")] = False,
+    dtype: Annotated[str | None, typer.Option(help="Of raw binary numbers: float64, '<int16' ...")] = None,
+    columns: Annotated[str | None, typer.Option(help="Of a row of them: their number, or names, as in t,q,i.")] = None,
 ) -> None:
     """Show what a log holds: channels, units, samples, clock, warnings, first rows."""
     import json as writer
 
-    description = describe(file, head)
+    from pipeline.logs.log import Options
+
+    of = int(columns) if columns and columns.isdecimal() else tuple(columns.split(",")) if columns else None
+    description = describe(file, head, Options(dtype=dtype, columns=of))
     if json:
         typer.echo(writer.dumps(description, indent=1, ensure_ascii=False, allow_nan=False))
     else:
         typer.echo("\n".join(lines(description)))
 
 
-def describe(file: Path, head: int) -> dict[str, Any]:
+def describe(file: Path, head: int, options: "Options | None" = None) -> dict[str, Any]:
     """Read a whole log; what it holds, in plain values of which none is NaN.
 
     Raises
@@ -42,10 +47,11 @@ def describe(file: Path, head: int) -> dict[str, Any]:
     import numpy as np
 
     from pipeline.logs import open_log
+    from pipeline.logs.log import Options
     from pipeline.maths.signals.clock import ClockStatistics
     from pipeline.maths.signals.outline import Outline
 
-    log = open_log(file)
+    log = open_log(file, options or Options())
     names = [channel.name for channel in log.channels if channel.kind != "text"]
     source, clock = _time(log), ClockStatistics()
     measured = [c.name for c in log.channels if c.kind == "number" and not c.derived and c.name != source]
@@ -111,6 +117,7 @@ def _clock(log: "Log", source: str, clock: "ClockStatistics", rising: dict[str, 
 
 def _channel(log: "Log", channel: Any, outline: "Outline | None") -> dict[str, Any]:
     about = {"name": channel.name, "unit": channel.unit, "kind": channel.kind, "derived": channel.derived}
+    about |= {"alias": channel.alias} if channel.alias else {}
     if outline is None:
         return about
     values = {name: _plain(getattr(outline, name)) for name in ("samples", "least", "most", "mean")}

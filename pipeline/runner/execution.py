@@ -117,11 +117,11 @@ def _names(writer: store.Writer) -> tuple[str, ...]:
 
 
 def _log(folders: Folders, entry: LogEntry) -> Log:
-    missing = [file for file in entry.files if not (folders.raw / file).is_file()]
+    missing = [file for file in entry.files if not (folders.raw / file).exists()]
     if missing:
         names = ", ".join(map(repr, missing))
         raise BadLog(f"file {names} of log {entry.name!r} is not in raw/{folders.raw.resolve().name}")
-    options = Options(entry.delimiter, entry.decimal, entry.header, entry.encoding)
+    options = Options(entry.delimiter, entry.decimal, entry.header, entry.encoding, entry.dtype, entry.columns)
     return open_parts([folders.raw / file for file in entry.files], options)
 
 

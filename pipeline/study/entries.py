@@ -3,7 +3,9 @@
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
+from pipeline.logs.binary import EXAMPLE, dtype_of
 from pipeline.robots import Robot
 from pipeline.robots.from_toml import wrong_name
 from pipeline.study import WHOLE, HungMass, LogEntry
@@ -65,6 +67,7 @@ def _entry(study: TomlTable, index: int, table: TomlTable, robot: Robot | None) 
         decimal=table.text("decimal", choices=(".", ",")) if "decimal" in table else None,
         header=table.flag("header") if "header" in table else None,
         encoding=table.text("encoding") if "encoding" in table else None,
+        **_binary(table),
     )
     table.close()
     return entry
@@ -113,6 +116,27 @@ def _delimiter(table: TomlTable) -> str | None:
         problem = "delimiter must not be empty; leave it out, and it is found from the file"
         table.problem(problem, "delimiter")
     return table.text("delimiter") if "delimiter" in table else None
+
+
+def _binary(table: TomlTable) -> dict[str, Any]:
+    """What raw binary numbers are, which such a file does not say itself."""
+    for key, other in (("dtype", "columns"), ("columns", "dtype")):
+        if key in table and other not in table:
+            table.problem(f"{key} is of raw binary numbers, and needs {other}; they say {EXAMPLE}", key)
+    said: dict[str, Any] = {}
+    if "dtype" in table:
+        words = 'a type of number as "float64", "DBL" or "<int16", where < stands for little-endian'
+        said["dtype"] = table.take("dtype", None, (str,), words, lambda word: dtype_of(word) is not None)
+    if "columns" in table:
+        columns = table.take("columns", None, (int, list), "how many numbers a row has, or their names", _are_columns)
+        said["columns"] = tuple(columns) if isinstance(columns, list) else columns
+    return said
+
+
+def _are_columns(value: object) -> bool:
+    if isinstance(value, list):
+        return bool(value) and all(map(_is_name, value)) and len(set(value)) == len(value)
+    return isinstance(value, int) and value > 0
 
 
 def _windows(table: TomlTable, key: str) -> tuple[tuple[float, float], ...]:

@@ -89,6 +89,8 @@ class LogEntry:
     decimal: str | None = None
     header: bool | None = None
     encoding: str | None = None
+    dtype: str | None = None  # of raw binary numbers
+    columns: int | tuple[str, ...] | None = None  # of a row of them: how many, or their names
 
     @property
     def tells_free_space(self) -> bool:
@@ -144,4 +146,4 @@ class Study:
 
     def absent(self) -> tuple[str, ...]:
         """Files of logs that are not there."""
-        return tuple(file for entry in self.logs for file in entry.files if not (self.folder / file).is_file())
+        return tuple(file for entry in self.logs for file in entry.files if not (self.folder / file).exists())
