@@ -24,7 +24,7 @@ class Unlike(ValueError):
 
 
 @dataclass(frozen=True)
-class Column:
+class Component:
     """One number of every message."""
 
     name: str  # "effort[0]", "force.x"
@@ -36,7 +36,7 @@ class Layout(Protocol):
     """The numbers of the messages of one topic."""
 
     @property
-    def columns(self) -> tuple[Column, ...]:
+    def columns(self) -> tuple[Component, ...]:
         """What they are."""
 
     def numbers(self, message: Any) -> Sequence[float] | None:
@@ -55,7 +55,7 @@ class Vectors:
         self.holder, units = VECTORS[kind]
         axes = {name: tuple("xyzw" if hasattr(getattr(self._held(message), name), "w") else "xyz") for name in units}
         self.paths = tuple((name, axis) for name in units for axis in axes[name])
-        self.columns = tuple(Column(f"{name}.{axis}", units[name]) for name, axis in self.paths)
+        self.columns = tuple(Component(f"{name}.{axis}", units[name]) for name, axis in self.paths)
 
     def _held(self, message: Any) -> Any:
         return getattr(message, self.holder)
@@ -76,7 +76,7 @@ class Joints:
             raise Unlike(f"names {len(self.names)} joints and has {self._counted(self.counts)}")
         known = unique(self.names)
         self.columns = tuple(
-            Column(f"{state}[{i}]", alias=f"{state}[{known[i]}]" if self.names else "")
+            Component(f"{state}[{i}]", alias=f"{state}[{known[i]}]" if self.names else "")
             for state, count in zip(STATES, self.counts, strict=True)
             for i in range(count)
         )
