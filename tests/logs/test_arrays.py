@@ -149,6 +149,16 @@ def test_what_lies_in_another_file_is_left_out(tmp_path):
     assert log.warnings == ["dataset /virtual lies in another file, and is left out"]
 
 
+def test_a_dataset_that_claims_more_samples_than_its_file_can_hold_is_refused():
+    """As a damaged length does: what was never written reads as zeros."""
+    file = BytesIO()
+    with h5py.File(file, "w") as hdf:
+        hdf.create_dataset("q", shape=(10**11,), dtype="f8", chunks=(1 << 16,))
+    with pytest.raises(BadLog, match="claim more samples than they can hold"):
+        for _ in opened(file.getvalue(), "log.h5").blocks(["q"]):
+            pass
+
+
 def test_without_h5py_the_message_says_how_to_install_it(monkeypatch):
     files = (hdf5({"t": T}), "log.h5"), (matlab_73({"t": T}), "log.mat")
     monkeypatch.setitem(sys.modules, "h5py", None)

@@ -63,7 +63,7 @@ def test_bags_of_a_study_s_recordings_give_its_results(tmp_path):
         recorded = pipeline.read(whole, "Recording", log=name)
         joints = list(dict.fromkeys(recorded["joint"]))
         columns = {
-            c: np.column_stack([recorded.loc[recorded["joint"] == j, c] for j in joints]) for c in "q dq tau".split()
+            c: np.column_stack([recorded.loc[recorded["joint"] == j, c] for j in joints]) for c in ["q", "dq", "tau"]
         }
         t = recorded.loc[recorded["joint"] == joints[0], "t"]
         states = zip(t, columns["q"], columns["dq"], columns["tau"], strict=True)

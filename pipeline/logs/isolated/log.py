@@ -17,6 +17,8 @@ SECONDS = 60.0  # that a file may take without a block, and as many more for eve
 BYTES_PER_SECOND = 5e6
 MEMORY = 448 << 20  # [bytes] that a child may have, and so many times the size of the file
 TIMES_ITS_SIZE = 4
+MOST_PACKED = 2000  # times its size that the samples of a file may be; what packs best packs to a thousandth
+BESIDE = 1 << 16  # [bytes] so that small files of headers may hold a little
 
 
 def require(path: Path, package: str, extra: str) -> None:
@@ -59,8 +61,14 @@ class IsolatedLog(Log):
         yield from ahead(self._blocks(list(names)))
 
     def _blocks(self, names: list[str]) -> Iterator[Block]:
+        left = (self.request["size"] + BESIDE) * MOST_PACKED
         for message, columns in _answers(self.path, self.request | {"names": names}):
             self.nulls, self.nans = message["nulls"], message["nans"]
+            left -= sum(column.nbytes for column in columns)
+            if left < 0:
+                raise BadLog(
+                    f"{self.path}: its {self.request['size']} bytes claim more samples than they can hold: {REMEDY}"
+                )
             if columns:
                 yield dict(zip(names, columns, strict=True))
             for name, value in message.get("end", {}).items():
@@ -74,6 +82,7 @@ def _request(path: Path, options: Options, reader: str) -> Message:
         "path": str(path.absolute()),
         "options": asdict(options),
         "names": None,
+        "size": size,
         "seconds": SECONDS + size / BYTES_PER_SECOND,
         "memory": MEMORY + TIMES_ITS_SIZE * size,
     }

@@ -1,4 +1,4 @@
-"""A bag as a log: its topics as channels with a clock each, read by rosbags."""
+"""A bag as a log: its topics as channels, with a clock each."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -7,18 +7,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from rosbags import rosbag1, rosbag2
-from rosbags.interfaces import MessageDefinitionFormat
-from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
 from pipeline.errors import BadLog
 from pipeline.logs.log import Block, Channel, Log, Options
 from pipeline.logs.ros.messages import KNOWN, Layout, Unlike, layout_of
+from pipeline.logs.ros.storage import Bag
 
 ROWS = 1 << 13  # messages of a block
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-STORAGES = rosbag2.Reader.STORAGE_PLUGINS
-RULE = "=" * 80 + "\n"  # between definitions in IDL
 
 
 @dataclass
@@ -54,71 +50,6 @@ class Topic:
         return clocks + numbers
 
 
-class Bag:
-    """An opened bag, of either ROS."""
-
-    def __init__(self, path: Path) -> None:
-        head = _head(path)
-        self.ros1 = head.startswith(b"#ROSBAG")
-        if self.ros1:
-            self.storage: Any = rosbag1.Reader(path)
-        else:
-            which = "dir" if path.is_dir() else ".mcap" if head.startswith(b"\x89MCAP") else ".db3"
-            self.storage = STORAGES[which](path)
-        self.storage.open()
-        for database in path.glob("*.db3") if path.is_dir() else [path]:
-            _require_pages(database)
-        self.types: dict[str, Any] = {}
-
-    def messages(self, connections: Sequence[Any]) -> Iterator[tuple[int, Any]]:
-        """When the recorder had each message [ns] since 1970, and the message."""
-        for connection, received, content in self.storage.messages(connections):
-            store = self._types_of(connection)
-            read = store.deserialize_ros1 if self.ros1 else store.deserialize_cdr
-            yield received, read(content, connection.msgtype)
-
-    def _types_of(self, connection: Any) -> Any:
-        """The types of a connection: as the bag defines them, else as ROS does."""
-        if connection.msgtype not in self.types:
-            definition = connection.msgdef
-            if definition.format == MessageDefinitionFormat.NONE:
-                store = get_typestore(Stores.ROS1_NOETIC if self.ros1 else Stores.LATEST)
-            else:
-                store = get_typestore(Stores.EMPTY)
-                store.register(_defined(definition, connection.msgtype))
-            self.types[connection.msgtype] = store
-        return self.types[connection.msgtype]
-
-
-def _head(path: Path) -> bytes:
-    if path.is_dir():
-        return b""
-    with path.open("rb") as file:
-        return file.read(32)
-
-
-def _require_pages(path: Path) -> None:
-    """Refuse a database without its last pages, which SQLite takes for zeros, or for an index that it does not need.
-
-    Raises
-    ------
-    ReaderError
-        If it is cut.
-    """
-    head = _head(path)
-    if head.startswith(b"SQLite"):
-        page, pages = int.from_bytes(head[16:18]), int.from_bytes(head[28:32])
-        if path.stat().st_size < (page if page > 1 else 1 << 16) * pages:
-            raise rosbag2.ReaderError(f"{path.name} ends before its {pages} pages do")
-
-
-def _defined(definition: Any, kind: str) -> dict[str, Any]:
-    if definition.format == MessageDefinitionFormat.MSG:
-        return dict(get_types_from_msg(definition.data, kind))
-    parts = definition.data.split(RULE)[1:] if definition.data.startswith(f"{RULE}IDL: ") else [f"\n{definition.data}"]
-    return {name: each for part in parts for name, each in get_types_from_idl(part.split("\n", 1)[1]).items()}
-
-
 def opened(path: Path, options: Options) -> Log:
     """Open the bag.
 
@@ -127,15 +58,11 @@ def opened(path: Path, options: Options) -> Log:
     BadLog
         If none of its topics is of a type that is read.
     """
-    try:
-        bag = Bag(path)
-    except (rosbag1.ReaderError, rosbag2.ReaderError) as error:
-        hint = "; run `rosbag reindex` on it" if "not indexed" in str(error) else "; record it again"
-        raise BadLog(f"{path}: this bag cannot be read ({error}){hint}") from None
+    bag = Bag(path)
     log = BagLog(path, "ros", (), zone="UTC", bag=bag)
     log.topics = _topics(log, bag)
     if not log.topics:
-        there = ", ".join(f"{c.topic} ({_short(c.msgtype)})" for c in bag.storage.connections[:12]) or "none"
+        there = ", ".join(f"{c.topic} ({_short(c.msgtype)})" for c in bag.connections[:12]) or "none"
         raise BadLog(
             f"{path}: the bag has no message of a type that is read ({', '.join(map(_short, KNOWN))}); its topics are "
             f"{there}"
@@ -153,7 +80,7 @@ def opened(path: Path, options: Options) -> Log:
 def _topics(log: Log, bag: Bag) -> list[Topic]:
     """The topics that are read, by name; what the bag holds besides is a fact."""
     by_name: dict[tuple[str, str], list[Any]] = {}
-    for connection in bag.storage.connections:
+    for connection in bag.connections:
         by_name.setdefault((f"/{connection.topic.strip('/')}", connection.msgtype), []).append(connection)
     topics: list[Topic] = []
     others: list[str] = []
