@@ -36,7 +36,7 @@ class Odd(Log):
         elif what == "fault":
             raise KeyError("of a library")
         elif what == "greedy":
-            np.ones(1 << 30)
+            np.ones(1 << 27)  # a gigabyte
         elif what == "print":
             os.write(1, b"what a library has to say\n")
         self.warnings.append("noticed")
@@ -137,3 +137,16 @@ def test_a_child_ends_with_its_parent(tmp_path):
     while Path(f"/proc/{child}").exists() and time.monotonic() < until:
         time.sleep(0.05)
     assert not Path(f"/proc/{child}").exists()
+
+
+def test_a_log_of_text_imports_nothing_that_other_formats_need(tmp_path):
+    import subprocess
+
+    (tmp_path / "log.csv").write_text("t,q\n0,1\n1,2\n")
+    code = (
+        "import sys; from pathlib import Path; from pipeline.logs import open_log\n"
+        f"log = open_log(Path({str(tmp_path / 'log.csv')!r})); list(log.blocks(['q']))\n"
+        "print(sorted({'h5py', 'rosbags', 'scipy.io', 'pyarrow.parquet', 'pyarrow.feather'} & set(sys.modules)))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=Path(__file__).parents[2])
+    assert done.stdout.strip() == "[]", done.stderr
