@@ -184,6 +184,18 @@ def test_types_that_the_bag_does_not_define_are_those_of_ros(tmp_path):
     assert_array_equal(column(open_log(database), "effort[1]")[0], before)
 
 
+@pytest.mark.parametrize("kind", KINDS)
+def test_signs_in_the_names_of_folders_and_files_mean_nothing(kind, tmp_path):
+    home = tmp_path / "day #2 50%"
+    home.mkdir()
+    bag = write(tmp_path / kind, states()).rename(home / "run #3%41")
+    assert len(column(open_log(bag), "effort[1]")[0]) == len(T)
+    if bag.is_dir():
+        [storage] = [file for file in bag.iterdir() if file.suffix != ".yaml"]
+        assert len(column(open_log(storage), "effort[1]")[0]) == len(T)
+
+
+@pytest.mark.medium
 def test_blocks_of_a_long_bag_are_bounded_and_whole(tmp_path):
     from pipeline.logs.log import Options
     from pipeline.logs.ros.bag import ROWS, opened

@@ -75,6 +75,18 @@ def test_channels_that_a_log_knows_by_a_number_and_a_name_are_the_same(bag):
     assert named.equals(pipeline.read(bag, "Recording"))
 
 
+def test_the_times_at_which_the_recorder_had_messages_are_the_alternative(bag):
+    states = (
+        joint_state(t, ["roll"], [q], [dq], [tau], topic="/arm/measured_js", stamped=i != 0)
+        for i, (t, q, dq, tau) in enumerate(zip(*COLUMNS.values(), strict=True))
+    )
+    write(bag / "late", states)
+    text = (bag / "study.toml").read_text().replace('"roll"', '"late"', 2)
+    (bag / "study.toml").write_text(text + 'time = "/arm/measured_js/received"\n')
+    call("ingest", bag)
+    np.testing.assert_allclose(pipeline.read(bag, "Recording")["t"], SIGNAL.t, rtol=0, atol=1e-9)
+
+
 @pytest.mark.parametrize(("dtype", "as_"), [("DBL", ">f8"), ("<float64", "<f8")])
 def test_raw_numbers_are_what_the_study_says(tmp_path, dtype, as_):
     names = {"time": "t", **{f"hand_roll.{symbol}": symbol for symbol in STATES}}

@@ -3,18 +3,35 @@
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
+from urllib.parse import quote
 
 from rosbags import rosbag1, rosbag2
 from rosbags.interfaces import MessageDefinitionFormat
+from rosbags.rosbag2.reader import DirectoryReader
+from rosbags.rosbag2.storage_mcap import McapReader
+from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
 from pipeline.errors import BadLog
 
-STORAGES = rosbag2.Reader.STORAGE_PLUGINS
 RULE = "=" * 80 + "\n"  # between definitions in IDL
+LITERAL = "/:"  # what of a path an address of SQLite may hold as it is
 PAGES = slice(28, 32)  # of a database's header: how many it has, and before that how large they are
 PAGE = slice(16, 18)
+
+
+class Database(Sqlite3Reader):  # type: ignore[misc]  # rosbags is not there for everybody who checks types
+    """A storage of SQLite, whose address rosbags makes of its path; `#` and `?` of a name would end it."""
+
+    def __init__(self, path: Path) -> None:
+        super().__init__(Path(quote(path.as_posix(), safe=LITERAL)))
+
+
+class Folder(DirectoryReader):  # type: ignore[misc]
+    """A bag in a folder."""
+
+    STORAGE_PLUGINS: ClassVar[dict[str, Any]] = {**DirectoryReader.STORAGE_PLUGINS, "sqlite3": Database}
 
 
 class Bag:
@@ -51,9 +68,11 @@ def _head(path: Path) -> bytes:
 
 
 def _storage(path: Path, head: bytes) -> Any:
+    if path.is_dir():
+        return Folder(path)
     if head.startswith(b"#ROSBAG"):
         return rosbag1.Reader(path)
-    return STORAGES["dir" if path.is_dir() else ".mcap" if head.startswith(b"\x89MCAP") else ".db3"](path)
+    return McapReader(path) if head.startswith(b"\x89MCAP") else Database(path)
 
 
 def _require_pages(path: Path) -> None:
