@@ -266,11 +266,15 @@ def test_verify_names_results_that_are_gone_or_odd(finished):
     file = reports(finished) / "results.json"
     results = json.loads(file.read_text())
     gone = results.pop()["key"]
-    odd = [{**results[0], "source": source} for source in ("processed/fits/a.parquet#mse", "raw/truth.toml#[1]", 3)]
-    file.write_text(json.dumps([*results, *odd, {}]))
+    odd = [{**results[0], "source": source} for source in ("processed/fits/a.parquet#mse", 3)]
+    file.write_text(json.dumps([*results, *odd, {}, {**results[0], "key": "fit.of.nothing"}]))
     said = flat(call("verify", finished, code=1))
     assert f"{gone} is gone" in said
-    assert said.count("cannot be followed to its source") == 4
+    assert f"{results[0]['key']} stands there 3 times" in said
+    assert said.count("says source 'processed/fits/a.parquet#mse', but its records give") == 1
+    assert said.count("says source 3, but") == 1
+    assert "None comes from no record" in said
+    assert "fit.of.nothing comes from no record" in said
 
 
 def test_verify_passes_over_files_that_are_no_entries(finished):

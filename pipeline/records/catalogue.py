@@ -10,6 +10,7 @@ from pipeline.records import AnyRecord, Record
 class Provenance:
     """Where a study's results come from: versions, and every file with its hash."""
 
+    name: str  # of the study
     version: str
     packages: dict[str, str]
     raw: dict[str, str]

@@ -9,14 +9,16 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from pipeline.errors import BadRecord, MissingRecord
+from pipeline.errors import BadRecord, BadRequest, MissingRecord, PipelineError
 from pipeline.records import AnyRecord, Column, Counts, Labels, Names, Origin, Record
 from pipeline.records.quantities import QUANTITIES
 
@@ -42,6 +44,7 @@ class Writer:
     def __init__(self, folder: Path, unit: Callable[[Record], Unit], made_from: dict[str, Any]) -> None:
         self.folder, self.unit, self.made_from = folder, unit, made_from
         self._open: dict[Path, pq.ParquetWriter] = {}
+        self._unnamed = unnamed()
         self._last: dict[Path, Record] = {}
 
     def __enter__(self) -> "Writer":
@@ -54,21 +57,29 @@ class Writer:
             target = self.folder / place
             target.parent.mkdir(parents=True, exist_ok=True)
             described = schema(type(record), self.unit(record))
-            self._open[place] = pq.ParquetWriter(_partial(target), described, **_encoding(described))
+            self._open[place] = pq.ParquetWriter(self._unnamed(target), described, **_encoding(described))
         self._open[place].write_table(_table(record, self._open[place].schema))
         self._last[place] = record
         return place
 
     def __exit__(self, failure: type[BaseException] | None, *_: object) -> None:
-        for place, file in self._open.items():
-            file.add_key_value_metadata(self._metadata(place))
-            file.close()
-        for place in self._open:
-            whole = self.folder / place
+        try:
             if failure is None:
-                _partial(whole).replace(whole)
-            else:
-                _partial(whole).unlink()
+                for place, file in self._open.items():
+                    file.add_key_value_metadata(self._metadata(place))
+                    file.close()
+                for place in self._open:
+                    self._unnamed(self.folder / place).replace(self.folder / place)
+        finally:
+            self._remove_partial()
+
+    def _remove_partial(self) -> None:
+        """Remove what has not got its name; on a disk that is full, a file cannot even be closed."""
+        for place, file in self._open.items():
+            with suppress(OSError):
+                file.close()
+            file.is_open = False  # or it would be closed again, aloud, when it is collected
+            self._unnamed(self.folder / place).unlink(missing_ok=True)
 
     def _metadata(self, place: Path) -> dict[str, str]:
         record = self._last[place]
@@ -123,11 +134,11 @@ def read(kind: type[AnyRecord], folder: Path, place: Path, sha256: str = "") -> 
         scalars = {name: _scalar(value) for name, value in json.loads(metadata["scalars"]).items()}
         columns = {name: table[name].to_numpy() for name in kind.columns()}
         record = kind(**columns, **scalars)
-    except (pa.ArrowException, KeyError, TypeError, ValueError, OSError) as error:
+        units = json.loads(metadata["units"]) | {f.name: f.metadata[b"unit"].decode() for f in table.schema}
+    except (pa.ArrowException, PipelineError, LookupError, TypeError, ValueError, OSError, MemoryError) as error:
         raise BadRecord(
             f"{whole}: not a {kind.__name__} as this version writes it ({error}); run with --force"
         ) from error
-    units = json.loads(metadata["units"]) | {f.name: f.metadata[b"unit"].decode() for f in table.schema}
     object.__setattr__(record, "origin", Origin(place.as_posix(), sha256 or digest(whole), units))
     return record
 
@@ -141,18 +152,37 @@ def digest(file: Path | str) -> str:
 def write_bytes(file: Path, content: bytes) -> None:
     """Write a file so that it is there whole or not at all."""
     file.parent.mkdir(parents=True, exist_ok=True)
-    _partial(file).write_bytes(content)
-    _partial(file).replace(file)
+    whole = unnamed()(file)
+    try:
+        whole.write_bytes(content)
+        whole.replace(file)
+    finally:
+        whole.unlink(missing_ok=True)
 
 
 def leftovers(folder: Path) -> Iterator[Path]:
-    """Files that an interrupted run left half written."""
-    for home, _, files in os.walk(folder):  # which takes a third of the time of rglob
+    """Files that an interrupted run left half written.
+
+    Raises
+    ------
+    BadRequest
+        If a folder in it is a link, which would have what is written there written elsewhere.
+    """
+    for home, folders, files in os.walk(folder):  # which takes a third of the time of rglob
+        for name in folders:
+            if os.path.islink(link := os.path.join(home, name)):
+                leads = os.readlink(link)
+                raise BadRequest(
+                    f"{link} is a link to {leads}, and what a run makes is not written through links: remove it, or "
+                    "put all results elsewhere with --processed and --reports"
+                )
         yield from (Path(home, file) for file in files if file.endswith(PARTIAL))
 
 
-def _partial(file: Path) -> Path:
-    return file.with_name(file.name + PARTIAL)
+def unnamed() -> Callable[[Path], Path]:
+    """What files are called while they are written: of two processes that write one file, neither has the other's."""
+    token = uuid4().hex[:12]
+    return lambda file: file.with_name(f"{file.name}.{token}{PARTIAL}")
 
 
 def _encoding(described: pa.Schema) -> dict[str, Any]:

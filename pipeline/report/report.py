@@ -1,10 +1,9 @@
 """Write the reports of a study: report and robot, each as HTML and PDF, results.json, and the answer as text."""
 
-import hashlib
-
 from pipeline.records.catalogue import Catalogue, Provenance
 from pipeline.report.content import Document, Section
 from pipeline.report.context import Context
+from pipeline.report.identity import MANIFEST, identity, manifest
 from pipeline.report.results import collect
 from pipeline.report.sections import DOCUMENTS, section_builder
 from pipeline.report.terminal import answer
@@ -16,14 +15,15 @@ def write(catalogue: Catalogue, study: Study, provenance: Provenance) -> dict[st
     """The files of the report, by name; what is shown and results.json come from the same numbers."""
     context = Context(catalogue, study, collect(catalogue), provenance)
     built = {name: (title, sections(context, names)) for name, (title, names) in DOCUMENTS.items()}
-    results = context.results.json()
-    edition = f"report ID {identity(provenance, results)} · davinci-forces {provenance.version}"
+    numbers = {"results.json": context.results.json(), "summary.txt": answer(context).encode()}
+    listed = manifest(provenance, numbers)
+    edition = f"report ID {identity(listed)} · davinci-forces {provenance.version}"
     documents = tuple(
         Document(title, study.title, study.simulated, content, edition, name, links_beside(name, built))
         for name, (title, content) in built.items()
         if content
     )
-    return render_all(documents) | {"results.json": results, "summary.txt": answer(context).encode()}
+    return render_all(documents) | numbers | {MANIFEST: listed}
 
 
 def links_beside(name: str, built: dict[str, tuple[str, tuple[Section, ...]]]) -> tuple[tuple[str, str], ...]:
@@ -35,10 +35,3 @@ def links_beside(name: str, built: dict[str, tuple[str, tuple[Section, ...]]]) -
 def sections(context: Context, names: tuple[str, ...]) -> tuple[Section, ...]:
     """The sections of a document that the study has something to say on."""
     return tuple(section for name in names if (section := section_builder(name)(context)) is not None)
-
-
-def identity(provenance: Provenance, results: bytes) -> str:
-    """128 bits of the sha256 of all that the report is made from: raw inputs, study file, records, results.json."""
-    files = {**provenance.raw, **provenance.processed, "results.json": hashlib.sha256(results).hexdigest()}
-    manifest = "\n".join(f"{sha} {name}" for name, sha in sorted(files.items()))
-    return hashlib.sha256(manifest.encode()).hexdigest()[:32]

@@ -77,10 +77,3 @@ def format_unit(unit: str) -> str:
     """A unit as it is printed: powers as superscripts, a root as a root, and nothing for a pure number."""
     text = re.sub(r"(\w+)\^0\.5", r"√\1", "" if unit == "1" else unit)
     return re.sub(r"\^(\d)", lambda match: "⁰¹²³⁴⁵⁶⁷⁸⁹"[int(match[1])], text)
-
-
-def parse_source(source: str) -> tuple[str, str, str]:
-    """The file, the field, and the row of a source: 'processed/fit/x.parquet#theta[inertia]'."""
-    file, _, place = source.partition("#")
-    field, _, row = place.partition("[")
-    return file, field, row.removesuffix("]")

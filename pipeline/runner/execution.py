@@ -1,5 +1,6 @@
 """Running one task: read its records, call its stage, write what it makes.  In this process or in another."""
 
+import errno
 import os
 import traceback
 from collections.abc import Iterator
@@ -15,7 +16,7 @@ from pipeline.logs.log import Log, Options
 from pipeline.logs.parts import open_parts
 from pipeline.records import KINDS, Diagnostic, Record, diagnostic, store
 from pipeline.robots.robot import Kind
-from pipeline.runner.ledger import Folders
+from pipeline.runner.ledger import Folders, file_name
 from pipeline.runner.places import Located, is_about_log
 from pipeline.runner.plan import Task
 from pipeline.runner.signature import declaration
@@ -52,12 +53,14 @@ def perform(folders: Folders, task: Task) -> Outcome:
         said = said_of(error)
         failed = without_folders(said, folders)
         with _writer(folders, task) as writer:
-            writer.write(diagnostic(task.stage, task.name.replace("/", "."), "error", failed))
+            writer.write(diagnostic(task.stage, file_name(task.name), "error", failed))
         return Outcome(task, _names(writer), failed, (f"error: {said}",))
 
 
 def said_of(error: Exception) -> str:
     """What went wrong in a task.  A fault of ours must not cost the other logs, so it is said like any other."""
+    if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
+        return f"{error}; what is about a log is stored under its name: give it a shorter one in study.toml"
     if isinstance(error, PipelineError | OSError):
         return str(error)
     # Where it happened is all that a report of it needs.

@@ -136,9 +136,15 @@ class Ledger:
         return altered + differences(entry.fingerprint, now)
 
 
+LONGEST = 200  # bytes of a file's name, which with all endings may have 255
+
+
 def file_name(task: str) -> str:
-    """The name of a task as that of a file."""
-    return task.replace("/", ".")
+    """The name of a task as that of a file; one that is too long ends in its hash."""
+    name = task.replace("/", ".")
+    if len(name.encode()) <= LONGEST:
+        return name
+    return f"{name.encode()[: LONGEST - 17].decode(errors='ignore')}~{hash_of_text(name)[:16]}"
 
 
 SEAL = ',\n "seal": "{}"\n}}\n'  # what an entry ends with

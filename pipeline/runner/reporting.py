@@ -38,16 +38,27 @@ def task(plan: Plan) -> Task:
 def perform(ledger: Ledger, task: Task) -> Outcome:
     """Write the report; what went wrong is its outcome."""
     try:
-        from pipeline.report.report import write
-
-        study, located = task.given["study"], task.records["records"]
-        files = write(catalogue(ledger, located), study, provenance(study, ledger, located))
+        files = written(ledger, task)
         for name, content in files.items():
             store.write_bytes(ledger.folders.reports / name, content)
         return Outcome(task, tuple(f"reports/{name}" for name in files))
     except Exception as error:
         said = said_of(error)
         return Outcome(task, (), without_folders(said, ledger.folders), (f"error: {said}",))
+
+
+def written(ledger: Ledger, task: Task) -> dict[str, bytes]:
+    """The files of the report, by name.
+
+    Raises
+    ------
+    BadRecord
+        If a record cannot be read.
+    """
+    from pipeline.report.report import write  # what it draws with takes longer to import than most runs take
+
+    study, located = task.given["study"], task.records["records"]
+    return write(catalogue(ledger, located), study, provenance(study, ledger, located))
 
 
 def catalogue(ledger: Ledger, located: tuple[Located, ...]) -> Catalogue:
@@ -71,7 +82,7 @@ def provenance(study: Study, ledger: Ledger, located: tuple[Located, ...]) -> Pr
     failures = {f"{e.stage} {e.task}": e.failed for e in ledger.entries() if e.failed and e.stage != REPORT}
     versions = {p: importlib.metadata.version(p) for p in PACKAGES}
     text = (study.folder / "study.toml").read_text(encoding="utf-8", errors="replace")
-    return Provenance(VERSION, versions, raw, processed, failures, text)
+    return Provenance(study.name, VERSION, versions, raw, processed, failures, text)
 
 
 def study_files(study: Study) -> tuple[str, ...]:

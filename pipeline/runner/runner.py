@@ -8,7 +8,7 @@ from functools import partial
 from multiprocessing import get_context
 from time import perf_counter
 
-from pipeline.errors import PipelineError
+from pipeline.errors import BadRequest, PipelineError
 from pipeline.records import KINDS, store
 from pipeline.report import REPORT
 from pipeline.runner import STEPS, reporting
@@ -42,6 +42,7 @@ class Runner:
         self.ran = 0
         self.seconds: dict[str, float] = {}  # that each step took
         self._pool: ProcessPoolExecutor | None = None
+        self.writable = True
 
     def run(self, names: Iterable[str]) -> bool:
         """Run these stages, and the report, in order; whether every task of theirs succeeded.
@@ -55,10 +56,11 @@ class Runner:
         # One pool for all stages: a process of its own takes seconds to import what the stages need.
         with ExitStack() as stack:
             self._stack = stack
-            stack.enter_context(locked(self.folders.processed))
-            for leftover in [*store.leftovers(self.folders.processed), *store.leftovers(self.folders.reports)]:
-                leftover.unlink()
-            self._remove_obsolete()
+            self.writable = stack.enter_context(locked(self.folders.processed))
+            if self.writable:
+                for leftover in [*store.leftovers(self.folders.processed), *store.leftovers(self.folders.reports)]:
+                    leftover.unlink()
+                self._remove_obsolete()
             for name in names:
                 start = perf_counter()
                 if name == REPORT:
@@ -123,6 +125,7 @@ class Runner:
 
     def _bring_up_to_date(self, name: str, tasks: list[Task], perform: Perform) -> None:
         """Perform what is not current of all the tasks there are, and forget those that are no more."""
+        self._require_writable(name, tasks)
         planned = {file_name(task.name) for task in tasks}
         for obsolete in [entry for entry in self.ledger.entries(name) if file_name(entry.task) not in planned]:
             self.ledger.remove(obsolete)
@@ -146,6 +149,17 @@ class Runner:
             self.console.progress(name, done, len(due))
         if current := len(tasks) - len(due) - copied:
             self.console.say(f"{name}: {current} of {len(tasks)} current")
+
+    def _require_writable(self, name: str, tasks: list[Task]) -> None:
+        """Refuse to begin what could not be kept."""
+        for task in tasks:
+            if not self.writable and (
+                reasons := self.ledger.reasons(self.ledger.entry(name, task.name), task.fingerprint)
+            ):
+                raise BadRequest(
+                    f"{self.folders.processed} cannot be written to, and {name} has to run: {_brief(reasons)}; allow "
+                    "writing, or name other folders with --processed and --reports"
+                )
 
     def _record(self, outcome: Outcome) -> None:
         """Remember what a task made, and remove what it made before and does no more."""

@@ -1,58 +1,75 @@
-"""Whether a study's files and numbers are still those that its results were made from."""
+"""Whether a study's files and numbers are those of a run on its logs, and its report the one that they give."""
 
 import json
-import tomllib
+from collections import Counter
 from collections.abc import Iterable, Iterator
-from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
 from typing import Any
 
 from pipeline.errors import NotReproduced, PipelineError
-from pipeline.records import KINDS, Record, store
-from pipeline.records.catalogue import Catalogue
-from pipeline.report.results import Results, cell, collect, parse_source
-from pipeline.runner.ledger import Folders, Ledger
+from pipeline.report import REPORT
+from pipeline.report.identity import MANIFEST, identity
+from pipeline.runner import STEPS, reporting
+from pipeline.runner.ledger import Folders, Ledger, file_name
+from pipeline.runner.plan import Plan, Task
+from pipeline.runner.signature import declaration
+from pipeline.study import Study
+
+MOST = 5  # files or tasks that are named of many that differ alike
 
 
 @dataclass(frozen=True)
 class Verified:
-    """How much was compared."""
+    """How much was compared, and what the report is called."""
 
     raw: int
     processed: int
     reports: int
     numbers: int
+    identity: str
 
 
-def verify(folders: Folders) -> Verified:
-    """Hash every file that the ledger names, and follow every number of results.json to its record.
+def verify(study: Study, folders: Folders, wanted: str = "") -> Verified:
+    """Hash every file that a run reads and makes, compare what was run with what there is to run, and make the report
+    anew; `wanted` is the report ID that it has to have, "" for any.
 
     Raises
     ------
     NotReproduced
-        With every file and number that is not what it was, one a line.
+        With everything that is not what it was, or what it would be, one a line.
     """
     ledger = Ledger(folders)
+    recorded = known_files(ledger)
+    problems = [f"{file} was altered: it is not as a stage wrote it" for file in ledger.broken()]
+    if not recorded and not problems:
+        raise NotReproduced(f"{folders.processed} holds no results; run `davinci-forces all {folders.raw}` first")
+    problems += [*altered_files(folders, ledger, recorded), *unknown_files(folders, recorded)]
+    problems += differences_from_plan(Plan(study, ledger))
+    made, numbers = {}, 0
+    try:
+        made = reporting.written(ledger, reporting.task(Plan(study, ledger)))
+        numbers = len(json.loads(made["results.json"]))
+    except PipelineError as error:
+        problems.append(f"the report cannot be made anew: {error}")
+    problems += [problem for name, content in made.items() for problem in altered_page(folders, name, content)]
+    is_called = identity(made[MANIFEST]) if made else ""
+    if wanted and is_called != wanted:
+        problems.append(
+            f"the report ID of these files is {is_called or 'unknown'}, not {wanted}: they are of another report"
+        )
+    if problems:
+        raise NotReproduced("\n".join(problems))
+    count = Counter(name.partition("/")[0] for name in recorded if ledger.digest(name))
+    return Verified(count["raw"], count["processed"], count["reports"], numbers, is_called)
+
+
+def known_files(ledger: Ledger) -> dict[str, dict[str, str]]:
+    """Every file that a task read or made, by the hashes that it had, each with the task that knew it so."""
     recorded: dict[str, dict[str, str]] = {}
     for entry in ledger.entries():
         for name, sha in (*entry.fingerprint["inputs"].items(), *entry.outputs.items()):
             recorded.setdefault(name, {}).setdefault(sha, f"{entry.stage} {entry.task}")
-    broken = [f"{file} was altered: it is not as a stage wrote it" for file in ledger.broken()]
-    if not recorded and not broken:
-        raise NotReproduced(f"{folders.processed} holds no results; run `davinci-forces all {folders.raw}` first")
-    problems = broken + list(altered_files(folders, ledger, recorded))
-    results, unreadable = read_results(folders)
-    problems += unreadable if results is None else [p for r in results for p in source_mismatches(folders, r)]
-    problems += unrecorded_files(folders, recorded)
-    if results is not None:
-        problems += record_mismatches(folders, results, collect(Catalogue(partial(records, folders, recorded))))
-    if problems:
-        raise NotReproduced("\n".join(problems))
-    present = [name for name in recorded if ledger.digest(name)]
-    count = {root: sum(name.startswith(f"{root}/") for name in present) for root in ("raw", "processed", "reports")}
-    return Verified(**count, numbers=len(results or []))
+    return recorded
 
 
 def altered_files(folders: Folders, ledger: Ledger, recorded: dict[str, dict[str, str]]) -> Iterator[str]:
@@ -71,86 +88,78 @@ def altered_files(folders: Folders, ledger: Ledger, recorded: dict[str, dict[str
                 yield f"{file} was altered: its SHA-256 is {now[:16]}..., and was {was[:16]}... for {task}"
 
 
-def unrecorded_files(folders: Folders, recorded: dict[str, dict[str, str]]) -> list[str]:
-    """Processed files that no stage made."""
-    files = (f for f in sorted(folders.processed.rglob("*.parquet")))
-    names = ((f, f"processed/{f.relative_to(folders.processed).as_posix()}") for f in files)
-    return [f"{file} was made by no stage of this study" for file, name in names if name not in recorded]
+def unknown_files(folders: Folders, recorded: Iterable[str]) -> Iterator[str]:
+    """Files among the results that no stage made, but for those that begin with a dot, as systems leave them."""
+    known = set(recorded)
+    for root, folder in (("processed", folders.processed), ("reports", folders.reports)):
+        for file in sorted(folder.rglob("*")):
+            place = file.relative_to(folder)
+            ours = f"{root}/{place.as_posix()}" in known or place.parts[0] == "tasks"
+            if not ours and not file.name.startswith(".") and not file.is_dir():
+                yield f"{file} was made by no stage of this study"
 
 
-def read_results(folders: Folders) -> tuple[list[dict[str, Any]] | None, list[str]]:
-    """The content of results.json, or what is wrong with it."""
-    file = folders.reports / "results.json"
+def differences_from_plan(plan: Plan) -> Iterator[str]:
+    """What a run would do again, and entries in the ledger of what it would not do."""
+    ledger = plan.ledger
+    for name in sorted({entry.stage for entry in ledger.entries()} - {*STEPS}):
+        yield f"{ledger.folders.processed / 'tasks' / name} holds entries of {name}, and there is no such stage"
+    for name in STEPS:
+        tasks = [reporting.task(plan)] if name == REPORT else list(plan.tasks(declaration(name)))
+        planned = {file_name(task.name) for task in tasks}
+        extra = [entry.task for entry in ledger.entries(name) if file_name(entry.task) not in planned]
+        if extra:
+            yield f"{name}: the ledger has entries of what this study has no call for: {_some(extra)}"
+        yield from stale(ledger, name, tasks)
+
+
+def stale(ledger: Ledger, name: str, tasks: Iterable[Task]) -> Iterator[str]:
+    """Tasks that did not run as they would now; files that were altered are said of the files."""
+    by_reason: dict[str, list[str]] = {}
+    for task in tasks:
+        entry = ledger.entry(name, task.name)
+        if entry is None:
+            by_reason.setdefault("it is not in the ledger, so it has not run, or its entry was removed", []).append(
+                task.name
+            )
+        elif not entry.failed:
+            changed = (r for r in ledger.reasons(entry, task.fingerprint) if not r.endswith("was altered"))
+            for reason in list(changed)[:2]:
+                by_reason.setdefault(reason, []).append(task.name)
+    for reason, names in by_reason.items():
+        yield f"{name}: {_some(names)}: {reason}"
+
+
+def altered_page(folders: Folders, name: str, content: bytes) -> Iterator[str]:
+    """Whether a file of the report is what these records and this version give; of results.json, which numbers."""
+    file = folders.reports / name
+    if not file.is_file():
+        yield f"{file} is gone"
+    elif file.read_bytes() != content:
+        numbers = list(altered_numbers(str(file), file.read_bytes(), content)) if name == "results.json" else []
+        yield from numbers or [f"{file} is not what its records give when it is made anew"]
+
+
+def altered_numbers(file: str, found: bytes, made: bytes) -> Iterator[str]:
+    """Results that are not those that the records give, are gone, or are of no record."""
+    expected: dict[str, dict[str, Any]] = {result["key"]: result for result in json.loads(made)}
     try:
-        results = json.loads(file.read_text(encoding="utf-8"))
-        return [dict(result) for result in results], []
-    except FileNotFoundError:
-        return None, [f"{file} is gone"]
+        results = [dict(result) for result in json.loads(found)]
     except (ValueError, TypeError) as error:
-        return None, [f"{file} cannot be read: {error}"]
-
-
-def records(folders: Folders, recorded: Iterable[str], kind: type[Record]) -> list[Record]:
-    """Every record of a kind that a stage made; one that cannot be read was altered, which is reported elsewhere."""
-    readable = []
-    for name in sorted(recorded):
-        if name.startswith(f"processed/{kind.folder()}/"):
-            with suppress(PipelineError):
-                readable.append(store.read(kind, folders.processed, Path(name).relative_to("processed")))
-    return readable
-
-
-def record_mismatches(folders: Folders, results: list[dict[str, Any]], collected: Results) -> Iterator[str]:
-    """Results whose standard error or unit is not what the records give, and results that are not there."""
-    keys = {str(result.get("key")) for result in results}
-    place = folders.reports / "results.json"
-    yield from (f"{place}: {key} is gone" for key in collected if key not in keys)
+        yield f"{file} cannot be read: {error}"
+        return
+    seen = Counter(str(result.get("key")) for result in results)
+    yield from (f"{file}: {key} is gone" for key in expected if key not in seen)
+    yield from (f"{file}: {key} stands there {count} times" for key, count in seen.items() if count > 1)
     for result in results:
         key = str(result.get("key"))
-        # A true parameter has the unit of its estimates, and no standard error.
-        group, _, parameter = key.removeprefix("truth.").rpartition(".")
-        estimates = [k for k in collected if k.startswith(f"fit.{group}.") and k.endswith(f".{parameter}")]
-        if key in collected:
-            std, unit = collected[key].std, collected[key].unit
-        elif key.startswith("truth.") and estimates:
-            std, unit = None, collected[estimates[0]].unit
-        else:
+        if key not in expected:
+            yield f"{file}: {key} comes from no record of this study"
             continue
-        for name, value in (("std", std), ("unit", unit)):
-            if result.get(name) != value:
-                yield f"{place}: {key}: says {name} {result.get(name)!r}, but its records give {value!r}"
+        for name, value in expected[key].items():
+            if name not in result or result[name] != value:
+                yield f"{file}: {key}: says {name} {result.get(name)!r}, but its records give {value!r}"
 
 
-def source_mismatches(folders: Folders, result: dict[str, Any]) -> Iterator[str]:
-    """What of a result is not what its source holds."""
-    name = f"{folders.reports / 'results.json'}: {result.get('key')}"
-    try:
-        if result["source"].startswith("raw/truth.toml#"):
-            yield from truth_mismatches(folders, result, name)
-            return
-        file, field, row = parse_source(result["source"])
-        place = Path(file).relative_to("processed")
-        record = store.read(KINDS[_kind(place)], folders.processed, place)
-        value, _ = cell(record, field, record.row_number(row) if row else None)
-        if result["value"] != value:
-            yield f"{name}: says {result['value']!r}, but {result['source']} holds {value!r}"
-        assert record.origin is not None
-        if result["sha256"] != record.origin.sha256:
-            yield f"{name}: {file} is not the file that it came from"
-    except (PipelineError, LookupError, AttributeError, TypeError, ValueError, OSError) as error:
-        yield f"{name}: cannot be followed to its source {result.get('source')!r}: {error}"
-
-
-def truth_mismatches(folders: Folders, result: dict[str, Any], name: str) -> Iterator[str]:
-    """What of a true value is not what truth.toml holds."""
-    value: Any = tomllib.loads((folders.raw / "truth.toml").read_text(encoding="utf-8"))
-    for step in json.loads(result["source"].partition("#")[2]):
-        value = value[step]
-    if result["value"] != value:
-        yield f"{name}: says {result['value']!r}, but {result['source']} holds {value!r}"
-    if result["sha256"] != store.digest(folders.raw / "truth.toml"):
-        yield f"{name}: truth.toml is not the file that it came from"
-
-
-def _kind(place: Path) -> str:
-    return {kind.folder(): name for name, kind in KINDS.items()}[place.parts[0]]
+def _some(names: list[str]) -> str:
+    return ", ".join(names[:MOST]) + (f" and {len(names) - MOST} more" if len(names) > MOST else "")

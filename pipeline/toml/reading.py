@@ -8,6 +8,8 @@ from pipeline.toml.file import TomlFile
 from pipeline.toml.lines import lines_of
 from pipeline.toml.table import TomlTable
 
+LARGEST = 4_000_000  # bytes: ten thousand logs with all their channels; what is larger was written by mistake
+
 
 def read(file: Path, kind: type[PipelineError], missing: str = "there is no such file") -> TomlTable:
     """The whole of a file.  What it says is checked by who asks the table for it.
@@ -18,6 +20,11 @@ def read(file: Path, kind: type[PipelineError], missing: str = "there is no such
         Of that kind, if the file cannot be read or is not TOML.
     """
     try:
+        if (size := file.stat().st_size) > LARGEST:
+            raise kind(
+                f"{file}: it has {size / 1e6:.1f} MB, and what people write down has at most {LARGEST / 1e6:.0f}: is "
+                "it a log? Of a study this large, make several"
+            )
         text = file.read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise kind(f"{file}: {missing}") from None

@@ -14,7 +14,7 @@ from pipeline.report.sections import DOCUMENTS, SECTIONS
 from tests.contracts.conftest import Lab
 
 SECTION = pytest.mark.parametrize("name", SECTIONS)
-PROVENANCE = Provenance("1", {"numpy": "2"}, {"raw/arm/roll.csv": "0" * 64}, {}, {"fit": "no joint moves"})
+PROVENANCE = Provenance("lab", "1", {"numpy": "2"}, {"raw/arm/roll.csv": "0" * 64}, {}, {"fit": "no joint moves"})
 
 
 def context(lab: Lab, catalogue: Catalogue) -> Context:

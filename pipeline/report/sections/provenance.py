@@ -20,10 +20,10 @@ def section(context: Context) -> Section:
     blocks: list[Block] = [
         Prose(
             f"Made by davinci-forces {provenance.version}. The report ID on page one is the first half of the SHA-256 "
-            "of the list of raw files, study file, processed files and results.json, each with its own; two reports of "
-            "one ID say the same. Every number of the tables is in `results.json` under a "
-            "key of its own, with the processed file and field that it stands in; `davinci-forces verify` follows "
-            "them back to the raw files."
+            "of `manifest.txt`, which lists raw files, study file, processed files and numbers, each with its own; two "
+            "reports of one ID say the same. `davinci-forces verify --id` shows whether files and pages are those of "
+            "an ID. Every number of the tables is in `results.json` under a key of its own, with the processed file "
+            "and field that it stands in."
         ),
         *listed(
             Table("Raw files, with the first 16 digits of their SHA-256.", ("File", "SHA-256"), raw, "raw-files", "ll")
