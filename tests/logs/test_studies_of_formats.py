@@ -75,6 +75,26 @@ def test_channels_that_a_log_knows_by_a_number_and_a_name_are_the_same(bag):
     assert named.equals(pipeline.read(bag, "Recording"))
 
 
+def test_topics_that_a_study_uses_together_are_put_on_the_clock_of_the_positions(bag):
+    """Efforts come 3 ms late, on a topic of their own; they are read beside the positions, by another child."""
+    messages = []
+    for t, q, dq, _ in zip(*COLUMNS.values(), strict=True):
+        messages.append(joint_state(t, ["roll"], [q], [dq], topic="/arm/measured_js"))
+        messages.append(joint_state(t + 0.003, ["roll"], [], [], [np.sin(t + 0.003)], topic="/arm/currents"))
+    write(bag / "both_mcap", messages)
+    text = (bag / "study.toml").read_text().replace('file = "roll"', 'file = "both_mcap"')
+    (bag / "study.toml").write_text(text.replace("/arm/measured_js/effort", "/arm/currents/effort"))
+    assert "error" not in call("ingest", bag)
+    recorded = pipeline.read(bag, "Recording")
+    begun = recorded["t"] + SIGNAL.t[-1] - recorded["t"].iloc[-1]  # times count from the first row that is kept
+    assert len(recorded) >= len(SIGNAL) - 2
+    # Slopes of parabolas are off by h^2/6 of a third derivative, of which a cubic takes 0.0962 h; at an end, where there
+    # is a chord, by h/2 of a second one, of which it takes 4/27 h.
+    off, h = np.abs(recorded["tau"] - np.sin(begun)).to_numpy(), 0.02
+    assert off[1:-1].max() < 0.0962 / 6 * h**3 * 1.1
+    assert off.max() < 4 / 27 / 2 * h**2 * 1.1
+
+
 def test_the_times_at_which_the_recorder_had_messages_are_the_alternative(bag):
     states = (
         joint_state(t, ["roll"], [q], [dq], [tau], topic="/arm/measured_js", stamped=i != 0)

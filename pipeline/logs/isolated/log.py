@@ -63,7 +63,8 @@ class IsolatedLog(Log):
     def _blocks(self, names: list[str]) -> Iterator[Block]:
         left = (self.request["size"] + BESIDE) * MOST_PACKED
         for message, columns in _answers(self.path, self.request | {"names": names}):
-            self.nulls, self.nans = message["nulls"], message["nans"]
+            self.nulls |= message["nulls"]
+            self.nans |= message["nans"]
             left -= sum(column.nbytes for column in columns)
             if left < 0:
                 raise BadLog(
@@ -71,8 +72,16 @@ class IsolatedLog(Log):
                 )
             if columns:
                 yield dict(zip(names, columns, strict=True))
-            for name, value in message.get("end", {}).items():
-                setattr(self, name, value)
+            if end := message.get("end"):
+                self._take(end)
+
+    def _take(self, end: Message) -> None:
+        """What the child noticed; channels of another clock may be read at the same time, by another child."""
+        self.warnings += [warning for warning in end["warnings"] if warning not in self.warnings]
+        self.comments += [comment for comment in end["comments"] if comment not in self.comments]
+        self.facts |= end["facts"]
+        self.dropped += end["dropped"]
+        self.cut |= end["cut"]
 
 
 def _request(path: Path, options: Options, reader: str) -> Message:
