@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from typer.testing import CliRunner
 
 import pipeline
+from pipeline.cli import app
 from pipeline.stages import STAGES
 from tests.conftest import ROOT
 from tests.logs.bag_writer import joint_state, write
@@ -69,6 +71,12 @@ def test_bags_of_a_study_s_recordings_give_its_results(tmp_path):
         states = zip(t, columns["q"], columns["dq"], columns["tau"], strict=True)
         write(bags / file, (joint_state(s, joints, *state, topic="/arm/measured_js") for s, *state in states))
     expected, got = results(original), results(bags)
+    # Of the stages that were not run, verify says so; of the folder that is a log, that it was altered.
+    metadata = bags / "two" / "metadata.yaml"
+    assert "metadata.yaml" not in CliRunner().invoke(app, ["verify", str(bags)]).output
+    metadata.write_text(metadata.read_text() + "\n")
+    assert "raw/two/metadata.yaml" in CliRunner().invoke(app, ["verify", str(bags)]).output
+    assert "two/metadata.yaml" in (tmp_path / "reports" / "bags" / "report.html").read_text()
     assert set(got) == set(expected)
     assert {key.partition(".")[0] for key in got} == {"fit", "predict", "ekf"}
     for key, value in expected.items():

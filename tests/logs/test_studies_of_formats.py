@@ -88,8 +88,8 @@ def test_topics_that_a_study_uses_together_are_put_on_the_clock_of_the_positions
     recorded = pipeline.read(bag, "Recording")
     begun = recorded["t"] + SIGNAL.t[-1] - recorded["t"].iloc[-1]  # times count from the first row that is kept
     assert len(recorded) >= len(SIGNAL) - 2
-    # Slopes of parabolas are off by h^2/6 of a third derivative, of which a cubic takes 0.0962 h; at an end, where there
-    # is a chord, by h/2 of a second one, of which it takes 4/27 h.
+    # Slopes of parabolas are off by h^2/6 of a third derivative, of which a cubic takes 0.0962 h; at an end, where it
+    # is that of a chord, by h/2 of a second one, of which it takes 4/27 h.
     off, h = np.abs(recorded["tau"] - np.sin(begun)).to_numpy(), 0.02
     assert off[1:-1].max() < 0.0962 / 6 * h**3 * 1.1
     assert off.max() < 4 / 27 / 2 * h**2 * 1.1
