@@ -32,7 +32,7 @@ def serve() -> None:
 
 def _answer(child: "Child", request: Message, answers: IO[bytes]) -> None:
     """Answer one request; whatever goes wrong in a library is an answer, too."""
-    _limit(request["memory"], request["seconds"])
+    _limit(request["memory"], request["cpu"])
     try:
         for message, columns in child.answers(request):
             send(answers, message, columns)

@@ -13,10 +13,13 @@ from pipeline.logs.isolated.wire import Message
 from pipeline.logs.log import Block, Channel, Clock, Log, Options
 from pipeline.maths.arrays import Array
 
-SECONDS = 60.0  # that a file may take without a block, and as many more for every so many bytes of it
-BYTES_PER_SECOND = 5e6
-MEMORY = 448 << 20  # [bytes] that a child may have, and so many times the size of the file
+SECONDS = 60.0  # that a file may take without a block, or of computing in all; and more for every so many bytes of it
+BYTES_PER_SECOND = 5e6  # without a block: an index may be long
+BYTES_PER_CPU_SECOND = 2e5  # in all: a tenth of what short messages of a bag take
+MEMORY = 448 << 20  # [bytes] that a child may have, and so many times the size of the file, but no more than most
 TIMES_ITS_SIZE = 4
+MOST_MEMORY = 4 << 30
+REMEDY = "it is damaged; record it again, or take it out of study.toml"
 MOST_PACKED = 2000  # times its size that the samples of a file may be; what packs best packs to a thousandth
 BESIDE = 1 << 16  # [bytes] so that small files of headers may hold a little
 
@@ -93,7 +96,8 @@ def _request(path: Path, options: Options, reader: str) -> Message:
         "names": None,
         "size": size,
         "seconds": SECONDS + size / BYTES_PER_SECOND,
-        "memory": MEMORY + TIMES_ITS_SIZE * size,
+        "cpu": SECONDS + size / BYTES_PER_CPU_SECOND,
+        "memory": min(MEMORY + TIMES_ITS_SIZE * size, MOST_MEMORY),
     }
 
 
@@ -102,6 +106,7 @@ def _size(path: Path) -> int:
 
 
 def _answers(path: Path, request: Message) -> Iterator[tuple[dict[str, Any], list[Array]]]:
+    problem = ""
     try:
         with child() as reading:
             for message, columns in reading.answers(request):
@@ -109,7 +114,6 @@ def _answers(path: Path, request: Message) -> Iterator[tuple[dict[str, Any], lis
                     # Read to its end, so that the child is kept; a generator that is closed would end it.
                     problem = _problem(path, request, message)
                     continue
-                problem = ""
                 yield message, columns
     except Ended as why:
         raise BadLog(f"{path}: reading it {why}, so it is not read: {REMEDY}") from None
@@ -117,15 +121,12 @@ def _answers(path: Path, request: Message) -> Iterator[tuple[dict[str, Any], lis
         raise BadLog(problem)
 
 
-REMEDY = "it is damaged; record it again, or take it out of study.toml"
-
-
 def _problem(path: Path, request: Message, message: Message) -> str:
     if message.get("memory"):
         most = request["memory"] >> 20
         return (
-            f"{path}: reading it takes more than {most} MB of memory; it is damaged, or holds much in one piece: "
-            + ("save it in another format that is read in pieces, as MATLAB's -v7.3")
+            f"{path}: reading it takes more than {most} MB of memory; it is damaged, or holds much in one piece: save "
+            "it in a format that is read in pieces, as MATLAB's -v7.3"
         )
     said = str(message["bad"]).replace(request["path"], str(path))
     return f"{path}: it cannot be read ({said}): {REMEDY}" if message.get("fault") else said

@@ -14,6 +14,7 @@ from pipeline.maths.arrays import Array
 
 KEPT = 2  # children that wait for a next log: starting one takes longer than reading a small file
 START = "import sys; sys.path[:] = {path!r}; from pipeline.logs.isolated.child import serve; serve()"
+OUT_OF_TIME = 24  # the signal SIGXCPU, which Windows does not know
 PACKAGES = Path(__file__).parents[3]
 # One thread each, and Arrow's memory from the system: what libraries reserve beforehand counts as used.
 SPARING = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "ARROW_DEFAULT_MEMORY_POOL": "system"}
@@ -54,7 +55,7 @@ class Child:
                 more = message.pop("more", False)
                 yield message, columns
         except (EOFError, OSError) as error:
-            raise Ended(self._why(request["seconds"])) from error
+            raise Ended(self._why(request)) from error
 
     @contextmanager
     def _within(self, seconds: float) -> Iterator[None]:
@@ -70,10 +71,12 @@ class Child:
         self.late = True
         self.process.kill()
 
-    def _why(self, seconds: float) -> str:
+    def _why(self, request: Message) -> str:
         code = self.process.wait()
-        if self.late or code == -24:  # SIGXCPU
-            return f"takes more than {seconds:.0f} s"
+        if self.late:
+            return f"takes more than {request['seconds']:.0f} s"
+        if code == -OUT_OF_TIME:
+            return f"takes more than {request['cpu']:.0f} s of computing"
         return f"ends the process that does so ({f'signal {-code}' if code < 0 else f'code {code}'})"
 
     def close(self) -> None:
