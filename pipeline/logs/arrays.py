@@ -13,6 +13,7 @@ from pipeline.maths.arrays import Array
 
 CELLS = 1 << 20  # of a block, at most
 MOST_COLUMNS = 256  # beyond which a matrix is no recording, but an image or a table of something else
+MOST_FACTS = 40  # that people want to read
 NUMBERS = "biuf"  # the kinds of dtypes
 
 
@@ -114,6 +115,9 @@ def take_in(log: ArrayLog, arrays: Sequence[Named]) -> None:
     for array in arrays:
         if not array.is_recording:
             log.facts[array.name] = _shown(array)
+    if len(log.facts) > MOST_FACTS:
+        more = len(log.facts) - MOST_FACTS
+        log.facts = dict(list(log.facts.items())[:MOST_FACTS]) | {"...": f"{more} more that are no recordings"}
     clocks = {array.time for array in recordings}
     columns = [(array, column) for array in recordings for column in range(array.columns)]
     called = unique([f"{a.name}[{column}]" if a.columns > 1 else a.name for a, column in columns])

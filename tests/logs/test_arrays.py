@@ -97,6 +97,12 @@ def test_complex_numbers_are_not_read_as_their_real_part():
     assert log.find("z").kind == "complex"
 
 
+def test_of_many_parameters_some_are_shown_and_the_others_counted():
+    log, _ = read(hdf5({"t": T, **{f"gain/{i}": float(i) for i in range(1000)}}), "log.h5")
+    assert log.facts["gain/0"] == "0.0"
+    assert log.facts["..."] == "960 more that are no recordings"
+
+
 def test_a_file_of_scalars_is_no_log():
     with pytest.raises(BadLog, match="it holds no variable of samples; it has gain"):
         read(matlab({"gain": 2.0}), "log.mat")
