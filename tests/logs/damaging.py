@@ -18,7 +18,7 @@ import numpy as np
 
 from pipeline.errors import BadLog
 from pipeline.logs import open_log
-from pipeline.logs.isolated.process import _close_all
+from pipeline.logs.isolated.process import close_all
 from pipeline.logs.log import Options
 from tests.contracts.test_formats import EXAMPLES
 from tests.logs import array_writers, bag_writer
@@ -125,7 +125,7 @@ def main(seed: int, count: int) -> None:
             except BaseException:
                 failures.append(f"{number} {example.name}/{file}: {traceback.format_exc()}")
             slowest = max(slowest, time.monotonic() - begun)
-    _close_all()  # so that they count
+    close_all()  # so that they count
     most = max(resource.getrusage(who).ru_maxrss for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN))
     said = {"failures": failures, "outcomes": outcomes, "slowest": slowest, "memory": most / 1024, "read": count}
     print(json.dumps(said))

@@ -121,6 +121,7 @@ def _taken() -> Child:
 
 
 @atexit.register
-def _close_all() -> None:
+def close_all() -> None:
+    """End the children that wait."""
     while _waiting:
         _waiting.pop().close()
