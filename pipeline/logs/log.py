@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from pipeline.errors import BadLog
 
 Block = dict[str, NDArray[np.float64]]  # channel name -> samples; every array of a block has one length
+COUNTED = "samples"  # unit of a channel of times that only counts them
 
 
 @dataclass(frozen=True)
@@ -149,7 +150,8 @@ class Log(ABC):
         """The names by the clock of their channels: its time channel, or "" for the log's own."""
         grouped: dict[str, list[str]] = {}
         for name in names:
-            grouped.setdefault(self._looked_up[name][1], []).append(name)
+            full = name if name in self._looked_up else self.find(name).name
+            grouped.setdefault(self._looked_up[full][1], []).append(name)
         return grouped
 
     @property
