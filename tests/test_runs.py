@@ -328,7 +328,7 @@ def test_a_push_is_found_in_the_contact_log(analysed):
 
 
 def test_verify_passes_what_was_made(analysed):
-    assert "are unchanged, and all" in call("verify", analysed)
+    assert "are unchanged, all" in call("verify", analysed)
 
 
 def flip(file: Path, at: int) -> None:

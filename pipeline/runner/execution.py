@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
+from time import perf_counter
 from typing import Any
 
 from pipeline.errors import BadLog, PipelineError
@@ -29,9 +30,10 @@ class Outcome:
     """What a task made, or why it could not, and its messages for the console."""
 
     task: Task
-    outputs: tuple[str, ...]
+    outputs: dict[str, str]  # file -> sha256
     failed: str = ""
     messages: tuple[str, ...] = ()
+    seconds: float = 0.0
 
 
 def perform(folders: Folders, task: Task) -> Outcome:
@@ -43,19 +45,20 @@ def perform(folders: Folders, task: Task) -> Outcome:
         If not even a diagnostic of what went wrong can be written.
     """
     messages: list[str] = []
+    start = perf_counter()
     try:
         run = import_module(f"pipeline.stages.{task.stage}").run
         with _writer(folders, task) as writer:
             for record in run(**arguments(folders, task)):
                 writer.write(record)
                 messages += _messages(record)
-        return Outcome(task, _names(writer), messages=tuple(messages))
+        return Outcome(task, _made(writer), messages=tuple(messages), seconds=perf_counter() - start)
     except Exception as error:
         said = said_of(error)
         failed = without_folders(said, folders)
         with _writer(folders, task) as writer:
             writer.write(diagnostic(task.stage, file_name(task.name), "error", failed))
-        return Outcome(task, _names(writer), failed, (f"error: {said}",))
+        return Outcome(task, _made(writer), failed, (f"error: {said}",), perf_counter() - start)
 
 
 def said_of(error: Exception) -> str:
@@ -116,8 +119,8 @@ def _writer(folders: Folders, task: Task) -> Iterator[store.Writer]:
         yield writer
 
 
-def _names(writer: store.Writer) -> tuple[str, ...]:
-    return tuple(f"processed/{place.as_posix()}" for place in writer.places)
+def _made(writer: store.Writer) -> dict[str, str]:
+    return {f"processed/{place.as_posix()}": store.digest(writer.folder / place) for place in writer.places}
 
 
 def _log(folders: Folders, entry: LogEntry) -> Log:

@@ -6,7 +6,7 @@ content of its outputs are what its entry says.  Comparing an old entry with a n
 
 import json
 import os
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -57,7 +57,7 @@ class Ledger:
     def __init__(self, folders: Folders) -> None:
         self.folders = folders
         self._digests: dict[str, str] = {}
-        self.changes = 0  # entries written or removed
+        self.changes: list[tuple[Iterable[str], Iterable[str]]] = []  # files that went and came, one pair an entry
 
     def place(self, stage: str, task: str) -> Path:
         """Where the entry of a task is."""
@@ -98,9 +98,10 @@ class Ledger:
 
     def write(self, entry: Entry) -> None:
         """Record what a task made."""
+        before = self.entry(entry.stage, entry.task)
         store.write_bytes(self.place(entry.stage, entry.task), sealed(entry).encode())
         self._entries.setdefault(entry.stage, {})[file_name(entry.task)] = entry
-        self.changes += 1
+        self.changes.append((before.outputs if before else (), entry.outputs))
 
     def broken(self) -> Iterator[Path]:
         """Entries that are not as they were written; other files there are no concern of ours."""
@@ -111,12 +112,16 @@ class Ledger:
     def remove(self, entry: Entry) -> None:
         """Forget a task, and remove what it made, with the folders that this leaves empty."""
         self._entries.get(entry.stage, {}).pop(file_name(entry.task), None)
-        self.changes += 1
+        self.changes.append((entry.outputs, ()))
         for file in (*map(self.folders.file, entry.outputs), self.place(entry.stage, entry.task)):
             file.unlink(missing_ok=True)
             with suppress(OSError):  # a folder that holds more stays
                 file.parent.rmdir()
                 file.parent.parent.rmdir()
+
+    def made(self, outputs: Mapping[str, str]) -> None:
+        """Take the hashes of files as whoever wrote them says."""
+        self._digests.update(outputs)
 
     def digest(self, name: str, fresh: bool = False) -> str:
         """The hash of a file, read once a run; "" when it is not there."""

@@ -1,6 +1,6 @@
 """Where the records of a study are: an index of their files by kind, and by the log and joint that they are about."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 
 from pipeline.records import KINDS, Record
 from pipeline.runner.ledger import Entry
@@ -18,46 +18,62 @@ class Places:
     def __init__(self, study: Study, entries: Iterable[Entry]) -> None:
         self._logs = {entry.name: i for i, entry in enumerate(study.logs)}
         self._joints = {joint.name: i for i, joint in enumerate(study.robot.joints)}
-        self._names: dict[str, list[str]] = {}
+        self._kinds = {kind.folder(): kind for kind in KINDS.values()}
+        self._names: dict[str, dict[str, dict[str, str]]] = {}  # by folder and log, with the joint
+        self._all: dict[str, dict[str, list[Located]]] = {}  # by kind and joint, what is about every log, in order
         for entry in entries:
-            for name in entry.outputs:
-                root, _, path = name.partition("/")
-                if root == "processed":
-                    self._names.setdefault(path.partition("/")[0], []).append(path)
-        self._indices: dict[tuple[str, bool, bool], dict[tuple[str, str], list[Located]]] = {}
-        self._ranked: dict[str, list[tuple[str, str, Located]]] = {}
+            self.add(entry.outputs)
+
+    def add(self, outputs: Iterable[str]) -> None:
+        """Know of files that a task made."""
+        for kind, path, log, joint in self._about(outputs):
+            self._names.setdefault(kind.folder(), {}).setdefault(log, {})[path] = joint
+
+    def remove(self, outputs: Iterable[str]) -> None:
+        """Know no more of files that a task made."""
+        for kind, path, log, _ in self._about(outputs):
+            self._names.get(kind.folder(), {}).get(log, {}).pop(path, None)
+
+    def _about(self, outputs: Iterable[str]) -> Iterator[tuple[type[Record], str, str, str]]:
+        """The records among a task's files that are about a log of the study, or about none.
+
+        What is kept of their kinds in order is no more.
+        """
+        for name in outputs:
+            root, _, path = name.partition("/")
+            kind = self._kinds.get(path.partition("/")[0]) if root == "processed" else None
+            if kind:
+                log, joint = about(kind, path)
+                if log == ANY or log in self._logs:
+                    self._all.pop(kind.__name__, None)
+                    yield kind, path, log, joint
 
     def of(self, kinds: Kinds, log: str = ANY, joint: str = ANY) -> tuple[Located, ...]:
         """Files of these kinds about a log and a joint; a kind that is about no log or joint is about every one."""
         located: tuple[Located, ...] = ()
         for kind in sorted(kinds, key=ORDER.__getitem__) if len(kinds) > 1 else kinds:
-            by_log, by_joint = bool(log) and is_about_log(kind), bool(joint) and is_about_joint(kind)
-            index = self._index(kind, by_log, by_joint)
-            located += tuple(index.get((log if by_log else ANY, joint if by_joint else ANY), ()))
+            of_joint = joint if is_about_joint(kind) else ANY
+            located += tuple(
+                self._sorted(kind, [log], of_joint) if log and is_about_log(kind) else self._of_all(kind, of_joint)
+            )
         return located
 
-    def _index(self, kind: type[Record], by_log: bool, by_joint: bool) -> dict[tuple[str, str], list[Located]]:
-        """All files of a kind, by the log and by the joint that they are about, or by either, or in one."""
-        which = (kind.__name__, by_log, by_joint)
-        if which not in self._indices:
-            index = self._indices[which] = {}
-            for log, joint, located in self._sorted(kind):
-                index.setdefault((log if by_log else ANY, joint if by_joint else ANY), []).append(located)
-        return self._indices[which]
+    def _of_all(self, kind: type[Record], joint: str) -> list[Located]:
+        """The files of a kind about a joint, of every log; many calls ask for them."""
+        by_joint = self._all.setdefault(kind.__name__, {})
+        if joint not in by_joint:
+            by_joint[joint] = self._sorted(kind, list(self._names.get(kind.folder(), ())), joint)
+        return by_joint[joint]
 
-    def _sorted(self, kind: type[Record]) -> list[tuple[str, str, Located]]:
-        """The files of a kind with what they are about, without those about a log that has left the study."""
-        if kind.__name__ not in self._ranked:
-            ranked = []
-            for name in self._names.get(kind.folder(), []):
-                log, joint = about(kind, name)
-                if log == ANY or log in self._logs:
-                    ranks = self._logs.get(log, len(self._logs)), self._joints.get(joint, len(self._joints))
-                    ranked.append((*ranks, name, log, joint))
-            self._ranked[kind.__name__] = [
-                (log, joint, (kind.__name__, name)) for *_, name, log, joint in sorted(ranked)
-            ]
-        return self._ranked[kind.__name__]
+    def _sorted(self, kind: type[Record], logs: Iterable[str], joint: str) -> list[Located]:
+        by_log = self._names.get(kind.folder(), {})
+        ranked = sorted(
+            (self._logs.get(log, -1), self._joints.get(of, len(self._joints)), path)
+            for log in logs
+            for path, of in by_log.get(log, {}).items()
+            if joint in (ANY, of)
+        )
+        return [(kind.__name__, path) for *_, path in ranked]
 
 
 def about(kind: type[Record], name: str) -> tuple[str, str]:

@@ -1,7 +1,7 @@
 """Which calls of a stage a study and its records give, and everything that each of them depends on."""
 
 import importlib.metadata
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -11,7 +11,7 @@ from pipeline.runner.canonical import hash_of
 from pipeline.runner.code import code
 from pipeline.runner.fingerprint import Fingerprint
 from pipeline.runner.ledger import Ledger
-from pipeline.runner.places import Located, Places, about
+from pipeline.runner.places import Located, Places, about, is_about_log
 from pipeline.runner.schemas import schemas
 from pipeline.runner.signature import Declaration
 from pipeline.study import Study
@@ -40,40 +40,44 @@ class Plan:
         self._entries = {entry.name: entry for entry in study.logs}
         self._joints = {joint.name: (joint.kind, joint.effort) for joint in study.robot.joints}
         self._hashes: dict[tuple[str, str], str] = {}
-        self._places: tuple[int, Places] | None = None  # and how often the ledger had changed
+        self._places = Places(study, ledger.entries())
+        self._seen = len(ledger.changes)
 
     def places(self) -> Places:
         """Where the records are that there are now."""
-        if self._places is None or self._places[0] != self.ledger.changes:
-            self._places = self.ledger.changes, Places(self.study, self.ledger.entries())
-        return self._places[1]
+        for gone, come in self.ledger.changes[self._seen :]:
+            self._places.remove(gone)
+            self._places.add(come)
+        self._seen = len(self.ledger.changes)
+        return self._places
 
-    def tasks(self, asks: Declaration) -> Iterator[Task]:
-        """Every call of a stage that the study and the records that are there give."""
+    def tasks(self, asks: Declaration, log: str = "") -> Iterator[Task]:
+        """Every call of a stage that the study and the records that are there give, or those about one log."""
         if "weighings" in asks.given.values() and not self.study.weighings.each:
             return
         places = self.places()
+        logs = (log,) if log else tuple(self._entries)
         if asks.each:
-            yield from self._each_record(asks, places)
+            yield from self._each_record(asks, places, log)
         elif asks.per_log:
-            yield from self._each_log(asks, places)
+            yield from self._each_log(asks, places, logs)
         elif "log" in asks.given.values():
-            yield from (self._task(asks, name, {}, name) for name in self._entries)
+            yield from (self._task(asks, name, {}, name) for name in logs)
         else:
             records = {p: places.of(kinds) for p, kinds in asks.every.items()}
             if any(records.values()) or not asks.reads:
                 yield self._task(asks, asks.name, records)
 
-    def _each_record(self, asks: Declaration, places: Places) -> Iterator[Task]:
+    def _each_record(self, asks: Declaration, places: Places, of_log: str) -> Iterator[Task]:
         [(parameter, kinds)] = asks.each.items()
-        for kind, place in places.of(kinds):
+        for kind, place in places.of(kinds, of_log):
             log, joint = about(KINDS[kind], place)
             others = {p: places.of(k, log, joint) for p, k in (asks.optional | asks.every).items()}
             name = _task_name(kind, place, len(kinds))
             yield self._task(asks, name, {parameter: ((kind, place),), **others}, log, joint)
 
-    def _each_log(self, asks: Declaration, places: Places) -> Iterator[Task]:
-        for log in self._entries:
+    def _each_log(self, asks: Declaration, places: Places, logs: Iterable[str]) -> Iterator[Task]:
+        for log in logs:
             own = {p: places.of(kinds, log) for p, kinds in asks.per_log.items()}
             if any(own.values()):
                 others = {p: places.of(kinds, log) for p, kinds in asks.every.items()}
@@ -119,6 +123,15 @@ def code_of(asks: Declaration) -> dict[str, str]:
     """The code that is at work in a stage, by hash."""
     opens = ("pipeline.logs",) if "log" in asks.given.values() else ()  # imported by none
     return code(f"pipeline.stages.{asks.name}", *RECORDS, *opens, without="pipeline.records")
+
+
+def log_of(asks: Declaration, task: str) -> str:
+    """The log that a call of a stage is about, told by its name; "" for one that is about no single log."""
+    if asks.each:
+        [kinds] = asks.each.values()
+        names = task.split("/")[len(kinds) > 1 :]
+        return names[0] if all(map(is_about_log, kinds)) else ""
+    return task if asks.per_log or "log" in asks.given.values() else ""
 
 
 def _task_name(kind: str, place: str, kinds: int) -> str:

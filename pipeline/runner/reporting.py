@@ -1,8 +1,10 @@
 """The last reader of a run: the report, of every record that there is."""
 
+import hashlib
 import importlib.metadata
 from dataclasses import asdict, replace
 from pathlib import Path
+from time import perf_counter
 
 from pipeline.records import KINDS, Record, store
 from pipeline.records.catalogue import Catalogue, Provenance
@@ -37,14 +39,16 @@ def task(plan: Plan) -> Task:
 
 def perform(ledger: Ledger, task: Task) -> Outcome:
     """Write the report; what went wrong is its outcome."""
+    start = perf_counter()
     try:
         files = written(ledger, task)
         for name, content in files.items():
             store.write_bytes(ledger.folders.reports / name, content)
-        return Outcome(task, tuple(f"reports/{name}" for name in files))
+        made = {f"reports/{name}": hashlib.sha256(content).hexdigest() for name, content in files.items()}
+        return Outcome(task, made, seconds=perf_counter() - start)
     except Exception as error:
         said = said_of(error)
-        return Outcome(task, (), without_folders(said, ledger.folders), (f"error: {said}",))
+        return Outcome(task, {}, without_folders(said, ledger.folders), (f"error: {said}",))
 
 
 def written(ledger: Ledger, task: Task) -> dict[str, bytes]:

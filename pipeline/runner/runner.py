@@ -1,12 +1,10 @@
-"""Runs stages on a study: what is current is skipped, and the rest is spread over processes."""
+"""Runs stages on a study: what is current is skipped, and each other task runs as soon as what it reads is there."""
 
-from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import Future, ProcessPoolExecutor, as_completed
-from contextlib import ExitStack
-from dataclasses import asdict, dataclass
-from functools import partial
-from multiprocessing import get_context
-from time import perf_counter
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import Executor
+from contextlib import closing
+from dataclasses import asdict, dataclass, field
+from functools import cached_property, partial
 
 from pipeline.errors import BadRequest, PipelineError
 from pipeline.records import KINDS, store
@@ -14,38 +12,51 @@ from pipeline.report import REPORT
 from pipeline.runner import STEPS, reporting
 from pipeline.runner.console import Console
 from pipeline.runner.execution import Outcome, perform
+from pipeline.runner.graph import WHOLE, Graph, Part, goes_by_log
 from pipeline.runner.ledger import Entry, Folders, Ledger, file_name
 from pipeline.runner.lock import locked
-from pipeline.runner.plan import Plan, Task
+from pipeline.runner.plan import Plan, Task, log_of
 from pipeline.runner.reuse import reused
 from pipeline.runner.signature import Declaration, declaration
+from pipeline.runner.workers import Crew
 from pipeline.stages import STAGES
 from pipeline.study import Study
 
-Perform = Callable[[Task], Outcome]
+
+@dataclass
+class Progress:
+    """How far a stage is."""
+
+    awaited: int = 0  # parts that are not planned yet
+    tasks: int = 0
+    current: int = 0
+    reasons: dict[str, list[str]] = field(default_factory=dict)  # tasks by why they run, until that is said
 
 
 @dataclass
 class Runner:
-    """Runs stages of one study."""
+    """Runs stages of one study; `workers` starts what tasks are handed to, and without it they run in this process."""
 
     study: Study
     folders: Folders
     console: Console
     force: bool = False
-    jobs: int = 1
+    workers: Callable[[], Executor] | None = None
 
     def __post_init__(self) -> None:
         self.ledger = Ledger(self.folders)
-        self.plan = Plan(self.study, self.ledger)
         self.failures = 0
         self.ran = 0
-        self.seconds: dict[str, float] = {}  # that each step took
-        self._pool: ProcessPoolExecutor | None = None
+        self.seconds: dict[str, float] = {}  # that the tasks of each step took together
         self.writable = True
 
+    @cached_property
+    def plan(self) -> Plan:
+        """What there is to do, read once the study is locked."""
+        return Plan(self.study, self.ledger)
+
     def run(self, names: Iterable[str]) -> bool:
-        """Run these stages, and the report, in order; whether every task of theirs succeeded.
+        """Run these stages, and the report; whether every task succeeded.
 
         Raises
         ------
@@ -53,21 +64,14 @@ class Runner:
             If another run is working on the study, or a stage has nothing to work on.
         """
         names = list(names)
-        # One pool for all stages: a process of its own takes seconds to import what the stages need.
-        with ExitStack() as stack:
-            self._stack = stack
-            self.writable = stack.enter_context(locked(self.folders.processed))
+        self.seconds = dict.fromkeys(names, 0.0)
+        with locked(self.folders.processed) as self.writable, closing(Crew(self.workers)) as self._crew:
             if self.writable:
-                for leftover in [*store.leftovers(self.folders.processed), *store.leftovers(self.folders.reports)]:
-                    leftover.unlink()
-                self._remove_obsolete()
-            for name in names:
-                start = perf_counter()
-                if name == REPORT:
-                    self._bring_up_to_date(name, [reporting.task(self.plan)], partial(reporting.perform, self.ledger))
-                else:
-                    self._stage(name, alone=len(names) == 1)
-                self.seconds[name] = perf_counter() - start
+                self._remove_leftovers()
+                self._remove_obsolete(names)
+            self._run(Graph(names, [entry.name for entry in self.study.logs]), alone=len(names) == 1)
+            if self._crew.breaks:
+                self._remove_leftovers()
         return self.failures == 0
 
     def preview(self, names: Iterable[str]) -> Iterator[str]:
@@ -87,12 +91,19 @@ class Runner:
                 yield f"{name}: {len(tasks) - due} of {len(tasks)} current"
             before += [name] if by_reason else []
 
-    def _remove_obsolete(self) -> None:
-        """Remove what an earlier version made under the names of stages and records that there are no more."""
+    def _remove_leftovers(self) -> None:
+        """Remove what an interrupted run, or a process that was ended, left half written."""
+        for leftover in [*store.leftovers(self.folders.processed), *store.leftovers(self.folders.reports)]:
+            leftover.unlink(missing_ok=True)
+
+    def _remove_obsolete(self, names: Sequence[str]) -> None:
+        """Remove what an earlier version made under the names of stages and records that there are no more, and what
+        these stages made of logs that have left the study.
+        """
         folders = {kind.folder() for kind in KINDS.values()}
         obsolete = [
             entry
-            for entry in list(self.ledger.entries())
+            for entry in self.ledger.entries()
             if entry.stage not in STEPS or not {_folder(name) for name in entry.outputs} - {""} <= folders
         ]
         for entry in obsolete:
@@ -101,16 +112,103 @@ class Runner:
             stages = ", ".join(dict.fromkeys(entry.stage for entry in obsolete))
             files = sum(len(entry.outputs) for entry in obsolete)
             self.console.say(f"removed {files} files of {stages} under names that an earlier version used")
+        logs = {entry.name for entry in self.study.logs} | {WHOLE}
+        for entry in list(self.ledger.entries()):
+            if entry.stage in names and _part(entry).log not in logs:
+                self.ledger.remove(entry)
 
-    def _stage(self, name: str, alone: bool) -> None:
-        asks = declaration(name)
-        tasks = list(self.plan.tasks(asks))
-        if not tasks and alone:
-            if awaited := self._awaits(asks):
-                kinds = " or ".join(k.__name__ for k in asks.reads)
-                raise PipelineError(f"{name} has nothing to work on: there are no {kinds} records; run {awaited} first")
-            self.console.say(f"{name}: the study holds nothing for it")
-        self._bring_up_to_date(name, tasks, partial(perform, self.folders))
+    def _run(self, graph: Graph, alone: bool) -> None:
+        """Plan what may begin, run it, and let begin what waited for it, until nothing is left."""
+        self._alone = alone
+        self._before: dict[Part, list[Entry]] = {}
+        for entry in self.ledger.entries():
+            self._before.setdefault(_part(entry), []).append(entry)
+        self._progress = {part.stage: Progress() for part in graph.parts}
+        for part in graph.parts:
+            self._progress[part.stage].awaited += _plans(part)
+        self._due: dict[Part, int] = {}  # tasks that are not done
+        while True:
+            for batch in iter(graph.next, []):
+                self._begin(graph, batch)
+            if self._crew.idle:
+                return
+            for outcome in self._crew.outcomes():
+                self._record(outcome)
+                self._done(graph, _part(outcome.task))
+
+    def _begin(self, graph: Graph, batch: Sequence[Part]) -> None:
+        """Plan parts of a stage, and take on what of them is not current."""
+        name = batch[0].stage
+        due = {part: self._plan_part(part) if _plans(part) else [] for part in batch}
+        progress = self._progress[name]
+        if not progress.awaited:  # all that it does is known
+            for reason, named in progress.reasons.items():
+                self.console.say(f"{_listed(name, named)}: {reason}")
+            progress.reasons.clear()
+        how = partial(reporting.perform, self.ledger) if name == REPORT else partial(perform, self.folders)
+        for part, tasks in due.items():
+            self._due[part] = len(tasks) + 1
+            for task in tasks:
+                self._crew.submit(how, task)
+            self._done(graph, part)
+
+    def _done(self, graph: Graph, part: Part) -> None:
+        """Count what of a part is done; with the last of it, let begin what waited for it."""
+        self._due[part] -= 1
+        if not self._due[part]:
+            graph.done(part)
+            if part.log == WHOLE:
+                self._conclude(part.stage)
+
+    def _conclude(self, name: str) -> None:
+        """Say what there was nothing to do for."""
+        progress = self._progress[name]
+        if progress.current:
+            self.console.say(f"{name}: {progress.current} of {progress.tasks} current")
+        if progress.tasks:
+            return
+        if self._alone and (awaited := self._awaits(declaration(name))):
+            kinds = " or ".join(k.__name__ for k in declaration(name).reads)
+            raise PipelineError(f"{name} has nothing to work on: there are no {kinds} records; run {awaited} first")
+        self.console.say(f"{name}: the study holds nothing for it")
+
+    def _plan_part(self, part: Part) -> list[Task]:
+        """The tasks of a part that have to run; what was made by those that are no more is removed."""
+        name, progress = part.stage, self._progress[part.stage]
+        asks = None if name == REPORT else declaration(name)
+        tasks = list(self.plan.tasks(asks, part.log)) if asks else [reporting.task(self.plan)]
+        planned = {file_name(task.name) for task in tasks}
+        for entry in self._before.get(part, ()):
+            if file_name(entry.task) not in planned:
+                self.ledger.remove(entry)
+        due: list[Task] = []
+        for task in tasks:
+            reasons = self._reasons(task)
+            if reasons and not self.force and (other := reused(self.ledger, task)):
+                self.console.say(f"{name}: copied from {other}, which has the same robot and settings")
+                self.ran += 1
+            elif reasons:
+                due.append(task)
+                progress.reasons.setdefault(_brief(reasons), []).append(task.name)
+            else:
+                progress.current += 1
+        progress.awaited -= 1
+        progress.tasks += len(tasks)
+        return due
+
+    def _reasons(self, task: Task) -> list[str]:
+        """Why a task has to run; nothing when it is current."""
+        reasons = (
+            ["--force"]
+            if self.force
+            else self.ledger.reasons(self.ledger.entry(task.stage, task.name), task.fingerprint)
+        )
+        if reasons and not self.writable:
+            raise BadRequest(
+                f"{self.folders.processed} cannot be written to, and {task.stage} has to run: {_brief(reasons)}; allow "
+                "writing, or name other folders with --processed and --reports"
+            )
+        return reasons
 
     def _awaits(self, asks: Declaration) -> str:
         """The first stage that has not been run and that this one needs, by way of others or itself; "" for none."""
@@ -123,66 +221,31 @@ class Runner:
                     return name
         return ""
 
-    def _bring_up_to_date(self, name: str, tasks: list[Task], perform: Perform) -> None:
-        """Perform what is not current of all the tasks there are, and forget those that are no more."""
-        self._require_writable(name, tasks)
-        planned = {file_name(task.name) for task in tasks}
-        for obsolete in [entry for entry in self.ledger.entries(name) if file_name(entry.task) not in planned]:
-            self.ledger.remove(obsolete)
-        due: list[Task] = []
-        tasks_by_reason: dict[str, list[str]] = {}
-        copied = 0
-        for task in tasks:
-            entry = self.ledger.entry(name, task.name)
-            reasons = ["--force"] if self.force else self.ledger.reasons(entry, task.fingerprint)
-            if reasons and not self.force and (other := reused(self.ledger, task)):
-                self.console.say(f"{name}: copied from {other}, which has the same robot and settings")
-                self.ran += 1
-                copied += 1
-            elif reasons:
-                due.append(task)
-                tasks_by_reason.setdefault(_brief(reasons), []).append(task.name)
-        for reason, names in tasks_by_reason.items():
-            self.console.say(f"{_listed(name, names)}: {reason}")
-        for done, outcome in enumerate(self._outcomes(due, perform), start=1):
-            self._record(outcome)
-            self.console.progress(name, done, len(due))
-        if current := len(tasks) - len(due) - copied:
-            self.console.say(f"{name}: {current} of {len(tasks)} current")
-
-    def _require_writable(self, name: str, tasks: list[Task]) -> None:
-        """Refuse to begin what could not be kept."""
-        for task in tasks:
-            if not self.writable and (
-                reasons := self.ledger.reasons(self.ledger.entry(name, task.name), task.fingerprint)
-            ):
-                raise BadRequest(
-                    f"{self.folders.processed} cannot be written to, and {name} has to run: {_brief(reasons)}; allow "
-                    "writing, or name other folders with --processed and --reports"
-                )
-
     def _record(self, outcome: Outcome) -> None:
         """Remember what a task made, and remove what it made before and does no more."""
         task = outcome.task
         before = self.ledger.entry(task.stage, task.name)
         for stale in set(before.outputs if before else ()) - set(outcome.outputs):
             self.folders.file(stale).unlink(missing_ok=True)
-        hashes = {made: self.ledger.digest(made, fresh=True) for made in outcome.outputs}
-        self.ledger.write(Entry(task.stage, task.name, asdict(task.fingerprint), hashes, outcome.failed))
+        self.ledger.made(outcome.outputs)
+        self.ledger.write(Entry(task.stage, task.name, asdict(task.fingerprint), outcome.outputs, outcome.failed))
         self.ran += 1
         self.failures += bool(outcome.failed)
+        self.seconds[task.stage] += outcome.seconds
         for line in outcome.messages:
             self.console.warn(f"{task.stage}: {line}")
+        self.console.progress(task.stage, *self._crew.counts)
 
-    def _outcomes(self, due: list[Task], perform: Perform) -> Iterator[Outcome]:
-        if self.jobs == 1 or len(due) == 1:
-            yield from map(perform, due)
-            return
-        if self._pool is None:
-            self._pool = self._stack.enter_context(ProcessPoolExecutor(self.jobs, mp_context=get_context("spawn")))
-        futures: list[Future[Outcome]] = [self._pool.submit(perform, task) for task in due]
-        for future in as_completed(futures):
-            yield future.result()
+
+def _plans(part: Part) -> bool:
+    """Whether a part has tasks: the whole of a stage that goes log by log is only when all of them are done."""
+    return part.log != WHOLE or part.stage == REPORT or not goes_by_log(declaration(part.stage))
+
+
+def _part(task: Task | Entry) -> Part:
+    """The part of its stage that a task belongs to; an entry of one, too."""
+    name = task.task if isinstance(task, Entry) else task.name
+    return Part(task.stage, WHOLE if task.stage == REPORT else log_of(declaration(task.stage), name))
 
 
 def _folder(name: str) -> str:

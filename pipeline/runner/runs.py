@@ -1,9 +1,9 @@
 """Runs of the stages on studies: where their folders are, which of them can run, and how a run speaks."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 from glob import glob
 from pathlib import Path
-from time import perf_counter
 
 import typer
 
@@ -12,8 +12,8 @@ from pipeline.report import REPORT
 from pipeline.runner.console import Verbosity, console, durations, printable
 from pipeline.runner.execution import Outcome
 from pipeline.runner.ledger import Folders
-from pipeline.runner.plan import Task
-from pipeline.runner.runner import Perform, Runner
+from pipeline.runner.runner import Runner
+from pipeline.runner.workers import pool
 from pipeline.study import Study, reading
 
 
@@ -114,7 +114,8 @@ def run(
     study = load(folder)
     speaks = console(verbosity)
     kind = Narrator if verbosity == "verbose" else Runner
-    runner = kind(study, folders(folder, processed, reports), speaks, force, jobs)
+    workers = partial(pool, jobs) if jobs > 1 else None
+    runner = kind(study, folders(folder, processed, reports), speaks, force, workers)
     speaks.say(typer.style(f"{folder}: {study.title}{' (SIMULATED)' if study.simulated else ''}", bold=True))
     if dry_run:
         for line in runner.preview(names):
@@ -144,14 +145,8 @@ def conclude(runner: Runner, folder: Path) -> None:
 
 
 class Narrator(Runner):
-    """A runner that says of every task, too, when it is done: how long it took, or how far its stage then was."""
+    """A runner that says of every task, too, when it is done, and how long it took."""
 
-    def _outcomes(self, due: list[Task], perform: Perform) -> Iterator[Outcome]:
-        together = self.jobs > 1 and len(due) > 1
-        start = perf_counter()
-        for outcome in super()._outcomes(due, perform):
-            seconds = perf_counter() - start
-            when = f"done {seconds:.2f} s into the stage" if together else f"took {seconds:.2f} s"
-            self.console.say(f"{outcome.task.stage}: {outcome.task.name}: {when}")
-            yield outcome
-            start = start if together else perf_counter()
+    def _record(self, outcome: Outcome) -> None:
+        self.console.say(f"{outcome.task.stage}: {outcome.task.name}: took {outcome.seconds:.2f} s")
+        super()._record(outcome)

@@ -1,0 +1,181 @@
+"""Tasks in other processes: all are done, whoever is killed, and nobody is left behind."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import BrokenExecutor
+from contextlib import closing
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from pipeline.runner import workers
+from pipeline.runner.execution import Outcome
+from pipeline.runner.fingerprint import Fingerprint
+from pipeline.runner.graph import WHOLE, Graph, Part
+from pipeline.runner.plan import Task
+from pipeline.runner.workers import Crew, pool
+from pipeline.stages import STAGES
+
+pytestmark = pytest.mark.medium
+
+
+def task(name: str) -> Task:
+    return Task("ingest", name, Fingerprint({}, {}, {}, {}, {}, "1"))
+
+
+def tell_process(each: Task) -> Outcome:
+    return Outcome(each, {"pid": str(os.getpid())})
+
+
+def die_once(mark: Path, each: Task) -> Outcome:
+    """The second task kills the process that it is in, the first time."""
+    if each.name == "2" and not mark.exists():
+        mark.touch()
+        os.kill(os.getpid(), signal.SIGKILL)
+    return Outcome(each, {})
+
+
+def die(each: Task) -> Outcome:
+    os.kill(os.getpid(), signal.SIGKILL)
+    raise AssertionError
+
+
+def outcomes(crew: Crew) -> list[Outcome]:
+    done = []
+    while not crew.idle:
+        done += crew.outcomes()
+    return done
+
+
+@pytest.fixture
+def at_once(monkeypatch):
+    """Others are started for the first task."""
+    monkeypatch.setattr(workers, "ALONE", -1.0)
+
+
+def test_tasks_run_here_while_there_is_little_to_do():
+    with closing(Crew(partial(pool, 2))) as crew:
+        for i in range(20):
+            crew.submit(tell_process, task(str(i)))
+        assert {o.outputs["pid"] for o in outcomes(crew)} == {str(os.getpid())}
+        assert crew.counts == (20, 20)
+
+
+def test_tasks_run_elsewhere_where_there_is_much(at_once):
+    with closing(Crew(partial(pool, 2))) as crew:
+        for i in range(20):
+            crew.submit(tell_process, task(str(i)))
+        done = outcomes(crew)
+        assert {o.task.name for o in done} == {str(i) for i in range(20)}
+        assert str(os.getpid()) not in {o.outputs["pid"] for o in done}
+
+
+def test_a_worker_that_is_killed_is_replaced_and_its_task_runs_again(at_once, tmp_path):
+    with closing(Crew(partial(pool, 2))) as crew:
+        for i in range(12):
+            crew.submit(partial(die_once, tmp_path / "mark"), task(str(i)))
+        assert sorted(int(o.task.name) for o in outcomes(crew)) == list(range(12))
+        assert crew.breaks == 1
+
+
+def test_a_task_that_ends_every_worker_ends_the_run(at_once):
+    with closing(Crew(partial(pool, 2))) as crew:
+        for i in range(2):
+            crew.submit(die, task(str(i)))
+        with pytest.raises(BrokenExecutor):
+            outcomes(crew)
+
+
+LEFT = """
+import sys
+from functools import partial
+from pathlib import Path
+sys.path[:0] = [{root!r}]
+from pipeline.runner import workers
+from tests.test_workers import sleep, task
+workers.ALONE = -1.0
+if __name__ == "__main__":
+    crew = workers.Crew(partial(workers.pool, 2))
+    for i in range(2):
+        crew.submit(partial(sleep, Path(sys.argv[1])), task(str(i)))
+    list(crew.outcomes())
+"""
+
+
+def sleep(folder: Path, each: Task) -> Outcome:
+    (folder / str(os.getpid())).touch()
+    time.sleep(600)
+    return Outcome(each, {})
+
+
+def alive(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="asks /proc who is alive")
+def test_workers_end_with_their_parent_however_it_ends(tmp_path):
+    script = tmp_path / "left.py"
+    script.write_text(LEFT.format(root=str(Path(__file__).parents[1])))
+    pids = tmp_path / "pids"
+    pids.mkdir()
+    parent = subprocess.Popen([sys.executable, str(script), str(pids)])
+    until = time.monotonic() + 120
+    while len(list(pids.iterdir())) < 2 and time.monotonic() < until:
+        time.sleep(0.1)
+    working = [int(file.name) for file in pids.iterdir()]
+    assert len(working) == 2
+    assert all(map(alive, working))
+    parent.kill()
+    parent.wait()
+    until = time.monotonic() + 5
+    while any(map(alive, working)) and time.monotonic() < until:
+        time.sleep(0.05)
+    assert not any(map(alive, working))
+
+
+LOGS = ("one", "two")
+
+
+def order(names) -> list[list[Part]]:
+    """The batches in which a run begins its parts, each of them done before the next."""
+    graph, batches = Graph(names, LOGS), []
+    while batch := graph.next():
+        batches.append(batch)
+        for part in batch:
+            graph.done(part)
+    return batches
+
+
+def test_every_part_of_a_run_begins_once_and_after_the_stages_before_it():
+    batches = order([*STAGES, "report"])
+    begun = [part for batch in batches for part in batch]
+    assert len(begun) == len(set(begun)) == len(Graph([*STAGES, "report"], LOGS).parts)
+    assert begun[-1] == Part("report", WHOLE)
+    stages = [part.stage for part in begun]
+    assert stages == sorted(stages, key=[*STAGES, "report"].index)
+
+
+def test_a_log_waits_for_what_is_made_of_it_and_a_stage_of_all_logs_for_all():
+    graph = Graph(STAGES, LOGS)
+    begun = [part for batch in iter(graph.next, []) for part in batch]
+    assert {part.stage for part in begun} == {"design", "ingest"}
+    graph.done(Part("ingest", "one"))
+    assert graph.next() == [Part("resample", "one")]
+    for stage in ("resample", "average", "differentiate", "smooth"):
+        graph.done(Part(stage, "one"))
+    waiting = [part for batch in iter(graph.next, []) for part in batch]
+    assert {part.log for part in waiting} <= {"one"}
+    assert not {part.stage for part in waiting} & {"fit", "choose", "predict", "tune"}
+    for stage in ("ingest", "resample", "average", "differentiate", "smooth"):
+        for log in LOGS:
+            if (stage, log) != ("ingest", "one") and log == "two":
+                graph.done(Part(stage, log))
+        graph.done(Part(stage, WHOLE))
+    assert {part.stage for batch in iter(graph.next, []) for part in batch} >= {"fit", "choose"}
