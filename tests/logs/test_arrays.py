@@ -188,6 +188,16 @@ def test_time_stamps_are_the_clock_and_nulls_are_counted_apart_from_nan(kind):
 
 
 @TABLES
+def test_all_time_stamps_count_from_one_second_whatever_their_units(kind):
+    ms = (T * 1e3).round().astype(np.int64) + 1_700_000_000_250
+    stamps = {"a": pa.array(ms, pa.timestamp("ms")), "b": pa.array((ms + 500) * 10**6, pa.timestamp("ns"))}
+    log, samples = read(arrow(kind, stamps), f"log.{kind}")
+    assert (log.started, log.zone) == ("2023-11-14T22:13:20", "local")
+    np.testing.assert_allclose(samples["a"], 0.25 + T, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(samples["b"], 0.75 + T, rtol=0, atol=1e-9)
+
+
+@TABLES
 def test_columns_of_whole_numbers_and_flags_are_numbers(kind):
     columns = {"n": pa.array(range(ROWS), pa.uint8()), "on": pa.array([True, False] * (ROWS // 2)), "f": np.float32(T)}
     _, samples = read(arrow(kind, columns), f"log.{kind}")

@@ -95,6 +95,20 @@ def test_topics_that_a_study_uses_together_are_put_on_the_clock_of_the_positions
     assert off.max() < 4 / 27 / 2 * h**2 * 1.1
 
 
+def test_bags_that_follow_one_another_are_parts_of_one_log(bag):
+    half = len(SIGNAL.t) // 2
+    rows = [*zip(*COLUMNS.values(), strict=True)]
+    for name, part in (("one", rows[:half]), ("two_mcap", rows[half:])):
+        states = (joint_state(t, ["roll"], [q], [dq], [tau], topic="/arm/measured_js") for t, q, dq, tau in part)
+        write(bag / name, states)
+    text = (bag / "study.toml").read_text().replace('file = "roll"', 'files = ["one", "two_mcap"]')
+    (bag / "study.toml").write_text(text)
+    assert "error" not in call("ingest", bag)
+    recorded = pipeline.read(bag, "Recording")
+    np.testing.assert_allclose(recorded["t"], SIGNAL.t, rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(recorded["tau"], SIGNAL.tau)
+
+
 def test_the_times_at_which_the_recorder_had_messages_are_the_alternative(bag):
     states = (
         joint_state(t, ["roll"], [q], [dq], [tau], topic="/arm/measured_js", stamped=i != 0)

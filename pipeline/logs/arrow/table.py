@@ -87,11 +87,11 @@ def _kind(what: pa.DataType) -> str:
 
 @dataclass
 class ArrowLog(Log):
-    """An opened table.  Samples of a column of time stamps are seconds since the first of them."""
+    """An opened table.  Samples of a column of time stamps are seconds from the whole one at which the log started."""
 
     batches: Batches = field(default=lambda names: iter(()))
     columns: dict[str, str] = field(default_factory=dict)  # by channel
-    origin: dict[str, int] = field(default_factory=dict)  # of columns of time stamps, in their own unit since 1970
+    origin: int = 0  # [s] since 1970, of time stamps
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, as `Log.blocks` says."""
@@ -100,7 +100,7 @@ class ArrowLog(Log):
             block = {}
             for name in names:
                 column = batch.column(self.columns[name])
-                block[name] = _numbers(column, self.origin.get(name, 0))
+                block[name] = _numbers(column, self.origin)
                 self.nulls[name] += column.null_count
                 self.nans[name] += int(np.count_nonzero(np.isnan(block[name]))) - column.null_count
             if batch.num_rows:
@@ -111,30 +111,29 @@ def _numbers(column: pa.Array, origin: int) -> Array:
     """The values of a column, NaN where there is none."""
     what = column.type
     if pa.types.is_timestamp(what) or pa.types.is_duration(what):
-        whole = column.cast(pa.int64())
-        known = whole.fill_null(origin).to_numpy(zero_copy_only=False)
-        seconds = (known - origin) / PER_SECOND[what.unit]
-        return np.where(column.is_null().to_numpy(zero_copy_only=False), np.nan, seconds)
+        per_second = PER_SECOND[what.unit]
+        since = origin * per_second if pa.types.is_timestamp(what) else 0
+        known = column.cast(pa.int64()).fill_null(since).to_numpy(zero_copy_only=False)
+        return np.where(column.is_null().to_numpy(zero_copy_only=False), np.nan, (known - since) / per_second)
     return np.asarray(column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False), np.float64)
 
 
 def _describe_time(log: ArrowLog) -> None:
-    """The first column of time stamps is the clock, and its first value says when it started."""
-    stamps = [channel.name for channel in log.channels if channel.kind == "time"]
-    for name in stamps:
-        for batch in log.batches([log.columns[name]]):
-            known = pc.drop_null(batch.column(0))
-            if len(known):
-                log.origin[name] = known[0].cast(pa.int64()).as_py()
-                if name == stamps[0]:
-                    log.started, log.zone = _date(log.origin[name], known.type)
-                break
-    log.time = stamps[0] if stamps else ""
+    """The first column of time stamps is the clock, and the first second in it is when the log started."""
+    log.time = next((channel.name for channel in log.channels if channel.kind == "time"), "")
+    if not log.time:
+        return
+    for batch in log.batches([log.columns[log.time]]):
+        known = pc.drop_null(batch.column(0))
+        if len(known):
+            log.origin = known[0].cast(pa.int64()).as_py() // PER_SECOND[known.type.unit]
+            log.started = _date(log.origin)
+            log.zone = "UTC" if known.type.tz else "local"
+            return
 
 
-def _date(value: int, what: pa.DataType) -> tuple[str, str]:
+def _date(seconds: int) -> str:
     try:
-        date = EPOCH + timedelta(microseconds=value * 10**6 // PER_SECOND[what.unit])
+        return (EPOCH + timedelta(seconds=seconds)).replace(tzinfo=None).isoformat()
     except OverflowError:
-        return "", ""
-    return date.replace(tzinfo=None).isoformat(), "UTC" if what.tz else "local"
+        return ""

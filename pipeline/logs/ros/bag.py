@@ -67,8 +67,9 @@ def opened(path: Path, options: Options) -> Log:
             f"{path}: the bag has no message of a type that is read ({', '.join(map(_short, KNOWN))}); its topics are "
             f"{there}"
         )
-    log.origin = min(topic.first for topic in log.topics)
-    log.started = (EPOCH + timedelta(microseconds=log.origin // 1000)).replace(tzinfo=None).isoformat()
+    microseconds = min(topic.first for topic in log.topics) // 1000  # as fine as dates are written
+    log.origin = microseconds * 1000
+    log.started = (EPOCH + timedelta(microseconds=microseconds)).replace(tzinfo=None).isoformat()
     alone = len(log.topics) == 1
     log.channels = tuple(channel for topic in log.topics for channel in topic.channels(alone))
     if alone:
