@@ -17,6 +17,7 @@ import pipeline
 from pipeline import commands, robots, stages
 from pipeline.cli import app
 from pipeline.estimators import ESTIMATORS
+from pipeline.logs import FORMATS
 from pipeline.maths.units import SI, UNITS
 from pipeline.records import (
     COLUMN_DTYPES,
@@ -120,6 +121,17 @@ def test_channels_are_those_that_there_are_with_the_units_taken():
     for row in log:
         units = [SI[OF_THE_LOG[name]] or "-" for name in spans(row[0])]
         assert row[2] in (", ".join(units), units[0])
+
+
+def test_formats_and_what_they_need_are_those_that_there_are():
+    assert named(rows("format", "files")) == list(FORMATS)
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    optional = project["optional-dependencies"]
+    asked = {re.match(r"\w+", each)[0]: name for name, (each, *_) in optional.items() if name != "all"}
+    assert {
+        spans(package)[0]: re.search(r"\[(\w+)\]", how)[1] for package, _, _, how in rows("package", "licence")
+    } == asked
+    assert sorted(optional["all"]) == sorted(each for name, (each, *_) in optional.items() if name != "all")
 
 
 def test_units_are_those_that_there_are():

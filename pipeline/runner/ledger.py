@@ -32,6 +32,13 @@ class Folders:
         root, _, path = name.partition("/")
         return Path(getattr(self, root)) / path
 
+    def inside(self, name: str) -> list[str]:
+        """The files right in the folder that a name stands for, as a bag of ROS 2 is one; any other name is a file."""
+        file = self.file(name)
+        if not file.is_dir():
+            return [name]
+        return sorted(f"{name.rstrip('/')}/{each.name}" for each in file.iterdir() if each.is_file())
+
 
 @dataclass(frozen=True)
 class Entry:

@@ -90,7 +90,7 @@ class Plan:
         settings = {name: getattr(self.study.settings, name) for name in asks.settings}
         inputs = {f"processed/{place}" for located in records.values() for _, place in located}
         if "log" in asks.given.values():
-            inputs |= {f"raw/{file}" for file in self._entries[log].files}
+            inputs |= {name for file in self._entries[log].files for name in self.ledger.folders.inside(f"raw/{file}")}
         hashes = {
             what: self._hash(what, {"entry": log, "joint": joint}.get(what, ""), given[p])
             for p, what in asks.given.items()

@@ -80,7 +80,8 @@ def catalogue(ledger: Ledger, located: tuple[Located, ...]) -> Catalogue:
 
 def provenance(study: Study, ledger: Ledger, located: tuple[Located, ...]) -> Provenance:
     """Versions, every file with its hash, and what failed."""
-    files = (*study_files(study), *(file for entry in study.logs for file in entry.files))
+    named = (*study_files(study), *(file for entry in study.logs for file in entry.files))
+    files = [name.removeprefix("raw/") for file in named for name in ledger.folders.inside(f"raw/{file}")]
     raw = {f"raw/{study.name}/{file}": ledger.digest(f"raw/{file}") for file in files}
     processed = {place: ledger.digest(f"processed/{place}") for _, place in located}
     failures = {f"{e.stage} {e.task}": e.failed for e in ledger.entries() if e.failed and e.stage != REPORT}

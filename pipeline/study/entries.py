@@ -3,7 +3,9 @@
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
+from pipeline.logs.binary import EXAMPLE, dtype_of
 from pipeline.robots import Robot
 from pipeline.robots.from_toml import wrong_name
 from pipeline.study import WHOLE, HungMass, LogEntry
@@ -15,6 +17,7 @@ ROLES = ("identification", "validation", "contact", "weight", "tissue", "frictio
 TARES = ("validation", "identification")  # roles of logs in which nothing touches the arm
 FARTHEST = 3.0  # [m] from the remote centre, beyond which a position is more likely in another unit
 WINDOWS = "a list of [start, end] in seconds, from 0 on"
+SEVERAL = ("files", "join")  # keys of several files: parts in order, or side by side
 ALL = "all"  # of a tissue log: every sample is one of contact
 
 
@@ -33,7 +36,7 @@ def lines_of_files(study: TomlTable, logs: Sequence[LogEntry]) -> dict[str, int]
     """The line that first names each file."""
     lines: dict[str, int] = {}
     for n, log in enumerate(logs):
-        key = "files" if ("log", n, "files") in study.file.lines else "file"
+        key = next((key for key in SEVERAL if ("log", n, key) in study.file.lines), "file")
         for i, file in enumerate(log.files):
             lines.setdefault(file, study.file.line(("log", n, key, i)))
     return lines
@@ -53,6 +56,7 @@ def _entry(study: TomlTable, index: int, table: TomlTable, robot: Robot | None) 
         files=_files(table),
         role=table.text("role", choices=ROLES),
         channels=Channels(table, robot).read(),
+        joined="join" in table,
         period=optional(table, "period"),
         rate=optional(table, "rate"),
         skip=optional(table, "skip") or 0.0,
@@ -65,6 +69,7 @@ def _entry(study: TomlTable, index: int, table: TomlTable, robot: Robot | None) 
         decimal=table.text("decimal", choices=(".", ",")) if "decimal" in table else None,
         header=table.flag("header") if "header" in table else None,
         encoding=table.text("encoding") if "encoding" in table else None,
+        **_binary(table),
     )
     table.close()
     return entry
@@ -80,17 +85,19 @@ def _name(study: TomlTable, index: int, table: TomlTable) -> str:
 
 
 def _files(table: TomlTable) -> tuple[str, ...]:
-    if ("file" in table) == ("files" in table):
-        table.problem('say either file = "..." or files = ["..."]')
+    given = [key for key in ("file", *SEVERAL) if key in table]
+    if len(given) != 1:
+        table.problem('say either file = "...", or files = ["..."] for parts in order, or join = ["..."] side by side')
         return ()
-    if "files" in table:
+    [key] = given
+    if key in SEVERAL:
         words = "a list of names of files"
-        named = table.take("files", [], (list,), words, lambda files: files and all(map(_is_name, files)))
+        named = table.take(key, [], (list,), words, lambda files: files and all(map(_is_name, files)))
     else:
         named = [table.take("file", "", (str,), "the name of a file", _is_name)]
     for i, file in enumerate(named):
         if not inside(file):
-            table.problem(f"{file!r} lies outside the study's folder", "files" if "files" in table else "file", i)
+            table.problem(f"{file!r} lies outside the study's folder", key, i)
     return tuple(file for file in named if file and inside(file))
 
 
@@ -113,6 +120,27 @@ def _delimiter(table: TomlTable) -> str | None:
         problem = "delimiter must not be empty; leave it out, and it is found from the file"
         table.problem(problem, "delimiter")
     return table.text("delimiter") if "delimiter" in table else None
+
+
+def _binary(table: TomlTable) -> dict[str, Any]:
+    """What raw binary numbers are, which such a file does not say itself."""
+    for key, other in (("dtype", "columns"), ("columns", "dtype")):
+        if key in table and other not in table:
+            table.problem(f"{key} is of raw binary numbers, and needs {other}; they say {EXAMPLE}", key)
+    said: dict[str, Any] = {}
+    if "dtype" in table:
+        words = 'a type of number as "float64", "DBL" or "<int16", where < stands for little-endian'
+        said["dtype"] = table.take("dtype", None, (str,), words, lambda word: dtype_of(word) is not None)
+    if "columns" in table:
+        columns = table.take("columns", None, (int, list), "how many numbers a row has, or their names", _are_columns)
+        said["columns"] = tuple(columns) if isinstance(columns, list) else columns
+    return said
+
+
+def _are_columns(value: object) -> bool:
+    if isinstance(value, list):
+        return bool(value) and all(map(_is_name, value)) and len(set(value)) == len(value)
+    return isinstance(value, int) and value > 0
 
 
 def _windows(table: TomlTable, key: str) -> tuple[tuple[float, float], ...]:

@@ -55,7 +55,7 @@ def study_of(table: TomlTable, folder: Path) -> Study:
     lines = lines_of_files(table, logs)
     if table.file.problems():
         for file, line in lines.items():
-            if not (folder / file).is_file():
+            if not (folder / file).exists():
                 table.file.note(line, f"file {file!r} is not in {folder}")
     table.file.refuse(BadStudy)
     assert robot is not None

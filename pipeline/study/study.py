@@ -33,6 +33,7 @@ class Source:
     unit: str | None = None
     sign: int = 1
     offset: float = 0.0
+    scale: float = 1.0
 
     @property
     def joint(self) -> str:
@@ -78,6 +79,7 @@ class LogEntry:
     files: tuple[str, ...]  # relative to the study
     role: str
     channels: tuple[Source, ...]
+    joined: bool = False  # whether the files stand side by side, else they are parts in order
     period: float | None = None
     rate: float | None = None
     skip: float = 0.0
@@ -90,6 +92,8 @@ class LogEntry:
     decimal: str | None = None
     header: bool | None = None
     encoding: str | None = None
+    dtype: str | None = None  # of raw binary numbers
+    columns: int | tuple[str, ...] | None = None  # of a row of them: how many, or their names
 
     @property
     def tells_free_space(self) -> bool:
@@ -146,4 +150,4 @@ class Study:
 
     def absent(self) -> tuple[str, ...]:
         """Files of logs that are not there."""
-        return tuple(file for entry in self.logs for file in entry.files if not (self.folder / file).is_file())
+        return tuple(file for entry in self.logs for file in entry.files if not (self.folder / file).exists())

@@ -1,0 +1,218 @@
+"""MATLAB, HDF5, Parquet and Feather files: arrays by name, in structs, groups and columns."""
+
+import sys
+from io import BytesIO
+
+import h5py
+import numpy as np
+import pyarrow as pa
+import pytest
+from numpy.testing import assert_array_equal
+from scipy.io import savemat
+
+from pipeline.errors import BadLog
+from tests.logs.array_writers import arrow, hdf5, matlab, matlab_73
+from tests.logs.reading import read
+
+ROWS = 30
+T = 0.01 * np.arange(ROWS)
+Q = np.arange(3.0 * ROWS).reshape(ROWS, 3)
+MATLAB = pytest.mark.parametrize("write", [matlab, matlab_73])
+
+
+def names(log) -> list[str]:
+    return [channel.name for channel in log.channels]
+
+
+@MATLAB
+@pytest.mark.parametrize("across", [False, True])
+def test_columns_of_a_matrix_are_numbered_along_its_shorter_side(write, across):
+    log, samples = read(write({"t": T, "q": Q.T if across else Q}), "log.mat")
+    assert sorted(names(log)) == ["q[0]", "q[1]", "q[2]", "t"]
+    for i in range(3):
+        assert_array_equal(samples[f"q[{i}]"], Q[:, i])
+
+
+@MATLAB
+def test_structs_in_structs_are_found_by_either_spelling(write):
+    log, samples = read(write({"log": {"arm": {"q": Q[:, 0], "title": "left"}, "gain": 2.5}}), "log.mat")
+    assert log.find("log.arm.q") == log.find("log/arm/q") == log.find("q")
+    assert_array_equal(samples["log/arm/q"], Q[:, 0])
+    assert (log.facts["log/arm/title"], log.facts["log/gain"]) == ("left", "2.5")
+
+
+@MATLAB
+def test_the_times_of_a_timeseries_are_the_clock_of_its_values_and_of_no_others(write):
+    timeseries = {"Time": T, "Data": Q, "TimeInfo": {"Units": "seconds"}, "DataInfo": {"Units": "rad"}}
+    log = opened(write({"ts": timeseries, "other": T + 1.0}), "log.mat")
+    with pytest.raises(BadLog, match="have 2 clocks"):
+        next(log.blocks(["ts/Data[0]", "other"]))
+    assert (log.find("ts/Data[1]").time, log.find("ts/Data[1]").unit) == ("ts/Time", "rad")
+    assert (log.find("ts/Time").kind, log.find("other").time) == ("time", "")
+
+
+@MATLAB
+def test_times_in_minutes_are_no_clock_that_is_taken_for_seconds(write):
+    timeseries = {"Time": T, "Data": Q, "TimeInfo": {"Units": "minutes"}}
+    log, _ = read(write({"ts": timeseries}), "log.mat")
+    assert log.find("ts/Data[1]").time == ""
+
+
+def test_what_simulink_logs_is_on_its_time():
+    """Elements of a struct array count from 1, as in MATLAB."""
+    signals = np.zeros((1, 2), dtype=[("values", object), ("label", object)])
+    for i, label in enumerate(("angle", "current")):
+        signals[0, i] = Q[:, i : i + 1], label
+    log, samples = read(matlab({"out": {"time": T, "signals": signals}}), "log.mat")
+    assert log.find("out.signals(2).values").time == "out/time"
+    assert_array_equal(samples["out/signals(2)/values"], Q[:, 1])
+    assert log.facts["out/signals(1)/label"] == "angle"
+
+
+def test_a_struct_array_of_version_7_3_is_followed():
+    file = BytesIO()
+    with h5py.File(file, "w") as hdf:
+        group = hdf.create_group("signals")
+        group.attrs["MATLAB_class"] = np.bytes_("struct")
+        parts = [hdf.create_dataset(f"#refs#/{name}", data=Q[:, i : i + 1].T) for i, name in enumerate("ab")]
+        group.create_dataset("values", data=np.array([[part.ref] for part in parts], h5py.ref_dtype))
+    log, samples = read(file.getvalue(), "log.h5")
+    assert names(log) == ["signals/values(1)", "signals/values(2)"]
+    assert_array_equal(samples["signals/values(2)"], Q[:, 1])
+
+
+@MATLAB
+def test_arrays_of_other_lengths_end_in_nulls_and_are_remarked_on(write):
+    log, samples = read(write({"t": T, "limits": [1.0, 2.0]}), "log.mat")
+    assert log.nulls == {"t": 0, "limits": ROWS - 2}
+    assert_array_equal(samples["limits"][:2], [1.0, 2.0])
+    assert "different numbers of samples" in log.warnings[0]
+
+
+def test_complex_numbers_are_not_read_as_their_real_part():
+    log = opened(matlab({"t": T, "z": Q[:, 0] + 1j}), "log.mat")
+    with pytest.raises(BadLog, match="complex"):
+        list(log.blocks(["z"]))
+    log = opened(hdf5({"t": T, "z": Q[:, 0] + 1j}), "log.h5")
+    assert log.find("z").kind == "complex"
+
+
+def test_of_many_parameters_some_are_shown_and_the_others_counted():
+    log, _ = read(hdf5({"t": T, **{f"gain/{i}": float(i) for i in range(1000)}}), "log.h5")
+    assert log.facts["gain/0"] == "0.0"
+    assert log.facts["..."] == "960 more that are no recordings"
+
+
+def test_a_file_of_scalars_is_no_log():
+    with pytest.raises(BadLog, match="it holds no variable of samples; it has gain"):
+        read(matlab({"gain": 2.0}), "log.mat")
+
+
+def test_a_matlab_object_says_how_to_save_it():
+    file = BytesIO()
+    with h5py.File(file, "w", userblock_size=512) as hdf:
+        hdf["t"] = T
+        made = hdf.create_dataset("ts", data=np.zeros((1, 6), np.uint32))
+        made.attrs["MATLAB_class"], made.attrs["MATLAB_object_decode"] = np.bytes_("timeseries"), np.int32(3)
+    content = b"MATLAB 7.3 MAT-file".ljust(512, b" ") + file.getvalue()[512:]
+    log, _ = read(content, "log.mat")
+    assert "save ts.Time and ts.Data as variables" in log.warnings[0]
+
+
+def test_version_4_is_read():
+    file = BytesIO()
+    savemat(file, {"t": T, "q": Q}, format="4")
+    log, samples = read(file.getvalue(), "log.mat")
+    assert_array_equal(samples["q[2]"], Q[:, 2])
+    assert log.format == "mat"
+
+
+@pytest.mark.parametrize("how", [{}, {"chunks": (7, 2), "compression": "gzip"}, {"maxshape": (None, 3)}])
+def test_datasets_of_any_layout_are_the_same(how):
+    _, samples = read(hdf5({"arm/q": Q}, **how), "log.h5")
+    assert_array_equal(np.column_stack([samples[f"arm/q[{i}]"] for i in range(3)]), Q)
+
+
+def test_fields_of_records_are_channels():
+    records = np.zeros(ROWS, dtype=[("t", "f8"), ("i", "<i2"), ("vector", "f4", 3)])
+    records["t"], records["i"] = T, np.arange(ROWS)
+    log, samples = read(hdf5({"run": records}, {"run": "A"}), "log.h5")
+    assert names(log) == ["run/t", "run/i"]
+    assert_array_equal(samples["run/i"], np.arange(ROWS))
+
+
+def test_what_lies_in_another_file_is_left_out(tmp_path):
+    (tmp_path / "other.h5").write_bytes(hdf5({"q": Q[:, 0]}))
+    with h5py.File(tmp_path / "log.h5", "w") as hdf:
+        hdf["t"] = T
+        hdf["link"] = h5py.ExternalLink("other.h5", "/q")
+        layout = h5py.VirtualLayout((ROWS,), "f8")
+        layout[:] = h5py.VirtualSource("other.h5", "q", (ROWS,))
+        hdf.create_virtual_dataset("virtual", layout)
+    log, _ = read((tmp_path / "log.h5").read_bytes(), "log.h5")
+    assert names(log) == ["t"]
+    assert log.warnings == ["dataset /virtual lies in another file, and is left out"]
+
+
+def test_a_dataset_that_claims_more_samples_than_its_file_can_hold_is_refused():
+    """As a damaged length does: what was never written reads as zeros."""
+    file = BytesIO()
+    with h5py.File(file, "w") as hdf:
+        hdf.create_dataset("q", shape=(10**11,), dtype="f8", chunks=(1 << 16,))
+    with pytest.raises(BadLog, match="claim more samples than they can hold"):
+        for _ in opened(file.getvalue(), "log.h5").blocks(["q"]):
+            pass
+
+
+def test_without_h5py_the_message_says_how_to_install_it(monkeypatch):
+    files = (hdf5({"t": T}), "log.h5"), (matlab_73({"t": T}), "log.mat")
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    for content, name in files:
+        with pytest.raises(BadLog, match=r"pip install davinci-forces\[hdf5\]"):
+            read(content, name)
+    assert read(matlab({"t": T}), "log.mat")[0].format == "mat"
+
+
+TABLES = pytest.mark.parametrize("kind", ["parquet", "feather"])
+
+
+@TABLES
+def test_time_stamps_are_the_clock_and_nulls_are_counted_apart_from_nan(kind):
+    stamps = pa.array((T * 1e9).round().astype(np.int64) + 1_700_000_000 * 10**9, pa.timestamp("ns", "UTC"))
+    holes = pa.array([None, float("nan"), *Q[2:, 0]])
+    log, samples = read(arrow(kind, {"when": stamps, "q": holes, "who": pa.array(["a"] * ROWS)}), f"log.{kind}")
+    assert (log.time, log.started, log.zone) == ("when", "2023-11-14T22:13:20", "UTC")
+    np.testing.assert_allclose(samples["when"], T, rtol=0, atol=1e-9)
+    assert (log.nulls["q"], log.nans["q"]) == (1, 1)
+    assert log.find("who").kind == "text"
+
+
+@TABLES
+def test_all_time_stamps_count_from_one_second_whatever_their_units(kind):
+    ms = (T * 1e3).round().astype(np.int64) + 1_700_000_000_250
+    stamps = {"a": pa.array(ms, pa.timestamp("ms")), "b": pa.array((ms + 500) * 10**6, pa.timestamp("ns"))}
+    log, samples = read(arrow(kind, stamps), f"log.{kind}")
+    assert (log.started, log.zone) == ("2023-11-14T22:13:20", "local")
+    np.testing.assert_allclose(samples["a"], 0.25 + T, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(samples["b"], 0.75 + T, rtol=0, atol=1e-9)
+
+
+@TABLES
+def test_columns_of_whole_numbers_and_flags_are_numbers(kind):
+    columns = {"n": pa.array(range(ROWS), pa.uint8()), "on": pa.array([True, False] * (ROWS // 2)), "f": np.float32(T)}
+    _, samples = read(arrow(kind, columns), f"log.{kind}")
+    assert_array_equal(samples["n"], np.arange(ROWS))
+    assert_array_equal(samples["on"], [1.0, 0.0] * (ROWS // 2))
+    assert_array_equal(samples["f"], np.float32(T).astype(float))
+
+
+def opened(content: bytes, name: str):
+    """The log without its samples; its file is kept for as long as the test runs."""
+    import tempfile
+    from pathlib import Path
+
+    from pipeline.logs import open_log
+
+    path = Path(tempfile.mkdtemp()) / name
+    path.write_bytes(content)
+    return open_log(path)

@@ -1,0 +1,83 @@
+"""A study of bags that hold what the demonstration study recorded gives that study's results."""
+
+import json
+import re
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+import pipeline
+from pipeline.cli import app
+from pipeline.stages import STAGES
+from tests.conftest import ROOT
+from tests.logs.bag_writer import joint_state, write
+
+DEMO = ROOT / "raw" / "davinci-demo"
+LOGS = ("matched-roll-excitation", "matched-roll-validation", "matched-roll-contact", "matched-slide-excitation")
+BAGS = dict(zip(LOGS, ("one.bag", "two", "three_mcap", "four.bag"), strict=True))
+STEPS = [name for name in STAGES[: STAGES.index("ekf") + 1] if name not in ("design", "chart")] + ["report"]
+TOLERANCE = 1e-6  # relative; times are rounded to nanoseconds
+
+
+def entries() -> dict[str, str]:
+    """The text of each [[log]] of the demonstration study that is used here."""
+    _, *tables = re.split(r"^\[\[log\]\]\n", (DEMO / "study.toml").read_text(), flags=re.M)
+    by_name = {re.search(r'name = "(.*)"', table)[1]: table for table in tables}
+    return {name: by_name[name] for name in LOGS}
+
+
+def study(folder: Path, tables: dict[str, str]) -> Path:
+    folder.mkdir(parents=True)
+    head = 'title = "T"\nrobot = "davinci"\n'
+    (folder / "study.toml").write_text(head + "".join(f"[[log]]\n{table}\n" for table in tables.values()))
+    return folder
+
+
+def results(folder: Path) -> dict[str, float]:
+    assert pipeline.run(folder, *STEPS, quiet=True)
+    home = folder.parents[1] / "reports" / folder.name / "results.json"
+    beginning = ("fit.", "predict.", "ekf.")
+    return {r["key"]: r["value"] for r in json.loads(home.read_text()) if r["key"].startswith(beginning)}
+
+
+@pytest.mark.slow
+def test_bags_of_a_study_s_recordings_give_its_results(tmp_path):
+    tables = entries()
+    whole = study(tmp_path / "raw" / "whole", {n: re.sub(r"skip = .*\n", "", t) for n, t in tables.items()})
+    original = study(tmp_path / "raw" / "original", tables)
+    for table in tables.values():
+        file = re.search(r'file = "(.*)"', table)[1]
+        for folder in (whole, original):
+            shutil.copy(DEMO / file, folder)
+    assert pipeline.run(whole, "ingest", quiet=True)
+    of_bags = {}
+    for name, table in tables.items():
+        of_bags[name] = table.partition("[log.channels]")[0] + "[log.channels]\n"
+        of_bags[name] = re.sub(r'file = ".*"', f'file = "{BAGS[name]}"', of_bags[name])
+        for joint in dict.fromkeys(re.findall(r'^"(\w+)\.', table, flags=re.M)):
+            for symbol, state in (("q", "position"), ("dq", "velocity"), ("tau", "effort")):
+                of_bags[name] += f'"{joint}.{symbol}" = "/arm/measured_js/{state}[{joint}]"\n'
+    bags = study(tmp_path / "raw" / "bags", of_bags)
+    for name, file in BAGS.items():
+        recorded = pipeline.read(whole, "Recording", log=name)
+        joints = list(dict.fromkeys(recorded["joint"]))
+        columns = {
+            c: np.column_stack([recorded.loc[recorded["joint"] == j, c] for j in joints]) for c in ["q", "dq", "tau"]
+        }
+        t = recorded.loc[recorded["joint"] == joints[0], "t"]
+        states = zip(t, columns["q"], columns["dq"], columns["tau"], strict=True)
+        write(bags / file, (joint_state(s, joints, *state, topic="/arm/measured_js") for s, *state in states))
+    expected, got = results(original), results(bags)
+    # Of the stages that were not run, verify says so; of the folder that is a log, that it was altered.
+    metadata = bags / "two" / "metadata.yaml"
+    assert "metadata.yaml" not in CliRunner().invoke(app, ["verify", str(bags)]).output
+    metadata.write_text(metadata.read_text() + "\n")
+    assert "raw/two/metadata.yaml" in CliRunner().invoke(app, ["verify", str(bags)]).output
+    assert "two/metadata.yaml" in (tmp_path / "reports" / "bags" / "report.html").read_text()
+    assert set(got) == set(expected)
+    assert {key.partition(".")[0] for key in got} == {"fit", "predict", "ekf"}
+    for key, value in expected.items():
+        assert got[key] == pytest.approx(value, rel=TOLERANCE, abs=0, nan_ok=True), key

@@ -1,0 +1,30 @@
+"""Random damages of files of every format: a message or samples, in bounded time and memory, and never a traceback."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+MOST_MEMORY = 512  # [MB]
+LONGEST = 60.0  # [s] of one file, on a machine that does other things too
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="memory is limited and measured as Linux does")
+
+
+@pytest.mark.parametrize(
+    ("seed", "count"),
+    [pytest.param(0, 150, marks=pytest.mark.medium), pytest.param(1, 3000, marks=pytest.mark.slow)],
+)
+def test_a_damaged_file_is_read_or_refused_within_limits(seed, count):
+    command = [sys.executable, "-m", "tests.logs.damaging", str(seed), str(count)]
+    done = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[2])
+    assert done.returncode == 0, done.stderr[-4000:]
+    said = json.loads(done.stdout)
+    assert not said["failures"], "\n".join(said["failures"][:5])
+    assert said["memory"] < MOST_MEMORY
+    assert said["slowest"] < LONGEST
+    assert sum(said["outcomes"].values()) == count
+    assert any(name.endswith("read") for name in said["outcomes"])
+    assert any(name.endswith("refused") for name in said["outcomes"])
