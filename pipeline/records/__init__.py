@@ -2,12 +2,12 @@
 
 from pipeline.records.assess import FreeSpace
 from pipeline.records.average import Average, PeriodResidual
+from pipeline.records.benchmark import Comparison
 from pipeline.records.bound import ErrorBand
 from pipeline.records.calibrate import FreeMotion
 from pipeline.records.chart import FrictionMap
 from pipeline.records.choose import Choice
 from pipeline.records.combine import ArmCorrelation
-from pipeline.records.compare import Comparison
 from pipeline.records.correlate import JointCorrelation
 from pipeline.records.design import Control, Excitation, Links, Lyapunov, Pose, Workspace
 from pipeline.records.diagnostic import Diagnostic, diagnostic

@@ -1,6 +1,9 @@
 """Write the reports of a study: report and robot, each as HTML and PDF, results.json, and the answer as text."""
 
+from collections.abc import Mapping
+
 from pipeline.records.catalogue import Catalogue, Provenance
+from pipeline.report.changes import Stated
 from pipeline.report.content import Document, Section
 from pipeline.report.context import Context
 from pipeline.report.identity import MANIFEST, identity, manifest
@@ -11,9 +14,11 @@ from pipeline.report.writers import render_all
 from pipeline.study import Study
 
 
-def write(catalogue: Catalogue, study: Study, provenance: Provenance) -> dict[str, bytes]:
+def write(
+    catalogue: Catalogue, study: Study, provenance: Provenance, baseline: Mapping[str, Stated] | None = None
+) -> dict[str, bytes]:
     """The files of the report, by name; what is shown and results.json come from the same numbers."""
-    context = Context(catalogue, study, collect(catalogue), provenance)
+    context = Context(catalogue, study, collect(catalogue), provenance, baseline)
     built = {name: (title, sections(context, names)) for name, (title, names) in DOCUMENTS.items()}
     numbers = {"results.json": context.results.json(), "summary.txt": answer(context).encode()}
     listed = manifest(provenance, numbers)

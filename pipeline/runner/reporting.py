@@ -9,6 +9,7 @@ from time import perf_counter
 from pipeline.records import KINDS, Record, store
 from pipeline.records.catalogue import Catalogue, Provenance
 from pipeline.report import REPORT
+from pipeline.runner import stated
 from pipeline.runner.canonical import hash_of
 from pipeline.runner.code import code
 from pipeline.runner.execution import Outcome, said_of, without_folders
@@ -62,7 +63,8 @@ def written(ledger: Ledger, task: Task) -> dict[str, bytes]:
     from pipeline.report.report import write  # what it draws with takes longer to import than most runs take
 
     study, located = task.given["study"], task.records["records"]
-    return write(catalogue(ledger, located), study, provenance(study, ledger, located))
+    baseline = stated.read(study.folder / study.baseline) if study.baseline else None
+    return write(catalogue(ledger, located), study, provenance(study, ledger, located), baseline)
 
 
 def catalogue(ledger: Ledger, located: tuple[Located, ...]) -> Catalogue:
@@ -90,4 +92,5 @@ def provenance(study: Study, ledger: Ledger, located: tuple[Located, ...]) -> Pr
 
 def study_files(study: Study) -> tuple[str, ...]:
     """The files of a study besides its logs."""
-    return tuple(file for file in ("study.toml", study.robot_file, "truth.toml" if study.truth else "") if file)
+    names = ("study.toml", study.robot_file, "truth.toml" if study.truth else "", study.baseline)
+    return tuple(name for name in names if name)

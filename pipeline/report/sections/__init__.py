@@ -15,6 +15,7 @@ DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
         "Contact forces without a force sensor",
         (
             "summary",
+            "baseline",
             "contacts",
             "tip",
             "tissue",
