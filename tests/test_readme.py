@@ -133,7 +133,7 @@ def test_keys_of_a_study_and_its_logs_are_all_told():
     told |= set(re.findall(r"\[+(?:log\.)?(\w+)", code)) | {span for span in spans(said) if span.isidentifier()}
     assert {f.name for f in fields(LogEntry)} | {f.name for f in fields(HungMass)} | {"file"} <= told
     changeable = {f.name for f in fields(Joint)} - {"name", "kind", "published", "physical", "printed"}
-    assert {"title", "robot", "simulated", "settings", "log", "tool", "length"} | changeable <= told
+    assert {"title", "robot", "simulated", "settings", "log", "tool", "length", "baseline"} | changeable <= told
     assert "[robot_overrides." in said
 
 

@@ -76,11 +76,13 @@ def _cells(each: "Change") -> tuple[str, ...]:
 
 def _pair(a: "Stated", b: "Stated") -> tuple[str, str]:
     """Two values with their units, in as many digits as tell them apart, at least 5."""
+    from pipeline.report.results import format_unit
+
     for digits in range(5, 18):
         texts = tuple(f"{one.value:.{digits}g}" if isinstance(one.value, float) else str(one.value) for one in (a, b))
         if texts[0] != texts[1]:
             break
-    return f"{texts[0]} {a.unit}".rstrip(), f"{texts[1]} {b.unit}".rstrip()
+    return f"{texts[0]} {format_unit(a.unit)}".rstrip(), f"{texts[1]} {format_unit(b.unit)}".rstrip()
 
 
 def _table(rows: list[tuple[str, ...]]) -> list[str]:

@@ -15,9 +15,12 @@ class Threshold(Record):
     joint: str
     filter: str
     detection_level: float
+    detection_level_std: float
     alarm_level: float
     level_from: str  # the log whose free space it is
 
     def published(self) -> Iterator[Published]:
         """Both levels."""
-        yield from self.publish(f"threshold.{self.joint}", "detection_level", "alarm_level")
+        prefix = f"threshold.{self.joint}"
+        yield Published(f"{prefix}.detection_level", "detection_level", std="detection_level_std")
+        yield from self.publish(prefix, "alarm_level")

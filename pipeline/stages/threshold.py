@@ -14,7 +14,7 @@ def run(spaces: Iterable[FreeSpace]) -> Iterator[Threshold]:
     for (joint, name), own in every.items():
         judge = worst(own)
         alarms = alarm_level([Quiet(s.smooth_rms, s.smooth_max, s.crossings) for s in unseen(own)])
-        yield Threshold(joint, name, judge.detection_level, alarms, judge.log)
+        yield Threshold(joint, name, judge.detection_level, judge.detection_level_std, alarms, judge.log)
 
 
 def worst(spaces: list[FreeSpace]) -> FreeSpace:
