@@ -30,6 +30,7 @@ from pipeline.records import (
     Lyapunov,
     Origin,
     Record,
+    SensorForce,
     Stiffness,
     TipBudget,
     TipContact,
@@ -221,7 +222,7 @@ def made(kind: type[Record], **about: Any) -> Record:
 
 
 ROBOT = ("robot.", "control.", "excitation.")
-BY_HAND = (*ROBOT, "weight.", "tissue.", "stability.", "guess.", "tip.")
+BY_HAND = (*ROBOT, "weight.", "tissue.", "stability.", "guess.", "tip.", "sensor.")
 
 
 def test_keys_of_a_robot_and_of_what_hangs_on_it_or_pushes_it_are_told_and_those_told_are_there():
@@ -237,7 +238,7 @@ def test_keys_of_a_robot_and_of_what_hangs_on_it_or_pushes_it_are_told_and_those
         made(DelayLimit),
         made(TissueLimit),
     ]
-    records += [made(TipForce), made(TipContact), made(TipBudget)]
+    records += [made(TipForce), made(TipContact), made(TipBudget), made(SensorForce)]
     keys = set(collect(Catalogue(lambda kind: [record for record in records if isinstance(record, kind)])))
     assert {key.partition(".")[0] + "." for key in keys} == set(BY_HAND)
     untold, empty = told(keys)

@@ -33,6 +33,7 @@ from pipeline.records.predict import Prediction
 from pipeline.records.record import COLUMN_DTYPES, AnyRecord, Column, Counts, Labels, Names, Origin, Record
 from pipeline.records.resample import Signal
 from pipeline.records.resolve import TipBudget, TipContact, TipForce
+from pipeline.records.sense import SensorForce
 from pipeline.records.settle import FilterNoise
 from pipeline.records.smooth import Smoothed
 from pipeline.records.threshold import Threshold
@@ -46,9 +47,9 @@ __all__ = [
     "FilterNoise", "Fit", "FittedPaths", "FreeMotion", "FreeSpace", "FreeWeight", "FrictionMap", "Guess",
     "HapticMotion", "Identifiability", "Innovation", "JointCorrelation", "Labels", "Links", "Load", "LogSummary",
     "Lyapunov", "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose", "Prediction", "Push", "Record",
-    "Recording", "Residual", "Signal", "Smoothed", "Spectrum", "StabilityLimit", "StabilityMap", "Stiffness",
-    "SwarmSearch", "Threshold", "TipBudget", "TipContact", "TipForce", "TissueLimit", "TissueModel", "Touch",
-    "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace", "diagnostic",
+    "Recording", "Residual", "SensorForce", "Signal", "Smoothed", "Spectrum", "StabilityLimit", "StabilityMap",
+    "Stiffness", "SwarmSearch", "Threshold", "TipBudget", "TipContact", "TipForce", "TissueLimit", "TissueModel",
+    "Touch", "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
@@ -59,7 +60,7 @@ KINDS: dict[str, type[Record]] = {
         MeasurementNoise, Residual, SwarmSearch, Guess, Choice, FrictionMap, Prediction, Tuning, FilterNoise,
         FreeMotion, ErrorBand, Track, FreeSpace, Threshold, Contact, Push, Stiffness, TissueModel, Load, Weight,
         FreeWeight, Comparison, StabilityMap, StabilityLimit, DelayLimit, TissueLimit, HapticMotion,
-        JointCorrelation, ArmCorrelation, TipForce, TipContact, TipBudget, Whiteness, Innovation, Explanation,
-        Diagnostic,
+        JointCorrelation, ArmCorrelation, TipForce, TipContact, TipBudget, SensorForce, Whiteness, Innovation,
+        Explanation, Diagnostic,
     )
 }  # fmt: skip

@@ -22,5 +22,5 @@ does not grow with the study, unless it is the only one of its stage.  The repor
 STAGES = (
     "design", "ingest", "resample", "average", "differentiate", "smooth", "fit", "choose", "chart", "predict", "tune",
     "settle", "calibrate", "bound", "ekf", "assess", "threshold", "measure", "palpate", "hang", "weigh", "benchmark",
-    "limit", "correlate", "combine", "resolve", "whiteness", "explain",
+    "limit", "correlate", "combine", "resolve", "sense", "whiteness", "explain",
 )  # fmt: skip

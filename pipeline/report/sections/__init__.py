@@ -18,6 +18,7 @@ DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
             "baseline",
             "contacts",
             "tip",
+            "sensor",
             "tissue",
             "stability",
             "weight",
