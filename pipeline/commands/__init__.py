@@ -1,3 +1,3 @@
 """What else the command line does: one module per command, exporting `run`, and its name in the list below."""
 
-COMMANDS = ("new", "inspect", "verify", "simulate", "robot", "excite", "stability", "compare")
+COMMANDS = ("new", "inspect", "verify", "simulate", "robot", "excite", "stability", "compare", "campaign")

@@ -169,6 +169,9 @@ QUANTITIES = {
     "detection_level_std": Quantity("standard error of the detection level", "{effort}"),
     "coverage_std": Quantity("standard error of the coverage"),
     "level_from": Quantity("log whose free space sets the detection level", ""),
+    "alarm_level_std": Quantity(
+        "standard error of that level, as free motion of another run may be larger", "{effort}"
+    ),
     "alarm_level": Quantity("level that free motion crosses at most once in ten minutes", "{effort}"),
     "smooth_rms": Quantity("root mean square of the smoothed external effort in free space", "{effort}"),
     "smooth_max": Quantity("largest smoothed external effort in free space", "{effort}"),

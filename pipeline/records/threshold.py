@@ -17,10 +17,11 @@ class Threshold(Record):
     detection_level: float
     detection_level_std: float
     alarm_level: float
+    alarm_level_std: float
     level_from: str  # the log whose free space it is
 
     def published(self) -> Iterator[Published]:
         """Both levels."""
         prefix = f"threshold.{self.joint}"
-        yield Published(f"{prefix}.detection_level", "detection_level", std="detection_level_std")
-        yield from self.publish(prefix, "alarm_level")
+        for name in ("detection_level", "alarm_level"):
+            yield Published(f"{prefix}.{name}", name, std=f"{name}_std")

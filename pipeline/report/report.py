@@ -6,6 +6,7 @@ from pipeline.records.catalogue import Catalogue, Provenance
 from pipeline.report.changes import Stated
 from pipeline.report.content import Document, Section
 from pipeline.report.context import Context
+from pipeline.report.digest import digest
 from pipeline.report.identity import MANIFEST, identity, manifest
 from pipeline.report.results import collect
 from pipeline.report.sections import DOCUMENTS, section_builder
@@ -21,6 +22,7 @@ def write(
     context = Context(catalogue, study, collect(catalogue), provenance, baseline)
     built = {name: (title, sections(context, names)) for name, (title, names) in DOCUMENTS.items()}
     numbers = {"results.json": context.results.json(), "summary.txt": answer(context).encode()}
+    numbers["summary.json"] = digest(context)
     listed = manifest(provenance, numbers)
     edition = f"report ID {identity(listed)} · davinci-forces {provenance.version}"
     documents = tuple(

@@ -138,6 +138,9 @@ def _inline(page: Json) -> Callable[[str], "Markup"]:
     def reference(text: str) -> Markup:
         return Markup('<a href="#{}">{}</a>').format(text, page["references"][text])
 
+    def link(text: str, to: str) -> Markup:
+        return Markup('<a href="{}">{}</a>').format(to, text)
+
     shapes: dict[str, Callable[[str], Any]] = {
         "text": Markup.escape,
         "code": Markup("<code>{}</code>").format,
@@ -148,7 +151,9 @@ def _inline(page: Json) -> Callable[[str], "Markup"]:
 
     def inline(text: str) -> Markup:
         spans: tuple[Span, ...] = parse(text)
-        return Markup("").join(shapes[span.kind](span.text) for span in spans)
+        return Markup("").join(
+            link(span.text, span.to) if span.kind == "link" else shapes[span.kind](span.text) for span in spans
+        )
 
     return inline
 
