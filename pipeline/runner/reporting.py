@@ -17,7 +17,8 @@ from pipeline.runner.fingerprint import Fingerprint
 from pipeline.runner.ledger import Ledger
 from pipeline.runner.places import Located
 from pipeline.runner.plan import VERSION, Plan, Task
-from pipeline.study import Study
+from pipeline.study import Study, review
+from pipeline.study.review import Rating
 
 PACKAGES = ("numpy", "scipy", "pandas", "pyarrow", "statsmodels", "numba", "matplotlib", "typst", "npTDMS")
 
@@ -29,7 +30,7 @@ def task(plan: Plan) -> Task:
     inputs = [f"processed/{place}" for _, place in located] + [f"raw/{file}" for file in study_files(study)]
     fingerprint = Fingerprint(
         inputs={name: ledger.digest(name) for name in sorted(inputs)},
-        given={"study": hash_of(replace(study, folder=Path(study.name)))},
+        given={"study": hash_of(replace(study, folder=Path(study.name))), **review_given(study)},
         settings=asdict(study.settings),
         schemas={},
         code=code("pipeline.report.report", "pipeline.records.store"),
@@ -64,7 +65,19 @@ def written(ledger: Ledger, task: Task) -> dict[str, bytes]:
 
     study, located = task.given["study"], task.records["records"]
     baseline = stated.read(study.folder / study.baseline) if study.baseline else None
-    return write(catalogue(ledger, located), study, provenance(study, ledger, located), baseline)
+    return write(catalogue(ledger, located), study, provenance(study, ledger, located), baseline, ratings(study))
+
+
+def ratings(study: Study) -> tuple[Rating, ...]:
+    """What reviewers said of the study's report, where its folder holds that."""
+    file = study.folder / review.FILE
+    return review.read(file) if file.is_file() else ()
+
+
+def review_given(study: Study) -> dict[str, str]:
+    """What a report depends on besides its ID: a review is shown, but it is no input that is verified."""
+    file = study.folder / review.FILE
+    return {"review": store.digest(file)} if file.is_file() else {}
 
 
 def catalogue(ledger: Ledger, located: tuple[Located, ...]) -> Catalogue:

@@ -76,7 +76,7 @@ def test_thirty_studies_fit_one_page_each_linked_to_its_report(tmp_path):
     assert len(page(tmp_path).encode()) < 5e6
     links = re.findall(r'href="(run-\d\d/report\.html)">run-\d\d</a>', page(tmp_path))
     assert {link: links.count(link) for link in links} == {
-        f"run-{i:02}/report.html": 1 + len(JOINTS) for i in range(30)
+        f"run-{i:02}/report.html": 1 + 2 * len(JOINTS) for i in range(30)
     }
     assert all((tmp_path / "reports" / link).is_file() for link in links)
     assert "recorded from 2024-01-01 to 2024-03-28" in page(tmp_path)
@@ -179,7 +179,7 @@ def test_a_campaign_opens_in_a_browser_without_a_word_of_error(tmp_path):
 def test_a_report_says_what_a_campaign_asks(analysed, tmp_path):
     call("campaign", analysed, "--out", tmp_path)
     text = (tmp_path / "campaign.html").read_text()
-    assert "Hand roll in every study" in text
+    assert "Hand roll: parameters, in every study" in text
     assert "detection level" in text
     rows = {row["key"] for row in json.loads((analysed.parent.parent / "reports/arm/results.json").read_text())}
     about = json.loads((analysed.parent.parent / "reports/arm/summary.json").read_text())

@@ -5,7 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from pipeline.report.campaign.findings import CHANCE, Findings
-from pipeline.report.campaign.studies import Campaigned, Series, joints_of, series_of
+from pipeline.report.campaign.studies import FLOORS, Campaigned, Series, joints_of, series_of
 from pipeline.report.content import (
     Block,
     Bullets,
@@ -40,7 +40,7 @@ def page(studies: Sequence[Campaigned], left_out: Sequence[str]) -> dict[str, by
     )
     simulated = any(study.simulated for study in ordered)
     heading = "1 study" if len(ordered) == 1 else f"{len(ordered)} studies"
-    document = Document("Campaign", heading, simulated, sections, "", "campaign")
+    document = Document("Campaign", heading, simulated, sections, "", "campaign", links=())
     return render_all((document,))
 
 
@@ -74,7 +74,7 @@ def overview(studies: Sequence[Campaigned], left_out: Sequence[str], by_date: bo
 
 def finding(one: Series, told: Findings) -> str:
     """What a series does, in words."""
-    name = f"**{title(one.joint)}, {literal(one.name)}**"
+    name = f"**{title(one.joint)}, {literal(words(one.name))}**"
     if told.drifts(one):
         line = told.trends[id(one)]
         slope = Number(line.slope, f"{format_unit(one.unit)} a {told.unit}".strip(), line.std)
@@ -86,7 +86,7 @@ def outliers_in_words(one: Series, told: Findings) -> Iterator[str]:
     """Studies that stand out."""
     for i in told.outliers(one):
         shown = Number(float(one.value[i]), format_unit(one.unit), float(one.std[i]))
-        where = f"{title(one.joint)}, {literal(one.name)}"
+        where = f"{title(one.joint)}, {literal(words(one.name))}"
         yield f"{one.studies[i].link} stands out: **{where}** is {literal(str(shown))}."
 
 
@@ -105,33 +105,57 @@ def joint_section(joint: str, studies: Sequence[Campaigned], told: Findings) -> 
     """The numbers of one joint, drawn and listed."""
     own = [one for one in told.every if one.joint == joint]
     names = list(dict.fromkeys(one.name for one in own))
-    by_study = {(one.name, study.name): key for one in own for study, key in zip(one.studies, one.keys, strict=True)}
-    rows = tuple(
-        (
-            date(study),
-            study.link,
-            word(study, joint),
-            *(cell(study, by_study.get((name, study.name))) for name in names),
-        )
-        for study in studies
-        if joint in study.joints
-    )
     odd = sorted({one.name for one in own if told.drifts(one) or told.varies(one) or told.outliers(one)})
     spoken = f"beyond errors: {', '.join(odd)}" if odd else "none changes beyond its errors"
     figure = Figure(
         f"{title(joint)}: its parameters and how far it is to be trusted, with standard errors, study by study; "
         "studies that stand out are named.",
-        f"{title(joint)}: {count(len(names), 'number')} over {len(rows)} studies; {spoken}.",
+        f"{title(joint)}: {count(len(names), 'number')} over {len(studies)} studies; {spoken}.",
         tuple(panel(one, told) for one in own),
         f"campaign-{joint}",
         columns=2,
         height=34,
     )
-    header = ("Recorded", "Study", "Verdict", *(literal(name[:1].upper() + name[1:]) for name in names))
-    table = Table(
-        f"{title(joint)} in every study.", header, rows, f"campaign-{joint}-numbers", "lll" + "r" * len(names)
+    floors = [name for name in names if name in FLOORS.values()]
+    parameters = [name for name in names if name not in floors]
+    tables = (
+        table(joint, "Parameters", "parameters", parameters, own, studies),
+        table(joint, "How far to trust it", "floors", floors, own, studies),
     )
-    return Section(title(joint), f"joint-{joint}", (figure, table))
+    return Section(title(joint), f"joint-{joint}", (figure, *tables))
+
+
+def table(
+    joint: str, said: str, label: str, names: Sequence[str], own: Sequence[Series], studies: Sequence[Campaigned]
+) -> Table:
+    """Some numbers of a joint, one row a study."""
+    keys = {(one.name, study.name): key for one in own for study, key in zip(one.studies, one.keys, strict=True)}
+    verdict = label == "floors"
+    rows = tuple(
+        (
+            date(study),
+            study.link,
+            *([word(study, joint)] if verdict else []),
+            *(cell(study, keys.get((name, study.name))) for name in names),
+        )
+        for study in studies
+        if joint in study.joints
+    )
+    heads = [words(name)[:1].upper() + words(name)[1:] for name in names]
+    header = ("Recorded", "Study", *(["Verdict"] if verdict else []), *map(literal, heads))
+    align = ("lll" if verdict else "ll") + "r" * len(names)
+    return Table(
+        f"{title(joint)}: {said[:1].lower() + said[1:]}, in every study.",
+        header,
+        rows,
+        f"campaign-{joint}-{label}",
+        align,
+    )
+
+
+def words(name: str) -> str:
+    """A number's name as it is printed."""
+    return name.replace("_", " ")
 
 
 def cell(study: Campaigned, key: str | None) -> Cell:
@@ -153,4 +177,5 @@ def panel(one: Series, told: Findings) -> Panel:
         marks.append(Points(t[out], one.value[out], "", "vermillion", std[out], names))
     unit = format_unit(one.unit)
     x_label = "time [days from the first]" if told.by_date else "study"
-    return Panel(one.name, x_label, f"{one.name} [{unit}]" if unit else one.name, tuple(marks))
+    name = words(one.name)
+    return Panel(name, x_label, f"{name} [{unit}]" if unit else name, tuple(marks))

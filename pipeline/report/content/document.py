@@ -13,6 +13,7 @@ from typing import Literal
 
 from pipeline.report.content.marks import Line3D, Panel, Points3D
 from pipeline.report.content.number import Number
+from pipeline.study.review import Rating
 
 Cell = str | Number
 Level = Literal["good", "warn", "bad", "info"]
@@ -140,6 +141,16 @@ Block = Prose | Bullets | Listing | Verdict | Equation | Table | Figure | Figure
 
 
 @dataclass(frozen=True)
+class Rated:
+    """What a page needs to take ratings: the sha256 of results.json, the report's ID, the runs, and earlier ratings."""
+
+    results: str
+    report: str
+    runs: tuple[str, ...]
+    ratings: tuple[Rating, ...] = ()
+
+
+@dataclass(frozen=True)
 class Document:
     """A whole report, its first section before the contents; a `simulated` one says so at the top of every page.
 
@@ -153,6 +164,7 @@ class Document:
     edition: str = ""  # which report this is: its ID and the version that made it
     file: str = "report"
     links: tuple[tuple[str, str], ...] = (("Numbers", "results.json"),)
+    rated: Rated | None = None  # where its HTML takes ratings of figures and runs
     author: str = "davinci-forces"
     keywords: tuple[str, ...] = ("da Vinci", "contact force", "system identification", "Kalman filter")
 

@@ -32,6 +32,7 @@ DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
             "ground_truth",
             "methods",
             "provenance",
+            "review",
         ),
     ),
     "robot": ("The robot, its control and its excitation", ("robot", "control", "excitation")),
