@@ -13,15 +13,22 @@ from pipeline.report.content.layout import place
 from pipeline.report.context import Context
 from pipeline.report.results import Results, collect
 from pipeline.report.sections import DOCUMENTS, SECTIONS
+from pipeline.study.review import Rating
 from tests.contracts.conftest import Lab
 
 SECTION = pytest.mark.parametrize("name", SECTIONS)
 PROVENANCE = Provenance("lab", "1", {"numpy": "2"}, {"raw/arm/roll.csv": "0" * 64}, {}, {"fit": "no joint moves"})
 
 
+RATINGS = (
+    Rating("figure", "answer-figure", "doubt", "look <again>", "R", "2026-01-02", "0" * 64),
+    Rating("run", "push", "accept", "", "", "", "0" * 64),
+)
+
+
 def context(lab: Lab, catalogue: Catalogue) -> Context:
     results = collect(catalogue)
-    return Context(catalogue, lab.study, results, PROVENANCE, baseline(results))
+    return Context(catalogue, lab.study, results, PROVENANCE, RATINGS, baseline=baseline(results))
 
 
 def baseline(results: Results) -> dict[str, Stated]:
