@@ -54,6 +54,7 @@ function openRating(subject, name, title) {
   heading.textContent = `Rate ${title}`;
   choice.value = own?.verdict ?? "doubt";
   words.value = own?.comment ?? "";
+  reviewer.value ||= own?.reviewer ?? "";
   form.showModal();
 }
 buttons.append(
