@@ -75,7 +75,7 @@ def ratings(study: Study) -> tuple[Rating, ...]:
 
 
 def review_given(study: Study) -> dict[str, str]:
-    """What a report depends on besides its ID: a review is shown, but it is no input that is verified."""
+    """What a page depends on besides what its ID is made of: a review is shown, and no input."""
     file = study.folder / review.FILE
     return {"review": store.digest(file)} if file.is_file() else {}
 
