@@ -169,9 +169,12 @@ def test_paths_that_differ_most_stand_for_all():
 
 def test_a_contact_is_judged_by_the_threshold_of_its_joint_and_filter():
     about = entry(role="contact", contact=((9.0, 11.0),))
-    theirs = [Threshold("hand_pitch", "ekf", 1.0, 9.0, "a"), Threshold("hand_roll", "rts", 1.0, 9.0, "b")]
+    theirs = [
+        Threshold("hand_pitch", "ekf", 1.0, 0.1, 9.0, 0.9, "a"),
+        Threshold("hand_roll", "rts", 1.0, 0.1, 9.0, 0.9, "b"),
+    ]
     assert not measured(track(noise()), theirs, about)
-    [contact] = measured(track(noise()), [*theirs, Threshold("hand_roll", "ekf", 0.01, 9.0, "c")], about)
+    [contact] = measured(track(noise()), [*theirs, Threshold("hand_roll", "ekf", 0.01, 0.001, 9.0, 0.9, "c")], about)
     assert (contact.level_from, contact.detection_level, *contact.above) == ("c", 0.01, 1)
 
 
@@ -220,7 +223,7 @@ def test_what_nearly_touches_is_one_contact_and_what_changes_sign_is_two():
 
 def test_a_contact_that_no_window_states_is_found_and_said_to_be():
     push = np.where((T >= 20) & (T <= 22), 2.0, 0.0) + np.where((T >= 9) & (T <= 11), 1.5, 0.0)
-    quiet_threshold = [Threshold("hand_roll", "ekf", 0.3, 0.5, "c")]
+    quiet_threshold = [Threshold("hand_roll", "ekf", 0.3, 0.03, 0.5, 0.05, "c")]
     about = entry(role="contact", contact=((9.0, 11.0), (30.0, 31.0)))
     [contact] = measured(track(push + noise(std=0.01)), quiet_threshold, about)
     assert contact.stated.tolist() == [1, 1, 0]

@@ -281,7 +281,8 @@ def band_of(*logs, square, path="another path"):
     """What free motion of other logs says, every block and speed alike."""
     N = len(logs)
     return ErrorBand(
-        joint="hand_roll", speed=0.3, band_rms=1.0, source=np.array(logs, object), path_of=np.array([path] * N, object),
+        joint="hand_roll", speed=0.3, band_rms=1.0, band_rms_std=0.1,
+        source=np.array(logs, object), path_of=np.array([path] * N, object),
         block=np.arange(N), speed_bin=np.zeros(N, int), count=np.full(N, 100), mean_square=np.full(N, square),
         filter_square=np.zeros(N), log_mean=np.zeros(N),
     )  # fmt: skip

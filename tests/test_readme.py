@@ -33,6 +33,7 @@ from pipeline.records import (
     Lyapunov,
     Origin,
     Record,
+    SensorForce,
     Stiffness,
     TipBudget,
     TipContact,
@@ -147,7 +148,7 @@ def test_keys_of_a_study_and_its_logs_are_all_told():
     told |= set(re.findall(r"\[+(?:log\.)?(\w+)", code)) | {span for span in spans(said) if span.isidentifier()}
     assert {f.name for f in fields(LogEntry)} | {f.name for f in fields(HungMass)} | {"file"} <= told
     changeable = {f.name for f in fields(Joint)} - {"name", "kind", "published", "physical", "printed"}
-    assert {"title", "robot", "simulated", "settings", "log", "tool", "length"} | changeable <= told
+    assert {"title", "robot", "simulated", "settings", "log", "tool", "length", "baseline"} | changeable <= told
     assert "[robot_overrides." in said
 
 
@@ -235,7 +236,7 @@ def made(kind: type[Record], **about: Any) -> Record:
 
 
 ROBOT = ("robot.", "control.", "excitation.")
-BY_HAND = (*ROBOT, "weight.", "tissue.", "stability.", "haptics.", "guess.", "tip.")
+BY_HAND = (*ROBOT, "weight.", "tissue.", "stability.", "haptics.", "guess.", "tip.", "sensor.")
 
 
 def test_keys_of_a_robot_and_of_what_hangs_on_it_or_pushes_it_are_told_and_those_told_are_there():
@@ -253,7 +254,7 @@ def test_keys_of_a_robot_and_of_what_hangs_on_it_or_pushes_it_are_told_and_those
         made(HapticResponse),
         made(HapticRun),
     ]
-    records += [made(TipForce), made(TipContact), made(TipBudget)]
+    records += [made(TipForce), made(TipContact), made(TipBudget), made(SensorForce)]
     keys = set(collect(Catalogue(lambda kind: [record for record in records if isinstance(record, kind)])))
     assert {key.partition(".")[0] + "." for key in keys} == set(BY_HAND)
     untold, empty = told(keys)

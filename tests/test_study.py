@@ -261,7 +261,10 @@ def problems(folder) -> list[str]:
 def test_nothing_that_is_wrong_hides_anything_else(tmp_path):
     text = GOOD.replace("title", "titel").replace("period = 10", "period = -10").replace("hand_roll.i", "hand_rol.i")
     (tmp_path / "study.toml").write_text(text)
-    known = "known are title, robot, simulated, robot_overrides, tool, settings, haptics, log; did you mean 'title'?"
+    known = (
+        "known are title, robot, simulated, robot_overrides, tool, settings, haptics, baseline, log; did you mean "
+        "'title'?"
+    )
     assert problems(tmp_path) == [
         f"study.toml:1: unknown key 'titel'; {known}",
         "study.toml:5: file 'a.csv' is not in the folder",

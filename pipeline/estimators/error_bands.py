@@ -1,17 +1,27 @@
 """Which errors on free motion tell how far a log's external effort may be off: never the log's own."""
 
+from typing import NamedTuple
+
 import numpy as np
 
 from pipeline.estimators.paths import ANOTHER_PATH
 from pipeline.maths.arrays import Array, Booleans
-from pipeline.maths.contact.error_band import BLOCKS, SpeedCells, centred, excess, speed_bin
+from pipeline.maths.contact.error_band import BLOCKS, SpeedCells, centred, excess, excess_std, speed_bin
 from pipeline.records import ErrorBand
 
 OWN = "its own other blocks"  # where there is nothing else
 
 
-def model_variance(band: ErrorBand, log: str, path: str, dq: Array, is_centred: bool) -> tuple[Array, str]:
-    """The variance (N,) of a log's external effort beyond the filter's own, along its velocity, and whose errors tell.
+class ModelVariance(NamedTuple):
+    """The variance (N,) of an external effort beyond the filter's own, its standard error (N,), and who tells them."""
+
+    variance: Array
+    std: Array
+    told_by: str
+
+
+def model_variance(band: ErrorBand, log: str, path: str, dq: Array, is_centred: bool) -> ModelVariance:
+    """The variance of a log's external effort beyond the filter's own, along its velocity (N,).
 
     Of other logs those on a path of the same kind are taken, for on a fitted path a model's error repeats.  Where there
     are none, those on another path, which are larger; and where this log is all there is, of each of its blocks the
@@ -23,11 +33,13 @@ def model_variance(band: ErrorBand, log: str, path: str, dq: Array, is_centred: 
     for which in (others & (kinds == path), others & (kinds == ANOTHER_PATH), others):
         if which.any():
             names = ", ".join(dict.fromkeys(source[which]))
-            return excess(rows(band, which, is_centred))[bins], names
-    variance = np.empty(len(dq))
+            own = rows(band, which, is_centred)
+            return ModelVariance(excess(own)[bins], excess_std(own)[bins], names)
+    variance, std = np.empty(len(dq)), np.empty(len(dq))
     for number, part in enumerate(np.array_split(np.arange(len(dq)), BLOCKS)):
-        variance[part] = excess(rows(band, band.block != number, is_centred))[bins[part]]
-    return variance, OWN
+        own = rows(band, band.block != number, is_centred)
+        variance[part], std[part] = excess(own)[bins[part]], excess_std(own)[bins[part]]
+    return ModelVariance(variance, std, OWN)
 
 
 def rows(band: ErrorBand, which: Booleans, is_centred: bool) -> SpeedCells:

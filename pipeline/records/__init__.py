@@ -2,12 +2,12 @@
 
 from pipeline.records.assess import FreeSpace
 from pipeline.records.average import Average, PeriodResidual
+from pipeline.records.benchmark import Comparison
 from pipeline.records.bound import ErrorBand
 from pipeline.records.calibrate import FreeMotion
 from pipeline.records.chart import FrictionMap
 from pipeline.records.choose import Choice
 from pipeline.records.combine import ArmCorrelation
-from pipeline.records.compare import Comparison
 from pipeline.records.correlate import JointCorrelation
 from pipeline.records.design import Control, Excitation, Links, Lyapunov, Pose, Workspace
 from pipeline.records.diagnostic import Diagnostic, diagnostic
@@ -34,6 +34,7 @@ from pipeline.records.predict import Prediction
 from pipeline.records.record import COLUMN_DTYPES, AnyRecord, Column, Counts, Labels, Names, Origin, Record
 from pipeline.records.resample import Signal
 from pipeline.records.resolve import TipBudget, TipContact, TipForce
+from pipeline.records.sense import SensorForce
 from pipeline.records.settle import FilterNoise
 from pipeline.records.smooth import Smoothed
 from pipeline.records.threshold import Threshold
@@ -47,9 +48,9 @@ __all__ = [
     "FilterNoise", "Fit", "FittedPaths", "FreeMotion", "FreeSpace", "FreeWeight", "FrictionMap", "Guess",
     "HapticMotion", "HapticResponse", "HapticRun", "Identifiability", "Innovation", "JointCorrelation", "Labels",
     "Links", "Load", "LogSummary", "Lyapunov", "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose",
-    "Prediction", "Push", "Record", "Recording", "Residual", "Signal", "Smoothed", "Spectrum", "StabilityLimit",
-    "StabilityMap", "Stiffness", "SwarmSearch", "Threshold", "TipBudget", "TipContact", "TipForce", "TissueLimit",
-    "TissueModel", "Touch", "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace", "diagnostic",
+    "Prediction", "Push", "Record", "Recording", "Residual", "SensorForce", "Signal", "Smoothed", "Spectrum",
+    "StabilityLimit", "StabilityMap", "Stiffness", "SwarmSearch", "Threshold", "TipBudget", "TipContact", "TipForce",
+    "TissueLimit", "TissueModel", "Touch", "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
@@ -60,7 +61,7 @@ KINDS: dict[str, type[Record]] = {
         Residual, SwarmSearch, Guess, Choice, FrictionMap, Prediction, Tuning, FilterNoise, FreeMotion, ErrorBand,
         Track, FreeSpace, Threshold, Contact, Push, Stiffness, TissueModel, Load, Weight, FreeWeight, Comparison,
         StabilityMap, StabilityLimit, DelayLimit, TissueLimit, HapticMotion, HapticResponse, HapticRun,
-        JointCorrelation, ArmCorrelation, TipForce, TipContact, TipBudget, Whiteness, Innovation, Explanation,
-        Diagnostic,
+        JointCorrelation, ArmCorrelation, TipForce, TipContact, TipBudget, SensorForce, Whiteness, Innovation,
+        Explanation, Diagnostic,
     )
 }  # fmt: skip

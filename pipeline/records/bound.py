@@ -18,6 +18,7 @@ class ErrorBand(Record):
     joint: str
     speed: float
     band_rms: float
+    band_rms_std: float
     source: Labels
     path_of: Labels
     block: Counts
@@ -29,4 +30,4 @@ class ErrorBand(Record):
 
     def published(self) -> Iterator[Published]:
         """The error over all rows."""
-        yield from self.publish(f"band.{self.joint}", "band_rms")
+        yield Published(f"band.{self.joint}.band_rms", "band_rms", std="band_rms_std")

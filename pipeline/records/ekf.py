@@ -33,6 +33,7 @@ class Track(Record):
     day_offset_std: float
     filter_part: float
     model_part: float
+    model_part_std: float
     lag_part: float
     smooth_rise: float
     band_from: str
@@ -53,6 +54,7 @@ class Track(Record):
     def published(self) -> Iterator[Published]:
         """What the filter found outside contacts, the noise that it assumes, and what its deviation is made of."""
         prefix = f"{self.filter}.{self.log}.{self.joint}"
-        names = ("tau_ext_rms", "nis_mean", "r_q", "r_dq", "q_dq", "q_tau", "filter_part", "model_part", "lag_part")
+        names = ("tau_ext_rms", "nis_mean", "r_q", "r_dq", "q_dq", "q_tau", "filter_part", "lag_part")
         yield from self.publish(prefix, *names)
+        yield Published(f"{prefix}.model_part", "model_part", std="model_part_std")
         yield Published(f"{prefix}.day_offset", "day_offset", std="day_offset_std")

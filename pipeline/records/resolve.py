@@ -84,8 +84,11 @@ class TipContact(Record):
     f_peak: Column
     f_peak_std: Column
     sigma_1: Column
+    sigma_1_std: Column
     sigma_2: Column
+    sigma_2_std: Column
     sigma_3: Column
+    sigma_3_std: Column
     weak_x: Column
     weak_y: Column
     weak_z: Column
@@ -102,7 +105,7 @@ class TipContact(Record):
             for key, name in (("f_x", "f_x"), ("f_y", "f_y"), ("f_z", "f_z"), ("peak", "f_peak")):
                 yield Published(f"{prefix}.{key}", name, std=f"{name}_std", row=i)
             for name in ("sigma_1", "sigma_2", "sigma_3"):
-                yield Published(f"{prefix}.{name}", name, row=i)
+                yield Published(f"{prefix}.{name}", name, std=f"{name}_std", row=i)
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,13 +120,16 @@ class TipBudget(Record):
     lever: Column
     filter_force: Column
     model_force: Column
+    model_force_std: Column
     lag_force: Column
     total_force: Column
+    total_force_std: Column
 
     def published(self) -> Iterator[Published]:
         """The parts of every joint."""
         for i, joint in enumerate(self.of_joint):
             prefix = f"tip.{self.log}.{joint}"
-            for key, name in (("filter_part", "filter_force"), ("model_part", "model_force"),
-                              ("lag_part", "lag_force"), ("total", "total_force")):  # fmt: skip
+            for key, name in (("filter_part", "filter_force"), ("lag_part", "lag_force")):
                 yield Published(f"{prefix}.{key}", name, row=i)
+            for key, name in (("model_part", "model_force"), ("total", "total_force")):
+                yield Published(f"{prefix}.{key}", name, std=f"{name}_std", row=i)

@@ -15,9 +15,13 @@ class Threshold(Record):
     joint: str
     filter: str
     detection_level: float
+    detection_level_std: float
     alarm_level: float
+    alarm_level_std: float
     level_from: str  # the log whose free space it is
 
     def published(self) -> Iterator[Published]:
         """Both levels."""
-        yield from self.publish(f"threshold.{self.joint}", "detection_level", "alarm_level")
+        prefix = f"threshold.{self.joint}"
+        for name in ("detection_level", "alarm_level"):
+            yield Published(f"{prefix}.{name}", name, std=f"{name}_std")

@@ -1,15 +1,17 @@
 """What every section is handed: the records, the results, and how to name things."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 from pipeline.records import Fit, FreeSpace, Prediction, Record
 from pipeline.records.catalogue import Catalogue, Provenance
 from pipeline.records.predict import CHOSEN
 from pipeline.records.quantities import QUANTITIES
+from pipeline.report.changes import Stated
 from pipeline.report.content import Block, Number, OnScreen, Table, literal
 from pipeline.report.results import Results, format_unit
 from pipeline.study import Study
+from pipeline.study.review import Rating
 
 PLAIN = "independent.lse"  # the fit that every other one is compared with
 THESIS_TISSUE = 457.24  # [N/m], section 8.2
@@ -24,6 +26,9 @@ class Context:
     study: Study
     results: Results
     provenance: Provenance
+    ratings: tuple[Rating, ...] = ()  # what reviewers said, where the study holds it
+    labels: frozenset[str] = frozenset()  # of what stands before a section in its document
+    baseline: Mapping[str, Stated] | None = None  # the numbers of an earlier report, where the study names one
 
     def number(self, key: str, digits: int = 4) -> Number | str:
         """The result of that key as a cell, or a dash where there is none."""

@@ -1,25 +1,50 @@
 """Write the reports of a study: report and robot, each as HTML and PDF, results.json, and the answer as text."""
 
+import hashlib
+from collections.abc import Mapping
+from dataclasses import replace
+
 from pipeline.records.catalogue import Catalogue, Provenance
-from pipeline.report.content import Document, Section
+from pipeline.report.changes import Stated
+from pipeline.report.content import Document, Rated, Section, name_of, walk
 from pipeline.report.context import Context
+from pipeline.report.digest import digest
 from pipeline.report.identity import MANIFEST, identity, manifest
 from pipeline.report.results import collect
 from pipeline.report.sections import DOCUMENTS, section_builder
 from pipeline.report.terminal import answer
 from pipeline.report.writers import render_all
 from pipeline.study import Study
+from pipeline.study.review import Rating
 
 
-def write(catalogue: Catalogue, study: Study, provenance: Provenance) -> dict[str, bytes]:
+def write(
+    catalogue: Catalogue,
+    study: Study,
+    provenance: Provenance,
+    baseline: Mapping[str, Stated] | None = None,
+    ratings: tuple[Rating, ...] = (),
+) -> dict[str, bytes]:
     """The files of the report, by name; what is shown and results.json come from the same numbers."""
-    context = Context(catalogue, study, collect(catalogue), provenance)
+    context = Context(catalogue, study, collect(catalogue), provenance, ratings, baseline=baseline)
     built = {name: (title, sections(context, names)) for name, (title, names) in DOCUMENTS.items()}
     numbers = {"results.json": context.results.json(), "summary.txt": answer(context).encode()}
+    numbers["summary.json"] = digest(context)
     listed = manifest(provenance, numbers)
-    edition = f"report ID {identity(listed)} · davinci-forces {provenance.version}"
+    report_id, results = identity(listed), hashlib.sha256(numbers["results.json"]).hexdigest()
+    edition = f"report ID {report_id} · davinci-forces {provenance.version}"
+    rated = Rated(results, report_id, tuple(log.name for log in study.logs), ratings)
     documents = tuple(
-        Document(title, study.title, study.simulated, content, edition, name, links_beside(name, built))
+        Document(
+            title,
+            study.title,
+            study.simulated,
+            content,
+            edition,
+            name,
+            links_beside(name, built),
+            rated=rated if name == "report" else None,
+        )
         for name, (title, content) in built.items()
         if content
     )
@@ -34,4 +59,9 @@ def links_beside(name: str, built: dict[str, tuple[str, tuple[Section, ...]]]) -
 
 def sections(context: Context, names: tuple[str, ...]) -> tuple[Section, ...]:
     """The sections of a document that the study has something to say on."""
-    return tuple(section for name in names if (section := section_builder(name)(context)) is not None)
+    built: list[Section] = []
+    for name in names:
+        labels = {label for section in built for block in walk(section) if (label := name_of(block))}
+        section = section_builder(name)(replace(context, labels=frozenset(labels)))
+        built += [section] if section is not None else []
+    return tuple(built)

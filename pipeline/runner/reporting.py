@@ -9,7 +9,7 @@ from time import perf_counter
 from pipeline.records import KINDS, Record, store
 from pipeline.records.catalogue import Catalogue, Provenance
 from pipeline.report import REPORT
-from pipeline.runner import arithmetic
+from pipeline.runner import arithmetic, stated
 from pipeline.runner.canonical import hash_of
 from pipeline.runner.code import code
 from pipeline.runner.execution import Outcome, said_of, without_folders
@@ -17,7 +17,8 @@ from pipeline.runner.fingerprint import Fingerprint
 from pipeline.runner.ledger import Ledger
 from pipeline.runner.places import Located
 from pipeline.runner.plan import VERSION, Plan, Task
-from pipeline.study import Study
+from pipeline.study import Study, review
+from pipeline.study.review import Rating
 
 PACKAGES = ("numpy", "scipy", "pandas", "pyarrow", "statsmodels", "numba", "matplotlib", "typst", "npTDMS")
 
@@ -29,7 +30,7 @@ def task(plan: Plan) -> Task:
     inputs = [f"processed/{place}" for _, place in located] + [f"raw/{file}" for file in study_files(study)]
     fingerprint = Fingerprint(
         inputs={name: ledger.digest(name) for name in sorted(inputs)},
-        given={"study": hash_of(replace(study, folder=Path(study.name)))},
+        given={"study": hash_of(replace(study, folder=Path(study.name))), **review_given(study)},
         settings=asdict(study.settings),
         schemas={},
         code=code("pipeline.report.report", "pipeline.records.store"),
@@ -63,7 +64,20 @@ def written(ledger: Ledger, task: Task) -> dict[str, bytes]:
     from pipeline.report.report import write  # what it draws with takes longer to import than most runs take
 
     study, located = task.given["study"], task.records["records"]
-    return write(catalogue(ledger, located), study, provenance(study, ledger, located))
+    baseline = stated.read(study.folder / study.baseline) if study.baseline else None
+    return write(catalogue(ledger, located), study, provenance(study, ledger, located), baseline, ratings(study))
+
+
+def ratings(study: Study) -> tuple[Rating, ...]:
+    """What reviewers said of the study's report, where its folder holds that."""
+    file = study.folder / review.FILE
+    return review.read(file) if file.is_file() else ()
+
+
+def review_given(study: Study) -> dict[str, str]:
+    """What a page depends on besides what its ID is made of: a review is shown, and no input."""
+    file = study.folder / review.FILE
+    return {"review": store.digest(file)} if file.is_file() else {}
 
 
 def catalogue(ledger: Ledger, located: tuple[Located, ...]) -> Catalogue:
@@ -92,4 +106,5 @@ def provenance(study: Study, ledger: Ledger, located: tuple[Located, ...]) -> Pr
 
 def study_files(study: Study) -> tuple[str, ...]:
     """The files of a study besides its logs."""
-    return tuple(file for file in ("study.toml", study.robot_file, "truth.toml" if study.truth else "") if file)
+    names = ("study.toml", study.robot_file, "truth.toml" if study.truth else "", study.baseline)
+    return tuple(name for name in names if name)

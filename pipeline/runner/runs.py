@@ -7,7 +7,7 @@ from pathlib import Path
 
 import typer
 
-from pipeline.errors import BadStudy
+from pipeline.errors import BadRequest, BadStudy, MissingRecord
 from pipeline.report import REPORT
 from pipeline.runner.console import Verbosity, console, durations, printable
 from pipeline.runner.execution import Outcome
@@ -80,6 +80,31 @@ def one(name: Path) -> Path:
         names = ", ".join(map(str, folders))
         raise BadStudy(f"{name} stands for {len(folders)} studies, {names}: name one of them; `all` takes several")
     return folders[0]
+
+
+def results_of(name: Path, reports: Path | None = None) -> Path:
+    """The results.json that is meant: by its own name, by its report's folder, or by its study.
+
+    Raises
+    ------
+    BadRequest
+        If a folder holds neither a study nor results.
+    MissingRecord
+        If a study has no results yet.
+    """
+    if name.is_file():
+        return name
+    folder = one(name)
+    if (folder / "study.toml").is_file():
+        file = folders(folder, None, reports).reports / "results.json"
+        if not file.is_file():
+            raise MissingRecord(f"{file} is not there; run `davinci-forces all {folder}`")
+        return file
+    if (folder / "results.json").is_file():
+        return folder / "results.json"
+    if folder.is_dir():
+        raise BadRequest(f"{folder} holds neither study.toml nor results.json; name a study or a results.json")
+    raise BadRequest(f"{name} is not there; name a study, as raw/<study>, or a results.json")
 
 
 def load(folder: Path) -> Study:

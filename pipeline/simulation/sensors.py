@@ -7,7 +7,7 @@ from scipy.signal import lfilter
 
 from pipeline.maths.arrays import Array
 from pipeline.simulation.motion import SimulatedMotion
-from pipeline.simulation.scenario.scenario import SensorNoise, SimulatedJoint
+from pipeline.simulation.scenario.scenario import ForceSensor, SensorNoise, SimulatedJoint
 
 
 @dataclass(frozen=True)
@@ -40,6 +40,13 @@ def record(
         SimulatedChannel(f"{joint.name}.dtheta_m", f"{simulated.label} motor speed", "rad/s", joint.gear_ratio * speed),
         SimulatedChannel(f"{joint.name}.i", f"{simulated.label} current", current_unit, size * current),
     ]  # fmt: skip
+
+
+def record_force(sensor: ForceSensor, t: Array, force: Array, random: np.random.Generator) -> list[SimulatedChannel]:
+    """What a sensor shows of the force (N, 3) of the tip at the times t (N,), base axes: late, and with noise."""
+    late = np.stack([np.interp(t - sensor.lag, t, along) for along in force.T], axis=-1)
+    shown = late + random.normal(0.0, sensor.noise, force.shape)
+    return [SimulatedChannel(f"force_{a}", f"Force {a}", "N", shown[:, i].copy()) for i, a in enumerate("xyz")]
 
 
 def generator(seed: int, log: str, joint: str) -> np.random.Generator:

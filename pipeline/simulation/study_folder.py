@@ -9,7 +9,7 @@ from pipeline.errors import BadRequest
 from pipeline.simulation import closed_loop, prescribed, study_toml, truth_toml, writers
 from pipeline.simulation.motion import SimulatedRun
 from pipeline.simulation.scenario.scenario import Scenario, SensorNoise, SimulatedLog
-from pipeline.simulation.sensors import SimulatedChannel, generator, record
+from pipeline.simulation.sensors import SimulatedChannel, generator, record, record_force
 
 TRUTH = "truth.toml"
 
@@ -65,6 +65,8 @@ def recorded(scenario: Scenario, log: SimulatedLog, run: SimulatedRun) -> list[S
         random = generator(scenario.seed, log.name, name)
         noise = noise_of(scenario, log.family, name)
         channels += record(scenario.joints[name], motion, noise, scenario.rate, log.current_unit, random)
+    if log.sensor and run.force is not None:
+        channels += record_force(log.sensor, run.t, run.force, generator(scenario.seed, log.name, "force"))
     return channels
 
 

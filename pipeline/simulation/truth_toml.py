@@ -34,6 +34,8 @@ def entry(log: SimulatedLog, run: SimulatedRun) -> str:
         lines.append(f"family = {toml(log.family)}")
     if log.mass:
         lines.append(f"mass = {toml(log.mass)}")
+    if log.sensor:
+        lines.append(f"sensor = {{ noise = {toml(log.sensor.noise)}, lag = {toml(log.sensor.lag)} }}")
     if log.tissue:
         lines += [f"stiffness = {toml(log.tissue.stiffness)}", f"surface = {toml(log.tissue.surface)}"]
         lines.append(f"touched = {toml(touched(run))}")

@@ -22,6 +22,6 @@ does not grow with the study, unless it is the only one of its stage.  The repor
 
 STAGES = (
     "design", "ingest", "resample", "average", "differentiate", "smooth", "fit", "choose", "chart", "predict", "tune",
-    "settle", "calibrate", "bound", "ekf", "assess", "threshold", "measure", "palpate", "hang", "weigh", "compare",
-    "limit", "feel", "correlate", "combine", "resolve", "whiteness", "explain",
+    "settle", "calibrate", "bound", "ekf", "assess", "threshold", "measure", "palpate", "hang", "weigh", "benchmark",
+    "limit", "feel", "correlate", "combine", "resolve", "sense", "whiteness", "explain",
 )  # fmt: skip

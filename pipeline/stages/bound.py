@@ -4,7 +4,9 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from pipeline.maths.arrays import evenly
+from pipeline.maths.arrays import Booleans, evenly
+from pipeline.maths.contact.error_band import BLOCKS, FEWEST
+from pipeline.maths.signals import jackknife
 from pipeline.records import ErrorBand, FilterNoise, FreeMotion
 
 LOGS = 20  # at most, that a band is made of
@@ -26,12 +28,20 @@ def band(joint: str, own: list[FreeMotion], speed: float) -> ErrorBand:
     names = ("block", "speed_bin", "count", "mean_square", "filter_square")
     columns = {name: np.concatenate([getattr(motion, name) for motion in own]) for name in names}
     repeated = [len(motion) for motion in own]
+    logs = np.repeat(np.arange(len(own)), repeated)
+    parts = logs if len(own) >= FEWEST else logs * BLOCKS + columns["block"]
     return ErrorBand(
         joint=joint,
         speed=speed,
-        band_rms=float(np.sqrt(np.average(columns["mean_square"], weights=columns["count"]))),
+        band_rms=rms(columns, np.ones(len(logs), np.bool_)),
+        band_rms_std=float(jackknife.standard_error(lambda kept: np.array([rms(columns, kept)]), parts)[0]),
         source=np.repeat(np.array([motion.log for motion in own], object), repeated),
         path_of=np.repeat(np.array([motion.path for motion in own], object), repeated),
         log_mean=np.repeat([motion.free_mean for motion in own], repeated),
         **columns,
     )
+
+
+def rms(columns: dict[str, np.ndarray], kept: Booleans) -> float:
+    """The root mean square of the cells that are kept, samples counting alike."""
+    return float(np.sqrt(np.average(columns["mean_square"][kept], weights=columns["count"][kept])))

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from pipeline.estimators.driving import Driving, driving, motions_of, named
-from pipeline.estimators.error_bands import model_variance
+from pipeline.estimators.error_bands import ModelVariance, model_variance
 from pipeline.estimators.paths import ANOTHER_PATH, SAME_PATH, follows
 from pipeline.estimators.used import describing
 from pipeline.filters import DEFAULT, diverges, rts, through
@@ -85,7 +85,7 @@ def tracked(
     own: Driving, noise: NoiseModel, band: ErrorBand | None, path: str, entry: LogEntry
 ) -> Iterator[Track | Diagnostic]:
     """The Track of one joint of a log."""
-    signal, parts, model = own.signal, own.parts, np.zeros(len(own.signal))
+    signal, parts = own.signal, own.parts
     made = through(DEFAULT, parts, noise)
     if diverges(made):
         yield diverged(signal, float(np.mean(made.nis)))
@@ -95,12 +95,13 @@ def tracked(
     offset = day_offset(signal.t, signal.tau - own.tau_hat, entry.free)
     if offset.drifts:
         yield drifting(signal, offset)
-    band_from = ""
+    beyond = ModelVariance(np.zeros(len(signal)), np.zeros(len(signal)), "")
     if band is not None:
-        model, band_from = model_variance(band, signal.log, path, signal.dq, bool(entry.free))
-    total = made.tau_ext_std**2 + model + late**2 + offset.std**2
+        beyond = model_variance(band, signal.log, path, signal.dq, bool(entry.free))
+    total = made.tau_ext_std**2 + beyond.variance + late**2 + offset.std**2
     calm = np.concatenate([settled(signal.t[part]) for part in segments(signal.segment)])
     free = free_space(signal.t, entry.contact, signal.rate)
+    model_part = float(np.sqrt(np.mean(beyond.variance)))
     yield Track(
         log=signal.log,
         joint=signal.joint,
@@ -120,10 +121,11 @@ def tracked(
         day_offset=offset.value,
         day_offset_std=offset.std,
         filter_part=rms(made.tau_ext_std[calm]),
-        model_part=float(np.sqrt(np.mean(model))),
+        model_part=model_part,
+        model_part_std=float(np.sqrt(model_part**2 + np.mean(beyond.std))) - model_part,
         lag_part=rms(late[calm]),
         smooth_rise=rise(rts.track, parts[0], noise),
-        band_from=band_from,
+        band_from=beyond.told_by,
         t=signal.t,
         q=made.q,
         dq=made.dq,

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from pipeline.maths.arrays import Array, Booleans
+from pipeline.maths.arrays import Array, Booleans, Integers
 from pipeline.maths.contact.free_space import NORMAL_95, FreeSpaceLevels, levels
 from pipeline.maths.contact.joint_correlation import matrix, shared
 from pipeline.maths.mechanics import tip_force
@@ -46,7 +46,7 @@ def run(
     force = resolved(own, robot.chain, rho, source, free)
     yield force
     yield budget(own, robot.chain, free if free.any() else ~free)
-    yield from touching(force, [*windows(entry, contacts)])
+    yield from touching(force, own, robot.chain, [*windows(entry, contacts)])
 
 
 def missing_joints(names: Sequence[str], tracks: dict[str, Track]) -> Iterator[str]:
@@ -103,10 +103,18 @@ def budget(own: Sequence[Track], chain: Chain, which: Booleans) -> TipBudget:
     noise, model, late = (
         lever * np.array([getattr(track, part) for track in own]) for part in ("filter_part", "model_part", "lag_part")
     )
+    total = np.sqrt(noise**2 + model**2 + late**2)
+    wider = np.sqrt(total**2 + lever**2 * [model_variance_std(track) for track in own])
     return TipBudget(
         log=own[0].log, of_joint=np.array([track.joint for track in own], object), lever=lever, filter_force=noise,
-        model_force=model, lag_force=late, total_force=np.sqrt(noise**2 + model**2 + late**2),
+        model_force=model, model_force_std=lever * [track.model_part_std for track in own], lag_force=late,
+        total_force=total, total_force_std=wider - total,
     )  # fmt: skip
+
+
+def model_variance_std(track: Track) -> float:
+    """The standard error of the variance that the model's error adds to an external effort."""
+    return (track.model_part + track.model_part_std) ** 2 - track.model_part**2
 
 
 def windows(entry: LogEntry, contacts: Iterable[Contact]) -> Iterator[tuple[float, float, bool]]:
@@ -124,7 +132,9 @@ def windows(entry: LogEntry, contacts: Iterable[Contact]) -> Iterator[tuple[floa
             yield start, end, False
 
 
-def touching(force: TipForce, windows: Sequence[tuple[float, float, bool]]) -> Iterator[TipContact]:
+def touching(
+    force: TipForce, own: Sequence[Track], chain: Chain, windows: Sequence[tuple[float, float, bool]]
+) -> Iterator[TipContact]:
     """The force where it is largest in each window in which it is known anywhere."""
     f = np.column_stack([force.f_x, force.f_y, force.f_z])
     size = np.where(np.isnan(f[:, 0]), -1.0, np.linalg.norm(f, axis=1))
@@ -136,15 +146,33 @@ def touching(force: TipForce, windows: Sequence[tuple[float, float, bool]]) -> I
         [force.c_xx, force.c_xy, force.c_xz], [force.c_xy, force.c_yy, force.c_yz], [force.c_xz, force.c_yz, force.c_zz]
     ])[..., at].transpose(2, 0, 1)  # fmt: skip
     sigma, axes = tip_force.sigma_ellipsoid(C)
+    sigma_std = half_axes_std(force, own, chain, at, sigma)
     std, u = np.sqrt(np.diagonal(C, axis1=1, axis2=2)), f[at] / size[at, None]
     yield TipContact(
         log=force.log, filter=force.filter, stated=stated.astype(np.int64), onset=onset, release=release,
         t_peak=force.t[at], f_x=f[at, 0], f_x_std=std[:, 0], f_y=f[at, 1], f_y_std=std[:, 1], f_z=f[at, 2],
         f_z_std=std[:, 2], f_peak=size[at], f_peak_std=np.sqrt(np.einsum("ni,nij,nj->n", u, C, u)),
-        sigma_1=sigma[:, 0], sigma_2=sigma[:, 1], sigma_3=sigma[:, 2], weak_x=axes[:, 0, 0], weak_y=axes[:, 0, 1],
+        sigma_1=sigma[:, 0], sigma_1_std=sigma_std[:, 0], sigma_2=sigma[:, 1], sigma_2_std=sigma_std[:, 1],
+        sigma_3=sigma[:, 2], sigma_3_std=sigma_std[:, 2], weak_x=axes[:, 0, 0], weak_y=axes[:, 0, 1],
         weak_z=axes[:, 0, 2], x=force.x[at], y=force.y[at], z=force.z[at], condition=force.condition[at],
         near_singular=force.near_singular[at],
     )  # fmt: skip
+
+
+def half_axes_std(force: TipForce, own: Sequence[Track], chain: Chain, at: Integers, sigma: Array) -> Array:
+    """The standard errors (K, 3) of the half-axes at samples (K,): what each joint's model variance adds by its own."""
+    J, _ = jacobian(chain, np.stack([track.q[at] for track in own], axis=-1))
+    std, rho = (
+        np.stack([track.tau_ext_std[at] for track in own], axis=-1),
+        matrix(force.rho_12, force.rho_13, force.rho_23),
+    )
+    squares = np.zeros(sigma.shape)
+    for i, track in enumerate(own):
+        wider = std.copy()
+        wider[:, i] = np.sqrt(std[:, i] ** 2 + model_variance_std(track))
+        _, C = tip_force.from_efforts(J, np.zeros(std.shape), tip_force.covariance(wider, rho))
+        squares += (tip_force.sigma_ellipsoid(C)[0] - sigma) ** 2
+    return np.asarray(np.sqrt(squares))
 
 
 def largest(t: Array, size: Array, window: tuple[float, float, bool]) -> int | None:

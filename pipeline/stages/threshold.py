@@ -13,8 +13,16 @@ def run(spaces: Iterable[FreeSpace]) -> Iterator[Threshold]:
         every.setdefault((space.joint, space.filter), []).append(space)
     for (joint, name), own in every.items():
         judge = worst(own)
-        alarms = alarm_level([Quiet(s.smooth_rms, s.smooth_max, s.crossings) for s in unseen(own)])
-        yield Threshold(joint, name, judge.detection_level, alarms, judge.log)
+        alarms, loudest = max(((alarm(space), space) for space in unseen(own)), key=lambda pair: pair[0])
+        yield Threshold(
+            joint, name, judge.detection_level, judge.detection_level_std, alarms,
+            alarms * loudest.free_rms_std / loudest.free_rms if loudest.free_rms else 0.0, judge.log,
+        )  # fmt: skip
+
+
+def alarm(space: FreeSpace) -> float:
+    """The effort that this free motion crosses no more than once in ten minutes; it scales with the motion's size."""
+    return alarm_level([Quiet(space.smooth_rms, space.smooth_max, space.crossings)])
 
 
 def worst(spaces: list[FreeSpace]) -> FreeSpace:

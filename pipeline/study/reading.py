@@ -50,6 +50,7 @@ def study_of(table: TomlTable, folder: Path) -> Study:
     robot = _with_tool(robot, table) if "tool" in table else robot
     settings = _settings(table.table("settings"), robot)
     scenario = _haptics(table, folder) if "haptics" in table else HapticScenario()
+    baseline = _baseline(table, folder)
     logs = entries_of(table, robot)
     table.close()
     lines = lines_of_files(table, logs)
@@ -62,13 +63,25 @@ def study_of(table: TomlTable, folder: Path) -> Study:
     own = table.values["robot"] if table.values["robot"].endswith(".toml") else ""
     truth = _truth(folder) if simulated else {}
     changed = overrides.values | ({"tool": table.values["tool"]} if "tool" in table else {})
-    return Study(folder, title, robot, simulated, settings, logs, changed, truth, scenario, own, lines)
+    return Study(folder, title, robot, simulated, settings, logs, changed, truth, scenario, baseline, own, lines)
 
 
 def _truth(folder: Path) -> dict[str, Any]:
     """The ground truth of a simulated study, where its folder has a truth.toml."""
     file = folder / "truth.toml"
     return toml.read(file, BadStudy).values if file.exists() else {}
+
+
+def _baseline(table: TomlTable, folder: Path) -> str:
+    """The file of an earlier report's numbers, "" where none is named."""
+    if "baseline" not in table:
+        return ""
+    name = table.text("baseline")
+    if not name or not inside(name):
+        table.problem(f"baseline {name!r} lies outside the study; copy that results.json beside study.toml", "baseline")
+    elif not (folder / name).is_file():
+        table.problem(f"file {name!r} is not in {folder}; copy a results.json there as {name}", "baseline")
+    return name
 
 
 def _robot(table: TomlTable, folder: Path) -> Robot | None:

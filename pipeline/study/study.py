@@ -124,6 +124,7 @@ class Study:
     changed: dict[str, Any] = field(default_factory=dict)  # what the study says of the robot, for the report
     truth: dict[str, Any] = field(default_factory=dict)  # ground truth of a simulated study: its truth.toml
     haptics: HapticScenario = field(default_factory=HapticScenario)  # what is simulated of a hand that feels the tissue
+    baseline: str = ""  # the results.json in the study's folder that the report is compared with, if there is one
     robot_file: str = ""  # the .toml in the study's folder that describes the robot, if there is one
     lines: dict[str, int] = field(default_factory=dict, compare=False)  # of study.toml, by the file of a log they name
 

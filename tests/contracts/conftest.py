@@ -72,6 +72,14 @@ def at_the_tip() -> list[Signal]:
     return [arm.signal(name, seed=i, external=lambda t, i=i: tau[:, i], **about) for i, name in enumerate(ALL)]
 
 
+def sensed() -> dict[str, np.ndarray]:
+    """The force of that push as a sensor has it, by channel."""
+    [push] = TRUTH["log"][1]["push"]
+    t = at_the_tip()[0].t
+    f = triangle(t, push["start"], push["end"], push["peak"])[:, None] * push["direction"]
+    return {f"force_{axis}": f[:, i] for i, axis in enumerate("xyz")}
+
+
 @pytest.fixture(scope="session")
 def lab(tmp_path_factory) -> Lab:
     folder = arm.write_study(tmp_path_factory.mktemp("contracts") / "raw" / "arm")
@@ -79,7 +87,7 @@ def lab(tmp_path_factory) -> Lab:
     hung = arm.signal("hand_roll", period=2.0, periods=5, rate=50.0, seed=3, external=np.cos)
     arm.write_csv(folder / "hung.csv", [hung])
     arm.write_csv(folder / "pitch.csv", [arm.signal("hand_pitch", period=2.0, periods=5, rate=50.0)])
-    arm.write_csv(folder / "tip.csv", at_the_tip())
+    arm.write_csv(folder / "tip.csv", at_the_tip(), sensed())
     weight = 'weight = { mass = 0.2, moves_with = "hand_roll", position = [0.02, 0.0, -0.3] }\ntare = "again"'
     with (folder / "study.toml").open("a") as file:
         file.write(arm.log_table("again", "again.csv", "identification", ["hand_roll"]))
@@ -87,6 +95,7 @@ def lab(tmp_path_factory) -> Lab:
         file.write(arm.log_table("hung", "hung.csv", "weight", ["hand_roll"], weight))
         file.write(arm.log_table("pitch", "pitch.csv", "identification", ["hand_pitch"]))
         file.write(arm.log_table("tip", "tip.csv", "contact", ALL, "contact = [[4.0, 8.0]]"))
+        file.write("".join(f'{name} = "{name}"\n' for name in sensed()))
     study = replace(reading.read(folder), robot=robot(), truth=TRUTH)
     said: list[str] = []
     runner = Runner(study, folders(folder, None, None), Console(lambda line: None, said.append))

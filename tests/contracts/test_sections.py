@@ -1,24 +1,44 @@
 """Every section of the report: of a study that has everything, of one that has nothing, and of any in between."""
 
+from dataclasses import replace
 from importlib import import_module
 
 import pytest
 
 from pipeline.records import KINDS
 from pipeline.records.catalogue import Catalogue, Provenance
+from pipeline.report.changes import Stated
 from pipeline.report.content import Document, Equation, Figure, Figure3D, Number, Section, Table, name_of, walk
 from pipeline.report.content.layout import place
 from pipeline.report.context import Context
-from pipeline.report.results import collect
+from pipeline.report.results import Results, collect
 from pipeline.report.sections import DOCUMENTS, SECTIONS
+from pipeline.study.review import Rating
 from tests.contracts.conftest import Lab
 
 SECTION = pytest.mark.parametrize("name", SECTIONS)
 PROVENANCE = Provenance("lab", "1", {"numpy": "2"}, {"raw/arm/roll.csv": "0" * 64}, {}, {"fit": "no joint moves"})
 
 
+RATINGS = (
+    Rating("figure", "answer-figure", "doubt", "look <again>", "R", "2026-01-02", "0" * 64),
+    Rating("run", "push", "accept", "", "", "", "0" * 64),
+)
+
+
 def context(lab: Lab, catalogue: Catalogue) -> Context:
-    return Context(catalogue, lab.study, collect(catalogue), PROVENANCE)
+    results = collect(catalogue)
+    return Context(catalogue, lab.study, results, PROVENANCE, RATINGS, baseline=baseline(results))
+
+
+def baseline(results: Results) -> dict[str, Stated]:
+    """The same numbers, of which one was another, one is gone and one is new."""
+    earlier = {key: Stated(result.value, result.std, result.unit) for key, result in results.items()}
+    for key in [*earlier][-1:]:
+        del earlier[key]
+    for key in [*earlier][:1]:
+        earlier[key] = replace(earlier[key], value=results[key].value + 1.0)
+    return earlier | {"gone": Stated(1.0)}
 
 
 def without(catalogue: Catalogue, *kinds: type) -> Catalogue:

@@ -13,7 +13,8 @@ from pipeline import robots
 from pipeline.maths.simulation.control import Regulator
 from pipeline.robots.davinci import ROBOT
 from pipeline.simulation.scenario.reading import _scenario, load, shipped
-from pipeline.simulation.scenario.scenario import BadScenario, Path
+from pipeline.simulation.scenario.scenario import BadScenario, ForceSensor, Path
+from pipeline.simulation.sensors import record_force
 from pipeline.toml import TomlTable
 from pipeline.toml.file import TomlFile
 from tests.test_study import ANYTHING, places_of
@@ -148,6 +149,20 @@ def test_the_tables_of_the_whole_arm_are_checked_too(tmp_path, old, new, says):
     assert any(says in problem for problem in found), found
     changed = {number for number, line in enumerate(text.splitlines(), start=1) if old in line}
     assert {int(problem.partition(":")[0]) for problem in found} & changed
+
+
+def test_the_force_at_the_tip_may_be_recorded_late_and_with_noise(tmp_path):
+    text = shipped_text("davinci-demo")
+    line = 'file = "tip_contact.tdms"'
+    whole = read(tmp_path, text.replace(line, f"{line}\nsensor = {{ noise = 0.1, lag = 0.02 }}"))
+    sensors = {log.name: log.sensor for log in whole.logs if log.sensor}
+    assert sensors == dict.fromkeys(("matched-tip-contact", "realistic-tip-contact"), ForceSensor(0.1, 0.02))
+    [problem] = problems(tmp_path, text.replace(line, f"{line}\nsensor = {{ lag = -1 }}"))
+    assert "sensor: lag must be finite and at least 0" in problem
+    t, f = np.arange(100) / 100.0, np.arange(300.0).reshape(100, 3)
+    made = record_force(ForceSensor(0.0, 0.02), t, f, np.random.default_rng(0))
+    assert [channel.quantity for channel in made] == ["force_x", "force_y", "force_z"]
+    assert np.allclose(np.stack([channel.samples for channel in made], axis=-1)[2:], f[:-2])
 
 
 def test_a_log_that_starts_beyond_a_stop_is_said_where_it_says_so(tmp_path):

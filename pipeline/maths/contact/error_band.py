@@ -9,10 +9,12 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.maths.arrays import Array, Booleans, Integers
+from pipeline.maths.signals import jackknife
 
 EDGES = (0.25, 0.5, 1.0, 1.5)  # of the ranges, in root mean squares of the identification's velocity
 BINS = len(EDGES) + 1
 BLOCKS = 6
+FEWEST = 3  # logs, below which it is blocks that are left out for a standard error
 
 
 class SpeedCells(NamedTuple):
@@ -56,8 +58,25 @@ def excess(of: SpeedCells) -> Array:
     """The variance (BINS,) beyond the filter's own; the same at all speeds where speed does not tell more."""
     if not len(of.samples):
         return np.zeros(BINS)
-    by_speed = means(of, of.mean_square - of.filter_square, together=not depends_on_speed(of))
-    return np.maximum(by_speed, 0.0)
+    return beyond(of, together=not depends_on_speed(of))
+
+
+def excess_std(of: SpeedCells) -> Array:
+    """The standard error (BINS,) of that variance, from how logs differ, or blocks where there are hardly any logs."""
+    if not len(of.samples):
+        return np.zeros(BINS)
+    together = not depends_on_speed(of)
+    return jackknife.standard_error(lambda kept: beyond(of.those(kept), together), units(of)) * np.ones(BINS)
+
+
+def beyond(of: SpeedCells, together: bool) -> Array:
+    """The variance (BINS,) beyond the filter's own, by range of speed or of all ranges together."""
+    return np.maximum(means(of, of.mean_square - of.filter_square, together), 0.0)
+
+
+def units(of: SpeedCells) -> Integers:
+    """Which of the parts that do not correlate each cell (C,) is of: its log, or its block where logs are few."""
+    return of.source if len(np.unique(of.source)) >= FEWEST else of.source * BLOCKS + of.block
 
 
 def means(of: SpeedCells, values: Array, together: bool) -> Array:

@@ -12,6 +12,7 @@ from pipeline.report.content.document import (
     Listing,
     OnScreen,
     Prose,
+    Rated,
     Section,
     Table,
     Verdict,
@@ -43,6 +44,6 @@ from pipeline.report.content.number import Number
 __all__ = [
     "AnyMark", "Band", "Bars", "Block", "Bullets", "Cell", "Document", "Equation", "Figure", "Figure3D", "HBand",
     "HLine", "Histogram", "Level", "Line", "Line3D", "Listing", "Number", "OnScreen", "Panel", "Points", "Points3D",
-    "Prose", "Reference", "Section", "Stems", "Table", "Tiles", "VLine", "VSpan", "Verdict", "literal", "name_of",
-    "numbers", "walk",
+    "Prose", "Rated", "Reference", "Section", "Stems", "Table", "Tiles", "VLine", "VSpan", "Verdict", "literal",
+    "name_of", "numbers", "walk",
 ]  # fmt: skip

@@ -1,9 +1,9 @@
 """What a report says: documents of sections of blocks, as data, with no HTML and no page in them.
 
 Titles of sections, prose, captions, list items and table cells take inline marks (see `inline`): `$x$` for Typst maths,
-backticks for code, `**bold**`, and `[@label]` for a reference to a labelled figure, table, equation or section.  Text
-that came from a log goes through `literal` there.  Words in figures, listings, and the title and study of a document
-are shown as they are.
+backticks for code, `**bold**`, `[words](file)` for a link to a file beside the document, and `[@label]` for a
+reference to a labelled figure, table, equation or section.  Text that came from a log goes through `literal` there.
+Words in figures, listings, and the title and study of a document are shown as they are.
 """
 
 import re
@@ -13,6 +13,7 @@ from typing import Literal
 
 from pipeline.report.content.marks import Line3D, Panel, Points3D
 from pipeline.report.content.number import Number
+from pipeline.study.review import Rating
 
 Cell = str | Number
 Level = Literal["good", "warn", "bad", "info"]
@@ -140,6 +141,16 @@ Block = Prose | Bullets | Listing | Verdict | Equation | Table | Figure | Figure
 
 
 @dataclass(frozen=True)
+class Rated:
+    """What a page needs to take ratings: the sha256 of results.json, the report's ID, the runs, and earlier ratings."""
+
+    results: str
+    report: str
+    runs: tuple[str, ...]
+    ratings: tuple[Rating, ...] = ()
+
+
+@dataclass(frozen=True)
 class Document:
     """A whole report, its first section before the contents; a `simulated` one says so at the top of every page.
 
@@ -153,6 +164,7 @@ class Document:
     edition: str = ""  # which report this is: its ID and the version that made it
     file: str = "report"
     links: tuple[tuple[str, str], ...] = (("Numbers", "results.json"),)
+    rated: Rated | None = None  # where its HTML takes ratings of figures and runs
     author: str = "davinci-forces"
     keywords: tuple[str, ...] = ("da Vinci", "contact force", "system identification", "Kalman filter")
 

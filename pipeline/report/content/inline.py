@@ -1,16 +1,19 @@
-"""Inline marks: `$maths$`, backticks for code, `**bold**` and `[@label]`; a backslash takes a mark's meaning away."""
+"""Inline marks: `$maths$`, backticks for code, `**bold**`, `[@label]` and `[words](file)`; a backslash takes a mark's
+meaning away.
+"""
 
 import re
 from typing import Literal, NamedTuple
 
-Kind = Literal["text", "code", "bold", "maths", "reference"]
+Kind = Literal["text", "code", "bold", "maths", "reference", "link"]
 
 MARK = re.compile(
     r"\\(?P<escaped>[\\$`*\[\]])"
     r"|\$(?P<maths>(?:\\.|[^$\\])+)\$"
     r"|`(?P<code>(?:\\.|[^`\\])+)`"
     r"|\*\*(?P<bold>(?:\\.|[^*\\])+)\*\*"
-    r"|\[@(?P<reference>[a-z0-9][a-z0-9._-]*)\]",
+    r"|\[@(?P<reference>[a-z0-9][a-z0-9._-]*)\]"
+    r"|\[(?P<link>(?:\\.|[^\[\]\\])+)\]\((?P<to>[\w./%~-]+)\)",
     re.DOTALL,
 )
 CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufffe\uffff]")
@@ -21,6 +24,7 @@ class Span(NamedTuple):
 
     kind: Kind
     text: str
+    to: str = ""  # the file beside the document that a link leads to
 
 
 def literal(text: str) -> str:
@@ -46,12 +50,19 @@ def parse(text: str) -> tuple[Span, ...]:
 
 
 def _span(match: re.Match[str]) -> Span:
+    if match["link"]:
+        return Span("link", printable(_unescaped(match["link"])), match["to"])
     kind, text = match.lastgroup, match[match.lastgroup or 0]
     if kind == "escaped":
         return Span("text", text)
     if kind in ("code", "bold"):
-        text = re.sub(r"\\([\\$`*\[\]])", r"\1", text)
+        text = _unescaped(text)
     return Span(kind, printable(text))  # type: ignore[arg-type]
+
+
+def _unescaped(text: str) -> str:
+    """A marked text without the backslashes of `literal`."""
+    return re.sub(r"\\([\\$`*\[\]])", r"\1", text)
 
 
 def _joined(spans: list[Span]) -> tuple[Span, ...]:
@@ -61,5 +72,5 @@ def _joined(spans: list[Span]) -> tuple[Span, ...]:
         if span.kind == "text" and joined and joined[-1].kind == "text":
             joined[-1] = Span("text", joined[-1].text + printable(span.text))
         elif span.text:
-            joined.append(Span(span.kind, printable(span.text)))
+            joined.append(Span(span.kind, printable(span.text), span.to))
     return tuple(joined)

@@ -15,8 +15,10 @@ DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
         "Contact forces without a force sensor",
         (
             "summary",
+            "baseline",
             "contacts",
             "tip",
+            "sensor",
             "tissue",
             "stability",
             "haptics",
@@ -31,6 +33,7 @@ DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
             "ground_truth",
             "methods",
             "provenance",
+            "review",
         ),
     ),
     "robot": ("The robot, its control and its excitation", ("robot", "control", "excitation")),

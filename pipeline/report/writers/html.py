@@ -2,7 +2,9 @@
 
 import base64
 import hashlib
+import json
 from collections.abc import Callable
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +29,7 @@ MOST_POINTS, FEWEST_POINTS = 20_000, 2_000  # of one zoomable figure
 STILL_POINTS = 2_000  # of a figure that does not zoom, for those who want its numbers
 SIGN = "\0"  # which no text can hold: it is not printable
 SCRIPTS = ("contents.js", "figures.js", "tables.js")
+REVIEW_SCRIPTS = ("review.js",)
 TRACE_SCRIPTS = ("axes.js", "marks.js", "traces.js")
 
 
@@ -48,7 +51,11 @@ def render(document: Document) -> bytes:
     page: Json = {
         "document": document, "placed": placed, "references": references(placed), "formulas": formulas,
         "pictures": {name: _picture(figure, name in folded) for name, figure in figures.items()}, "symbols": symbols,
-        "looks": looks(), "scripts": [_script(name) for name in SCRIPTS + (TRACE_SCRIPTS if zooms else ())],
+        "looks": looks(), "scripts": [
+            _script(name)
+            for name in SCRIPTS + (TRACE_SCRIPTS if zooms else ()) + (REVIEW_SCRIPTS if document.rated else ())
+        ],
+        "rated": _json(asdict(document.rated)) if document.rated else "",
     }  # fmt: skip
     still = {name: f for name, f in figures.items() if name not in zooms and not (isinstance(f, Figure) and f.small)}
     numbers = {name: thin_figure(figure, STILL_POINTS) for name, figure in still.items()}
@@ -81,6 +88,11 @@ def _thin_figures(zooms: dict[str, Figure], room: int) -> dict[str, ThinnedFigur
     share = room // POINT_BYTES // max(len(zooms), 1)
     limit = max(FEWEST_POINTS, min(MOST_POINTS, share))
     return {name: thin_figure(figure, limit) for name, figure in zooms.items()}
+
+
+def _json(value: Any) -> str:
+    """Data for a script in the page, in which nothing can end the script's element."""
+    return json.dumps(value, ensure_ascii=False).replace("<", "\\u003c").replace(SIGN, "")
 
 
 def _script(name: str) -> str:
@@ -138,6 +150,9 @@ def _inline(page: Json) -> Callable[[str], "Markup"]:
     def reference(text: str) -> Markup:
         return Markup('<a href="#{}">{}</a>').format(text, page["references"][text])
 
+    def link(text: str, to: str) -> Markup:
+        return Markup('<a href="{}">{}</a>').format(to, text)
+
     shapes: dict[str, Callable[[str], Any]] = {
         "text": Markup.escape,
         "code": Markup("<code>{}</code>").format,
@@ -148,7 +163,9 @@ def _inline(page: Json) -> Callable[[str], "Markup"]:
 
     def inline(text: str) -> Markup:
         spans: tuple[Span, ...] = parse(text)
-        return Markup("").join(shapes[span.kind](span.text) for span in spans)
+        return Markup("").join(
+            link(span.text, span.to) if span.kind == "link" else shapes[span.kind](span.text) for span in spans
+        )
 
     return inline
 

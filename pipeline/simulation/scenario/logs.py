@@ -10,7 +10,14 @@ import numpy as np
 from pipeline.maths.excitation.fourier import Fourier
 from pipeline.maths.simulation.surroundings import SHAPES
 from pipeline.robots.from_toml import NAME
-from pipeline.simulation.scenario.scenario import Path, SimulatedJoint, SimulatedLog, SimulatedPush, Tissue
+from pipeline.simulation.scenario.scenario import (
+    ForceSensor,
+    Path,
+    SimulatedJoint,
+    SimulatedLog,
+    SimulatedPush,
+    Tissue,
+)
 from pipeline.study.entries import ROLES
 from pipeline.toml import TomlTable
 
@@ -85,11 +92,12 @@ def _of_arm(
     mass = table.number("mass", 0.0, low=0.0)
     tip = tuple(_push(entry, log.duration, True) for entry in table.tables("tip"))
     tissue = _tissue(table.table("tissue")) if "tissue" in table else None
+    sensor = _sensor(table.table("sensor")) if "sensor" in table else None
     wanted = table.texts("families", list(families), families)
     roles_table = table.table("role_in")
     roles = {family: roles_table.text(family, log.role, ROLES) for family in families}
     roles_table.close()
-    shared = {**vars(log), "lead": lead, "skip": skip, "mass": mass, "tip": tip, "tissue": tissue}
+    shared = {**vars(log), "lead": lead, "skip": skip, "mass": mass, "tip": tip, "tissue": tissue, "sensor": sensor}
     return [
         SimulatedLog(
             **{
@@ -138,6 +146,12 @@ def _push(table: TomlTable, duration: float, at_tip: bool) -> SimulatedPush:
         table.problem(f"end = {end:g} s is after the recording's {duration:g} s", "end")
     table.close()
     return SimulatedPush(shape, start, end, peak, direction)
+
+
+def _sensor(table: TomlTable) -> ForceSensor:
+    sensor = ForceSensor(table.number("noise", 0.0, low=0.0), table.number("lag", 0.0, low=0.0))
+    table.close()
+    return sensor
 
 
 def _tissue(table: TomlTable) -> Tissue:

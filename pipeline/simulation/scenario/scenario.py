@@ -29,6 +29,14 @@ class SensorNoise:
 
 
 @dataclass(frozen=True)
+class ForceSensor:
+    """A sensor of the force at the tip: the standard deviation of its noise [N], and how late it is [s]."""
+
+    noise: float
+    lag: float
+
+
+@dataclass(frozen=True)
 class SimulatedPush:
     """An effort, or a force of the tip, that the robot exerts on its surroundings from start to end [s].  (7.8)"""
 
@@ -121,6 +129,7 @@ class SimulatedLog:
     tip: tuple[SimulatedPush, ...] = ()
     mass: float = 0.0  # [kg] hung on the tip
     tissue: Tissue | None = None
+    sensor: ForceSensor | None = None  # of the force at the tip
 
     @property
     def joints(self) -> tuple[str, ...]:

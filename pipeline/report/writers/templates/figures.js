@@ -41,9 +41,9 @@ function csv(numbers) {
   return rows.join("\r\n") + "\r\n";
 }
 
-function save(text, name) {
+function save(text, name, type = "text/csv", start = "\uFEFF") {
   const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob(["\uFEFF", text], { type: "text/csv" }));
+  link.href = URL.createObjectURL(new Blob([start, text], { type }));
   link.download = name;
   link.click();
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);

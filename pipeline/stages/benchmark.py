@@ -1,4 +1,4 @@
-"""Compare filters: what each makes of free space, and of a push that is added to the recorded effort in software."""
+"""Benchmark filters: what each makes of free space, and of a push that is added to the recorded effort in software."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise
@@ -78,7 +78,7 @@ def compared(
         said = (
             f"{signal.log}/{signal.joint}: the filter is deaf: it shows {shown.share:.0%} of a push of {DURATION:g} s"
         )
-        yield diagnostic("compare", f"{signal.log}.{signal.joint}", "warning", f"{said}; raise q_tau in [settings]")
+        yield diagnostic("benchmark", f"{signal.log}.{signal.joint}", "warning", f"{said}; raise q_tau in [settings]")
     yield Comparison(
         log=signal.log, joint=signal.joint, filter=label, role=signal.role, default=int(label == DEFAULT),
         free_rms=space.rms, free_rms_std=space.rms_std, free_level=space.level_95, free_level_std=space.level_95_std,

@@ -1,0 +1,73 @@
+"""Which numbers of two results.json differ by more than their standard errors allow."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+SIGMAS = 2.0  # standard errors of a difference, beyond which a number has changed
+RELATIVE = 1e-9  # the same, relative to a number of which no standard error is stated
+
+Value = float | int | str | bool | None
+
+
+@dataclass(frozen=True)
+class Stated:
+    """A number as a results.json states it; `std` is None where it has no standard error."""
+
+    value: Value
+    std: float | None = None
+    unit: str = ""
+
+    @property
+    def number(self) -> float | None:
+        """The value as a number; truth and text are none."""
+        value = self.value
+        return float(value) if isinstance(value, int | float) and not isinstance(value, bool) else None
+
+
+@dataclass(frozen=True)
+class Change:
+    """A key whose number changed, came or went: `before` is None where it came, `after` where it went."""
+
+    key: str
+    before: Stated | None
+    after: Stated | None
+
+    @property
+    def std(self) -> float | None:
+        """The standard error of b - a, sqrt(s_a^2 + s_b^2); None where neither number states one, or one is gone."""
+        return difference_std(self.before, self.after) if self.before and self.after else None
+
+    @property
+    def z(self) -> float | None:
+        """(b - a) / std; None where there is no such error, or no difference of numbers."""
+        if not (self.before and self.after and self.std):
+            return None
+        a, b = self.before.number, self.after.number
+        return (b - a) / self.std if a is not None and b is not None and math.isfinite(b - a) else None
+
+
+def changes(before: Mapping[str, Stated], after: Mapping[str, Stated]) -> list[Change]:
+    """Every key that changed, went or came, in the order of the files."""
+    both = [Change(key, a, after.get(key)) for key, a in before.items()]
+    came = [Change(key, None, b) for key, b in after.items() if key not in before]
+    return [d for d in (*both, *came) if d.before is None or d.after is None or has_changed(d.before, d.after)]
+
+
+def has_changed(a: Stated, b: Stated) -> bool:
+    """|b - a| > 2 sqrt(s_a^2 + s_b^2), or > 1e-9 of the larger where neither states an error; a unit is no other."""
+    if a.unit != b.unit:
+        return True
+    p, q = a.number, b.number
+    if p is None or q is None:
+        return type(a.value) is not type(b.value) or a.value != b.value
+    if p == q or (math.isnan(p) and math.isnan(q)):
+        return False
+    std = difference_std(a, b)
+    allowed = RELATIVE * max(abs(p), abs(q)) if std is None else SIGMAS * std
+    return not math.isfinite(q - p) or abs(q - p) > allowed
+
+
+def difference_std(a: Stated, b: Stated) -> float | None:
+    """sqrt(s_a^2 + s_b^2), with 0 for an error that only one of them states; None where there is no error at all."""
+    return math.hypot(a.std or 0.0, b.std or 0.0) or None

@@ -1,0 +1,218 @@
+"""`davinci-forces compare` and a study's baseline: what changed, came and went, and what is no results.json."""
+
+import json
+import math
+import shutil
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from pipeline.cli import app
+from pipeline.errors import BadStudy
+from pipeline.report.changes import Change, Stated, changes
+from pipeline.study import reading
+from tests.arm import write_study
+
+
+def call(*arguments, code=0) -> str:
+    result = CliRunner().invoke(app, [str(a) for a in arguments], env={"COLUMNS": "400", "TERM": "dumb"})
+    assert result.exit_code == code, result.output
+    return result.output
+
+
+def compared(a: Path, b: Path) -> list[dict]:
+    return json.loads(call("compare", a, b, "--json"))
+
+
+def results(file: Path, **values) -> Path:
+    """A results.json of values, or of (value, std)."""
+    pairs = {key: value if isinstance(value, tuple) else (value, None) for key, value in values.items()}
+    rows = [{"key": key, "value": value, "std": std, "unit": "N"} for key, (value, std) in pairs.items()]
+    file.write_text(json.dumps(rows))
+    return file
+
+
+def changed(a: Stated, b: Stated) -> bool:
+    return bool(changes({"x": a}, {"x": b}))
+
+
+def test_a_number_has_changed_beyond_two_standard_errors_of_the_difference():
+    std = math.hypot(0.3, 0.4)
+    for sign in (1, -1):
+        assert not changed(Stated(5.0, 0.3), Stated(5.0 + sign * 1.999 * std, 0.4))
+        assert changed(Stated(5.0, 0.3), Stated(5.0 + sign * 2.001 * std, 0.4))
+
+
+def test_the_error_of_one_side_alone_counts():
+    assert not changed(Stated(1.0), Stated(1.1, 0.06))
+    assert changed(Stated(1.0), Stated(1.1, 0.04))
+
+
+@pytest.mark.parametrize("std", [None, 0.0])
+def test_without_an_error_a_billionth_is_a_change(std):
+    assert not changed(Stated(3e6, std), Stated(3e6 * (1 + 0.9e-9), std))
+    assert changed(Stated(3e6, std), Stated(3e6 * (1 + 1.1e-9), std))
+    assert changed(Stated(0.0, std), Stated(1e-300, std))
+
+
+def test_text_and_truth_are_compared_as_they_are_and_nan_is_nan():
+    assert not changed(Stated("lse"), Stated("lse"))
+    assert changed(Stated("lse"), Stated("wlse"))
+    assert changed(Stated(True), Stated(False))
+    assert changed(Stated(True), Stated(1.0))
+    assert not changed(Stated(math.nan, 1.0), Stated(math.nan, 1.0))
+    assert changed(Stated(math.nan, 1.0), Stated(0.0, 1.0))
+    assert changed(Stated(1.0, 5.0), Stated(math.inf, 5.0))
+
+
+def test_another_unit_is_a_change():
+    assert changed(Stated(1.0, 0.1, "N m"), Stated(1.0, 0.1, "A"))
+
+
+def test_z_counts_standard_errors_of_the_difference():
+    change = Change("x", Stated(1.0, 3.0), Stated(21.0, 4.0))
+    assert (change.std, change.z) == (5.0, 4.0)
+    assert Change("x", Stated(1.0), Stated(2.0)).z is None
+    assert Change("x", None, Stated(2.0, 1.0)).std is None
+
+
+def test_rows_name_what_changed_came_and_went(tmp_path):
+    a = results(tmp_path / "a.json", same=1.0, moved=(1.0, 0.3), gone=2.0, odd=math.nan)
+    b = results(tmp_path / "b.json", moved=(3.0, 0.4), new=4.0, same=1.0, odd=1.0)
+    assert compared(a, b) == [
+        {"key": "moved", "a": 1.0, "b": 3.0, "std": 0.5, "z": 4.0},
+        {"key": "gone", "a": 2.0, "b": None, "std": None, "z": None},
+        {"key": "odd", "a": "nan", "b": 1.0, "std": None, "z": None},
+        {"key": "new", "a": None, "b": 4.0, "std": None, "z": None},
+    ]
+    said = call("compare", a, b)
+    assert "2 of the 3 numbers that both have changed" in said
+    assert "1 went:\n  gone" in said
+    assert "1 came:\n  new" in said
+    assert "+4.0" in said
+
+
+def test_a_change_in_a_late_digit_is_shown_in_as_many(tmp_path):
+    a, b = results(tmp_path / "a.json", x=1.0), results(tmp_path / "b.json", x=1.0 + 1e-8)
+    assert "1.00000001 N" in call("compare", a, b)
+
+
+def test_a_study_its_report_and_its_numbers_are_the_same_and_do_not_differ(analysed):
+    home = analysed.parent.parent
+    for name in (analysed, home / "reports" / "arm", home / "reports" / "arm" / "results.json"):
+        assert compared(analysed, name) == []
+    assert "0 of the " in call("compare", analysed, analysed)
+
+
+def test_one_altered_value_is_the_one_that_is_named(analysed, tmp_path):
+    rows = json.loads((analysed.parent.parent / "reports/arm/results.json").read_text())
+    [row] = [row for row in rows if row["key"] == "fit.hand_roll.independent.lse.inertia"]
+    before = row["value"]
+    row["value"] += 3.0 * row["std"]
+    (tmp_path / "other.json").write_text(json.dumps(rows))
+    [found] = compared(analysed, tmp_path / "other.json")
+    assert (found["key"], found["a"], found["b"]) == (row["key"], before, row["value"])
+    assert found["z"] == pytest.approx(3.0 / math.sqrt(2.0))
+
+
+@pytest.fixture
+def finished(analysed, tmp_path) -> Path:
+    shutil.copytree(analysed.parent.parent, tmp_path / "lab")
+    return tmp_path / "lab" / "raw" / "arm"
+
+
+@pytest.mark.medium
+def test_an_altered_contact_log_changes_its_own_numbers_alone(analysed, finished):
+    rows = [line.split(",") for line in (finished / "push.csv").read_text().splitlines()]
+    for row in rows[1:]:
+        if 4.5 < float(row[0]) < 5.5:
+            row[3] = repr(float(row[3]) + 1.0)  # pushed twice as hard
+    (finished / "push.csv").write_text("\n".join(",".join(row) for row in rows) + "\n")
+    call("all", finished)
+    keys = [row["key"] for row in compared(analysed, finished)]
+    assert "contact.push.hand_roll.1.peak" in keys
+    assert not [key for key in keys if ".push." not in key]
+
+
+@pytest.mark.medium
+def test_two_runs_of_the_same_data_find_nothing(analysed, tmp_path):
+    study = write_study(tmp_path / "raw" / "arm")
+    call("all", study)
+    assert compared(analysed, study) == []
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("{", "is no results.json: "),
+        ("{}", "it holds no list of numbers"),
+        ("[1]", "number 1: it is not"),
+        ('[{"key": "x", "value": [1]}]', "number 1 (x): its value is [1], not a number"),
+        ('[{"key": "x", "value": 1, "std": -1}]', "(x): its std is -1"),
+        ('[{"key": "x", "value": 1, "std": true}]', "(x): its std is True"),
+        ('[{"key": "x", "value": 1, "unit": 1}]', "(x): its unit is 1"),
+        ('[{"key": "x", "value": 1}, {"key": "x", "value": 2}]', "number 2 (x): the key is there twice"),
+    ],
+)
+def test_what_is_no_results_json_is_said_to_be_none(tmp_path, text, words):
+    good, bad = results(tmp_path / "good.json", x=1.0), tmp_path / "bad.json"
+    bad.write_text(text)
+    for pair in ((good, bad), (bad, good)):
+        said = call("compare", *pair, code=1)
+        assert str(bad) in said
+        assert words in said
+
+
+def test_what_is_not_there_is_said_with_its_remedy(tmp_path):
+    good = results(tmp_path / "good.json", x=1.0)
+    assert "name a study" in call("compare", good, tmp_path / "none.json", code=1)
+    assert "holds neither study.toml nor results.json" in call("compare", tmp_path / ".", good, code=1)
+    study = write_study(tmp_path / "raw" / "arm")
+    assert f"run `davinci-forces all {study}`" in call("compare", study, good, code=1)
+
+
+def test_a_file_that_is_no_text_is_said_to_be_none(tmp_path):
+    (tmp_path / "bad.json").write_bytes(np.arange(200, dtype=np.uint8).tobytes())
+    assert "is no results.json" in call("compare", tmp_path / "bad.json", tmp_path / "bad.json", code=1)
+
+
+@pytest.mark.parametrize(
+    ("line", "words"),
+    [
+        ('baseline = "old.json"', "file 'old.json' is not in"),
+        ('baseline = "../old.json"', "lies outside the study"),
+        ("baseline = 3", "baseline must be text"),
+    ],
+)
+def test_a_baseline_that_cannot_be_is_a_problem_of_its_line(tmp_path, line, words):
+    study = write_study(tmp_path / "arm")
+    text = (study / "study.toml").read_text()
+    (study / "study.toml").write_text(f"{line}\n{text}")
+    with pytest.raises(BadStudy, match=rf"study\.toml:1: .*{words}"):
+        reading.read(study)
+
+
+@pytest.mark.medium
+def test_a_report_says_what_changed_since_its_baseline_and_is_made_anew_when_that_changes(finished):
+    rows = json.loads((finished.parents[1] / "reports/arm/results.json").read_text())
+    kept = [dict(row) for row in rows if row["key"] != "period.roll"]
+    kept[0]["value"] += 1.0
+    changed_key = kept[0]["key"]
+    study, baseline = finished / "study.toml", finished / "old.json"
+    baseline.write_text(json.dumps([*kept, {"key": "gone.<b>", "value": 1.0, "std": None, "unit": ""}]))
+    study.write_text(f'baseline = "old.json"\n{study.read_text()}')
+    call("report", finished)
+    page = (finished.parents[1] / "reports/arm/report.html").read_text()
+    assert "Since the baseline" in page
+    assert "1 came and 1 went" in page
+    assert "gone.&lt;b&gt;" in page
+    assert changed_key in page
+    assert "nothing to do" in call("report", finished)
+    call("verify", finished)
+    baseline.write_text(json.dumps(rows))
+    assert "raw/old.json changed" in call("report", finished)
+    assert "0 changed; 0 came and 0 went" in (finished.parents[1] / "reports/arm/report.html").read_text()
+    baseline.write_text("[")
+    assert f"{baseline} is no results.json" in call("report", finished, code=1)
