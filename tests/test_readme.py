@@ -126,13 +126,15 @@ def test_channels_are_those_that_there_are_with_the_units_taken():
 
 def test_formats_and_what_they_need_are_those_that_there_are():
     assert named(rows("format", "files")) == list(FORMATS)
-    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    optional = project["optional-dependencies"]
-    asked = {re.match(r"\w+", each)[0]: name for name, (each, *_) in optional.items() if name != "all"}
-    assert {
-        spans(package)[0]: re.search(r"\[(\w+)\]", how)[1] for package, _, _, how in rows("package", "licence")
-    } == asked
-    assert sorted(optional["all"]) == sorted(each for name, (each, *_) in optional.items() if name != "all")
+    code = "".join(source.read_text(encoding="utf-8") for source in (ROOT / "pipeline" / "logs").rglob("*.py"))
+    required = dict(re.findall(r'require\(path, "(\w+)", "(\w+)"\)', code))
+    table = rows("package", "licence")
+    assert {spans(row[0])[0]: re.search(r"\[(\w+)\]", row[3])[1] for row in table} == required
+    optional = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]["optional-dependencies"]
+    for package, extra in required.items():
+        [requirement] = optional[extra]
+        assert re.match(r"\w+", requirement)[0] == package
+        assert requirement in optional["all"]
 
 
 def test_units_are_those_that_there_are():
