@@ -6,6 +6,11 @@ A format is a module of this folder that exports two functions:
     read(path: Path, options: Options) -> Log        raises BadLog
 
 `read` looks at headers only; the samples are read by iterating over `Log.blocks`.
+
+Channels may have clocks of their own: `Channel.time` names the channel of the same log that says when the samples of a
+channel were taken, in seconds from `Log.started`.  Where the file has none, the reader makes one (`derived`, of kind
+"time"), which is right from file segment to file segment and from write to write.  What has one uniform clock in common
+needs none: `Log.clock` says it.
 """
 
 from abc import ABC, abstractmethod
@@ -40,6 +45,7 @@ class Channel:
     unit: str = ""
     kind: str = "number"  # or "text", "time" (what cannot be used as a quantity is still listed)
     derived: bool = False  # made by the reader, not written in the log ("write", "elapsed")
+    time: str = ""  # the channel that says when its samples were taken; "" for the log's own: `Log.time`, else `.clock`
 
 
 @dataclass(frozen=True)
@@ -76,9 +82,9 @@ class Log(ABC):
 
     @abstractmethod
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
-        """Read the samples of these channels, in consecutive blocks of bounded size.
+        """Read the samples of these channels, all of one clock, in consecutive blocks of bounded size.
 
-        Missing cells and cells that hold NaN are both NaN in the block; they are counted apart in `nulls` and `nans`.
+        Whoever wants channels of several clocks reads them one clock after the other, see `by_clock`.  Missing cells and cells that hold NaN are both NaN in the block; they are counted apart in `nulls` and `nans`.
 
         Raises
         ------
@@ -108,6 +114,15 @@ class Log(ABC):
         hint = f"the closest are {_listed(near)}" if near else f"it has {_listed(self.channels[:12])}"
         raise BadLog(f"{self.path}: there is no channel {name!r} among its {len(names)}; {hint}")
 
+    def by_clock(self, names: Sequence[str]) -> dict[str, list[str]]:
+        """The names by the clock of their channels: its time channel, or "" for the log's own."""
+        clocks = {channel.time for channel in self.channels} - {""}
+        of = {channel.name: channel.name if channel.name in clocks else channel.time for channel in self.channels}
+        grouped: dict[str, list[str]] = {}
+        for name in names:
+            grouped.setdefault(of[name], []).append(name)
+        return grouped
+
     def _numbered(self, number: int) -> Channel:
         written = [channel for channel in self.channels if not channel.derived]
         if not 0 <= number < len(written):
@@ -123,6 +138,8 @@ class Log(ABC):
         for name in names:
             if (channel := self.find(name)).kind not in kinds:
                 raise BadLog(f"{self.path}: channel {name!r} holds {channel.kind}, not numbers; choose another")
+        if len(clocks := self.by_clock(names)) > 1:
+            raise BadLog(f"{self.path}: {', '.join(map(repr, names))} have {len(clocks)} clocks; read them one by one")
 
 
 def _listed(channels: Sequence[Channel], joint: str = ", ") -> str:
