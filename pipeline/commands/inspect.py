@@ -1,6 +1,8 @@
 """Show what a log holds: channels, units, samples, clock, what is odd about it, and its first rows."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -31,45 +33,74 @@ def run(
         typer.echo("\n".join(lines(description)))
 
 
+@dataclass
+class _Survey:
+    """What one pass over the channels of one clock found."""
+
+    statistics: "ClockStatistics"
+    outlines: dict[str, "Outline"]
+    first: dict[str, list[float]]  # rows of each channel
+    rising: dict[str, "ClockStatistics"]  # channels that rise throughout, as a time does
+    rows: int = 0
+
+
 def describe(file: Path, head: int) -> dict[str, Any]:
-    """Read a whole log; what it holds, in plain values of which none is NaN.
+    """Read a whole log, one clock after the other; what it holds, in plain values of which none is NaN.
 
     Raises
     ------
     BadLog
         If it cannot be read.
     """
+    from pipeline.logs import open_log
+
+    log = open_log(file)
+    names = [channel.name for channel in log.channels if channel.kind in ("number", "time")]
+    source, warnings = _time(log), list[str]()
+    found: dict[str, _Survey] = {}
+    nulls, nans = dict[str, int](), dict[str, int]()
+    for own, together in sorted(log.by_clock(names).items(), key=lambda each: each[0] != "") or [("", names)]:
+        found[own] = _survey(log, own or source, together, head)
+        warnings += [warning for warning in log.warnings if warning not in warnings]
+        nulls, nans = nulls | log.nulls, nans | log.nans
+    log.nulls, log.nans = nulls, nans
+    main = found.pop("", None) or next(iter(found.values()))
+    outlines = {name: outline for each in (main, *found.values()) for name, outline in each.outlines.items()}
+    first = {name: rows for each in (main, *found.values()) for name, rows in each.first.items()}
+    return {
+        "file": str(file), "format": log.format, "rows": max(each.rows for each in (main, *found.values())),
+        "started": log.started, "zone": log.zone, "clock": _clock(log, source, main.statistics, main.rising),
+        "clocks": [_clock(log, own, each.statistics, {}) | {"channels": [*each.first]} for own, each in found.items()],
+        "channels": [_channel(log, channel, outlines.get(channel.name)) for channel in log.channels],
+        "facts": log.facts, "comments": log.comments, "dropped": log.dropped,
+        "warnings": [*warnings, *_flags(log, source, main.statistics)],
+        "head": {name: [_plain(value) for value in first[name]] for name in names},
+    }  # fmt: skip
+
+
+def _survey(log: "Log", source: str, together: list[str], head: int) -> _Survey:
+    """Read the channels of one clock, whose times `source` holds, if any does."""
     import numpy as np
 
-    from pipeline.logs import open_log
     from pipeline.maths.signals.clock import ClockStatistics
     from pipeline.maths.signals.outline import Outline
 
-    log = open_log(file)
-    names = [channel.name for channel in log.channels if channel.kind != "text"]
-    source, clock = _time(log), ClockStatistics()
-    measured = [c.name for c in log.channels if c.kind == "number" and not c.derived and c.name != source]
-    outlines = {name: Outline() for name in names}
-    first: dict[str, list[float]] = {name: [] for name in names}
-    rising = {} if source or log.clock else {name: ClockStatistics() for name in measured}
-    rows = 0
-    for block in log.blocks(names):
+    kinds = {channel.name: channel.kind for channel in log.channels if not channel.derived}
+    measured = [name for name in together if kinds.get(name) == "number" and name != source]
+    survey = _Survey(
+        ClockStatistics(), {name: Outline() for name in together}, {name: [] for name in together},
+        {} if source or log.clock else {name: ClockStatistics() for name in measured},
+    )  # fmt: skip
+    for block in log.blocks(together):
         count = len(next(iter(block.values())))
-        t = block[source] if source else _counted(log, rows, count)
-        clock.update(t, np.column_stack([block[name] for name in measured]) if measured else None)
-        for name in names:
-            outlines[name].update(block[name])
-            first[name].extend(block[name][: max(0, head - rows)].tolist())
-        rising = {name: statistics for name, statistics in rising.items() if _still_rises(statistics, block[name])}
-        rows += count
-    return {
-        "file": str(file), "format": log.format, "rows": rows, "started": log.started, "zone": log.zone,
-        "clock": _clock(log, source, clock, rising),
-        "channels": [_channel(log, channel, outlines.get(channel.name)) for channel in log.channels],
-        "facts": log.facts, "comments": log.comments, "dropped": log.dropped,
-        "warnings": [*log.warnings, *_flags(log, source, clock)],
-        "head": {name: [_plain(value) for value in values] for name, values in first.items()},
-    }  # fmt: skip
+        t = block[source] if source in block else _counted(log, survey.rows, count)
+        survey.statistics.update(t, np.column_stack([block[name] for name in measured]) if measured else None)
+        for name in together:
+            survey.outlines[name].update(block[name])
+            survey.first[name].extend(block[name][: max(0, head - survey.rows)].tolist())
+        survey.rising = {n: each for n, each in survey.rising.items() if _still_rises(each, block[n])}
+        survey.rows += count
+    return survey
 
 
 def _time(log: "Log") -> str:
@@ -153,12 +184,15 @@ def lines(description: dict[str, Any]) -> Iterator[str]:
         yield f"  {clock['duration'] or 0:.6g} s at {clock['rate']:.6g} Hz, jitter {clock['jitter'] * 1e3:.3g} ms (std)"
         yield f"  longest gap {clock['longest_gap']:.3g} s; {clock['backward']} steps back, {clock['repeated']} of zero"
     yield f"  {clock['duplicates']} rows repeat the one before"
+    for other in description["clocks"]:
+        whose = ", ".join(repr(name) for name in other["channels"][:6]) + (" ..." if len(other["channels"]) > 6 else "")
+        yield f"another clock: {other['source']}, {other['rate']:.6g} Hz, of {whose}"
     yield "channels:"
     yield from _table([_row(i, channel) for i, channel in enumerate(description["channels"])])
     if any(description["head"].values()):
         yield "first rows:"
         names = list(description["head"])
-        rows = zip(*description["head"].values(), strict=True)
+        rows = zip_longest(*description["head"].values())
         yield from _table([names, *([_number(value) for value in row] for row in rows)])
     for title in ("comments", "warnings"):
         if description[title]:

@@ -84,7 +84,8 @@ class Log(ABC):
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, all of one clock, in consecutive blocks of bounded size.
 
-        Whoever wants channels of several clocks reads them one clock after the other, see `by_clock`.  Missing cells and cells that hold NaN are both NaN in the block; they are counted apart in `nulls` and `nans`.
+        Whoever wants channels of several clocks reads them one clock after the other, see `by_clock`.  Missing cells
+        and cells that hold NaN are both NaN in the block; they are counted apart in `nulls` and `nans`.
 
         Raises
         ------
@@ -135,8 +136,9 @@ class Log(ABC):
         self.dropped = 0
         self._at_open = self._at_open or (len(self.warnings), len(self.comments))
         del self.warnings[self._at_open[0] :], self.comments[self._at_open[1] :]
+        by_name = {channel.name: channel for channel in self.channels}
         for name in names:
-            if (channel := self.find(name)).kind not in kinds:
+            if (channel := by_name.get(name) or self.find(name)).kind not in kinds:
                 raise BadLog(f"{self.path}: channel {name!r} holds {channel.kind}, not numbers; choose another")
         if len(clocks := self.by_clock(names)) > 1:
             raise BadLog(f"{self.path}: {', '.join(map(repr, names))} have {len(clocks)} clocks; read them one by one")

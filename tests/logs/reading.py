@@ -16,9 +16,15 @@ Read = tuple[Log, Samples]
 def whole(path: Path, options: Options = Options()) -> Read:  # noqa: B008 - frozen
     """The log, and all samples of all its channels that hold numbers or times."""
     log = open_log(path, options)
-    names = [channel.name for channel in log.channels if channel.kind != "text"]
-    blocks = list(log.blocks(names))
-    return log, {name: np.concatenate([np.empty(0), *(block[name] for block in blocks)]) for name in names}
+    names = [channel.name for channel in log.channels if channel.kind in ("number", "time")]
+    samples: Samples = {}
+    nulls, nans = {}, {}
+    for together in log.by_clock(names).values():
+        blocks = list(log.blocks(together))
+        samples |= {name: np.concatenate([np.empty(0), *(block[name] for block in blocks)]) for name in together}
+        nulls, nans = nulls | log.nulls, nans | log.nans
+    log.nulls, log.nans = nulls, nans
+    return log, {name: samples[name] for name in names}
 
 
 def read(content: bytes, name: str = "log.lvm", options: Options = Options()) -> Read:  # noqa: B008 - frozen

@@ -17,7 +17,8 @@ NUMBERS = {
     1: "i1", 2: "i2", 3: "i4", 4: "i8", 5: "u1", 6: "u2", 7: "u4", 8: "u8", 9: "f4", 10: "f8",
     0x19: "f4", 0x1A: "f8", BOOLEAN: "u1",
 }  # fmt: skip
-SIZES = {0x1B: 16, TIME: 16, 0x08000C: 8, 0x10000D: 16}  # [bytes] of those that are no plain number
+COMPLEX = (0x08000C, 0x10000D)
+SIZES = {0x1B: 16, TIME: 16, COMPLEX[0]: 8, COMPLEX[1]: 16}  # [bytes] of those that are no plain number
 EPOCH = datetime(1904, 1, 1, tzinfo=UTC)
 
 
@@ -41,7 +42,8 @@ class Objects:
 
     latest: dict[str, Samples] = field(default_factory=dict)  # by path: what was stated last
     active: dict[str, Samples] = field(default_factory=dict)  # channels with data in this file segment, in order
-    properties: dict[str, dict[str, Any]] = field(default_factory=dict)
+    properties: dict[str, dict[str, Any]] = field(default_factory=dict)  # what was stated last
+    revised: dict[str, dict[str, Any]] = field(default_factory=dict)  # what was first, of those that were changed
 
     def update(self, metadata: bytes, order: str, renew: bool) -> None:
         """Take in the metadata of one file segment.
@@ -64,8 +66,10 @@ class Objects:
             properties = self.properties.setdefault(path, {})
             self._index(path, take.number("I"), take)
             for _ in range(take.number("I")):
-                name = take.text()
-                properties[name] = take.value(take.number("I"))
+                name, value = take.text(), take.value(take.number("I"))
+                if properties.get(name, value) != value:
+                    self.revised.setdefault(path, {}).setdefault(name, properties[name])
+                properties[name] = value
 
     def _index(self, path: str, header: int, take: "_Cursor") -> None:
         if header == NO_DATA:

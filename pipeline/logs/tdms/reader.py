@@ -1,7 +1,6 @@
 """TDMS files, the binary logs of LabVIEW and DIAdem."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass, field
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -11,12 +10,16 @@ import numpy as np
 
 from pipeline.errors import BadLog
 from pipeline.logs.blocks import ahead
-from pipeline.logs.log import Block, Channel, Clock, Log, Options
+from pipeline.logs.log import Block, Channel, Log, Options
 from pipeline.logs.names import unique
 from pipeline.logs.tdms import scaled
-from pipeline.logs.tdms.metadata import DAQMX_RAW, EPOCH, NUMBERS, TIME, Objects, names
-from pipeline.logs.tdms.samples import Queue, pieces, side_by_side
+from pipeline.logs.tdms.clocks import Sampled, clocks_of
+from pipeline.logs.tdms.index import Index
+from pipeline.logs.tdms.metadata import COMPLEX, DAQMX_RAW, EPOCH, NUMBERS, TIME, Objects, names
+from pipeline.logs.tdms.samples import ROWS, Queue, pieces, rows_of, side_by_side
 from pipeline.logs.tdms.walk import TAG, Walk
+from pipeline.logs.tdms.waveforms import Waveforms
+from pipeline.logs.timeline import Timeline
 
 UNITS = ("unit_string", "ni_unitdescription", "unit", "units")
 
@@ -35,28 +38,35 @@ def read(path: Path, options: Options) -> Log:
         If it holds no channel, or one whose scale is not known.
     """
     warnings: list[str] = []
-    shapes: set[frozenset[tuple[str, int]]] = set()
-    lengths: dict[str, int] = {}
+    index, waveforms = Index(), Waveforms()
     with path.open("rb") as file:
         walk = Walk(file, path.stat().st_size, warnings.append)
         for region in walk.regions():
-            shapes.add(frozenset(region.counts.items()))
-            for channel, count in region.counts.items():
-                lengths[channel] = lengths.get(channel, 0) + count * region.records
-        origin = {p: _first_second(file, path, p) for p, s in walk.objects.latest.items() if s.kind == TIME}
+            index.add(region)
+            waveforms.add(region, walk.objects.properties)
+        stamps = [p for p, samples in walk.objects.latest.items() if samples.kind == TIME]
+        origins = [_first_second(file, index, p) for p in stamps]
     paths = list(walk.objects.latest)
     if not paths:
         why = f" ({'; '.join(warnings)})" if warnings else ""
         raise BadLog(f"{path}: no channel can be read from this TDMS file{why}; record it again")
-    counts = {p: tuple(dict(shape).get(p, 0) for shape in shapes) for p in paths}
-    log = TdmsLog(path, "tdms", _channels(walk.objects), warnings=warnings, size=walk.end, counts=counts, origin=origin)
+    channels = _channels(walk.objects, warnings)
+    name = {p: channel.name for p, channel in zip(paths, channels, strict=True)}
+    log = TdmsLog(
+        path, "tdms", channels, warnings=warnings, size=walk.end, index=index, names=name,
+        origin=min((second for second in origins if second is not None), default=0),
+    )  # fmt: skip
     log.cut = walk.cut
-    _describe(log, walk, lengths)
+    _describe(log, walk, waveforms)
     return log
 
 
-def _channels(objects: Objects) -> tuple[Channel, ...]:
-    written = unique(["/".join(names(path)) for path in objects.latest])
+def _channels(objects: Objects, warnings: list[str]) -> tuple[Channel, ...]:
+    said = ["/".join(names(path)) for path in objects.latest]
+    written = unique(said)
+    for one, channel in zip(said, written, strict=True):
+        if one != channel:
+            warnings.append(f"a channel is called {one!r} like another; it is read as {channel!r}")
     return tuple(
         Channel(name, _unit(objects.properties.get(path, {})), _kind(samples.kind))
         for name, (path, samples) in zip(written, objects.latest.items(), strict=True)
@@ -64,7 +74,9 @@ def _channels(objects: Objects) -> tuple[Channel, ...]:
 
 
 def _kind(kind: int) -> str:
-    return "number" if kind in NUMBERS or kind == DAQMX_RAW else "time" if kind == TIME else "text"
+    if kind in NUMBERS or kind == DAQMX_RAW:
+        return "number"
+    return "time" if kind == TIME else "complex numbers" if kind in COMPLEX else "text"
 
 
 def _unit(properties: Mapping[str, Any]) -> str:
@@ -74,12 +86,15 @@ def _unit(properties: Mapping[str, Any]) -> str:
 
 @dataclass
 class TdmsLog(Log):
-    """An opened TDMS file.  Samples of a channel of time stamps are seconds since the first of them."""
+    """An opened TDMS file.  Samples of channels of time stamps are seconds since the second of the first of all."""
 
     size: int = 0  # [bytes] of the file that can be read
-    counts: dict[str, tuple[int, ...]] = field(default_factory=dict)  # by path: its samples in records of every shape
+    index: Index = field(default_factory=Index)
+    names: dict[str, str] = field(default_factory=dict)  # of the channels, by path
     scaled: frozenset[str] = frozenset()  # paths that npTDMS reads
-    origin: dict[str, int] = field(default_factory=dict)  # [s] since 1904 of the first time stamp, by path
+    origin: int = 0  # [s] since 1904 that time stamps are counted from
+    made: dict[str, Timeline] = field(default_factory=dict)  # by name: derived channels of times
+    mixed: dict[str, str] = field(default_factory=dict)  # by name: why the samples of a channel are not of one kind
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, as `Log.blocks` says.
@@ -87,58 +102,82 @@ class TdmsLog(Log):
         Channels of unequal lengths are filled up with NaN behind their ends.
         """
         self._start_anew(names, kinds=("number", "time"))
-        name = {path: channel.name for path, channel in zip(self.counts, self.channels, strict=True)}
-        yield from ahead(self._blocks(names, name))
+        if problem := next((self.mixed[name] for name in names if name in self.mixed), ""):
+            raise BadLog(f"{self.path}: {problem}")
+        yield from ahead(self._timed(names))
 
-    def _blocks(self, names: Sequence[str], name: Mapping[str, str]) -> Iterator[Block]:
-        with ExitStack() as stack:
-            together = self._together([path for path in self.counts if name[path] in names])
-            queues = [Queue(self._source(paths, stack), paths) for paths in together]
-            for block, lacking in side_by_side(queues):
+    def _timed(self, asked_for: Sequence[str]) -> Iterator[Block]:
+        """The blocks with the times that are made."""
+        made = {name: self.made[name] for name in asked_for if name in self.made}
+        written = [name for name in asked_for if name not in made]
+        row = 0
+        for block in self._blocks(written) if written else _rows(made):
+            count = len(next(iter(block.values())))
+            block |= {name: timeline.at(row, count) for name, timeline in made.items()}
+            yield {name: block[name] for name in asked_for}
+            row += count
+
+    def _blocks(self, asked_for: Sequence[str]) -> Iterator[Block]:
+        asked = set(asked_for)
+        paths = [path for path, name in self.names.items() if name in asked]
+        plain = self.index.together([path for path in paths if path not in self.scaled])
+        scaled = self.index.together([path for path in paths if path in self.scaled])
+        with self.path.open("rb") as file:
+            queues = [Queue(self._source(file, group), group) for group in (*plain, *scaled)]
+            for block, lacking in side_by_side(queues, rows_of(len(paths))):
                 for path, samples in block.items():
-                    self.nulls[name[path]] += lacking[path]
-                    self.nans[name[path]] += int(np.count_nonzero(np.isnan(samples))) - lacking[path]
-                by_name = {name[path]: samples for path, samples in block.items()}
-                yield {asked_for: by_name[asked_for] for asked_for in names}
+                    name = self.names[path]
+                    self.nulls[name] += lacking[path]
+                    self.nans[name] += int(np.count_nonzero(np.isnan(samples))) - lacking[path]
+                yield {self.names[path]: samples for path, samples in block.items()}
 
-    def _together(self, paths: Sequence[str]) -> list[list[str]]:
-        """The channels that can be read in one go: those with as many samples as each other in every record."""
-        groups: dict[tuple[int, ...] | str, list[str]] = {}
-        for path in paths:
-            groups.setdefault(path if path in self.scaled else self.counts[path], []).append(path)
-        return list(groups.values())
-
-    def _source(self, paths: Sequence[str], stack: ExitStack) -> Iterator[Block]:
-        file = stack.enter_context(self.path.open("rb"))
+    def _source(self, file: BinaryIO, paths: Sequence[str]) -> Iterator[Block]:
         if paths[0] in self.scaled:
-            return self._scaled(file, paths[0])
-        return pieces(file, Walk(file, self.size, lambda _: None).regions(), paths, self.origin)
+            return self._scaled(file, paths)
+        return pieces(file, self.index.regions(paths[0]), paths, self.origin)
 
-    def _scaled(self, file: BinaryIO, path: str) -> Iterator[Block]:
+    def _scaled(self, file: BinaryIO, paths: Sequence[str]) -> Iterator[Block]:
         try:
-            yield from scaled.pieces(file, self.size, path)
+            yield from scaled.pieces(file, self.size, paths, self.index.largest_chunk(paths))
         except Exception as error:
-            raise BadLog(f"{self.path}: npTDMS cannot read channel {path} ({error})") from error
+            raise BadLog(f"{self.path}: npTDMS cannot read channel {paths[0]} ({error})") from error
 
 
-def _describe(log: TdmsLog, walk: Walk, lengths: Mapping[str, int]) -> None:
+def _rows(made: Mapping[str, Timeline]) -> Iterator[Block]:
+    """Blocks of nothing, as long as the times that are made."""
+    rows = max(timeline.rows for timeline in made.values())
+    for first in range(0, rows, ROWS):
+        yield {"": np.empty(min(ROWS, rows - first))}
+
+
+def _describe(log: TdmsLog, walk: Walk, waveforms: Waveforms) -> None:
     """What the properties and the file segments say about the log."""
-    properties = walk.objects.properties
-    latest = walk.objects.latest
+    properties, latest = walk.objects.properties, walk.objects.latest
     log.facts["segments"] = str(walk.file_segments)
     log.facts["layout"] = ", ".join(sorted(walk.layouts))
     log.facts |= {key: str(value) for key, value in properties.get("/", {}).items() if isinstance(value, str) and value}
     log.scaled = frozenset(p for p, s in latest.items() if s.kind == DAQMX_RAW or _scales(properties, p))
     for path in log.scaled:
-        if unknown := scaled.unknown_scales(_scales(properties, path)):
-            raise BadLog(f"{log.path}: channel {path} has a scale of unknown kind: {', '.join(unknown)}")
-    _describe_time(log, {path: properties.get(path, {}) for path in latest})
-    sizes = {"/".join(names(path)): lengths.get(path, 0) for path in latest}
+        if problem := scaled.problem(_scales(properties, path)):
+            raise BadLog(f"{log.path}: channel {path} {problem}")
+    for path, first in walk.objects.revised.items():
+        if (word := _decisive(first)) and path in latest:
+            log.mixed[log.names[path]] = (
+                f"channel {log.names[path]!r} says {word} = {first[word]!r} first and {properties[path][word]!r} in a "
+                "later file segment, so its samples are of two kinds; split the file, or record it again"
+            )
+    sizes = {log.names[path]: sum(rows for rows, _ in waveforms.writes.get(path, ())) for path in latest}
+    _describe_time(log, waveforms, properties, sizes)
     if len(set(sizes.values())) > 1:
         counts = ", ".join(f"{name}: {length}" for name, length in list(sizes.items())[:6])
         log.warnings.append(f"channels have different numbers of samples ({counts}); the shorter end in nulls")
     elif not any(sizes.values()):
         log.warnings.append("the file names channels and holds no samples: the recorder stopped before its first write")
+
+
+def _decisive(words: Mapping[str, Any]) -> str:
+    """The first of these properties that decides what a sample means."""
+    return next((word for word in words if word.lower() in UNITS or word.startswith("NI_Scal")), "")
 
 
 def _scales(properties: Mapping[str, dict[str, Any]], path: str) -> dict[str, Any]:
@@ -148,36 +187,34 @@ def _scales(properties: Mapping[str, dict[str, Any]], path: str) -> dict[str, An
     return next((candidate for candidate in candidates if scaled.is_scaled(candidate)), {})
 
 
-def _describe_time(log: TdmsLog, properties: Mapping[str, Mapping[str, Any]]) -> None:
-    """The clock that the waveform properties give, and when it started."""
-    log.zone = "UTC"
-    steps = {path: p["wf_increment"] for path, p in properties.items() if p.get("wf_increment")}
-    if steps:
-        path, step = next(iter(steps.items()))
-        log.clock = Clock(float(step), float(properties[path].get("wf_start_offset", 0.0)))
-        if len(set(steps.values())) > 1:
+def _describe_time(
+    log: TdmsLog, waveforms: Waveforms, properties: Mapping[str, Mapping[str, Any]], sizes: Mapping[str, int]
+) -> None:
+    """When the log started, and the clocks that time stamps and waveform properties give."""
+    kinds = {channel.name: channel.kind for channel in log.channels}
+    stamped = EPOCH + timedelta(seconds=log.origin) if log.origin else None
+    started = stamped or waveforms.started
+    timelines = waveforms.timelines(started, properties)
+    sampled = {
+        name: Sampled(names(path)[0], sizes[name], kinds[name] == "time", timelines.get(path))
+        for path, name in log.names.items()
+    }
+    found = clocks_of(log.channels, sampled, log.cut)
+    log.channels, log.clock, log.time, log.made = found.channels, found.clock, found.time, found.made
+    said = (words.get("wf_start_time") for path, words in properties.items() if path in log.names)
+    if started := started or next((start for start in said if isinstance(start, datetime)), None):
+        log.zone, log.started = "UTC", started.replace(tzinfo=None).isoformat()
+    for name, timeline in found.made.items():
+        if gaps := [f"{first}" for first in timeline.first[1:]]:
+            some = ", ".join(gaps[:5]) + (" ..." if len(gaps) > 5 else "")
             log.warnings.append(
-                f"channels have different sampling intervals ({_some(steps)}); the clock is the first one's"
+                f"the file's later writes say another start or interval: {name!r} begins anew at sample {some}"
             )
-    starts = [p["wf_start_time"] for p in properties.values() if isinstance(p.get("wf_start_time"), datetime)]
-    stamps = [channel.name for channel in log.channels if channel.kind == "time"]
-    log.time = stamps[0] if stamps else ""
-    if starts:
-        log.started = starts[0].replace(tzinfo=None).isoformat()
-    elif log.origin:
-        log.started = (EPOCH + timedelta(seconds=min(log.origin.values()))).replace(tzinfo=None).isoformat()
-    else:
-        log.zone = ""
 
 
-def _some(values: Mapping[str, Any]) -> str:
-    return ", ".join(f"{'/'.join(names(path))}: {value:g} s" for path, value in list(values.items())[:6])
-
-
-def _first_second(file: BinaryIO, log: Path, path: str) -> int:
+def _first_second(file: BinaryIO, index: Index, path: str) -> int | None:
     """The whole second since 1904 of a channel's first time stamp."""
-    regions = Walk(file, log.stat().st_size, lambda _: None).regions()
-    for piece in pieces(file, regions, [path], {}):
+    for piece in pieces(file, index.regions(path), [path], 0):
         if len(piece[path]):
             return int(np.floor(piece[path][0]))
-    return 0
+    return None

@@ -10,12 +10,18 @@ from pipeline.logs.log import Block
 from pipeline.logs.tdms.walk import BLOCK, Column, Region
 
 ROWS = 1 << 17  # of a piece
+VALUES = 1 << 22  # of a block
 
 
-def pieces(file: BinaryIO, regions: Iterator[Region], paths: Sequence[str], origin: dict[str, int]) -> Iterator[Block]:
+def rows_of(channels: int) -> int:
+    """Rows of a block of so many channels."""
+    return min(ROWS, VALUES // max(channels, 1) + 1)
+
+
+def pieces(file: BinaryIO, regions: Iterator[Region], paths: Sequence[str], origin: int) -> Iterator[Block]:
     """The samples of channels that always come together, as many of each in every piece.
 
-    `origin` gives, for a channel of time stamps, the second since 1904 that its times are counted from.
+    `origin` is the second since 1904 that time stamps are counted from.
     """
     for region in regions:
         columns = {path: region.columns[path] for path in paths if path in region.columns}
@@ -24,28 +30,29 @@ def pieces(file: BinaryIO, regions: Iterator[Region], paths: Sequence[str], orig
         dense = all(column.step == column.dtype.itemsize for column in columns.values())
         read = _slices if dense and region.stride > BLOCK else _records
         for views in read(file, region, columns):
-            yield {path: _numbers(view, origin.get(path, 0)) for path, view in views.items()}
+            yield {path: _numbers(view, origin) for path, view in views.items()}
 
 
 def _records(file: BinaryIO, region: Region, columns: dict[str, Column]) -> Iterator[dict[str, NDArray[Any]]]:
     """Many whole records at a time."""
     widest = max(column.count for column in columns.values())
     many = max(1, min(BLOCK // region.stride, ROWS // max(widest, 1)))
+    begin = min(column.offset for column in columns.values())
     needed = max(
         column.offset + (column.count - 1) * column.step + column.dtype.itemsize for column in columns.values()
     )
     for first in range(0, region.records, many):
         records = min(many, region.records - first)
-        file.seek(region.position + first * region.stride)
-        raw = file.read((records - 1) * region.stride + needed)
-        yield {path: _view(raw, records, region.stride, column).reshape(-1) for path, column in columns.items()}
+        file.seek(region.position + first * region.stride + begin)
+        raw = file.read((records - 1) * region.stride + needed - begin)
+        yield {path: _view(raw, records, region.stride, column, begin).reshape(-1) for path, column in columns.items()}
 
 
-def _view(raw: bytes, records: int, stride: int, column: Column) -> NDArray[Any]:
+def _view(raw: bytes, records: int, stride: int, column: Column, begin: int) -> NDArray[Any]:
     shape = (records, column.count)
     if not column.count:
         return np.empty(shape, column.dtype)
-    return np.ndarray(shape, column.dtype, raw, offset=column.offset, strides=(stride, column.step))
+    return np.ndarray(shape, column.dtype, raw, offset=column.offset - begin, strides=(stride, column.step))
 
 
 def _slices(file: BinaryIO, region: Region, columns: dict[str, Column]) -> Iterator[dict[str, NDArray[Any]]]:
@@ -77,9 +84,9 @@ class Queue:
         self.parts: list[Block] = []
         self.length, self.ended = 0, False
 
-    def fill(self) -> None:
+    def fill(self, rows: int) -> None:
         """Read until there is a block's worth, or the end."""
-        while self.length < ROWS and not self.ended:
+        while self.length < rows and not self.ended:
             part = next(self.source, None)
             if part is None:
                 self.ended = True
@@ -97,11 +104,11 @@ class Queue:
         return {p: np.concatenate((s[:rows], fill)) if lacking else s[:rows] for p, s in whole.items()}, lacking
 
 
-def side_by_side(queues: Sequence[Queue]) -> Iterator[tuple[Block, dict[str, int]]]:
-    """Blocks of all channels, and how many samples each lacks, until the longest ends."""
+def side_by_side(queues: Sequence[Queue], most: int = ROWS) -> Iterator[tuple[Block, dict[str, int]]]:
+    """Blocks of all channels, of about `most` rows, and how many samples each lacks, until the longest ends."""
     while True:
         for queue in queues:
-            queue.fill()
+            queue.fill(most)
         going = [queue.length for queue in queues if not queue.ended]
         rows = min(going) if going else max((queue.length for queue in queues), default=0)
         if not rows:

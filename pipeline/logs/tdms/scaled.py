@@ -6,7 +6,8 @@ age and state in the same folder.
 
 import io
 import logging
-from collections.abc import Iterator
+import re
+from collections.abc import Iterator, Sequence
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -15,6 +16,9 @@ from pipeline.logs.log import Block
 from pipeline.logs.tdms.metadata import names
 from pipeline.logs.tdms.samples import ROWS
 
+COUNT = "NI_Number_Of_Scales"
+NUMBERED = re.compile(r"NI_Scale\[(\d{1,6})\]_")
+MOST = 1000  # scales of a channel
 # What npTDMS knows; it would return values of any other scale unscaled.
 SCALES = {
     "Polynomial",
@@ -58,24 +62,34 @@ class Part(io.RawIOBase):
 def is_scaled(properties: dict[str, Any]) -> bool:
     """Whether the values are still to be scaled as the properties say."""
     return properties.get("NI_Scaling_Status", "unscaled") != "scaled" and (
-        int(properties.get("NI_Number_Of_Scales", 0)) > 0 or any(name.endswith("_Scale_Type") for name in properties)
+        properties.get(COUNT, 0) not in (0, "0") or any(name.endswith("_Scale_Type") for name in properties)
     )
 
 
-def unknown_scales(properties: dict[str, Any]) -> list[str]:
-    """Kinds of scale that cannot be applied."""
+def problem(properties: dict[str, Any]) -> str:
+    """Why the scales cannot be applied, or ""; a count that was damaged would have npTDMS look for billions."""
     kinds = {str(value) for name, value in properties.items() if name.endswith("_Scale_Type")}
-    return sorted(kinds - SCALES)
+    if unknown := sorted(kinds - SCALES):
+        return f"has a scale of unknown kind: {', '.join(unknown)}"
+    numbers = [int(match[1]) for name in properties if (match := NUMBERED.match(name))]
+    count, most = properties.get(COUNT, 0), max([0, *numbers]) + 1
+    if not isinstance(count, int) or not 0 <= count <= min(most, MOST):
+        return f"says that it has {count!r} scales and describes {len(kinds)}: the file is damaged; record it again"
+    return ""
 
 
-def pieces(file: BinaryIO, size: int, path: str) -> Iterator[Block]:
-    """The scaled samples of a channel."""
+def pieces(file: BinaryIO, size: int, paths: Sequence[str], chunk: int) -> Iterator[Block]:
+    """The scaled samples of channels that always come together; `chunk` is how many of each do."""
     from nptdms import TdmsFile
     from nptdms.log import log_manager
 
     log_manager.set_level(logging.ERROR)  # what is amiss with the file we have said already
-    group, channel = names(path)
     with TdmsFile.open(Part(file, size)) as opened:
-        samples = opened[group][channel]
-        for first in range(0, len(samples), ROWS):
-            yield {path: np.asarray(samples[first : first + ROWS], dtype=np.float64)}
+        of = {path: names(path) for path in paths}
+        if chunk <= ROWS:
+            for each in opened.data_chunks():
+                yield {path: np.asarray(each[g][c][:], dtype=np.float64) for path, (g, c) in of.items()}
+            return
+        channels = {path: opened[group][channel] for path, (group, channel) in of.items()}
+        for first in range(0, len(channels[paths[0]]), ROWS):
+            yield {path: np.asarray(c[first : first + ROWS], dtype=np.float64) for path, c in channels.items()}
