@@ -78,6 +78,9 @@ class Log(ABC):
     nans: dict[str, int] = field(default_factory=dict)  # samples logged as NaN, of every channel that was read
     dropped: int = 0  # rows that could not be used
     cut: bool = False  # the file ends before what was begun, so that channels may end in missing samples
+    _lookup: tuple[tuple[Channel, ...], dict[str, tuple[Channel, str]]] | None = field(
+        default=None, init=False, repr=False
+    )
     _at_open: tuple[int, int] | None = field(default=None, init=False, repr=False)  # warnings and comments from headers
 
     @abstractmethod
@@ -117,12 +120,19 @@ class Log(ABC):
 
     def by_clock(self, names: Sequence[str]) -> dict[str, list[str]]:
         """The names by the clock of their channels: its time channel, or "" for the log's own."""
-        clocks = {channel.time for channel in self.channels} - {""}
-        of = {channel.name: channel.name if channel.name in clocks else channel.time for channel in self.channels}
         grouped: dict[str, list[str]] = {}
         for name in names:
-            grouped.setdefault(of[name], []).append(name)
+            grouped.setdefault(self._looked_up[name][1], []).append(name)
         return grouped
+
+    @property
+    def _looked_up(self) -> dict[str, tuple[Channel, str]]:
+        """The channels and their clocks, by name; made anew where the channels are others."""
+        if self._lookup is None or self._lookup[0] is not self.channels:
+            clocks = {channel.time for channel in self.channels} - {""}
+            by_name = {c.name: (c, c.name if c.name in clocks else c.time) for c in self.channels}
+            self._lookup = self.channels, by_name
+        return self._lookup[1]
 
     def _numbered(self, number: int) -> Channel:
         written = [channel for channel in self.channels if not channel.derived]
@@ -136,9 +146,9 @@ class Log(ABC):
         self.dropped = 0
         self._at_open = self._at_open or (len(self.warnings), len(self.comments))
         del self.warnings[self._at_open[0] :], self.comments[self._at_open[1] :]
-        by_name = {channel.name: channel for channel in self.channels}
         for name in names:
-            if (channel := by_name.get(name) or self.find(name)).kind not in kinds:
+            channel = self._looked_up[name][0] if name in self._looked_up else self.find(name)
+            if channel.kind not in kinds:
                 raise BadLog(f"{self.path}: channel {name!r} holds {channel.kind}, not numbers; choose another")
         if len(clocks := self.by_clock(names)) > 1:
             raise BadLog(f"{self.path}: {', '.join(map(repr, names))} have {len(clocks)} clocks; read them one by one")

@@ -61,15 +61,18 @@ class Timeline:
 
 
 def together(timelines: dict[str, Timeline]) -> list[list[str]]:
-    """Names of channels that were sampled together."""
+    """Names of channels that were sampled together, in their order."""
+    order = {name: i for i, name in enumerate(timelines)}
+    ranked = sorted(timelines, key=lambda name: (*_rank(timelines[name]), order[name]))
     groups: list[list[str]] = []
-    of: dict[tuple[object, ...], list[str]] = {}  # most are alike to the last digit, and need no comparing
-    for name, one in timelines.items():
-        key = (tuple(one.first), tuple(one.start), tuple(one.step))
-        if key not in of:
-            like = next((group for group in groups if timelines[group[0]].is_like(one)), None)
-            if like is None:
-                groups.append(like := [])
-            of[key] = like
-        of[key].append(name)
-    return groups
+    for name in ranked:
+        if groups and timelines[groups[-1][0]].is_like(timelines[name]):
+            groups[-1].append(name)
+        else:
+            groups.append([name])
+    return sorted((sorted(group, key=order.__getitem__) for group in groups), key=lambda group: order[group[0]])
+
+
+def _rank(one: Timeline) -> tuple[list[int], list[str], list[float]]:
+    """What brings timelines that are alike next to each other, without comparing all pairs."""
+    return one.first, [f"{step:.9g}" for step in one.step], one.start

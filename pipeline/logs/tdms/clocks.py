@@ -39,7 +39,8 @@ def clocks_of(channels: Sequence[Channel], sampled: Mapping[str, Sampled], ends_
         return Clocks(tuple(channels))
     own = clocks[0] if "" not in clocks else None
     named = dict(zip(clocks, _names(clocks, channels, sampled), strict=True))
-    made = {named[c]: _longest(c, of, sampled) for c in clocks if c and not sampled[c].is_stamps}
+    longest = _longest(of, sampled)
+    made = {named[c]: longest[c] for c in clocks if c and not sampled[c].is_stamps}
     told = tuple(replace(c, time="" if of[c.name] in (own, "") else named[of[c.name]]) for c in channels)
     if own and named[own] in made and made[named[own]].is_uniform:
         timeline = made.pop(named[own])
@@ -80,6 +81,11 @@ def _names(clocks: Sequence[str], channels: Sequence[Channel], sampled: Mapping[
     return [next(free) if name else clock for name, clock in zip(made, clocks, strict=True)]
 
 
-def _longest(clock: str, of: Mapping[str, str], sampled: Mapping[str, Sampled]) -> Timeline:
-    timelines = [sampled[name].timeline for name, its in of.items() if its == clock]
-    return max((one for one in timelines if one), key=lambda one: one.rows)
+def _longest(of: Mapping[str, str], sampled: Mapping[str, Sampled]) -> dict[str, Timeline]:
+    """The longest timeline of each clock."""
+    longest: dict[str, Timeline] = {}
+    for name, clock in of.items():
+        timeline = sampled[name].timeline
+        if timeline and (clock not in longest or timeline.rows > longest[clock].rows):
+            longest[clock] = timeline
+    return longest

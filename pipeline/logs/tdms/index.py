@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.logs.tdms.walk import Column, Region
 
@@ -23,11 +24,13 @@ class Index:
 
     kinds: list[Records] = field(default_factory=list)
     _holding: dict[str, list[int]] = field(default_factory=dict)  # by path: the kinds that hold samples of it
+    _by_kind: list[NDArray[np.intp]] = field(default_factory=list)  # numbers of regions, once all are there
     _numbers: dict[tuple[object, ...], int] = field(default_factory=dict)  # of the kinds
     _regions: tuple["array[int]", ...] = field(default_factory=lambda: tuple(array("q") for _ in range(4)))
 
     def add(self, region: Region) -> None:
         """Take in a region."""
+        self._by_kind = []
         last = self.kinds[self._regions[3][-1]] if self.kinds else None
         if last and last.columns == region.columns and last.counts == region.counts:
             kind = self._regions[3][-1]
@@ -51,12 +54,20 @@ class Index:
 
     def regions(self, path: str) -> Iterator[Region]:
         """The regions that hold samples of a channel, in order."""
-        position, records, stride, kind = (np.frombuffer(numbers, np.int64) for numbers in self._regions)
-        holding = np.zeros(len(self.kinds), dtype=bool)
-        holding[self._holding.get(path, [])] = True
-        for i in np.flatnonzero(holding[kind]):
-            of = self.kinds[kind[i]]
-            yield Region(int(position[i]), int(records[i]), int(stride[i]), of.columns, of.counts)
+        position, records, stride, _ = self._regions
+        for i in self._places(path):
+            of = self.kinds[self._regions[3][i]]
+            yield Region(position[i], records[i], stride[i], of.columns, of.counts)
+
+    def _places(self, path: str) -> list[int]:
+        """Numbers of the regions that hold samples of a channel, in order."""
+        if not self._by_kind and self.kinds:
+            kind = np.frombuffer(self._regions[3], np.int64)
+            order = np.argsort(kind, kind="stable")
+            self._by_kind = np.split(order, np.searchsorted(kind[order], np.arange(1, len(self.kinds))))
+        holding = [self._by_kind[kind] for kind in self._holding.get(path, ())]
+        places: list[int] = np.sort(np.concatenate([np.empty(0, np.intp), *holding])).tolist()
+        return places
 
     def largest_chunk(self, paths: Sequence[str]) -> int:
         """Most samples of any of these channels in one record."""

@@ -95,6 +95,7 @@ class TdmsLog(Log):
     origin: int = 0  # [s] since 1904 that time stamps are counted from
     made: dict[str, Timeline] = field(default_factory=dict)  # by name: derived channels of times
     mixed: dict[str, str] = field(default_factory=dict)  # by name: why the samples of a channel are not of one kind
+    _paths: dict[str, str] = field(default_factory=dict)  # by name
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, as `Log.blocks` says.
@@ -118,8 +119,8 @@ class TdmsLog(Log):
             row += count
 
     def _blocks(self, asked_for: Sequence[str]) -> Iterator[Block]:
-        asked = set(asked_for)
-        paths = [path for path, name in self.names.items() if name in asked]
+        path_of = self._paths = self._paths or {name: path for path, name in self.names.items()}
+        paths = [path_of[name] for name in dict.fromkeys(asked_for)]
         plain = self.index.together([path for path in paths if path not in self.scaled])
         scaled = self.index.together([path for path in paths if path in self.scaled])
         with self.path.open("rb") as file:

@@ -134,14 +134,18 @@ class Walk:
         return self.size
 
     def _alike(self, head: bytes, at: int, stride: int) -> int:
-        """How many of the file segments that follow have the same lead-in and metadata."""
-        alike = 0
+        """How many of the file segments that follow have the same lead-in and metadata.
+
+        Ever more of them are looked at in one go, so that a file of which no two are alike is not read many times.
+        """
+        alike, window = 0, stride
         while True:
-            many = min(self.size - at, max(BLOCK, stride)) // stride
+            many = min(self.size - at, window) // stride
             same = self._same(head, at, stride, many)
             alike, at = alike + same, at + same * stride
             if same < many or not many:
                 return alike
+            window = max(min(2 * window, BLOCK), stride)
 
     def _same(self, head: bytes, at: int, stride: int, many: int) -> int:
         """How many of the next file segments begin like this: compared at once where small, else one by one."""
