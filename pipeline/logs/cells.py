@@ -2,12 +2,14 @@
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.csv as csv
 from numpy.typing import NDArray
+
+from pipeline.maths.arrays import Booleans
 
 NUMBER = re.compile(rb"[+-]?((\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
 UNREADABLE = pa.ArrowInvalid
@@ -30,6 +32,7 @@ class Cells:
     columns: dict[int, NDArray[np.float64]]
     nulls: dict[int, int]
     texts: list[bytes | None]
+    empty: dict[int, Booleans] = field(default_factory=dict)  # which cells are, of columns that have empty ones
 
 
 def marks(block: bytes, delimiter: bytes) -> bytes:
@@ -72,6 +75,7 @@ def parse(
         columns={i: column.to_numpy() for i, column in columns.items()},
         nulls={i: column.null_count for i, column in columns.items()},
         texts=table.column(f"{text}").to_pylist() if text >= 0 else [],
+        empty={i: column.is_null().to_numpy() for i, column in columns.items() if column.null_count},
     )
 
 

@@ -7,6 +7,7 @@ from datetime import datetime
 from decimal import Decimal
 
 from pipeline.logs.lines import decoded
+from pipeline.logs.lvm.clocks import Sampling
 from pipeline.logs.names import unique
 
 MAGIC = b"LabVIEW Measurement"
@@ -47,6 +48,7 @@ class Layout:
     x0: float = 0.0
     step: float | None = None
     step_written: str = ""
+    sampled: tuple[Sampling | None, ...] = ()  # of every column that is measured
     remarks: tuple[str, ...] = ()  # what is wrong with the header, and what was done
     notes: str = ""
 
@@ -54,6 +56,21 @@ class Layout:
     def width(self) -> int:
         """Cells of a row without a comment."""
         return len(self.names)
+
+    @property
+    def measured(self) -> str:
+        """The first channel, whose x stands in column 0; "" where there is none."""
+        return next(iter(self.sampling), "")
+
+    @property
+    def first_sampling(self) -> Sampling:
+        """What the header says of when the first channel was sampled."""
+        return self.sampling.get(self.measured) or Sampling(self.start, self.x0, self.step or 0.0)
+
+    @property
+    def sampling(self) -> dict[str, Sampling]:
+        """What the header says of when each channel was sampled."""
+        return {name: one for name, one in zip(self.names, self.sampled, strict=True) if one}
 
     def is_like(self, other: "Layout") -> bool:
         """Whether rows of both have the same columns."""
@@ -110,7 +127,8 @@ def layout(lines: Sequence[bytes], columns: bytes, file: FileHeader, line: int, 
     return Layout(
         file=file, names=tuple(names), units=tuple(units), line=line, samples=max(samples, default=None),
         start=start, started=started, x0=_number(_first(tags, "X0")) or 0.0, step=_number(written),
-        step_written=written, remarks=tuple(remarks), notes=notes,
+        step_written=written, sampled=_sampled(tags, measured, len(names), start, file), remarks=tuple(remarks),
+        notes=notes,
     )  # fmt: skip
 
 
@@ -118,7 +136,34 @@ def dated(like: Layout, lines: Sequence[bytes], line: int, encoding: str | None)
     """The layout of a file segment whose header differs in its date only."""
     tags = _tags([text for text in lines if text[:4] in (b"Date", b"Time")], like.file.separator.decode(), encoding)
     start, started = _started(tags, like.file)
-    return replace(like, line=line, start=start, started=started)
+    starts = _starts(tags, len(like.names), start)
+    sampled = (one and replace(one, start=its) for one, its in zip(like.sampled, starts, strict=True))
+    return replace(like, line=line, start=start, started=started, sampled=tuple(sampled))
+
+
+def _sampled(
+    tags: dict[str, list[str]], measured: Sequence[int], columns: int, start: Decimal | None, file: FileHeader
+) -> tuple[Sampling | None, ...]:
+    """By column, what is said of it; a cell that is missing says what the first one does."""
+    starts = _starts(tags, columns, start)
+    x0, step = ([_cell(tags, tag, i) or _first(tags, tag) for i in range(columns)] for tag in ("X0", "Delta_X"))
+    sampled = (i for i in measured if _cell(tags, "Samples", i) != "0")  # else nobody knows what they say
+    said = {i: Sampling(starts[i], _number(x0[i]) or 0.0, _number(step[i]) or 0.0) for i in sampled}
+    return tuple(said.get(i) for i in range(columns))
+
+
+def _starts(tags: dict[str, list[str]], columns: int, start: Decimal | None) -> list[Decimal | None]:
+    dates, times = tags.get("Date", []), tags.get("Time", [])
+    if len({*dates} - {""}) <= 1 and len({*times} - {""}) <= 1:
+        return [start] * columns
+    own = (_start(_cell(tags, "Date", i), _cell(tags, "Time", i))[0] for i in range(columns))
+    return [start if one is None else one for one in own]
+
+
+def _cell(tags: dict[str, list[str]], tag: str, column: int) -> str:
+    """What a header says under a tag of one column of a row."""
+    cells = tags.get(tag, [])
+    return cells[column - 1] if 0 < column <= len(cells) else ""
 
 
 def _tags(lines: Sequence[bytes], separator: str, encoding: str | None) -> dict[str, list[str]]:

@@ -1,13 +1,14 @@
 """LabVIEW measurement files (LVM), the text that LabVIEW writes with headers."""
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from pipeline.errors import BadLog
 from pipeline.logs.blocks import ahead
 from pipeline.logs.lines import MARKS, Lines
 from pipeline.logs.log import Block, Channel, Clock, Log, Options
+from pipeline.logs.lvm.clocks import OwnClock, equal_columns
 from pipeline.logs.lvm.header import FOR_PEOPLE, MAGIC, BadHeader, Layout, X
 from pipeline.logs.lvm.rows import Reading
 from pipeline.logs.lvm.run import Run
@@ -59,11 +60,47 @@ def _opened(path: Path, options: Options, walk: Walk) -> "LvmLog":
     derived = unique(("write", "elapsed"), names)[: 1 + dated]
     clock = None if has_x or dated or one.step is None else Clock(one.step, one.x0)
     warnings = [_rounded(one)] if clock and _rounded(one) else []
-    return LvmLog(
-        path, "lvm", channels=(*written, *(Channel(n, "s" * (i == 1), derived=True) for i, n in enumerate(derived))),
-        clock=clock, time=derived[1] if dated else X if has_x else "", started=one.started,
-        zone="local" if one.started else "", facts=_facts(one, walk), warnings=warnings, options=options,
+    made = (Channel(name, "s" * (i == 1), derived=True) for i, name in enumerate(derived))
+    log = LvmLog(
+        path, "lvm", channels=(*written, *made), clock=clock, time=derived[1] if dated else X if has_x else "",
+        started=one.started, zone="local" if one.started else "", facts=_facts(one, walk), warnings=warnings,
+        options=options,
     )  # fmt: skip
+    log.clocks = _own_clocks(log, walk, layouts)
+    of = {name: own.time for own in log.clocks for name in (*own.channels, own.x)}
+    times = (Channel(own.time, "s", "time", derived=True, time=own.time) for own in log.clocks)
+    log.channels = (*(replace(c, time=of.get(c.name, "")) for c in log.channels), *times)
+    return log
+
+
+def _own_clocks(log: "LvmLog", walk: Walk, layouts: Sequence[Layout]) -> tuple[OwnClock, ...]:
+    """The clocks of channels that were not sampled with the first."""
+    x_of = {
+        name: each.names[i - 1]
+        for each in layouts if each.file.x_columns == "Multi"
+        for i, name in enumerate(each.names) if i % 2
+    }  # fmt: skip
+    groups = walk.groups
+    if len(columns := [*dict.fromkeys(x_of.values())]) > 1:
+        aside = replace(log, warnings=[], comments=[], nulls=dict.fromkeys(columns, 0), nans=dict.fromkeys(columns, 0))
+        same = equal_columns(columns, Reading(aside, log.options.encoding, tuple(columns)).blocks())
+        number = {x: i for i, group in enumerate(same) for x in group}
+        by_x = (_by(group, lambda name: number.get(x_of.get(name, ""), -1)) for group in groups)
+        groups = [part for parts in by_x for part in parts]
+    taken = [channel.name for channel in log.channels]
+    others = [group for group in groups if layouts[0].measured not in group]
+    times = unique([f"time of {group[0]}" for group in others], taken)
+    return tuple(
+        OwnClock(time, tuple(group), x_of.get(group[0], "")) for time, group in zip(times, others, strict=True)
+    )
+
+
+def _by(names: Sequence[str], key: Callable[[str], int]) -> list[list[str]]:
+    """The names grouped by a number."""
+    groups: dict[int, list[str]] = {}
+    for name in names:
+        groups.setdefault(key(name), []).append(name)
+    return list(groups.values())
 
 
 def _rounded(one: Layout) -> str:
@@ -95,8 +132,13 @@ class LvmLog(Log):
     """
 
     options: Options = field(default_factory=Options)
+    clocks: tuple[OwnClock, ...] = ()  # of channels that were not sampled with the first
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
-        """Read the samples of these channels, as `Log.blocks` says."""
-        self._start_anew(names)
-        yield from ahead(Reading(self, self.options.encoding, tuple(names)).blocks())
+        """Read the samples of these channels, as `Log.blocks` says.
+
+        Where channels have clocks of their own, rows that hold nothing of theirs are none.
+        """
+        self._start_anew(names, kinds=("number", "time"))
+        [clock] = self.by_clock(names) or [""]
+        yield from ahead(Reading(self, self.options.encoding, tuple(names), self.clocks, clock).blocks())

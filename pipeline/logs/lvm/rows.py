@@ -1,6 +1,6 @@
 """One pass over the rows of a LabVIEW measurement file: numbers, the numbers of the writes, and what is odd."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,12 +8,14 @@ from numpy.typing import NDArray
 from pipeline.errors import BadLog
 from pipeline.logs.cells import UNREADABLE, Cells, NotANumber, marks, parse_carefully, parse_either
 from pipeline.logs.lines import Lines, decoded
+from pipeline.logs.local_time import REMARK, clocks_may_change
 from pipeline.logs.log import Block, Log
+from pipeline.logs.lvm.clocks import OwnClock, Sampling
 from pipeline.logs.lvm.header import BadHeader, Layout, unescaped
 from pipeline.logs.lvm.run import WRITTEN, Run
 from pipeline.logs.lvm.walk import Walk
 from pipeline.logs.remarks import Remarks
-from pipeline.maths.arrays import Array
+from pipeline.maths.arrays import Array, Booleans
 
 DATED = 1e9  # [s] an x beyond this counts from 1904, not from the start of the file segment
 MOST_COMMENTS = 1000
@@ -22,9 +24,15 @@ MOST_COMMENTS = 1000
 class Reading:
     """A pass over the file; what it notices goes into the log."""
 
-    def __init__(self, log: Log, encoding: str | None, names: tuple[str, ...]) -> None:
+    def __init__(
+        self, log: Log, encoding: str | None, names: tuple[str, ...], clocks: Sequence[OwnClock] = (), clock: str = ""
+    ) -> None:
         self.log, self.names, self.encoding = log, names, encoding
-        self.derived = [channel.name for channel in log.channels if channel.derived]
+        self.derived = [channel.name for channel in log.channels if channel.derived and channel.kind != "time"]
+        self.own = next((own for own in clocks if own.time == clock), None)
+        others = {name for own in clocks for name in (*own.channels, own.x)}
+        first = tuple(c.name for c in log.channels if not c.derived and c.name not in others) if others else ()
+        self.together = (*self.own.channels, self.own.x) if self.own else first  # one of them has a sample in a row
         self.say = Remarks(log.warnings)
         self.walk, self.lines = Walk(encoding, self.say), Lines(log.path, encoding)
         self.write = self.rows = self.rows_in_segment = self.back = 0
@@ -79,19 +87,19 @@ class Reading:
             ) from None
 
     def _wanted(self, run: Run) -> dict[int, str]:
+        return self._columns_of(run, self.names)
+
+    def _columns_of(self, run: Run, channels: Sequence[str]) -> dict[int, str]:
         names = ((i, run.name(i)) for i in range(run.width - run.commented))
-        return {i: name for i, name in names if name in self.names}
+        return {i: name for i, name in names if name in channels}
 
     def _columns(self, run: Run) -> list[int]:
-        return sorted({0, *self._wanted(run)})
+        return sorted({0, *self._wanted(run), *self._columns_of(run, self.together)})
 
     def _block(self, run: Run, cells: Cells) -> Block:
         """The samples of a run, under the names of their channels."""
-        block: Block = {}
-        for i, name in self._wanted(run).items():
-            block[name] = cells.columns[i]
-            self.log.nulls[name] += cells.nulls[i]
-            self.log.nans[name] += int(np.count_nonzero(np.isnan(cells.columns[i]))) - cells.nulls[i]
+        block: Block = {name: cells.columns[i] for i, name in self._wanted(run).items()}
+        empty = {name: cells.empty[i] for i, name in self._wanted(run).items() if i in cells.empty}
         x = cells.columns[0] if run.layout.file.x_columns != "No" else None
         self.first = self.first or run.layout
         before = self.rows_in_segment if run.layout is self.file_segment else 0
@@ -100,11 +108,36 @@ class Reading:
         for name, values in zip(self.derived, made.values(), strict=False):
             if name in self.names:
                 block[name] = values
+        if self.own and self.own.time in self.names:
+            block[self.own.time] = self._own_times(self.own, run, cells, before)
         for name in set(self.names) - set(block):
-            block[name] = np.full(cells.rows, np.nan)
-            self.log.nulls[name] += cells.rows
+            block[name], empty[name] = np.full(cells.rows, np.nan), np.ones(cells.rows, dtype=bool)
         self.rows += cells.rows
+        held = self._held(run, cells)
+        if held is not None:
+            block = {name: values[held] for name, values in block.items()}
+            empty = {name: which[held] for name, which in empty.items()}
+        for name, values in block.items():
+            nulls = int(np.count_nonzero(empty[name])) if name in empty else 0
+            self.log.nulls[name] += nulls
+            self.log.nans[name] += int(np.count_nonzero(np.isnan(values))) - nulls
         return {name: block[name] for name in self.names}
+
+    def _held(self, run: Run, cells: Cells) -> Booleans | None:
+        """Rows that hold a sample of the channels of this clock; None where all do."""
+        columns = self._columns_of(run, self.together)
+        if not self.together or not all(i in cells.empty for i in columns):
+            return None
+        none: Booleans = np.ones(cells.rows, dtype=bool)
+        for i in columns:
+            none &= cells.empty[i]
+        return ~none
+
+    def _own_times(self, own: OwnClock, run: Run, cells: Cells, before: int) -> Array:
+        """Times of the channels that were not sampled with the first, since the start of the log [s]."""
+        column = next(iter(self._columns_of(run, [own.x])), None) if own.x else None
+        x = None if column is None else cells.columns[column]
+        return self._since_start(run, x, cells.rows, before, own.channels[0])
 
     def _look_at(self, run: Run, rows: int) -> None:
         """File segments, comments and decimal marks of a run."""
@@ -125,6 +158,9 @@ class Reading:
 
     def _begin_segment(self, layout: Layout) -> None:
         self._check_samples()
+        before = self.file_segment.started if self.file_segment else ""
+        if before and layout.started and clocks_may_change(before, layout.started):
+            self.say(f"line {layout.line}: {REMARK}")
         self.file_segment, self.rows_in_segment = layout, 0
         assert self.first is not None
         if absent := sorted(set(self.first.names) - set(layout.names)):
@@ -156,15 +192,25 @@ class Reading:
     def _elapsed(self, run: Run, x: Array | None, rows: int, before: int) -> Array:
         """Time since the start of the first file segment [s]; `before` rows of the run's first one came already."""
         assert self.first is not None
+        return self._since_start(run, x, rows, before, self.first.measured)
+
+    def _since_start(self, run: Run, x: Array | None, rows: int, before: int, channel: str) -> Array:
+        """The same by what the headers say of a channel."""
         firsts = np.array([row for row, _ in run.file_segments])
         counts = np.diff(firsts, append=rows)
-        starts = [_seconds_between(self.first, layout) for _, layout in run.file_segments]
+        said = [layout.sampling.get(channel) or layout.first_sampling for _, layout in run.file_segments]
+        starts = [self._seconds_from_first(one) for one in said]
         if x is None:
-            x0, step = ([getattr(layout, name) or 0.0 for _, layout in run.file_segments] for name in ("x0", "step"))
+            x0, step = [one.x0 for one in said], [one.step for one in said]
             number = np.arange(rows) - np.repeat(firsts, counts)
             number[: counts[0]] += before
             x = np.repeat(x0, counts) + np.repeat(step, counts) * number
         return np.where(np.abs(x) > DATED, x, x + np.repeat(starts, counts))
+
+    def _seconds_from_first(self, one: Sampling) -> float:
+        """From the start of the log to that of a file segment [s]; NaN where one has no date."""
+        assert self.first is not None
+        return float(one.start - self.first.start) if one.start is not None and self.first.start is not None else np.nan
 
     def _check_samples(self) -> None:
         """A header counts the samples of its write; without several headers, of the first write only."""
@@ -203,8 +249,3 @@ class Reading:
         if lines.damage:
             say(lines.damage)
         say.close()
-
-
-def _seconds_between(first: Layout, layout: Layout) -> float:
-    """From the start of one file segment to that of another [s]; NaN where one has no date."""
-    return float(layout.start - first.start) if layout.start is not None and first.start is not None else np.nan

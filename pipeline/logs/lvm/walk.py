@@ -10,6 +10,7 @@ from typing import TypeVar
 
 from pipeline.logs.cells import NUMBER
 from pipeline.logs.lines import Block
+from pipeline.logs.lvm.clocks import refined
 from pipeline.logs.lvm.header import END, MAGIC, BadHeader, FileHeader, Layout, X, dated, file_header, layout
 from pipeline.logs.lvm.run import WRITTEN, Run
 
@@ -34,6 +35,7 @@ class Walk:
     layout: Layout | None = None
     line: int = 0
     met: dict[tuple[str, ...], Layout] = field(default_factory=dict)  # the first file segment with these columns
+    groups: list[list[str]] = field(default_factory=list)  # channels that were sampled together in all of them
     file_segments: int = 0
     narrow: int = 0  # rows with too few cells
     first_narrow: int = 0  # line of the first of them
@@ -144,6 +146,9 @@ class Walk:
     def _columns(self, line: bytes) -> str:
         self.layout = self._parsed(line)
         self._header, self._begins, self._width = [], True, self.layout.width
+        sampled = self.layout.sampling
+        if self.layout.names not in self.met or len({*sampled.values()}) > 1:
+            self.groups = refined(self.groups, sampled, self.file.x_columns == "Multi")
         self.met.setdefault(self.layout.names, self.layout)
         self.file_segments += 1
         for remark in self.layout.remarks:
