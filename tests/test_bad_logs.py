@@ -266,8 +266,9 @@ def test_a_clock_that_jumps_in_a_log_of_another_role_has_a_gap(lab):
 @pytest.mark.parametrize("rows", [7, 20, 64, 100])
 def test_a_clock_is_set_back_wherever_the_blocks_of_a_log_end(tmp_path, rows):
     from pipeline.logs import open_log
-    from pipeline.stages.ingest import Reading
     from pipeline.study import reading as study
+    from pipeline.study.intake.mending import mended
+    from pipeline.study.intake.reading import Intake
 
     signal = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5)
     speed = np.abs(arm.excitation("hand_roll", signal.t, 2.0)[1])
@@ -277,10 +278,10 @@ def test_a_clock_is_set_back_wherever_the_blocks_of_a_log_end(tmp_path, rows):
         late = signal.t + np.where(np.arange(len(signal)) < at, 0.0, 3.0)
         arm.write_csv(tmp_path / "bad.csv", [replace(signal, t=late)])
         log = open_log(tmp_path / "bad.csv")
-        reading = Reading(log, entry, arm.ARM)
+        reading = Intake(log, entry, arm.ARM)
         [whole] = log.blocks(reading.names)
         parts = [{k: v[i : i + rows] for k, v in whole.items()} for i in range(0, len(signal), rows)]
-        t = np.concatenate([block["time"] for block in reading.mended(iter(parts))])
+        t = np.concatenate([block["time"] for block in mended(reading, iter(parts))])
         if speed[at] > 0.1:
             np.testing.assert_allclose(t, signal.t, atol=1e-9)
 

@@ -15,6 +15,7 @@ needs none: `Log.clock` says it.
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
@@ -117,6 +118,28 @@ class Log(ABC):
         near = [channel for channel in self.channels if channel.name in close]
         hint = f"the closest are {_listed(near)}" if near else f"it has {_listed(self.channels[:12])}"
         raise BadLog(f"{self.path}: there is no channel {name!r} among its {len(names)}; {hint}")
+
+    def times_called(self, name: str | int) -> list[Channel]:
+        """The channels that a study means by the name of its time: one, or one of that name in each group of channels.
+
+        Raises
+        ------
+        BadLog
+            If there is none.
+        """
+        if isinstance(name, int):
+            return [self.find(name)]
+        last = name.rpartition("/")[2]
+        alike = [c for c in self.channels if "/" in c.name and c.name.rpartition("/")[2] == last and not c.derived]
+        exact = [c for c in self.channels if c.name == name]
+        others = [c for c in alike if c not in exact] if not exact or "/" in name else []
+        return [*exact, *others] or [self.find(name)]
+
+    def apart(self) -> "Log":
+        """The same log to be read at the same time as this one, with counts and warnings of its own."""
+        other = copy(self)
+        other.warnings, other.comments, other.facts = [*self.warnings], [*self.comments], {**self.facts}
+        return other
 
     def by_clock(self, names: Sequence[str]) -> dict[str, list[str]]:
         """The names by the clock of their channels: its time channel, or "" for the log's own."""

@@ -32,6 +32,13 @@ class Parts(Log):
                 raise BadLog(f"{part.path}: its channels are not those of {first.path}, so they are not one log")
         self.facts = {"parts": ", ".join(part.path.name for part in parts), **first.facts}
 
+    def apart(self) -> "Parts":
+        """The same, with parts that are read apart, too."""
+        other = super().apart()
+        assert isinstance(other, Parts)
+        other.parts = [part.apart() for part in self.parts]
+        return other
+
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the parts in order; what they noticed is put together."""
         self._start_anew(names, kinds=("number", "time"))

@@ -83,9 +83,11 @@ class Channels:
         channel = table.take("channel", None, (str, int), words, lambda value: isinstance(value, str) or value >= 0)
         unit = _unit(table, needed) if "unit" in table else None
         sign = table.take("sign", 1, (int,), "1 or -1", lambda value: value in (1, -1))
-        offset = table.number("offset", 0.0)
+        offset, scale = table.number("offset", 0.0), table.number("scale", 1.0)
+        if scale == 0:
+            table.problem("scale must not be 0, as nothing would be left of the channel", "scale")
         table.close()
-        return Source(quantity, channel, needed, unit, sign, offset)
+        return Source(quantity, channel, needed, unit, sign, offset, scale)
 
     def measured(self, quantity: str, keys: tuple[str, ...]) -> str | None:
         """What the unit of a quantity measures, or None for an unknown quantity."""

@@ -33,6 +33,7 @@ class Source:
     unit: str | None = None
     sign: int = 1
     offset: float = 0.0
+    scale: float = 1.0
 
     @property
     def joint(self) -> str:
