@@ -1,15 +1,16 @@
 """Numbers out of rows of delimited cells, a block at a time, parsed by Arrow."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.csv as csv
 from numpy.typing import NDArray
 
-from pipeline.maths.arrays import Booleans
+from pipeline.maths.arrays import Array, Booleans
 
 NUMBER = re.compile(rb"[+-]?((\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
 UNREADABLE = pa.ArrowInvalid
@@ -48,8 +49,11 @@ def parse(
     wanted: Sequence[int],
     text: int = -1,
     quoted: bool = False,
+    times: Mapping[int, Callable[[pa.ChunkedArray], Array]] = MappingProxyType({}),
 ) -> Cells:
     """Convert the `wanted` columns of rows of `width` cells to numbers; `text` is a column left as it stands.
+
+    `times` makes numbers of those of the wanted columns that are not written as such.
 
     Raises
     ------
@@ -57,6 +61,7 @@ def parse(
         If a row has another width, or a wanted cell is no number.
     """
     types = {f"{i}": pa.float64() for i in wanted} | ({f"{text}": pa.binary()} if text >= 0 else {})
+    types |= {f"{i}": pa.string() for i in wanted if i in times}
     table = csv.read_csv(
         pa.py_buffer(block),
         read_options=csv.ReadOptions(column_names=[f"{i}" for i in range(width)], block_size=PIECE),
@@ -65,6 +70,7 @@ def parse(
             column_types=types,
             include_columns=list(types),
             null_values=["", " "],
+            strings_can_be_null=bool(times),
             decimal_point=decimal.decode(),
             check_utf8=False,
         ),
@@ -72,7 +78,7 @@ def parse(
     columns = {i: table.column(f"{i}") for i in wanted}
     return Cells(
         rows=table.num_rows,
-        columns={i: column.to_numpy() for i, column in columns.items()},
+        columns={i: times[i](column) if i in times else column.to_numpy() for i, column in columns.items()},
         nulls={i: column.null_count for i, column in columns.items()},
         texts=table.column(f"{text}").to_pylist() if text >= 0 else [],
         empty={i: column.is_null().to_numpy() for i, column in columns.items() if column.null_count},
@@ -103,8 +109,10 @@ def parse_carefully(block: bytes, width: int, delimiter: bytes, wanted: Sequence
     return parse_either(b"".join(delimiter.join(row) + b"\n" for row in rows), width, delimiter, wanted)
 
 
-def check(rows: Sequence[Sequence[bytes]], wanted: Sequence[int], number: re.Pattern[bytes] = NUMBER) -> None:
-    """Find a wanted cell that is no number.
+def check(
+    rows: Sequence[Sequence[bytes]], wanted: Sequence[int], patterns: Sequence[re.Pattern[bytes]] | None = None
+) -> None:
+    """Find a wanted cell that is no number, or not what the pattern of its column says.
 
     Raises
     ------
@@ -112,6 +120,6 @@ def check(rows: Sequence[Sequence[bytes]], wanted: Sequence[int], number: re.Pat
         Where there is one.
     """
     for i, row in enumerate(rows):
-        for column in wanted:
-            if row[column] and not number.fullmatch(row[column]):
+        for column, pattern in zip(wanted, patterns or [NUMBER] * len(wanted), strict=True):
+            if row[column] and not pattern.fullmatch(row[column]):
                 raise NotANumber(i, column, row[column])

@@ -5,8 +5,8 @@ from datetime import datetime, timedelta
 MONTHS = (3, 4, 9, 10, 11)  # in which some country's clocks change, on a Sunday night
 HOURS = (1, 2, 3)  # at which they do, by local time
 REMARK = (
-    "their starts are local times on either side of a Sunday night in which clocks may have been put forward or back; "
-    "if they were, the times after it are wrong by an hour: record in UTC, or give the parts as logs of their own"
+    "times are local and on either side of a Sunday night in which clocks may have been put forward or back; if they "
+    "were, the times after it are wrong by an hour: record in UTC, or give what comes after as a log of its own"
 )
 
 

@@ -173,8 +173,8 @@ def test_quoted_cells_are_read_without_their_quotes() -> None:
     assert_array_equal(samples["q"], [1, 2])
 
 
-def test_a_column_of_dates_is_text_and_the_others_are_read() -> None:
-    log, samples = text("when;q", "2026-10-15 02:26:03;1,5", "2026-10-15 02:26:04;2,5")
+def test_a_column_of_days_is_text_and_the_others_are_read() -> None:
+    log, samples = text("when;q", "2026-10-15;1,5", "2026-10-15;2,5")
     assert [channel.kind for channel in log.channels] == ["text", "number"]
     assert_array_equal(samples["q"], [1.5, 2.5])
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from pipeline.logs.log import Options
 from pipeline.logs.names import unique, unit_in
+from pipeline.logs.text.stamps import Stamps, begun, stamps_of, tells_time
 from pipeline.maths.units import canonical, measures
 
 NAMED = {"tab": "\t", "comma": ",", "semicolon": ";", "space": " ", "\\t": "\t"}
@@ -35,7 +36,8 @@ class Dialect:
     decimal: str
     names: tuple[str, ...]  # of every column of a row
     units: tuple[str, ...]
-    kinds: tuple[str, ...]  # "number", or "text" for columns without any number
+    kinds: tuple[str, ...]  # "number", "time", or "text" for columns without any number
+    stamps: dict[int, Stamps]  # of the columns of times
     header: int  # lines before the first row
     named: bool  # whether the names stand in the file
     preamble: tuple[str, ...]  # lines of the header that are neither names nor units
@@ -67,14 +69,17 @@ def find(lines: Sequence[str], options: Options) -> Dialect:
     delimiter, decimal = _marks(rows, options)
     body = [split(line, delimiter) for line in rows[len(rows) // 4 :]]
     width = Counter(len(cells) for cells in body).most_common(1)[0][0]
-    kinds = _kinds([cells for cells in body if len(cells) == width], NUMBERS[decimal])
+    whole = [cells for cells in body if len(cells) == width]
+    kinds = _kinds(whole, NUMBERS[decimal])
     header = _header(lines, delimiter, kinds, NUMBERS[decimal], options)
     names, units, preamble = _names([line for line in lines[:header] if line.strip()], delimiter, width, options)
+    stamps = _stamps([split(line, delimiter) for line in lines[header:] if line.strip()], kinds)
+    kinds = ["time" if i in stamps else kind for i, kind in enumerate(kinds)]
     names, units = names or [""] * width, units or [""] * width
     return Dialect(
         delimiter=delimiter, decimal=decimal, names=unique(names), named=any(names),
         units=tuple(unit or unit_in(name) for name, unit in zip(names, units, strict=True)), kinds=tuple(kinds),
-        header=header, preamble=tuple(preamble), trailing=width > 1 and any(names) and not names[-1],
+        stamps=stamps, header=header, preamble=tuple(preamble), trailing=width > 1 and any(names) and not names[-1],
         quoted=any('"' in row for row in rows[len(rows) // 4 :]),
     )  # fmt: skip
 
@@ -101,7 +106,8 @@ def _score(body: Sequence[str], delimiter: str, number: re.Pattern[str]) -> tupl
     numbers = [
         sum(bool(number.fullmatch(cell)) for cell in cells) for cells in (split(line, delimiter) for line in body)
     ]
-    filled = [sum(bool(cell) for cell in split(line, delimiter)) for line in body]
+    # A column of times says as little of the delimiter as an empty one.
+    filled = [sum(bool(cell) and not tells_time(cell) for cell in split(line, delimiter)) for line in body]
     good = [count for count, cells in zip(numbers, filled, strict=True) if count and 2 * count >= cells]
     return len(good), sum(good)
 
@@ -138,6 +144,13 @@ def _kinds(body: Sequence[Sequence[str]], number: re.Pattern[str]) -> list[str]:
         filled = [cell for cell in column if cell]
         kinds.append("text" if filled and not any(number.fullmatch(cell) for cell in filled) else "number")
     return kinds
+
+
+def _stamps(rows: Sequence[Sequence[str]], kinds: Sequence[str]) -> dict[int, Stamps]:
+    """The columns of times among those of text."""
+    rows = [row for row in rows if len(row) == len(kinds)]
+    found = {i: stamps_of([row[i] for row in rows]) for i, kind in enumerate(kinds) if kind == "text"}
+    return {i: begun(stamps, next(row[i] for row in rows if row[i])) for i, stamps in found.items() if stamps}
 
 
 def _header(

@@ -3,6 +3,7 @@
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from datetime import datetime, timedelta
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +12,10 @@ from pipeline.errors import BadLog
 from pipeline.logs.blocks import ahead
 from pipeline.logs.cells import UNREADABLE, Cells, NotANumber, check, parse
 from pipeline.logs.lines import GZIP, Lines, decoded
+from pipeline.logs.local_time import REMARK, clocks_may_change
 from pipeline.logs.log import Block, Channel, Log, Options
 from pipeline.logs.text.dialect import NAMES, Dialect, Unclear, find, split
+from pipeline.logs.text.stamps import Unwrapped
 
 VALUE = rb"[+-]?((\d+MARK?\d*|MARK\d+)([eE][+-]?\d+)?|nan|inf|infinity)"
 NUMBERS = {
@@ -51,7 +54,13 @@ def read(path: Path, options: Options) -> Log:
     }
     shown = channels[: len(channels) - dialect.trailing]
     comments = list(dialect.preamble)
-    return TextLog(path, "text", shown, facts=facts, comments=comments, dialect=dialect, encoding=options.encoding)
+    time = next((channel.name for channel in shown if channel.kind == "time"), "")
+    dated = next((stamps for stamps in dialect.stamps.values() if stamps.dated), None)
+    return TextLog(
+        path, "text", shown, time=time, started=dated.started if dated else "",
+        zone=("UTC" if dated.zoned else "local") if dated else "", facts=facts, comments=comments, dialect=dialect,
+        encoding=options.encoding,
+    )  # fmt: skip
 
 
 @dataclass
@@ -63,7 +72,7 @@ class TextLog(Log):
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, as `Log.blocks` says."""
-        self._start_anew(names)
+        self._start_anew(names, kinds=("number", "time"))
         assert self.dialect is not None
         yield from ahead(_Reading(self, self.dialect, tuple(names)).blocks())
 
@@ -77,6 +86,9 @@ class _Reading:
         behind = [len(dialect.names) - 1] if dialect.trailing else []  # must stay empty
         self.wanted = sorted({*self.columns.values(), *behind})
         self.rows = self.narrow = self.first_narrow = 0
+        self.times = {i: stamps.seconds for i, stamps in dialect.stamps.items() if i in self.wanted}
+        self.latest = 0.0  # [s] of a column that says the day
+        self.days = {i: Unwrapped() for i in self.times if not dialect.stamps[i].dated}
 
     def blocks(self) -> Iterator[Block]:
         """The blocks of samples.
@@ -99,6 +111,10 @@ class _Reading:
     def _block(self, first: int, block: bytes) -> Block:
         cells = self._at_once(block) or self._row_by_row(first, block)
         self.rows += cells.rows
+        for i in self.times.keys() - self.days.keys():
+            self.latest = max(self.latest, *cells.columns[i][-1:].tolist())
+        for i, unwrapped in self.days.items():
+            cells.columns[i] = unwrapped(cells.columns[i])
         for name, i in self.columns.items():
             self.log.nulls[name] += cells.nulls[i]
             self.log.nans[name] += int(np.count_nonzero(np.isnan(cells.columns[i]))) - cells.nulls[i]
@@ -111,7 +127,7 @@ class _Reading:
             return None
         delimiter, decimal, width = dialect.delimiter.encode(), dialect.decimal.encode(), len(dialect.names)
         try:
-            cells = parse(block, width, delimiter, decimal, self.wanted, quoted=dialect.quoted)
+            cells = parse(block, width, delimiter, decimal, self.wanted, quoted=dialect.quoted, times=self.times)
         except UNREADABLE:
             return None
         return None if dialect.trailing and cells.nulls[width - 1] < cells.rows else cells
@@ -125,11 +141,20 @@ class _Reading:
                 rows.append([texts[i].encode("latin-1") for i in self.wanted])
                 lines.append(line)
         try:
-            check(rows, range(len(self.wanted)), NUMBERS[self.dialect.decimal])
+            check(rows, range(len(self.wanted)), [self._pattern(i) for i in self.wanted])
         except NotANumber as bad:
             raise BadLog(self._no_number(lines[bad.row], self.wanted[bad.column], bad.cell)) from None
         text = b"".join(b"\t".join(row) + b"\n" for row in rows).replace(b"\n\n", b"\n \n")
-        cells = parse(text, len(self.wanted), b"\t", self.dialect.decimal.encode(), range(len(self.wanted)))
+        times = {self.wanted.index(i): seconds for i, seconds in self.times.items()}
+        try:
+            cells = parse(
+                text, len(self.wanted), b"\t", self.dialect.decimal.encode(), range(len(self.wanted)), times=times
+            )
+        except UNREADABLE as bad:
+            raise BadLog(
+                f"{self.log.path}:{lines[0]}: from this line on there is a time that no calendar holds ({bad}); "
+                "correct the cell, or take the row out of the log"
+            ) from None
         number = dict(enumerate(self.wanted))
         return Cells(
             rows=cells.rows,
@@ -137,6 +162,12 @@ class _Reading:
             nulls={number[i]: count for i, count in cells.nulls.items()},
             texts=[],
         )
+
+    def _pattern(self, column: int) -> re.Pattern[bytes]:
+        """What a cell of a column has to look like."""
+        if column in self.times:
+            return re.compile(self.dialect.stamps[column].pattern.pattern.encode())
+        return NUMBERS[self.dialect.decimal]
 
     def _fitted(self, line: int, cells: list[str]) -> list[str]:
         """The cells of a row, as many as there are columns."""
@@ -153,6 +184,11 @@ class _Reading:
     def _no_number(self, line: int, column: int, cell: bytes) -> str:
         shown = decoded(cell, self.log.encoding)
         name = self.dialect.names[column]
+        if column in self.times:
+            return (
+                f"{self.log.path}:{line}: {shown[:40]!r} in column {column} ({name}) is no time like those before it; "
+                "correct the cell, or take the row out of the log"
+            )
         return (
             f"{self.log.path}:{line}: {shown[:40]!r} in column {column} ({name}) is no number with the decimal mark "
             f"{self.dialect.decimal!r}; correct the cell, or set `decimal` for this log in study.toml"
@@ -168,6 +204,10 @@ class _Reading:
             say(f"line {lines.cut_at}: the file ends within this row, which is dropped")
         if not self.rows:
             say("the file holds no whole row")
+        if self.latest and self.log.zone == "local":
+            ended = datetime.fromisoformat(self.log.started) + timedelta(seconds=self.latest)
+            if clocks_may_change(self.log.started, ended.isoformat()):
+                say(f"the log began at {self.log.started} and ended at {ended.isoformat()}: {REMARK}")
         if lines.padding:
             say(f"{lines.padding} NUL bytes at the end of the file, as a power cut leaves them, are not read")
         if lines.damage:
