@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 from pipeline.errors import BadLog
 
 Block = dict[str, NDArray[np.float64]]  # channel name -> samples; every array of a block has one length
+COUNTED = "samples"  # unit of a channel of times that only counts them
 
 
 @dataclass(frozen=True)

@@ -30,12 +30,12 @@ def open_parts(files: Sequence[Path], options: Options) -> Log:
     BadLog
         If one cannot be read, has other channels than the first, is there twice, or started before the one before.
     """
-    _require_different(files)
+    require_different(files)
     opened = [open_log(file, options) for file in files]
     return opened[0] if len(opened) == 1 else Parts(opened)
 
 
-def _require_different(files: Sequence[Path]) -> None:
+def require_different(files: Sequence[Path]) -> None:
     """Refuse a file that is given twice, or beside a copy of itself."""
     sizes: dict[int, list[Path]] = {}
     for file in files:
@@ -61,7 +61,7 @@ class Parts(Log):
                 raise BadLog(f"{part.path}: its channels are not those of {first.path}, so they are not one log")
         self.facts = {"parts": ", ".join(part.path.name for part in parts), **first.facts}
         self.cut = parts[-1].cut
-        self.starts = _starts(parts)
+        self.starts = starts_of(parts)
         self.remarks: list[str] = []
         if self.starts:
             self._place()
@@ -163,7 +163,7 @@ def _is_own(log: Log, together: frozenset[str]) -> bool:
     return "" in log.by_clock(sorted(together)[:1])
 
 
-def _starts(parts: Sequence[Log]) -> list[datetime]:
+def starts_of(parts: Sequence[Log]) -> list[datetime]:
     """When the parts started; empty where not all say so in the same kind of time."""
     said = [part.started for part in parts]
     if not all(said) or len({part.zone for part in parts}) > 1:

@@ -13,6 +13,7 @@ from time import perf_counter
 from typing import Any
 
 from pipeline.errors import BadLog, PipelineError
+from pipeline.logs.joined import open_joined
 from pipeline.logs.log import Log, Options
 from pipeline.logs.parts import open_parts
 from pipeline.records import KINDS, Diagnostic, Record, diagnostic, store
@@ -128,7 +129,8 @@ def _log(folders: Folders, entry: LogEntry) -> Log:
         names = ", ".join(map(repr, missing))
         raise BadLog(f"file {names} of log {entry.name!r} is not in raw/{folders.raw.resolve().name}")
     options = Options(entry.delimiter, entry.decimal, entry.header, entry.encoding)
-    return open_parts([folders.raw / file for file in entry.files], options)
+    files = [folders.raw / file for file in entry.files]
+    return open_joined(files, options) if entry.joined else open_parts(files, options)
 
 
 def _messages(record: Record) -> list[str]:

@@ -15,6 +15,7 @@ ROLES = ("identification", "validation", "contact", "weight", "tissue", "frictio
 TARES = ("validation", "identification")  # roles of logs in which nothing touches the arm
 FARTHEST = 3.0  # [m] from the remote centre, beyond which a position is more likely in another unit
 WINDOWS = "a list of [start, end] in seconds, from 0 on"
+SEVERAL = ("files", "join")  # keys of several files: parts in order, or side by side
 ALL = "all"  # of a tissue log: every sample is one of contact
 
 
@@ -33,7 +34,7 @@ def lines_of_files(study: TomlTable, logs: Sequence[LogEntry]) -> dict[str, int]
     """The line that first names each file."""
     lines: dict[str, int] = {}
     for n, log in enumerate(logs):
-        key = "files" if ("log", n, "files") in study.file.lines else "file"
+        key = next((key for key in SEVERAL if ("log", n, key) in study.file.lines), "file")
         for i, file in enumerate(log.files):
             lines.setdefault(file, study.file.line(("log", n, key, i)))
     return lines
@@ -53,6 +54,7 @@ def _entry(study: TomlTable, index: int, table: TomlTable, robot: Robot | None) 
         files=_files(table),
         role=table.text("role", choices=ROLES),
         channels=Channels(table, robot).read(),
+        joined="join" in table,
         period=optional(table, "period"),
         rate=optional(table, "rate"),
         skip=optional(table, "skip") or 0.0,
@@ -80,17 +82,19 @@ def _name(study: TomlTable, index: int, table: TomlTable) -> str:
 
 
 def _files(table: TomlTable) -> tuple[str, ...]:
-    if ("file" in table) == ("files" in table):
-        table.problem('say either file = "..." or files = ["..."]')
+    given = [key for key in ("file", *SEVERAL) if key in table]
+    if len(given) != 1:
+        table.problem('say either file = "...", or files = ["..."] for parts in order, or join = ["..."] side by side')
         return ()
-    if "files" in table:
+    [key] = given
+    if key in SEVERAL:
         words = "a list of names of files"
-        named = table.take("files", [], (list,), words, lambda files: files and all(map(_is_name, files)))
+        named = table.take(key, [], (list,), words, lambda files: files and all(map(_is_name, files)))
     else:
         named = [table.take("file", "", (str,), "the name of a file", _is_name)]
     for i, file in enumerate(named):
         if not inside(file):
-            table.problem(f"{file!r} lies outside the study's folder", "files" if "files" in table else "file", i)
+            table.problem(f"{file!r} lies outside the study's folder", key, i)
     return tuple(file for file in named if file and inside(file))
 
 

@@ -7,7 +7,7 @@ import numpy as np
 
 from pipeline.errors import BadLog
 from pipeline.logs.aligned import Alignment, Follower, Timed, aligned
-from pipeline.logs.log import Block, Log
+from pipeline.logs.log import COUNTED, Block, Log
 from pipeline.maths.arrays import Array
 from pipeline.maths.signals.clock import GAP
 from pipeline.study import LogEntry, Source
@@ -71,6 +71,8 @@ class Clocks:
 
     def _is_known(self, group: Together) -> bool:
         own = next(iter(self.log.by_clock(group.names)))
+        if group.time and not group.is_stated and self.log.find(group.time).unit == COUNTED:
+            return False
         return bool(group.time or self.entry.rate or (self.log.clock and not own))
 
     def _split(self, own: str, names: Sequence[str]) -> Iterator[Together]:
