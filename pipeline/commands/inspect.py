@@ -30,7 +30,9 @@ def run(
     if json:
         typer.echo(writer.dumps(description, indent=1, ensure_ascii=False, allow_nan=False))
     else:
-        typer.echo("\n".join(lines(description)))
+        from pipeline.logs.names import visible
+
+        typer.echo("\n".join(visible(line) for line in lines(description)))
 
 
 @dataclass

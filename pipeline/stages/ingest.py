@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from pipeline.logs.log import Log
+from pipeline.logs.names import visible
 from pipeline.records import Diagnostic, LogSummary, Recording, Touch, diagnostic
 from pipeline.robots.robot import Robot
 from pipeline.study import LogEntry
@@ -29,4 +30,4 @@ def run(log: Log, entry: LogEntry, robot: Robot) -> Iterator[Recording | Touch |
     noticed = [f"{entry.name}: {remark}" for remark in (*log.warnings, *remarks(intake))]
     for severity, said in (("warning", noticed), ("note", list(intake.clocks.note()))):
         if said:
-            yield diagnostic("ingest", entry.name, severity, *said)
+            yield diagnostic("ingest", entry.name, severity, *map(visible, said))

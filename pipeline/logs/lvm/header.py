@@ -87,6 +87,10 @@ def file_header(lines: Sequence[bytes], encoding: str | None) -> FileHeader:
         If the separator is also the decimal mark, or X_Columns is none of No, One, Multi.
     """
     separator = _separator(lines)
+    if not separator.isascii() or separator.isalnum() or separator in b"+-*":
+        raise BadHeader(
+            f"the separator is {decoded(separator, encoding)!r}, which cannot part numbers; export with tabs"
+        )
     cells = [decoded(line, encoding).split(separator.decode()) for line in lines[1:]]
     tags = {row[0].strip(): row[1].strip() for row in cells if len(row) > 1 and row[0].strip() not in ("", "Separator")}
     decimal = tags.get("Decimal_Separator", "")

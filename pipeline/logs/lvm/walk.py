@@ -44,6 +44,7 @@ class Walk:
     _header: list[bytes] = field(default_factory=list)
     _begins: bool = True  # the next row begins a write
     _width: int = 0  # of the row before
+    _rowless: bool = False  # no row came yet since the last header
     _run: Run | None = None
     _rows: list[bytes] = field(default_factory=list)
     _done: list[Run] = field(default_factory=list)
@@ -62,7 +63,7 @@ class Walk:
         """
         run = self._whole(block)
         if run and (taken := take(run, block.lines)) is not None:
-            self._begins, self._width = False, run.layout.width
+            self._begins, self._width, self._rowless = False, run.layout.width, False
             self.line = block.first + block.lines - 1
             yield run, taken
         elif len(block.text) > SMALL and block.lines > 1:
@@ -144,8 +145,10 @@ class Walk:
         return self._collected(line, "segment")
 
     def _columns(self, line: bytes) -> str:
+        if self._rowless and self.layout:
+            self.say(f"line {self.layout.line}: the file segment whose header ends here holds no rows")
         self.layout = self._parsed(line)
-        self._header, self._begins, self._width = [], True, self.layout.width
+        self._header, self._begins, self._width, self._rowless = [], True, self.layout.width, True
         sampled = self.layout.sampling
         if self.layout.names not in self.met or len({*sampled.values()}) > 1:
             self.groups = refined(self.groups, sampled, self.file.x_columns == "Multi")
@@ -211,7 +214,7 @@ class Walk:
         run.width = max(run.width, cells)
         run.lines.append(self.line)
         self._rows.append(line)
-        self._begins, self._width = False, cells
+        self._begins, self._width, self._rowless = False, cells, False
 
     def _fitted(self, line: bytes, cells: int, separator: bytes, layout: Layout, run: Run) -> tuple[bytes, int]:
         """A row whose width is not the layout's, without trailing empty cells and its comment."""

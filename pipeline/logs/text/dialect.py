@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from pipeline.logs.log import Options
-from pipeline.logs.names import unique, unit_in
+from pipeline.logs.names import renamed, unique, unit_in
 from pipeline.logs.text.stamps import Stamps, begun, stamps_of, tells_time
 from pipeline.maths.units import canonical, measures
 
@@ -43,6 +43,7 @@ class Dialect:
     preamble: tuple[str, ...]  # lines of the header that are neither names nor units
     trailing: bool  # every row ends in a delimiter
     quoted: bool  # cells stand in quotes
+    remarks: tuple[str, ...] = ()  # on names that had to be changed
 
 
 def split(line: str, delimiter: str) -> list[str]:
@@ -80,7 +81,7 @@ def find(lines: Sequence[str], options: Options) -> Dialect:
         delimiter=delimiter, decimal=decimal, names=unique(names), named=any(names),
         units=tuple(unit or unit_in(name) for name, unit in zip(names, units, strict=True)), kinds=tuple(kinds),
         stamps=stamps, header=header, preamble=tuple(preamble), trailing=width > 1 and any(names) and not names[-1],
-        quoted=any('"' in row for row in rows[len(rows) // 4 :]),
+        quoted=any('"' in row for row in rows[len(rows) // 4 :]), remarks=tuple(renamed(names, unique(names))),
     )  # fmt: skip
 
 

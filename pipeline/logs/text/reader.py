@@ -59,7 +59,7 @@ def read(path: Path, options: Options) -> Log:
     return TextLog(
         path, "text", shown, time=time, started=dated.started if dated else "",
         zone=("UTC" if dated.zoned else "local") if dated else "", facts=facts, comments=comments, dialect=dialect,
-        encoding=options.encoding,
+        encoding=options.encoding, warnings=list(dialect.remarks),
     )  # fmt: skip
 
 

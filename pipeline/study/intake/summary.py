@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from pipeline.errors import BadLog
+from pipeline.logs.names import visible
 from pipeline.maths.signals.clock import GAP
 from pipeline.records import LogSummary
 from pipeline.study.intake.reading import Intake
@@ -51,10 +52,10 @@ def summary(intake: Intake) -> LogSummary:
         repeated=clock.repeated,
         duplicates=clock.duplicates,
         dropped=log.dropped + intake.lost,
-        facts=tuple(f"{key}: {value}" for key, value in facts.items()),
-        warnings=tuple(log.warnings),
-        channel=np.array(names, object),
-        unit=np.array([channel.unit for channel in log.channels], object),
+        facts=tuple(visible(f"{key}: {value}") for key, value in facts.items()),
+        warnings=tuple(map(visible, log.warnings)),
+        channel=np.array([*map(visible, names)], object),
+        unit=np.array([visible(channel.unit) for channel in log.channels], object),
         feeds=np.array([", ".join(feeds.get(name, [])) for name in names], object),
         nulls=np.array([log.nulls.get(name, 0) for name in names]),
         nans=np.array([log.nans.get(name, 0) for name in names]),
