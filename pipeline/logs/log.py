@@ -146,7 +146,8 @@ class Log(ABC):
         """The names by the clock of their channels: its time channel, or "" for the log's own."""
         grouped: dict[str, list[str]] = {}
         for name in names:
-            grouped.setdefault(self._looked_up[name][1], []).append(name)
+            full = name if name in self._looked_up else self.find(name).name
+            grouped.setdefault(self._looked_up[full][1], []).append(name)
         return grouped
 
     @property

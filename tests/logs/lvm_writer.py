@@ -16,6 +16,12 @@ class Write:
     start: str = "02:26:06,3043494224548339844"
     step: float = 1.0
     samples: int | None = None  # what the header says; the truth where it is None
+    # Of each channel, where they differ:
+    xs: Sequence[Sequence[float | None]] = ()
+    starts: Sequence[str] = ()
+    steps: Sequence[float] = ()
+    x0s: Sequence[float] = ()
+    date: str = "2026/10/15"
 
 
 @dataclass(frozen=True)
@@ -73,10 +79,16 @@ def _segment_header(write: Write, style: Style) -> list[str]:
     rows = len(next(iter(write.columns.values())))
     names = list(write.columns)
     header = [line("Channels", [many]), line("Samples", [rows if write.samples is None else write.samples] * many)]
-    header += [line("Date", ["2026/10/15"] * many), line("Time", [write.start] * many)]
+    header += [line("Date", [write.date] * many), line("Time", write.starts or [write.start] * many)]
     header += [line("Y_Unit_Label", write.units)] if write.units else []
-    header += [line("X_Dimension", ["Time"] * many), line("X0", [number(0.0, style)] * many)]
-    header += [line("Delta_X", [number(write.step, style)] * many), f"***End_of_Header***{s}"]
+    header += [
+        line("X_Dimension", ["Time"] * many),
+        line("X0", [number(x0, style) for x0 in write.x0s or [0.0] * many]),
+    ]
+    header += [
+        line("Delta_X", [number(step, style) for step in write.steps or [write.step] * many]),
+        f"***End_of_Header***{s}",
+    ]
     named = (
         [cell for name in names for cell in ("X_Value", name)] if style.x_columns == "Multi" else ["X_Value", *names]
     )
@@ -87,8 +99,11 @@ def _rows(write: Write, style: Style) -> list[str]:
     rows = []
     for i, values in enumerate(zip(*write.columns.values(), strict=True)):
         cells = [number(value, style) for value in values]
-        x = number(write.x[i], style) if style.x_columns != "No" else ""
-        cells = [cell for y in cells for cell in (x, y)] if style.x_columns == "Multi" else [x, *cells]
+        if style.x_columns == "Multi":
+            xs = (each[i] for each in write.xs or [write.x] * len(cells))
+            cells = [cell for x, y in zip(xs, cells, strict=True) for cell in (number(x, style), y)]
+        else:
+            cells = [number(write.x[i], style) if style.x_columns != "No" else "", *cells]
         rows.append(style.separator.join(cells + ([write.comment] if i == 0 and write.comment else [])))
     return rows
 

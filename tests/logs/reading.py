@@ -33,3 +33,12 @@ def read(content: bytes, name: str = "log.lvm", options: Options = Options()) ->
         path = Path(folder) / name
         path.write_bytes(content)
         return whole(path, options)
+
+
+def times_of(log: Log, name: str, samples: Samples) -> NDArray[np.float64]:
+    """When the samples of a channel were taken, as the log says it of its clock."""
+    [channel] = [channel for channel in log.channels if channel.name == name]
+    if time := channel.time or log.time:
+        return samples[time]
+    assert log.clock is not None
+    return log.clock.start + log.clock.step * np.arange(len(samples[name]))
