@@ -50,7 +50,8 @@ __all__ = [
     "Links", "Load", "LogSummary", "Lyapunov", "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose",
     "Prediction", "Push", "Record", "Recording", "Residual", "SensorForce", "Signal", "Smoothed", "Spectrum",
     "StabilityLimit", "StabilityMap", "Stiffness", "SwarmSearch", "Threshold", "TipBudget", "TipContact", "TipForce",
-    "TissueLimit", "TissueModel", "Touch", "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace", "diagnostic",
+    "TissueLimit", "TissueModel", "Touch", "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace",
+    "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {

@@ -130,7 +130,7 @@ def _log(folders: Folders, entry: LogEntry) -> Log:
         raise BadLog(f"file {names} of log {entry.name!r} is not in raw/{folders.raw.resolve().name}")
     options = Options(entry.delimiter, entry.decimal, entry.header, entry.encoding, entry.dtype, entry.columns)
     files = [folders.raw / file for file in entry.files]
-    return open_joined(files, options) if entry.joined else open_parts(files, options)
+    return open_joined(files, options) if entry.join else open_parts(files, options)
 
 
 def _messages(record: Record) -> list[str]:

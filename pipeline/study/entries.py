@@ -56,7 +56,7 @@ def _entry(study: TomlTable, index: int, table: TomlTable, robot: Robot | None) 
         files=_files(table),
         role=table.text("role", choices=ROLES),
         channels=Channels(table, robot).read(),
-        joined="join" in table,
+        join="join" in table,
         period=optional(table, "period"),
         rate=optional(table, "rate"),
         skip=optional(table, "skip") or 0.0,

@@ -79,7 +79,7 @@ class LogEntry:
     files: tuple[str, ...]  # relative to the study
     role: str
     channels: tuple[Source, ...]
-    joined: bool = False  # whether the files stand side by side, else they are parts in order
+    join: bool = False  # whether the files stand side by side, else they are parts in order
     period: float | None = None
     rate: float | None = None
     skip: float = 0.0

@@ -7,9 +7,9 @@ import numpy as np
 import pyarrow.csv as csv
 import pytest
 
-from tests.benchmarks.reading import nptdms, ours, seconds
+from tests.benchmarks.reading import nptdms, nptdms_alone, ours, ours_alone, seconds
 from tests.logs.lvm_writer import Style, Write, lvm
-from tests.logs.tdms_writer import segment
+from tests.logs.tdms_writer import daqmx, segment
 
 CHANNELS = 21  # position, velocity and torque of seven joints
 MB = 1_000_000
@@ -110,3 +110,26 @@ def faster(path: Path, folder: Path, what: str, least: float, report: Report, re
     size = path.stat().st_size // MB
     report(f"tdms {what}, {size} MB: {took:.3f} s, npTDMS {rival:.3f} s, {rival / took:.1f} x (at least {least})")
     assert rival >= least * took
+
+
+@pytest.mark.parametrize("many", [350, 1400])
+def test_many_tdms_channels_of_differing_counts_cost_little_more_than_with_nptdms(
+    tmp_path: Path, report: Report, many: int
+) -> None:
+    path = tmp_path / "log.tdms"
+    path.write_bytes(b"".join(segment({f"g/{i}": np.arange(i % 97 + 1.0) for i in range(many)}) for _ in range(3)))
+    little_more(path, f"{many} channels", report)
+
+
+def test_values_of_daq_cards_cost_little_more_than_with_nptdms(tmp_path: Path, full: bool, report: Report) -> None:
+    path, rows = tmp_path / "log.tdms", 100_000 if full else 10_000
+    raw = np.random.default_rng(5).integers(-9000, 9000, (16, rows)).astype(np.int16)
+    path.write_bytes(daqmx({f"g/{i}": values for i, values in enumerate(raw)}, 1e-3, chunks=100) * 5)
+    little_more(path, "of DAQ cards", report)
+
+
+def little_more(path: Path, what: str, report: Report) -> None:
+    """Reading all channels takes at most twice as long as with npTDMS."""
+    rival, took = seconds(lambda: nptdms_alone(path), lambda: ours_alone(path))
+    report(f"tdms {what}, {path.stat().st_size / MB:.2f} MB: {took:.4f} s, npTDMS {rival:.4f} s, {took / rival:.2f} x")
+    assert took <= 2 * rival

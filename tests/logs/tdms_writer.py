@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 KINDS = {"i1": 1, "i2": 2, "i4": 3, "i8": 4, "u1": 5, "u2": 6, "u4": 7, "u8": 8, "f4": 9, "f8": 10}
-METADATA, NEW_LIST, RAW, INTERLEAVED, BIG_ENDIAN = 2, 4, 8, 32, 64
+METADATA, NEW_LIST, RAW, INTERLEAVED, BIG_ENDIAN, DAQMX = 2, 4, 8, 32, 64, 128
+FORMAT_CHANGING, RAW_DAQMX, INT16 = 0x1269, 0xFFFFFFFF, 3
 
 
 def segment(
@@ -56,3 +57,28 @@ def _interleaved(channels: Mapping[str, NDArray[Any]], order: str) -> bytes:
 def _contiguous(channels: Mapping[str, NDArray[Any]], order: str, chunks: int) -> bytes:
     parts = [np.array_split(samples.astype(samples.dtype.newbyteorder(order)), chunks) for samples in channels.values()]
     return b"".join(part[i].tobytes() for i in range(chunks) for part in parts)
+
+
+def daqmx(channels: Mapping[str, NDArray[np.int16]], slope: float, chunks: int = 1) -> bytes:
+    """A segment as a DAQ card leaves it: the channels' raw values side by side, to be scaled to `slope` * raw + 1."""
+    many, rows = len(channels), len(next(iter(channels.values())))
+    parts = [struct.pack("<I", many)]
+    for i, name in enumerate(channels):
+        group, channel = name.split("/", 1)
+        parts.append(_text(f"/'{group}'/'{channel}'"))
+        parts.append(struct.pack("<IIIQ", FORMAT_CHANGING, RAW_DAQMX, 1, rows // chunks))
+        # One scaler: its type, buffer, offset in a row, format, number; then one buffer, as wide as a row.
+        parts.append(struct.pack("<I5I", 1, INT16, 0, 2 * i, 0, 0) + struct.pack("<II", 1, 2 * many))
+        parts.append(struct.pack("<I", 5))
+        parts.append(_text("NI_Number_Of_Scales") + struct.pack("<Ii", 3, 2))
+        parts.append(_text("NI_Scale[1]_Scale_Type") + struct.pack("<I", 0x20) + _text("Linear"))
+        parts.append(_text("NI_Scale[1]_Linear_Input_Source") + struct.pack("<II", 7, 0))
+        parts.append(_text("NI_Scale[1]_Linear_Slope") + struct.pack("<Id", 10, slope))
+        parts.append(_text("NI_Scale[1]_Linear_Y_Intercept") + struct.pack("<Id", 10, 1.0))
+    metadata, raw = b"".join(parts), np.column_stack(list(channels.values())).astype("<i2").tobytes()
+    lead = struct.pack("<IIQQ", METADATA | NEW_LIST | RAW | DAQMX, 4713, len(metadata) + len(raw), len(metadata))
+    return b"TDSm" + lead + metadata + raw
+
+
+def _text(words: str) -> bytes:
+    return struct.pack("<I", len(words.encode())) + words.encode()

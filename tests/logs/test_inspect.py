@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 from pipeline.commands import inspect
 from pipeline.maths.signals.outline import Outline
 from tests.logs.lvm_writer import Style, Write, lvm
+from tests.logs.test_clocks import said, tdms
 
 
 def shown(path: Path, *options: str) -> str:
@@ -111,3 +112,19 @@ def test_the_bars_go_from_low_to_high() -> None:
     assert inspect.sparkline(course) == "▁▂▃▄▅▆▇█ "
     assert inspect.sparkline([None]) == ""
     assert inspect.sparkline([2.0, 2.0]) == "▁▁"
+
+
+def test_every_clock_of_a_log_is_shown(tmp_path: Path) -> None:
+    path = tmp_path / "log.tdms"
+    path.write_bytes(tdms({"a/q": ([1, 2, 3], said(0, 0.01)), "a/i": ([3, 4], said(0, 0.02))}))
+    found = json.loads(shown(path, "--json"))
+    assert_allclose([found["clock"]["rate"], found["clocks"][0]["rate"]], [100, 50])
+    assert [channel["samples"] for channel in found["channels"]] == [3, 2, 2]
+    assert "another clock: channel 'time of a/i', 50 Hz, of 'a/i'" in shown(path)
+
+
+def test_control_characters_are_written_out(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_bytes(b"t,q\x1b[31m \xc2\xb0\n0,1\n1,2\n")
+    assert "q\\x1b[31m \u00b0" in shown(path)
+    assert "\x1b" not in shown(path)

@@ -236,3 +236,22 @@ def test_only_the_channels_asked_for_are_converted() -> None:
     with pytest.raises(BadLog, match="4x5"):
         read(content)
     assert log.channels
+
+
+@pytest.mark.parametrize("separator", [b"\xa7", b"7", b"-"])
+def test_a_separator_that_cannot_part_numbers_is_refused(separator: bytes) -> None:
+    content = lvm([Write({"a": [1.0]}, x=[0.0])]).replace(b"Separator\tTab", b"Separator" + separator)
+    with pytest.raises(BadLog, match=r"the separator is .*, which cannot part numbers"):
+        read(content)
+
+
+def test_a_file_segment_without_rows_and_a_header_that_does_not_end_are_remarked_on() -> None:
+    writes = [Write({"a": [1.0]}, x=[0.0]), Write({"a": []}, samples=0), Write({"a": [2.0]}, x=[1.0])]
+    log, samples = read(lvm(writes))
+    assert_array_equal(samples["a"], [1, 2])
+    assert log.warnings == ["line 33: the file segment whose header ends here holds no rows"]
+    content = lvm(writes)
+    end = content.rindex(b"***End_of_Header***")
+    log, samples = read(content[:end] + content[content.index(b"\n", end) + 1 :])
+    assert_array_equal(samples["a"], [1])
+    assert any("(no line ***End_of_Header*** ends the header)" in warning for warning in log.warnings)

@@ -147,6 +147,14 @@ def test_files_side_by_side_that_say_when_they_started_count_from_the_first(tmp_
     assert not log.warnings
 
 
+def test_times_in_text_side_by_side_count_from_the_first_file(tmp_path: Path) -> None:
+    for name, second in (("q", 1), ("i", 3)):
+        (tmp_path / f"{name}.csv").write_text(f"t,{name}\n2026-10-15T02:26:0{second}Z,1\n2026-10-15T02:26:09Z,2\n")
+    log = open_joined([tmp_path / "q.csv", tmp_path / "i.csv"], Options())
+    assert_allclose(times(log, "q"), [0, 8])
+    assert_allclose(times(log, "i"), [2, 8])
+
+
 def test_an_old_start_of_labview_is_none(tmp_path: Path) -> None:
     epoch = (datetime(1904, 1, 1) - NOON).total_seconds()
     parts = (tdms({"a/q": (values, said(epoch, 0.01))}) for values in ([1, 2], [3, 4]))

@@ -8,17 +8,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from nptdms import ChannelObject, GroupObject, RootObject, TdmsWriter
+from nptdms import ChannelObject, GroupObject, RootObject, TdmsFile, TdmsWriter
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
 from pipeline.errors import BadLog
 from pipeline.logs import blocks
 from pipeline.logs.tdms import samples as tdms_samples
+from pipeline.logs.tdms import scaled as tdms_scaled
 from pipeline.logs.tdms import walk as tdms_walk
 from tests.logs.cutting import is_cut_honestly
 from tests.logs.reading import read
-from tests.logs.tdms_writer import KINDS, segment
+from tests.logs.tdms_writer import KINDS, daqmx, segment
 
 Table = dict[str, NDArray[Any]]
 NAMES = ("Motors/Roll current", "Motors/it's", "Joints/<script>", "Joints/Roll", "a/b/c")
@@ -226,3 +227,49 @@ def test_a_channel_is_found_by_its_last_part_where_only_one_has_it() -> None:
         log.find("Roll curent")
     with pytest.raises(BadLog, match="no column 3; its 3 columns are counted from 0"):
         log.find(3)
+
+
+def test_a_count_of_scales_that_was_damaged_is_refused_before_anything_is_made_of_it() -> None:
+    for count in (2**31 - 1, 3, -1):
+        scale = {
+            "NI_Number_Of_Scales": np.int32(count), "NI_Scale[1]_Scale_Type": "Linear",
+            "NI_Scale[1]_Linear_Slope": 2.0, "NI_Scale[1]_Linear_Y_Intercept": 1.0,
+        }  # fmt: skip
+        file = io.BytesIO()
+        with TdmsWriter(file) as writer:
+            writer.write_segment([ChannelObject("a", "raw", np.array([1, 2], dtype=np.int16), scale)])
+        with pytest.raises(BadLog, match=f"says that it has {count} scales and describes 1: the file is damaged"):
+            read(file.getvalue(), "log.tdms")
+
+
+def test_complex_channels_are_called_that() -> None:
+    file = io.BytesIO()
+    with TdmsWriter(file) as writer:
+        writer.write_segment([ChannelObject("a", "z", np.array([1 + 2j, 3j])), ChannelObject("a", "x", np.arange(2.0))])
+    log, samples = read(file.getvalue(), "log.tdms")
+    assert [channel.kind for channel in log.channels] == ["complex numbers", "number"]
+    assert_array_equal(samples["a/x"], [0, 1])
+    with pytest.raises(BadLog, match="channel 'a/z' holds complex numbers, not numbers"):
+        next(log.blocks(["a/z"]))
+
+
+def test_channels_that_are_called_alike_are_remarked_on() -> None:
+    file = io.BytesIO()
+    with TdmsWriter(file) as writer:
+        writer.write_segment([ChannelObject("a/b", "c", np.array([1.0])), ChannelObject("a", "b/c", np.array([2.0]))])
+    log, samples = read(file.getvalue(), "log.tdms")
+    assert (samples["a/b/c"], samples["a/b/c_1"]) == ([1], [2])
+    assert log.warnings == ["a channel is called 'a/b/c' like another; it is read as 'a/b/c_1'"]
+
+
+@pytest.mark.parametrize("chunk", [1, 7, 10**9])
+def test_values_of_daq_cards_are_read_as_npTDMS_reads_them_however_long_their_chunks(
+    monkeypatch: pytest.MonkeyPatch, chunk: int
+) -> None:
+    monkeypatch.setattr(tdms_scaled, "ROWS", chunk)
+    raw = {f"a/{i}": np.arange(i, 40 + i, dtype=np.int16) for i in range(3)}
+    content = daqmx(raw, slope=0.5, chunks=4) * 3
+    _, samples = read(content, "log.tdms")
+    for name, values in raw.items():
+        assert_array_equal(samples[name], np.tile(0.5 * values + 1, 3))
+        assert_array_equal(samples[name], TdmsFile.read(io.BytesIO(content))["a"][name[2:]][:])

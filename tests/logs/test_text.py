@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.testing import assert_array_equal
+from numpy.testing import assert_allclose, assert_array_equal
 
 from pipeline.errors import BadLog
+from pipeline.logs import lines as log_lines
 from pipeline.logs.log import Options
 from tests.logs.cutting import is_cut_honestly
 from tests.logs.reading import read, whole
@@ -191,3 +192,49 @@ def test_recordings_of_other_arms_have_the_columns_that_their_notes_say(data: An
         table = np.loadtxt(data / name, delimiter=",", skiprows=int("palpation" in name), max_rows=rows)
         assert len(samples) == columns
         assert_array_equal(np.column_stack(list(samples.values())), table)
+
+
+@pytest.mark.parametrize(
+    ("cells", "wanted", "started", "zone"),
+    [
+        (("23:59:59.5", "00:00:00", "0:00:00.25"), [86399.5, 86400, 86400.25], "", ""),
+        (("2026-10-15T02:26:06.304Z", "2026-10-15T02:26:06.314Z"), [0, 0.01], "2026-10-15T02:26:06.304000", "UTC"),
+        (("2026-10-15T02:26:06+02:00", "2026-10-15T00:26:07+0000"), [0, 1], "2026-10-15T00:26:06", "UTC"),
+        (("2026/10/15 02:26:06,304", "2026/10/15 02:26:07"), [0, 0.696], "2026-10-15T02:26:06.304000", "local"),
+        (("2026-10-15 23:59", "2026-10-16 00:01"), [0, 120], "2026-10-15T23:59:00", "local"),
+    ],
+)
+def test_a_column_of_times_is_the_time(cells: tuple[str, ...], wanted: list[float], started: str, zone: str) -> None:
+    log, samples = text("when;q", *(f"{cell};1,5" for cell in cells))
+    assert (log.time, log.started, log.zone) == ("when", started, zone)
+    assert_allclose(samples["when"], wanted, rtol=0, atol=1e-9)
+
+
+@given(st.integers(0, 86_399_999), st.lists(st.integers(1, 40_000_000), min_size=1, max_size=30), st.integers(1, 9))
+def test_times_of_day_go_on_past_any_midnight_in_blocks_of_any_size(begin: int, steps: list[int], size: int) -> None:
+    at = begin + np.concatenate(([0], np.cumsum(steps)))  # [ms]
+    cells = [
+        f"{ms // 3_600_000 % 24:02}:{ms // 60_000 % 60:02}:{ms // 1000 % 60:02}.{ms % 1000:03}" for ms in at.tolist()
+    ]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(log_lines.Lines.blocks, "__defaults__", (16 * size,))
+        _, samples = text("t,q", *(f"{cell},1" for cell in cells))
+    assert_allclose(samples["t"], 1e-3 * at, rtol=1e-12)
+
+
+def test_columns_of_days_and_of_times_make_rows_though_most_cells_are_no_numbers() -> None:
+    log, samples = text("2026-10-15 02:26:06.304 1.5", "2026-10-15 02:26:06.314 2.5")
+    assert [channel.kind for channel in log.channels] == ["text", "time", "number"]
+    assert_allclose(samples["column_1"], [8766.304, 8766.314], rtol=1e-12)
+
+
+def test_a_cell_that_is_no_time_is_named_with_its_place() -> None:
+    with pytest.raises(BadLog, match=r":3: '02:26:x' in column 0 \(t\) is no time like those before it"):
+        text("t,q", "02:26:06,1", "02:26:x,2", "02:26:07,3", "02:26:08,3")
+    with pytest.raises(BadLog, match="a time that no calendar holds"):
+        text("t,q", "2026-02-28 02:26:06,1", "2026-02-30 02:26:06,2")
+
+
+def test_columns_that_are_called_alike_are_remarked_on() -> None:
+    log, _ = text("t,q,q", "0,1,2", "1,3,4")
+    assert log.warnings == ["column 2 is called 'q' like another; it is read as 'q_1'"]

@@ -19,7 +19,7 @@ class Sampled:
 
 
 @dataclass(frozen=True)
-class Clocks:
+class ClocksFound:
     """The channels with their clocks, and what the log says of its own."""
 
     channels: tuple[Channel, ...]
@@ -28,7 +28,7 @@ class Clocks:
     made: dict[str, Timeline] = field(default_factory=dict)  # the derived channels of times
 
 
-def clocks_of(channels: Sequence[Channel], sampled: Mapping[str, Sampled], ends_anywhere: bool) -> Clocks:
+def clocks_of(channels: Sequence[Channel], sampled: Mapping[str, Sampled], ends_anywhere: bool) -> ClocksFound:
     """Find the clock of every channel; `ends_anywhere` says that the file was cut, so that lengths say nothing.
 
     The first clock is the log's own, unless there are channels without any: those must not be taken to have it.
@@ -36,7 +36,7 @@ def clocks_of(channels: Sequence[Channel], sampled: Mapping[str, Sampled], ends_
     of = _shared(channels, sampled, ends_anywhere)
     clocks = list(dict.fromkeys(of.values()))
     if not any(clocks):
-        return Clocks(tuple(channels))
+        return ClocksFound(tuple(channels))
     own = clocks[0] if "" not in clocks else None
     named = dict(zip(clocks, _names(clocks, channels, sampled), strict=True))
     longest = _longest(of, sampled)
@@ -44,8 +44,8 @@ def clocks_of(channels: Sequence[Channel], sampled: Mapping[str, Sampled], ends_
     told = tuple(replace(c, time="" if of[c.name] in (own, "") else named[of[c.name]]) for c in channels)
     if own and named[own] in made and made[named[own]].is_uniform:
         timeline = made.pop(named[own])
-        return Clocks(_with(told, made), Clock(timeline.step[0], timeline.start[0]), "", made)
-    return Clocks(_with(told, made, own=named[own] if own else ""), None, named[own] if own else "", made)
+        return ClocksFound(_with(told, made), Clock(timeline.step[0], timeline.start[0]), "", made)
+    return ClocksFound(_with(told, made, own=named[own] if own else ""), None, named[own] if own else "", made)
 
 
 def _with(channels: tuple[Channel, ...], made: Mapping[str, Timeline], own: str = "") -> tuple[Channel, ...]:

@@ -25,7 +25,7 @@ class Together:
 
 
 @dataclass
-class Clocks:
+class UsedClocks:
     """The clocks of the channels that a study uses; `scale` is what one unit of its time is in SI."""
 
     log: Log

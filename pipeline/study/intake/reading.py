@@ -12,7 +12,7 @@ from pipeline.maths.units import SI, UNITS, canonical, measures, size
 from pipeline.records import Column, Recording, Touch
 from pipeline.robots.robot import Joint, Robot
 from pipeline.study import WHOLE, LogEntry, Source
-from pipeline.study.intake.clocks import Clocks
+from pipeline.study.intake.clocks import UsedClocks
 from pipeline.study.intake.touch import touched
 
 
@@ -36,7 +36,9 @@ class Intake:
         used = [channel.name for quantity, channel in self.channels.items() if quantity != "time"]
         positions = (f"{joint}.{symbol}" for joint in self.entry.joints for symbol in ("q", "theta_m"))
         reference = next((self.channels[q].name for q in positions if q in self.channels), used[0] if used else "")
-        self.clocks = Clocks(self.log, self.entry, self.scales.get("time", 1.0), list(dict.fromkeys(used)), reference)
+        self.clocks = UsedClocks(
+            self.log, self.entry, self.scales.get("time", 1.0), list(dict.fromkeys(used)), reference
+        )
         if not self.clocked and self.entry.needs_clock and not self.clocks.are_several:
             raise BadLog(
                 f"{self.log.path}: the log carries no clock; name its time channel in [log.channels], "

@@ -1,0 +1,271 @@
+"""Channels that were not sampled together, used together: put on one clock, or refused."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.testing import assert_allclose, assert_array_equal
+from numpy.typing import NDArray
+
+import pipeline
+from pipeline.errors import BadLog
+from pipeline.logs.aligned import Alignment, Timed, aligned
+from pipeline.maths.signals.clock import GAP
+from tests import arm
+from tests.logs.test_clocks import said, tdms
+from tests.test_runs import call
+
+Samples = NDArray[np.float64]
+
+
+def in_blocks(name: str, t: Samples, x: Samples, rows: int) -> Iterator[Timed]:
+    return ((t[i : i + rows], {name: x[i : i + rows]}) for i in range(0, len(t), rows))
+
+
+def put_on(t: Samples, their_t: Samples, x: Samples, rows: int = 1000) -> tuple[Samples, Samples, Alignment]:
+    """The samples `x` of another clock on the clock `t`: its times that are kept, and the samples there."""
+    done = Alignment()
+    timed = aligned(in_blocks("q", t, t, rows), {"x": in_blocks("x", their_t, x, rows)}, done, BadLog)
+    blocks = list(timed)
+    for times, block in blocks:
+        assert_array_equal(times, block["q"])
+    return np.concatenate([t for t, _ in blocks]), np.concatenate([block["x"] for _, block in blocks]), done
+
+
+uneven = st.lists(st.floats(0.6, 1.6), min_size=5, max_size=60)
+
+
+@given(uneven, uneven, st.integers(1, 70), st.integers(0, 55))
+@settings(max_examples=200)
+def test_a_parabola_comes_through_exactly_whatever_the_clocks_the_blocks_and_the_gaps(
+    own: list[float], theirs: list[float], rows: int, gap: int
+) -> None:
+    t, their_t = np.cumsum(own), np.cumsum(theirs) + 0.5
+    their_t[gap:] += 5.0
+    x = 1 + 2 * their_t - 0.3 * their_t**2
+    try:
+        whole, all_of_it, _ = put_on(t, their_t, x)
+    except BadLog as problem:
+        assert "no time in common" in str(problem)  # noqa: PT017 - only some clocks have none
+        return
+    again, same, _ = put_on(t, their_t, x, rows) if rows > 60 else (whole, all_of_it, None)
+    assert_array_equal(same, all_of_it)
+    assert_array_equal(again, whole)
+    # Beside an end or a gap only one neighbour is known, and the cubic has the chord's slope there.
+    i = np.searchsorted(their_t, whole, side="right") - 1
+    reach = GAP * np.median(np.diff(their_t))
+    steps = np.diff(their_t)
+    inner = (i > 0) & (i < len(their_t) - 2)
+    inner[inner] = (steps[i[inner] - 1] <= reach) & (steps[np.minimum(i[inner] + 1, len(steps) - 1)] <= reach)
+    assert_allclose(all_of_it[inner], (1 + 2 * whole - 0.3 * whole**2)[inner], rtol=1e-9, atol=1e-9)
+    bridged = (i >= 0) & (i < len(steps)) & (whole > their_t[i])
+    assert (steps[i[bridged]] <= reach).all()
+
+
+@pytest.mark.parametrize("rows", [2, 3, 17, 400])
+def test_what_is_interpolated_does_not_depend_on_the_blocks(rows: int) -> None:
+    rng = np.random.default_rng(3)
+    t, their_t = np.cumsum(rng.uniform(0.9, 1.1, 300)), np.cumsum(rng.uniform(0.9, 1.1, 300)) + 0.3
+    x = rng.normal(size=300)
+    wanted = put_on(t, their_t, x)
+    for one, other in zip(put_on(t, their_t, x, rows)[:2], wanted[:2], strict=True):
+        assert_array_equal(one, other)
+
+
+def test_samples_of_the_same_times_stay_what_they_are() -> None:
+    t = 0.01 * np.arange(500)
+    x = np.random.default_rng(4).normal(size=500)
+    times, same, done = put_on(t, t, x)
+    assert_array_equal(times, t)
+    assert_array_equal(same, x)
+    assert not done.changed
+
+
+def test_white_noise_keeps_what_a_cubic_leaves_of_it() -> None:
+    """Half-way, the weights are -1/16, 9/16, 9/16 and -1/16: 164/256 of the variance."""
+    many = 100_000
+    x = np.random.default_rng(5).normal(size=many)
+    _, halfway, _ = put_on(np.arange(many) + 0.5, np.arange(many, dtype=float), x)
+    assert_allclose(halfway.var(), 164 / 256, rtol=4 * np.sqrt(2 / many))
+
+
+def test_a_channel_that_is_sampled_much_faster_is_averaged_first() -> None:
+    fast = np.arange(100_000) * 1e-4
+    noise = np.random.default_rng(6).normal(size=len(fast))
+    t, x, done = put_on(np.arange(1, 999) * 0.01, fast, np.sin(2 * np.pi * fast) + noise)
+    assert done.others["x"].many == 100
+    left = x - np.sinc(0.01) * np.sin(2 * np.pi * t)
+    assert left.std() < 1.2 * 0.1  # a hundred samples have a tenth of the deviation
+
+
+@pytest.mark.parametrize(
+    ("theirs", "says"),
+    [
+        (100 + 0.01 * np.arange(100), "from 0 to 0.99 s, that of x from 100 to 100.99 s: they have no time in common"),
+        (0.2 * np.arange(10), "x is sampled every 0.2 s and the positions every 0.01 s: what goes on in more than 10"),
+        (np.r_[0.01 * np.arange(50), 0.01 * np.arange(50)], "the time of x does not increase at row 50"),
+        (np.r_[0.01 * np.arange(50), np.nan], "the time of x is no number at row 50"),
+    ],
+)
+def test_clocks_that_do_not_go_together_are_refused(theirs: Samples, says: str) -> None:
+    with pytest.raises(BadLog, match=says):
+        put_on(0.01 * np.arange(100), theirs, theirs)
+
+
+@pytest.fixture
+def lab(tmp_path: Path) -> Path:
+    """A study without its log."""
+    folder = tmp_path / "raw" / "arm"
+    folder.mkdir(parents=True)
+    arm.write_robot(folder)
+    return folder
+
+
+def describe(folder: Path, file: str, channels: str, role: str = "validation") -> None:
+    entry = f'title = "T"\nrobot = "arm.toml"\n[[log]]\nname = "run"\n{file}\nrole = "{role}"\n'
+    (folder / "study.toml").write_text(f"{entry}[log.channels]\n{channels}\n")
+
+
+def motion(t: Samples) -> tuple[Samples, Samples]:
+    return 0.3 * np.sin(2 * np.pi * t), 2.0 * np.cos(2 * np.pi * t)
+
+
+OF_TDMS = '"hand_roll.q" = "a/q"\n"hand_roll.tau" = "b/tau"'
+
+
+@pytest.mark.parametrize("role", ["validation", "identification"])
+def test_an_effort_with_a_clock_of_its_own_comes_to_the_times_of_the_position(lab: Path, role: str) -> None:
+    t = 0.01 * np.arange(500)
+    q, tau = motion(t)[0], motion(t + 0.0033)[1]
+    (lab / "run.tdms").write_bytes(tdms({"a/q": (q, said(0, 0.01)), "b/tau": (tau, said(0.0033, 0.01))}))
+    describe(lab, 'file = "run.tdms"', OF_TDMS, role)
+    call("ingest", lab)
+    made = pipeline.read(lab, "Recording", log="run")
+    assert len(made) == 499  # the effort begins after the first position
+    assert_allclose(made["q"], q[1:], rtol=1e-12)
+    inner = slice(2, -2)
+    wanted = motion(0.01 + made["t"].to_numpy())[1]
+    h4 = (2 * np.pi * 0.01) ** 4  # the error of a cubic goes with the fourth power of the sampling time
+    assert_allclose(made["tau"][inner], wanted[inner], atol=2.0 * h4)
+    [note] = [text for text in pipeline.read(lab, "Diagnostic")["text"] if "clocks of their own" in text]
+    assert "'b/tau' (100 Hz) by cubics between neighbours, across no gap" in note
+
+
+def test_a_pause_of_one_clock_is_a_gap_of_all(lab: Path) -> None:
+    t = 0.01 * np.arange(300)
+    q, tau = motion(t)
+    (lab / "run.tdms").write_bytes(
+        tdms(
+            {"a/q": (q, said(0, 0.01)), "b/tau": (tau[:100], said(0.005, 0.01))},
+            {"b/tau": (tau[200:], said(2.005, 0.01))},
+        )
+    )
+    describe(lab, 'file = "run.tdms"', OF_TDMS)
+    call("ingest", lab)
+    call("resample", lab)
+    signal = pipeline.read(lab, "Signal", log="run")
+    assert signal["segment"].max() == 1
+    assert_allclose(np.diff(signal["t"]).max(), 1.02, atol=1e-9)
+
+
+def test_each_group_of_a_tdms_file_has_the_times_that_the_study_names(lab: Path) -> None:
+    t = 0.01 * np.arange(300)
+    one = {"a/Time": (1e3 * t, {}), "a/q": (motion(t)[0], {})}
+    other = {"b/Time": (1e3 * t + 4, {}), "b/tau": (motion(t + 0.004)[1], {})}
+    (lab / "run.tdms").write_bytes(tdms(one, other))
+    for name in ("Time", "a/Time"):
+        describe(lab, 'file = "run.tdms"', f'time = {{ channel = "{name}", unit = "ms" }}\n{OF_TDMS}')
+        call("ingest", lab)
+        made = pipeline.read(lab, "Recording", log="run")
+        assert_allclose(made["tau"][2:-2], motion(0.01 + made["t"].to_numpy())[1][2:-2], atol=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("theirs", "says"),
+    [
+        ((np.arange(5.0), {}), "nothing says when channel 'b/tau' was sampled"),
+        ((np.arange(9.0), said(60, 0.01)), "they have no time in common"),
+    ],
+)
+def test_channels_whose_clocks_do_not_go_together_are_an_error(
+    lab: Path, theirs: tuple[Samples, dict[str, float]], says: str
+) -> None:
+    (lab / "run.tdms").write_bytes(tdms({"a/q": (np.arange(9.0), said(0, 0.01)), "b/tau": theirs}))
+    describe(lab, 'file = "run.tdms"', OF_TDMS)
+    assert says in " ".join(call("ingest", lab, code=1).split())
+
+
+def test_one_signal_a_file_becomes_a_recording(lab: Path) -> None:
+    t = 0.008 * np.arange(400)
+    q, tau = motion(t)
+    for name, columns in (("q", (t, q)), ("tau", (t + 0.003, motion(t + 0.003)[1])), ("dq", (t, tau))):
+        (lab / f"{name}.csv").write_text("".join(f"{a!r}, {b!r}\n" for a, b in np.column_stack(columns).tolist()))
+    channels = "\n".join(f'"hand_roll.{name}" = "{name}/column_1"' for name in ("q", "dq", "tau"))
+    describe(lab, 'join = ["q.csv", "dq.csv", "tau.csv"]', f"time = 0\n{channels}")
+    call("ingest", lab)
+    made = pipeline.read(lab, "Recording", log="run")
+    assert_array_equal(made["q"], q[1:])
+    assert_array_equal(made["dq"], tau[1:])
+    assert_allclose(made["tau"][2:-2], tau[3:-2], atol=1e-4)
+    described = pipeline.read(lab, "LogSummary")
+    assert set(described["feeds"]) >= {"time", "hand_roll.q", "hand_roll.tau"}
+
+
+def test_joined_files_without_clocks_are_counted_by_the_rate(lab: Path) -> None:
+    q, tau = motion(0.01 * np.arange(100))
+    for name, column in (("q", q), ("tau", tau)):
+        (lab / f"{name}.csv").write_text(f"{name}\n" + "".join(f"{value!r}\n" for value in column.tolist()))
+    channels = '"hand_roll.q" = "q"\n"hand_roll.tau" = "tau"'
+    describe(lab, 'join = ["q.csv", "tau.csv"]', channels)
+    assert "nothing says when channel 'q/q' was sampled" in " ".join(call("ingest", lab, code=1).split())
+    describe(lab, 'join = ["q.csv", "tau.csv"]\nrate = 100.0', channels)
+    call("ingest", lab)
+    made = pipeline.read(lab, "Recording", log="run")
+    assert_array_equal(made["tau"], tau)
+    assert_allclose(made["t"], 0.01 * np.arange(100), atol=1e-12)
+
+
+def test_a_scale_applies_after_offset_and_sign_and_its_unit_names_the_result(lab: Path) -> None:
+    t = 0.01 * np.arange(100)
+    q, tau = motion(t)
+    (lab / "run.tdms").write_bytes(tdms({"a/q": (q, said(0, 0.01)), "b/tau": (-tau / 0.4 - 1.5, said(0, 0.01))}))
+    scaled = '{ channel = "b/tau", offset = 1.5, sign = -1, scale = 400.0, unit = "mN m" }'
+    describe(lab, 'file = "run.tdms"', f'"hand_roll.q" = "a/q"\n"hand_roll.tau" = {scaled}')
+    call("ingest", lab)
+    assert_allclose(pipeline.read(lab, "Recording", log="run")["tau"], tau, atol=1e-12)
+
+
+def test_a_scale_of_nothing_is_a_problem_of_the_study(lab: Path) -> None:
+    describe(lab, 'file = "run.tdms"', '"hand_roll.q" = "a/q"\n"hand_roll.tau" = { channel = "b/tau", scale = 0 }')
+    assert "scale must not be 0" in " ".join(call("ingest", lab, code=1).split())
+
+
+def test_the_signals_of_a_real_arm_one_a_file_become_recordings(data: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "raw" / "ur5"
+    folder.mkdir(parents=True)
+    arm.write_robot(folder)
+    stem = "No10_Standstill_ForceSensor_All__"
+    files = sorted((data / "ur5").glob(f"{stem}*.csv"))
+    assert len(files) == 6
+    for file in files:
+        (folder / file.name.removeprefix(stem)).symlink_to(file)
+    listed = ", ".join(f'"{file.name.removeprefix(stem)}"' for file in files)
+    channels = [
+        f'"{joint}.{symbol}" = "{file}/column_{i}"'
+        for i, joint in ((1, "hand_roll"), (2, "hand_pitch"))
+        for symbol, file in (("q", "q_actual"), ("dq", "qd_actual"), ("i", "i_actual"))
+    ]
+    forces = [f'force_{axis} = "force_sensor/column_{i}"' for i, axis in enumerate("xyz", start=1)]
+    describe(folder, f"join = [{listed}]", "\n".join(["time = 0", *channels, *forces]))
+    call("ingest", folder)
+    made = pipeline.read(folder, "Recording", joint="hand_roll")
+    raw = np.loadtxt(folder / "q_actual.csv", delimiter=",", max_rows=3400)
+    assert_array_equal(made["q"][:3399], raw[1:3400, 1])
+    touch = pipeline.read(folder, "Touch")
+    theirs = np.loadtxt(folder / "force_sensor.csv", delimiter=",", max_rows=5000)
+    t = touch["t"][:2000] + raw[1, 0]
+    bend = np.abs(np.diff(theirs[:, 3], 2)).max()  # a cubic is no further from the chord than the samples bend
+    assert_allclose(touch["force_z"][:2000], np.interp(t, theirs[:, 0], theirs[:, 3]), atol=bend / 4)
