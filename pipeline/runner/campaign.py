@@ -10,9 +10,10 @@ from urllib.parse import quote
 from pipeline.errors import BadRequest, MissingRecord
 from pipeline.records import store
 from pipeline.report.campaign.page import page
-from pipeline.report.campaign.studies import FLOORS, Campaigned, Judged
+from pipeline.report.campaign.studies import FLOORS, Campaigned, JointVerdict, joints_of, series_of
 from pipeline.report.verdicts import WORDS
 from pipeline.runner import runs, stated
+from pipeline.runner.drifting import findings
 
 
 def write(studies: Sequence[Path], reports: Path | None, out: Path | None) -> tuple[list[Path], list[str]]:
@@ -32,7 +33,11 @@ def write(studies: Sequence[Path], reports: Path | None, out: Path | None) -> tu
     if len({folder.name for folder in there}) < len(there):
         raise BadRequest(f"two studies are called alike: {', '.join(map(str, there))}; a campaign tells them by name")
     place = out or there[0].parent
-    files = page([campaigned(folder, place) for folder in there], left_out)
+    every = [campaigned(folder, place) for folder in there]
+    by_date = all(study.when is not None for study in every)
+    ordered = sorted(every, key=lambda study: study.started) if by_date else every
+    series = [one for joint in joints_of(ordered) for one in series_of(ordered, joint)]
+    files = page(ordered, left_out, findings(series, ordered, by_date))
     for name, content in files.items():
         store.write_bytes(place / name, content)
     return [place / name for name in files], left_out
@@ -42,7 +47,7 @@ def campaigned(folder: Path, place: Path) -> Campaigned:
     """One study, by the files of its report; `place` is the folder of the page that leads there."""
     numbers, about = stated.read(folder / "results.json"), digest(folder / "summary.json")
     joints = {
-        str(joint["joint"]): Judged(
+        str(joint["joint"]): JointVerdict(
             joint["verdict"],
             bool(joint["same_path"]),
             {n: joint[n] for n in FLOORS},

@@ -4,8 +4,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from pipeline.report.campaign.findings import CHANCE, Findings
-from pipeline.report.campaign.studies import FLOORS, Campaigned, Series, joints_of, series_of
+from pipeline.report.campaign.findings import Findings, place
+from pipeline.report.campaign.studies import FLOORS, Campaigned, Series, joints_of
 from pipeline.report.content import (
     Block,
     Bullets,
@@ -28,38 +28,33 @@ from pipeline.report.verdicts import WORDS
 from pipeline.report.writers import render_all
 
 
-def page(studies: Sequence[Campaigned], left_out: Sequence[str]) -> dict[str, bytes]:
-    """campaign.html and campaign.pdf; `left_out` names the studies that have no results."""
-    by_date = all(study.when is not None for study in studies)
-    ordered = sorted(studies, key=lambda study: study.started) if by_date else list(studies)
-    every = [series for joint in joints_of(ordered) for series in series_of(ordered, joint)]
-    told = Findings(every, ordered, by_date)
+def page(studies: Sequence[Campaigned], left_out: Sequence[str], told: Findings) -> dict[str, bytes]:
+    """campaign.html and campaign.pdf of studies in their order; `left_out` names those that have no results."""
     sections = (
-        Section("The campaign", "campaign", tuple(overview(ordered, left_out, by_date, told))),
-        *(joint_section(joint, ordered, told) for joint in joints_of(ordered)),
+        Section("The campaign", "campaign", tuple(overview(studies, left_out, told))),
+        *(joint_section(joint, studies, told) for joint in joints_of(studies)),
     )
-    simulated = any(study.simulated for study in ordered)
-    heading = "1 study" if len(ordered) == 1 else f"{len(ordered)} studies"
-    document = Document("Campaign", heading, simulated, sections, "", "campaign", links=())
-    return render_all((document,))
+    simulated = any(study.simulated for study in studies)
+    heading = "1 study" if len(studies) == 1 else f"{len(studies)} studies"
+    return render_all((Document("Campaign", heading, simulated, sections, "", "campaign", links=()),))
 
 
-def overview(studies: Sequence[Campaigned], left_out: Sequence[str], by_date: bool, told: Findings) -> Iterator[Block]:
+def overview(studies: Sequence[Campaigned], left_out: Sequence[str], told: Findings) -> Iterator[Block]:
     """What there is, what drifts, and one row a study."""
-    dates = f", recorded from {studies[0].started[:10]} to {studies[-1].started[:10]}" if by_date else ""
+    dates = f", recorded from {studies[0].started[:10]} to {studies[-1].started[:10]}" if told.by_date else ""
     undated = " Their logs do not all say when they were recorded, so they are in the order in which they are named."
-    order = "" if by_date else undated
+    order = "" if told.by_date else undated
     yield Prose(
         f"{count(len(studies), 'report')}{dates}, each row linked to its own.{order} Parameters are those of each "
         "joint by itself, by least squares. A number drifts where a weighted line through it has a slope beyond its "
         "standard error, varies where its studies scatter about one mean by more than their errors, and a study "
         "stands out where it is far from the mean of the others; errors of a line are widened where values scatter. "
-        f"Of all {told.tests} tests together, the chance that any tells falsely is {100 * CHANCE:.0f} %."
+        f"Of all {told.tests} tests together, the chance that any tells falsely is {100 * told.chance:.0f} %."
     )
     if left_out:
         names = ", ".join(f"`{literal(name)}`" for name in left_out)
         yield Verdict("info", f"Left out, as they have no results: {names}. `davinci-forces all` makes them.")
-    said = tuple(finding(one, told) for one in told.every if told.drifts(one) or told.varies(one))
+    said = tuple(finding(one, told) for one in told.every if place(one) in told.slopes or place(one) in told.varying)
     said += tuple(text for one in told.every for text in outliers_in_words(one, told))
     if said:
         yield Verdict("warn", "**Beyond standard errors:**")
@@ -75,16 +70,15 @@ def overview(studies: Sequence[Campaigned], left_out: Sequence[str], by_date: bo
 def finding(one: Series, told: Findings) -> str:
     """What a series does, in words."""
     name = f"**{title(one.joint)}, {literal(words(one.name))}**"
-    if told.drifts(one):
-        line = told.trends[id(one)]
-        slope = Number(line.slope, f"{format_unit(one.unit)} a {told.unit}".strip(), line.std)
+    if line := told.slopes.get(place(one)):
+        slope = Number(line.value, f"{format_unit(one.unit)} a {told.unit}".strip(), line.std)
         return f"{name} drifts by {literal(str(slope))} over {len(one.value)} studies."
     return f"{name} varies by more than its standard errors, without a trend."
 
 
 def outliers_in_words(one: Series, told: Findings) -> Iterator[str]:
     """Studies that stand out."""
-    for i in told.outliers(one):
+    for i in told.stand_out(one):
         shown = Number(float(one.value[i]), format_unit(one.unit), float(one.std[i]))
         where = f"{title(one.joint)}, {literal(words(one.name))}"
         yield f"{one.studies[i].link} stands out: **{where}** is {literal(str(shown))}."
@@ -105,7 +99,7 @@ def joint_section(joint: str, studies: Sequence[Campaigned], told: Findings) -> 
     """The numbers of one joint, drawn and listed."""
     own = [one for one in told.every if one.joint == joint]
     names = list(dict.fromkeys(one.name for one in own))
-    odd = sorted({one.name for one in own if told.drifts(one) or told.varies(one) or told.outliers(one)})
+    odd = sorted({one.name for one in own if told.tell(one)})
     spoken = f"beyond errors: {', '.join(odd)}" if odd else "none changes beyond its errors"
     figure = Figure(
         f"{title(joint)}: its parameters and how far it is to be trusted, with standard errors, study by study; "
@@ -168,7 +162,7 @@ def cell(study: Campaigned, key: str | None) -> Cell:
 
 def panel(one: Series, told: Findings) -> Panel:
     """One number over time."""
-    t, out = told.times(one), told.outliers(one)
+    t, out = told.times(one), list(told.stand_out(one))
     inside = [i for i in range(len(t)) if i not in out]
     std = np.nan_to_num(one.std)
     marks: list[AnyMark] = [Points(t[inside], one.value[inside], "", "blue", std[inside])] if inside else []

@@ -17,7 +17,7 @@ FLOORS = {"model_error": "model error", "detection_level": "detection level", "c
 
 
 @dataclass(frozen=True)
-class Judged:
+class JointVerdict:
     """One joint of a study as its report judges it; the keys lead to its numbers."""
 
     verdict: Level
@@ -34,7 +34,7 @@ class Campaigned:
     robot: str
     simulated: bool
     started: str
-    joints: Mapping[str, Judged]
+    joints: Mapping[str, JointVerdict]
     numbers: Mapping[str, Stated]
 
     @property
