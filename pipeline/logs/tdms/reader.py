@@ -146,7 +146,7 @@ class TdmsLog(Log):
 
 def _rows(made: Mapping[str, Timeline]) -> Iterator[Block]:
     """Blocks of nothing, as long as the times that are made."""
-    rows = max(timeline.rows for timeline in made.values())
+    rows = max((timeline.rows for timeline in made.values()), default=0)
     for first in range(0, rows, ROWS):
         yield {"": np.empty(min(ROWS, rows - first))}
 
