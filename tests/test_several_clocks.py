@@ -171,6 +171,21 @@ def test_a_pause_of_one_clock_is_a_gap_of_all(lab: Path) -> None:
     assert_allclose(np.diff(signal["t"]).max(), 1.02, atol=1e-9)
 
 
+def test_a_pause_between_two_parts_is_a_gap(lab: Path) -> None:
+    q, tau = motion(0.01 * np.arange(300))
+    for i, start in enumerate((0, 60)):
+        both = {"a/q": (q, said(start, 0.01)), "b/tau": (tau, said(start, 0.01))}
+        (lab / f"{i}.tdms").write_bytes(tdms(both))
+    describe(lab, 'files = ["0.tdms", "1.tdms"]', OF_TDMS)
+    call("ingest", lab)
+    call("resample", lab)
+    signal = pipeline.read(lab, "Signal", log="run")
+    assert (signal["gaps"].iloc[0], signal["method"].iloc[0]) == (1, "as recorded")
+    assert_allclose(np.diff(signal["t"]).max(), 60 - 2.99, rtol=1e-12)
+    describe(lab, 'files = ["1.tdms", "0.tdms"]', OF_TDMS)
+    assert 'files = ["0.tdms", "1.tdms"]' in " ".join(call("ingest", lab, code=1).split())
+
+
 def test_each_group_of_a_tdms_file_has_the_times_that_the_study_names(lab: Path) -> None:
     t = 0.01 * np.arange(300)
     one = {"a/Time": (1e3 * t, {}), "a/q": (motion(t)[0], {})}

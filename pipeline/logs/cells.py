@@ -104,7 +104,7 @@ def parse_carefully(block: bytes, width: int, delimiter: bytes, wanted: Sequence
     try:
         return parse_either(block, width, delimiter, wanted)
     except UNREADABLE:
-        rows = [[cell.strip() for cell in row.split(delimiter)] for row in block.splitlines()]
+        rows = [[cell.strip() for cell in row.split(delimiter)] for row in block.split(b"\n")[:-1]]
     check(rows, wanted)
     return parse_either(b"".join(delimiter.join(row) + b"\n" for row in rows), width, delimiter, wanted)
 

@@ -244,6 +244,14 @@ def test_lvm_clocks_are_right_from_one_dated_write_to_the_next() -> None:
     assert_allclose(times_of(log, "i", samples), [0, 0.2, 60, 60.5], rtol=1e-12)
 
 
+def test_lvm_columns_of_x_are_right_from_one_dated_write_to_the_next() -> None:
+    xs = [[0.0, 0.1], [0.05, 0.25]]
+    writes = [Write({"q": [1.0, 2.0], "i": [3.0, 4.0]}, xs=xs, start=start) for start in ("02:26:06,5", "02:27:06,5")]
+    log, samples = read(lvm(writes, Style(x_columns="Multi")))
+    assert_allclose(times_of(log, "q", samples), [0, 0.1, 60, 60.1], rtol=1e-12)
+    assert_allclose(times_of(log, "i", samples), [0.05, 0.25, 60.05, 60.25], rtol=1e-12)
+
+
 def test_local_starts_around_a_night_in_which_clocks_change_are_remarked_on() -> None:
     for date, remarked in (("2026/03/29", True), ("2026/07/26", False)):
         writes = [Write({"q": [1.0]}, x=[0.0], start=start, date=date) for start in ("01:59:00,0", "03:01:00,0")]

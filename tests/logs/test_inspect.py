@@ -9,6 +9,7 @@ import pytest
 import typer
 from hypothesis import given
 from hypothesis import strategies as st
+from nptdms import ChannelObject, TdmsWriter
 from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
@@ -128,3 +129,10 @@ def test_control_characters_are_written_out(tmp_path: Path) -> None:
     path.write_bytes(b"t,q\x1b[31m \xc2\xb0\n0,1\n1,2\n")
     assert "q\\x1b[31m \u00b0" in shown(path)
     assert "\x1b" not in shown(path)
+
+
+def test_a_log_of_words_alone_is_shown(tmp_path: Path) -> None:
+    path = tmp_path / "log.tdms"
+    with TdmsWriter(str(path)) as writer:
+        writer.write_segment([ChannelObject("a", "words", ["grasp", "let go"])])
+    assert "0  a/words  -  text" in shown(path)

@@ -211,6 +211,14 @@ def test_text_in_a_number_cell_is_named_with_its_place() -> None:
         read(content)
 
 
+def test_a_carriage_return_within_a_cell_is_named_with_its_place() -> None:
+    content = lvm([Write({"a": [4.0, 5.0]}, x=[0.0, 1.0])])
+    at = content.rindex(b"1,0")
+    damaged = content[: at + 1] + b"\r" + content[at + 2 :].replace(b"\r\n", b"\n", 1)
+    with pytest.raises(BadLog, match=r":24: '1\\r0' in column 0"):
+        read(damaged)
+
+
 def test_a_special_block_that_is_not_closed_is_refused() -> None:
     content = lvm([Write({"a": [1.0]}, x=[0.0])], Style(special=True)).replace(b"***End_Special***", b"***End***")
     with pytest.raises(BadLog, match="the special block is not closed"):

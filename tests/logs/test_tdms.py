@@ -183,6 +183,17 @@ def test_time_stamps_are_seconds_since_the_first() -> None:
     assert_allclose(samples["a/time"], [0.25, 0.26, 2.0], atol=1e-12)
 
 
+def test_time_stamps_that_no_calendar_holds_are_no_start() -> None:
+    file = io.BytesIO()
+    stamps = np.array(["2026-10-15T02:26:03", "2026-10-15T02:26:04"], dtype="datetime64[us]")
+    with TdmsWriter(file) as writer:
+        writer.write_segment([ChannelObject("a", "time", stamps)])
+    content = bytearray(file.getvalue())
+    content[-17] = content[-1] = 0x7F  # the high bytes of the seconds since 1904
+    log, _ = read(bytes(content), "log.tdms")
+    assert log.started == ""
+
+
 def test_a_linear_scale_is_applied_and_an_unknown_one_refused() -> None:
     def file(kind: str) -> bytes:
         scale = {

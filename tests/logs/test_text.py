@@ -231,6 +231,8 @@ def test_columns_of_days_and_of_times_make_rows_though_most_cells_are_no_numbers
 def test_a_cell_that_is_no_time_is_named_with_its_place() -> None:
     with pytest.raises(BadLog, match=r":3: '02:26:x' in column 0 \(t\) is no time like those before it"):
         text("t,q", "02:26:06,1", "02:26:x,2", "02:26:07,3", "02:26:08,3")
+    with pytest.raises(BadLog, match=r":2: '2026-02-2x 02:26' in column 0 \(t\) is no time"):
+        text("t,q", "2026-02-2x 02:26,1", "2026-02-28 02:27,2", "2026-02-28 02:28,2")
     with pytest.raises(BadLog, match="a time that no calendar holds"):
         text("t,q", "2026-02-28 02:26:06,1", "2026-02-30 02:26:06,2")
 

@@ -146,7 +146,7 @@ class TdmsLog(Log):
 
 def _rows(made: Mapping[str, Timeline]) -> Iterator[Block]:
     """Blocks of nothing, as long as the times that are made."""
-    rows = max(timeline.rows for timeline in made.values())
+    rows = max((timeline.rows for timeline in made.values()), default=0)
     for first in range(0, rows, ROWS):
         yield {"": np.empty(min(ROWS, rows - first))}
 
@@ -193,7 +193,7 @@ def _describe_time(
 ) -> None:
     """When the log started, and the clocks that time stamps and waveform properties give."""
     kinds = {channel.name: channel.kind for channel in log.channels}
-    stamped = EPOCH + timedelta(seconds=log.origin) if log.origin else None
+    stamped = _moment(log.origin) if log.origin else None
     started = stamped or waveforms.started
     timelines = waveforms.timelines(started, properties)
     sampled = {
@@ -211,6 +211,14 @@ def _describe_time(
             log.warnings.append(
                 f"the file's later writes say another start or interval: {name!r} begins anew at sample {some}"
             )
+
+
+def _moment(second: int) -> datetime | None:
+    """The moment of a second since 1904; None for one that no calendar holds."""
+    try:
+        return EPOCH + timedelta(seconds=second)
+    except OverflowError:
+        return None
 
 
 def _first_second(file: BinaryIO, index: Index, path: str) -> int | None:

@@ -150,8 +150,9 @@ def _kinds(body: Sequence[Sequence[str]], number: re.Pattern[str]) -> list[str]:
 def _stamps(rows: Sequence[Sequence[str]], kinds: Sequence[str]) -> dict[int, Stamps]:
     """The columns of times among those of text."""
     rows = [row for row in rows if len(row) == len(kinds)]
-    found = {i: stamps_of([row[i] for row in rows]) for i, kind in enumerate(kinds) if kind == "text"}
-    return {i: begun(stamps, next(row[i] for row in rows if row[i])) for i, stamps in found.items() if stamps}
+    columns = {i: [row[i] for row in rows] for i, kind in enumerate(kinds) if kind == "text"}
+    found = {i: (told := stamps_of(cells)) and begun(told, cells) for i, cells in columns.items()}
+    return {i: stamps for i, stamps in found.items() if stamps}
 
 
 def _header(

@@ -14,9 +14,9 @@ from pipeline.maths.arrays import Array
 CLOCK = r"\d?\d:\d\d:\d\d(?:[.,]\d+)?"
 DATE = r"\d{4}[-/]\d\d[-/]\d\d"
 ZONE = r"\s?(?:Z|[+-]\d\d(?::?\d\d)?)"
-MOMENT = re.compile(rf"{DATE}[T ]\d\d:\d\d(?::\d\d(?:[.,]\d+)?)?(?P<zone>{ZONE})?")
-TIME_OF_DAY = re.compile(CLOCK)
-DAY_ALONE = re.compile(DATE)
+MOMENT = re.compile(rf"{DATE}[T ]\d\d:\d\d(?::\d\d(?:[.,]\d+)?)?(?P<zone>{ZONE})?", re.ASCII)
+TIME_OF_DAY = re.compile(CLOCK, re.ASCII)
+DAY_ALONE = re.compile(DATE, re.ASCII)
 DAY = 86400.0  # [s]
 
 
@@ -75,11 +75,15 @@ def tells_time(cell: str) -> bool:
     return cell[:1].isdecimal() and any(each.fullmatch(cell) for each in (MOMENT, TIME_OF_DAY, DAY_ALONE))
 
 
-def begun(stamps: Stamps, first: str) -> Stamps:
-    """The same, counted from the first cell of the log where that says a day."""
-    if not stamps.dated or not first:
+def begun(stamps: Stamps, cells: Sequence[str]) -> Stamps | None:
+    """The same, counted from the first cell that says a day; None where no calendar holds it."""
+    if not stamps.dated:
         return stamps
-    seconds = stamps.seconds(pa.chunked_array([[first]]))
+    first = next(cell for cell in cells if stamps.pattern.fullmatch(cell))
+    try:
+        seconds = stamps.seconds(pa.chunked_array([[first]]))
+    except pa.ArrowInvalid:
+        return None
     return Stamps(stamps.pattern, stamps.zoned, round(float(seconds[0]) * 1e6) * 1000)
 
 
