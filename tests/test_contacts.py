@@ -7,9 +7,10 @@ import pytest
 
 from pipeline.maths.contact.day_offset import day_offset
 from pipeline.maths.contact.detection import FALSE_ALARMS, Quiet, alarm_level, events, quiet
-from pipeline.maths.contact.error_band import cells, excess
+from pipeline.maths.contact.error_band import SpeedCells, cells, excess, excess_std
 from pipeline.maths.contact.free_space import levels
 from pipeline.maths.contact.window import mean_size, summarise
+from pipeline.maths.signals import jackknife
 from pipeline.maths.signals.bootstrap import blocks, standard_error
 from pipeline.maths.signals.noise import model_error, noise_std, smoothed
 from pipeline.maths.signals.path import likeness, most_different
@@ -256,3 +257,23 @@ def test_the_offset_of_free_windows_has_a_standard_error_and_a_drift():
     assert not found.drifts
     assert day_offset(T, 0.3 + 0.1 * T, [(0.0, 10.0), (20.0, 30.0)]).drifts
     assert day_offset(T, 0.3 + noise(1), [])[:2] == (0.0, 0.0)
+
+
+def test_leaving_out_units_gives_the_standard_error_of_a_mean_of_units():
+    random, unit = np.random.default_rng(5), np.repeat(np.arange(8), 50)
+    x = random.normal(size=8)[unit]  # all that differs is between units
+    found = jackknife.standard_error(lambda kept: np.array([x[kept].mean()]), unit)
+    assert found == pytest.approx(x[::50].std(ddof=1) / np.sqrt(8))
+    assert np.isnan(jackknife.standard_error(lambda kept: np.array([x[kept].mean()]), np.zeros(len(x), int))).all()
+
+
+def test_a_band_is_as_uncertain_as_its_logs_differ():
+    """Of logs whose variances scatter; the variance that is made of them scatters as its standard error says."""
+    random, made = np.random.default_rng(6), []
+    for _ in range(200):
+        of = [cells(noise(1, s), np.zeros(len(T)), np.ones(len(T)), speed=0.1) for s in random.uniform(0.5, 1.5, 6)]
+        own = SpeedCells(*(np.concatenate(columns) for columns in zip(*of, strict=True)))
+        own = own._replace(source=np.repeat(np.arange(6), [len(one.block) for one in of]))
+        made.append((excess(own)[0], excess_std(own)[0]))
+    values, errors = np.array(made).T
+    assert np.sqrt(np.mean(errors**2)) == pytest.approx(values.std(), rel=4 / np.sqrt(2 * 200))
