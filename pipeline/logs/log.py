@@ -10,7 +10,8 @@ A format is a module of this folder that exports two functions:
 Channels may have clocks of their own: `Channel.time` names the channel of the same log that says when the samples of a
 channel were taken, in seconds from `Log.started`.  Where the file has none, the reader makes one (`derived`, of kind
 "time"), which is right from file segment to file segment and from write to write.  What has one uniform clock in common
-needs none: `Log.clock` says it.
+needs none: `Log.clock` says it.  Several clocks are read at the same time through `Log.apart`, a shallow copy, so that
+what a pass over a file needs is kept by `blocks` itself.
 """
 
 from abc import ABC, abstractmethod

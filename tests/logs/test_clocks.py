@@ -233,6 +233,11 @@ def test_lvm_channels_with_an_interval_of_their_own_beside_one_column_of_x_do_no
     log, samples = read(lvm([Write(columns, x=[0.0, 0.1, 0.2, 0.3], steps=(0.1, 0.2))]))
     assert_allclose(times_of(log, "q", samples), [0, 0.1, 0.2, 0.3])
     assert_allclose(times_of(log, "i", samples), [0, 0.2])
+    # Where the first is the slower one, rows go on after its last sample.
+    log, samples = read(lvm([Write(dict(reversed(columns.items())), x=[0.0, 0.2, 0.4, 0.6], steps=(0.2, 0.1))]))
+    assert_allclose(times_of(log, "i", samples), [0, 0.2])
+    assert_allclose(times_of(log, "q", samples), [0, 0.1, 0.2, 0.3])
+    assert log.nulls["i"] == 0
 
 
 def test_lvm_clocks_are_right_from_one_dated_write_to_the_next() -> None:

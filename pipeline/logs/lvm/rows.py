@@ -11,7 +11,7 @@ from pipeline.logs.lines import Lines, decoded
 from pipeline.logs.local_time import REMARK, clocks_may_change
 from pipeline.logs.log import Block, Log
 from pipeline.logs.lvm.clocks import OwnClock, Sampling
-from pipeline.logs.lvm.header import BadHeader, Layout, unescaped
+from pipeline.logs.lvm.header import BadHeader, Layout, X, unescaped
 from pipeline.logs.lvm.run import WRITTEN, Run
 from pipeline.logs.lvm.walk import Walk
 from pipeline.logs.remarks import Remarks
@@ -31,7 +31,8 @@ class Reading:
         self.derived = [channel.name for channel in log.channels if channel.derived and channel.kind != "time"]
         self.own = next((own for own in clocks if own.time == clock), None)
         others = {name for own in clocks for name in (*own.channels, own.x)}
-        first = tuple(c.name for c in log.channels if not c.derived and c.name not in others) if others else ()
+        written = [c.name for c in log.channels if not c.derived and not c.name.startswith(X)]
+        first = tuple(name for name in written if name not in others) if others else ()
         self.together = (*self.own.channels, self.own.x) if self.own else first  # one of them has a sample in a row
         self.say = Remarks(log.warnings)
         self.walk, self.lines = Walk(encoding, self.say), Lines(log.path, encoding)
