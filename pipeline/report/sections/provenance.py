@@ -38,7 +38,7 @@ def section(context: Context) -> Section:
         blocks += [Prose("Changes of the robot:"), Listing("\n".join(f"{k}: {v}" for k, v in study.changed.items()))]
     blocks.append(
         Prose(
-            f"{len(provenance.processed)} processed files stand behind this report; their hashes are in results.json."
+            f"{len(provenance.processed)} processed files stand behind this report; their hashes are in `manifest.txt`."
         )
     )
     if provenance.processed:
