@@ -22,35 +22,23 @@ from typing import Any
 from pipeline import toml
 from pipeline.errors import BadRobot
 from pipeline.maths.models.terms import TERMS, Term
-from pipeline.robots.robot import Joint, Kind, Limits, Robot
+from pipeline.robots.robot import ANYWHERE, Joint, Kind, Limits, Robot
 from pipeline.toml import TomlTable, is_number, shown
+from pipeline.toml.file import TomlFile
 
 NAME = re.compile(r"[a-z0-9_-]+")
 # Names that Windows keeps for devices, whatever comes after a dot: records are files named by log and joint.
 RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(10))}
-ANYWHERE = (-math.inf, math.inf)
 UNLIMITED = Limits(ANYWHERE, ANYWHERE, ANYWHERE)
 KINDS = tuple(kind.value for kind in Kind)
 
 
-def read(file: Path) -> Robot:
-    """Read a robot.
-
-    Raises
-    ------
-    BadRobot
-        With every problem of the file, each with its line.
+def described(file: Path) -> tuple[Robot | None, TomlFile]:
+    """A robot, None where it cannot be told which joints it has, and the problems of its file; raises BadRobot where
+    that is not TOML.
     """
-    table = table_of(file)
-    robot = robot_of(table, file.stem)
-    table.file.refuse(BadRobot)
-    assert robot is not None
-    return robot
-
-
-def table_of(file: Path) -> TomlTable:
-    """The file of a robot, unchecked; raises BadRobot where it cannot be read."""
-    return toml.read(file, BadRobot, "there is no such robot file")
+    table = toml.read(file, BadRobot, "there is no such robot file")
+    return robot_of(table, file.stem), table.file
 
 
 def robot_of(table: TomlTable, stem: str) -> Robot | None:

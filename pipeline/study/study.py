@@ -118,7 +118,7 @@ class Study:
     logs: tuple[LogEntry, ...]
     changed: dict[str, Any] = field(default_factory=dict)  # what the study says of the robot, for the report
     truth: dict[str, Any] = field(default_factory=dict)  # ground truth of a simulated study: its truth.toml
-    robot_file: str = ""  # the .toml in the study's folder that describes the robot, if there is one
+    robot_file: str = ""  # the .toml or .urdf in the study's folder that describes the robot, if there is one
     lines: dict[str, int] = field(default_factory=dict, compare=False)  # of study.toml, by the file of a log they name
 
     @property
