@@ -4,6 +4,7 @@ Logs need nothing but the effort at each joint, in N m or N; what turns a curren
 study says it in [robot_overrides.<joint>]: gear_ratio and torque_constant, or effort = "A".
 """
 
+import heapq
 import math
 import re
 from collections.abc import Sequence
@@ -21,11 +22,11 @@ from pipeline.robots.robot import ANYWHERE, Joint, Kind, Limits, Robot
 from pipeline.robots.urdf import elements
 from pipeline.robots.urdf.elements import Element
 from pipeline.robots.urdf.mimicry import Driven, driven
-from pipeline.robots.urdf.tables import MOVING, Notes, UrdfJoint, inertial, joint
+from pipeline.robots.urdf.tables import MOVING, TIP, Notes, UrdfJoint, inertial, joint
 from pipeline.toml.file import TomlFile
 
 HARMONICS = 10  # of an excitation that nobody has described: more than most have, and below most noise
-TIPS = ("tip", "tcp", "tool0", "ee_link")  # what the frame at the tip is called, as far as there is a custom
+TIPS = (TIP, "tcp", "tool0", "ee_link")  # what the frame at the tip is called, as far as there is a custom
 POSES = 20  # random ones, at which a joint that feels gravity does so
 FRICTION = (viscous, coulomb, offset)
 
@@ -53,7 +54,7 @@ def robot_of(outermost: Element, file: TomlFile, stem: str) -> Robot | None:
     by_name = {one.name: one for one in joints}
     moved = driven(by_name, file)
     ordered = _outwards(root, joints)
-    coordinates = _coordinates(ordered, moved, file)
+    coordinates = _coordinates(ordered, file)
     if not coordinates:
         Notes(file, outermost).problem(f"no joint moves; one must be {', '.join(MOVING)}")
     if file.problems():
@@ -105,18 +106,19 @@ def _root(outermost: Element, links: dict[str, Element], joints: Sequence[UrdfJo
 
 
 def _outwards(root: str, joints: Sequence[UrdfJoint]) -> list[UrdfJoint]:
-    """The joints from the base outwards, each branch in the order of the file."""
-    on = dict[str, list[UrdfJoint]]()
-    for one in joints:
-        on.setdefault(one.parent, []).append(one)
-    ordered, ahead = list[UrdfJoint](), on.pop(root, [])[::-1]
+    """The joints that hang on the base, each after the one that carries it, else in the order of the file."""
+    on = dict[str, list[int]]()
+    for number, one in enumerate(joints):
+        on.setdefault(one.parent, []).append(number)
+    ordered, ahead = list[UrdfJoint](), on.pop(root, [])
     while ahead:
-        ordered.append(ahead.pop())
-        ahead += on.pop(ordered[-1].child, [])[::-1]
+        ordered.append(joints[heapq.heappop(ahead)])
+        for number in on.pop(ordered[-1].child, []):
+            heapq.heappush(ahead, number)
     return ordered
 
 
-def _coordinates(ordered: Sequence[UrdfJoint], moved: dict[str, Driven], file: TomlFile) -> dict[str, str]:
+def _coordinates(ordered: Sequence[UrdfJoint], file: TomlFile) -> dict[str, str]:
     """The joints that move by themselves, outwards, and the names that logs and records call them by."""
     from pipeline.robots.from_toml import wrong_name
 

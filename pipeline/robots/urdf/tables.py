@@ -18,6 +18,7 @@ NAME = re.compile(r"[\w ./:+-]{1,100}")  # of links and joints, as files, equati
 MOVING = ("revolute", "continuous", "prismatic")
 UNLIMITED = 1e9  # [N m, N or their rates] what a file says that knows no limit; URDF has no word for it
 ROUNDING = 1e-9  # of an inertia's eigenvalues, as a share of the largest, that printed digits may leave below 0
+TIP = "tip"  # what a file that we write calls the frame at the tip
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
@@ -143,7 +144,7 @@ def _bounds(notes: Notes, limit: Element | None, kind: str) -> tuple[float, floa
     if low >= high:
         said = f"lower is {low:g} and upper {high:g}: a joint that moves has a lower below its upper"
         notes.problem(f'{said}; correct them, or write type="fixed" where it does not move', limit)
-    return low, high
+    return low if low > -UNLIMITED else -math.inf, high if high < UNLIMITED else math.inf
 
 
 def _most(notes: Notes, limit: Element | None, key: str) -> float:
