@@ -72,7 +72,9 @@ def _truth(folder: Path) -> dict[str, Any]:
 
 def _robot(table: TomlTable, folder: Path) -> Robot | None:
     """The robot, or None where it cannot be told which joints it has."""
-    name = table.take("robot", None, (str,), f"one of {', '.join(robots.ROBOTS)}, or a file, {' or '.join(robots.FILES)}")
+    name = table.take(
+        "robot", None, (str,), f"one of {', '.join(robots.ROBOTS)}, or a file, {' or '.join(robots.FILES)}"
+    )
     if name is None:
         return None
     if not inside(name):

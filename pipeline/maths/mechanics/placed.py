@@ -95,7 +95,7 @@ def _moved(link: PlacedLink) -> Array:
     if link.slides:
         T[:3, 3] = link.bias * link.axis
     elif link.bias:
-        K = np.cross(np.eye(3), link.axis).T  # K r = axis x r
+        K = np.cross(np.eye(3), link.axis)  # K r = axis x r
         T[:3, :3] += np.sin(link.bias) * K + (1.0 - np.cos(link.bias)) * K @ K
     return T
 

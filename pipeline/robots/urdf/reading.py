@@ -49,7 +49,7 @@ def robot_of(outermost: Element, file: TomlFile, stem: str) -> Robot | None:
     links = _named(outermost.all("link"), file)
     weights = {name: inertial(link, file) for name, link in links.items()}
     _named(outermost.all("joint"), file)
-    joints = [described for element in outermost.all("joint") if (described := joint(element, file))]
+    joints = [joint(element, file) for element in outermost.all("joint")]
     root = _root(outermost, links, joints, file)
     by_name = {one.name: one for one in joints}
     moved = driven(by_name, file)
@@ -99,7 +99,9 @@ def _root(outermost: Element, links: dict[str, Element], joints: Sequence[UrdfJo
     elif not bases:
         notes.problem("every link is carried by another, in a circle; one must be the base")
     elif len(bases) > 1:
-        notes.problem(f"links {', '.join(map(repr, bases))} are carried by nothing; one must be the base, join the others")
+        notes.problem(
+            f"links {', '.join(map(repr, bases))} are carried by nothing; one must be the base, join the others"
+        )
     elif not file.problems() and len(_outwards(bases[0], joints)) + 1 < len(links):
         notes.problem(f"some links hang on each other in a circle, and not on the base {bases[0]!r}; cut it")
     return bases[0] if len(bases) == 1 else ""

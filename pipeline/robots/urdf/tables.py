@@ -110,8 +110,8 @@ def inertial(link: Element, file: TomlFile) -> Array | None:
     return np.asarray(of_pseudo_inertias((at @ J @ at.T)[None])[0])
 
 
-def joint(element: Element, file: TomlFile) -> UrdfJoint | None:
-    """A joint; None where it cannot be told what it joins, or how."""
+def joint(element: Element, file: TomlFile) -> UrdfJoint:
+    """A joint; one of an unknown type is taken to be fixed, so that the links beyond it hang on something."""
     notes, kind = Notes(file, element), element.attributes.get("type", "")
     name = notes.name(element, "name", "its name")
     parent = notes.name(element.first("parent"), "link", 'its <parent link="..."/>')
@@ -119,7 +119,7 @@ def joint(element: Element, file: TomlFile) -> UrdfJoint | None:
     if kind not in (*MOVING, "fixed"):
         remedy = "describe it by several of them" if kind in ("floating", "planar") else "correct it"
         notes.problem(f"type is {shown(kind)}, and must be one of {', '.join(MOVING)} or fixed; {remedy}")
-        return None
+        kind = "fixed"
     axis = np.array(notes.numbers(element.first("axis"), "xyz", [1.0, 0.0, 0.0]))
     length = float(np.linalg.norm(axis))
     if not length:
