@@ -1,4 +1,4 @@
-"""Print a robot: its joints, its kinematics and dynamics at one pose (frames, tip, Jacobian, M, C dq, G), or its URDF."""
+"""Print a robot: its joints, and at one pose frames, tip, Jacobian, M, C dq and G; or the robot as URDF."""
 
 import json
 from typing import TYPE_CHECKING, Annotated, Any

@@ -92,7 +92,8 @@ def _row(table: TomlTable, carriers: list[str], known: list[str], kinds: dict[st
 
 def _weight(table: TomlTable, row: TableRow) -> _Weight | None:
     """What a link weighs; None where the file does not say."""
-    if not any([key in table for key in WEIGHT]):
+    asked = [key in table for key in WEIGHT]  # of all of them, which makes them known
+    if not any(asked):
         return None
     if row.coordinate == FIXED:
         table.problem("nothing moves it, so it weighs with what carries it: give that its mass", "mass")

@@ -115,7 +115,8 @@ def _not_zero(table: TomlTable, key: str, default: float) -> float:
 
 def _limits(table: TomlTable) -> Limits:
     limits = table.table("limits")
-    changed = replace(UNLIMITED, **{name: _bounds(limits, name) for name in ("q", "dq", "ddq") if name in limits})
+    q, dq, ddq = (_bounds(limits, name) if name in limits else ANYWHERE for name in ("q", "dq", "ddq"))
+    changed = Limits(q, dq, ddq)
     if "effort" in limits:
         changed = replace(changed, effort=limits.number("effort", above=0.0, words="the most effort of its drive"))
     limits.close()

@@ -13,7 +13,6 @@ from pipeline.maths.mechanics.drives import Drives
 from pipeline.maths.models.physical import PhysicalTable
 from pipeline.maths.models.terms import Term
 
-
 ANYWHERE = (-math.inf, math.inf)
 
 

@@ -89,7 +89,7 @@ def motions(n: int):
 
 
 def same_dynamics(one, other, n: int, tolerance: float) -> None:
-    q, dq, ddq = motions(n)
+    q, dq, _ = motions(n)
     for made, expected in (
         (rigid_body.mass_matrix(one.chain, one.bodies, q), rigid_body.mass_matrix(other.chain, other.bodies, q)),
         (rigid_body.coriolis(one.chain, one.bodies, q, dq), rigid_body.coriolis(other.chain, other.bodies, q, dq)),

@@ -65,7 +65,10 @@ def assembled(base: str, links: Sequence[PlacedLink], tip: str) -> tuple[Chain, 
 
 
 def transform(xyz: Sequence[float], rpy: Sequence[float]) -> Array:
-    """The pose (4, 4) of a place [m] and of roll, pitch and yaw [rad] about fixed axes: R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    """The pose (4, 4) of a place [m] and of roll, pitch and yaw [rad] about fixed axes.
+
+    R = Rz(yaw) Ry(pitch) Rx(roll)
+    """
     (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
     T = np.eye(4)
     T[:3, 3] = xyz

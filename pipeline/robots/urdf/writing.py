@@ -1,8 +1,9 @@
 """A robot as URDF: its chain, what its links weigh, and the limits of its joints.
 
 A link's frame is at its joint: the one that bears the link's name where that is so, else the one with z along the axis,
-as the dynamics take it.  Other frames that the chain names are links without mass, fixed where they are.  A coordinate that moves several links moves the first, which the others
-mimic.  URDF has no word for acceleration, for where a joint without limits ends, or for a drive.
+as the dynamics take it.  Other frames that the chain names are links without mass, fixed where they are.  A coordinate
+that moves several links moves the first, which the others mimic.  URDF has no word for acceleration, for where a joint
+without limits ends, or for a drive.
 """
 
 from collections.abc import Iterator
