@@ -12,6 +12,8 @@ from pipeline.errors import BadRobot, BadStudy
 from pipeline.maths.mechanics.kinematics import tip
 from pipeline.robots.from_toml import RESERVED
 from pipeline.robots.robot import Kind
+from pipeline.runner.canonical import hash_of
+from pipeline.runner.reporting import study_files
 from pipeline.study import reading
 from pipeline.toml import TomlTable
 from pipeline.toml.file import TomlFile
@@ -343,6 +345,43 @@ def test_a_robot_may_be_described_beside_the_study(tmp_path):
         robot.joint("elbow")
 
 
+ARM_URDF = """<robot name="mine"><link name="base"/><link name="upper"/>
+<joint name="shoulder" type="revolute"><parent link="base"/><child link="upper"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="1"/></joint></robot>"""
+STUDY_OF_URDF = """robot = "arm.urdf"
+[robot_overrides.shoulder]
+effort = "A"
+[[log]]
+name = "run"
+file = "run.csv"
+role = "validation"
+rate = 100.0
+channels = { "shoulder.q" = 0, "shoulder.i" = 1 }
+"""
+
+
+def test_a_urdf_beside_the_study_describes_its_robot_and_counts_among_its_files(tmp_path):
+    (tmp_path / "arm.urdf").write_text(ARM_URDF)
+    (tmp_path / "run.csv").write_text("0,0\n")
+    study = read(tmp_path, STUDY_OF_URDF)
+    assert study_files(study) == ("study.toml", "arm.urdf")
+    [joint] = study.robot.joints
+    assert (joint.name, joint.limits.q, joint.unit("{effort}")) == ("shoulder", (-1.0, 1.0), "A")
+    before = hash_of(study.robot)
+    (tmp_path / "arm.urdf").write_text(ARM_URDF.replace('xyz="0 1 0"', 'xyz="1 1 0"'))
+    assert hash_of(read(tmp_path, STUDY_OF_URDF).robot) != before
+
+
+def test_what_is_wrong_with_a_urdf_is_said_together_with_what_is_wrong_with_the_study(tmp_path):
+    (tmp_path / "arm.urdf").write_text(ARM_URDF.replace('type="revolute"', 'type="screw"'))
+    (tmp_path / "run.csv").write_text("0,0\n")
+    with pytest.raises(BadStudy) as caught:
+        read(tmp_path, STUDY_OF_URDF.replace("rate = 100.0", "rat = 100.0"))
+    said = str(caught.value)
+    assert "study.toml:8: log 1 (run): unknown key 'rat'" in said
+    assert "arm.urdf:2: <joint name='shoulder'>: type is 'screw'" in said
+
+
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
@@ -362,7 +401,7 @@ def test_a_robot_may_be_described_beside_the_study(tmp_path):
         (
             "[[joint]]",
             "[[joints]]",
-            "arm.toml:2: unknown key 'joints'; known are name, title, joint; did you mean 'joint'?",
+            "arm.toml:2: unknown key 'joints'; known are name, title, joint, link; did you mean 'joint'?",
         ),
     ],
 )

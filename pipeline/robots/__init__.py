@@ -5,25 +5,46 @@ from pathlib import Path
 
 from pipeline.errors import BadRobot
 from pipeline.robots.robot import Joint, Kind, Limits, Robot
+from pipeline.toml.file import TomlFile
 
 ROBOTS = ("davinci", "dvrk_psm")
+FILES = (".toml", ".urdf")  # in which laboratories describe robots of their own
 
-__all__ = ["ROBOTS", "Joint", "Kind", "Limits", "Robot", "load"]
+__all__ = ["FILES", "ROBOTS", "Joint", "Kind", "Limits", "Robot", "described", "load"]
 
 
 def load(name: str, folder: Path) -> Robot:
-    """The robot of that name, or the one that a TOML file beside the study describes.
+    """The robot of that name, or the one that a file beside the study describes, in TOML or as URDF.
 
     Raises
     ------
     BadRobot
-        If there is no such robot or file, or the file is wrong.
+        If there is no such robot or file, or the file is wrong: with every problem of it, each with its line.
+    """
+    robot, file = described(name, folder)
+    if file:
+        file.refuse(BadRobot)
+    assert robot is not None
+    return robot
+
+
+def described(name: str, folder: Path) -> tuple[Robot | None, TomlFile | None]:
+    """The same robot, None where it cannot be told which joints it has, and the problems of its file where it has one.
+
+    Raises
+    ------
+    BadRobot
+        If there is no such robot, or its file cannot be read at all.
     """
     if name.endswith(".toml"):
-        from pipeline.robots.from_toml import read
+        from pipeline.robots import from_toml
 
-        return read(folder / name)
+        return from_toml.described(folder / name)
+    if name.endswith(".urdf"):
+        from pipeline.robots.urdf import reading
+
+        return reading.described(folder / name)
     if name not in ROBOTS:
-        raise BadRobot(f"there is no robot {name!r}; there are {', '.join(ROBOTS)}, or name a .toml file")
-    robot: Robot = import_module(f"pipeline.robots.{name}").ROBOT
-    return robot
+        said = f"there is no robot {name!r}; there are {', '.join(ROBOTS)}"
+        raise BadRobot(f"{said}, or name a file, {' or '.join(FILES)}")
+    return import_module(f"pipeline.robots.{name}").ROBOT, None

@@ -10,7 +10,9 @@ terms = ["inertia", "gravity, sine", "viscous friction", "Coulomb friction"]
 gear_ratio = 100.0                      # motor angle over joint position; 1 where logs give the joint side
 torque_constant = 0.05                  # [N m/A]; or, where it is not known, effort = "A"
 harmonics = 5                           # of the excitation
-limits = { q = [-1.0, 1.0], dq = [-2.0, 2.0], ddq = [-5.0, 5.0] }
+limits = { q = [-1.0, 1.0], dq = [-2.0, 2.0], ddq = [-5.0, 5.0] }    # and effort = 10.0, which is not exceeded
+
+Its geometry, where it is known, is said by [[link]], as `chain_table` reads them.
 """
 
 import math
@@ -22,35 +24,24 @@ from typing import Any
 from pipeline import toml
 from pipeline.errors import BadRobot
 from pipeline.maths.models.terms import TERMS, Term
-from pipeline.robots.robot import Joint, Kind, Limits, Robot
+from pipeline.robots import chain_table
+from pipeline.robots.robot import ANYWHERE, Joint, Kind, Limits, Robot
 from pipeline.toml import TomlTable, is_number, shown
+from pipeline.toml.file import TomlFile
 
 NAME = re.compile(r"[a-z0-9_-]+")
 # Names that Windows keeps for devices, whatever comes after a dot: records are files named by log and joint.
 RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(10))}
-ANYWHERE = (-math.inf, math.inf)
 UNLIMITED = Limits(ANYWHERE, ANYWHERE, ANYWHERE)
 KINDS = tuple(kind.value for kind in Kind)
 
 
-def read(file: Path) -> Robot:
-    """Read a robot.
-
-    Raises
-    ------
-    BadRobot
-        With every problem of the file, each with its line.
+def described(file: Path) -> tuple[Robot | None, TomlFile]:
+    """A robot, None where it cannot be told which joints it has, and the problems of its file; raises BadRobot where
+    that is not TOML.
     """
-    table = table_of(file)
-    robot = robot_of(table, file.stem)
-    table.file.refuse(BadRobot)
-    assert robot is not None
-    return robot
-
-
-def table_of(file: Path) -> TomlTable:
-    """The file of a robot, unchecked; raises BadRobot where it cannot be read."""
-    return toml.read(file, BadRobot, "there is no such robot file")
+    table = toml.read(file, BadRobot, "there is no such robot file")
+    return robot_of(table, file.stem), table.file
 
 
 def robot_of(table: TomlTable, stem: str) -> Robot | None:
@@ -58,11 +49,12 @@ def robot_of(table: TomlTable, stem: str) -> Robot | None:
     name = table.text("name", stem)
     title = table.text("title", name)
     entries = table.tables("joint", "it has no [[joint]]")
-    table.close()
     joints = [_joint(entry) for entry in entries]
     table.unique("joint", "name", ((i, joint.name) for i, joint in enumerate(joints) if joint), "two joints are named")
     known = tuple(joint for joint in joints if joint)
-    return Robot(name, title, known) if known and len(known) == len(joints) else None
+    carried = chain_table.read(table, known)
+    table.close()
+    return Robot(name, title, known, *carried) if known and len(known) == len(joints) else None
 
 
 def wrong_name(name: str) -> str:
@@ -102,6 +94,8 @@ def change(joint: Joint, table: TomlTable) -> Joint:
         ),
         q_tau=float(table.take("q_tau", joint.q_tau, (int, float), "a number from 0 on", lambda x: 0 <= x < math.inf)),
     )
+    if changed.effort != joint.effort and "limits" not in table:  # which is then in another unit
+        changed = replace(changed, limits=replace(changed.limits, effort=math.inf))
     if "effort" in table and "torque_constant" in table:
         table.problem("torque_constant is not used where effort is in A; leave one of them out", "torque_constant")
     table.close()
@@ -121,7 +115,10 @@ def _not_zero(table: TomlTable, key: str, default: float) -> float:
 
 def _limits(table: TomlTable) -> Limits:
     limits = table.table("limits")
-    changed = replace(UNLIMITED, **{name: _bounds(limits, name) for name in ("q", "dq", "ddq") if name in limits})
+    q, dq, ddq = (_bounds(limits, name) if name in limits else ANYWHERE for name in ("q", "dq", "ddq"))
+    changed = Limits(q, dq, ddq)
+    if "effort" in limits:
+        changed = replace(changed, effort=limits.number("effort", above=0.0, words="the most effort of its drive"))
     limits.close()
     return changed
 

@@ -1,5 +1,6 @@
 """What a robot is: its joints, each with its motor, its model and its limits, and the chain that carries them."""
 
+import math
 import re
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -11,6 +12,8 @@ from pipeline.maths.mechanics.chain import Chain
 from pipeline.maths.mechanics.drives import Drives
 from pipeline.maths.models.physical import PhysicalTable
 from pipeline.maths.models.terms import Term
+
+ANYWHERE = (-math.inf, math.inf)
 
 
 class Kind(Enum):
@@ -41,6 +44,7 @@ class Limits:
     q: tuple[float, float]
     dq: tuple[float, float]
     ddq: tuple[float, float]
+    effort: float = math.inf  # the most that its drive gives at the joint, either way
 
 
 class PrintedColumn(NamedTuple):

@@ -16,7 +16,7 @@ ARM = 3  # joints that carry the tip
 def run(tracks: Sequence[Track], entry: LogEntry, robot: Robot) -> Iterator[JointCorrelation]:
     """One JointCorrelation of a log; none where a joint is at rest, or where it is not known when it was touched."""
     own = [track for joint in robot.joints[:ARM] for track in tracks if track.joint == joint.name and not track.at_rest]
-    if robot.chain is None or len(own) < ARM or not entry.tells_free_space:
+    if robot.chain is None or len(robot.joints) != ARM or len(own) < ARM or not entry.tells_free_space:
         return
     calm = [(start - SETTLE, end) for start, end in entry.contact]  # the smoother sees a contact coming
     free = free_space(own[0].t, calm, own[0].rate)

@@ -32,7 +32,12 @@ def run(
     if robot.chain is None or len(robot.joints) < ARM or entry.role in ("weight", "friction"):
         return
     by_joint = {track.joint: track for track in tracks}
-    names = [joint.name for joint in robot.joints[:ARM]]
+    if len(robot.joints) > ARM:  # the chain would be taken to stand still beyond them
+        if entry.role in ("contact", "tissue"):
+            said = f"{robot.name} has {len(robot.joints)} joints, and a force at the tip is told by {ARM} that carry it"
+            yield diagnostic("resolve", entry.name, "note", f"{entry.name}: no force at the tip: {said}")
+        return
+    names = [joint.name for joint in robot.joints]
     missing = list(missing_joints(names, by_joint))
     if missing:
         if entry.role in ("contact", "tissue"):

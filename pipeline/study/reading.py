@@ -60,7 +60,7 @@ def study_of(table: TomlTable, folder: Path) -> Study:
                 table.file.note(line, f"file {file!r} is not in {folder}")
     table.file.refuse(BadStudy)
     assert robot is not None
-    own = table.values["robot"] if table.values["robot"].endswith(".toml") else ""
+    own = table.values["robot"] if table.values["robot"].endswith(robots.FILES) else ""
     truth = _truth(folder) if simulated else {}
     changed = overrides.values | ({"tool": table.values["tool"]} if "tool" in table else {})
     return Study(folder, title, robot, simulated, settings, logs, changed, truth, scenario, baseline, own, lines)
@@ -86,21 +86,21 @@ def _baseline(table: TomlTable, folder: Path) -> str:
 
 def _robot(table: TomlTable, folder: Path) -> Robot | None:
     """The robot, or None where it cannot be told which joints it has."""
-    name = table.take("robot", None, (str,), f"one of {', '.join(robots.ROBOTS)}, or a .toml file")
+    name = table.take(
+        "robot", None, (str,), f"one of {', '.join(robots.ROBOTS)}, or a file, {' or '.join(robots.FILES)}"
+    )
     if name is None:
         return None
     if not inside(name):
         table.problem(f"robot {name!r} lies outside the study", "robot")
         return None
     try:
-        if not name.endswith(".toml"):
-            return robots.load(name, folder)
-        described = from_toml.table_of(folder / name)
+        robot, file = robots.described(name, folder)
     except BadRobot as error:
         table.problem(str(error), "robot")
         return None
-    table.file.named.append(described.file)
-    return from_toml.robot_of(described, Path(name).stem)
+    table.file.named += [file] if file else []
+    return robot
 
 
 def _haptics(table: TomlTable, folder: Path) -> HapticScenario:

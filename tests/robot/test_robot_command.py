@@ -9,11 +9,11 @@ from typer.testing import CliRunner
 
 from pipeline.cli import guarded
 from pipeline.commands import robot
-from pipeline.errors import BadRequest, BadRobot
+from pipeline.errors import BadRobot
 from pipeline.maths.mechanics import kinematics, rigid_body, workspace
 from pipeline.robots.davinci_chain import BODIES, CHAIN
 
-KEYS = ["frames", "tip", "jacobian_v", "jacobian_w", "mass", "coriolis", "gravity", "condition", "warnings"]
+KEYS = ["frames", "tip", "jacobian_v", "jacobian_w", "mass", "coriolis", "gravity", "condition", "warnings", "joints"]
 app = typer.Typer()
 app.command()(guarded(robot.run))
 
@@ -103,10 +103,44 @@ def test_bad_input_is_refused_with_its_place(words, says):
     assert says in result.output
 
 
-def test_a_robot_without_geometry_is_refused(tmp_path):
+MINE = 'name = "mine"\n[[joint]]\nname = "a"\nkind = "revolute"\nterms = ["inertia", "gravity, sine"]\n'
+LINK = '[[link]]\nname = "l"\nmoved_by = "a"\nalpha = 1.5\nmass = 2.0\ncentre = [0.1, 0.0, 0.0]\n'
+
+
+def test_a_robot_without_geometry_shows_its_joints_and_has_no_pose(tmp_path):
     file = tmp_path / "mine.toml"
-    file.write_text('name = "mine"\n[[joint]]\nname = "a"\nkind = "revolute"\nterms = ["inertia"]\n')
-    with pytest.raises(BadRequest, match="robot mine has no chain"):
-        robot.run(str(file), None, None, False)
-    with pytest.raises(BadRobot, match="no robot 'nonsuch'"):
+    file.write_text(MINE)
+    assert "a   revolute, without an end; effort in N m: inertia + gravity, sine" in asked(str(file)).stdout
+    found = document(str(file))["joints"]["a"]
+    assert found["limits"] == {"q": [None, None], "dq": [None, None], "ddq": [None, None], "effort": None}
+    for words in (("--at", "0.1"), ("--dq", "0.1")):
+        result = asked(str(file), *words)
+        assert result.exit_code == 1
+        assert "robot mine has no chain: its geometry is not known; leave --at and --dq out" in result.output
+    result = asked(str(file), "--urdf")
+    assert result.exit_code == 1
+    assert "robot mine has no chain: its geometry is not known, and a URDF is made of it" in result.output
+
+
+def test_a_robot_that_does_not_exist_is_refused():
+    with pytest.raises(BadRobot, match="no robot 'nonsuch'; there are davinci, dvrk_psm, or name a file"):
         robot.run("nonsuch", None, None, False)
+
+
+def test_a_robot_of_ones_own_with_a_chain_is_shown_with_as_many_joints_as_it_has(tmp_path):
+    file = tmp_path / "mine.toml"
+    file.write_text(MINE + LINK)
+    found = document(str(file))
+    assert list(found) == KEYS
+    np.testing.assert_allclose(found["mass"], [[2.0 * 0.1**2]])
+    assert "pose of mine has 1" in asked(str(file), "--at", "0,0").output
+
+
+def test_the_urdf_that_is_printed_is_shown_as_the_same_arm(tmp_path):
+    file = tmp_path / "copy.urdf"
+    file.write_text(asked("davinci", "--urdf").stdout)
+    pose = ("--at", "0.1,0.2,0.03,0.1,-0.2,0.3,0.4", "--dq", "0.3,0.2,0.1,0.5,0.5,0.5,0.5")
+    found, expected = document(str(file), *pose), document("davinci", *pose)
+    for key in ("tip", "mass", "coriolis", "gravity"):
+        np.testing.assert_allclose(found[key], expected[key], rtol=0, atol=1e-12)
+    assert found["joints"]["hand_roll"]["limits"]["q"] == expected["joints"]["hand_roll"]["limits"]["q"]

@@ -56,6 +56,20 @@ class Bodies:
         return np.concatenate([there.masses[:, None], moments, inertia], axis=1).ravel()
 
 
+def weighing(parameters: Array) -> Bodies:
+    """The bodies that have inertial parameters (L, 10): the inverse of `Bodies.parameters`, counted with any n.
+
+    The centre of what weighs nothing is at the origin.
+    """
+    masses = parameters[:, 0]
+    centres = np.divide(parameters[:, 1:4], masses[:, None], out=np.zeros((len(masses), 3)), where=masses[:, None] > 0)
+    weightless = Bodies(masses, centres, np.zeros((len(masses), 3, 3)), np.zeros(len(masses), np.int64))
+    inertias = np.zeros((len(masses), 3, 3))
+    inertias[:, *_UPPER] = parameters[:, 4:]
+    inertias = inertias + np.triu(inertias, 1).swapaxes(1, 2)
+    return replace(weightless, inertias=inertias - weightless.about_frames())
+
+
 def cylinder(mass: float, height: float, radius: float, axis: int) -> Array:
     """The inertia (3, 3) [kg m^2] of a uniform cylinder about its centre; `axis` 0, 1 or 2 is its own.  (4.23)"""
     across = mass * height**2 / 12.0 + mass * radius**2 / 4.0
