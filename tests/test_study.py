@@ -378,7 +378,7 @@ def test_what_is_wrong_with_a_urdf_is_said_together_with_what_is_wrong_with_the_
     with pytest.raises(BadStudy) as caught:
         read(tmp_path, STUDY_OF_URDF.replace("rate = 100.0", "rat = 100.0"))
     said = str(caught.value)
-    assert "study.toml:8: log 1 (run): unknown key 'rat'" in said
+    assert "study.toml:8: log 'run': unknown key 'rat'" in said
     assert "arm.urdf:2: <joint name='shoulder'>: type is 'screw'" in said
 
 

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def run(
-    robot: Annotated[str, typer.Argument(help="A listed robot, or the path of a robot's .toml file.")],
+    robot: Annotated[str, typer.Argument(help="A listed robot, or the path of a robot's .toml or .urdf file.")],
     joint: Annotated[str, typer.Argument(help="A joint of it, or `all`, which then move together.")],
     evaluate: Annotated[str | None, typer.Option(help="Judge these coefficients: a0,a1,b1,a2,b2,...")] = None,
     period: Annotated[float | None, typer.Option(help="Period [s]; else 10, or 5 where all joints slide.")] = None,

@@ -51,7 +51,7 @@ def advice(robot: Robot, joint: Joint, said: Sequence[str]) -> str:
 
 def better_motion(robot: Robot, joint: Joint) -> str:
     """The command that designs a motion of a joint; a robot that is not listed is in a file beside the study."""
-    named = robot.name if robot.name in ROBOTS else f"{robot.name}.toml"
+    named = robot.file or (robot.name if robot.name in ROBOTS else f"{robot.name}.toml")
     return f"`davinci-forces excite {named} {joint.name}`"
 
 

@@ -1,5 +1,6 @@
 """What the robot is: one module per robot, exporting `ROBOT`, and its name in the list below."""
 
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
@@ -39,12 +40,17 @@ def described(name: str, folder: Path) -> tuple[Robot | None, TomlFile | None]:
     if name.endswith(".toml"):
         from pipeline.robots import from_toml
 
-        return from_toml.described(folder / name)
+        return _from(name, from_toml.described(folder / name))
     if name.endswith(".urdf"):
         from pipeline.robots.urdf import reading
 
-        return reading.described(folder / name)
+        return _from(name, reading.described(folder / name))
     if name not in ROBOTS:
         said = f"there is no robot {name!r}; there are {', '.join(ROBOTS)}"
         raise BadRobot(f"{said}, or name a file, {' or '.join(FILES)}")
     return import_module(f"pipeline.robots.{name}").ROBOT, None
+
+
+def _from(name: str, described: tuple[Robot | None, TomlFile]) -> tuple[Robot | None, TomlFile]:
+    robot, file = described
+    return replace(robot, file=name) if robot else None, file

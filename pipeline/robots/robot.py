@@ -132,6 +132,7 @@ class Robot:
     drives: Drives | None = None  # of all coordinates of the chain
     control: tuple[ControlStudy, ...] = ()
     tool: Tool | None = None  # where it is known which part of the chain it is, so that another may take its place
+    file: str = field(default="", compare=False)  # that describes it, where a file does
 
     def with_tool(self, length: float) -> "Robot":
         """The robot with a tool whose shaft is this long [m].

@@ -1,5 +1,6 @@
 """URDF: what is written reads back as the same arm, what others wrote means what it says, what is wrong is said."""
 
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -16,6 +17,8 @@ from pipeline.maths.mechanics import kinematics, rigid_body
 from pipeline.maths.mechanics.placed import roll_pitch_yaw, transform
 from pipeline.robots.davinci import ROBOT as DAVINCI
 from pipeline.robots.urdf import elements, reading, writing
+from pipeline.stages import resolve
+from pipeline.study import LogEntry
 from pipeline.toml.file import TomlFile
 
 POSES = 50
@@ -351,3 +354,11 @@ def test_no_description_however_odd_ends_in_anything_but_a_robot_or_problems(dat
     with np.errstate(all="ignore"):
         made, problems = parsed(text)
     assert problems or made.joints
+
+
+def test_of_an_arm_of_more_than_three_joints_no_force_at_the_tip_is_made_up():
+    """The chain would be taken to stand still beyond the third."""
+    arm = replace(DAVINCI, joints=robot(writing.text(DAVINCI)).joints)
+    touched = LogEntry(name="touch", files=("a.csv",), role="contact", channels=())
+    [said] = resolve.run([], [], [], touched, arm)
+    assert "touch: no force at the tip: davinci has 7 joints, and a force at the tip is told by 3" in said.text[0]

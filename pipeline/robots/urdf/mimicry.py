@@ -7,7 +7,7 @@ from pipeline.robots.urdf.tables import UrdfJoint
 from pipeline.toml.file import TomlFile
 
 
-class Driven(NamedTuple):
+class Mover(NamedTuple):
     """A joint at sign times the position of the joint `by`, plus a bias; `by` is "" of one that does not move."""
 
     by: str
@@ -15,12 +15,12 @@ class Driven(NamedTuple):
     bias: float = 0.0
 
 
-def driven(joints: Mapping[str, UrdfJoint], file: TomlFile) -> dict[str, Driven]:
+def driven(joints: Mapping[str, UrdfJoint], file: TomlFile) -> dict[str, Mover]:
     """How each joint is moved; what is wrong with a mimic is noted."""
     return {name: _driven(one, joints, file) for name, one in joints.items()}
 
 
-def _driven(joint: UrdfJoint, joints: Mapping[str, UrdfJoint], file: TomlFile) -> Driven:
+def _driven(joint: UrdfJoint, joints: Mapping[str, UrdfJoint], file: TomlFile) -> Mover:
     """Along the joints that mimic each other, to the one that moves by itself."""
     sign, bias, seen, one = 1.0, 0.0, [joint.name], joint
     while one.kind != "fixed" and one.mimic:
@@ -30,11 +30,11 @@ def _driven(joint: UrdfJoint, joints: Mapping[str, UrdfJoint], file: TomlFile) -
         if wrong:
             if one is joint:
                 file.note(one.line, f"<joint name={one.name!r}> <mimic>: {wrong}")
-            return Driven("")
+            return Mover("")
         assert following is not None
         one = following
         seen.append(one.name)
-    return Driven("" if one.kind == "fixed" or not sign else one.name, 1 if sign >= 0 else -1, bias)
+    return Mover("" if one.kind == "fixed" or not sign else one.name, 1 if sign >= 0 else -1, bias)
 
 
 def _wrong(joint: UrdfJoint, following: UrdfJoint | None, seen: list[str]) -> str:

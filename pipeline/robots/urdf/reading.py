@@ -21,7 +21,7 @@ from pipeline.maths.models.terms import Term, coulomb, gravity_cos, gravity_sin,
 from pipeline.robots.robot import ANYWHERE, Joint, Kind, Limits, Robot
 from pipeline.robots.urdf import elements
 from pipeline.robots.urdf.elements import Element
-from pipeline.robots.urdf.mimicry import Driven, driven
+from pipeline.robots.urdf.mimicry import Mover, driven
 from pipeline.robots.urdf.tables import MOVING, TIP, Notes, UrdfJoint, inertial, joint
 from pipeline.toml.file import TomlFile
 
@@ -139,7 +139,7 @@ def _coordinates(ordered: Sequence[UrdfJoint], file: TomlFile) -> dict[str, str]
 
 
 def _placed(
-    root: str, ordered: Sequence[UrdfJoint], moved: dict[str, Driven], coordinates: list[str],
+    root: str, ordered: Sequence[UrdfJoint], moved: dict[str, Mover], coordinates: list[str],
     weights: dict[str, Array | None],
 ) -> list[PlacedLink]:  # fmt: skip
     frames, placed = {root: 0}, list[PlacedLink]()
