@@ -1,0 +1,70 @@
+"""The analyses of public recordings that ship without them: each runs on its files, and is passed over without them."""
+
+import json
+import shutil
+import tomllib
+
+import pytest
+
+from tests.conftest import ROOT
+from tests.test_robustness import flat
+from tests.test_runs import call
+
+PUBLIC = {"dvrk-psm": "dvrk_wpi", "dvrk-psm-2": "dvrk_slide", "palpation": "palpation", "ur10e": "ur10e"}
+
+
+def test_all_passes_over_each_in_one_line_while_its_recordings_are_absent(tmp_path, monkeypatch):
+    for name in PUBLIC:
+        shutil.copytree(ROOT / "raw" / name, tmp_path / "raw" / name, ignore=shutil.ignore_patterns("*.csv"))
+    monkeypatch.chdir(tmp_path)
+    said = call("all")
+    assert len(said.splitlines()) == len(PUBLIC)
+    for name in PUBLIC:
+        assert f"raw/{name}: skipped, its logs are not here" in said
+        assert "get them" in flat((ROOT / "raw" / name / "study.toml").read_text().replace("#", "")).lower()
+
+
+def test_no_recording_ships():
+    ignored = (ROOT / ".gitignore").read_text().splitlines()
+    for name in PUBLIC:
+        assert f"raw/{name}/*.csv" in ignored
+
+
+@pytest.fixture(scope="module")
+def analysed(data, tmp_path_factory):
+    """Analyse a shipped study on the recordings; its results by key, and what was said."""
+    made = {}
+
+    def analyse(name):
+        if name not in made:
+            study = tmp_path_factory.mktemp(name) / "raw" / name
+            shutil.copytree(ROOT / "raw" / name, study)
+            for log in tomllib.loads((study / "study.toml").read_text())["log"]:
+                (study / log["file"]).symlink_to(data / PUBLIC[name] / log["file"])
+            said = call("all", study)
+            file = study.parent.parent / "reports" / name / "results.json"
+            made[name] = {r["key"]: r for r in json.loads(file.read_text())}, said
+        return made[name]
+
+    return analyse
+
+
+@pytest.mark.slow
+def test_the_stiffness_of_the_phantom_is_that_of_a_line_through_its_probes(analysed):
+    results, _ = analysed("palpation")
+    assert results["tissue.probes.stiffness"]["value"] == pytest.approx(453, rel=0.05)
+    assert "tissue.continuous.stiffness" in results
+
+
+@pytest.mark.slow
+def test_the_band_of_the_second_arm_covers_a_path_that_was_not_fitted(analysed):
+    results, _ = analysed("dvrk-psm-2")
+    assert 0.9 < results["ekf.slide.instrument_slide.coverage"]["value"] < 0.98
+
+
+@pytest.mark.slow
+def test_the_shoulder_of_the_ur10e_repeats_every_ten_seconds_and_is_in_amperes(analysed):
+    results, said = analysed("ur10e")
+    assert results["period.joint-1"]["value"] == pytest.approx(10.0, abs=0.002)
+    assert results["fit.shoulder_pan.independent.lse.coulomb_friction"]["unit"] == "A"
+    assert "fault of davinci-forces" not in said
