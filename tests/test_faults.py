@@ -1,15 +1,21 @@
 """What machines do to a run: disks that are full or read-only, links, names and files that are too long."""
 
 import os
+import shutil
+import signal
 import subprocess
 import sys
+import time
+from contextlib import suppress
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from pipeline.records.store import PARTIAL
 from tests.test_robustness import flat, raw, small  # noqa: F401 - fixtures
 from tests.test_runs import call, contents, edit, processed, reports
+from tests.test_workers import alive
 
 LIMITED = """
 import resource, sys
@@ -141,3 +147,65 @@ def test_where_nothing_can_be_written_what_needs_no_writing_is_done(raw, read_on
     assert "lowpass = 17.0 became 12.0" in said
     assert not (processed(folder) / ".lock").exists()
     assert {name: content for name, content in before.items() if name != ".lock"} == contents(processed(folder))
+
+
+RUN = """
+import sys
+from pathlib import Path
+from pipeline.runner import STEPS, arithmetic
+arithmetic.pin()
+from pipeline.runner import runs, workers
+workers.ALONE = -1.0
+if __name__ == "__main__":
+    sys.exit(0 if runs.run(Path(sys.argv[1]), STEPS, jobs=2) else 1)
+"""
+
+
+def children(pid: int) -> list[int]:
+    """The processes that one started, and those that they did."""
+    found, known = [], {pid}
+    for stat in sorted(Path("/proc").glob("[0-9]*/stat"), key=lambda file: int(file.parent.name)):
+        with suppress(OSError):
+            if int(stat.read_text().rpartition(")")[2].split()[1]) in known:
+                known.add(int(stat.parent.name))
+                found.append(int(stat.parent.name))
+    return found
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(sys.platform != "linux", reason="asks /proc who is there")
+def test_whoever_of_a_run_is_killed_whenever_the_bytes_are_the_same_and_nobody_is_left(raw, tmp_path):  # noqa: F811
+    """Parent or worker, at moments over all stages; the next run goes on."""
+    kills, rng = int(os.environ.get("DAVINCI_FORCES_KILLS", "12")), np.random.default_rng(0)
+    clean = small(tmp_path / "clean" / "raw" / "lab", ("one",))
+    call("all", clean)
+    wanted = contents(processed(clean)), contents(reports(clean))
+    folder = small(raw / "lab", ("one",))
+    script = tmp_path / "run.py"
+    script.write_text(RUN)
+    for attempt in range(kills):
+        run = subprocess.Popen(
+            [sys.executable, str(script), str(folder)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        with suppress(subprocess.TimeoutExpired):
+            run.wait(rng.uniform(1.0, 12.0))
+        started = children(run.pid)
+        if attempt % 2 and started:
+            with suppress(ProcessLookupError):
+                os.kill(int(rng.choice(started)), signal.SIGKILL)
+            with suppress(subprocess.TimeoutExpired):
+                run.wait(2.0)
+        started = {*started, *children(run.pid)}
+        run.kill()
+        run.wait()
+        until = time.monotonic() + 5
+        while any(map(alive, started)) and time.monotonic() < until:
+            time.sleep(0.05)
+        assert not any(map(alive, started))
+        for name, content in contents(processed(folder)).items():
+            assert name.endswith((PARTIAL, ".lock")) or content == wanted[0][name], name
+        if attempt % 4 == 3:  # otherwise soon nothing would be left to be killed in
+            shutil.rmtree(processed(folder))
+    call("all", folder)
+    assert not partial_files(raw.parent)
+    assert (contents(processed(folder)), contents(reports(folder))) == wanted
