@@ -101,11 +101,12 @@ def joint_section(joint: str, studies: Sequence[Campaigned], told: Findings) -> 
     names = list(dict.fromkeys(one.name for one in own))
     odd = sorted({one.name for one in own if told.tell(one)})
     spoken = f"beyond errors: {', '.join(odd)}" if odd else "none changes beyond its errors"
+    drawn = [one for one in own if len(one.studies) > 1]  # a single one is no course over time
     figure = Figure(
         f"{title(joint)}: its parameters and how far it is to be trusted, with standard errors, study by study; "
         "studies that stand out are named.",
         f"{title(joint)}: {count(len(names), 'number')} over {len(studies)} studies; {spoken}.",
-        tuple(panel(one, told) for one in own),
+        tuple(panel(one, told) for one in drawn),
         f"campaign-{joint}",
         columns=2,
         height=34,
@@ -116,7 +117,7 @@ def joint_section(joint: str, studies: Sequence[Campaigned], told: Findings) -> 
         table(joint, "Parameters", "parameters", parameters, own, studies),
         table(joint, "How far to trust it", "floors", floors, own, studies),
     )
-    return Section(title(joint), f"joint-{joint}", (figure, *tables))
+    return Section(title(joint), f"joint-{joint}", (*([figure] if drawn else []), *tables))
 
 
 def table(
@@ -172,4 +173,5 @@ def panel(one: Series, told: Findings) -> Panel:
     unit = format_unit(one.unit)
     x_label = "time [days from the first]" if told.by_date else "study"
     name = words(one.name)
-    return Panel(name, x_label, f"{name} [{unit}]" if unit else name, tuple(marks))
+    x_range = None if told.by_date else (min(told.time.values()) - 0.5, max(told.time.values()) + 0.5)
+    return Panel(name, x_label, f"{name} [{unit}]" if unit else name, tuple(marks), x_range)
