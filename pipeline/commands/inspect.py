@@ -14,7 +14,6 @@ if TYPE_CHECKING:
     from pipeline.maths.signals.outline import Outline
 
 BARS = "▁▂▃▄▅▆▇█"
-TIMES = ("time", "t", "t_s", "elapsed", "x_value", "seconds")
 MAX_SHARE = 0.1  # share of repeated rows, and of jitter in the sampling time, above which they are flagged
 
 
@@ -47,7 +46,6 @@ class _Survey:
     statistics: "ClockStatistics"
     outlines: dict[str, "Outline"]
     first: dict[str, list[float]]  # rows of each channel
-    rising: dict[str, "ClockStatistics"]  # channels that rise throughout, as a time does
     rows: int = 0
 
 
@@ -61,10 +59,11 @@ def describe(file: Path, head: int, options: "Options | None" = None) -> dict[st
     """
     from pipeline.logs import open_log
     from pipeline.logs.log import Options
+    from pipeline.study.timing import named_time
 
     log = open_log(file, options or Options())
     names = [channel.name for channel in log.channels if channel.kind in ("number", "time")]
-    source, warnings = _time(log), list[str]()
+    source, warnings = named_time(log), list[str]()
     found: dict[str, _Survey] = {}
     nulls, nans = dict[str, int](), dict[str, int]()
     for own, together in sorted(log.by_clock(names).items(), key=lambda each: each[0] != "") or [("", names)]:
@@ -78,8 +77,8 @@ def describe(file: Path, head: int, options: "Options | None" = None) -> dict[st
     first = {name: rows for each in (main, *found.values()) for name, rows in each.first.items()}
     return {
         "file": str(file), "format": log.format, "rows": max(each.rows for each in (main, *found.values())),
-        "started": log.started, "zone": log.zone, "clock": _clock(log, source, main.statistics, main.rising),
-        "clocks": [_clock(log, own, each.statistics, {}) | {"channels": [*each.first]} for own, each in found.items()],
+        "started": log.started, "zone": log.zone, "clock": _clock(log, source, main.statistics),
+        "clocks": [_clock(log, own, each.statistics) | {"channels": [*each.first]} for own, each in found.items()],
         "channels": [_channel(log, channel, outlines.get(channel.name)) for channel in log.channels],
         "facts": log.facts, "comments": log.comments, "dropped": log.dropped,
         "warnings": [*warnings, *_flags(log, source, main.statistics)],
@@ -98,7 +97,6 @@ def _survey(log: "Log", source: str, together: list[str], head: int) -> _Survey:
     measured = [name for name in together if kinds.get(name) == "number" and name != source]
     survey = _Survey(
         ClockStatistics(), {name: Outline() for name in together}, {name: [] for name in together},
-        {} if source or log.clock else {name: ClockStatistics() for name in measured},
     )  # fmt: skip
     for block in log.blocks(together):
         count = len(next(iter(block.values())))
@@ -107,17 +105,8 @@ def _survey(log: "Log", source: str, together: list[str], head: int) -> _Survey:
         for name in together:
             survey.outlines[name].update(block[name])
             survey.first[name].extend(block[name][: max(0, head - survey.rows)].tolist())
-        survey.rising = {n: each for n, each in survey.rising.items() if _still_rises(each, block[n])}
         survey.rows += count
     return survey
-
-
-def _time(log: "Log") -> str:
-    """The channel that holds the time: the format's own, else one that is called so, unless the format has a clock."""
-    if log.time or log.clock:
-        return log.time
-    names = (c.name for c in log.channels if c.kind == "number" and c.name.partition("[")[0].strip().lower() in TIMES)
-    return next(names, "")
 
 
 def _counted(log: "Log", rows: int, count: int) -> Any:
@@ -128,18 +117,12 @@ def _counted(log: "Log", rows: int, count: int) -> Any:
     return log.clock.start + number * log.clock.step if log.clock else number
 
 
-def _still_rises(statistics: "ClockStatistics", values: Any) -> bool:
-    """Whether a channel has risen from every sample to the next up to here, as a time does."""
-    statistics.update(values)
-    return not (statistics.backward or statistics.repeated) and abs(statistics.last - statistics.first) < float("inf")
-
-
-def _clock(log: "Log", source: str, clock: "ClockStatistics", rising: dict[str, "ClockStatistics"]) -> dict[str, Any]:
+def _clock(log: "Log", source: str, clock: "ClockStatistics") -> dict[str, Any]:
     if not source and not log.clock:
-        advice = "none: say rate = ... [Hz] for this log in study.toml"
-        for name, statistics in rising.items():
-            advice += f", or time = {name!r}, which rises throughout ({statistics.rate:.6g} Hz if it is in seconds)"
-            break
+        from pipeline.study.guessing import clock_hint
+
+        hint = clock_hint(log.apart())
+        advice = "none: say rate = ... [Hz] for this log in study.toml" + (f", or {hint}" if hint else "")
         return {"source": advice, "duplicates": clock.duplicates}
     return {
         "source": f"channel {source!r}" if source else "the log's own interval",
