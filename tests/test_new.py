@@ -1,0 +1,249 @@
+"""What `new` makes of logs that nobody described: by content, by numbers in names, by motion and by size."""
+
+import shutil
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import pipeline
+from pipeline import robots
+from pipeline.maths.signals import columns
+from pipeline.study import reading
+from tests.test_runs import call
+
+RATE, PERIOD, N = 125.0, 4.0, 2000  # [Hz], [s]: four periods
+
+
+def motion(joints: int, seed: int = 0, repeats: bool = True) -> tuple[np.ndarray, ...]:
+    """Times, positions and velocities (N, joints) of smooth motion."""
+    rng = np.random.default_rng(seed)
+    t = np.arange(N) / RATE
+    omega = 2 * np.pi / (PERIOD if repeats else 3 * N / RATE) * np.arange(1, 4 if repeats else 40)
+    a, b = rng.normal(size=(2, len(omega), joints)) / np.arange(1, len(omega) + 1)[:, None]
+    sin, cos = np.sin(np.outer(t, omega)), np.cos(np.outer(t, omega))
+    return t, sin @ a + cos @ b, (cos * omega) @ a - (sin * omega) @ b
+
+
+def effort(q: np.ndarray, dq: np.ndarray, seed: int = 1) -> np.ndarray:
+    noise = np.random.default_rng(seed).normal(size=q.shape)
+    return 2.0 * dq + np.sign(dq) + 5 * np.sin(q) + 0.05 * noise
+
+
+def table(file, *blocks, header: str = ""):
+    file.parent.mkdir(parents=True, exist_ok=True)
+    np.savetxt(file, np.column_stack(blocks), delimiter=",", fmt="%.9g", header=header, comments="")
+    return file
+
+
+def new(*files) -> str:
+    """What `new` says, having written study.toml beside the logs."""
+    return call("new", *files)
+
+
+def held(folder, number: int = 0) -> dict[str, object]:
+    entry = reading.read(folder).logs[number]
+    return {source.quantity: source.channel for source in entry.channels}
+
+
+def test_columns_without_names_are_told_by_what_they_hold(tmp_path):
+    t, q, dq = motion(4)
+    new(table(tmp_path / "run.csv", t, q, dq, effort(q, dq)))
+    expected = {"time": "column_0"}
+    for k in range(4):
+        expected |= {f"joint_{k + 1}.q": f"column_{1 + k}", f"joint_{k + 1}.dq": f"column_{5 + k}"}
+        expected |= {f"joint_{k + 1}.tau": f"column_{9 + k}"}
+    assert held(tmp_path) == expected
+    text = (tmp_path / "study.toml").read_text()
+    assert 'time = "column_0"  # rises throughout (125 Hz if it is in seconds)' in text
+    assert text.count("CHECK: follows the velocities") == 4
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(1, 8), st.integers(0, 3), st.integers(0, 100), st.booleans())
+def test_the_number_of_joints_is_told_whatever_comes_after_the_velocities(joints, more, seed, timed):
+    t, q, dq = motion(joints, seed)
+    others = np.random.default_rng(seed).normal(size=(N, joints + more))
+    found = columns.blocks([*q.T, *dq.T, *others.T], t if timed else None)
+    assert found is not None
+    assert found.n == joints
+    assert found.rate == pytest.approx(1.0 if timed else RATE, rel=0.01)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(3, 24), st.integers(0, 100))
+def test_noise_is_no_block_of_velocities(width, seed):
+    assert columns.blocks([*np.random.default_rng(seed).normal(size=(width, 500))]) is None
+
+
+@pytest.mark.parametrize("rate", [100.0, 125.0, 200.0, 500.0, 1000.0])
+def test_where_there_is_no_time_the_velocities_tell_the_rate(tmp_path, rate):
+    _, q, dq = motion(4)
+    dq = dq * rate / RATE + np.random.default_rng(3).normal(size=dq.shape) * 0.02
+    file = table(tmp_path / "run.csv", q, dq, effort(q, dq))
+    new(file)
+    [entry] = reading.read(tmp_path).logs
+    assert entry.rate == rate
+    assert f"rate = {rate!r}, by which the velocities are those of the positions" in call("inspect", file)
+
+
+def test_torques_that_are_proportional_tell_that_a_block_is_of_currents(tmp_path):
+    t, q, dq = motion(2)
+    i = effort(q, dq)
+    new(table(tmp_path / "run.csv", t, q, dq, i, i + 0.01 * np.cos(q), 12.0 * i))
+    assert {"joint_1.i": "column_5", "joint_2.i": "column_6"}.items() <= held(tmp_path).items()
+    assert [joint.effort for joint in robots.load("robot.toml", tmp_path).joints] == ["A", "A"]
+
+
+def test_a_joint_at_rest_stays_commented_out_with_the_reason(tmp_path):
+    t, q, dq = motion(4)
+    q[:, 2], dq[:, 2] = 0.7 + 1e-4 * np.sin(t), 0.0
+    new(table(tmp_path / "run.csv", t, q, dq, effort(q, dq)))
+    assert not any(quantity.startswith("joint_3.") for quantity in held(tmp_path))
+    assert '# "joint_3.q" = "column_3"  # the joint is at rest' in (tmp_path / "study.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["q{}", "dq{}", "tau{}"],
+        ["/PSM1/measured_js/position[{}]", "/PSM1/measured_js/velocity[{}]", "/PSM1/measured_js/effort[{}]"],
+    ],
+)
+@pytest.mark.parametrize("first", [0, 1])
+def test_the_number_in_a_name_tells_the_joint(tmp_path, names, first):
+    t, q, dq = motion(4)
+    header = ",".join(["t", *(name.format(first + k) for name in names for k in range(4))])
+    new(table(tmp_path / "run.csv", t, q, dq, effort(q, dq), header=header))
+    for symbol, name in zip(("q", "dq", "tau"), names, strict=True):
+        for k in range(4):
+            assert held(tmp_path)[f"joint_{k + 1}.{symbol}"] == name.format(first + k)
+
+
+def test_words_in_brackets_tell_the_joint_by_their_order_and_what_was_wanted_is_left_out(tmp_path):
+    t, q, dq = motion(2)
+    header = "t,position[pan],position[lift],setpoint_effort[pan],setpoint_effort[lift],effort[pan],effort[lift]"
+    new(table(tmp_path / "run.csv", t, q, effort(q, dq), effort(q, dq), header=header))
+    assert held(tmp_path) == {
+        "time": "t", "joint_1.q": "position[pan]", "joint_2.q": "position[lift]",
+        "joint_1.tau": "effort[pan]", "joint_2.tau": "effort[lift]",
+    }  # fmt: skip
+
+
+def test_three_joints_of_which_the_third_slides_are_of_the_arm_of_the_kit(tmp_path):
+    t, q, dq = motion(3)
+    scale = np.array([0.2, 0.2, 0.03])
+    new(table(tmp_path / "run.csv", t, q * scale, dq * scale, effort(q, dq)))
+    assert 'robot = "dvrk_psm"' in (tmp_path / "study.toml").read_text()
+    assert "instrument_slide.q" in held(tmp_path)
+    assert not (tmp_path / "robot.toml").exists()
+
+
+def test_a_robot_file_is_taken_where_it_fits_and_never_overwritten(tmp_path):
+    t, q, dq = motion(4)
+    file = table(tmp_path / "run.csv", t, q, dq, effort(q, dq))
+    (tmp_path / "robot.toml").write_text("mine = true\n")
+    new(file)
+    assert (tmp_path / "robot.toml").read_text() == "mine = true\n"
+    written = (tmp_path / "robot-of-4.toml").read_text()
+    (tmp_path / "study.toml").unlink()
+    (tmp_path / "robot-of-4.toml").rename(tmp_path / "arm.toml")
+    new(file)
+    assert 'robot = "arm.toml"' in (tmp_path / "study.toml").read_text()
+    assert (tmp_path / "arm.toml").read_text() == written
+    assert sorted(p.name for p in tmp_path.glob("*.toml")) == ["arm.toml", "robot.toml", "study.toml"]
+
+
+def test_motion_and_words_of_the_name_tell_what_a_log_is_for(tmp_path):
+    made = {}
+    for seed, (name, repeats) in enumerate({"a": True, "b": False, "c_noweight": True, "d_205g": True}.items()):
+        t, q, dq = motion(4, seed, repeats)
+        made[name] = table(tmp_path / f"{name}.csv", t, q, dq, effort(q, dq))
+    t = np.arange(N) / RATE
+    speeds = np.repeat([0.1, -0.1, 0.2, -0.2, 0.4, -0.4, 0.1, -0.1], N // 8)
+    dq = np.column_stack([speeds, np.zeros((N, 3))])
+    q = np.cumsum(dq, axis=0) / RATE
+    made["e"] = table(tmp_path / "e.csv", t, q, dq, effort(q, dq))
+    new(*made.values())
+    roles = {entry.name: entry.role for entry in reading.read(tmp_path).logs}
+    assert roles == {
+        "a": "identification", "b": "validation", "c_noweight": "validation", "d_205g": "contact", "e": "friction",
+    }  # fmt: skip
+    assert "# weight = { mass = 0.205," in (tmp_path / "study.toml").read_text()
+
+
+def test_where_nothing_repeats_all_logs_are_identified_from(tmp_path):
+    files = []
+    for seed in (4, 5):
+        t, q, dq = motion(4, seed, repeats=False)
+        files.append(table(tmp_path / f"run-{seed}.csv", t, q, dq, effort(q, dq)))
+    new(*files)
+    assert {entry.role for entry in reading.read(tmp_path).logs} == {"identification"}
+
+
+def test_files_of_one_signal_each_are_joined(tmp_path):
+    t, q, dq = motion(4)
+    signals = {"q_actual": q, "qd_actual": dq, "i_actual": effort(q, dq), "i_target": effort(q, dq, 2)}
+    new(*(table(tmp_path / f"No1_all__{name}.csv", t, values) for name, values in signals.items()))
+    [entry] = reading.read(tmp_path).logs
+    assert entry.join
+    assert len(entry.files) == 4
+    assert held(tmp_path)["time"] == 0
+    assert held(tmp_path)["joint_2.i"] == "No1_all__i_actual/column_2"
+    assert not any("target" in str(channel) for channel in held(tmp_path).values())
+
+
+@pytest.mark.parametrize(("scale", "unit"), [(12.0, "mm"), (0.012, "m")])
+def test_a_depth_that_is_too_large_for_metres_is_in_millimetres(tmp_path, scale, unit):
+    depth = np.linspace(0, scale, 50)
+    new(table(tmp_path / "probes.csv", np.arange(50) // 10, depth, depth / scale, header="probe,depth,force"))
+    [entry] = reading.read(tmp_path).logs
+    assert {source.quantity: source.unit for source in entry.channels}["depth"] == unit
+
+
+@pytest.mark.parametrize("header", ["t", "Time (s)", "Time [s]", "elapsed s", "X_Value"])
+def test_inspect_and_new_name_the_same_clock(tmp_path, header):
+    t, q, dq = motion(1)
+    file = table(tmp_path / "run.csv", t, q, effort(q, dq), header=f"{header},roll position,roll current")
+    new(file)
+    assert held(tmp_path)["time"] == header
+    assert f"clock: channel '{header}'" in call("inspect", file)
+    assert not reading.read(tmp_path).logs[0].rate
+
+
+FOLDERS = {  # robot and roles that the recordings ask for
+    "dvrk_wpi": ("dvrk_psm", ["identification", "contact", "validation"]),
+    "dvrk_slide": ("dvrk_psm", ["identification", "friction", "friction", "identification"]),
+    "ur10e": ("robot.toml", ["identification", "identification", "identification"]),
+    "palpation": ("davinci", ["tissue", "tissue"]),
+    "ur5": ("robot.toml", ["contact"]),
+}
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_a_stranger_s_folder_becomes_a_study(data, tmp_path, folder):
+    robot, roles = FOLDERS[folder]
+    study = tmp_path / folder
+    study.mkdir()
+    for file in sorted((data / folder).glob("*.csv")):
+        (study / file.name).write_bytes(file.read_bytes())
+    new(*sorted(study.glob("*.csv")))
+    assert f'robot = "{robot}"' in (study / "study.toml").read_text()
+    assert [entry.role for entry in reading.read(study).logs] == roles
+    rates = {entry.name: entry.rate for entry in reading.read(study).logs}
+    if folder.startswith("dvrk"):
+        assert rates == {name: 100.0 if name.startswith("slide") else 200.0 for name in rates}
+    call("ingest", study)
+
+
+def test_a_joint_of_another_arm_is_identified_from_one_line_more_than_new_writes(data, tmp_path):
+    study = tmp_path / "raw" / "ur10e"
+    study.mkdir(parents=True)
+    shutil.copy(data / "ur10e" / "joint_1.csv", study)
+    new(study / "joint_1.csv")
+    file = study / "study.toml"
+    file.write_text(file.read_text().replace("# skip = 1.0", "skip = 11.0"))
+    for stage in ("ingest", "resample", "average", "differentiate", "fit", "predict"):
+        call(stage, study)
+    assert pipeline.read(study, "Prediction")["relative_error"].max() < 0.06
