@@ -247,3 +247,13 @@ def test_a_joint_of_another_arm_is_identified_from_one_line_more_than_new_writes
     for stage in ("ingest", "resample", "average", "differentiate", "fit", "predict"):
         call(stage, study)
     assert pipeline.read(study, "Prediction")["relative_error"].max() < 0.06
+
+
+def test_a_urdf_beside_the_logs_is_the_robot_and_currents_are_its_effort(data, tmp_path):
+    for name in ("fourier_20s_8harm.csv", "ur10e.urdf"):
+        (tmp_path / name).write_bytes((data / "ur10e" / name).read_bytes())
+    new(tmp_path / "fourier_20s_8harm.csv")
+    assert 'robot = "ur10e.urdf"' in (tmp_path / "study.toml").read_text()
+    assert held(tmp_path)["elbow_joint.i"] == "column_15"
+    assert {joint.effort for joint in reading.read(tmp_path).robot.joints} == {"A"}
+    assert not (tmp_path / "robot.toml").exists()

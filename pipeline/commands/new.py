@@ -8,7 +8,9 @@ import typer
 
 def run(
     files: Annotated[list[Path], typer.Argument(help="Logs, in the folder of the study: raw/<study>/<log>.")],
-    robot: Annotated[str, typer.Option(help="The robot, or its .toml or .urdf file beside the study; else guessed.")] = "",
+    robot: Annotated[
+        str, typer.Option(help="The robot, or a .toml or .urdf file beside the study.", show_default="guessed")
+    ] = "",
     study: Annotated[Path | None, typer.Option(help="Folder of the study, where not that of the first log.")] = None,
     show: Annotated[bool, typer.Option("--print", help="Print it instead of writing study.toml.")] = False,
 ) -> None:

@@ -89,9 +89,19 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
         "[settings]  # every key has a default; the report prints what was used",
         "# lowpass = 17.0  # [Hz] zero-phase, where velocities and accelerations are differences",
     ]
+    if arm.name.endswith(".urdf") and any("i" in each.symbols() for each in guesses):
+        head += _in_amperes(robot)
     roles = roles_of([each.name for each in drawn], guesses)
     logs = (line for each, role in zip(drawn, roles, strict=True) for line in _log(each, folder, robot, role))
     return Draft("\n".join([*head, *logs]) + "\n", arm.name if arm.text else "", arm.text)
+
+
+def _in_amperes(robot: Robot) -> Iterator[str]:
+    """Lines by which currents are the effort of joints whose drives a URDF says nothing of."""
+    for joint in robot.joints:
+        yield ""
+        yield f"[robot_overrides.{joint.name}]"
+        yield 'effort = "A"  # the log holds currents; where the constant is known, torque_constant = ... [N m/A]'
 
 
 def _drawn(files: list[Path], robot: Robot) -> Drawn:
