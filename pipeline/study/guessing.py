@@ -27,7 +27,7 @@ NUMBERED = re.compile(r"(.*?)(?:\[([^\]]+)\]|_?(\d+))")
 
 
 @dataclass(frozen=True)
-class Told:
+class Meaning:
     """What one channel holds: a symbol of a joint that is counted from 0, and how that is known."""
 
     symbol: str
@@ -39,7 +39,7 @@ class Told:
 class Guess:
     """What the channels of a log hold, by their names; and how it moves."""
 
-    told: dict[str, Told] = field(default_factory=dict)
+    told: dict[str, Meaning] = field(default_factory=dict)
     joints: int = 0
     moving: tuple[int, ...] = ()  # joints, counted from 0
     time: str = ""  # the channel of times, where content or a name tells it
@@ -117,13 +117,13 @@ def _rises(t: Array) -> str:
     return f"rises throughout ({_rate(t):.6g} Hz if it is in seconds)"
 
 
-def by_numbers(channels: Sequence[Channel]) -> dict[str, Told]:
+def by_numbers(channels: Sequence[Channel]) -> dict[str, Meaning]:
     """Joints by the position of a channel among those of one name: `q1`, `position[2]`, `effort[outer_yaw]`."""
     groups: dict[str, list[tuple[str, str]]] = {}
     for channel in channels:
         if not is_time(channel) and (match := NUMBERED.fullmatch(channel.name)):
             groups.setdefault(match[1], []).append((match[2] or match[3], channel.name))
-    told: dict[str, Told] = {}
+    told: dict[str, Meaning] = {}
     for stem, members in groups.items():
         words = re.findall(r"[a-z]+", stem.rpartition("/")[2].lower() or stem.lower())
         words_of_path = re.findall(r"[a-z]+", stem.lower())
@@ -135,13 +135,13 @@ def by_numbers(channels: Sequence[Channel]) -> dict[str, Told]:
     return told if "q" in symbols and symbols & {"tau", "i"} else {}
 
 
-def _numbered(symbol: str, members: Sequence[tuple[str, str]]) -> dict[str, Told]:
+def _numbered(symbol: str, members: Sequence[tuple[str, str]]) -> dict[str, Meaning]:
     """Channels of one name by their numbers, counted from the least; by their order where these are words."""
     if not all(index.isdecimal() for index, _ in members):
-        return {name: Told(symbol, k, f"number {k + 1} of those names") for k, (_, name) in enumerate(members)}
+        return {name: Meaning(symbol, k, f"number {k + 1} of those names") for k, (_, name) in enumerate(members)}
     least = min(int(index) for index, _ in members)
     first = least if least <= 1 else 0
-    return {name: Told(symbol, int(index) - first, "by the number in its name") for index, name in members}
+    return {name: Meaning(symbol, int(index) - first, "by the number in its name") for index, name in members}
 
 
 def _by_content(log: Log, names: Sequence[str]) -> Guess:
@@ -160,16 +160,16 @@ def _by_content(log: Log, names: Sequence[str]) -> Guess:
     if blocks is None:
         return found
     n, values = blocks.n, [samples[name] for name in left]
-    told = {name: Told("q", k, f"position {k + 1} of {n}, by its derivative") for k, name in enumerate(left[:n])}
+    told = {name: Meaning("q", k, f"position {k + 1} of {n}, by its derivative") for k, name in enumerate(left[:n])}
     derivative = f"derivative of the positions that move (correlation {blocks.correlation:.3f})"
-    told |= {name: Told("dq", k, derivative) for k, name in enumerate(left[n : 2 * n])}
+    told |= {name: Meaning("dq", k, derivative) for k, name in enumerate(left[n : 2 * n])}
     others = [values[start : start + n] for start in range(3 * n, len(values) - n + 1, n)]
     is_current = columns.is_current(values[2 * n : 3 * n], others, blocks.moving)
     why_effort = "CHECK: follows the velocities; " + (
         "current, as torques of later columns are proportional to it or its like"
         if is_current else "effort, as nothing says that it is a current"
     )  # fmt: skip
-    told |= {name: Told("i" if is_current else "tau", k, why_effort) for k, name in enumerate(left[2 * n : 3 * n])}
+    told |= {name: Meaning("i" if is_current else "tau", k, why_effort) for k, name in enumerate(left[2 * n : 3 * n])}
     rate = 0.0 if t is not None else columns.round_rate(blocks.rate)
     return motion(replace(found, told=told, joints=n, rate=rate), samples)
 

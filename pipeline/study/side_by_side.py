@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pipeline.logs.joined import Joined
 from pipeline.maths.signals import columns
-from pipeline.study.guessing import SET, WORDS, Guess, Told, motion, samples_of
+from pipeline.study.guessing import SET, WORDS, Guess, Meaning, motion, samples_of
 
 FORCE = ("force", "forces", "wrench", "ft", "m")  # files of recordings that hold no quantity of a joint
 
@@ -56,7 +56,7 @@ def guess_joined(log: Joined) -> Guess:
     BadLog
         Where a file is damaged.
     """
-    told: dict[str, Told] = {}
+    told: dict[str, Meaning] = {}
     samples = {}
     times = []
     for stem, part in log.parts.items():
@@ -68,7 +68,7 @@ def guess_joined(log: Joined) -> Guess:
         symbol = symbol_of(stem)
         if symbol and symbol not in {each.symbol for each in told.values()}:
             for k, name in enumerate(left):
-                told[f"{stem}/{name}"] = Told(symbol, k, f"column {k + 1} of the signal that its file's name tells")
+                told[f"{stem}/{name}"] = Meaning(symbol, k, f"column {k + 1} of the signal that its file's name tells")
                 samples[f"{stem}/{name}"] = values[name]
     joints = 1 + max((each.joint for each in told.values()), default=-1)
     found = Guess(told, joints)

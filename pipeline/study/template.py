@@ -18,7 +18,7 @@ from pipeline.maths.units import SI, canonical, measures
 from pipeline.robots.robot import Joint, Robot
 from pipeline.study.arm_guess import DEFAULT, Arm, arm_of
 from pipeline.study.channels import OF_THE_LOG
-from pipeline.study.guessing import Guess, Told, clock_hint, guess, samples_of
+from pipeline.study.guessing import Guess, Meaning, clock_hint, guess, samples_of
 from pipeline.study.roles import Role, roles_of
 from pipeline.study.side_by_side import grouped, guess_joined, start_of
 from pipeline.study.timing import has_clock, is_time, named_time
@@ -212,7 +212,7 @@ def _channels(drawn: Drawn, robot: Robot, touching: dict[str, str]) -> Iterator[
     yield "# of the log: time, and for tissue push, depth or tip_x, tip_y, tip_z, force or force_x, force_y, force_z"
 
 
-def _told(channel: Channel, told: Told, found: Guess, robot: Robot) -> str:
+def _told(channel: Channel, told: Meaning, found: Guess, robot: Robot) -> str:
     """The line of a channel that its number or content tells; commented out where the joint rests or is unknown."""
     if told.joint >= len(robot.joints):
         return f'# "<joint>.{told.symbol}" = {_text(channel.name)}  # joint {told.joint + 1}, which {robot.name} lacks'
