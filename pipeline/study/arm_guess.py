@@ -9,7 +9,7 @@ from pipeline import robots
 from pipeline.errors import BadRobot
 from pipeline.robots.from_toml import robot_of
 from pipeline.robots.robot import Kind, Robot
-from pipeline.study.guessing import Guess
+from pipeline.study.guessing import Holding
 from pipeline.toml import TomlTable
 from pipeline.toml.file import TomlFile
 
@@ -30,7 +30,7 @@ class Arm(NamedTuple):
     text: str = ""
 
 
-def arm_of(guesses: Sequence[Guess], folder: Path) -> Arm:
+def arm_of(guesses: Sequence[Holding], folder: Path) -> Arm:
     """The robot of logs: a listed one that fits, a description beside them, or one that is written.
 
     Raises
@@ -64,7 +64,7 @@ def arm_of(guesses: Sequence[Guess], folder: Path) -> Arm:
     return Arm(name, robot_made, f"written for the {n} joints of the logs: no listed robot fits", text)
 
 
-def _is_davinci(guess: Guess) -> bool:
+def _is_davinci(guess: Holding) -> bool:
     """Whether positions may be of the da Vinci arm: two joints that turn by less than half a turn, one that slides."""
     if guess.joints not in WIDTHS or len(guess.ranges) < 3:
         return False

@@ -36,7 +36,7 @@ class Meaning:
 
 
 @dataclass(frozen=True)
-class Guess:
+class Holding:
     """What the channels of a log hold, by their names; and how it moves."""
 
     told: dict[str, Meaning] = field(default_factory=dict)
@@ -75,7 +75,7 @@ def samples_of(log: Log, names: Sequence[str]) -> dict[str, Array]:
     return {name: values[: whole[-1] + 1 if len(whole) else 0] for name, values in found.items()}
 
 
-def guess(log: Log) -> Guess:
+def guess(log: Log) -> Holding:
     """What the channels of a log hold: by the numbers in their names where these tell, else by their content.
 
     Raises
@@ -85,12 +85,12 @@ def guess(log: Log) -> Guess:
     """
     numbers = [channel for channel in log.channels if channel.kind == "number" and not channel.derived]
     if not 0 < len(numbers) <= WIDEST:
-        return Guess()
+        return Holding()
     told = by_numbers(numbers)
     if told:
-        return _moved(log, Guess(told, 1 + max(each.joint for each in told.values())))
+        return _moved(log, Holding(told, 1 + max(each.joint for each in told.values())))
     if any(re.search("[A-Za-z]", channel.name.replace("column", "")) for channel in numbers):
-        return Guess()  # its names mean something, if not to us
+        return Holding()  # its names mean something, if not to us
     return _by_content(log, [channel.name for channel in numbers])
 
 
@@ -144,10 +144,10 @@ def _numbered(symbol: str, members: Sequence[tuple[str, str]]) -> dict[str, Mean
     return {name: Meaning(symbol, int(index) - first, "by the number in its name") for index, name in members}
 
 
-def _by_content(log: Log, names: Sequence[str]) -> Guess:
+def _by_content(log: Log, names: Sequence[str]) -> Holding:
     """Columns without names: a time, n positions, n velocities, and n efforts or currents."""
     if len(log.by_clock(names)) > 1:
-        return Guess()
+        return Holding()
     samples = samples_of(log, names)
     own = named_time(log)
     first = None if own or has_clock(log) else columns.rising([samples[name] for name in names])
@@ -156,7 +156,7 @@ def _by_content(log: Log, names: Sequence[str]) -> Guess:
     left = [name for name in names if name != time]
     t = samples.get(time) if time else _counted(log, len(samples[names[0]]))
     blocks = columns.blocks([samples[name] for name in left], t)
-    found = Guess(time=time, why_time=why)
+    found = Holding(time=time, why_time=why)
     if blocks is None:
         return found
     n, values = blocks.n, [samples[name] for name in left]
@@ -183,7 +183,7 @@ def _rate(t: Array) -> float:
     return (len(t) - 1) / float(t[-1] - t[0])
 
 
-def _moved(log: Log, found: Guess) -> Guess:
+def _moved(log: Log, found: Holding) -> Holding:
     """The same with how its joints move."""
     names = [name for name, told in found.told.items() if told.symbol in ("q", "dq")]
     samples: dict[str, Array] = {}
@@ -192,7 +192,7 @@ def _moved(log: Log, found: Guess) -> Guess:
     return motion(found, samples)
 
 
-def motion(found: Guess, samples: dict[str, Array]) -> Guess:
+def motion(found: Holding, samples: dict[str, Array]) -> Holding:
     """Which joints move, whether they repeat, and whether one is held at velocity after velocity."""
     q = {told.joint: samples[name] for name, told in found.told.items() if told.symbol == "q"}
     dq = {told.joint: samples[name] for name, told in found.told.items() if told.symbol == "dq" and name in samples}

@@ -4,7 +4,7 @@ import re
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from pipeline.study.guessing import Guess
+from pipeline.study.guessing import Holding
 
 FREE = re.compile(r"no_?-?(weight|load|mass|contact)|unloaded|free", re.IGNORECASE)
 HUNG = re.compile(r"weight|payload|(?<![a-z0-9])(\d+)(k?g)(?![a-z])", re.IGNORECASE)
@@ -20,7 +20,7 @@ class Role(NamedTuple):
     more: tuple[str, ...] = ()
 
 
-def roles_of(names: Sequence[str], guesses: Sequence[Guess]) -> list[Role]:
+def roles_of(names: Sequence[str], guesses: Sequence[Holding]) -> list[Role]:
     """The role of each log: by a word of its name, else by its motion among those of the others."""
     told = [_by_word(name) for name in names]
     repeating = [guess for guess, word in zip(guesses, told, strict=True) if not word and guess.repeats]
@@ -45,7 +45,7 @@ def _by_word(name: str) -> Role | None:
     return None
 
 
-def _by_motion(guess: Guess, covered: set[int]) -> Role:
+def _by_motion(guess: Holding, covered: set[int]) -> Role:
     if guess.ranges and not guess.moving:
         return Role("contact", "no joint moves in it, so nothing can be identified from it")
     if guess.repeats:
@@ -60,7 +60,7 @@ def _by_motion(guess: Guess, covered: set[int]) -> Role:
     return Role("validation", "its motion does not repeat, and that of another log does")
 
 
-def _one_identified(found: Sequence[Role], guesses: Sequence[Guess]) -> Iterator[Role]:
+def _one_identified(found: Sequence[Role], guesses: Sequence[Holding]) -> Iterator[Role]:
     """The same with the first log that moves as the one to identify from, as there is no other."""
     first = [bool(guess.moving) for guess in guesses].index(True)
     for i, role in enumerate(found):

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pipeline.logs.joined import Joined
 from pipeline.maths.signals import columns
-from pipeline.study.guessing import SET, WORDS, Guess, Meaning, motion, samples_of
+from pipeline.study.guessing import SET, WORDS, Holding, Meaning, motion, samples_of
 
 FORCE = ("force", "forces", "wrench", "ft", "m")  # files of recordings that hold no quantity of a joint
 
@@ -48,7 +48,7 @@ def _split(file: Path) -> tuple[str, str]:
     return name, ""
 
 
-def guess_joined(log: Joined) -> Guess:
+def guess_joined(log: Joined) -> Holding:
     """What the channels of joined files hold: joints in the order of columns, beside a time that rises throughout.
 
     Raises
@@ -71,7 +71,7 @@ def guess_joined(log: Joined) -> Guess:
                 told[f"{stem}/{name}"] = Meaning(symbol, k, f"column {k + 1} of the signal that its file's name tells")
                 samples[f"{stem}/{name}"] = values[name]
     joints = 1 + max((each.joint for each in told.values()), default=-1)
-    found = Guess(told, joints)
+    found = Holding(told, joints)
     if len(set(times)) == 1 and times[0] is not None:
         found = replace(found, time=str(times[0]), why_time="a column that rises throughout in every file, in seconds")
     return motion(found, samples)

@@ -18,7 +18,7 @@ from pipeline.maths.units import SI, canonical, measures
 from pipeline.robots.robot import Joint, Robot
 from pipeline.study.arm_guess import DEFAULT, Arm, arm_of
 from pipeline.study.channels import OF_THE_LOG
-from pipeline.study.guessing import Guess, Meaning, clock_hint, guess, samples_of
+from pipeline.study.guessing import Holding, Meaning, clock_hint, guess, samples_of
 from pipeline.study.roles import Role, roles_of
 from pipeline.study.side_by_side import grouped, guess_joined, start_of
 from pipeline.study.timing import has_clock, is_time, named_time
@@ -48,7 +48,7 @@ class Drawn:
 
     files: list[Path]
     log: Log
-    guess: Guess
+    guess: Holding
 
     @property
     def name(self) -> str:
@@ -110,7 +110,7 @@ def _drawn(files: list[Path], robot: Robot) -> Drawn:
         return Drawn(files, joined, guess_joined(joined))
     log = open_log(files[0])
     named = any(_guess(channel, robot) not in ("", "time") for channel in log.channels)
-    return Drawn(files, log, Guess() if named or is_tissue([*_touching(log, robot).values()]) else guess(log))
+    return Drawn(files, log, Holding() if named or is_tissue([*_touching(log, robot).values()]) else guess(log))
 
 
 def _alike(drawn: list[Drawn]) -> list[Drawn]:
@@ -156,7 +156,7 @@ def _log(drawn: Drawn, folder: Path, robot: Robot, role: Role) -> Iterator[str]:
     yield from _channels(drawn, robot, touching if tissue else {})
 
 
-def _rate(log: Log, found: Guess, tissue: bool) -> Iterator[str]:
+def _rate(log: Log, found: Holding, tissue: bool) -> Iterator[str]:
     """The line of a log's rate, where nothing else is its clock."""
     if has_clock(log) or named_time(log) or found.time:
         return
@@ -212,7 +212,7 @@ def _channels(drawn: Drawn, robot: Robot, touching: dict[str, str]) -> Iterator[
     yield "# of the log: time, and for tissue push, depth or tip_x, tip_y, tip_z, force or force_x, force_y, force_z"
 
 
-def _told(channel: Channel, told: Meaning, found: Guess, robot: Robot) -> str:
+def _told(channel: Channel, told: Meaning, found: Holding, robot: Robot) -> str:
     """The line of a channel that its number or content tells; commented out where the joint rests or is unknown."""
     if told.joint >= len(robot.joints):
         return f'# "<joint>.{told.symbol}" = {_text(channel.name)}  # joint {told.joint + 1}, which {robot.name} lacks'
