@@ -180,7 +180,7 @@ def test_a_report_says_what_a_campaign_asks(analysed, tmp_path):
     call("campaign", analysed, "--out", tmp_path)
     text = (tmp_path / "campaign.html").read_text()
     assert "Hand roll: parameters, in every study" in text
-    assert "detection level" in text
+    assert "Detection level" in text
     rows = {row["key"] for row in json.loads((analysed.parent.parent / "reports/arm/results.json").read_text())}
     about = json.loads((analysed.parent.parent / "reports/arm/summary.json").read_text())
     keys = [joint[name] for joint in about["joints"] for name in ("model_error", "detection_level", "coverage")]
