@@ -42,7 +42,7 @@ class Runner:
     console: Console
     force: bool = False
     workers: Callable[[], Executor] | None = None
-    perform: Callable[[Folders, Task], Outcome] | None = None  # how they do it, where not as this process does
+    perform: Callable[[Folders, Task], Outcome] | None = None  # how they do it
 
     def __post_init__(self) -> None:
         self.ledger = Ledger(self.folders)
@@ -146,7 +146,11 @@ class Runner:
             for reason, named in progress.reasons.items():
                 self.console.say(f"{_listed(name, named)}: {reason}")
             progress.reasons.clear()
-        how = partial(reporting.perform, self.ledger) if name == REPORT else partial(self.perform or perform, self.folders)
+        how = (
+            partial(reporting.perform, self.ledger)
+            if name == REPORT
+            else partial(self.perform or perform, self.folders)
+        )
         for part, tasks in due.items():
             self._due[part] = len(tasks) + 1
             for task in tasks:
