@@ -7,14 +7,16 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 from typer.testing import CliRunner
 
 from pipeline.runner import arithmetic
 
 arithmetic.pin()  # before anything loads numpy, as on the command line
 os.environ["MPLBACKEND"] = "Agg"
-settings.register_profile("project", deadline=None, derandomize=True)
+# How long examples take is a matter of the machine and of what else it does: no test fails of it.
+slow_machine = [HealthCheck.too_slow]
+settings.register_profile("project", deadline=None, derandomize=True, suppress_health_check=slow_machine)
 settings.register_profile("quick", settings.get_profile("project"), max_examples=20)
 settings.load_profile("project")
 
