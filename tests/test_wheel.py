@@ -73,6 +73,7 @@ def test_an_installed_package_simulates_and_analyses_in_an_empty_folder(installe
     run(program, "simulate", "davinci-joints", "raw/joints", cwd=tmp_path)
     run(program, "all", "--jobs", os.cpu_count() or 1, cwd=tmp_path)
     assert {file.name for file in (tmp_path / "reports" / "joints").iterdir()} == {
-        "report.html", "report.pdf", "robot.html", "robot.pdf", "results.json", "summary.txt", "summary.json"
+        "report.html", "report.pdf", "robot.html", "robot.pdf", "results.json", "summary.txt", "summary.json",
+        "manifest.txt",
     }  # fmt: skip
     assert "are unchanged" in run(program, "verify", "raw/joints", cwd=tmp_path)
