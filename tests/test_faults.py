@@ -5,7 +5,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from contextlib import suppress
 from pathlib import Path
 
@@ -15,7 +14,7 @@ import pytest
 from pipeline.records.store import PARTIAL
 from tests.test_robustness import flat, raw, small  # noqa: F401 - fixtures
 from tests.test_runs import call, contents, edit, processed, reports
-from tests.test_workers import alive
+from tests.test_workers import end_within
 
 LIMITED = """
 import resource, sys
@@ -198,10 +197,7 @@ def test_whoever_of_a_run_is_killed_whenever_the_bytes_are_the_same_and_nobody_i
         started = {*started, *children(run.pid)}
         run.kill()
         run.wait()
-        until = time.monotonic() + 5
-        while any(map(alive, started)) and time.monotonic() < until:
-            time.sleep(0.05)
-        assert not any(map(alive, started))
+        assert end_within(5.0, started)
         for name, content in contents(processed(folder)).items():
             assert name.endswith((PARTIAL, ".lock")) or content == wanted[0][name], name
         if attempt % 4 == 3:  # otherwise soon nothing would be left to be killed in

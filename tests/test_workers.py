@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterable
 from concurrent.futures import BrokenExecutor
 from contextlib import closing
 from functools import partial
@@ -133,6 +134,14 @@ def alive(pid: int) -> bool:
         return False
 
 
+def end_within(seconds: float, pids: Iterable[int]) -> bool:
+    """Whether these processes all end in so long."""
+    until = time.monotonic() + seconds
+    while any(map(alive, pids)) and time.monotonic() < until:
+        time.sleep(0.05)
+    return not any(map(alive, pids))
+
+
 @pytest.mark.skipif(sys.platform != "linux", reason="asks /proc who is alive")
 def test_workers_end_with_their_parent_however_it_ends(tmp_path):
     script = tmp_path / "left.py"
@@ -148,10 +157,7 @@ def test_workers_end_with_their_parent_however_it_ends(tmp_path):
     assert all(map(alive, working))
     parent.kill()
     parent.wait()
-    until = time.monotonic() + 5
-    while any(map(alive, working)) and time.monotonic() < until:
-        time.sleep(0.05)
-    assert not any(map(alive, working))
+    assert end_within(5.0, working)
 
 
 LOGS = ("one", "two")

@@ -44,10 +44,12 @@ def verify(study: Study, folders: Folders, wanted: str = "") -> Verified:
     if not recorded and not problems:
         raise NotReproduced(f"{folders.processed} holds no results; run `davinci-forces all {folders.raw}` first")
     problems += [*altered_files(folders, ledger, recorded), *unknown_files(folders, recorded)]
-    problems += differences_from_plan(Plan(study, ledger))
+    plan = Plan(study, ledger)
+    report = reporting.task(plan)
+    problems += differences_from_plan(plan, report)
     made, numbers = {}, 0
     try:
-        made = reporting.written(ledger, reporting.task(Plan(study, ledger)))
+        made = reporting.written(ledger, report)
         numbers = len(json.loads(made["results.json"]))
     except PipelineError as error:
         problems.append(f"the report cannot be made anew: {error}")
@@ -99,13 +101,13 @@ def unknown_files(folders: Folders, recorded: Iterable[str]) -> Iterator[str]:
                 yield f"{file} was made by no stage of this study"
 
 
-def differences_from_plan(plan: Plan) -> Iterator[str]:
+def differences_from_plan(plan: Plan, report: Task) -> Iterator[str]:
     """What a run would do again, and entries in the ledger of what it would not do."""
     ledger = plan.ledger
     for name in sorted({entry.stage for entry in ledger.entries()} - {*STEPS}):
         yield f"{ledger.folders.processed / 'tasks' / name} holds entries of {name}, and there is no such stage"
     for name in STEPS:
-        tasks = [reporting.task(plan)] if name == REPORT else list(plan.tasks(declaration(name)))
+        tasks = [report] if name == REPORT else list(plan.tasks(declaration(name)))
         planned = {file_name(task.name) for task in tasks}
         extra = [entry.task for entry in ledger.entries(name) if file_name(entry.task) not in planned]
         if extra:
