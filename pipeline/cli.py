@@ -1,6 +1,5 @@
 """Contact forces of a da Vinci arm from its motor currents, without a force sensor: from logs to a report."""
 
-import ast
 import re
 import sys
 from collections.abc import Callable, Iterator
@@ -8,6 +7,7 @@ from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
 from functools import wraps
 from importlib import import_module
+from inspect import cleandoc
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -181,9 +181,9 @@ def run_all(
 
 
 def docstring(module: str) -> str:
-    """What a module says of itself, without importing it."""
+    """What a module says of itself, which is what its file begins with; importing all would take seconds."""
     file = Path(__file__).parent / f"{module}.py"
-    return ast.get_docstring(ast.parse(file.read_text(encoding="utf-8"))) or ""
+    return cleandoc(file.read_text(encoding="utf-8").split('"""', 2)[1])
 
 
 for stage in STAGES:

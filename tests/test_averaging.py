@@ -88,6 +88,20 @@ def test_whole_samples_are_plainly_averaged():
     assert (folded.counts == 7).all()
 
 
+@pytest.mark.parametrize("samples", [2000, 2137, 399])
+def test_samples_on_the_phases_average_as_do_samples_next_to_them(samples):
+    """Where no fit is needed the average is that with one; so it is of periods that are not all whole, or of none."""
+    t, x = np.arange(samples) / 100, np.random.default_rng(3).normal(size=samples)
+    beside = t + np.where(np.arange(samples) % 7 == 3, 1e-6, 0.0)  # s, of 0.01 s: more than a sample on a phase is off
+    on, off = (averaging.fold(times, x, 4.0, 400) for times in (t, beside))
+    assert averaging.on_phases(t, 4.0, 400)
+    assert not averaging.on_phases(beside, 4.0, 400)
+    for name in averaging.Folded._fields:
+        assert_allclose(getattr(on, name), getattr(off, name), atol=1e-3, err_msg=name)
+    assert on.counts.sum() == samples
+    assert_allclose(on.noise, x - on.mean[np.arange(samples) % 400], atol=1e-12)
+
+
 def test_noise_keeps_its_size_and_stays_white_at_a_period_of_no_whole_number_of_samples():
     t = np.arange(20_000) / 100
     x = np.random.default_rng(0).normal(size=len(t))

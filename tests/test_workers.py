@@ -1,6 +1,7 @@
 """Tasks in other processes: all are done, whoever is killed, and nobody is left behind."""
 
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -111,12 +112,12 @@ from functools import partial
 from pathlib import Path
 sys.path[:0] = [{root!r}]
 from pipeline.runner import workers
-from tests.test_workers import sleep, task
+from tests.test_workers import {busy}, task
 workers.ALONE = -1.0
 if __name__ == "__main__":
     crew = workers.Crew(partial(workers.pool, 2))
     for i in range(2):
-        crew.submit(partial(sleep, Path(sys.argv[1])), task(str(i)))
+        crew.submit(partial({busy}, Path(sys.argv[1])), task(str(i)))
     list(crew.outcomes())
 """
 
@@ -124,6 +125,13 @@ if __name__ == "__main__":
 def sleep(folder: Path, each: Task) -> Outcome:
     (folder / str(os.getpid())).touch()
     time.sleep(600)
+    return Outcome(each, {})
+
+
+def compute(folder: Path, each: Task) -> Outcome:
+    """Compute for longer than anybody waits, and let no other thread have a turn meanwhile, as a compiler does."""
+    (folder / str(os.getpid())).touch()
+    re.match("(a+)+b", "a" * 60)
     return Outcome(each, {})
 
 
@@ -143,9 +151,10 @@ def end_within(seconds: float, pids: Iterable[int]) -> bool:
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="asks /proc who is alive")
-def test_workers_end_with_their_parent_however_it_ends(tmp_path):
+@pytest.mark.parametrize("busy", [sleep, compute], ids=lambda busy: busy.__name__)
+def test_workers_end_with_their_parent_however_it_ends(tmp_path, busy):
     script = tmp_path / "left.py"
-    script.write_text(LEFT.format(root=str(Path(__file__).parents[1])))
+    script.write_text(LEFT.format(root=str(Path(__file__).parents[1]), busy=busy.__name__))
     pids = tmp_path / "pids"
     pids.mkdir()
     parent = subprocess.Popen([sys.executable, str(script), str(pids)])

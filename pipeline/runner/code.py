@@ -1,7 +1,7 @@
 """The code that a result depends on: modules with everything of the pipeline that they import, by hash."""
 
 import ast
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
@@ -37,12 +37,20 @@ def _collect(sources: Iterable[Path], files: dict[Path, None]) -> None:
 @cache
 def _imports(file: Path) -> tuple[str, ...]:
     modules = []
-    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+    for node in _statements(ast.parse(file.read_text(encoding="utf-8"))):
         if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("pipeline"):
             for alias in node.names:
                 deeper = f"{node.module}.{alias.name}"
                 modules.append(deeper if _files(deeper) else node.module)
     return tuple(modules)
+
+
+def _statements(node: ast.AST) -> Iterator[ast.AST]:
+    """All statements below a node; what they are made of is most of a tree, and holds no import."""
+    yield node
+    for part in ("body", "handlers", "orelse", "finalbody", "cases"):
+        for each in getattr(node, part, ()):
+            yield from _statements(each)
 
 
 @cache

@@ -3,6 +3,7 @@ all logs waits for all of them.
 """
 
 from collections.abc import Iterable, Sequence
+from functools import cache
 from heapq import heappop, heappush
 from typing import NamedTuple
 
@@ -68,12 +69,17 @@ def _awaited(part: Part, names: Iterable[str], logs: Sequence[str]) -> list[Part
     """The parts that make what this one reads, as far as one of these stages makes it at all."""
     if part.stage == REPORT:
         return [Part(name, WHOLE) for name in names if name != REPORT]
-    asks = declaration(part.stage)
-    if part.log == WHOLE and goes_by_log(asks):
+    if part.log == WHOLE and goes_by_log(declaration(part.stage)):
         return [Part(part.stage, log) for log in logs]
-    awaited = []
-    for name in STAGES[: STAGES.index(part.stage)]:
-        for kind in {*declaration(name).makes} & {*asks.reads}:
-            own = part.log != WHOLE and is_about_log(kind) and goes_by_log(declaration(name))
-            awaited.append(Part(name, part.log if own else WHOLE))
-    return awaited
+    return [Part(name, part.log if own else WHOLE) for name, own in _makers(part.stage)]
+
+
+@cache
+def _makers(stage: str) -> tuple[tuple[str, bool], ...]:
+    """The stages that make what this one reads, each with whether what they made of a log is enough for that log."""
+    asks = declaration(stage)
+    return tuple(
+        (name, goes_by_log(asks) and goes_by_log(declaration(name)) and is_about_log(kind))
+        for name in STAGES[: STAGES.index(stage)]
+        for kind in {*declaration(name).makes} & {*asks.reads}
+    )

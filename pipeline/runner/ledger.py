@@ -1,4 +1,4 @@
-"""What was made from what: one small JSON file per task, next to the records it made.
+"""What was made from what: one small JSON file per task, next to the records it made, and an index of them all.
 
 A task is current while its fingerprint (inputs by content, settings, robot, records as declared, code, version) and the
 content of its outputs are what its entry says.  Comparing an old entry with a new fingerprint gives the reason to run.
@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from pipeline.records import store
+from pipeline.runner import index
 from pipeline.runner.canonical import hash_of_text
 from pipeline.runner.fingerprint import Fingerprint, differences
 
@@ -52,19 +53,31 @@ class Entry:
 
 
 class Ledger:
-    """The entries of one study.  Entries, and the files whose hash is asked for, are read once a run."""
+    """The entries of one study.  Entries, and the files whose hash is asked for, are read once a run.
 
-    def __init__(self, folders: Folders) -> None:
+    They are read from their index where that holds them all, or `one_by_one`.
+    """
+
+    def __init__(self, folders: Folders, one_by_one: bool = False) -> None:
         self.folders = folders
         self._digests: dict[str, str] = {}
         self.changes: list[tuple[Iterable[str], Iterable[str]]] = []  # files that went and came, one pair an entry
+        self.home = folders.processed / "tasks"
+        self._one_by_one, self._indexed = one_by_one, False
 
     def place(self, stage: str, task: str) -> Path:
         """Where the entry of a task is."""
-        return self.folders.processed / "tasks" / stage / f"{file_name(task)}.json"
+        return self.home / stage / f"{file_name(task)}.json"
 
     @cached_property
     def _entries(self) -> dict[str, dict[str, Entry]]:
+        indexed = {} if self._one_by_one else index.read(self.home, list(self._files()))
+        self._indexed = bool(indexed)
+        if not indexed:
+            return self._read_one_by_one()
+        return {stage: {name: Entry(**e) for name, e in named.items()} for stage, named in indexed.items()}
+
+    def _read_one_by_one(self) -> dict[str, dict[str, Entry]]:
         entries: dict[str, dict[str, Entry]] = {}
         shared: dict[tuple[tuple[str, str], ...], dict[str, str]] = {}
         for stage, name, file in self._files():
@@ -78,9 +91,8 @@ class Ledger:
 
     def _files(self) -> Iterator[tuple[str, str, str]]:
         """Stage, task and file of every entry; as text, since paths would take as long as hashing what was made."""
-        home = os.path.join(self.folders.processed, "tasks")
-        for name in sorted(glob("*/*.json", root_dir=home)):
-            yield os.path.dirname(name), os.path.basename(name).removesuffix(".json"), f"{home}{os.sep}{name}"
+        for name in sorted(glob("*/*.json", root_dir=self.home)):
+            yield os.path.dirname(name), os.path.basename(name).removesuffix(".json"), f"{self.home}{os.sep}{name}"
 
     def entry(self, stage: str, task: str) -> Entry | None:
         """The entry of a task, or None when it has not run or its entry cannot be read."""
@@ -99,6 +111,7 @@ class Ledger:
     def write(self, entry: Entry) -> None:
         """Record what a task made."""
         before = self.entry(entry.stage, entry.task)
+        self._forget_index()
         store.write_bytes(self.place(entry.stage, entry.task), sealed(entry).encode())
         self._entries.setdefault(entry.stage, {})[file_name(entry.task)] = entry
         self.changes.append((before.outputs if before else (), entry.outputs))
@@ -111,6 +124,7 @@ class Ledger:
 
     def remove(self, entry: Entry) -> None:
         """Forget a task, and remove what it made, with the folders that this leaves empty."""
+        self._forget_index()
         self._entries.get(entry.stage, {}).pop(file_name(entry.task), None)
         self.changes.append((entry.outputs, ()))
         for file in (*map(self.folders.file, entry.outputs), self.place(entry.stage, entry.task)):
@@ -118,6 +132,22 @@ class Ledger:
             with suppress(OSError):  # a folder that holds more stays
                 file.parent.rmdir()
                 file.parent.parent.rmdir()
+
+    def write_index(self) -> None:
+        """Put the index of all entries in place, unless it is."""
+        if self._entries and not self._indexed:
+            store.write_bytes(self.home / index.NAME, self.index())
+            self._indexed = True
+
+    def index(self) -> bytes:
+        """The content that the index of the entries has."""
+        return index.written({s: {n: vars(e) for n, e in named.items()} for s, named in self._entries.items()})
+
+    def _forget_index(self) -> None:
+        """Remove the index, which is about to say less than the entries do."""
+        if self._indexed or not self.changes:
+            self.home.joinpath(index.NAME).unlink(missing_ok=True)
+            self._indexed = False
 
     def made(self, outputs: Mapping[str, str]) -> None:
         """Take the hashes of files as whoever wrote them says."""

@@ -1,6 +1,10 @@
 """What a worker has imported before it is handed a task; importing this is what it takes."""
 
-from pipeline.runner import execution, workers
+from pipeline.logs.isolated import orphans
+
+orphans.end_with_parent()  # before the seconds of importing
+
+from pipeline.runner import execution, workers  # noqa: E402
 
 __all__ = ["execution"]
 

@@ -73,6 +73,8 @@ class Runner:
             self._run(Graph(names, [entry.name for entry in self.study.logs]), alone=len(names) == 1)
             if self._crew.breaks:
                 self._remove_leftovers()
+            if self.writable:
+                self.ledger.write_index()
         return self.failures == 0
 
     def preview(self, names: Iterable[str]) -> Iterator[str]:

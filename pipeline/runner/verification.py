@@ -9,7 +9,7 @@ from typing import Any
 from pipeline.errors import NotReproduced, PipelineError
 from pipeline.report import REPORT
 from pipeline.report.identity import MANIFEST, identity
-from pipeline.runner import STEPS, reporting
+from pipeline.runner import STEPS, index, reporting
 from pipeline.runner.ledger import Folders, Ledger, file_name
 from pipeline.runner.plan import Plan, Task
 from pipeline.runner.signature import declaration
@@ -38,12 +38,12 @@ def verify(study: Study, folders: Folders, wanted: str = "") -> Verified:
     NotReproduced
         With everything that is not what it was, or what it would be, one a line.
     """
-    ledger = Ledger(folders)
+    ledger = Ledger(folders, one_by_one=True)
     recorded = known_files(ledger)
     problems = [f"{file} was altered: it is not as a stage wrote it" for file in ledger.broken()]
     if not recorded and not problems:
         raise NotReproduced(f"{folders.processed} holds no results; run `davinci-forces all {folders.raw}` first")
-    problems += [*altered_files(folders, ledger, recorded), *unknown_files(folders, recorded)]
+    problems += [*altered_index(ledger), *altered_files(folders, ledger, recorded), *unknown_files(folders, recorded)]
     plan = Plan(study, ledger)
     report = reporting.task(plan)
     problems += differences_from_plan(plan, report)
@@ -72,6 +72,13 @@ def known_files(ledger: Ledger) -> dict[str, dict[str, str]]:
         for name, sha in (*entry.fingerprint["inputs"].items(), *entry.outputs.items()):
             recorded.setdefault(name, {}).setdefault(sha, f"{entry.stage} {entry.task}")
     return recorded
+
+
+def altered_index(ledger: Ledger) -> Iterator[str]:
+    """Whether the index, where there is one, says what the entries do."""
+    file = ledger.home / index.NAME
+    if file.is_file() and file.read_bytes() != ledger.index():
+        yield f"{file} is not what the entries beside it say; remove it, it is made anew by the next run"
 
 
 def altered_files(folders: Folders, ledger: Ledger, recorded: dict[str, dict[str, str]]) -> Iterator[str]:

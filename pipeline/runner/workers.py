@@ -12,6 +12,7 @@ from multiprocessing.connection import wait
 from threading import Thread
 from time import perf_counter
 
+from pipeline.logs.isolated import orphans
 from pipeline.runner.execution import Outcome
 from pipeline.runner.plan import Task
 from pipeline.stages import STAGES
@@ -32,7 +33,8 @@ def pool(jobs: int) -> Executor:
 
 
 def end_with_parent() -> None:
-    """End this process when the one that started it has ended, however that came."""
+    """End this process when the one that started it has ended, however that came, or the one that began the run."""
+    orphans.end_with_parent()
     parent = parent_process()
     if parent is not None:
         Thread(target=_await, args=(parent.sentinel,), daemon=True).start()

@@ -13,7 +13,10 @@ from pipeline.logs.isolated.wire import Message, receive, send
 from pipeline.maths.arrays import Array
 
 KEPT = 2  # children that wait for a next log: starting one takes longer than reading a small file
-START = "import sys; sys.path[:] = {path!r}; from pipeline.logs.isolated.child import serve; serve()"
+START = (
+    "import sys; sys.path[:] = {path!r}; from pipeline.logs.isolated import orphans; orphans.end_with_parent(); "
+    "from pipeline.logs.isolated.child import serve; serve()"
+)
 OUT_OF_TIME = 24  # the signal SIGXCPU, which Windows does not know
 PACKAGES = Path(__file__).parents[3]
 # One thread each, and Arrow's memory from the system: what libraries reserve beforehand counts as used.

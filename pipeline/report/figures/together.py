@@ -14,7 +14,10 @@ from pipeline.report.figures.svg import draw_svg, drawn
 
 FEWEST = 8  # figures that are worth another process, which takes as long to begin
 MOST = 4  # processes, this one among them
-PROGRAM = "from pipeline.report.figures.together import serve; serve()"
+PROGRAM = (
+    "from pipeline.logs.isolated import orphans; orphans.end_with_parent(); "
+    "from pipeline.report.figures.together import serve; serve()"
+)
 
 
 def draw_together(figures: Iterable[Figure | Figure3D]) -> None:
