@@ -23,7 +23,7 @@ def read(study: str | Path, record: str, **about: str) -> "pd.DataFrame":
     MissingRecord
         If the study has none: run its stages first.
     """
-    from pipeline.runner.dataframes import read as read_frames
+    from pipeline.runner.results.dataframes import read as read_frames
 
     return read_frames(Path(study), record, about)
 
@@ -41,7 +41,8 @@ def run(study: str | Path, *stages: str, force: bool = False, jobs: int = 1, qui
         If the study is wrong, another run is working on it, or a stage has nothing to work on.
     """
     from pipeline.errors import BadRequest
-    from pipeline.runner import STEPS, arithmetic
+    from pipeline.runner import STEPS
+    from pipeline.runner.processes import arithmetic
 
     arithmetic.pin()
 
@@ -64,6 +65,6 @@ def results(study: str | Path) -> "pd.DataFrame":
     MissingRecord
         If the study has no results: run its stages first.
     """
-    from pipeline.runner.dataframes import results as read_results
+    from pipeline.runner.results.dataframes import results as read_results
 
     return read_results(Path(study))

@@ -17,7 +17,8 @@ from typer.core import TyperCommand
 from pipeline.commands import COMMANDS
 from pipeline.errors import PipelineError
 from pipeline.report import REPORT
-from pipeline.runner import STEPS, arithmetic
+from pipeline.runner import STEPS
+from pipeline.runner.processes import arithmetic
 from pipeline.stages import STAGES
 
 if TYPE_CHECKING:

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 from typer.testing import CliRunner
 
-from pipeline.runner import arithmetic
+from pipeline.runner.processes import arithmetic
 
 arithmetic.pin()  # before anything loads numpy, as on the command line
 os.environ["MPLBACKEND"] = "Agg"

@@ -121,7 +121,7 @@ def test_a_verbose_run_names_every_task_with_its_time(study):
 
 @pytest.mark.medium
 def test_tasks_that_run_together_say_what_each_took(study, monkeypatch):
-    monkeypatch.setattr("pipeline.runner.workers.ALONE", -1.0)
+    monkeypatch.setattr("pipeline.runner.processes.workers.ALONE", -1.0)
     said = call("ingest", study, "--verbose", "--jobs", 2)
     done = re.findall(r"^ingest: (\w+): took \d+\.\d\d s$", said, re.M)
     assert {*done} == {"roll", "slide", "check", "push"}

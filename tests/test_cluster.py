@@ -14,8 +14,8 @@ from pathlib import Path
 import pytest
 
 from pipeline.errors import BadRequest
-from pipeline.runner import arithmetic, cluster, workers
 from pipeline.runner.ledger import Folders
+from pipeline.runner.processes import arithmetic, cluster, workers
 from tests import arm
 from tests.test_robustness import flat
 from tests.test_runs import call, contents, processed
@@ -24,6 +24,7 @@ pytest.importorskip("distributed")
 pytestmark = pytest.mark.slow
 
 MODULE = [sys.executable, "-m"]
+RECORDINGS = int(os.environ.get("DAVINCI_FORCES_RECORDINGS", "24"))
 
 
 @dataclass
@@ -73,7 +74,7 @@ def study_of(folder: Path, count: int) -> Path:
 
 def test_a_cluster_gives_the_same_bytes_though_a_worker_is_killed(local, tmp_path, monkeypatch):
     monkeypatch.setattr(workers, "ALONE", -1.0)
-    study = study_of(tmp_path / "one" / "raw" / "lab", 24)
+    study = study_of(tmp_path / "one" / "raw" / "lab", RECORDINGS)
     there = tmp_path / "two" / "raw" / "lab"
     shutil.copytree(study, there)
     from pipeline.stages import STAGES
@@ -90,7 +91,7 @@ def test_a_cluster_gives_the_same_bytes_though_a_worker_is_killed(local, tmp_pat
         time.sleep(0.05)
     assert run.poll() is None, run.stdout.read().decode()
     victim.send_signal(signal.SIGKILL)
-    said, _ = run.communicate(timeout=600)
+    said, _ = run.communicate(timeout=60 + 25 * RECORDINGS)
     assert run.returncode == 0, said.decode()
     assert contents(processed(there)) == contents(processed(study))
 
@@ -98,9 +99,10 @@ def test_a_cluster_gives_the_same_bytes_though_a_worker_is_killed(local, tmp_pat
 RUN = """
 import sys
 from pathlib import Path
-from pipeline.runner import arithmetic
+from pipeline.runner.processes import arithmetic
 arithmetic.pin()
-from pipeline.runner import runs, workers
+from pipeline.runner import runs
+from pipeline.runner.processes import workers
 workers.ALONE = -1.0
 study, address, *names = sys.argv[1:]
 sys.exit(0 if runs.run(Path(study), names, cluster=address) else 1)

@@ -151,9 +151,11 @@ def test_where_nothing_can_be_written_what_needs_no_writing_is_done(raw, read_on
 RUN = """
 import sys
 from pathlib import Path
-from pipeline.runner import STEPS, arithmetic
+from pipeline.runner import STEPS
+from pipeline.runner.processes import arithmetic
 arithmetic.pin()
-from pipeline.runner import runs, workers
+from pipeline.runner import runs
+from pipeline.runner.processes import workers
 workers.ALONE = -1.0
 if __name__ == "__main__":
     sys.exit(0 if runs.run(Path(sys.argv[1]), STEPS, jobs=2) else 1)

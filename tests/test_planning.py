@@ -8,10 +8,10 @@ import pytest
 
 from pipeline.records import KINDS, Fit, LogSummary, MeasurementNoise, Signal, Track, Whiteness
 from pipeline.robots import dvrk_psm
+from pipeline.runner.fingerprints.schemas import schemas
 from pipeline.runner.ledger import Entry, Folders, Ledger
 from pipeline.runner.places import about
 from pipeline.runner.plan import Plan
-from pipeline.runner.schemas import schemas
 from pipeline.runner.signature import declaration
 from pipeline.stages import STAGES
 from pipeline.study import LogEntry, Settings, Study

@@ -7,8 +7,8 @@ import pytest
 from typer.testing import CliRunner
 
 from pipeline.cli import app
-from pipeline.runner.canonical import hash_of_text
-from pipeline.runner.fingerprint import Fingerprint
+from pipeline.runner.fingerprints.canonical import hash_of_text
+from pipeline.runner.fingerprints.fingerprint import Fingerprint
 from pipeline.runner.ledger import Entry, Folders, Ledger
 from pipeline.runner.plan import Task
 from pipeline.runner.reuse import reused

@@ -13,8 +13,8 @@ import pytest
 from pipeline.errors import BadRequest
 from pipeline.records import Diagnostic, Recording
 from pipeline.robots import davinci
-from pipeline.runner.canonical import canonical, hash_of
-from pipeline.runner.code import code
+from pipeline.runner.fingerprints.canonical import canonical, hash_of
+from pipeline.runner.fingerprints.code import code
 from pipeline.runner.lock import locked
 from pipeline.stages import resample
 from tests import arm

@@ -12,7 +12,7 @@ from pipeline.errors import BadRobot, BadStudy
 from pipeline.maths.mechanics.kinematics import tip
 from pipeline.robots.from_toml import RESERVED
 from pipeline.robots.robot import Kind
-from pipeline.runner.canonical import hash_of
+from pipeline.runner.fingerprints.canonical import hash_of
 from pipeline.runner.reporting import study_files
 from pipeline.study import reading
 from pipeline.toml import TomlTable

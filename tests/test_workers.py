@@ -14,12 +14,12 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.runner import workers
 from pipeline.runner.execution import Outcome
-from pipeline.runner.fingerprint import Fingerprint
+from pipeline.runner.fingerprints.fingerprint import Fingerprint
 from pipeline.runner.graph import WHOLE, Graph, Part
 from pipeline.runner.plan import Task
-from pipeline.runner.workers import Crew, pool
+from pipeline.runner.processes import workers
+from pipeline.runner.processes.workers import Crew, pool
 from pipeline.stages import STAGES
 
 pytestmark = pytest.mark.medium
@@ -111,7 +111,7 @@ import sys
 from functools import partial
 from pathlib import Path
 sys.path[:0] = [{root!r}]
-from pipeline.runner import workers
+from pipeline.runner.processes import workers
 from tests.test_workers import {busy}, task
 workers.ALONE = -1.0
 if __name__ == "__main__":

@@ -16,7 +16,8 @@ def run(
     ] = None,
 ) -> None:
     """Write campaign.html and campaign.pdf from the reports that there are; studies without one are named."""
-    from pipeline.runner import campaign, runs
+    from pipeline.runner import runs
+    from pipeline.runner.results import campaign
 
     files, left_out = campaign.write(list(runs.studies(studies or [])), reports, out)
     for study in left_out:

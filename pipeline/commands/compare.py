@@ -22,7 +22,8 @@ def run(
 ) -> None:
     """Name every number of B that is not that of A, and the keys that only one of them has."""
     from pipeline.report.changes import changes
-    from pipeline.runner import runs, stated
+    from pipeline.runner import runs
+    from pipeline.runner.results import stated
 
     files = runs.results_of(a, reports), runs.results_of(b, reports)
     before, after = (stated.read(file) for file in files)

@@ -11,7 +11,7 @@ from collections.abc import Collection, Mapping
 from pathlib import Path
 from typing import Any
 
-from pipeline.runner.canonical import hash_of_text
+from pipeline.runner.fingerprints.canonical import hash_of_text
 
 NAME = "index.json"
 SHARED = "code", "schemas", "settings"  # parts of a fingerprint that are the same for many tasks

@@ -16,8 +16,8 @@ from typing import Any
 
 from pipeline.records import store
 from pipeline.runner import index
-from pipeline.runner.canonical import hash_of_text
-from pipeline.runner.fingerprint import Fingerprint, differences
+from pipeline.runner.fingerprints.canonical import hash_of_text
+from pipeline.runner.fingerprints.fingerprint import Fingerprint, differences
 
 
 @dataclass(frozen=True)

@@ -7,12 +7,12 @@ from typing import Any
 
 from pipeline.records import KINDS
 from pipeline.robots.robot import Kind
-from pipeline.runner.canonical import hash_of
-from pipeline.runner.code import code
-from pipeline.runner.fingerprint import Fingerprint
+from pipeline.runner.fingerprints.canonical import hash_of
+from pipeline.runner.fingerprints.code import code
+from pipeline.runner.fingerprints.fingerprint import Fingerprint
+from pipeline.runner.fingerprints.schemas import schemas
 from pipeline.runner.ledger import Ledger
 from pipeline.runner.places import Located, Places, about, is_about_log
-from pipeline.runner.schemas import schemas
 from pipeline.runner.signature import Declaration
 from pipeline.study import Study
 

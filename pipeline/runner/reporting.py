@@ -9,14 +9,15 @@ from time import perf_counter
 from pipeline.records import KINDS, Record, store
 from pipeline.records.catalogue import Catalogue, Provenance
 from pipeline.report import REPORT
-from pipeline.runner import arithmetic, stated
-from pipeline.runner.canonical import hash_of
-from pipeline.runner.code import code
 from pipeline.runner.execution import Outcome, said_of, without_folders
-from pipeline.runner.fingerprint import Fingerprint
+from pipeline.runner.fingerprints.canonical import hash_of
+from pipeline.runner.fingerprints.code import code
+from pipeline.runner.fingerprints.fingerprint import Fingerprint
 from pipeline.runner.ledger import Ledger
 from pipeline.runner.places import Located
 from pipeline.runner.plan import VERSION, Plan, Task
+from pipeline.runner.processes import arithmetic
+from pipeline.runner.results import stated
 from pipeline.study import Study, review
 from pipeline.study.review import Rating
 

@@ -16,9 +16,9 @@ from pipeline.runner.graph import WHOLE, Graph, Part, goes_by_log
 from pipeline.runner.ledger import Entry, Folders, Ledger, file_name
 from pipeline.runner.lock import locked
 from pipeline.runner.plan import Plan, Task, log_of
+from pipeline.runner.processes.workers import Crew
 from pipeline.runner.reuse import reused
 from pipeline.runner.signature import Declaration, declaration
-from pipeline.runner.workers import Crew
 from pipeline.stages import STAGES
 from pipeline.study import Study
 

@@ -12,8 +12,8 @@ from pipeline.report import REPORT
 from pipeline.runner.console import Verbosity, console, durations, printable
 from pipeline.runner.execution import Outcome
 from pipeline.runner.ledger import Folders
+from pipeline.runner.processes.workers import pool
 from pipeline.runner.runner import Runner
-from pipeline.runner.workers import pool
 from pipeline.study import Study, reading
 
 
@@ -159,7 +159,7 @@ def run(
 
 def run_on_cluster(runner: Runner, names: Sequence[str], address: str) -> bool:
     """Run stages with the workers of a Dask cluster; raises as `connected` does, and as any run."""
-    from pipeline.runner.cluster import connected, perform_there
+    from pipeline.runner.processes.cluster import connected, perform_there
 
     with connected(address, runner.folders) as (executor, terms):
         runner.workers, runner.perform = (lambda: executor), partial(perform_there, terms)

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from pipeline.cli import app
 from pipeline.errors import BadStudy
-from pipeline.runner.canonical import canonical
+from pipeline.runner.fingerprints.canonical import canonical
 from pipeline.simulation import haptic
 from pipeline.study import HapticScenario, reading
 from pipeline.study.haptics import SLIDE, SLIDE_NOISE, BadHaptics, read

@@ -28,7 +28,7 @@ def pool(jobs: int) -> Executor:
     method = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
     context = get_context(method)
     if method == "forkserver":
-        context.set_forkserver_preload(["pipeline.runner.preloaded"])
+        context.set_forkserver_preload(["pipeline.runner.processes.preloaded"])
     return ProcessPoolExecutor(jobs, mp_context=context, initializer=end_with_parent)
 
 

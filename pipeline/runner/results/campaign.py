@@ -12,8 +12,9 @@ from pipeline.records import store
 from pipeline.report.campaign.page import page
 from pipeline.report.campaign.studies import FLOORS, Campaigned, JointVerdict, joints_of, series_of
 from pipeline.report.verdicts import WORDS
-from pipeline.runner import runs, stated
-from pipeline.runner.drifting import findings
+from pipeline.runner import runs
+from pipeline.runner.results import stated
+from pipeline.runner.results.drifting import findings
 
 
 def write(studies: Sequence[Path], reports: Path | None, out: Path | None) -> tuple[list[Path], list[str]]:

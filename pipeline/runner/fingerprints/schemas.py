@@ -9,7 +9,7 @@ import numpy as np
 
 from pipeline.records import COLUMN_DTYPES, Record
 from pipeline.records.quantities import QUANTITIES
-from pipeline.runner.canonical import hash_of
+from pipeline.runner.fingerprints.canonical import hash_of
 from pipeline.runner.signature import declaration
 
 

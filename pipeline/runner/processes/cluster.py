@@ -13,12 +13,12 @@ from uuid import uuid4
 
 from pipeline.errors import BadRequest
 from pipeline.records import store
-from pipeline.runner import arithmetic
-from pipeline.runner.canonical import hash_of
-from pipeline.runner.code import PACKAGE
 from pipeline.runner.execution import Outcome, perform
+from pipeline.runner.fingerprints.canonical import hash_of
+from pipeline.runner.fingerprints.code import PACKAGE
 from pipeline.runner.ledger import Folders
 from pipeline.runner.plan import Task
+from pipeline.runner.processes import arithmetic
 
 PACKAGES = ("numpy", "scipy", "numba", "pyarrow", "statsmodels", "clarabel")  # that results are made with
 PATIENCE = 10.0  # [s] that a shared file system may take to show a file to others

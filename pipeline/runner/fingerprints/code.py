@@ -7,7 +7,7 @@ from pathlib import Path
 
 from pipeline.records import store
 
-PACKAGE = Path(__file__).parents[1]
+PACKAGE = Path(__file__).parents[2]
 
 
 @cache

@@ -4,7 +4,8 @@ from pipeline.logs.isolated import orphans
 
 orphans.end_with_parent()  # before the seconds of importing
 
-from pipeline.runner import execution, workers  # noqa: E402
+from pipeline.runner import execution  # noqa: E402
+from pipeline.runner.processes import workers  # noqa: E402
 
 __all__ = ["execution"]
 

@@ -1,0 +1,1 @@
+"""All that the outputs of a task depend on, by hash: values, code, and the declarations of records."""

@@ -1,0 +1,1 @@
+"""What a finished study states: its numbers as data frames, and those of many studies beside each other."""
