@@ -75,9 +75,10 @@ MATHS = (
 
 
 SOLVERS = {
+    "solver.py": {"clarabel"},
     "lmi.py": {"clarabel"},
     "conic.py": {"clarabel"},
-}  # what one module of maths alone imports beside them, where it is called
+}  # what modules of maths import beside them, where it is called
 
 
 def imports(source: Path) -> set[str]:

@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.sparse import csc_array
 
+from pipeline.maths.estimation import solver
 from pipeline.maths.haptics import lmi, motion
 from pipeline.maths.haptics.bimodal import Hand, cqlf_limit, energy, mode
 from pipeline.maths.haptics.motion import switched, worst
@@ -48,7 +49,7 @@ def test_a_map_takes_little_longer_than_its_bare_solves():
 
     hand, k_t = HANDS[0], np.linspace(1.0, 60.0, 900)
     A, bound = lmi.inequality(hand, 20.0)
-    settings, cones, nothing = lmi.quiet(), [clarabel.PSDTriangleConeT(2)] * 3, csc_array((3, 3))
+    settings, cones, nothing = solver.settings(lmi.TOLERANCE), [clarabel.PSDTriangleConeT(2)] * 3, csc_array((3, 3))
 
     def bare():
         for _ in k_t:

@@ -15,6 +15,7 @@ from scipy.sparse import csc_array, diags_array, eye_array, hstack, vstack
 
 from pipeline.errors import NotIdentifiable
 from pipeline.maths.arrays import Array, Integers
+from pipeline.maths.estimation import solver
 from pipeline.maths.estimation.least_squares import Triangle
 from pipeline.maths.mechanics.bodies import of_pseudo_inertias
 from pipeline.maths.models.mechanism import Mechanism
@@ -158,13 +159,7 @@ def at_price(F: csc_array, y: Array, cones: Cones, price: float) -> tuple[Array,
 
 
 def careful() -> Any:
-    """The solver's settings: no words, one thread, so that the same problem has the same answer, and small steps."""
-    import clarabel
-
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.max_threads = 1
-    settings.presolve_enable = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
+    """The solver's settings, with small steps."""
+    settings = solver.settings(TOLERANCE)
     settings.max_step_fraction = STEP
     return settings

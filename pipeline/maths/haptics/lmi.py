@@ -7,12 +7,11 @@ scaled first by the mean stiffness of both modes, which changes no answer, so th
 numbers near 1 for any hand.
 """
 
-from typing import Any
-
 import numpy as np
 from scipy.sparse import csc_array
 
 from pipeline.maths.arrays import Array, Booleans
+from pipeline.maths.estimation import solver
 from pipeline.maths.haptics.bimodal import Hand
 
 EXISTS = 1e-7  # t beyond what the solver's tolerance leaves
@@ -28,7 +27,7 @@ def holds(hand: Hand, k_t: Array) -> Booleans:
     """Whether a common quadratic Lyapunov function exists for each stiffness k_t (N,) [N/m]."""
     import clarabel
 
-    settings, cones = quiet(), [clarabel.PSDTriangleConeT(2)] * 3
+    settings, cones = solver.settings(TOLERANCE), [clarabel.PSDTriangleConeT(2)] * 3
     cost, nothing = np.array([0.0, 0.0, -1.0]), csc_array((3, 3))
     found = []
     for k in np.asarray(k_t, float).tolist():
@@ -62,15 +61,3 @@ def lmi_limit(hand: Hand, high: float) -> float:
         middle = 0.5 * (low + high)
         low, high = (middle, high) if holds(hand, np.array([middle]))[0] else (low, middle)
     return low
-
-
-def quiet() -> Any:
-    """The solver's settings: no words, one thread, so that the same problem has the same answer."""
-    import clarabel
-
-    settings = clarabel.DefaultSettings()
-    settings.verbose = False
-    settings.max_threads = 1
-    settings.presolve_enable = False
-    settings.tol_gap_abs = settings.tol_gap_rel = settings.tol_feas = TOLERANCE
-    return settings
