@@ -21,7 +21,7 @@ def entry(**changes) -> LogEntry:
 
 
 def run(signals, **changes):
-    made = list(average.run(signals, entry(**changes), arm.ARM, harmonics=0))
+    made = list(average.run(signals, entry(**changes), arm.ARM, harmonics=0, lowpass=17.0))
     return [r for r in made if isinstance(r, Average)], [r for r in made if isinstance(r, Diagnostic)]
 
 
@@ -179,7 +179,7 @@ def test_a_stated_period_that_the_data_do_not_have_is_refused():
 
 
 def test_what_averaging_removes_is_the_noise():
-    made = list(average.run([arm.signal(seed=3)], entry(), arm.ARM, harmonics=0))
+    made = list(average.run([arm.signal(seed=3)], entry(), arm.ARM, harmonics=0, lowpass=17.0))
     [noise] = [r for r in made if isinstance(r, PeriodResidual)]
     [mean] = [r for r in made if isinstance(r, Average)]
     assert mean.sigma_tau == pytest.approx(arm.NOISE["hand_roll"], rel=4 / np.sqrt(2 * 9000))

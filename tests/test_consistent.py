@@ -241,7 +241,7 @@ def smoothed(tau: np.ndarray) -> list[Smoothed]:
     t, segment = np.arange(N) / RATE, np.zeros(N, int)
     return [
         Smoothed(joint=joint.name, t=t, q=motion.q[:, i], dq=motion.dq[:, i], ddq=motion.ddq[:, i], tau=tau[:, i],
-                 segment=segment, **about)
+                 segment=segment, standing=np.zeros(N, int), **about)
         for i, joint in enumerate(ROBOT.joints[:3])
     ]  # fmt: skip
 

@@ -31,7 +31,7 @@ from tests.test_averaging import entry
 
 
 def trajectory(signal) -> Trajectory:
-    averages = average.run([signal], entry(name=signal.log), arm.ARM, harmonics=0)
+    averages = average.run([signal], entry(name=signal.log), arm.ARM, harmonics=0, lowpass=17.0)
     [mean] = [r for r in averages if isinstance(r, Average)]
     made = differentiate.run(mean, arm.joint(signal.joint), derivative="harmonics", harmonics=0)
     return next(r for r in made if isinstance(r, Trajectory))
@@ -143,7 +143,9 @@ def test_logs_of_a_joint_are_pooled():
 
 
 def test_both_ways_of_differentiating_agree():
-    [mean] = [r for r in average.run([arm.signal()], entry(), arm.ARM, harmonics=0) if isinstance(r, Average)]
+    [mean] = [
+        r for r in average.run([arm.signal()], entry(), arm.ARM, harmonics=0, lowpass=17.0) if isinstance(r, Average)
+    ]
     made = [
         next(differentiate.run(mean, arm.joint("hand_roll"), derivative=d, harmonics=0)) for d in ("harmonics", "fft")
     ]
@@ -162,7 +164,7 @@ def test_derivatives_are_those_of_the_trajectory():
 def test_a_harmonic_that_is_left_out_is_remarked_on():
     signal = arm.signal("hand_roll")
     object.__setattr__(signal, "q", signal.q + 0.05 * np.sin(2 * np.pi * 5 * signal.t / 10))
-    [mean] = [r for r in average.run([signal], entry(), arm.ARM, harmonics=0) if isinstance(r, Average)]
+    [mean] = [r for r in average.run([signal], entry(), arm.ARM, harmonics=0, lowpass=17.0) if isinstance(r, Average)]
     made = list(differentiate.run(mean, arm.joint("hand_roll"), derivative="harmonics", harmonics=0))
     assert "harmonic 5 of the position is" in str(made[-1].text)
 

@@ -49,7 +49,7 @@ def entry(**changes) -> LogEntry:
 
 
 def run(*signals, **changes) -> tuple[list[Average], list[str]]:
-    made = list(average.run(signals, entry(**changes), arm.ARM, harmonics=0))
+    made = list(average.run(signals, entry(**changes), arm.ARM, harmonics=0, lowpass=17.0))
     said = [text for record in made if isinstance(record, Diagnostic) for text in record.text]
     return [record for record in made if isinstance(record, Average)], said
 
@@ -131,7 +131,7 @@ def test_two_whole_periods_are_enough(T, periods):
 def test_less_than_two_periods_are_not_averaged_and_refused_where_a_period_is_stated():
     with pytest.raises(NotPeriodic, match=r"19.00 s hold no motion that repeats at least twice.*skip and until"):
         run(moved(np.arange(1900) / RATE), period=10.0)
-    [note] = average.run([moved(np.arange(1900) / RATE)], entry(), arm.ARM, harmonics=0)
+    [note] = average.run([moved(np.arange(1900) / RATE)], entry(), arm.ARM, harmonics=0, lowpass=17.0)
     assert note.text[0].endswith("nothing is averaged; its parameters come from the low-passed samples")
 
 

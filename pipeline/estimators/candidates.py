@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.estimators.observations import Observed, equations
-from pipeline.maths.arrays import Array, Booleans
+from pipeline.maths.arrays import Array, Booleans, Integers
 from pipeline.maths.models.coupled import CoupledArm
 from pipeline.maths.models.independent import IndependentJoint
 from pipeline.maths.models.model import Model
@@ -31,7 +31,7 @@ class Library(NamedTuple):
     model: CoupledArm | IndependentJoint
     logs: tuple[Observed, ...]
     added: tuple[tuple[Term, ...], ...]  # of each effort
-    samples: int  # of one effort, that the equations are made of
+    samples: Integers  # of each effort (m,), that the equations are made of
     by_block: Equations
     by_period: Equations
     inertias: Array  # (S, m, m, p) with M = inertias theta, along the trajectories
@@ -207,12 +207,13 @@ def residual_variance(part: Library, reaches: dict[str, Reach]) -> float:
 
 
 def reach_of(logs: Sequence[Observed], joint: str) -> Reach:
-    """How far and how fast a joint moves, over all logs that move it."""
+    """How far and how fast a joint moves where it does not stand still, over all logs that move it."""
     ranges, squares, count = [0.0], 0.0, 0
     for log in logs:
         i = [record.joint for record in log.records].index(joint)
-        low, high = np.percentile(log.motion.q[:, i], [1.0, 99.0])
+        q, dq = (x[:, i][log.records[i].standing == 0] for x in (log.motion.q, log.motion.dq))
+        low, high = np.percentile(q, [1.0, 99.0])
         ranges.append(float(high - low))
-        squares += float(log.motion.dq[:, i] @ log.motion.dq[:, i])
-        count += len(log.motion.dq)
+        squares += float(dq @ dq)
+        count += len(dq)
     return Reach(rounded(max(ranges)), rounded(float(np.sqrt(squares / count))))

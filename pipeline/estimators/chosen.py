@@ -1,4 +1,4 @@
-"""Choosing among candidates, the parameters of the chosen one, and what it predicts of the data that it left out."""
+"""Choosing among candidates, and the parameters of those that are fitted."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -7,19 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.estimators.candidates import Candidate, Library
-from pipeline.estimators.observations import Observed
-from pipeline.estimators.scores import scored
 from pipeline.maths.arrays import Array, Booleans
 from pipeline.maths.models.model import Model
 from pipeline.maths.selection.blocks import BLOCKS, MOST, left_out
 from pipeline.maths.selection.cross_validation import Judged, preferred, standard_error
 from pipeline.maths.selection.ridge import covariance, scaled_equations
-from pipeline.records import Prediction
-from pipeline.records.predict import CHOSEN
 from pipeline.robots.models import Reach
 from pipeline.robots.robot import Robot
-
-SCHEME = "leave a block of path out"
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,33 +140,9 @@ def parameters(
                 theta=theta,
                 theta_std_classical=np.sqrt(np.diag(covariance(together, ridge, errors / samples))),
                 theta_std=np.sqrt(jackknife),
-                samples=samples,
-                mse=float(errors.sum() / samples),
+                samples=int(samples.max()),
+                mse=float((errors / samples).sum()),
                 r2=float(1.0 - errors.sum() / squares.sum()),
                 condition=float(np.sqrt(np.linalg.cond(scaled_equations(together, ridge)[0]))),
             ),
         )
-
-
-def held_out(
-    chosen: Candidate, log: Observed, robot: Robot, reaches: dict[str, Reach], count: int
-) -> Iterator[Prediction]:
-    """The effort of each joint of a log in every block of its path, by the refit that had not seen it."""
-    block = np.tile(np.arange(BLOCKS), count)
-    without = [chosen.parameters(reaches, block == b) for b in range(BLOCKS)]
-    name = f"{chosen.variant}.{chosen.estimator}"
-    for i, (model, library) in enumerate(zip(chosen.models(robot, reaches), chosen.libraries, strict=True)):
-        own = next((seen for seen in library.logs if seen.number == log.number), None)
-        if own is None:
-            continue
-        Phi = model.regressor(own.motion).Phi
-        tau_hat = np.einsum("nmp,np->nm", Phi, np.array([part[i] for part in without])[own.block])
-        names = [record.joint for record in own.records]
-        for m, effort in enumerate(model.efforts):
-            record = own.records[names.index(effort)]
-            if not record.at_rest:
-                everywhere = np.ones(len(record), np.bool_)
-                yield scored(
-                    record, CHOSEN, name, "identification", SCHEME, "another path", tau_hat[:, m], everywhere,
-                    log.lowpass,
-                )  # fmt: skip

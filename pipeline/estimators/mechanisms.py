@@ -38,7 +38,7 @@ def held(model: Model, library: Library, equations: Equations, ridge: Ridge, fre
     made = nearest(factor(equations, ridge), model.mechanism)
     errors, squares = equations.errors(made.theta)[0], float(equations.squares.sum())
     estimate = free._replace(
-        theta=made.theta, mse=float(errors.sum() / library.samples), r2=float(1.0 - errors.sum() / squares)
+        theta=made.theta, mse=float((errors / library.samples).sum()), r2=float(1.0 - errors.sum() / squares)
     )
     rmse, rmse_free = (np.sqrt(x / library.samples) for x in (errors, equations.errors(free.theta)[0]))
     return Held(estimate, rmse, rmse_free, made.excess)

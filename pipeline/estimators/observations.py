@@ -11,7 +11,7 @@ from pipeline.maths.models.model import Model, Motion
 from pipeline.maths.selection.blocks import BLOCKS, MOST, path_blocks, repetitions
 from pipeline.maths.selection.equations import Equations, added, gathered
 from pipeline.maths.signals.noise import smoothed
-from pipeline.records import Average, Smoothed
+from pipeline.records import Average, Smoothed, Trajectory
 
 PER_CUTOFF = 3  # samples kept per period of the low-pass's cutoff: more of them say nothing new
 
@@ -21,11 +21,12 @@ class Observed(NamedTuple):
 
     records: tuple[Smoothed, ...]  # of n joints
     motion: Motion
-    tau: Array  # (N, n) effort, low-passed; NaN of a joint at rest, whose friction takes any value
+    tau: Array  # (N, n) effort, low-passed; NaN where a joint stands still: its friction takes any value
     block: Integers  # (N,) of the path
     period: Integers  # (N,) which repetition of the path; -1 where it does not repeat
     lowpass: float  # [Hz]
     number: int  # of the log, from 0
+    white: dict[str, float]  # the noise of each joint's effort, where periods tell it
 
     @property
     def moving(self) -> Booleans:
@@ -39,31 +40,50 @@ class Observed(NamedTuple):
         return self._replace(records=self.records[one], motion=motion, tau=self.tau[:, one])
 
     def rows(self, model: Model) -> tuple[Array, Array, Integers]:
-        """Phi (K, m, p) and tau (K, m) of a model of these joints, through one low-pass, and the samples (K,) kept."""
+        """Phi (K, m, p) and tau (K, m) of a model of these joints, through one low-pass, and the samples (K,) kept.
+
+        Those at which none of the model's joints moves are left out.
+        """
         names, rate = [record.joint for record in self.records], self.records[0].rate
         Phi, known = model.regressor(self.motion)
         step = max(1, int(rate / (PER_CUTOFF * self.lowpass)))
-        kept = np.flatnonzero(known & (np.arange(len(known)) % step == 0))
+        tau = self.tau[:, [names.index(effort) for effort in model.efforts]]
+        kept = np.flatnonzero(known & (np.arange(len(known)) % step == 0) & ~np.isnan(tau).all(axis=1))
         smooth = np.zeros((len(kept), *Phi.shape[1:]))
         some = Phi.any(axis=0)  # most columns are of one effort only
         smooth[:, some] = smoothed(Phi[:, some], self.motion.segment, rate, self.lowpass)[kept]
-        return smooth, self.tau[kept][:, [names.index(effort) for effort in model.efforts]], kept
+        return smooth, tau[kept], kept
 
 
 def observed(records: Sequence[Smoothed], averages: Iterable[Average], lowpass: float, number: int) -> Observed:
     """The joints of one log, in their order, which share a clock."""
     first = records[0]
-    period = next((a.period for a in averages if a.log == first.log), 0.0)
+    own = {a.joint: a for a in averages if a.log == first.log}
+    average = next(iter(own.values()), None)
     q, dq, ddq = (np.stack([getattr(r, name) for r in records], axis=1) for name in ("q", "dq", "ddq"))
-    tau = np.stack(
-        [np.full(len(r), np.nan) if r.at_rest else smoothed(r.tau, r.segment, r.rate, lowpass) for r in records], axis=1
-    )
+    tau = np.stack([smooth_effort(r, lowpass) for r in records], axis=1)
     motion = Motion(q, dq, ddq, 1.0 / first.rate, first.segment)
-    repetition = repetitions(first.t, period) if period else np.full(len(first), -1)
-    whole = int((first.t[-1] - first.t[0]) * (1 + 1e-9) / period) if period else 0
-    # At most so many groups of whole periods; what is left of one at the end goes with the last.
-    group = np.minimum(repetition, whole - 1) * min(whole, MOST) // whole if whole > 1 else np.full(len(first), -1)
-    return Observed(tuple(records), motion, tau, path_blocks(first.t, period), group, lowpass, number)
+    moving, white = np.asarray(~np.isnan(tau).all(axis=1)), {joint: a.sigma_tau_white for joint, a in own.items()}
+    block = path_blocks(first.t, average.period if average else 0.0, moving)
+    period = np.full(len(first), -1)
+    if average is not None:
+        kept = averaged(first.t, average)
+        # At most so many groups of whole periods.
+        period[kept] = repetitions(first.t[kept], average.period) * min(average.periods, MOST) // average.periods
+    return Observed(tuple(records), motion, tau, block, period, lowpass, number, white)
+
+
+def smooth_effort(record: Smoothed, lowpass: float) -> Array:
+    """The effort (N,) of a joint through the low-pass; NaN where it stands still, throughout where it is at rest."""
+    if record.at_rest:
+        return np.full(len(record), np.nan)
+    return np.where(record.standing > 0, np.nan, smoothed(record.tau, record.segment, record.rate, lowpass))
+
+
+def averaged(t: Array, own: Average | Trajectory) -> Booleans:
+    """Which samples (N,), at these times [s], belong to the whole periods that were averaged."""
+    since = t - own.t_start
+    return np.asarray((since >= 0.0) & (since < own.periods * own.period - 0.5 / own.rate))
 
 
 def pose_samples(
@@ -80,15 +100,15 @@ def pose_samples(
     return Regression(Phi[:, 0], tau[:, 0], np.zeros(len(kept)), ones, (0,), names, known), kept
 
 
-def equations(model: Model, logs: Sequence[Observed], count: int) -> tuple[int, Equations, Equations]:
+def equations(model: Model, logs: Sequence[Observed], count: int) -> tuple[Integers, Equations, Equations]:
     """The normal equations in cells of the paths (6 a log) and of the periods (20 a log) of all `count` logs.
 
-    And how many samples of each effort they are made of.
+    And how many samples of each effort (m,) they are made of.
     """
-    samples, by_block, by_period = 0, [], []
+    samples, by_block, by_period = np.zeros(len(model.efforts), np.int64), [], []
     for log in logs:
         Phi, tau, kept = log.rows(model)
-        samples += len(kept)
+        samples += (~np.isnan(tau)).sum(axis=0)
         block, period = log.block[kept] + BLOCKS * log.number, log.period[kept] + MOST * log.number
         by_block.append(gathered(Phi, tau, block, BLOCKS * count))
         by_period.append(gathered(Phi, tau, np.where(log.period[kept] < 0, -1, period), MOST * count))

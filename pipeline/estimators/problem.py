@@ -127,10 +127,10 @@ def factored(problem: Regression, weight: Array) -> Triangle:
         the columns of Phi are linearly dependent.
     """
     K, p = int(np.count_nonzero(weight)), problem.Phi.shape[1]
-    if np.ptp(problem.tau) == 0:
-        raise NotIdentifiable("the effort is the same throughout: check its channel")
     if p >= K:
         raise NotIdentifiable(f"{K} samples for {p} parameters: record more of the motion")
+    if np.ptp(problem.tau) == 0:
+        raise NotIdentifiable("the effort is the same throughout: check its channel")
     R = triangle(problem.Phi, problem.tau, weight)
     if not np.isfinite(R.squares):
         columns = {"weight": np.where(weight >= 0, weight, np.nan), "effort": problem.tau, "motion": problem.Phi.sum(1)}

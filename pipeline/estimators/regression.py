@@ -5,27 +5,37 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipeline.estimators.problem import NOTHING, Known, Regression
-from pipeline.maths.arrays import Array
+from pipeline.maths.arrays import Array, Booleans
 from pipeline.maths.models.independent import IndependentJoint
 from pipeline.maths.models.model import Model, Motion
 from pipeline.maths.signals.harmonics import kept_noise
 from pipeline.maths.signals.smoothing import motion, segments
+from pipeline.maths.signals.standstill import standing
 from pipeline.records import Signal, Trajectory
 
 
 def pose(model: IndependentJoint, trajectories: Sequence[Trajectory], known: Known = NOTHING) -> Regression:
-    """The least squares problem of one joint: the averaged periods of all its logs, one after the other.  (6.37)"""
+    """The least squares problem of one joint: the averaged periods of all its logs, one after the other.  (6.37)
+
+    What stands still counts as if it had not been recorded: friction takes any value there.
+    """
     lengths = [len(t) for t in trajectories]
     return Regression(
         Phi=np.vstack([model.regressor(averaged_motion(t)).Phi[:, 0] for t in trajectories]),
         tau=np.concatenate([t.tau for t in trajectories]),
         tau_var=np.concatenate([t.tau_var for t in trajectories]),
-        periods=np.concatenate([t.count for t in trajectories]),
+        periods=np.concatenate([np.where(stands_still(t), 0, t.count) for t in trajectories]),
         starts=tuple(np.cumsum([0, *lengths[:-1]]).tolist()),
         names=tuple(parameter.name for parameter in model.parameters),
         known=known,
         Phi_cov=np.array([row_covariance(model, t) for t in trajectories]),
     )
+
+
+def stands_still(t: Trajectory) -> Booleans:
+    """Where an averaged period (K,), which goes on as it began, stands still."""
+    q, dq = np.tile(t.q, 3), np.tile(t.dq, 3)
+    return standing(q, dq, np.zeros(len(q), np.int64), len(t.q) / t.period)[len(t.q) : 2 * len(t.q)]
 
 
 def row_covariance(model: IndependentJoint, t: Trajectory) -> Array:

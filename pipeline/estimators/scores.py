@@ -1,11 +1,16 @@
 """How well an effort was predicted, on one footing: raw, and with effort and prediction through the same low-pass."""
 
+from dataclasses import replace
+from typing import TypeVar
+
 import numpy as np
 
 from pipeline.maths.arrays import Array, Booleans
 from pipeline.maths.signals.noise import model_error, noise_std, smoothed
 from pipeline.maths.signals.smoothing import share_passed
 from pipeline.records import Prediction, Signal, Smoothed
+
+AnySignal = TypeVar("AnySignal", Signal, Smoothed)
 
 FIRST = 1111  # samples that the published rival's errors are over
 
@@ -20,8 +25,13 @@ def scored(
     tau_hat: Array,
     free: Booleans,
     lowpass: float,
+    white: float | None = None,
 ) -> Prediction:
-    """A prediction with its scores, over the samples where nothing touched the robot."""
+    """A prediction with its scores, over some of the samples (N,): where nothing touched the robot.
+
+    `white` is the noise of the effort where periods tell it; else it is what a low-pass takes out of the error, which
+    holds a ripple of the drive as well.
+    """
     tau, error = signal.tau[free], (signal.tau - tau_hat)[free]
     spread = tau - tau.mean()
     smooth, smooth_error = (
@@ -29,7 +39,7 @@ def scored(
     )
     rmse = float(np.sqrt(np.mean(error**2)))
     unexplained = float(np.linalg.norm(error) / (np.linalg.norm(spread) or 1.0))
-    noise = noise_std(signal.tau - tau_hat, signal.segment, signal.rate, lowpass)
+    noise = noise_std(signal.tau - tau_hat, signal.segment, signal.rate, lowpass) if white is None else white
     beyond_noise, beyond_noise_std = model_error(smooth_error, noise * np.sqrt(share_passed(signal.rate, lowpass)))
     return Prediction(
         log=signal.log,
@@ -53,6 +63,11 @@ def scored(
         tau=signal.tau,
         tau_hat=tau_hat,
     )
+
+
+def some(signal: AnySignal, which: Booleans) -> AnySignal:
+    """Some of the samples (N,) of a recording."""
+    return replace(signal, **{name: getattr(signal, name)[which] for name in signal.columns()})
 
 
 def relative(error: Array, tau: Array) -> float:

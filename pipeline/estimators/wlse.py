@@ -85,8 +85,8 @@ def reach_of(degrees: float, K: int) -> int:
 
 
 def usual(M: NDArray[np.int64]) -> int:
-    """The median of periods (K,), of which most logs have one number."""
-    return int(M[0]) if M.min() == M.max() else int(np.median(M))
+    """The median of periods (K,), of which most logs have one number, where there are any."""
+    return int(M[0]) if M.min() == M.max() else int(np.median(M[M > 0]))
 
 
 def around(x: Array, reach: int) -> Array:

@@ -21,6 +21,8 @@ class Average(Record):
     sigma_q: float
     sigma_dq: float
     sigma_tau: float
+    sigma_tau_white: float
+    relative_noise: float
     t: Column
     q: Column
     dq: Column
@@ -34,7 +36,7 @@ class Average(Record):
         """The period, which the joints of a log share, and the noise between periods."""
         yield Published(f"period.{self.log}", "period", std="period_std")
         yield Published(f"period.{self.log}.periods", "periods")
-        yield from self.publish(f"noise.{self.log}.{self.joint}", "sigma_q", "sigma_dq", "sigma_tau")
+        yield from self.publish(f"noise.{self.log}.{self.joint}", "sigma_q", "sigma_dq", "sigma_tau", "relative_noise")
 
 
 @dataclass(frozen=True, eq=False)

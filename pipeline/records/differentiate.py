@@ -20,6 +20,7 @@ class Trajectory(Record):
     sigma_q: float
     sigma_dq: float
     sigma_tau: float
+    sigma_tau_white: float
     t: Column
     q: Column
     dq: Column

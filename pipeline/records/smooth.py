@@ -9,7 +9,8 @@ from pipeline.records.record import Column, Counts, Record
 class Smoothed(Record):
     """The motion of one joint in one identification log, low-passed without delay, and its effort as recorded.
 
-    The noise is what the low-pass takes out.
+    The noise is what the low-pass takes out.  Where the joint stands still, friction takes any value up to its Coulomb
+    level: nothing is fitted to its effort there, nor judged by it.
     """
 
     log: str
@@ -25,3 +26,4 @@ class Smoothed(Record):
     ddq: Column
     tau: Column
     segment: Counts
+    standing: Counts

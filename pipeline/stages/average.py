@@ -8,11 +8,12 @@ from pipeline.errors import NotPeriodic
 from pipeline.maths.signals import averaging
 from pipeline.maths.signals.agreement import Difference, alike, alternating
 from pipeline.maths.signals.averaging import Folded, whole_periods
+from pipeline.maths.signals.noise import noise_std, smoothed
 from pipeline.maths.signals.period import Period, refine
 from pipeline.maths.signals.repetition import Repetition, repetition
-from pipeline.maths.signals.smoothing import segments
+from pipeline.maths.signals.smoothing import segments, share_passed
 from pipeline.maths.signals.stretch import stretch
-from pipeline.records import Average, Column, Diagnostic, PeriodResidual, Signal, diagnostic
+from pipeline.records import Average, Column, Counts, Diagnostic, PeriodResidual, Signal, diagnostic
 from pipeline.robots.robot import Robot
 from pipeline.study import LogEntry
 
@@ -25,7 +26,7 @@ MEASURED = ("q", "dq", "tau")
 
 
 def run(
-    signals: Sequence[Signal], entry: LogEntry, robot: Robot, *, harmonics: int
+    signals: Sequence[Signal], entry: LogEntry, robot: Robot, *, harmonics: int, lowpass: float
 ) -> Iterator[Average | PeriodResidual | Diagnostic]:
     """One period of each joint that moves, of the longest stretch that repeats; the joints of a log share both."""
     if entry.role != "identification":
@@ -54,7 +55,7 @@ def run(
     remarks += left_out(moving[0], span, kept, period, [(names[d.signal], d) for d in odd])
     period, more = honoured(period, entry)
     for signal in moving:
-        yield from averaged(signal, kept, period, entry.period or 0.0)
+        yield from averaged(signal, kept, period, entry.period or 0.0, lowpass)
     if remarks + more:
         yield diagnostic("average", entry.name, "warning", *remarks, *more)
 
@@ -173,7 +174,9 @@ def honoured(found: Period, entry: LogEntry) -> tuple[Period, list[str]]:
     ]
 
 
-def averaged(signal: Signal, span: slice, found: Period, stated: float) -> Iterator[Average | PeriodResidual]:
+def averaged(
+    signal: Signal, span: slice, found: Period, stated: float, lowpass: float
+) -> Iterator[Average | PeriodResidual]:
     """Fold one joint at a period, from the first sample of a stretch on."""
     K = averaging.phases(found.length, signal.rate)
     M = whole_periods(signal.t[span], found.length, signal.rate)
@@ -184,6 +187,8 @@ def averaged(signal: Signal, span: slice, found: Period, stated: float) -> Itera
         return averaging.fold(t, x[used], found.length, K)
 
     q, dq, tau = folded(signal.q), folded(signal.dq), folded(signal.tau)
+    white = white_noise(tau, signal.segment[used], signal.rate, lowpass)
+    size = float(np.sqrt(np.mean(smoothed(signal.tau, signal.segment, signal.rate, lowpass)[used] ** 2))) or 1.0
     yield Average(
         log=signal.log,
         joint=signal.joint,
@@ -196,6 +201,8 @@ def averaged(signal: Signal, span: slice, found: Period, stated: float) -> Itera
         sigma_q=averaging.noise_std(q),
         sigma_dq=averaging.noise_std(dq),
         sigma_tau=averaging.noise_std(tau),
+        sigma_tau_white=white,
+        relative_noise=white * float(np.sqrt(share_passed(signal.rate, lowpass))) / size,
         t=np.arange(K) / K * found.length,
         q=q.mean,
         dq=dq.mean,
@@ -206,3 +213,12 @@ def averaged(signal: Signal, span: slice, found: Period, stated: float) -> Itera
         count=q.counts,
     )
     yield PeriodResidual(signal.log, signal.joint, t=t, q_noise=q.noise, dq_noise=dq.noise, tau_noise=tau.noise)
+
+
+def white_noise(folded: Folded, segment: Counts, rate: float, lowpass: float) -> float:
+    """The standard deviation of noise that neither repeats nor is as slow as motion, with a degree spent per phase.
+
+    A ripple of the drive is faster than the motion, too, but repeats; what differs with the motion is slower.
+    """
+    degrees = len(folded.noise) - int((folded.counts > 0).sum())
+    return noise_std(folded.noise, segment, rate, lowpass) * float(np.sqrt(len(folded.noise) / degrees))

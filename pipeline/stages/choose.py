@@ -7,9 +7,10 @@ import numpy as np
 
 from pipeline.errors import NotIdentifiable
 from pipeline.estimators.candidates import Candidate, Library, candidates, reach_of
-from pipeline.estimators.chosen import BlockEstimate, Selection, held_out, parameters, selected
+from pipeline.estimators.chosen import BlockEstimate, Selection, parameters, selected
 from pipeline.estimators.mechanisms import NOTHING, held
 from pipeline.estimators.observations import Observed, observed
+from pipeline.estimators.unseen import predictions
 from pipeline.maths.models.model import Model
 from pipeline.records import Average, Choice, Diagnostic, Fit, Prediction, Smoothed, diagnostic
 from pipeline.robots.models import Reach
@@ -47,8 +48,9 @@ def run(
             yield from (fitted(candidate, candidate.estimator, *part) for part in found)
             if candidate.variant != "independent" and by_variant[candidate.variant] == name:
                 yield from possible(candidate, found, robot, reaches)
-    for log in logs:
-        yield from held_out(selection.chosen, log, robot, reaches, len(logs))
+    for candidate in worth.values():
+        for log in logs:
+            yield from predictions(candidate, candidate is selection.chosen, log, robot, reaches, len(logs))
 
 
 def by_log(smoothed: Iterable[Smoothed], averages: Iterable[Average], robot: Robot, lowpass: float) -> list[Observed]:

@@ -29,6 +29,7 @@ def run(
         sigma_q=average.sigma_q,
         sigma_dq=average.sigma_dq,
         sigma_tau=average.sigma_tau,
+        sigma_tau_white=average.sigma_tau_white,
         t=average.t,
         q=q,
         dq=dq,

@@ -174,10 +174,15 @@ def summary_of(
     )
 
 
+def left(regression: Regression, estimate: Estimate) -> Array:
+    """What a fit leaves of the effort that it was made from."""
+    return np.asarray((regression.tau - regression.Phi @ estimate.theta)[regression.periods > 0])
+
+
 def explained(regression: Regression, estimate: Estimate) -> float:
     """The share of the effort's variance that a fit explains, R2."""
-    residual = regression.tau - regression.Phi @ estimate.theta
-    spread = regression.tau - regression.tau.mean()
+    tau, residual = regression.tau[regression.periods > 0], left(regression, estimate)
+    spread = tau - tau.mean()
     return float(1 - residual @ residual / (spread @ spread))
 
 
@@ -205,7 +210,7 @@ def summarised(
     parts: Sequence[Part], model: IndependentJoint, name: str, regression: Regression, estimate: Estimate
 ) -> Fit:
     """A Fit with how well it describes what it was fitted to."""
-    residual = regression.tau - regression.Phi @ estimate.theta
+    residual = left(regression, estimate)
     return Fit(
         group=model.group,
         model=model.name,

@@ -9,11 +9,11 @@ from pipeline.errors import NotIdentifiable
 from pipeline.estimators import ESTIMATORS, estimator
 from pipeline.estimators.folds import folds
 from pipeline.estimators.known import known_of
-from pipeline.estimators.observations import observed, pose_samples
+from pipeline.estimators.observations import averaged, observed, pose_samples
 from pipeline.estimators.paths import ANOTHER_PATH, SAME_PATH, follows
 from pipeline.estimators.problem import Known
 from pipeline.estimators.regression import measured_motion, of_joints, pose, predicted
-from pipeline.estimators.scores import scored
+from pipeline.estimators.scores import scored, some
 from pipeline.estimators.used import describing, model_of, used
 from pipeline.maths.arrays import Array, Booleans
 from pipeline.maths.models.independent import IndependentJoint
@@ -65,16 +65,17 @@ def run(
             own = by_joint.get(signal.joint)
             yield from unseen(signal, signals, own, every, chosen, entry, robot, lowpass)
     elif entry.role == "identification":
-        averaged, samples = {t.joint: t for t in trajectories}, {s.joint: s for s in smoothed}
+        periods, samples = {t.joint: t for t in trajectories}, {s.joint: s for s in smoothed}
         refits = list(cross_fits)
         for signal in moving:
             model, joint = independent(robot.joint(signal.joint)), signal.joint
             known = known_of(robot.joint(joint))
             own_fits = [fit for fit in refits if fit.group == joint]
+            judged = samples[joint].standing == 0 if joint in samples else np.ones(len(signal), np.bool_)
             if own_fits:
-                yield from without_the_log(signal, averaged.get(joint), own_fits, model, lowpass)
-            elif joint in averaged:
-                yield from without_a_period(signal, averaged[joint], model, known, lowpass)
+                yield from without_the_log(signal, periods.get(joint), own_fits, model, judged, lowpass)
+            elif joint in periods:
+                yield from without_a_period(signal, periods[joint], model, known, judged, lowpass)
             elif joint in samples:
                 yield from without_a_segment(samples[joint], model, known, lowpass)
 
@@ -126,12 +127,16 @@ def along(fit: Fit, signal: Signal, signals: Sequence[Signal], robot: Robot, low
 
 
 def without_the_log(
-    signal: Signal, own: Trajectory | None, cross_fits: Iterable[CrossFit], model: IndependentJoint, lowpass: float
+    signal: Signal,
+    own: Trajectory | None,
+    cross_fits: Iterable[CrossFit],
+    model: IndependentJoint,
+    judged: Booleans,
+    lowpass: float,
 ) -> Iterator[Prediction]:
-    """Predict a log from fits to other identification logs."""
-    kept = whole(signal, own) if own is not None else np.ones(len(signal), np.bool_)
-    part, motion = at(signal, kept), kept_motion(signal, kept, lowpass)
-    everywhere = np.ones(len(part.t), np.bool_)
+    """Predict a log from fits to other identification logs, and judge them by some of its samples (N,)."""
+    kept = averaged(signal.t, own) if own is not None else np.ones(len(signal), np.bool_)
+    part, motion = some(signal, kept), kept_motion(signal, kept, lowpass)
     for fit in cross_fits:
         left_out = [str(names).split(", ") for names in fit.left_out]
         rows = [row for row, names in enumerate(left_out) if signal.log in names]
@@ -140,15 +145,18 @@ def without_the_log(
             scheme = "leave one log out" if number == 1 else f"leave {number} logs out"
             tau_hat = predicted(model, fit.theta[rows], motion)
             about = (fit.model, fit.estimator, signal.role, scheme, ANOTHER_PATH)
-            yield scored(part, *about, tau_hat, everywhere, lowpass)
+            yield scored(part, *about, tau_hat, judged[kept], lowpass, own.sigma_tau_white if own else None)
 
 
 def without_a_period(
-    signal: Signal, own: Trajectory, model: IndependentJoint, known: Known, lowpass: float
+    signal: Signal, own: Trajectory, model: IndependentJoint, known: Known, judged: Booleans, lowpass: float
 ) -> Iterator[Prediction | Diagnostic]:
-    """Predict each period of a log from fits to the other periods; only the effort is left out, not the path."""
-    kept = whole(signal, own)
-    part = at(signal, kept)
+    """Predict each period of a log from fits to the other periods; only the effort is left out, not the path.
+
+    They are judged by some of the log's samples (N,).
+    """
+    kept = averaged(signal.t, own)
+    part = some(signal, kept)
     since = part.t - own.t_start
     number = np.minimum((since / own.period + 1e-9).astype(int), own.periods - 1)
     group = np.array(folds(own.periods))[number]
@@ -164,9 +172,9 @@ def without_a_period(
             except NotIdentifiable as error:
                 yield not_predicted(signal, name, error)
                 del tau_hat[name]
-    everywhere, scheme = np.ones(len(since), np.bool_), "leave one period out"
     for name, effort in tau_hat.items():
-        yield scored(part, model.name, name, signal.role, scheme, SAME_PATH, effort, everywhere, lowpass)
+        about = (model.name, name, signal.role, "leave one period out", SAME_PATH)
+        yield scored(part, *about, effort, judged[kept], lowpass, own.sigma_tau_white)
 
 
 def without_a_segment(
@@ -175,7 +183,7 @@ def without_a_segment(
     """Predict each sixth of a log that does not repeat from fits to the other five."""
     log = observed([own], (), lowpass, 0)
     Phi = model.regressor(log.motion).Phi[:, 0]
-    everywhere, about = np.ones(len(own), np.bool_), ("identification", "leave a segment out", ANOTHER_PATH)
+    judged, about = own.standing == 0, ("identification", "leave a segment out", ANOTHER_PATH)
     for name in ESTIMATORS:
         tau_hat = np.empty(len(own))
         try:
@@ -185,7 +193,7 @@ def without_a_segment(
         except NotIdentifiable as error:
             yield not_predicted(own, name, error)
             continue
-        yield scored(own, model.name, name, *about, tau_hat, everywhere, lowpass)
+        yield scored(own, model.name, name, *about, tau_hat, judged, lowpass)
 
 
 def not_predicted(signal: Signal | Smoothed, name: str, error: NotIdentifiable) -> Diagnostic:
@@ -193,18 +201,6 @@ def not_predicted(signal: Signal | Smoothed, name: str, error: NotIdentifiable) 
     about = f"{signal.log}/{signal.joint}"
     said = f"{about}: {name} has no leave-out score, because a refit is not possible: {error}"
     return diagnostic("predict", f"{signal.log}.{signal.joint}", "note", said)
-
-
-def whole(signal: Signal, own: Trajectory) -> Booleans:
-    """Which samples belong to the whole periods that were averaged."""
-    since = signal.t - own.t_start
-    return np.asarray((since >= 0.0) & (since < own.periods * own.period - 0.5 / signal.rate))
-
-
-def at(signal: Signal, which: Booleans) -> Signal:
-    """Some of the samples of a signal."""
-    columns = {name: getattr(signal, name)[which] for name in signal.columns()}
-    return replace(signal, **columns)
 
 
 def kept_motion(signal: Signal, which: Booleans, lowpass: float) -> Motion:

@@ -29,10 +29,10 @@ def smoothed() -> list[Smoothed]:
         tau = model.regressor(Motion(q, dq, ddq, 1 / RATE, np.zeros(SAMPLES, int))).Phi @ theta
         tau += 0.1 * tau.std(axis=0) * random.normal(size=tau.shape)
         for i, joint in enumerate(ROBOT.joints):
+            zero = np.zeros(SAMPLES, int)
             columns = {"t": t, "q": q[:, i], "dq": dq[:, i], "ddq": ddq[:, i], "tau": tau[:, i]}
-            records.append(
-                Smoothed(f"run{number}", joint.name, RATE, 0, 0.0, 0.0, 0.0, **columns, segment=np.zeros(SAMPLES, int))
-            )
+            columns |= {"segment": zero, "standing": zero}
+            records.append(Smoothed(f"run{number}", joint.name, RATE, 0, 0.0, 0.0, 0.0, **columns))
     return records
 
 

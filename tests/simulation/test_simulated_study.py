@@ -123,7 +123,9 @@ def test_every_unbiased_estimator_finds_the_truth_of_averaged_periods_within_its
     signal = Signal(log, joint, "identification", 100.0, "as recorded", "differences", 0, 0, t=t, q=q,
                     dq=np.gradient(q, 0.01), tau=tau, segment=segment)  # fmt: skip
     entry = study.log(log)
-    (average_of,) = [r for r in average.run([signal], entry, study.robot, harmonics=0) if isinstance(r, Average)]
+    (average_of,) = [
+        r for r in average.run([signal], entry, study.robot, harmonics=0, lowpass=17.0) if isinstance(r, Average)
+    ]
     made = differentiate.run(average_of, it, derivative="harmonics", harmonics=0)
     trajectories = [r for r in made if isinstance(r, Trajectory)]
     fits = {r.estimator: r for r in fit.run(trajectories, [], study.robot, lowpass=17.0) if isinstance(r, Fit)}

@@ -11,12 +11,15 @@ BLOCKS = 6  # of a period, or of a recording that does not repeat
 MOST = 20  # groups at most that are left out, one refit each
 
 
-def path_blocks(t: Array, period: float) -> Integers:
+def path_blocks(t: Array, period: float, moving: Booleans | None = None) -> Integers:
     """The block of the path, 0 to 5, that each sample (N,) is in: the sixth of its period, or of the recording.
 
-    `t` [s]; a `period` of 0 [s] is that of a recording that does not repeat.
+    `t` [s]; a `period` of 0 [s] is that of a recording that does not repeat, of which sixths of what is `moving` (N,)
+    are taken, all where it is left out.
     """
     since = t - t[0]
+    if moving is not None and not moving.all() and not period:
+        since = np.concatenate([[0.0], np.cumsum(np.diff(t) * moving[1:])])
     length = period or float(since[-1]) * (1 + 1e-9) or 1.0
     return np.asarray((since / length % 1.0 * BLOCKS).astype(np.int64) % BLOCKS)
 

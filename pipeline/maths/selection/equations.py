@@ -40,15 +40,16 @@ class Equations(NamedTuple):
 def gathered(Phi: Array, tau: Array, cell: Integers, cells: int) -> Equations:
     """The equations of Phi (N, m, p) and tau (N, m), the rows of which are in cells (N,); rows in cell -1 are left out.
 
-    An effort that is NaN throughout a cell counts nothing there.
+    An effort counts nothing where it is NaN.
     """
     m, p = Phi.shape[1:]
     made = Equations(np.zeros((cells, m, p, p)), np.zeros((cells, m, p)), np.zeros((cells, m)))
     for c in np.unique(cell[cell >= 0]).tolist():
         rows = cell == c
         for i in range(m):
-            F, z = Phi[rows, i], tau[rows, i]
-            if len(z) and not np.isnan(z[0]):
+            told = rows & ~np.isnan(tau[:, i])
+            if told.any():
+                F, z = Phi[told, i], tau[told, i]
                 made.gram[c, i], made.right[c, i], made.squares[c, i] = F.T @ F, F.T @ z, z @ z
     return made
 

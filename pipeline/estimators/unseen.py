@@ -1,0 +1,109 @@
+"""What candidates predict of identification logs, by refits that had not seen what they predict.
+
+One scheme leaves blocks of path out, which is what a candidate is chosen by.  The other is that by which the joints'
+own fits are judged, so that all can be compared: without the log, or of one log without a period, else a segment.
+"""
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+import numpy as np
+
+from pipeline.estimators.candidates import Candidate, Library
+from pipeline.estimators.folds import folds
+from pipeline.estimators.observations import Observed
+from pipeline.estimators.paths import ANOTHER_PATH, SAME_PATH
+from pipeline.estimators.scores import scored, some
+from pipeline.maths.arrays import Array, Booleans, Integers
+from pipeline.maths.models.model import Model
+from pipeline.maths.selection.blocks import BLOCKS, MOST
+from pipeline.maths.selection.equations import Equations
+from pipeline.maths.selection.ridge import Ridge, solve
+from pipeline.records import Prediction
+from pipeline.records.predict import CHOSEN
+from pipeline.robots.models import Reach
+from pipeline.robots.robot import Robot
+
+
+class Scheme(NamedTuple):
+    """What refits leave out: cells of the equations, and which of them had not seen each sample of a log."""
+
+    name: str
+    path: str  # whether what is left out is repeated in what is kept
+    cells: Equations
+    out: Booleans  # (G, C) of each refit
+    refit: Integers  # (N,) of each sample, from 0; -1 of those that are not predicted
+
+
+class Refitted(NamedTuple):
+    """One model of a candidate in one log, ready to be refitted."""
+
+    model: Model
+    library: Library
+    ridge: Ridge
+    columns: list[int]  # of the library that the model has
+    log: Observed
+    total: int  # of all logs
+
+
+def predictions(
+    candidate: Candidate, is_chosen: bool, log: Observed, robot: Robot, reaches: dict[str, Reach], count: int
+) -> Iterator[Prediction]:
+    """The effort of each joint of a log, one of `count`, by refits of a candidate: as the joints' own fits are judged.
+
+    Of the chosen one also without blocks of path, as `chosen`.  Where a refit cannot be made there is none.
+    """
+    name = f"{candidate.variant}.{candidate.estimator}"
+    each = zip(candidate.models(robot, reaches), candidate.libraries, candidate.ridges(), strict=True)
+    for model, library, ridge in each:
+        own = next((seen for seen in library.logs if seen.number == log.number), None)
+        if own is None:
+            continue
+        made = Refitted(model, library, ridge, library.columns(candidate.friction, reaches), own, count)
+        Phi = model.regressor(own.motion).Phi
+        if is_chosen:
+            yield from by(blocks(made, "leave a block of path out"), made, Phi, CHOSEN, name)
+        if name != "independent.lse":  # which is a joint's own fit
+            yield from by(as_the_others(made), made, Phi, candidate.variant, candidate.estimator)
+
+
+def by(scheme: Scheme, made: Refitted, Phi: Array, name: str, estimator: str) -> Iterator[Prediction]:
+    """The efforts of a model in a log, each sample by the refit that had not seen it, scored where the joint moves."""
+    log, cells = made.log, scheme.cells.columns(made.columns)
+    try:
+        thetas = np.array([solve(cells.without(out), made.ridge) for out in scheme.out])
+    except np.linalg.LinAlgError:
+        return
+    kept = scheme.refit >= 0
+    tau_hat = np.einsum("nmp,np->nm", Phi[kept], thetas[scheme.refit[kept]])
+    names = [record.joint for record in log.records]
+    for m, effort in enumerate(made.model.efforts):
+        record = some(log.records[names.index(effort)], kept)
+        moves = record.standing == 0
+        if not record.at_rest and moves.any():
+            about = (name, estimator, "identification", scheme.name, scheme.path)
+            yield scored(record, *about, tau_hat[:, m], moves, log.lowpass, log.white.get(effort))
+
+
+def blocks(made: Refitted, name: str) -> Scheme:
+    """Leave each sixth of the path out, that of all logs together."""
+    out = np.tile(np.arange(BLOCKS), made.total) == np.arange(BLOCKS)[:, None]
+    return Scheme(name, ANOTHER_PATH, made.library.by_block, out, made.log.block)
+
+
+def as_the_others(made: Refitted) -> Scheme:
+    """Leave out what the joints' own fits are judged by: the log, with its neighbours of many, or a period of it."""
+    log, logs = made.log, made.library.logs
+    if len(logs) > 1:
+        fold = folds(len(logs))
+        mine = fold[[own.number for own in logs].index(log.number)]
+        left = [own.number for own, number in zip(logs, fold, strict=True) if number == mine]
+        out = np.isin(np.repeat(np.arange(made.total), BLOCKS), left)[None]
+        refit = np.where(log.period < 0, -1, 0) if log.period.max() >= 0 else np.zeros_like(log.period)
+        name = "leave one log out" if len(left) == 1 else f"leave {len(left)} logs out"
+        return Scheme(name, ANOTHER_PATH, made.library.by_block, out, refit)
+    if log.period.max() >= 1:
+        periods = np.arange(log.period.max() + 1)
+        out = MOST * log.number + periods[:, None] == np.arange(MOST * made.total)
+        return Scheme("leave one period out", SAME_PATH, made.library.by_period, out, log.period)
+    return blocks(made, "leave a segment out")
