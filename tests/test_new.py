@@ -237,16 +237,21 @@ def test_a_stranger_s_folder_becomes_a_study(data, tmp_path, folder):
     call("ingest", study)
 
 
-def test_a_joint_of_another_arm_is_identified_from_one_line_more_than_new_writes(data, tmp_path):
+@pytest.mark.parametrize("correction", ["# skip = 1.0", "skip = 11.0"])
+def test_a_joint_of_another_arm_is_identified_from_what_new_writes_corrected_or_not(data, tmp_path, correction):
+    """A slow start, five periods and a stop: by every fit, the chosen one included, however it is cross-validated."""
     study = tmp_path / "raw" / "ur10e"
     study.mkdir(parents=True)
     shutil.copy(data / "ur10e" / "joint_1.csv", study)
     new(study / "joint_1.csv")
     file = study / "study.toml"
-    file.write_text(file.read_text().replace("# skip = 1.0", "skip = 11.0"))
-    for stage in ("ingest", "resample", "average", "differentiate", "fit", "predict"):
+    file.write_text(file.read_text().replace("# skip = 1.0", correction))
+    for stage in ("ingest", "resample", "average", "smooth", "differentiate", "fit", "choose", "predict"):
         call(stage, study)
-    assert pipeline.read(study, "Prediction")["relative_error"].max() < 0.06
+    errors = pipeline.read(study, "Prediction").drop_duplicates(["model", "estimator"])
+    assert {"leave one period out", "leave a block of path out"} == set(errors["scheme"])
+    assert "chosen" in set(errors["model"])
+    assert errors["relative_error"].max() < 0.06
 
 
 def test_a_urdf_beside_the_logs_is_the_robot_and_currents_are_its_effort(data, tmp_path):

@@ -21,6 +21,7 @@ from pipeline.report.content import (
     literal,
 )
 from pipeline.report.context import Context, fit_name, title
+from pipeline.report.left_out import MEASURES
 
 SHOWN = 9  # runs at most in the PDF
 SAME = 1e-9  # relative errors closer than this are one
@@ -40,9 +41,9 @@ def blocks(context: Context, choice: Choice) -> Iterator[Block]:
         "Candidates are a structure, each joint by itself or coupled through the arm's links, with friction added to "
         "it, and a ridge. Each is refitted without a sixth of the path, without half of it, and without each log where "
         "there are several, and judged by the relative error where it was not fitted: measured motion, effort and "
-        "prediction through one low-pass, the mean over joints. One candidate is taken for the whole arm, the smallest "
-        "that is not clearly worse than the best and whose inertia is positive definite along the trajectories. "
-        "Leaving periods out instead repeats the path, and rewards every parameter: it is shown beside."
+        "prediction through one low-pass, the mean over joints, where they do not stand still. One candidate is taken "
+        "for the whole arm, the smallest that is not clearly worse than the best and whose inertia is positive "
+        f"definite along the trajectories. {MEASURES}"
     )
     yield Verdict("info", f"**Chosen: {literal(choice.chosen)}.** {literal(choice.why)}.")
     yield table(context, choice, leading(choice), "The best candidate of each variant.", "choice-table")
@@ -69,8 +70,10 @@ def leading(choice: Choice) -> list[int]:
 
 def table(context: Context, choice: Choice, rows: list[int], caption: str, label: str) -> Table:
     """Scores of candidates."""
-    header = ("Candidate", "Parameters", "Error unseen", "Where fitted", "Periods left out", "Physical")
-    said = f"{caption} Relative errors: on blocks of path left out, where fitted, and on repeated periods left out."
+    header = ("Candidate", "Parameters", "Path blocks left out", "Where fitted", "Periods left out", "Physical")
+    said = (
+        f"{caption} Relative errors: on blocks of path left out (raw samples), where fitted, and on periods left out."
+    )
     return Table(said, header, tuple(row(context, choice, i) for i in rows), label, "lrrrrl")
 
 

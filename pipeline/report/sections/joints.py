@@ -27,6 +27,7 @@ from pipeline.report.content import (
 from pipeline.report.context import Context, fit_name, label, title
 from pipeline.report.friction import friction_maps
 from pipeline.report.identified import correlations, wanting
+from pipeline.report.left_out import left_out
 from pipeline.report.overlaid import convergence, estimators
 from pipeline.report.plots import autocorrelation, binned_means, correlation, explained_by
 from pipeline.report.printed import printed_beside
@@ -91,6 +92,7 @@ def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
                 shown,
             )
     yield from implausible(fits)
+    yield from left_out(context, first.group)
     yield compared(context, fits)
 
 

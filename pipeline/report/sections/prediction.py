@@ -5,14 +5,8 @@ from collections.abc import Iterator
 from pipeline.records import Prediction
 from pipeline.report.content import Block, Cell, Figure, Line, OnScreen, Panel, Prose, Section, Table, VSpan, literal
 from pipeline.report.context import Context, fit_name, label, listed, title
+from pipeline.report.left_out import LEFT_OUT
 from pipeline.report.verdicts import percent
-
-LEFT_OUT = {
-    "leave one log out": "the log",
-    "leave one period out": "a period",
-    "leave a block of path out": "a block of path",
-    "leave a segment out": "a segment",
-}
 
 
 def section(context: Context) -> Section | None:
@@ -31,7 +25,8 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
         "more than 20, or, where it has only one, each of its periods in turn. On the path that was fitted the model's "
         "error repeats, so such a score flatters. "
         '$R^2$ is of the raw effort, and noise alone keeps it below its ceiling $1 - sigma^2 \\/ "var"(tau)$; the '
-        "model error is what differs beyond noise."
+        "model error is what differs beyond noise. Where a joint of an identification log stands still, friction takes "
+        "any value, and it is not judged."
     )
     used = [p for p in predictions if f"{p.model}.{p.estimator}" == context.used_fit(p.joint)]
     header = ("Log", "Joint", "Left out", "Path", "Model error", "Of effort", "$R^2$", "Ceiling")
@@ -95,8 +90,9 @@ def estimators(context: Context, predictions: list[Prediction]) -> Iterator[Tabl
 
 def worst(context: Context, predictions: list[Prediction], joint: str, model: str, estimator: str) -> Cell:
     """The model error of one fit in the worst run of a joint that was not fitted."""
-    own = [p for p in predictions if (p.joint, p.model, p.estimator) == (joint, model, estimator)]
-    unseen = [p for p in own if p.role != "identification"] or own
+    unseen = [p for p in predictions if p.joint == joint and p.role != "identification"]
+    unseen = unseen or [p for p in predictions if p.joint == joint]
+    unseen = [p for p in unseen if (p.model, p.estimator) == (model, estimator)]
     if not unseen:
         return "–"
     return context.number(f"{max(unseen, key=lambda p: p.model_error).prefix}.model_error", 3)
