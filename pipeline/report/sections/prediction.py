@@ -26,7 +26,7 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
         "error repeats, so such a score flatters. "
         '$R^2$ is of the raw effort, and noise alone keeps it below its ceiling $1 - sigma^2 \\/ "var"(tau)$; the '
         "model error is what differs beyond noise. Where a joint of an identification log stands still, friction takes "
-        "any value, and it is not judged."
+        "any value, and it is not judged; other logs are judged throughout."
     )
     used = [p for p in predictions if f"{p.model}.{p.estimator}" == context.used_fit(p.joint)]
     header = ("Log", "Joint", "Left out", "Path", "Model error", "Of effort", "$R^2$", "Ceiling")
