@@ -45,7 +45,7 @@ def row_covariance(model: IndependentJoint, t: Trajectory) -> Array:
     """
     J = model.sensitivity(averaged_motion(t))
     noise = kept_noise(t.sigma_q, len(t.q), t.harmonics, 2 * np.pi / t.period) / t.periods
-    return np.asarray(np.einsum("kip,ij,kjq->pq", J, noise, J) / len(t.q))
+    return np.asarray(np.tensordot(J, noise @ J, axes=((0, 1), (0, 1))) / len(t.q))
 
 
 def joined(parts: Sequence[Regression]) -> Regression:

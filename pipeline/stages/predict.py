@@ -12,7 +12,7 @@ from pipeline.estimators.known import known_of
 from pipeline.estimators.observations import averaged, observed, pose_samples
 from pipeline.estimators.paths import ANOTHER_PATH, SAME_PATH, follows
 from pipeline.estimators.problem import Known
-from pipeline.estimators.regression import measured_motion, of_joints, pose, predicted
+from pipeline.estimators.regression import measured_motion, of_joints, pose, predicted, stands_still
 from pipeline.estimators.scores import scored, some
 from pipeline.estimators.used import describing, model_of, used
 from pipeline.maths.arrays import Array, Booleans
@@ -162,13 +162,15 @@ def without_a_period(
     group = np.array(folds(own.periods))[number]
     Phi = model.regressor(kept_motion(signal, kept, lowpass)).Phi[:, 0]
     tau_hat = {name: np.empty(len(since)) for name in ESTIMATORS}
+    all_periods, moving = pose(model, [own], known), ~stands_still(own)
     rests = averaging.left_out(part.t, part.tau, own.period, len(own.t), group)
     for out, rest in enumerate(rests):
-        left = group == out
-        others = replace(own, tau=rest.mean, tau_var=rest.var, count=rest.counts)
+        left = np.flatnonzero(group == out)
+        rows = Phi[left]
+        others = replace(all_periods, tau=rest.mean, tau_var=rest.var, periods=np.where(moving, rest.counts, 0))
         for name in list(tau_hat):
             try:
-                tau_hat[name][left] = Phi[left] @ estimator(name)(pose(model, [others], known)).theta
+                tau_hat[name][left] = rows @ estimator(name)(others).theta
             except NotIdentifiable as error:
                 yield not_predicted(signal, name, error)
                 del tau_hat[name]
