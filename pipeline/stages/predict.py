@@ -71,13 +71,15 @@ def run(
             model, joint = independent(robot.joint(signal.joint)), signal.joint
             known = known_of(robot.joint(joint))
             own_fits = [fit for fit in refits if fit.group == joint]
-            judged = samples[joint].standing == 0 if joint in samples else np.ones(len(signal), np.bool_)
+            sampled = samples.get(joint)
+            judged = sampled.standing == 0 if sampled else np.ones(len(signal), np.bool_)
+            motion = smoothed_motion(sampled) if sampled else measured_motion(signal, lowpass)
             if own_fits:
-                yield from without_the_log(signal, periods.get(joint), own_fits, model, judged, lowpass)
+                yield from without_the_log(signal, motion, periods.get(joint), own_fits, model, judged, lowpass)
             elif joint in periods:
-                yield from without_a_period(signal, periods[joint], model, known, judged, lowpass)
-            elif joint in samples:
-                yield from without_a_segment(samples[joint], model, known, lowpass)
+                yield from without_a_period(signal, motion, periods[joint], model, known, judged, lowpass)
+            elif sampled:
+                yield from without_a_segment(sampled, model, known, lowpass)
 
 
 def unseen(
@@ -128,6 +130,7 @@ def along(fit: Fit, signal: Signal, signals: Sequence[Signal], robot: Robot, low
 
 def without_the_log(
     signal: Signal,
+    motion: Motion,
     own: Trajectory | None,
     cross_fits: Iterable[CrossFit],
     model: IndependentJoint,
@@ -136,7 +139,7 @@ def without_the_log(
 ) -> Iterator[Prediction]:
     """Predict a log from fits to other identification logs, and judge them by some of its samples (N,)."""
     kept = averaged(signal.t, own) if own is not None else np.ones(len(signal), np.bool_)
-    part, motion = some(signal, kept), kept_motion(signal, kept, lowpass)
+    part, motion = some(signal, kept), at(motion, kept)
     for fit in cross_fits:
         left_out = [str(names).split(", ") for names in fit.left_out]
         rows = [row for row, names in enumerate(left_out) if signal.log in names]
@@ -149,7 +152,13 @@ def without_the_log(
 
 
 def without_a_period(
-    signal: Signal, own: Trajectory, model: IndependentJoint, known: Known, judged: Booleans, lowpass: float
+    signal: Signal,
+    motion: Motion,
+    own: Trajectory,
+    model: IndependentJoint,
+    known: Known,
+    judged: Booleans,
+    lowpass: float,
 ) -> Iterator[Prediction | Diagnostic]:
     """Predict each period of a log from fits to the other periods; only the effort is left out, not the path.
 
@@ -160,7 +169,7 @@ def without_a_period(
     since = part.t - own.t_start
     number = np.minimum((since / own.period + 1e-9).astype(int), own.periods - 1)
     group = np.array(folds(own.periods))[number]
-    Phi = model.regressor(kept_motion(signal, kept, lowpass)).Phi[:, 0]
+    Phi = model.regressor(at(motion, kept)).Phi[:, 0]
     tau_hat = {name: np.empty(len(since)) for name in ESTIMATORS}
     all_periods, moving = pose(model, [own], known), ~stands_still(own)
     rests = averaging.left_out(part.t, part.tau, own.period, len(own.t), group)
@@ -205,7 +214,12 @@ def not_predicted(signal: Signal | Smoothed, name: str, error: NotIdentifiable) 
     return diagnostic("predict", f"{signal.log}.{signal.joint}", "note", said)
 
 
-def kept_motion(signal: Signal, which: Booleans, lowpass: float) -> Motion:
-    """The measured motion of a recording at some of its samples."""
-    q, dq, ddq, T_s, segment, periodic = measured_motion(signal, lowpass)
+def smoothed_motion(own: Smoothed) -> Motion:
+    """The motion of a joint along a recording, as it was smoothed to choose a model by."""
+    return Motion(own.q[:, None], own.dq[:, None], own.ddq[:, None], 1.0 / own.rate, own.segment)
+
+
+def at(motion: Motion, which: Booleans) -> Motion:
+    """A motion at some of its samples (N,)."""
+    q, dq, ddq, T_s, segment, periodic = motion
     return Motion(q[which], dq[which], ddq[which], T_s, segment[which], periodic)

@@ -12,15 +12,15 @@ BLOCK = 1 << 15  # samples whose basis is held at a time
 
 def basis(t: Array, omega: float, harmonics: int) -> Array:
     """The mean and the harmonics at these times, (N, 2 H + 1).  (6.16)"""
-    F = np.empty((len(t), 2 * harmonics + 1))
-    F[:, 0] = 1.0
+    F = np.empty((2 * harmonics + 1, len(t)))  # a harmonic's samples beside each other, which halves the time
+    F[0] = 1.0
     # Powers of one rotation cost a product each, where a cosine and a sine would cost twenty times as much.
     turn = np.exp(1j * omega * t)
     turned = np.ones_like(turn)
     for k in range(1, harmonics + 1):
-        turned = turned * turn
-        F[:, 2 * k - 1], F[:, 2 * k] = turned.real, turned.imag
-    return F
+        turned *= turn
+        F[2 * k - 1], F[2 * k] = turned.real, turned.imag
+    return F.T
 
 
 def project(t: Array, x: Array, omega: float, harmonics: int) -> Array:
