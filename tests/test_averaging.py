@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
 from pipeline.errors import NotPeriodic
-from pipeline.maths.signals import averaging, period
+from pipeline.maths.signals import averaging, harmonics, period
 from pipeline.records import Average, Diagnostic, PeriodResidual
 from pipeline.stages import average
 from pipeline.study import LogEntry
@@ -228,3 +228,22 @@ def test_leaving_a_group_out_is_averaging_the_others():
 
 def test_logs_of_other_roles_are_not_averaged():
     assert run([arm.signal()], role="validation") == ([], [])
+
+
+@pytest.mark.parametrize(("samples", "rate", "start"), [(5000, 100.0, 0.0), (1300, 7.3, 40.0), (256, 5.0, -3.0)])
+def test_evenly_sampled_harmonics_are_those_of_any_times(samples, rate, start):
+    """The blocks that differ by a turn give what the normal equations of all samples do."""
+    t = start + np.arange(samples) / rate
+    omega, H = 2 * np.pi / 10.3, 9
+    x = np.sin(omega * t) + np.random.default_rng(1).normal(size=samples)
+    F = harmonics.basis(t, omega, H)
+    c = harmonics.project(t, x, omega, H)
+    assert harmonics.even_step(t) == pytest.approx(1 / rate)
+    assert_allclose(c, np.linalg.lstsq(F, x, rcond=None)[0], atol=1e-12)
+    assert_allclose(harmonics.evaluate(c, t, omega), F @ c, atol=1e-11)
+
+
+def test_times_with_a_gap_or_a_shift_are_not_even():
+    t = np.arange(5000) / 100
+    for late in (t + 1e-5 * (np.arange(5000) > 4000), t + 1e-8 * np.sin(t), np.delete(t, slice(700, 720)), t[:200]):
+        assert harmonics.even_step(late) == 0.0

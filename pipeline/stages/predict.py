@@ -170,22 +170,23 @@ def without_a_period(
     number = np.minimum((since / own.period + 1e-9).astype(int), own.periods - 1)
     group = np.array(folds(own.periods))[number]
     Phi = model.regressor(at(motion, kept)).Phi[:, 0]
-    tau_hat = {name: np.empty(len(since)) for name in ESTIMATORS}
     all_periods, moving = pose(model, [own], known), ~stands_still(own)
     rests = averaging.left_out(part.t, part.tau, own.period, len(own.t), group)
-    for out, rest in enumerate(rests):
-        left = np.flatnonzero(group == out)
-        rows = Phi[left]
-        others = replace(all_periods, tau=rest.mean, tau_var=rest.var, periods=np.where(moving, rest.counts, 0))
-        for name in list(tau_hat):
-            try:
-                tau_hat[name][left] = rows @ estimator(name)(others).theta
-            except NotIdentifiable as error:
-                yield not_predicted(signal, name, error)
-                del tau_hat[name]
-    for name, effort in tau_hat.items():
+    others = [
+        replace(all_periods, tau=rest.mean, tau_var=rest.var, periods=np.where(moving, rest.counts, 0))
+        for rest in rests
+    ]
+    for name in ESTIMATORS:
+        tau_hat = np.empty(len(since))
+        try:
+            for out, regression in enumerate(others):
+                left = np.flatnonzero(group == out)
+                tau_hat[left] = Phi[left] @ estimator(name)(regression).theta
+        except NotIdentifiable as error:
+            yield not_predicted(signal, name, error)
+            continue
         about = (model.name, name, signal.role, "leave one period out", SAME_PATH)
-        yield scored(part, *about, effort, judged[kept], lowpass, own.sigma_tau_white)
+        yield scored(part, *about, tau_hat, judged[kept], lowpass, own.sigma_tau_white)
 
 
 def without_a_segment(

@@ -1,6 +1,7 @@
 """Finding the period of a recording from the recording itself."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -48,15 +49,13 @@ class NormalEquation(NamedTuple):
 
     gradient: float
     information: float
-    spectra: Array  # (N // 2 + 1,) product of the spectra of slope and residual, summed over the signals
-    weights: Array  # (N // 2 + 1,) power of the slope
-    kept: Array  # (N // 2 + 1,) share of white noise that fitting the harmonics leaves at each line
+    kept: Callable[[], Array]  # (N // 2 + 1,) share of white noise that fitting the harmonics leaves at each line
+    parts: list[tuple[float, Array, Array]]  # of each signal its weight, slope (N,) and residual (N,)
 
     @classmethod
     def at(cls, t: Array, signals: Sequence[Array], omega: float, harmonics: int) -> "NormalEquation":
         """Linearised at an angular frequency; `t` (N,) is centred, `signals` (N,) each."""
-        gradient = information = 0.0
-        spectra, weights = np.zeros(len(t) // 2 + 1, complex), np.zeros(len(t) // 2 + 1)
+        gradient, information, parts = 0.0, 0.0, []
         for x in signals:
             c = project(t, x, omega, harmonics)
             residual = x - evaluate(c, t, omega)
@@ -65,10 +64,8 @@ class NormalEquation(NamedTuple):
             weight = 1.0 / max(residual.var(), 1e-24 * x.var(), 1e-300)
             gradient += weight * float(free @ residual)
             information += weight * float(free @ free)
-            spectrum = np.fft.rfft(free)
-            spectra += weight * np.conj(spectrum) * np.fft.rfft(residual)
-            weights += weight * np.abs(spectrum) ** 2
-        return cls(gradient, information, spectra, weights, _kept(t, omega, harmonics))
+            parts.append((weight, free, residual))
+        return cls(gradient, information, partial(_kept, t, omega, harmonics), parts)
 
     @property
     def variance(self) -> float:
@@ -76,11 +73,16 @@ class NormalEquation(NamedTuple):
 
         The slope lies in narrow bands beside the harmonics, so few lines say how large the residuals are there.
         """
-        weights = self.weights / self.weights.sum()
+        spectra, weights = np.zeros(1, complex), np.zeros(1)
+        for weight, free, residual in self.parts:
+            spectrum = np.fft.rfft(free)
+            spectra = spectra + weight * np.conj(spectrum) * np.fft.rfft(residual)
+            weights = weights + weight * np.abs(spectrum) ** 2
+        weights = weights / weights.sum()
         lines = 1.0 / float(weights @ weights)
-        kept = float(weights @ self.kept) - 1.0 / (2.0 * lines)  # the slope was fitted, too
+        kept = float(weights @ self.kept()) - 1.0 / (2.0 * lines)  # the slope was fitted, too
         # Twice the sum over the half spectrum is that over the whole.
-        power = 2.0 * float(np.sum(np.abs(self.spectra) ** 2)) / (2 * len(self.spectra) - 2) ** 2
+        power = 2.0 * float(np.sum(np.abs(spectra) ** 2)) / (2 * len(spectra) - 2) ** 2
         return float(power / self.information**2 / kept * (1 + LOST / lines))
 
 
