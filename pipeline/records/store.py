@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -132,7 +133,7 @@ def read(kind: type[AnyRecord], folder: Path, place: Path, sha256: str = "") -> 
         if metadata["record"] != kind.__name__:
             raise KeyError(metadata["record"])
         scalars = {name: _scalar(value) for name, value in json.loads(metadata["scalars"]).items()}
-        columns = {name: table[name].to_numpy() for name in kind.columns()}
+        columns = {name: _values(table[name]) for name in kind.columns()}
         record = kind(**columns, **scalars)
         units = json.loads(metadata["units"]) | {f.name: f.metadata[b"unit"].decode() for f in table.schema}
     except (pa.ArrowException, PipelineError, LookupError, TypeError, ValueError, OSError, MemoryError) as error:
@@ -199,7 +200,28 @@ def _encoding(described: pa.Schema) -> dict[str, Any]:
 
 
 def _table(record: Record, described: pa.Schema) -> pa.Table:
-    return pa.table({f.name: pa.array(getattr(record, f.name), f.type) for f in described}, described)
+    return pa.table({f.name: _column(getattr(record, f.name), f.type) for f in described}, described)
+
+
+def _column(values: np.ndarray[Any, Any], kind: pa.DataType) -> pa.Array:
+    """A column as Arrow has it, of the same memory where it holds numbers.
+
+    `pa.array` would load pandas to ask whether these are of it, which takes longer than storing a short log.
+    """
+    if kind != pa.string():
+        return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(np.ascontiguousarray(values))])
+    texts = [text.encode() for text in values]
+    ends = np.cumsum([0, *map(len, texts)], dtype=np.int32)
+    return pa.StringArray.from_buffers(len(texts), pa.py_buffer(ends), pa.py_buffer(b"".join(texts)))
+
+
+def _values(column: pa.ChunkedArray) -> np.ndarray[Any, Any]:
+    """What `_column` stored."""
+    if column.type == pa.string():
+        return np.array(column.to_pylist(), object)
+    dtype = np.dtype(str(column.type))
+    chunks = [np.frombuffer(c.buffers()[1] or b"", dtype)[c.offset : c.offset + len(c)] for c in column.chunks]
+    return np.concatenate(chunks or [np.empty(0, dtype)])
 
 
 def _scalar(value: Any) -> Any:

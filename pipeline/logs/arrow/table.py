@@ -11,6 +11,7 @@ import pyarrow.compute as pc
 from pyarrow import feather, ipc, parquet
 
 from pipeline.errors import BadLog
+from pipeline.logs.columns import absent, integers, numbers
 from pipeline.logs.log import Block, Channel, Log, Options
 from pipeline.logs.names import unique
 from pipeline.maths.arrays import Array
@@ -113,9 +114,9 @@ def _numbers(column: pa.Array, origin: int) -> Array:
     if pa.types.is_timestamp(what) or pa.types.is_duration(what):
         per_second = PER_SECOND[what.unit]
         since = origin * per_second if pa.types.is_timestamp(what) else 0
-        known = column.cast(pa.int64()).fill_null(since).to_numpy(zero_copy_only=False)
-        return np.where(column.is_null().to_numpy(zero_copy_only=False), np.nan, (known - since) / per_second)
-    return np.asarray(column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False), np.float64)
+        whole = pa.chunked_array([column.cast(pa.int64())])
+        return np.where(absent(whole), np.nan, (integers(whole) - since) / per_second)
+    return numbers(pa.chunked_array([column.cast(pa.float64(), safe=False)]))
 
 
 def _describe_time(log: ArrowLog) -> None:
