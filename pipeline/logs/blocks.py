@@ -7,13 +7,15 @@ import numpy as np
 
 from pipeline.logs.log import Block
 
-ROWS = 1 << 16
+ROWS = 1 << 16  # of a block, or fewer
+CELLS = 1 << 20  # of a block of many channels
 
 
 def ahead(blocks: Iterator[Block]) -> Iterator[Block]:
-    """The same samples in blocks of at least `ROWS` rows, but for the last; each is made while the one before is used.
+    """The same samples in blocks of at least `ROWS` rows or `CELLS` cells, but for the last.
 
-    Parsing and compressing both leave the interpreter free, so that reading and storing a log share two processors.
+    Each is made while the one before is used: parsing and compressing both leave the interpreter free, so that reading
+    and storing a log share two processors.
     """
     made = _gathered(blocks)
     with ThreadPoolExecutor(max_workers=1) as reader:
@@ -29,7 +31,7 @@ def _gathered(blocks: Iterator[Block]) -> Iterator[Block]:
     for block in blocks:
         waiting.append(block)
         rows += len(next(iter(block.values()), ()))
-        if rows >= ROWS:
+        if rows >= ROWS or rows * len(block) >= CELLS:
             yield _joined(waiting)
             waiting, rows = [], 0
     if rows:

@@ -43,9 +43,9 @@ def opened(path: Path, options: Options) -> Log:
 def _of_hdf5(path: Path, log: Log) -> Iterator[Named]:
     import h5py
 
-    from pipeline.logs.hdf5.datasets import CACHE, arrays_of
+    from pipeline.logs.hdf5.datasets import arrays_of
 
-    yield from arrays_of(h5py.File(path, "r", rdcc_nbytes=CACHE, locking=False), log)
+    yield from arrays_of(h5py.File(path, "r", locking=False), log)
 
 
 def _of_matlab(path: Path, log: Log) -> Iterator[Named]:
