@@ -10,7 +10,8 @@ import json
 import os
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import fields
+from dataclasses import Field, fields
+from functools import cache
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
@@ -25,7 +26,7 @@ from pipeline.records.quantities import QUANTITIES
 
 Unit = Callable[[str], str]
 
-ARROW = {Column: pa.float64(), Counts: pa.int64(), Labels: pa.string()}
+ARROW: dict[Any, pa.DataType] = {Column: pa.float64(), Counts: pa.int64(), Labels: pa.string()}
 PARTIAL = ".partial"  # what the name of a file that is still being written ends with
 
 
@@ -43,7 +44,8 @@ class Writer:
     """
 
     def __init__(self, folder: Path, unit: Callable[[Record], Unit], made_from: dict[str, Any]) -> None:
-        self.folder, self.unit, self.made_from = folder, unit, made_from
+        self.folder, self.unit = folder, unit
+        self.made_from = json.dumps(made_from, ensure_ascii=False, sort_keys=True)
         self._open: dict[Path, pq.ParquetWriter] = {}
         self._unnamed = unnamed()
         self._last: dict[Path, Record] = {}
@@ -90,7 +92,7 @@ class Writer:
             "record": type(record).__name__,
             "scalars": json.dumps(values, ensure_ascii=False),
             "units": json.dumps(units, ensure_ascii=False),
-            "made_from": json.dumps(self.made_from, ensure_ascii=False, sort_keys=True),
+            "made_from": self.made_from,
         }
 
     @property
@@ -101,16 +103,19 @@ class Writer:
 
 def schema(kind: type[Record], unit: Unit) -> pa.Schema:
     """The columns of a record, each with its meaning and unit."""
+    return _schema(kind, tuple(unit(QUANTITIES[f.name].unit) for f in _stored(kind)))  # type: ignore[arg-type]  # a class is hashable
+
+
+@cache
+def _schema(kind: type[Record], units: tuple[str, ...]) -> pa.Schema:
     return pa.schema(
-        pa.field(
-            f.name,
-            ARROW[f.type],
-            nullable=False,
-            metadata={"meaning": QUANTITIES[f.name].meaning, "unit": unit(QUANTITIES[f.name].unit)},
-        )
-        for f in fields(kind)  # type: ignore[arg-type]
-        if f.type in ARROW
+        pa.field(f.name, ARROW[f.type], nullable=False, metadata={"meaning": QUANTITIES[f.name].meaning, "unit": unit})
+        for f, unit in zip(_stored(kind), units, strict=True)
     )
+
+
+def _stored(kind: Any) -> list[Field[Any]]:
+    return [f for f in fields(kind) if f.type in ARROW]
 
 
 def read(kind: type[AnyRecord], folder: Path, place: Path, sha256: str = "") -> AnyRecord:
