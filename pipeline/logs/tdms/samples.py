@@ -11,6 +11,7 @@ from pipeline.logs.tdms.walk import BLOCK, Column, Region
 
 ROWS = 1 << 17  # of a piece
 VALUES = 1 << 20  # of a block
+FAR = 1 << 16  # [bytes] between what is wanted of two records, which cost more to read than to pass over
 
 
 def rows_of(channels: int) -> int:
@@ -41,11 +42,21 @@ def _records(file: BinaryIO, region: Region, columns: dict[str, Column]) -> Iter
     needed = max(
         column.offset + (column.count - 1) * column.step + column.dtype.itemsize for column in columns.values()
     )
+    span = needed - begin
+    apart = region.stride - span > FAR
     for first in range(0, region.records, many):
-        records = min(many, region.records - first)
-        file.seek(region.position + first * region.stride + begin)
-        raw = file.read((records - 1) * region.stride + needed - begin)
-        yield {path: _view(raw, records, region.stride, column, begin) for path, column in columns.items()}
+        records, start = min(many, region.records - first), region.position + first * region.stride + begin
+        if apart:
+            raw = b"".join(_read(file, start + i * region.stride, span) for i in range(records))
+        else:
+            raw = _read(file, start, (records - 1) * region.stride + span)
+        stride = span if apart else region.stride
+        yield {path: _view(raw, records, stride, column, begin) for path, column in columns.items()}
+
+
+def _read(file: BinaryIO, position: int, octets: int) -> bytes:
+    file.seek(position)
+    return file.read(octets)
 
 
 def _view(raw: bytes, records: int, stride: int, column: Column, begin: int) -> NDArray[Any]:
@@ -66,8 +77,9 @@ def _slices(file: BinaryIO, region: Region, columns: dict[str, Column]) -> Itera
 
 def _slice(file: BinaryIO, start: int, column: Column, first: int, rows: int) -> NDArray[Any]:
     count = max(0, min(rows, column.count - first))
-    file.seek(start + column.offset + first * column.step)
-    return np.frombuffer(file.read(count * column.dtype.itemsize), column.dtype)
+    return np.frombuffer(
+        _read(file, start + column.offset + first * column.step, count * column.dtype.itemsize), column.dtype
+    )
 
 
 def _numbers(samples: NDArray[Any], origin: int) -> NDArray[np.float64]:
