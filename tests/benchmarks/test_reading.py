@@ -1,6 +1,5 @@
 """How fast logs become Parquet, beside a bare parser of text and npTDMS: `--full` for the promised sizes."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -8,30 +7,12 @@ import pyarrow.csv as csv
 import pytest
 
 from pipeline.logs import open_log
-from tests.benchmarks.reading import nptdms, nptdms_alone, ours, ours_alone, seconds
+from tests.benchmarks.reading import Report, nptdms, nptdms_alone, ours, ours_alone, seconds
 from tests.logs.lvm_writer import Style, Write, lvm
 from tests.logs.tdms_writer import daqmx, segment
 
 CHANNELS = 21  # position, velocity and torque of seven joints
 MB = 1_000_000
-Report = Callable[[str], None]
-
-
-@pytest.fixture(scope="module")
-def full(request: pytest.FixtureRequest) -> bool:
-    """Whether the promised sizes are asked for; else it is a tenth of them, at half the ratio."""
-    return bool(request.config.getoption("--full"))
-
-
-@pytest.fixture
-def report(capsys: pytest.CaptureFixture[str]) -> Report:
-    """Prints past the capture, so that the numbers are seen."""
-
-    def say(line: str) -> None:
-        with capsys.disabled():
-            print(f"\n{line}", end="")
-
-    return say
 
 
 def lvm_file(path: Path, size: int) -> tuple[Path, bytes]:
