@@ -10,7 +10,7 @@ import h5py
 import numpy as np
 
 from pipeline.errors import BadLog
-from pipeline.logs.arrays import ArrayLog, Named, take_in
+from pipeline.logs.arrays import ArrayLog, Named, matlab_object, take_in
 from pipeline.logs.log import Log, Options
 
 UNITS = ("units", "unit", "Units", "Unit")
@@ -57,7 +57,7 @@ def _arrays(file: h5py.File, node: Any, name: str, deep: int, log: Log) -> Itera
         for key in node if deep else ():
             yield from _arrays(file, _opened(file, f"{node.name}/{key}"), f"{name}/{key}", deep - 1, log)
     elif "MATLAB_object_decode" in node.attrs:
-        log.warnings.append(_object(name, _matlab_class(node)))
+        log.warnings.append(matlab_object(name, _matlab_class(node)))
     elif node.shape is None or "MATLAB_empty" in node.attrs:
         return
     elif _matlab_class(node) == "char" and node.dtype.kind == "u":
@@ -108,11 +108,6 @@ def _text(value: Any) -> str:
     value = value.item() if isinstance(value, np.ndarray | np.generic) and value.size == 1 else value
     value = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
     return value[:200] if isinstance(value, str) else ""
-
-
-def _object(name: str, kind: str) -> str:
-    how = f"{name}.Time and {name}.Data" if kind == "timeseries" else "its numbers"
-    return f"{name} is a MATLAB object ({kind}), which MATLAB alone reads: save {how} as variables of their own"
 
 
 @dataclass(frozen=True)
