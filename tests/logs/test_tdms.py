@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 from pipeline.errors import BadLog
 from pipeline.logs import blocks
 from pipeline.logs.tdms import samples as tdms_samples
-from pipeline.logs.tdms import samples as tdms_samples
 from pipeline.logs.tdms import scaled as tdms_scaled
 from pipeline.logs.tdms import walk as tdms_walk
 from tests.logs.cutting import is_cut_honestly
