@@ -88,8 +88,6 @@ def describe(file: Path, head: int, options: "Options | None" = None) -> dict[st
 
 def _survey(log: "Log", source: str, together: list[str], head: int) -> _Survey:
     """Read the channels of one clock, whose times `source` holds, if any does."""
-    import numpy as np
-
     from pipeline.maths.signals.clock import ClockStatistics
     from pipeline.maths.signals.outline import Outline
 
@@ -101,7 +99,7 @@ def _survey(log: "Log", source: str, together: list[str], head: int) -> _Survey:
     for block in log.blocks(together):
         count = len(next(iter(block.values())))
         t = block[source] if source in block else _counted(log, survey.rows, count)
-        survey.statistics.update(t, np.column_stack([block[name] for name in measured]) if measured else None)
+        survey.statistics.update(t, [block[name] for name in measured])
         for name in together:
             survey.outlines[name].update(block[name])
             survey.first[name].extend(block[name][: max(0, head - survey.rows)].tolist())

@@ -1,5 +1,6 @@
 """Logs that hold arrays by name, as MATLAB and HDF5 do: their columns as channels, read in slices."""
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -133,6 +134,18 @@ def take_in(log: ArrayLog, arrays: Sequence[Named]) -> None:
     if len(set(lengths.values())) > 1:
         counts = ", ".join(f"{name}: {length}" for name, length in list(lengths.items())[:6])
         log.warnings.append(f"arrays have different numbers of samples ({counts}); the shorter end in nulls")
+
+
+def matlab_object(name: str, kind: str = "") -> str:
+    """What to say of an object of MATLAB, with the line of MATLAB that makes a struct of a timeseries."""
+    said, variable = name.replace("/", "."), re.sub(r"\W+", "_", name).strip("_")
+    line = (
+        f"{variable} = struct('Time', {said}.Time, 'Data', squeeze({said}.Data)); save('{variable}.mat', '{variable}')"
+    )
+    what = f"{name} is a MATLAB object{f' ({kind})' if kind else ''}, which MATLAB alone reads"
+    if kind not in ("", "timeseries"):
+        return f"{what}: save its numbers as variables of their own"
+    return f"{what}: of a timeseries, run this in MATLAB and read the new file: {line}"
 
 
 def _shown(array: Named) -> str:

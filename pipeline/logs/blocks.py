@@ -7,20 +7,26 @@ import numpy as np
 
 from pipeline.logs.log import Block
 
-ROWS = 1 << 16
+ROWS = 1 << 16  # of a block, or fewer
+CELLS = 1 << 20  # of a block of many channels
 
 
 def ahead(blocks: Iterator[Block]) -> Iterator[Block]:
-    """The same samples in blocks of at least `ROWS` rows, but for the last; each is made while the one before is used.
+    """The same samples in blocks of at least `ROWS` rows or `CELLS` cells, but for the last.
 
-    Parsing and compressing both leave the interpreter free, so that reading and storing a log share two processors.
+    Each is made while the one before is used: parsing and compressing both leave the interpreter free, so that reading
+    and storing a log share two processors.  A log of one block needs no second one, which takes longer to start.
     """
     made = _gathered(blocks)
-    with ThreadPoolExecutor(max_workers=1) as reader:
-        following = reader.submit(next, made, None)
-        while (block := following.result()) is not None:
-            following = reader.submit(next, made, None)
-            yield block
+    block = next(made, None)
+    if block and not _is_full(_rows(block), len(block)):
+        yield block
+    elif block:
+        with ThreadPoolExecutor(max_workers=1) as reader:
+            while block:
+                following = reader.submit(next, made, None)
+                yield block
+                block = following.result()
 
 
 def _gathered(blocks: Iterator[Block]) -> Iterator[Block]:
@@ -28,12 +34,20 @@ def _gathered(blocks: Iterator[Block]) -> Iterator[Block]:
     rows = 0
     for block in blocks:
         waiting.append(block)
-        rows += len(next(iter(block.values()), ()))
-        if rows >= ROWS:
+        rows += _rows(block)
+        if _is_full(rows, len(block)):
             yield _joined(waiting)
             waiting, rows = [], 0
     if rows:
         yield _joined(waiting)
+
+
+def _rows(block: Block) -> int:
+    return len(next(iter(block.values()), ()))
+
+
+def _is_full(rows: int, channels: int) -> bool:
+    return rows >= ROWS or rows * channels >= CELLS
 
 
 def _joined(blocks: Sequence[Block]) -> Block:

@@ -10,6 +10,7 @@ import pyarrow as pa
 import pyarrow.csv as csv
 from numpy.typing import NDArray
 
+from pipeline.logs.columns import absent, numbers
 from pipeline.maths.arrays import Array, Booleans
 
 NUMBER = re.compile(rb"[+-]?((\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
@@ -78,10 +79,10 @@ def parse(
     columns = {i: table.column(f"{i}") for i in wanted}
     return Cells(
         rows=table.num_rows,
-        columns={i: times[i](column) if i in times else column.to_numpy() for i, column in columns.items()},
+        columns={i: times[i](column) if i in times else numbers(column) for i, column in columns.items()},
         nulls={i: column.null_count for i, column in columns.items()},
         texts=table.column(f"{text}").to_pylist() if text >= 0 else [],
-        empty={i: column.is_null().to_numpy() for i, column in columns.items() if column.null_count},
+        empty={i: absent(column) for i, column in columns.items() if column.null_count},
     )
 
 

@@ -10,11 +10,13 @@ import json
 import os
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import fields
+from dataclasses import Field, fields
+from functools import cache
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
 
+import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -24,7 +26,7 @@ from pipeline.records.quantities import QUANTITIES
 
 Unit = Callable[[str], str]
 
-ARROW = {Column: pa.float64(), Counts: pa.int64(), Labels: pa.string()}
+ARROW: dict[Any, pa.DataType] = {Column: pa.float64(), Counts: pa.int64(), Labels: pa.string()}
 PARTIAL = ".partial"  # what the name of a file that is still being written ends with
 
 
@@ -42,7 +44,8 @@ class Writer:
     """
 
     def __init__(self, folder: Path, unit: Callable[[Record], Unit], made_from: dict[str, Any]) -> None:
-        self.folder, self.unit, self.made_from = folder, unit, made_from
+        self.folder, self.unit = folder, unit
+        self.made_from = json.dumps(made_from, ensure_ascii=False, sort_keys=True)
         self._open: dict[Path, pq.ParquetWriter] = {}
         self._unnamed = unnamed()
         self._last: dict[Path, Record] = {}
@@ -89,7 +92,7 @@ class Writer:
             "record": type(record).__name__,
             "scalars": json.dumps(values, ensure_ascii=False),
             "units": json.dumps(units, ensure_ascii=False),
-            "made_from": json.dumps(self.made_from, ensure_ascii=False, sort_keys=True),
+            "made_from": self.made_from,
         }
 
     @property
@@ -100,16 +103,19 @@ class Writer:
 
 def schema(kind: type[Record], unit: Unit) -> pa.Schema:
     """The columns of a record, each with its meaning and unit."""
+    return _schema(kind, tuple(unit(QUANTITIES[f.name].unit) for f in _stored(kind)))  # type: ignore[arg-type]  # a class is hashable
+
+
+@cache
+def _schema(kind: type[Record], units: tuple[str, ...]) -> pa.Schema:
     return pa.schema(
-        pa.field(
-            f.name,
-            ARROW[f.type],
-            nullable=False,
-            metadata={"meaning": QUANTITIES[f.name].meaning, "unit": unit(QUANTITIES[f.name].unit)},
-        )
-        for f in fields(kind)  # type: ignore[arg-type]
-        if f.type in ARROW
+        pa.field(f.name, ARROW[f.type], nullable=False, metadata={"meaning": QUANTITIES[f.name].meaning, "unit": unit})
+        for f, unit in zip(_stored(kind), units, strict=True)
     )
+
+
+def _stored(kind: Any) -> list[Field[Any]]:
+    return [f for f in fields(kind) if f.type in ARROW]
 
 
 def read(kind: type[AnyRecord], folder: Path, place: Path, sha256: str = "") -> AnyRecord:
@@ -132,7 +138,7 @@ def read(kind: type[AnyRecord], folder: Path, place: Path, sha256: str = "") -> 
         if metadata["record"] != kind.__name__:
             raise KeyError(metadata["record"])
         scalars = {name: _scalar(value) for name, value in json.loads(metadata["scalars"]).items()}
-        columns = {name: table[name].to_numpy() for name in kind.columns()}
+        columns = {name: _values(table[name]) for name in kind.columns()}
         record = kind(**columns, **scalars)
         units = json.loads(metadata["units"]) | {f.name: f.metadata[b"unit"].decode() for f in table.schema}
     except (pa.ArrowException, PipelineError, LookupError, TypeError, ValueError, OSError, MemoryError) as error:
@@ -199,7 +205,28 @@ def _encoding(described: pa.Schema) -> dict[str, Any]:
 
 
 def _table(record: Record, described: pa.Schema) -> pa.Table:
-    return pa.table({f.name: pa.array(getattr(record, f.name), f.type) for f in described}, described)
+    return pa.table({f.name: _column(getattr(record, f.name), f.type) for f in described}, described)
+
+
+def _column(values: np.ndarray[Any, Any], kind: pa.DataType) -> pa.Array:
+    """A column as Arrow has it, of the same memory where it holds numbers.
+
+    `pa.array` would load pandas to ask whether these are of it, which takes longer than storing a short log.
+    """
+    if kind != pa.string():
+        return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(np.ascontiguousarray(values))])
+    texts = [text.encode() for text in values]
+    ends = np.cumsum([0, *map(len, texts)], dtype=np.int32)
+    return pa.StringArray.from_buffers(len(texts), pa.py_buffer(ends), pa.py_buffer(b"".join(texts)))
+
+
+def _values(column: pa.ChunkedArray) -> np.ndarray[Any, Any]:
+    """What `_column` stored."""
+    if column.type == pa.string():
+        return np.array(column.to_pylist(), object)
+    dtype = np.dtype(str(column.type))
+    chunks = [np.frombuffer(c.buffers()[1] or b"", dtype)[c.offset : c.offset + len(c)] for c in column.chunks]
+    return np.concatenate(chunks or [np.empty(0, dtype)])
 
 
 def _scalar(value: Any) -> Any:

@@ -4,7 +4,6 @@ from collections.abc import Iterator
 from itertools import product
 
 import numpy as np
-from scipy.interpolate import CubicHermiteSpline
 
 from pipeline.maths.excitation import criterion, fourier
 from pipeline.maths.excitation.fourier import Fourier
@@ -13,7 +12,7 @@ from pipeline.maths.mechanics import workspace
 from pipeline.maths.mechanics.bodies import Bodies
 from pipeline.maths.mechanics.chain import Chain
 from pipeline.maths.mechanics.kinematics import frames, jacobian, tip
-from pipeline.maths.simulation.control import Regulator
+from pipeline.maths.simulation.actuators import Regulator
 from pipeline.records import Column, Control, Excitation, Links, Lyapunov, Pose, Workspace
 from pipeline.robots.robot import ControlStudy, Joint, Robot
 
@@ -97,6 +96,8 @@ def watched(
     study: ControlStudy, joint: str, t: Column, q: Column, dq: Column, start: float, reference: float
 ) -> Control:
     """One joint of a study: how far it overshoots, when it settles, and its errors as time goes on."""
+    from scipy.interpolate import CubicHermiteSpline  # which every run would load, as it asks what each stage makes
+
     between = CubicHermiteSpline(t, q, dq)  # the solver's steps grow to seconds as the errors die out
     step = reference - start
     overshoot = settling_time = float("nan")

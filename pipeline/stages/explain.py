@@ -6,7 +6,7 @@ import numpy as np
 
 from pipeline.estimators.driving import Driving, Motions, driving, motions_of, named
 from pipeline.estimators.refitting import refitted
-from pipeline.estimators.used import describing
+from pipeline.estimators.used import describing, model_of
 from pipeline.filters.assumed import assumed
 from pipeline.filters.causes.innovations import Innovations, innovations
 from pipeline.filters.causes.search import CauseSearch, search
@@ -85,7 +85,8 @@ def others(
     yield THIS_LOG, own.by(refitted(own, motions, robot, free))
     joint = own.signal.joint
     structures = [fit for fit in fits if fit.group == joint and fit.model != own.fit.model]
-    for fit in structures[:1]:
+    told = [fit for fit in structures if motions.keys() >= set(model_of(robot, fit).joints)]  # of what the log holds
+    for fit in told[:1]:
         other = driving(own.signal, motions, fit, robot)
         if other.joint.inertia.min() > 0:
             yield fit.model, other

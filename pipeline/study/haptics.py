@@ -14,8 +14,7 @@ import numpy as np
 from pipeline import toml
 from pipeline.errors import PipelineError
 from pipeline.maths.haptics.bimodal import THESIS, Hand
-from pipeline.maths.simulation.control import Cascade, Motors
-from pipeline.maths.simulation.haptic import Device
+from pipeline.maths.simulation.actuators import Cascade, Device, Motors
 from pipeline.robots.from_toml import NAME
 from pipeline.toml import TomlTable
 

@@ -12,6 +12,7 @@ import pyarrow.parquet as pq
 from pipeline.logs import open_log
 
 ROW_GROUP = 1 << 20
+Report = Callable[[str], None]  # what shows a line
 
 
 def parquet(path: Path, names: list[str]) -> pq.ParquetWriter:

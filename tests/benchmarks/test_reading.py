@@ -1,36 +1,18 @@
 """How fast logs become Parquet, beside a bare parser of text and npTDMS: `--full` for the promised sizes."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pyarrow.csv as csv
 import pytest
 
-from tests.benchmarks.reading import nptdms, nptdms_alone, ours, ours_alone, seconds
+from pipeline.logs import open_log
+from tests.benchmarks.reading import Report, nptdms, nptdms_alone, ours, ours_alone, seconds
 from tests.logs.lvm_writer import Style, Write, lvm
 from tests.logs.tdms_writer import daqmx, segment
 
 CHANNELS = 21  # position, velocity and torque of seven joints
 MB = 1_000_000
-Report = Callable[[str], None]
-
-
-@pytest.fixture(scope="module")
-def full(request: pytest.FixtureRequest) -> bool:
-    """Whether the promised sizes are asked for; else it is a tenth of them, at half the ratio."""
-    return bool(request.config.getoption("--full"))
-
-
-@pytest.fixture
-def report(capsys: pytest.CaptureFixture[str]) -> Report:
-    """Prints past the capture, so that the numbers are seen."""
-
-    def say(line: str) -> None:
-        with capsys.disabled():
-            print(f"\n{line}", end="")
-
-    return say
 
 
 def lvm_file(path: Path, size: int) -> tuple[Path, bytes]:
@@ -52,7 +34,7 @@ def lvm_file(path: Path, size: int) -> tuple[Path, bytes]:
 
 
 def test_lvm_to_parquet_costs_little_more_than_parsing_its_rows(tmp_path: Path, full: bool, report: Report) -> None:
-    size, most = (100 * MB, 3.0) if full else (10 * MB, 6.0)
+    size, most = (100 * MB, 2.0) if full else (10 * MB, 4.0)
     path, body = lvm_file(tmp_path / "log.lvm", size)
     (tmp_path / "body.txt").write_bytes(body)
     plain = csv.ParseOptions(delimiter="\t")
@@ -119,6 +101,16 @@ def test_many_tdms_channels_of_differing_counts_cost_little_more_than_with_nptdm
     path = tmp_path / "log.tdms"
     path.write_bytes(b"".join(segment({f"g/{i}": np.arange(i % 97 + 1.0) for i in range(many)}) for _ in range(3)))
     little_more(path, f"{many} channels", report)
+
+
+def test_as_many_clocks_as_tdms_channels_cost_little_more_than_with_nptdms(tmp_path: Path, report: Report) -> None:
+    path, many = tmp_path / "log.tdms", 1400
+    channels = {f"g/{i}": np.arange(97.0) for i in range(many)}
+    steps = {name: 1e-3 * (1 + i / 20) for i, name in enumerate(channels)}
+    path.write_bytes(b"".join(segment(channels, steps=steps) for _ in range(3)))
+    clocks = {channel.time for channel in open_log(path).channels if not channel.derived}
+    assert len(clocks) == many
+    little_more(path, f"{many} channels with a clock each", report)
 
 
 def test_values_of_daq_cards_cost_little_more_than_with_nptdms(tmp_path: Path, full: bool, report: Report) -> None:

@@ -19,9 +19,10 @@ def segment(
     described: bool = True,
     chunks: int = 1,
     units: Mapping[str, str] | None = None,
+    steps: Mapping[str, float] | None = None,
 ) -> bytes:
     """A segment: its channels, whose samples are split into `chunks`; without metadata it continues the one before."""
-    metadata = _metadata(channels, order, chunks, units or {}) if described else b""
+    metadata = _metadata(channels, order, chunks, units or {}, steps or {}) if described else b""
     raw = _interleaved(channels, order) if interleaved else _contiguous(channels, order, chunks)
     toc = RAW | (METADATA | NEW_LIST if described else 0)
     toc |= (INTERLEAVED if interleaved else 0) | (BIG_ENDIAN if order == ">" else 0)
@@ -29,7 +30,9 @@ def segment(
     return b"TDSm" + struct.pack("<I", toc) + lead + metadata + raw
 
 
-def _metadata(channels: Mapping[str, NDArray[Any]], order: str, chunks: int, units: Mapping[str, str]) -> bytes:
+def _metadata(
+    channels: Mapping[str, NDArray[Any]], order: str, chunks: int, units: Mapping[str, str], steps: Mapping[str, float]
+) -> bytes:
     def text(words: str) -> bytes:
         return struct.pack(order + "I", len(words.encode())) + words.encode()
 
@@ -39,10 +42,12 @@ def _metadata(channels: Mapping[str, NDArray[Any]], order: str, chunks: int, uni
         parts.append(text(f"/'{group}'/'{channel}'"))
         kind = KINDS[samples.dtype.str[1:]]
         parts.append(struct.pack(order + "IIIQ", 20, kind, 1, len(samples) // chunks))
-        unit = units.get(name)
-        parts.append(struct.pack(order + "I", 1 if unit else 0))
+        unit, step = units.get(name), steps.get(name)
+        parts.append(struct.pack(order + "I", bool(unit) + bool(step)))
         if unit:
             parts.append(text("unit_string") + struct.pack(order + "I", 0x20) + text(unit))
+        if step:
+            parts.append(text("wf_increment") + struct.pack(order + "Id", 10, step))
     return b"".join(parts)
 
 

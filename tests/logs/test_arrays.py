@@ -116,7 +116,14 @@ def test_a_matlab_object_says_how_to_save_it():
         made.attrs["MATLAB_class"], made.attrs["MATLAB_object_decode"] = np.bytes_("timeseries"), np.int32(3)
     content = b"MATLAB 7.3 MAT-file".ljust(512, b" ") + file.getvalue()[512:]
     log, _ = read(content, "log.mat")
-    assert "save ts.Time and ts.Data as variables" in log.warnings[0]
+    line = "ts = struct('Time', ts.Time, 'Data', squeeze(ts.Data)); save('ts.mat', 'ts')"
+    assert log.warnings[0].endswith(line)
+
+
+def test_what_that_line_of_matlab_saves_is_read_with_its_clock():
+    log, samples = read(matlab({"ts": {"Time": T[:, None], "Data": Q}}), "ts.mat")
+    assert_array_equal(samples["ts/Data[2]"], Q[:, 2])
+    assert log.find("ts/Data[2]").time == "ts/Time"
 
 
 def test_version_4_is_read():

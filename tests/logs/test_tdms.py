@@ -240,6 +240,24 @@ def test_a_channel_is_found_by_its_last_part_where_only_one_has_it() -> None:
         log.find(3)
 
 
+def test_a_scaled_channel_is_read_once_however_long_its_chunk(monkeypatch: pytest.MonkeyPatch) -> None:
+    scale = {
+        "NI_Scaling_Status": "unscaled", "NI_Number_Of_Scales": 1, "NI_Scale[0]_Scale_Type": "Linear",
+        "NI_Scale[0]_Linear_Slope": 2.0, "NI_Scale[0]_Linear_Y_Intercept": 1.0,
+        "NI_Scale[0]_Linear_Input_Source": 0xFFFFFFFF,
+    }  # fmt: skip
+    made, rows = io.BytesIO(), 2 * tdms_samples.BLOCK // 8  # so that the chunk is read in pieces
+    with TdmsWriter(made) as writer:
+        writer.write_segment([ChannelObject("a", "raw", np.arange(rows, dtype=np.float64), scale)])
+    octets: list[int] = []
+    own = tdms_samples._read
+    monkeypatch.setattr(tdms_samples, "_read", lambda file, at, many: (octets.append(many), own(file, at, many))[1])
+    _, samples = read(made.getvalue(), "log.tdms")
+    assert_array_equal(samples["a/raw"], 2.0 * np.arange(rows) + 1.0)
+    assert len(octets) > 2
+    assert sum(octets) == 8 * rows
+
+
 def test_a_count_of_scales_that_was_damaged_is_refused_before_anything_is_made_of_it() -> None:
     for count in (2**31 - 1, 3, -1):
         scale = {

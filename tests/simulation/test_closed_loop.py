@@ -9,8 +9,8 @@ import pytest
 from pipeline.maths.mechanics import kinematics
 from pipeline.maths.mechanics.rigid_body import gravity
 from pipeline.maths.models.independent import regressor
+from pipeline.maths.simulation.actuators import Regulator
 from pipeline.maths.simulation.closed_loop import JointConstraints, Timing, simulate
-from pipeline.maths.simulation.control import Regulator
 from pipeline.maths.simulation.plant import arm
 from pipeline.maths.simulation.surroundings import nothing
 from pipeline.simulation import closed_loop

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from pipeline.maths.simulation.actuators import Motors, Regulator
 from pipeline.maths.simulation.continuous import Regulated, regulate
-from pipeline.maths.simulation.control import Motors, Regulator, current_after, pi
+from pipeline.maths.simulation.control import current_after, pi
 from pipeline.maths.simulation.plant import arm
 from pipeline.robots.davinci import ROBOT
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from pipeline import robots
-from pipeline.maths.simulation.control import Regulator
+from pipeline.maths.simulation.actuators import Regulator
 from pipeline.robots.davinci import ROBOT
 from pipeline.simulation.scenario.reading import _scenario, load, shipped
 from pipeline.simulation.scenario.scenario import BadScenario, ForceSensor, Path

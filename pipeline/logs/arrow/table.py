@@ -11,11 +11,14 @@ import pyarrow.compute as pc
 from pyarrow import feather, ipc, parquet
 
 from pipeline.errors import BadLog
+from pipeline.logs.columns import absent, integers, numbers
 from pipeline.logs.log import Block, Channel, Log, Options
 from pipeline.logs.names import unique
 from pipeline.maths.arrays import Array
 
-ROWS = 1 << 16  # of a batch
+ROWS = 1 << 14  # of a batch
+BUFFER = 1 << 18  # [bytes] of a column of Parquet that are read at a time
+MAPPED = 64 << 20  # [bytes] of a batch of a Feather file, beyond which it is not read into memory
 UNITS = (b"unit", b"units")
 PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
@@ -44,16 +47,20 @@ def _file(path: Path) -> tuple[pa.Schema, Batches]:
     with path.open("rb") as file:
         head = file.read(4)
     if head == b"PAR1":
-        opened = parquet.ParquetFile(path)
+        opened = parquet.ParquetFile(path, pre_buffer=False, buffer_size=BUFFER)  # or all of a row group is held
         return opened.schema_arrow, lambda names: opened.iter_batches(ROWS, columns=list(names), use_threads=False)
     if head == b"FEA1":
         table = feather.read_table(path, use_threads=False)
         return table.schema, lambda names: iter(table.select(names).to_batches(ROWS))
-    file = ipc.open_file(pa.memory_map(str(path)))
-    return file.schema, lambda names: _records(file, names)
+    return ipc.open_file(str(path)).schema, lambda names: _records(path, names)
 
 
-def _records(file: ipc.RecordBatchFileReader, names: Sequence[str]) -> Iterator[pa.RecordBatch]:
+def _records(path: Path, names: Sequence[str]) -> Iterator[pa.RecordBatch]:
+    """Its batches, of these columns alone; what is mapped counts as memory, so that only large batches are."""
+    whole = ipc.open_file(str(path))
+    mapped = path.stat().st_size > MAPPED * whole.num_record_batches
+    columns = ipc.IpcReadOptions(included_fields=[whole.schema.names.index(name) for name in names], use_threads=False)
+    file = ipc.open_file(pa.memory_map(str(path)) if mapped else pa.OSFile(str(path)), options=columns)
     for i in range(file.num_record_batches):
         batch = file.get_batch(i).select(names)
         batch.validate(full=True)
@@ -113,9 +120,9 @@ def _numbers(column: pa.Array, origin: int) -> Array:
     if pa.types.is_timestamp(what) or pa.types.is_duration(what):
         per_second = PER_SECOND[what.unit]
         since = origin * per_second if pa.types.is_timestamp(what) else 0
-        known = column.cast(pa.int64()).fill_null(since).to_numpy(zero_copy_only=False)
-        return np.where(column.is_null().to_numpy(zero_copy_only=False), np.nan, (known - since) / per_second)
-    return np.asarray(column.cast(pa.float64(), safe=False).to_numpy(zero_copy_only=False), np.float64)
+        whole = pa.chunked_array([column.cast(pa.int64())])
+        return np.where(absent(whole), np.nan, (integers(whole) - since) / per_second)
+    return numbers(pa.chunked_array([column.cast(pa.float64(), safe=False)]))
 
 
 def _describe_time(log: ArrowLog) -> None:

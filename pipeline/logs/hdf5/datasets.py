@@ -1,5 +1,6 @@
 """The datasets of an HDF5 file as arrays, read by h5py."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,11 +10,12 @@ import h5py
 import numpy as np
 
 from pipeline.errors import BadLog
-from pipeline.logs.arrays import ArrayLog, Named, take_in
+from pipeline.logs.arrays import ArrayLog, Named, matlab_object, take_in
 from pipeline.logs.log import Log, Options
 
 UNITS = ("units", "unit", "Units", "Unit")
-CACHE = 64 << 20  # [bytes] so that a chunk of a dataset is unpacked once, and not for every slice of it
+CACHE = 64 << 20  # [bytes] of the chunks of a dataset that are kept unpacked, at most
+SLOTS = 521  # that chunks share by their number, as HDF5 has it
 MOST_REFERENCES = 1000
 DEEPEST = 20
 
@@ -26,7 +28,7 @@ def opened(path: Path, options: Options) -> Log:
     BadLog
         If it holds no dataset of samples.
     """
-    file = h5py.File(path, "r", rdcc_nbytes=CACHE, locking=False)
+    file = h5py.File(path, "r", locking=False)
     log = ArrayLog(path, "hdf5", ())
     log.facts |= {name: text for name in file.attrs if (text := _text(file.attrs[name]))}
     take_in(log, list(arrays_of(file, log)))
@@ -37,10 +39,10 @@ def opened(path: Path, options: Options) -> Log:
 
 def arrays_of(file: h5py.File, log: Log) -> Iterator[Named]:
     """Every dataset that groups lead to, in the order of their names; those in other files are left out."""
-    datasets: list[h5py.Dataset] = []
+    names: list[str] = []
     # Which visits no link to another file.
-    file.visititems(lambda _, each: datasets.append(each) if isinstance(each, h5py.Dataset) else None)
-    for dataset in datasets:
+    file.visititems(lambda name, each: names.append(name) if isinstance(each, h5py.Dataset) else None)
+    for dataset in (_opened(file, name) for name in names):
         if dataset.name.startswith("/#"):  # what MATLAB refers to, and follows from elsewhere
             continue
         if dataset.is_virtual or dataset.external:
@@ -53,9 +55,9 @@ def _arrays(file: h5py.File, node: Any, name: str, deep: int, log: Log) -> Itera
     """The arrays of a dataset, or of what it refers to."""
     if isinstance(node, h5py.Group):
         for key in node if deep else ():
-            yield from _arrays(file, node[key], f"{name}/{key}", deep - 1, log)
+            yield from _arrays(file, _opened(file, f"{node.name}/{key}"), f"{name}/{key}", deep - 1, log)
     elif "MATLAB_object_decode" in node.attrs:
-        log.warnings.append(_object(name, _matlab_class(node)))
+        log.warnings.append(matlab_object(name, _matlab_class(node)))
     elif node.shape is None or "MATLAB_empty" in node.attrs:
         return
     elif _matlab_class(node) == "char" and node.dtype.kind == "u":
@@ -64,7 +66,8 @@ def _arrays(file: h5py.File, node: Any, name: str, deep: int, log: Log) -> Itera
         pattern = "{}{{{}}}" if _matlab_class(node) == "cell" else "{}({})"
         for number, reference in enumerate(node[()].T.ravel()[:MOST_REFERENCES] if deep else (), start=1):
             if reference:
-                yield from _arrays(file, file[reference], pattern.format(name, number), deep - 1, log)
+                referred = _opened(file, h5py.h5r.get_name(reference, file.id).decode())
+                yield from _arrays(file, referred, pattern.format(name, number), deep - 1, log)
     elif node.dtype.kind in "SO" and node.size == 1:
         log.facts[name] = _text(node[()])
     elif node.dtype.names:
@@ -73,6 +76,23 @@ def _arrays(file: h5py.File, node: Any, name: str, deep: int, log: Log) -> Itera
                 yield Named(f"{name}/{field}", Field(node, field), unit_of(node))
     else:
         yield Named(name, node, unit_of(node))
+
+
+def _opened(file: h5py.File, name: str) -> Any:
+    """What has this name; a dataset with room for those of its chunks that hold the same samples.
+
+    So a chunk is unpacked once, and not for every slice of it, and a file of many datasets takes little memory.
+    """
+    node = file[name]
+    if not isinstance(node, h5py.Dataset) or node.chunks is None or not node.size:
+        return node
+    chunks = [-(-length // chunk) for length, chunk in zip(node.shape, node.chunks, strict=True)]
+    along = chunks[node.shape.index(max(node.shape))]
+    beside = math.prod(chunks) // along * math.prod(node.chunks) * node.dtype.itemsize
+    del node  # as long as a dataset is open, it keeps the room that it was opened with
+    access = h5py.h5p.create(h5py.h5p.DATASET_ACCESS)
+    access.set_chunk_cache(SLOTS, min(beside, CACHE), 1.0)  # those that were read to their end make room first
+    return h5py.Dataset(h5py.h5d.open(file.id, name.encode(), access))
 
 
 def unit_of(dataset: h5py.Dataset) -> str:
@@ -88,11 +108,6 @@ def _text(value: Any) -> str:
     value = value.item() if isinstance(value, np.ndarray | np.generic) and value.size == 1 else value
     value = value.decode("utf-8", "replace") if isinstance(value, bytes) else value
     return value[:200] if isinstance(value, str) else ""
-
-
-def _object(name: str, kind: str) -> str:
-    how = f"{name}.Time and {name}.Data" if kind == "timeseries" else "its numbers"
-    return f"{name} is a MATLAB object ({kind}), which MATLAB alone reads: save {how} as variables of their own"
 
 
 @dataclass(frozen=True)

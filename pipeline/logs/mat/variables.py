@@ -10,7 +10,7 @@ from scipy.io import loadmat, whosmat
 from scipy.io.matlab import MatlabFunction, MatlabOpaque
 
 from pipeline.errors import BadLog
-from pipeline.logs.arrays import ArrayLog, Named, take_in
+from pipeline.logs.arrays import ArrayLog, Named, matlab_object, take_in
 from pipeline.logs.log import Log, Options
 
 NUMBERS = {"double", "single", "logical", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))}
@@ -43,9 +43,9 @@ def opened(path: Path, options: Options) -> Log:
 def _of_hdf5(path: Path, log: Log) -> Iterator[Named]:
     import h5py
 
-    from pipeline.logs.hdf5.datasets import CACHE, arrays_of
+    from pipeline.logs.hdf5.datasets import arrays_of
 
-    yield from arrays_of(h5py.File(path, "r", rdcc_nbytes=CACHE, locking=False), log)
+    yield from arrays_of(h5py.File(path, "r", locking=False), log)
 
 
 def _of_matlab(path: Path, log: Log) -> Iterator[Named]:
@@ -85,10 +85,7 @@ class Variable:
 def _arrays(name: str, value: Any, deep: int, log: Log) -> Iterator[Named]:
     """The arrays of a struct or a cell, by their names in MATLAB."""
     if isinstance(value, MatlabOpaque | MatlabFunction) or not isinstance(value, np.ndarray):
-        log.warnings.append(
-            f"{name} is a MATLAB object, which MATLAB alone reads: save its numbers, of a timeseries {name}.Time and "
-            f"{name}.Data, as variables of their own"
-        )
+        log.warnings.append(matlab_object(name))
     elif value.dtype.kind in "US":
         log.facts[name] = "".join(map(str, value.ravel()[:1]))[:200]
     elif value.dtype.names or value.dtype.kind == "O":

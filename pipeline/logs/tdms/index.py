@@ -55,7 +55,7 @@ class Index:
     def regions(self, path: str) -> Iterator[Region]:
         """The regions that hold samples of a channel, in order."""
         position, records, stride, _ = self._regions
-        for i in self._places(path):
+        for i in self._places(path) if path in self._holding else ():
             of = self.kinds[self._regions[3][i]]
             yield Region(position[i], records[i], stride[i], of.columns, of.counts)
 
@@ -66,7 +66,7 @@ class Index:
             order = np.argsort(kind, kind="stable")
             self._by_kind = np.split(order, np.searchsorted(kind[order], np.arange(1, len(self.kinds))))
         holding = [self._by_kind[kind] for kind in self._holding.get(path, ())]
-        places: list[int] = np.sort(np.concatenate([np.empty(0, np.intp), *holding])).tolist()
+        places: list[int] = (holding[0] if len(holding) == 1 else np.sort(np.concatenate(holding))).tolist()
         return places
 
     def largest_chunk(self, paths: Sequence[str]) -> int:

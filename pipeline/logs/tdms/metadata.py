@@ -19,6 +19,7 @@ NUMBERS = {
 }  # fmt: skip
 COMPLEX = (0x08000C, 0x10000D)
 SIZES = {0x1B: 16, TIME: 16, COMPLEX[0]: 8, COMPLEX[1]: 16}  # [bytes] of those that are no plain number
+OCTETS = {"I": 4, "Q": 8, "q": 8}  # [bytes] of the numbers of which metadata are made
 EPOCH = datetime(1904, 1, 1, tzinfo=UTC)
 
 
@@ -88,7 +89,7 @@ class _Cursor:
 
     def number(self, code: str) -> int:
         (value,) = struct.unpack_from(self.order + code, self.data, self.at)
-        self.at += struct.calcsize("=" + code)
+        self.at += OCTETS[code]
         return int(value)
 
     def bytes(self, length: int) -> bytes:

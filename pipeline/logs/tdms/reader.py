@@ -92,6 +92,7 @@ class TdmsLog(Log):
     index: Index = field(default_factory=Index)
     names: dict[str, str] = field(default_factory=dict)  # of the channels, by path
     scaled: frozenset[str] = frozenset()  # paths that npTDMS reads
+    scales: dict[str, dict[str, Any]] = field(default_factory=dict)  # of paths of other numbers, the properties
     origin: int = 0  # [s] since 1904 that time stamps are counted from
     made: dict[str, Timeline] = field(default_factory=dict)  # by name: derived channels of times
     mixed: dict[str, str] = field(default_factory=dict)  # by name: why the samples of a channel are not of one kind
@@ -135,13 +136,19 @@ class TdmsLog(Log):
     def _source(self, file: BinaryIO, paths: Sequence[str]) -> Iterator[Block]:
         if paths[0] in self.scaled:
             return self._scaled(file, paths)
-        return pieces(file, self.index.regions(paths[0]), paths, self.origin)
+        read = pieces(file, self.index.regions(paths[0]), paths, self.origin)
+        scales = {path: self.scales[path] for path in paths if path in self.scales}
+        return self._said(scaled.applied(read, scales), paths[0]) if scales else read
 
     def _scaled(self, file: BinaryIO, paths: Sequence[str]) -> Iterator[Block]:
+        return self._said(scaled.pieces(file, self.size, paths, self.index.largest_chunk(paths)), paths[0])
+
+    def _said(self, read: Iterator[Block], path: str) -> Iterator[Block]:
+        """What npTDMS makes; whatever goes wrong in it is said to be of this channel."""
         try:
-            yield from scaled.pieces(file, self.size, paths, self.index.largest_chunk(paths))
+            yield from read
         except Exception as error:
-            raise BadLog(f"{self.path}: npTDMS cannot read channel {paths[0]} ({error})") from error
+            raise BadLog(f"{self.path}: npTDMS cannot read channel {path} ({error})") from error
 
 
 def _rows(made: Mapping[str, Timeline]) -> Iterator[Block]:
@@ -157,10 +164,12 @@ def _describe(log: TdmsLog, walk: Walk, waveforms: Waveforms) -> None:
     log.facts["segments"] = str(walk.file_segments)
     log.facts["layout"] = ", ".join(sorted(walk.layouts))
     log.facts |= {key: str(value) for key, value in properties.get("/", {}).items() if isinstance(value, str) and value}
-    log.scaled = frozenset(p for p, s in latest.items() if s.kind == DAQMX_RAW or _scales(properties, p))
-    for path in log.scaled:
-        if problem := scaled.problem(_scales(properties, path)):
+    log.scaled = frozenset(p for p, s in latest.items() if s.kind == DAQMX_RAW)
+    for path in latest:
+        if problem := scaled.problem(said := _scales(properties, path)):
             raise BadLog(f"{log.path}: channel {path} {problem}")
+        if said and path not in log.scaled:
+            log.scales[path] = said
     for path, first in walk.objects.revised.items():
         if (word := _decisive(first)) and path in latest:
             log.mixed[log.names[path]] = (

@@ -10,7 +10,8 @@ from pipeline.logs.log import Block
 from pipeline.logs.tdms.walk import BLOCK, Column, Region
 
 ROWS = 1 << 17  # of a piece
-VALUES = 1 << 22  # of a block
+VALUES = 1 << 20  # of a block
+FAR = 1 << 16  # [bytes] between what is wanted of two records, which cost more to read than to pass over
 
 
 def rows_of(channels: int) -> int:
@@ -41,11 +42,21 @@ def _records(file: BinaryIO, region: Region, columns: dict[str, Column]) -> Iter
     needed = max(
         column.offset + (column.count - 1) * column.step + column.dtype.itemsize for column in columns.values()
     )
+    span = needed - begin
+    apart = region.stride - span > FAR
     for first in range(0, region.records, many):
-        records = min(many, region.records - first)
-        file.seek(region.position + first * region.stride + begin)
-        raw = file.read((records - 1) * region.stride + needed - begin)
-        yield {path: _view(raw, records, region.stride, column, begin).reshape(-1) for path, column in columns.items()}
+        records, start = min(many, region.records - first), region.position + first * region.stride + begin
+        if apart:
+            raw = b"".join(_read(file, start + i * region.stride, span) for i in range(records))
+        else:
+            raw = _read(file, start, (records - 1) * region.stride + span)
+        stride = span if apart else region.stride
+        yield {path: _view(raw, records, stride, column, begin) for path, column in columns.items()}
+
+
+def _read(file: BinaryIO, position: int, octets: int) -> bytes:
+    file.seek(position)
+    return file.read(octets)
 
 
 def _view(raw: bytes, records: int, stride: int, column: Column, begin: int) -> NDArray[Any]:
@@ -57,23 +68,24 @@ def _view(raw: bytes, records: int, stride: int, column: Column, begin: int) -> 
 
 def _slices(file: BinaryIO, region: Region, columns: dict[str, Column]) -> Iterator[dict[str, NDArray[Any]]]:
     """Records that are too large to be read whole: a slice of every channel at a time."""
-    most = max(column.count for column in columns.values())
+    most, rows = max(column.count for column in columns.values()), rows_of(len(columns))
     for record in range(region.records):
         start = region.position + record * region.stride
-        for first in range(0, most, ROWS):
-            yield {path: _slice(file, start, column, first) for path, column in columns.items()}
+        for first in range(0, most, rows):
+            yield {path: _slice(file, start, column, first, rows) for path, column in columns.items()}
 
 
-def _slice(file: BinaryIO, start: int, column: Column, first: int) -> NDArray[Any]:
-    count = max(0, min(ROWS, column.count - first))
-    file.seek(start + column.offset + first * column.step)
-    return np.frombuffer(file.read(count * column.dtype.itemsize), column.dtype)
+def _slice(file: BinaryIO, start: int, column: Column, first: int, rows: int) -> NDArray[Any]:
+    count = max(0, min(rows, column.count - first))
+    return np.frombuffer(
+        _read(file, start + column.offset + first * column.step, count * column.dtype.itemsize), column.dtype
+    )
 
 
 def _numbers(samples: NDArray[Any], origin: int) -> NDArray[np.float64]:
     if samples.dtype.names:
-        return (samples["seconds"] - origin) + samples["fraction"] / 2.0**64
-    return samples.astype(np.float64)
+        samples = (samples["seconds"] - origin) + samples["fraction"] / 2.0**64
+    return samples.astype(np.float64).reshape(-1)  # a copy, so that the rest of what was read is let go
 
 
 class Queue:

@@ -7,7 +7,7 @@ age and state in the same folder.
 import io
 import logging
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, BinaryIO
 
 import numpy as np
@@ -76,6 +76,20 @@ def problem(properties: dict[str, Any]) -> str:
     if not isinstance(count, int) or not 0 <= count <= min(most, MOST):
         return f"says that it has {count!r} scales and describes {len(kinds)}: the file is damaged; record it again"
     return ""
+
+
+def applied(read: Iterator[Block], scales: Mapping[str, dict[str, Any]]) -> Iterator[Block]:
+    """The samples with those of some channels scaled as their properties say.
+
+    npTDMS would read all of a chunk for every piece of it, which takes as long as their product.
+    """
+    from nptdms.base_segment import RawChannelDataChunk
+    from nptdms.scaling import get_scaling
+
+    of = {path: scaling for path, said in scales.items() if (scaling := get_scaling(said, {}, {}))}
+    for piece in read:
+        raw = {path: RawChannelDataChunk.channel_data(piece[path]) for path in of}
+        yield piece | {path: np.asarray(each.scale(raw[path]), np.float64) for path, each in of.items()}
 
 
 def pieces(file: BinaryIO, size: int, paths: Sequence[str], chunk: int) -> Iterator[Block]:

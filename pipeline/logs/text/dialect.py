@@ -74,7 +74,9 @@ def find(lines: Sequence[str], options: Options) -> Dialect:
     kinds = _kinds(whole, NUMBERS[decimal])
     header = _header(lines, delimiter, kinds, NUMBERS[decimal], options)
     names, units, preamble = _names([line for line in lines[:header] if line.strip()], delimiter, width, options)
-    stamps = _stamps([split(line, delimiter) for line in lines[header:] if line.strip()], kinds)
+    stamps = (
+        _stamps([split(line, delimiter) for line in lines[header:] if line.strip()], kinds) if "text" in kinds else {}
+    )
     kinds = ["time" if i in stamps else kind for i, kind in enumerate(kinds)]
     names, units = names or [""] * width, units or [""] * width
     return Dialect(
@@ -90,7 +92,8 @@ def _marks(rows: Sequence[str], options: Options) -> tuple[str, str]:
     delimiters = (NAMED.get(options.delimiter, options.delimiter),) if options.delimiter else CANDIDATES
     decimals = (options.decimal,) if options.decimal else (".", ",")
     body = rows[len(rows) // 4 :]
-    scores = {(d, m): _score(body, d, NUMBERS[m]) for d in delimiters for m in decimals if d != m}
+    cells = {delimiter: [split(line, delimiter) for line in body] for delimiter in delimiters}
+    scores = {(d, m): _score(cells[d], NUMBERS[m]) for d in delimiters for m in decimals if d != m}
     best = max(scores, key=lambda each: scores[each], default=(",", ","))
     if not scores or 2 * scores[best][0] < len(body):
         raise Unclear(
@@ -102,15 +105,17 @@ def _marks(rows: Sequence[str], options: Options) -> tuple[str, str]:
     return best
 
 
-def _score(body: Sequence[str], delimiter: str, number: re.Pattern[str]) -> tuple[int, int]:
+def _score(body: Sequence[Sequence[str]], number: re.Pattern[str]) -> tuple[int, int]:
     """Lines that are mostly numbers, and the numbers in them."""
-    numbers = [
-        sum(bool(number.fullmatch(cell)) for cell in cells) for cells in (split(line, delimiter) for line in body)
-    ]
-    # A column of times says as little of the delimiter as an empty one.
-    filled = [sum(bool(cell) and not tells_time(cell) for cell in split(line, delimiter)) for line in body]
-    good = [count for count, cells in zip(numbers, filled, strict=True) if count and 2 * count >= cells]
+    numbers = [len(cells) - [*map(number.fullmatch, cells)].count(None) for cells in body]
+    good = [count for count, cells in zip(numbers, body, strict=True) if count and _are_mostly(count, cells)]
     return len(good), sum(good)
+
+
+def _are_mostly(count: int, cells: Sequence[str]) -> bool:
+    """Whether so many of the cells are most of them; one of times says as little of the delimiter as an empty one."""
+    filled = [cell for cell in cells if cell]
+    return 2 * count >= len(filled) or 2 * count >= sum(not tells_time(cell) for cell in filled)
 
 
 def _comma(rows: Sequence[str], body: Sequence[str]) -> tuple[str, str]:
@@ -118,8 +123,10 @@ def _comma(rows: Sequence[str], body: Sequence[str]) -> tuple[str, str]:
 
     Fractions betray themselves: they have no sign, one has a leading zero, and they come in pairs with whole parts.
     """
+    if "." in "".join(body):
+        return ",", "."
     cells = [row for line in body if any(map(NUMBERS["."].fullmatch, row := split(line, ",")))]
-    if "." in "".join(body) or not all(WHOLE.fullmatch(cell) for row in cells for cell in row):
+    if not all(WHOLE.fullmatch(cell) for row in cells for cell in row):
         return ",", "."
     first = split(rows[0], ",")
     if not any(NUMBERS["."].fullmatch(cell) for cell in first):  # a header says how many columns there are

@@ -9,6 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.compute as pc
 
+from pipeline.logs.columns import absent, integers
 from pipeline.maths.arrays import Array
 
 CLOCK = r"\d?\d:\d\d:\d\d(?:[.,]\d+)?"
@@ -55,8 +56,7 @@ class Stamps:
             text = pc.replace_substring_regex(text, r" 0(\d\d:)", r" \1")
         text = pc.replace_substring_regex(text, r"(\.\d{9})\d+", r"\1")
         moments = pc.cast(text, pa.timestamp("ns", tz="UTC" if self.zoned else None)).cast(pa.int64())
-        since: Array = pc.divide(pc.cast(pc.subtract(moments, self.zero), pa.float64(), safe=False), 1e9).to_numpy()
-        return since
+        return np.where(absent(moments), np.nan, (integers(moments) - self.zero) / 1e9)
 
 
 def stamps_of(cells: Sequence[str]) -> Stamps | None:

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import qr, solve_triangular
 
 from pipeline.maths.arrays import Array
 from pipeline.maths.mechanics.bodies import PARAMETERS
@@ -39,6 +38,8 @@ def base_parameters(Y: Array) -> BaseParameters:
     ones whatever the motion, as in the grouping by hand (Khalil and Kleinfinger 1987).  The motion must be rich (random
     poses, velocities and accelerations will do): what it does not show is left out.
     """
+    from scipy.linalg import qr, solve_triangular  # which every command would load
+
     (R,) = qr(Y.reshape(-1, Y.shape[-1]), mode="r")  # it has the dependences of Y's columns, in as many rows
     scale = np.linalg.norm(R, axis=0)
     seen = np.flatnonzero(scale > NEGLIGIBLE * scale.max())

@@ -1,7 +1,8 @@
 """What the times of a log say about its recorder, gathered block by block."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -25,20 +26,23 @@ class ClockStatistics:
     bad_pair: tuple[float, float] = (math.nan, math.nan)
     _mean: float = 0.0  # of the steps
     _squares: float = 0.0  # sum of squared deviations from it
-    _last_row: Array | None = None
+    _last_row: list[float] = field(default_factory=list)
 
-    def update(self, t: Array, rows: Array | None = None) -> None:
-        """Take in the next block: times (N,) and, to find repeated rows, the samples (N, channels)."""
+    def update(self, t: Array, channels: Sequence[Array] = ()) -> None:
+        """Take in the next block: times (N,) and, to find repeated rows, the samples (N,) of every channel."""
         if not len(t):
             return
         if self.samples == 0:
             self.first = float(t[0])
         steps = np.diff(t, prepend=[self.last] if self.samples else t[:1])[0 if self.samples else 1 :]
         self._steps(t, steps)
-        if rows is not None:
-            whole = rows if self._last_row is None else np.vstack([self._last_row, rows])
-            self.duplicates += int(np.all(whole[1:] == whole[:-1], axis=1).sum())
-            self._last_row = rows[-1].copy()
+        if channels:
+            repeats = np.ones(len(t), dtype=bool)
+            for number, x in enumerate(channels):
+                repeats[1:] &= x[1:] == x[:-1]
+                repeats[0] &= bool(self._last_row) and x[0] == self._last_row[number]
+            self.duplicates += int(np.count_nonzero(repeats))
+            self._last_row = [float(x[-1]) for x in channels]
         self.samples += len(t)
         self.last = float(t[-1])
 

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from pipeline.maths.arrays import Array
 from pipeline.maths.compiled import compiled
-from pipeline.maths.simulation.control import Cascade, Loops, Motors, Regulator, drive, follow, pi, read
+from pipeline.maths.simulation.actuators import Cascade, Loops, Motors, Regulator
+from pipeline.maths.simulation.control import drive, follow, pi, read
 from pipeline.maths.simulation.friction import Friction
 from pipeline.maths.simulation.step import at_rest, middle, step
 from pipeline.maths.simulation.surroundings import Surroundings, on_tip, weigh

@@ -12,8 +12,9 @@ from pipeline.maths.arrays import Array
 from pipeline.maths.compiled import cached
 from pipeline.maths.mechanics import kernels, link, recursions, vector
 from pipeline.maths.simulation import plant as arms
+from pipeline.maths.simulation.actuators import Regulator
 from pipeline.maths.simulation.closed_loop import Plant
-from pipeline.maths.simulation.control import Regulator, lyapunov
+from pipeline.maths.simulation.control import lyapunov
 
 RELATIVE, ABSOLUTE = 1e-9, 1e-11
 

@@ -23,7 +23,8 @@ from pipeline.maths.arrays import Array
 from pipeline.maths.compiled import cached, compiled
 from pipeline.maths.simulation import control, friction
 from pipeline.maths.simulation import step as stepping
-from pipeline.maths.simulation.control import Cascade, Loops, Motors, drive, follow, read
+from pipeline.maths.simulation.actuators import Cascade, Device, Loops, Motors
+from pipeline.maths.simulation.control import drive, follow, read
 from pipeline.maths.simulation.friction import Friction
 from pipeline.maths.simulation.step import State, at_rest, middle, step
 
@@ -36,15 +37,6 @@ class Grip(NamedTuple):
     Phi: Array  # (2, 2)
     Gamma: Array  # (2,) [m/N], [m/(s N)]
     put: Array  # (0, 2) where it moves by itself
-
-
-class Device(NamedTuple):
-    """What lies between hand and arm."""
-
-    motion: float  # of the arm over that of the hand
-    force: float  # felt over estimated
-    strongest: float  # [N] that it can make
-    step: float  # [m] of its position; 0 for none
 
 
 class FeltTissue(NamedTuple):

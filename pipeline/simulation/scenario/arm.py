@@ -3,7 +3,7 @@
 import numpy as np
 
 from pipeline.maths.arrays import Array
-from pipeline.maths.simulation.control import Cascade, Motors, Regulator
+from pipeline.maths.simulation.actuators import Cascade, Motors, Regulator
 from pipeline.maths.simulation.friction import Friction
 from pipeline.robots.robot import Robot
 from pipeline.simulation.scenario.scenario import Family, SensorNoise, SimulatedArm, SimulatedJoint

@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.errors import PipelineError
 from pipeline.maths.arrays import Array
 from pipeline.maths.excitation.fourier import Fourier, motion
-from pipeline.maths.simulation.control import Cascade, Motors, Regulator
+from pipeline.maths.simulation.actuators import Cascade, Motors, Regulator
 from pipeline.maths.simulation.friction import Friction
 from pipeline.maths.simulation.surroundings import SHAPES
 from pipeline.robots.robot import Joint, Robot

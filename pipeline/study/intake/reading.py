@@ -97,7 +97,7 @@ class Intake:
         for name in self.names:
             self.require_numbers(name, block[name])
         t = self.times(block)
-        self.clock.update(t, np.column_stack([block[c.name] for q, c in self.channels.items() if q != "time"]))
+        self.clock.update(t, [block[c.name] for q, c in self.channels.items() if q != "time"])
         self.require_increasing()
         first = self.clock.first
         kept = t - first >= self.entry.skip - 1e-9

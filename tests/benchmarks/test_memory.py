@@ -1,0 +1,106 @@
+"""How much memory it takes to read a log that is far larger: 250 MB, `--full` for logs of 1 GB; else of 100 MB."""
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.benchmarks.reading import Report
+from tests.benchmarks.test_reading import MB, lvm_file
+from tests.logs.tdms_writer import segment
+
+MOST = 250  # [MB]
+JOINTS = ("hand_roll", "hand_pitch", "instrument_slide")
+CHANNELS = [f"{joint}.{symbol}" for joint in JOINTS for symbol in ("q", "tau")]
+MEASURED = """
+import sys
+from pathlib import Path
+from resource import RUSAGE_CHILDREN, getrusage
+from pipeline.logs.isolated import process
+import pipeline
+from pipeline.commands.inspect import describe
+if sys.argv[1] == "ingest":
+    assert pipeline.run(sys.argv[2], "ingest", quiet=True)
+else:
+    describe(Path(sys.argv[2]), 5)
+process.close_all()
+[line] = [line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM")]
+print(int(line.split()[1]) / 1024, getrusage(RUSAGE_CHILDREN).ru_maxrss / 1024)
+"""
+
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="how much memory a process took is Linux's to say")
+
+
+def tdms(path: Path, size: int) -> Path:
+    """A log of 50 channels, those of joints among them, as it is written second by second."""
+    t, names = np.arange(1000) / 1000, [*CHANNELS, *(f"other {i}" for i in range(43))]
+    one = {f"g/{name}": np.sin(t + i) for i, name in enumerate(names)}
+    second = 8 * (len(one) + 1) * len(t)
+    with path.open("wb") as file:
+        for i in range(size // second):
+            file.write(segment({"g/time": i + t, **one}))
+    return path
+
+
+def lvm(path: Path, size: int) -> Path:
+    made, _ = lvm_file(path, size)
+    return made
+
+
+def hdf5(path: Path, size: int) -> Path:
+    """A log of 20 packed channels."""
+    import h5py
+
+    rows = size // 8 // 20
+    values = np.random.default_rng(1).standard_normal(rows)
+    with h5py.File(path, "w") as file:
+        for name in ("time", *CHANNELS, *(f"other {i}" for i in range(13))):
+            data = np.arange(rows) / 1000 if name == "time" else values
+            file.create_dataset(name, data=data, chunks=(4096,), compression="gzip", compression_opts=1)
+    return path
+
+
+def parquet(path: Path, size: int) -> Path:
+    """The same as one row group."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    rows = size // 8 // 20
+    values = np.random.default_rng(1).standard_normal(rows)
+    columns = dict.fromkeys((*CHANNELS, *(f"other {i}" for i in range(13))), values)
+    pq.write_table(pa.table({"time": np.arange(rows) / 1000, **columns}), path, row_group_size=rows)
+    return path
+
+
+FORMATS: dict[str, tuple[Callable[[Path, int], Path], str]] = {
+    "log.tdms": (tdms, ""),
+    "log.lvm": (lvm, "channel "),
+    "log.h5": (hdf5, ""),
+    "log.parquet": (parquet, ""),
+}
+
+
+@pytest.mark.parametrize("name", FORMATS)
+def test_a_log_is_read_in_little_memory_however_large_it_is(tmp_path: Path, full: bool, report: Report, name: str):
+    write, numbered = FORMATS[name]
+    (tmp_path / "raw" / "lab").mkdir(parents=True)
+    log = write(tmp_path / "raw" / "lab" / name, (1000 if full else 100) * MB)
+    channels = [f"{numbered}{i}" if numbered else channel for i, channel in enumerate(CHANNELS)]
+    said = "".join(f'"{own}" = "{channel}"\n' for own, channel in zip(CHANNELS, channels, strict=True))
+    said += "" if name.endswith("lvm") else 'time = "time"\n'
+    table = f'[[log]]\nname = "large"\nfile = "{name}"\nrole = "validation"\n[log.channels]\n{said}'
+    (log.parent / "study.toml").write_text(f'robot = "davinci"\n{table}')
+    peaks = {how: peak(how, what) for how, what in (("ingest", log.parent), ("inspect", log))}
+    told = "; ".join(f"{how} {own:.0f} MB, and its child {child:.0f} MB" for how, (own, child) in peaks.items())
+    report(f"{name}, {log.stat().st_size // MB} MB: {told}")
+    assert max(max(pair) for pair in peaks.values()) < MOST
+
+
+def peak(how: str, what: Path) -> tuple[float, float]:
+    """The most memory [MB] that a process takes for it, and the largest of its children."""
+    done = subprocess.run([sys.executable, "-c", MEASURED, how, what], capture_output=True, text=True, check=True)
+    own, child = map(float, done.stdout.splitlines()[-1].split())
+    return own, child

@@ -1,0 +1,34 @@
+"""Stage `explain`: which models of a joint a log is explained by."""
+
+import numpy as np
+
+from pipeline.estimators.driving import driving, motions_of
+from pipeline.records import Fit
+from pipeline.robots import davinci
+from pipeline.robots.models import coupled, independent
+from pipeline.stages.explain import THIS_LOG, others
+from tests import arm
+
+ROLL = davinci.ROBOT.joint("hand_roll")
+
+
+def fit(model: str) -> Fit:
+    """A fit of the roll, each of its parameters 1."""
+    described = independent(ROLL) if model == "independent" else coupled(davinci.ROBOT, [0], [()], "", ROLL.name)
+    names = np.array([parameter.name for parameter in described.parameters], object)
+    columns = dict.fromkeys(Fit.columns(), np.zeros(len(names))) | dict.fromkeys(("parameter", "phi", "unit"), names)
+    about = {"group": ROLL.name, "model": model, "estimator": "lse", "logs": ("a",), "theta": np.ones(len(names))}
+    return Fit(**(dict.fromkeys(Fit.scalars(), 1) | columns | about))
+
+
+def told_by(signals) -> list[str]:
+    """What the roll of a log with these joints is explained by, where it was fitted alone and with the whole arm."""
+    motions, fits = motions_of(signals, 17.0), [fit("independent"), fit("coupled")]
+    own = driving(signals[0], motions, fits[0], davinci.ROBOT)
+    return [name for name, _ in others(own, motions, fits, davinci.ROBOT, np.ones(len(signals[0]), bool))]
+
+
+def test_a_log_without_the_other_joints_is_explained_by_what_needs_them_not():
+    signals = [arm.signal(joint.name, periods=2, period=5.0) for joint in davinci.ROBOT.joints]
+    assert told_by(signals) == ["", THIS_LOG, "coupled"]
+    assert told_by(signals[:1]) == ["", THIS_LOG]
