@@ -299,7 +299,7 @@ def test_units_meanings_and_origins_travel_with_the_file(analysed):
     assert field.metadata[b"meaning"] == b"variance of the effort between periods"
     made_from = json.loads(file.metadata.metadata[b"made_from"])
     assert made_from["inputs"].keys() == {"processed/signal/slide/instrument_slide.parquet"}
-    assert made_from["settings"] == {"harmonics": 0}
+    assert made_from["settings"] == {"harmonics": 0, "lowpass": 17.0}
     assert "pipeline/maths/signals/averaging.py" in made_from["code"]
 
 

@@ -30,8 +30,8 @@ def left_out(context: Context, joint: str) -> Iterator[Block]:
     header = ("Fit", "Left out", "Relative error", "Path blocks left out, raw samples")
     caption = f"{title(joint)}: relative error of its fits where they were not fitted, in the worst log."
     table = Table(caption, header, rows, f"left-out-{joint}", "llrr")
-    yield Prose(f"{MEASURES}{noise(context, joint)}")
-    yield OnScreen(f"{title(joint)}: its fits where they were not fitted", f"all-left-out-{joint}", (table,))
+    says = Prose(f"{MEASURES}{noise(context, joint)}")
+    yield OnScreen(f"{title(joint)}: its fits where they were not fitted", f"all-left-out-{joint}", (says, table))
 
 
 def row(context: Context, joint: str, of_fit: list[Prediction]) -> tuple[Cell, ...]:
