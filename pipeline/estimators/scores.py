@@ -65,7 +65,7 @@ def scored(
     )
 
 
-def some(signal: AnySignal, which: Booleans) -> AnySignal:
+def some(signal: AnySignal, which: Booleans | slice) -> AnySignal:
     """Some of the samples (N,) of a recording."""
     return replace(signal, **{name: getattr(signal, name)[which] for name in signal.columns()})
 

@@ -226,7 +226,7 @@ def _values(column: pa.ChunkedArray) -> np.ndarray[Any, Any]:
         return np.array(column.to_pylist(), object)
     dtype = np.dtype(str(column.type))
     chunks = [np.frombuffer(c.buffers()[1] or b"", dtype)[c.offset : c.offset + len(c)] for c in column.chunks]
-    return np.concatenate(chunks or [np.empty(0, dtype)])
+    return chunks[0] if len(chunks) == 1 else np.concatenate(chunks or [np.empty(0, dtype)])
 
 
 def _scalar(value: Any) -> Any:

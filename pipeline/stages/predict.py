@@ -138,7 +138,7 @@ def without_the_log(
     lowpass: float,
 ) -> Iterator[Prediction]:
     """Predict a log from fits to other identification logs, and judge them by some of its samples (N,)."""
-    kept = averaged(signal.t, own) if own is not None else np.ones(len(signal), np.bool_)
+    kept = whole_periods(signal.t, own) if own is not None else slice(None)
     part, motion = some(signal, kept), at(motion, kept)
     for fit in cross_fits:
         left_out = [str(names).split(", ") for names in fit.left_out]
@@ -164,7 +164,7 @@ def without_a_period(
 
     They are judged by some of the log's samples (N,).
     """
-    kept = averaged(signal.t, own)
+    kept = whole_periods(signal.t, own)
     part = some(signal, kept)
     since = part.t - own.t_start
     number = np.minimum((since / own.period + 1e-9).astype(int), own.periods - 1)
@@ -220,7 +220,13 @@ def smoothed_motion(own: Smoothed) -> Motion:
     return Motion(own.q[:, None], own.dq[:, None], own.ddq[:, None], 1.0 / own.rate, own.segment)
 
 
-def at(motion: Motion, which: Booleans) -> Motion:
-    """A motion at some of its samples (N,)."""
+def whole_periods(t: Array, own: Trajectory) -> slice:
+    """The samples, at these times [s], of the periods that were averaged: a view of them takes no memory."""
+    inside = np.flatnonzero(averaged(t, own))
+    return slice(int(inside[0]), int(inside[-1]) + 1)
+
+
+def at(motion: Motion, which: slice) -> Motion:
+    """A motion at some of its samples."""
     q, dq, ddq, T_s, segment, periodic = motion
     return Motion(q[which], dq[which], ddq[which], T_s, segment[which], periodic)
