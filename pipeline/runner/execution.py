@@ -5,7 +5,7 @@ import os
 import traceback
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
@@ -115,7 +115,7 @@ def _writer(folders: Folders, task: Task) -> Iterator[store.Writer]:
         kind, measured = task.joints.get(name, (Kind.REVOLUTE, ""))
         return lambda template: kind.unit(template, measured)
 
-    with store.Writer(folders.processed, unit, asdict(task.fingerprint)) as writer:
+    with store.Writer(folders.processed, unit, vars(task.fingerprint)) as writer:
         yield writer
 
 

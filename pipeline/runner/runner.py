@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import Executor
 from contextlib import closing
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import cached_property, partial
 
 from pipeline.errors import BadRequest, PipelineError
@@ -235,7 +235,7 @@ class Runner:
         for stale in set(before.outputs if before else ()) - set(outcome.outputs):
             self.folders.file(stale).unlink(missing_ok=True)
         self.ledger.made(outcome.outputs)
-        self.ledger.write(Entry(task.stage, task.name, asdict(task.fingerprint), outcome.outputs, outcome.failed))
+        self.ledger.write(Entry(task.stage, task.name, dict(vars(task.fingerprint)), outcome.outputs, outcome.failed))
         self.ran += 1
         self.failures += bool(outcome.failed)
         self.seconds[task.stage] += outcome.seconds
