@@ -1,5 +1,6 @@
 """What a log of a study costs when there are many, as ratios within one run, of the processor's time."""
 
+import os
 import subprocess
 import sys
 import time
@@ -18,6 +19,7 @@ from tests import arm, many
 
 GROWS = 1.3  # times at most, what a log costs in a study of many, over one in a study of few
 PLANNED = 12.0  # times at most, what planning ten times as many logs takes
+TWICE = 1.6  # times as fast at least, two processes as one
 CHECKED = 2.0  # times at most, what finding nothing to do takes beyond start-up, over hashing the files that there are
 
 
@@ -106,3 +108,26 @@ def test_a_log_costs_the_same_in_a_study_of_many(tmp_path, full, capsys):
         print(f"the {hashing:.2f} s of hashing all files", end="")
     assert max(grows.values()) < (GROWS if full else 2 * GROWS)
     assert checked < start_up + (CHECKED if full else 2 * CHECKED) * hashing
+
+
+def seconds_of_jobs(study: Path, jobs: int) -> float:
+    """How long a process of its own takes from ingest to whiteness, by the clock."""
+    code = "import sys, pipeline; pipeline.run(sys.argv[1], *sys.argv[3:], jobs=int(sys.argv[2]), quiet=True)"
+    names = STAGES[STAGES.index("ingest") : STAGES.index("whiteness") + 1]
+    start = time.perf_counter()
+    subprocess.run([sys.executable, "-c", code, study, str(jobs), *names], check=True, stdout=subprocess.DEVNULL)
+    return time.perf_counter() - start
+
+
+@pytest.mark.skipif((os.cpu_count() or 1) < 2, reason="two processes need two processors")
+def test_two_processes_take_little_more_than_half_the_time_of_one(tmp_path, full, capsys):
+    """Of a hundred logs of a minute at full size; few short ones are done before others have begun to help."""
+    logs, period = (100, 10.4) if full else (20, 10.4)
+    one, two = (lab(tmp_path / str(jobs), logs, period, 100.0) for jobs in (1, 2))
+    alone, shared = seconds_of_jobs(one, 1), seconds_of_jobs(two, 2)
+    with capsys.disabled():
+        print(
+            f"\n{logs} logs of a minute take {alone:.0f} s, two processes are {alone / shared:.2f} times as fast",
+            end="",
+        )
+    assert alone > (TWICE if full else 1.0) * shared
