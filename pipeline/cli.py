@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
+from copy import copy
 from functools import wraps
 from importlib import import_module
 from inspect import cleandoc
@@ -12,19 +13,50 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperGroup
 
 from pipeline.commands import COMMANDS
 from pipeline.errors import PipelineError
 from pipeline.report import REPORT
 from pipeline.runner import STEPS
 from pipeline.runner.processes import arithmetic
-from pipeline.stages import STAGES
 
 if TYPE_CHECKING:
     from pipeline.runner.console import Verbosity
 
+STEP = "step"  # what the command that the steps are copies of is called until then
+
+
+class Steps(TyperGroup):
+    """Commands, of which those that are steps of a run differ in name and help only: what they take is read once."""
+
+    def __init__(self, *, commands: dict[str, Any], **attributes: Any) -> None:
+        step = commands.pop(STEP)
+        modules = {name: "report/report" if name == REPORT else f"stages/{name}" for name in STEPS}
+        steps = {name: renamed(step, name, docstring(module)) for name, module in modules.items()}
+        super().__init__(commands=steps | commands, **attributes)
+
+
+def renamed(command: TyperCommand, name: str, words: str) -> TyperCommand:
+    """A command by another name, with other help."""
+    other = copy(command)
+    other.name, other.help = name, as_written(words)
+    return other
+
+
+def docstring(module: str) -> str:
+    """What a module says of itself, which is what its file begins with; importing all would take seconds."""
+    file = Path(__file__).parent / f"{module}.py"
+    return cleandoc(file.read_text(encoding="utf-8").split('"""', 2)[1])
+
+
+def as_written(words: str) -> str:
+    """Help that shows `raw/<study>`, which Markdown takes for a tag of HTML and leaves out."""
+    return re.sub(r"(`[^`]*`)|<", lambda match: match[1] or r"\<", words)
+
+
 app = typer.Typer(
+    cls=Steps,
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
@@ -46,14 +78,14 @@ Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say of each task
 
 
 class ShownAsWritten(TyperCommand):
-    """A command whose help shows `raw/<study>`, which Markdown takes for a tag of HTML and leaves out."""
+    """A command whose help is shown as it was written."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         for described in (self, *self.params):
             words = getattr(described, "help", None)
             if words and self.rich_markup_mode == "markdown":
-                vars(described)["help"] = re.sub(r"(`[^`]*`)|<", lambda match: match[1] or r"\<", words)
+                vars(described)["help"] = as_written(words)
 
 
 def main() -> None:
@@ -135,27 +167,27 @@ def run_stages(study: Path, names: tuple[str, ...], *how: Any) -> bool:
         return False
 
 
-def add_step(name: str, module: str) -> None:
-    """Make a step of a run a command, explained by the docstring of its module."""
+@app.command(STEP, rich_help_panel="Stages, in order", cls=ShownAsWritten)
+@guarded
+def run_step(
+    context: typer.Context,
+    study: StudyFolder,
+    processed: Processed = None,
+    reports: Reports = None,
+    force: Force = False,
+    jobs: Jobs = 1,
+    cluster: Cluster = "",
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    dry_run: DryRun = False,
+) -> None:
+    """Run the step whose name the command has."""
+    from pipeline.runner import runs
 
-    @app.command(name, help=docstring(module), rich_help_panel="Stages, in order", cls=ShownAsWritten)
-    @guarded
-    def command(
-        study: StudyFolder,
-        processed: Processed = None,
-        reports: Reports = None,
-        force: Force = False,
-        jobs: Jobs = 1,
-        cluster: Cluster = "",
-        quiet: Quiet = False,
-        verbose: Verbose = False,
-        dry_run: DryRun = False,
-    ) -> None:
-        from pipeline.runner import runs
-
-        says = verbosity(quiet, verbose)
-        if not run_stages(runs.one(study), (name,), processed, reports, force, jobs, says, dry_run, cluster):
-            raise typer.Exit(1)
+    says = verbosity(quiet, verbose)
+    names = (str(context.command.name),)
+    if not run_stages(runs.one(study), names, processed, reports, force, jobs, says, dry_run, cluster):
+        raise typer.Exit(1)
 
 
 @app.command("all", rich_help_panel="Stages, in order", cls=ShownAsWritten)
@@ -181,15 +213,6 @@ def run_all(
         raise typer.Exit(1)
 
 
-def docstring(module: str) -> str:
-    """What a module says of itself, which is what its file begins with; importing all would take seconds."""
-    file = Path(__file__).parent / f"{module}.py"
-    return cleandoc(file.read_text(encoding="utf-8").split('"""', 2)[1])
-
-
-for stage in STAGES:
-    add_step(stage, f"stages/{stage}")
-add_step(REPORT, "report/report")
 for other in COMMANDS:
     module = import_module(f"pipeline.commands.{other}")
     added = app.command(other, help=module.__doc__, rich_help_panel="Other commands", cls=ShownAsWritten)

@@ -6,6 +6,7 @@ import re
 import shutil
 import subprocess
 import sys
+from importlib import import_module
 from importlib.metadata import version
 from pathlib import Path
 
@@ -51,12 +52,21 @@ def test_the_version_is_that_of_the_package():
 def test_help_shows_every_description_as_it_is_written(name):
     """Neither `<study>`, which is a tag to Markdown, nor `[s]`, which is a style to rich, is lost."""
     shown = " ".join(call(name, "--help").split())
-    parameters = inspect.signature(EVERY[name].callback).parameters
+    signed = inspect.signature(EVERY[name].callback).parameters.values()
+    parameters = [parameter for parameter in signed if parameter.annotation is not typer.Context]
     assert parameters
-    for parameter in parameters.values():
+    for parameter in parameters:
         says = parameter.annotation.__metadata__[0].help
         assert says, f"{parameter.name} has no description"
         assert " ".join(says.replace("`", "").split()) in shown, parameter.name
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_a_step_is_explained_by_its_own_module(name):
+    module = import_module("pipeline.report.report" if name == "report" else f"pipeline.stages.{name}")
+    words = re.sub(r"[`\\]", "", " ".join(inspect.getdoc(module).split()))
+    assert words[:60] in " ".join(call(name, "--help").split())
+    assert "No such command" in call("step", "raw/mine", code=2)
 
 
 def test_a_code_span_is_shown_without_a_backslash():
