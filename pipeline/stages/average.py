@@ -220,5 +220,5 @@ def white_noise(folded: Folded, segment: Counts, rate: float, lowpass: float) ->
 
     A ripple of the drive is faster than the motion, too, but repeats; what differs with the motion is slower.
     """
-    degrees = len(folded.noise) - int((folded.counts > 0).sum())
-    return noise_std(folded.noise, segment, rate, lowpass) * float(np.sqrt(len(folded.noise) / degrees))
+    shrunk = float(np.sqrt(len(folded.noise) / averaging.degrees(folded)))
+    return noise_std(folded.noise, segment, rate, lowpass) * shrunk

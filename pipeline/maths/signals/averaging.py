@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.maths.arrays import Array, Integers
-from pipeline.maths.signals.harmonics import evaluate, project
+from pipeline.maths.signals.harmonics import are_apart, evaluate, project
 
 SMOOTH = 30  # harmonics that describe how a signal moves within the width of one phase bin
 ON_PHASE = 1e-6  # of the time between phases, by which a sample on one may be off it
-BLOCK = 1 << 15  # samples whose times are looked at together: few enough to stay in the processor
 
 
 class Folded(NamedTuple):
@@ -60,14 +59,7 @@ def fold(t: Array, x: Array, period: float, K: int) -> Folded:
 
 def on_phases(t: Array, period: float, K: int) -> bool:
     """Whether each sample falls on the phase after that of the one before it."""
-    step = period / K
-    due, may_miss = t[0] + np.arange(BLOCK) * step, ON_PHASE * step
-    for start in range(0, len(t), BLOCK):
-        block = t[start : start + BLOCK]
-        late = block - due[: len(block)]
-        if late.max() - start * step > may_miss or late.min() - start * step < -may_miss:
-            return False
-    return True
+    return are_apart(t, period / K, ON_PHASE)
 
 
 def stacked(x: Array, K: int) -> Folded:
@@ -117,5 +109,9 @@ def carried(t: Array, x: Array, period: float, K: int) -> tuple[Array, Array, In
 
 def noise_std(folded: Folded) -> float:
     """Standard deviation of the noise, with one degree of freedom spent per phase.  (6.32), corrected"""
-    degrees = len(folded.noise) - int((folded.counts > 0).sum())
-    return float(np.sqrt(folded.noise @ folded.noise / degrees))
+    return float(np.sqrt(folded.noise @ folded.noise / degrees(folded)))
+
+
+def degrees(folded: Folded) -> int:
+    """Degrees of freedom of the noise: one is spent per phase."""
+    return len(folded.noise) - int((folded.counts > 0).sum())

@@ -56,20 +56,25 @@ def even_step(t: Array) -> float:
     if len(t) < EVEN:
         return 0.0
     step = float(t[-1] - t[0]) / (len(t) - 1)
+    return step if are_apart(t, step, UNEVEN) else 0.0
+
+
+def are_apart(t: Array, step: float, within: float) -> bool:
+    """Whether samples (N,) are so far apart, none of them off by more than a share of it from where it is due."""
     due = t[0] + np.arange(BLOCK) * step
     for start in range(0, len(t), BLOCK):
         block = t[start : start + BLOCK]
-        late = block - due[: len(block)] - start * step
-        if max(late.max(), -late.min()) > UNEVEN * step:
-            return 0.0
-    return step
+        late = block - due[: len(block)]
+        if max(late.max() - start * step, start * step - late.min()) > within * step:
+            return False
+    return True
 
 
 def _project_evenly(t: Array, x: Array, step: float, omega: float, harmonics: int) -> Array:
     """The coefficients of evenly sampled x (N,)."""
     whole = len(t) // EVEN * EVEN
     starts = basis(t[:whole:EVEN], omega, harmonics)
-    within = x[:whole].reshape(-1, EVEN) @ basis(np.arange(EVEN, dtype=np.float64) * step, omega, harmonics)
+    within = x[:whole].reshape(-1, EVEN) @ _one_block(step, omega, harmonics)
     right = _turned(starts, within).sum(axis=0) + x[whole:] @ basis(t[whole:], omega, harmonics)
     return np.asarray(np.linalg.solve(_gram(t, step, omega, harmonics), right), dtype=np.float64)
 
@@ -79,13 +84,14 @@ def _evaluate_evenly(c: Array, t: Array, step: float, omega: float) -> Array:
     whole, harmonics = len(t) // EVEN * EVEN, len(c) // 2
     signal = np.empty(len(t))
     turned = _turned(basis(-t[:whole:EVEN], omega, harmonics), c)
-    np.matmul(
-        turned,
-        basis(np.arange(EVEN, dtype=np.float64) * step, omega, harmonics).T,
-        out=signal[:whole].reshape(-1, EVEN),
-    )
+    np.matmul(turned, _one_block(step, omega, harmonics).T, out=signal[:whole].reshape(-1, EVEN))
     signal[whole:] = basis(t[whole:], omega, harmonics) @ c
     return signal
+
+
+def _one_block(step: float, omega: float, harmonics: int) -> Array:
+    """The basis (EVEN, 2 H + 1) of a block of evenly spaced samples that starts at 0."""
+    return basis(np.arange(EVEN, dtype=np.float64) * step, omega, harmonics)
 
 
 def _turned(starts: Array, parts: Array) -> Array:
@@ -107,7 +113,7 @@ def _gram(t: Array, step: float, omega: float, harmonics: int) -> Array:
     cos jx cos kx = (cos (j - k)x + cos (j + k)x) / 2, and so on: sums of twice as many harmonics tell them all.
     """
     whole = len(t) // EVEN * EVEN
-    within = basis(np.arange(EVEN, dtype=np.float64) * step, omega, 2 * harmonics).sum(axis=0)
+    within = _one_block(step, omega, 2 * harmonics).sum(axis=0)
     sums = _turned(basis(t[:whole:EVEN], omega, 2 * harmonics), within).sum(axis=0)
     sums += basis(t[whole:], omega, 2 * harmonics).sum(axis=0)
     cosines, sines = np.append(sums[0], sums[1::2]), np.append(0.0, sums[2::2])
