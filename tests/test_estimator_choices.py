@@ -9,7 +9,7 @@ from scipy.optimize import nnls
 
 from pipeline.errors import NotIdentifiable
 from pipeline.estimators import estimator
-from pipeline.estimators.problem import Known, Regression, solve
+from pipeline.estimators.problem import Known, Regression, factored
 from pipeline.estimators.wlse import pooled
 from pipeline.maths.models.independent import regressor
 from tests import arm
@@ -92,7 +92,7 @@ def test_what_the_model_leaves_beyond_noise_makes_weights_equal():
     """Weights of the noise alone trust the quiet half, where the model errs as it does elsewhere."""
     quiet = np.where(np.arange(K) < K // 2, 1.0, 0.03)
     wrong = 0.3 * np.sin(2 * np.pi * 5 * np.arange(K) / K)
-    weigh = {"noise": lambda p: solve(p, p.periods / pooled(p.tau_var, p.periods)).theta}
+    weigh = {"noise": lambda p: factored(p, p.periods / pooled(p.tau_var, p.periods)).theta}
     weigh |= {name: lambda p, name=name: estimator(name)(p).theta for name in ("lse", "wlse")}
 
     def off(name, error):

@@ -1,6 +1,6 @@
 """Least squares with inertia and friction that are not negative, as no mechanism's are."""
 
-from pipeline.estimators.problem import Estimate, Regression, factored, spread
+from pipeline.estimators.problem import Estimate, Regression, spread
 from pipeline.maths.estimation import bounded
 
 
@@ -9,7 +9,6 @@ def estimate(problem: Regression) -> Estimate:
 
     The standard errors are those of least squares: of a parameter that a bound holds back, they are too large.
     """
-    weight = problem.periods.astype(float)
-    R = factored(problem, weight)
+    weight, R = problem.weight, problem.triangle
     theta = bounded.bounded(R, problem.known.signs(len(R.y)))
     return Estimate(theta, lambda: spread(problem, weight, R, theta))

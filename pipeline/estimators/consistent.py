@@ -3,7 +3,7 @@
 Sousa and Cortesao, 2014 and 2019; Traversaro, Brossette, Escande and Nori, 2016; Wensing, Kim and Slotine, 2018.
 """
 
-from pipeline.estimators.problem import Estimate, Regression, factored, spread
+from pipeline.estimators.problem import Estimate, Regression, spread
 from pipeline.maths.estimation.conic import nearest
 from pipeline.maths.models.mechanism import of_signs
 
@@ -20,7 +20,6 @@ def estimate(problem: Regression) -> Estimate:
     NotIdentifiable
         If the conic program is not solved, and where least squares raise it.
     """
-    weight = problem.periods.astype(float)
-    R = factored(problem, weight)
+    weight, R = problem.weight, problem.triangle
     theta = nearest(R, of_signs(problem.known.signs(len(R.y)))).theta
     return Estimate(theta, lambda: spread(problem, weight, R, R.theta))

@@ -28,8 +28,7 @@ def estimate(problem: Regression) -> Estimate:
     s is the deviation of the residuals by the median of their absolute values.  The standard errors are those of least
     squares on residuals s psi(r / s) over the share of samples that lie near.  (Huber, 1981, (7.6.5))
     """
-    weight = problem.periods.astype(float)
-    R = factored(problem, weight)
+    weight, R = problem.weight, problem.triangle
     found = settled(problem, weight, R)
     return Estimate(found.theta, lambda: robust_spread(problem, weight, R, found))
 

@@ -8,7 +8,7 @@ the excitation's harmonics kept, little noise is left, and both agree.
 import numpy as np
 
 from pipeline.errors import NotIdentifiable
-from pipeline.estimators.problem import ALIKE, CONDITION, Estimate, Regression, Spread, factored
+from pipeline.estimators.problem import ALIKE, CONDITION, Estimate, Regression, Spread
 from pipeline.maths.arrays import Array
 from pipeline.maths.estimation.correlation import correlated
 from pipeline.maths.estimation.identifiability import not_told_apart
@@ -24,8 +24,7 @@ def estimate(problem: Regression) -> Estimate:
     NotIdentifiable
         If the instruments do not tell the parameters apart, and where least squares raise it.
     """
-    weight = problem.periods.astype(float)
-    R = factored(problem, weight)
+    weight, R = problem.weight, problem.triangle
     root = np.sqrt(weight)[:, None]
     F = problem.Phi * root / R.scale
     Q, _ = np.linalg.qr(instruments(problem) * root / R.scale)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pipeline.estimators.problem import Estimate, Regression, factored, spread
+from pipeline.estimators.problem import Estimate, Regression, spread
 from pipeline.maths.arrays import Array
 from pipeline.maths.estimation.least_squares import Triangle
 
@@ -18,8 +18,7 @@ def estimate(problem: Regression) -> Estimate:
     around Phi theta by another (MacKay, 1992).  The standard errors are those of least squares: they leave out what the
     guess adds.
     """
-    weight = problem.periods.astype(float)
-    R = factored(problem, weight)
+    weight, R = problem.weight, problem.triangle
     guess = np.zeros(len(R.y)) if problem.known.guess is None else problem.known.guess
     theta = drawn(R, guess, int(np.count_nonzero(weight)))
     return Estimate(theta, lambda: spread(problem, weight, R, theta))

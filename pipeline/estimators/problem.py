@@ -48,6 +48,16 @@ class Regression:
     known: Known = NOTHING
     Phi_cov: Array | None = None  # (S, p, p) covariance of the errors of a row, the mean over each log; None: not known
 
+    @cached_property
+    def weight(self) -> Array:
+        """By what each sample (K,) counts where all periods count the same."""
+        return self.periods.astype(float)
+
+    @cached_property
+    def triangle(self) -> Triangle:
+        """What the samples say of the parameters where all periods count the same.  Raises what `factored` does."""
+        return factored(self, self.weight)
+
 
 class Spread(NamedTuple):
     """How far parameters may be off."""
@@ -107,18 +117,8 @@ class Estimate:
 Estimator = Callable[[Regression], Estimate]
 
 
-def solve(problem: Regression, weight: Array) -> Estimate:
-    """Minimise the sum of weight (tau - Phi theta)^2, by QR of the weighted rows.  (6.42), (6.46)
-
-    `weight` is (K,), 0 where there is nothing.  The standard errors take their scale from the residuals, so a model
-    that does not fit has wider ones, whatever the noise.  Raises what `factored` does.
-    """
-    R = factored(problem, weight)
-    return Estimate(R.theta, lambda: spread(problem, weight, R, R.theta))
-
-
 def factored(problem: Regression, weight: Array) -> Triangle:
-    """What the rows, each counting by its weight (K,), say of the parameters.
+    """What the rows, each counting by its weight (K,), 0 where there is nothing, say of the parameters.  (6.42)
 
     Raises
     ------

@@ -6,7 +6,7 @@ squares; inertia and friction are not negative.
 
 import numpy as np
 
-from pipeline.estimators.problem import Estimate, Regression, Search, factored, spread
+from pipeline.estimators.problem import Estimate, Regression, Search, spread
 from pipeline.maths.estimation.bounded import bounded
 from pipeline.maths.estimation.least_squares import Triangle
 from pipeline.maths.estimation.swarm import CONSTRICTED, PARTICLES, THESIS, Manner, search
@@ -21,8 +21,7 @@ def estimate(problem: Regression) -> Estimate:
 
     The standard errors are those of least squares: of a parameter that its box holds back, they are too large.
     """
-    weight = problem.periods.astype(float)
-    R = factored(problem, weight)
+    weight, R = problem.weight, problem.triangle
     box = problem.known.box or around(R, problem)
     theta = search(R, box, SEED).theta
     return Estimate(

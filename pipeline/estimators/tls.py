@@ -14,7 +14,7 @@ import numpy as np
 from scipy.linalg import qr
 
 from pipeline.errors import NotIdentifiable
-from pipeline.estimators.problem import Estimate, Regression, Spread, factored
+from pipeline.estimators.problem import Estimate, Regression, Spread
 from pipeline.maths.arrays import Array
 from pipeline.maths.estimation.correlation import correlated
 from pipeline.maths.estimation.least_squares import Triangle
@@ -47,8 +47,7 @@ def estimate(problem: Regression) -> Estimate:
     NotIdentifiable
         If the noise of the columns is not known, or buries what they show, and where least squares raise it.
     """
-    weight = problem.periods.astype(float)
-    R = factored(problem, weight)
+    weight, R = problem.weight, problem.triangle
     if problem.Phi_cov is None:
         raise NotIdentifiable("how noisy the motion is shows where periods repeat: record at least two of them")
     C = noise_of(problem, problem.Phi_cov, weight) / np.outer(R.scale, R.scale)

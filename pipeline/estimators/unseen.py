@@ -13,7 +13,7 @@ from pipeline.estimators.candidates import Candidate, Library
 from pipeline.estimators.folds import folds
 from pipeline.estimators.observations import Observed
 from pipeline.estimators.paths import ANOTHER_PATH, SAME_PATH
-from pipeline.estimators.scores import scored, some
+from pipeline.estimators.scores import Judge, some
 from pipeline.maths.arrays import Array, Booleans, Integers
 from pipeline.maths.models.model import Model
 from pipeline.maths.selection.blocks import BLOCKS, MOST
@@ -81,8 +81,8 @@ def by(scheme: Scheme, made: Refitted, Phi: Array, name: str, estimator: str) ->
         record = some(log.records[names.index(effort)], kept)
         moves = record.standing == 0
         if not record.at_rest and moves.any():
-            about = (name, estimator, "identification", scheme.name, scheme.path)
-            yield scored(record, *about, tau_hat[:, m], moves, log.lowpass, log.white.get(effort))
+            judge = Judge(record, moves, log.lowpass, log.white.get(effort))
+            yield judge.scored(name, estimator, "identification", scheme.name, scheme.path, tau_hat[:, m])
 
 
 def blocks(made: Refitted, name: str) -> Scheme:

@@ -27,6 +27,7 @@ from pipeline.records.quantities import QUANTITIES
 Unit = Callable[[str], str]
 
 ARROW: dict[Any, pa.DataType] = {Column: pa.float64(), Counts: pa.int64(), Labels: pa.string()}
+ROWS = 1 << 24  # at most in a row group: a recording in one of them is read without a copy
 PARTIAL = ".partial"  # what the name of a file that is still being written ends with
 
 
@@ -48,7 +49,7 @@ class Writer:
         self.made_from = json.dumps(made_from, ensure_ascii=False, sort_keys=True)
         self._open: dict[Path, pq.ParquetWriter] = {}
         self._unnamed = unnamed()
-        self._last: dict[Path, Record] = {}
+        self._described: dict[Path, dict[str, str]] = {}
 
     def __enter__(self) -> "Writer":
         return self
@@ -61,15 +62,15 @@ class Writer:
             target.parent.mkdir(parents=True, exist_ok=True)
             described = schema(type(record), self.unit(record))
             self._open[place] = pq.ParquetWriter(self._unnamed(target), described, **_encoding(described))
-        self._open[place].write_table(_table(record, self._open[place].schema))
-        self._last[place] = record
+        self._open[place].write_table(_table(record, self._open[place].schema), ROWS)
+        self._described[place] = self._metadata(record)
         return place
 
     def __exit__(self, failure: type[BaseException] | None, *_: object) -> None:
         try:
             if failure is None:
                 for place, file in self._open.items():
-                    file.add_key_value_metadata(self._metadata(place))
+                    file.add_key_value_metadata(self._described[place])
                     file.close()
                 for place in self._open:
                     self._unnamed(self.folder / place).replace(self.folder / place)
@@ -84,8 +85,7 @@ class Writer:
             file.is_open = False  # or it would be closed again, aloud, when it is collected
             self._unnamed(self.folder / place).unlink(missing_ok=True)
 
-    def _metadata(self, place: Path) -> dict[str, str]:
-        record = self._last[place]
+    def _metadata(self, record: Record) -> dict[str, str]:
         units = {name: self.unit(record)(QUANTITIES[name].unit) for name in record.scalars()}
         values = {name: getattr(record, name) for name in record.scalars()}
         return {

@@ -20,7 +20,7 @@ from pipeline.estimators.identifiability import (
 )
 from pipeline.estimators.known import known_of
 from pipeline.estimators.observations import observed, pose_samples
-from pipeline.estimators.problem import NOTHING, Estimate, Known, Regression, Search, factored
+from pipeline.estimators.problem import NOTHING, Estimate, Known, Regression, Search
 from pipeline.estimators.regression import joined, pose
 from pipeline.maths.arrays import Array
 from pipeline.maths.estimation.identifiability import Told, told
@@ -124,7 +124,7 @@ def identifiability(
     plain = estimates.get("lse")
     if plain is None:
         return
-    seen = told(factored(regression, regression.periods.astype(float)))
+    seen = told(regression.triangle)
     names = [parameter.name for parameter in model.parameters]
     wanting = (*together(names, seen), *not_seen(regression, plain))
     yield summary_of(model, names, seen, regression, plain, advice(robot, joint, wanting))

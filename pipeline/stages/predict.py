@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise, starmap
 
 import numpy as np
 
@@ -13,9 +14,9 @@ from pipeline.estimators.observations import averaged, observed, pose_samples
 from pipeline.estimators.paths import ANOTHER_PATH, SAME_PATH, follows
 from pipeline.estimators.problem import Known
 from pipeline.estimators.regression import measured_motion, of_joints, pose, predicted, stands_still
-from pipeline.estimators.scores import scored, some
+from pipeline.estimators.scores import Judge, some
 from pipeline.estimators.used import describing, model_of, used
-from pipeline.maths.arrays import Array, Booleans
+from pipeline.maths.arrays import Array, Booleans, Integers
 from pipeline.maths.models.independent import IndependentJoint
 from pipeline.maths.models.model import Motion
 from pipeline.maths.selection.blocks import BLOCKS
@@ -109,9 +110,10 @@ def unseen(
     named = [(f.model, f.estimator, f) for f in own]
     if chosen is not None:
         named.append((CHOSEN, f"{chosen.model}.{chosen.estimator}", chosen))
+    judge = Judge(signal, free, lowpass)
     for model, by, fit in named:
         tau_hat = along(fit, signal, signals, robot, lowpass)
-        yield scored(signal, model, by, entry.role, entry.role, path, tau_hat, free, lowpass)
+        yield judge.scored(model, by, entry.role, entry.role, path, tau_hat)
 
 
 def is_held(fit: Fit, signals: Sequence[Signal], robot: Robot) -> bool:
@@ -139,7 +141,8 @@ def without_the_log(
 ) -> Iterator[Prediction]:
     """Predict a log from fits to other identification logs, and judge them by some of its samples (N,)."""
     kept = whole_periods(signal.t, own) if own is not None else slice(None)
-    part, motion = some(signal, kept), at(motion, kept)
+    motion = at(motion, kept)
+    judge = Judge(some(signal, kept), judged[kept], lowpass, own.sigma_tau_white if own else None)
     for fit in cross_fits:
         left_out = [str(names).split(", ") for names in fit.left_out]
         rows = [row for row, names in enumerate(left_out) if signal.log in names]
@@ -147,8 +150,7 @@ def without_the_log(
             number = len(left_out[rows[0]])
             scheme = "leave one log out" if number == 1 else f"leave {number} logs out"
             tau_hat = predicted(model, fit.theta[rows], motion)
-            about = (fit.model, fit.estimator, signal.role, scheme, ANOTHER_PATH)
-            yield scored(part, *about, tau_hat, judged[kept], lowpass, own.sigma_tau_white if own else None)
+            yield judge.scored(fit.model, fit.estimator, signal.role, scheme, ANOTHER_PATH, tau_hat)
 
 
 def without_a_period(
@@ -166,27 +168,31 @@ def without_a_period(
     """
     kept = whole_periods(signal.t, own)
     part = some(signal, kept)
-    since = part.t - own.t_start
-    number = np.minimum((since / own.period + 1e-9).astype(int), own.periods - 1)
-    group = np.array(folds(own.periods))[number]
+    fold = fold_of(part.t, own)
+    ends = np.searchsorted(fold, np.arange(fold[-1] + 2)).tolist()
     Phi = model.regressor(at(motion, kept)).Phi[:, 0]
     all_periods, moving = pose(model, [own], known), ~stands_still(own)
-    rests = averaging.left_out(part.t, part.tau, own.period, len(own.t), group)
+    rests = averaging.left_out(part.t, part.tau, own.period, len(own.t), fold)
     others = [
         replace(all_periods, tau=rest.mean, tau_var=rest.var, periods=np.where(moving, rest.counts, 0))
         for rest in rests
     ]
+    judge = Judge(part, judged[kept], lowpass, own.sigma_tau_white)
     for name in ESTIMATORS:
-        tau_hat = np.empty(len(since))
+        tau_hat = np.empty(len(part))
         try:
-            for out, regression in enumerate(others):
-                left = np.flatnonzero(group == out)
+            for left, regression in zip(starmap(slice, pairwise(ends)), others, strict=True):
                 tau_hat[left] = Phi[left] @ estimator(name)(regression).theta
         except NotIdentifiable as error:
             yield not_predicted(signal, name, error)
             continue
-        about = (model.name, name, signal.role, "leave one period out", SAME_PATH)
-        yield scored(part, *about, tau_hat, judged[kept], lowpass, own.sigma_tau_white)
+        yield judge.scored(model.name, name, signal.role, "leave one period out", SAME_PATH, tau_hat)
+
+
+def fold_of(t: Array, own: Trajectory) -> Integers:
+    """The fold of periods (N,) that each sample of whole periods is of, at these times [s]; it never falls."""
+    period = np.minimum(((t - own.t_start) / own.period + 1e-9).astype(int), own.periods - 1)
+    return np.asarray(np.array(folds(own.periods))[period])
 
 
 def without_a_segment(
@@ -195,7 +201,7 @@ def without_a_segment(
     """Predict each sixth of a log that does not repeat from fits to the other five."""
     log = observed([own], (), lowpass, 0)
     Phi = model.regressor(log.motion).Phi[:, 0]
-    judged, about = own.standing == 0, ("identification", "leave a segment out", ANOTHER_PATH)
+    judge = Judge(own, own.standing == 0, lowpass)
     for name in ESTIMATORS:
         tau_hat = np.empty(len(own))
         try:
@@ -205,7 +211,7 @@ def without_a_segment(
         except NotIdentifiable as error:
             yield not_predicted(own, name, error)
             continue
-        yield scored(own, model.name, name, *about, tau_hat, judged, lowpass)
+        yield judge.scored(model.name, name, "identification", "leave a segment out", ANOTHER_PATH, tau_hat)
 
 
 def not_predicted(signal: Signal | Smoothed, name: str, error: NotIdentifiable) -> Diagnostic:

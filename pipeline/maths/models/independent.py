@@ -12,14 +12,14 @@ from pipeline.maths.models.memory import driven
 from pipeline.maths.models.model import JointDynamics, Motion, Parameter, Regressor
 from pipeline.maths.models.terms import Term
 
-FUNCTIONS: dict[str, Callable[[Array, Array], Array | float]] = {  # those of `bias`, of q and dq; z is 0
-    "1": lambda q, dq: 1.0,
-    "sin q": lambda q, dq: np.sin(q),
-    "cos q": lambda q, dq: np.cos(q),
-    "q": lambda q, dq: q,
-    "dq": lambda q, dq: dq,
-    "sign(dq)": lambda q, dq: np.sign(dq),
-    "z": lambda q, dq: 0.0,
+FUNCTIONS: dict[str, Callable[[Array, Array, Array | float], Array | float]] = {  # those of `bias`, of q, dq and z
+    "1": lambda q, dq, z: 1.0,
+    "sin q": lambda q, dq, z: np.sin(q),
+    "cos q": lambda q, dq, z: np.cos(q),
+    "q": lambda q, dq, z: q,
+    "dq": lambda q, dq, z: dq,
+    "sign(dq)": lambda q, dq, z: np.sign(dq),
+    "z": lambda q, dq, z: z,
 }
 
 
@@ -56,12 +56,14 @@ class IndependentJoint:
     def regressor(self, motion: Motion) -> Regressor:
         """Phi (N, 1, p).  (6.9), (6.12), (6.14)"""
         q, dq, ddq = (x[:, 0] for x in motion[:3])
-        known, columns = np.ones(len(q), np.bool_), []
-        for term in self.terms:
-            z, started = driven(motion, 0, term)
-            known &= started
-            columns.append(column(term, q, dq, ddq, z))
-        return Regressor(np.stack(columns, axis=-1)[:, None, :], known)
+        known, Phi = np.ones(len(q), np.bool_), np.zeros((len(q), 1, len(self.terms)))
+        for i, term in enumerate(self.terms):
+            z: Array | float = 0.0
+            if term.scale:
+                z, started = driven(motion, 0, term)
+                known &= started
+            add(term, q, dq, ddq, z, Phi[:, 0, i])
+        return Regressor(Phi, known)
 
     def sensitivity(self, motion: Motion) -> Array:
         """By how much the regressor moves with the motion: its derivatives by q, dq and ddq, (N, 3, p).
@@ -96,24 +98,20 @@ class IndependentJoint:
         return (JointDynamics(np.full(len(motion.q), inertia_of(self.terms, theta)), c, known),)
 
 
-def column(term: Term, q: Array, dq: Array, ddq: Array, z: Array) -> Array:
-    """phi (N,) of one term."""
-    b, _, _ = bias(term.coefficients, q, dq, z)
-    return np.asarray(term.a * ddq + b)
-
-
 def regressor(terms: Sequence[Term], q: Array, dq: Array, ddq: Array) -> Array:
-    """Phi (..., K, p) of terms without memory; q, dq and ddq (..., K) in the joint's units.  (6.9), (6.12), (6.14)
-
-    The same as `column`, but without the functions that a term has not, for those who ask for thousands.
-    """
+    """Phi (..., K, p) of terms without memory; q, dq and ddq (..., K) in the joint's units.  (6.9), (6.12), (6.14)"""
     Phi = np.zeros((len(terms), *q.shape))
     for phi, term in zip(Phi, terms, strict=True):
-        if term.a:
-            phi += term.a * ddq
-        for name, coefficient in term.b.items():
-            phi += coefficient * FUNCTIONS[name](q, dq)
+        add(term, q, dq, ddq, 0.0, phi)
     return np.moveaxis(Phi, 0, -1)
+
+
+def add(term: Term, q: Array, dq: Array, ddq: Array, z: Array | float, phi: Array) -> None:
+    """Add a ddq + b(q, dq, z) of one term to `phi` (...); like `bias`, but of the functions that the term has only."""
+    if term.a:
+        phi += term.a * ddq
+    for name, coefficient in term.b.items():
+        phi += coefficient * FUNCTIONS[name](q, dq, z)
 
 
 def inertia_of(terms: Sequence[Term], theta: Array) -> float:

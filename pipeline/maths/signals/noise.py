@@ -15,11 +15,12 @@ def noise_std(residual: Array, segment: Integers, rate: float, cutoff: float) ->
     The model's error is slower than that but for jumps where the motion turns, so the median is taken, which a few
     jumps do not move.  0 where the sampling rate leaves the low-pass nothing to take out.
     """
-    passed = share_passed(rate, cutoff)
-    if passed == 1.0:
-        return 0.0
-    removed = residual - smoothed(residual, segment, rate, cutoff)
-    return float(np.median(np.abs(removed)) / NORMAL_MAD / np.sqrt(1.0 - passed))
+    return white_std(residual - smoothed(residual, segment, rate, cutoff), share_passed(rate, cutoff))
+
+
+def white_std(removed: Array, passed: float) -> float:
+    """Standard deviation of white noise, from what a low-pass that lets a share of its power through took out (N,)."""
+    return float(np.median(np.abs(removed)) / NORMAL_MAD / np.sqrt(1.0 - passed)) if passed < 1.0 else 0.0
 
 
 def smoothed(x: Array, segment: Integers, rate: float, cutoff: float) -> Array:

@@ -1,6 +1,7 @@
 """Velocities and accelerations of motion that does not repeat: zero-phase low-pass, then differences."""
 
 from collections.abc import Iterator
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -18,20 +19,28 @@ def lowpass(x: Array, rate: float, cutoff: float) -> Array:
     """
     if cutoff >= 0.4 * rate or len(x) < 2:
         return x
-    from scipy.signal import butter, sosfiltfilt
+    from scipy.signal import sosfiltfilt
 
-    sos = butter(ORDER, cutoff, fs=rate, output="sos")
+    sos = _sections(rate, cutoff)
     return np.asarray(sosfiltfilt(sos, x, axis=0, padlen=min(3 * round(rate / cutoff) + 3, len(x) - 1)))
 
 
+@cache
 def share_passed(rate: float, cutoff: float) -> float:
     """The share of the power of white noise that `lowpass` lets through."""
     if cutoff >= 0.4 * rate:
         return 1.0
-    from scipy.signal import butter, sosfreqz
+    from scipy.signal import sosfreqz
 
-    _, H = sosfreqz(butter(ORDER, cutoff, fs=rate, output="sos"), 4096)
+    _, H = sosfreqz(_sections(rate, cutoff), 4096)
     return float(np.mean(np.abs(H) ** 4))  # two passes multiply the amplitude by |H| each
+
+
+@cache
+def _sections(rate: float, cutoff: float) -> Array:
+    from scipy.signal import butter
+
+    return np.asarray(butter(ORDER, cutoff, fs=rate, output="sos"))
 
 
 def motion(q: Array, dq: Array | None, rate: float, cutoff: float) -> tuple[Array, Array, Array]:
