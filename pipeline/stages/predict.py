@@ -73,12 +73,10 @@ def run(
             known = known_of(robot.joint(joint))
             own_fits = [fit for fit in refits if fit.group == joint]
             sampled = samples.get(joint)
-            judged = sampled.standing == 0 if sampled else np.ones(len(signal), np.bool_)
-            motion = smoothed_motion(sampled) if sampled else measured_motion(signal, lowpass)
             if own_fits:
-                yield from without_the_log(signal, motion, periods.get(joint), own_fits, model, judged, lowpass)
+                yield from without_the_log(signal, sampled, periods.get(joint), own_fits, model, lowpass)
             elif joint in periods:
-                yield from without_a_period(signal, motion, periods[joint], model, known, judged, lowpass)
+                yield from without_a_period(signal, sampled, periods[joint], model, known, lowpass)
             elif sampled:
                 yield from without_a_segment(sampled, model, known, lowpass)
 
@@ -132,17 +130,16 @@ def along(fit: Fit, signal: Signal, signals: Sequence[Signal], robot: Robot, low
 
 def without_the_log(
     signal: Signal,
-    motion: Motion,
+    sampled: Smoothed | None,
     own: Trajectory | None,
     cross_fits: Iterable[CrossFit],
     model: IndependentJoint,
-    judged: Booleans,
     lowpass: float,
 ) -> Iterator[Prediction]:
-    """Predict a log from fits to other identification logs, and judge them by some of its samples (N,)."""
+    """Predict a log from fits to other identification logs."""
     kept = whole_periods(signal.t, own) if own is not None else slice(None)
-    motion = at(motion, kept)
-    judge = Judge(some(signal, kept), judged[kept], lowpass, own.sigma_tau_white if own else None)
+    motion = motion_of(signal, sampled, kept, lowpass)
+    judge = Judge(some(signal, kept), moves(signal, sampled)[kept], lowpass, own.sigma_tau_white if own else None)
     for fit in cross_fits:
         left_out = [str(names).split(", ") for names in fit.left_out]
         rows = [row for row, names in enumerate(left_out) if signal.log in names]
@@ -155,29 +152,24 @@ def without_the_log(
 
 def without_a_period(
     signal: Signal,
-    motion: Motion,
+    sampled: Smoothed | None,
     own: Trajectory,
     model: IndependentJoint,
     known: Known,
-    judged: Booleans,
     lowpass: float,
 ) -> Iterator[Prediction | Diagnostic]:
-    """Predict each period of a log from fits to the other periods; only the effort is left out, not the path.
-
-    They are judged by some of the log's samples (N,).
-    """
+    """Predict each period of a log from fits to the other periods; only the effort is left out, not the path."""
     kept = whole_periods(signal.t, own)
     part = some(signal, kept)
     fold = fold_of(part.t, own)
     ends = np.searchsorted(fold, np.arange(fold[-1] + 2)).tolist()
-    Phi = model.regressor(at(motion, kept)).Phi[:, 0]
     all_periods, moving = pose(model, [own], known), ~stands_still(own)
-    rests = averaging.left_out(part.t, part.tau, own.period, len(own.t), fold)
     others = [
         replace(all_periods, tau=rest.mean, tau_var=rest.var, periods=np.where(moving, rest.counts, 0))
-        for rest in rests
+        for rest in averaging.left_out(part.t, part.tau, own.period, len(own.t), fold)
     ]
-    judge = Judge(part, judged[kept], lowpass, own.sigma_tau_white)
+    Phi = model.regressor(motion_of(signal, sampled, kept, lowpass)).Phi[:, 0]
+    judge = Judge(part, moves(signal, sampled)[kept], lowpass, own.sigma_tau_white)
     for name in ESTIMATORS:
         tau_hat = np.empty(len(part))
         try:
@@ -221,9 +213,17 @@ def not_predicted(signal: Signal | Smoothed, name: str, error: NotIdentifiable) 
     return diagnostic("predict", f"{signal.log}.{signal.joint}", "note", said)
 
 
-def smoothed_motion(own: Smoothed) -> Motion:
-    """The motion of a joint along a recording, as it was smoothed to choose a model by."""
-    return Motion(own.q[:, None], own.dq[:, None], own.ddq[:, None], 1.0 / own.rate, own.segment)
+def motion_of(signal: Signal, sampled: Smoothed | None, which: slice, lowpass: float) -> Motion:
+    """The motion of a joint at some samples of a recording: as it was smoothed to choose a model by, if it was."""
+    if sampled is None:
+        return at(measured_motion(signal, lowpass), which)
+    q, dq, ddq = (x[:, None] for x in (sampled.q, sampled.dq, sampled.ddq))
+    return at(Motion(q, dq, ddq, 1.0 / sampled.rate, sampled.segment), which)
+
+
+def moves(signal: Signal, sampled: Smoothed | None) -> Booleans:
+    """Where a joint does not stand still (N,), as far as that was looked for."""
+    return sampled.standing == 0 if sampled is not None else np.ones(len(signal), np.bool_)
 
 
 def whole_periods(t: Array, own: Trajectory) -> slice:
