@@ -1,5 +1,6 @@
 """Runs in a world that is not kind: missing files, full disks, two runs at once, altered results."""
 
+import ast
 import json
 import shutil
 import subprocess
@@ -14,7 +15,7 @@ from pipeline.errors import BadRequest
 from pipeline.records import Diagnostic, Recording
 from pipeline.robots import davinci
 from pipeline.runner.fingerprints.canonical import canonical, hash_of
-from pipeline.runner.fingerprints.code import code
+from pipeline.runner.fingerprints.code import PACKAGE, code, imported
 from pipeline.runner.lock import locked
 from pipeline.stages import resample
 from tests import arm
@@ -65,6 +66,14 @@ def test_the_readers_of_logs_count_for_ingest_and_the_store_for_every_stage(fini
     )
     for file in (processed(finished) / "tasks").glob("*/*.json"):
         assert "pipeline/records/store.py" in json.loads(file.read_text())["fingerprint"]["code"], file
+
+
+@pytest.mark.parametrize("file", sorted(PACKAGE.rglob("*.py")), ids=lambda file: file.relative_to(PACKAGE).as_posix())
+def test_no_import_of_a_module_is_overlooked(file):
+    source = file.read_text(encoding="utf-8")
+    statements = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ImportFrom))
+    parsed = [(str(s.module), [n.name for n in s.names]) for s in statements if str(s.module).startswith("pipeline")]
+    assert sorted(imported(source)) == sorted(parsed)
 
 
 def test_code_of_several_modules_is_that_of_each():

@@ -1,6 +1,6 @@
 """The code that a result depends on: modules with everything of the pipeline that they import, by hash."""
 
-import ast
+import re
 from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
@@ -8,6 +8,8 @@ from pathlib import Path
 from pipeline.records import store
 
 PACKAGE = Path(__file__).parents[2]
+IMPORT = re.compile(r"^[ \t]*from (pipeline[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
+COMMENT = re.compile(r"#.*")
 
 
 @cache
@@ -37,20 +39,21 @@ def _collect(sources: Iterable[Path], files: dict[Path, None]) -> None:
 @cache
 def _imports(file: Path) -> tuple[str, ...]:
     modules = []
-    for node in _statements(ast.parse(file.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("pipeline"):
-            for alias in node.names:
-                deeper = f"{node.module}.{alias.name}"
-                modules.append(deeper if _files(deeper) else node.module)
+    for module, names in imported(file.read_text(encoding="utf-8")):
+        for name in names:
+            deeper = f"{module}.{name}"
+            modules.append(deeper if _files(deeper) else module)
     return tuple(modules)
 
 
-def _statements(node: ast.AST) -> Iterator[ast.AST]:
-    """All statements below a node; what they are made of is most of a tree, and holds no import."""
-    yield node
-    for part in ("body", "handlers", "orelse", "finalbody", "cases"):
-        for each in getattr(node, part, ()):
-            yield from _statements(each)
+def imported(source: str) -> Iterator[tuple[str, list[str]]]:
+    """What a module imports from the pipeline: each module, and the names from it.
+
+    Statements are found by how they begin: to parse all of a stage's modules would take longer than many a run.
+    """
+    for module, said in IMPORT.findall(source):
+        names = COMMENT.sub("", said).strip("() \n").split(",")
+        yield module, [name.split()[0] for name in names if name.strip()]
 
 
 @cache
