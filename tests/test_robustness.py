@@ -1,10 +1,12 @@
 """Runs in a world that is not kind: missing files, full disks, two runs at once, altered results."""
 
 import ast
+import gc
 import json
 import shutil
 import subprocess
 import sys
+import weakref
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 
@@ -12,7 +14,7 @@ import numpy as np
 import pytest
 
 from pipeline.errors import BadRequest
-from pipeline.records import Diagnostic, Recording
+from pipeline.records import Diagnostic, PeriodResidual, Recording, store
 from pipeline.robots import davinci
 from pipeline.runner.fingerprints.canonical import canonical, hash_of
 from pipeline.runner.fingerprints.code import PACKAGE, code, imported
@@ -74,6 +76,19 @@ def test_no_import_of_a_module_is_overlooked(file):
     statements = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ImportFrom))
     parsed = [(str(s.module), [n.name for n in s.names]) for s in statements if str(s.module).startswith("pipeline")]
     assert sorted(imported(source)) == sorted(parsed)
+
+
+def test_what_is_written_is_let_go_though_its_file_has_no_name_yet(tmp_path):
+    """Or a task that makes a record a time would need memory for all of them."""
+    t = np.arange(10.0)
+    with store.Writer(tmp_path, lambda record: lambda template: "", {}) as writer:
+        record = PeriodResidual("log", "joint", t=t, q_noise=t, dq_noise=t, tau_noise=t)
+        writer.write(record)
+        held = weakref.ref(record)
+        del record
+        gc.collect()
+        assert held() is None
+    assert (tmp_path / "period_residual" / "log" / "joint.parquet").exists()
 
 
 def test_code_of_several_modules_is_that_of_each():
@@ -231,7 +246,7 @@ def test_many_runs_at_once_hold_the_lock_one_after_the_other(tmp_path):
 import sys, time
 from pathlib import Path
 from pipeline.errors import BadRequest
-from pipeline.records import Diagnostic, Recording
+from pipeline.records import Diagnostic, PeriodResidual, Recording, store
 from pipeline.runner.lock import locked
 folder, done = Path(sys.argv[1]), 0
 while done < 40:

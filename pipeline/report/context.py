@@ -15,6 +15,7 @@ from pipeline.study.review import Rating
 
 PLAIN = "independent.lse"  # the fit that every other one is compared with
 THESIS_TISSUE = 457.24  # [N/m], section 8.2
+ACRONYMS = ("lse", "wlse", "pso", "iv", "tls")  # of estimators
 PAPER = 18  # rows of a table at most, in the PDF
 
 
@@ -82,9 +83,16 @@ def listed(table: Table) -> Iterator[Block]:
 def fit_name(model: str, estimator: str) -> str:
     """A fit as a reader knows it: 'independent, LSE'; the chosen one with what was chosen."""
     if model != CHOSEN:
-        return f"{model}, {estimator.upper()}"
+        return f"{model}, {estimator_name(estimator)}"
     structure, _, by = estimator.rpartition(".")
-    return f"chosen: {structure}, {by.upper()}"
+    return f"chosen: {structure}, {estimator_name(by)}"
+
+
+def estimator_name(estimator: str) -> str:
+    """An estimator as a reader knows it: acronyms in capitals, and 'Huber'."""
+    if estimator in ACRONYMS:
+        return estimator.upper()
+    return "Huber" if estimator == "huber" else estimator
 
 
 def count(number: int, noun: str) -> str:

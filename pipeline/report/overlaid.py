@@ -7,7 +7,7 @@ import numpy as np
 from pipeline.records import Fit, Residual, SwarmSearch
 from pipeline.report.content import Figure, Line, Panel, literal
 from pipeline.report.content.marks import Colour
-from pipeline.report.context import Context, label, title
+from pipeline.report.context import Context, estimator_name, label, title
 
 LOOKS: dict[str, Colour] = {
     "lse": "vermillion",
@@ -31,13 +31,13 @@ def estimators(context: Context, fit: Fit) -> Iterator[Figure]:
     plain = own["lse"]
     same = [name for name in MEANT_TO_DIFFER if name in own and apart(own[name], plain) < ALIKE]
     own = {name: r for name, r in own.items() if name not in same}
-    others = [r for name, r in own.items() if name != "lse"]
+    others = {name: r for name, r in own.items() if name != "lse"}
     if not others:
         return
     effort = label(plain, "tau", "effort")
     name = f"{title(fit.group)} in {literal(plain.log)}"
-    named = ", ".join(estimator.upper() for estimator in own)
-    largest = max(float(abs(r.tau_hat - plain.tau_hat).max()) for r in others)
+    named = ", ".join(map(estimator_name, own))
+    largest = max(float(abs(r.tau_hat - plain.tau_hat).max()) for r in others.values())
     yield Figure(
         f"{name}: averaged effort with the model's by {named}, and how far the others are from least squares."
         f"{alike(same)}",
@@ -47,12 +47,12 @@ def estimators(context: Context, fit: Fit) -> Iterator[Figure]:
                 "Averaged effort and models", "time [s]", effort,
                 (
                     Line(plain.t, plain.tau, "measured", "sky"),
-                    *(Line(r.t, r.tau_hat, e.upper(), LOOKS[e]) for e, r in own.items()),
+                    *(Line(r.t, r.tau_hat, estimator_name(e), LOOKS[e]) for e, r in own.items()),
                 ),
             ),
             Panel(
                 "Less that of least squares", "time [s]", effort,
-                tuple(Line(r.t, r.tau_hat - plain.tau_hat, r.estimator.upper(), LOOKS[r.estimator]) for r in others),
+                tuple(Line(r.t, r.tau_hat - plain.tau_hat, estimator_name(e), LOOKS[e]) for e, r in others.items()),
             ),
         ),
         f"estimators-{fit.group}",
@@ -69,7 +69,7 @@ def apart(one: Residual, other: Residual) -> float:
 def alike(names: list[str]) -> str:
     """Which estimators are not drawn, as they say the same as least squares."""
     verb = "is" if len(names) == 1 else "are"
-    return f" {' and '.join(name.upper() for name in names)} {verb} least squares' own." if names else ""
+    return f" {' and '.join(map(estimator_name, names))} {verb} least squares' own." if names else ""
 
 
 def convergence(context: Context, joint: str) -> Iterator[Figure]:

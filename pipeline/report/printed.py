@@ -6,7 +6,7 @@ from dataclasses import replace
 from pipeline.records import Fit
 from pipeline.records.record import slug
 from pipeline.report.content import Block, Bullets, Cell, Prose, Table
-from pipeline.report.context import Context, title
+from pipeline.report.context import Context, estimator_name, title
 from pipeline.report.results import format_unit
 from pipeline.robots.robot import Printed
 
@@ -32,7 +32,7 @@ def table(context: Context, fit: Fit, printed: Printed) -> Table:
     """Parameters and mean squared error, printed and found."""
     header = ["Parameter", "Unit"]
     for column in printed.columns:
-        header += [f"{column.estimator.upper() or 'Guess'}, printed", "here"]
+        header += [f"{estimator_name(column.estimator) or 'Guess'}, printed", "here"]
     rows: list[tuple[Cell, ...]] = []
     for i, name in enumerate((*map(str, fit.parameter), "mse")):
         last = i == len(fit.parameter)

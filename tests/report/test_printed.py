@@ -87,7 +87,7 @@ def test_estimators_are_drawn_over_the_averaged_effort_and_as_differences(record
     by_name = {r.estimator: r for r in records if isinstance(r, Residual)}
     shown = next(mark for mark in less.marks if mark.label == "WLSE")
     np.testing.assert_array_equal(shown.y, by_name["wlse"].tau_hat - by_name["lse"].tau_hat)
-    assert figure.caption.endswith("CONSISTENT and TLS are least squares' own.")
+    assert figure.caption.endswith("consistent and TLS are least squares' own.")
 
 
 def test_an_estimator_that_differs_from_least_squares_is_drawn_and_one_that_does_not_is_named(records):
@@ -96,7 +96,7 @@ def test_an_estimator_that_differs_from_least_squares_is_drawn_and_one_that_does
         for r in records
     ]
     (figure,) = estimators(context(other), plain(other))
-    assert "CONSISTENT" in {mark.label for mark in figure.panels[1].marks}
+    assert "consistent" in {mark.label for mark in figure.panels[1].marks}
     assert figure.caption.endswith("TLS is least squares' own.")
 
 

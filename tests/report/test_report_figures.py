@@ -7,6 +7,7 @@ import re
 import subprocess
 import sys
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -68,6 +69,22 @@ def test_nothing_is_clipped_and_no_legend_covers_data(figure: Figure) -> None:
         for legend, inside in drawn:
             assert inside.height > 0.4 * 45 / 25.4 * canvas.dpi
             assert legend is None or legend.get_window_extent().y0 >= inside.y1 - 1
+
+
+@pytest.mark.parametrize("columns", [1, 2, 3])
+@pytest.mark.parametrize(("low", "high"), [(-0.065, 0.105), (-1.05, 1.05), (0, 12_345), (-7e-5, 9e-5), (0, 100)])
+def test_no_number_on_an_axis_touches_the_next(low: float, high: float, columns: int) -> None:
+    x = np.linspace(low, high, 50)
+    figure = Figure("", "", (Panel("", "position [m]", "y", (Line(x, x),)),) * columns, columns=columns, height=45)
+    with mpl.rc_context(STYLE):
+        canvas = draw_figure(figure)
+        canvas.savefig(Path(os.devnull), format="svg")
+        for axes in canvas.axes:
+            inside = axes.get_window_extent()
+            drawn = [text.get_window_extent() for text in axes.get_xticklabels() if text.get_text()]
+            seen = [box for box in drawn if inside.x0 <= (box.x0 + box.x1) / 2 <= inside.x1]
+            assert len(seen) >= 2
+            assert all(one.x1 < next_one.x0 for one, next_one in pairwise(seen))
 
 
 @pytest.mark.parametrize(

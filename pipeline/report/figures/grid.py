@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 from pipeline.report.content import Figure
 from pipeline.report.figures.panels import LINE, draw_heading, make_room_for_names, plan_heading
+from pipeline.report.figures.ticks import spread_ticks
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -30,6 +31,8 @@ def arrange(canvas: "Canvas", figure: Figure) -> None:
     numbers = max(_letters(axes.yaxis) for axes in canvas.axes) * DIGIT
     left = TICK + numbers + max(_lines(axes.get_ylabel()) for axes in canvas.axes) * LINE + 1
     wide = width - left - RIGHT
+    for axes in canvas.axes:
+        spread_ticks(axes.xaxis, wide / DIGIT)
     headings = [plan_heading(panel, wide) for panel in figure.panels]
     rooms = [max(h.height for h in headings[i : i + columns]) for i in range(0, len(headings), columns)]
     below = [max(_room_below(axes) for axes in row) for row in rows]

@@ -33,6 +33,20 @@ def scale_ticks(axis: "Axis", label: str) -> str:
     return f"{meaning}[{ten} {unit}" if bracket else f"{label} [{ten}]"
 
 
+def spread_ticks(axis: "Axis", room: float) -> None:
+    """Put fewer numbers on a linear axis along which so many letters fit, until none touches the next."""
+    from matplotlib.ticker import MaxNLocator
+
+    locator, (low, high) = axis.get_major_locator(), axis.get_view_interval()
+    while isinstance(locator, MaxNLocator):
+        values = [value for value in locator() if low <= value <= high]
+        numbers = axis.get_major_formatter().format_ticks(values)
+        letters = 1 + max((len(number.replace(".", "")) for number in numbers), default=0)
+        if len(values) < 3 or letters <= room * (values[1] - values[0]) / (high - low):
+            break
+        locator.set_params(nbins=len(values) - 2)
+
+
 def set_log_ticks(axis: "Axis") -> None:
     """Number a logarithmic axis whose range is set: 1, 2 and 5 of each of a few decades, else some whole decades."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator

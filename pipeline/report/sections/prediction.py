@@ -80,10 +80,8 @@ def estimators(context: Context, predictions: list[Prediction]) -> Iterator[Tabl
     joints = list(dict.fromkeys(p.joint for p in predictions))
     if len(fits) < 2:
         return
-    rows = tuple(
-        (fit_name(model, estimator), *(worst(context, predictions, joint, model, estimator) for joint in joints))
-        for model, estimator in fits
-    )
+    errors = {fit: [worst(context, predictions, joint, *fit) for joint in joints] for fit in fits}
+    rows = tuple((fit_name(*fit), *found) for fit, found in errors.items() if any(cell != "–" for cell in found))
     caption = "Every fit compared: its model error in the worst unseen run of each joint."
     yield Table(caption, ("Fit", *map(title, joints)), rows, "estimators-table", "l" + "r" * len(joints))
 
