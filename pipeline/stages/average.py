@@ -182,9 +182,10 @@ def averaged(
     signal: Signal, used: slice, phased: Phases, found: Period, stated: float, lowpass: float
 ) -> Iterator[Average | PeriodResidual]:
     """Fold one joint at the phases of a period, from the first sample used on."""
-    q, dq, tau = (phased.fold(x[used]) for x in (signal.q, signal.dq, signal.tau))
-    white = white_noise(tau, signal.segment[used], signal.rate, lowpass)
     size = float(np.sqrt(np.mean(smoothed(signal.tau, signal.segment, signal.rate, lowpass)[used] ** 2))) or 1.0
+    tau = phased.fold(signal.tau[used])
+    white = white_noise(tau, signal.segment[used], signal.rate, lowpass)
+    q, dq = phased.fold(signal.q[used]), phased.fold(signal.dq[used])
     yield Average(
         log=signal.log,
         joint=signal.joint,

@@ -157,7 +157,7 @@ class _Periods(NamedTuple):
         counts = np.bincount(place, minlength=M * K).reshape(M, K)
         others = phased.counts - counts
         both = counts * others
-        weight = np.where(both > 0, phased.counts / np.maximum(both, 1), 0.0)
+        weight = np.divide(phased.counts, both, out=np.zeros(both.shape), where=both > 0)
         degrees = np.maximum(others.sum(axis=1) - np.count_nonzero(others, axis=1), 1)
         return cls(phased, number[first], first, place, counts, weight, np.count_nonzero(both, axis=1), degrees)
 
@@ -170,7 +170,7 @@ class _Periods(NamedTuple):
         explained = np.einsum("mk,mk,mk->m", off, off, self.weight)
         # What is left without a period: all squares, less those within it and those it is apart from the others by.
         squares = np.add.reduceat(residual * residual, self.first)
-        own = squares - np.sum(sums * sums / np.maximum(self.counts, 1), axis=1)
+        own = squares - np.einsum("mk,mk->m", sums, sums / np.maximum(self.counts, 1))
         between = squares.sum() - mean @ sums.sum(axis=0)
         noise = np.maximum(between - explained - own, 0.0) / self.degrees
         apart = explained / np.maximum(self.compared, 1)

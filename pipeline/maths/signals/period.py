@@ -54,12 +54,12 @@ def standard_error(t: Array, signals: Sequence[Array], period: float, harmonics:
     from scipy.fft import prev_fast_len, rfft
 
     omega, N = 2 * np.pi / period, prev_fast_len(len(t), real=True)
-    spectra, weights, information = np.zeros(1, complex), np.zeros(1), 0.0
+    spectra, weights, information = np.zeros(N // 2 + 1, complex), np.zeros(N // 2 + 1), 0.0
     for weight, slope, residual in _linearised(t - t.mean(), signals, omega, harmonics):
         information += weight * float(slope @ slope)
         spectrum = np.asarray(rfft(slope[:N]))
-        weights = weights + weight * (spectrum.real**2 + spectrum.imag**2)
-        spectra = spectra + weight * spectrum.conj() * rfft(residual[:N])
+        weights += weight * np.abs(spectrum) ** 2
+        spectra += weight * spectrum.conj() * rfft(residual[:N])
     power = float(np.vdot(spectra, spectra).real) / (N * float(weights.sum()))
     weights /= weights.sum()
     lines = 1.0 / float(weights @ weights)
@@ -80,7 +80,7 @@ def _linearised(
     for x in signals:
         c, residual = fit.left(x)
         _, slope = fit.left(t * fit.evaluate(derivative(c, 1.0)))
-        yield 1.0 / max(residual.var(), 1e-24 * x.var(), 1e-300), slope, residual
+        yield len(t) / max(float(residual @ residual), 1e-24 * float(x @ x), 1e-300), slope, residual
 
 
 def _taken(lines: Integers, N: int, apart: float, harmonics: int) -> Array:
