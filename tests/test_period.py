@@ -254,6 +254,17 @@ def test_noise_that_joints_share_is_not_counted_as_twice_the_knowledge():
     assert np.std(z) < 1.25
 
 
+@pytest.mark.parametrize("rho", [0.0, 0.99])
+def test_an_interval_of_the_period_needs_neither_every_sample_nor_every_line_of_the_spectrum(rho, monkeypatch):
+    """Of a prime number of samples some are left out; the slope has 3e-4 of its power at the lines that are."""
+    T, t = 10.0, np.arange(100_003) / 50
+    x = waves(t, T) + 0.01 * coloured(np.random.default_rng(0), len(t), rho)
+    few = period.standard_error(t, [x], T, 3)
+    monkeypatch.setattr(period, "BESIDE", len(t))
+    monkeypatch.setattr("scipy.fft.prev_fast_len", lambda N, real: N)
+    assert few == pytest.approx(period.standard_error(t, [x], T, 3), rel=0.01)
+
+
 @pytest.mark.parametrize("by", [2.5, 3.0, 5.0, 1.7e9])
 @pytest.mark.parametrize("at", [8.0, 23.45, 40.0])
 def test_a_step_of_the_clock_costs_the_shorter_side_at_most(by, at):

@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.maths.arrays import Array, Integers
-from pipeline.maths.signals.averaging import Phases, end, phases, whole_periods
+from pipeline.maths.signals.averaging import Phases, end, nearest, phases, whole_periods
 from pipeline.maths.signals.period import refine
 
 ODD = 2.0  # times what noise explains: a period that differs by less is left in, as it costs more to lose it
@@ -144,6 +144,7 @@ class _Periods(NamedTuple):
     first: Integers  # (M,) the first sample of each
     place: Integers  # (N,) of each sample in the table
     counts: Integers  # (M, K)
+    totals: Integers  # (K,) of the counts
     weight: Array  # (M, K) of the square of what a period's sum is off the mean; 0 where it or the others have none
     compared: Integers  # (M,) phases at which a period and the others have samples
     degrees: Integers  # (M,) of freedom behind the variance of the others
@@ -153,19 +154,21 @@ class _Periods(NamedTuple):
         phased, number = Phases(t, length, phases(length, rate)), numbers(t, length)
         first = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1])
         M, K = len(first), phased.K
-        place = np.repeat(np.arange(M) * K, np.diff(first, append=len(t))) + phased.bins
+        place = np.repeat(np.arange(M) * K, np.diff(first, append=len(t)))
+        place += nearest(t - t[0], length, K)
         counts = np.bincount(place, minlength=M * K).reshape(M, K)
-        others = phased.counts - counts
+        totals = counts.sum(axis=0)
+        others = totals - counts
         both = counts * others
-        weight = np.divide(phased.counts, both, out=np.zeros(both.shape), where=both > 0)
+        weight = np.divide(totals, both, out=np.zeros(both.shape), where=both > 0)
         degrees = np.maximum(others.sum(axis=1) - np.count_nonzero(others, axis=1), 1)
-        return cls(phased, number[first], first, place, counts, weight, np.count_nonzero(both, axis=1), degrees)
+        return cls(phased, number[first], first, place, counts, totals, weight, np.count_nonzero(both, axis=1), degrees)
 
     def odd(self, x: Array, signal: int) -> list[Difference]:
         """The periods in which a signal (N,) differs from the others."""
         _, residual = self.phased.carried(x)
         sums = _sums(self.place, residual, self.counts)
-        mean = sums.sum(axis=0) / np.maximum(self.phased.counts, 1)
+        mean = sums.sum(axis=0) / np.maximum(self.totals, 1)
         off = sums - self.counts * mean
         explained = np.einsum("mk,mk,mk->m", off, off, self.weight)
         # What is left without a period: all squares, less those within it and those it is apart from the others by.

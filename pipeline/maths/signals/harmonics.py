@@ -3,6 +3,7 @@
 Coefficients are (2 H + 1,): mean, then cosine and sine of harmonics 1 to H, at multiples of omega.
 """
 
+from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
@@ -36,11 +37,11 @@ class Harmonics:
     """
 
     def __init__(self, t: Array, omega: float, harmonics: int) -> None:
-        self.t, self.omega, self.harmonics = t, omega, harmonics
+        self.omega, self.harmonics, self._size = omega, harmonics, len(t)
         step = even_step(t)
         self._even = len(t) // EVEN * EVEN if step else 0  # samples in blocks that differ by a turn only
-        self._starts, self._within = t[: self._even : EVEN], np.arange(EVEN, dtype=np.float64) * step
-        self._rest = [slice(start, start + BLOCK) for start in range(self._even, len(t), BLOCK)]
+        self._starts, self._within = t[: self._even : EVEN].copy(), np.arange(EVEN, dtype=np.float64) * step
+        self._rest = t[self._even :].copy() if step else t  # no view, which would keep all times of a long log
 
     def project(self, x: Array) -> Array:
         """The coefficients closest to samples (N,) in the least squares sense.
@@ -51,12 +52,12 @@ class Harmonics:
 
     def evaluate(self, c: Array) -> Array:
         """The signal (N,) that the coefficients describe."""
-        signal, turned = np.empty(len(self.t)), np.empty((len(self._starts), len(c)))
+        signal, turned = np.empty(self._size), np.empty((len(self._starts), len(c)))
         turned[:, 0] = c[0]
         np.multiply(self._turns.conj(), _pairs(c), out=_pairs(turned))
         np.matmul(turned, self._block.T, out=signal[: self._even].reshape(-1, EVEN))
-        for part in self._rest:
-            signal[part] = basis(self.t[part], self.omega, self.harmonics) @ c
+        for part, F in self._blocks(self.harmonics):
+            signal[part] = F @ c
         return signal
 
     def left(self, x: Array) -> tuple[Array, Array]:
@@ -81,8 +82,8 @@ class Harmonics:
         products = np.empty(2 * self.harmonics + 1)
         products[0] = within[:, 0].sum()
         _pairs(products)[:] = np.einsum("bk,bk->k", self._turns, _pairs(within))
-        for part in self._rest:
-            products += x[part] @ basis(self.t[part], self.omega, self.harmonics)
+        for part, F in self._blocks(self.harmonics):
+            products += x[part] @ F
         return products
 
     @cached_property
@@ -111,9 +112,15 @@ class Harmonics:
         within = basis(self._within, self.omega, harmonics).sum(axis=0)
         sums[0] *= within[0]
         _pairs(sums)[:] *= _pairs(within)
-        for part in self._rest:
-            sums += basis(self.t[part], self.omega, harmonics).sum(axis=0)
+        for _, F in self._blocks(harmonics):
+            sums += F.sum(axis=0)
         return sums
+
+    def _blocks(self, harmonics: int) -> Iterator[tuple[slice, Array]]:
+        """Blocks of the samples that no other block serves, each with its basis (n, 2 H + 1)."""
+        for start in range(self._even, self._size, BLOCK):
+            part = slice(start, min(start + BLOCK, self._size))
+            yield part, basis(self._rest[start - self._even : part.stop - self._even], self.omega, harmonics)
 
 
 def project(t: Array, x: Array, omega: float, harmonics: int) -> Array:

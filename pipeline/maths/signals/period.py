@@ -10,7 +10,7 @@ from pipeline.maths.signals.harmonics import Harmonics, derivative
 from pipeline.maths.signals.repetition import repetition
 
 LOST = 2.0  # lines of the spectrum that an interval of two standard errors has to allow for; found by simulation
-NEGLIGIBLE = 1e-6  # of the heaviest line of a spectrum: what is fitted takes nothing worth counting from a lighter one
+BESIDE = 1000  # lines of the spectrum above the highest harmonic, beyond which the slope has 3e-4 of its power
 
 
 class Period(NamedTuple):
@@ -53,20 +53,21 @@ def standard_error(t: Array, signals: Sequence[Array], period: float, harmonics:
     """
     from scipy.fft import prev_fast_len, rfft
 
-    omega, N = 2 * np.pi / period, prev_fast_len(len(t), real=True)
-    spectra, weights, information = np.zeros(N // 2 + 1, complex), np.zeros(N // 2 + 1), 0.0
-    for weight, slope, residual in _linearised(t - t.mean(), signals, omega, harmonics):
+    N = prev_fast_len(len(t), real=True)  # samples whose spectrum is taken: few less than there are
+    apart = (t[N - 1] - t[0]) / (N - 1) * N / period  # lines of the spectrum between two harmonics
+    lines = np.arange(min(int(harmonics * apart) + BESIDE, N // 2 + 1))
+    spectra, weights, information = np.zeros(len(lines), complex), np.zeros(len(lines)), 0.0
+    for weight, slope, residual in _linearised(t - t.mean(), signals, 2 * np.pi / period, harmonics):
         information += weight * float(slope @ slope)
-        spectrum = np.asarray(rfft(slope[:N]))
-        weights += weight * np.abs(spectrum) ** 2
-        spectra += weight * spectrum.conj() * rfft(residual[:N])
+        of_slope, of_residual = (np.array(rfft(x[:N])[: len(lines)]) for x in (slope, residual))
+        spectra += weight * of_slope.conj() * of_residual
+        weights += weight * np.abs(of_slope) ** 2
     power = float(np.vdot(spectra, spectra).real) / (N * float(weights.sum()))
     weights /= weights.sum()
-    lines = 1.0 / float(weights @ weights)
-    near = np.flatnonzero(weights > NEGLIGIBLE * weights.max())
-    apart = (t[N - 1] - t[0]) / (N - 1) * N / period  # lines of the spectrum between two harmonics
-    taken = float(weights[near] @ _taken(near, N, apart, harmonics)) + 1.0 / (2.0 * lines)  # the slope was fitted, too
-    return float(period / omega * np.sqrt(power / information / (1.0 - taken) * (1 + LOST / lines)))
+    alike = float(weights @ weights)  # the share of one line, were they all of one weight
+    kept = 1.0 - float(weights @ _taken(lines, N, apart, harmonics)) - alike / 2.0  # the slope was fitted, too
+    variance = power / information / kept * (1.0 + LOST * alike)
+    return float(period**2 / (2 * np.pi) * np.sqrt(variance))
 
 
 def _linearised(
