@@ -218,7 +218,7 @@ def test_correlated_noise_is_no_transient(rho, periods):
     for seed in range(60):
         t = np.arange(1000 * periods) / RATE
         x = waves(t, 10.0) + 0.01 * coloured(np.random.default_rng(seed), len(t), rho)
-        flagged += bool(differing(t, x, 10.0, RATE))
+        flagged += bool(differing(t, [x], 10.0, RATE))
     assert flagged <= 2
 
 
@@ -236,8 +236,8 @@ def test_intervals_of_the_period_cover_whatever_the_colour_of_the_noise():
             for seed in range(100):
                 rng = np.random.default_rng(seed)
                 x = waves(t, T, (1.0, 0.4)) + 0.01 * coloured(rng, len(t), rho)
-                found = period.refine(t, [x], T, 2)
-                inside.append(abs(found.length - T) < 1.96 * found.std)
+                length = period.refine(t, [x], T, 2)
+                inside.append(abs(length - T) < 1.96 * period.standard_error(t, [x], length, 2))
     settings = np.mean(np.reshape(inside, (-1, 100)), axis=1)
     assert np.mean(inside) == pytest.approx(0.95, abs=0.02)
     assert settings.min() > 0.85
@@ -248,9 +248,21 @@ def test_noise_that_joints_share_is_not_counted_as_twice_the_knowledge():
     for seed in range(150):
         rng = np.random.default_rng(seed)
         shared = 0.01 * coloured(rng, len(t), 0.9)
-        found = period.refine(t, [waves(t, T) + shared] * 4, T, 3)
-        z.append((found.length - T) / found.std)
+        signals = [waves(t, T) + shared] * 4
+        length = period.refine(t, signals, T, 3)
+        z.append((length - T) / period.standard_error(t, signals, length, 3))
     assert np.std(z) < 1.25
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.99])
+def test_an_interval_of_the_period_needs_neither_every_sample_nor_every_line_of_the_spectrum(rho, monkeypatch):
+    """Of a prime number of samples some are left out; the slope has 3e-4 of its power at the lines that are."""
+    T, t = 10.0, np.arange(100_003) / 50
+    x = waves(t, T) + 0.01 * coloured(np.random.default_rng(0), len(t), rho)
+    few = period.standard_error(t, [x], T, 3)
+    monkeypatch.setattr(period, "BESIDE", len(t))
+    monkeypatch.setattr("scipy.fft.prev_fast_len", lambda N, real: N)
+    assert few == pytest.approx(period.standard_error(t, [x], T, 3), rel=0.01)
 
 
 @pytest.mark.parametrize("by", [2.5, 3.0, 5.0, 1.7e9])
@@ -331,9 +343,9 @@ def test_no_motion_is_followed_across_a_gap_beyond_which_its_phase_is_not_known(
     """Even where it happens to be right there: so many periods later, it can only be by chance."""
     t = np.arange(6000) / RATE
     x = waves(t, 8.0) + 1e-3 * np.random.default_rng(0).normal(size=6000)
-    found = period.refine(t[:3000], [x[:3000]], 8.0, 3)
+    length = period.refine(t[:3000], [x[:3000]], 8.0, 3)
     for gap, bridged in ((1000, True), (100_000_000, False)):
-        late = t + np.where(t < 30.0, 0.0, gap * found.length)
+        late = t + np.where(t < 30.0, 0.0, gap * length)
         span, _ = stretch(late, [x], 8.0, slice(0, 3000), 3)
         assert (span.stop > 3000) == bridged
 
@@ -345,8 +357,8 @@ def test_a_stretch_ends_to_the_sample_where_the_motion_is_a_hundredth_away(start
     held = np.where(t < t[start], clean[start], np.where(t < t[stop], clean, clean[stop]))
     away = np.abs(held - clean) > 0.01 * clean[start:stop].std()
     x = held + 1e-4 * np.random.default_rng(0).normal(size=6000)
-    span, found = stretch(t, [x], 8.0, slice(2000, 3600), 3)
+    span, length = stretch(t, [x], 8.0, slice(2000, 3600), 3)
     before, after = np.flatnonzero(away[:start]), stop + np.flatnonzero(away[stop:])
     assert span.start == pytest.approx(before[-1] + 1 if len(before) else 0, abs=3)
     assert span.stop == pytest.approx(after[0], abs=3)
-    assert found.length == pytest.approx(8.0, abs=5 * found.std)
+    assert length == pytest.approx(8.0, abs=5 * period.standard_error(t[span], [x[span]], length, 3))

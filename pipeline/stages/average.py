@@ -6,14 +6,14 @@ import numpy as np
 
 from pipeline.errors import NotPeriodic
 from pipeline.maths.signals import averaging
-from pipeline.maths.signals.agreement import Difference, alike, alternating
-from pipeline.maths.signals.averaging import Folded, whole_periods
+from pipeline.maths.signals.agreement import Difference, alike, alternation
+from pipeline.maths.signals.averaging import Folded, Phases, end, phases, whole_periods
 from pipeline.maths.signals.noise import noise_std, smoothed
-from pipeline.maths.signals.period import Period, refine
+from pipeline.maths.signals.period import Period, refine, standard_error
 from pipeline.maths.signals.repetition import Repetition, repetition
 from pipeline.maths.signals.smoothing import segments, share_passed
 from pipeline.maths.signals.stretch import stretch
-from pipeline.records import Average, Column, Counts, Diagnostic, PeriodResidual, Signal, diagnostic
+from pipeline.records import Average, Counts, Diagnostic, PeriodResidual, Signal, diagnostic
 from pipeline.robots.robot import Robot
 from pipeline.study import LogEntry
 
@@ -47,15 +47,19 @@ def run(
         said = f"{lasting(moving[0], entry)}, so nothing is averaged"
         yield diagnostic("average", entry.name, "note", f"{said}; its parameters come from the low-passed samples")
         return
-    span, period = longest(moving, found, orders, entry)
+    span, length = longest(moving, found, orders, entry)
     names = [f"{symbol} of {signal.joint}" for signal in moving for symbol in MEASURED]
     columns = [getattr(signal, symbol) for signal in moving for symbol in MEASURED]
     positions = [signal.q for signal in moving]
-    kept, period, odd = alike(moving[0].t, positions, columns, span, period, moving[0].rate, orders)
-    remarks += left_out(moving[0], span, kept, period, [(names[d.signal], d) for d in odd])
-    period, more = honoured(period, entry)
+    t, rate = moving[0].t, moving[0].rate
+    kept, length, odd = alike(t, positions, columns, span, length, rate, orders)
+    remarks += left_out(moving[0], span, kept, length, [(names[d.signal], d) for d in odd])
+    std = standard_error(t[kept], [x[kept] for x in positions], length, orders)
+    period, more = honoured(Period(length, std), entry)
+    used = slice(kept.start, end(t, kept, period.length, rate))
+    phased = Phases(t[used], period.length, phases(period.length, rate))
     for signal in moving:
-        yield from averaged(signal, kept, period, entry.period or 0.0, lowpass)
+        yield from averaged(signal, used, phased, period, entry.period or 0.0, lowpass)
     if remarks + more:
         yield diagnostic("average", entry.name, "warning", *remarks, *more)
 
@@ -98,8 +102,8 @@ def together(signals: Sequence[Signal]) -> Repetition | None:
     return None
 
 
-def longest(signals: Sequence[Signal], found: Repetition, orders: int, entry: LogEntry) -> tuple[slice, Period]:
-    """The longest stretch around what was found that repeats with one period.
+def longest(signals: Sequence[Signal], found: Repetition, orders: int, entry: LogEntry) -> tuple[slice, float]:
+    """The longest stretch around what was found that repeats with one period, and that period.
 
     Raises
     ------
@@ -108,17 +112,17 @@ def longest(signals: Sequence[Signal], found: Repetition, orders: int, entry: Lo
     """
     t, rate, positions = signals[0].t, signals[0].rate, [signal.q for signal in signals]
     core = slice(found.core, min(found.core + round(2 * found.lag), len(t)))
-    span, period = stretch(t, positions, found.lag / rate, core, orders)
-    for k in multiples(period.length, entry.period, whole_periods(t[span], period.length, rate)):
-        if any(alternating(t[span], x[span], period.length, rate, k) for x in positions):
-            period = refine(t[span], [x[span] for x in positions], k * period.length, orders)
-            break
-    if whole_periods(t[span], period.length, rate) < 2:
+    span, length = stretch(t, positions, found.lag / rate, core, orders)
+    t, positions = t[span], [x[span] for x in positions]
+    k = alternation(t, positions, length, rate, multiples(length, entry.period, whole_periods(t, length, rate)))
+    if k > 1:
+        length = refine(t, positions, k * length, orders)
+    if whole_periods(t, length, rate) < 2:
         raise NotPeriodic(
-            f"{entry.name}: the motion repeats from {t[span][0]:.2f} to {t[span][-1]:.2f} s only, which is fewer than "
-            f"two periods of {period.length:.4f} s; record more of them"
+            f"{entry.name}: the motion repeats from {t[0]:.2f} to {t[-1]:.2f} s only, which is fewer than two periods "
+            f"of {length:.4f} s; record more of them"
         )
-    return span, period
+    return span, length
 
 
 def multiples(length: float, stated: float | None, M: int) -> list[int]:
@@ -128,7 +132,7 @@ def multiples(length: float, stated: float | None, M: int) -> list[int]:
 
 
 def left_out(
-    first: Signal, span: slice, kept: slice, period: Period, odd: Sequence[tuple[str, Difference]]
+    first: Signal, span: slice, kept: slice, length: float, odd: Sequence[tuple[str, Difference]]
 ) -> list[str]:
     """What does not repeat, or not as well as the rest, and what to write in the study so that it need not be said."""
     t = first.t
@@ -136,7 +140,7 @@ def left_out(
     sides += [f"the {t[-1] - t[kept.stop - 1]:.2f} s after"] * (span.stop < len(t))
     said = [f"{' and '.join(sides)} do not, as in a stop, a ramp or another motion{at_gaps(first, span)}"] * bool(sides)
     for name, d in odd:
-        if d.inside or t[kept.start] - t[span.start] > BRIEF * period.length or not sides:
+        if d.inside or t[kept.start] - t[span.start] > BRIEF * length or not sides:
             differs = f"period {d.period + 1} of {d.periods} differs from the others by {d.rms:.3g} rms in {name}"
             what = ", and is kept, because it is not at an end" if d.inside else ", as in a transient"
             said.append(f"{differs}, {d.ratio:.1f} times what noise explains{what}")
@@ -145,7 +149,7 @@ def left_out(
     advice = f"; the rest is left out: write {' and '.join(keys)} in study.toml to say so" if keys else ""
     return [
         f"{first.log}: {t[kept.start]:.2f} to {t[kept.stop - 1]:.2f} s are evaluated, which repeat every "
-        f"{period.length:.4f} s; {'; '.join(said)}{advice}"
+        f"{length:.4f} s; {'; '.join(said)}{advice}"
     ] * bool(said)
 
 
@@ -175,20 +179,13 @@ def honoured(found: Period, entry: LogEntry) -> tuple[Period, list[str]]:
 
 
 def averaged(
-    signal: Signal, span: slice, found: Period, stated: float, lowpass: float
+    signal: Signal, used: slice, phased: Phases, found: Period, stated: float, lowpass: float
 ) -> Iterator[Average | PeriodResidual]:
-    """Fold one joint at a period, from the first sample of a stretch on."""
-    K = averaging.phases(found.length, signal.rate)
-    M = whole_periods(signal.t[span], found.length, signal.rate)
-    used = slice(span.start, averaging.end(signal.t, span, found.length, signal.rate))
-    t = signal.t[used]
-
-    def folded(x: Column) -> Folded:
-        return averaging.fold(t, x[used], found.length, K)
-
-    q, dq, tau = folded(signal.q), folded(signal.dq), folded(signal.tau)
-    white = white_noise(tau, signal.segment[used], signal.rate, lowpass)
+    """Fold one joint at the phases of a period, from the first sample used on."""
     size = float(np.sqrt(np.mean(smoothed(signal.tau, signal.segment, signal.rate, lowpass)[used] ** 2))) or 1.0
+    tau = phased.fold(signal.tau[used])
+    white = white_noise(tau, signal.segment[used], signal.rate, lowpass)
+    q, dq = phased.fold(signal.q[used]), phased.fold(signal.dq[used])
     yield Average(
         log=signal.log,
         joint=signal.joint,
@@ -196,14 +193,14 @@ def averaged(
         period=found.length,
         period_std=found.std,
         stated_period=stated,
-        periods=M,
-        t_start=float(t[0]),
+        periods=whole_periods(phased.t, found.length, signal.rate),
+        t_start=float(phased.t[0]),
         sigma_q=averaging.noise_std(q),
         sigma_dq=averaging.noise_std(dq),
         sigma_tau=averaging.noise_std(tau),
         sigma_tau_white=white,
         relative_noise=white * float(np.sqrt(share_passed(signal.rate, lowpass))) / size,
-        t=np.arange(K) / K * found.length,
+        t=np.arange(phased.K) / phased.K * found.length,
         q=q.mean,
         dq=dq.mean,
         tau=tau.mean,
@@ -212,7 +209,7 @@ def averaged(
         tau_var=tau.var,
         count=q.counts,
     )
-    yield PeriodResidual(signal.log, signal.joint, t=t, q_noise=q.noise, dq_noise=dq.noise, tau_noise=tau.noise)
+    yield PeriodResidual(signal.log, signal.joint, t=phased.t, q_noise=q.noise, dq_noise=dq.noise, tau_noise=tau.noise)
 
 
 def white_noise(folded: Folded, segment: Counts, rate: float, lowpass: float) -> float:

@@ -98,7 +98,7 @@ def period_of(signals: Sequence[Signal], robot: Robot) -> float:
     if lag is None:
         return 0.0
     orders = max(robot.joint(signal.joint).harmonics for signal in signals)
-    return refine(signals[0].t[part], positions, lag / signals[0].rate, orders).length
+    return refine(signals[0].t[part], positions, lag / signals[0].rate, orders)
 
 
 def left(prediction: Prediction, signal: Signal, lowpass: float) -> Array:

@@ -1,6 +1,7 @@
 """Put every recording on a uniform clock, with its gaps marked and a velocity where none was logged."""
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,8 +9,9 @@ from numpy.typing import NDArray
 from pipeline.errors import BadLog
 from pipeline.maths.signals.clock import GAP
 from pipeline.maths.signals.faults import saturated, stuck
-from pipeline.maths.signals.smoothing import lowpass as lowpass_of
-from pipeline.maths.signals.smoothing import motion, segments
+from pipeline.maths.signals.harmonics import are_apart, even_step
+from pipeline.maths.signals.noise import smoothed
+from pipeline.maths.signals.smoothing import segments
 from pipeline.records import Column, Diagnostic, Recording, Signal, diagnostic
 from pipeline.robots.robot import Joint
 
@@ -31,26 +33,22 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
     BadLog
         If no segment between gaps holds more than a few samples.
     """
-    T_s = float(np.median(np.diff(recording.t)))
+    T_s = even_step(recording.t) or float(np.median(np.diff(recording.t)))
     cuts = np.flatnonzero(np.diff(recording.t) > GAP * T_s) + 1
-    parts = [p for p in np.split(np.arange(len(recording.t)), cuts) if len(p) >= FEWEST]
+    parts = [slice(a, b) for a, b in pairwise([0, *cuts.tolist(), len(recording)]) if b - a >= FEWEST]
     if not parts:
         raise BadLog(f"{recording.log}/{recording.joint}: no segment without a gap holds {FEWEST} samples")
-    if is_even(recording.t, parts, T_s):
+    if all(is_even(recording.t[part], T_s) for part in parts):
         # The mean over the longest segment; a median would carry the rounding of the time stamps.
-        longest = max(parts, key=len)
-        T_s = float((recording.t[longest[-1]] - recording.t[longest[0]]) / (len(longest) - 1))
-        clocks, method = [recording.t[p] for p in parts], "as recorded"
+        T_s = step_of(max((recording.t[part] for part in parts), key=len))
+        method, columns = "as recorded", [as_recorded(recording, part) for part in parts]
     else:
-        clocks, method = (
-            [uniform(recording.t[p], T_s) for p in parts],
-            "cubic spline through the samples of each segment",
-        )
-    columns = [on_clock(recording, p, clock, method) for p, clock in zip(parts, clocks, strict=True)]
-    q, dq, tau = (np.concatenate(column) for column in zip(*columns, strict=True))
-    segment = np.repeat(np.arange(len(parts)), [len(c) for c in clocks])
+        method = "cubic spline through the samples of each segment"
+        columns = [on_uniform_clock(recording, part, T_s) for part in parts]
+    segment = np.repeat(np.arange(len(parts)), [len(t) for t, *_ in columns])
+    t, q, dq, tau = (np.concatenate(column) if len(parts) > 1 else column[0] for column in zip(*columns, strict=True))
     if recording.velocity == "derived":
-        dq = np.concatenate([motion(q[part], None, 1 / T_s, lowpass)[1] for part in segments(segment)])
+        dq = derived(q, segment, 1.0 / T_s, lowpass)
     at_rest = not moves(q, joint)
     yield Signal(
         log=recording.log,
@@ -61,13 +59,13 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
         velocity=recording.velocity,
         gaps=len(parts) - 1,
         at_rest=int(at_rest),
-        t=np.concatenate(clocks),
+        t=t,
         q=q,
         dq=dq,
         tau=tau,
         segment=segment,
     )
-    yield from remarks(recording, method, cuts, sum(map(len, parts)))
+    yield from remarks(recording, method, cuts, sum(part.stop - part.start for part in parts))
     wrong = [] if at_rest else [*disagreement(recording, q, dq, segment, 1.0 / T_s), *faults(recording, joint)]
     if wrong:
         yield diagnostic("resample", f"{recording.log}.{recording.joint}", "warning", *wrong)
@@ -81,14 +79,19 @@ def moves(q: Column, joint: Joint) -> bool:
     return reach > AT_REST * (high - low if np.isfinite(high - low) else 1.0)
 
 
+def derived(q: Column, segment: Indices, rate: float, cutoff: float) -> Column:
+    """The velocity (N,) of a low-passed position (N,), segment by segment."""
+    slow = smoothed(q, segment, rate, cutoff)
+    return np.concatenate([np.gradient(slow[part], 1.0 / rate) for part in segments(segment)])
+
+
 def disagreement(recording: Recording, q: Column, dq: Column, segment: Indices, rate: float) -> list[str]:
     """Whether a logged velocity is that of the logged position, judged where both are slow enough to compare."""
     if recording.velocity == "derived":
         return []
     cutoff = min(SLOW, 0.1 * rate)
-    pairs = [(motion(q[part], None, rate, cutoff)[1], lowpass_of(dq[part], rate, cutoff)) for part in segments(segment)]
-    derived, logged = (np.concatenate(parts) for parts in zip(*pairs, strict=True))
-    slope = float(derived @ logged / (derived @ derived))
+    expected, logged = derived(q, segment, rate, cutoff), smoothed(dq, segment, rate, cutoff)
+    slope = float(expected @ logged / (expected @ expected))
     if abs(slope - 1) < AGREES:
         return []
     return [
@@ -110,15 +113,20 @@ def faults(recording: Recording, joint: Joint) -> Iterator[str]:
             f"{name}: the effort is exactly at its largest or least value in {samples} samples: the drive, or what "
             "measures it, was saturated, and more was asked of the joint than the log says; record with less effort"
         )
-    reach = float(np.percentile(np.abs(recording.q), 99.0))
-    if np.isfinite(far) and reach > FAR * far:
+    size = np.abs(recording.q)
+    if size.max() > FAR * far and (reach := float(np.percentile(size, 99.0))) > FAR * far:
         said = f"{name}: positions reach {reach:.3g}, {reach / far:.0f} times the joint's limits"
         yield f"{said}; check the unit of the position"
 
 
-def is_even(t: Column, parts: list[Indices], T_s: float) -> bool:
-    """Whether every segment runs on a uniform clock of its own, to a fraction of a sample."""
-    return all(np.abs(t[p] - np.linspace(t[p[0]], t[p[-1]], len(p))).max() < EVEN * T_s for p in parts)
+def is_even(t: Column, T_s: float) -> bool:
+    """Whether a segment runs on a uniform clock of its own, to a fraction of a sampling time."""
+    return are_apart(t, step_of(t), EVEN * T_s / step_of(t))
+
+
+def step_of(t: Column) -> float:
+    """The mean time between samples."""
+    return float((t[-1] - t[0]) / (len(t) - 1))
 
 
 def uniform(t: Column, T_s: float) -> Column:
@@ -127,15 +135,18 @@ def uniform(t: Column, T_s: float) -> Column:
     return np.asarray(t[0] + T_s * np.arange(steps + 1))
 
 
-def on_clock(recording: Recording, part: Indices, clock: Column, method: str) -> tuple[Column, ...]:
-    """Position, velocity and effort of one segment at the times of a clock."""
-    columns = (recording.q[part], recording.dq[part], recording.tau[part])
-    if method == "as recorded":
-        return columns
+def as_recorded(recording: Recording, part: slice) -> tuple[Column, ...]:
+    """Time, position, velocity and effort of one segment, in the memory of the recording."""
+    return recording.t[part], recording.q[part], recording.dq[part], recording.tau[part]
+
+
+def on_uniform_clock(recording: Recording, part: slice, T_s: float) -> tuple[Column, ...]:
+    """Time, position, velocity and effort of one segment on a uniform clock."""
     from scipy.interpolate import make_interp_spline
 
-    spline = make_interp_spline(recording.t[part], np.column_stack(columns), k=3)
-    return tuple(spline(clock).T)
+    t, *columns = as_recorded(recording, part)
+    clock = uniform(t, T_s)
+    return clock, *np.ascontiguousarray(make_interp_spline(t, np.column_stack(columns), k=3)(clock).T)
 
 
 def remarks(recording: Recording, method: str, cuts: Indices, kept: int) -> Iterator[Diagnostic]:

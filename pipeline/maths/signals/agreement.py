@@ -4,11 +4,10 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pipeline.maths.arrays import Array, Integers
-from pipeline.maths.signals.averaging import carried, end, phases, whole_periods
-from pipeline.maths.signals.period import Period, refine
+from pipeline.maths.signals.averaging import Phases, end, nearest, phases, whole_periods
+from pipeline.maths.signals.period import refine
 
 ODD = 2.0  # times what noise explains: a period that differs by less is left in, as it costs more to lose it
 NEGLIGIBLE = 1e-4  # of a signal's standard deviation: a smaller difference is that of an encoder's steps
@@ -35,28 +34,28 @@ def alike(
     positions: Sequence[Array],
     signals: Sequence[Array],
     span: slice,
-    period: Period,
+    length: float,
     rate: float,
     orders: int,
-) -> tuple[slice, Period, list[Difference]]:
+) -> tuple[slice, float, list[Difference]]:
     """The stretch without the first and last periods that differ from the others, its period, and what differed.
 
     What does not fill a period is left out at the start rather than at the end, before a period is; of the periods
-    never more than half, as they could be the ones that are right.  `t` (N,) [s]; `positions`, whose harmonics give
-    the period, and `signals`, which are compared, (N,) each.
+    never more than half, as they could be the ones that are right.  `t` (N,) and `length` [s]; `positions`, whose
+    harmonics give the period, and `signals`, which are compared, (N,) each.
     """
     left_out: list[Difference] = []
-    fewest = (whole_periods(t[span], period.length, rate) + 1) // 2
+    fewest = (whole_periods(t[span], length, rate) + 1) // 2
     while True:
-        M = whole_periods(t[span], period.length, rate)
-        used = slice(span.start, end(t, span, period.length, rate))
-        odd = [d for i, x in enumerate(signals) for d in differing(t[used], x[used], period.length, rate, i)]
+        M = whole_periods(t[span], length, rate)
+        used = slice(span.start, end(t, span, length, rate))
+        odd = differing(t[used], [x[used] for x in signals], length, rate)
         at_the_edges = sorted((d for d in odd if not d.inside), key=lambda d: -d.ratio)
         if not at_the_edges or fewest >= M:
-            return span, period, left_out + sorted(odd, key=lambda d: -d.ratio)[:1]
+            return span, length, left_out + sorted(odd, key=lambda d: -d.ratio)[:1]
         left_out.append(at_the_edges[0])
-        span = _without(t, span, at_the_edges[0], M, period.length, rate)
-        period = refine(t[span], [x[span] for x in positions], period.length, orders)
+        span = _without(t, span, at_the_edges[0], M, length, rate)
+        length = refine(t[span], [x[span] for x in positions], length, orders)
 
 
 def _without(t: Array, span: slice, odd: Difference, M: int, length: float, rate: float) -> slice:
@@ -68,29 +67,44 @@ def _without(t: Array, span: slice, odd: Difference, M: int, length: float, rate
     return slice(start if start > span.start + 1 else int(np.searchsorted(t, next_one)), span.stop)
 
 
-def alternating(t: Array, x: Array, length: float, rate: float, k: int) -> bool:
-    """Whether the periods of a signal (N,) agree with every k-th other but not with those between: k of them are one.
+def alternation(t: Array, signals: Sequence[Array], length: float, rate: float, among: Sequence[int]) -> int:
+    """How many periods make the one after which all signals (N,) repeat: the first of `among` that does, or 1.
 
-    A motion may all but repeat within its period.  Its periods are compared by groups, in an analysis of variance.
+    A motion may all but repeat within its period.  Its periods then agree with every k-th other but not with those
+    between; they are compared by groups, in an analysis of variance.
     """
-    K = phases(length, rate)
-    _, residual, bins = carried(t, x, length, K)
-    number = np.floor((t - t[0]) / length + 1e-9).astype(np.int64)
-    group = number % k
-    counts, sums = _sums(group * K + bins, residual, k, K)
+    phased, number = Phases(t, length, phases(length, rate)), numbers(t, length)
+    left = [phased.carried(x)[1] for x in signals if among]
+    for k in among:
+        place = number % k * phased.K + phased.bins
+        counts = np.bincount(place, minlength=k * phased.K).reshape(k, -1)
+        if any(_alternates(x, residual, place, counts) for x, residual in zip(signals, left, strict=True)):
+            return k
+    return 1
+
+
+def _alternates(x: Array, residual: Array, place: Integers, counts: Integers) -> bool:
+    """Whether groups of the periods of a signal (N,) differ by more than their noise; `counts` (k, K) are theirs."""
+    sums = _sums(place, residual, counts)
     means = sums / np.maximum(counts, 1)
-    noise = residual - means[group, bins]
-    degrees = len(x) - int((counts > 0).sum())
-    between = counts * (means - sums.sum(axis=0) / np.maximum(counts.sum(axis=0), 1)) ** 2
-    F = float(between.sum()) / ((k - 1) * K) / max(float(noise @ noise) / max(degrees, 1), 1e-300)
-    large = float(np.sqrt(between.sum() / len(x))) > NEGLIGIBLE * float(x.std())
-    return large and F > ODD**2 and is_unlikely(F, _lag_one(noise), (k - 1) * K, degrees)
+    mean = sums.sum(axis=0) / np.maximum(counts.sum(axis=0), 1)
+    between, own = float(np.sum(counts * (means - mean) ** 2)), counts[1:].size
+    left, degrees = float(residual @ residual - np.sum(sums * means)), len(x) - int((counts > 0).sum())
+    F = between / own / max(left / max(degrees, 1), 1e-300)
+    if F <= ODD**2 or np.sqrt(between / len(x)) <= NEGLIGIBLE * x.std():
+        return False
+    return is_unlikely(F, _lag_one(residual - means.ravel()[place]), own, degrees)
 
 
-def _sums(place: Integers, x: Array, rows: int, K: int) -> tuple[NDArray[np.int64], Array]:
-    """How many samples fall on each place, and their sums, (rows, K)."""
-    counts: NDArray[np.int64] = np.bincount(place, minlength=rows * K).astype(np.int64)
-    return counts.reshape(rows, K), np.asarray(np.bincount(place, x, rows * K).reshape(rows, K), dtype=np.float64)
+def numbers(t: Array, length: float) -> Integers:
+    """The period in which each time (N,) is, counted from that of the first."""
+    turns: Array = (t - t[0]) / length + 1e-9
+    return turns.astype(np.int64)
+
+
+def _sums(place: Integers, x: Array, counts: Integers) -> Array:
+    """The sums of samples (N,) by their place in a table like that of their counts."""
+    return np.asarray(np.bincount(place, x, counts.size).reshape(counts.shape), dtype=np.float64)
 
 
 def _lag_one(noise: Array) -> float:
@@ -103,73 +117,77 @@ def is_unlikely(F: float, rho: float, own: float, others: float) -> bool:
 
     Squares of first-order noise are correlated by rho^2, so that few of them say as much as independent ones.
     """
-    from scipy.stats import f
+    from scipy.special import fdtrc
 
     worth = (1 - rho**2) / (1 + rho**2)
-    return bool(f.sf(F, max(worth * own, 1.0), max(worth * others, 1.0)) < CHANCE)
+    return bool(fdtrc(max(worth * own, 1.0), max(worth * others, 1.0), F) < CHANCE)
 
 
-def differing(t: Array, x: Array, length: float, rate: float, signal: int = 0) -> list[Difference]:
-    """The periods of a signal (N,) that differ from the others.
+def differing(t: Array, signals: Sequence[Array], length: float, rate: float) -> list[Difference]:
+    """The periods of signals (N,) that differ from the others.
 
     A period is compared with the mean of the others at each phase, as an analysis of variance would: the mean square of
     the difference over the variance between the others.  Noise that is correlated leaves few degrees of freedom behind
     either, so their number is taken from the others' own correlation.  Of two periods nobody can tell which is odd.
     """
-    K = phases(length, rate)
-    _, residual, bins = carried(t, x, length, K)
-    numbers, number = np.unique(np.floor((t - t[0]) / length + 1e-9), return_inverse=True)
-    if len(numbers) < 3:
+    periods = _Periods.of(t, length, rate)
+    if len(periods.numbers) < 3:
         return []
-    table = _Table.of(residual, bins, number, len(numbers), K)
-    odd = np.flatnonzero((table.ratio > ODD) & (table.rms > NEGLIGIBLE * x.std()))
-    M = int(numbers[-1]) + 1
-    return [
-        Difference(signal, int(numbers[m]), M, float(table.rms[m]), float(table.ratio[m]))
-        for m in odd.tolist()
-        if table.is_unlikely(m)
-    ]
+    return [difference for i, x in enumerate(signals) for difference in periods.odd(x, i)]
 
 
-class _Table(NamedTuple):
-    """Every period's sums at every phase, and what follows from leaving each out."""
+class _Periods(NamedTuple):
+    """Where samples (N,) fall in a table of M periods by K phases: what all signals of a log share."""
 
-    sums: Array  # (M, K)
-    counts: NDArray[np.int64]  # (M, K)
-    ratio: Array  # (M,) root of the mean square of a period's difference over the variance of the others
-    rms: Array  # (M,) of the difference, beyond noise
-    degrees: Array  # (M,) of freedom behind the variance of the others
+    phased: Phases
+    numbers: Integers  # (M,) of the periods, those that hold no samples left out
+    first: Integers  # (M,) the first sample of each
+    place: Integers  # (N,) of each sample in the table
+    counts: Integers  # (M, K)
+    totals: Integers  # (K,) of the counts
+    weight: Array  # (M, K) of the square of what a period's sum is off the mean; 0 where it or the others have none
+    compared: Integers  # (M,) phases at which a period and the others have samples
+    degrees: Integers  # (M,) of freedom behind the variance of the others
 
     @classmethod
-    def of(cls, residual: Array, bins: Integers, number: Integers, M: int, K: int) -> "_Table":
-        place = number * K + bins
-        counts, sums = _sums(place, residual, M, K)
-        squares = np.bincount(number, residual**2, M).sum()
-        others = counts.sum(axis=0) - counts
-        both = (counts > 0) & (others > 0)
-        apart = np.where(both, sums / np.maximum(counts, 1) - (sums.sum(axis=0) - sums) / np.maximum(others, 1), 0.0)
-        weight = np.where(both, counts * others / np.maximum(counts + others, 1), 0.0)
-        own = squares_within(residual, place, counts, sums)
-        between = squares - float(np.sum(sums.sum(axis=0) ** 2 / np.maximum(counts.sum(axis=0), 1)))
-        explained = (weight * apart**2).sum(axis=1)
-        # What is left without a period: all squares, less those within it and those it is apart from the others by.
-        left = np.maximum(between - explained - own, 0.0)
-        degrees = np.maximum(others.sum(axis=1) - (others > 0).sum(axis=1), 1)
-        noise = left / degrees
-        mean = explained / np.maximum(both.sum(axis=1), 1)
-        ratio = np.sqrt(mean / np.maximum(noise, 1e-300))
-        return cls(sums, counts, ratio, np.sqrt(np.maximum(mean - noise, 0.0)), degrees)
+    def of(cls, t: Array, length: float, rate: float) -> "_Periods":
+        phased, number = Phases(t, length, phases(length, rate)), numbers(t, length)
+        first = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1])
+        M, K = len(first), phased.K
+        place = np.repeat(np.arange(M) * K, np.diff(first, append=len(t)))
+        place += nearest(t - t[0], length, K)
+        counts = np.bincount(place, minlength=M * K).reshape(M, K)
+        totals = counts.sum(axis=0)
+        others = totals - counts
+        both = counts * others
+        weight = np.divide(totals, both, out=np.zeros(both.shape), where=both > 0)
+        degrees = np.maximum(others.sum(axis=1) - np.count_nonzero(others, axis=1), 1)
+        return cls(phased, number[first], first, place, counts, totals, weight, np.count_nonzero(both, axis=1), degrees)
 
-    def is_unlikely(self, m: int) -> bool:
-        """Whether noise as correlated as that of the other periods rarely makes one differ so."""
-        others = np.arange(len(self.sums)) != m
-        counts, sums = self.counts[others], self.sums[others]
+    def odd(self, x: Array, signal: int) -> list[Difference]:
+        """The periods in which a signal (N,) differs from the others."""
+        _, residual = self.phased.carried(x)
+        sums = _sums(self.place, residual, self.counts)
+        mean = sums.sum(axis=0) / np.maximum(self.totals, 1)
+        off = sums - self.counts * mean
+        explained = np.einsum("mk,mk,mk->m", off, off, self.weight)
+        # What is left without a period: all squares, less those within it and those it is apart from the others by.
+        squares = np.add.reduceat(residual * residual, self.first)
+        own = squares - np.einsum("mk,mk->m", sums, sums / np.maximum(self.counts, 1))
+        between = squares.sum() - mean @ sums.sum(axis=0)
+        noise = np.maximum(between - explained - own, 0.0) / self.degrees
+        apart = explained / np.maximum(self.compared, 1)
+        ratio, rms = np.sqrt(apart / np.maximum(noise, 1e-300)), np.sqrt(np.maximum(apart - noise, 0.0))
+        return [
+            Difference(signal, int(self.numbers[m]), int(self.numbers[-1]) + 1, float(rms[m]), float(ratio[m]))
+            for m in np.flatnonzero(ratio > ODD).tolist()
+            if rms[m] > NEGLIGIBLE * x.std() and self._is_unlikely(m, float(ratio[m]), sums)
+        ]
+
+    def _is_unlikely(self, m: int, ratio: float, sums: Array) -> bool:
+        """Whether noise as correlated as that of the other periods rarely makes one differ so; `sums` (M, K)."""
+        others = np.arange(len(sums)) != m
+        counts, sums = self.counts[others], sums[others]
         mean = sums.sum(axis=0) / np.maximum(counts.sum(axis=0), 1)
         noise = np.where(counts > 0, sums / np.maximum(counts, 1) - mean, 0.0)
-        return is_unlikely(self.ratio[m] ** 2, _lag_one(noise), self.counts.shape[1], self.degrees[m])
-
-
-def squares_within(residual: Array, place: Integers, counts: NDArray[np.int64], sums: Array) -> Array:
-    """Squares within each period (M,): of samples that share a phase, from their mean."""
-    means = (sums / np.maximum(counts, 1)).ravel()
-    return np.asarray(np.bincount(place // counts.shape[1], (residual - means[place]) ** 2, len(counts)))
+        return is_unlikely(ratio**2, _lag_one(noise), counts.shape[1], self.degrees[m])

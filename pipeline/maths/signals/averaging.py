@@ -1,13 +1,14 @@
 """Averaging the repeated periods of a recording, whatever the ratio of its period to its sampling time."""
 
 from collections.abc import Iterator
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.maths.arrays import Array, Integers
-from pipeline.maths.signals.harmonics import are_apart, evaluate, project
+from pipeline.maths.signals.harmonics import Harmonics, are_apart
 
 SMOOTH = 30  # harmonics that describe how a signal moves within the width of one phase bin
 ON_PHASE = 1e-6  # of the time between phases, by which a sample on one may be off it
@@ -39,22 +40,74 @@ def end(t: Array, span: slice, period: float, rate: float, M: int | None = None)
     return int(after)
 
 
-def fold(t: Array, x: Array, period: float, K: int) -> Folded:
-    """Average the samples at each of K phases, from the first sample on.
+class Phases:
+    """The K phases of a period, and where samples (N,) at times (N,) fall among them: what all signals of a log share.
 
     A sample rarely falls on a phase exactly.  A smooth harmonic fit carries it from where it was taken to the phase,
-    and only what the fit leaves is averaged: for a period of a whole number of samples this is plain averaging, the
-    noise stays as white as it was, and a jump of friction does not ring as it would under interpolation.  A phase that
-    no sample falls on takes the fit and a count of 0.  `t`, `x` are (N,).  (6.30), (6.31)
+    and only what the fit leaves is compared and averaged.
     """
-    if len(t) >= K and on_phases(t, period, K):
-        return stacked(x, K)
-    smooth, residual, bins = carried(t, x, period, K)
-    counts = np.bincount(bins, minlength=K)
-    mean = np.bincount(bins, residual, K) / np.maximum(counts, 1)
-    noise = residual - mean[bins]
-    var = np.bincount(bins, noise * noise, K) / np.maximum(counts - 1, 1)
-    return Folded(mean + smooth, var, counts, noise)
+
+    def __init__(self, t: Array, period: float, K: int) -> None:
+        self.t, self.period, self.K = t, period, K
+
+    @cached_property
+    def on_them(self) -> bool:
+        """Whether each sample falls on the phase after that of the one before it."""
+        return len(self.t) >= self.K and on_phases(self.t, self.period, self.K)
+
+    @cached_property
+    def bins(self) -> Integers:
+        """The phase that is nearest to each sample, (N,)."""
+        return nearest(self.t - self.t[0], self.period, self.K)
+
+    @cached_property
+    def counts(self) -> NDArray[np.int64]:
+        """How many samples are nearest to each phase, (K,)."""
+        return np.bincount(self.bins, minlength=self.K)
+
+    @cached_property
+    def _smooth(self) -> tuple[Harmonics, Harmonics]:
+        """The harmonics that describe a signal, at its samples and at the phases."""
+        omega, harmonics = 2 * np.pi / self.period, min(SMOOTH, self.K // 4)
+        times = self.t - self.t[0], np.arange(self.K) / self.K * self.period
+        of_samples, of_phases = (Harmonics(since, omega, harmonics) for since in times)
+        return of_samples, of_phases
+
+    def carried(self, x: Array) -> tuple[Array, Array]:
+        """The smooth fit of samples (N,) at the phases (K,), and what it leaves of each sample (N,)."""
+        of_samples, of_phases = self._smooth
+        c, residual = of_samples.left(x)
+        return of_phases.evaluate(c), residual
+
+    def fold(self, x: Array) -> Folded:
+        """Average the samples (N,) at each phase, from the first sample on.
+
+        For a period of a whole number of samples this is plain averaging, the noise stays as white as it was, and a
+        jump of friction does not ring as it would under interpolation.  A phase that no sample falls on takes the fit
+        and a count of 0.  (6.30), (6.31)
+        """
+        if self.on_them:
+            return stacked(x, self.K)
+        smooth, noise = self.carried(x)
+        mean = np.bincount(self.bins, noise, self.K) / np.maximum(self.counts, 1)
+        noise -= mean[self.bins]
+        var = np.bincount(self.bins, noise * noise, self.K) / np.maximum(self.counts - 1, 1)
+        return Folded(mean + smooth, var, self.counts, noise)
+
+
+def nearest(since: Array, period: float, K: int) -> Integers:
+    """The nearest of K phases of a period to each time (N,) since its first."""
+    turns = since / period
+    turns -= np.floor(turns)
+    turns *= K
+    bins = np.rint(turns, out=turns).astype(np.int64)
+    bins[bins == K] = 0
+    return bins
+
+
+def fold(t: Array, x: Array, period: float, K: int) -> Folded:
+    """Average samples (N,) at times (N,) at each of K phases."""
+    return Phases(t, period, K).fold(x)
 
 
 def on_phases(t: Array, period: float, K: int) -> bool:
@@ -85,9 +138,10 @@ def left_out(t: Array, x: Array, period: float, K: int, groups: Integers) -> Ite
 
     The smooth fit is that of all samples: it only carries each to the nearest phase.
     """
-    smooth, residual, bins = carried(t, x, period, K)
+    phased = Phases(t, period, K)
+    smooth, residual = phased.carried(x)
     size = int(groups.max()) + 1
-    place = groups * K + bins
+    place = groups * K + phased.bins
     powers = (np.ones_like(residual), residual, residual * residual)
     sums = [np.bincount(place, w, size * K).reshape(size, K) for w in powers]
     totals = [part.sum(axis=0) for part in sums]
@@ -97,14 +151,6 @@ def left_out(t: Array, x: Array, period: float, K: int, groups: Integers) -> Ite
         mean = total / np.maximum(counts, 1)
         var = np.maximum(squares - counts * mean**2, 0.0) / np.maximum(counts - 1, 1)
         yield Folded(mean + smooth, var, counts, np.empty(0))
-
-
-def carried(t: Array, x: Array, period: float, K: int) -> tuple[Array, Array, Integers]:
-    """The smooth fit at the phases (K,), what it leaves of each sample (N,), and the phase of each sample (N,)."""
-    omega, since = 2 * np.pi / period, t - t[0]
-    c = project(since, x, omega, min(SMOOTH, K // 4))
-    bins = np.rint(since / period % 1.0 * K).astype(np.int64) % K
-    return evaluate(c, np.arange(K) / K * period, omega), x - evaluate(c, since, omega), bins
 
 
 def noise_std(folded: Folded) -> float:

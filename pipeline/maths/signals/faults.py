@@ -28,17 +28,14 @@ class Stuck(NamedTuple):
 def stuck(t: Array, x: Array) -> list[Stuck]:
     """Where a signal (N,) at times (N,) [s] repeats a value and then jumps, which no rest of a joint ends in."""
     step = np.abs(np.diff(x))
-    moving = step[step > 0.0]
+    still = [(a, b) for a, b in repeated(step == 0.0) if t[b] - t[a] >= STUCK and b < len(step)]
+    moving = step[step > 0.0] if still else step[:0]
     if not len(moving):
         return []
     usual = float(np.quantile(moving, USUAL)) if len(moving) > 1 else np.inf
     # The jumps themselves must not set what is usual.
     usual = min(usual, float(np.median(moving)) * JUMP)
-    return [
-        Stuck(float(t[a]), float(t[b]), float(x[b + 1] - x[b]))
-        for a, b in repeated(step == 0.0)
-        if t[b] - t[a] >= STUCK and b + 1 < len(x) and step[b] > JUMP * usual
-    ]
+    return [Stuck(float(t[a]), float(t[b]), float(x[b + 1] - x[b])) for a, b in still if step[b] > JUMP * usual]
 
 
 def saturated(x: Array) -> int:

@@ -3,7 +3,11 @@
 Coefficients are (2 H + 1,): mean, then cosine and sine of harmonics 1 to H, at multiples of omega.
 """
 
+from collections.abc import Iterator
+from functools import cached_property
+
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.maths.arrays import Array
 
@@ -25,30 +29,113 @@ def basis(t: Array, omega: float, harmonics: int) -> Array:
     return F.T
 
 
-def project(t: Array, x: Array, omega: float, harmonics: int) -> Array:
-    """The coefficients closest to the samples (N,) in the least squares sense.
+class Harmonics:
+    """The mean and the first harmonics of omega at times (N,): what depends on these alone serves all signals.
 
-    The harmonics are all but orthogonal over whole periods, so their normal equations are well conditioned, and
-    a block of samples at a time keeps the memory bounded.  Evenly sampled blocks differ by a turn of each harmonic
-    only: one basis serves all, which takes a tenth of the time.
+    Evenly sampled blocks differ by a turn of each harmonic only: one basis serves all, which takes a tenth of the time.
+    What they leave, and all of an uneven clock, is taken a block at a time, which keeps the memory bounded.
     """
-    if step := even_step(t):
-        return _project_evenly(t, x, step, omega, harmonics)
-    size = 2 * harmonics + 1
-    gram, right = np.zeros((size, size)), np.zeros(size)
-    for start in range(0, len(t), BLOCK):
-        F = basis(t[start : start + BLOCK], omega, harmonics)
-        gram += F.T @ F
-        right += F.T @ x[start : start + BLOCK]
-    return np.asarray(np.linalg.solve(gram, right), dtype=np.float64)
+
+    def __init__(self, t: Array, omega: float, harmonics: int) -> None:
+        self.omega, self.harmonics, self._size = omega, harmonics, len(t)
+        step = even_step(t)
+        self._even = len(t) // EVEN * EVEN if step else 0  # samples in blocks that differ by a turn only
+        self._starts, self._within = t[: self._even : EVEN].copy(), np.arange(EVEN, dtype=np.float64) * step
+        self._rest = t[self._even :].copy() if step else t  # no view, which would keep all times of a long log
+
+    def project(self, x: Array) -> Array:
+        """The coefficients closest to samples (N,) in the least squares sense.
+
+        The harmonics are all but orthogonal over whole periods, so their normal equations are well conditioned.
+        """
+        return np.asarray(np.linalg.solve(self._gram, self._products(x)), dtype=np.float64)
+
+    def evaluate(self, c: Array) -> Array:
+        """The signal (N,) that the coefficients describe."""
+        signal, turned = np.empty(self._size), np.empty((len(self._starts), len(c)))
+        turned[:, 0] = c[0]
+        np.multiply(self._turns.conj(), _pairs(c), out=_pairs(turned))
+        np.matmul(turned, self._block.T, out=signal[: self._even].reshape(-1, EVEN))
+        for part, F in self._blocks(self.harmonics):
+            signal[part] = F @ c
+        return signal
+
+    def left(self, x: Array) -> tuple[Array, Array]:
+        """The coefficients closest to samples (N,), and what they leave of them (N,)."""
+        c = self.project(x)
+        signal = self.evaluate(c)
+        return c, np.subtract(x, signal, out=signal)
+
+    @cached_property
+    def _block(self) -> Array:
+        """The basis (EVEN, 2 H + 1) of a block of evenly spaced samples that starts at 0."""
+        return basis(self._within, self.omega, self.harmonics)
+
+    @cached_property
+    def _turns(self) -> NDArray[np.complex128]:
+        """How far each harmonic has turned where each of B blocks starts, (B, H)."""
+        return _pairs(np.ascontiguousarray(basis(self._starts, self.omega, self.harmonics)))
+
+    def _products(self, x: Array) -> Array:
+        """The products (2 H + 1,) of the basis with samples (N,)."""
+        within = x[: self._even].reshape(-1, EVEN) @ self._block
+        products = np.empty(2 * self.harmonics + 1)
+        products[0] = within[:, 0].sum()
+        _pairs(products)[:] = np.einsum("bk,bk->k", self._turns, _pairs(within))
+        for part, F in self._blocks(self.harmonics):
+            products += x[part] @ F
+        return products
+
+    @cached_property
+    def _gram(self) -> Array:
+        """The products (2 H + 1, 2 H + 1) of the basis with itself.
+
+        cos jx cos kx = (cos (j - k)x + cos (j + k)x) / 2, and so on: sums of twice as many harmonics tell them all.
+        """
+        H = self.harmonics
+        sums = self._sums(2 * H)
+        cosines, sines = np.append(sums[0], sums[1::2]), np.append(0.0, sums[2::2])
+        k = np.arange(H + 1)
+        ahead, behind = k[:, None] + k, k[:, None] - k
+        sine_behind = np.sign(behind) * sines[np.abs(behind)]
+        gram = np.empty((2 * H + 1, 2 * H + 1))
+        of_cosine, of_sine = np.append(0, k[1:] * 2 - 1), k[1:] * 2
+        gram[np.ix_(of_cosine, of_cosine)] = (cosines[np.abs(behind)] + cosines[ahead]) / 2.0
+        gram[np.ix_(of_sine, of_sine)] = (cosines[np.abs(behind)] - cosines[ahead])[1:, 1:] / 2.0
+        gram[np.ix_(of_sine, of_cosine)] = (sines[ahead] + sine_behind)[1:] / 2.0
+        gram[np.ix_(of_cosine, of_sine)] = gram[np.ix_(of_sine, of_cosine)].T
+        return gram
+
+    def _sums(self, harmonics: int) -> Array:
+        """The basis of so many harmonics, summed over all times: (2 H + 1,)."""
+        sums: Array = basis(self._starts, self.omega, harmonics).sum(axis=0)
+        within = basis(self._within, self.omega, harmonics).sum(axis=0)
+        sums[0] *= within[0]
+        _pairs(sums)[:] *= _pairs(within)
+        for _, F in self._blocks(harmonics):
+            sums += F.sum(axis=0)
+        return sums
+
+    def _blocks(self, harmonics: int) -> Iterator[tuple[slice, Array]]:
+        """Blocks of the samples that no other block serves, each with its basis (n, 2 H + 1)."""
+        for start in range(self._even, self._size, BLOCK):
+            part = slice(start, min(start + BLOCK, self._size))
+            yield part, basis(self._rest[start - self._even : part.stop - self._even], self.omega, harmonics)
+
+
+def project(t: Array, x: Array, omega: float, harmonics: int) -> Array:
+    """The coefficients closest to the samples (N,) in the least squares sense."""
+    return Harmonics(t, omega, harmonics).project(x)
 
 
 def evaluate(c: Array, t: Array, omega: float) -> Array:
     """The signal (N,) that the coefficients describe."""
-    if step := even_step(t):
-        return _evaluate_evenly(c, t, step, omega)
-    parts = [basis(t[start : start + BLOCK], omega, len(c) // 2) @ c for start in range(0, max(len(t), 1), BLOCK)]
-    return np.concatenate(parts)
+    return Harmonics(t, omega, len(c) // 2).evaluate(c)
+
+
+def _pairs(parts: Array) -> NDArray[np.complex128]:
+    """The cosine and sine parts (..., 2 H + 1) of each harmonic as one number (..., H), in the same memory."""
+    return parts[..., 1:].view(np.complex128)
 
 
 def even_step(t: Array) -> float:
@@ -68,65 +155,6 @@ def are_apart(t: Array, step: float, within: float) -> bool:
         if max(late.max() - start * step, start * step - late.min()) > within * step:
             return False
     return True
-
-
-def _project_evenly(t: Array, x: Array, step: float, omega: float, harmonics: int) -> Array:
-    """The coefficients of evenly sampled x (N,)."""
-    whole = len(t) // EVEN * EVEN
-    starts = basis(t[:whole:EVEN], omega, harmonics)
-    within = x[:whole].reshape(-1, EVEN) @ _one_block(step, omega, harmonics)
-    right = _turned(starts, within).sum(axis=0) + x[whole:] @ basis(t[whole:], omega, harmonics)
-    return np.asarray(np.linalg.solve(_gram(t, step, omega, harmonics), right), dtype=np.float64)
-
-
-def _evaluate_evenly(c: Array, t: Array, step: float, omega: float) -> Array:
-    """The signal (N,) that the coefficients describe at evenly spaced times."""
-    whole, harmonics = len(t) // EVEN * EVEN, len(c) // 2
-    signal = np.empty(len(t))
-    turned = _turned(basis(-t[:whole:EVEN], omega, harmonics), c)
-    np.matmul(turned, _one_block(step, omega, harmonics).T, out=signal[:whole].reshape(-1, EVEN))
-    signal[whole:] = basis(t[whole:], omega, harmonics) @ c
-    return signal
-
-
-def _one_block(step: float, omega: float, harmonics: int) -> Array:
-    """The basis (EVEN, 2 H + 1) of a block of evenly spaced samples that starts at 0."""
-    return basis(np.arange(EVEN, dtype=np.float64) * step, omega, harmonics)
-
-
-def _turned(starts: Array, parts: Array) -> Array:
-    """Cosine and sine parts (B or 1, 2 H + 1) of blocks, each turned on to where its block starts.
-
-    `starts` (B, 2 H + 1) is the basis at the blocks' first samples.
-    """
-    turned = np.empty(starts.shape)
-    turned[:, 0] = parts[..., 0]
-    c, s = starts[:, 1::2], starts[:, 2::2]
-    p, q = parts[..., 1::2], parts[..., 2::2]
-    turned[:, 1::2], turned[:, 2::2] = c * p - s * q, s * p + c * q
-    return turned
-
-
-def _gram(t: Array, step: float, omega: float, harmonics: int) -> Array:
-    """The products (2 H + 1, 2 H + 1) of the basis with itself, summed over evenly spaced times (N,).
-
-    cos jx cos kx = (cos (j - k)x + cos (j + k)x) / 2, and so on: sums of twice as many harmonics tell them all.
-    """
-    whole = len(t) // EVEN * EVEN
-    within = _one_block(step, omega, 2 * harmonics).sum(axis=0)
-    sums = _turned(basis(t[:whole:EVEN], omega, 2 * harmonics), within).sum(axis=0)
-    sums += basis(t[whole:], omega, 2 * harmonics).sum(axis=0)
-    cosines, sines = np.append(sums[0], sums[1::2]), np.append(0.0, sums[2::2])
-    k = np.arange(harmonics + 1)
-    ahead, behind = k[:, None] + k, k[:, None] - k
-    sine_behind = np.sign(behind) * sines[np.abs(behind)]
-    gram = np.empty((2 * harmonics + 1, 2 * harmonics + 1))
-    of_cosine, of_sine = np.append(0, k[1:] * 2 - 1), k[1:] * 2
-    gram[np.ix_(of_cosine, of_cosine)] = (cosines[np.abs(behind)] + cosines[ahead]) / 2.0
-    gram[np.ix_(of_sine, of_sine)] = (cosines[np.abs(behind)] - cosines[ahead])[1:, 1:] / 2.0
-    gram[np.ix_(of_sine, of_cosine)] = (sines[ahead] + sine_behind)[1:] / 2.0
-    gram[np.ix_(of_cosine, of_sine)] = gram[np.ix_(of_sine, of_cosine)].T
-    return gram
 
 
 def derivative(c: Array, omega: float) -> Array:

@@ -32,7 +32,7 @@ def goes_on(x: Array, lost: float) -> bool:
     A polynomial is fitted with and without a jump of its value and slope in the middle: the test of whether it needs
     them is Fisher's F.
     """
-    from scipy.stats import f
+    from scipy.special import fdtri
 
     s = (np.arange(2 * REACH) - (REACH - 0.5)) / REACH
     after = (s > 0).astype(float)
@@ -41,7 +41,7 @@ def goes_on(x: Array, lost: float) -> bool:
     degrees = len(s) - broken.shape[1]
     one, two = (_residual(basis, x) for basis in (whole, broken))
     noise = np.maximum(two / degrees, 1e-24 * np.maximum(x.var(axis=1), 1e-300))
-    if np.any((one - two) / 2 / noise > f.isf(CHANCE, 2, degrees)):
+    if np.any((one - two) / 2 / noise > fdtri(2, degrees, 1.0 - CHANCE)):
         return False
     c = np.linalg.lstsq(broken, x.T, rcond=None)[0]
     before, behind = c[1], c[1] + c[ORDER + 2]

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from pipeline.maths.arrays import Array, Booleans
-from pipeline.maths.signals.averaging import phases
-from pipeline.maths.signals.harmonics import evaluate, project
-from pipeline.maths.signals.period import Period, refine
+from pipeline.maths.signals.averaging import nearest, phases
+from pipeline.maths.signals.harmonics import Harmonics
+from pipeline.maths.signals.period import refine, standard_error
 
 STRAYS = 4.0  # times what the harmonics leave where the motion repeats: a sample further away strays from it
 LEAST = 0.01  # of the motion's standard deviation: a sample nearer than that does not stray
@@ -15,32 +15,36 @@ IN_A_ROW = 3  # samples that stray before the motion is over: one by itself is a
 UNSURE = 0.02  # of a period, by which a phase may be uncertain beyond a gap
 
 
-def stretch(t: Array, signals: Sequence[Array], length: float, core: slice, harmonics: int) -> tuple[slice, Period]:
-    """The longest run of samples around `core` that repeat with one period, and that period.
+def stretch(t: Array, signals: Sequence[Array], length: float, core: slice, harmonics: int) -> tuple[slice, float]:
+    """The longest run of samples around `core` that repeat with one period, and that period [s].
 
     The harmonics of what is known to repeat say where the next samples should be, up to as many again on either side;
     from those that are there the period is known better.  `t` (N,) [s], with or without gaps; `signals` (N,) each;
     `length` [s] good enough for the few periods of `core`.
     """
-    found = refine(t[core], [x[core] for x in signals], length, harmonics)
-    while True:
-        reach = core.stop - core.start
-        wide = slice(max(core.start - reach, 0), min(core.stop + reach, len(t)))
-        wide = _certain(t, core, wide, found)
-        strays = _strays(t, signals, found.length, core, wide, harmonics)
+    length = refine(t[core], [x[core] for x in signals], length, harmonics)
+    while (wide := _certain(t, signals, length, core, harmonics)) != core:
+        strays = _strays(t, signals, length, core, wide, harmonics)
         ahead = _ahead(strays[core.stop - wide.start :])
         behind = _ahead(strays[: core.start - wide.start][::-1])
         longer = slice(core.start - behind, core.stop + ahead)
         if longer == core:
-            return core, found
+            break
         core = longer
-        found = refine(t[core], [x[core] for x in signals], found.length, harmonics)
+        length = refine(t[core], [x[core] for x in signals], length, harmonics)
+    return core, length
 
 
-def _certain(t: Array, core: slice, wide: slice, found: Period) -> slice:
-    """The part of `wide` up to the first gap on either side beyond which the phase is not known."""
+def _certain(t: Array, signals: Sequence[Array], length: float, core: slice, harmonics: int) -> slice:
+    """`core` and as many samples on either side, up to the first gap there beyond which the phase is not known."""
+    reach = core.stop - core.start
+    wide = slice(max(core.start - reach, 0), min(core.stop + reach, len(t)))
     steps = np.diff(t[wide])
-    far = wide.start + 1 + np.flatnonzero(steps * found.std > UNSURE * found.length**2)
+    # A period is known to within itself, so that no shorter gap can matter.
+    if not np.any(steps > UNSURE * length):
+        return wide
+    std = standard_error(t[core], [x[core] for x in signals], length, harmonics)
+    far = wide.start + 1 + np.flatnonzero(steps * std > UNSURE * length**2)
     before, after = far[far <= core.start], far[far >= core.stop]
     return slice(int(before[-1]) if len(before) else wide.start, int(after[0]) if len(after) else wide.stop)
 
@@ -51,14 +55,16 @@ def _strays(t: Array, signals: Sequence[Array], length: float, core: slice, wide
     inside = slice(core.start - wide.start, core.stop - wide.start)
     N, rate = core.stop - core.start, (core.stop - core.start - 1) / (t[core.stop - 1] - t[core.start])
     K = phases(length, rate)
-    bins = np.rint(since / length % 1.0 * K).astype(np.int64) % K
+    bins = nearest(since, length, K)
+    known, whole = (Harmonics(times, omega, harmonics) for times in (since[inside], since))
     counts = np.maximum(np.bincount(bins[inside], minlength=K), 1)
     strays = np.zeros(len(since), dtype=bool)
     for x in signals:
-        residual = x[wide] - evaluate(project(since[inside], x[core], omega, harmonics), since, omega)
+        residual = whole.evaluate(known.project(x[core]))
+        np.subtract(x[wide], residual, out=residual)
         residual -= (np.bincount(bins[inside], residual[inside], K) / counts)[bins]
         # The mean of M periods follows their noise, and misses that of others by more.
-        expected = np.sqrt(np.sum(residual[inside] ** 2) / max(N - K, 1) * (1 + K / N))
+        expected = np.sqrt(residual[inside] @ residual[inside] / max(N - K, 1) * (1 + K / N))
         strays |= np.abs(residual) > max(STRAYS * expected, LEAST * x[core].std())
     return strays
 
