@@ -1,4 +1,7 @@
-"""How much memory it takes to read a log that is far larger: 250 MB, `--full` for logs of 1 GB; else of 100 MB."""
+"""How much memory a log takes: read, 250 MB however large it is; taken through the stages, a few times its numbers.
+
+`--full` for logs of 1 GB and of 20 minutes; else of 100 MB and of 5 minutes.
+"""
 
 import subprocess
 import sys
@@ -8,11 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests import arm
 from tests.benchmarks.reading import Report
 from tests.benchmarks.test_reading import MB, lvm_file
 from tests.logs.tdms_writer import segment
 
 MOST = 250  # [MB]
+LIBRARIES = 200  # [MB] what a process takes that has loaded numpy, scipy, pyarrow and numba
+TIMES = 2.75  # the numbers of a log, at most
+COLUMNS = 5  # of a signal
+STAGES = ("ingest", "resample", "average", "differentiate", "fit", "predict", "ekf", "whiteness")
 JOINTS = ("hand_roll", "hand_pitch", "instrument_slide")
 CHANNELS = [f"{joint}.{symbol}" for joint in JOINTS for symbol in ("q", "tau")]
 MEASURED = """
@@ -22,8 +30,8 @@ from resource import RUSAGE_CHILDREN, getrusage
 from pipeline.logs.isolated import process
 import pipeline
 from pipeline.commands.inspect import describe
-if sys.argv[1] == "ingest":
-    assert pipeline.run(sys.argv[2], "ingest", quiet=True)
+if sys.argv[1] == "run":
+    assert pipeline.run(sys.argv[2], *sys.argv[3:], quiet=True)
 else:
     describe(Path(sys.argv[2]), 5)
 process.close_all()
@@ -93,14 +101,30 @@ def test_a_log_is_read_in_little_memory_however_large_it_is(tmp_path: Path, full
     said += "" if name.endswith("lvm") else 'time = "time"\n'
     table = f'[[log]]\nname = "large"\nfile = "{name}"\nrole = "validation"\n[log.channels]\n{said}'
     (log.parent / "study.toml").write_text(f'robot = "davinci"\n{table}')
-    peaks = {how: peak(how, what) for how, what in (("ingest", log.parent), ("inspect", log))}
+    peaks = {"ingest": peak("run", log.parent, "ingest"), "inspect": peak("inspect", log)}
     told = "; ".join(f"{how} {own:.0f} MB, and its child {child:.0f} MB" for how, (own, child) in peaks.items())
     report(f"{name}, {log.stat().st_size // MB} MB: {told}")
     assert max(max(pair) for pair in peaks.values()) < MOST
 
 
-def peak(how: str, what: Path) -> tuple[float, float]:
+def test_the_stages_of_a_long_log_take_little_more_memory_than_it_does(tmp_path: Path, full: bool, report: Report):
+    """A kilohertz of three joints, one process: what the libraries are, and its numbers a few times."""
+    signals = [arm.signal(joint, period=10.0, rate=1000.0, periods=120 if full else 30) for joint in JOINTS]
+    study = tmp_path / "raw" / "lab"
+    arm.write_csv(study / "long.csv", signals)
+    (study / "study.toml").write_text(
+        'robot = "davinci"\n' + arm.log_table("long", "long.csv", "identification", JOINTS)
+    )
+    own, _ = peak("run", study, *STAGES)
+    numbers = 8 * COLUMNS * sum(len(signal) for signal in signals) / MB
+    report(f"{len(signals[0])} samples of three joints, {numbers:.0f} MB: {', '.join(STAGES)} take {own:.0f} MB")
+    assert own < LIBRARIES + TIMES * numbers
+
+
+def peak(how: str, what: Path, *stages: str) -> tuple[float, float]:
     """The most memory [MB] that a process takes for it, and the largest of its children."""
-    done = subprocess.run([sys.executable, "-c", MEASURED, how, what], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", MEASURED, how, what, *stages], capture_output=True, text=True, check=True
+    )
     own, child = map(float, done.stdout.splitlines()[-1].split())
     return own, child
