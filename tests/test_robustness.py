@@ -16,9 +16,14 @@ import pytest
 from pipeline.errors import BadRequest
 from pipeline.records import Diagnostic, PeriodResidual, Recording, store
 from pipeline.robots import davinci
+from pipeline.runner import execution
 from pipeline.runner.fingerprints.canonical import canonical, hash_of
 from pipeline.runner.fingerprints.code import PACKAGE, code, imported
+from pipeline.runner.fingerprints.fingerprint import Fingerprint
+from pipeline.runner.ledger import Folders
 from pipeline.runner.lock import locked
+from pipeline.runner.plan import Task
+from pipeline.runner.signature import declaration
 from pipeline.stages import resample
 from tests import arm
 from tests.test_runs import call, processed, reports
@@ -76,6 +81,23 @@ def test_no_import_of_a_module_is_overlooked(file):
     statements = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ImportFrom))
     parsed = [(str(s.module), [n.name for n in s.names]) for s in statements if str(s.module).startswith("pipeline")]
     assert sorted(imported(source)) == sorted(parsed)
+
+
+def test_records_that_a_stage_comes_to_in_turn_are_read_then_and_not_kept(finished):
+    """Or a stage of a long log would need memory for all joints, though it looks at one."""
+    where = processed(finished)
+    [file] = (where / "signal").rglob("*.parquet")
+    place = file.relative_to(where).as_posix()
+    task = Task("predict", "one", Fingerprint({f"processed/{place}": ""}, {}, {}, {}, {}, ""))
+    signals = execution.InTurn(Folders(finished, where, where), task, (("Signal", place),))
+    assert declaration("predict").in_turn == {"signals"}
+    assert len(signals) == 1
+    [first], [again] = signals, signals
+    assert first.t.tolist() == again.t.tolist()
+    held = weakref.ref(first)
+    del first
+    gc.collect()
+    assert held() is None
 
 
 def test_what_is_written_is_let_go_though_its_file_has_no_name_yet(tmp_path):
@@ -193,7 +215,11 @@ def test_a_log_that_may_not_be_read_is_no_fault_of_ours(raw, monkeypatch):
 HOLD = """
 import sys, time
 from pathlib import Path
+from pipeline.runner.fingerprints.fingerprint import Fingerprint
+from pipeline.runner.ledger import Folders
 from pipeline.runner.lock import locked
+from pipeline.runner.plan import Task
+from pipeline.runner.signature import declaration
 with locked(Path(sys.argv[1])):
     print("held", flush=True)
     time.sleep(60)
@@ -247,7 +273,11 @@ import sys, time
 from pathlib import Path
 from pipeline.errors import BadRequest
 from pipeline.records import Diagnostic, PeriodResidual, Recording, store
+from pipeline.runner.fingerprints.fingerprint import Fingerprint
+from pipeline.runner.ledger import Folders
 from pipeline.runner.lock import locked
+from pipeline.runner.plan import Task
+from pipeline.runner.signature import declaration
 folder, done = Path(sys.argv[1]), 0
 while done < 40:
     try:

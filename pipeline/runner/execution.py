@@ -3,7 +3,7 @@
 import errno
 import os
 import traceback
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
@@ -52,6 +52,7 @@ def perform(folders: Folders, task: Task) -> Outcome:
             for record in run(**arguments(folders, task)):
                 writer.write(record)
                 messages += _messages(record)
+                del record  # before the stage makes the next
         return Outcome(task, _made(writer), messages=tuple(messages), seconds=perf_counter() - start)
     except Exception as error:
         said = said_of(error)
@@ -85,12 +86,33 @@ def arguments(folders: Folders, task: Task) -> dict[str, Any]:
     asks = declaration(task.stage)
     handed: dict[str, Any] = dict(task.settings)
     for parameter, located in task.records.items():
+        if parameter in asks.in_turn:
+            handed[parameter] = InTurn(folders, task, located)
+            continue
         records = [_record(folders, task, each) for each in located]
         alone = parameter in asks.each or parameter in asks.optional
         handed[parameter] = next(iter(records), None) if alone else records
     for parameter, value in task.given.items():
         handed[parameter] = _log(folders, value) if asks.given[parameter] == "log" else value
     return handed
+
+
+@dataclass(frozen=True)
+class InTurn(Collection[Record]):
+    """Records that are read whenever they are come to, and not kept: all of a long log would take much memory."""
+
+    folders: Folders
+    task: Task
+    located: tuple[Located, ...]
+
+    def __iter__(self) -> Iterator[Record]:
+        return (_record(self.folders, self.task, each) for each in self.located)
+
+    def __len__(self) -> int:
+        return len(self.located)
+
+    def __contains__(self, record: object) -> bool:
+        return any(record is each for each in self)
 
 
 def _record(folders: Folders, task: Task, located: Located) -> Record:

@@ -1,7 +1,7 @@
 """What a stage asks for and promises, read from the signature of its `run`."""
 
 import types
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cache
 from importlib import import_module
@@ -27,6 +27,7 @@ class Declaration:
     name: str
     each: dict[str, Kinds]  # called once for each record of these kinds
     per_log: dict[str, Kinds]  # called once a log, with all its records of these kinds
+    in_turn: set[str]  # those of these parameters whose records are read when the stage comes to them
     optional: dict[str, Kinds]  # the record about the same, or None
     every: dict[str, Kinds]  # all records about the same
     given: dict[str, str]  # parameter -> "log", "entry", "joint", "robot", "weighings" or "haptics"
@@ -45,14 +46,16 @@ def declaration(name: str) -> Declaration:
     """Read the signature of a stage."""
     run = import_module(f"pipeline.stages.{name}").run
     hints = get_type_hints(run)
-    declared = Declaration(name, {}, {}, {}, {}, {}, _settings(name, run), _kinds(_inner(hints.pop("return"))))
+    declared = Declaration(name, {}, {}, set(), {}, {}, {}, _settings(name, run), _kinds(_inner(hints.pop("return"))))
     for parameter, hint in hints.items():
         if parameter in declared.settings:
             continue
         if hint in GIVEN:
             declared.given[parameter] = GIVEN[hint]
-        elif get_origin(hint) is Sequence:
+        elif get_origin(hint) in (Sequence, Collection):
             declared.per_log[parameter] = _kinds(_inner(hint))
+            if get_origin(hint) is Collection:
+                declared.in_turn.add(parameter)
         elif get_origin(hint) is Iterable:
             declared.every[parameter] = _kinds(_inner(hint))
         elif type(None) in get_args(hint):
@@ -71,7 +74,7 @@ def _settings(name: str, run: Any) -> tuple[str, ...]:
 
 
 def _inner(hint: Any) -> Any:
-    return get_args(hint)[0] if get_origin(hint) in (Iterable, Iterator, Sequence) else hint
+    return get_args(hint)[0] if get_origin(hint) in (Collection, Iterable, Iterator, Sequence) else hint
 
 
 def _kinds(hint: Any) -> Kinds:

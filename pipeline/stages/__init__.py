@@ -5,6 +5,7 @@ The signature of `run` is the declaration of everything it needs:
 
     signal: Signal              called once for each record of that kind; `Track | Residual` takes either kind
     signals: Sequence[Signal]   called once a log, with the records of all its joints
+    signals: Collection[Signal] the same, but each is read when the stage comes to it, and again when it comes again
     log: Log                    called once for each log of the study, opened
     average: Average | None     the record of that kind about the same, where there is one
     fits: Iterable[Fit]         all records of that kind about the same; the stage waits for them

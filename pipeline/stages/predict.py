@@ -1,18 +1,19 @@
 """Predict the effort of logs that a fit has not seen, and score it; identification logs by leaving data out."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
-from itertools import pairwise, starmap
+from itertools import pairwise
 
 import numpy as np
 
 from pipeline.errors import NotIdentifiable
 from pipeline.estimators import ESTIMATORS, estimator
+from pipeline.estimators.driving import Motions, motions_of
 from pipeline.estimators.folds import folds
 from pipeline.estimators.known import known_of
 from pipeline.estimators.observations import averaged, observed, pose_samples
 from pipeline.estimators.paths import ANOTHER_PATH, SAME_PATH, follows
-from pipeline.estimators.problem import Known
+from pipeline.estimators.problem import Known, Regression
 from pipeline.estimators.regression import measured_motion, of_joints, pose, predicted, stands_still
 from pipeline.estimators.scores import Judge, some
 from pipeline.estimators.used import describing, model_of, used
@@ -36,12 +37,12 @@ from pipeline.records import (
 )  # fmt: skip
 from pipeline.records.predict import CHOSEN
 from pipeline.robots.models import independent
-from pipeline.robots.robot import Robot
+from pipeline.robots.robot import Joint, Robot
 from pipeline.study import LogEntry
 
 
 def run(
-    signals: Sequence[Signal],
+    signals: Collection[Signal],
     smoothed: Iterable[Smoothed],
     trajectories: Iterable[Trajectory],
     paths: Iterable[FittedPaths],
@@ -58,32 +59,46 @@ def run(
     A joint at rest is not predicted: at standstill friction takes any value up to its Coulomb level.  What the chosen
     model says of identification logs comes with the choice.
     """
-    moving = [signal for signal in signals if not signal.at_rest]
-    by_joint = {p.joint: p for p in paths}
     if entry.role in ("validation", "contact"):
-        every, chosen = list(fits), list(choices)
-        for signal in moving:
-            own = by_joint.get(signal.joint)
-            yield from unseen(signal, signals, own, every, chosen, entry, robot, lowpass)
+        by_joint, every, chosen = {p.joint: p for p in paths}, list(fits), list(choices)
+        recorded = list(signals)
+        motions = motions_of(recorded, lowpass)
+        for signal in recorded:
+            if not signal.at_rest:
+                path = by_joint.get(signal.joint)
+                yield from unseen(signal, recorded, motions, path, every, chosen, entry, robot, lowpass)
     elif entry.role == "identification":
         periods, samples = {t.joint: t for t in trajectories}, {s.joint: s for s in smoothed}
         refits = list(cross_fits)
-        for signal in moving:
-            model, joint = independent(robot.joint(signal.joint)), signal.joint
-            known = known_of(robot.joint(joint))
-            own_fits = [fit for fit in refits if fit.group == joint]
-            sampled = samples.get(joint)
-            if own_fits:
-                yield from without_the_log(signal, sampled, periods.get(joint), own_fits, model, lowpass)
-            elif joint in periods:
-                yield from without_a_period(signal, sampled, periods[joint], model, known, lowpass)
-            elif sampled:
-                yield from without_a_segment(sampled, model, known, lowpass)
+        for signal in signals:
+            if not signal.at_rest:
+                own, sampled = periods.get(signal.joint), samples.get(signal.joint)
+                yield from left_out(signal, sampled, own, refits, robot.joint(signal.joint), lowpass)
+
+
+def left_out(
+    signal: Signal,
+    sampled: Smoothed | None,
+    own: Trajectory | None,
+    cross_fits: Sequence[CrossFit],
+    joint: Joint,
+    lowpass: float,
+) -> Iterator[Prediction | Diagnostic]:
+    """Predict a joint of an identification log by refits without it, or of one log without some of it."""
+    model, known = independent(joint), known_of(joint)
+    refits = [fit for fit in cross_fits if fit.group == joint.name]
+    if refits:
+        yield from without_the_log(signal, sampled, own, refits, model, lowpass)
+    elif own is not None:
+        yield from without_a_period(signal, sampled, own, model, known, lowpass)
+    elif sampled is not None:
+        yield from without_a_segment(sampled, model, known, lowpass)
 
 
 def unseen(
     signal: Signal,
     signals: Sequence[Signal],
+    motions: Motions,
     paths: FittedPaths | None,
     fits: Sequence[Fit],
     choices: Sequence[Choice],
@@ -110,8 +125,7 @@ def unseen(
         named.append((CHOSEN, f"{chosen.model}.{chosen.estimator}", chosen))
     judge = Judge(signal, free, lowpass)
     for model, by, fit in named:
-        tau_hat = along(fit, signal, signals, robot, lowpass)
-        yield judge.scored(model, by, entry.role, entry.role, path, tau_hat)
+        yield judge.scored(model, by, entry.role, entry.role, path, along(fit, signal.joint, motions, robot))
 
 
 def is_held(fit: Fit, signals: Sequence[Signal], robot: Robot) -> bool:
@@ -121,11 +135,10 @@ def is_held(fit: Fit, signals: Sequence[Signal], robot: Robot) -> bool:
     return len(needed) == 1 and 0 not in needed
 
 
-def along(fit: Fit, signal: Signal, signals: Sequence[Signal], robot: Robot, lowpass: float) -> Array:
+def along(fit: Fit, joint: str, motions: Motions, robot: Robot) -> Array:
     """The effort (N,) that a fit gives for a joint along a log that holds all the joints it needs."""
-    model, by_joint = model_of(robot, fit), {s.joint: s for s in signals}
-    motion = of_joints([measured_motion(by_joint[joint], lowpass) for joint in model.joints])
-    return predicted(model, fit.theta, motion, model.efforts.index(signal.joint))
+    model = model_of(robot, fit)
+    return predicted(model, fit.theta, of_joints([motions[name] for name in model.joints]), model.efforts.index(joint))
 
 
 def without_the_log(
@@ -161,24 +174,32 @@ def without_a_period(
     """Predict each period of a log from fits to the other periods; only the effort is left out, not the path."""
     kept = whole_periods(signal.t, own)
     part = some(signal, kept)
-    fold = fold_of(part.t, own)
-    ends = np.searchsorted(fold, np.arange(fold[-1] + 2)).tolist()
-    all_periods, moving = pose(model, [own], known), ~stands_still(own)
-    others = [
-        replace(all_periods, tau=rest.mean, tau_var=rest.var, periods=np.where(moving, rest.counts, 0))
-        for rest in averaging.left_out(part.t, part.tau, own.period, len(own.t), fold)
-    ]
+    runs, others = without_folds(part, own, model, known)
     Phi = model.regressor(motion_of(signal, sampled, kept, lowpass)).Phi[:, 0]
     judge = Judge(part, moves(signal, sampled)[kept], lowpass, own.sigma_tau_white)
     for name in ESTIMATORS:
-        tau_hat = np.empty(len(part))
         try:
-            for left, regression in zip(starmap(slice, pairwise(ends)), others, strict=True):
-                tau_hat[left] = Phi[left] @ estimator(name)(regression).theta
+            thetas = [estimator(name)(regression).theta for regression in others]
         except NotIdentifiable as error:
             yield not_predicted(signal, name, error)
             continue
+        tau_hat = np.concatenate([Phi[run] @ theta for run, theta in zip(runs, thetas, strict=True)])
         yield judge.scored(model.name, name, signal.role, "leave one period out", SAME_PATH, tau_hat)
+        del tau_hat  # before there is the next, which in a long log is large
+
+
+def without_folds(
+    part: Signal, own: Trajectory, model: IndependentJoint, known: Known
+) -> tuple[list[slice], list[Regression]]:
+    """The samples of each fold of a log's whole periods, and the least squares problem of the others."""
+    fold = fold_of(part.t, own)
+    every, moving = pose(model, [own], known), ~stands_still(own)
+    others = [
+        replace(every, tau=rest.mean, tau_var=rest.var, periods=np.where(moving, rest.counts, 0))
+        for rest in averaging.left_out(part.t, part.tau, own.period, len(own.t), fold)
+    ]
+    ends = np.searchsorted(fold, np.arange(len(others) + 1)).tolist()
+    return [slice(*both) for both in pairwise(ends)], others
 
 
 def fold_of(t: Array, own: Trajectory) -> Integers:

@@ -37,6 +37,7 @@ def test_the_declaration_parses_and_the_stage_says_what_it_does(name: str):
 def arguments(lab: Lab, task: Task) -> dict[str, Any]:
     """What the runner would hand to a stage; records that cannot be written into."""
     handed = execution.arguments(lab.folders, task)
+    handed |= {p: list(handed[p]) for p in task.records if isinstance(handed[p], execution.InTurn)}
     for record in [r for p in task.records for r in (handed[p] if isinstance(handed[p], list) else [handed[p]]) if r]:
         for column in record.columns():
             getattr(record, column).setflags(write=False)
