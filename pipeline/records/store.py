@@ -149,6 +149,11 @@ def read(kind: type[AnyRecord], folder: Path, place: Path, sha256: str = "") -> 
     return record
 
 
+def release() -> None:
+    """Give back what Arrow keeps of the memory in which records were read and written."""
+    pa.default_memory_pool().release_unused()
+
+
 def digest(file: Path | str) -> str:
     """The sha256 of a file's bytes."""
     with open(file, "rb") as stream:

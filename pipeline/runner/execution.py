@@ -60,6 +60,8 @@ def perform(folders: Folders, task: Task) -> Outcome:
         with _writer(folders, task) as writer:
             writer.write(diagnostic(task.stage, file_name(task.name), "error", failed))
         return Outcome(task, _made(writer), failed, (f"error: {said}",), perf_counter() - start)
+    finally:
+        store.release()
 
 
 def said_of(error: Exception) -> str:
