@@ -11,7 +11,7 @@ from pipeline.maths.contact.error_band import SpeedCells, cells, excess, excess_
 from pipeline.maths.contact.free_space import levels
 from pipeline.maths.contact.window import mean_size, summarise
 from pipeline.maths.signals import jackknife
-from pipeline.maths.signals.bootstrap import blocks, standard_error
+from pipeline.maths.signals.bootstrap import blocks, error_of_mean, standard_error
 from pipeline.maths.signals.noise import model_error, noise_std, smoothed
 from pipeline.maths.signals.path import likeness, most_different
 from pipeline.maths.signals.smoothing import lowpass, share_passed
@@ -65,6 +65,7 @@ def test_the_block_bootstrap_knows_that_correlated_samples_say_less():
     means = [float(x[part].mean()) for part in blocks(len(x))]
     true = np.sqrt((1 + 0.95) / (1 - 0.95) / len(x)) / np.sqrt(1 - 0.95**2)
     found = standard_error(lambda parts: float(np.mean(parts)), means)
+    assert error_of_mean(means) == pytest.approx(found, rel=1e-12)
     assert found == pytest.approx(true, rel=4 / np.sqrt(2 * len(means)))
 
 

@@ -9,7 +9,7 @@ from pipeline.estimators.problem import NOTHING, Known, Regression
 from pipeline.maths.arrays import Array, Booleans, Integers
 from pipeline.maths.models.model import Model, Motion
 from pipeline.maths.selection.blocks import BLOCKS, MOST, path_blocks, repetitions
-from pipeline.maths.selection.equations import Equations, added, gathered
+from pipeline.maths.selection.equations import Equations, gathered, side_by_side
 from pipeline.maths.signals.noise import smoothed
 from pipeline.records import Average, Smoothed, Trajectory
 
@@ -109,7 +109,7 @@ def equations(model: Model, logs: Sequence[Observed], count: int) -> tuple[Integ
     for log in logs:
         Phi, tau, kept = log.rows(model)
         samples += (~np.isnan(tau)).sum(axis=0)
-        block, period = log.block[kept] + BLOCKS * log.number, log.period[kept] + MOST * log.number
-        by_block.append(gathered(Phi, tau, block, BLOCKS * count))
-        by_period.append(gathered(Phi, tau, np.where(log.period[kept] < 0, -1, period), MOST * count))
-    return samples, added(by_block), added(by_period)
+        by_block.append(gathered(Phi, tau, log.block[kept], BLOCKS))
+        by_period.append(gathered(Phi, tau, log.period[kept], MOST))
+    numbers = [log.number for log in logs]
+    return samples, side_by_side(by_block, numbers, count), side_by_side(by_period, numbers, count)

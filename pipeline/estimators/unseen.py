@@ -4,7 +4,7 @@ One scheme leaves blocks of path out, which is what a candidate is chosen by.  T
 own fits are judged, so that all can be compared: without the log, or of one log without a period, else a segment.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -35,43 +35,49 @@ class Scheme(NamedTuple):
     refit: Integers  # (N,) of each sample, from 0; -1 of those that are not predicted
 
 
-class Refitted(NamedTuple):
-    """One model of a candidate in one log, ready to be refitted."""
+class Refitted:
+    """One model of a candidate, to be refitted without some of its cells; what several logs ask for is made once."""
 
-    model: Model
-    library: Library
-    ridge: Ridge
-    columns: list[int]  # of the library that the model has
-    log: Observed
-    total: int  # of all logs
+    def __init__(self, model: Model, library: Library, ridge: Ridge, columns: list[int], total: int) -> None:
+        self.model, self.logs, self.total = model, {log.number: log for log in library.logs}, total
+        self.by_block, self.by_period = library.by_block.columns(columns), library.by_period.columns(columns)
+        self._ridge, self._made = ridge, dict[bytes, Array]()
+
+    def theta(self, cells: Equations, out: Booleans) -> Array:
+        """The parameters (p,) without some cells (C,); raises LinAlgError where the rest does not tell them apart."""
+        key = out.tobytes()
+        if key not in self._made:
+            self._made[key] = solve(cells.without(out), self._ridge)
+        return self._made[key]
 
 
 def predictions(
-    candidate: Candidate, is_chosen: bool, log: Observed, robot: Robot, reaches: dict[str, Reach], count: int
+    candidate: Candidate, is_chosen: bool, logs: Sequence[Observed], robot: Robot, reaches: dict[str, Reach]
 ) -> Iterator[Prediction]:
-    """The effort of each joint of a log, one of `count`, by refits of a candidate: as the joints' own fits are judged.
+    """The effort of each joint of all logs, by refits of a candidate: as the joints' own fits are judged.
 
     Of the chosen one also without blocks of path, as `chosen`.  Where a refit cannot be made there is none.
     """
     name = f"{candidate.variant}.{candidate.estimator}"
     each = zip(candidate.models(robot, reaches), candidate.libraries, candidate.ridges(), strict=True)
-    for model, library, ridge in each:
-        own = next((seen for seen in library.logs if seen.number == log.number), None)
-        if own is None:
-            continue
-        made = Refitted(model, library, ridge, library.columns(candidate.friction, reaches), own, count)
-        Phi = model.regressor(own.motion).Phi
-        if is_chosen:
-            yield from by(blocks(made, "leave a block of path out"), made, Phi, CHOSEN, name)
-        if name != "independent.lse":  # which is a joint's own fit
-            yield from by(as_the_others(made), made, Phi, candidate.variant, candidate.estimator)
+    every = [
+        Refitted(model, library, ridge, library.columns(candidate.friction, reaches), len(logs))
+        for model, library, ridge in each
+    ]
+    for number in (log.number for log in logs):
+        for made in (made for made in every if number in made.logs):
+            log = made.logs[number]
+            Phi = made.model.regressor(log.motion).Phi
+            if is_chosen:
+                yield from by(blocks(made, log, "leave a block of path out"), made, log, Phi, CHOSEN, name)
+            if name != "independent.lse":  # which is a joint's own fit
+                yield from by(as_the_others(made, log), made, log, Phi, candidate.variant, candidate.estimator)
 
 
-def by(scheme: Scheme, made: Refitted, Phi: Array, name: str, estimator: str) -> Iterator[Prediction]:
+def by(scheme: Scheme, made: Refitted, log: Observed, Phi: Array, name: str, estimator: str) -> Iterator[Prediction]:
     """The efforts of a model in a log, each sample by the refit that had not seen it, scored where the joint moves."""
-    log, cells = made.log, scheme.cells.columns(made.columns)
     try:
-        thetas = np.array([solve(cells.without(out), made.ridge) for out in scheme.out])
+        thetas = np.array([made.theta(scheme.cells, out) for out in scheme.out])
     except np.linalg.LinAlgError:
         return
     kept = scheme.refit >= 0
@@ -85,25 +91,23 @@ def by(scheme: Scheme, made: Refitted, Phi: Array, name: str, estimator: str) ->
             yield judge.scored(name, estimator, "identification", scheme.name, scheme.path, tau_hat[:, m])
 
 
-def blocks(made: Refitted, name: str) -> Scheme:
+def blocks(made: Refitted, log: Observed, name: str) -> Scheme:
     """Leave each sixth of the path out, that of all logs together."""
     out = np.tile(np.arange(BLOCKS), made.total) == np.arange(BLOCKS)[:, None]
-    return Scheme(name, ANOTHER_PATH, made.library.by_block, out, made.log.block)
+    return Scheme(name, ANOTHER_PATH, made.by_block, out, log.block)
 
 
-def as_the_others(made: Refitted) -> Scheme:
+def as_the_others(made: Refitted, log: Observed) -> Scheme:
     """Leave out what the joints' own fits are judged by: the log, with its neighbours of many, or a period of it."""
-    log, logs = made.log, made.library.logs
-    if len(logs) > 1:
-        fold = folds(len(logs))
-        mine = fold[[own.number for own in logs].index(log.number)]
-        left = [own.number for own, number in zip(logs, fold, strict=True) if number == mine]
+    if len(made.logs) > 1:
+        fold = dict(zip(made.logs, folds(len(made.logs)), strict=True))
+        left = [number for number, own in fold.items() if own == fold[log.number]]
         out = np.isin(np.repeat(np.arange(made.total), BLOCKS), left)[None]
         refit = np.where(log.period < 0, -1, 0) if log.period.max() >= 0 else np.zeros_like(log.period)
         name = "leave one log out" if len(left) == 1 else f"leave {len(left)} logs out"
-        return Scheme(name, ANOTHER_PATH, made.library.by_block, out, refit)
+        return Scheme(name, ANOTHER_PATH, made.by_block, out, refit)
     if log.period.max() >= 1:
         periods = np.arange(log.period.max() + 1)
         out = MOST * log.number + periods[:, None] == np.arange(MOST * made.total)
-        return Scheme("leave one period out", SAME_PATH, made.library.by_period, out, log.period)
-    return blocks(made, "leave a segment out")
+        return Scheme("leave one period out", SAME_PATH, made.by_period, out, log.period)
+    return blocks(made, log, "leave a segment out")

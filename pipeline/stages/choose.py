@@ -49,8 +49,7 @@ def run(
             if candidate.variant != "independent" and by_variant[candidate.variant] == name:
                 yield from possible(candidate, found, robot, reaches)
     for candidate in worth.values():
-        for log in logs:
-            yield from predictions(candidate, candidate is selection.chosen, log, robot, reaches, len(logs))
+        yield from predictions(candidate, candidate is selection.chosen, logs, robot, reaches)
 
 
 def by_log(smoothed: Iterable[Smoothed], averages: Iterable[Average], robot: Robot, lowpass: float) -> list[Observed]:

@@ -4,10 +4,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from pipeline.estimators import unseen
+from pipeline.estimators.candidates import Library
+from pipeline.estimators.unseen import Refitted
 from pipeline.maths.selection.blocks import BLOCKS, MOST, left_out, path_blocks
 from pipeline.maths.selection.cross_validation import Judged, judged, preferred, standard_error, together
-from pipeline.maths.selection.equations import gathered
+from pipeline.maths.selection.equations import gathered, side_by_side
 from pipeline.maths.selection.ridge import Ridge, covariance, penalty, solve
+from pipeline.robots import davinci
+from pipeline.robots.models import independent
 
 RNG = np.random.default_rng(3)
 N, P, CELLS = 600, 4, 6
@@ -25,6 +30,30 @@ def test_leaving_cells_out_is_least_squares_on_the_other_rows():
     assert_allclose(solve(equations.without(out), PLAIN), theta, rtol=1e-10)
     error = TAU[~kept, 0] - PHI[~kept, 0] @ theta
     assert equations.of(out).errors(theta)[0, 0] == pytest.approx(error @ error, rel=1e-9)
+
+
+def test_logs_side_by_side_are_those_gathered_together_and_one_that_is_not_there_counts_nothing():
+    log = np.arange(N) * 3 // N
+    parts = [gathered(PHI[log == i], TAU[log == i], CELL[log == i], CELLS) for i in (0, 2)]
+    there = log != 1
+    together = gathered(PHI[there], TAU[there], (CELL + CELLS * log)[there], 4 * CELLS)
+    for whole, placed in zip(together, side_by_side(parts, (0, 2), 4), strict=True):
+        assert_allclose(placed, whole, rtol=0, atol=0)
+
+
+def test_refits_that_several_logs_ask_for_are_made_once(monkeypatch):
+    """Or of a thousand logs each would sum the equations of all again."""
+    model = independent(davinci.ROBOT.joint("hand_roll"))
+    p = len(model.parameters)
+    Phi = RNG.normal(size=(N, 1, p))
+    cells = gathered(Phi, Phi @ np.ones(p), CELL, CELLS)
+    library = Library(model, (), ((),), np.array([N]), cells, cells, np.empty(0))
+    made = Refitted(model, library, PLAIN, list(range(p)), 1)
+    solved = []
+    monkeypatch.setattr(unseen, "solve", lambda *given: solved.append(given) or solve(*given))
+    for out in (*np.eye(CELLS, dtype=bool), *np.eye(CELLS, dtype=bool)):
+        assert_allclose(made.theta(cells, out), 1.0, rtol=1e-9)
+    assert len(solved) == CELLS
 
 
 def test_what_is_predicted_has_not_been_seen():

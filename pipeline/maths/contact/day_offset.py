@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.maths.arrays import Array
-from pipeline.maths.signals.bootstrap import blocks, standard_error
+from pipeline.maths.signals.bootstrap import blocks, error_of_mean
 from pipeline.maths.signals.windows import outside
 
 BEYOND = 2.0  # standard errors of a difference, from which on it is a drift
@@ -43,6 +43,4 @@ def day_offset(t: Array, left: Array, windows: Sequence[tuple[float, float]]) ->
 def _mean(x: Array) -> tuple[float, float]:
     """The mean of correlated samples and its standard error."""
     parts = [float(x[part].mean()) for part in blocks(len(x))]
-    return float(x.mean()), standard_error(lambda some: float(np.mean(some)), parts) if len(parts) > 1 else float(
-        abs(x[0])
-    )
+    return float(x.mean()), error_of_mean(parts) if len(parts) > 1 else float(abs(x[0]))

@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.maths.arrays import Array
-from pipeline.maths.signals.bootstrap import blocks, standard_error
+from pipeline.maths.signals.bootstrap import blocks, error_of_mean, standard_error
 
 EXPONENTS = np.linspace(1.0, 2.5, 31)
 FOLDS = 20
@@ -128,7 +128,7 @@ def chosen(candidates: Sequence[FittedLaw]) -> tuple[FittedLaw, str]:
         worse = (candidate.errors - best.errors).tolist()
         if candidate is best:
             return best, "it predicts pushes left out best"
-        if float(np.mean(worse)) < standard_error(_mean, worse):
+        if float(np.mean(worse)) < error_of_mean(worse):
             return candidate, f"{best.law.name} predicts pushes left out better, but by no more than chance does"
     raise AssertionError("the best is one of the candidates")
 
@@ -137,7 +137,3 @@ def _relative(pairs: list[tuple[float, float]]) -> float:
     """Root of the errors' squares over the force's."""
     errors, sizes = np.array(pairs).T
     return float(np.sqrt(max(errors.sum(), 0.0) / max(sizes.sum(), np.finfo(float).tiny)))
-
-
-def _mean(parts: list[float]) -> float:
-    return float(np.mean(parts))

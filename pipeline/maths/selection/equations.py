@@ -54,6 +54,10 @@ def gathered(Phi: Array, tau: Array, cell: Integers, cells: int) -> Equations:
     return made
 
 
-def added(parts: Sequence[Equations]) -> Equations:
-    """The sums of equations in the same cells."""
-    return Equations(*(sum(columns[1:], columns[0]) for columns in zip(*parts, strict=True)))
+def side_by_side(parts: Sequence[Equations], places: Sequence[int], count: int) -> Equations:
+    """Equations of as many cells each as `count` such parts of as many cells, each in its place; other cells hold 0."""
+    made = Equations(*(np.zeros((count, *column.shape)) for column in parts[0]))
+    for place, part in zip(places, parts, strict=True):
+        for whole, column in zip(made, part, strict=True):
+            whole[place] = column
+    return Equations(*(column.reshape(-1, *column.shape[2:]) for column in made))

@@ -9,6 +9,8 @@ from typing import TypeVar
 
 import numpy as np
 
+from pipeline.maths.arrays import Array, Integers
+
 BLOCKS = 20
 DRAWS = 200
 
@@ -30,8 +32,21 @@ def standard_error(statistic: Callable[[list[Block]], float], parts: Sequence[Bl
     """
     if len(parts) < 2:
         return float("nan")
-    rng = np.random.default_rng(seed)
-    draws = rng.integers(0, len(parts), (DRAWS, len(parts)))
+    return _spread(np.array([statistic([parts[i] for i in draw]) for draw in _draws(len(parts), seed)]), len(parts))
+
+
+def error_of_mean(values: Sequence[float] | Array, seed: int = 0) -> float:
+    """The same of the mean of numbers (n,), one a block."""
+    if len(values) < 2:
+        return float("nan")
+    return _spread(np.asarray(values)[_draws(len(values), seed)].mean(axis=1), len(values))
+
+
+def _draws(n: int, seed: int) -> Integers:
+    """Which of n blocks each draw takes, (DRAWS, n)."""
+    return np.random.default_rng(seed).integers(0, n, (DRAWS, n))
+
+
+def _spread(drawn: Array, n: int) -> float:
     # A draw of as many blocks as there are understates a variance by (n - 1) / n.
-    scale = np.sqrt(len(parts) / (len(parts) - 1))
-    return float(scale * np.std([statistic([parts[i] for i in draw]) for draw in draws]))
+    return float(np.sqrt(n / (n - 1)) * np.std(drawn))

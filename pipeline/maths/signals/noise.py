@@ -3,7 +3,7 @@
 import numpy as np
 
 from pipeline.maths.arrays import Array, Integers
-from pipeline.maths.signals.bootstrap import blocks, standard_error
+from pipeline.maths.signals.bootstrap import blocks, error_of_mean
 from pipeline.maths.signals.smoothing import lowpass, segments, share_passed
 
 NORMAL_MAD = 0.6744897501960817  # median of |x| of a standard normal variable
@@ -37,10 +37,6 @@ def model_error(slow: Array, noise: float) -> tuple[float, float]:
     squares = slow**2
     excess = float(np.mean(squares)) - noise**2
     error = float(np.sqrt(max(excess, 0.0)))
-    spread = standard_error(_mean, [float(squares[part].mean()) for part in blocks(len(slow))])
+    spread = error_of_mean([float(squares[part].mean()) for part in blocks(len(slow))])
     # d sqrt(x) = dx / (2 sqrt(x)), which says nothing near 0: there the root of the spread is the bound.
     return error, min(spread / (2.0 * error), float(np.sqrt(spread))) if error > 0 else float(np.sqrt(spread))
-
-
-def _mean(parts: list[float]) -> float:
-    return float(np.mean(parts))
