@@ -8,9 +8,11 @@ import numpy as np
 from pipeline.estimators.problem import NOTHING, Known, Regression
 from pipeline.maths.arrays import Array, Booleans, Integers
 from pipeline.maths.models.model import Model, Motion
+from pipeline.maths.models.pieces import pieces
 from pipeline.maths.selection.blocks import BLOCKS, MOST, path_blocks, repetitions
 from pipeline.maths.selection.equations import Equations, gathered, side_by_side
 from pipeline.maths.signals.noise import smoothed
+from pipeline.maths.signals.smoothing import reach
 from pipeline.records import Average, Smoothed, Trajectory
 
 PER_CUTOFF = 3  # samples kept per period of the low-pass's cutoff: more of them say nothing new
@@ -45,14 +47,20 @@ class Observed(NamedTuple):
         Those at which none of the model's joints moves are left out.
         """
         names, rate = [record.joint for record in self.records], self.records[0].rate
-        Phi, known = model.regressor(self.motion)
-        step = max(1, int(rate / (PER_CUTOFF * self.lowpass)))
         tau = self.tau[:, [names.index(effort) for effort in model.efforts]]
-        kept = np.flatnonzero(known & (np.arange(len(known)) % step == 0) & ~np.isnan(tau).all(axis=1))
-        smooth = np.zeros((len(kept), *Phi.shape[1:]))
-        some = Phi.any(axis=0)  # most columns are of one effort only
-        smooth[:, some] = smoothed(Phi[:, some], self.motion.segment, rate, self.lowpass)[kept]
-        return smooth, tau[kept], kept
+        step = max(1, int(rate / (PER_CUTOFF * self.lowpass)))
+        wanted = (np.arange(len(tau)) % step == 0) & ~np.isnan(tau).all(axis=1)
+        rows, kept = [], []
+        for piece in pieces(model, self.motion, reach(rate, self.lowpass)):
+            Phi, known = model.regressor(piece.motion)
+            taken = np.flatnonzero(known[piece.inside] & wanted[piece.place])
+            smooth = np.zeros((len(taken), *Phi.shape[1:]))
+            some = Phi.any(axis=0)  # most columns are of one effort only
+            smooth[:, some] = smoothed(Phi[:, some], piece.motion.segment, rate, self.lowpass)[piece.inside][taken]
+            rows.append(smooth)
+            kept.append(taken + piece.place.start)
+        samples = np.concatenate(kept)
+        return np.concatenate(rows), tau[samples], samples
 
 
 def observed(records: Sequence[Smoothed], averages: Iterable[Average], lowpass: float, number: int) -> Observed:

@@ -8,6 +8,7 @@ from pipeline.estimators.problem import NOTHING, Known, Regression
 from pipeline.maths.arrays import Array, Booleans
 from pipeline.maths.models.independent import IndependentJoint
 from pipeline.maths.models.model import Model, Motion
+from pipeline.maths.models.pieces import efforts
 from pipeline.maths.signals.harmonics import kept_noise
 from pipeline.maths.signals.smoothing import motion, segments
 from pipeline.maths.signals.standstill import standing
@@ -86,7 +87,7 @@ def of_joints(motions: Sequence[Motion]) -> Motion:
 
 def predicted(model: Model, theta: Array, motion: Motion, effort: int = 0) -> Array:
     """One of the model's efforts (N,) along a motion."""
-    return np.asarray(model.regressor(motion).Phi[:, effort] @ theta)
+    return np.ascontiguousarray(efforts(model, theta, motion)[:, effort])
 
 
 def _smoothed(signal: Signal, part: slice, lowpass: float) -> tuple[Array, Array, Array]:

@@ -16,6 +16,7 @@ from pipeline.estimators.paths import ANOTHER_PATH, SAME_PATH
 from pipeline.estimators.scores import Judge, some
 from pipeline.maths.arrays import Array, Booleans, Integers
 from pipeline.maths.models.model import Model
+from pipeline.maths.models.pieces import efforts
 from pipeline.maths.selection.blocks import BLOCKS, MOST
 from pipeline.maths.selection.equations import Equations
 from pipeline.maths.selection.ridge import Ridge, solve
@@ -67,21 +68,20 @@ def predictions(
     for number in (log.number for log in logs):
         for made in (made for made in every if number in made.logs):
             log = made.logs[number]
-            Phi = made.model.regressor(log.motion).Phi
             if is_chosen:
-                yield from by(blocks(made, log, "leave a block of path out"), made, log, Phi, CHOSEN, name)
+                yield from by(blocks(made, log, "leave a block of path out"), made, log, CHOSEN, name)
             if name != "independent.lse":  # which is a joint's own fit
-                yield from by(as_the_others(made, log), made, log, Phi, candidate.variant, candidate.estimator)
+                yield from by(as_the_others(made, log), made, log, candidate.variant, candidate.estimator)
 
 
-def by(scheme: Scheme, made: Refitted, log: Observed, Phi: Array, name: str, estimator: str) -> Iterator[Prediction]:
+def by(scheme: Scheme, made: Refitted, log: Observed, name: str, estimator: str) -> Iterator[Prediction]:
     """The efforts of a model in a log, each sample by the refit that had not seen it, scored where the joint moves."""
     try:
         thetas = np.array([made.theta(scheme.cells, out) for out in scheme.out])
     except np.linalg.LinAlgError:
         return
     kept = scheme.refit >= 0
-    tau_hat = np.einsum("nmp,np->nm", Phi[kept], thetas[scheme.refit[kept]])
+    tau_hat = efforts(made.model, thetas, log.motion, scheme.refit)[kept]
     names = [record.joint for record in log.records]
     for m, effort in enumerate(made.model.efforts):
         record = some(log.records[names.index(effort)], kept)

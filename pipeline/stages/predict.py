@@ -20,6 +20,7 @@ from pipeline.estimators.used import describing, model_of, used
 from pipeline.maths.arrays import Array, Booleans, Integers
 from pipeline.maths.models.independent import IndependentJoint
 from pipeline.maths.models.model import Motion
+from pipeline.maths.models.pieces import cut
 from pipeline.maths.selection.blocks import BLOCKS
 from pipeline.maths.signals import averaging
 from pipeline.maths.signals.windows import outside
@@ -237,9 +238,9 @@ def not_predicted(signal: Signal | Smoothed, name: str, error: NotIdentifiable) 
 def motion_of(signal: Signal, sampled: Smoothed | None, which: slice, lowpass: float) -> Motion:
     """The motion of a joint at some samples of a recording: as it was smoothed to choose a model by, if it was."""
     if sampled is None:
-        return at(measured_motion(signal, lowpass), which)
+        return cut(measured_motion(signal, lowpass), which)
     q, dq, ddq = (x[:, None] for x in (sampled.q, sampled.dq, sampled.ddq))
-    return at(Motion(q, dq, ddq, 1.0 / sampled.rate, sampled.segment), which)
+    return cut(Motion(q, dq, ddq, 1.0 / sampled.rate, sampled.segment), which)
 
 
 def moves(signal: Signal, sampled: Smoothed | None) -> Booleans:
@@ -251,9 +252,3 @@ def whole_periods(t: Array, own: Trajectory) -> slice:
     """The samples, at these times [s], of the periods that were averaged: a view of them takes no memory."""
     inside = np.flatnonzero(averaged(t, own))
     return slice(int(inside[0]), int(inside[-1]) + 1)
-
-
-def at(motion: Motion, which: slice) -> Motion:
-    """A motion at some of its samples."""
-    q, dq, ddq, T_s, segment, periodic = motion
-    return Motion(q[which], dq[which], ddq[which], T_s, segment[which], periodic)

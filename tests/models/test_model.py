@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from pipeline.estimators.observations import observed
 from pipeline.filters import FILTERS, tracker
 from pipeline.filters.problem import NoiseModel
 from pipeline.maths.mechanics.rigid_body import inverse_dynamics, mass_matrix
@@ -17,6 +18,8 @@ from pipeline.maths.models.driven import Driven
 from pipeline.maths.models.independent import IndependentJoint
 from pipeline.maths.models.memory import deflection, driven
 from pipeline.maths.models.model import Motion
+from pipeline.maths.models.pieces import efforts, pieces
+from pipeline.records import Smoothed
 from pipeline.robots.davinci_chain import BODIES, CHAIN
 
 DAHL = terms.presliding(0.01)
@@ -73,6 +76,41 @@ def test_the_effort_of_a_coupled_arm_is_that_of_its_links_drives_and_friction():
     whole = model.bias(theta, motion) + np.einsum("nij,nj->ni", M, motion.ddq)
     assert_allclose(whole, true_effort(motion), rtol=1e-9, atol=1e-9)
     assert 0 < np.flatnonzero(known)[0] < 400
+
+
+@pytest.mark.parametrize("model", [coupled(), IndependentJoint("one", (terms.inertia, DAHL, terms.coulomb), ("",) * 3)])
+def test_a_long_motion_piece_by_piece_is_the_whole_of_it(model, monkeypatch):
+    """With friction that remembers, and gaps, at each of which it starts anew."""
+    motion = wandering(2000, segments=3)
+    Phi, known = model.regressor(motion)
+    theta = np.random.default_rng(1).normal(size=(2, len(model.parameters)))
+    which = np.arange(2000) % 2
+    monkeypatch.setattr("pipeline.maths.models.pieces.SAMPLES", 300)
+    every = list(pieces(model, motion, 7))
+    assert [len(piece.motion.q) for piece in every] == [307, *[314] * 5, 207]
+    for piece in every:
+        found = model.regressor(piece.motion)
+        assert_allclose(found.Phi[piece.inside], Phi[piece.place], rtol=1e-12, atol=1e-14)
+        assert found.known[piece.inside].tolist() == known[piece.place].tolist()
+    assert_allclose(efforts(model, theta[0], motion), Phi @ theta[0], rtol=1e-9, atol=1e-12)
+    assert_allclose(
+        efforts(model, theta, motion, which), np.einsum("nmp,np->nm", Phi, theta[which]), rtol=1e-9, atol=1e-12
+    )
+
+
+def test_rows_for_a_fit_are_low_passed_piece_by_piece_as_they_would_be_at_once(monkeypatch):
+    motion, tau = wandering(3000, segments=2), np.random.default_rng(2).normal(size=(3000, 2))
+    t, still = np.arange(3000) * T_S, np.zeros(3000, np.int64)
+    columns = zip(("one", "two"), motion.q.T, motion.dq.T, motion.ddq.T, tau.T, strict=True)
+    records = [
+        Smoothed("log", name, 1 / T_S, 0, 0.0, 0.0, 0.0, t, q, dq, ddq, own, motion.segment, still)
+        for name, q, dq, ddq, own in columns
+    ]
+    log = observed(records, (), 4.0, 0)
+    at_once = log.rows(coupled())
+    monkeypatch.setattr("pipeline.maths.models.pieces.SAMPLES", 700)
+    for piecewise, whole in zip(log.rows(coupled()), at_once, strict=True):
+        assert_allclose(piecewise, whole, rtol=1e-9, atol=1e-12)
 
 
 def test_the_columns_of_a_coupled_arm_are_independent_and_no_fewer_than_its_links_need():

@@ -20,6 +20,7 @@ from pipeline.maths.models.bias import COULOMB, VISCOUS
 from pipeline.maths.models.mechanism import Mechanism
 from pipeline.maths.models.memory import driven
 from pipeline.maths.models.model import JointDynamics, Motion, Parameter, Regressor
+from pipeline.maths.models.pieces import SAMPLES, efforts
 from pipeline.maths.models.terms import Term
 
 RICH = 200  # random poses, velocities and accelerations that tell the base parameters
@@ -63,6 +64,11 @@ class CoupledArm:
         return (*led, *(self._friction_parameter(i, term) for i, terms in enumerate(self.friction) for term in terms))
 
     @property
+    def displacements(self) -> set[tuple[int, float]]:
+        """Those of its friction."""
+        return {(joint, term.displacement) for _, joint, term, _ in self._frictions() if term.displacement}
+
+    @property
     def mechanism(self) -> Mechanism:
         """Base parameters by all links' and what is added to each row; friction by itself."""
         K, L, terms = self.base.combination, len(self.chain.links), [term for own in self.friction for term in own]
@@ -86,7 +92,8 @@ class CoupledArm:
 
     def inertia(self, theta: Array, q: Array) -> Array:
         """M (N, m, m) at q (N, n).  (4.38)"""
-        return np.asarray(self.inertia_columns(q) @ theta)
+        parts = [self.inertia_columns(q[i : i + SAMPLES]) @ theta for i in range(0, max(len(q), 1), SAMPLES)]
+        return np.concatenate(parts)
 
     def inertia_columns(self, q: Array) -> Array:
         """What the parameters (p,) make of M at q (N, n), (N, m, m, p): M is linear in them."""
@@ -100,11 +107,11 @@ class CoupledArm:
 
     def bias(self, theta: Array, motion: Motion) -> Array:
         """The effort (N, m) of this motion without what accelerates it.  (4.38)"""
-        return np.asarray(self.regressor(motion._replace(ddq=np.zeros_like(motion.ddq))).Phi @ theta)
+        return efforts(self, theta, motion._replace(ddq=np.zeros_like(motion.ddq)))
 
     def joint_dynamics(self, theta: Array, motion: Motion) -> tuple[JointDynamics, ...]:
         """Each row with its own inertia, viscous and Coulomb friction; all else is known from the motion."""
-        M, tau = self.inertia(theta, motion.q), np.asarray(self.regressor(motion).Phi @ theta)
+        M, tau = self.inertia(theta, motion.q), efforts(self, theta, motion)
         views = []
         for i, joint in enumerate(self.rows):
             of_row = [(float(theta[column]), term) for row, _, term, column in self._frictions() if row == i]

@@ -49,6 +49,11 @@ class IndependentJoint:
         return tuple(Parameter(term.name, term.typst, unit, term.positive, term.scale) for term, unit in pairs)
 
     @property
+    def displacements(self) -> set[tuple[int, float]]:
+        """Those of its terms."""
+        return {(0, term.displacement) for term in self.terms if term.displacement}
+
+    @property
     def mechanism(self) -> Mechanism:
         """Of a joint without bodies signs are known."""
         return of_signs(np.array([term.positive for term in self.terms]))

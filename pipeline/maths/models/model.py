@@ -6,6 +6,7 @@ Identification asks for Phi, prediction for Phi theta; a filter tracks each join
 of it.  Shapes: N samples, n joints, m efforts, p parameters.
 """
 
+from collections.abc import Collection, Mapping
 from typing import NamedTuple, Protocol
 
 from pipeline.maths.arrays import Array, Booleans, Integers
@@ -32,6 +33,7 @@ class Motion(NamedTuple):
     T_s: float  # [s]
     segment: Integers  # (N,) a new number after each gap
     periodic: bool = False  # whether each segment is one period, which repeats
+    memory: Mapping[tuple[int, float], tuple[Array, Booleans]] = {}  # deflections that are known already, see `driven`
 
 
 class Regressor(NamedTuple):
@@ -75,6 +77,11 @@ class Model(Protocol):
     @property
     def parameters(self) -> tuple[Parameter, ...]:
         """Its parameters, in the order of theta."""
+        ...
+
+    @property
+    def displacements(self) -> Collection[tuple[int, float]]:
+        """The joint and the displacement of every deflection that it depends on."""
         ...
 
     @property

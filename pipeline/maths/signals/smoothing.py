@@ -26,6 +26,17 @@ def lowpass(x: Array, rate: float, cutoff: float) -> Array:
 
 
 @cache
+def reach(rate: float, cutoff: float) -> int:
+    """Samples after which what `lowpass` has seen is less than rounding."""
+    if cutoff >= 0.4 * rate:
+        return 0
+    from scipy.signal import sos2zpk
+
+    slowest = float(np.abs(sos2zpk(_sections(rate, cutoff))[1]).max())
+    return int(np.ceil(np.log(np.finfo(float).eps) / np.log(slowest)))
+
+
+@cache
 def share_passed(rate: float, cutoff: float) -> float:
     """The share of the power of white noise that `lowpass` lets through."""
     if cutoff >= 0.4 * rate:
