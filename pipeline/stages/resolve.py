@@ -9,7 +9,7 @@ from pipeline.maths.contact.free_space import NORMAL_95, FreeSpaceLevels, levels
 from pipeline.maths.contact.joint_correlation import matrix, shared
 from pipeline.maths.mechanics import tip_force
 from pipeline.maths.mechanics.chain import Chain
-from pipeline.maths.mechanics.kinematics import jacobian, tip
+from pipeline.maths.mechanics.kinematics import along, jacobian, tip
 from pipeline.maths.mechanics.workspace import NEAR_SINGULAR, condition
 from pipeline.maths.signals.windows import SETTLE, free_space
 from pipeline.records import ArmCorrelation, Contact, Diagnostic, TipBudget, TipContact, TipForce, Track, diagnostic
@@ -76,10 +76,10 @@ def correlation(log: str, correlations: Iterable[ArmCorrelation]) -> tuple[Array
 def resolved(own: Sequence[Track], chain: Chain, rho: Array, source: str, free: Booleans) -> TipForce:
     """The force at the tip of one log, without delay: joints that lag differently would point it elsewhere."""
     first, q = own[0], np.stack([track.q for track in own], axis=-1)
-    J, _ = jacobian(chain, q)
+    J = along(lambda some: jacobian(chain, some)[0], q)
     tau_ext, std = (np.stack([getattr(t, name) for t in own], axis=-1) for name in ("tau_ext_smooth", "tau_ext_std"))
     f, C = tip_force.from_efforts(J, tau_ext, tip_force.covariance(std, matrix(*rho.tolist())))
-    blur, (x, y, z) = condition(J), tip(chain, q).T
+    blur, (x, y, z) = condition(J), along(lambda some: tip(chain, some), q).T
     near = blur > NEAR_SINGULAR
     judged = free & ~near
     space = levels_of(f[judged], C[judged]) if int(judged.sum()) >= FEWEST else UNKNOWN

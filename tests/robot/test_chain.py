@@ -116,3 +116,12 @@ def test_the_research_kit_s_counterweight_keeps_to_the_back_link():
     local = np.linalg.inv(T[:, PSM.names.index("back_link")]) @ T[:, PSM.names.index("counterweight")]
     np.testing.assert_allclose(local[:, :3, :3], np.broadcast_to(local[0, :3, :3], (POSES, 3, 3)), atol=1e-14)
     np.testing.assert_allclose(np.ptp(local[:, [0, 2], 3], axis=0), 0, atol=1e-14)
+
+
+@pytest.mark.parametrize("N", [0, 3, 10, 25])
+def test_what_is_said_of_many_poses_so_many_at_a_time_is_what_is_said_of_all(N, monkeypatch):
+    monkeypatch.setattr(kinematics, "AT_ONCE", 10)
+    q, asked = np.random.default_rng(N).normal(size=(N, 3)), []
+    found = kinematics.along(lambda some: asked.append(len(some)) or kinematics.tip(PSM, some), q)
+    assert found.tolist() == kinematics.tip(PSM, q).tolist()
+    assert max(asked) <= 10

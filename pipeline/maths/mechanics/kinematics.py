@@ -3,13 +3,15 @@
 Shapes: `q` is (..., n) in rad or m, with any leading axes; n below the chain's own leaves the later coordinates at 0.
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from pipeline.maths.arrays import Array
 from pipeline.maths.mechanics.chain import FIXED, Chain
+
+AT_ONCE = 1 << 14  # poses
 
 
 def frames(chain: Chain, q: ArrayLike) -> Array:
@@ -34,7 +36,9 @@ def _bodies(chain: Chain, q: Array) -> Array:
 
 def tip(chain: Chain, q: ArrayLike) -> Array:
     """Where the tip is: the origin of frame 9L of the da Vinci (..., 3) [m]."""
-    return np.asarray(frames(chain, q)[..., chain.names.index(chain.tip), :3, 3])
+    index = chain.names.index(chain.tip)
+    carrier = _bodies(chain, np.asarray(q, float))[..., chain.body[index], :, :]
+    return np.asarray((carrier @ chain.offset[index])[..., :3, 3])
 
 
 def jacobian(
@@ -46,20 +50,25 @@ def jacobian(
     """
     q = np.asarray(q, float)
     index = chain.names.index(frame or chain.tip)
-    T = frames(chain, q)[..., index, :, :]
-    return _jacobian(chain, q, int(chain.body[index]), T[..., :3, :3] @ np.asarray(point, float) + T[..., :3, 3])
+    bodies, body = _bodies(chain, q), int(chain.body[index])
+    T = bodies[..., body, :, :] @ chain.offset[index]
+    return _jacobian(chain, bodies, q.shape[-1], body, T[..., :3, :3] @ np.asarray(point, float) + T[..., :3, 3])
 
 
-def _jacobian(chain: Chain, q: Array, body: int, at: Array) -> tuple[Array, Array]:
-    """J_v and J_omega of the point of a body that is at `at` (..., 3) in the base frame."""
-    T = _bodies(chain, q)
-    J_v, J_w = np.zeros((2, *q.shape[:-1], 3, q.shape[-1]))
+def _jacobian(chain: Chain, T: Array, n: int, body: int, at: Array) -> tuple[Array, Array]:
+    """J_v and J_omega (..., 3, n) of a body's point that is at `at` (..., 3) in the base frame, with all bodies' T."""
+    J_v, J_w = np.zeros((2, *T.shape[:-3], 3, n))
     for carrier in _to_base(chain, body):
         k, z, origin = chain.coordinate[carrier - 1], T[..., carrier, :3, 2], T[..., carrier, :3, 3]
-        if FIXED < k < q.shape[-1]:
+        if FIXED < k < n:
             J_v[..., k] += z if chain.slides[carrier - 1] else np.cross(z, at - origin)
             J_w[..., k] += 0.0 if chain.slides[carrier - 1] else z
     return J_v, J_w
+
+
+def along(of: Callable[[Array], Array], q: Array) -> Array:
+    """What a function says of poses (N, n), so many at a time: all bodies' poses at all samples may take gigabytes."""
+    return np.concatenate([of(q[i : i + AT_ONCE]) for i in range(0, max(len(q), 1), AT_ONCE)])
 
 
 def _to_base(chain: Chain, body: int) -> Iterator[int]:
@@ -77,6 +86,6 @@ def remote_centre(chain: Chain) -> Array:
     """
     tip_body = int(chain.body[chain.names.index(chain.tip)])
     body = next(body for body in _to_base(chain, tip_body) if chain.coordinate[body - 1] == 1)
-    v, w = (J.T for J in _jacobian(chain, np.zeros(2), body, np.zeros(3)))  # v + w x p = 0 for both
+    v, w = (J.T for J in _jacobian(chain, _bodies(chain, np.zeros(2)), 2, body, np.zeros(3)))  # v + w x p = 0 for both
     cross = np.cross(np.eye(3), w[:, None, :])  # row i of -[w]x: e_i x w
     return np.asarray(np.linalg.lstsq(np.concatenate(np.swapaxes(cross, 1, 2)), v.ravel(), rcond=None)[0])
