@@ -1,6 +1,6 @@
 """Calibrate the band: what the filter makes of free motion by a fit that has not seen it."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -23,7 +23,7 @@ FEWEST = 100  # samples of free motion, below which nothing is said of its error
 
 def run(
     signals: Sequence[Signal],
-    predictions: Iterable[Prediction],
+    predictions: Collection[Prediction],
     fits: Iterable[Fit],
     choices: Iterable[Choice],
     noises: Iterable[FilterNoise],
@@ -38,7 +38,8 @@ def run(
     """One FreeMotion per joint that moves; of an identification log, by refits that left out what they predict."""
     if not entry.tells_free_space:
         return
-    every, chosen, unseen = list(fits), list(choices), list(predictions)
+    every, chosen = list(fits), list(choices)
+    unseen = [p for p in predictions if (p.model == CHOSEN) == (fit == CHOSEN)]  # one fit's, of ten, of a long log
     settled, fitted = {noise.joint: noise for noise in noises}, {path.joint: path for path in paths}
     motions = motions_of(signals, lowpass)
     for signal in signals:
