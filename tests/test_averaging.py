@@ -75,14 +75,14 @@ def test_a_smooth_signal_averages_to_itself_whatever_the_period(samples, periods
 
     M = averaging.whole_periods(t, length, 100.0)
     used = t < M * length - 0.5 / 100.0
-    folded = averaging.fold(t[used], wave(t[used]), length, K)
+    folded = averaging.Phases(t[used], length, K).fold(wave(t[used]))
     assert_allclose(folded.mean, wave(np.arange(K) / K * length), atol=1e-9)
     assert_allclose(folded.var, 0.0, atol=1e-15)
 
 
 def test_whole_samples_are_plainly_averaged():
     x = np.random.default_rng(0).normal(size=(7, 200))
-    folded = averaging.fold(np.arange(1400) / 100, x.ravel(), 2.0, 200)
+    folded = averaging.Phases(np.arange(1400) / 100, 2.0, 200).fold(x.ravel())
     assert_allclose(folded.mean, x.mean(axis=0), atol=1e-12)
     assert_allclose(folded.var, x.var(axis=0, ddof=1), atol=1e-12)
     assert (folded.counts == 7).all()
@@ -93,7 +93,7 @@ def test_samples_on_the_phases_average_as_do_samples_next_to_them(samples):
     """Where no fit is needed the average is that with one; so it is of periods that are not all whole, or of none."""
     t, x = np.arange(samples) / 100, np.random.default_rng(3).normal(size=samples)
     beside = t + np.where(np.arange(samples) % 7 == 3, 1e-6, 0.0)  # s, of 0.01 s: more than a sample on a phase is off
-    on, off = (averaging.fold(times, x, 4.0, 400) for times in (t, beside))
+    on, off = (averaging.Phases(times, 4.0, 400).fold(x) for times in (t, beside))
     assert averaging.on_phases(t, 4.0, 400)
     assert not averaging.on_phases(beside, 4.0, 400)
     for name in averaging.Folded._fields:
@@ -105,7 +105,7 @@ def test_samples_on_the_phases_average_as_do_samples_next_to_them(samples):
 def test_noise_keeps_its_size_and_stays_white_at_a_period_of_no_whole_number_of_samples():
     t = np.arange(20_000) / 100
     x = np.random.default_rng(0).normal(size=len(t))
-    folded = averaging.fold(t, x, 1.2345, averaging.phases(1.2345, 100))
+    folded = averaging.Phases(t, 1.2345, averaging.phases(1.2345, 100)).fold(x)
     degrees = len(t) - len(folded.mean)
     assert averaging.noise_std(folded) == pytest.approx(1.0, abs=4 / np.sqrt(2 * degrees))
     next_to = np.corrcoef(folded.noise[1:], folded.noise[:-1])[0, 1]

@@ -50,7 +50,7 @@ def averaged_noise(mean: Average, rho: float, seed: int, white: float = 0.0) -> 
     rng = np.random.default_rng(seed)
     N = int(mean.periods * mean.period * RATE)
     e = lfilter([np.sqrt(1 - rho**2)], [1, -rho], rng.normal(size=N + 2000))[2000:] + white * rng.normal(size=N)
-    return averaging.fold(np.arange(N) / RATE, e, mean.period, len(mean))
+    return averaging.Phases(np.arange(N) / RATE, mean.period, len(mean)).fold(e)
 
 
 def scores(averages: list[Average], rho: float, white: float = 0.0, seeds: int = SEEDS, name: str = "lse"):

@@ -35,7 +35,7 @@ def test_averaging_periods_of_whole_samples_takes_at_most_twenty_sums(capsys):
     t = np.arange(SAMPLES) / RATE
     x = np.sin(2 * np.pi * t / PERIOD) + noise()
     K = averaging.phases(PERIOD, RATE)
-    ours, rival = least(lambda: averaging.fold(t, x, PERIOD, K), x.sum)
+    ours, rival = least(lambda: averaging.Phases(t, PERIOD, K).fold(x), x.sum)
     with capsys.disabled():
         print(f"\naveraging {SAMPLES} samples: {1e9 * ours / SAMPLES:.1f} ns each, {ours / rival:.1f} sums", end="")
     assert ours < AS_A_SUM * rival

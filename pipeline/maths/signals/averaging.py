@@ -105,11 +105,6 @@ def nearest(since: Array, period: float, K: int) -> Integers:
     return bins
 
 
-def fold(t: Array, x: Array, period: float, K: int) -> Folded:
-    """Average samples (N,) at times (N,) at each of K phases."""
-    return Phases(t, period, K).fold(x)
-
-
 def on_phases(t: Array, period: float, K: int) -> bool:
     """Whether each sample falls on the phase after that of the one before it."""
     return are_apart(t, period / K, ON_PHASE)
