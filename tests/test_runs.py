@@ -20,7 +20,7 @@ from pipeline.cli import app
 from pipeline.errors import BadRequest, MissingRecord
 from pipeline.estimators import ESTIMATORS
 from pipeline.records import store
-from pipeline.runner import ledger
+from pipeline.runner import ledger, reporting
 from pipeline.stages import STAGES
 from tests.arm import write_robot, write_study
 
@@ -66,6 +66,13 @@ def reports(study: Path) -> Path:
 
 def processed(study: Path) -> Path:
     return study.parent.parent / "processed" / study.name
+
+
+def test_a_report_of_long_records_whose_columns_are_read_when_asked_for_is_the_same(finished, monkeypatch):
+    monkeypatch.setattr(reporting, "KEPT", 0)
+    before = contents(reports(finished))
+    call("report", finished, "--force")
+    assert contents(reports(finished)) == before
 
 
 def test_a_second_run_runs_no_stage_and_says_so(finished):

@@ -184,5 +184,8 @@ def test_a_flipped_byte_in_any_record_is_a_message(finished, kind):  # noqa: F81
             flipped[at] ^= 1 << int(rng.integers(8))
             file.write_bytes(flipped)
             with suppress(PipelineError):
+                read = store.read(kind, processed(finished), file.relative_to(processed(finished)), longest=0)
+                _ = [getattr(read, name) for name in kind.columns()]
+            with suppress(PipelineError):
                 store.read(kind, processed(finished), file.relative_to(processed(finished)))
         file.write_bytes(good)

@@ -7,9 +7,9 @@ kind from another: they are its place on disk.  `published` says which of its nu
 """
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields
-from typing import Any, ClassVar, NamedTuple, TypeVar
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,6 +65,24 @@ class Record:
         """Names of the fields that are scalars."""
         return tuple(f.name for f in fields(cls) if f.type not in COLUMN_DTYPES)  # type: ignore[arg-type]
 
+    @classmethod
+    def later(cls, scalars: Mapping[str, Any], column: Callable[[str], NDArray[Any]]) -> Self:
+        """A record with these scalars, whose columns are read, by name, whenever they are asked for.
+
+        A column is checked each time; nothing checks that all are of one length.
+        """
+        record = object.__new__(cls)
+        record.__dict__.update(scalars, _column=column)
+        return record
+
+    if not TYPE_CHECKING:  # or a name that no record has would be found in no other way than by running
+
+        def __getattr__(self, name: str) -> Any:
+            """A column that is not held, which is asked for here only where there is no attribute of that name."""
+            if name not in self.columns() or "_column" not in self.__dict__:
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            return self._checked(name, self.__dict__["_column"](name))
+
     @property
     def key(self) -> Names:
         """What tells this record from others of its kind."""
@@ -98,19 +116,20 @@ class Record:
                 column = np.asarray(getattr(self, f.name), dtype=COLUMN_DTYPES[f.type])
                 object.__setattr__(self, f.name, column)
         self._check_lengths()
-        self._check_finite()
+        for name in self.columns():
+            self._checked(name, getattr(self, name))
 
     def _check_lengths(self) -> None:
         lengths = {name: len(getattr(self, name)) for name in self.columns()}
         if len(set(lengths.values())) > 1:
             raise BadRecord(f"{self}: columns differ in length: {lengths}")
 
-    def _check_finite(self) -> None:
-        for name in self.columns():
-            column = getattr(self, name)
-            if column.dtype.kind == "f" and name not in self.UNKNOWN and not np.isfinite(column).all():
-                bad = np.flatnonzero(~np.isfinite(column))
-                raise BadRecord(f"{self}: {name} has {len(bad)} values that are not finite, the first at row {bad[0]}")
+    def _checked(self, name: str, column: NDArray[Any]) -> NDArray[Any]:
+        """A column, once it is known that its numbers are finite."""
+        if column.dtype.kind == "f" and name not in self.UNKNOWN and not np.isfinite(column).all():
+            bad = np.flatnonzero(~np.isfinite(column))
+            raise BadRecord(f"{self}: {name} has {len(bad)} values that are not finite, the first at row {bad[0]}")
+        return column
 
     def __str__(self) -> str:
         return f"{type(self).__name__} {'/'.join(self.key)}"

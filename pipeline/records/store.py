@@ -9,9 +9,9 @@ import hashlib
 import json
 import os
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import Field, fields
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 from uuid import uuid4
@@ -118,35 +118,52 @@ def _stored(kind: Any) -> list[Field[Any]]:
     return [f for f in fields(kind) if f.type in ARROW]
 
 
-def read(kind: type[AnyRecord], folder: Path, place: Path, sha256: str = "") -> AnyRecord:
+def read(kind: type[AnyRecord], folder: Path, place: Path, sha256: str = "", longest: int | None = None) -> AnyRecord:
     """Read a record back, with its origin; a file whose hash is known already is not hashed again.
+
+    The columns of one of more than `longest` rows are read whenever they are asked for, and not kept.
 
     Raises
     ------
     MissingRecord
         If the file is not there.
     BadRecord
-        If it is not a record of this kind, as this version writes it.
+        If it is not a record of this kind, as this version writes it; of a long one, whenever a column is not.
     """
     whole = folder / place
     if not whole.exists():
         raise MissingRecord(f"{whole} is not there; run the stage that writes {kind.__name__} records first")
-    try:
-        with pq.ParquetFile(whole) as file:
-            table, stored = file.read(), file.metadata.metadata or {}
+    with _understood(kind, whole), pq.ParquetFile(whole) as file:
+        stored, described = file.metadata.metadata or {}, file.schema_arrow
         metadata = {key.decode(): stored[key].decode() for key in (b"record", b"scalars", b"units")}
         if metadata["record"] != kind.__name__:
             raise KeyError(metadata["record"])
         scalars = {name: _scalar(value) for name, value in json.loads(metadata["scalars"]).items()}
-        columns = {name: _values(table[name]) for name in kind.columns()}
-        record = kind(**columns, **scalars)
-        units = json.loads(metadata["units"]) | {f.name: f.metadata[b"unit"].decode() for f in table.schema}
+        units = json.loads(metadata["units"]) | {f.name: f.metadata[b"unit"].decode() for f in described}
+        if longest is None or file.metadata.num_rows <= longest:
+            table = file.read()
+            record = kind(**{name: _values(table[name]) for name in kind.columns()}, **scalars)
+        else:
+            record = kind.later(scalars, partial(_column_of, kind, whole))
+    object.__setattr__(record, "origin", Origin(place.as_posix(), sha256 or digest(whole), units))
+    return record
+
+
+@contextmanager
+def _understood(kind: type[Record], whole: Path) -> Iterator[None]:
+    """Say of whatever cannot be read in a file that it is not a record of this kind."""
+    try:
+        yield
     except (pa.ArrowException, PipelineError, LookupError, TypeError, ValueError, OSError, MemoryError) as error:
         raise BadRecord(
             f"{whole}: not a {kind.__name__} as this version writes it ({error}); run with --force"
         ) from error
-    object.__setattr__(record, "origin", Origin(place.as_posix(), sha256 or digest(whole), units))
-    return record
+
+
+def _column_of(kind: type[Record], whole: Path, name: str) -> np.ndarray[Any, Any]:
+    """One column of the record in a file."""
+    with _understood(kind, whole), pq.ParquetFile(whole) as file:
+        return _values(file.read([name])[name])
 
 
 def release() -> None:

@@ -21,6 +21,7 @@ from pipeline.runner.results import stated
 from pipeline.study import Study, review
 from pipeline.study.review import Rating
 
+KEPT = 1 << 16  # rows of a record at most, to be held while the report is made
 PACKAGES = ("numpy", "scipy", "pandas", "pyarrow", "statsmodels", "numba", "matplotlib", "typst", "npTDMS")
 
 
@@ -88,7 +89,7 @@ def catalogue(ledger: Ledger, located: tuple[Located, ...]) -> Catalogue:
         places = [place for name, place in located if name == kind.__name__]
         digests = [ledger.digest(f"processed/{place}") for place in places]
         processed = ledger.folders.processed
-        return [store.read(kind, processed, Path(place), sha) for place, sha in zip(places, digests, strict=True)]
+        return [store.read(kind, processed, Path(place), sha, KEPT) for place, sha in zip(places, digests, strict=True)]
 
     return Catalogue(read)
 

@@ -7,7 +7,9 @@ from hypothesis import strategies as st
 from report_documents import zoomable
 
 from pipeline.report.content import Band, Figure, Line, Panel, Points
-from pipeline.report.figures.traces import envelope, thin_figure, thin_mark
+from pipeline.report.content.document import HELD
+from pipeline.report.content.thinning import envelope, thin_mark
+from pipeline.report.figures.traces import thin_figure
 
 
 @given(st.integers(0, 2**31), st.integers(2, 3000), st.integers(1, 200))
@@ -70,6 +72,25 @@ def test_a_figure_keeps_to_its_limit_and_says_what_it_shows(samples: int) -> Non
     assert result.samples == 4 * samples + 4
     assert ("All" in result.note) == (result.samples <= 20_000)
     assert ("envelope" in result.note) == (result.samples > 20_000)
+
+
+def test_a_figure_holds_so_many_points_of_a_long_mark_and_knows_how_many_there_were() -> None:
+    t = np.arange(1e6)
+    y = np.sin(t)
+    y[654_321] = 7.0
+    short = Points(t[:10], y[:10])
+    figure = Figure("", "", (Panel("", "", "", (Line(t, y), Band(t, y - 1, y + 1), short)),))
+    line, band, points = figure.panels[0].marks
+    assert isinstance(line, Line)
+    assert isinstance(band, Band)
+    assert 0.9 * HELD < len(line.x) <= HELD
+    assert 0.9 * HELD < 2 * len(band.x) <= HELD
+    assert points is short
+    assert line.x[line.y == 7.0] == [654_321.0]
+    result = thin_figure(figure, 1000)
+    assert result.samples == figure.samples == 3_000_010
+    assert result.shown <= 1000
+    assert "3\N{NARROW NO-BREAK SPACE}000\N{NARROW NO-BREAK SPACE}010 samples" in result.note
 
 
 def test_short_marks_stay_whole_beside_long_ones() -> None:

@@ -8,15 +8,17 @@ Words in figures, listings, and the title and study of a document are shown as t
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from pipeline.report.content.marks import Line3D, Panel, Points3D
 from pipeline.report.content.number import Number
+from pipeline.report.content.thinning import points_of, thin_mark
 from pipeline.study.review import Rating
 
 Cell = str | Number
 Level = Literal["good", "warn", "bad", "info"]
+HELD = 1 << 16  # points of a mark at most: several times what a page shows, so that thinning again hides nothing
 
 
 @dataclass(frozen=True)
@@ -83,7 +85,8 @@ class Figure:
     """Panels under one caption; `zoomable` ones zoom and pan in HTML with the x axes of all panels linked.
 
     `height` is that of one row of panels [mm], on a page whose text is 170 mm wide.  A `small` one takes at most 3 kB
-    of the HTML: its lines are drawn in few points, without axes, and their numbers do not come along.
+    of the HTML: its lines are drawn in few points, without axes, and their numbers do not come along.  A mark of very
+    many samples is thinned at once, or the figures of long logs would hold all of them.
     """
 
     caption: str
@@ -94,10 +97,18 @@ class Figure:
     columns: int = 1
     height: float = 48.0
     small: bool = False
+    samples: int = field(init=False)  # points of all marks, as they were given
 
     def __post_init__(self) -> None:
         if self.small and self.zoomable:
             raise ValueError(f"figure {self.caption!r}: a small figure has not the samples to zoom into")
+        object.__setattr__(self, "samples", sum(points_of(mark) for panel in self.panels for mark in panel.marks))
+        object.__setattr__(self, "panels", tuple(_held(panel) for panel in self.panels))
+
+
+def _held(panel: Panel) -> Panel:
+    """A panel with what is kept of its marks."""
+    return replace(panel, marks=tuple(thin_mark(mark, HELD) for mark in panel.marks))
 
 
 @dataclass(frozen=True, eq=False)

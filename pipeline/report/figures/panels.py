@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from pipeline.report.content.marks import AnyMark, Bars, Line, Panel, Points, Stems, Tiles
+from pipeline.report.content.thinning import is_sorted, thin_mark
 from pipeline.report.figures.draw import draw_bars, draw_mark, unescape_label
 from pipeline.report.figures.palette import assign_looks
 from pipeline.report.figures.ticks import scale_ticks, set_log_ticks
-from pipeline.report.figures.traces import is_sorted, thin_mark
 
 if TYPE_CHECKING:
     from matplotlib.artist import Artist

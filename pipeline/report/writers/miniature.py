@@ -12,8 +12,8 @@ from pipeline.maths.arrays import Array
 from pipeline.report.content import Band, Figure, HBand, HLine, Line, Panel, Points, VSpan
 from pipeline.report.content.inline import printable
 from pipeline.report.content.marks import AnyMark
+from pipeline.report.content.thinning import thin_mark
 from pipeline.report.figures.palette import COLOURS, DARK, SURROUNDINGS, assign_looks
-from pipeline.report.figures.traces import thin_mark
 
 WIDTH, LEFT, LINE, LETTER = 640, 64, 15, 6.2  # [px] of a figure, left of axes, of a line of words, of a letter of them
 LETTERS = 60  # of a title or a label

@@ -1,0 +1,49 @@
+"""Records read back: whole, or column by column where they are long."""
+
+import numpy as np
+import pytest
+
+from pipeline.errors import BadRecord
+from pipeline.records import PeriodResidual, store
+
+ROWS = 1000
+
+
+@pytest.fixture
+def written(tmp_path):
+    """A folder with a record in it, and where in the folder that is."""
+    rng = np.random.default_rng(1)
+    t, q, dq, tau = np.arange(1.0 * ROWS), *rng.standard_normal((3, ROWS))
+    record = PeriodResidual("log", "joint", t=t, q_noise=q, dq_noise=dq, tau_noise=tau)
+    with store.Writer(tmp_path, lambda record: lambda template: template, {}) as writer:
+        return tmp_path, writer.write(record), record
+
+
+def test_a_long_record_holds_no_column_and_has_them_all(written):
+    folder, place, record = written
+    whole, later = (
+        store.read(PeriodResidual, folder, place),
+        store.read(PeriodResidual, folder, place, longest=ROWS - 1),
+    )
+    assert {"t", "tau_noise"} <= set(vars(whole))
+    assert not {"t", "tau_noise"} & set(vars(later))
+    for name in record.columns():
+        np.testing.assert_array_equal(getattr(later, name), getattr(record, name))
+    assert not {"t", "tau_noise"} & set(vars(later))
+    assert (later.key, len(later), later.origin) == (whole.key, ROWS, whole.origin)
+    assert "tau_noise" in vars(store.read(PeriodResidual, folder, place, longest=ROWS))
+
+
+def test_what_a_long_record_has_not_is_no_attribute(written):
+    folder, place, _ = written
+    later = store.read(PeriodResidual, folder, place, longest=1)
+    with pytest.raises(AttributeError, match="tau_hat"):
+        _ = later.tau_hat  # type: ignore[attr-defined]
+
+
+def test_a_column_of_a_long_record_that_is_gone_is_said_when_it_is_asked_for(written):
+    folder, place, _ = written
+    later = store.read(PeriodResidual, folder, place, longest=1)
+    (folder / place).write_bytes(b"PAR1")
+    with pytest.raises(BadRecord, match=r"joint\.parquet: not a PeriodResidual"):
+        _ = later.tau_noise
