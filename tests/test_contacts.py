@@ -7,11 +7,17 @@ import pytest
 
 from pipeline.maths.contact.day_offset import day_offset
 from pipeline.maths.contact.detection import FALSE_ALARMS, Quiet, alarm_level, events, quiet
-from pipeline.maths.contact.error_band import SpeedCells, cells, excess, excess_std
+from pipeline.maths.contact.error_band import SpeedCells, cells, excess, excess_std, means, units, without_each
 from pipeline.maths.contact.free_space import levels
 from pipeline.maths.contact.window import mean_size, summarise
 from pipeline.maths.signals import jackknife
-from pipeline.maths.signals.bootstrap import blocks, error_of_mean, standard_error
+from pipeline.maths.signals.bootstrap import (
+    blocks,
+    error_of_mean,
+    error_of_pooled_mean,
+    error_of_quantile,
+    standard_error,
+)
 from pipeline.maths.signals.noise import model_error, noise_std, smoothed
 from pipeline.maths.signals.path import likeness, most_different
 from pipeline.maths.signals.smoothing import lowpass, share_passed
@@ -67,6 +73,33 @@ def test_the_block_bootstrap_knows_that_correlated_samples_say_less():
     found = standard_error(lambda parts: float(np.mean(parts)), means)
     assert error_of_mean(means) == pytest.approx(found, rel=1e-12)
     assert found == pytest.approx(true, rel=4 / np.sqrt(2 * len(means)))
+
+
+@pytest.mark.parametrize("samples", [2, 33, 1000, 4321])
+def test_standard_errors_of_many_draws_at_once_are_those_of_one_draw_after_the_other(samples):
+    x = np.random.default_rng(samples).standard_normal(samples).round(2)
+    parts = [x[part] for part in blocks(samples)]
+    for share in (0.5, 0.95, 0.99):
+        found = standard_error(lambda drawn, share=share: float(np.quantile(np.concatenate(drawn), share)), parts)
+        assert error_of_quantile(x, share) == pytest.approx(found, rel=1e-12)
+    found = standard_error(lambda drawn: float(np.sqrt(np.mean(np.concatenate(drawn) ** 2))), parts)
+    assert error_of_pooled_mean(x**2, of=np.sqrt) == pytest.approx(found, rel=1e-12)
+    assert np.isnan(error_of_pooled_mean(x[:1]))
+    assert np.isnan(error_of_quantile(x[:1], 0.5))
+
+
+@pytest.mark.parametrize("logs", [1, 2, 5])
+@pytest.mark.parametrize("together", [True, False])
+def test_means_without_each_part_are_those_of_the_others(logs, together):
+    rng, each = np.random.default_rng(logs), []
+    for log in range(logs):
+        dq = rng.standard_normal(60) * (0.2 if log else 3.0)  # slow logs leave ranges to the first alone
+        own = cells(rng.standard_normal(60), np.full(60, 0.1), dq, 1.0)
+        each.append(own._replace(source=np.full(len(own.source), 7 * log)))
+    of = SpeedCells(*(np.concatenate(column) for column in zip(*each, strict=True)))
+    for parts in (units(of), of.source * 6 + of.block):
+        one_by_one = [means(rest := of.those(parts != part), rest.mean_square, together) for part in np.unique(parts)]
+        np.testing.assert_allclose(without_each(of, of.mean_square, parts, together), one_by_one, rtol=1e-12)
 
 
 def test_a_triangle_has_its_peak_mean_and_impulse():

@@ -65,8 +65,8 @@ def excess_std(of: SpeedCells) -> Array:
     """The standard error (BINS,) of that variance, from how logs differ, or blocks where there are hardly any logs."""
     if not len(of.samples):
         return np.zeros(BINS)
-    together = not depends_on_speed(of)
-    return jackknife.standard_error(lambda kept: beyond(of.those(kept), together), units(of)) * np.ones(BINS)
+    left_out = without_each(of, of.mean_square - of.filter_square, units(of), together=not depends_on_speed(of))
+    return jackknife.of_left_out(np.maximum(left_out, 0.0))
 
 
 def beyond(of: SpeedCells, together: bool) -> Array:
@@ -84,32 +84,52 @@ def means(of: SpeedCells, values: Array, together: bool) -> Array:
 
     A range that no log was in takes the mean of all.
     """
-    total = _balanced(of, values, np.ones(len(values), np.bool_))
-    if together:
-        return np.full(BINS, total)
-    each = [of.speed_bin == number for number in range(BINS)]
-    return np.array([_balanced(of, values, own) if own.any() else total for own in each])
+    own, samples = sums(of, values, np.unique(of.source, return_inverse=True)[1])
+    return _of_ranges(_ratio(own, samples).sum(0), (samples > 0).sum(0), together)
+
+
+def without_each(of: SpeedCells, values: Array, unit: Integers, together: bool) -> Array:
+    """The same means (U, BINS) without the cells of each of the parts (C,), in order, of which each is of one log.
+
+    What leaving a part out changes is the mean of its own log, so that all of them take little more than one.
+    """
+    _, log = np.unique(of.source, return_inverse=True)
+    _, first, part = np.unique(unit, return_index=True, return_inverse=True)
+    own, samples = sums(of, values, log)
+    left, kept = (every[log[first]] - out for every, out in zip((own, samples), sums(of, values, part), strict=True))
+    changed = _ratio(left, kept) - _ratio(own, samples)[log[first]]
+    fewer = (kept > 0).astype(int) - (samples > 0)[log[first]]
+    return _of_ranges(_ratio(own, samples).sum(0) + changed, (samples > 0).sum(0) + fewer, together)
+
+
+def sums(of: SpeedCells, values: Array, group: Integers) -> tuple[Array, Array]:
+    """Sums (G, BINS + 1) of values over samples, and of samples, by groups (C,) and range; last of all ranges."""
+    shape = int(group.max()) + 1, BINS
+    each = (
+        np.bincount(group * BINS + of.speed_bin, weights=x, minlength=shape[0] * BINS).reshape(shape)
+        for x in (of.samples * values, of.samples)
+    )
+    weighted, samples = (np.column_stack([x, x.sum(1)]) for x in each)
+    return weighted, samples
 
 
 def depends_on_speed(of: SpeedCells) -> bool:
     """Whether variances by range of speed make blocks that are left out more likely than one variance does."""
-    units = list(dict.fromkeys(zip(of.source.tolist(), of.block.tolist(), strict=True)))
-    if len(units) < 3:
+    unit = np.unique(of.source * BLOCKS + of.block, return_inverse=True)[1]
+    if unit.max() < 2:
         return False
-    gain = 0.0
-    for source, block in units:
-        out = (of.source == source) & (of.block == block)
-        rest = of.those(~out)
-        one, several = (means(rest, rest.mean_square, together)[of.speed_bin[out]] for together in (True, False))
-        seen, weight = of.mean_square[out], of.samples[out] / of.samples[out].sum()
-        gain += float(weight @ (np.log(one / several) + seen * (1.0 / one - 1.0 / several)))
-    return gain > 0.0
+    one, several = (without_each(of, of.mean_square, unit, together)[unit, of.speed_bin] for together in (True, False))
+    gain = np.log(one / several) + of.mean_square * (1.0 / one - 1.0 / several)
+    return float(np.sum(of.samples / np.bincount(unit, weights=of.samples)[unit] * gain)) > 0.0
 
 
-def _balanced(of: SpeedCells, values: Array, which: Booleans) -> float:
-    """The mean over logs of each log's mean over its samples."""
-    sources = of.source[which]
-    return float(np.mean([
-        np.average(values[which][sources == source], weights=of.samples[which][sources == source])
-        for source in np.unique(sources)
-    ]))  # fmt: skip
+def _of_ranges(total: Array, logs: Integers, together: bool) -> Array:
+    """The means (..., BINS) of sums over so many logs (..., BINS + 1), the last of which is of all ranges."""
+    mean = _ratio(total, logs)
+    every = np.broadcast_to(mean[..., -1:], mean[..., :-1].shape)
+    return np.asarray(every if together else np.where(logs[..., :-1] > 0, mean[..., :-1], every))
+
+
+def _ratio(total: Array, count: Array | Integers) -> Array:
+    """Means; zero of nothing."""
+    return np.divide(total, count, out=np.zeros(np.shape(total)), where=count > 0)

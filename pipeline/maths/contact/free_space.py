@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from pipeline.maths.arrays import Array, evenly
-from pipeline.maths.signals.bootstrap import blocks, standard_error
+from pipeline.maths.signals.bootstrap import error_of_pooled_mean, error_of_quantile
 
 DETECTED = 0.99  # share of free-space samples below the detection level
 USUAL = 0.95
@@ -30,25 +30,13 @@ def levels(tau_ext: Array, std: Array) -> FreeSpaceLevels:
     """The levels of an external effort (N,) whose stated standard deviation is `std` (N,), in free space."""
     few = evenly(len(tau_ext), MOST)
     size, inside = np.abs(tau_ext[few]), (np.abs(tau_ext[few]) <= NORMAL_95 * std[few]).astype(float)
-    parts = blocks(len(few))
-    sizes, insides = [size[part] for part in parts], [inside[part] for part in parts]
-    values = []
-    for statistic, columns in ((_rms, sizes), (_level_95, sizes), (_level_99, sizes), (_mean, insides)):
-        values += [statistic(columns), standard_error(statistic, columns)]
-    return FreeSpaceLevels(*values)
-
-
-def _rms(parts: list[Array]) -> float:
-    return float(np.sqrt(np.mean(np.concatenate(parts) ** 2)))
-
-
-def _level_95(parts: list[Array]) -> float:
-    return float(np.quantile(np.concatenate(parts), USUAL))
-
-
-def _level_99(parts: list[Array]) -> float:
-    return float(np.quantile(np.concatenate(parts), DETECTED))
-
-
-def _mean(parts: list[Array]) -> float:
-    return float(np.mean(np.concatenate(parts)))
+    return FreeSpaceLevels(
+        rms=float(np.sqrt(np.mean(size**2))),
+        rms_std=error_of_pooled_mean(size**2, of=np.sqrt),
+        level_95=float(np.quantile(size, USUAL)),
+        level_95_std=error_of_quantile(size, USUAL),
+        level_99=float(np.quantile(size, DETECTED)),
+        level_99_std=error_of_quantile(size, DETECTED),
+        coverage=float(np.mean(inside)),
+        coverage_std=error_of_pooled_mean(inside),
+    )

@@ -42,6 +42,36 @@ def error_of_mean(values: Sequence[float] | Array, seed: int = 0) -> float:
     return _spread(np.asarray(values)[_draws(len(values), seed)].mean(axis=1), len(values))
 
 
+def error_of_pooled_mean(x: Array, seed: int = 0, of: Callable[[Array], Array] = np.asarray) -> float:
+    """The same of the mean of samples (N,), in blocks of about one length, or of a function of that mean."""
+    parts = blocks(len(x))
+    if len(parts) < 2:
+        return float("nan")
+    draws = _draws(len(parts), seed)
+    sums, samples = (np.array(each)[draws].sum(axis=1) for each in ([x[p].sum() for p in parts], _lengths(parts)))
+    return _spread(of(sums / samples), len(parts))
+
+
+def error_of_quantile(x: Array, share: float, seed: int = 0) -> float:
+    """The same of a quantile of samples (N,), which are sorted once for all draws."""
+    parts = blocks(len(x))
+    if len(parts) < 2:
+        return float("nan")
+    order = np.argsort(x)
+    rising, block = x[order], np.repeat(np.arange(len(parts)), _lengths(parts))[order]
+    drawn = np.empty(DRAWS)
+    for i, draw in enumerate(_draws(len(parts), seed)):
+        up_to = np.cumsum(np.bincount(draw, minlength=len(parts))[block])  # samples of the draw, each one included
+        place = share * (up_to[-1] - 1)
+        below, above = rising[np.searchsorted(up_to, [np.floor(place), np.ceil(place)], side="right")]
+        drawn[i] = below + (above - below) * (place % 1.0)
+    return _spread(drawn, len(parts))
+
+
+def _lengths(parts: Sequence[slice]) -> list[int]:
+    return [part.stop - part.start for part in parts]
+
+
 def _draws(n: int, seed: int) -> Integers:
     """Which of n blocks each draw takes, (DRAWS, n)."""
     return np.random.default_rng(seed).integers(0, n, (DRAWS, n))

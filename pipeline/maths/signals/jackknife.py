@@ -18,6 +18,12 @@ def standard_error(statistic: Callable[[Booleans], Array], units: Integers) -> A
     NaN for a single unit, of which nothing can be left out.
     """
     numbers = np.unique(units)
-    n = len(numbers)
-    left_out = np.array([statistic(units != number) for number in numbers]) if n > 1 else np.full((1, 1), np.nan)
+    return of_left_out(np.array([statistic(units != n) for n in numbers] if len(numbers) > 1 else [[np.nan]]))
+
+
+def of_left_out(left_out: Array) -> Array:
+    """The same of a statistic (n, p) without each of n units."""
+    n = len(left_out)
+    if n < 2:
+        return np.full(left_out.shape[1], np.nan)
     return np.asarray(np.sqrt((n - 1) / n * np.sum((left_out - left_out.mean(0)) ** 2, axis=0)))
