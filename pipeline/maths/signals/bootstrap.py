@@ -58,14 +58,27 @@ def error_of_quantile(x: Array, share: float, seed: int = 0) -> float:
     if len(parts) < 2:
         return float("nan")
     order = np.argsort(x)
-    rising, block = x[order], np.repeat(np.arange(len(parts)), _lengths(parts))[order]
-    drawn = np.empty(DRAWS)
-    for i, draw in enumerate(_draws(len(parts), seed)):
-        up_to = np.cumsum(np.bincount(draw, minlength=len(parts))[block])  # samples of the draw, each one included
-        place = share * (up_to[-1] - 1)
-        below, above = rising[np.searchsorted(up_to, [np.floor(place), np.ceil(place)], side="right")]
-        drawn[i] = below + (above - below) * (place % 1.0)
-    return _spread(drawn, len(parts))
+    before = np.zeros((len(x), len(parts)), np.int32)  # how many samples of each block are up to each one, sorted
+    before[np.arange(len(x)), np.repeat(np.arange(len(parts)), _lengths(parts))[order]] = 1
+    np.cumsum(before, axis=0, out=before)
+    draws = _draws(len(parts), seed)
+    times = np.sum(draws[:, :, None] == np.arange(len(parts)), axis=1)  # that each draw takes each block
+    place = share * (times @ _lengths(parts) - 1)
+    below, above = (x[order[_reached(before, times, of)]] for of in (np.floor(place), np.ceil(place)))
+    return _spread(below + (above - below) * (place % 1.0), len(parts))
+
+
+def _reached(before: Integers, times: Integers, place: Array) -> Integers:
+    """The first sample (DRAWS,) of N up to which a draw holds more than so many (DRAWS,), by bisection of all at once.
+
+    `before` (N, n) counts the samples of blocks, which draws take so many times (DRAWS, n).
+    """
+    low, high = np.zeros(len(times), np.int64), np.full(len(times), len(before) - 1)
+    while (low < high).any():
+        middle = (low + high) // 2
+        more = np.einsum("db,db->d", before[middle], times) > place
+        low, high = np.where(more, low, middle + 1), np.where(more, middle, high)
+    return low
 
 
 def _lengths(parts: Sequence[slice]) -> list[int]:
