@@ -13,7 +13,7 @@ def known_of(joint: Joint) -> Known:
     positive = np.array([term.positive for term in joint.terms])
     if joint.physical is None or joint.effort:  # a current does not say how much its motor pushes
         return Known(positive)
-    made = lumping(joint.physical, joint.gear_ratio, [term.name for term in joint.terms])
+    made = lumping(joint.physical, joint.gear_ratio, tuple(term.name for term in joint.terms))
     if made is None:
         return Known(positive)
     guess, lower, upper = np.array([(x.guess, x.lower, x.upper) for x in joint.physical.parameters]).T

@@ -214,11 +214,13 @@ def unnamed() -> Callable[[Path], Path]:
 
 
 def _encoding(described: pa.Schema) -> dict[str, Any]:
-    """Floats byte by byte and compressed, which is smaller and faster than dictionaries of them."""
+    """Floats byte by byte and compressed, which is smaller and faster than dictionaries of them.
+
+    LZ4 takes half the time of Zstandard, and no more room: what is left of floats by byte is noise, or hardly anything.
+    """
     floats = [f.name for f in described if pa.types.is_floating(f.type)]
     return {
-        "compression": "zstd",
-        "compression_level": 1,
+        "compression": "lz4",
         "use_dictionary": [f.name for f in described if f.name not in floats],
         "column_encoding": dict.fromkeys(floats, "BYTE_STREAM_SPLIT"),
         "write_statistics": False,

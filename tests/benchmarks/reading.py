@@ -19,7 +19,7 @@ def parquet(path: Path, names: list[str]) -> pq.ParquetWriter:
     """A Parquet file as the store writes it: floats split by byte, compressed quickly, without dictionaries."""
     return pq.ParquetWriter(
         path, pa.schema([pa.field(name, pa.float64(), nullable=False) for name in names]), use_dictionary=False,
-        column_encoding="BYTE_STREAM_SPLIT", compression="zstd", compression_level=1, write_statistics=False,
+        column_encoding="BYTE_STREAM_SPLIT", compression="lz4", write_statistics=False,
     )  # fmt: skip
 
 

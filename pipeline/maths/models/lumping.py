@@ -3,7 +3,7 @@
 theta = C m(x),    m(x) monomials such as m_3, m_3 l_c3, m_3 l_c3^2             (6.7), (6.10), (6.13)
 """
 
-from collections.abc import Sequence
+from functools import cache
 
 import numpy as np
 
@@ -15,10 +15,12 @@ from pipeline.maths.models.reduced_joint import reduced_parameters
 ROUNDING = 1e-12  # below which a parameter does not enter
 
 
-def lumping(table: PhysicalTable, gear_ratio: float, names: Sequence[str]) -> Lumping | None:
+@cache
+def lumping(table: PhysicalTable, gear_ratio: float, names: tuple[str, ...]) -> Lumping | None:
     """How a joint's physical parameters make those of its model, derived from the chain.
 
-    None where the table does not make the parameters that are named, and no others.
+    None where the table does not make the parameters that are named, and no others.  Kept for each table, as every
+    task asks for it again.
     """
     one, place = len(table.parameters), {(x.quality, x.link): i for i, x in enumerate(table.parameters)}
     made = list[tuple[tuple[int, int, int], dict[str, float]]]()

@@ -58,7 +58,7 @@ def error_of_quantile(x: Array, share: float, seed: int = 0) -> float:
     if len(parts) < 2:
         return float("nan")
     order = np.argsort(x)
-    before = np.zeros((len(x), len(parts)), np.int32)  # how many samples of each block are up to each one, sorted
+    before = np.zeros((len(x), len(parts)), np.int64)  # how many samples of each block are up to each one, sorted
     before[np.arange(len(x)), np.repeat(np.arange(len(parts)), _lengths(parts))[order]] = 1
     np.cumsum(before, axis=0, out=before)
     draws = _draws(len(parts), seed)
