@@ -7,7 +7,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterable
-from concurrent.futures import BrokenExecutor
+from concurrent.futures import BrokenExecutor, Executor, Future
 from contextlib import closing
 from functools import partial
 from pathlib import Path
@@ -19,7 +19,7 @@ from pipeline.runner.fingerprints.fingerprint import Fingerprint
 from pipeline.runner.graph import WHOLE, Graph, Part
 from pipeline.runner.plan import Task
 from pipeline.runner.processes import workers
-from pipeline.runner.processes.workers import Crew, pool
+from pipeline.runner.processes.workers import Crew, Others, pool
 from pipeline.stages import STAGES
 
 pytestmark = pytest.mark.medium
@@ -60,7 +60,7 @@ def at_once(monkeypatch):
 
 
 def test_tasks_run_here_while_there_is_little_to_do():
-    with closing(Crew(partial(pool, 2))) as crew:
+    with closing(Crew(Others(partial(pool, 2)))) as crew:
         for i in range(20):
             crew.submit(tell_process, task(str(i)))
         assert {o.outputs["pid"] for o in outcomes(crew)} == {str(os.getpid())}
@@ -68,7 +68,7 @@ def test_tasks_run_here_while_there_is_little_to_do():
 
 
 def test_tasks_run_elsewhere_where_there_is_much(at_once):
-    with closing(Crew(partial(pool, 2))) as crew:
+    with closing(Crew(Others(partial(pool, 2)))) as crew:
         for i in range(20):
             crew.submit(tell_process, task(str(i)))
         done = outcomes(crew)
@@ -77,7 +77,7 @@ def test_tasks_run_elsewhere_where_there_is_much(at_once):
 
 
 def test_a_worker_that_is_killed_is_replaced_and_its_task_runs_again(at_once, tmp_path):
-    with closing(Crew(partial(pool, 2))) as crew:
+    with closing(Crew(Others(partial(pool, 2)))) as crew:
         for i in range(12):
             crew.submit(partial(die_once, tmp_path / "mark"), task(str(i)))
         assert sorted(int(o.task.name) for o in outcomes(crew)) == list(range(12))
@@ -85,7 +85,7 @@ def test_a_worker_that_is_killed_is_replaced_and_its_task_runs_again(at_once, tm
 
 
 def test_a_worker_that_is_killed_with_nothing_to_do_is_replaced(at_once):
-    with closing(Crew(partial(pool, 1))) as crew:
+    with closing(Crew(Others(partial(pool, 1)))) as crew:
         pids = set()
         for names in (("1", "2"), ("3", "4")):
             for name in names:
@@ -99,11 +99,51 @@ def test_a_worker_that_is_killed_with_nothing_to_do_is_replaced(at_once):
 
 
 def test_a_task_that_ends_every_worker_ends_the_run(at_once):
-    with closing(Crew(partial(pool, 2))) as crew:
+    with closing(Crew(Others(partial(pool, 2)))) as crew:
         for i in range(2):
             crew.submit(die, task(str(i)))
         with pytest.raises(BrokenExecutor):
             outcomes(crew)
+
+
+class Recording(Executor):
+    """Runs what it is handed at once, in this process, and remembers how many tasks that was at a time."""
+
+    def __init__(self) -> None:
+        self.shares: list[int] = []
+
+    def submit(self, function, /, share):
+        self.shares.append(len(share))
+        future = Future()
+        future.set_result(function(share))
+        return future
+
+
+def took(seconds: float, each: Task) -> Outcome:
+    return Outcome(each, {}, seconds=seconds)
+
+
+@pytest.mark.parametrize(("seconds", "together"), [(0.03, 7), (0.15, 2), (1.0, 1)])
+def test_tasks_that_are_known_to_be_short_are_handed_over_together(at_once, seconds, together):
+    there = Recording()
+    crew = Crew(Others(lambda: there, hands=2))
+    for i in range(400):
+        crew.submit(partial(took, seconds), task(str(i)))
+    assert [int(o.task.name) for o in outcomes(crew)] == list(range(400))
+    assert there.shares[:6] == [1] * 6  # of which nothing was known
+    assert max(there.shares) == together
+    assert there.shares[-1] <= 2  # so that all end at about the same time
+    assert sum(there.shares) == 400
+
+
+def test_others_are_prepared_as_soon_as_there_is_work_for_them_in_sight(monkeypatch):
+    monkeypatch.setattr(workers, "ALONE", 0.2)
+    prepared: list[int] = []
+    crew = Crew(Others(Recording, hands=2, prepare=lambda: prepared.append(crew.counts[0])))
+    for i in range(40):
+        crew.submit(lambda each: time.sleep(0.01) or Outcome(each, {}), task(str(i)))
+    assert len(outcomes(crew)) == 40
+    assert prepared == [1]  # the other 39 will take as long as the first
 
 
 LEFT = """
@@ -115,7 +155,7 @@ from pipeline.runner.processes import workers
 from tests.test_workers import {busy}, task
 workers.ALONE = -1.0
 if __name__ == "__main__":
-    crew = workers.Crew(partial(workers.pool, 2))
+    crew = workers.Crew(workers.Others(partial(workers.pool, 2)))
     for i in range(2):
         crew.submit(partial({busy}, Path(sys.argv[1])), task(str(i)))
     list(crew.outcomes())

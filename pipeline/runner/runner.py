@@ -1,7 +1,6 @@
 """Runs stages on a study: what is current is skipped, and each other task runs as soon as what it reads is there."""
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import Executor
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import cached_property, partial
@@ -16,7 +15,7 @@ from pipeline.runner.graph import WHOLE, Graph, Part, goes_by_log
 from pipeline.runner.ledger import Entry, Folders, Ledger, file_name
 from pipeline.runner.lock import locked
 from pipeline.runner.plan import Plan, Task, log_of
-from pipeline.runner.processes.workers import Crew
+from pipeline.runner.processes.workers import Crew, Others
 from pipeline.runner.reuse import reused
 from pipeline.runner.signature import Declaration, declaration
 from pipeline.stages import STAGES
@@ -35,13 +34,13 @@ class Progress:
 
 @dataclass
 class Runner:
-    """Runs stages of one study; `workers` starts what tasks are handed to, and without it they run in this process."""
+    """Runs stages of one study; tasks are handed to `others`, and without them run in this process."""
 
     study: Study
     folders: Folders
     console: Console
     force: bool = False
-    workers: Callable[[], Executor] | None = None
+    others: Others | None = None
     perform: Callable[[Folders, Task], Outcome] | None = None  # how they do it
 
     def __post_init__(self) -> None:
@@ -66,7 +65,10 @@ class Runner:
         """
         names = list(names)
         self.seconds = dict.fromkeys(names, 0.0)
-        with locked(self.folders.processed) as self.writable, closing(Crew(self.workers)) as self._crew:
+        with (
+            locked(self.folders.processed) as self.writable,
+            closing(Crew(self.others)) as self._crew,
+        ):
             if self.writable:
                 self._remove_leftovers()
                 self._remove_obsolete(names)

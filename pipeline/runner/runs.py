@@ -12,7 +12,7 @@ from pipeline.report import REPORT
 from pipeline.runner.console import Verbosity, console, durations, printable
 from pipeline.runner.execution import Outcome
 from pipeline.runner.ledger import Folders
-from pipeline.runner.processes.workers import pool
+from pipeline.runner.processes.workers import Others, pool, prepare
 from pipeline.runner.runner import Runner
 from pipeline.study import Study, reading
 
@@ -141,7 +141,7 @@ def run(
     speaks = console(verbosity)
     kind = Narrator if verbosity == "verbose" else Runner
     places = folders(folder.resolve() if cluster else folder, processed, reports)
-    runner = kind(study, places, speaks, force, partial(pool, jobs) if jobs > 1 else None)
+    runner = kind(study, places, speaks, force, Others(partial(pool, jobs), jobs, prepare) if jobs > 1 else None)
     speaks.say(typer.style(f"{folder}: {study.title}{' (SIMULATED)' if study.simulated else ''}", bold=True))
     if dry_run:
         for line in runner.preview(names):
@@ -161,8 +161,8 @@ def run_on_cluster(runner: Runner, names: Sequence[str], address: str) -> bool:
     """Run stages with the workers of a Dask cluster; raises as `connected` does, and as any run."""
     from pipeline.runner.processes.cluster import connected, perform_there
 
-    with connected(address, runner.folders) as (executor, terms):
-        runner.workers, runner.perform = (lambda: executor), partial(perform_there, terms)
+    with connected(address, runner.folders) as (executor, hands, terms):
+        runner.others, runner.perform = Others(lambda: executor, hands), partial(perform_there, terms)
         return runner.run(names)
 
 

@@ -85,8 +85,8 @@ def require(terms: Terms, folders: Folders) -> None:
 
 
 @contextmanager
-def connected(address: str, folders: Folders) -> Iterator[tuple[Executor, Terms]]:
-    """The workers of a cluster as an executor, and the terms on which they are handed tasks of a study.
+def connected(address: str, folders: Folders) -> Iterator[tuple[Executor, int, Terms]]:
+    """The workers of a cluster as an executor, how many tasks they run at once, and on what terms they are handed them.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def connected(address: str, folders: Folders) -> Iterator[tuple[Executor, Terms]
     folders.processed.mkdir(parents=True, exist_ok=True)
     mark.touch()
     try:
-        yield client.get_executor(pure=False), terms
+        yield client.get_executor(pure=False), max(sum(client.nthreads().values()), 1), terms
     except KilledWorker as error:
         raise BadRequest(f"workers of the cluster ended again and again, perhaps for want of memory: {error}") from None
     finally:
