@@ -14,13 +14,18 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.runner.console import Console
 from pipeline.runner.execution import Outcome
 from pipeline.runner.fingerprints.fingerprint import Fingerprint
 from pipeline.runner.graph import WHOLE, Graph, Part
 from pipeline.runner.plan import Task
 from pipeline.runner.processes import workers
 from pipeline.runner.processes.workers import Crew, Others, pool
+from pipeline.runner.runner import Runner
+from pipeline.runner.runs import folders
 from pipeline.stages import STAGES
+from pipeline.study import reading
+from tests import arm
 
 pytestmark = pytest.mark.medium
 
@@ -134,6 +139,22 @@ def test_tasks_that_are_known_to_be_short_are_handed_over_together(at_once, seco
     assert max(there.shares) == together
     assert there.shares[-1] <= 2  # so that all end at about the same time
     assert sum(there.shares) == 400
+
+
+def test_what_one_of_the_others_left_half_written_goes_with_the_run_though_nobody_knows_of_its_end(at_once, tmp_path):
+    study = arm.write_study(tmp_path / "raw" / "arm")
+
+    class Leaving(Recording):
+        def submit(self, function, /, share):
+            (tmp_path / "processed" / "arm" / "recording.parquet.0123.partial").touch()
+            return super().submit(function, share)
+
+    there = Leaving()
+    where, silent = folders(study, None, None), Console(lambda line: None, lambda line: None)
+    assert Runner(reading.read(study), where, silent, others=Others(lambda: there)).run(["ingest"])
+    assert there.shares
+    assert (where.processed / "recording").is_dir()
+    assert not list(where.processed.rglob("*.partial"))
 
 
 def test_others_are_prepared_as_soon_as_there_is_work_for_them_in_sight(monkeypatch):

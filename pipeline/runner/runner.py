@@ -73,9 +73,9 @@ class Runner:
                 self._remove_leftovers()
                 self._remove_obsolete(names)
             self._run(Graph(names, [entry.name for entry in self.study.logs]), alone=len(names) == 1)
-            if self._crew.breaks:
-                self._remove_leftovers()
             if self.writable:
+                if self.others:  # of whom one may have been ended, which of a cluster's is not even known
+                    self._remove_leftovers()
                 self.ledger.write_index()
         return self.failures == 0
 
