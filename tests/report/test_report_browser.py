@@ -11,7 +11,7 @@ import pytest
 from browser import CHROMIUM, Browser
 from report_documents import document
 
-from pipeline.report.content import Document, Number, Prose, Section, Table
+from pipeline.report.content import Document, Number, Prose, Rated, Section, Table
 from pipeline.report.writers import html
 
 pytestmark = [
@@ -22,14 +22,15 @@ SIZES = [(1440, False), (1024, True), (390, False), (390, True)]
 
 
 def many_rows() -> Document:
-    """The document with a long table in a folded part after it."""
+    """The document with a long table in a folded part after it, to be rated as every report is."""
     efforts = [Number((-1) ** i * 10.0 ** (i - 12), "N", key=f"run.{i}") for i in range(24)]
     rows = tuple(
         (f"run-{i}", effort, "a/b" * 20, *[Number(-1.25, "N m", 0.01)] * 6) for i, effort in enumerate(efforts)
     )
     long = Table("Runs.", ("run", "effort", "file", *(f"mean {i}" for i in range(6))), rows, label="runs")
     full = document()
-    return replace(full, sections=(*full.sections, Section("Third", "third", (Prose("All:"), long))))
+    rated = Rated("0" * 64, "1" * 32, ("run-0", "run-1"), ())
+    return replace(full, sections=(*full.sections, Section("Third", "third", (Prose("All:"), long))), rated=rated)
 
 
 @pytest.fixture(scope="module")
@@ -156,6 +157,8 @@ def test_a_finger_that_swipes_over_traces_scrolls_the_page(browser: Browser, fil
 def test_a_legend_entry_hides_its_mark(browser: Browser, file: Path) -> None:
     browser.open(file)
     show(browser, "#zoom")
+    legends = browser.run("[...document.querySelectorAll('#zoom .plot .legend')].map((each) => each.innerText.trim())")
+    assert [words for words in legends if "legend" in words or "sample" in words] == []  # nor any other class's name
     entry = "document.querySelector('#zoom .legend button')"
     picture = "document.querySelector('#zoom .area canvas').toDataURL()"
     before = browser.run(picture)

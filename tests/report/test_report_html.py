@@ -217,6 +217,16 @@ def test_hundreds_of_small_figures_leave_room_and_each_takes_three_kilobytes() -
     assert len(rendered) < 8_000_000
 
 
+def test_no_two_scripts_of_a_page_give_one_name_to_two_things() -> None:
+    """They share their names, and of two functions of one name a page has the last."""
+    scripts = (*html.SCRIPTS, *html.TRACE_SCRIPTS, *html.REVIEW_SCRIPTS)
+    outermost = re.compile(r"^(?:async )?(?:function|class|const|let|var) (\w+|\[[^]]*\]|\{[^}]*\})", re.MULTILINE)
+    found = [re.findall(r"\w+", name) for script in scripts for name in outermost.findall(html._script(script))]
+    names = Counter(name for each in found for name in each)
+    assert len(names) > 50
+    assert [name for name, times in names.items() if times > 1] == []
+
+
 def test_a_wrong_equation_is_named() -> None:
     wrong = Document("T", "s", False, (Section("A", "a", (Equation("x + y", "sum"), Equation("nonsense(", "?"))),))
     with pytest.raises(NotTypeset, match=r"nonsense\("):

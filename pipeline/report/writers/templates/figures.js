@@ -49,6 +49,14 @@ function save(text, name, type = "text/csv", start = "\uFEFF") {
   setTimeout(() => URL.revokeObjectURL(link.href), 10_000);
 }
 
+// An element for the page, for all scripts, which share their names.
+function newElement(tag, words = "", attributes = {}) {
+  const element = document.createElement(tag);
+  element.textContent = words;
+  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
+  return element;
+}
+
 function newButton(words, label, act) {
   const button = document.createElement("button");
   button.type = "button";

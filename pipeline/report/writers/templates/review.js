@@ -6,13 +6,6 @@ const ratings = rated.ratings.map((rating) => ({ ...rating }));
 const VERDICTS = ["accept", "doubt", "reject"];
 let unsaved = false;
 
-function newElement(tag, words = "", attributes = {}) {
-  const element = document.createElement(tag);
-  element.textContent = words;
-  for (const [name, value] of Object.entries(attributes)) element.setAttribute(name, value);
-  return element;
-}
-
 // TOML's basic strings are JSON's, but for DEL and for halves of letters, which TOML has none of.
 const tomlText = (text) =>
   JSON.stringify(text.replace(/[\ud800-\udbff](?![\udc00-\udfff])|(?<![\ud800-\udbff])[\udc00-\udfff]/g, "\ufffd")).replaceAll("\x7f", "\\u007f");

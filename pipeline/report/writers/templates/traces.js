@@ -13,11 +13,11 @@ class Panel {
       const data = Object.fromEntries(Object.entries(mark.columns).map(([field, place]) => [field, columns[place]]));
       return { ...mark, data, sorted: data.x ? isSorted(data.x) : false, hidden: false };
     });
-    this.element = newElement("div", "panel");
+    this.element = newElement("div", "", { class: "panel" });
     this.element.append(this.heading());
-    this.area = newElement("div", "area");
-    this.picture = newElement("canvas", "");
-    this.cursor = newElement("canvas", "");
+    this.area = newElement("div", "", { class: "area" });
+    this.picture = newElement("canvas");
+    this.cursor = newElement("canvas");
     this.cursor.setAttribute("role", "img");
     this.cursor.setAttribute("aria-label", [panel.title, panel.y_label].filter(Boolean).join(", ") || "traces");
     this.area.append(this.picture, this.cursor);
@@ -25,8 +25,8 @@ class Panel {
   }
 
   heading() {
-    const heading = newElement("div", "legend");
-    const title = newElement("b", "");
+    const heading = newElement("div", "", { class: "legend" });
+    const title = newElement("b");
     title.textContent = this.title;
     if (this.title) heading.append(title);
     for (const mark of this.marks.filter((one) => one.label)) {
@@ -36,7 +36,7 @@ class Panel {
         this.draw();
       });
       entry.setAttribute("aria-pressed", "true");
-      const sample = newElement("span", `sample ${mark.style ? "line " + mark.style : "area"}`);
+      const sample = newElement("span", "", { class: `sample ${mark.style ? "line " + mark.style : "area"}` });
       sample.style.setProperty("--mark", `var(--${mark.colour})`);
       entry.prepend(sample);
       heading.append(entry);
@@ -149,7 +149,7 @@ class Panel {
 class Plot {
   constructor(figure) {
     const numbers = numbersOf(figure);
-    this.element = newElement("div", "plot");
+    this.element = newElement("div", "", { class: "plot" });
     this.element.style.setProperty("--columns", numbers.across);
     this.panels = numbers.panels.map((panel) => new Panel(panel, numbers.columns, this));
     this.panels.forEach((panel, i) => {
@@ -276,12 +276,6 @@ function outline(panel, start, now) {
   const [top, bottom] = isHigh(start, now) ? [start.y, now.y] : [panel.frame.top, panel.frame.bottom];
   context.fillStyle = colour("--axes");
   fill(context, 0.25, () => box(context, start.x, top, now.x, bottom));
-}
-
-function newElement(tag, classes) {
-  const element = document.createElement(tag);
-  if (classes) element.className = classes;
-  return element;
 }
 
 // An empty canvas of a size, sharp on any screen.
