@@ -5,11 +5,11 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.maths.models.independent import combined, inertia_of, regressor
-from pipeline.maths.models.model import JointDynamics
-from pipeline.maths.models.terms import coulomb, gravity_cos, gravity_sin, inertia, lifted_mass, viscous
-from pipeline.records import Signal
-from pipeline.robots.robot import Joint, Kind, Limits, Robot
+from davinci_forces.maths.models.independent import combined, inertia_of, regressor
+from davinci_forces.maths.models.model import JointDynamics
+from davinci_forces.maths.models.terms import coulomb, gravity_cos, gravity_sin, inertia, lifted_mass, viscous
+from davinci_forces.records import Signal
+from davinci_forces.robots.robot import Joint, Kind, Limits, Robot
 
 HAND = Limits(q=(-0.6, 0.6), dq=(-1.2, 1.2), ddq=(-1.2, 1.2))
 SLIDE = Limits(q=(-0.07, 0.11), dq=(-2.0, 2.0), ddq=(-3.0, 3.0))

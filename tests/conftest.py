@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, settings
 from typer.testing import CliRunner
 
-from pipeline.runner.processes import arithmetic
+from davinci_forces.runner.processes import arithmetic
 
 arithmetic.pin()  # before anything loads numpy, as on the command line
 os.environ["MPLBACKEND"] = "Agg"
@@ -152,7 +152,7 @@ def analysed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A small study that every stage has run on; it is made once a run of the tests, and not to be changed."""
 
     def make(home: Path) -> None:
-        from pipeline.cli import app
+        from davinci_forces.cli import app
         from tests.arm import write_study
 
         done = CliRunner().invoke(app, ["all", str(write_study(home / "raw" / "arm"))])

@@ -2,17 +2,17 @@
 
 from pathlib import Path
 
-from pipeline.records import Diagnostic, Record
-from pipeline.robots import dvrk_psm
-from pipeline.runner.ledger import Entry, Folders, Ledger
-from pipeline.runner.places import is_about_log
-from pipeline.runner.plan import Plan
-from pipeline.runner.signature import declaration
-from pipeline.stages import STAGES
-from pipeline.study import LogEntry, Settings, Study
+from davinci_forces.records import Diagnostic, Record
+from davinci_forces.robots import dvrk_psm
+from davinci_forces.runner.ledger import Entry, Folders, Ledger
+from davinci_forces.runner.places import is_about_log
+from davinci_forces.runner.plan import Plan
+from davinci_forces.runner.signature import declaration
+from davinci_forces.stages import STAGES
+from davinci_forces.study import LogEntry, Settings, Study
 
 JOINTS = tuple(joint.name for joint in dvrk_psm.ROBOT.joints[:2])
-CODE = {f"pipeline/module_{i}.py": "0" * 64 for i in range(40)}  # about as many as a stage has
+CODE = {f"davinci_forces/module_{i}.py": "0" * 64 for i in range(40)}  # about as many as a stage has
 
 
 def study(home: Path, logs: int) -> tuple[Study, Folders]:

@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from pipeline.errors import NotPeriodic
-from pipeline.maths.signals import averaging, harmonics, period
-from pipeline.records import Average, Diagnostic, PeriodResidual
-from pipeline.stages import average
-from pipeline.study import LogEntry
+from davinci_forces.errors import NotPeriodic
+from davinci_forces.maths.periods import averaging, harmonics, period
+from davinci_forces.records import Average, Diagnostic, PeriodResidual
+from davinci_forces.stages import average
+from davinci_forces.study import LogEntry
 from tests import arm
 
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import pipeline
-from pipeline.stages import STAGES
+import davinci_forces
+from davinci_forces.stages import STAGES
 from tests import arm
 from tests.test_runs import call, contents
 
@@ -56,7 +56,7 @@ def run(folder, code=1) -> str:
 def call_any(name, folder) -> str:
     from typer.testing import CliRunner
 
-    from pipeline.cli import app
+    from davinci_forces.cli import app
 
     result = CliRunner().invoke(app, [name, str(folder)])
     assert result.exit_code in (0, 1), result.output
@@ -97,7 +97,7 @@ def test_a_spoilt_log_is_named_and_the_good_one_goes_on(lab, change, says):
 def test_a_log_of_one_period_is_not_averaged_which_is_remarked_on(lab):
     edit(lab, lambda lines: lines[:120])
     run(lab)
-    remarks = " ".join(pipeline.read(lab, "Diagnostic")["text"])
+    remarks = " ".join(davinci_forces.read(lab, "Diagnostic")["text"])
     assert "bad: 2.38 s hold no motion that repeats at least twice, so nothing is averaged" in remarks
 
 
@@ -137,9 +137,9 @@ def test_a_binary_log_that_was_cut_keeps_its_whole_rows_with_a_warning(lab):
     said = run(lab)
     assert "its last 40 rows lack some channels: they are left out" in said
     assert "error" not in said
-    import pipeline
+    import davinci_forces
 
-    assert len(pipeline.read(lab, "Recording", log="bad")) == len(signal) - 40
+    assert len(davinci_forces.read(lab, "Recording", log="bad")) == len(signal) - 40
 
 
 def test_joints_of_different_lengths_are_named(lab):
@@ -173,7 +173,7 @@ def test_a_log_without_a_clock_asks_for_a_rate(lab):
 
 def test_units_signs_and_offsets_come_to_the_joint_in_si(lab):
     """Position in degrees off by 5 and mirrored, effort as a current in mA: the recording is the same."""
-    import pipeline
+    import davinci_forces
 
     signal = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5)
     changed = replace(signal, q=-np.rad2deg(signal.q) - 5, tau=signal.tau / (200 * 0.0438) * 1e3)
@@ -187,30 +187,30 @@ def test_units_signs_and_offsets_come_to_the_joint_in_si(lab):
     motor = "\n[robot_overrides.hand_roll]\ngear_ratio = 200.0\ntorque_constant = 0.0438\n"
     (lab / "study.toml").write_text((head + tail).replace("[[log]]", motor + "[[log]]", 1))
     call("ingest", lab)
-    good, bad = (pipeline.read(lab, "Recording", log=name) for name in ("good", "bad"))
+    good, bad = (davinci_forces.read(lab, "Recording", log=name) for name in ("good", "bad"))
     for column in ("t", "q", "dq", "tau"):
         np.testing.assert_allclose(bad[column], good[column], atol=1e-12)
 
 
 def test_the_transient_is_skipped_and_the_clock_kept(lab):
-    import pipeline
+    import davinci_forces
 
     describe(lab, more="skip = 1.0")
     call("ingest", lab)
-    bad = pipeline.read(lab, "Recording", log="bad")
+    bad = davinci_forces.read(lab, "Recording", log="bad")
     assert bad["t"].iloc[0] == 1.0
 
 
 def test_a_log_ends_where_the_study_says_whatever_comes_after(lab):
     """`until` counts from the log's first sample, as `skip` does; a recorder may die as it pleases after it."""
-    import pipeline
+    import davinci_forces
 
     describe(lab, more="skip = 1.0\nuntil = 6.5")
     edit(lab, lambda lines: cell(cell(lines, 400, 0, "0.5"), 401, 2, "nan"))
     said = call("ingest", lab)
-    bad = pipeline.read(lab, "Recording", log="bad")
+    bad = davinci_forces.read(lab, "Recording", log="bad")
     assert (bad["t"].iloc[0], bad["t"].iloc[-1]) == (1.0, 6.5)
-    assert pipeline.read(lab, "LogSummary", log="bad")["duration"].iloc[0] == 6.5
+    assert davinci_forces.read(lab, "LogSummary", log="bad")["duration"].iloc[0] == 6.5
     assert "until" not in said
 
 
@@ -226,13 +226,13 @@ def test_too_little_before_the_end_is_refused(lab):
 
 
 def test_a_gap_is_marked_and_not_bridged(lab):
-    import pipeline
+    import davinci_forces
 
     edit(lab, lambda lines: [*lines[:200], *lines[215:]])
     said = call("ingest", lab)
     assert "the longest time between samples is 0.32 s" in " ".join(said.split())
     call("resample", lab)
-    signal = pipeline.read(lab, "Signal", log="bad")
+    signal = davinci_forces.read(lab, "Signal", log="bad")
     assert signal["gaps"].iloc[0] == 1
     assert list(np.unique(signal["segment"])) == [0, 1]
     assert np.diff(signal["t"]).max() == pytest.approx(0.32)
@@ -240,35 +240,35 @@ def test_a_gap_is_marked_and_not_bridged(lab):
 
 @pytest.mark.parametrize("jump", [3.0, 1.7e9])
 def test_a_clock_that_jumps_while_the_motion_goes_on_is_set_back_and_said_to_be(lab, jump):
-    import pipeline
+    import davinci_forces
 
     signal = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5)
     arm.write_csv(lab / "bad.csv", [replace(signal, t=signal.t + np.where(signal.t < 4.2, 0.0, jump))])
     said = run(lab)
     assert f"bad: the clock jumps while the motion goes on, by {jump:.6g} s after 4.180 s" in said
     assert "gap" not in said
-    good, bad = (pipeline.read(lab, "Recording", log=name) for name in ("good", "bad"))
+    good, bad = (davinci_forces.read(lab, "Recording", log=name) for name in ("good", "bad"))
     np.testing.assert_allclose(bad["t"], good["t"], atol=1e-6)
-    assert pipeline.read(lab, "Average", log="bad")["period"].iloc[0] == pytest.approx(2.0, abs=1e-4)
+    assert davinci_forces.read(lab, "Average", log="bad")["period"].iloc[0] == pytest.approx(2.0, abs=1e-4)
 
 
 def test_a_clock_that_jumps_in_a_log_of_another_role_has_a_gap(lab):
     """Windows of contact count on the log's own clock."""
-    import pipeline
+    import davinci_forces
 
     describe(lab, role="validation")
     signal = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5)
     arm.write_csv(lab / "bad.csv", [replace(signal, t=signal.t + np.where(signal.t < 4.2, 0.0, 3.0))])
     call("ingest", lab)
-    assert np.diff(pipeline.read(lab, "Recording", log="bad")["t"]).max() == pytest.approx(3.02)
+    assert np.diff(davinci_forces.read(lab, "Recording", log="bad")["t"]).max() == pytest.approx(3.02)
 
 
 @pytest.mark.parametrize("rows", [7, 20, 64, 100])
 def test_a_clock_is_set_back_wherever_the_blocks_of_a_log_end(tmp_path, rows):
-    from pipeline.logs import open_log
-    from pipeline.study import reading as study
-    from pipeline.study.intake.mending import mended
-    from pipeline.study.intake.reading import Intake
+    from davinci_forces.logs import open_log
+    from davinci_forces.study import reading as study
+    from davinci_forces.study.intake.mending import mended
+    from davinci_forces.study.intake.reading import Intake
 
     signal = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5)
     speed = np.abs(arm.excitation("hand_roll", signal.t, 2.0)[1])
@@ -287,7 +287,7 @@ def test_a_clock_is_set_back_wherever_the_blocks_of_a_log_end(tmp_path, rows):
 
 
 def test_an_uneven_clock_is_made_uniform_and_said_to_be(lab):
-    import pipeline
+    import davinci_forces
 
     rng = np.random.default_rng(0)
     signal = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5, noise=0)
@@ -296,21 +296,21 @@ def test_an_uneven_clock_is_made_uniform_and_said_to_be(lab):
     arm.write_csv(lab / "bad.csv", [replace(signal, t=t, q=q, dq=dq, tau=np.sin(t))])
     call("ingest", lab)
     call("resample", lab)
-    made = pipeline.read(lab, "Signal", log="bad")
+    made = davinci_forces.read(lab, "Signal", log="bad")
     assert "cubic spline" in made["method"].iloc[0]
     assert np.ptp(np.diff(made["t"])) < 1e-9
     np.testing.assert_allclose(made["tau"], np.sin(made["t"] + t[0]), atol=1e-5)
 
 
 def test_velocity_that_was_not_logged_is_derived(lab):
-    import pipeline
+    import davinci_forces
 
     text = (lab / "study.toml").read_text()
     head, tail = text.rsplit('"hand_roll.dq" = "hand_roll.dq"\n', 1)
     (lab / "study.toml").write_text(head + tail)
     call("ingest", lab)
     call("resample", lab)
-    good, bad = (pipeline.read(lab, "Signal", log=name) for name in ("good", "bad"))
+    good, bad = (davinci_forces.read(lab, "Signal", log=name) for name in ("good", "bad"))
     assert bad["velocity"].iloc[0] == "derived"
     middle = slice(50, -50)
     np.testing.assert_allclose(bad["dq"][middle], good["dq"][middle], atol=0.02)
@@ -329,7 +329,7 @@ def test_rows_that_repeat_are_flagged(lab):
 
 
 def test_parts_of_a_log_are_read_as_one(lab):
-    import pipeline
+    import davinci_forces
 
     lines = (lab / "bad.csv").read_text().splitlines()
     (lab / "one.csv").write_text("\n".join(lines[:300]) + "\n")
@@ -337,7 +337,7 @@ def test_parts_of_a_log_are_read_as_one(lab):
     text = (lab / "study.toml").read_text().replace('file = "bad.csv"', 'files = ["one.csv", "two.csv"]')
     (lab / "study.toml").write_text(text)
     call("ingest", lab)
-    good, bad = (pipeline.read(lab, "Recording", log=name) for name in ("good", "bad"))
+    good, bad = (davinci_forces.read(lab, "Recording", log=name) for name in ("good", "bad"))
     np.testing.assert_array_equal(good["tau"], bad["tau"])
 
 

@@ -15,11 +15,11 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-import pipeline
-from pipeline import commands
-from pipeline.cli import app
-from pipeline.errors import BadRequest, BadStudy, MissingRecord
-from pipeline.runner import STEPS, runs
+import davinci_forces
+from davinci_forces import commands
+from davinci_forces.cli import app
+from davinci_forces.errors import BadRequest, BadStudy, MissingRecord
+from davinci_forces.runner import STEPS, runs
 from tests.arm import write_study
 
 EVERY = typer.main.get_command(app).commands
@@ -63,7 +63,7 @@ def test_help_shows_every_description_as_it_is_written(name):
 
 @pytest.mark.parametrize("name", STEPS)
 def test_a_step_is_explained_by_its_own_module(name):
-    module = import_module("pipeline.report.report" if name == "report" else f"pipeline.stages.{name}")
+    module = import_module("davinci_forces.report.report" if name == "report" else f"davinci_forces.stages.{name}")
     words = re.sub(r"[`\\]", "", " ".join(inspect.getdoc(module).split()))
     assert words[:60] in " ".join(call(name, "--help").split())
     assert "No such command" in call("step", "raw/mine", code=2)
@@ -80,7 +80,7 @@ def test_a_code_span_is_shown_without_a_backslash():
 
 def complete(**environment: str) -> str:
     done = subprocess.run(
-        [sys.executable, "-c", "from pipeline.cli import app; app(prog_name='davinci-forces')"],
+        [sys.executable, "-c", "from davinci_forces.cli import app; app(prog_name='davinci-forces')"],
         env={**os.environ, **environment},
         capture_output=True,
         text=True,
@@ -108,7 +108,7 @@ def test_importing_the_package_imports_nothing_heavy():
 def test_a_quiet_run_says_nothing_where_all_is_well(study, tmp_path, monkeypatch):
     assert call("ingest", study, "--quiet") == ""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("pipeline.cli.STEPS", ("ingest", "resample"))
+    monkeypatch.setattr("davinci_forces.cli.STEPS", ("ingest", "resample"))
     elsewhere = tmp_path / "raw" / "elsewhere"  # whose logs are not there
     shutil.copytree(study, elsewhere, ignore=shutil.ignore_patterns("*.csv"))
     assert call("all", "--quiet") == ""
@@ -131,7 +131,7 @@ def test_a_verbose_run_names_every_task_with_its_time(study):
 
 @pytest.mark.medium
 def test_tasks_that_run_together_say_what_each_took(study, monkeypatch):
-    monkeypatch.setattr("pipeline.runner.processes.workers.ALONE", -1.0)
+    monkeypatch.setattr("davinci_forces.runner.processes.workers.ALONE", -1.0)
     said = call("ingest", study, "--verbose", "--jobs", 2)
     done = re.findall(r"^ingest: (\w+): took \d+\.\d\d s$", said, re.M)
     assert {*done} == {"roll", "slide", "check", "push"}
@@ -146,7 +146,7 @@ def test_a_pattern_that_the_shell_left_is_expanded(study, tmp_path, monkeypatch)
     shutil.copytree(study, tmp_path / "raw" / "other")
     (tmp_path / "raw" / "notes.txt").touch()
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("pipeline.cli.STEPS", ("ingest",))
+    monkeypatch.setattr("davinci_forces.cli.STEPS", ("ingest",))
     call("all", "raw/*")
     assert {folder.name for folder in (tmp_path / "processed").iterdir()} == {"arm", "other"}
     said = call("ingest", "raw/*", code=1)
@@ -163,36 +163,36 @@ def test_a_folder_whose_own_name_looks_like_a_pattern_is_no_pattern(tmp_path):
 
 
 def test_stages_run_from_python_in_their_order(study, capsys):
-    assert pipeline.run(study, "resample", "ingest") is True
+    assert davinci_forces.run(study, "resample", "ingest") is True
     said = capsys.readouterr().out
     assert said.index("ingest: ") < said.index("resample: ")
-    assert set(pipeline.read(study, "Signal")["joint"]) == {"hand_roll", "instrument_slide"}
-    assert pipeline.run(str(study), "ingest", quiet=True) is True
+    assert set(davinci_forces.read(study, "Signal")["joint"]) == {"hand_roll", "instrument_slide"}
+    assert davinci_forces.run(str(study), "ingest", quiet=True) is True
     assert capsys.readouterr().out == ""
 
 
 def test_a_run_from_python_says_whether_all_went_well(study):
     (study / "check.csv").unlink()
-    assert pipeline.run(study, "ingest", quiet=True) is False
+    assert davinci_forces.run(study, "ingest", quiet=True) is False
 
 
 def test_a_run_from_python_that_cannot_begin_raises(study, tmp_path):
     with pytest.raises(BadRequest, match="no stage 'ingets'; there are design, ingest"):
-        pipeline.run(study, "ingets")
+        davinci_forces.run(study, "ingets")
     with pytest.raises(BadStudy, match="there is no such file"):
-        pipeline.run(tmp_path / "raw" / "nowhere")
+        davinci_forces.run(tmp_path / "raw" / "nowhere")
 
 
 @pytest.mark.medium
 def test_every_stage_runs_where_none_is_named(finished):
     shutil.rmtree(finished.parent.parent / "reports")
-    assert pipeline.run(finished, quiet=True) is True
+    assert davinci_forces.run(finished, quiet=True) is True
     assert (finished.parent.parent / "reports" / "arm" / "results.json").exists()
 
 
 @pytest.mark.medium
 def test_results_are_read_by_key_with_what_is_known_of_their_error(analysed):
-    frame = pipeline.results(analysed)
+    frame = davinci_forces.results(analysed)
     assert list(frame.columns) == ["value", "std", "unit", "source"]
     assert frame.loc["period.roll", "value"] == pytest.approx(2.0, abs=5 * frame.loc["period.roll", "std"])
     assert frame.loc["period.roll", "unit"] == "s"
@@ -204,7 +204,7 @@ def test_results_are_read_by_key_with_what_is_known_of_their_error(analysed):
 
 def test_results_that_are_not_there_say_what_to_run(study):
     with pytest.raises(MissingRecord, match=r"results.json is not there; run `davinci-forces all .*arm`"):
-        pipeline.results(study)
+        davinci_forces.results(study)
 
 
 @pytest.mark.parametrize("text", ["{", "7", '["a"]', '[{"key": "a"}]', "[null]"])
@@ -213,7 +213,7 @@ def test_results_that_are_not_what_the_report_wrote_say_so(study, text):
     file.parent.mkdir(parents=True)
     file.write_text(text)
     with pytest.raises(MissingRecord, match="is not as the report wrote it"):
-        pipeline.results(study)
+        davinci_forces.results(study)
 
 
 def test_every_stage_and_command_is_there():

@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.errors import BadRequest
-from pipeline.runner.ledger import Folders
-from pipeline.runner.processes import arithmetic, cluster, workers
+from davinci_forces.errors import BadRequest
+from davinci_forces.runner.ledger import Folders
+from davinci_forces.runner.processes import arithmetic, cluster, workers
 from tests import arm
 from tests.test_robustness import flat
 from tests.test_runs import call, contents, processed
@@ -77,7 +77,7 @@ def test_a_cluster_gives_the_same_bytes_though_a_worker_is_killed(local, tmp_pat
     study = study_of(tmp_path / "one" / "raw" / "lab", RECORDINGS)
     there = tmp_path / "two" / "raw" / "lab"
     shutil.copytree(study, there)
-    from pipeline.stages import STAGES
+    from davinci_forces.stages import STAGES
 
     names = STAGES[: STAGES.index("whiteness") + 1]
     for name in names:
@@ -100,10 +100,10 @@ def test_a_cluster_gives_the_same_bytes_though_a_worker_is_killed(local, tmp_pat
 RUN = """
 import sys
 from pathlib import Path
-from pipeline.runner.processes import arithmetic
+from davinci_forces.runner.processes import arithmetic
 arithmetic.pin()
-from pipeline.runner import runs
-from pipeline.runner.processes import workers
+from davinci_forces.runner import runs
+from davinci_forces.runner.processes import workers
 workers.ALONE = -1.0
 study, address, *names = sys.argv[1:]
 sys.exit(0 if runs.run(Path(study), names, cluster=address) else 1)

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from pipeline.cli import app
-from pipeline.errors import BadStudy
-from pipeline.report.changes import Change, Stated, changes
-from pipeline.study import reading
+from davinci_forces.cli import app
+from davinci_forces.errors import BadStudy
+from davinci_forces.report.changes import Change, Stated, changes
+from davinci_forces.study import reading
 from tests.arm import write_study
 
 

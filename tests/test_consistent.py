@@ -7,19 +7,19 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from scipy.optimize import minimize, nnls
 
-from pipeline.errors import NotIdentifiable
-from pipeline.estimators import estimator
-from pipeline.estimators.problem import Known
-from pipeline.maths.estimation import conic
-from pipeline.maths.estimation.conic import ENTRIES, nearest, scaled
-from pipeline.maths.estimation.least_squares import triangle
-from pipeline.maths.mechanics.bodies import of_pseudo_inertias, pseudo_inertias
-from pipeline.maths.models.mechanism import Mechanism, of_signs
-from pipeline.maths.models.model import Motion
-from pipeline.records import Diagnostic, Fit, Smoothed
-from pipeline.robots.dvrk_psm import ROBOT
-from pipeline.robots.models import coupled
-from pipeline.stages import choose, fit
+from davinci_forces.errors import NotIdentifiable
+from davinci_forces.estimators import estimator
+from davinci_forces.estimators.problem import Known
+from davinci_forces.maths.estimation import conic
+from davinci_forces.maths.estimation.conic import ENTRIES, nearest, scaled
+from davinci_forces.maths.estimation.least_squares import triangle
+from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias, pseudo_inertias
+from davinci_forces.maths.models.mechanism import Mechanism, of_signs
+from davinci_forces.maths.models.model import Motion
+from davinci_forces.records import Diagnostic, Fit, Smoothed
+from davinci_forces.robots.dvrk_psm import ROBOT
+from davinci_forces.robots.models import coupled
+from davinci_forces.stages import choose, fit
 from tests import arm
 from tests.contracts.test_estimators import NAMES, PHI, THETA, K, problem
 from tests.test_estimation import trajectory
@@ -77,7 +77,7 @@ def test_the_parameters_of_a_model_are_made_of_its_links_drives_and_friction():
     """By the effort of bodies that weigh something, link by link."""
     x, motion, mechanism = real_bodies(), wandering(), ARM.mechanism
     L = mechanism.links
-    from pipeline.maths.mechanics.rigid_body import regressor
+    from davinci_forces.maths.mechanics.rigid_body import regressor
 
     links = regressor(ARM.chain, *motion[:3])[:, :3] @ x[: 10 * L]
     rotor, spring, offset = x[10 * L : 10 * L + 9].reshape(3, 3)
@@ -90,7 +90,7 @@ def test_the_parameters_of_a_model_are_made_of_its_links_drives_and_friction():
 
 
 def test_of_a_joint_without_bodies_signs_are_known():
-    from pipeline.robots.models import independent
+    from davinci_forces.robots.models import independent
 
     mechanism = independent(arm.joint("hand_roll")).mechanism
     assert_array_equal(mechanism.matrix, np.eye(4))
@@ -275,7 +275,7 @@ def test_what_it_costs_a_joint_is_said_where_least_squares_find_what_no_mechanis
     signal = arm.signal("hand_roll")
     theta = np.array([-0.2, *THETA[1:]])
     q, dq, ddq = arm.excitation("hand_roll", signal.t)
-    from pipeline.maths.models.independent import regressor
+    from davinci_forces.maths.models.independent import regressor
 
     tau = regressor(arm.joint("hand_roll").terms, q, dq, ddq) @ theta
     noise = 0.01 * np.random.default_rng(0).normal(size=len(tau))

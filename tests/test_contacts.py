@@ -5,25 +5,33 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.maths.contact.day_offset import day_offset
-from pipeline.maths.contact.detection import FALSE_ALARMS, Quiet, alarm_level, events, quiet
-from pipeline.maths.contact.error_band import SpeedCells, cells, excess, excess_std, means, units, without_each
-from pipeline.maths.contact.free_space import levels
-from pipeline.maths.contact.window import mean_size, summarise
-from pipeline.maths.signals import jackknife
-from pipeline.maths.signals.bootstrap import (
+from davinci_forces.maths.contact.detection import FALSE_ALARMS, Quiet, alarm_level, events, quiet
+from davinci_forces.maths.contact.window import mean_size, summarise
+from davinci_forces.maths.signals.noise import model_error, noise_std, smoothed
+from davinci_forces.maths.signals.path import likeness, most_different
+from davinci_forces.maths.signals.smoothing import lowpass, share_passed
+from davinci_forces.maths.signals.windows import free_space
+from davinci_forces.maths.uncertainty import jackknife
+from davinci_forces.maths.uncertainty.bootstrap import (
     blocks,
     error_of_mean,
     error_of_pooled_mean,
     error_of_quantile,
     standard_error,
 )
-from pipeline.maths.signals.noise import model_error, noise_std, smoothed
-from pipeline.maths.signals.path import likeness, most_different
-from pipeline.maths.signals.smoothing import lowpass, share_passed
-from pipeline.maths.signals.windows import free_space
-from pipeline.records import Threshold, Track
-from pipeline.stages import assess, measure, threshold
+from davinci_forces.maths.uncertainty.day_offset import day_offset
+from davinci_forces.maths.uncertainty.error_band import (
+    SpeedCells,
+    cells,
+    excess,
+    excess_std,
+    means,
+    units,
+    without_each,
+)
+from davinci_forces.maths.uncertainty.free_space import levels
+from davinci_forces.records import Threshold, Track
+from davinci_forces.stages import assess, measure, threshold
 from tests import arm
 from tests.test_averaging import entry
 

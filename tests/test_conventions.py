@@ -15,16 +15,16 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-import pipeline
-from pipeline import commands, estimators, filters, logs, robots, stages
-from pipeline.cli import STEPS, app
-from pipeline.records import KINDS, Record
-from pipeline.records.quantities import QUANTITIES
-from pipeline.report import sections, writers
-from pipeline.runner.signature import declaration
-from pipeline.study import Settings
+import davinci_forces
+from davinci_forces import commands, estimators, filters, logs, robots, stages
+from davinci_forces.cli import STEPS, app
+from davinci_forces.records import KINDS, Record
+from davinci_forces.records.quantities import QUANTITIES
+from davinci_forces.report import sections, writers
+from davinci_forces.runner.signature import declaration
+from davinci_forces.study import Settings
 
-ROOT = Path(pipeline.__file__).parent
+ROOT = Path(davinci_forces.__file__).parent
 HOME = ROOT.parent
 SOURCES = sorted(ROOT.rglob("*.py"))
 LISTS = {  # extension folder -> its choices
@@ -113,13 +113,13 @@ def test_imports_of_maths_point_downwards(source):
     home = source.relative_to(ROOT / "maths").parts[0].removesuffix(".py")
     if home == "__init__":
         return
-    for room in rooms(source, "pipeline.maths") - {home}:
+    for room in rooms(source, "davinci_forces.maths") - {home}:
         assert tier(room, MATHS) > tier(home, MATHS), f"maths.{home} imports maths.{room}"
 
 
 @pytest.mark.parametrize("folder", ["stages", "report.sections", "estimators", "filters", "commands"])
 def test_choices_of_a_folder_do_not_import_each_other(folder):
-    package = f"pipeline.{folder}"
+    package = f"davinci_forces.{folder}"
     listed = {name for name, _ in choices(import_module(package))}
     for name in sorted(listed):
         for source in sources(import_module(f"{package}.{name}")):
@@ -185,7 +185,7 @@ def test_maths_is_numpy_scipy_and_numba_only(source):
 
 @pytest.mark.parametrize("source", sorted((ROOT / "stages").glob("*.py")), ids=lambda s: s.name)
 def test_a_stage_opens_no_file(source):
-    opening = {"pathlib", "os", "pyarrow", "pyarrow.parquet", "pipeline.records.store", "shutil", "io"}
+    opening = {"pathlib", "os", "pyarrow", "pyarrow.parquet", "davinci_forces.records.store", "shutil", "io"}
     assert not imports(source) & opening
     called = {
         n.func.id
@@ -197,8 +197,8 @@ def test_a_stage_opens_no_file(source):
 
 @pytest.mark.parametrize("source", sorted((ROOT / "report").rglob("*.py")), ids=lambda s: str(s.relative_to(ROOT)))
 def test_the_report_computes_no_physics(source):
-    physics = {name for name in imports(source) if name.startswith(("pipeline.maths", "pipeline.robots"))}
-    data = ("pipeline.maths.arrays.", "pipeline.robots.robot.")
+    physics = {name for name in imports(source) if name.startswith(("davinci_forces.maths", "davinci_forces.robots"))}
+    data = ("davinci_forces.maths.arrays.", "davinci_forces.robots.robot.")
     assert not [name for name in physics if not name.startswith(data)]
 
 
@@ -222,7 +222,7 @@ def exporting(package, name: str) -> set[str]:
 
 @pytest.mark.parametrize(("folder", "exported"), EXPORTED.items())
 def test_every_choice_of_an_extension_folder_is_listed(folder, exported):
-    assert exporting(import_module(f"pipeline.{folder}"), exported) == set(LISTS[folder])
+    assert exporting(import_module(f"davinci_forces.{folder}"), exported) == set(LISTS[folder])
     assert len(set(LISTS[folder])) == len(LISTS[folder])
 
 
@@ -243,7 +243,7 @@ def test_a_record_is_a_declaration_and_what_it_does_is_for_the_report_alone():
 
 
 def test_every_record_is_listed():
-    from pipeline import records
+    from davinci_forces import records
 
     made = {k for _, k in inspect.getmembers(records, inspect.isclass) if issubclass(k, Record) and k is not Record}
     assert made == set(KINDS.values())
@@ -281,7 +281,7 @@ def test_every_stage_and_command_explains_itself(name):
     shown = CliRunner().invoke(app, [name, "--help"], env={"COLUMNS": "200", "TERM": "dumb"})
     assert shown.exit_code == 0
     package = "stages" if name in stages.STAGES else "report" if name in STEPS else "commands"
-    said = " ".join(import_module(f"pipeline.{package}.{name}").__doc__.split())
+    said = " ".join(import_module(f"davinci_forces.{package}.{name}").__doc__.split())
     assert said in " ".join(shown.output.split())
 
 
@@ -294,7 +294,7 @@ def test_the_readme_names_every_command():
 def test_help_imports_nothing_heavy():
     code = (
         "import sys; sys.argv = ['davinci-forces', '--help']\n"
-        "from pipeline.cli import main\n"
+        "from davinci_forces.cli import main\n"
         "try: main()\n"
         "except SystemExit as done: assert done.code == 0\n"
         "heavy = {'pandas', 'scipy', 'matplotlib', 'statsmodels', 'numba', 'nptdms', 'clarabel', 'h5py', 'rosbags'}\n"

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-import pipeline
-from pipeline.estimators.candidates import share_parameters
-from pipeline.robots.dvrk_psm import ROBOT
-from pipeline.robots.models import coupled
+import davinci_forces
+from davinci_forces.identification.candidates import share_parameters
+from davinci_forces.robots.dvrk_psm import ROBOT
+from davinci_forces.robots.models import coupled
 from tests import arm
 from tests.test_runs import call
 
@@ -32,7 +32,7 @@ def in_current(tmp_path_factory):
 
 @pytest.mark.medium
 def test_a_current_is_taken_as_it_is_whatever_the_gears(in_current):
-    recording = pipeline.read(in_current, "Recording", log="roll")
+    recording = davinci_forces.read(in_current, "Recording", log="roll")
     logged = np.loadtxt(in_current / "roll.csv", delimiter=",", skiprows=1)[:, 3]
     np.testing.assert_array_equal(recording["tau"], logged)
     assert recording.attrs["units"]["tau"] == "A"

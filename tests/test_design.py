@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipeline.maths.mechanics.kinematics import tip
-from pipeline.records import Control, Excitation, Links, Lyapunov, Pose, Workspace
-from pipeline.robots import davinci, dvrk_psm, from_toml
-from pipeline.stages import design
+from davinci_forces.maths.mechanics.kinematics import tip
+from davinci_forces.records import Control, Excitation, Links, Lyapunov, Pose, Workspace
+from davinci_forces.robots import davinci, dvrk_psm, from_toml
+from davinci_forces.stages import design
 
 
 @pytest.fixture(scope="module")

@@ -7,20 +7,20 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipeline.errors import PipelineError
-from pipeline.filters import belief, ekf, rts, tracker
-from pipeline.filters.assumed import assumed
-from pipeline.filters.lag import lag
-from pipeline.filters.problem import NoiseModel
-from pipeline.filters.response import at_rest, slowest
-from pipeline.filters.stepping import covariances
-from pipeline.filters.tuning import likeliest_walk, tuned
-from pipeline.maths.models.bias import bias
-from pipeline.maths.models.driven import Driven
-from pipeline.maths.models.independent import combined, inertia_of
-from pipeline.records import Diagnostic, ErrorBand, Fit, MeasurementNoise, Track, Whiteness
-from pipeline.stages import ekf as stage
-from pipeline.stages import fit, settle, tune, whiteness
+from davinci_forces.errors import PipelineError
+from davinci_forces.filters import belief, ekf, rts, tracker
+from davinci_forces.filters.assumed import assumed
+from davinci_forces.filters.lag import lag
+from davinci_forces.filters.problem import NoiseModel
+from davinci_forces.filters.response import at_rest, slowest
+from davinci_forces.filters.stepping import covariances
+from davinci_forces.filters.tuning import likeliest_walk, tuned
+from davinci_forces.maths.models.bias import bias
+from davinci_forces.maths.models.driven import Driven
+from davinci_forces.maths.models.independent import combined, inertia_of
+from davinci_forces.records import Diagnostic, ErrorBand, Fit, MeasurementNoise, Track, Whiteness
+from davinci_forces.stages import ekf as stage
+from davinci_forces.stages import fit, settle, tune, whiteness
 from tests import arm
 from tests.test_averaging import entry
 from tests.test_estimation import trajectory

@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from pipeline.estimators import ESTIMATORS, estimator
-from pipeline.estimators.folds import folds
-from pipeline.estimators.problem import Regression
-from pipeline.estimators.wlse import pooled
-from pipeline.records import (
+from davinci_forces.estimators import ESTIMATORS, estimator
+from davinci_forces.estimators.problem import Regression
+from davinci_forces.estimators.wlse import pooled
+from davinci_forces.identification.folds import folds
+from davinci_forces.records import (
     Average,
     CrossFit,
     Diagnostic,
@@ -24,8 +24,8 @@ from pipeline.records import (
     Residual,
     Trajectory,
 )
-from pipeline.robots.models import independent
-from pipeline.stages import average, differentiate, fit, predict, smooth
+from davinci_forces.robots.models import independent
+from davinci_forces.stages import average, differentiate, fit, predict, smooth
 from tests import arm
 from tests.test_averaging import entry
 
@@ -243,7 +243,7 @@ def test_a_joint_is_fitted_anew_at_most_twenty_times_however_many_its_logs_are(m
     one = trajectory(arm.signal(periods=4, rate=20.0))
     calls = []
     monkeypatch.setattr(
-        "pipeline.stages.fit.estimator", lambda name: lambda p: calls.append(name) or estimator(name)(p)
+        "davinci_forces.stages.fit.estimator", lambda name: lambda p: calls.append(name) or estimator(name)(p)
     )
     for logs in (20, 30, 60):
         calls.clear()

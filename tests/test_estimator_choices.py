@@ -7,11 +7,11 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.optimize import nnls
 
-from pipeline.errors import NotIdentifiable
-from pipeline.estimators import estimator
-from pipeline.estimators.problem import Known, Regression, factored
-from pipeline.estimators.wlse import pooled
-from pipeline.maths.models.independent import regressor
+from davinci_forces.errors import NotIdentifiable
+from davinci_forces.estimators import estimator
+from davinci_forces.estimators.problem import Known, Regression, factored
+from davinci_forces.estimators.wlse import pooled
+from davinci_forces.maths.models.independent import regressor
 from tests import arm
 from tests.contracts.test_estimators import NAMES, PHI, SEEDS, THETA, K, problem
 

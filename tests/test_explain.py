@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from pipeline.estimators.driving import driving, motions_of
-from pipeline.records import Fit
-from pipeline.robots import davinci
-from pipeline.robots.models import coupled, independent
-from pipeline.stages.explain import THIS_LOG, others
+from davinci_forces.identification.driving import driving, motions_of
+from davinci_forces.records import Fit
+from davinci_forces.robots import davinci
+from davinci_forces.robots.models import coupled, independent
+from davinci_forces.stages.explain import THIS_LOG, others
 from tests import arm
 
 ROLL = davinci.ROBOT.joint("hand_roll")

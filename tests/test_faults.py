@@ -11,7 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.records.store import PARTIAL
+from davinci_forces.records.store import PARTIAL
 from tests.test_robustness import flat, raw, small  # noqa: F401 - fixtures
 from tests.test_runs import call, contents, edit, processed, reports
 from tests.test_workers import end_within
@@ -20,7 +20,7 @@ LIMITED = """
 import resource, sys
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]),) * 2)
 sys.argv = ["davinci-forces", *sys.argv[2:]]
-from pipeline.cli import main
+from davinci_forces.cli import main
 main()
 """
 
@@ -57,7 +57,7 @@ def test_a_report_that_failed_once_is_the_same_as_that_of_a_clean_run(raw, monke
     for page in reports(folder).iterdir():
         page.unlink()
     with monkeypatch.context() as patch:
-        patch.setattr("pipeline.report.report.render_all", fail)
+        patch.setattr("davinci_forces.report.report.render_all", fail)
         assert "No space left on device" in flat(call("all", folder, code=1))
     call("all", folder)
     assert (contents(reports(folder)), contents(processed(folder))) == clean
@@ -73,7 +73,7 @@ def test_a_stage_that_failed_once_leaves_nothing_behind(raw, monkeypatch):  # no
 
     edit(folder / "study.toml", 'robot = "arm.toml"', 'robot = "arm.toml"\n[settings]\nlowpass = 12.0')
     with monkeypatch.context() as patch:
-        patch.setattr("pipeline.stages.fit.run", fail)
+        patch.setattr("davinci_forces.stages.fit.run", fail)
         call("all", folder, code=1)
     edit(folder / "study.toml", "\n[settings]\nlowpass = 12.0", "")
     call("all", folder)
@@ -151,11 +151,11 @@ def test_where_nothing_can_be_written_what_needs_no_writing_is_done(raw, read_on
 RUN = """
 import sys
 from pathlib import Path
-from pipeline.runner import STEPS
-from pipeline.runner.processes import arithmetic
+from davinci_forces.runner import STEPS
+from davinci_forces.runner.processes import arithmetic
 arithmetic.pin()
-from pipeline.runner import runs
-from pipeline.runner.processes import workers
+from davinci_forces.runner import runs
+from davinci_forces.runner.processes import workers
 workers.ALONE = -1.0
 if __name__ == "__main__":
     sys.exit(0 if runs.run(Path(sys.argv[1]), STEPS, jobs=2) else 1)

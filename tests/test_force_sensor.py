@@ -9,15 +9,15 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import norm
 
-from pipeline.maths.contact.force_sensor import at, errors, lag
-from pipeline.records import Diagnostic, SensorForce, TipForce, Touch, store
-from pipeline.robots import load
-from pipeline.runner import runs
-from pipeline.simulation import study_folder
-from pipeline.simulation.scenario import reading as scenario
-from pipeline.simulation.scenario.scenario import ForceSensor
-from pipeline.stages import STAGES, sense
-from pipeline.study import Source
+from davinci_forces.maths.contact.force_sensor import at, errors, lag
+from davinci_forces.records import Diagnostic, SensorForce, TipForce, Touch, store
+from davinci_forces.robots import load
+from davinci_forces.runner import runs
+from davinci_forces.simulation import study_folder
+from davinci_forces.simulation.scenario import reading as scenario
+from davinci_forces.simulation.scenario.scenario import ForceSensor
+from davinci_forces.stages import STAGES, sense
+from davinci_forces.study import Source
 from tests.test_averaging import entry
 from tests.test_tip import NAMES, PUSH, RATE, STD, T, efforts, noise, run, tracks
 

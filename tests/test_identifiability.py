@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipeline.estimators import estimator
-from pipeline.estimators.identifiability import advice, hardly_described, inertia_at_fault, not_seen, together
-from pipeline.estimators.problem import Estimate, Spread, factored
-from pipeline.maths.estimation.identifiability import combinations, deviation, pairs, told
-from pipeline.maths.estimation.least_squares import triangle
-from pipeline.records import Diagnostic, Identifiability
-from pipeline.records.catalogue import Catalogue
-from pipeline.report.identified import wanting
-from pipeline.robots.davinci import ROBOT
-from pipeline.stages import fit
+from davinci_forces.estimators import estimator
+from davinci_forces.estimators.problem import Estimate, Spread, factored
+from davinci_forces.identification.identifiability import advice, hardly_described, inertia_at_fault, not_seen, together
+from davinci_forces.maths.estimation.identifiability import combinations, deviation, pairs, told
+from davinci_forces.maths.estimation.least_squares import triangle
+from davinci_forces.records import Diagnostic, Identifiability
+from davinci_forces.records.catalogue import Catalogue
+from davinci_forces.report.identified import wanting
+from davinci_forces.robots.davinci import ROBOT
+from davinci_forces.stages import fit
 from tests import arm
 from tests.contracts.test_estimators import NAMES, PHI, SIGMA, THETA, K, M, problem
 from tests.test_estimation import trajectory

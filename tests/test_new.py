@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-import pipeline
-from pipeline import robots
-from pipeline.maths.signals import columns
-from pipeline.study import reading
+import davinci_forces
+from davinci_forces import robots
+from davinci_forces.maths.signals import columns
+from davinci_forces.study import reading
 from tests.test_runs import call
 
 RATE, PERIOD, N = 125.0, 4.0, 2000  # [Hz], [s]: four periods
@@ -248,7 +248,7 @@ def test_a_joint_of_another_arm_is_identified_from_what_new_writes_corrected_or_
     file.write_text(file.read_text().replace("# skip = 1.0", correction))
     for stage in ("ingest", "resample", "average", "smooth", "differentiate", "fit", "choose", "predict"):
         call(stage, study)
-    errors = pipeline.read(study, "Prediction").drop_duplicates(["model", "estimator"])
+    errors = davinci_forces.read(study, "Prediction").drop_duplicates(["model", "estimator"])
     assert {"leave one period out", "leave a block of path out"} == set(errors["scheme"])
     assert "chosen" in set(errors["model"])
     assert errors["relative_error"].max() < 0.06

@@ -4,7 +4,7 @@ import shutil
 
 import pytest
 
-import pipeline
+import davinci_forces
 
 JOINTS = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint")
 LOGS = (("learn", "fourier_50s_12harm.csv", "identification"), ("check", "fourier_20s_8harm.csv", "validation"))
@@ -25,20 +25,20 @@ def study(data, tmp_path_factory):
         for i, joint in enumerate(JOINTS):
             text += f'"{joint}.q" = {1 + i}\n"{joint}.dq" = {7 + i}\n"{joint}.i" = {13 + i}\n'
     (study / "study.toml").write_text(text)
-    assert pipeline.run(study, *STAGES)
+    assert davinci_forces.run(study, *STAGES)
     return study
 
 
 @pytest.fixture(scope="module")
 def predictions(study):
     """What a model that was learnt on one path says of another."""
-    return pipeline.read(study, "Prediction", log="check")
+    return davinci_forces.read(study, "Prediction", log="check")
 
 
 @pytest.fixture(scope="module")
 def learnt(study):
     """What refits without a part of the path that is learnt from say of that part."""
-    return pipeline.read(study, "Prediction", log="learn")
+    return davinci_forces.read(study, "Prediction", log="learn")
 
 
 def relative_error(predictions, joint, model):

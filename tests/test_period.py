@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter, sosfiltfilt
 
-from pipeline.errors import NotPeriodic
-from pipeline.maths.models.independent import regressor
-from pipeline.maths.signals import period
-from pipeline.maths.signals.agreement import differing
-from pipeline.maths.signals.repetition import repetition
-from pipeline.maths.signals.steps import REACH, steps
-from pipeline.maths.signals.stretch import stretch
-from pipeline.records import Average, Diagnostic, Fit, Signal, Trajectory
-from pipeline.stages import average, differentiate, fit
-from pipeline.study import LogEntry
+from davinci_forces.errors import NotPeriodic
+from davinci_forces.maths.models.independent import regressor
+from davinci_forces.maths.periods import period
+from davinci_forces.maths.periods.agreement import differing
+from davinci_forces.maths.periods.repetition import repetition
+from davinci_forces.maths.periods.steps import REACH, steps
+from davinci_forces.maths.periods.stretch import stretch
+from davinci_forces.records import Average, Diagnostic, Fit, Signal, Trajectory
+from davinci_forces.stages import average, differentiate, fit
+from davinci_forces.study import LogEntry
 from tests import arm
 
 RATE = 100.0

@@ -6,15 +6,15 @@ from collections import Counter
 
 import pytest
 
-from pipeline.records import KINDS, Fit, LogSummary, MeasurementNoise, Signal, Track, Whiteness
-from pipeline.robots import dvrk_psm
-from pipeline.runner.fingerprints.schemas import schemas
-from pipeline.runner.ledger import Entry, Folders, Ledger
-from pipeline.runner.places import about
-from pipeline.runner.plan import Plan
-from pipeline.runner.signature import declaration
-from pipeline.stages import STAGES
-from pipeline.study import LogEntry, Settings, Study
+from davinci_forces.records import KINDS, Fit, LogSummary, MeasurementNoise, Signal, Track, Whiteness
+from davinci_forces.robots import dvrk_psm
+from davinci_forces.runner.fingerprints.schemas import schemas
+from davinci_forces.runner.ledger import Entry, Folders, Ledger
+from davinci_forces.runner.places import about
+from davinci_forces.runner.plan import Plan
+from davinci_forces.runner.signature import declaration
+from davinci_forces.stages import STAGES
+from davinci_forces.study import LogEntry, Settings, Study
 from tests import many
 
 ROLL, PITCH = (joint.name for joint in dvrk_psm.ROBOT.joints[:2])
@@ -101,7 +101,7 @@ def test_a_stage_depends_on_the_settings_and_things_that_its_signature_names(pla
 
 
 def test_what_is_read_counts_by_name_type_and_unit_and_what_is_written_by_meaning_too(monkeypatch):
-    from pipeline.records.quantities import QUANTITIES
+    from davinci_forces.records.quantities import QUANTITIES
 
     before = {stage: schemas(stage) for stage in ("predict", "fit", "whiteness")}
     read = {"Signal", "Trajectory", "FittedPaths", "Fit", "CrossFit", "Smoothed", "Choice"}

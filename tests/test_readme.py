@@ -13,13 +13,13 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-import pipeline
-from pipeline import commands, robots, stages
-from pipeline.cli import app
-from pipeline.estimators import ESTIMATORS
-from pipeline.logs import FORMATS
-from pipeline.maths.units import SI, UNITS
-from pipeline.records import (
+import davinci_forces
+from davinci_forces import commands, robots, stages
+from davinci_forces.cli import app
+from davinci_forces.estimators import ESTIMATORS
+from davinci_forces.logs import FORMATS
+from davinci_forces.maths.units import SI, UNITS
+from davinci_forces.records import (
     COLUMN_DTYPES,
     KINDS,
     Control,
@@ -42,14 +42,14 @@ from pipeline.records import (
     TissueModel,
     Weight,
 )
-from pipeline.records.catalogue import Catalogue
-from pipeline.report.results import collect
-from pipeline.robots.robot import Joint
-from pipeline.runner import STEPS
-from pipeline.runner.signature import declaration
-from pipeline.study import HungMass, LogEntry, Settings, reading
-from pipeline.study.channels import OF_A_JOINT, OF_THE_LOG
-from pipeline.study.entries import ROLES
+from davinci_forces.records.catalogue import Catalogue
+from davinci_forces.report.results import collect
+from davinci_forces.robots.robot import Joint
+from davinci_forces.runner import STEPS
+from davinci_forces.runner.signature import declaration
+from davinci_forces.study import HungMass, LogEntry, Settings, reading
+from davinci_forces.study.channels import OF_A_JOINT, OF_THE_LOG
+from davinci_forces.study.entries import ROLES
 from tests.conftest import ROOT
 
 README = (ROOT / "README.md").read_text(encoding="utf-8")
@@ -299,7 +299,7 @@ def test_the_study_file_of_the_readme_is_one(tmp_path):
 
 def test_what_python_is_offered_is_what_the_readme_shows():
     code = README.partition("```python\n")[2].partition("```")[0]
-    assert {f"pipeline.{name}(" for name in pipeline.__all__} <= set(re.findall(r"pipeline\.\w+\(", code))
+    assert {f"davinci_forces.{name}(" for name in davinci_forces.__all__} <= set(re.findall(r"pipeline\.\w+\(", code))
 
 
 def test_the_readme_leads_to_files_that_are_there():

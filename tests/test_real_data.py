@@ -61,18 +61,18 @@ def test_a_hung_mass_is_seen_on_the_joints_that_carry_it_and_not_on_the_slide(re
 
 def test_the_ridge_that_is_chosen_lies_within_those_that_were_tried(dvrk):
     """At an edge, a stronger or weaker one might have done better."""
-    import pipeline
-    from pipeline.estimators.candidates import RIDGES
+    import davinci_forces
+    from davinci_forces.identification.candidates import RIDGES
 
-    name = str(pipeline.read(dvrk, "Choice")["chosen"].iloc[0])
+    name = str(davinci_forces.read(dvrk, "Choice")["chosen"].iloc[0])
     assert name.startswith("coupled+dahl")
     assert min(RIDGES["coupled"]) < float(name.partition(", ridge ")[2]) < max(RIDGES["coupled"])
 
 
 def weight(study):
-    import pipeline
+    import davinci_forces
 
-    [row] = pipeline.read(study, "Weight").drop_duplicates("log").to_dict("records")
+    [row] = davinci_forces.read(study, "Weight").drop_duplicates("log").to_dict("records")
     return row
 
 
@@ -85,9 +85,9 @@ def test_the_mass_that_hangs_on_the_arm_is_found_within_four_percent_and_its_int
 
 
 def test_nothing_hangs_on_the_arm_in_runs_of_free_motion(dvrk):
-    import pipeline
+    import davinci_forces
 
-    free = pipeline.read(dvrk, "FreeWeight")
+    free = davinci_forces.read(dvrk, "FreeWeight")
     assert set(free["log"]) == {"one", "one-noweight"}
     assert (free["free_mass"].abs() < 1.96 * free["free_mass_std"]).all()
 
@@ -121,10 +121,10 @@ def test_free_motion_looks_small_while_a_push_is_shown(results, joint, least, al
 
 
 def test_the_bands_cover_free_motion_that_they_were_not_made_of(dvrk, results):
-    import pipeline
+    import davinci_forces
 
     for joint in ("hand_roll", "hand_pitch", "instrument_slide"):
-        track = pipeline.read(dvrk, "Track", log="one-noweight", joint=joint)
+        track = davinci_forces.read(dvrk, "Track", log="one-noweight", joint=joint)
         assert track["band_from"].iloc[0] == "one"
         assert results[f"ekf.one-noweight.{joint}.coverage"] >= 0.90
 
@@ -161,19 +161,19 @@ def ur10e(data, tmp_path_factory):
 
 
 def test_the_period_of_a_log_that_ends_in_a_stop_is_that_of_its_motion(ur10e):
-    import pipeline
+    import davinci_forces
 
     for log in ("skipped", "ended"):
-        average = pipeline.read(ur10e[0], "Average", log=log)
+        average = davinci_forces.read(ur10e[0], "Average", log=log)
         assert average["period"].iloc[0] == pytest.approx(10.0, abs=0.002)
         assert average["periods"].iloc[0] == 4
 
 
 def test_effort_of_a_drive_of_unknown_gain_is_in_amperes_and_so_are_its_parameters(ur10e):
-    import pipeline
+    import davinci_forces
 
-    assert pipeline.read(ur10e[0], "Trajectory").attrs["units"]["tau"] == "A"
-    fit = pipeline.read(ur10e[0], "Fit", estimator="lse").set_index("parameter")
+    assert davinci_forces.read(ur10e[0], "Trajectory").attrs["units"]["tau"] == "A"
+    fit = davinci_forces.read(ur10e[0], "Fit", estimator="lse").set_index("parameter")
     assert fit["unit"].to_dict() == {
         "inertia": "A s^2/rad", "viscous friction": "A s/rad", "Coulomb friction": "A", "offset": "A",
     }  # fmt: skip
@@ -188,9 +188,9 @@ def test_one_remark_says_what_the_stop_costs_and_none_where_the_study_says_it(ur
 
 
 def test_what_a_log_that_ends_in_a_stop_says_of_the_joint_predicts_its_periods(ur10e):
-    import pipeline
+    import davinci_forces
 
-    assert pipeline.read(ur10e[0], "Prediction", log="skipped")["relative_error"].max() < 0.06
+    assert davinci_forces.read(ur10e[0], "Prediction", log="skipped")["relative_error"].max() < 0.06
 
 
 def test_verify_passes(dvrk):

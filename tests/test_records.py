@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.errors import BadRecord
-from pipeline.records import PeriodResidual, store
+from davinci_forces.errors import BadRecord
+from davinci_forces.records import PeriodResidual, store
 
 ROWS = 1000
 

@@ -6,13 +6,13 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from pipeline.cli import app
-from pipeline.runner.fingerprints.canonical import hash_of_text
-from pipeline.runner.fingerprints.fingerprint import Fingerprint
-from pipeline.runner.ledger import Entry, Folders, Ledger
-from pipeline.runner.plan import Task
-from pipeline.runner.reuse import reused
-from pipeline.stages import design
+from davinci_forces.cli import app
+from davinci_forces.runner.fingerprints.canonical import hash_of_text
+from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
+from davinci_forces.runner.ledger import Entry, Folders, Ledger
+from davinci_forces.runner.plan import Task
+from davinci_forces.runner.reuse import reused
+from davinci_forces.stages import design
 
 SAME = Fingerprint({}, {"robot": "a"}, {"shape": [1, 2]}, {}, {"design.py": "b"}, "1")
 LINKS, POSE = "processed/links/arm.parquet", "processed/pose/arm.parquet"

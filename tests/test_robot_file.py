@@ -6,11 +6,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline import robots
-from pipeline.errors import BadRobot
-from pipeline.robots.from_toml import robot_of
-from pipeline.toml import TomlTable
-from pipeline.toml.file import TomlFile
+from davinci_forces import robots
+from davinci_forces.errors import BadRobot
+from davinci_forces.robots.from_toml import robot_of
+from davinci_forces.toml import TomlTable
+from davinci_forces.toml.file import TomlFile
 from tests import arm
 from tests.test_study import ANYTHING, ARM, places_of
 

@@ -13,18 +13,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.errors import BadRequest
-from pipeline.records import Diagnostic, PeriodResidual, Recording, store
-from pipeline.robots import davinci
-from pipeline.runner import execution
-from pipeline.runner.fingerprints.canonical import canonical, hash_of
-from pipeline.runner.fingerprints.code import PACKAGE, code, imported
-from pipeline.runner.fingerprints.fingerprint import Fingerprint
-from pipeline.runner.ledger import Folders
-from pipeline.runner.lock import locked
-from pipeline.runner.plan import Task
-from pipeline.runner.signature import declaration
-from pipeline.stages import resample
+from davinci_forces.errors import BadRequest
+from davinci_forces.records import Diagnostic, PeriodResidual, Recording, store
+from davinci_forces.robots import davinci
+from davinci_forces.runner import execution
+from davinci_forces.runner.fingerprints.canonical import canonical, hash_of
+from davinci_forces.runner.fingerprints.code import PACKAGE, code, imported
+from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
+from davinci_forces.runner.ledger import Folders
+from davinci_forces.runner.lock import locked
+from davinci_forces.runner.plan import Task
+from davinci_forces.runner.signature import declaration
+from davinci_forces.stages import resample
 from tests import arm
 from tests.test_runs import call, processed, reports
 
@@ -68,11 +68,13 @@ def flat(said: str) -> str:
 
 def test_the_readers_of_logs_count_for_ingest_and_the_store_for_every_stage(finished):
     entry = json.loads((processed(finished) / "tasks" / "ingest" / "one.json").read_text())
-    assert {"pipeline/logs/text/reader.py", "pipeline/logs/tdms/reader.py", "pipeline/logs/blocks.py"} <= set(
-        entry["fingerprint"]["code"]
-    )
+    assert {
+        "davinci_forces/logs/text/reader.py",
+        "davinci_forces/logs/tdms/reader.py",
+        "davinci_forces/logs/blocks.py",
+    } <= set(entry["fingerprint"]["code"])
     for file in (processed(finished) / "tasks").glob("*/*.json"):
-        assert "pipeline/records/store.py" in json.loads(file.read_text())["fingerprint"]["code"], file
+        assert "davinci_forces/records/store.py" in json.loads(file.read_text())["fingerprint"]["code"], file
 
 
 @pytest.mark.parametrize("file", sorted(PACKAGE.rglob("*.py")), ids=lambda file: file.relative_to(PACKAGE).as_posix())
@@ -114,9 +116,9 @@ def test_what_is_written_is_let_go_though_its_file_has_no_name_yet(tmp_path):
 
 
 def test_code_of_several_modules_is_that_of_each():
-    assert code("pipeline.maths.units", "pipeline.records.store") == code("pipeline.maths.units") | code(
-        "pipeline.records.store"
-    )
+    assert code("davinci_forces.maths.units", "davinci_forces.records.store") == code(
+        "davinci_forces.maths.units"
+    ) | code("davinci_forces.records.store")
 
 
 def test_the_hash_of_a_robot_sees_every_bit_of_it():
@@ -168,7 +170,7 @@ def test_a_study_of_which_no_file_is_there_says_so_and_stops(raw):
 @pytest.mark.parametrize("named", [True, False])
 def test_a_broken_study_does_not_stop_the_others(raw, monkeypatch, named):
     monkeypatch.chdir(raw.parent)
-    monkeypatch.setattr("pipeline.cli.STEPS", ("ingest",))
+    monkeypatch.setattr("davinci_forces.cli.STEPS", ("ingest",))
     for name in ("a", "c"):
         (raw / name).mkdir()
     (raw / "a" / "study.toml").write_text("title = 3")
@@ -197,7 +199,7 @@ def test_what_the_machine_refuses_is_a_message(raw, monkeypatch, failure, says):
     def refuse(*_):
         raise failure
 
-    monkeypatch.setattr("pipeline.runner.runner.perform", refuse)
+    monkeypatch.setattr("davinci_forces.runner.runner.perform", refuse)
     said = flat(call("ingest", small(raw / "lab"), code=1))
     assert says in said
 
@@ -206,7 +208,7 @@ def test_a_log_that_may_not_be_read_is_no_fault_of_ours(raw, monkeypatch):
     def refuse(files, options):
         raise PermissionError(13, "Permission denied", str(files[0]))
 
-    monkeypatch.setattr("pipeline.runner.execution.open_parts", refuse)
+    monkeypatch.setattr("davinci_forces.runner.execution.open_parts", refuse)
     said = flat(call("ingest", small(raw / "lab"), code=1))
     assert "Permission denied" in said
     assert "fault of davinci-forces" not in said
@@ -215,11 +217,11 @@ def test_a_log_that_may_not_be_read_is_no_fault_of_ours(raw, monkeypatch):
 HOLD = """
 import sys, time
 from pathlib import Path
-from pipeline.runner.fingerprints.fingerprint import Fingerprint
-from pipeline.runner.ledger import Folders
-from pipeline.runner.lock import locked
-from pipeline.runner.plan import Task
-from pipeline.runner.signature import declaration
+from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
+from davinci_forces.runner.ledger import Folders
+from davinci_forces.runner.lock import locked
+from davinci_forces.runner.plan import Task
+from davinci_forces.runner.signature import declaration
 with locked(Path(sys.argv[1])):
     print("held", flush=True)
     time.sleep(60)
@@ -271,13 +273,13 @@ def test_many_runs_at_once_hold_the_lock_one_after_the_other(tmp_path):
     text = """
 import sys, time
 from pathlib import Path
-from pipeline.errors import BadRequest
-from pipeline.records import Diagnostic, PeriodResidual, Recording, store
-from pipeline.runner.fingerprints.fingerprint import Fingerprint
-from pipeline.runner.ledger import Folders
-from pipeline.runner.lock import locked
-from pipeline.runner.plan import Task
-from pipeline.runner.signature import declaration
+from davinci_forces.errors import BadRequest
+from davinci_forces.records import Diagnostic, PeriodResidual, Recording, store
+from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
+from davinci_forces.runner.ledger import Folders
+from davinci_forces.runner.lock import locked
+from davinci_forces.runner.plan import Task
+from davinci_forces.runner.signature import declaration
 folder, done = Path(sys.argv[1]), 0
 while done < 40:
     try:

@@ -15,13 +15,13 @@ import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner
 
-import pipeline
-from pipeline.cli import app
-from pipeline.errors import BadRequest, MissingRecord
-from pipeline.estimators import ESTIMATORS
-from pipeline.records import store
-from pipeline.runner import ledger, reporting
-from pipeline.stages import STAGES
+import davinci_forces
+from davinci_forces.cli import app
+from davinci_forces.errors import BadRequest, MissingRecord
+from davinci_forces.estimators import ESTIMATORS
+from davinci_forces.records import store
+from davinci_forces.runner import ledger, reporting
+from davinci_forces.stages import STAGES
 from tests.arm import write_robot, write_study
 
 FIRST = '[[log]]\nname = "roll"'  # how the first log of the study begins
@@ -171,7 +171,7 @@ def test_an_altered_processed_file_is_made_again(finished):
 def package(tmp_path) -> Path:
     """A copy of the package, so that its code can be edited."""
     copy = tmp_path / "code" / "pipeline"
-    return shutil.copytree(Path(pipeline.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
+    return shutil.copytree(Path(davinci_forces.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
 
 
 def run_by(package: Path, *arguments: object) -> str:
@@ -194,7 +194,7 @@ def test_editing_a_term_of_the_model_makes_the_fit_run_again_and_says_why(finish
     edit(package / "maths" / "models" / "terms.py", 'b={"sign(dq)": 1.0}', 'b={"sign(dq)": 2.0}')
     said = run_by(package, "fit", finished)
     assert "the robot changed" in said
-    assert "the code of pipeline/maths/models/terms.py changed" in said
+    assert "the code of davinci_forces/maths/models/terms.py changed" in said
 
 
 def test_a_reworded_meaning_runs_what_stores_it_and_what_reads_that(finished, package):
@@ -206,7 +206,7 @@ def test_a_reworded_meaning_runs_what_stores_it_and_what_reads_that(finished, pa
         assert line.endswith(" current"), line
     assert re.search(r"^ekf: .* and 1 more: the declaration of Track changed$", said, re.M), said
     assert re.search(r"^whiteness: track/.*: processed/track/.*parquet changed$", said, re.M), said
-    assert re.search(r"^report: the code of pipeline/records/predict.py changed", said, re.M), said
+    assert re.search(r"^report: the code of davinci_forces/records/predict.py changed", said, re.M), said
 
 
 @pytest.mark.parametrize("whole", [True, False], ids=["index", "no index"])
@@ -243,7 +243,7 @@ def test_a_run_that_is_ended_leaves_no_index_that_lacks_what_it_made(finished, m
 
     monkeypatch.setattr(ledger.Ledger, "write_index", end)
     with pytest.raises(KeyboardInterrupt):
-        pipeline.run(finished, "average", force=True)
+        davinci_forces.run(finished, "average", force=True)
     assert not (processed(finished) / "tasks" / "index.json").exists()
 
 
@@ -263,7 +263,7 @@ def test_a_report_that_fails_says_so_costs_no_stage_and_is_tried_again(finished,
         raise ZeroDivisionError("for a test")
 
     with monkeypatch.context() as patch:
-        patch.setattr("pipeline.report.report.collect", fail)
+        patch.setattr("davinci_forces.report.report.collect", fail)
         edit(finished / "study.toml", 'title = "A test"', 'title = "A trial"')
         assert "report: error: ZeroDivisionError: for a test (test_runs.py:" in call("report", finished, code=1)
     assert "report: it failed last time" in call("report", finished)
@@ -281,7 +281,7 @@ def test_a_log_that_leaves_the_study_takes_its_records_with_it(finished):
 def test_a_run_that_is_killed_resumes_to_the_same_bytes(study, analysed):
     """Killed again and again, at moments that move, until it is through; every file there is whole throughout."""
     wanted = contents(processed(analysed))
-    command = [sys.executable, "-c", "from pipeline.cli import main; main()", "all", str(study)]
+    command = [sys.executable, "-c", "from davinci_forces.cli import main; main()", "all", str(study)]
     for attempt in range(12):
         running = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         time.sleep(0.8 + 0.35 * attempt)
@@ -307,7 +307,7 @@ def test_units_meanings_and_origins_travel_with_the_file(analysed):
     made_from = json.loads(file.metadata.metadata[b"made_from"])
     assert made_from["inputs"].keys() == {"processed/signal/slide/instrument_slide.parquet"}
     assert made_from["settings"] == {"harmonics": 0, "lowpass": 17.0}
-    assert "pipeline/maths/signals/averaging.py" in made_from["code"]
+    assert "davinci_forces/maths/periods/averaging.py" in made_from["code"]
 
 
 def test_floats_are_stored_byte_by_byte_and_compressed(analysed):
@@ -325,23 +325,23 @@ def test_no_processed_file_knows_this_machine(analysed):
 
 
 def test_a_study_is_read_back_as_a_frame_with_its_units(analysed):
-    frame = pipeline.read(analysed, "Track", joint="hand_roll")
+    frame = davinci_forces.read(analysed, "Track", joint="hand_roll")
     assert set(frame["log"]) == {"roll", "check", "push"}
     assert frame.attrs["units"]["tau_ext"] == "N m"
-    both = pipeline.read(analysed, "Track")
+    both = davinci_forces.read(analysed, "Track")
     assert both.attrs["units"]["q"] == {"hand_roll": "rad", "instrument_slide": "m"}
-    own = pipeline.read(analysed, "Fit", model="independent")
+    own = davinci_forces.read(analysed, "Fit", model="independent")
     assert set(own["estimator"]) >= set(ESTIMATORS)
     assert len(own[own["estimator"] == "lse"]) == 4 + 4
 
 
 def test_reading_what_is_not_there_says_what_there_is(analysed, study):
     with pytest.raises(BadRequest, match="no record 'Tracks'; there are Links, Pose"):
-        pipeline.read(analysed, "Tracks")
+        davinci_forces.read(analysed, "Tracks")
     with pytest.raises(BadRequest, match="Track has no arm; it has log, joint"):
-        pipeline.read(analysed, "Track", arm="left")
+        davinci_forces.read(analysed, "Track", arm="left")
     with pytest.raises(MissingRecord, match="run `davinci-forces all"):
-        pipeline.read(study, "Track")
+        davinci_forces.read(study, "Track")
 
 
 def test_results_hold_what_the_study_found(analysed):
@@ -355,7 +355,7 @@ def test_results_hold_what_the_study_found(analysed):
 
 
 def test_a_push_is_found_in_the_contact_log(analysed):
-    track = pipeline.read(analysed, "Track", log="push")
+    track = davinci_forces.read(analysed, "Track", log="push")
     inside = track["t"].between(4.5, 5.9)
     assert track["tau_ext"][inside].mean() == pytest.approx(1.0, abs=0.15)
 
@@ -409,7 +409,7 @@ def test_all_takes_the_studies_of_raw_and_skips_those_without_logs(study, monkey
     other.mkdir()
     write_robot(other)
     (other / "study.toml").write_text((study / "study.toml").read_text())
-    monkeypatch.setattr("pipeline.cli.STEPS", ("ingest",))
+    monkeypatch.setattr("davinci_forces.cli.STEPS", ("ingest",))
     said = call("all")
     assert "raw/elsewhere: skipped, its logs are not here (roll.csv ...)" in said
     assert (tmp_path / "processed" / "arm" / "recording" / "roll" / "hand_roll.parquet").exists()

@@ -10,10 +10,10 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
-import pipeline
-from pipeline.errors import BadLog
-from pipeline.logs.aligned import Alignment, Timed, aligned
-from pipeline.maths.signals.clock import GAP
+import davinci_forces
+from davinci_forces.errors import BadLog
+from davinci_forces.logs.aligned import Alignment, Timed, aligned
+from davinci_forces.maths.signals.clock import GAP
 from tests import arm
 from tests.logs.test_clocks import said, tdms
 from tests.test_runs import call
@@ -145,14 +145,14 @@ def test_an_effort_with_a_clock_of_its_own_comes_to_the_times_of_the_position(la
     (lab / "run.tdms").write_bytes(tdms({"a/q": (q, said(0, 0.01)), "b/tau": (tau, said(0.0033, 0.01))}))
     describe(lab, 'file = "run.tdms"', OF_TDMS, role)
     call("ingest", lab)
-    made = pipeline.read(lab, "Recording", log="run")
+    made = davinci_forces.read(lab, "Recording", log="run")
     assert len(made) == 499  # the effort begins after the first position
     assert_allclose(made["q"], q[1:], rtol=1e-12)
     inner = slice(2, -2)
     wanted = motion(0.01 + made["t"].to_numpy())[1]
     h4 = (2 * np.pi * 0.01) ** 4  # the error of a cubic goes with the fourth power of the sampling time
     assert_allclose(made["tau"][inner], wanted[inner], atol=2.0 * h4)
-    [note] = [text for text in pipeline.read(lab, "Diagnostic")["text"] if "clocks of their own" in text]
+    [note] = [text for text in davinci_forces.read(lab, "Diagnostic")["text"] if "clocks of their own" in text]
     assert "'b/tau' (100 Hz) by cubics between neighbours, across no gap" in note
 
 
@@ -168,7 +168,7 @@ def test_a_pause_of_one_clock_is_a_gap_of_all(lab: Path) -> None:
     describe(lab, 'file = "run.tdms"', OF_TDMS)
     call("ingest", lab)
     call("resample", lab)
-    signal = pipeline.read(lab, "Signal", log="run")
+    signal = davinci_forces.read(lab, "Signal", log="run")
     assert signal["segment"].max() == 1
     assert_allclose(np.diff(signal["t"]).max(), 1.02, atol=1e-9)
 
@@ -181,7 +181,7 @@ def test_a_pause_between_two_parts_is_a_gap(lab: Path) -> None:
     describe(lab, 'files = ["0.tdms", "1.tdms"]', OF_TDMS)
     call("ingest", lab)
     call("resample", lab)
-    signal = pipeline.read(lab, "Signal", log="run")
+    signal = davinci_forces.read(lab, "Signal", log="run")
     assert (signal["gaps"].iloc[0], signal["method"].iloc[0]) == (1, "as recorded")
     assert_allclose(np.diff(signal["t"]).max(), 60 - 2.99, rtol=1e-12)
     describe(lab, 'files = ["1.tdms", "0.tdms"]', OF_TDMS)
@@ -196,7 +196,7 @@ def test_each_group_of_a_tdms_file_has_the_times_that_the_study_names(lab: Path)
     for name in ("Time", "a/Time"):
         describe(lab, 'file = "run.tdms"', f'time = {{ channel = "{name}", unit = "ms" }}\n{OF_TDMS}')
         call("ingest", lab)
-        made = pipeline.read(lab, "Recording", log="run")
+        made = davinci_forces.read(lab, "Recording", log="run")
         assert_allclose(made["tau"][2:-2], motion(0.01 + made["t"].to_numpy())[1][2:-2], atol=1e-4)
 
 
@@ -223,11 +223,11 @@ def test_one_signal_a_file_becomes_a_recording(lab: Path) -> None:
     channels = "\n".join(f'"hand_roll.{name}" = "{name}/column_1"' for name in ("q", "dq", "tau"))
     describe(lab, 'join = ["q.csv", "dq.csv", "tau.csv"]', f"time = 0\n{channels}")
     call("ingest", lab)
-    made = pipeline.read(lab, "Recording", log="run")
+    made = davinci_forces.read(lab, "Recording", log="run")
     assert_array_equal(made["q"], q[1:])
     assert_array_equal(made["dq"], tau[1:])
     assert_allclose(made["tau"][2:-2], tau[3:-2], atol=1e-4)
-    described = pipeline.read(lab, "LogSummary")
+    described = davinci_forces.read(lab, "LogSummary")
     assert set(described["feeds"]) >= {"time", "hand_roll.q", "hand_roll.tau"}
 
 
@@ -240,7 +240,7 @@ def test_joined_files_without_clocks_are_counted_by_the_rate(lab: Path) -> None:
     assert "nothing says when channel 'q/q' was sampled" in " ".join(call("ingest", lab, code=1).split())
     describe(lab, 'join = ["q.csv", "tau.csv"]\nrate = 100.0', channels)
     call("ingest", lab)
-    made = pipeline.read(lab, "Recording", log="run")
+    made = davinci_forces.read(lab, "Recording", log="run")
     assert_array_equal(made["tau"], tau)
     assert_allclose(made["t"], 0.01 * np.arange(100), atol=1e-12)
 
@@ -252,7 +252,7 @@ def test_a_scale_applies_after_offset_and_sign_and_its_unit_names_the_result(lab
     scaled = '{ channel = "b/tau", offset = 1.5, sign = -1, scale = 400.0, unit = "mN m" }'
     describe(lab, 'file = "run.tdms"', f'"hand_roll.q" = "a/q"\n"hand_roll.tau" = {scaled}')
     call("ingest", lab)
-    assert_allclose(pipeline.read(lab, "Recording", log="run")["tau"], tau, atol=1e-12)
+    assert_allclose(davinci_forces.read(lab, "Recording", log="run")["tau"], tau, atol=1e-12)
 
 
 def test_a_scale_of_nothing_is_a_problem_of_the_study(lab: Path) -> None:
@@ -278,10 +278,10 @@ def test_the_signals_of_a_real_arm_one_a_file_become_recordings(data: Path, tmp_
     forces = [f'force_{axis} = "force_sensor/column_{i}"' for i, axis in enumerate("xyz", start=1)]
     describe(folder, f"join = [{listed}]", "\n".join(["time = 0", *channels, *forces]))
     call("ingest", folder)
-    made = pipeline.read(folder, "Recording", joint="hand_roll")
+    made = davinci_forces.read(folder, "Recording", joint="hand_roll")
     raw = np.loadtxt(folder / "q_actual.csv", delimiter=",", max_rows=3400)
     assert_array_equal(made["q"][:3399], raw[1:3400, 1])
-    touch = pipeline.read(folder, "Touch")
+    touch = davinci_forces.read(folder, "Touch")
     theirs = np.loadtxt(folder / "force_sensor.csv", delimiter=",", max_rows=5000)
     t = touch["t"][:2000] + raw[1, 0]
     bend = np.abs(np.diff(theirs[:, 3], 2)).max()  # a cubic is no further from the chord than the samples bend

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from pipeline.estimators import estimator
-from pipeline.estimators.problem import Regression
-from pipeline.estimators.regression import pose
-from pipeline.maths.signals import averaging
-from pipeline.records import Average, Signal, Trajectory
-from pipeline.robots.dvrk_psm import ROBOT
-from pipeline.robots.models import independent
-from pipeline.stages import average, differentiate
+from davinci_forces.estimators import estimator
+from davinci_forces.estimators.problem import Regression
+from davinci_forces.identification.regression import pose
+from davinci_forces.maths.periods import averaging
+from davinci_forces.records import Average, Signal, Trajectory
+from davinci_forces.robots.dvrk_psm import ROBOT
+from davinci_forces.robots.models import independent
+from davinci_forces.stages import average, differentiate
 from tests.test_averaging import entry
 
 JOINTS = tuple(joint.name for joint in ROBOT.joints)

@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipeline.maths.models.independent import regressor
-from pipeline.maths.selection.blocks import path_blocks
-from pipeline.maths.selection.equations import gathered
-from pipeline.maths.signals.noise import noise_std
-from pipeline.maths.signals.smoothing import lowpass
-from pipeline.maths.signals.standstill import HOLD, standing
-from pipeline.records import Average, Choice, Diagnostic, Fit, Prediction, Smoothed, Trajectory
-from pipeline.stages import average, choose, differentiate, fit, predict, smooth
-from pipeline.study import LogEntry
+from davinci_forces.maths.models.independent import regressor
+from davinci_forces.maths.selection.blocks import path_blocks
+from davinci_forces.maths.selection.equations import gathered
+from davinci_forces.maths.signals.noise import noise_std
+from davinci_forces.maths.signals.smoothing import lowpass
+from davinci_forces.maths.signals.standstill import HOLD, standing
+from davinci_forces.records import Average, Choice, Diagnostic, Fit, Prediction, Smoothed, Trajectory
+from davinci_forces.stages import average, choose, differentiate, fit, predict, smooth
+from davinci_forces.study import LogEntry
 from tests import arm
 
 RATE, LOWPASS = 100.0, 17.0

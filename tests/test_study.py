@@ -7,16 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline import robots
-from pipeline.errors import BadRobot, BadStudy
-from pipeline.maths.mechanics.kinematics import tip
-from pipeline.robots.from_toml import RESERVED
-from pipeline.robots.robot import Kind
-from pipeline.runner.fingerprints.canonical import hash_of
-from pipeline.runner.reporting import study_files
-from pipeline.study import reading
-from pipeline.toml import TomlTable
-from pipeline.toml.file import TomlFile
+from davinci_forces import robots
+from davinci_forces.errors import BadRobot, BadStudy
+from davinci_forces.maths.mechanics.kinematics import tip
+from davinci_forces.robots.from_toml import RESERVED
+from davinci_forces.robots.robot import Kind
+from davinci_forces.runner.fingerprints.canonical import hash_of
+from davinci_forces.runner.reporting import study_files
+from davinci_forces.study import reading
+from davinci_forces.toml import TomlTable
+from davinci_forces.toml.file import TomlFile
 from tests.test_runs import call
 
 GOOD = """title = "T"

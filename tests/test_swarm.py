@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pipeline.estimators import pso
-from pipeline.estimators.known import known_of
-from pipeline.estimators.problem import Known, Regression
-from pipeline.maths.estimation.bounded import bounded
-from pipeline.maths.estimation.least_squares import triangle
-from pipeline.maths.estimation.swarm import CONSTRICTED, THESIS, search
-from pipeline.maths.models.independent import regressor
-from pipeline.maths.models.reduced_joint import reduced_parameters
-from pipeline.maths.models.terms import offset
-from pipeline.records import Fit, SwarmSearch
-from pipeline.robots.davinci import ROBOT
-from pipeline.robots.davinci_chain import CHAIN, DRIVES, bodies, in_table_frames
-from pipeline.stages import fit
+from davinci_forces.estimators import pso
+from davinci_forces.estimators.problem import Known, Regression
+from davinci_forces.identification.known import known_of
+from davinci_forces.maths.estimation.bounded import bounded
+from davinci_forces.maths.estimation.least_squares import triangle
+from davinci_forces.maths.estimation.swarm import CONSTRICTED, THESIS, search
+from davinci_forces.maths.models.independent import regressor
+from davinci_forces.maths.models.reduced_joint import reduced_parameters
+from davinci_forces.maths.models.terms import offset
+from davinci_forces.records import Fit, SwarmSearch
+from davinci_forces.robots.davinci import ROBOT
+from davinci_forces.robots.davinci_chain import CHAIN, DRIVES, bodies, in_table_frames
+from davinci_forces.stages import fit
 from tests import arm
 from tests.test_estimation import trajectory
 

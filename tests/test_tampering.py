@@ -13,9 +13,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from pipeline.errors import PipelineError
-from pipeline.records import KINDS, store
-from pipeline.runner.ledger import Folders, Ledger
+from davinci_forces.errors import PipelineError
+from davinci_forces.records import KINDS, store
+from davinci_forces.runner.ledger import Folders, Ledger
 from tests.test_robustness import analysed, finished, flat  # noqa: F401 - fixtures
 from tests.test_runs import call, processed, reports
 

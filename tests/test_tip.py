@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.maths.contact.joint_correlation import matrix, shared
-from pipeline.maths.mechanics import kinematics, tip_force, workspace
-from pipeline.records import (
+from davinci_forces.maths.mechanics import kinematics, tip_force, workspace
+from davinci_forces.maths.uncertainty.joint_correlation import matrix, shared
+from davinci_forces.records import (
     ArmCorrelation,
     Contact,
     Diagnostic,
@@ -19,10 +19,10 @@ from pipeline.records import (
     TipForce,
     Track,
 )
-from pipeline.report import verdicts
-from pipeline.report.sections import tip
-from pipeline.robots import load
-from pipeline.stages import combine, correlate, resolve
+from davinci_forces.report import verdicts
+from davinci_forces.report.sections import tip
+from davinci_forces.robots import load
+from davinci_forces.stages import combine, correlate, resolve
 from tests.test_averaging import entry
 
 RATE = 100.0

@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.errors import BadRequest
-from pipeline.toml import parse, read
-from pipeline.toml.lines import lines_of
+from davinci_forces.errors import BadRequest
+from davinci_forces.toml import parse, read
+from davinci_forces.toml.lines import lines_of
 
 NAMES = st.sampled_from(
     ["a", "b_1", "-", "7", "1.5", "a b", "[x]", "q = 1", "#", "'", '"', "\\", "", "é", "a\nb", "]]"]

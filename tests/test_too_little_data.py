@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.records import Choice, Diagnostic, Fit, Signal
-from pipeline.stages import choose, fit, smooth
+from davinci_forces.records import Choice, Diagnostic, Fit, Signal
+from davinci_forces.stages import choose, fit, smooth
 from tests import arm
 from tests.test_averaging import entry
 from tests.test_estimation import trajectory

@@ -6,19 +6,19 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pipeline.errors import NotIdentifiable
-from pipeline.estimators import estimator
-from pipeline.estimators.folds import part
-from pipeline.estimators.problem import Regression
-from pipeline.estimators.regression import averaged_motion, joined, pose, row_covariance
-from pipeline.estimators.tls import Noise, smallest
-from pipeline.maths.estimation.least_squares import triangle
-from pipeline.maths.models.independent import regressor
-from pipeline.maths.models.model import Motion
-from pipeline.maths.signals.harmonics import derivative, evaluate, kept_noise, project
-from pipeline.records import Diagnostic, Fit
-from pipeline.robots.models import independent
-from pipeline.stages import fit
+from davinci_forces.errors import NotIdentifiable
+from davinci_forces.estimators import estimator
+from davinci_forces.estimators.problem import Regression
+from davinci_forces.estimators.tls import Noise, smallest
+from davinci_forces.identification.folds import part
+from davinci_forces.identification.regression import averaged_motion, joined, pose, row_covariance
+from davinci_forces.maths.estimation.least_squares import triangle
+from davinci_forces.maths.models.independent import regressor
+from davinci_forces.maths.models.model import Motion
+from davinci_forces.maths.periods.harmonics import derivative, evaluate, kept_noise, project
+from davinci_forces.records import Diagnostic, Fit
+from davinci_forces.robots.models import independent
+from davinci_forces.stages import fit
 from tests import arm
 from tests.contracts.test_estimators import NAMES, PHI, problem
 from tests.test_estimation import trajectory

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipeline.maths.contact.weighing import PARTS, Rows, Weighed, better, offset, weighed, widening
-from pipeline.maths.mechanics.load import unit_load
-from pipeline.maths.signals.shift import circular, rolled, straight
-from pipeline.records import Diagnostic, FreeWeight, Load, Prediction, Signal, Track, Weight
-from pipeline.robots import dvrk_psm
-from pipeline.stages import hang, weigh
-from pipeline.study import HungMass, Weighing, Weighings
+from davinci_forces.maths.contact.weighing import PARTS, Rows, Weighed, better, offset, weighed, widening
+from davinci_forces.maths.mechanics.load import unit_load
+from davinci_forces.maths.periods.shift import circular, rolled, straight
+from davinci_forces.records import Diagnostic, FreeWeight, Load, Prediction, Signal, Track, Weight
+from davinci_forces.robots import dvrk_psm
+from davinci_forces.stages import hang, weigh
+from davinci_forces.study import HungMass, Weighing, Weighings
 from tests.arm import ARM
 from tests.test_averaging import entry
 

@@ -59,7 +59,7 @@ def test_the_wheel_holds_every_file_of_the_package(wheel):
     with zipfile.ZipFile(wheel) as archive:
         held = {name for name in archive.namelist() if name.startswith("pipeline/")}
     assert held == wanted
-    assert {"pipeline/py.typed", "pipeline/simulation/shipped/davinci-joints.toml"} <= held
+    assert {"davinci_forces/py.typed", "davinci_forces/simulation/shipped/davinci-joints.toml"} <= held
     suffixes = {Path(name).suffix for name in held}
     assert suffixes == {".py", ".toml", ".html", ".typ", ".css", ".js", ".png", ".typed"}
 
@@ -68,7 +68,7 @@ def test_the_wheel_holds_every_file_of_the_package(wheel):
 def test_an_installed_package_simulates_and_analyses_in_an_empty_folder(installed, tmp_path):
     program = installed / "davinci-forces"
     python = next(installed.glob("python*"))
-    place = run(python, "-c", "import pipeline; print(pipeline.__file__)", cwd=tmp_path).strip()
+    place = run(python, "-c", "import pipeline; print(davinci_forces.__file__)", cwd=tmp_path).strip()
     assert Path(place).is_relative_to(installed.parent)
     run(program, "simulate", "davinci-joints", "raw/joints", cwd=tmp_path)
     run(program, "all", "--jobs", os.cpu_count() or 1, cwd=tmp_path)

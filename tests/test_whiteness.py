@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pipeline.filters import ekf
-from pipeline.filters.causes import coloured
-from pipeline.filters.causes.innovations import innovations
-from pipeline.filters.causes.search import search
-from pipeline.filters.causes.timing import delays, mended
-from pipeline.filters.causes.trials import CLOCK, COLOUR, CONTACT, REVERSALS, SIZES, STEP, WALK, Passes, Subject
-from pipeline.filters.causes.verdict import finding, verdict
-from pipeline.filters.problem import NoiseModel
-from pipeline.maths.models.driven import Driven
-from pipeline.maths.models.independent import combined, inertia_of
-from pipeline.maths.signals import whiteness
-from pipeline.maths.signals.reversals import moving
+from davinci_forces.filters import ekf
+from davinci_forces.filters.problem import NoiseModel
+from davinci_forces.innovations import coloured
+from davinci_forces.innovations.innovations import innovations
+from davinci_forces.innovations.search import search
+from davinci_forces.innovations.timing import delays, mended
+from davinci_forces.innovations.trials import CLOCK, COLOUR, CONTACT, REVERSALS, SIZES, STEP, WALK, Passes, Subject
+from davinci_forces.innovations.verdict import finding, verdict
+from davinci_forces.maths.models.driven import Driven
+from davinci_forces.maths.models.independent import combined, inertia_of
+from davinci_forces.maths.signals import whiteness
+from davinci_forces.maths.signals.reversals import moving
 from tests import arm
 from tests.test_ekf import NOISE, T_S, matched, simulate, walk
 

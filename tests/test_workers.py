@@ -14,17 +14,17 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.runner.console import Console
-from pipeline.runner.execution import Outcome
-from pipeline.runner.fingerprints.fingerprint import Fingerprint
-from pipeline.runner.graph import WHOLE, Graph, Part
-from pipeline.runner.plan import Task
-from pipeline.runner.processes import workers
-from pipeline.runner.processes.workers import Crew, Others, pool
-from pipeline.runner.runner import Runner
-from pipeline.runner.runs import folders
-from pipeline.stages import STAGES
-from pipeline.study import reading
+from davinci_forces.runner.console import Console
+from davinci_forces.runner.execution import Outcome
+from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
+from davinci_forces.runner.graph import WHOLE, Graph, Part
+from davinci_forces.runner.plan import Task
+from davinci_forces.runner.processes import workers
+from davinci_forces.runner.processes.workers import Crew, Others, pool
+from davinci_forces.runner.runner import Runner
+from davinci_forces.runner.runs import folders
+from davinci_forces.stages import STAGES
+from davinci_forces.study import reading
 from tests import arm
 
 pytestmark = pytest.mark.medium
@@ -172,7 +172,7 @@ import sys
 from functools import partial
 from pathlib import Path
 sys.path[:0] = [{root!r}]
-from pipeline.runner.processes import workers
+from davinci_forces.runner.processes import workers
 from tests.test_workers import {busy}, task
 workers.ALONE = -1.0
 if __name__ == "__main__":

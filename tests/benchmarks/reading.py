@@ -9,7 +9,7 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from pipeline.logs import open_log
+from davinci_forces.logs import open_log
 
 ROW_GROUP = 1 << 20
 Report = Callable[[str], None]  # what shows a line

@@ -4,11 +4,11 @@ import time
 
 import numpy as np
 
-from pipeline.maths.models.model import Motion
-from pipeline.records import Choice, Smoothed
-from pipeline.robots.dvrk_psm import ROBOT
-from pipeline.robots.models import coupled
-from pipeline.stages import choose
+from davinci_forces.maths.models.model import Motion
+from davinci_forces.records import Choice, Smoothed
+from davinci_forces.robots.dvrk_psm import ROBOT
+from davinci_forces.robots.models import coupled
+from davinci_forces.stages import choose
 
 LOGS, SAMPLES, RATE = 6, 6000, 200.0
 AT_MOST = 15.0  # [s] of one core

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipeline.estimators import estimator
-from pipeline.estimators.problem import Regression
-from pipeline.maths.estimation import swarm
-from pipeline.maths.estimation.least_squares import triangle
-from pipeline.robots.davinci import ROBOT
+from davinci_forces.estimators import estimator
+from davinci_forces.estimators.problem import Regression
+from davinci_forces.maths.estimation import swarm
+from davinci_forces.maths.estimation.least_squares import triangle
+from davinci_forces.robots.davinci import ROBOT
 from tests.test_swarm import problem
 
 ROWS, COLUMNS = 1_000_000, 5

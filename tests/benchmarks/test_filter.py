@@ -10,15 +10,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipeline.filters import rts
-from pipeline.filters.belief import FIRST
-from pipeline.filters.ekf import track
-from pipeline.filters.problem import NoiseModel
-from pipeline.filters.stepping import covariances
-from pipeline.maths.models.driven import Driven
-from pipeline.maths.models.model import JointDynamics
-from pipeline.records import Track
-from pipeline.records.store import Writer
+from davinci_forces.filters import rts
+from davinci_forces.filters.belief import FIRST
+from davinci_forces.filters.ekf import track
+from davinci_forces.filters.problem import NoiseModel
+from davinci_forces.filters.stepping import covariances
+from davinci_forces.maths.models.driven import Driven
+from davinci_forces.maths.models.model import JointDynamics
+from davinci_forces.records import Track
+from davinci_forces.records.store import Writer
 
 N = 1_000_000
 AT_MOST = 1.2  # times the time of C++ -O3

@@ -27,11 +27,11 @@ MEASURED = """
 import sys
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, getrusage
-from pipeline.logs.isolated import process
-import pipeline
-from pipeline.commands.inspect import describe
+from davinci_forces.logs.isolated import process
+import davinci_forces
+from davinci_forces.commands.inspect import describe
 if sys.argv[1] == "run":
-    assert pipeline.run(sys.argv[2], *sys.argv[3:], quiet=True)
+    assert davinci_forces.run(sys.argv[2], *sys.argv[3:], quiet=True)
 else:
     describe(Path(sys.argv[2]), 5)
 process.close_all()

@@ -6,7 +6,7 @@ import numpy as np
 import pyarrow.csv as csv
 import pytest
 
-from pipeline.logs import open_log
+from davinci_forces.logs import open_log
 from tests.benchmarks.reading import Report, nptdms, nptdms_alone, ours, ours_alone, seconds
 from tests.logs.lvm_writer import Style, Write, lvm
 from tests.logs.tdms_writer import daqmx, segment

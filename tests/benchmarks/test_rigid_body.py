@@ -6,8 +6,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from pipeline.maths.mechanics import rigid_body
-from pipeline.robots.davinci_chain import BODIES, CHAIN
+from davinci_forces.maths.mechanics import rigid_body
+from davinci_forces.robots.davinci_chain import BODIES, CHAIN
 from tests.robot.pinocchio_arm import tree
 
 pin = pytest.importorskip("pinocchio", reason="Pinocchio, the rival, is not installed: `make bench` installs it")

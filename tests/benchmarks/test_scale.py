@@ -8,13 +8,13 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.records import store
-from pipeline.runner.console import Console
-from pipeline.runner.ledger import Folders
-from pipeline.runner.runner import Runner
-from pipeline.runner.runs import folders
-from pipeline.stages import STAGES
-from pipeline.study import Study, reading
+from davinci_forces.records import store
+from davinci_forces.runner.console import Console
+from davinci_forces.runner.ledger import Folders
+from davinci_forces.runner.runner import Runner
+from davinci_forces.runner.runs import folders
+from davinci_forces.stages import STAGES
+from davinci_forces.study import Study, reading
 from tests import arm, many
 
 GROWS = 1.3  # times at most, what a log costs in a study of many, over one in a study of few
@@ -84,7 +84,7 @@ def seconds_of_hashing(where: Folders) -> float:
 
 def seconds_afresh(study: Path) -> float:
     """What finding nothing to do takes a process of its own, from its start on."""
-    code = "import sys, time, pipeline; pipeline.run(*sys.argv[1:], quiet=True); print(time.process_time())"
+    code = "import sys, time, pipeline; davinci_forces.run(*sys.argv[1:], quiet=True); print(time.process_time())"
     done = subprocess.run([sys.executable, "-c", code, study, *STAGES], capture_output=True, text=True, check=True)
     return float(done.stdout)
 
@@ -112,7 +112,7 @@ def test_a_log_costs_the_same_in_a_study_of_many(tmp_path, full, capsys):
 
 def seconds_of_jobs(study: Path, jobs: int) -> float:
     """How long a process of its own takes from ingest to whiteness, by the clock."""
-    code = "import sys, pipeline; pipeline.run(sys.argv[1], *sys.argv[3:], jobs=int(sys.argv[2]), quiet=True)"
+    code = "import sys, pipeline; davinci_forces.run(sys.argv[1], *sys.argv[3:], jobs=int(sys.argv[2]), quiet=True)"
     names = STAGES[STAGES.index("ingest") : STAGES.index("whiteness") + 1]
     start = time.perf_counter()
     subprocess.run([sys.executable, "-c", code, study, str(jobs), *names], check=True, stdout=subprocess.DEVNULL)

@@ -5,8 +5,8 @@ import time
 import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
-from pipeline.maths.signals import averaging
-from pipeline.stages import whiteness
+from davinci_forces.maths.periods import averaging
+from davinci_forces.stages import whiteness
 
 SAMPLES = 1_000_000
 RATE, PERIOD = 1000.0, 5.0  # Hz, s

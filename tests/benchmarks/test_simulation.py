@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
-from pipeline.simulation import closed_loop
-from pipeline.simulation.scenario.reading import load
+from davinci_forces.simulation import closed_loop
+from davinci_forces.simulation.scenario.reading import load
 
 AT_LEAST = 50.0  # times faster than real time, with the wrist fixed
 

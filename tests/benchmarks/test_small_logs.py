@@ -7,10 +7,10 @@ import numpy as np
 import pyarrow.csv as csv
 import pytest
 
-from pipeline.runner.console import Console
-from pipeline.runner.runner import Runner
-from pipeline.runner.runs import folders
-from pipeline.study import reading
+from davinci_forces.runner.console import Console
+from davinci_forces.runner.runner import Runner
+from davinci_forces.runner.runs import folders
+from davinci_forces.study import reading
 from tests.benchmarks.reading import Report, parquet
 from tests.logs.lvm_writer import Style, Write, lvm
 from tests.logs.tdms_writer import segment

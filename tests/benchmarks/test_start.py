@@ -20,7 +20,7 @@ def one(number: int = 1):
     "Do one thing."
 app()
 """
-HELP = "import sys; sys.argv[0] = 'davinci-forces'; from pipeline.cli import main; main()"
+HELP = "import sys; sys.argv[0] = 'davinci-forces'; from davinci_forces.cli import main; main()"
 LOOP = """
 import numpy as np
 from numba import njit
@@ -34,10 +34,10 @@ loop(np.ones(4000))
 """
 FILTER = """
 import numpy as np
-from pipeline.filters.ekf import track
-from pipeline.filters.problem import NoiseModel
-from pipeline.maths.models.driven import Driven
-from pipeline.maths.models.model import JointDynamics
+from davinci_forces.filters.ekf import track
+from davinci_forces.filters.problem import NoiseModel
+from davinci_forces.maths.models.driven import Driven
+from davinci_forces.maths.models.model import JointDynamics
 t = np.arange(4000) * 1e-3
 joint = JointDynamics(np.full(4000, 0.5), (0.1, 0.7, -0.2, 0.0, 0.3, 0.2, 0.0), np.zeros(4000))
 noise = NoiseModel(1e-4, 1e-3, 1e-5, 1e-3, 0.05)

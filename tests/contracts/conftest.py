@@ -6,22 +6,22 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.maths.excitation.fourier import Fourier
-from pipeline.maths.excitation.joint import Design
-from pipeline.maths.mechanics.kinematics import jacobian
-from pipeline.maths.simulation import continuous
-from pipeline.maths.simulation.surroundings import triangle
-from pipeline.records import KINDS, Record, Signal, store
-from pipeline.records.catalogue import Catalogue
-from pipeline.robots import Robot, davinci, davinci_physical, davinci_printed
-from pipeline.robots.davinci_chain import BODIES, CHAIN
-from pipeline.runner.console import Console
-from pipeline.runner.ledger import Folders, Ledger
-from pipeline.runner.plan import Plan
-from pipeline.runner.runner import Runner
-from pipeline.runner.runs import folders
-from pipeline.stages import STAGES, design
-from pipeline.study import Study, reading
+from davinci_forces.maths.excitation.fourier import Fourier
+from davinci_forces.maths.excitation.joint import Design
+from davinci_forces.maths.mechanics.kinematics import jacobian
+from davinci_forces.maths.simulation import continuous
+from davinci_forces.maths.simulation.surroundings import triangle
+from davinci_forces.records import KINDS, Record, Signal, store
+from davinci_forces.records.catalogue import Catalogue
+from davinci_forces.robots import Robot, davinci, davinci_physical, davinci_printed
+from davinci_forces.robots.davinci_chain import BODIES, CHAIN
+from davinci_forces.runner.console import Console
+from davinci_forces.runner.ledger import Folders, Ledger
+from davinci_forces.runner.plan import Plan
+from davinci_forces.runner.runner import Runner
+from davinci_forces.runner.runs import folders
+from davinci_forces.stages import STAGES, design
+from davinci_forces.study import Study, reading
 from tests import arm
 
 TRUTH = {

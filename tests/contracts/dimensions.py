@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from pipeline.maths.constants import GRAVITY
-from pipeline.maths.models.terms import Term
-from pipeline.robots.robot import Kind
+from davinci_forces.maths.constants import GRAVITY
+from davinci_forces.maths.models.terms import Term
+from davinci_forces.robots.robot import Kind
 
 Powers = tuple[int, int, int, int]
 BASE: dict[str, Powers] = {

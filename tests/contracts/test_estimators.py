@@ -7,10 +7,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pipeline.errors import NotIdentifiable
-from pipeline.estimators import ESTIMATORS
-from pipeline.estimators.problem import Estimate, Estimator, Regression
-from pipeline.maths.models.independent import regressor
+from davinci_forces.errors import NotIdentifiable
+from davinci_forces.estimators import ESTIMATORS
+from davinci_forces.estimators.problem import Estimate, Estimator, Regression
+from davinci_forces.maths.models.independent import regressor
 from tests import arm
 
 K, M = 400, 10  # samples of a period, periods averaged
@@ -25,7 +25,7 @@ EXACT = np.zeros((1, len(NAMES), len(NAMES)))  # covariance of the errors of the
 BIASED = {"prior": 0.3}
 
 ESTIMATOR = pytest.mark.parametrize(
-    "estimate", [import_module(f"pipeline.estimators.{name}").estimate for name in ESTIMATORS], ids=ESTIMATORS
+    "estimate", [import_module(f"davinci_forces.estimators.{name}").estimate for name in ESTIMATORS], ids=ESTIMATORS
 )
 
 

@@ -13,12 +13,12 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.stats import chi2
 
-from pipeline.filters import FILTERS, tracker
-from pipeline.filters.belief import FIRST
-from pipeline.filters.problem import Filter, NoiseModel
-from pipeline.maths.models.driven import Driven
-from pipeline.maths.models.model import JointDynamics
-from pipeline.maths.models.terms import inertia, offset, stiffness, viscous
+from davinci_forces.filters import FILTERS, tracker
+from davinci_forces.filters.belief import FIRST
+from davinci_forces.filters.problem import Filter, NoiseModel
+from davinci_forces.maths.models.driven import Driven
+from davinci_forces.maths.models.model import JointDynamics
+from davinci_forces.maths.models.terms import inertia, offset, stiffness, viscous
 from tests import arm
 
 T_S = 0.01
@@ -28,7 +28,7 @@ NOISE = NoiseModel(r_q=1e-3, r_dq=8e-3, q_q=1e-5, q_dq=1e-4, q_tau=0.05)
 SEEDS = 100
 
 FILTER = pytest.mark.parametrize(
-    "track", [import_module(f"pipeline.filters.{name}").track for name in FILTERS], ids=FILTERS
+    "track", [import_module(f"davinci_forces.filters.{name}").track for name in FILTERS], ids=FILTERS
 )
 STEPPED = pytest.mark.parametrize("name", ["ekf", "ekf_euler"])
 STATED = pytest.mark.parametrize("name", ["ekf", "ekf_euler", "rts"])  # of the model of chance that is simulated

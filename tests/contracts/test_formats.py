@@ -12,9 +12,9 @@ from nptdms import ChannelObject, TdmsWriter
 from numpy.testing import assert_allclose, assert_array_equal
 from typer.testing import CliRunner
 
-from pipeline.cli import app
-from pipeline.logs import FORMATS, open_log
-from pipeline.logs.log import Options
+from davinci_forces.cli import app
+from davinci_forces.logs import FORMATS, open_log
+from davinci_forces.logs.log import Options
 from tests.logs import bag_writer
 from tests.logs.array_writers import arrow, hdf5, matlab, matlab_73
 from tests.logs.cutting import is_cut_honestly
@@ -237,11 +237,11 @@ def test_the_first_format_that_recognises_a_file_is_its_own_whatever_the_file_is
     """Formats are tried in the order of their list, with the last as a catch-all."""
     for path in (Path(written.file), Path("log.dat")):
         head = written.content[:4096]
-        first = next(f for f in FORMATS if import_module(f"pipeline.logs.{f}").recognises(path, head))
+        first = next(f for f in FORMATS if import_module(f"davinci_forces.logs.{f}").recognises(path, head))
         assert first == name
 
 
 @pytest.mark.parametrize("name", FORMATS)
 def test_no_format_recognises_what_is_no_log(name: str):
     noise = bytes(range(256)) * 16
-    assert not import_module(f"pipeline.logs.{name}").recognises(Path("picture.png"), noise)
+    assert not import_module(f"davinci_forces.logs.{name}").recognises(Path("picture.png"), noise)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pipeline.maths.mechanics import kinematics, rigid_body
-from pipeline.maths.models.model import Motion
-from pipeline.maths.models.terms import TERMS
-from pipeline.robots import ROBOTS, load
-from pipeline.robots.from_toml import wrong_name
-from pipeline.robots.models import independent
-from pipeline.robots.robot import Joint, Kind, Robot
+from davinci_forces.maths.mechanics import kinematics, rigid_body
+from davinci_forces.maths.models.model import Motion
+from davinci_forces.maths.models.terms import TERMS
+from davinci_forces.robots import ROBOTS, load
+from davinci_forces.robots.from_toml import wrong_name
+from davinci_forces.robots.models import independent
+from davinci_forces.robots.robot import Joint, Kind, Robot
 from tests.contracts.dimensions import is_effort
 from tests.robot import lagrangian
 

@@ -5,15 +5,15 @@ from importlib import import_module
 
 import pytest
 
-from pipeline.records import KINDS
-from pipeline.records.catalogue import Catalogue, Provenance
-from pipeline.report.changes import Stated
-from pipeline.report.content import Document, Equation, Figure, Figure3D, Number, Section, Table, name_of, walk
-from pipeline.report.content.layout import place
-from pipeline.report.context import Context
-from pipeline.report.results import Results, collect
-from pipeline.report.sections import DOCUMENTS, SECTIONS
-from pipeline.study.review import Rating
+from davinci_forces.records import KINDS
+from davinci_forces.records.catalogue import Catalogue, Provenance
+from davinci_forces.report.changes import Stated
+from davinci_forces.report.content import Document, Equation, Figure, Figure3D, Number, Section, Table, name_of, walk
+from davinci_forces.report.content.layout import place
+from davinci_forces.report.context import Context
+from davinci_forces.report.results import Results, collect
+from davinci_forces.report.sections import DOCUMENTS, SECTIONS
+from davinci_forces.study.review import Rating
 from tests.contracts.conftest import Lab
 
 SECTION = pytest.mark.parametrize("name", SECTIONS)
@@ -46,7 +46,7 @@ def without(catalogue: Catalogue, *kinds: type) -> Catalogue:
 
 
 def written(name: str, about: Context) -> Section | None:
-    return import_module(f"pipeline.report.sections.{name}").section(about)
+    return import_module(f"davinci_forces.report.sections.{name}").section(about)
 
 
 @pytest.fixture(scope="module")

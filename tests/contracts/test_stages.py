@@ -10,13 +10,13 @@ from typing import Any
 import pytest
 from numpy.testing import assert_array_equal
 
-from pipeline.records import Diagnostic, Record
-from pipeline.records.catalogue import Catalogue, Provenance
-from pipeline.report import report
-from pipeline.runner import execution
-from pipeline.runner.plan import Task
-from pipeline.runner.signature import declaration
-from pipeline.stages import STAGES
+from davinci_forces.records import Diagnostic, Record
+from davinci_forces.records.catalogue import Catalogue, Provenance
+from davinci_forces.report import report
+from davinci_forces.runner import execution
+from davinci_forces.runner.plan import Task
+from davinci_forces.runner.signature import declaration
+from davinci_forces.stages import STAGES
 from tests.contracts.conftest import Lab, shorten
 
 STAGE = pytest.mark.parametrize("name", STAGES)
@@ -24,7 +24,7 @@ STAGE = pytest.mark.parametrize("name", STAGES)
 
 @STAGE
 def test_the_declaration_parses_and_the_stage_says_what_it_does(name: str):
-    module = import_module(f"pipeline.stages.{name}")
+    module = import_module(f"davinci_forces.stages.{name}")
     assert module.__doc__
     assert module.run.__doc__
     asks = declaration(name)
@@ -69,7 +69,7 @@ def same(one: Record, other: Record) -> None:
 def test_the_same_records_give_the_same_records_and_nothing_else_is_read(name: str, lab: Lab, monkeypatch):
     """Twice on the very same arguments, which stay as they are, and with the study's files moved away meanwhile."""
     shorten(monkeypatch)
-    run, asks = import_module(f"pipeline.stages.{name}").run, declaration(name)
+    run, asks = import_module(f"davinci_forces.stages.{name}").run, declaration(name)
     files = [lab.folders.processed, *([] if "log" in asks.given.values() else [lab.study.folder])]
     made: Counter[tuple[str, ...]] = Counter()
     kinds: set[type[Record]] = set()

@@ -4,12 +4,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipeline.maths.models import kernels, terms
-from pipeline.maths.models.bias import bias as bias_of
-from pipeline.maths.models.independent import combined, inertia_of, regressor
-from pipeline.maths.models.terms import TERMS, Term
-from pipeline.report.writers.equations import Formula, draw_formulas
-from pipeline.robots.robot import Kind
+from davinci_forces.maths.models import kernels, terms
+from davinci_forces.maths.models.bias import bias as bias_of
+from davinci_forces.maths.models.independent import combined, inertia_of, regressor
+from davinci_forces.maths.models.terms import TERMS, Term
+from davinci_forces.report.writers.equations import Formula, draw_formulas
+from davinci_forces.robots.robot import Kind
 from tests.contracts.dimensions import has_a_dimension, is_effort
 
 TERM = pytest.mark.parametrize("term", TERMS.values(), ids=TERMS)

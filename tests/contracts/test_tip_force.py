@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pipeline.records import TipContact
+from davinci_forces.records import TipContact
 from tests.contracts.conftest import TRUTH, Lab
 
 

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipeline.errors import BadRequest
-from pipeline.maths.haptics.bimodal import THESIS, Hand
-from pipeline.maths.haptics.delay import damping_needed, delay_limit, discretised, sampled_limit, spectral_radius
-from pipeline.maths.haptics.motion import FINE, flow, grows, late, leaving_limit
+from davinci_forces.errors import BadRequest
+from davinci_forces.haptics.maths.bimodal import THESIS, Hand
+from davinci_forces.haptics.maths.delay import damping_needed, delay_limit, discretised, sampled_limit, spectral_radius
+from davinci_forces.haptics.maths.motion import FINE, flow, grows, late, leaving_limit
 
 PRESSED = 1.0  # [N]
 DELAYS = (0.005, 0.05, 0.3)

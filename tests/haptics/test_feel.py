@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipeline.maths.haptics.bimodal import Hand
-from pipeline.maths.haptics.delay import sampled_limit
-from pipeline.records import FilterNoise, Fit, HapticResponse, HapticRun
-from pipeline.robots import davinci
-from pipeline.simulation import haptic
-from pipeline.stages import feel
-from pipeline.study import HapticScenario
-from pipeline.study.haptics import SLIDE, SLIDE_NOISE
+from davinci_forces.haptics import loop as haptic
+from davinci_forces.haptics.maths.bimodal import Hand
+from davinci_forces.haptics.maths.delay import sampled_limit
+from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE
+from davinci_forces.records import FilterNoise, Fit, HapticResponse, HapticRun
+from davinci_forces.robots import davinci
+from davinci_forces.stages import feel
+from davinci_forces.study import HapticScenario
 from tests.haptics.test_limit import stiffness
 
 HAND = Hand(1.0, 10.0, 300.0)

@@ -6,16 +6,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pipeline.filters import ekf
-from pipeline.maths.haptics.bimodal import THESIS, Hand
-from pipeline.maths.haptics.delay import delay_limit, held, sampled_limit
-from pipeline.maths.haptics.feeling import harmonic, response_limit
-from pipeline.maths.haptics.motion import switched
-from pipeline.maths.models.driven import Driven
-from pipeline.maths.models.model import JointDynamics
-from pipeline.maths.simulation.haptic import Clocks, FeltTissue, Grip, simulate
-from pipeline.simulation import haptic
-from pipeline.study.haptics import FIRM, SLIDE, AxisNoise, HapticScenario
+from davinci_forces.filters import ekf
+from davinci_forces.haptics import loop as haptic
+from davinci_forces.haptics.maths.bimodal import THESIS, Hand
+from davinci_forces.haptics.maths.delay import delay_limit, held, sampled_limit
+from davinci_forces.haptics.maths.feeling import harmonic, response_limit
+from davinci_forces.haptics.maths.motion import switched
+from davinci_forces.haptics.maths.simulated_loop import Clocks, FeltTissue, Grip, simulate
+from davinci_forces.haptics.scenario import FIRM, SLIDE, AxisNoise, HapticScenario
+from davinci_forces.maths.models.driven import Driven
+from davinci_forces.maths.models.model import JointDynamics
 
 K = 457.24
 NOBODY = np.zeros((0, 2))

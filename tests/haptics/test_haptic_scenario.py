@@ -9,15 +9,15 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from pipeline.cli import app
-from pipeline.errors import BadStudy
-from pipeline.runner.fingerprints.canonical import canonical
-from pipeline.simulation import haptic
-from pipeline.study import HapticScenario, reading
-from pipeline.study.haptics import SLIDE, SLIDE_NOISE, BadHaptics, read
+from davinci_forces.cli import app
+from davinci_forces.errors import BadStudy
+from davinci_forces.haptics import loop as haptic
+from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, BadHaptics, read
+from davinci_forces.runner.fingerprints.canonical import canonical
+from davinci_forces.study import HapticScenario, reading
 from tests import arm
 
-SHIPPED = files("pipeline.study").joinpath("haptics.toml").read_text(encoding="utf-8")
+SHIPPED = files("davinci_forces.study").joinpath("haptics.toml").read_text(encoding="utf-8")
 SHORT = """
 plan = [[0.0, -0.01], [0.5, 0.01], [1.0, -0.01]]
 [[hand]]

@@ -5,14 +5,14 @@ from dataclasses import fields
 import numpy as np
 import pytest
 
-from pipeline.records import HapticResponse, HapticRun, Origin, Record
-from pipeline.records.catalogue import Catalogue, Provenance
-from pipeline.report.content import Figure, OnScreen, Section, Table, Verdict, VSpan, walk
-from pipeline.report.context import Context
-from pipeline.report.results import collect
-from pipeline.report.sections import haptics
-from pipeline.robots import davinci
-from pipeline.study import Settings, Study
+from davinci_forces.records import HapticResponse, HapticRun, Origin, Record
+from davinci_forces.records.catalogue import Catalogue, Provenance
+from davinci_forces.report.content import Figure, OnScreen, Section, Table, Verdict, VSpan, walk
+from davinci_forces.report.context import Context
+from davinci_forces.report.results import collect
+from davinci_forces.report.sections import haptics
+from davinci_forces.robots import davinci
+from davinci_forces.study import Settings, Study
 
 NAN = float("nan")
 T = np.arange(1000) / 100.0

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipeline.maths.haptics.bimodal import THESIS, cqlf_limit
-from pipeline.maths.haptics.delay import delay_limit, sampled_limit
-from pipeline.maths.haptics.switching import switching_limit
-from pipeline.records import (
+from davinci_forces.haptics.maths.bimodal import THESIS, cqlf_limit
+from davinci_forces.haptics.maths.delay import delay_limit, sampled_limit
+from davinci_forces.haptics.maths.switching import switching_limit
+from davinci_forces.records import (
     Comparison,
     DelayLimit,
     HapticMotion,
@@ -16,8 +16,8 @@ from pipeline.records import (
     Stiffness,
     TissueLimit,
 )
-from pipeline.robots import davinci
-from pipeline.stages import limit
+from davinci_forces.robots import davinci
+from davinci_forces.stages import limit
 
 K = 457.24
 

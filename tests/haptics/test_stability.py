@@ -9,11 +9,11 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 from scipy.sparse import csc_array
 
-from pipeline.maths.estimation import solver
-from pipeline.maths.haptics import lmi, motion
-from pipeline.maths.haptics.bimodal import Hand, cqlf_limit, energy, mode
-from pipeline.maths.haptics.motion import switched, worst
-from pipeline.maths.haptics.switching import log_growth, switching_limit
+from davinci_forces.haptics.maths import lmi, motion
+from davinci_forces.haptics.maths.bimodal import Hand, cqlf_limit, energy, mode
+from davinci_forces.haptics.maths.motion import switched, worst
+from davinci_forces.haptics.maths.switching import log_growth, switching_limit
+from davinci_forces.maths.estimation import solver
 
 HANDS = (Hand(1.0, 1.0, 100.0), Hand(1.0, 30.0, 100.0), Hand(0.2, 0.05, 2000.0), Hand(1.0, 20.0, 100.0))
 

@@ -6,9 +6,9 @@ import pytest
 from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
-from pipeline.cli import app
-from pipeline.maths.haptics.bimodal import THESIS
-from pipeline.maths.haptics.delay import delay_limit, sampled_limit
+from davinci_forces.cli import app
+from davinci_forces.haptics.maths.bimodal import THESIS
+from davinci_forces.haptics.maths.delay import delay_limit, sampled_limit
 
 
 def said(*options: str, code: int = 0) -> str:

@@ -5,8 +5,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.testing import assert_array_equal
 
-from pipeline.errors import BadLog
-from pipeline.logs.log import Options
+from davinci_forces.errors import BadLog
+from davinci_forces.logs.log import Options
 from tests.logs.reading import read
 
 whole = lru_cache(maxsize=4)(read)

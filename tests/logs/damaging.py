@@ -16,10 +16,10 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.errors import BadLog
-from pipeline.logs import open_log
-from pipeline.logs.isolated.process import close_all
-from pipeline.logs.log import Options
+from davinci_forces.errors import BadLog
+from davinci_forces.logs import open_log
+from davinci_forces.logs.isolated.process import close_all
+from davinci_forces.logs.log import Options
 from tests.contracts.test_formats import EXAMPLES
 from tests.logs import array_writers, bag_writer
 

@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.logs import open_log
-from pipeline.logs.log import Log, Options
+from davinci_forces.logs import open_log
+from davinci_forces.logs.log import Log, Options
 
 Samples = dict[str, NDArray[np.float64]]
 Read = tuple[Log, Samples]

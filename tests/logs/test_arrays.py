@@ -10,7 +10,7 @@ import pytest
 from numpy.testing import assert_array_equal
 from scipy.io import savemat
 
-from pipeline.errors import BadLog
+from davinci_forces.errors import BadLog
 from tests.logs.array_writers import arrow, hdf5, matlab, matlab_73
 from tests.logs.reading import read
 
@@ -218,7 +218,7 @@ def opened(content: bytes, name: str):
     import tempfile
     from pathlib import Path
 
-    from pipeline.logs import open_log
+    from davinci_forces.logs import open_log
 
     path = Path(tempfile.mkdtemp()) / name
     path.write_bytes(content)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-import pipeline
-from pipeline.cli import app
-from pipeline.stages import STAGES
+import davinci_forces
+from davinci_forces.cli import app
+from davinci_forces.stages import STAGES
 from tests.conftest import ROOT
 from tests.logs.bag_writer import joint_state, write
 
@@ -37,7 +37,7 @@ def study(folder: Path, tables: dict[str, str]) -> Path:
 
 
 def results(folder: Path) -> dict[str, float]:
-    assert pipeline.run(folder, *STEPS, quiet=True)
+    assert davinci_forces.run(folder, *STEPS, quiet=True)
     home = folder.parents[1] / "reports" / folder.name / "results.json"
     beginning = ("fit.", "predict.", "ekf.")
     return {r["key"]: r["value"] for r in json.loads(home.read_text()) if r["key"].startswith(beginning)}
@@ -52,7 +52,7 @@ def test_bags_of_a_study_s_recordings_give_its_results(tmp_path):
         file = re.search(r'file = "(.*)"', table)[1]
         for folder in (whole, original):
             shutil.copy(DEMO / file, folder)
-    assert pipeline.run(whole, "ingest", quiet=True)
+    assert davinci_forces.run(whole, "ingest", quiet=True)
     of_bags = {}
     for name, table in tables.items():
         of_bags[name] = table.partition("[log.channels]")[0] + "[log.channels]\n"
@@ -62,7 +62,7 @@ def test_bags_of_a_study_s_recordings_give_its_results(tmp_path):
                 of_bags[name] += f'"{joint}.{symbol}" = "/arm/measured_js/{state}[{joint}]"\n'
     bags = study(tmp_path / "raw" / "bags", of_bags)
     for name, file in BAGS.items():
-        recorded = pipeline.read(whole, "Recording", log=name)
+        recorded = davinci_forces.read(whole, "Recording", log=name)
         joints = list(dict.fromkeys(recorded["joint"]))
         columns = {
             c: np.column_stack([recorded.loc[recorded["joint"] == j, c] for j in joints]) for c in ["q", "dq", "tau"]

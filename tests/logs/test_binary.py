@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from pipeline.errors import BadLog
-from pipeline.logs.binary import dtype_of
-from pipeline.logs.log import Options
+from davinci_forces.errors import BadLog
+from davinci_forces.logs.binary import dtype_of
+from davinci_forces.logs.log import Options
 from tests.logs.reading import read
 
 ROWS = np.arange(60.0).reshape(20, 3)

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.errors import BadLog
-from pipeline.logs.isolated import log as isolated
-from pipeline.logs.isolated import process
-from pipeline.logs.log import Channel, Log, Options
+from davinci_forces.errors import BadLog
+from davinci_forces.logs.isolated import log as isolated
+from davinci_forces.logs.isolated import process
+from davinci_forces.logs.log import Channel, Log, Options
 
 HERE = "tests.logs.test_isolated"  # which the child imports as the reader
 POSIX = pytest.mark.skipif(sys.platform == "win32", reason="signals and limits are those of POSIX")
@@ -132,7 +132,7 @@ def test_a_child_ends_with_its_parent(tmp_path):
     import subprocess
 
     code = (
-        "from pathlib import Path; from pipeline.logs.isolated import start; from pipeline.logs.log import Options\n"
+        "from pathlib import Path; from davinci_forces.logs.isolated import start; from davinci_forces.logs.log import Options\n"
         f"print(start(Path({str(tmp_path / 'log.odd')!r}), Options(), {HERE!r}).facts['pid'], flush=True)\n"
         "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"
     )
@@ -150,7 +150,7 @@ def test_a_log_of_text_imports_nothing_that_other_formats_need(tmp_path):
 
     (tmp_path / "log.csv").write_text("t,q\n0,1\n1,2\n")
     code = (
-        "import sys; from pathlib import Path; from pipeline.logs import open_log\n"
+        "import sys; from pathlib import Path; from davinci_forces.logs import open_log\n"
         f"log = open_log(Path({str(tmp_path / 'log.csv')!r})); list(log.blocks(['q']))\n"
         "print(sorted({'h5py', 'rosbags', 'scipy.io', 'pyarrow.parquet', 'pyarrow.feather'} & set(sys.modules)))"
     )

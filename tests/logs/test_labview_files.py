@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pipeline.errors import BadLog
-from pipeline.logs.log import Log
+from davinci_forces.errors import BadLog
+from davinci_forces.logs.log import Log
 from tests.logs.cutting import is_cut_honestly
 from tests.logs.reading import Samples, whole
 

@@ -11,8 +11,8 @@ from tests.logs.tdms_writer import segment
 
 CODE = """
 import sys
-import pipeline
-assert pipeline.run(sys.argv[1], "ingest", quiet=True)
+import davinci_forces
+assert davinci_forces.run(sys.argv[1], "ingest", quiet=True)
 print(*sorted({"numba", "pandas", "scipy"} & set(sys.modules)))
 """
 

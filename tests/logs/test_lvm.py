@@ -10,10 +10,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pipeline.errors import BadLog
-from pipeline.logs import lines, open_log
-from pipeline.logs.log import Options
-from pipeline.logs.lvm import walk as lvm_walk
+from davinci_forces.errors import BadLog
+from davinci_forces.logs import lines, open_log
+from davinci_forces.logs.log import Options
+from davinci_forces.logs.lvm import walk as lvm_walk
 from tests.logs.cutting import is_cut_honestly
 from tests.logs.lvm_writer import Style, Write, lvm
 from tests.logs.reading import read

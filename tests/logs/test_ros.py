@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pipeline.errors import BadLog
-from pipeline.logs import open_log
+from davinci_forces.errors import BadLog
+from davinci_forces.logs import open_log
 from tests.logs.bag_writer import joint_state, vectors, write
 
 NAMES = ["outer_yaw", "outer_pitch", "outer_insertion"]
@@ -197,8 +197,8 @@ def test_signs_in_the_names_of_folders_and_files_mean_nothing(kind, tmp_path):
 
 @pytest.mark.medium
 def test_blocks_of_a_long_bag_are_bounded_and_whole(tmp_path):
-    from pipeline.logs.log import Options
-    from pipeline.logs.ros.bag import ROWS, opened
+    from davinci_forces.logs.log import Options
+    from davinci_forces.logs.ros.bag import ROWS, opened
 
     count = 2 * ROWS + 5
     messages = (joint_state(0.001 * i, ["roll"], [i]) for i in range(count))

@@ -9,10 +9,10 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
-from pipeline.errors import BadLog
-from pipeline.logs.joined import open_joined
-from pipeline.logs.log import Log, Options
-from pipeline.logs.parts import open_parts
+from davinci_forces.errors import BadLog
+from davinci_forces.logs.joined import open_joined
+from davinci_forces.logs.log import Log, Options
+from davinci_forces.logs.parts import open_parts
 from tests.logs.lvm_writer import Style, Write, lvm
 from tests.logs.test_clocks import NOON, said, tdms
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-import pipeline
-from pipeline.cli import app
-from pipeline.errors import BadStudy
-from pipeline.study import reading
+import davinci_forces
+from davinci_forces.cli import app
+from davinci_forces.errors import BadStudy
+from davinci_forces.study import reading
 from tests import arm
 from tests.logs.array_writers import hdf5
 from tests.logs.bag_writer import joint_state, write
@@ -47,7 +47,7 @@ def call(*arguments) -> str:
 
 def test_a_log_that_is_a_folder_is_read_and_counts_by_each_of_its_files(bag):
     call("ingest", bag)
-    recorded = pipeline.read(bag, "Recording")
+    recorded = davinci_forces.read(bag, "Recording")
     np.testing.assert_allclose(recorded["t"], SIGNAL.t, rtol=0, atol=1e-9)
     np.testing.assert_array_equal(recorded["tau"], SIGNAL.tau)
     assert "nothing to do" in call("ingest", bag)
@@ -69,10 +69,10 @@ def test_a_folder_that_is_not_there_is_a_file_that_is_not_there(bag):
 def test_channels_that_a_log_knows_by_a_number_and_a_name_are_the_same(bag):
     text = (bag / "study.toml").read_text()
     call("ingest", bag)
-    named = pipeline.read(bag, "Recording")
+    named = davinci_forces.read(bag, "Recording")
     (bag / "study.toml").write_text(text.replace("[roll]", "[0]"))
     call("ingest", bag)
-    assert named.equals(pipeline.read(bag, "Recording"))
+    assert named.equals(davinci_forces.read(bag, "Recording"))
 
 
 def test_topics_that_a_study_uses_together_are_put_on_the_clock_of_the_positions(bag):
@@ -85,7 +85,7 @@ def test_topics_that_a_study_uses_together_are_put_on_the_clock_of_the_positions
     text = (bag / "study.toml").read_text().replace('file = "roll"', 'file = "both_mcap"')
     (bag / "study.toml").write_text(text.replace("/arm/measured_js/effort", "/arm/currents/effort"))
     assert "error" not in call("ingest", bag)
-    recorded = pipeline.read(bag, "Recording")
+    recorded = davinci_forces.read(bag, "Recording")
     begun = recorded["t"] + SIGNAL.t[-1] - recorded["t"].iloc[-1]  # times count from the first row that is kept
     assert len(recorded) >= len(SIGNAL) - 2
     # Slopes of parabolas are off by h^2/6 of a third derivative, of which a cubic takes 0.0962 h; at an end, where it
@@ -104,7 +104,7 @@ def test_bags_that_follow_one_another_are_parts_of_one_log(bag):
     text = (bag / "study.toml").read_text().replace('file = "roll"', 'files = ["one", "two_mcap"]')
     (bag / "study.toml").write_text(text)
     assert "error" not in call("ingest", bag)
-    recorded = pipeline.read(bag, "Recording")
+    recorded = davinci_forces.read(bag, "Recording")
     np.testing.assert_allclose(recorded["t"], SIGNAL.t, rtol=0, atol=1e-9)
     np.testing.assert_array_equal(recorded["tau"], SIGNAL.tau)
 
@@ -118,7 +118,7 @@ def test_the_times_at_which_the_recorder_had_messages_are_the_alternative(bag):
     text = (bag / "study.toml").read_text().replace('"roll"', '"late"', 2)
     (bag / "study.toml").write_text(text + 'time = "/arm/measured_js/received"\n')
     call("ingest", bag)
-    np.testing.assert_allclose(pipeline.read(bag, "Recording")["t"], SIGNAL.t, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(davinci_forces.read(bag, "Recording")["t"], SIGNAL.t, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize(("dtype", "as_"), [("DBL", ">f8"), ("<float64", "<f8")])
@@ -128,7 +128,7 @@ def test_raw_numbers_are_what_the_study_says(tmp_path, dtype, as_):
     folder = describe(tmp_path / "raw" / "arm", "roll.bin", names, more)
     np.column_stack(list(COLUMNS.values())).astype(as_).tofile(folder / "roll.bin")
     assert "error" not in call("ingest", folder)
-    np.testing.assert_array_equal(pipeline.read(folder, "Recording")["tau"], SIGNAL.tau)
+    np.testing.assert_array_equal(davinci_forces.read(folder, "Recording")["tau"], SIGNAL.tau)
 
 
 @pytest.mark.parametrize(

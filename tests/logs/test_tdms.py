@@ -12,11 +12,11 @@ from nptdms import ChannelObject, GroupObject, RootObject, TdmsFile, TdmsWriter
 from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
-from pipeline.errors import BadLog
-from pipeline.logs import blocks
-from pipeline.logs.tdms import samples as tdms_samples
-from pipeline.logs.tdms import scaled as tdms_scaled
-from pipeline.logs.tdms import walk as tdms_walk
+from davinci_forces.errors import BadLog
+from davinci_forces.logs import blocks
+from davinci_forces.logs.tdms import samples as tdms_samples
+from davinci_forces.logs.tdms import scaled as tdms_scaled
+from davinci_forces.logs.tdms import walk as tdms_walk
 from tests.logs.cutting import is_cut_honestly
 from tests.logs.reading import read
 from tests.logs.tdms_writer import KINDS, daqmx, segment

@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
 
-from pipeline.errors import BadLog
-from pipeline.logs import lines as log_lines
-from pipeline.logs.log import Options
+from davinci_forces.errors import BadLog
+from davinci_forces.logs import lines as log_lines
+from davinci_forces.logs.log import Options
 from tests.logs.cutting import is_cut_honestly
 from tests.logs.reading import read, whole
 

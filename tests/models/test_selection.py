@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipeline.estimators import unseen
-from pipeline.estimators.candidates import Library
-from pipeline.estimators.unseen import Refitted
-from pipeline.maths.selection.blocks import BLOCKS, MOST, left_out, path_blocks
-from pipeline.maths.selection.cross_validation import Judged, judged, preferred, standard_error, together
-from pipeline.maths.selection.equations import gathered, side_by_side
-from pipeline.maths.selection.ridge import Ridge, covariance, penalty, solve
-from pipeline.robots import davinci
-from pipeline.robots.models import independent
+from davinci_forces.identification import unseen
+from davinci_forces.identification.candidates import Library
+from davinci_forces.identification.unseen import Refitted
+from davinci_forces.maths.selection.blocks import BLOCKS, MOST, left_out, path_blocks
+from davinci_forces.maths.selection.cross_validation import Judged, judged, preferred, standard_error, together
+from davinci_forces.maths.selection.equations import gathered, side_by_side
+from davinci_forces.maths.selection.ridge import Ridge, covariance, penalty, solve
+from davinci_forces.robots import davinci
+from davinci_forces.robots.models import independent
 
 RNG = np.random.default_rng(3)
 N, P, CELLS = 600, 4, 6

@@ -3,7 +3,7 @@
 import pytest
 from report_documents import document
 
-from pipeline.report.content import Document
+from davinci_forces.report.content import Document
 
 
 @pytest.fixture(scope="session")

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from pipeline.report.content import (
+from davinci_forces.report.content import (
     Band,
     Bars,
     Bullets,

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.records import FreeSpace, Prediction
+from davinci_forces.records import FreeSpace, Prediction
 
 NOTHING = np.zeros(0)
 

@@ -11,10 +11,10 @@ import pytest
 from browser import CHROMIUM, Browser
 from typer.testing import CliRunner
 
-from pipeline.cli import app
-from pipeline.maths.estimation.drift import holm, scatter, stands_out, trend
-from pipeline.report.content import literal
-from pipeline.report.content.inline import Span, parse
+from davinci_forces.cli import app
+from davinci_forces.maths.estimation.drift import holm, scatter, stands_out, trend
+from davinci_forces.report.content import literal
+from davinci_forces.report.content.inline import Span, parse
 
 JOINTS = {"hand_roll": "N m", "instrument_slide": "N"}
 PARAMETERS = ("inertia", "gravity, sine", "viscous friction", "Coulomb friction")

@@ -6,16 +6,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pipeline.records import Fit, FrictionMap, Origin, Residual, SwarmSearch
-from pipeline.records.catalogue import Catalogue
-from pipeline.report.content import Bullets, Line, Table
-from pipeline.report.context import Context
-from pipeline.report.friction import friction_maps
-from pipeline.report.overlaid import convergence, estimators
-from pipeline.report.printed import printed_beside
-from pipeline.report.results import collect
-from pipeline.robots import davinci, dvrk_psm
-from pipeline.stages import fit
+from davinci_forces.records import Fit, FrictionMap, Origin, Residual, SwarmSearch
+from davinci_forces.records.catalogue import Catalogue
+from davinci_forces.report.content import Bullets, Line, Table
+from davinci_forces.report.context import Context
+from davinci_forces.report.friction import friction_maps
+from davinci_forces.report.overlaid import convergence, estimators
+from davinci_forces.report.printed import printed_beside
+from davinci_forces.report.results import collect
+from davinci_forces.robots import davinci, dvrk_psm
+from davinci_forces.stages import fit
 from tests import arm
 from tests.test_estimation import trajectory
 

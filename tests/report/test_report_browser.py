@@ -11,8 +11,8 @@ import pytest
 from browser import CHROMIUM, Browser
 from report_documents import document
 
-from pipeline.report.content import Document, Number, Prose, Rated, Section, Table
-from pipeline.report.writers import html
+from davinci_forces.report.content import Document, Number, Prose, Rated, Section, Table
+from davinci_forces.report.writers import html
 
 pytestmark = [
     pytest.mark.medium,

@@ -17,13 +17,13 @@ import pytest
 from matplotlib.text import Text
 from report_documents import HOSTILE, still, zoomable
 
-from pipeline.report import writers
-from pipeline.report.content import Document, Figure, Figure3D, Histogram, Line, Panel, Tiles, walk
-from pipeline.report.figures import together
-from pipeline.report.figures.panels import wrap_label
-from pipeline.report.figures.svg import STYLE, draw_figure, draw_svg, svg
-from pipeline.report.figures.ticks import power_of_ten
-from pipeline.report.writers import html, pdf
+from davinci_forces.report import writers
+from davinci_forces.report.content import Document, Figure, Figure3D, Histogram, Line, Panel, Tiles, walk
+from davinci_forces.report.figures import together
+from davinci_forces.report.figures.panels import wrap_label
+from davinci_forces.report.figures.svg import STYLE, draw_figure, draw_svg, svg
+from davinci_forces.report.figures.ticks import power_of_ten
+from davinci_forces.report.writers import html, pdf
 
 
 def test_every_mark_is_drawn_into_well_formed_svg_of_the_width_of_the_page(full: Document) -> None:
@@ -121,7 +121,7 @@ def test_a_figure_of_a_million_samples_stays_small() -> None:
 
 def test_another_process_gives_the_same_bytes(full: Document) -> None:
     program = (
-        "import hashlib; from report_documents import document; from pipeline.report.writers import html, pdf;"
+        "import hashlib; from report_documents import document; from davinci_forces.report.writers import html, pdf;"
         "d = document();"
         "[print(hashlib.sha256(w.render(d)).hexdigest()) for w in (pdf, html)]"
     )
@@ -145,7 +145,7 @@ def test_all_files_written_side_by_side_are_those_written_alone(full: Document) 
 
 def test_importing_the_content_imports_no_drawing_catalogue() -> None:
     program = (
-        "import sys; from pipeline.report import content; from pipeline.report.writers import html, pdf; "
+        "import sys; from davinci_forces.report import content; from davinci_forces.report.writers import html, pdf; "
         "print([n for n in ('matplotlib', 'typst', 'jinja2', 'pandas') if n in sys.modules])"
     )
     root = str(Path(__file__).parents[2])

@@ -15,10 +15,10 @@ import numpy as np
 import pytest
 from report_documents import HOSTILE, document, zoomable
 
-from pipeline.report.content import Document, Equation, Figure, Line, Number, Panel, Prose, Section, Table
-from pipeline.report.writers import html
-from pipeline.report.writers.numbers import numbers_json
-from pipeline.report.writers.typesetting import NotTypeset
+from davinci_forces.report.content import Document, Equation, Figure, Line, Number, Panel, Prose, Section, Table
+from davinci_forces.report.writers import html
+from davinci_forces.report.writers.numbers import numbers_json
+from davinci_forces.report.writers.typesetting import NotTypeset
 
 
 class Page(HTMLParser):

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.report.content.number import MISSING, Number
+from davinci_forces.report.content.number import MISSING, Number
 
 PLAIN = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹−", "-0123456789-")
 sizes = st.builds(lambda m, e: m * 10.0**e, st.floats(1, 9.999), st.integers(-25, 25))

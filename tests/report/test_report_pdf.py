@@ -8,10 +8,10 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.report.content import Document, Equation, Number, Prose, Section, Table
-from pipeline.report.content.layout import place, references
-from pipeline.report.writers import pdf
-from pipeline.report.writers.typesetting import NotTypeset, typeset
+from davinci_forces.report.content import Document, Equation, Number, Prose, Section, Table
+from davinci_forces.report.content.layout import place, references
+from davinci_forces.report.writers import pdf
+from davinci_forces.report.writers.typesetting import NotTypeset, typeset
 
 poppler = pytest.mark.skipif(shutil.which("pdftotext") is None, reason="no pdftotext on the path to read the PDF with")
 MILLIMETRE = 72 / 25.4

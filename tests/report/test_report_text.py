@@ -5,11 +5,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from report_documents import HOSTILE
 
-from pipeline.report.content import Document, Equation, Number, Prose, Section, Table, literal, numbers
-from pipeline.report.content.inline import Span, parse, printable
-from pipeline.report.content.layout import place, references
-from pipeline.report.content.tables import columns
-from pipeline.report.writers.widths import BREAK, PAGE, allow_breaks, fit_columns
+from davinci_forces.report.content import Document, Equation, Number, Prose, Section, Table, literal, numbers
+from davinci_forces.report.content.inline import Span, parse, printable
+from davinci_forces.report.content.layout import place, references
+from davinci_forces.report.content.tables import columns
+from davinci_forces.report.writers.widths import BREAK, PAGE, allow_breaks, fit_columns
 
 anything = st.text(st.one_of(st.sampled_from("\\$`*[]@a "), st.characters()))
 

@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from report_documents import zoomable
 
-from pipeline.report.content import Band, Figure, Line, Panel, Points
-from pipeline.report.content.document import HELD
-from pipeline.report.content.thinning import envelope, thin_mark
-from pipeline.report.figures.traces import thin_figure
+from davinci_forces.report.content import Band, Figure, Line, Panel, Points
+from davinci_forces.report.content.document import HELD
+from davinci_forces.report.content.thinning import envelope, thin_mark
+from davinci_forces.report.figures.traces import thin_figure
 
 
 @given(st.integers(0, 2**31), st.integers(2, 3000), st.integers(1, 200))

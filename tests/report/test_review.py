@@ -14,12 +14,12 @@ from browser import CHROMIUM, Browser
 from report_documents import document
 from typer.testing import CliRunner
 
-from pipeline.cli import app
-from pipeline.errors import BadStudy
-from pipeline.report.content import Rated
-from pipeline.report.writers import html
-from pipeline.study import review
-from pipeline.study.review import Rating
+from davinci_forces.cli import app
+from davinci_forces.errors import BadStudy
+from davinci_forces.report.content import Rated
+from davinci_forces.report.writers import html
+from davinci_forces.study import review
+from davinci_forces.study.review import Rating
 
 HASH, OLD = "a" * 64, "b" * 64
 HOSTILE = (

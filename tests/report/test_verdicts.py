@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from report_records import free_space, prediction
 
-from pipeline.report.verdicts import Trust, band, band_in_words, graded, thresholds
+from davinci_forces.report.verdicts import Trust, band, band_in_words, graded, thresholds
 
 
 def trust(error: float = 0.05, path: str = "another path", level: float = 0.3, sought: float | None = None) -> Trust:

@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from pipeline.maths.mechanics import kinematics
-from pipeline.maths.mechanics.bodies import Bodies
-from pipeline.maths.mechanics.chain import Chain
+from davinci_forces.maths.mechanics import kinematics
+from davinci_forces.maths.mechanics.bodies import Bodies
+from davinci_forces.maths.mechanics.chain import Chain
 from tests.robot.thesis_matrices import gradient
 
 G = 9.81

@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from pipeline.maths.mechanics.bodies import Bodies
-from pipeline.maths.mechanics.chain import FIXED, Chain
+from davinci_forces.maths.mechanics.bodies import Bodies
+from davinci_forces.maths.mechanics.chain import FIXED, Chain
 
 
 class Tree(NamedTuple):

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from pipeline.maths.mechanics import rigid_body
-from pipeline.maths.mechanics.base_parameters import base_parameters
-from pipeline.robots import dvrk_psm_chain
-from pipeline.robots.davinci_chain import BODIES, CHAIN
+from davinci_forces.maths.mechanics import rigid_body
+from davinci_forces.maths.mechanics.base_parameters import base_parameters
+from davinci_forces.robots import dvrk_psm_chain
+from davinci_forces.robots.davinci_chain import BODIES, CHAIN
 
 PSM = dvrk_psm_chain.CHAIN
 ARMS = pytest.mark.parametrize(("chain", "n"), [(CHAIN, 3), (CHAIN, 6), (CHAIN, 7), (PSM, 3), (PSM, 6)])

@@ -5,9 +5,9 @@ import pytest
 from numba import njit
 from scipy.integrate import solve_ivp
 
-from pipeline.maths.constants import GRAVITY
-from pipeline.maths.mechanics import kernels, rigid_body, vector
-from pipeline.robots.davinci_chain import BODIES, CHAIN
+from davinci_forces.maths.constants import GRAVITY
+from davinci_forces.maths.mechanics import kernels, rigid_body, vector
+from davinci_forces.robots.davinci_chain import BODIES, CHAIN
 from tests.robot import lagrangian
 
 N = 9 * vector.LANES + 1  # nine full vectors, and one sample more

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from pipeline.maths.mechanics import kinematics, workspace
-from pipeline.robots.davinci import ROBOT
-from pipeline.robots.davinci_chain import CHAIN
+from davinci_forces.maths.mechanics import kinematics, workspace
+from davinci_forces.robots.davinci import ROBOT
+from davinci_forces.robots.davinci_chain import CHAIN
 from tests.robot import thesis_matrices as thesis
 
 LIMITS = np.array([joint.limits.q for joint in ROBOT.joints])

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipeline.maths.constants import GRAVITY
-from pipeline.maths.mechanics.kinematics import frames, remote_centre
-from pipeline.maths.mechanics.load import mirrored, moved_with, unit_load
-from pipeline.robots import davinci, dvrk_psm
+from davinci_forces.maths.constants import GRAVITY
+from davinci_forces.maths.mechanics.kinematics import frames, remote_centre
+from davinci_forces.maths.mechanics.load import mirrored, moved_with, unit_load
+from davinci_forces.robots import davinci, dvrk_psm
 
 CHAINS = {"davinci": davinci.ROBOT.chain, "dvrk_psm": dvrk_psm.ROBOT.chain}
 LINKS = [(name, link) for name, chain in CHAINS.items() for link in chain.links[:9]]

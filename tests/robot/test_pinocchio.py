@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from pipeline.maths.mechanics import kinematics, rigid_body
-from pipeline.robots.davinci_chain import BODIES, CHAIN
+from davinci_forces.maths.mechanics import kinematics, rigid_body
+from davinci_forces.robots.davinci_chain import BODIES, CHAIN
 from tests.robot.pinocchio_arm import tree
 
 pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed: a rival of benchmarks, not a dependency")

@@ -5,12 +5,12 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pytest
 
-from pipeline.maths.mechanics.bodies import Bodies
-from pipeline.maths.mechanics.chain import denavit_hartenberg
-from pipeline.maths.mechanics.drives import Drives
-from pipeline.maths.models.reduced_joint import reduced_parameters
-from pipeline.robots.davinci import ROBOT
-from pipeline.robots.davinci_chain import BODIES, CHAIN, DRIVES, GUESSED_LC5, in_table_frames
+from davinci_forces.maths.mechanics.bodies import Bodies
+from davinci_forces.maths.mechanics.chain import denavit_hartenberg
+from davinci_forces.maths.mechanics.drives import Drives
+from davinci_forces.maths.models.reduced_joint import reduced_parameters
+from davinci_forces.robots.davinci import ROBOT
+from davinci_forces.robots.davinci_chain import BODIES, CHAIN, DRIVES, GUESSED_LC5, in_table_frames
 
 # What the formulas are written in, and where it is in the bodies: link 3 is row 1 of the arrays.
 CENTRES = {3: (0, -1), 4: (0, -1), 5: (2, -1), 6: (2, -1), 7: (1, -1), 8: (0, -1), 9: (0, -1)}

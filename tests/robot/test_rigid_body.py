@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from pipeline.maths.mechanics import rigid_body
-from pipeline.maths.mechanics.bodies import Bodies
-from pipeline.maths.mechanics.chain import Chain
-from pipeline.maths.mechanics.drives import Drives
-from pipeline.robots import dvrk_psm_chain
-from pipeline.robots.davinci_chain import BODIES, CHAIN, DRIVES, in_table_frames
+from davinci_forces.maths.mechanics import rigid_body
+from davinci_forces.maths.mechanics.bodies import Bodies
+from davinci_forces.maths.mechanics.chain import Chain
+from davinci_forces.maths.mechanics.drives import Drives
+from davinci_forces.robots import dvrk_psm_chain
+from davinci_forces.robots.davinci_chain import BODIES, CHAIN, DRIVES, in_table_frames
 from tests.robot import lagrangian
 from tests.robot import thesis_matrices as thesis
 

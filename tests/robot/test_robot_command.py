@@ -7,11 +7,11 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from pipeline.cli import guarded
-from pipeline.commands import robot
-from pipeline.errors import BadRobot
-from pipeline.maths.mechanics import kinematics, rigid_body, workspace
-from pipeline.robots.davinci_chain import BODIES, CHAIN
+from davinci_forces.cli import guarded
+from davinci_forces.commands import robot
+from davinci_forces.errors import BadRobot
+from davinci_forces.maths.mechanics import kinematics, rigid_body, workspace
+from davinci_forces.robots.davinci_chain import BODIES, CHAIN
 
 KEYS = ["frames", "tip", "jacobian_v", "jacobian_w", "mass", "coriolis", "gravity", "condition", "warnings", "joints"]
 app = typer.Typer()

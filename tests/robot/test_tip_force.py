@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.errors import BadRobot
-from pipeline.maths.mechanics import kinematics, tip_force, workspace
-from pipeline.robots import ROBOTS, load
-from pipeline.robots.dvrk_psm_chain import REACH, TOOL, WRIST
+from davinci_forces.errors import BadRobot
+from davinci_forces.maths.mechanics import kinematics, tip_force, workspace
+from davinci_forces.robots import ROBOTS, load
+from davinci_forces.robots.dvrk_psm_chain import REACH, TOOL, WRIST
 
 ARMS = {name: load(name, Path()) for name in ROBOTS}
 ARM = pytest.mark.parametrize("name", ARMS)

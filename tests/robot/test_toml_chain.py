@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipeline import robots
-from pipeline.errors import BadRobot
-from pipeline.maths.mechanics import kinematics, rigid_body
-from pipeline.robots.dvrk_psm_chain import CHAIN
+from davinci_forces import robots
+from davinci_forces.errors import BadRobot
+from davinci_forces.maths.mechanics import kinematics, rigid_body
+from davinci_forces.robots.dvrk_psm_chain import CHAIN
 
 TWO = """
 name = "two"

@@ -10,16 +10,16 @@ from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 
-from pipeline import robots
-from pipeline.errors import BadRobot
-from pipeline.maths.constants import GRAVITY
-from pipeline.maths.mechanics import kinematics, rigid_body
-from pipeline.maths.mechanics.placed import roll_pitch_yaw, transform
-from pipeline.robots.davinci import ROBOT as DAVINCI
-from pipeline.robots.urdf import elements, reading, writing
-from pipeline.stages import resolve
-from pipeline.study import LogEntry
-from pipeline.toml.file import TomlFile
+from davinci_forces import robots
+from davinci_forces.errors import BadRobot
+from davinci_forces.maths.constants import GRAVITY
+from davinci_forces.maths.mechanics import kinematics, rigid_body
+from davinci_forces.maths.mechanics.placed import roll_pitch_yaw, transform
+from davinci_forces.robots.davinci import ROBOT as DAVINCI
+from davinci_forces.robots.urdf import elements, reading, writing
+from davinci_forces.stages import resolve
+from davinci_forces.study import LogEntry
+from davinci_forces.toml.file import TomlFile
 
 POSES = 50
 LINK = """<link name="{name}"><inertial><origin xyz="{centre}" rpy="0.3 -0.2 0.5"/><mass value="{mass}"/>

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from pipeline.maths.mechanics import kinematics, rigid_body
-from pipeline.robots.davinci import ROBOT as DAVINCI
-from pipeline.robots.urdf import writing
+from davinci_forces.maths.mechanics import kinematics, rigid_body
+from davinci_forces.robots.davinci import ROBOT as DAVINCI
+from davinci_forces.robots.urdf import writing
 from tests.robot.test_urdf import GRIPPER, motions, robot
 
 pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed: a rival of benchmarks, not a dependency")

@@ -6,18 +6,18 @@ from functools import cache
 import numpy as np
 import pytest
 
-from pipeline.maths.mechanics import kinematics
-from pipeline.maths.mechanics.rigid_body import gravity
-from pipeline.maths.models.independent import regressor
-from pipeline.maths.simulation.actuators import Regulator
-from pipeline.maths.simulation.closed_loop import JointConstraints, Timing, simulate
-from pipeline.maths.simulation.plant import arm
-from pipeline.maths.simulation.surroundings import nothing
-from pipeline.simulation import closed_loop
-from pipeline.simulation.motion import SimulatedRun
-from pipeline.simulation.scenario.reading import load
-from pipeline.simulation.scenario.scenario import BadScenario, Path, Scenario, SimulatedLog
-from pipeline.simulation.truth_toml import touched
+from davinci_forces.maths.mechanics import kinematics
+from davinci_forces.maths.mechanics.rigid_body import gravity
+from davinci_forces.maths.models.independent import regressor
+from davinci_forces.maths.simulation.actuators import Regulator
+from davinci_forces.maths.simulation.closed_loop import JointConstraints, Timing, simulate
+from davinci_forces.maths.simulation.plant import arm
+from davinci_forces.maths.simulation.surroundings import nothing
+from davinci_forces.simulation import closed_loop
+from davinci_forces.simulation.motion import SimulatedRun
+from davinci_forces.simulation.scenario.reading import load
+from davinci_forces.simulation.scenario.scenario import BadScenario, Path, Scenario, SimulatedLog
+from davinci_forces.simulation.truth_toml import touched
 
 G = 9.81
 SLIDE = "instrument_slide"

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pipeline.maths.simulation.actuators import Motors, Regulator
-from pipeline.maths.simulation.continuous import Regulated, regulate
-from pipeline.maths.simulation.control import current_after, pi
-from pipeline.maths.simulation.plant import arm
-from pipeline.robots.davinci import ROBOT
+from davinci_forces.maths.simulation.actuators import Motors, Regulator
+from davinci_forces.maths.simulation.continuous import Regulated, regulate
+from davinci_forces.maths.simulation.control import current_after, pi
+from davinci_forces.maths.simulation.plant import arm
+from davinci_forces.robots.davinci import ROBOT
 
 K_P = np.array([500, 500, 500, 10, 10, 1.0])  # Table 5.1
 K_D = np.array([50, 50, 40, 2, 0.2, 0.02])
@@ -57,7 +57,7 @@ def test_the_lyapunov_function_falls_by_what_damping_takes():
 
 
 def test_a_compensator_that_knows_nine_tenths_of_the_masses_leaves_pd_with_the_offset_of_the_tenth():
-    from pipeline.maths.mechanics.rigid_body import gravity
+    from davinci_forces.maths.mechanics.rigid_body import gravity
 
     run = study(False, 0.9, "rest", 60.0)
     expected = 0.1 * gravity(ROBOT.chain, ROBOT.bodies, run.q[-1]) / K_P

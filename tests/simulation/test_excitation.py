@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.maths.excitation.criterion import condition, determinant, triangle
-from pipeline.maths.excitation.fourier import Fourier, instants, motion, observation, ranges
-from pipeline.maths.excitation.joint import ExcitationProblem, design, impossible, within
-from pipeline.maths.models.bias import bias
-from pipeline.maths.models.independent import regressor
-from pipeline.maths.models.terms import TERMS, inertia, stiffness
-from pipeline.robots.davinci import ROBOT
+from davinci_forces.maths.excitation.criterion import condition, determinant, triangle
+from davinci_forces.maths.excitation.fourier import Fourier, instants, motion, observation, ranges
+from davinci_forces.maths.excitation.joint import ExcitationProblem, design, impossible, within
+from davinci_forces.maths.models.bias import bias
+from davinci_forces.maths.models.independent import regressor
+from davinci_forces.maths.models.terms import TERMS, inertia, stiffness
+from davinci_forces.robots.davinci import ROBOT
 
 TABLE_6_1 = {  # with b1 of hand roll corrected; f as printed, and for hand roll as that correction gives it
     "hand_roll": ((-0.1848, 0.0260, -0.2783, 0.0609, -0.4261), 10.0, -8.5973),

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.maths.excitation.arm import ArmExcitationProblem, arm_observation, arm_problem, design_together
-from pipeline.maths.excitation.criterion import determinant
-from pipeline.maths.excitation.fourier import Fourier, instants, motion
-from pipeline.maths.excitation.joint import ExcitationProblem, design
-from pipeline.maths.mechanics.rigid_body import inverse_dynamics
-from pipeline.robots.davinci import ROBOT
+from davinci_forces.maths.excitation.arm import ArmExcitationProblem, arm_observation, arm_problem, design_together
+from davinci_forces.maths.excitation.criterion import determinant
+from davinci_forces.maths.excitation.fourier import Fourier, instants, motion
+from davinci_forces.maths.excitation.joint import ExcitationProblem, design
+from davinci_forces.maths.mechanics.rigid_body import inverse_dynamics
+from davinci_forces.robots.davinci import ROBOT
 
 LIMITS = {joint.name: (joint.limits.q, joint.limits.dq, joint.limits.ddq) for joint in ROBOT.joints}
 

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline.maths.excitation.directions import delayed, extremes, fitted, from_standstill
-from pipeline.maths.excitation.fourier import Fourier, motion, ranges
-from pipeline.maths.excitation.search import descend, lowest
+from davinci_forces.maths.excitation.directions import delayed, extremes, fitted, from_standstill
+from davinci_forces.maths.excitation.fourier import Fourier, motion, ranges
+from davinci_forces.maths.excitation.search import descend, lowest
 
 LIMITS = ((-0.3, 0.5), (-1.0, 0.2), (-np.inf, 2.0))
 numbers = st.lists(st.floats(-1e3, 1e3).filter(lambda c: c == 0 or abs(c) > 1e-3), min_size=3, max_size=11).filter(

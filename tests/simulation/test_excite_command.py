@@ -7,8 +7,8 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from pipeline.commands import excite
-from pipeline.errors import BadRequest, BadRobot
+from davinci_forces.commands import excite
+from davinci_forces.errors import BadRequest, BadRobot
 
 PITCH = "-0.1912,0.2861,-0.0639,0.1741,0.3701"
 app = typer.Typer()

@@ -9,14 +9,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from pipeline import robots
-from pipeline.maths.simulation.actuators import Regulator
-from pipeline.robots.davinci import ROBOT
-from pipeline.simulation.scenario.reading import _scenario, load, shipped
-from pipeline.simulation.scenario.scenario import BadScenario, ForceSensor, Path
-from pipeline.simulation.sensors import record_force
-from pipeline.toml import TomlTable
-from pipeline.toml.file import TomlFile
+from davinci_forces import robots
+from davinci_forces.maths.simulation.actuators import Regulator
+from davinci_forces.robots.davinci import ROBOT
+from davinci_forces.simulation.scenario.reading import _scenario, load, shipped
+from davinci_forces.simulation.scenario.scenario import BadScenario, ForceSensor, Path
+from davinci_forces.simulation.sensors import record_force
+from davinci_forces.toml import TomlTable
+from davinci_forces.toml.file import TomlFile
 from tests.test_study import ANYTHING, places_of
 
 LISTED = ", ".join(robots.ROBOTS)
@@ -39,7 +39,7 @@ external.hand_roll = [ { shape = "triangle", start = 2.0, end = 4.0, peak = 1.0 
 
 
 def shipped_text(name: str) -> str:
-    return files("pipeline.simulation").joinpath(f"shipped/{name}.toml").read_text(encoding="utf-8")
+    return files("davinci_forces.simulation").joinpath(f"shipped/{name}.toml").read_text(encoding="utf-8")
 
 
 def read(tmp_path, text: str):

@@ -9,19 +9,19 @@ import typer
 from scipy.signal import lfilter
 from typer.testing import CliRunner
 
-from pipeline.commands import simulate
-from pipeline.errors import BadRequest
-from pipeline.estimators import ESTIMATORS
-from pipeline.logs import open_log
-from pipeline.maths.excitation.fourier import motion
-from pipeline.maths.models.independent import regressor
-from pipeline.records import Average, Fit, Signal, Trajectory
-from pipeline.simulation import study_folder
-from pipeline.simulation.scenario.reading import load
-from pipeline.simulation.scenario.scenario import SensorNoise
-from pipeline.simulation.sensors import drift, generator, stepped
-from pipeline.stages import average, differentiate, fit
-from pipeline.study import Study, reading
+from davinci_forces.commands import simulate
+from davinci_forces.errors import BadRequest
+from davinci_forces.estimators import ESTIMATORS
+from davinci_forces.logs import open_log
+from davinci_forces.maths.excitation.fourier import motion
+from davinci_forces.maths.models.independent import regressor
+from davinci_forces.records import Average, Fit, Signal, Trajectory
+from davinci_forces.simulation import study_folder
+from davinci_forces.simulation.scenario.reading import load
+from davinci_forces.simulation.scenario.scenario import SensorNoise
+from davinci_forces.simulation.sensors import drift, generator, stepped
+from davinci_forces.stages import average, differentiate, fit
+from davinci_forces.study import Study, reading
 
 app = typer.Typer()
 app.command()(simulate.run)

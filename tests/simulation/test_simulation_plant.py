@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from pipeline.maths.mechanics import kinematics, rigid_body
-from pipeline.maths.simulation.continuous import at
-from pipeline.maths.simulation.plant import arm
-from pipeline.robots.davinci import ROBOT
+from davinci_forces.maths.mechanics import kinematics, rigid_body
+from davinci_forces.maths.simulation.continuous import at
+from davinci_forces.maths.simulation.plant import arm
+from davinci_forces.robots.davinci import ROBOT
 
 random = np.random.default_rng(4)
 

@@ -6,11 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
-from pipeline.maths.simulation.continuous import at as dynamics
-from pipeline.maths.simulation.friction import Friction
-from pipeline.maths.simulation.plant import arm
-from pipeline.maths.simulation.step import State, middle, step
-from pipeline.robots.davinci import ROBOT
+from davinci_forces.maths.simulation.continuous import at as dynamics
+from davinci_forces.maths.simulation.friction import Friction
+from davinci_forces.maths.simulation.plant import arm
+from davinci_forces.maths.simulation.step import State, middle, step
+from davinci_forces.robots.davinci import ROBOT
 
 G = 9.81
 

@@ -4,10 +4,10 @@ import json
 
 import pytest
 
-import pipeline
-from pipeline.robots.davinci import ROBOT
-from pipeline.simulation.scenario.reading import load
-from pipeline.stages import STAGES
+import davinci_forces
+from davinci_forces.robots.davinci import ROBOT
+from davinci_forces.simulation.scenario.reading import load
+from davinci_forces.stages import STAGES
 from tests.test_runs import call
 
 PERIODS = 10
@@ -71,7 +71,7 @@ def test_friction_takes_from_coulomb_s_and_gives_to_the_viscous_and_is_seen_over
         )
         assert found["viscous_friction"] > 1.1 * true["viscous_friction"]
         assert found["coulomb_friction"] < 0.95 * true["coulomb_friction"]
-        charts = pipeline.read(study, "FrictionMap", joint=joint.name, model="independent")
+        charts = davinci_forces.read(study, "FrictionMap", joint=joint.name, model="independent")
         assert {log.partition("-")[0] for log in charts["log"].unique()} == {"matched", "realistic"}
 
 

@@ -6,14 +6,14 @@ from importlib.resources import files
 import numpy as np
 import pytest
 
-import pipeline
-from pipeline.runner.console import Console
-from pipeline.runner.runner import Runner
-from pipeline.runner.runs import folders
-from pipeline.simulation import study_folder
-from pipeline.simulation.scenario.reading import load
-from pipeline.stages import STAGES
-from pipeline.study import reading
+import davinci_forces
+from davinci_forces.runner.console import Console
+from davinci_forces.runner.runner import Runner
+from davinci_forces.runner.runs import folders
+from davinci_forces.simulation import study_folder
+from davinci_forces.simulation.scenario.reading import load
+from davinci_forces.stages import STAGES
+from davinci_forces.study import reading
 from tests.tissue.pushing import SURFACE, K
 
 SEEDS = 5
@@ -24,7 +24,7 @@ NEEDED = tuple(name for name in STAGES[: STAGES.index("palpate") + 1] if name !=
 @pytest.fixture(scope="module")
 def found(tmp_path_factory):
     """The tissue of every seed: what the demonstration study has of the slide, simulated anew and analysed."""
-    text = (files("pipeline.simulation") / "shipped" / "davinci-demo.toml").read_text()
+    text = (files("davinci_forces.simulation") / "shipped" / "davinci-demo.toml").read_text()
     head, *logs = re.split(r"(?m)^\[\[log\]\]\n", text)
     kept = head + "".join(f"[[log]]\n{log}" for log in logs if re.match(LOGS, log))
     home, tissue = tmp_path_factory.mktemp("arm"), []
@@ -35,7 +35,7 @@ def found(tmp_path_factory):
         said: list[str] = []
         runner = Runner(reading.read(raw), folders(raw, None, None), Console(lambda _: None, said.append))
         assert runner.run(NEEDED), "\n".join(said)
-        tissue.append(pipeline.read(raw, "Stiffness"))
+        tissue.append(davinci_forces.read(raw, "Stiffness"))
     return tissue
 
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.maths.contact.indentation import NONE, found
-from pipeline.maths.contact.onset import hinge, onset_std
-from pipeline.maths.contact.pushes import between_troughs, runs
-from pipeline.maths.contact.stiffness import median_std, slope_error, straight, work
-from pipeline.maths.contact.tissue import LAWS, judged, moments
-from pipeline.study import WHOLE
+from davinci_forces.maths.tissue.indentation import NONE, found
+from davinci_forces.maths.tissue.onset import hinge, onset_std
+from davinci_forces.maths.tissue.pushes import between_troughs, runs
+from davinci_forces.maths.tissue.stiffness import median_std, slope_error, straight, work
+from davinci_forces.maths.tissue.tissue import LAWS, judged, moments
+from davinci_forces.study import WHOLE
 from tests.tissue.pushing import APPROACH, SURFACE, TWICE, K, coloured, motion, palpated, pressed, sensed, slid, touch
 
 SEEDS = 100

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-import pipeline
-from pipeline.cli import app
-from pipeline.errors import BadStudy
-from pipeline.logs import open_log
-from pipeline.records import Touch
-from pipeline.stages import ingest
-from pipeline.study import WHOLE, reading
+import davinci_forces
+from davinci_forces.cli import app
+from davinci_forces.errors import BadStudy
+from davinci_forces.logs import open_log
+from davinci_forces.records import Touch
+from davinci_forces.stages import ingest
+from davinci_forces.study import WHOLE, reading
 from tests import arm
 
 PROBES = """[[log]]
@@ -53,15 +53,15 @@ def test_a_file_of_probes_needs_no_clock(tmp_path):
     folder = study(tmp_path)
     said = stages(folder, "ingest", "palpate")
     assert "error" not in said
-    touch = pipeline.read(folder, "Touch")
+    touch = davinci_forces.read(folder, "Touch")
     assert touch["t"].isna().all()
     assert list(touch["sample"]) == list(range(120))
     np.testing.assert_allclose(touch["depth"].max(), 2e-3)
     assert touch.attrs["units"]["depth"] == "m"
-    pushes = pipeline.read(folder, "Push")
+    pushes = davinci_forces.read(folder, "Push")
     assert set(pushes["push"]) == set(range(12))
     assert pushes["k_t"].median() == pytest.approx(450, rel=0.02)
-    [summary] = pipeline.read(folder, "LogSummary").groupby("log", observed=True)
+    [summary] = davinci_forces.read(folder, "LogSummary").groupby("log", observed=True)
     assert summary[1]["rate"].isna().all()  # nobody may take the number of a sample for its time
 
 
@@ -200,7 +200,7 @@ def test_real_probes_of_a_phantom(data, tmp_path):
     folder = study(tmp_path)
     (folder / "probes.csv").write_bytes((data / "palpation" / "phantom_T1_probes.csv").read_bytes())
     stages(folder, "ingest", "palpate")
-    tissue = pipeline.read(folder, "Stiffness")
+    tissue = davinci_forces.read(folder, "Stiffness")
     counted = tissue[tissue["counted"] == 1]["k_t"]
     assert tissue["stiffness"].iloc[0] == pytest.approx(453, rel=0.05)
     assert counted.median() == pytest.approx(453, rel=0.05)
@@ -216,7 +216,7 @@ def test_real_pushes_over_a_surface_are_found_one_by_one(data, tmp_path):
     folder = study(tmp_path, text=text)
     (folder / "probes.csv").write_bytes((data / "palpation" / "ContPalpTrial1.csv").read_bytes())
     stages(folder, "ingest", "palpate")
-    tissue, pushes = pipeline.read(folder, "Stiffness"), pipeline.read(folder, "Push")
+    tissue, pushes = davinci_forces.read(folder, "Stiffness"), davinci_forces.read(folder, "Push")
     assert 340 <= len(tissue) <= 380
     known = tissue.dropna(subset=["onset_depth"])
     assert len(known) > 0.6 * len(tissue)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from pipeline.study import WHOLE
+from davinci_forces.study import WHOLE
 from tests.tissue.pushing import TWICE, coloured, motion, palpated, pressed, sensed, slid, touch
 
 
@@ -74,7 +74,7 @@ def test_a_log_without_a_force_is_said():
 
 
 def test_a_log_of_another_role_is_left_alone():
-    from pipeline.stages import palpate
+    from davinci_forces.stages import palpate
     from tests import arm
     from tests.test_averaging import entry
 

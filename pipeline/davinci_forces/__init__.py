@@ -1,0 +1,70 @@
+"""Contact forces of a da Vinci arm from its motor currents, offline: from raw logs to reports."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+__all__ = ["read", "results", "run"]
+
+
+def read(study: str | Path, record: str, **about: str) -> "pd.DataFrame":
+    """The records of one kind of an analysed study as one DataFrame: `read("raw/mine", "Track", joint="hand_roll")`.
+
+    The scalars that tell records apart (log, joint, ...) are columns of their own.  `attrs["units"]` gives the unit of
+    each column; where it differs between joints, a dict by joint.  Keyword arguments keep records whose scalars have
+    these values.
+
+    Raises
+    ------
+    BadRequest
+        If there is no such kind of record.
+    MissingRecord
+        If the study has none: run its stages first.
+    """
+    from davinci_forces.runner.results.dataframes import read as read_frames
+
+    return read_frames(Path(study), record, about)
+
+
+def run(study: str | Path, *stages: str, force: bool = False, jobs: int = 1, quiet: bool = False) -> bool:
+    """Run stages on a study, and the report, in their order, or all where none is named; whether every task succeeded.
+
+    What is current is skipped, as on the command line.  `jobs` is the number of processes.
+
+    Raises
+    ------
+    BadRequest
+        If there is no such stage.
+    PipelineError
+        If the study is wrong, another run is working on it, or a stage has nothing to work on.
+    """
+    from davinci_forces.errors import BadRequest
+    from davinci_forces.runner import STEPS
+    from davinci_forces.runner.processes import arithmetic
+
+    arithmetic.pin()
+
+    unknown = [name for name in stages if name not in STEPS]
+    if unknown:
+        raise BadRequest(f"there is no stage {unknown[0]!r}; there are {', '.join(STEPS)}")
+    from davinci_forces.runner import runs
+
+    names = [name for name in STEPS if name in stages] or STEPS
+    return runs.run(Path(study), names, force=force, jobs=jobs, verbosity="quiet" if quiet else "normal")
+
+
+def results(study: str | Path) -> "pd.DataFrame":
+    """Every number of a study's report, by its key: `results("raw/mine").loc["period.roll", "value"]`.
+
+    The columns are value, std (NaN where there is none), unit, and source, the record that holds the number.
+
+    Raises
+    ------
+    MissingRecord
+        If the study has no results: run its stages first.
+    """
+    from davinci_forces.runner.results.dataframes import results as read_results
+
+    return read_results(Path(study))

@@ -1,0 +1,219 @@
+"""Contact forces of a da Vinci arm from its motor currents, without a force sensor: from logs to a report."""
+
+import re
+import sys
+from collections.abc import Callable, Iterator
+from concurrent.futures import BrokenExecutor
+from contextlib import contextmanager
+from copy import copy
+from functools import wraps
+from importlib import import_module
+from inspect import cleandoc
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperCommand, TyperGroup
+
+from davinci_forces.commands import COMMANDS
+from davinci_forces.errors import PipelineError
+from davinci_forces.report import REPORT
+from davinci_forces.runner import STEPS
+from davinci_forces.runner.processes import arithmetic
+
+if TYPE_CHECKING:
+    from davinci_forces.runner.console import Verbosity
+
+STEP = "step"  # what the command that the steps are copies of is called until then
+
+
+class Steps(TyperGroup):
+    """Commands, of which those that are steps of a run differ in name and help only: what they take is read once."""
+
+    def __init__(self, *, commands: dict[str, Any], **attributes: Any) -> None:
+        step = commands.pop(STEP)
+        modules = {name: "report/report" if name == REPORT else f"stages/{name}" for name in STEPS}
+        steps = {name: renamed(step, name, docstring(module)) for name, module in modules.items()}
+        super().__init__(commands=steps | commands, **attributes)
+
+
+def renamed(command: TyperCommand, name: str, words: str) -> TyperCommand:
+    """A command by another name, with other help."""
+    other = copy(command)
+    other.name, other.help = name, as_written(words)
+    return other
+
+
+def docstring(module: str) -> str:
+    """What a module says of itself, which is what its file begins with; importing all would take seconds."""
+    file = Path(__file__).parent / f"{module}.py"
+    return cleandoc(file.read_text(encoding="utf-8").split('"""', 2)[1])
+
+
+def as_written(words: str) -> str:
+    """Help that shows `raw/<study>`, which Markdown takes for a tag of HTML and leaves out."""
+    return re.sub(r"(`[^`]*`)|<", lambda match: match[1] or r"\<", words)
+
+
+app = typer.Typer(
+    cls=Steps,
+    no_args_is_help=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    pretty_exceptions_enable=False,
+    rich_markup_mode="markdown",  # the default swallows units in square brackets
+)
+
+StudyFolder = Annotated[Path, typer.Argument(help="Folder of a study: raw/<study>, which holds study.toml.")]
+Studies = Annotated[list[Path] | None, typer.Argument(help="Folders of studies; all in raw/ where none is named.")]
+Processed = Annotated[Path | None, typer.Option(help="Folder for processed files, instead of processed/ beside raw/.")]
+Reports = Annotated[Path | None, typer.Option(help="Folder for reports, instead of reports/ beside raw/.")]
+Force = Annotated[bool, typer.Option("--force", help="Run what is current, too.")]
+Jobs = Annotated[int, typer.Option(min=1, help="Processes to spread the work over.")]
+Cluster = Annotated[
+    str, typer.Option(metavar="ADDRESS", help="Scheduler of a Dask cluster to spread the work over: tcp://host:8786.")
+]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what would run and why, and change nothing.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say only what went wrong, or may have.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say of each task, too, when it is done and its time.")]
+
+
+class ShownAsWritten(TyperCommand):
+    """A command whose help is shown as it was written."""
+
+    def __init__(self, *args: Any, **kwargs: Any) -> None:
+        super().__init__(*args, **kwargs)
+        for described in (self, *self.params):
+            words = getattr(described, "help", None)
+            if words and self.rich_markup_mode == "markdown":
+                vars(described)["help"] = as_written(words)
+
+
+def main() -> None:
+    """Run the command line."""
+    arithmetic.pin()
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):  # names in logs need not fit the console's encoding
+            stream.reconfigure(errors="replace")
+    app()
+
+
+@contextmanager
+def messages() -> Iterator[None]:
+    """Print what the pipeline raises on purpose, and what the machine refuses, as a message; leave with exit code 1."""
+    try:
+        yield
+    except BrokenPipeError:  # whoever read the output has gone, and needs no message
+        raise
+    except (PipelineError, OSError) as error:
+        typer.secho(f"error: {error}", fg="red", err=True)
+        raise typer.Exit(1) from None
+    except BrokenExecutor:
+        says = "a process of this run was ended from outside, perhaps for want of memory; run again with fewer --jobs"
+        typer.secho(f"error: {says}: what was finished is kept", fg="red", err=True)
+        raise typer.Exit(1) from None
+
+
+def guarded(run: Callable[..., Any]) -> Callable[..., Any]:
+    """A command that ends in a message where it cannot go on."""
+
+    @wraps(run)
+    def command(*args: Any, **kwargs: Any) -> Any:
+        with messages():
+            return run(*args, **kwargs)
+
+    return command
+
+
+def tell_version(asked: bool) -> None:
+    """Print the version, where it is asked for, and leave."""
+    if asked:
+        from importlib.metadata import version
+
+        typer.echo(f"davinci-forces {version('davinci-forces')}")
+        raise typer.Exit
+
+
+Version = Annotated[
+    bool, typer.Option("--version", callback=tell_version, is_eager=True, help="Print the version and leave.")
+]
+
+
+@app.callback(help=__doc__)
+def options(version: Version = False) -> None:
+    """What holds for every command; the option does its work by itself."""
+
+
+def verbosity(quiet: bool, verbose: bool) -> "Verbosity":
+    """How much a run says.
+
+    Raises
+    ------
+    typer.BadParameter
+        If it is to say both less and more.
+    """
+    if quiet and verbose:
+        raise typer.BadParameter("a run cannot be both --quiet and --verbose; leave one out")
+    return "quiet" if quiet else "verbose" if verbose else "normal"
+
+
+def run_stages(study: Path, names: tuple[str, ...], *how: Any) -> bool:
+    """Run stages on one study; whether all went well.  Why they could not run at all is printed."""
+    from davinci_forces.runner import runs
+
+    try:
+        with messages():
+            return runs.run(study, names, *how)
+    except typer.Exit:
+        return False
+
+
+@app.command(STEP, rich_help_panel="Stages, in order", cls=ShownAsWritten)
+@guarded
+def run_step(
+    context: typer.Context,
+    study: StudyFolder,
+    processed: Processed = None,
+    reports: Reports = None,
+    force: Force = False,
+    jobs: Jobs = 1,
+    cluster: Cluster = "",
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    dry_run: DryRun = False,
+) -> None:
+    """Run the step whose name the command has."""
+    from davinci_forces.runner import runs
+
+    says = verbosity(quiet, verbose)
+    names = (str(context.command.name),)
+    if not run_stages(runs.one(study), names, processed, reports, force, jobs, says, dry_run, cluster):
+        raise typer.Exit(1)
+
+
+@app.command("all", rich_help_panel="Stages, in order", cls=ShownAsWritten)
+@guarded
+def run_all(
+    studies: Studies = None,
+    processed: Processed = None,
+    reports: Reports = None,
+    force: Force = False,
+    jobs: Jobs = 1,
+    cluster: Cluster = "",
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+    dry_run: DryRun = False,
+) -> None:
+    """Run every stage and the report, on the studies named or on all in raw/ whose logs are there."""
+    from davinci_forces.runner import runs
+
+    says = verbosity(quiet, verbose)
+    named = runs.studies(studies or [], says)
+    good = [run_stages(study, STEPS, processed, reports, force, jobs, says, dry_run, cluster) for study in named]
+    if not all(good):
+        raise typer.Exit(1)
+
+
+for other in COMMANDS:
+    module = import_module(f"davinci_forces.commands.{other}")
+    added = app.command(other, help=module.__doc__, rich_help_panel="Other commands", cls=ShownAsWritten)
+    added(guarded(module.run))

@@ -1,0 +1,34 @@
+"""Write a commented study.toml for logs: what their channels are, and what they seem to hold."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def run(
+    files: Annotated[list[Path], typer.Argument(help="Logs, in the folder of the study: raw/<study>/<log>.")],
+    robot: Annotated[
+        str, typer.Option(help="The robot, or a .toml or .urdf file beside the study.", show_default="guessed")
+    ] = "",
+    study: Annotated[Path | None, typer.Option(help="Folder of the study, where not that of the first log.")] = None,
+    show: Annotated[bool, typer.Option("--print", help="Print it instead of writing study.toml.")] = False,
+) -> None:
+    """Describe logs in a study.toml, which is never overwritten."""
+    from davinci_forces.errors import BadRequest
+    from davinci_forces.records import store
+    from davinci_forces.study import template
+
+    folder = study or files[0].parent
+    draft = template.describe(files, folder, robot)
+    if show:
+        typer.echo(draft.text)
+        return
+    target = folder / "study.toml"
+    if target.exists():
+        raise BadRequest(f"{target} is there already; move it away, or print the new one with --print")
+    if draft.robot_file:
+        store.write_bytes(folder / draft.robot_file, draft.robot_text.encode())
+        typer.echo(f"{folder / draft.robot_file}: written; check the kinds of its joints and their terms")
+    store.write_bytes(target, draft.text.encode())
+    typer.echo(f"{target}: written; check the channels, then run `davinci-forces all {folder}`")

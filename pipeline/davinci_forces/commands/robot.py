@@ -1,0 +1,206 @@
+"""Print a robot: its joints, and at one pose frames, tip, Jacobian, M, C dq and G; or the robot as URDF."""
+
+import json
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+if TYPE_CHECKING:
+    from davinci_forces.robots.robot import Joint, Robot
+
+ROUNDING = 1e-14
+DEFAULT = 6  # coordinates of the pose where none is given: the arm with one jaw
+
+
+def run(
+    robot: Annotated[str, typer.Argument(help="A listed robot, or the path of a robot's .toml or .urdf file.")],
+    at: Annotated[
+        str | None, typer.Option(help="Pose q1,q2,... in rad or m: of davinci 3, 6 or 7 values; what is missing is 0.")
+    ] = None,
+    dq: Annotated[str | None, typer.Option(help="Velocities, for C dq: as many values as --at or fewer.")] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+    urdf: Annotated[bool, typer.Option("--urdf", help="Print the robot as URDF, for ROS and simulators.")] = False,
+) -> None:
+    """The pose, the velocity Jacobian of the tip (7.21)-(7.24) and the terms of (4.38), with all joints in SI units.
+
+    Of a robot whose geometry is not known, its joints.
+    """
+    from pathlib import Path
+
+    from davinci_forces.robots import load
+
+    arm = load(robot, Path())
+    if urdf:
+        from davinci_forces.robots.urdf import writing
+
+        typer.echo(writing.text(arm), nl=False)
+        return
+    n = arm.chain.n if arm.chain else 0
+    q = _values("--at", at) if at is not None else [0.0] * (min(DEFAULT, n) if arm.wrist else n)
+    document = _document(arm, q, _values("--dq", dq) if dq is not None else [])
+    typer.echo(json.dumps(document, indent=2, allow_nan=False) if as_json else _format_text(arm, q, document))
+
+
+def _values(option: str, text: str) -> list[float]:
+    """Numbers separated by commas."""
+    import math
+
+    from davinci_forces.errors import BadRequest
+
+    values = []
+    for place, word in enumerate(text.split(","), start=1):
+        try:
+            values.append(float(word))
+        except ValueError:
+            raise BadRequest(f"{option} {text}: value {place} is {word.strip()!r}, not a number") from None
+        if not math.isfinite(values[-1]):
+            raise BadRequest(f"{option} {text}: value {place} is {word.strip()}, and must be finite")
+    return values
+
+
+def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]:
+    """Everything that is printed, as JSON's types.
+
+    Raises
+    ------
+    BadRequest
+        If the robot has no chain, or q and dq have not the numbers of values that it can take.
+    """
+    import numpy as np
+
+    from davinci_forces.errors import BadRequest
+    from davinci_forces.maths.mechanics import kinematics, workspace
+
+    chain = robot.chain
+    if chain is None and (q or dq):
+        raise BadRequest(f"robot {robot.name} has no chain: its geometry is not known; leave --at and --dq out")
+    if chain is None:
+        return {"warnings": [], "joints": _joints(robot)}
+    counts = sorted({len(robot.joints), chain.n - 1, chain.n} if robot.wrist else {chain.n})
+    if len(q) not in counts:
+        numbers = " or ".join(filter(None, (", ".join(map(str, counts[:-1])), str(counts[-1]))))
+        raise BadRequest(f"--at has {len(q)} values; the pose of {robot.name} has {numbers}")
+    if len(dq) > len(q):
+        raise BadRequest(f"--dq has {len(dq)} values and the pose {len(q)}; give as many or fewer")
+    pose, rates = np.array(q), np.array(dq + [0.0] * (len(q) - len(dq)))
+    T = kinematics.frames(chain, pose)
+    J_v, J_w = kinematics.jacobian(chain, pose)
+    singular = bool(workspace.is_singular(chain, pose))
+    return {
+        "frames": {
+            name: {"origin": t[:3, 3].tolist(), "rotation": t[:3, :3].tolist()}
+            for name, t in zip(chain.names, T, strict=True)
+        },
+        "tip": kinematics.tip(chain, pose).tolist(),
+        "jacobian_v": J_v.tolist(),
+        "jacobian_w": J_w.tolist(),
+        **_dynamics(robot, pose, rates),
+        "condition": None if singular else float(workspace.condition(J_v[..., : workspace.ARM])),
+        "warnings": _outside(robot, q) + ([_singular(chain, q)] if singular else []),
+        "joints": _joints(robot),
+    }
+
+
+def _joints(robot: "Robot") -> dict[str, Any]:
+    """What is said of each joint: its kind, unit of effort, limits (null where there are none) and terms."""
+    import math
+
+    return {
+        joint.name: {
+            "kind": joint.kind.value,
+            "effort": joint.unit("{effort}"),
+            "limits": {
+                **{
+                    symbol: [end if math.isfinite(end) else None for end in getattr(joint.limits, symbol)]
+                    for symbol in ("q", "dq", "ddq")
+                },
+                "effort": joint.limits.effort if math.isfinite(joint.limits.effort) else None,
+            },
+            "terms": [term.name for term in joint.terms],
+        }
+        for joint in robot.joints
+    }
+
+
+def _dynamics(robot: "Robot", q: Any, dq: Any) -> dict[str, Any]:
+    """M, C dq and G, of a robot whose masses are known."""
+    from davinci_forces.maths.mechanics import rigid_body
+
+    if robot.chain is None or robot.bodies is None:
+        return {"mass": None, "coriolis": None, "gravity": None}
+    return {
+        "mass": rigid_body.mass_matrix(robot.chain, robot.bodies, q).tolist(),
+        "coriolis": rigid_body.coriolis(robot.chain, robot.bodies, q, dq).tolist(),
+        "gravity": rigid_body.gravity(robot.chain, robot.bodies, q).tolist(),
+    }
+
+
+def _outside(robot: "Robot", q: list[float]) -> list[str]:
+    """Which joints are beyond their limits: it is computed all the same."""
+    warnings = []
+    for joint, value in zip(robot.joints, q, strict=False):
+        (low, high), unit = joint.limits.q, joint.unit("{position}")
+        if not low <= value <= high:
+            warnings.append(f"{joint.name} at {value:g} {unit} is outside its limits, {low:g} to {high:g} {unit}")
+    return warnings
+
+
+def _singular(chain: Any, q: list[float]) -> str:
+    """Why the pose has no condition number, and where such poses lie."""
+    from davinci_forces.maths.mechanics.workspace import ARM, SINGULAR, singular_slides
+
+    kinds = [set(chain.slides[chain.coordinate == k].tolist()) for k in range(ARM)]
+    of_a_slide = kinds == [{False}, {False}, {True}]
+    slides = ", ".join(sorted({f"{slide:.4f}" for slide in singular_slides(chain, q[1])})) if of_a_slide else ""
+    where = f"; at this pitch that is so where the slide is at {slides} m" if slides else ""
+    return (
+        f"singular: the condition number of J_v of the first {ARM} joints is above {SINGULAR:g}, so that they do not "
+        f"tell the force at the tip in one direction{where}"
+    )
+
+
+def _format_text(robot: "Robot", q: list[float], document: dict[str, Any]) -> str:
+    """The result for people: numbers in columns, everything in the base axes and SI units; rounding errors are 0."""
+    lines = [robot.title, "", *_joint_lines(robot)]
+    if "frames" not in document:
+        return "\n".join([*lines, "", "its geometry is not known: [[link]] in its file says it, or a URDF"])
+    lines += ["", f"at q = {_numbers(q)}"]
+    lines += [f"warning: {text}" for text in document["warnings"]]
+    width = max(map(len, ("frame", *document["frames"])))
+    lines += ["", f"{'frame':>{width}}   origin [m]"]
+    lines += [f"{name:>{width}}   {_numbers(frame['origin'])}" for name, frame in document["frames"].items()]
+    lines += ["", f"tip [m]   {_numbers(document['tip'])}"]
+    titles = {"jacobian_v": "J_v of the tip", "jacobian_w": "J_omega", "mass": "M"}
+    for key, title in titles.items():
+        if document[key] is not None:
+            lines += ["", title, *(f"  {_numbers(row)}" for row in document[key])]
+    if document["mass"] is not None:
+        lines += ["", f"C dq   {_numbers(document['coriolis'])}", f"G      {_numbers(document['gravity'])}"]
+    condition = document["condition"]
+    return "\n".join([*lines, "", f"condition of J_v   {'singular' if condition is None else f'{condition:.4g}'}"])
+
+
+def _joint_lines(robot: "Robot") -> list[str]:
+    """One line a joint: from where to where it moves, how fast, and what its effort is made of."""
+    width = max(len(joint.name) for joint in robot.joints)
+    lines = []
+    for joint in robot.joints:
+        terms = " + ".join(term.name for term in joint.terms)
+        lines.append(f"{joint.name:>{width}}   {_moves(joint)}; effort in {joint.unit('{effort}')}: {terms}")
+    return lines
+
+
+def _moves(joint: "Joint") -> str:
+    """How a joint moves, as far as it is limited."""
+    import math
+
+    (low, high), (_, fastest), most = joint.limits.q, joint.limits.dq, joint.limits.effort
+    position = joint.unit("{position}")
+    words = [joint.kind.value, f"{low:g} to {high:g} {position}" if math.isfinite(high - low) else "without an end"]
+    words += [f"at most {fastest:g} {position}/s"] if math.isfinite(fastest) else []
+    words += [f"at most {most:g} {joint.unit('{effort}')}"] if math.isfinite(most) else []
+    return ", ".join(words)
+
+
+def _numbers(values: list[float]) -> str:
+    return " ".join(f"{value if abs(value) > ROUNDING else 0.0:12.6g}" for value in values)

@@ -1,0 +1,20 @@
+"""The effort that the model leaves of every sample, with accelerations from measured motion.
+
+With the motion that is handed over, q, dq and ddq:
+
+    tau_ext = tau - M ddq - b(q, dq)                                                  (7.28)
+"""
+
+import numpy as np
+
+from davinci_forces.filters.problem import NoiseModel, Tracked
+from davinci_forces.maths.models.bias import bias
+from davinci_forces.maths.models.driven import Driven
+
+
+def track(recording: Driven, noise: NoiseModel) -> Tracked:
+    """As the motion that is handed over has it; its deviation is that of the noise of the effort."""
+    joint, q, dq, ddq, tau, T_s, _ = recording
+    tau_ext = tau - joint.inertia * ddq - bias(joint.coefficients, q, dq, 0.0)[0] - joint.known
+    nothing = np.zeros(len(q))
+    return Tracked(q, dq, tau_ext, joint.inertia * noise.q_dq / T_s, nothing, nothing, nothing)

@@ -1,0 +1,43 @@
+"""The observer of the generalised momentum (De Luca and Mattone 2003), the field's usual one.
+
+    p = M dq,    dp/dt = tau - b + dM/dt dq - tau_ext
+    tau_ext^ = z - K p,    dz/dt = K (tau - b + dM/dt dq + K p - z)
+
+It sees the external effort through a first-order lag of 1 / K, and needs no acceleration.  K is that of a random walk
+of `q_tau` a sample seen through the noise of effort and velocity, so that filters are tuned alike.
+"""
+
+import numpy as np
+
+from davinci_forces.filters.problem import NoiseModel, Tracked
+from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.models.bias import bias
+from davinci_forces.maths.models.driven import Driven
+
+
+def track(recording: Driven, noise: NoiseModel) -> Tracked:
+    """Exact over a sample of constant drive; its deviation is what noise of effort and velocity makes of it."""
+    from scipy.signal import lfilter
+
+    joint, q, dq, _, tau, T_s, first_std = recording
+    M = joint.inertia
+    K, forgets = gain(float(np.mean(M)), T_s, noise)
+    p, turning = M * dq, (np.gradient(M, T_s) if len(M) > 1 else np.zeros(1)) * dq
+    drive = tau - bias(joint.coefficients, q, dq, 0.0)[0] - joint.known + turning
+    # z[k+1] = forgets z[k] + (1 - forgets) (drive[k] + K p[k]), from z[0] = K p[0]: no external effort at first.
+    driven, _ = lfilter([0.0, 1.0 - forgets], [1.0, -forgets], drive + K * p, zi=[K * p[0]])
+    return Tracked(q, dq, driven - K * p, deviation(M, K, forgets, T_s, noise, first_std), *np.zeros((3, len(q))))
+
+
+def gain(M: float, T_s: float, noise: NoiseModel) -> tuple[float, float]:
+    """K [1/s], and the share of itself that the observer keeps over a sample."""
+    ratio = noise.q_tau * T_s / (M * float(np.hypot(noise.q_dq, noise.r_dq)))
+    share = 0.5 * ratio * (np.sqrt(ratio**2 + 4.0) - ratio)
+    return -float(np.log1p(-share)) / T_s, 1.0 - share
+
+
+def deviation(M: Array, K: float, forgets: float, T_s: float, noise: NoiseModel, first_std: float) -> Array:
+    """Noise of effort through the lag, that of velocity through what is left of it, and what was not known at first."""
+    through = (1.0 - forgets) / (1.0 + forgets)
+    settled = through * (M * noise.q_dq / T_s) ** 2 + (1.0 + through) * (K * M * noise.r_dq) ** 2
+    return np.asarray(np.sqrt(settled + (first_std * forgets ** np.arange(len(M))) ** 2))

@@ -1,0 +1,89 @@
+"""The smoother: every state from the whole recording, before and after it.
+
+The filter's pass forwards, then backwards the recursion of Bryson and Frazier (in the form of Bierman 1973), which is
+that of Rauch, Tung and Striebel without an inverse of P:
+
+    l~ = -H' S^-1 i + (I - K H)' l^,    L~ = H' S^-1 H + (I - K H)' L^ (I - K H)
+    x|N = x- - P- l~,    P|N = P- - P- L~ P-,    l^ = F' l~ and L^ = F' L~ F one sample earlier
+"""
+
+from typing import Any
+
+import numpy as np
+
+from davinci_forces.filters import belief, stepping
+from davinci_forces.filters.belief import corrected, gains, spread
+from davinci_forces.filters.problem import NoiseModel, Tracked
+from davinci_forces.filters.stepping import arguments, transition
+from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.compiled import cached
+from davinci_forces.maths.models import bias as derivation
+from davinci_forces.maths.models.driven import Driven
+
+LEFT = 1e-12  # of a variance, below which a difference from it is rounding
+STORED = 15  # of each sample: what was predicted, and the transition to the next
+
+
+def track(recording: Driven, noise: NoiseModel) -> Tracked:
+    """Filter a recording forwards and smooth it backwards; the innovations are the filter's."""
+    N = len(recording.q)
+    out, stored = np.empty((7, N)), np.empty((N, STORED))
+    _forwards(stored, *arguments(recording, noise), *out[4:])
+    _backwards(stored, noise.r_q**2, noise.r_dq**2, *out[:6])
+    return Tracked(*out)
+
+
+@cached(derivation, belief, stepping)
+def _forwards(
+    stored: Any, s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float,
+    Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float, out_iq: Any, out_idq: Any, out_nis: Any,
+) -> None:  # fmt: skip
+    for k in range(len(y_q)):
+        for i in range(9):
+            stored[k, i] = s[i]
+        s, i_q, i_dq, nis, _ = corrected(s, y_q[k], y_dq[k], R_q, R_dq)
+        out_iq[k], out_idq[k], out_nis[k] = i_q, i_dq, nis
+        q, dq, F, unsure = transition(s[0], s[1], s[2], s[6], drive[k], inertia[k], c_b, T_s)
+        for i in range(6):
+            stored[k, 9 + i] = F[i]
+        s = spread(s, q, dq, F, Q_qq, Q_qd, Q_dd + unsure, Q_tau)
+
+
+@cached(belief)
+def _backwards(
+    stored: Array, R_q: float, R_dq: float, out_q: Any, out_dq: Any, out_tau: Any, out_std: Any, i_q: Any, i_dq: Any
+) -> None:
+    l1, l2, l3 = 0.0, 0.0, 0.0
+    L11, L12, L13, L22, L23, L33 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    for k in range(len(i_q) - 1, -1, -1):
+        row = stored[k]
+        a, b, c, d, e, f = row[3], row[4], row[5], row[6], row[7], row[8]
+        s = (row[0], row[1], row[2], a, b, c, d, e, f)
+        v_qq, v_qd, v_dd, k11, k12, k21, k22, k31, k32, _ = gains(s, R_q, R_dq)
+        # I - K H = [1-k11 -k12 0; -k21 1-k22 0; -k31 -k32 1]
+        m11, m12, m21, m22 = 1.0 - k11, -k12, -k21, 1.0 - k22
+        t1, t2 = v_qq * i_q[k] + v_qd * i_dq[k], v_qd * i_q[k] + v_dd * i_dq[k]
+        l1, l2 = m11 * l1 + m21 * l2 - k31 * l3 - t1, m12 * l1 + m22 * l2 - k32 * l3 - t2
+        # L^ (I - K H), then (I - K H)' times that
+        g11, g12 = L11 * m11 + L12 * m21 - L13 * k31, L11 * m12 + L12 * m22 - L13 * k32
+        g21, g22 = L12 * m11 + L22 * m21 - L23 * k31, L12 * m12 + L22 * m22 - L23 * k32
+        g31, g32 = L13 * m11 + L23 * m21 - L33 * k31, L13 * m12 + L23 * m22 - L33 * k32
+        L11, L12 = m11 * g11 + m21 * g21 - k31 * g31 + v_qq, m11 * g12 + m21 * g22 - k31 * g32 + v_qd
+        L22 = m12 * g12 + m22 * g22 - k32 * g32 + v_dd
+        L13, L23 = g31, g32
+        out_q[k] = row[0] - a * l1 - b * l2 - c * l3
+        out_dq[k] = row[1] - b * l1 - d * l2 - e * l3
+        out_tau[k] = row[2] - c * l1 - e * l2 - f * l3
+        told = c * (c * L11 + 2 * (e * L12 + f * L13)) + e * (e * L22 + 2 * f * L23) + f * f * L33
+        out_std[k] = max(f - told, LEFT * f) ** 0.5
+        if k > 0:
+            before = stored[k - 1]
+            f11, f12, f13, f21, f22, f23 = before[9], before[10], before[11], before[12], before[13], before[14]
+            l1, l2, l3 = f11 * l1 + f21 * l2, f12 * l1 + f22 * l2, f13 * l1 + f23 * l2 + l3
+            # L~ F, then F' times that
+            h11, h12, h13 = L11 * f11 + L12 * f21, L11 * f12 + L12 * f22, L11 * f13 + L12 * f23 + L13
+            h21, h22, h23 = L12 * f11 + L22 * f21, L12 * f12 + L22 * f22, L12 * f13 + L22 * f23 + L23
+            h33 = L13 * f13 + L23 * f23 + L33
+            L11, L12, L13 = f11 * h11 + f21 * h21, f11 * h12 + f21 * h22, f11 * h13 + f21 * h23
+            L22, L23 = f12 * h12 + f22 * h22, f12 * h13 + f22 * h23
+            L33 = f13 * h13 + f23 * h23 + h33

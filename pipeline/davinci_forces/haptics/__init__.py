@@ -1,0 +1,1 @@
+"""The simulated hand that feels tissue through the arm."""

@@ -1,0 +1,270 @@
+"""What is simulated of a hand that feels: hand, device, link, arm, filter, tissue and plan, read from a TOML file.
+
+What the file leaves out is that of the experiment of section 8.4, and of body, noise and tissue that of the study.
+"""
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from davinci_forces import toml
+from davinci_forces.errors import PipelineError
+from davinci_forces.haptics.maths.bimodal import THESIS, Hand
+from davinci_forces.maths.simulation.actuators import Cascade, Device, Motors
+from davinci_forces.robots.from_toml import NAME
+from davinci_forces.toml import TomlTable
+
+LONGEST = 2_000_000  # ticks
+LATEST = 5.0  # [s] of a delay
+
+
+class BadHaptics(PipelineError):
+    """A scenario of a hand that feels breaks its contract; every problem is listed, each with its place."""
+
+
+class Body(NamedTuple):
+    """What slides, and its friction."""
+
+    inertia: float  # [kg]
+    gravity: float  # [N] of the effort that holds it
+    viscous: float  # [N s/m]
+    coulomb: tuple[float, float]  # [N] up and down
+    static: tuple[float, float]
+    stribeck_velocity: float = 0.01  # [m/s]
+    bristle_stiffness: float = 0.0  # [N/m]; 0 for none
+    bristle_damping: float = 0.0  # [N s/m]
+
+
+class AxisNoise(NamedTuple):
+    """Standard deviations of what is measured."""
+
+    q: float  # [m]
+    dq: float  # [m/s]
+    tau: float  # [N]
+
+
+# The instrument slide of the demonstration study, where neither a file nor a study says another: its links of Tables
+# 4.1 and 4.2 with the friction and the noise of Table 6.6.
+SLIDE = Body(2.0036, -2.04048, 3.2723, (3.984, 3.984), (3.984, 3.984))
+SLIDE_NOISE = AxisNoise(5e-7, 5e-4, 1.3454)
+MOTOR = Motors(*(np.array([x]) for x in (1340.0, 0.0438, 2.0, 3e-4, 5.0, 48.0, 9.587379924285257e-5)))
+LAW = Cascade(*(np.array([x]) for x in (30.0, 7.5, 0.0160, 4.02, 0.6, 2000.0, 4e-4)))
+DEVICE = Device(motion=1.0, force=1.0, strongest=math.inf, step=0.0)
+FIRM = Hand(1.0, 40.0, 500.0)  # an arm that is tensed
+# Section 8.4: fast in and out for 8 s, fast away from the tissue to 15 s, then slowly in.
+PLAN = (
+    (0.0, -0.04), (1.0, 0.03), (2.0, -0.04), (3.0, 0.035), (4.0, -0.04), (5.0, 0.025), (6.0, -0.04), (7.0, 0.03),
+    (8.0, -0.09), (8.7, -0.01), (9.4, -0.09), (10.1, -0.01), (10.8, -0.09), (11.5, -0.01), (12.2, -0.09),
+    (12.9, -0.01), (13.6, -0.09), (15.0, -0.04), (22.0, 0.04), (29.0, -0.04), (30.0, -0.04),
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class HapticScenario:
+    """A simulated experiment; None is for a study to say."""
+
+    title: str = "Section 8.4: in and out of tissue"
+    seed: int = 8
+    hands: tuple[tuple[str, Hand], ...] = (("thesis", THESIS), ("firm", FIRM))
+    device: Device = DEVICE
+    reach: float = 0.15  # [m] of the device to either side, from the tissue's surface
+    link_rate: float = 100.0  # [Hz], chapter 9
+    position_delay: float = 0.0  # [s] of the link, beside that of its rate
+    force_delay: float = 0.0
+    tick: float = 5e-4  # [s] of the motor drivers
+    rate: float = 100.0  # [Hz] of the controller, its sensors and the filter
+    exact: bool = False  # whether the arm is wherever it is told to be
+    motor: Motors = MOTOR
+    law: Cascade = LAW
+    stops: tuple[float, float] = (-0.13, 0.09)  # [m] from the tissue's surface
+    body: Body | None = None
+    noise: AxisNoise | None = None
+    known: Body | None = None  # what the filter takes the body for
+    filtered: bool = True  # by the extended Kalman filter; else the true force is sent
+    q_tau: float = 0.0  # random walk of its external effort [N/s^0.5]; 0 is the slowest that shows a push
+    stiffness: float | None = None  # [N/m]
+    damping: float = 5.0  # [N s/m]
+    friction: float = 0.05  # along the tool, over the force that presses
+    plan: tuple[tuple[float, float], ...] = (
+        PLAN  # where the hand would be if it felt nothing: [s], [m] from the surface
+    )
+
+    @property
+    def duration(self) -> float:
+        """Of the plan [s]."""
+        return self.plan[-1][0] - self.plan[0][0]
+
+
+def read(file: Path) -> HapticScenario:
+    """Read a scenario.
+
+    Raises
+    ------
+    BadHaptics
+        With every problem of the file, each with its line.
+    """
+    table = toml.read(file, BadHaptics)
+    scenario = scenario_of(table)
+    table.file.refuse(BadHaptics)
+    return scenario
+
+
+def scenario_of(table: TomlTable) -> HapticScenario:
+    """The scenario that the whole of a file describes; its problems are noted."""
+    usual = HapticScenario()
+    link, arm, tissue = table.table("link"), table.table("arm"), table.table("tissue")
+    device = table.table("device")
+    filtered, q_tau, known = _filter(table.table("filter"))
+    scenario = HapticScenario(
+        title=table.text("title", usual.title),
+        seed=table.whole("seed", usual.seed),
+        hands=_hands(table) or usual.hands,
+        device=_device(device),
+        reach=device.number("reach", usual.reach, above=0.0),
+        link_rate=link.number("rate", usual.link_rate, above=0.0),
+        position_delay=_delay(link, "position_delay"),
+        force_delay=_delay(link, "force_delay"),
+        tick=arm.number("tick", usual.tick, above=0.0),
+        rate=arm.number("rate", usual.rate, above=0.0),
+        exact=arm.text("follows", "cascade", ("cascade", "exactly")) == "exactly",
+        motor=Motors(*_ones(arm.table("motor"), usual.motor)),
+        law=Cascade(*_ones(arm.table("control"), usual.law)),
+        stops=_stops(arm, usual.stops),
+        body=_body(arm.table("body")) if "body" in arm else None,
+        noise=_noise(arm.table("noise")) if "noise" in arm else None,
+        known=known,
+        filtered=filtered,
+        q_tau=q_tau,
+        stiffness=tissue.number("stiffness", above=0.0) if "stiffness" in tissue else None,
+        damping=tissue.number("damping", usual.damping, low=0.0),
+        friction=_below_one(tissue, "friction", usual.friction),
+        plan=_plan(table),
+    )
+    for part in (device, link, arm, tissue, table):
+        part.close()
+    _check_clocks(link, arm, scenario)
+    if scenario.exact and scenario.filtered:
+        said = 'an arm that follows exactly has no effort to make a force of; write use = "none" in [filter]'
+        arm.problem(said, "follows")
+    return scenario
+
+
+def _hands(table: TomlTable) -> tuple[tuple[str, Hand], ...]:
+    """Every [[hand]]."""
+    hands = []
+    for entry in table.tables("hand"):
+        name = entry.text("name")
+        if not NAME.fullmatch(name):
+            entry.problem(f"name must match [a-z0-9_-]+, not {name!r}", "name")
+        values = (entry.number(key, above=0.0) for key in ("mass", "damping", "stiffness"))
+        hands.append((name, Hand(*values)))
+        entry.close()
+    table.unique("hand", "name", enumerate(name for name, _ in hands), "two hands have the name")
+    return tuple(hands)
+
+
+def _device(table: TomlTable) -> Device:
+    usual = HapticScenario().device
+    return Device(
+        table.number("motion_scale", usual.motion, above=0.0),
+        table.number("force_scale", usual.force, low=0.0),
+        table.number("strongest", above=0.0) if "strongest" in table else usual.strongest,
+        table.number("position_step", usual.step, low=0.0),
+    )
+
+
+def _delay(table: TomlTable, key: str) -> float:
+    delay = table.number(key, 0.0, low=0.0)
+    if delay > LATEST:
+        table.problem(f"{key} must be at most {LATEST:g} s, not {delay:g}; it is in seconds", key)
+    return delay
+
+
+def _ones(table: TomlTable, usual: Motors | Cascade) -> list[np.ndarray]:
+    """The numbers of one joint; what a motor is made of must be positive, but its encoder's step."""
+    positive = isinstance(usual, Motors)
+    columns = []
+    for key, value in zip(type(usual)._fields, usual, strict=True):
+        above = 0.0 if positive and key != "encoder_step" else -math.inf
+        columns.append(np.array([table.number(key, float(value[0]), low=0.0, above=above)]))
+    table.close()
+    return columns
+
+
+def _stops(table: TomlTable, usual: tuple[float, float]) -> tuple[float, float]:
+    low, high = table.numbers("stops", list(usual), count=2) or usual
+    if low >= high:
+        table.problem(f"stops must be lower and upper, not {low:g} and {high:g}", "stops")
+    return low, high
+
+
+def _body(table: TomlTable) -> Body:
+    coulomb = _pair(table, "coulomb", None)
+    body = Body(
+        table.number("inertia", above=0.0),
+        table.number("gravity", 0.0),
+        table.number("viscous", low=0.0),
+        coulomb,
+        _pair(table, "static", coulomb),
+        table.number("stribeck_velocity", 0.01, above=0.0),
+        table.number("bristle_stiffness", 0.0, low=0.0),
+        table.number("bristle_damping", 0.0, low=0.0),
+    )
+    if body.bristle_stiffness > 0.0 and min(coulomb) <= 0.0:
+        table.problem("bristles need Coulomb friction greater than 0", "coulomb")
+    table.close()
+    return body
+
+
+def _pair(table: TomlTable, key: str, default: tuple[float, float] | None) -> tuple[float, float]:
+    up, down = table.numbers(key, list(default) if default else None, count=2) or (1.0, 1.0)
+    if min(up, down) < 0.0:
+        table.problem(f"{key} must be two numbers, up and down, that are not negative, not {[up, down]}", key)
+    return up, down
+
+
+def _noise(table: TomlTable) -> AxisNoise:
+    noise = AxisNoise(*(table.number(key, above=0.0) for key in AxisNoise._fields))
+    table.close()
+    return noise
+
+
+def _filter(table: TomlTable) -> tuple[bool, float, Body | None]:
+    """What makes a force of the readings: whether a filter does, its walk, and what it takes the body for."""
+    filtered = table.text("use", "ekf", ("ekf", "none")) == "ekf"
+    q_tau = table.number("q_tau", 0.0, low=0.0)
+    known = _body(table.table("body")) if "body" in table else None
+    table.close()
+    return filtered, q_tau, known
+
+
+def _below_one(table: TomlTable, key: str, default: float) -> float:
+    value = table.number(key, default, low=0.0)
+    if value >= 1.0:
+        table.problem(f"{key} must be below 1, as tissue never pulls, not {value:g}", key)
+    return value
+
+
+def _plan(table: TomlTable) -> tuple[tuple[float, float], ...]:
+    points = table.pairs("plan", "a list of two or more pairs of numbers", [list(p) for p in PLAN], least=2)
+    if any(b[0] <= a[0] for a, b in pairwise(points)):
+        table.problem("the times of plan must increase", "plan")
+    if any(abs(x) > 1.0 for _, x in points):
+        table.problem("plan goes further than 1 m from the tissue's surface; it is in metres", "plan")
+    return points if len(points) > 1 else PLAN
+
+
+def _check_clocks(link: TomlTable, arm: TomlTable, scenario: HapticScenario) -> None:
+    """Note where the clocks do not fit each other, or there is too much to go through."""
+    ticks = scenario.duration / scenario.tick
+    if ticks > LONGEST:
+        arm.problem(f"{ticks:.3g} ticks cannot be gone through; at most {LONGEST} can", "tick")
+    for table, rate in ((link, scenario.link_rate), (arm, scenario.rate)):
+        turn = 1.0 / rate / scenario.tick if rate * scenario.tick > 0.0 else math.nan
+        if math.isfinite(turn) and (abs(turn - round(turn)) > 1e-6 or round(turn) < 1):
+            said = f"a period of {rate:g} Hz must be whole ticks of {scenario.tick:g} s, not {turn:g} of them"
+            table.problem(said, "rate")

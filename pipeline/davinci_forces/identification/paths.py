@@ -1,0 +1,20 @@
+"""Whether a recording follows a path that was fitted, on which the model's error repeats."""
+
+import numpy as np
+
+from davinci_forces.maths.signals.path import SAME_PATH as LIKE
+from davinci_forces.maths.signals.path import likeness
+from davinci_forces.maths.signals.smoothing import segments
+from davinci_forces.records import FittedPaths, Signal
+
+SAME_PATH, ANOTHER_PATH = "same path", "another path"
+
+
+def follows(signal: Signal, paths: FittedPaths) -> bool:
+    """Whether the longest segment of a recording is like one of the paths."""
+    part = max(segments(signal.segment), key=lambda s: s.stop - s.start)
+    each = [np.flatnonzero(paths.source == log) for log in dict.fromkeys(paths.source)]
+    likenesses = [
+        likeness(signal.t[part], signal.q[part], paths.q[rows], float(paths.period[rows[0]])) for rows in each
+    ]
+    return max(likenesses) > LIKE

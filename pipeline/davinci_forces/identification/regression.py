@@ -1,0 +1,95 @@
+"""Records as motions and regressions: averaged periods to be fitted, and recordings whose effort is to be predicted."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from davinci_forces.estimators.problem import NOTHING, Known, Regression
+from davinci_forces.maths.arrays import Array, Booleans
+from davinci_forces.maths.models.independent import IndependentJoint
+from davinci_forces.maths.models.model import Model, Motion
+from davinci_forces.maths.models.pieces import efforts
+from davinci_forces.maths.periods.harmonics import kept_noise
+from davinci_forces.maths.signals.smoothing import motion, segments
+from davinci_forces.maths.signals.standstill import standing
+from davinci_forces.records import Signal, Trajectory
+
+
+def pose(model: IndependentJoint, trajectories: Sequence[Trajectory], known: Known = NOTHING) -> Regression:
+    """The least squares problem of one joint: the averaged periods of all its logs, one after the other.  (6.37)
+
+    What stands still counts as if it had not been recorded: friction takes any value there.
+    """
+    lengths = [len(t) for t in trajectories]
+    return Regression(
+        Phi=np.vstack([model.regressor(averaged_motion(t)).Phi[:, 0] for t in trajectories]),
+        tau=np.concatenate([t.tau for t in trajectories]),
+        tau_var=np.concatenate([t.tau_var for t in trajectories]),
+        periods=np.concatenate([np.where(stands_still(t), 0, t.count) for t in trajectories]),
+        starts=tuple(np.cumsum([0, *lengths[:-1]]).tolist()),
+        names=tuple(parameter.name for parameter in model.parameters),
+        known=known,
+        Phi_cov=np.array([row_covariance(model, t) for t in trajectories]),
+    )
+
+
+def stands_still(t: Trajectory) -> Booleans:
+    """Where an averaged period (K,), which goes on as it began, stands still."""
+    q, dq = np.tile(t.q, 3), np.tile(t.dq, 3)
+    return standing(q, dq, np.zeros(len(q), np.int64), len(t.q) / t.period)[len(t.q) : 2 * len(t.q)]
+
+
+def row_covariance(model: IndependentJoint, t: Trajectory) -> Array:
+    """The covariance (p, p) of the errors of a row of Phi, which noise of the averaged motion makes; its mean.
+
+    cov(Phi_k) = J_k cov(q, dq, ddq) J_k' / M,    J_k the derivatives of Phi by the motion.
+    """
+    J = model.sensitivity(averaged_motion(t))
+    noise = kept_noise(t.sigma_q, len(t.q), t.harmonics, 2 * np.pi / t.period) / t.periods
+    return np.asarray(np.tensordot(J, noise @ J, axes=((0, 1), (0, 1))) / len(t.q))
+
+
+def joined(parts: Sequence[Regression]) -> Regression:
+    """The least squares problem of several parts together."""
+    ends = np.cumsum([0, *(len(p.tau) for p in parts[:-1])]).tolist()
+    noises = [p.Phi_cov for p in parts if p.Phi_cov is not None]
+    return Regression(
+        Phi=np.concatenate([p.Phi for p in parts]),
+        tau=np.concatenate([p.tau for p in parts]),
+        tau_var=np.concatenate([p.tau_var for p in parts]),
+        periods=np.concatenate([p.periods for p in parts]),
+        starts=tuple(end + start for end, p in zip(ends, parts, strict=True) for start in p.starts),
+        names=parts[0].names,
+        known=parts[0].known,
+        Phi_cov=np.concatenate(noises) if len(noises) == len(parts) else None,
+    )
+
+
+def averaged_motion(trajectory: Trajectory) -> Motion:
+    """One averaged period of a joint, which repeats."""
+    columns = (trajectory.q, trajectory.dq, trajectory.ddq)
+    q, dq, ddq = (x[:, None] for x in columns)
+    return Motion(q, dq, ddq, trajectory.period / len(q), np.zeros(len(q), np.int64), periodic=True)
+
+
+def measured_motion(signal: Signal, lowpass: float) -> Motion:
+    """A recording of a joint that need not repeat: low-passed, with its acceleration, each segment by itself."""
+    parts = [_smoothed(signal, part, lowpass) for part in segments(signal.segment)]
+    q, dq, ddq = (np.concatenate(columns)[:, None] for columns in zip(*parts, strict=True))
+    return Motion(q, dq, ddq, 1.0 / signal.rate, signal.segment)
+
+
+def of_joints(motions: Sequence[Motion]) -> Motion:
+    """The motion of several joints of one recording, in this order."""
+    q, dq, ddq = (np.concatenate(columns, axis=1) for columns in zip(*(m[:3] for m in motions), strict=True))
+    return motions[0]._replace(q=q, dq=dq, ddq=ddq)
+
+
+def predicted(model: Model, theta: Array, motion: Motion, effort: int = 0) -> Array:
+    """One of the model's efforts (N,) along a motion."""
+    return np.ascontiguousarray(efforts(model, theta, motion)[:, effort])
+
+
+def _smoothed(signal: Signal, part: slice, lowpass: float) -> tuple[Array, Array, Array]:
+    dq = signal.dq[part] if signal.velocity == "logged" else None
+    return motion(signal.q[part], dq, signal.rate, lowpass)

@@ -1,0 +1,77 @@
+"""How well an effort was predicted, on one footing: raw, and with effort and prediction through the same low-pass."""
+
+from dataclasses import replace
+from typing import TypeVar
+
+import numpy as np
+
+from davinci_forces.maths.arrays import Array, Booleans
+from davinci_forces.maths.signals.noise import model_error, smoothed, white_std
+from davinci_forces.maths.signals.smoothing import share_passed
+from davinci_forces.records import Prediction, Signal, Smoothed
+
+AnySignal = TypeVar("AnySignal", Signal, Smoothed)
+
+FIRST = 1111  # samples that the published rival's errors are over
+
+
+class Judge:
+    """What predictions of the effort of a recording are held against; what they share is worked out once.
+
+    `free` (N,) are the samples that count: where nothing touched the robot.  `white` is the noise of the effort where
+    periods tell it; else it is what a low-pass takes out of the error, which holds a ripple of the drive as well.
+    """
+
+    def __init__(self, signal: Signal | Smoothed, free: Booleans, lowpass: float, white: float | None = None) -> None:
+        self.signal, self.lowpass, self.white = signal, lowpass, white
+        self.free = slice(None) if free.all() else free
+        tau = signal.tau[self.free]
+        self.smooth = self._smoothed(signal.tau)[self.free]
+        self.range, self.variance = float(np.ptp(tau)) or 1.0, float(tau.var()) or 1.0
+        self.spread = float(np.linalg.norm(tau - tau.mean())) or 1.0
+        self.passed = share_passed(signal.rate, lowpass)
+
+    def scored(self, model: str, name: str, role: str, scheme: str, path: str, tau_hat: Array) -> Prediction:
+        """A prediction (N,) with its scores."""
+        whole_error = self.signal.tau - tau_hat
+        slow = self._smoothed(whole_error)
+        noise = white_std(whole_error - slow, self.passed) if self.white is None else self.white
+        error, slow = whole_error[self.free], slow[self.free]
+        unexplained = float(np.linalg.norm(error)) / self.spread
+        rmse = float(np.sqrt(error @ error / len(error)))
+        beyond_noise, beyond_noise_std = model_error(slow, noise * np.sqrt(self.passed))
+        return Prediction(
+            log=self.signal.log,
+            joint=self.signal.joint,
+            model=model,
+            estimator=name,
+            role=role,
+            scheme=scheme,
+            path=path,
+            rmse=rmse,
+            nrmse=rmse / self.range,
+            r2=1.0 - unexplained**2,
+            fit_percent=100.0 * (1.0 - unexplained),
+            r2_ceiling=1.0 - noise**2 / self.variance,
+            model_error=beyond_noise,
+            model_error_std=beyond_noise_std,
+            effort_rms=float(np.sqrt(np.mean(self.smooth**2))),
+            relative_error=relative(slow, self.smooth),
+            relative_error_1111=relative(slow[:FIRST], self.smooth[:FIRST]),
+            t=self.signal.t,
+            tau=self.signal.tau,
+            tau_hat=tau_hat,
+        )
+
+    def _smoothed(self, x: Array) -> Array:
+        return smoothed(x, self.signal.segment, self.signal.rate, self.lowpass)
+
+
+def some(signal: AnySignal, which: Booleans | slice) -> AnySignal:
+    """Some of the samples (N,) of a recording."""
+    return replace(signal, **{name: getattr(signal, name)[which] for name in signal.columns()})
+
+
+def relative(error: Array, tau: Array) -> float:
+    """The norm of an error (N,) over that of the effort (N,)."""
+    return float(np.linalg.norm(error) / (np.linalg.norm(tau) or 1.0))

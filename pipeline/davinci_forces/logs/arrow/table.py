@@ -1,0 +1,146 @@
+"""The columns of a Parquet or Feather file, read by pyarrow in batches."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.compute as pc
+from pyarrow import feather, ipc, parquet
+
+from davinci_forces.errors import BadLog
+from davinci_forces.logs.columns import absent, integers, numbers
+from davinci_forces.logs.log import Block, Channel, Log, Options
+from davinci_forces.logs.names import unique
+from davinci_forces.maths.arrays import Array
+
+ROWS = 1 << 14  # of a batch
+BUFFER = 1 << 18  # [bytes] of a column of Parquet that are read at a time
+MAPPED = 64 << 20  # [bytes] of a batch of a Feather file, beyond which it is not read into memory
+UNITS = (b"unit", b"units")
+PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+
+Batches = Callable[[Sequence[str]], Iterator[pa.RecordBatch]]
+
+
+def opened(path: Path, options: Options) -> Log:
+    """Open the file.
+
+    Raises
+    ------
+    BadLog
+        If it has no columns, or one name twice.
+    """
+    schema, batches = _file(path)
+    if not schema.names or len(set(schema.names)) < len(schema.names):
+        raise BadLog(f"{path}: its columns are {', '.join(schema.names) or 'none'}; each needs a name of its own")
+    log = ArrowLog(path, "arrow", _channels(schema), batches=batches)
+    log.columns = dict(zip((channel.name for channel in log.channels), schema.names, strict=True))
+    _describe_time(log)
+    return log
+
+
+def _file(path: Path) -> tuple[pa.Schema, Batches]:
+    with path.open("rb") as file:
+        head = file.read(4)
+    if head == b"PAR1":
+        opened = parquet.ParquetFile(path, pre_buffer=False, buffer_size=BUFFER)  # or all of a row group is held
+        return opened.schema_arrow, lambda names: opened.iter_batches(ROWS, columns=list(names), use_threads=False)
+    if head == b"FEA1":
+        table = feather.read_table(path, use_threads=False)
+        return table.schema, lambda names: iter(table.select(names).to_batches(ROWS))
+    return ipc.open_file(str(path)).schema, lambda names: _records(path, names)
+
+
+def _records(path: Path, names: Sequence[str]) -> Iterator[pa.RecordBatch]:
+    """Its batches, of these columns alone; what is mapped counts as memory, so that only large batches are."""
+    whole = ipc.open_file(str(path))
+    mapped = path.stat().st_size > MAPPED * whole.num_record_batches
+    columns = ipc.IpcReadOptions(included_fields=[whole.schema.names.index(name) for name in names], use_threads=False)
+    file = ipc.open_file(pa.memory_map(str(path)) if mapped else pa.OSFile(str(path)), options=columns)
+    for i in range(file.num_record_batches):
+        batch = file.get_batch(i).select(names)
+        batch.validate(full=True)
+        for first in range(0, batch.num_rows, ROWS):
+            yield batch.slice(first, ROWS)
+
+
+def _channels(schema: pa.Schema) -> tuple[Channel, ...]:
+    names = unique(schema.names)
+    return tuple(Channel(name, _unit(each), _kind(each.type)) for name, each in zip(names, schema, strict=True))
+
+
+def _unit(column: pa.Field) -> str:
+    if pa.types.is_timestamp(column.type) or pa.types.is_duration(column.type):
+        return "s"
+    metadata = column.metadata or {}
+    return next((metadata[key].decode("utf-8", "replace") for key in UNITS if metadata.get(key)), "")
+
+
+def _kind(what: pa.DataType) -> str:
+    if pa.types.is_timestamp(what):
+        return "time"
+    # A dictionary is a column of labels, whatever the labels are.
+    numeric = any(
+        test(what)
+        for test in (pa.types.is_integer, pa.types.is_floating, pa.types.is_boolean, pa.types.is_decimal,
+                     pa.types.is_duration)
+    )  # fmt: skip
+    return "number" if numeric else "text"
+
+
+@dataclass
+class ArrowLog(Log):
+    """An opened table.  Samples of a column of time stamps are seconds from the whole one at which the log started."""
+
+    batches: Batches = field(default=lambda names: iter(()))
+    columns: dict[str, str] = field(default_factory=dict)  # by channel
+    origin: int = 0  # [s] since 1970, of time stamps
+
+    def blocks(self, names: Sequence[str]) -> Iterator[Block]:
+        """Read the samples of these channels, as `Log.blocks` says."""
+        self._start_anew(names, kinds=("number", "time"))
+        for batch in self.batches([self.columns[name] for name in names]):
+            block = {}
+            for name in names:
+                column = batch.column(self.columns[name])
+                block[name] = _numbers(column, self.origin)
+                self.nulls[name] += column.null_count
+                self.nans[name] += int(np.count_nonzero(np.isnan(block[name]))) - column.null_count
+            if batch.num_rows:
+                yield block
+
+
+def _numbers(column: pa.Array, origin: int) -> Array:
+    """The values of a column, NaN where there is none."""
+    what = column.type
+    if pa.types.is_timestamp(what) or pa.types.is_duration(what):
+        per_second = PER_SECOND[what.unit]
+        since = origin * per_second if pa.types.is_timestamp(what) else 0
+        whole = pa.chunked_array([column.cast(pa.int64())])
+        return np.where(absent(whole), np.nan, (integers(whole) - since) / per_second)
+    return numbers(pa.chunked_array([column.cast(pa.float64(), safe=False)]))
+
+
+def _describe_time(log: ArrowLog) -> None:
+    """The first column of time stamps is the clock, and the first second in it is when the log started."""
+    log.time = next((channel.name for channel in log.channels if channel.kind == "time"), "")
+    if not log.time:
+        return
+    for batch in log.batches([log.columns[log.time]]):
+        known = pc.drop_null(batch.column(0))
+        if len(known):
+            log.origin = known[0].cast(pa.int64()).as_py() // PER_SECOND[known.type.unit]
+            log.started = _date(log.origin)
+            log.zone = "UTC" if known.type.tz else "local"
+            return
+
+
+def _date(seconds: int) -> str:
+    try:
+        return (EPOCH + timedelta(seconds=seconds)).replace(tzinfo=None).isoformat()
+    except OverflowError:
+        return ""

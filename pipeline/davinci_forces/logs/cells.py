@@ -1,0 +1,126 @@
+"""Numbers out of rows of delimited cells, a block at a time, parsed by Arrow."""
+
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from types import MappingProxyType
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.csv as csv
+from numpy.typing import NDArray
+
+from davinci_forces.logs.columns import absent, numbers
+from davinci_forces.maths.arrays import Array, Booleans
+
+NUMBER = re.compile(rb"[+-]?((\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
+UNREADABLE = pa.ArrowInvalid
+PIECE = 1 << 20  # [bytes] that one thread of Arrow parses at a time
+
+
+class NotANumber(ValueError):
+    """The cell at (row, column), counted from 0, holds something else than a number."""
+
+    def __init__(self, row: int, column: int, cell: bytes) -> None:
+        super().__init__(row, column, cell)
+        self.row, self.column, self.cell = row, column, cell
+
+
+@dataclass(frozen=True)
+class Cells:
+    """Columns of numbers, NaN where a cell is empty; how many cells are; and the cells of a column of text."""
+
+    rows: int
+    columns: dict[int, NDArray[np.float64]]
+    nulls: dict[int, int]
+    texts: list[bytes | None]
+    empty: dict[int, Booleans] = field(default_factory=dict)  # which cells are, of columns that have empty ones
+
+
+def marks(block: bytes, delimiter: bytes) -> bytes:
+    """The decimal marks among the bytes of a block: `.`, `,`, both or none."""
+    return bytes(mark for mark in b".," if mark != delimiter[0] and mark in block)
+
+
+def parse(
+    block: bytes,
+    width: int,
+    delimiter: bytes,
+    decimal: bytes,
+    wanted: Sequence[int],
+    text: int = -1,
+    quoted: bool = False,
+    times: Mapping[int, Callable[[pa.ChunkedArray], Array]] = MappingProxyType({}),
+) -> Cells:
+    """Convert the `wanted` columns of rows of `width` cells to numbers; `text` is a column left as it stands.
+
+    `times` makes numbers of those of the wanted columns that are not written as such.
+
+    Raises
+    ------
+    UNREADABLE
+        If a row has another width, or a wanted cell is no number.
+    """
+    types = {f"{i}": pa.float64() for i in wanted} | ({f"{text}": pa.binary()} if text >= 0 else {})
+    types |= {f"{i}": pa.string() for i in wanted if i in times}
+    table = csv.read_csv(
+        pa.py_buffer(block),
+        read_options=csv.ReadOptions(column_names=[f"{i}" for i in range(width)], block_size=PIECE),
+        parse_options=csv.ParseOptions(delimiter=delimiter.decode(), quote_char='"' if quoted else False),
+        convert_options=csv.ConvertOptions(
+            column_types=types,
+            include_columns=list(types),
+            null_values=["", " "],
+            strings_can_be_null=bool(times),
+            decimal_point=decimal.decode(),
+            check_utf8=False,
+        ),
+    )
+    columns = {i: table.column(f"{i}") for i in wanted}
+    return Cells(
+        rows=table.num_rows,
+        columns={i: times[i](column) if i in times else numbers(column) for i, column in columns.items()},
+        nulls={i: column.null_count for i, column in columns.items()},
+        texts=table.column(f"{text}").to_pylist() if text >= 0 else [],
+        empty={i: absent(column) for i, column in columns.items() if column.null_count},
+    )
+
+
+def parse_either(block: bytes, width: int, delimiter: bytes, wanted: Sequence[int], text: int = -1) -> Cells:
+    """The same with whichever decimal mark the cells have, be it both; a cell with two marks is no number."""
+    decimals = marks(block, delimiter)
+    if len(decimals) == 2 and text < 0:
+        block, decimals = block.replace(b",", b"."), b"."
+    return parse(block, width, delimiter, decimals[:1] or b".", wanted, text)
+
+
+def parse_carefully(block: bytes, width: int, delimiter: bytes, wanted: Sequence[int]) -> Cells:
+    """The same, but it finds the cell that is no number, and forgives blanks around numbers.
+
+    Raises
+    ------
+    NotANumber
+        Where a wanted cell is none.
+    """
+    try:
+        return parse_either(block, width, delimiter, wanted)
+    except UNREADABLE:
+        rows = [[cell.strip() for cell in row.split(delimiter)] for row in block.split(b"\n")[:-1]]
+    check(rows, wanted)
+    return parse_either(b"".join(delimiter.join(row) + b"\n" for row in rows), width, delimiter, wanted)
+
+
+def check(
+    rows: Sequence[Sequence[bytes]], wanted: Sequence[int], patterns: Sequence[re.Pattern[bytes]] | None = None
+) -> None:
+    """Find a wanted cell that is no number, or not what the pattern of its column says.
+
+    Raises
+    ------
+    NotANumber
+        Where there is one.
+    """
+    for i, row in enumerate(rows):
+        for column, pattern in zip(wanted, patterns or [NUMBER] * len(wanted), strict=True):
+            if row[column] and not pattern.fullmatch(row[column]):
+                raise NotANumber(i, column, row[column])

@@ -1,0 +1,188 @@
+"""What every log format is asked for, and what it answers.
+
+A format is a module of this folder that exports two functions:
+
+    recognises(path: Path, head: bytes) -> bool      from the name and the first 4096 bytes alone
+    read(path: Path, options: Options) -> Log        raises BadLog
+
+`read` looks at headers only; the samples are read by iterating over `Log.blocks`.
+
+Channels may have clocks of their own: `Channel.time` names the channel of the same log that says when the samples of a
+channel were taken, in seconds from `Log.started`.  Where the file has none, the reader makes one (`derived`, of kind
+"time"), which is right from file segment to file segment and from write to write.  What has one uniform clock in common
+needs none: `Log.clock` says it.  Several clocks are read at the same time through `Log.apart`, a shallow copy, so that
+what a pass over a file needs is kept by `blocks` itself.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Iterator, Sequence
+from copy import copy
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from davinci_forces.errors import BadLog
+
+Block = dict[str, NDArray[np.float64]]  # channel name -> samples; every array of a block has one length
+COUNTED = "samples"  # unit of a channel of times that only counts them
+
+
+@dataclass(frozen=True)
+class Options:
+    """What a study may say about how a file is to be read; None is found from the file."""
+
+    delimiter: str | None = None
+    decimal: str | None = None  # "." or ","
+    header: bool | None = None  # the first row holds names
+    encoding: str | None = None
+    dtype: str | None = None  # of raw binary numbers: "float64", "<i2"; big-endian where it does not say
+    columns: int | tuple[str, ...] | None = None  # of a row of raw binary numbers: how many, or their names
+
+
+@dataclass(frozen=True)
+class Channel:
+    """One channel of a log: its name is unique within the log, and its unit is what the log says, or ""."""
+
+    name: str
+    unit: str = ""
+    kind: str = "number"  # or "text", "time" (what cannot be used as a quantity is still listed)
+    derived: bool = False  # made by the reader, not written in the log ("write", "elapsed")
+    time: str = ""  # the channel that says when its samples were taken; "" for the log's own: `Log.time`, else `.clock`
+    alias: str = ""  # another name that `find` knows it by: of a joint in place of its number, in another spelling
+
+
+@dataclass(frozen=True)
+class Clock:
+    """A clock that the format itself carries, for logs without a time channel: t = start + i * step [s]."""
+
+    step: float
+    start: float = 0.0
+
+
+@dataclass
+class Log(ABC):
+    """An opened log.
+
+    `warnings`, `facts`, `comments` and the counts grow while its blocks are read, and are whole when they are
+    exhausted.  Reading the blocks again starts them anew.
+    """
+
+    path: Path
+    format: str  # the name of the module that reads it
+    channels: tuple[Channel, ...]  # in the order of the file
+    clock: Clock | None = None
+    time: str = ""  # the channel that is the log's own time axis, where the format has one
+    started: str = ""  # date and time of the first sample as the file gives it, ISO 8601; "" where it does not
+    zone: str = ""  # "UTC", "local" or ""
+    facts: dict[str, str] = field(default_factory=dict)  # delimiter, encoding, operator ...: for people to read
+    warnings: list[str] = field(default_factory=list)  # one line each: the place in the file, and what was done
+    comments: list[str] = field(default_factory=list)  # what the operator wrote beside the samples, with its row
+    nulls: dict[str, int] = field(default_factory=dict)  # samples missing, of every channel that was read
+    nans: dict[str, int] = field(default_factory=dict)  # samples logged as NaN, of every channel that was read
+    dropped: int = 0  # rows that could not be used
+    cut: bool = False  # the file ends before what was begun, so that channels may end in missing samples
+    _lookup: tuple[tuple[Channel, ...], dict[str, tuple[Channel, str]]] | None = field(
+        default=None, init=False, repr=False
+    )
+    _at_open: tuple[int, int] | None = field(default=None, init=False, repr=False)  # warnings and comments from headers
+
+    @abstractmethod
+    def blocks(self, names: Sequence[str]) -> Iterator[Block]:
+        """Read the samples of these channels, all of one clock, in consecutive blocks of bounded size.
+
+        Whoever wants channels of several clocks reads them one clock after the other, see `by_clock`.  Missing cells
+        and cells that hold NaN are both NaN in the block; they are counted apart in `nulls` and `nans`.
+
+        Raises
+        ------
+        BadLog
+            Where the file is damaged in a way that cannot be read past; names the file, line and column.
+        """
+
+    def find(self, name: str | int) -> Channel:
+        """The channel of a name, of the last part of a name where only one has it, or of a number counted from 0.
+
+        Raises
+        ------
+        BadLog
+            If there is none, or more than one; lists the closest.
+        """
+        if isinstance(name, int):
+            return self._numbered(name)
+        exact = [channel for channel in self.channels if channel.name == name]
+        exact = exact or [channel for channel in self.channels if channel.alias == name]
+        last = [c for c in self.channels if c.name.endswith(f"/{name}") or c.alias.endswith(f"/{name}")]
+        if len(exact or last) == 1:
+            return (exact or last)[0]
+        if last:
+            raise BadLog(f"{self.path}: {len(last)} channels are called {name!r}; write {_listed(last, ' or ')}")
+        names = [channel.name for channel in self.channels]
+        close = get_close_matches(name, names, n=3, cutoff=0.5)
+        near = [channel for channel in self.channels if channel.name in close]
+        hint = f"the closest are {_listed(near)}" if near else f"it has {_listed(self.channels[:12])}"
+        raise BadLog(f"{self.path}: there is no channel {name!r} among its {len(names)}; {hint}")
+
+    def times_called(self, name: str | int) -> list[Channel]:
+        """The channels that a study means by the name of its time: one, or one of that name in each group of channels.
+
+        Raises
+        ------
+        BadLog
+            If there is none.
+        """
+        if isinstance(name, int):
+            return [self.find(name)]
+        last = name.rpartition("/")[2]
+        alike = [c for c in self.channels if "/" in c.name and c.name.rpartition("/")[2] == last and not c.derived]
+        exact = [c for c in self.channels if c.name == name]
+        others = [c for c in alike if c not in exact] if not exact or "/" in name else []
+        return [*exact, *others] or [self.find(name)]
+
+    def apart(self) -> "Log":
+        """The same log to be read at the same time as this one, with counts and warnings of its own."""
+        other = copy(self)
+        other.warnings, other.comments, other.facts = [*self.warnings], [*self.comments], {**self.facts}
+        return other
+
+    def by_clock(self, names: Sequence[str]) -> dict[str, list[str]]:
+        """The names by the clock of their channels: its time channel, or "" for the log's own."""
+        grouped: dict[str, list[str]] = {}
+        for name in names:
+            full = name if name in self._looked_up else self.find(name).name
+            grouped.setdefault(self._looked_up[full][1], []).append(name)
+        return grouped
+
+    @property
+    def _looked_up(self) -> dict[str, tuple[Channel, str]]:
+        """The channels and their clocks, by name; made anew where the channels are others."""
+        if self._lookup is None or self._lookup[0] is not self.channels:
+            clocks = {channel.time for channel in self.channels} - {""}
+            by_name = {c.name: (c, c.name if c.name in clocks else c.time) for c in self.channels}
+            self._lookup = self.channels, by_name
+        return self._lookup[1]
+
+    def _numbered(self, number: int) -> Channel:
+        written = [channel for channel in self.channels if not channel.derived]
+        if not 0 <= number < len(written):
+            raise BadLog(f"{self.path}: there is no column {number}; its {len(written)} columns are counted from 0")
+        return written[number]
+
+    def _start_anew(self, names: Sequence[str], kinds: Sequence[str] = ("number",)) -> None:
+        """Empty the counts before the blocks are read, and refuse channels that do not hold numbers."""
+        self.nulls, self.nans = dict.fromkeys(names, 0), dict.fromkeys(names, 0)
+        self.dropped = 0
+        self._at_open = self._at_open or (len(self.warnings), len(self.comments))
+        del self.warnings[self._at_open[0] :], self.comments[self._at_open[1] :]
+        for name in names:
+            channel = self._looked_up[name][0] if name in self._looked_up else self.find(name)
+            if channel.kind not in kinds:
+                raise BadLog(f"{self.path}: channel {name!r} holds {channel.kind}, not numbers; choose another")
+        if len(clocks := self.by_clock(names)) > 1:
+            raise BadLog(f"{self.path}: {', '.join(map(repr, names))} have {len(clocks)} clocks; read them one by one")
+
+
+def _listed(channels: Sequence[Channel], joint: str = ", ") -> str:
+    return joint.join(repr(channel.name) for channel in channels) or "none"

@@ -1,0 +1,253 @@
+"""The two headers of a LabVIEW measurement file: of the file, and of each file segment in it."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from decimal import Decimal
+
+from davinci_forces.logs.lines import decoded
+from davinci_forces.logs.lvm.clocks import Sampling
+from davinci_forces.logs.names import unique
+
+MAGIC = b"LabVIEW Measurement"
+END = b"***End_of_Header***"
+X = "X_Value"
+SEPARATOR = re.compile(rb"Separator(.)(.*)", re.DOTALL)
+DATE = re.compile(r"(\d{4})/(\d\d?)/(\d\d?)")
+TIME = re.compile(r"(\d\d?):(\d\d):(\d\d)(?:[.,](\d+))?")
+FOR_PEOPLE = ("Operator", "Project", "Description", "Writer_Version", "Time_Pref")
+
+
+class BadHeader(ValueError):
+    """A header that cannot be read past; says what is wrong without the place."""
+
+
+@dataclass(frozen=True)
+class FileHeader:
+    """What stands at the head of a file, and again wherever a later session appended to it."""
+
+    separator: bytes = b"\t"
+    decimal: str = ""
+    x_columns: str = "One"  # "No", "One" or "Multi"
+    several: bool = False  # every write is a file segment with a header of its own
+    tags: dict[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """What the cells of a file segment's rows are.  Column 0 is x, or empty where the rows have none."""
+
+    file: FileHeader
+    names: tuple[str, ...]  # of every column of a row, unique; "" for one that holds nothing
+    units: tuple[str, ...]  # of every column
+    line: int  # of the column line
+    samples: int | None = None  # per channel, as the header says
+    start: Decimal | None = None  # [s] of the first sample, since the year 1 in local time
+    started: str = ""
+    x0: float = 0.0
+    step: float | None = None
+    step_written: str = ""
+    sampled: tuple[Sampling | None, ...] = ()  # of every column that is measured
+    remarks: tuple[str, ...] = ()  # what is wrong with the header, and what was done
+    notes: str = ""
+
+    @property
+    def width(self) -> int:
+        """Cells of a row without a comment."""
+        return len(self.names)
+
+    @property
+    def measured(self) -> str:
+        """The first channel, whose x stands in column 0; "" where there is none."""
+        return next(iter(self.sampling), "")
+
+    @property
+    def first_sampling(self) -> Sampling:
+        """What the header says of when the first channel was sampled."""
+        return self.sampling.get(self.measured) or Sampling(self.start, self.x0, self.step or 0.0)
+
+    @property
+    def sampling(self) -> dict[str, Sampling]:
+        """What the header says of when each channel was sampled."""
+        return {name: one for name, one in zip(self.names, self.sampled, strict=True) if one}
+
+    def is_like(self, other: "Layout") -> bool:
+        """Whether rows of both have the same columns."""
+        own, its = self.file, other.file
+        return (self.names, own.separator, own.x_columns) == (other.names, its.separator, its.x_columns)
+
+
+def file_header(lines: Sequence[bytes], encoding: str | None) -> FileHeader:
+    """Parse the lines from the magic one up to the end of the header.
+
+    Raises
+    ------
+    BadHeader
+        If the separator is also the decimal mark, or X_Columns is none of No, One, Multi.
+    """
+    separator = _separator(lines)
+    if not separator.isascii() or separator.isalnum() or separator in b"+-*":
+        raise BadHeader(
+            f"the separator is {decoded(separator, encoding)!r}, which cannot part numbers; export with tabs"
+        )
+    cells = [decoded(line, encoding).split(separator.decode()) for line in lines[1:]]
+    tags = {row[0].strip(): row[1].strip() for row in cells if len(row) > 1 and row[0].strip() not in ("", "Separator")}
+    decimal = tags.get("Decimal_Separator", "")
+    if not decimal and any(line.startswith(b"Decimal_Separator" + separator * 2) for line in lines):
+        decimal = separator.decode()
+    if decimal == separator.decode():
+        raise BadHeader(f"the separator and the decimal mark are both {decimal!r}; export the log again with another")
+    x_columns = tags.get("X_Columns", "One").capitalize()
+    if x_columns not in ("No", "One", "Multi"):
+        raise BadHeader(f"X_Columns is {x_columns!r}, where LabVIEW writes No, One or Multi")
+    several = tags.get("Multi_Headings", "No").lower() == "yes"
+    return FileHeader(separator, decimal, x_columns, several, tags)
+
+
+def layout(lines: Sequence[bytes], columns: bytes, file: FileHeader, line: int, encoding: str | None) -> Layout:
+    """What a file segment's header and its column line say.
+
+    Raises
+    ------
+    BadHeader
+        If the column line is missing, or x is a frequency.
+    """
+    separator = file.separator.decode()
+    tags = _tags(lines, separator, encoding)
+    names, remarks = _names(decoded(columns, encoding).split(separator), file, line)
+    measured = [i for i in range(len(names)) if names[i] and not _is_x(i, file)]
+    _check(tags, len(measured), line, remarks)
+    units = [""] * len(names)
+    unit_labels = tags.get("Y_Unit_Label", [])
+    for i in measured:
+        units[i] = unit_labels[i - 1] if i <= len(unit_labels) else ""
+    x_unit = next((cell for cell in tags.get("X_Unit_Label", []) if cell), "s")
+    units = [x_unit if names[i] and _is_x(i, file) else unit for i, unit in enumerate(units)]
+    samples = [int(cell) for cell in tags.get("Samples", []) if cell.isdecimal()]
+    start, started = _started(tags, file)
+    written = _first(tags, "Delta_X")
+    notes = " ".join(cell for cell in tags.get("Notes", []) if cell)
+    return Layout(
+        file=file, names=tuple(names), units=tuple(units), line=line, samples=max(samples, default=None),
+        start=start, started=started, x0=_number(_first(tags, "X0")) or 0.0, step=_number(written),
+        step_written=written, sampled=_sampled(tags, measured, len(names), start, file), remarks=tuple(remarks),
+        notes=notes,
+    )  # fmt: skip
+
+
+def dated(like: Layout, lines: Sequence[bytes], line: int, encoding: str | None) -> Layout:
+    """The layout of a file segment whose header differs in its date only."""
+    tags = _tags([text for text in lines if text[:4] in (b"Date", b"Time")], like.file.separator.decode(), encoding)
+    start, started = _started(tags, like.file)
+    starts = _starts(tags, len(like.names), start)
+    sampled = (one and replace(one, start=its) for one, its in zip(like.sampled, starts, strict=True))
+    return replace(like, line=line, start=start, started=started, sampled=tuple(sampled))
+
+
+def _sampled(
+    tags: dict[str, list[str]], measured: Sequence[int], columns: int, start: Decimal | None, file: FileHeader
+) -> tuple[Sampling | None, ...]:
+    """By column, what is said of it; a cell that is missing says what the first one does."""
+    starts = _starts(tags, columns, start)
+    x0, step = ([_cell(tags, tag, i) or _first(tags, tag) for i in range(columns)] for tag in ("X0", "Delta_X"))
+    sampled = (i for i in measured if _cell(tags, "Samples", i) != "0")  # else nobody knows what they say
+    said = {i: Sampling(starts[i], _number(x0[i]) or 0.0, _number(step[i]) or 0.0) for i in sampled}
+    return tuple(said.get(i) for i in range(columns))
+
+
+def _starts(tags: dict[str, list[str]], columns: int, start: Decimal | None) -> list[Decimal | None]:
+    dates, times = tags.get("Date", []), tags.get("Time", [])
+    if len({*dates} - {""}) <= 1 and len({*times} - {""}) <= 1:
+        return [start] * columns
+    own = (_start(_cell(tags, "Date", i), _cell(tags, "Time", i))[0] for i in range(columns))
+    return [start if one is None else one for one in own]
+
+
+def _cell(tags: dict[str, list[str]], tag: str, column: int) -> str:
+    """What a header says under a tag of one column of a row."""
+    cells = tags.get(tag, [])
+    return cells[column - 1] if 0 < column <= len(cells) else ""
+
+
+def _tags(lines: Sequence[bytes], separator: str, encoding: str | None) -> dict[str, list[str]]:
+    rows = [decoded(text, encoding).split(separator) for text in lines]
+    return {row[0].strip(): [cell.strip() for cell in row[1:]] for row in rows if row[0].strip()}
+
+
+def _started(tags: dict[str, list[str]], file: FileHeader) -> tuple[Decimal | None, str]:
+    start, started = _start(_first(tags, "Date"), _first(tags, "Time"))
+    return (start, started) if started else _start(file.tags.get("Date", ""), file.tags.get("Time", ""))
+
+
+def unescaped(comment: bytes, encoding: str | None) -> str:
+    r"""A comment as it was typed: LabVIEW writes `\\` for a backslash and `\0A` for a control character."""
+    one = re.compile(r"\\(\\|[0-9A-Fa-f]{2})")
+    return one.sub(lambda m: "\\" if m[1] == "\\" else chr(int(m[1], 16)), decoded(comment, encoding)).strip()
+
+
+def _separator(lines: Sequence[bytes]) -> bytes:
+    for line in lines[1:]:
+        if tag := SEPARATOR.fullmatch(line):
+            return {b"Tab": b"\t", b"Comma": b","}.get(tag[2].strip(), tag[1])
+    return lines[0][len(MAGIC) : len(MAGIC) + 1].strip(b" ") or b"\t"
+
+
+def _is_x(column: int, file: FileHeader) -> bool:
+    return column % 2 == 0 if file.x_columns == "Multi" else column == 0
+
+
+def _names(cells: list[str], file: FileHeader, line: int) -> tuple[list[str], list[str]]:
+    """Names of the columns of a row, and remarks on those that had to be changed."""
+    cells = [cell.strip() for cell in cells]
+    while cells and not cells[-1]:
+        cells.pop()
+    if cells and cells[-1] == "Comment":
+        cells.pop()
+    if not cells or (cells[0] != X and any(_number(cell) is not None for cell in cells)):
+        raise BadHeader(f"the column line, which names the channels and begins with {X}, is missing")
+    made = list(unique([X if _is_x(i, file) else cell for i, cell in enumerate(cells)]))
+    remarks = [
+        f"line {line}: channel {i} is called {cell!r} like another, or not at all; it is read as {name!r}"
+        for i, (cell, name) in enumerate(zip(cells, made, strict=True))
+        if name != cell and not _is_x(i, file)
+    ]
+    if file.x_columns == "No":
+        made[0] = ""
+    return made, remarks
+
+
+def _check(tags: dict[str, list[str]], channels: int, line: int, remarks: list[str]) -> None:
+    dimension = next((cell for cell in tags.get("X_Dimension", []) if cell), "Time")
+    if dimension != "Time":
+        raise BadHeader(f"the x axis is {dimension}, not time: this is no recording over time; choose another file")
+    stated = _first(tags, "Channels")
+    if stated.isdecimal() and int(stated) != channels:
+        remarks.append(
+            f"line {line}: the header says {stated} channels, the column line names {channels}, which are read"
+        )
+
+
+def _first(tags: dict[str, list[str]], tag: str) -> str:
+    return next((cell for cell in tags.get(tag, []) if cell), "")
+
+
+def _number(cell: str) -> float | None:
+    try:
+        return float(cell.replace(",", "."))
+    except ValueError:
+        return None
+
+
+def _start(date: str, time: str) -> tuple[Decimal | None, str]:
+    """Seconds, exact to the last written digit, and the same in ISO 8601 without a zone."""
+    day, clock = DATE.fullmatch(date), TIME.fullmatch(time)
+    if not day or not clock:
+        return None, ""
+    try:
+        moment = datetime(*(int(part) for part in day.groups()), *(int(part) for part in clock.groups()[:3]))  # type: ignore
+    except ValueError:
+        return None, ""
+    seconds = moment.toordinal() * 86400 + moment.hour * 3600 + moment.minute * 60 + moment.second
+    fraction = clock[4] or "0"
+    return Decimal(seconds) + Decimal(f"0.{fraction}"), f"{moment.isoformat()}.{fraction[:6].ljust(6, '0')}"

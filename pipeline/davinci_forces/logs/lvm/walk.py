@@ -1,0 +1,254 @@
+"""The lines of a LabVIEW measurement file, told apart: headers are parsed, rows are handed on in runs of one layout.
+
+A block whose rows all have the width of the layout is handed on as it is.  Any other block is taken line by line:
+comments are taken out of the rows, and rows are filled up to one width.
+"""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from davinci_forces.logs.cells import NUMBER
+from davinci_forces.logs.lines import Block
+from davinci_forces.logs.lvm.clocks import refined
+from davinci_forces.logs.lvm.header import END, MAGIC, BadHeader, FileHeader, Layout, X, dated, file_header, layout
+from davinci_forces.logs.lvm.run import WRITTEN, Run
+
+SMALL = 1 << 16  # [bytes] of a block that is taken line by line
+LONGEST_HEADER = 10_000  # lines
+BEGINS_NUMBER = b"0123456789-+.,"
+TAGS = frozenset(
+    b"Channels Samples Date Time X_Dimension X_Unit_Label Y_Dimension Y_Unit_Label X0 Delta_X Notes Test_Name "
+    b"Test_Numbers Test_Series UUT_Name UUT_M/N UUT_S/N ***End_of_Header***".split()
+)
+
+Taken = TypeVar("Taken")
+
+
+@dataclass
+class Walk:
+    """Where in a file we are, and what was odd about its lines.  `say` is told of oddities as they come."""
+
+    encoding: str | None
+    say: Callable[[str], None]
+    file: FileHeader = field(default_factory=FileHeader)
+    layout: Layout | None = None
+    line: int = 0
+    met: dict[tuple[str, ...], Layout] = field(default_factory=dict)  # the first file segment with these columns
+    groups: list[list[str]] = field(default_factory=list)  # channels that were sampled together in all of them
+    file_segments: int = 0
+    narrow: int = 0  # rows with too few cells
+    first_narrow: int = 0  # line of the first of them
+    wide: dict[int, int] = field(default_factory=dict)  # cells of a row, where too many -> line of the first such row
+    state: str = "before"
+    _header: list[bytes] = field(default_factory=list)
+    _begins: bool = True  # the next row begins a write
+    _width: int = 0  # of the row before
+    _rowless: bool = False  # no row came yet since the last header
+    _run: Run | None = None
+    _rows: list[bytes] = field(default_factory=list)
+    _done: list[Run] = field(default_factory=list)
+    _like: tuple[bytes, ...] = ()  # the header of the file segment before, but for its date
+
+    def runs(self, block: Block, take: Callable[[Run, int], Taken | None]) -> Iterator[tuple[Run, Taken | None]]:
+        """The runs of rows in a block of whole lines.
+
+        `take` is given what may be a run, and its number of lines, and returns None where it is not.  What it does not
+        take is halved, until only the lines around what is odd are taken one by one.
+
+        Raises
+        ------
+        BadHeader
+            If a header cannot be read past; `line` says where.
+        """
+        run = self._whole(block)
+        if run and (taken := take(run, block.lines)) is not None:
+            self._begins, self._width, self._rowless = False, run.layout.width, False
+            self.line = block.first + block.lines - 1
+            yield run, taken
+        elif len(block.text) > SMALL and block.lines > 1:
+            for half in block.halves():
+                yield from self.runs(half, take)
+        else:
+            for run in self._line_by_line(block):
+                yield run, None
+
+    def _whole(self, block: Block) -> Run | None:
+        """The block as one run, if its first line is a row with or without a comment."""
+        if self.state != "row" or self.layout is None:
+            return None
+        first = block.text[: block.text.find(b"\n")]
+        width = first.count(self.layout.file.separator) + 1
+        if width not in (self.layout.width, self.layout.width + 1):
+            return None
+        begins = [0] if self._begins else []
+        commented, file_segments = width > self.layout.width, [(0, self.layout)]
+        return Run(self.layout, width, block.first, block.text, commented, begins=begins, file_segments=file_segments)
+
+    def _line_by_line(self, block: Block) -> Iterator[Run]:
+        for self.line, line in enumerate(block.text.split(b"\n")[:-1], start=block.first):
+            handle = getattr(self, f"_{self.state}")
+            self.state = handle(line.rstrip(b"\r"))
+            if self._done:
+                yield self._done.pop()
+        self._finish_run()
+        if self._done:
+            yield self._done.pop()
+
+    def finish(self) -> None:
+        """The file has ended.
+
+        Raises
+        ------
+        BadHeader
+            If it ended before any column line.
+        """
+        if self.state == "row" or (self.state == "between" and self.layout):
+            return
+        problem = {
+            "special": "the special block is not closed by ***End_Special***",
+            "columns": f"the column line, which names the channels and begins with {X}, is missing",
+            "between": "no header of a file segment follows the file's header",
+        }.get(self.state, f"no line {END.decode()} ends the header")
+        if self.layout is None:
+            raise BadHeader(f"{problem}; without it the samples have no names")
+        self.say(f"line {self.line}: the file ends within a header ({problem}); the rows before it are read")
+
+    def _before(self, line: bytes) -> str:
+        self._header = [line]
+        return "file"
+
+    def _file(self, line: bytes) -> str:
+        if not line.startswith(END):
+            return self._collected(line, "file")
+        self.file, self._header = file_header(self._header, self.encoding), []
+        return "between"
+
+    def _between(self, line: bytes) -> str:
+        first = line.split(self.file.separator, 1)[0].strip()
+        if not line.strip(self.file.separator + b" "):
+            return "between"
+        if self._is_header(line, first):
+            return self._headed(line, first)
+        if self.layout and (not first or NUMBER.fullmatch(first)):
+            self.say(f"line {self.line}: rows go on after a blank line, without a header; they are read as before")
+            self._begins = True
+            return self._row(line)
+        return self._segment(line)
+
+    def _special(self, line: bytes) -> str:
+        return "between" if line.startswith(b"***End_Special***") else "special"
+
+    def _segment(self, line: bytes) -> str:
+        if line.startswith(END):
+            return "columns"
+        return self._collected(line, "segment")
+
+    def _columns(self, line: bytes) -> str:
+        if self._rowless and self.layout:
+            self.say(f"line {self.layout.line}: the file segment whose header ends here holds no rows")
+        self.layout = self._parsed(line)
+        self._header, self._begins, self._width, self._rowless = [], True, self.layout.width, True
+        sampled = self.layout.sampling
+        if self.layout.names not in self.met or len({*sampled.values()}) > 1:
+            self.groups = refined(self.groups, sampled, self.file.x_columns == "Multi")
+        self.met.setdefault(self.layout.names, self.layout)
+        self.file_segments += 1
+        for remark in self.layout.remarks:
+            self.say(remark)
+        return "row"
+
+    def _parsed(self, columns: bytes) -> Layout:
+        """The layout that the header says; parsed anew only where more than its date differs from the one before."""
+        like = (columns, *(line for line in self._header if not line.startswith((b"Date", b"Time"))))
+        before, self._like = self._like, like
+        if self.layout and like == before and self.layout.file is self.file and not self.layout.remarks:
+            return dated(self.layout, self._header, self.line, self.encoding)
+        return layout(self._header, columns, self.file, self.line, self.encoding)
+
+    def _row(self, line: bytes) -> str:
+        assert self.layout is not None
+        separator = self.layout.file.separator
+        if line[:1] not in BEGINS_NUMBER or not line[:1]:
+            first = line.split(separator, 1)[0].strip()
+            if self._is_header(line, first):
+                return self._headed(line, first)
+            if not line.strip(b" ") or (line == separator and self.layout.width != 2):
+                return "between"
+        self._take(line, separator, self.layout)
+        return "row"
+
+    def _is_header(self, line: bytes, first: bytes) -> bool:
+        return first in TAGS or first == X.encode() or line.startswith((MAGIC, b"***"))
+
+    def _headed(self, line: bytes, first: bytes) -> str:
+        """The state in which the line after this one, which begins a header, is read."""
+        self._header = []
+        if line.startswith(MAGIC):
+            if self.layout:
+                self.say(f"line {self.line}: the file header stands here again: another session was appended")
+            return self._before(line)
+        if line.startswith(b"***Start_Special***"):
+            return "special"
+        return self._columns(line) if first == X.encode() else self._segment(line)
+
+    def _collected(self, line: bytes, state: str) -> str:
+        self._header.append(line)
+        if len(self._header) > LONGEST_HEADER:
+            raise BadHeader(f"no line {END.decode()} ends the header within {LONGEST_HEADER} lines")
+        return state
+
+    def _take(self, line: bytes, separator: bytes, layout: Layout) -> None:
+        """Add a row to the run, without its comment."""
+        if self._run is None or not self._run.layout.is_like(layout):
+            self._finish_run()
+            self._run, self._rows = Run(layout, layout.width, self.line, lines=[]), []
+        run, cells = self._run, line.count(separator) + 1
+        assert run.lines is not None
+        if not run.file_segments or run.file_segments[-1][1] is not layout:
+            run.file_segments.append((len(run.lines), layout))
+        if cells != layout.width:
+            line, cells = self._fitted(line, cells, separator, layout, run)
+        if self._begins or (cells != self._width and layout.file.x_columns == "No"):
+            run.begins.append(len(run.lines))
+        run.width = max(run.width, cells)
+        run.lines.append(self.line)
+        self._rows.append(line)
+        self._begins, self._width, self._rowless = False, cells, False
+
+    def _fitted(self, line: bytes, cells: int, separator: bytes, layout: Layout, run: Run) -> tuple[bytes, int]:
+        """A row whose width is not the layout's, without trailing empty cells and its comment."""
+        while cells > layout.width and line.endswith(separator):
+            line, cells = line[: -len(separator)], cells - 1
+        row, _, last = line.rpartition(separator)
+        if last and ((cells > layout.width and not WRITTEN.fullmatch(last)) or not NUMBER.fullmatch(last.strip())):
+            run.comments.append((self.line, last))
+            line, cells = row, cells - 1
+        if cells > layout.width:
+            self.wide.setdefault(cells, self.line)
+        elif cells < layout.width:
+            self._comment_of_row_before(separator, run)
+            self._is_narrow(self.line)
+        return line, cells
+
+    def _comment_of_row_before(self, separator: bytes, run: Run) -> None:
+        """Where a write has a channel fewer, the comment of its first row stands under the last channel's name."""
+        if not self._rows or not run.lines:
+            return
+        row, _, last = self._rows[-1].rpartition(separator)
+        if last and not NUMBER.fullmatch(last.strip()):
+            run.comments.append((run.lines[-1], last))
+            self._is_narrow(run.lines[-1])
+            self._rows[-1] = row
+
+    def _is_narrow(self, line: int) -> None:
+        self.narrow, self.first_narrow = self.narrow + 1, self.first_narrow or line
+
+    def _finish_run(self) -> None:
+        run, self._run = self._run, None
+        if run is None:
+            return
+        separator = run.layout.file.separator
+        full = (row + separator * (run.width - 1 - row.count(separator)) for row in self._rows)
+        run.block = b"\n".join(full) + b"\n"
+        self._done.append(run)

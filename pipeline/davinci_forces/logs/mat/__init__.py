@@ -1,0 +1,27 @@
+"""MATLAB's files: vectors, matrices and structs of them, of versions 4 to 7.2 and of 7.3, which is HDF5."""
+
+from pathlib import Path
+
+from davinci_forces.logs import isolated
+from davinci_forces.logs.log import Log, Options
+
+__all__ = ["read", "recognises"]
+
+
+def recognises(path: Path, head: bytes) -> bool:
+    """Whether the file says so, or is named so and is no text."""
+    return head.startswith(b"MATLAB ") or (path.suffix.lower() == ".mat" and b"\0" in head[:20])
+
+
+def read(path: Path, options: Options) -> Log:
+    """Open the file: list its variables.
+
+    Raises
+    ------
+    BadLog
+        If it cannot be read, or is of version 7.3 and h5py is not installed.
+    """
+    with path.open("rb") as file:
+        if file.read(512).startswith(b"MATLAB 7.3"):
+            isolated.require(path, "h5py", "hdf5")
+    return isolated.start(path, options, "davinci_forces.logs.mat.variables")

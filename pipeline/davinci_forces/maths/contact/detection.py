@@ -1,0 +1,105 @@
+"""Where contacts begin and end, found in an external effort without delay, at a stated rate of false alarms.
+
+A contact is where the effort stays above the alarm level.  That is what free motion crosses once in ten minutes by
+Rice's formula for a normal process, or the most that it was ever seen to reach, whichever is more:
+
+    level = rms sqrt(2 ln(v_0 / false alarms a second)),    v_0 upward crossings of zero a second         (Rice 1944)
+
+A flank is taken to be a ramp that the smoother has widened, and left in its middle; it makes a step T_s long:
+
+    onset = t(half the peak) - T/2,    T^2 = T_seen^2 - T_s^2,    T_seen = 2 (t(3/4 of the peak) - t(1/4))
+"""
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from davinci_forces.maths.arrays import Array, Booleans
+
+FALSE_ALARMS = 1.0 / 600.0  # [1/s]
+TOGETHER = 0.25  # [s] apart at most, two crossings of one sign are one contact
+
+
+class Quiet(NamedTuple):
+    """An external effort where nothing touches the robot."""
+
+    rms: float
+    largest: float
+    crossings: float  # of zero, upwards, a second
+
+
+class Event(NamedTuple):
+    """A contact that was found: where it begins and ends [s], and how far that may be off."""
+
+    onset: float
+    onset_std: float
+    release: float
+    release_std: float
+
+
+def quiet(tau_ext: Array, free: Booleans, rate: float) -> Quiet:
+    """How an effort (N,) at `rate` [Hz] behaves where it is free (N,)."""
+    x, follows = tau_ext[free], np.diff(np.flatnonzero(free)) == 1
+    upwards = (x[:-1] < 0.0) & (x[1:] >= 0.0) & follows
+    rms = float(np.sqrt(np.mean(x**2)))
+    return Quiet(rms, float(np.abs(x).max()), float(upwards.sum()) / (len(x) / rate))
+
+
+def alarm_level(spaces: Sequence[Quiet]) -> float:
+    """The effort that all these free motions cross no more than once in ten minutes."""
+    often = (max(s.crossings / FALSE_ALARMS, 1.0) for s in spaces)
+    return max(max(s.largest, s.rms * float(np.sqrt(2.0 * np.log(n)))) for s, n in zip(spaces, often, strict=True))
+
+
+def events(t: Array, tau_ext: Array, std: Array, level: float, rise: float) -> Iterator[Event]:
+    """The contacts in a smoothed external effort (N,) with its standard deviation (N,), over times (N,) [s].
+
+    `rise` [s] is how long the smoother makes a step.
+    """
+    for start, stop in runs(t, np.where(np.abs(tau_ext) > level, np.sign(tau_ext), 0.0)):
+        size = tau_ext * np.sign(tau_ext[start])
+        onset, onset_std = edge(t, size, std, start, stop, 1, rise)
+        release, release_std = edge(t, size, std, start, stop, -1, rise)
+        yield Event(onset, onset_std, release, release_std)
+
+
+def runs(t: Array, side: Array) -> Iterator[tuple[int, int]]:
+    """Runs of one sign (N,), as start and stop, those of the same sign that nearly touch taken together."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0.0], side, [0.0]])))
+    signed = [(int(a), int(b)) for a, b in pairwise(edges) if side[a] != 0.0]
+    merged: list[tuple[int, int]] = []
+    for a, b in signed:
+        if merged and t[a] - t[merged[-1][1] - 1] <= TOGETHER and side[a] == side[merged[-1][0]]:
+            merged[-1] = (merged[-1][0], b)
+        else:
+            merged.append((a, b))
+    yield from merged
+
+
+def edge(t: Array, size: Array, std: Array, start: int, stop: int, inwards: int, rise: float) -> tuple[float, float]:
+    """Where a contact, above the level from `start` to `stop`, begins (inwards 1) or ends (-1), and its error."""
+    k, peak = (start if inwards > 0 else stop - 1), float(size[start:stop].max())
+    middle = reached(t, size, k, inwards, 0.5 * peak)
+    upper, lower = reached(t, size, k, inwards, 0.75 * peak), left(t, size, k, inwards, 0.25 * peak)
+    seen = max(2.0 * abs(upper - lower), float(t[1] - t[0]))
+    true = float(np.sqrt(max(seen**2 - rise**2, 0.0)))
+    return middle - 0.5 * inwards * true, float(std[k]) * seen / peak
+
+
+def reached(t: Array, size: Array, k: int, inwards: int, level: float) -> float:
+    """The time at which a size, followed inwards from sample k on, first reaches a level."""
+    while size[k] < level:
+        k += inwards
+    return left(t, size, k, inwards, level)
+
+
+def left(t: Array, size: Array, k: int, inwards: int, level: float) -> float:
+    """The time at which a size, followed outwards from sample k on, is no more above a level, between two samples."""
+    while 0 <= k - inwards < len(t) and size[k - inwards] >= level:
+        k -= inwards
+    out = k - inwards
+    if not 0 <= out < len(t) or size[k] <= size[out]:
+        return float(t[k])
+    return float(t[k] + (t[out] - t[k]) * (size[k] - level) / (size[k] - size[out]))

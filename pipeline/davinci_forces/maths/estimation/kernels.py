@@ -1,0 +1,116 @@
+"""Compiled loops of estimation.
+
+Import this module only where a loop runs: compiling it, or reading it back from the cache on disk, takes a moment.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from davinci_forces.maths.compiled import cached, inlined
+
+ROWS = 512  # at a time: few enough that all their columns stay in the processor's nearest cache
+
+
+@inlined
+def dot(x: Any, y: Any, n: int) -> float:
+    """x' y over the first n; four sums at once, none of which waits for another."""
+    a = b = c = d = 0.0
+    whole = n - n % 4
+    for i in range(0, whole, 4):
+        a += x[i] * y[i]
+        b += x[i + 1] * y[i + 1]
+        c += x[i + 2] * y[i + 2]
+        d += x[i + 3] * y[i + 3]
+    for i in range(whole, n):
+        a += x[i] * y[i]
+    return (a + b) + (c + d)
+
+
+@cached()
+def triangularise(Phi: Any, tau: Any, weight: Any, R: Any) -> None:
+    """Write the triangle R (p + 1, p + 1) of the rows sqrt(w) [Phi tau], by Householder's reflections block by block.
+
+    A block stands below the triangle of those before it, so reflection k takes row k of the triangle and the block.
+    """
+    K, p = Phi.shape
+    R[:] = 0.0
+    A = np.empty((p + 1, ROWS))  # a block's columns
+    for start in range(0, K, ROWS):
+        n = min(ROWS, K - start)
+        for i in range(n):
+            root = np.sqrt(weight[start + i])
+            for j in range(p):
+                A[j, i] = root * Phi[start + i, j]
+            A[p, i] = root * tau[start + i]
+        for k in range(p + 1):
+            v = A[k]
+            below = dot(v, v, n)
+            if below == 0.0:
+                continue
+            size = np.sqrt(R[k, k] ** 2 + below)
+            first = R[k, k] + (size if R[k, k] > 0 else -size)
+            for j in range(k + 1, p + 1):
+                factor = (first * R[k, j] + dot(v, A[j], n)) * 2.0 / (first**2 + below)
+                R[k, j] -= factor * first
+                column = A[j]
+                for i in range(n):
+                    column[i] -= factor * v[i]
+            R[k, k] = -size if first > 0 else size
+
+
+@inlined
+def beyond(x: Any, factors: Any, C: Any, y: Any, monomials: Any) -> float:
+    """|C m(x) - y|^2, of n parameters x (n + 1,), the last of which is 1; `monomials` (T,) is overwritten."""
+    for t in range(len(factors)):
+        monomials[t] = x[factors[t, 0]] * x[factors[t, 1]] * x[factors[t, 2]]
+    total = 0.0
+    for i in range(len(y)):
+        e = dot(C[i], monomials, len(monomials)) - y[i]
+        total += e * e
+    return total
+
+
+@cached()
+def fly(
+    x: Any,
+    v: Any,
+    best: Any,
+    costs: Any,
+    lower: Any,
+    upper: Any,
+    factors: Any,
+    C: Any,
+    y: Any,
+    r: Any,
+    w: Any,
+    cognitive: float,
+    social: float,
+    reflects: bool,
+    history: Any,
+) -> None:
+    """Move particles x (S, n + 1) by velocities v (S, n), once for each r (I, S, n, 2) in [0, 1) and weight w (I,).
+
+    `best` (S, n + 1) and `costs` (S,) are what each particle has found; the least of them after each move is written to
+    `history` (I,).
+    """
+    S, n = v.shape
+    monomials = np.empty(len(factors))
+    for k in range(len(w)):
+        leader = best[np.argmin(costs)].copy()
+        for s in range(S):
+            for i in range(n):
+                towards = cognitive * r[k, s, i, 0] * (best[s, i] - x[s, i])
+                v[s, i] = w[k] * v[s, i] + towards + social * r[k, s, i, 1] * (leader[i] - x[s, i])
+                x[s, i] += v[s, i]
+                if x[s, i] < lower[i] or x[s, i] > upper[i]:
+                    wall = lower[i] if x[s, i] < lower[i] else upper[i]
+                    if reflects:
+                        x[s, i] = 2.0 * wall - x[s, i]
+                        v[s, i] = -v[s, i]
+                    x[s, i] = min(max(x[s, i], lower[i]), upper[i])
+            cost = beyond(x[s], factors, C, y, monomials)
+            if cost < costs[s]:
+                costs[s] = cost
+                best[s] = x[s]
+        history[k] = costs.min()

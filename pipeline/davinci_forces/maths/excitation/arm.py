@@ -1,0 +1,110 @@
+"""Trajectories of all joints at once: those that tell most about the arm as one, links, rotors and friction together.
+
+    tau = Y(q, dq, ddq) pi + diag(ddq) J_m + diag(dq) v + diag(sign(dq)) c                            (6.3), (A.16)
+
+The columns that no motion tells apart are left out, so the criterion is that of the arm's base parameters.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.excitation.criterion import CRITERIA
+from davinci_forces.maths.excitation.directions import delayed, fitted, from_standstill
+from davinci_forces.maths.excitation.fourier import Fourier, basis, instants
+from davinci_forces.maths.excitation.joint import ExcitationProblem, impossible, within
+from davinci_forces.maths.excitation.search import Tell, lowest, nothing
+from davinci_forces.maths.mechanics.chain import Chain
+from davinci_forces.maths.mechanics.rigid_body import base_parameters, compiled_regressor
+
+RICH = 200  # random samples that show which columns depend on others
+AT_ONCE = 8  # trajectories, whose regressors fit into a processor's cache
+
+
+@dataclass(frozen=True)
+class ArmExcitationProblem:
+    """The first joints of an arm, to be excited together; all of them share period, samples and criterion."""
+
+    chain: Chain
+    joints: tuple[ExcitationProblem, ...]
+    columns: NDArray[np.int64]  # of all columns, those of the base parameters (p,)
+
+
+class ArmDesign(NamedTuple):
+    """The designed trajectory of each joint, and the lowest criterion that each start has come to (starts,)."""
+
+    series: list[Fourier]
+    optima: Array
+
+
+def arm_problem(chain: Chain, joints: Sequence[ExcitationProblem]) -> ArmExcitationProblem:
+    """The problem, with the base parameters of the arm."""
+    q, dq, ddq = np.random.default_rng(0).uniform(-1, 1, (3, RICH, len(joints)))
+    all_columns = np.arange(10 * len(chain.parent) + 3 * len(joints))
+    return ArmExcitationProblem(chain, tuple(joints), base_parameters(_columns(chain, q, dq, ddq, all_columns)).columns)
+
+
+def arm_observation(problem: ArmExcitationProblem, series: Sequence[Fourier]) -> Array:
+    """F (K n, p) of the base parameters over one period, the joints of a sample below each other.  (6.19)"""
+    return np.asarray(_observations(problem, [one.x[None] for one in series])[0])
+
+
+def design_together(problem: ArmExcitationProblem, starts: int, seed: int, tell: Tell = nothing) -> ArmDesign:
+    """The best of several optima, each of a population of its own.
+
+    Raises
+    ------
+    ValueError
+        If a joint's limits cannot be kept, or if no trajectory tells its terms apart.
+    """
+    if reason := next(filter(None, (impossible(joint.limits) for joint in problem.joints)), ""):
+        raise ValueError(reason)
+    criterion = CRITERIA[problem.joints[0].criterion]
+
+    def objective(z: Array) -> Array:
+        chunks = (z[i : i + AT_ONCE] for i in range(0, len(z), AT_ONCE))
+        return np.concatenate([criterion(_observations(problem, _trajectories(problem, chunk))) for chunk in chunks])
+
+    best = lowest(objective, sum(1 + 2 * joint.harmonics for joint in problem.joints), starts, seed, tell)
+    if not np.isfinite(best.values).any():
+        raise ValueError("no trajectory of these harmonics tells the base parameters of the arm apart")
+    parts = zip(problem.joints, _trajectories(problem, best.z[None]), strict=True)
+    return ArmDesign([within(joint, Fourier.of(x[0], joint.period)) for joint, x in parts], best.values)
+
+
+def _trajectories(problem: ArmExcitationProblem, z: Array) -> list[Array]:
+    """Coefficients (S, 1 + 2 N_f) of each joint within its limits; the first one stands still when time starts."""
+    first = problem.joints[0]
+    ends = np.cumsum([1 + 2 * joint.harmonics for joint in problem.joints])
+    own, *others = np.split(z, ends[:-1], axis=1)
+    own, phase = from_standstill(own, first.samples)
+    parts = zip(problem.joints, (own, *others), strict=True)
+    return [fitted(delayed(part, phase), joint.limits, first.period) for joint, part in parts]
+
+
+def _observations(problem: ArmExcitationProblem, x: Sequence[Array]) -> Array:
+    """F (S, K n, p) of many trajectories by the coefficients (S, 1 + 2 N_f) of each joint."""
+    first = problem.joints[0]
+    t = instants(first.period, first.samples)
+    bases = [basis(first.period, joint.harmonics, t) for joint in problem.joints]
+    q, dq, ddq = (np.stack([part @ B[i].T for B, part in zip(bases, x, strict=True)], axis=-1) for i in range(3))
+    return _columns(problem.chain, q, dq, ddq, problem.columns)
+
+
+def _columns(chain: Chain, q: Array, dq: Array, ddq: Array, columns: NDArray[np.int64]) -> Array:
+    """Some columns (..., K n, p) of the links' inertial parameters, then rotors, viscous and Coulomb friction.
+
+    With q, dq and ddq (..., K, n), all columns are 10 L + 3 n.
+    """
+    links = 10 * len(chain.parent)
+    of_links = columns[columns < links]
+    F = np.zeros((*q.shape, len(columns)))
+    F[..., : len(of_links)] = compiled_regressor(chain, q, dq, ddq)[..., of_links]
+    for i in range(len(of_links), len(columns)):
+        kind, joint = divmod(columns[i] - links, q.shape[-1])
+        F[..., joint, i] = (ddq, dq, np.sign(dq))[kind][..., joint]
+    return F.reshape(*q.shape[:-2], -1, len(columns))

@@ -1,0 +1,99 @@
+"""What the links of an arm weigh, and where."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from davinci_forces.maths.arrays import Array
+
+# The ten inertial parameters of a link, in the order of the regressor's columns: mass, first moments, and the inertia
+# about the origin of the link's frame (not its centre of mass), in which the dynamics are linear.
+PARAMETERS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+_UPPER = np.triu_indices(3)
+
+
+@dataclass(frozen=True, eq=False)
+class Bodies:
+    """The inertia of every link: masses (L,) [kg], centres (L, 3) [m] and inertias (L, 3, 3) [kg m^2].
+
+    Centres are in the link's frame; inertias are about the centre of mass, in axes parallel to the link's frame (4.21).
+    `counts_from` (L,) is the number of coordinates from which on a link is part of the model at all: the arm with six
+    coordinates has one jaw, and the second comes with the seventh (section 3.1.2).
+    """
+
+    masses: Array
+    centres: Array
+    inertias: Array
+    counts_from: NDArray[np.int64]
+
+    def counted(self, n: int) -> "Bodies":
+        """The bodies of the model with n coordinates: those that are not part of it weigh nothing."""
+        there = self.counts_from <= n
+        return replace(self, masses=self.masses * there, inertias=self.inertias * there[:, None, None])
+
+    def scaled(self, factor: float) -> "Bodies":
+        """The same bodies of another density, as a compensator that knows the masses badly has them.  Section 5.2"""
+        return replace(self, masses=self.masses * factor, inertias=self.inertias * factor)
+
+    def within(self, T: Array) -> "Bodies":
+        """The same bodies in other frames, in which those they are given in are at T (L, 4, 4) [m]."""
+        R = T[:, :3, :3]
+        centres = np.einsum("lij,lj->li", R, self.centres) + T[:, :3, 3]
+        return replace(self, centres=centres, inertias=R @ self.inertias @ R.swapaxes(1, 2))
+
+    def about_frames(self) -> Array:
+        """Inertias (L, 3, 3) about the origins of the links' frames [kg m^2], by the parallel axis theorem."""
+        c = self.centres
+        squares = np.einsum("li,li->l", c, c)[:, None, None] * np.eye(3) - np.einsum("li,lj->lij", c, c)
+        return np.asarray(self.inertias + self.masses[:, None, None] * squares)
+
+    def parameters(self, n: int) -> Array:
+        """The inertial parameters (10 L,) of the model with n coordinates, ten a link in the order of PARAMETERS."""
+        there = self.counted(n)
+        inertia = there.about_frames()[:, *_UPPER]
+        moments = there.masses[:, None] * there.centres
+        return np.concatenate([there.masses[:, None], moments, inertia], axis=1).ravel()
+
+
+def weighing(parameters: Array) -> Bodies:
+    """The bodies that have inertial parameters (L, 10): the inverse of `Bodies.parameters`, counted with any n.
+
+    The centre of what weighs nothing is at the origin.
+    """
+    masses = parameters[:, 0]
+    centres = np.divide(parameters[:, 1:4], masses[:, None], out=np.zeros((len(masses), 3)), where=masses[:, None] > 0)
+    weightless = Bodies(masses, centres, np.zeros((len(masses), 3, 3)), np.zeros(len(masses), np.int64))
+    inertias = np.zeros((len(masses), 3, 3))
+    inertias[:, *_UPPER] = parameters[:, 4:]
+    inertias = inertias + np.triu(inertias, 1).swapaxes(1, 2)
+    return replace(weightless, inertias=inertias - weightless.about_frames())
+
+
+def cylinder(mass: float, height: float, radius: float, axis: int) -> Array:
+    """The inertia (3, 3) [kg m^2] of a uniform cylinder about its centre; `axis` 0, 1 or 2 is its own.  (4.23)"""
+    across = mass * height**2 / 12.0 + mass * radius**2 / 4.0
+    return np.diag([mass * radius**2 / 2.0 if i == axis else across for i in range(3)])
+
+
+def pseudo_inertias(parameters: Array) -> Array:
+    """[[S, h], [h', m]] (L, 4, 4) of inertial parameters (L, 10), S the second moments: I = tr(S) 1 - S.
+
+    In another frame it is T J T'.  Wensing, Kim and Slotine, Linear matrix inequalities for physically consistent
+    inertial parameter identification, 2018.
+    """
+    inertia = np.zeros((len(parameters), 3, 3))
+    inertia[:, *_UPPER] = parameters[:, 4:]
+    inertia = inertia + np.triu(inertia, 1).swapaxes(1, 2)
+    J = np.zeros((len(parameters), 4, 4))
+    J[:, :3, :3] = np.trace(inertia, axis1=1, axis2=2)[:, None, None] / 2.0 * np.eye(3) - inertia
+    J[:, :3, 3] = J[:, 3, :3] = parameters[:, 1:4]
+    J[:, 3, 3] = parameters[:, 0]
+    return J
+
+
+def of_pseudo_inertias(J: Array) -> Array:
+    """The inertial parameters (L, 10) of pseudo-inertias (L, 4, 4): the inverse of `pseudo_inertias`."""
+    S = J[:, :3, :3]
+    inertia = np.trace(S, axis1=1, axis2=2)[:, None, None] * np.eye(3) - S
+    return np.concatenate([J[:, 3, 3:], J[:, :3, 3], inertia[:, *_UPPER]], axis=1)

@@ -1,0 +1,91 @@
+"""Where every frame of an arm is, and how it moves.
+
+Shapes: `q` is (..., n) in rad or m, with any leading axes; n below the chain's own leaves the later coordinates at 0.
+"""
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.mechanics.chain import FIXED, Chain
+
+AT_ONCE = 1 << 14  # poses
+
+
+def frames(chain: Chain, q: ArrayLike) -> Array:
+    """The pose of every named frame in the base frame, homogeneous matrices (..., F, 4, 4) [m].  (3.6), (4.30)"""
+    return np.asarray(_bodies(chain, np.asarray(q, float))[..., chain.body, :, :] @ chain.offset)
+
+
+def _bodies(chain: Chain, q: Array) -> Array:
+    """The pose of every body in the base frame (..., L + 1, 4, 4), the base first."""
+    chain = chain.reduced(q.shape[-1])
+    moved = np.where(chain.coordinate == FIXED, 0.0, q[..., chain.coordinate])
+    c, s = (np.where(chain.slides, still, of(moved))[..., None] for still, of in ((1.0, np.cos), (0.0, np.sin)))
+    x, y, z, place = np.moveaxis(chain.placement, -1, 0)
+    slid = place + np.where(chain.slides, moved, 0.0)[..., None] * z
+    local = np.stack([c * x + s * y, c * y - s * x, np.broadcast_to(z, slid.shape), slid], axis=-1)
+    T = np.empty((*q.shape[:-1], len(chain.parent) + 1, 4, 4))
+    T[..., 0, :, :] = np.eye(4)
+    for i, carrier in enumerate(chain.parent):
+        T[..., i + 1, :, :] = T[..., carrier, :, :] @ local[..., i, :, :]
+    return T
+
+
+def tip(chain: Chain, q: ArrayLike) -> Array:
+    """Where the tip is: the origin of frame 9L of the da Vinci (..., 3) [m]."""
+    index = chain.names.index(chain.tip)
+    carrier = _bodies(chain, np.asarray(q, float))[..., chain.body[index], :, :]
+    return np.asarray((carrier @ chain.offset[index])[..., :3, 3])
+
+
+def jacobian(
+    chain: Chain, q: ArrayLike, frame: str | None = None, point: ArrayLike = (0.0, 0.0, 0.0)
+) -> tuple[Array, Array]:
+    """J_v and J_omega (..., 3, n) of a point fixed to a frame, `point` (3,) in its axes [m]; of the tip by default.
+
+    Velocities are in the base axes.  (7.21)-(7.24), with 6w7 for the second 5w6 of (4.20)
+    """
+    q = np.asarray(q, float)
+    index = chain.names.index(frame or chain.tip)
+    bodies, body = _bodies(chain, q), int(chain.body[index])
+    T = bodies[..., body, :, :] @ chain.offset[index]
+    return _jacobian(chain, bodies, q.shape[-1], body, T[..., :3, :3] @ np.asarray(point, float) + T[..., :3, 3])
+
+
+def _jacobian(chain: Chain, T: Array, n: int, body: int, at: Array) -> tuple[Array, Array]:
+    """J_v and J_omega (..., 3, n) of a body's point that is at `at` (..., 3) in the base frame, with all bodies' T."""
+    J_v, J_w = np.zeros((2, *T.shape[:-3], 3, n))
+    for carrier in _to_base(chain, body):
+        k, z, origin = chain.coordinate[carrier - 1], T[..., carrier, :3, 2], T[..., carrier, :3, 3]
+        if FIXED < k < n:
+            J_v[..., k] += z if chain.slides[carrier - 1] else np.cross(z, at - origin)
+            J_w[..., k] += 0.0 if chain.slides[carrier - 1] else z
+    return J_v, J_w
+
+
+def along(of: Callable[[Array], Array], q: Array) -> Array:
+    """What a function says of poses (N, n), so many at a time: all bodies' poses at all samples may take gigabytes."""
+    return np.concatenate([of(q[i : i + AT_ONCE]) for i in range(0, max(len(q), 1), AT_ONCE)])
+
+
+def _to_base(chain: Chain, body: int) -> Iterator[int]:
+    """A body and those that carry it, without the base."""
+    while body > 0:
+        yield body
+        body = int(chain.parent[body - 1])
+
+
+def remote_centre(chain: Chain) -> Array:
+    """The point (3,) [m] about which the first two coordinates turn whatever carries the instrument.
+
+    It is the point of the last link towards the tip that they move, which neither of them moves at q = 0; that it stays
+    where it is for all q is a property of the parallelogram.  Section 2.2
+    """
+    tip_body = int(chain.body[chain.names.index(chain.tip)])
+    body = next(body for body in _to_base(chain, tip_body) if chain.coordinate[body - 1] == 1)
+    v, w = (J.T for J in _jacobian(chain, _bodies(chain, np.zeros(2)), 2, body, np.zeros(3)))  # v + w x p = 0 for both
+    cross = np.cross(np.eye(3), w[:, None, :])  # row i of -[w]x: e_i x w
+    return np.asarray(np.linalg.lstsq(np.concatenate(np.swapaxes(cross, 1, 2)), v.ravel(), rcond=None)[0])

@@ -1,0 +1,115 @@
+"""Chains of frames that are placed anywhere and move about or along any axis, as URDF describes them.
+
+    frame = carrier * placement * turn about, or shift along, axis by sign q + bias
+
+A chain's links move about or along their own z: a link's frame is turned so that its z is the axis, and the frame that
+was described keeps its place as a named frame of the link.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.mechanics.bodies import PARAMETERS, Bodies, of_pseudo_inertias, pseudo_inertias, weighing
+from davinci_forces.maths.mechanics.chain import FIXED, Chain
+
+Z = np.array([0.0, 0.0, 1.0])
+
+
+class PlacedLink(NamedTuple):
+    """One frame on an earlier one, and the link's inertial parameters in it; what nothing moves is fixed there."""
+
+    name: str
+    before: int  # frame that carries it: 0 is the base, and link i has frame i + 1
+    placement: Array  # in that frame at q = 0 (4, 4) [m]
+    axis: Array = Z  # (3,) in its own frame, of length 1
+    coordinate: int = FIXED
+    sign: int = 1  # -1 where it moves against the coordinate
+    bias: float = 0.0  # by how much it is moved at q = 0 [rad or m]
+    slides: bool = False
+    parameters: Array = np.zeros(len(PARAMETERS))  # (10,), in the order of PARAMETERS
+
+
+def assembled(base: str, links: Sequence[PlacedLink], tip: str) -> tuple[Chain, Bodies]:
+    """The chain of such links, and its bodies: what is fixed to a link weighs with it, and what is fixed to the base
+    weighs nothing.
+    """
+    body, offset, moving = [0], [np.eye(4)], list[PlacedLink]()
+    parent, placement, pseudo = list[int](), list[Array](), list[Array]()
+    own = pseudo_inertias(np.array([link.parameters for link in links]).reshape(-1, len(PARAMETERS)))
+    for link, J in zip(links, own, strict=True):
+        at = offset[link.before] @ link.placement @ _moved(link)
+        if link.coordinate == FIXED:
+            body.append(body[link.before])
+        else:
+            turned = _z_along(link.sign * link.axis)
+            parent.append(body[link.before])
+            placement.append(at @ turned)
+            pseudo.append(np.zeros((4, 4)))
+            moving.append(link)
+            body.append(len(moving))
+            at = turned.T
+        offset.append(at)
+        if body[-1]:
+            pseudo[body[-1] - 1] = pseudo[body[-1] - 1] + at @ J @ at.T
+    chain = Chain(
+        links=tuple(link.name for link in moving), parent=np.array(parent), placement=np.array(placement),
+        slides=np.array([link.slides for link in moving]), coordinate=np.array([link.coordinate for link in moving]),
+        names=(base, *(link.name for link in links)), body=np.array(body), offset=np.array(offset),
+        before=np.array([0, *(link.before for link in links)]), tip=tip,
+        n=max(link.coordinate for link in moving) + 1,
+    )  # fmt: skip
+    return chain, weighing(of_pseudo_inertias(np.array(pseudo)))
+
+
+def transform(xyz: Sequence[float], rpy: Sequence[float]) -> Array:
+    """The pose (4, 4) of a place [m] and of roll, pitch and yaw [rad] about fixed axes.
+
+    R = Rz(yaw) Ry(pitch) Rx(roll)
+    """
+    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
+    T = np.eye(4)
+    T[:3, 3] = xyz
+    T[:3, :3] = [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+    return T
+
+
+def roll_pitch_yaw(R: Array) -> tuple[float, float, float]:
+    """The angles of `transform` that make a rotation (3, 3): however it is turned, they make it to rounding.
+
+    Where the pitch is a quarter turn, yaw is what it is taken to be, and the roll is told without it.
+    """
+    yaw = float(np.arctan2(R[1, 0], R[0, 0]))
+    c, s = np.cos(yaw), np.sin(yaw)
+    pitch = float(np.arctan2(-R[2, 0], c * R[0, 0] + s * R[1, 0]))
+    roll = float(np.arctan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1]))
+    return roll, pitch, yaw
+
+
+def _moved(link: PlacedLink) -> Array:
+    """What a link's bias does to its frame (4, 4)."""
+    T = np.eye(4)
+    if link.slides:
+        T[:3, 3] = link.bias * link.axis
+    elif link.bias:
+        K = np.cross(np.eye(3), link.axis)  # K r = axis x r
+        T[:3, :3] += np.sin(link.bias) * K + (1.0 - np.cos(link.bias)) * K @ K
+    return T
+
+
+def _z_along(axis: Array) -> Array:
+    """A rotation (4, 4) whose z is an axis (3,) of length 1."""
+    T = np.eye(4)
+    if np.array_equal(axis, Z):
+        return T
+    x = np.eye(3)[int(np.abs(axis).argmin())]  # of the frame's axes the one that is least along it
+    x = x - (x @ axis) * axis
+    x /= np.linalg.norm(x)
+    T[:3, :3] = np.column_stack([x, np.cross(axis, x), axis])
+    return T

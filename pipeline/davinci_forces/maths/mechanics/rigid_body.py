@@ -1,0 +1,137 @@
+"""The dynamics of an arm's links, from its chain and bodies.
+
+    tau = M(q) ddq + C(q, dq) dq + G(q)                                                              (4.9), (4.27)
+
+Shapes: q, dq, ddq, tau are (..., n) in rad or m, their rates, and N m or N.  Any leading axes; they broadcast.  With n
+below the chain's own, the later coordinates are at rest at 0.
+"""
+
+from math import cos, sin
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.constants import GRAVITY
+from davinci_forces.maths.mechanics import recursions
+from davinci_forces.maths.mechanics.base_parameters import base_parameters
+from davinci_forces.maths.mechanics.bodies import Bodies
+from davinci_forces.maths.mechanics.chain import Chain
+from davinci_forces.maths.mechanics.drives import Drives
+from davinci_forces.maths.mechanics.tree import Tree, folded, tree_of
+
+__all__ = ["base_parameters", "coriolis", "gravity", "inverse_dynamics", "mass_matrix", "regressor"]
+
+COMPILE_FROM = 20_000  # samples; fewer are done before the kernels are loaded
+
+
+def mass_matrix(chain: Chain, bodies: Bodies, q: ArrayLike, drives: Drives | None = None) -> Array:
+    """M (..., n, n), symmetric positive definite; with the rotors' inertia where drives are given.  (4.28), (4.38)"""
+    q = np.asarray(q, float)
+    n, tree = q.shape[-1], moving(chain, bodies, q.shape[-1])
+    if _many(q):
+        from davinci_forces.maths.mechanics.kernels import mass_matrices
+
+        M = np.empty((*q.shape, n))
+        mass_matrices(tree, _rows(q), M.reshape(-1, n, n))
+    else:
+        entries: list[Any] = [0.0] * (n * n)
+        lists, at = tree.lists(), _numbers(q)
+        recursions.mass_matrix(lists, _turns(at), at, recursions.work_space(lists, 0.0), entries)
+        M = np.stack(entries, axis=-1).reshape(*q.shape, n)
+    return M if drives is None else np.asarray(M + np.diag(drives.inertia))
+
+
+def gravity(chain: Chain, bodies: Bodies, q: ArrayLike) -> Array:
+    """G (..., n): the effort that holds the arm still.  (4.38)"""
+    q = np.asarray(q, float)
+    return inverse_dynamics(chain, bodies, q, np.zeros_like(q), np.zeros_like(q))
+
+
+def coriolis(chain: Chain, bodies: Bodies, q: ArrayLike, dq: ArrayLike) -> Array:
+    """C dq (..., n): centrifugal and Coriolis efforts.  (4.38)"""
+    q, dq = np.broadcast_arrays(np.asarray(q, float), np.asarray(dq, float))
+    return _newton_euler(moving(chain, bodies, q.shape[-1]), 0.0, q, dq, np.zeros_like(q))
+
+
+def inverse_dynamics(
+    chain: Chain, bodies: Bodies, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike, drives: Drives | None = None
+) -> Array:
+    """The effort tau (..., n) of this motion with nothing touching the arm.  (4.27), (4.28), (7.27)"""
+    q, dq, ddq = np.broadcast_arrays(*(np.asarray(x, float) for x in (q, dq, ddq)))
+    tau = _newton_euler(moving(chain, bodies, q.shape[-1]), GRAVITY, q, dq, ddq)
+    return tau if drives is None else np.asarray(tau + drives.inertia * ddq + drives.friction(dq))
+
+
+def regressor(chain: Chain, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Array:
+    """Y (..., n, 10 L) with tau = Y pi, pi the inertial parameters of all links (`Bodies.parameters`).  (6.3)"""
+    q, dq, ddq = np.broadcast_arrays(*(np.asarray(x, float) for x in (q, dq, ddq)))
+    if _many(q):
+        return compiled_regressor(chain, q, dq, ddq)
+    n, L = q.shape[-1], len(chain.parent)
+    N = q.size // n
+    tree = tree_of(chain.reduced(n), np.zeros((L, 10)))
+    entries: list[Any] = [None] * (n * L)
+    lists, at = tree.lists(), _numbers(q)
+    work = recursions.work_space(lists, 0.0, n + 1)
+    recursions.regressor(lists, GRAVITY, _turns(at), at, _numbers(dq), _numbers(ddq), work, entries)
+    Y = np.zeros((n, L, 10, N))
+    for entry, ten in zip(entries, Y.reshape(n * L, 10, N), strict=True):
+        if entry is not None:
+            ten[:] = np.reshape(entry, (10, N))
+    return np.moveaxis(Y, -1, 0).reshape(*q.shape, 10 * L)
+
+
+def compiled_regressor(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
+    """Y (..., n, 10 L) of `regressor` by the kernels however few the samples, for those who ask often."""
+    from davinci_forces.maths.mechanics.kernels import regressors
+    from davinci_forces.maths.mechanics.vector import LANES
+
+    n, L = q.shape[-1], len(chain.parent)
+    if q.size < LANES * n:  # they cannot do fewer
+        return regressor(chain, q, dq, ddq)
+    Y = np.zeros((*q.shape, 10 * L))
+    tree = tree_of(chain.reduced(n), np.zeros((L, 10)))
+    regressors(tree, GRAVITY, _rows(q), _rows(dq), _rows(ddq), Y.reshape(-1, n, 10 * L))
+    return Y
+
+
+def moving(chain: Chain, bodies: Bodies, n: int) -> Tree:
+    """The arm with its first n coordinates, and only the links that they move."""
+    return tree_of(*folded(chain.reduced(n), bodies.parameters(n).reshape(-1, 10)))
+
+
+def _newton_euler(tree: Tree, g: float, q: Array, dq: Array, ddq: Array) -> Array:
+    if _many(q):
+        from davinci_forces.maths.mechanics import kernels
+
+        tau = np.empty(q.shape)
+        kernels.inverse_dynamics(tree, g, _rows(q), _rows(dq), _rows(ddq), _rows(tau))
+        return tau
+    efforts: list[Any] = [0.0] * tree.n
+    tree, at = tree.lists(), _numbers(q)
+    work = recursions.work_space(tree, 0.0)
+    recursions.inverse_dynamics(tree, g, _turns(at), at, _numbers(dq), _numbers(ddq), work, efforts)
+    return np.stack(efforts, axis=-1).reshape(q.shape)
+
+
+def _many(q: Array) -> bool:
+    """Whether q (..., n) has so many samples that the compiled kernels are worth their start."""
+    return bool(q.size >= COMPILE_FROM * q.shape[-1])
+
+
+def _rows(x: Array) -> Array:
+    """All samples of (..., n) as one contiguous (N, n), a view where x is contiguous itself."""
+    return np.ascontiguousarray(x, float).reshape(-1, x.shape[-1])
+
+
+def _numbers(x: Array) -> list[Any]:
+    """One array of N samples a coordinate of (..., n), or one float, and a 0 for what never moves."""
+    columns = x.reshape(-1, x.shape[-1]).T
+    return [*(columns[:, 0].tolist() if columns.shape[1] == 1 else columns.copy()), 0.0]
+
+
+def _turns(q: list[Any]) -> list[Any]:
+    """cos and sin of every coordinate."""
+    return [(np.cos(x), np.sin(x)) if np.ndim(x) else (cos(x), sin(x)) for x in q]

@@ -1,0 +1,66 @@
+"""The force at the tip that explains external efforts at the joints, and how far it may be off.
+
+tau_ext = J' w                                                                     (7.17), (7.18), (7.25)
+w = J^-T tau_ext,    C_w = J^-T C_tau J^-1                                         (7.26)
+
+J is J_v of the first three joints, and w the force [N]; or J_v above J_omega of six, and w the wrench: the force [N]
+and the moment [N m].  Shapes: k is 3 or 6, and any leading axes come before it.
+"""
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.mechanics.workspace import SINGULAR, condition
+
+CHI_SQUARED_95 = 7.814727903251179  # what 95 % of squared lengths of normal vectors of three components stay below
+
+
+def from_efforts(J: ArrayLike, tau_ext: ArrayLike, C_tau: ArrayLike) -> tuple[Array, Array]:
+    """The force or wrench (..., k) that efforts (..., k) with covariance (..., k, k) come from, and its covariance.
+
+    Both are NaN at poses that count as singular, where the efforts leave one direction of it open.  (7.26)
+    """
+    J, tau_ext = np.asarray(J, float), np.asarray(tau_ext, float)
+    C_tau = np.broadcast_to(np.asarray(C_tau, float), J.shape)
+    w, C_w = np.full(tau_ext.shape, np.nan), np.full(J.shape, np.nan)
+    known = condition(J) <= SINGULAR
+    inverse = np.linalg.inv(np.swapaxes(J[known], -1, -2))  # J^-T
+    w[known] = np.einsum("...ij,...j->...i", inverse, tau_ext[known])
+    C_w[known] = inverse @ C_tau[known] @ np.swapaxes(inverse, -1, -2)
+    return w, C_w
+
+
+def covariance(std: ArrayLike, correlation: ArrayLike) -> Array:
+    """The covariance (..., k, k) of efforts with these standard deviations (..., k) and correlations (k, k)."""
+    std = np.asarray(std, float)
+    return np.asarray(std[..., :, None] * np.asarray(correlation, float) * std[..., None, :])
+
+
+def sigma_ellipsoid(C: ArrayLike) -> tuple[Array, Array]:
+    """The half-axes (..., 3) of the sigma ellipsoid of a covariance (..., 3, 3), the longest first, and their
+    directions (..., 3, 3), one a row.
+    """
+    values, vectors = np.linalg.eigh(np.asarray(C, float))
+    sigma = np.sqrt(np.maximum(values[..., ::-1], 0.0))
+    directions = np.swapaxes(vectors[..., ::-1], -1, -2)
+    largest = np.take_along_axis(directions, np.abs(directions).argmax(-1)[..., None], -1)
+    return sigma, directions * np.sign(largest)  # an axis has no sign: its largest component is taken as positive
+
+
+def reach_95(f: ArrayLike, C: ArrayLike) -> Array:
+    """How far (...,) the 95 % ellipsoid of a covariance (..., 3, 3) reaches in the direction of a force (..., 3).
+
+    |f| is no more than that where 0 lies in the 95 % ellipsoid about f.
+    """
+    f, C = np.asarray(f, float), np.asarray(C, float)
+    size = np.linalg.norm(f, axis=-1)
+    u = np.divide(f, size[..., None], out=np.zeros(f.shape), where=size[..., None] > 0.0)
+    u[..., 0] += size == 0.0  # of no force, any direction
+    squared = np.einsum("...i,...i->...", u, np.linalg.solve(C, u[..., None])[..., 0])
+    return np.asarray(np.sqrt(CHI_SQUARED_95 / squared))
+
+
+def lever(J: ArrayLike) -> Array:
+    """The force [N] that one unit of each effort (..., k) stands for at the tip: the lengths of the columns of J^-T."""
+    return np.asarray(np.linalg.norm(np.linalg.inv(np.swapaxes(np.asarray(J, float), -1, -2))[..., :3, :], axis=-2))

@@ -1,0 +1,131 @@
+"""The model of a joint that moves by itself, or is taken to: a sum of terms.  Section 6.1"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.models.bias import Coefficients, bias
+from davinci_forces.maths.models.mechanism import Mechanism, of_signs
+from davinci_forces.maths.models.memory import driven
+from davinci_forces.maths.models.model import JointDynamics, Motion, Parameter, Regressor
+from davinci_forces.maths.models.terms import Term
+
+FUNCTIONS: dict[str, Callable[[Array, Array, Array | float], Array | float]] = {  # those of `bias`, of q, dq and z
+    "1": lambda q, dq, z: 1.0,
+    "sin q": lambda q, dq, z: np.sin(q),
+    "cos q": lambda q, dq, z: np.cos(q),
+    "q": lambda q, dq, z: q,
+    "dq": lambda q, dq, z: dq,
+    "sign(dq)": lambda q, dq, z: np.sign(dq),
+    "z": lambda q, dq, z: z,
+}
+
+
+@dataclass(frozen=True)
+class IndependentJoint:
+    """tau = sum_i theta_i (a_i ddq + b_i(q, dq)), with the units of the terms filled in.  (6.8), (6.11), (6.13)"""
+
+    group: str
+    terms: tuple[Term, ...]
+    units: tuple[str, ...]  # of the parameters
+    name: str = "independent"
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The joint alone."""
+        return (self.group,)
+
+    @property
+    def efforts(self) -> tuple[str, ...]:
+        """The joint's own."""
+        return self.joints
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """One a term."""
+        pairs = zip(self.terms, self.units, strict=True)
+        return tuple(Parameter(term.name, term.typst, unit, term.positive, term.scale) for term, unit in pairs)
+
+    @property
+    def displacements(self) -> set[tuple[int, float]]:
+        """Those of its terms."""
+        return {(0, term.displacement) for term in self.terms if term.displacement}
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """Of a joint without bodies signs are known."""
+        return of_signs(np.array([term.positive for term in self.terms]))
+
+    def regressor(self, motion: Motion) -> Regressor:
+        """Phi (N, 1, p).  (6.9), (6.12), (6.14)"""
+        q, dq, ddq = (x[:, 0] for x in motion[:3])
+        known, Phi = np.ones(len(q), np.bool_), np.zeros((len(q), 1, len(self.terms)))
+        for i, term in enumerate(self.terms):
+            z: Array | float = 0.0
+            if term.scale:
+                z, started = driven(motion, 0, term)
+                known &= started
+            add(term, q, dq, ddq, z, Phi[:, 0, i])
+        return Regressor(Phi, known)
+
+    def sensitivity(self, motion: Motion) -> Array:
+        """By how much the regressor moves with the motion: its derivatives by q, dq and ddq, (N, 3, p).
+
+        The jump of sign(dq) has none, and what remembers the motion is taken as it stands.
+        """
+        q, dq = motion.q[:, 0], motion.dq[:, 0]
+        columns = []
+        for term in self.terms:
+            _, by_q, by_dq = bias(term.coefficients, q, dq, 0.0)
+            columns.append(np.stack([by_q + 0.0 * q, by_dq + 0.0 * q, term.a + 0.0 * q], axis=1))
+        return np.stack(columns, axis=-1)
+
+    def inertia(self, theta: Array, q: Array) -> Array:
+        """M (N, 1, 1), the same everywhere.  (6.5)"""
+        return np.full((len(q), 1, 1), inertia_of(self.terms, theta))
+
+    def inertia_columns(self, q: Array) -> Array:
+        """What the parameters (p,) make of M at q (N, 1), (N, 1, 1, p)."""
+        return np.tile(np.array([term.a for term in self.terms]), (len(q), 1, 1, 1))
+
+    def bias(self, theta: Array, motion: Motion) -> Array:
+        """V + F + G (N, 1)."""
+        still = motion._replace(ddq=np.zeros_like(motion.ddq))
+        return np.asarray(self.regressor(still).Phi @ theta)
+
+    def joint_dynamics(self, theta: Array, motion: Motion) -> tuple[JointDynamics]:
+        """The terms of the joint's own state as coefficients, those that measured motion drives as known effort."""
+        c = combined(self.terms, theta)
+        of_z = [theta_i * bool(term.scale) for theta_i, term in zip(theta, self.terms, strict=True)]
+        known = self.bias(np.array(of_z), motion)[:, 0] if any(of_z) else np.zeros(len(motion.q))
+        return (JointDynamics(np.full(len(motion.q), inertia_of(self.terms, theta)), c, known),)
+
+
+def regressor(terms: Sequence[Term], q: Array, dq: Array, ddq: Array) -> Array:
+    """Phi (..., K, p) of terms without memory; q, dq and ddq (..., K) in the joint's units.  (6.9), (6.12), (6.14)"""
+    Phi = np.zeros((len(terms), *q.shape))
+    for phi, term in zip(Phi, terms, strict=True):
+        add(term, q, dq, ddq, 0.0, phi)
+    return np.moveaxis(Phi, 0, -1)
+
+
+def add(term: Term, q: Array, dq: Array, ddq: Array, z: Array | float, phi: Array) -> None:
+    """Add a ddq + b(q, dq, z) of one term to `phi` (...); like `bias`, but of the functions that the term has only."""
+    if term.a:
+        phi += term.a * ddq
+    for name, coefficient in term.b.items():
+        phi += coefficient * FUNCTIONS[name](q, dq, z)
+
+
+def inertia_of(terms: Sequence[Term], theta: Array) -> float:
+    """What multiplies the acceleration: M, constant for a joint that moves alone.  (6.5)"""
+    return float(sum(p * term.a for p, term in zip(theta, terms, strict=True)))
+
+
+def combined(terms: Sequence[Term], theta: Array) -> Coefficients:
+    """The coefficients of b = sum_i theta_i b_i, for `bias`; terms of z are left out."""
+    rows = np.array([term.coefficients if not term.scale else np.zeros(7) for term in terms])
+    one, sine, cosine, linear, viscous, coulomb, presliding = (np.asarray(theta) @ rows).tolist()
+    return one, sine, cosine, linear, viscous, coulomb, presliding

@@ -1,0 +1,20 @@
+"""What compiled loops use of a model: the bias and the deflection of one sample, and the deflection along a motion.
+
+Import this module only where a loop runs: compiling it, or reading it back from the cache on disk, takes a moment.
+"""
+
+from typing import Any
+
+from davinci_forces.maths.compiled import cached, inlined
+from davinci_forces.maths.models import bias as derivation
+
+bias = inlined(derivation.bias)
+deflect = inlined(derivation.deflect)
+
+
+@cached(derivation)
+def deflections(dq: Any, T_s: float, x_0: float, z: float, out: Any) -> None:
+    """Write the deflection at each sample (N,) of velocities dq (N,), from z at the first."""
+    for k in range(len(dq)):
+        out[k] = z
+        z = deflect(z, dq[k], T_s, x_0)

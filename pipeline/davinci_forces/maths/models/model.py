@@ -1,0 +1,106 @@
+"""What a model is: the dynamics of a joint or of the whole arm, linear in its parameters.
+
+    tau = Phi(q, dq, ddq) theta,        tau = M(q) ddq + b(q, dq) + tau_ext                            (6.8), (7.8)
+
+Identification asks for Phi, prediction for Phi theta; a filter tracks each joint by itself and asks what it is to know
+of it.  Shapes: N samples, n joints, m efforts, p parameters.
+"""
+
+from collections.abc import Collection, Mapping
+from typing import NamedTuple, Protocol
+
+from davinci_forces.maths.arrays import Array, Booleans, Integers
+from davinci_forces.maths.models.bias import Coefficients
+from davinci_forces.maths.models.mechanism import Mechanism
+
+
+class Parameter(NamedTuple):
+    """One parameter of a model."""
+
+    name: str
+    typst: str  # what it multiplies, in Typst's maths
+    unit: str
+    positive: bool  # whether physics knows its sign
+    scale: float = 0.0  # the displacement or velocity that its column depends on, in the joint's units; 0 for none
+
+
+class Motion(NamedTuple):
+    """The motion of n joints on a uniform clock, in the joints' units."""
+
+    q: Array  # (N, n)
+    dq: Array  # (N, n)
+    ddq: Array  # (N, n)
+    T_s: float  # [s]
+    segment: Integers  # (N,) a new number after each gap
+    periodic: bool = False  # whether each segment is one period, which repeats
+    memory: Mapping[tuple[int, float], tuple[Array, Booleans]] = {}  # deflections that are known already, see `driven`
+
+
+class Regressor(NamedTuple):
+    """Phi of a motion, and the samples at which it is known: memory starts unknown after each gap."""
+
+    Phi: Array  # (N, m, p)
+    known: Booleans  # (N,)
+
+
+class JointDynamics(NamedTuple):
+    """What a filter is to know of one joint along a motion: inertia ddq + b(c; q, dq) + known + tau_ext = tau."""
+
+    inertia: Array  # (N,)
+    coefficients: Coefficients  # c, of what depends on the joint's own state
+    known: Array  # (N,) effort that the measured motion determines: of other joints, of friction's memory
+
+
+class Model(Protocol):
+    """A model of a joint or of the arm.  Every method is pure."""
+
+    @property
+    def name(self) -> str:
+        """Its structure, as keys and the setting `fit` name it: "independent"."""
+        ...
+
+    @property
+    def group(self) -> str:
+        """What it describes: a joint by name, or "arm"."""
+        ...
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Its joints, in the order of the axis n."""
+        ...
+
+    @property
+    def efforts(self) -> tuple[str, ...]:
+        """The joints whose effort it gives, in the order of the axis m: its joints, or some of them."""
+        ...
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Its parameters, in the order of theta."""
+        ...
+
+    @property
+    def displacements(self) -> Collection[tuple[int, float]]:
+        """The joint and the displacement of every deflection that it depends on."""
+        ...
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """What its parameters are made of, and what of it no mechanism has."""
+        ...
+
+    def regressor(self, motion: Motion) -> Regressor:
+        """Phi with tau = Phi theta.  (6.38)"""
+        ...
+
+    def inertia(self, theta: Array, q: Array) -> Array:
+        """M (N, m, m) at q (N, n), of the joints whose effort it gives.  (6.5)"""
+        ...
+
+    def bias(self, theta: Array, motion: Motion) -> Array:
+        """The effort (N, m) of this motion without what accelerates it.  (4.38)"""
+        ...
+
+    def joint_dynamics(self, theta: Array, motion: Motion) -> tuple[JointDynamics, ...]:
+        """Each joint whose effort it gives, as a filter takes it.  (7.15), (7.16)"""
+        ...

@@ -1,0 +1,85 @@
+"""The terms that a joint model is made of.
+
+A joint model is linear in its parameters (6.8), and each of its terms is linear in acceleration:
+
+    tau = sum_i theta_i phi_i,        phi_i = a_i ddq + b_i(q, dq)
+
+so one tuple of terms gives the regressor for identification, and the inertia, the bias and its derivatives for the
+filter.  b_i is a combination of the functions of `bias`.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from davinci_forces.maths.constants import GRAVITY
+from davinci_forces.maths.models.bias import COEFFICIENTS, Coefficients
+
+
+@dataclass(frozen=True)
+class Term:
+    """One column of the regressor: phi = a ddq + sum of b[f] f(q, dq) over functions f of `COEFFICIENTS`.
+
+    `unit` is that of the parameter, with {inertia}, {mass_moment}, {effort} and {position} left to the joint; `typst`
+    is phi in Typst's maths, for equations; a `positive` parameter is one whose sign physics knows. A term of z says
+    what z is by one of three, in the joint's units: the `displacement` of a deflection, the `width` [velocity] of a
+    smooth sign, or the velocity at which Stribeck's peak has `faded`; see `driven`.
+    """
+
+    name: str
+    typst: str
+    unit: str
+    a: float = 0.0
+    b: Mapping[str, float] = field(default_factory=dict, hash=False)
+    positive: bool = False
+    displacement: float = 0.0
+    width: float = 0.0
+    faded: float = 0.0
+
+    def __post_init__(self) -> None:
+        if unknown := sorted(set(self.b) - set(COEFFICIENTS)):
+            raise ValueError(f"term {self.name!r}: no functions {unknown}; there are {', '.join(COEFFICIENTS)}")
+        if sum(scale > 0 for scale in (self.displacement, self.width, self.faded)) != int("z" in self.b):
+            said = "a term of z, and no other, has one displacement, width or velocity greater than 0"
+            raise ValueError(f"term {self.name!r}: {said}")
+
+    @property
+    def scale(self) -> float:
+        """The displacement or velocity that z depends on, in the joint's units; 0 for a term without z."""
+        return self.displacement or self.width or self.faded
+
+    @property
+    def coefficients(self) -> Coefficients:
+        """The coefficients of b, for `bias`."""
+        one, sine, cosine, linear, viscous, coulomb, presliding = (self.b.get(name, 0.0) for name in COEFFICIENTS)
+        return one, sine, cosine, linear, viscous, coulomb, presliding
+
+
+inertia = Term("inertia", "dot.double(q)", "{inertia}", a=1.0, positive=True)
+lifted_mass = Term("lifted mass", "(dot.double(q) - g)", "{inertia}", a=1.0, b={"1": -GRAVITY}, positive=True)
+gravity_sin = Term("gravity, sine", "g sin(q)", "{mass_moment}", b={"sin q": GRAVITY})
+gravity_cos = Term("gravity, cosine", "g cos(q)", "{mass_moment}", b={"cos q": GRAVITY})
+viscous = Term("viscous friction", "dot(q)", "{effort} s/{position}", b={"dq": 1.0}, positive=True)
+coulomb = Term("Coulomb friction", 'op("sign")(dot(q))', "{effort}", b={"sign(dq)": 1.0}, positive=True)
+offset = Term("offset", "1", "{effort}", b={"1": 1.0})
+stiffness = Term("stiffness", "q", "{effort}/{position}", b={"q": 1.0})
+
+
+def presliding(displacement: float, number: int = 1) -> Term:
+    """Friction of bristles that turn over within a displacement, in the joint's units; several are numbered from 1."""
+    return Term(f"presliding friction {number}", f"z_{number}", "{effort}", b={"z": 1.0}, displacement=displacement)
+
+
+def smooth_sign(width: float) -> Term:
+    """Friction that turns over within velocities of +- `width`, in the joint's units."""
+    return Term("smooth friction", 'tanh(dot(q) \\/ dot(q)_"w")', "{effort}", b={"z": 1.0}, width=width)
+
+
+def stribeck(faded: float) -> Term:
+    """What friction is more near standstill; the velocity, in the joint's units, takes e-fold of it away."""
+    phi = 'op("sign")(dot(q)) e^(-(dot(q) \\/ dot(q)_"s")^2)'
+    return Term("Stribeck friction", phi, "{effort}", b={"z": 1.0}, faded=faded)
+
+
+TERMS = {
+    term.name: term for term in (inertia, lifted_mass, gravity_sin, gravity_cos, viscous, coulomb, offset, stiffness)
+}

@@ -1,0 +1,1 @@
+"""Motion that repeats: its period, its average, its harmonics."""

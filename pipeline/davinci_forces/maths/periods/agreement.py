@@ -1,0 +1,193 @@
+"""Which of the periods of a recording differ from the others by more than their noise."""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from davinci_forces.maths.arrays import Array, Integers
+from davinci_forces.maths.periods.averaging import Phases, end, nearest, phases, whole_periods
+from davinci_forces.maths.periods.period import refine
+
+ODD = 2.0  # times what noise explains: a period that differs by less is left in, as it costs more to lose it
+NEGLIGIBLE = 1e-4  # of a signal's standard deviation: a smaller difference is that of an encoder's steps
+CHANCE = 1e-3  # that a period differs by as much though nothing but noise differs
+
+
+class Difference(NamedTuple):
+    """How far one period of a signal is from the mean of the others."""
+
+    signal: int
+    period: int  # counted from 0
+    periods: int
+    rms: float  # beyond noise
+    ratio: float  # of its root mean square to what noise explains
+
+    @property
+    def inside(self) -> bool:
+        """Whether periods on either side agree with each other."""
+        return 0 < self.period < self.periods - 1
+
+
+def alike(
+    t: Array,
+    positions: Sequence[Array],
+    signals: Sequence[Array],
+    span: slice,
+    length: float,
+    rate: float,
+    orders: int,
+) -> tuple[slice, float, list[Difference]]:
+    """The stretch without the first and last periods that differ from the others, its period, and what differed.
+
+    What does not fill a period is left out at the start rather than at the end, before a period is; of the periods
+    never more than half, as they could be the ones that are right.  `t` (N,) and `length` [s]; `positions`, whose
+    harmonics give the period, and `signals`, which are compared, (N,) each.
+    """
+    left_out: list[Difference] = []
+    fewest = (whole_periods(t[span], length, rate) + 1) // 2
+    while True:
+        M = whole_periods(t[span], length, rate)
+        used = slice(span.start, end(t, span, length, rate))
+        odd = differing(t[used], [x[used] for x in signals], length, rate)
+        at_the_edges = sorted((d for d in odd if not d.inside), key=lambda d: -d.ratio)
+        if not at_the_edges or fewest >= M:
+            return span, length, left_out + sorted(odd, key=lambda d: -d.ratio)[:1]
+        left_out.append(at_the_edges[0])
+        span = _without(t, span, at_the_edges[0], M, length, rate)
+        length = refine(t[span], [x[span] for x in positions], length, orders)
+
+
+def _without(t: Array, span: slice, odd: Difference, M: int, length: float, rate: float) -> slice:
+    """A stretch of M whole periods without the first or the last of them, or without what does not fill one."""
+    if odd.period > 0:
+        return slice(span.start, end(t, span, length, rate, M - 1))
+    late, next_one = t[span.stop - 1] + 0.5 / rate - M * length, t[span.start] + length - 0.5 / rate
+    start = int(np.searchsorted(t, late))
+    return slice(start if start > span.start + 1 else int(np.searchsorted(t, next_one)), span.stop)
+
+
+def alternation(t: Array, signals: Sequence[Array], length: float, rate: float, among: Sequence[int]) -> int:
+    """How many periods make the one after which all signals (N,) repeat: the first of `among` that does, or 1.
+
+    A motion may all but repeat within its period.  Its periods then agree with every k-th other but not with those
+    between; they are compared by groups, in an analysis of variance.
+    """
+    phased, number = Phases(t, length, phases(length, rate)), numbers(t, length)
+    left = [phased.carried(x)[1] for x in signals if among]
+    for k in among:
+        place = number % k * phased.K + phased.bins
+        counts = np.bincount(place, minlength=k * phased.K).reshape(k, -1)
+        if any(_alternates(x, residual, place, counts) for x, residual in zip(signals, left, strict=True)):
+            return k
+    return 1
+
+
+def _alternates(x: Array, residual: Array, place: Integers, counts: Integers) -> bool:
+    """Whether groups of the periods of a signal (N,) differ by more than their noise; `counts` (k, K) are theirs."""
+    sums = _sums(place, residual, counts)
+    means = sums / np.maximum(counts, 1)
+    mean = sums.sum(axis=0) / np.maximum(counts.sum(axis=0), 1)
+    between, own = float(np.sum(counts * (means - mean) ** 2)), counts[1:].size
+    left, degrees = float(residual @ residual - np.sum(sums * means)), len(x) - int((counts > 0).sum())
+    F = between / own / max(left / max(degrees, 1), 1e-300)
+    if F <= ODD**2 or np.sqrt(between / len(x)) <= NEGLIGIBLE * x.std():
+        return False
+    return is_unlikely(F, _lag_one(residual - means.ravel()[place]), own, degrees)
+
+
+def numbers(t: Array, length: float) -> Integers:
+    """The period in which each time (N,) is, counted from that of the first."""
+    turns: Array = (t - t[0]) / length + 1e-9
+    return turns.astype(np.int64)
+
+
+def _sums(place: Integers, x: Array, counts: Integers) -> Array:
+    """The sums of samples (N,) by their place in a table like that of their counts."""
+    return np.asarray(np.bincount(place, x, counts.size).reshape(counts.shape), dtype=np.float64)
+
+
+def _lag_one(noise: Array) -> float:
+    """The correlation of each sample with the next, along the last axis."""
+    return float(np.sum(noise[..., 1:] * noise[..., :-1]) / max(float(np.sum(noise**2)), 1e-300))
+
+
+def is_unlikely(F: float, rho: float, own: float, others: float) -> bool:
+    """Whether noise of a correlation from sample to sample rarely makes one variance so many times another.
+
+    Squares of first-order noise are correlated by rho^2, so that few of them say as much as independent ones.
+    """
+    from scipy.special import fdtrc
+
+    worth = (1 - rho**2) / (1 + rho**2)
+    return bool(fdtrc(max(worth * own, 1.0), max(worth * others, 1.0), F) < CHANCE)
+
+
+def differing(t: Array, signals: Sequence[Array], length: float, rate: float) -> list[Difference]:
+    """The periods of signals (N,) that differ from the others.
+
+    A period is compared with the mean of the others at each phase, as an analysis of variance would: the mean square of
+    the difference over the variance between the others.  Noise that is correlated leaves few degrees of freedom behind
+    either, so their number is taken from the others' own correlation.  Of two periods nobody can tell which is odd.
+    """
+    periods = _Periods.of(t, length, rate)
+    if len(periods.numbers) < 3:
+        return []
+    return [difference for i, x in enumerate(signals) for difference in periods.odd(x, i)]
+
+
+class _Periods(NamedTuple):
+    """Where samples (N,) fall in a table of M periods by K phases: what all signals of a log share."""
+
+    phased: Phases
+    numbers: Integers  # (M,) of the periods, those that hold no samples left out
+    first: Integers  # (M,) the first sample of each
+    place: Integers  # (N,) of each sample in the table
+    counts: Integers  # (M, K)
+    totals: Integers  # (K,) of the counts
+    weight: Array  # (M, K) of the square of what a period's sum is off the mean; 0 where it or the others have none
+    compared: Integers  # (M,) phases at which a period and the others have samples
+    degrees: Integers  # (M,) of freedom behind the variance of the others
+
+    @classmethod
+    def of(cls, t: Array, length: float, rate: float) -> "_Periods":
+        phased, number = Phases(t, length, phases(length, rate)), numbers(t, length)
+        first = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1])
+        M, K = len(first), phased.K
+        place = np.repeat(np.arange(M) * K, np.diff(first, append=len(t)))
+        place += nearest(t - t[0], length, K)
+        counts = np.bincount(place, minlength=M * K).reshape(M, K)
+        totals = counts.sum(axis=0)
+        others = totals - counts
+        both = counts * others
+        weight = np.divide(totals, both, out=np.zeros(both.shape), where=both > 0)
+        degrees = np.maximum(others.sum(axis=1) - np.count_nonzero(others, axis=1), 1)
+        return cls(phased, number[first], first, place, counts, totals, weight, np.count_nonzero(both, axis=1), degrees)
+
+    def odd(self, x: Array, signal: int) -> list[Difference]:
+        """The periods in which a signal (N,) differs from the others."""
+        _, residual = self.phased.carried(x)
+        sums = _sums(self.place, residual, self.counts)
+        mean = sums.sum(axis=0) / np.maximum(self.totals, 1)
+        off = sums - self.counts * mean
+        explained = np.einsum("mk,mk,mk->m", off, off, self.weight)
+        # What is left without a period: all squares, less those within it and those it is apart from the others by.
+        squares = np.add.reduceat(residual * residual, self.first)
+        own = squares - np.einsum("mk,mk->m", sums, sums / np.maximum(self.counts, 1))
+        between = squares.sum() - mean @ sums.sum(axis=0)
+        noise = np.maximum(between - explained - own, 0.0) / self.degrees
+        apart = explained / np.maximum(self.compared, 1)
+        ratio, rms = np.sqrt(apart / np.maximum(noise, 1e-300)), np.sqrt(np.maximum(apart - noise, 0.0))
+        return [
+            Difference(signal, int(self.numbers[m]), int(self.numbers[-1]) + 1, float(rms[m]), float(ratio[m]))
+            for m in np.flatnonzero(ratio > ODD).tolist()
+            if rms[m] > NEGLIGIBLE * x.std() and self._is_unlikely(m, float(ratio[m]), sums)
+        ]
+
+    def _is_unlikely(self, m: int, ratio: float, sums: Array) -> bool:
+        """Whether noise as correlated as that of the other periods rarely makes one differ so; `sums` (M, K)."""
+        others = np.arange(len(sums)) != m
+        counts, sums = self.counts[others], sums[others]
+        mean = sums.sum(axis=0) / np.maximum(counts.sum(axis=0), 1)
+        noise = np.where(counts > 0, sums / np.maximum(counts, 1) - mean, 0.0)
+        return is_unlikely(ratio**2, _lag_one(noise), counts.shape[1], self.degrees[m])

@@ -1,0 +1,75 @@
+"""Velocities and accelerations of motion that does not repeat: zero-phase low-pass, then differences."""
+
+from collections.abc import Iterator
+from functools import cache
+from itertools import pairwise
+
+import numpy as np
+
+from davinci_forces.maths.arrays import Array, Integers
+
+ORDER = 4  # of the Butterworth filter, run forwards and backwards
+
+
+def lowpass(x: Array, rate: float, cutoff: float) -> Array:
+    """Low-pass a signal (N,), or columns (N, ...), without delay.
+
+    `cutoff` [Hz] is where the two passes together have halved the power twice.  One at or above 0.4 of the sampling
+    rate leaves the signal as it is.
+    """
+    if cutoff >= 0.4 * rate or len(x) < 2:
+        return x
+    from scipy.signal import sosfiltfilt
+
+    sos = _sections(rate, cutoff)
+    return np.asarray(sosfiltfilt(sos, x, axis=0, padlen=min(3 * round(rate / cutoff) + 3, len(x) - 1)))
+
+
+@cache
+def reach(rate: float, cutoff: float) -> int:
+    """Samples after which what `lowpass` has seen is less than rounding."""
+    if cutoff >= 0.4 * rate:
+        return 0
+    from scipy.signal import sos2zpk
+
+    slowest = float(np.abs(sos2zpk(_sections(rate, cutoff))[1]).max())
+    return int(np.ceil(np.log(np.finfo(float).eps) / np.log(slowest)))
+
+
+@cache
+def share_passed(rate: float, cutoff: float) -> float:
+    """The share of the power of white noise that `lowpass` lets through."""
+    if cutoff >= 0.4 * rate:
+        return 1.0
+    from scipy.signal import sosfreqz
+
+    _, H = sosfreqz(_sections(rate, cutoff), 4096)
+    return float(np.mean(np.abs(H) ** 4))  # two passes multiply the amplitude by |H| each
+
+
+@cache
+def _sections(rate: float, cutoff: float) -> Array:
+    from scipy.signal import butter
+
+    return np.asarray(butter(ORDER, cutoff, fs=rate, output="sos"))
+
+
+def motion(q: Array, dq: Array | None, rate: float, cutoff: float) -> tuple[Array, Array, Array]:
+    """Position, velocity and acceleration (N,) each, from a logged velocity where there is one.
+
+    Differences are central; the ends are one-sided.
+    """
+    smooth = lowpass(q, rate, cutoff)
+    if len(q) < 2:
+        return smooth, np.zeros_like(q), np.zeros_like(q)
+    velocity = np.gradient(smooth, 1.0 / rate) if dq is None else lowpass(dq, rate, cutoff)
+    return smooth, velocity, np.gradient(velocity, 1.0 / rate)
+
+
+def segments(segment: Integers) -> Iterator[slice]:
+    """The segments of a signal: runs of samples without a gap, by the number of the segment of each sample."""
+    if len(segment) == 0:
+        return
+    edges = [0, *(np.flatnonzero(np.diff(segment)) + 1).tolist(), len(segment)]
+    for start, stop in pairwise(edges):
+        yield slice(start, stop)

@@ -1,0 +1,173 @@
+"""A robot in closed loop, as the laboratory runs it: motors, drivers, controller, friction, stops, and what it touches.
+
+Time goes in ticks of the motor drivers.  Every so many ticks the controller reads the encoders and sets what the
+drivers follow, and the recorder takes a sample; between ticks the arm moves by one implicit step.
+"""
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.compiled import compiled
+from davinci_forces.maths.simulation.actuators import Cascade, Loops, Motors, Regulator
+from davinci_forces.maths.simulation.control import drive, follow, pi, read
+from davinci_forces.maths.simulation.friction import Friction
+from davinci_forces.maths.simulation.step import at_rest, middle, step
+from davinci_forces.maths.simulation.surroundings import Surroundings, on_tip, weigh
+
+
+class Plant(NamedTuple):
+    """The rigid body that moves: two compiled functions, and what they are told about it.
+
+    `dynamics(data, q, dq, M, b)` fills the inertia (n, n), with the motors', and the bias (n,), Coriolis and gravity;
+    `tip(data, q, J)` fills the Jacobian (3, n) of the tip and returns its position (3,), both in the base frame.
+    """
+
+    dynamics: Callable[..., None]
+    tip: Callable[..., Array]
+    data: Any
+
+
+class JointConstraints(NamedTuple):
+    """What is around the rigid body."""
+
+    friction: Friction
+    lower: Array  # hard stops (n,)
+    upper: Array
+    moving: NDArray[np.bool_]  # (n,); the other joints stay at rest
+
+
+class Timing(NamedTuple):
+    """The clocks."""
+
+    tick: float  # [s] of the motor drivers
+    ticks: int  # for one turn of the controller
+
+
+class Simulated(NamedTuple):
+    """What truly happened, at the controller's instants; every array is (K, n), but `force` (K, 3) [N]."""
+
+    q: Array
+    dq: Array
+    tau: Array  # effort of the motors at the joints
+    tau_ext: Array  # effort exerted on the surroundings
+    force: Array  # of the tip on the surroundings, base frame
+
+
+def simulate(
+    plant: Plant, body: JointConstraints, motors: Motors, law: Cascade | Regulator, timing: Timing, reference: Array,
+    around: Surroundings, q: Array,
+) -> Simulated:  # fmt: skip
+    """Run the closed loop from rest at q (n,).
+
+    `reference` (K, n) holds the positions asked for at the controller's K instants.
+    """
+    K, n = reference.shape
+    out = Simulated(np.zeros((K, n)), np.zeros((K, n)), np.zeros((K, n)), np.zeros((K, n)), np.zeros((K, 3)))
+    state = at_rest(q)
+    run = _cascade if isinstance(law, Cascade) else _regulator
+    run(plant.dynamics, plant.tip, plant.data, body, motors, law, timing, reference, around, state, out)
+    return out
+
+
+@compiled
+def _cascade(
+    dynamics: Any, tip: Any, data: Any, body: Any, motors: Any, law: Any, timing: Any, reference: Any, around: Any,
+    state: Any, out: Any,
+) -> None:  # fmt: skip
+    """The three cascaded PI loops.  Fig 2.5"""
+    n, h = len(state.q), timing.tick
+    loops = Loops(
+        np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    )
+    tau, angle = np.zeros(n), np.zeros(n)
+    read(motors, state.q, loops.angle)
+    for k in range(len(reference)):
+        for tick in range(timing.ticks):
+            read(motors, state.q, angle)
+            if tick == 0:
+                follow(motors, law, loops, reference[k], angle, h * timing.ticks)
+            drive(motors, law, loops, angle, state.dq, (tick + 1) / timing.ticks, h, tau)
+            _tick(dynamics, tip, data, body, around, state, tau, h, k, tick, timing.ticks, out)
+
+
+@compiled
+def _regulator(
+    dynamics: Any, tip: Any, data: Any, body: Any, motors: Any, law: Any, timing: Any, reference: Any, around: Any,
+    state: Any, out: Any,
+) -> None:  # fmt: skip
+    """PID with gravity compensation at the controller's rate; the motors give what is asked up to their current."""
+    n, turn = len(state.q), timing.tick * timing.ticks
+    M, G, still, integral, tau = np.zeros((n, n)), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    angle, before = np.zeros(n), np.zeros(n)
+    read(motors, state.q, before)
+    for k in range(len(reference)):
+        read(motors, state.q, angle)
+        dynamics(data, angle / motors.gear_ratio, still, M, G)
+        for j in range(n):
+            error = reference[k, j] - angle[j] / motors.gear_ratio[j]
+            known = law.gravity * G[j] - law.derivative[j] * (angle[j] - before[j]) / (turn * motors.gear_ratio[j])
+            limit = motors.gear_ratio[j] * motors.torque_constant[j] * motors.current_limit[j]
+            output, integral[j] = pi(error, law.proportional[j], law.integral[j], integral[j], turn, limit)
+            tau[j], before[j] = min(max(output + known, -limit), limit), angle[j]
+        for tick in range(timing.ticks):
+            _tick(dynamics, tip, data, body, around, state, tau, timing.tick, k, tick, timing.ticks, out)
+
+
+@compiled
+def _tick(
+    dynamics: Any, tip: Any, data: Any, body: Any, around: Any, state: Any, tau: Any, h: float, k: int, tick: int,
+    ticks: int, out: Any,
+) -> None:  # fmt: skip
+    """Move for one tick under constant motor efforts tau (n,), and record at the controller's instants."""
+    n, now = len(state.q), k * ticks + tick
+    M, b, J, free = np.empty((n, n)), np.empty(n), np.zeros((3, n)), np.empty(n)
+    q, dq, start = np.empty(n), np.empty(n), np.empty(n)
+    external, force, drift, velocity = np.empty(n), np.zeros(3), np.zeros(3), np.zeros(3)
+    for i in range(n):
+        start[i], external[i] = state.dq[i], around.efforts[now, i]
+    middle(state, h, q, dq)
+    dynamics(data, q, dq, M, b)
+    if around.mass > 0:
+        weigh(tip, data, q, dq, J, drift)
+    if around.at_tip:
+        x = tip(data, q, J)
+        _through(J, dq, velocity)
+        on_tip(around, now, x, velocity, force)
+    for i in range(n):
+        for c in range(3):
+            external[i] += J[c, i] * (force[c] + around.mass * drift[c])
+            for j in range(n):
+                M[i, j] += around.mass * J[c, i] * J[c, j]
+        free[i] = tau[i] - external[i]
+    if tick == 0:
+        _record(state, tau, external, force, k, out)
+    step(M, b, free, body.friction, body.lower, body.upper, state, body.moving, h)
+    if tick == 0 and around.mass > 0:  # what the mass's acceleration adds
+        for i in range(n):
+            dq[i] = (state.dq[i] - start[i]) / h
+        _through(J, dq, velocity)
+        for c in range(3):
+            out.force[k, c] += around.mass * (velocity[c] + drift[c])
+            for i in range(n):
+                out.tau_ext[k, i] += around.mass * J[c, i] * velocity[c]
+
+
+@compiled
+def _through(J: Any, dq: Any, velocity: Any) -> None:
+    """J dq (3,)."""
+    for c in range(3):
+        velocity[c] = 0.0
+        for i in range(len(dq)):
+            velocity[c] += J[c, i] * dq[i]
+
+
+@compiled
+def _record(state: Any, tau: Any, external: Any, force: Any, k: int, out: Any) -> None:
+    for i in range(len(tau)):
+        out.q[k, i], out.dq[k, i], out.tau[k, i], out.tau_ext[k, i] = state.q[i], state.dq[i], tau[i], external[i]
+    for c in range(3):
+        out.force[k, c] = force[c]

@@ -1,0 +1,118 @@
+"""One step of a robot with friction and hard stops: implicit in what is stiff, exact about what sticks.
+
+    M(q) ddq + b(q, dq) + v dq + friction + tau_ext = tau                                          (4.40), (A.16)
+
+The step is the midpoint rule, implicit in friction, with the bias at where the middle of the step is foreseen to be:
+Moreau and Jean's scheme for systems with dry friction, of second order where nothing sticks; bristles, taken at the
+end of the step so that they may be stiff, are of first order (`friction.bristle`).  The velocity at its end minimises
+dq^T A dq / 2 - r^T dq + h sum_i g_i |dq_i|, which is strictly convex, so a joint that friction holds comes out with a
+velocity of exactly zero.  Jean, Computer Methods in Applied Mechanics and Engineering 177 (1999) 235-257.
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.compiled import compiled
+from davinci_forces.maths.simulation.friction import Friction, bristle, level
+
+SWEEPS = 100
+ENOUGH = 1e-13  # relative change of a sweep
+
+
+class State(NamedTuple):
+    """The mechanical state of n joints, changed in place by a step."""
+
+    q: Array
+    dq: Array
+    z: Array  # deflection of the bristles
+    before: Array  # velocity a step ago
+
+
+def at_rest(q: Array) -> State:
+    """Standing still at q (n,), with relaxed bristles."""
+    return State(q.astype(np.float64), np.zeros(len(q)), np.zeros(len(q)), np.zeros(len(q)))
+
+
+@compiled
+def middle(state: Any, h: float, q: Any, dq: Any) -> None:
+    """Fill position and velocity (n,) in the middle of the coming step, as far as they are known."""
+    for i in range(len(q)):
+        q[i] = state.q[i] + h / 2 * state.dq[i]
+        dq[i] = state.dq[i] + (state.dq[i] - state.before[i]) / 2
+
+
+@compiled
+def step(
+    M: Any, b: Any, tau: Any, friction: Friction, lower: Any, upper: Any, state: State, moving: Any, h: float
+) -> None:
+    """Advance the state by h [s] under constant efforts.
+
+    `M` (n, n) and `b` (n,) are inertia and bias at the middle of the step, `tau` (n,) is the effort less the external
+    one.  Joints that are not `moving` (n,) stay at rest.  A joint that would pass `lower` or `upper` is put there and
+    loses its velocity, as Simulink's second-order integrator does (section 4.5).
+    """
+    q, dq, z, before = state
+    n = len(q)
+    A, r, new = np.empty((n, n)), np.empty(n), np.empty(n)
+    up, down, decay, free = np.zeros(n), np.zeros(n), np.ones(n), np.empty(n, np.bool_)
+    for i in range(n):
+        r[i], new[i], free[i] = h * (tau[i] - b[i]), dq[i], moving[i]
+        for j in range(n):
+            A[i, j] = M[i, j]
+            r[i] += M[i, j] * dq[j]
+    _rub(friction, dq, z, h, A, r, up, down, decay)
+    side = np.zeros(n)
+    for _ in range(n + 1):  # each turn may stop one joint more
+        _velocity(A, r, up, down, free, new)
+        hit = False
+        for i in range(n):
+            end = q[i] + h / 2 * (dq[i] + new[i])
+            if free[i] and (end > upper[i] or end < lower[i]):
+                side[i], free[i], hit = 1.0 if end > upper[i] else -1.0, False, True
+        if not hit:
+            break
+    for i in range(n):
+        if side[i] != 0:
+            q[i] = upper[i] if side[i] > 0 else lower[i]
+        elif moving[i]:
+            q[i] += h / 2 * (dq[i] + new[i])
+        z[i] = (z[i] + h * new[i]) / decay[i]
+        before[i], dq[i] = dq[i], new[i]
+
+
+@compiled
+def _rub(friction: Any, dq: Any, z: Any, h: float, A: Any, r: Any, up: Any, down: Any, decay: Any) -> None:
+    """Add friction: what is smooth to A and r, and what sticks as the impulses up and down that it can hold."""
+    for i in range(len(dq)):
+        A[i, i] += h / 2 * friction.viscous[i]
+        r[i] -= h / 2 * friction.viscous[i] * dq[i]
+        if friction.bristle_stiffness[i] > 0:
+            constant, slope, decay[i] = bristle(friction, i, dq[i], z[i], h)
+            A[i, i] += h * slope
+            r[i] -= h * constant
+        else:
+            up[i] = h * level(friction, i, max(dq[i], 0.0))
+            down[i] = h * level(friction, i, min(dq[i], -1e-300))
+
+
+@compiled
+def _velocity(A: Any, r: Any, up: Any, down: Any, free: Any, v: Any) -> None:
+    """Minimise v^T A v / 2 - r^T v + sum_i (up_i max(v_i, 0) + down_i max(-v_i, 0)), one joint at a time, from v."""
+    n = len(r)
+    for i in range(n):
+        if not free[i]:
+            v[i] = 0.0
+    for _ in range(SWEEPS):
+        change, size = 0.0, 0.0
+        for i in range(n):
+            if free[i]:
+                s = r[i] + A[i, i] * v[i]
+                for j in range(n):
+                    s -= A[i, j] * v[j]
+                new = (max(s - up[i], 0.0) + min(s + down[i], 0.0)) / A[i, i]
+                change, size = max(change, abs(new - v[i])), max(size, abs(new))
+                v[i] = new
+        if change <= ENOUGH * size:
+            break

@@ -1,0 +1,77 @@
+"""What touches a simulated robot: efforts at its joints, forces on its tip, a weight, tissue.
+
+Efforts and forces are those that the robot exerts on its surroundings (7.8).
+"""
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.compiled import compiled
+from davinci_forces.maths.constants import GRAVITY
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+class Surroundings(NamedTuple):
+    """What the robot touches, T ticks long."""
+
+    efforts: Array  # (T, n) at the joints
+    forces: Array  # (T, 3) of the tip, base frame [N]
+    mass: float  # [kg] hung on the tip; 0 for none
+    stiffness: float  # [N/m] of the tissue; 0 for none
+    damping: float  # [N s/m] of the tissue while it is pressed
+    surface: Array  # a point (3,) of the tissue's surface [m]
+    normal: Array  # (3,) out of the tissue, of length 1
+    at_tip: bool  # whether anything but efforts and the mass acts
+
+
+def nothing(ticks: int, n: int) -> Surroundings:
+    """Free space."""
+    return Surroundings(np.zeros((ticks, n)), np.zeros((ticks, 3)), 0.0, 0.0, 0.0, np.zeros(3), UP.copy(), False)
+
+
+def triangle(t: Array, start: float, end: float, peak: float) -> Array:
+    """An effort that rises from zero to its peak midway between start and end, and falls again.  Section 7.3"""
+    return peak * np.clip(1 - np.abs(2 * t - start - end) / (end - start), 0, None)
+
+
+def pulse(t: Array, start: float, end: float, peak: float) -> Array:
+    """An effort that is there from start to end, and nowhere else."""
+    return peak * ((t >= start) & (t < end)).astype(np.float64)
+
+
+SHAPES = {"triangle": triangle, "pulse": pulse}
+
+
+@compiled
+def on_tip(around: Any, tick: int, x: Any, velocity: Any, force: Any) -> None:
+    """Fill the force (3,) [N] of the tip at x (3,) [m] on what it touches: the one given for this tick, and tissue.
+
+    Tissue is a spring with a damper that pushes and never pulls.  (8.1)
+    """
+    depth, sinking = 0.0, 0.0
+    for k in range(3):
+        force[k] = around.forces[tick, k]
+        depth += (around.surface[k] - x[k]) * around.normal[k]
+        sinking -= velocity[k] * around.normal[k]
+    if around.stiffness > 0 and depth > 0:
+        pressed = max(around.stiffness * depth + around.damping * sinking, 0.0)
+        for k in range(3):
+            force[k] -= pressed * around.normal[k]
+
+
+@compiled
+def weigh(tip: Any, data: Any, q: Any, dq: Any, J: Any, drift: Any) -> None:
+    """Fill the Jacobian (3, n) of the tip, and dJ/dt dq + g up (3,) [m/s^2]: what a mass hung there feels, less J ddq.
+
+    The robot exerts m (a + g up) on the mass, with a = J ddq + dJ/dt dq.  Section 7.5
+    """
+    ahead, h = np.empty_like(J), 1e-6
+    tip(data, q, J)
+    tip(data, q + h * dq, ahead)
+    for k in range(3):
+        drift[k] = GRAVITY if k == 2 else 0.0
+        for i in range(len(q)):
+            drift[k] += (ahead[k, i] - J[k, i]) * dq[i] / h

@@ -1,0 +1,1 @@
+"""What pushes into tissue tell of it."""

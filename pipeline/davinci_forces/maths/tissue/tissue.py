@@ -1,0 +1,139 @@
+"""Models of tissue: what force it meets a depth and a velocity with, and which of them predicts pushes it has not seen.
+
+    spring          f = c + k x                                          (8.1)
+    Kelvin-Voigt    f = c + k x + b v
+    Hunt-Crossley   f = c + k x^n + b x^n v      Hunt and Crossley, Coefficient of restitution interpreted as damping in
+                                                 vibroimpact, Journal of Applied Mechanics 42 (1975)
+
+x is the depth below first contact and v its rate.  Each push has a c of its own, the force that it begins with.  For a
+given exponent n all are linear, so a push is known by the small matrices that its samples give, and leaving one out is
+a difference of sums.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.uncertainty.bootstrap import blocks, error_of_mean, standard_error
+
+EXPONENTS = np.linspace(1.0, 2.5, 31)
+FOLDS = 20
+
+
+class ForceLaw(NamedTuple):
+    """The structure of a model: which of the columns x^n, v and x^n v it has, and whether the exponent is free."""
+
+    name: str
+    columns: tuple[int, ...]
+    free: bool
+
+    @property
+    def parameters(self) -> int:
+        """How many parameters all pushes share."""
+        return len(self.columns) + self.free
+
+    @property
+    def damped(self) -> bool:
+        """Whether the velocity counts."""
+        return len(self.columns) > 1
+
+
+LAWS = (
+    ForceLaw("spring", (0,), False),
+    ForceLaw("Kelvin-Voigt", (0, 1), False),
+    ForceLaw("power law", (0,), True),
+    ForceLaw("Hunt-Crossley", (0, 2), True),
+)
+
+
+class Moments(NamedTuple):
+    """What P pushes say for E exponents: products of the columns and the force, less their means."""
+
+    A: Array  # (P, E, 3, 3)
+    b: Array  # (P, E, 3)
+    squares: Array  # (P,)
+
+
+class FittedLaw(NamedTuple):
+    """How well a model predicts pushes that it has not seen, and what it is when fitted to all of them."""
+
+    law: ForceLaw
+    errors: Array  # (folds,) squares of the errors on pushes left out
+    score: float  # relative error on them
+    score_std: float
+    theta: Array  # (3,) of x^n [N/m^n], v [N s/m] and x^n v [N s/m^(n+1)]
+    exponent: float
+
+
+def moments(pushes: Sequence[tuple[Array, Array, Array]]) -> Moments:
+    """The moments of pushes, each the depth below first contact [m], its rate [m/s] and the force [N], (N,)."""
+    A, b, squares = [], [], []
+    for x, v, f in pushes:
+        columns, away = _columns(x, v, EXPONENTS), f - f.mean()
+        columns = columns - columns.mean(axis=0)
+        A.append(np.einsum("kei,kej->eij", columns, columns))
+        b.append(np.einsum("kei,k->ei", columns, away))
+        squares.append(float(away @ away))
+    return Moments(np.array(A), np.array(b), np.array(squares))
+
+
+def judged(given: Moments, law: ForceLaw) -> FittedLaw:
+    """A model by cross-validation over pushes: by leaving out one at a time, or a twentieth of them."""
+    parts = blocks(len(given.squares), FOLDS)
+    A, b, _ = (column.sum(axis=0) for column in given)
+    errors, sizes = np.zeros(len(parts)), np.zeros(len(parts))
+    for i, part in enumerate(parts):
+        A_out, b_out, sizes[i] = (column[part].sum(axis=0) for column in given)
+        theta, e = fitted(A - A_out, b - b_out, law)
+        errors[i] = sizes[i] - 2 * theta @ b_out[e] + theta @ A_out[e] @ theta
+    theta, e = fitted(A, b, law)
+    pairs = list(zip(errors.tolist(), sizes.tolist(), strict=True))
+    return FittedLaw(law, errors, _relative(pairs), standard_error(_relative, pairs), theta, float(EXPONENTS[e]))
+
+
+def fitted(A: Array, b: Array, law: ForceLaw) -> tuple[Array, int]:
+    """The parameters (3,) of least squares of moments (E, 3, 3) and (E, 3), and which exponent leaves least."""
+    own = list(law.columns)
+    exponents = range(len(EXPONENTS) if law.free else 1)
+    thetas = [np.linalg.lstsq(A[e][np.ix_(own, own)], b[e, own], rcond=1e-12)[0] for e in exponents]
+    best = int(np.argmax([theta @ b[e, own] for e, theta in enumerate(thetas)]))
+    theta = np.zeros(3)
+    theta[own] = thetas[best]
+    return theta, best
+
+
+def force_of(model: FittedLaw, x: Array, v: Array) -> Array:
+    """The force (N,) of a model at depths below first contact (N,) and their rates (N,), without the push's own c."""
+    return np.asarray(_columns(x, v, np.array([model.exponent]))[:, 0] @ model.theta)
+
+
+def tangent(model: FittedLaw, x: float) -> tuple[float, float]:
+    """Stiffness [N/m] at rest and damping [N s/m] of a model at a depth below first contact [m]."""
+    k, b, b_x = model.theta
+    return float(k * model.exponent * x ** (model.exponent - 1)), float(b + b_x * x**model.exponent)
+
+
+def _columns(x: Array, v: Array, exponents: Array) -> Array:
+    """x^n, v and x^n v (N, E, 3) of depths (N,) and their rates (N,)."""
+    power = np.clip(x, 0.0, None)[:, None] ** exponents
+    return np.stack([power, np.broadcast_to(v[:, None], power.shape), power * v[:, None]], axis=2)
+
+
+def chosen(candidates: Sequence[FittedLaw]) -> tuple[FittedLaw, str]:
+    """The model of the fewest parameters that predicts pushes left out no worse than chance; and why."""
+    best = min(candidates, key=lambda c: c.score)
+    for candidate in sorted(candidates, key=lambda c: (c.law.parameters, c.score)):
+        worse = (candidate.errors - best.errors).tolist()
+        if candidate is best:
+            return best, "it predicts pushes left out best"
+        if float(np.mean(worse)) < error_of_mean(worse):
+            return candidate, f"{best.law.name} predicts pushes left out better, but by no more than chance does"
+    raise AssertionError("the best is one of the candidates")
+
+
+def _relative(pairs: list[tuple[float, float]]) -> float:
+    """Root of the errors' squares over the force's."""
+    errors, sizes = np.array(pairs).T
+    return float(np.sqrt(max(errors.sum(), 0.0) / max(sizes.sum(), np.finfo(float).tiny)))

@@ -1,0 +1,1 @@
+"""How far estimates may be off: bands, levels, offsets, resampling."""

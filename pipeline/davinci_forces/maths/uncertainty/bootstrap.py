@@ -1,0 +1,95 @@
+"""Standard errors where there is no formula: by drawing blocks of samples that are longer than what correlates.
+
+Kuensch, The jackknife and the bootstrap for general stationary observations, Annals of Statistics 17 (1989).
+"""
+
+from collections.abc import Callable, Sequence
+from itertools import pairwise
+from typing import TypeVar
+
+import numpy as np
+
+from davinci_forces.maths.arrays import Array, Integers
+
+BLOCKS = 20
+DRAWS = 200
+
+Block = TypeVar("Block")
+
+
+def blocks(N: int, count: int = BLOCKS) -> list[slice]:
+    """N samples as so many blocks of about one length; fewer where there are not that many samples."""
+    edges = np.linspace(0, N, min(count, max(N, 1)) + 1).round().astype(int).tolist()
+    return [slice(start, stop) for start, stop in pairwise(edges) if stop > start]
+
+
+def standard_error(statistic: Callable[[list[Block]], float], parts: Sequence[Block], seed: int = 0) -> float:
+    """The standard deviation of a statistic of blocks over draws of as many blocks, with replacement.
+
+    A block is whatever the statistic takes: samples, or what is already known of them.
+
+    NaN for a single block, of which nothing can be drawn.
+    """
+    if len(parts) < 2:
+        return float("nan")
+    return _spread(np.array([statistic([parts[i] for i in draw]) for draw in _draws(len(parts), seed)]), len(parts))
+
+
+def error_of_mean(values: Sequence[float] | Array, seed: int = 0) -> float:
+    """The same of the mean of numbers (n,), one a block."""
+    if len(values) < 2:
+        return float("nan")
+    return _spread(np.asarray(values)[_draws(len(values), seed)].mean(axis=1), len(values))
+
+
+def error_of_pooled_mean(x: Array, seed: int = 0, of: Callable[[Array], Array] = np.asarray) -> float:
+    """The same of the mean of samples (N,), in blocks of about one length, or of a function of that mean."""
+    parts = blocks(len(x))
+    if len(parts) < 2:
+        return float("nan")
+    draws = _draws(len(parts), seed)
+    sums, samples = (np.array(each)[draws].sum(axis=1) for each in ([x[p].sum() for p in parts], _lengths(parts)))
+    return _spread(of(sums / samples), len(parts))
+
+
+def error_of_quantile(x: Array, share: float, seed: int = 0) -> float:
+    """The same of a quantile of samples (N,), which are sorted once for all draws."""
+    parts = blocks(len(x))
+    if len(parts) < 2:
+        return float("nan")
+    order = np.argsort(x)
+    before = np.zeros((len(x), len(parts)), np.int64)  # how many samples of each block are up to each one, sorted
+    before[np.arange(len(x)), np.repeat(np.arange(len(parts)), _lengths(parts))[order]] = 1
+    np.cumsum(before, axis=0, out=before)
+    draws = _draws(len(parts), seed)
+    times = np.sum(draws[:, :, None] == np.arange(len(parts)), axis=1)  # that each draw takes each block
+    place = share * (times @ _lengths(parts) - 1)
+    below, above = (x[order[_reached(before, times, of)]] for of in (np.floor(place), np.ceil(place)))
+    return _spread(below + (above - below) * (place % 1.0), len(parts))
+
+
+def _reached(before: Integers, times: Integers, place: Array) -> Integers:
+    """The first sample (DRAWS,) of N up to which a draw holds more than so many (DRAWS,), by bisection of all at once.
+
+    `before` (N, n) counts the samples of blocks, which draws take so many times (DRAWS, n).
+    """
+    low, high = np.zeros(len(times), np.int64), np.full(len(times), len(before) - 1)
+    while (low < high).any():
+        middle = (low + high) // 2
+        more = np.einsum("db,db->d", before[middle], times) > place
+        low, high = np.where(more, low, middle + 1), np.where(more, middle, high)
+    return low
+
+
+def _lengths(parts: Sequence[slice]) -> list[int]:
+    return [part.stop - part.start for part in parts]
+
+
+def _draws(n: int, seed: int) -> Integers:
+    """Which of n blocks each draw takes, (DRAWS, n)."""
+    return np.random.default_rng(seed).integers(0, n, (DRAWS, n))
+
+
+def _spread(drawn: Array, n: int) -> float:
+    # A draw of as many blocks as there are understates a variance by (n - 1) / n.
+    return float(np.sqrt(n / (n - 1)) * np.std(drawn))

@@ -1,0 +1,37 @@
+"""All records of a study, for stages that read every kind."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from davinci_forces.records import AnyRecord, Record
+
+
+@dataclass(frozen=True)
+class Provenance:
+    """Where a study's results come from: versions, and every file with its hash."""
+
+    name: str  # of the study
+    version: str
+    packages: dict[str, str]
+    raw: dict[str, str]
+    processed: dict[str, str]
+    failures: dict[str, str]
+    study: str = ""  # the study file, as it was read
+
+
+class Catalogue:
+    """The records of a study by kind, read when asked for."""
+
+    def __init__(self, read: Callable[[type[Record]], Sequence[Record]]) -> None:
+        self._read = read
+        self._records: dict[type[Record], list[Record]] = {}
+
+    def all(self, kind: type[AnyRecord]) -> list[AnyRecord]:
+        """Every record of a kind, in the order of the study's logs and the robot's joints."""
+        if kind not in self._records:
+            self._records[kind] = list(self._read(kind))
+        return list(self._records[kind])  # type: ignore[arg-type]
+
+    def about(self, kind: type[AnyRecord], **scalars: str) -> list[AnyRecord]:
+        """Records of a kind whose scalars have these values."""
+        return [r for r in self.all(kind) if all(getattr(r, k) == v for k, v in scalars.items())]

@@ -1,0 +1,133 @@
+"""Records of what is known of a robot before anything is recorded: geometry, control studies, excitation."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from davinci_forces.records.record import Column, Counts, Labels, Published, Record
+
+
+@dataclass(frozen=True, eq=False)
+class Links(Record):
+    """The links of a robot: Denavit-Hartenberg parameters and masses.  Tables 3.1 and 4.2"""
+
+    KEY = ("robot",)
+    UNKNOWN = ("alpha", "a", "d", "offset", "mass")
+    ROWS = "link"
+
+    robot: str
+    worst_condition: float
+    link: Labels
+    parent: Labels
+    alpha: Column
+    a: Column
+    d: Column
+    offset: Column
+    moved_by: Counts
+    mass: Column
+
+    def published(self) -> Iterator[Published]:
+        """The geometry of every link, and the worst condition of the tip's Jacobian."""
+        yield Published("robot.worst_condition", "worst_condition")
+        for i, link in enumerate(self.link):
+            for name in ("alpha", "a", "d", "offset", "mass"):
+                yield Published(f"robot.link.{link}.{name}", name, row=i)
+
+
+@dataclass(frozen=True, eq=False)
+class Pose(Record):
+    """Where the frames of a robot's chain are at one configuration."""
+
+    KEY = ("robot", "pose")
+
+    robot: str
+    pose: str
+    link: Labels
+    parent: Labels
+    x: Column
+    y: Column
+    z: Column
+
+
+@dataclass(frozen=True, eq=False)
+class Workspace(Record):
+    """Places that the tip can reach within the limits, and how well efforts tell the force there."""
+
+    KEY = ("robot",)
+
+    robot: str
+    x: Column
+    y: Column
+    z: Column
+    condition: Column
+
+
+@dataclass(frozen=True, eq=False)
+class Control(Record):
+    """One joint in a simulated control study of chapter 5."""
+
+    KEY = ("controller", "joint")
+
+    controller: str
+    joint: str
+    start: float
+    reference: float
+    settling_time: float  # NaN where it does not settle, or is not to move
+    overshoot: float
+    error_10: float
+    error_20: float
+    error_end: float
+    t: Column
+    q: Column
+    dq: Column
+
+    def published(self) -> Iterator[Published]:
+        """How the joint follows its reference."""
+        names = ("start", "reference", "settling_time", "overshoot", "error_10", "error_20", "error_end")
+        yield from self.publish(f"control.{self.controller}.{self.joint}", *names)
+
+
+@dataclass(frozen=True, eq=False)
+class Lyapunov(Record):
+    """The Lyapunov function along a simulated control study.  (5.9)"""
+
+    KEY = ("controller",)
+
+    controller: str
+    V_rise: float
+    V_0: float
+    t: Column
+    V: Column
+
+    def published(self) -> Iterator[Published]:
+        """Where it starts, and how far it rises."""
+        yield from self.publish(f"control.{self.controller}", "V_rise", "V_0")
+
+
+@dataclass(frozen=True, eq=False)
+class Excitation(Record):
+    """One period of an excitation trajectory, published or designed, with what it is worth and what it exceeds."""
+
+    KEY = ("joint", "source")
+
+    joint: str
+    source: str
+    period: float
+    objective: float
+    condition: float
+    coefficients: tuple[float, ...]
+    excess_q: float
+    excess_dq: float
+    excess_ddq: float
+    t: Column
+    q: Column
+    dq: Column
+    ddq: Column
+
+    def published(self) -> Iterator[Published]:
+        """What the trajectory is worth, what it exceeds, and its coefficients as Table 6.1 names them."""
+        prefix = f"excitation.{self.joint}.{self.source}"
+        names = ("period", "objective", "condition", "excess_q", "excess_dq", "excess_ddq")
+        yield from self.publish(prefix, *names)
+        for i in range(len(self.coefficients)):
+            letter = "a" if i == 0 or i % 2 else "b"
+            yield Published(f"{prefix}.{letter}{(i + 1) // 2}", "coefficients", row=i)

@@ -1,0 +1,167 @@
+"""Records of what all identification logs say together: parameters, what they leave of the effort, paths and noise."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from davinci_forces.records.record import Column, Labels, Names, Published, Record, slug
+
+
+@dataclass(frozen=True, eq=False)
+class Fit(Record):
+    """The parameters of a model, estimated by one estimator from all identification logs."""
+
+    KEY = ("group", "model", "estimator")
+    ROWS = "parameter"
+
+    group: str
+    model: str
+    estimator: str
+    logs: Names
+    samples: int
+    periods: int
+    mse: float
+    r2: float
+    condition: float
+    correlated_lags: int
+    parameter: Labels
+    phi: Labels
+    unit: Labels
+    scale: Column
+    theta: Column
+    theta_std: Column
+    theta_std_classical: Column
+
+    def published(self) -> Iterator[Published]:
+        """The parameters with both standard errors, and the fit to the averaged effort."""
+        prefix = ".".join(("fit", *self.key))
+        for i, parameter in enumerate(self.parameter):
+            yield Published(f"{prefix}.{slug(parameter)}", "theta", std="theta_std", row=i)
+            yield Published(f"{prefix}.{slug(parameter)}.std_classical", "theta_std_classical", row=i)
+        yield from self.publish(prefix, "mse", "r2", "condition", "samples", "periods")
+        yield Published(f"{prefix}.hac_lags", "correlated_lags")  # the key that results.json had before the field
+
+
+@dataclass(frozen=True, eq=False)
+class Guess(Record):
+    """What a joint's parameters were guessed to be before anything was measured, and how well that fits."""
+
+    KEY = ("group",)
+    ROWS = "parameter"
+
+    group: str
+    mse: float
+    parameter: Labels
+    unit: Labels
+    theta: Column
+
+    def published(self) -> Iterator[Published]:
+        """The parameters, and the mean squared error that they leave."""
+        for i, parameter in enumerate(self.parameter):
+            yield Published(f"guess.{self.group}.{slug(parameter)}", "theta", row=i)
+        yield from self.publish(f"guess.{self.group}", "mse")
+
+
+@dataclass(frozen=True, eq=False)
+class CrossFit(Record):
+    """The parameters of a model, estimated without some of the identification logs, each left out once."""
+
+    KEY = ("group", "model", "estimator")
+
+    group: str
+    model: str
+    estimator: str
+    left_out: Labels  # separated by ", "
+    parameter: Labels
+    unit: Labels
+    theta: Column
+
+
+@dataclass(frozen=True, eq=False)
+class SwarmSearch(Record):
+    """How a swarm searched for the parameters of a model: the best it knew after each iteration."""
+
+    KEY = ("group", "model", "estimator", "walls")
+
+    group: str
+    model: str
+    estimator: str
+    walls: str
+    seed: int
+    particles: int
+    searched: int
+    swarms: int
+    iterations: int
+    excess: float
+    mse: float
+    best_mse: Column
+
+    def published(self) -> Iterator[Published]:
+        """What it reached, and in how many iterations."""
+        yield from self.publish(".".join(("search", *self.key)), "mse", "excess", "searched", "swarms", "iterations")
+
+
+@dataclass(frozen=True, eq=False)
+class Identifiability(Record):
+    """What the identification logs tell of a model's parameters: each beside each, and what follows in words."""
+
+    KEY = ("group", "model")
+
+    group: str
+    model: str
+    scaled_condition: float
+    together: Names
+    not_seen: Names
+    advice: str
+    parameter: Labels
+    beside: Labels
+    correlation: Column
+
+    def published(self) -> Iterator[Published]:
+        """The condition number, and the correlation of every pair of parameters, once."""
+        yield Published(f"identifiability.{'.'.join(self.key)}.condition", "scaled_condition")
+        names = list(dict.fromkeys(self.parameter))
+        for i, (one, other) in enumerate(zip(self.parameter, self.beside, strict=True)):
+            if names.index(one) < names.index(other):
+                yield Published(f"correlation.{'.'.join(self.key)}.{slug(one)}.{slug(other)}", "correlation", row=i)
+
+
+@dataclass(frozen=True, eq=False)
+class FittedPaths(Record):
+    """The paths that were fitted on a joint, one period of each in turn; of many, those that differ most."""
+
+    KEY = ("joint",)
+
+    joint: str
+    source: Labels  # the log that follows the path
+    period: Column
+    t: Column
+    q: Column
+
+
+@dataclass(frozen=True, eq=False)
+class MeasurementNoise(Record):
+    """The noise of a joint between periods, the root mean square over its identification logs."""
+
+    KEY = ("joint",)
+
+    joint: str
+    sigma_q: float
+    sigma_dq: float
+    sigma_tau: float
+
+
+@dataclass(frozen=True, eq=False)
+class Residual(Record):
+    """The averaged effort of one identification log, and the effort that a fit gives for it."""
+
+    KEY = ("log", "joint", "model", "estimator")
+
+    log: str
+    joint: str
+    model: str
+    estimator: str
+    rate: float
+    t: Column
+    dq: Column
+    tau: Column
+    tau_hat: Column

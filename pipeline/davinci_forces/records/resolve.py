@@ -1,0 +1,135 @@
+"""Records of the force at the tip."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from davinci_forces.records.record import Column, Counts, Labels, Published, Record
+
+
+@dataclass(frozen=True, eq=False)
+class TipForce(Record):
+    """The force that the tip exerts on its environment during one log, in base axes, with its covariance.
+
+    It is that of the external efforts without delay, where nothing but the tip is touched; NaN at singular poses.
+    """
+
+    KEY = ("log",)
+    UNKNOWN = ("f_x", "f_y", "f_z", "c_xx", "c_yy", "c_zz", "c_xy", "c_xz", "c_yz")
+
+    log: str
+    role: str
+    filter: str
+    model: str
+    tested: int
+    force_rms: float
+    force_rms_std: float
+    force_level: float
+    force_level_std: float
+    force_detection: float
+    force_detection_std: float
+    force_coverage: float
+    force_coverage_std: float
+    rho_12: float
+    rho_13: float
+    rho_23: float
+    correlation_from: str
+    median_condition: float
+    near_share: float
+    t: Column
+    x: Column
+    y: Column
+    z: Column
+    f_x: Column
+    f_y: Column
+    f_z: Column
+    c_xx: Column
+    c_yy: Column
+    c_zz: Column
+    c_xy: Column
+    c_xz: Column
+    c_yz: Column
+    condition: Column
+    near_singular: Counts
+
+    def published(self) -> Iterator[Published]:
+        """How large it looks in free space, and how well the poses of the log tell it."""
+        for key, name in (("free_rms", "force_rms"), ("free_level", "force_level"),
+                          ("detection_level", "force_detection"), ("coverage", "force_coverage")):  # fmt: skip
+            yield Published(f"tip.{self.log}.{key}", name, std=f"{name}_std")
+        yield Published(f"tip.{self.log}.condition", "median_condition")
+        yield Published(f"tip.{self.log}.near_singular", "near_share")
+
+
+@dataclass(frozen=True, eq=False)
+class TipContact(Record):
+    """The force at the tip in each contact of one log, at the time at which it is largest.
+
+    The windows that the study states come first, then what was found beside them on any joint.
+    """
+
+    KEY = ("log",)
+
+    log: str
+    filter: str
+    stated: Counts
+    onset: Column
+    release: Column
+    t_peak: Column
+    f_x: Column
+    f_x_std: Column
+    f_y: Column
+    f_y_std: Column
+    f_z: Column
+    f_z_std: Column
+    f_peak: Column
+    f_peak_std: Column
+    sigma_1: Column
+    sigma_1_std: Column
+    sigma_2: Column
+    sigma_2_std: Column
+    sigma_3: Column
+    sigma_3_std: Column
+    weak_x: Column
+    weak_y: Column
+    weak_z: Column
+    x: Column
+    y: Column
+    z: Column
+    condition: Column
+    near_singular: Counts
+
+    def published(self) -> Iterator[Published]:
+        """Every contact, numbered from 1."""
+        for i in range(len(self)):
+            prefix = f"tip.{self.log}.{i + 1}"
+            for key, name in (("f_x", "f_x"), ("f_y", "f_y"), ("f_z", "f_z"), ("peak", "f_peak")):
+                yield Published(f"{prefix}.{key}", name, std=f"{name}_std", row=i)
+            for name in ("sigma_1", "sigma_2", "sigma_3"):
+                yield Published(f"{prefix}.{name}", name, std=f"{name}_std", row=i)
+
+
+@dataclass(frozen=True, eq=False)
+class TipBudget(Record):
+    """What each joint's error comes to at the tip, at the median pose of one log's free space."""
+
+    KEY = ("log",)
+    ROWS = "of_joint"
+
+    log: str
+    of_joint: Labels
+    lever: Column
+    filter_force: Column
+    model_force: Column
+    model_force_std: Column
+    lag_force: Column
+    total_force: Column
+    total_force_std: Column
+
+    def published(self) -> Iterator[Published]:
+        """The parts of every joint."""
+        for i, joint in enumerate(self.of_joint):
+            prefix = f"tip.{self.log}.{joint}"
+            for key, name in (("filter_part", "filter_force"), ("lag_part", "lag_force")):
+                yield Published(f"{prefix}.{key}", name, row=i)
+            for key, name in (("model_part", "model_force"), ("total", "total_force")):
+                yield Published(f"{prefix}.{key}", name, std=f"{name}_std", row=i)

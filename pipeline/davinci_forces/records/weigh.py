@@ -1,0 +1,66 @@
+"""Records of hung masses."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from davinci_forces.records.record import Column, Labels, Published, Record
+
+
+@dataclass(frozen=True, eq=False)
+class Weight(Record):
+    """The mass that hangs on the arm in one log, from the external effort of the joints that it loads."""
+
+    KEY = ("log",)
+    ROWS = "loaded"
+
+    log: str
+    moves_with: str
+    tare: str  # the log that was subtracted
+    stated_mass: float  # NaN where the study gives none
+    mass: float
+    mass_std: float
+    run_std: float
+    fit_std: float
+    widening: float
+    mass_mirrored: float
+    mass_mirrored_std: float
+    side: str
+    mass_scale: float
+    mass_scale_std: float
+    tare_mass: float
+    tare_mass_std: float
+    loaded: Labels
+    unit: Labels
+    mass_alone: Column
+    mass_alone_std: Column
+    joint_offset: Column
+    left_rms: Column
+    free_error: Column
+
+    def published(self) -> Iterator[Published]:
+        """The mass by the side as stated and by the other one, the scale, and what the tare looks like."""
+        for key, field in (("mass", "mass"), ("mass_mirrored", "mass_mirrored"), ("scale", "mass_scale")):
+            yield Published(f"weight.{self.log}.{key}", field, std=f"{field}_std")
+        yield Published(f"weight.{self.log}.tare_mass", "tare_mass", std="tare_mass_std")
+        yield from self.publish(f"weight.{self.log}", "run_std", "fit_std", "widening")
+        for i, joint in enumerate(self.loaded):
+            yield Published(f"weight.{self.log}.{joint}.mass", "mass_alone", std="mass_alone_std", row=i)
+            for name in ("joint_offset", "left_rms", "free_error"):
+                yield Published(f"weight.{self.log}.{joint}.{name}", name, row=i)
+
+
+@dataclass(frozen=True, eq=False)
+class FreeWeight(Record):
+    """The mass that seems to hang on the arm in a log of free motion, where nothing does."""
+
+    KEY = ("log", "weight")
+
+    log: str
+    weight: str
+    role: str
+    free_mass: float
+    free_mass_std: float
+
+    def published(self) -> Iterator[Published]:
+        """The mass that should be 0."""
+        yield Published(f"weight.{self.weight}.free.{self.log}", "free_mass", std="free_mass_std")

@@ -1,0 +1,92 @@
+"""What a campaign knows of each study, and one number of a joint over all of them."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import NamedTuple
+
+import numpy as np
+
+from davinci_forces.maths.arrays import Array
+from davinci_forces.report.changes import Stated
+from davinci_forces.report.content import Level, literal
+
+FIT = "independent.lse"  # the fit whose parameters mean the same in every study
+ABOUT_THE_FIT = ("mse", "r2", "condition", "samples", "periods", "hac_lags")
+FLOORS = {"model_error": "model error", "detection_level": "detection level", "coverage": "coverage of the 95 % band"}
+
+
+@dataclass(frozen=True)
+class JointVerdict:
+    """One joint of a study as its report judges it; the keys lead to its numbers."""
+
+    verdict: Level
+    same_path: bool
+    keys: Mapping[str, str | None]
+
+
+@dataclass(frozen=True)
+class Campaigned:
+    """One study of a campaign: its name, its report beside the page, when it was recorded, and its numbers."""
+
+    name: str
+    report: str
+    robot: str
+    simulated: bool
+    started: str
+    joints: Mapping[str, JointVerdict]
+    numbers: Mapping[str, Stated]
+
+    @property
+    def when(self) -> datetime | None:
+        """When its first log began, as far as a log says so."""
+        try:
+            return datetime.fromisoformat(self.started[:19])
+        except ValueError:
+            return None
+
+    @property
+    def link(self) -> str:
+        """Its name, which leads to its report."""
+        words = literal(self.name).replace("]", "\\]")
+        return f"[{words}]({self.report})"
+
+
+class Series(NamedTuple):
+    """One number of a joint over the studies that have it, with the standard errors."""
+
+    joint: str
+    name: str
+    unit: str
+    studies: tuple[Campaigned, ...]
+    keys: tuple[str, ...]
+    value: Array
+    std: Array  # NaN where none is stated
+
+
+def joints_of(studies: Sequence[Campaigned]) -> list[str]:
+    """The joints that any study judges, in order."""
+    return list(dict.fromkeys(joint for study in studies for joint in study.joints))
+
+
+def series_of(studies: Sequence[Campaigned], joint: str) -> Iterator[Series]:
+    """Every parameter of a joint, and how far it is to be trusted, over the studies; one a unit."""
+    keyed: dict[tuple[str, str], list[tuple[Campaigned, str]]] = {}
+    prefix = f"fit.{joint}.{FIT}."
+    for study in studies:
+        named = [(key.removeprefix(prefix), key) for key in study.numbers if key.startswith(prefix)]
+        judged = study.joints.get(joint)
+        floors = [(said, judged.keys.get(name)) for name, said in FLOORS.items()] if judged else []
+        for name, key in [*named, *floors]:
+            if (
+                key is not None
+                and key in study.numbers
+                and name not in ABOUT_THE_FIT
+                and not name.endswith(".std_classical")
+            ):
+                keyed.setdefault((name, study.numbers[key].unit), []).append((study, key))
+    for (name, unit), found in keyed.items():
+        stated = [study.numbers[key] for study, key in found]
+        value = np.array([one.number if one.number is not None else np.nan for one in stated])
+        std = np.array([one.std or np.nan for one in stated])
+        yield Series(joint, name, unit, tuple(s for s, _ in found), tuple(k for _, k in found), value, std)

@@ -1,0 +1,207 @@
+"""What a report says: documents of sections of blocks, as data, with no HTML and no page in them.
+
+Titles of sections, prose, captions, list items and table cells take inline marks (see `inline`): `$x$` for Typst maths,
+backticks for code, `**bold**`, `[words](file)` for a link to a file beside the document, and `[@label]` for a
+reference to a labelled figure, table, equation or section.  Text that came from a log goes through `literal` there.
+Words in figures, listings, and the title and study of a document are shown as they are.
+"""
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Literal
+
+from davinci_forces.report.content.marks import Line3D, Panel, Points3D
+from davinci_forces.report.content.number import Number
+from davinci_forces.report.content.thinning import points_of, thin_mark
+from davinci_forces.study.review import Rating
+
+Cell = str | Number
+Level = Literal["good", "warn", "bad", "info"]
+HELD = 1 << 16  # points of a mark at most: several times what a page shows, so that thinning again hides nothing
+
+
+@dataclass(frozen=True)
+class Prose:
+    """Paragraphs, separated by empty lines."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Bullets:
+    """An unordered list."""
+
+    items: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Listing:
+    """Text of a machine, shown as it is in a fixed-width font: settings, a file, a command."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One judgement, coloured and named by its level."""
+
+    level: Level
+    text: str
+
+
+@dataclass(frozen=True)
+class Equation:
+    """A numbered equation in Typst's syntax, and the same in words for those who do not see it."""
+
+    typst: str
+    alt: str
+    label: str | None = None
+
+
+@dataclass(frozen=True)
+class Table:
+    """Rows under a header; a unit that all numbers of a column share moves to its header, so never write one there.
+
+    `align` is one letter per column (l, c or r); without it, columns of numbers are right and others left.
+    """
+
+    caption: str
+    header: tuple[str, ...]
+    rows: tuple[tuple[Cell, ...], ...]
+    label: str | None = None
+    align: str = ""
+
+    def __post_init__(self) -> None:
+        wrong = [len(row) for row in self.rows if len(row) != len(self.header)]
+        if wrong or (self.align and len(self.align) != len(self.header)):
+            raise ValueError(
+                f"table {self.caption!r}: {len(self.header)} columns, but rows of {wrong}, align {self.align!r}"
+            )
+
+
+@dataclass(frozen=True, eq=False)
+class Figure:
+    """Panels under one caption; `zoomable` ones zoom and pan in HTML with the x axes of all panels linked.
+
+    `height` is that of one row of panels [mm], on a page whose text is 170 mm wide.  A `small` one takes at most 3 kB
+    of the HTML: its lines are drawn in few points, without axes, and their numbers do not come along.  A mark of very
+    many samples is thinned at once, or the figures of long logs would hold all of them.
+    """
+
+    caption: str
+    alt: str
+    panels: tuple[Panel, ...]
+    label: str | None = None
+    zoomable: bool = False
+    columns: int = 1
+    height: float = 48.0
+    small: bool = False
+    samples: int = field(init=False)  # points of all marks, as they were given
+
+    def __post_init__(self) -> None:
+        if self.small and self.zoomable:
+            raise ValueError(f"figure {self.caption!r}: a small figure has not the samples to zoom into")
+        object.__setattr__(self, "samples", sum(points_of(mark) for panel in self.panels for mark in panel.marks))
+        object.__setattr__(self, "panels", tuple(_held(panel) for panel in self.panels))
+
+
+def _held(panel: Panel) -> Panel:
+    """A panel with what is kept of its marks."""
+    return replace(panel, marks=tuple(thin_mark(mark, HELD) for mark in panel.marks))
+
+
+@dataclass(frozen=True, eq=False)
+class Figure3D:
+    """Lines and points in space on equal axes, seen from `elevation` and `azimuth` [deg]; `height` in [mm]."""
+
+    caption: str
+    alt: str
+    marks: tuple[Line3D | Points3D, ...]
+    label: str | None = None
+    x_label: str = "x [m]"
+    y_label: str = "y [m]"
+    z_label: str = "z [m]"
+    elevation: float = 20.0
+    azimuth: float = -60.0
+    height: float = 100.0
+
+
+@dataclass(frozen=True)
+class Section:
+    """A titled part; sections among its blocks are its subsections."""
+
+    title: str
+    anchor: str
+    blocks: tuple["Block", ...]
+
+
+@dataclass(frozen=True)
+class OnScreen:
+    """What only a screen has room for: folded in HTML until it is asked for; the PDF names its title and leaves it out.
+
+    Figures, tables and equations in it are numbered S1, S2, ..., so that those of the PDF follow each other.
+    """
+
+    title: str
+    anchor: str
+    blocks: tuple["Block", ...]
+
+
+Block = Prose | Bullets | Listing | Verdict | Equation | Table | Figure | Figure3D | Section | OnScreen
+
+
+@dataclass(frozen=True)
+class Rated:
+    """What a page needs to take ratings: the sha256 of results.json, the report's ID, the runs, and earlier ratings."""
+
+    results: str
+    report: str
+    runs: tuple[str, ...]
+    ratings: tuple[Rating, ...] = ()
+
+
+@dataclass(frozen=True)
+class Document:
+    """A whole report, its first section before the contents; a `simulated` one says so at the top of every page.
+
+    Its files are `file`.html and `file`.pdf, which lead to each other and to the files of `links`, by what they hold.
+    """
+
+    title: str
+    study: str
+    simulated: bool
+    sections: tuple[Section, ...]
+    edition: str = ""  # which report this is: its ID and the version that made it
+    file: str = "report"
+    links: tuple[tuple[str, str], ...] = (("Numbers", "results.json"),)
+    rated: Rated | None = None  # where its HTML takes ratings of figures and runs
+    author: str = "davinci-forces"
+    keywords: tuple[str, ...] = ("da Vinci", "contact force", "system identification", "Kalman filter")
+
+    def __post_init__(self) -> None:
+        names = [name for block in walk(self) if (name := name_of(block))]
+        if bad := [name for name in names if not re.fullmatch(r"[a-z0-9][a-z0-9._-]*", name)]:
+            raise ValueError(f"labels and anchors are lower-case letters, digits and ._- only, not {bad}")
+        if twice := sorted({name for name in names if names.count(name) > 1}):
+            raise ValueError(f"labels and anchors must differ; used more than once: {twice}")
+
+
+def walk(parent: Document | Section | OnScreen) -> Iterator[Block]:
+    """Every block in reading order, sections before what they hold."""
+    for block in parent.sections if isinstance(parent, Document) else parent.blocks:
+        yield block
+        if isinstance(block, Section | OnScreen):
+            yield from walk(block)
+
+
+def name_of(block: Block) -> str | None:
+    """What references call a block: its label, or the anchor of a section or of what is on screen only."""
+    return block.anchor if isinstance(block, Section | OnScreen) else getattr(block, "label", None)
+
+
+def numbers(document: Document) -> Iterator[Number]:
+    """Every number in the tables, in reading order."""
+    for block in walk(document):
+        if isinstance(block, Table):
+            yield from (cell for row in block.rows for cell in row if isinstance(cell, Number))

@@ -1,0 +1,131 @@
+"""Numbering what a document holds, once for all writers: both print the same numbers and link the same references."""
+
+from collections import Counter
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from davinci_forces.report.content.document import (
+    Block,
+    Bullets,
+    Document,
+    Equation,
+    Figure,
+    Figure3D,
+    Listing,
+    OnScreen,
+    Prose,
+    Section,
+    Table,
+    Verdict,
+    name_of,
+    walk,
+)
+from davinci_forces.report.content.inline import Kind, parse
+
+KINDS: dict[type, str] = {Figure: "figure", Figure3D: "figure", Table: "table", Equation: "equation"}
+NAMES = {"figure": "Figure {}", "table": "Table {}", "equation": "Eq. ({})", "section": "Section {}"}
+TEXTS: dict[type, Callable[[Any], tuple[str, ...]]] = {
+    Prose: lambda prose: (prose.text,),
+    Bullets: lambda bullets: bullets.items,
+    Listing: lambda listing: (),
+    Verdict: lambda verdict: (verdict.text,),
+    Equation: lambda equation: (),
+    Table: lambda table: (table.caption, *table.header, *(c for row in table.rows for c in row if isinstance(c, str))),
+    Figure: lambda figure: (figure.caption,),
+    Figure3D: lambda figure: (figure.caption,),
+    Section: lambda section: (section.title,),
+    OnScreen: lambda folded: (folded.title,),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """A block in its place: its kind, number and anchor, and for a section its depth and what it holds."""
+
+    block: Block
+    kind: str
+    number: str = ""
+    anchor: str = ""
+    depth: int = 0
+    blocks: tuple["Placed", ...] = ()
+
+
+def place(document: Document) -> tuple[Placed, ...]:
+    """The sections of a document, numbered: sections 1, 1.1; figures, tables and equations 1, 2, 3, and S1, S2, S3
+    where they are on screen only.
+
+    Raises
+    ------
+    ValueError
+        If a reference leads nowhere.
+    """
+    check_references(document)
+    counters: Counter[str] = Counter()
+    return tuple(_section(section, str(i), 1, counters) for i, section in enumerate(document.sections, 1))
+
+
+def references(placed: tuple[Placed, ...]) -> dict[str, str]:
+    """What a reference to each label or anchor prints: {'roll-residual': 'Figure 3'}."""
+    printed: dict[str, str] = {}
+    for item in placed:
+        if item.number and name_of(item.block):
+            printed[item.anchor] = NAMES[item.kind].format(item.number)
+        elif isinstance(item.block, OnScreen):
+            printed[item.anchor] = f"“{''.join(span.text for span in parse(item.block.title))}”"
+        printed |= references(item.blocks)
+    return printed
+
+
+def on_screen(placed: tuple[Placed, ...]) -> frozenset[str]:
+    """The anchors of all that the PDF leaves out."""
+    left: set[str] = set()
+    for item in placed:
+        inside = on_screen(item.blocks) | {child.anchor for child in item.blocks}
+        left |= inside | {item.anchor} if item.kind == "onscreen" else on_screen(item.blocks)
+    return frozenset(left - {""})
+
+
+def marked_texts(document: Document, kind: Kind) -> Iterator[str]:
+    """The contents of the inline marks of one kind, in all texts of a document."""
+    for block in walk(document):
+        for text in TEXTS[type(block)](block):
+            yield from (span.text for span in parse(text) if span.kind == kind)
+
+
+def check_references(document: Document) -> None:
+    """Check that every reference leads somewhere.
+
+    Raises
+    ------
+    ValueError
+        If any does not, with all of their labels.
+    """
+    named = {name_of(block) for block in walk(document)}
+    if missing := sorted(set(marked_texts(document, "reference")) - named):
+        raise ValueError(f"{document.title}: references to labels that no block has: {missing}")
+
+
+def _section(section: Section, number: str, depth: int, counters: Counter[str]) -> Placed:
+    children: list[Placed] = []
+    for block in section.blocks:
+        if isinstance(block, Section):
+            counters[number] += 1
+            children.append(_section(block, f"{number}.{counters[number]}", depth + 1, counters))
+        else:
+            children.append(_block(block, counters, ""))
+    return Placed(section, "section", number, section.anchor, depth, tuple(children))
+
+
+def _block(block: Block, counters: Counter[str], series: str) -> Placed:
+    """A block that is no section; `series` comes before its number."""
+    if isinstance(block, OnScreen):
+        inside = tuple(_block(child, counters, "S") for child in block.blocks)
+        return Placed(block, "onscreen", anchor=block.anchor, blocks=inside)
+    kind = KINDS.get(type(block), "")
+    if not kind:
+        return Placed(block, type(block).__name__.lower())
+    counters[series + kind] += 1
+    number = f"{series}{counters[series + kind]}"
+    # A capital letter cannot be confused with a label, which has none.
+    return Placed(block, kind, number, name_of(block) or f"{kind.capitalize()}-{number}")

@@ -1,0 +1,218 @@
+"""What a figure shows: panels of marks, as data.  Words in figures are shown as they are, without inline marks."""
+
+from dataclasses import dataclass, fields
+from typing import Any, Literal
+
+import numpy as np
+
+from davinci_forces.maths.arrays import Array
+
+Colour = Literal["", "black", "blue", "vermillion", "green", "orange", "sky", "purple", "yellow", "grey"]
+Style = Literal["", "solid", "dashed", "dotted", "dashdot"]
+
+
+class Mark:
+    """What all marks share: columns become float arrays of one length, checked once when made."""
+
+    def __post_init__(self) -> None:
+        columns = {f.name: _column(getattr(self, f.name)) for f in fields(self) if f.type is Array}  # type: ignore[arg-type]
+        shapes = {name: column.shape for name, column in columns.items()}
+        if any(len(shape) != 1 for shape in shapes.values()) or len(set(shapes.values())) > 1:
+            raise ValueError(f"{type(self).__name__}: columns must be flat and of one length, not {shapes}")
+        for name, column in columns.items():
+            object.__setattr__(self, name, column)
+
+
+def _column(values: Any) -> Array:
+    return np.asarray(values, dtype=np.float64)
+
+
+@dataclass(frozen=True, eq=False)
+class Line(Mark):
+    """A curve through samples; NaN interrupts it."""
+
+    x: Array
+    y: Array
+    label: str = ""
+    colour: Colour = ""  # "" takes the next of the palette
+    style: Style = ""  # "" takes the next style, so that lines of a panel differ without colours, too
+
+
+@dataclass(frozen=True, eq=False)
+class Points(Mark):
+    """Separate points, each with a bar of +- `y_std` about it and its name beside it where these are given."""
+
+    x: Array
+    y: Array
+    label: str = ""
+    colour: Colour = ""
+    y_std: Array | None = None
+    names: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.y_std is not None:
+            object.__setattr__(self, "y_std", np.broadcast_to(_column(self.y_std), self.x.shape))
+
+
+@dataclass(frozen=True, eq=False)
+class Band(Mark):
+    """The area between two curves, such as +- 2 sigma."""
+
+    x: Array
+    lower: Array
+    upper: Array
+    label: str = ""
+    colour: Colour = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Stems(Mark):
+    """A stem from zero to each value, as an autocorrelation is drawn."""
+
+    x: Array
+    y: Array
+    label: str = ""
+    colour: Colour = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Histogram:
+    """Counts (or densities) between edges: (n + 1,) edges and (n,) counts."""
+
+    edges: Array
+    counts: Array
+    label: str = ""
+    colour: Colour = ""
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "edges", _column(self.edges))
+        object.__setattr__(self, "counts", _column(self.counts))
+        if self.edges.shape != (len(self.counts) + 1,):
+            raise ValueError(f"Histogram: {len(self.counts)} counts need one edge more, not {self.edges.shape}")
+
+
+@dataclass(frozen=True, eq=False)
+class Tiles(Mark):
+    """A square matrix of numbers from -1 to 1, row by row, each on a tile that is tinted by it, and its names."""
+
+    value: Array  # (n^2,)
+    names: tuple[str, ...]  # (n,) of rows, and of columns, at which their first words stand
+    label: str = ""
+    colour: Colour = "blue"  # of positive numbers; negative ones are `opposite`
+    opposite: Colour = "vermillion"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if len(self.value) != len(self.names) ** 2:
+            raise ValueError(f"Tiles: {len(self.names)} names need their square of numbers, not {len(self.value)}")
+
+
+@dataclass(frozen=True, eq=False)
+class Bars:
+    """One bar per name; several Bars in a panel share the names and stand side by side."""
+
+    names: tuple[str, ...]
+    heights: Array
+    label: str = ""
+    colour: Colour = ""
+    std: Array | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "heights", _column(self.heights))
+        if self.std is not None:
+            object.__setattr__(self, "std", np.broadcast_to(_column(self.std), self.heights.shape))
+        if self.heights.shape != (len(self.names),):
+            raise ValueError(f"Bars: {len(self.names)} names need as many heights, not {self.heights.shape}")
+
+
+@dataclass(frozen=True)
+class HLine:
+    """A horizontal line across the panel."""
+
+    y: float
+    label: str = ""
+    colour: Colour = "grey"
+    style: Style = "dashed"
+
+
+@dataclass(frozen=True)
+class VLine:
+    """A vertical line across the panel."""
+
+    x: float
+    label: str = ""
+    colour: Colour = "grey"
+    style: Style = "dashed"
+
+
+@dataclass(frozen=True)
+class HBand:
+    """A range of y across the panel, such as the confidence band of an autocorrelation."""
+
+    lower: float
+    upper: float
+    label: str = ""
+    colour: Colour = "grey"
+
+
+@dataclass(frozen=True)
+class VSpan:
+    """A range of x over the height of the panel, such as a contact window."""
+
+    start: float
+    end: float
+    label: str = ""
+    colour: Colour = "orange"
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The straight line y = intercept + slope x across the panel."""
+
+    slope: float
+    intercept: float = 0.0
+    label: str = ""
+    colour: Colour = "grey"
+    style: Style = "dashed"
+
+
+AnyMark = Line | Points | Band | Stems | Histogram | Bars | Tiles | HLine | VLine | HBand | VSpan | Reference
+
+
+@dataclass(frozen=True, eq=False)
+class Panel:
+    """One pair of axes; labels carry their unit: `velocity [rad/s]`."""
+
+    title: str
+    x_label: str
+    y_label: str
+    marks: tuple[AnyMark, ...]
+    x_range: tuple[float, float] | None = None
+    y_range: tuple[float, float] | None = None
+    x_log: bool = False
+    y_log: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Line3D(Mark):
+    """A curve in space."""
+
+    x: Array
+    y: Array
+    z: Array
+    label: str = ""
+    colour: Colour = ""
+    style: Style = ""
+
+
+@dataclass(frozen=True, eq=False)
+class Points3D(Mark):
+    """Points in space, each with its name beside it where `names` is given."""
+
+    x: Array
+    y: Array
+    z: Array
+    label: str = ""
+    colour: Colour = ""
+    names: tuple[str, ...] = ()

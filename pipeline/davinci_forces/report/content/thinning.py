@@ -1,0 +1,91 @@
+"""Thinning marks of many samples, without hiding an extreme."""
+
+from dataclasses import replace
+from functools import singledispatch
+
+import numpy as np
+from numpy.typing import NDArray
+
+from davinci_forces.maths.arrays import Array
+from davinci_forces.report.content.marks import AnyMark, Band, Line, Points, Stems
+
+Indices = NDArray[np.intp]
+
+
+def thin_mark(mark: AnyMark, limit: int) -> AnyMark:
+    """The mark in at most `limit` points; one of fewer stays as it is."""
+    return _thinned(mark, limit) if points_of(mark) > limit else mark
+
+
+@singledispatch
+def _thinned(mark: AnyMark, limit: int) -> AnyMark:
+    raise TypeError(f"a mark has points to leave out, {type(mark).__name__} has none")
+
+
+@_thinned.register(Line)
+def _(mark: Line, limit: int) -> AnyMark:
+    kept = _kept_indices(mark.x, mark.y, limit)
+    return replace(mark, x=mark.x[kept], y=mark.y[kept])
+
+
+@_thinned.register(Stems)
+def _(mark: Stems, limit: int) -> AnyMark:
+    kept = _kept_indices(mark.x, mark.y, limit)
+    return replace(mark, x=mark.x[kept], y=mark.y[kept])
+
+
+@_thinned.register(Points)
+def _(mark: Points, limit: int) -> AnyMark:
+    kept = _kept_indices(mark.x, mark.y, limit)
+    return replace(mark, x=mark.x[kept], y=mark.y[kept], y_std=None if mark.y_std is None else mark.y_std[kept])
+
+
+@_thinned.register(Band)
+def _(mark: Band, limit: int) -> AnyMark:
+    if not is_sorted(mark.x):
+        return mark
+    starts = _range_starts(mark.x, limit // 2)
+    lower, upper = np.fmin.reduceat(mark.lower, starts), np.fmax.reduceat(mark.upper, starts)
+    return replace(mark, x=mark.x[starts], lower=lower, upper=upper)
+
+
+def envelope(x: Array, y: Array, bins: int) -> Indices:
+    """Where the least and the greatest sample of each of `bins` equal ranges of x are, in order.
+
+    An extreme is never lost, however short; a range without a finite sample keeps one, so that a gap stays a gap.
+    x (N,) must not decrease; returns (n,) indices, n <= 2 bins.
+    """
+    starts = _range_starts(x, bins)
+    ranges = np.repeat(np.arange(len(starts)), np.diff(starts, append=len(x)))
+    below, above = np.where(np.isnan(y), np.inf, y), np.where(np.isnan(y), -np.inf, y)
+    least = below == np.minimum.reduceat(below, starts)[ranges]
+    greatest = above == np.maximum.reduceat(above, starts)[ranges]
+    return np.unique(np.concatenate([_first_of_each(least, ranges), _first_of_each(greatest, ranges)]))
+
+
+def _first_of_each(chosen: NDArray[np.bool_], ranges: Indices) -> Indices:
+    """The first chosen sample of each range."""
+    places = np.flatnonzero(chosen)
+    return places[np.unique(ranges[places], return_index=True)[1]]
+
+
+def _range_starts(x: Array, bins: int) -> Indices:
+    """The first sample of each of the equal ranges of x that hold any."""
+    ranges = np.minimum((x - x[0]) / ((x[-1] - x[0]) or 1.0) * bins, bins - 1).astype(int)
+    return np.flatnonzero(np.diff(ranges, prepend=-1))
+
+
+def _kept_indices(x: Array, y: Array, limit: int) -> Indices:
+    if is_sorted(x):
+        return envelope(x, y, limit // 2)
+    return np.arange(0, len(x), -(-len(x) // limit))
+
+
+def is_sorted(x: Array) -> bool:
+    """Whether x never decreases, as time does."""
+    return bool(np.all(np.diff(x) >= 0))
+
+
+def points_of(mark: AnyMark) -> int:
+    """Points that a mark puts on the page: two for each sample of a band."""
+    return len(mark.x) * (2 if isinstance(mark, Band) else 1) if isinstance(mark, Line | Points | Band | Stems) else 0

@@ -1,0 +1,113 @@
+"""What every section is handed: the records, the results, and how to name things."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+from davinci_forces.records import Fit, FreeSpace, Prediction, Record
+from davinci_forces.records.catalogue import Catalogue, Provenance
+from davinci_forces.records.predict import CHOSEN
+from davinci_forces.records.quantities import QUANTITIES
+from davinci_forces.report.changes import Stated
+from davinci_forces.report.content import Block, Number, OnScreen, Table, literal
+from davinci_forces.report.results import Results, format_unit
+from davinci_forces.study import Study
+from davinci_forces.study.review import Rating
+
+PLAIN = "independent.lse"  # the fit that every other one is compared with
+THESIS_TISSUE = 457.24  # [N/m], section 8.2
+ACRONYMS = ("lse", "wlse", "pso", "iv", "tls")  # of estimators
+PAPER = 18  # rows of a table at most, in the PDF
+
+
+@dataclass(frozen=True)
+class Context:
+    """One study, ready to be reported."""
+
+    catalogue: Catalogue
+    study: Study
+    results: Results
+    provenance: Provenance
+    ratings: tuple[Rating, ...] = ()  # what reviewers said, where the study holds it
+    labels: frozenset[str] = frozenset()  # of what stands before a section in its document
+    baseline: Mapping[str, Stated] | None = None  # the numbers of an earlier report, where the study names one
+
+    def number(self, key: str, digits: int = 4) -> Number | str:
+        """The result of that key as a cell, or a dash where there is none."""
+        return self.results[key].number(digits) if key in self.results else "–"
+
+    def probability(self, key: str) -> Number | str:
+        """A probability as a cell: below 0.001 it is only said to be."""
+        number = self.number(key, 2)
+        return number if isinstance(number, str) else replace(number, least=0.001)
+
+    def count(self, key: str) -> Number | str:
+        """The result of that key, which is a whole number, as a cell."""
+        return self.number(key, len(str(round(self.results[key].value))) if key in self.results else 1)
+
+    def size(self, record: Record, field: str, value: float, digits: int = 2) -> str:
+        """A value of a record's field with its unit, in words of a sentence."""
+        unit = record.origin.units.get(field, "") if record.origin else ""
+        return str(Number(value, format_unit(unit), digits=digits))
+
+    def used_fit(self, joint: str) -> str:
+        """`<model>.<estimator>` of the fit that the filter ran with, as its predictions go by: `chosen.<fit>`."""
+        chosen = [f"{p.model}.{p.estimator}" for p in self.catalogue.about(Prediction, joint=joint, model=CHOSEN)]
+        if self.study.settings.fit == CHOSEN and chosen:
+            return chosen[0]
+        return self.own_fit(joint)
+
+    def own_fit(self, joint: str) -> str:
+        """`<model>.<estimator>` of the fit of a joint by itself: the one that the filter ran with, or least squares."""
+        names = [f"{fit.model}.{fit.estimator}" for fit in self.own_fits() if fit.group == joint]
+        chosen = [p.estimator for p in self.catalogue.about(Prediction, joint=joint, model=CHOSEN)]
+        wanted = (*chosen[:1], PLAIN) if self.study.settings.fit == CHOSEN else (self.study.settings.fit, PLAIN)
+        return next((name for name in (*wanted, *names) if name in names), self.study.settings.fit)
+
+    def worst_space(self, joint: str) -> FreeSpace | None:
+        """The free space of a joint with the highest detection level, of a log not fitted where there is one."""
+        spaces = self.catalogue.about(FreeSpace, joint=joint)
+        unseen = [space for space in spaces if space.role != "identification"]
+        return max(unseen or spaces, key=lambda space: space.detection_level, default=None)
+
+    def own_fits(self) -> list[Fit]:
+        """The fits of the joints' own terms, one joint at a time."""
+        return self.catalogue.about(Fit, model="independent")
+
+
+def listed(table: Table) -> Iterator[Block]:
+    """A table as it is, or on screen where it has more rows than paper has room for."""
+    long = len(table.rows) > PAPER
+    yield OnScreen(table.caption.partition(";")[0].rstrip("."), f"all-{table.label}", (table,)) if long else table
+
+
+def fit_name(model: str, estimator: str) -> str:
+    """A fit as a reader knows it: 'independent, LSE'; the chosen one with what was chosen."""
+    if model != CHOSEN:
+        return f"{model}, {estimator_name(estimator)}"
+    structure, _, by = estimator.rpartition(".")
+    return f"chosen: {structure}, {estimator_name(by)}"
+
+
+def estimator_name(estimator: str) -> str:
+    """An estimator as a reader knows it: acronyms in capitals, and 'Huber'."""
+    if estimator in ACRONYMS:
+        return estimator.upper()
+    return "Huber" if estimator == "huber" else estimator
+
+
+def count(number: int, noun: str) -> str:
+    """A number with its noun: '1 run', '3 runs'."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
+
+
+def title(name: str) -> str:
+    """The name of a log or joint as a heading: 'hand_roll' is 'Hand roll'."""
+    text = literal(name.replace("_", " "))
+    return text[:1].upper() + text[1:]
+
+
+def label(record: Record, field: str, meaning: str = "") -> str:
+    """The label of an axis: what a field means and its unit."""
+    unit = record.origin.units.get(field, "") if record.origin else ""
+    text = meaning or QUANTITIES[field].meaning
+    return f"{text} [{format_unit(unit)}]" if unit not in ("", "1") else text

@@ -1,0 +1,75 @@
+"""Drawing many figures at once: other processes of this program take a share, and this one the rest."""
+
+import os
+import pickle
+import subprocess
+import sys
+from collections.abc import Iterable
+from contextlib import suppress
+from pathlib import Path
+from typing import IO
+
+from davinci_forces.report.content import Figure, Figure3D
+from davinci_forces.report.figures.svg import draw_svg, drawn
+
+FEWEST = 8  # figures that are worth another process, which takes as long to begin
+MOST = 4  # processes, this one among them
+PROGRAM = (
+    "from davinci_forces.logs.isolated import orphans; orphans.end_with_parent(); "
+    "from davinci_forces.report.figures.together import serve; serve()"
+)
+
+
+def draw_together(figures: Iterable[Figure | Figure3D]) -> None:
+    """Draw the figures that are not drawn yet; the same bytes come out wherever one is drawn."""
+    left = sorted((figure for figure in figures if figure not in drawn), key=_cost)
+    processes = min(MOST, os.cpu_count() or 1, max(len(left) // FEWEST, 1))
+    shares = [left[i::processes] for i in range(processes)]
+    asked = [(share, _ask(share)) for share in shares[1:]]
+    _draw(shares[0])
+    for share, process in asked:
+        _take(share, process)
+
+
+def serve() -> None:
+    """Draw the figures that another process asks for, until it has all of them."""
+    figures = pickle.load(sys.stdin.buffer)
+    pickle.dump([draw_svg(figure) for figure in figures], sys.stdout.buffer)
+
+
+def _cost(figure: Figure | Figure3D) -> int:
+    """What takes the time: the panels."""
+    return -len(figure.panels) if isinstance(figure, Figure) else -1
+
+
+def _draw(figures: list[Figure | Figure3D]) -> None:
+    for figure in figures:
+        drawn[figure] = draw_svg(figure)
+
+
+def _ask(share: list[Figure | Figure3D]) -> "subprocess.Popen[bytes]":
+    """Have another process draw a share.  It starts anew: a fork would inherit locks of threads that it has not."""
+    path = os.pathsep.join(filter(None, [str(Path(__file__).parents[3]), os.environ.get("PYTHONPATH")]))
+    process = subprocess.Popen(
+        [sys.executable, "-P", "-c", PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+        env=os.environ | {"PYTHONPATH": path},
+    )  # fmt: skip
+    _send(share, process.stdin)
+    return process
+
+
+def _send(share: list[Figure | Figure3D], pipe: IO[bytes] | None) -> None:
+    assert pipe is not None
+    with suppress(OSError), pipe:  # one that has ended is found out when its share is taken
+        pickle.dump(share, pipe)
+
+
+def _take(share: list[Figure | Figure3D], process: "subprocess.Popen[bytes]") -> None:
+    """Take what a process has drawn; where it could not, draw its share here, which says why."""
+    assert process.stdout is not None
+    with process.stdout as pipe:
+        output = pipe.read()
+    if process.wait():
+        _draw(share)
+    else:
+        drawn.update(zip(share, pickle.loads(output), strict=True))

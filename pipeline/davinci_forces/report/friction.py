@@ -1,0 +1,65 @@
+"""Friction over velocity, measured and modelled, in both directions.  Fig 6.21"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from davinci_forces.records import FrictionMap
+from davinci_forces.report.content import Figure, Line, Panel, Points
+from davinci_forces.report.content.marks import Colour
+from davinci_forces.report.context import Context, label, title
+
+PANELS = 6  # maps at most
+BRANCHES: tuple[tuple[int, str, Colour], ...] = ((1, "gaining speed", "blue"), (0, "losing speed", "vermillion"))
+
+
+def friction_maps(context: Context, joint: str) -> Iterator[Figure]:
+    """What is left of the effort when a fit's other terms are taken off, over velocity, one panel a log and model."""
+    maps = [m for m in context.catalogue.about(FrictionMap, joint=joint) if len(m)]
+    if not maps:
+        return
+    shown = sorted(maps, key=lambda m: (m.role != "friction", m.model))[:PANELS]
+    more = f" Of {len(maps)} maps, {len(shown)} are shown." if len(maps) > len(shown) else ""
+    yield Figure(
+        f"{title(joint)}: friction, as what all other terms leave of the effort, over velocity (means of ranges, bars: "
+        "their standard deviations), while the joint gains speed and while it loses speed, and the model's friction. "
+        f"Where the two branches differ, friction has a memory, or turns over slower than its sign.{more}",
+        f"Friction over velocity of the {joint.replace('_', ' ')}: {in_words(shown[0])}",
+        tuple(panel(m) for m in shown),
+        f"friction-{joint}",
+        columns=2 if len(shown) > 1 else 1,
+        height=48,
+    )
+
+
+def panel(m: FrictionMap) -> Panel:
+    """One map."""
+    marks = []
+    for gaining, name, colour in BRANCHES:
+        own = m.gaining == gaining
+        if own.any():
+            marks.append(Points(m.dq[own], m.tau_friction[own], name, colour, y_std=m.tau_friction_std[own]))
+    return Panel(
+        f"{m.log} ({m.model})", label(m, "dq", "velocity"), label(m, "tau_friction", "friction"),
+        (*marks, *curves(m)),
+    )  # fmt: skip
+
+
+def curves(m: FrictionMap) -> Iterator[Line]:
+    """The model's friction: one curve for both branches where it has no memory, else one of each."""
+    branches = [np.flatnonzero(m.gaining == gaining) for gaining in (1, 0)]
+    for rows in branches if m.model != "independent" else [np.arange(len(m))]:
+        ordered = rows[np.argsort(m.dq[rows], kind="stable")]
+        for side in (m.dq[ordered] < 0, m.dq[ordered] > 0):
+            part = ordered[side]
+            if len(part):
+                named = "model" if rows is branches[0] or m.model == "independent" else ""
+                yield Line(
+                    m.dq[part], m.tau_friction_hat[part], named if part[0] == ordered[0] else "", "black", "solid"
+                )
+
+
+def in_words(m: FrictionMap) -> str:
+    """Its size in either direction."""
+    sides = [float(m.tau_friction[side].mean()) if side.any() else 0.0 for side in (m.dq < 0, m.dq > 0)]
+    return f"{sides[0]:.2g} on average backwards and {sides[1]:.2g} forwards."

@@ -1,0 +1,67 @@
+"""Write the reports of a study: report and robot, each as HTML and PDF, results.json, and the answer as text."""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import replace
+
+from davinci_forces.records.catalogue import Catalogue, Provenance
+from davinci_forces.report.changes import Stated
+from davinci_forces.report.content import Document, Rated, Section, name_of, walk
+from davinci_forces.report.context import Context
+from davinci_forces.report.digest import digest
+from davinci_forces.report.identity import MANIFEST, identity, manifest
+from davinci_forces.report.results import collect
+from davinci_forces.report.sections import DOCUMENTS, section_builder
+from davinci_forces.report.terminal import answer
+from davinci_forces.report.writers import render_all
+from davinci_forces.study import Study
+from davinci_forces.study.review import Rating
+
+
+def write(
+    catalogue: Catalogue,
+    study: Study,
+    provenance: Provenance,
+    baseline: Mapping[str, Stated] | None = None,
+    ratings: tuple[Rating, ...] = (),
+) -> dict[str, bytes]:
+    """The files of the report, by name; what is shown and results.json come from the same numbers."""
+    context = Context(catalogue, study, collect(catalogue), provenance, ratings, baseline=baseline)
+    built = {name: (title, sections(context, names)) for name, (title, names) in DOCUMENTS.items()}
+    numbers = {"results.json": context.results.json(), "summary.txt": answer(context).encode()}
+    numbers["summary.json"] = digest(context)
+    listed = manifest(provenance, numbers)
+    report_id, results = identity(listed), hashlib.sha256(numbers["results.json"]).hexdigest()
+    edition = f"report ID {report_id} · davinci-forces {provenance.version}"
+    rated = Rated(results, report_id, tuple(log.name for log in study.logs), ratings)
+    documents = tuple(
+        Document(
+            title,
+            study.title,
+            study.simulated,
+            content,
+            edition,
+            name,
+            links_beside(name, built),
+            rated=rated if name == "report" else None,
+        )
+        for name, (title, content) in built.items()
+        if content
+    )
+    return render_all(documents) | numbers | {MANIFEST: listed}
+
+
+def links_beside(name: str, built: dict[str, tuple[str, tuple[Section, ...]]]) -> tuple[tuple[str, str], ...]:
+    """The other documents of a report, by their titles, and its numbers."""
+    others = [(title, f"{other}.html") for other, (title, content) in built.items() if content and other != name]
+    return (*others, ("Numbers", "results.json"))
+
+
+def sections(context: Context, names: tuple[str, ...]) -> tuple[Section, ...]:
+    """The sections of a document that the study has something to say on."""
+    built: list[Section] = []
+    for name in names:
+        labels = {label for section in built for block in walk(section) if (label := name_of(block))}
+        section = section_builder(name)(replace(context, labels=frozenset(labels)))
+        built += [section] if section is not None else []
+    return tuple(built)

@@ -1,0 +1,47 @@
+"""What a report says, in order: one module per section, exporting `section`, and its name in the list below.
+
+section(context: Context) -> Section | None        None where a study has nothing to say on it
+"""
+
+from collections.abc import Callable
+from importlib import import_module
+
+from davinci_forces.report.content import Section
+from davinci_forces.report.context import Context
+
+# A file, its title, and its sections: each answers one question.
+DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
+    "report": (
+        "Contact forces without a force sensor",
+        (
+            "summary",
+            "baseline",
+            "contacts",
+            "tip",
+            "sensor",
+            "tissue",
+            "stability",
+            "haptics",
+            "weight",
+            "joints",
+            "choice",
+            "prediction",
+            "noise",
+            "filters",
+            "runs",
+            "innovations",
+            "ground_truth",
+            "methods",
+            "provenance",
+            "review",
+        ),
+    ),
+    "robot": ("The robot, its control and its excitation", ("robot", "control", "excitation")),
+}
+SECTIONS = tuple(name for _, names in DOCUMENTS.values() for name in names)
+
+
+def section_builder(name: str) -> Callable[[Context], Section | None]:
+    """The function that builds the section of that name."""
+    build: Callable[[Context], Section | None] = import_module(f"davinci_forces.report.sections.{name}").section
+    return build

@@ -1,0 +1,134 @@
+"""Every contact: what the robot exerted, with its error, against the detection level; and what is not analysed."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from davinci_forces.records import Contact, Stiffness, Track, Weight
+from davinci_forces.report.content import (
+    Block,
+    Cell,
+    Figure,
+    HBand,
+    Panel,
+    Points,
+    Prose,
+    Section,
+    Table,
+    literal,
+)
+from davinci_forces.report.context import Context, count, label, listed, title
+from davinci_forces.study import LogEntry
+
+
+def section(context: Context) -> Section | None:
+    """All windows of contact, and what was recorded without being analysed."""
+    found = tuple(blocks(context))
+    return Section("Contacts", "contacts", found) if found else None
+
+
+def blocks(context: Context) -> Iterator[Block]:
+    """The section's content."""
+    contacts = context.catalogue.all(Contact)
+    if contacts:
+        yield Prose(
+            "Each contact on each joint that moved in it, in the windows that the study states and wherever else the "
+            "smoothed external effort is above the alarm level, which free motion crosses at most once in ten minutes: "
+            "when it began and ended, the largest external effort, its mean and its impulse (effort times time). Their "
+            "standard errors are what the same quantities come to over windows of the same length in free space; of a "
+            "peak, its own deviation, too. A peak counts as told from free space where it is above the joint's "
+            "detection level, which 99 % of the samples of its worst free run stay below."
+        )
+        yield peaks(contacts)
+        yield from listed(
+            Table(
+                "Contacts, log by log; told says whether the peak is above the detection level, and where no window of "
+                "the study says so that a contact was found.",
+                ("Log", "Joint", "Onset", "Release", "Peak", "Mean", "Impulse", "Told"),
+                tuple(row for contact in contacts for row in rows(context, contact)),
+                "contact-table",
+                "llrrrrrl",
+            )
+        )
+    unused = tuple((literal(name), joint, why) for name, joint, why in not_analysed(context))
+    if unused:
+        yield Table(
+            "Recorded, and not analysed for contact.",
+            ("Log", "Joint", "Why, and what would change it"),
+            unused,
+            "not-analysed",
+        )
+
+
+def rows(context: Context, contact: Contact) -> Iterator[tuple[Cell, ...]]:
+    """One row a window."""
+    for i, above in enumerate(contact.above, 1):
+        key = f"contact.{contact.log}.{contact.joint}.{i}"
+        numbers = (context.number(f"{key}.{name}", 3) for name in ("onset", "release", "peak", "mean", "impulse"))
+        yield (literal(contact.log), title(contact.joint), *numbers, told(contact, i - 1, bool(above)))
+
+
+def told(contact: Contact, i: int, above: bool) -> str:
+    """Whether a contact stands out, and what of it is not as the study has it."""
+    if not contact.stated[i]:
+        return "found, not stated"
+    return ("yes" if contact.found[i] else "peak only") if above else "no"
+
+
+def peaks(contacts: list[Contact]) -> Figure:
+    """The peak of every window beside the detection level of its joint."""
+    joints = list(dict.fromkeys(contact.joint for contact in contacts))
+    missed = sum(int((contact.above == 0).sum()) for contact in contacts)
+    total = sum(len(contact) for contact in contacts)
+    caption = (
+        "The peak of every window with its standard error; in the grey band, below the detection level, it cannot be "
+        "told from free space. Windows are in the order of [@contact-table]."
+    )
+    alt = f"Peaks of {count(total, 'window')}, joint by joint; {missed} lie below the detection level."
+    panels = tuple(peak_panel([c for c in contacts if c.joint == joint], i == 0) for i, joint in enumerate(joints))
+    return Figure(caption, alt, panels, "contact-peaks", columns=min(len(panels), 3), height=45)
+
+
+def peak_panel(contacts: list[Contact], named: bool) -> Panel:
+    """The peaks of one joint, in the order of the logs."""
+    peak, std = (np.concatenate([getattr(c, name) for c in contacts]) for name in ("peak", "peak_std"))
+    level = max(contact.detection_level for contact in contacts)
+    marks = (
+        HBand(-level, level, "detection level" if named else ""),
+        Points(np.arange(1.0, len(peak) + 1), peak, "peak" if named else "", "vermillion", y_std=std),
+    )
+    return Panel(title(contacts[0].joint), "window", label(contacts[0], "peak", "effort"), marks)
+
+
+def not_analysed(context: Context) -> Iterator[tuple[str, str, str]]:
+    """Log, joint and reason of what was recorded and tells nothing of contact here."""
+    measured = {(contact.log, contact.joint) for contact in context.catalogue.all(Contact)}
+    weighed = {weight.log for weight in context.catalogue.all(Weight)}
+    tracked = {(track.log, track.joint): track for track in context.catalogue.all(Track)}
+    palpated = {tissue.log for tissue in context.catalogue.all(Stiffness)}
+    for entry in context.study.logs:
+        analysed = entry.name in weighed | palpated
+        if entry.role not in ("contact", "weight", "tissue", "friction") or analysed:
+            continue
+        joints = [joint for joint in entry.joints if (entry.name, joint) not in measured]
+        reasons: dict[str, list[str]] = {}
+        for joint in joints:
+            track = tracked.get((entry.name, joint))
+            reasons.setdefault(reason(entry, track), []).append(title(joint))
+        yield from ((entry.name, ", ".join(names), why) for why, names in reasons.items())
+
+
+def reason(entry: LogEntry, track: Track | None) -> str:
+    """Why a joint of a log has no contact measured."""
+    if entry.role == "friction":
+        return "a log of friction is charted, joint by joint, and not tracked"
+    if track is None:
+        return "no fit of the joint to compare with: record an identification log of it"
+    if track.at_rest:
+        return (
+            "at rest: friction takes any value up to its Coulomb level, so effort up to that level cannot be told from "
+            "it; move the joint"
+        )
+    if entry.role != "contact":
+        return f"a log of role “{entry.role}” is tracked, and its windows are not measured"
+    return "no contact was found above the alarm level; write `contact = [[start, end]]` where there was one"

@@ -1,0 +1,116 @@
+"""The simulated control studies: PD with gravity compensation, and PID where the masses are not known exactly."""
+
+from collections.abc import Iterator
+
+from davinci_forces.records import Control, Lyapunov
+from davinci_forces.report.content import Block, Cell, Figure, HLine, Line, Panel, Prose, Section, Table, Verdict
+from davinci_forces.report.context import Context, label, title
+from davinci_forces.robots.robot import ControlStudy
+
+SHOWN = 0.5  # of a study's time, in which it settles
+
+
+def section(context: Context) -> Section | None:
+    """How the robot's controllers behave in simulation, where it has any."""
+    names = {run.controller for run in context.catalogue.all(Control)}
+    studies = [study for study in context.study.robot.control if study.name in names]
+    if not studies:
+        return None
+    return Section("Control, in simulation", "control", tuple(blocks(context, studies)))
+
+
+def blocks(context: Context, studies: list[ControlStudy]) -> Iterator[Block]:
+    """The section's content.  Fig 5.2-5.6"""
+    exact = [study for study in studies if study.known_masses == 1.0]
+    light = [study for study in studies if study.known_masses != 1.0]
+    yield Prose(
+        "Simulated: the full rigid-body model of the arm under controllers with gravity compensation, as in the "
+        "thesis's chapter 5 (gains of Tables 5.1 and 5.4 for the da Vinci). The thesis does not state the friction of "
+        f"its simulation; here it is viscous only, {viscous_friction(context, studies[0])}. With exact gravity "
+        "compensation PD settles at its reference, and the Lyapunov function "
+        "$V = 1/2 dot(q)^T M dot(q) + 1/2 tilde(q)^T K_p tilde(q)$ never rises."
+    )
+    for study in exact:
+        rise, start = (context.results.get(f"control.{study.name}.{name}") for name in ("V_rise", "V_0"))
+        if rise and start:
+            verdict = f"{study.title}: $V$ starts at {start.number(4)} and rises by {rise.number(2)} at the most."
+            yield Verdict("good" if rise.value == 0 else "bad", verdict)
+        yield response(context, study)
+    if exact:
+        yield settling(context, exact)
+    if light:
+        yield Prose(
+            "A compensator that does not know all of the masses leaves PD with an offset. Integral action removes it, "
+            "but with the gains of Table 5.4 slowly: its slow pole keeps the error **larger** than PD's offset for "
+            "some twenty seconds. The thesis calls the response faster, which this simulation does not confirm."
+        )
+        yield errors(context, light)
+
+
+def viscous_friction(context: Context, study: ControlStudy) -> str:
+    """The friction that a study assumes, joint by joint."""
+    values = zip(context.study.robot.coordinates, study.viscous, strict=False)
+    rubbing = [f"{value:g} in SI units at the {title(name).lower()}" for name, value in values if value]
+    return (", ".join(rubbing) + ", and none elsewhere") if rubbing else "of none"
+
+
+def response(context: Context, study: ControlStudy) -> Figure:
+    """Positions, velocities and the Lyapunov function of a study."""
+    until = SHOWN * study.duration
+    runs = context.catalogue.about(Control, controller=study.name)
+    names = [joint.name for joint in context.study.robot.joints]
+    q = tuple(Line(run.t[run.t < until], run.q[run.t < until], title(run.joint)) for run in runs)
+    identified = [run for run in runs if run.joint in names]
+    dq = tuple(Line(run.t[run.t < until], run.dq[run.t < until], title(run.joint)) for run in identified)
+    panels = [
+        Panel("Position", "time [s]", "position [rad or m]", q),
+        Panel("Velocity of the joints that are identified", "time [s]", "velocity [rad/s or m/s]", dq),
+    ]
+    for lyapunov in context.catalogue.about(Lyapunov, controller=study.name):
+        early = lyapunov.t < until
+        line = (Line(lyapunov.t[early], lyapunov.V[early], "", "black"), HLine(0.0))
+        panels.append(Panel("Lyapunov function", "time [s]", label(lyapunov, "V"), line))
+    return Figure(
+        f"Simulated: {study.title}.",
+        f"Positions and velocities over time, and the Lyapunov function falling to zero: {study.title}.",
+        tuple(panels),
+        columns=3,
+        height=52,
+    )
+
+
+def settling(context: Context, studies: list[ControlStudy]) -> Table:
+    """How fast each joint settles, and how far it overshoots."""
+    names = ("settling_time", "overshoot", "error_end")
+    return Table(
+        "Time after which each joint stays within 2 % of its step, overshoot over the step, and error at the end.",
+        ("Study", "Joint", "Settling time", "Overshoot", "Error at the end"),
+        tuple(row(context, study.name, run, names) for study in studies for run in runs_of(context, study)),
+        align="llrrr",
+    )
+
+
+def errors(context: Context, studies: list[ControlStudy]) -> Table:
+    """What each controller is off by as time goes on, where the masses are known badly."""
+    share, duration = studies[0].known_masses, studies[0].duration
+    return Table(
+        f"Position error when gravity is compensated with {share:g} of the masses, after 10, 20 and {duration:g} s.",
+        ("Study", "Joint", "After 10 s", "After 20 s", f"After {duration:g} s"),
+        tuple(
+            row(context, study.name, run, ("error_10", "error_20", "error_end"))
+            for study in studies
+            for run in runs_of(context, study)
+        ),
+        align="llrrr",
+    )
+
+
+def runs_of(context: Context, study: ControlStudy) -> list[Control]:
+    """The joints of a study."""
+    return context.catalogue.about(Control, controller=study.name)
+
+
+def row(context: Context, name: str, run: Control, numbers: tuple[str, ...]) -> tuple[Cell, ...]:
+    """One joint of a study with some of its numbers."""
+    key = f"control.{run.controller}.{run.joint}"
+    return (name, title(run.joint), *(context.number(f"{key}.{number}", 3) for number in numbers))

@@ -1,0 +1,91 @@
+"""Excitation trajectories: those that were published, and those designed here within the joints' limits."""
+
+from collections.abc import Iterator
+
+from davinci_forces.records import Excitation
+from davinci_forces.report.content import Block, Figure, HLine, Line, Panel, Prose, Section, Table, Verdict, literal
+from davinci_forces.report.context import Context, label, title
+
+SOURCES = {"table-6.1": "Table 6.1", "table-6.1-corrected": "Table 6.1, misprint corrected", "found": "designed here"}
+
+
+def section(context: Context) -> Section | None:
+    """Objectives and limits of every trajectory."""
+    excitations = context.catalogue.all(Excitation)
+    if not excitations:
+        return None
+    return Section("Excitation", "excitation", tuple(blocks(context, excitations)))
+
+
+def blocks(context: Context, excitations: list[Excitation]) -> Iterator[Block]:
+    """The section's content.  Fig 6.5, Table 6.1"""
+    yield Prose(
+        "A trajectory tells the parameters apart the better, the smaller $-log_10 det(F^T F)$ over 300 samples of a "
+        "period. Position, velocity and acceleration have to keep their limits at every instant: the extremes are "
+        "computed, not sampled. Those designed here are the best of several searches, which know no limits: the "
+        "harmonics are scaled until they touch one, and the mean lies anywhere in the slack that they leave."
+    )
+    yield Table(
+        "Objective and condition of published trajectories and of those designed here, and how far each exceeds its "
+        "position limits.",
+        ("Joint", "Trajectory", "Objective", "Condition", "Beyond limits"),
+        tuple(
+            (
+                title(e.joint),
+                source_label(e),
+                *(context.number(f"excitation.{e.joint}.{e.source}.{name}", 5) for name in ("objective", "condition")),
+                context.number(f"excitation.{e.joint}.{e.source}.excess_q", 2),
+            )
+            for e in excitations
+        ),
+        "excitation-table",
+        "llrrr",
+    )
+    for e in excitations:
+        if max(e.excess_q, e.excess_dq, e.excess_ddq) > 0:
+            excess = context.results[f"excitation.{e.joint}.{e.source}.excess_q"].number(2)
+            yield Verdict(
+                "warn", f"**{title(e.joint)}**, {source_label(e)}: breaks the thesis's own position limits by {excess}."
+            )
+    yield coefficients(context, excitations)
+    for joint in dict.fromkeys(e.joint for e in excitations):
+        yield figure(context, [e for e in excitations if e.joint == joint])
+
+
+def source_label(e: Excitation) -> str:
+    """Where a trajectory comes from."""
+    return SOURCES.get(e.source, literal(e.source))
+
+
+def coefficients(context: Context, excitations: list[Excitation]) -> Table:
+    """The Fourier coefficients of every trajectory."""
+    names = ("a0", "a1", "b1", "a2", "b2")
+    rows = tuple(
+        (
+            title(e.joint),
+            source_label(e),
+            *(context.number(f"excitation.{e.joint}.{e.source}.{name}", 4) for name in names),
+        )
+        for e in excitations
+    )
+    header = ("Joint", "Trajectory", *(f"${name[0]}_{name[1]}$" for name in names))
+    return Table("Coefficients of the Fourier series.", header, rows, align="llrrrrr")
+
+
+def figure(context: Context, trajectories: list[Excitation]) -> Figure:
+    """One period of each trajectory of a joint, within its limits."""
+    first = trajectories[0]
+    limits = context.study.robot.joint(first.joint).limits
+    panels = []
+    for symbol, meaning in (("q", "position"), ("dq", "velocity"), ("ddq", "acceleration")):
+        named = symbol == "q"  # once is enough: the colours are the same in every panel
+        lines = [Line(e.t, getattr(e, symbol), source_label(e) if named else "") for e in trajectories]
+        bounds = [HLine(bound, "limits" if named and i == 0 else "") for i, bound in enumerate(getattr(limits, symbol))]
+        panels.append(Panel(meaning.capitalize(), "time [s]", label(first, symbol, meaning), (*lines, *bounds)))
+    return Figure(
+        f"{title(first.joint)}: one period of the published trajectories and of the designed one, with the limits.",
+        f"Position, velocity and acceleration over a period of the {title(first.joint)} trajectories.",
+        tuple(panels),
+        columns=3,
+        height=55,
+    )

@@ -1,0 +1,229 @@
+"""Whether the filter's innovations are white, and by what they are when not."""
+
+from collections import Counter
+from collections.abc import Iterator
+
+import numpy as np
+
+from davinci_forces.records import Column, Explanation, Innovation, Track, Whiteness
+from davinci_forces.report.content import (
+    AnyMark,
+    Block,
+    Cell,
+    Figure,
+    HBand,
+    Line,
+    OnScreen,
+    Panel,
+    Prose,
+    Section,
+    Table,
+    literal,
+)
+from davinci_forces.report.context import Context, count, label, listed, title
+from davinci_forces.report.plots import autocorrelation
+from davinci_forces.report.verdicts import findings_in_words
+
+UNEXPLAINED = "unexplained"  # a finding: no cause that was tried explains it
+SIGNALS = (("innovation_q", "position"), ("innovation_dq", "velocity"))
+
+
+def section(context: Context) -> Section | None:
+    """The verdict on every run, the worst run of each joint drawn, and every test on demand."""
+    explained = context.catalogue.all(Explanation)
+    return Section("Innovations", "innovations", tuple(blocks(context, explained))) if explained else None
+
+
+def blocks(context: Context, explained: list[Explanation]) -> Iterator[Block]:
+    """The section's content."""
+    assumed = " ([@filter-assumptions])" if context.catalogue.all(Track) else ""
+    yield Prose(
+        "An innovation is what a measurement adds to what the filter had predicted. Innovations are white where model "
+        "and noise are what the filter takes them for. Each run is tested whole, but for its first second, by the "
+        "autocorrelation and the cumulative periodogram of both innovations ([@thresholds]). Where it fails, one cause "
+        "after the other is taken away, as few at once as will do: contact and reversals are left out; the walk, "
+        "the size of the noise, its colour, the times of the samples and the model are replaced by what this very log "
+        "makes likeliest. A cause is named only where all tests pass without it, with a hundred times the "
+        "probability, and where as many samples at other times still fail. The filter's walk is chosen to show "
+        f"pushes{assumed}, which free motion does not ask for: that alone colours its innovations a little.\n\n"
+        + summary(explained)
+    )
+    yield from listed(verdicts(context, explained))
+    drawn = [e for e in explained if is_worst(context, e)]
+    drawn.sort(key=lambda e: least_probability(e)[0])
+    yield from (figure(context, e, whole=True) for e in drawn[:1])
+    if drawn[1:]:
+        worst = tuple(figure(context, e, whole=True) for e in drawn[1:])
+        yield OnScreen("Innovations of the worst free run of each other joint", "innovations-worst", worst)
+    yield OnScreen("Tests of the innovations, run by run", "innovation-tests", (tests(context, explained),))
+    others = tuple(
+        OnScreen(
+            f"{title(e.joint)} in {literal(e.log)}",
+            f"why-{e.log}-{e.joint}",
+            (trials(e),) if e in drawn or e.finding != UNEXPLAINED else (figure(context, e, whole=False), trials(e)),
+        )
+        for e in explained
+    )
+    yield OnScreen(f"Innovations of {count(len(others), 'run')}, and what was tried", "innovation-runs", others)
+
+
+def summary(explained: list[Explanation]) -> str:
+    """How many runs are white, and how many are explained."""
+    counts = Counter(e.finding for e in explained)
+    said = [
+        f"{counts[finding]} {'is' if counts[finding] == 1 else 'are'} {words}"
+        for finding, words in findings_in_words().items()
+        if counts[finding]
+    ]
+    return f"Of {count(len(explained), 'run')} of moving joints, {', '.join(said)}."
+
+
+def is_worst(context: Context, e: Explanation) -> bool:
+    """Whether it is the run of its joint that is drawn among runs."""
+    space = context.worst_space(e.joint)
+    return space is not None and space.log == e.log
+
+
+def verdicts(context: Context, explained: list[Explanation]) -> Table:
+    """The verdict on every run, in words."""
+    rows = tuple(
+        (
+            literal(e.log),
+            title(e.joint),
+            *(context.number(f"ekf.{e.log}.{e.joint}.{name}", 3) for name in ("nis_q", "nis_dq")),
+            literal(e.verdict),
+        )
+        for e in explained
+    )
+    band = max((i.nis_high - 1.0 for i in context.catalogue.all(Innovation)), default=0.0)
+    within = f"; of white ones it is within {band:.2f} of 1 in 95 of 100 runs" if band else ""
+    return Table(
+        "Are the innovations white, and by what not? NIS: the mean square of each innovation over its stated variance, "
+        f"which is 1 where that is right{within}.",
+        ("Log", "Joint", "NIS of $q$", "NIS of $dot(q)$", "Verdict"),
+        rows,
+        "innovation-verdicts",
+        "llrrl",
+    )
+
+
+def tests(context: Context, explained: list[Explanation]) -> Table:
+    """Every test of every run."""
+    rows = tuple((literal(e.log), title(e.joint), *statistics(context, f"ekf.{e.log}.{e.joint}")) for e in explained)
+    header = ("Log", "Joint", "NIS", "ACF(1) of $q$", "of $dot(q)$", "Ljung-Box, $q$", "$dot(q)$")
+    return Table(
+        "The filter's innovations: normalised innovation squared of both (expected: 2), first autocorrelations, "
+        "the probabilities of a larger Ljung-Box statistic and of a cumulative periodogram that strays farther, if "
+        "they were white; and by how much the times of samples are off, where other joints of the log can tell.",
+        (*header, "Periodogram, $q$", "$dot(q)$", "Times"),
+        rows,
+        "innovation-table",
+        "llrrrrrrrr",
+    )
+
+
+def statistics(context: Context, prefix: str) -> tuple[Cell, ...]:
+    """The numbers of one run's innovations."""
+    probabilities = ("ljung_box_p_q", "ljung_box_p_dq", "periodogram_p_q", "periodogram_p_dq")
+    return (
+        *(context.number(f"{prefix}.{name}", 2) for name in ("nis_mean", "acf1_q", "acf1_dq")),
+        *(context.probability(f"{prefix}.{name}") for name in probabilities),
+        context.number(f"{prefix}.clock_std", 2),
+    )
+
+
+def trials(e: Explanation) -> Table:
+    """What was taken away of a run, and what the tests then said; the most telling first."""
+    least = least_probability(e)
+    order = [0, *sorted(range(1, len(e)), key=lambda i: -least[i])]
+    rows = tuple(
+        (
+            literal(str(e.without[i])),
+            str(e.left[i]),
+            f"{e.walk[i]:.3g}",
+            printed(least[i]),
+            "●" if e.explains[i] else "",
+        )
+        for i in order
+    )
+    return Table(
+        f"{title(e.joint)} in {literal(e.log)}: what was left out or mended, the samples left to test, the walk over "
+        "the one in use, and the smallest probability of all tests; ● explains.",
+        ("Without", "Samples", "Walk", "Smallest $p$", "Explains"),
+        rows,
+        f"trials-{e.log}-{e.joint}",
+        "lrrrl",
+    )
+
+
+def least_probability(e: Explanation) -> Column:
+    """The smallest probability of all tests, of the run as it is and then without each cause."""
+    return np.asarray(np.min([e.ljung_box_p_q, e.ljung_box_p_dq, e.periodogram_p_q, e.periodogram_p_dq], axis=0))
+
+
+def printed(probability: float) -> str:
+    """A probability of a trial."""
+    return f"{probability:.2g}" if probability >= 0.001 else "< 0.001"
+
+
+def figure(context: Context, e: Explanation, whole: bool) -> Figure:
+    """Autocorrelation, cumulative periodogram, correlation with the motion; over time, if `whole`.  Fig 7.9-7.11"""
+    name, about = f"{title(e.joint)} in {literal(e.log)}", {"log": e.log, "joint": e.joint}
+    white = {w.signal: w for w in context.catalogue.about(Whiteness, **about)}
+    moved = {i.signal: i for i in context.catalogue.about(Innovation, **about)}
+    tracks = context.catalogue.about(Track, **about) if whole else []
+    more = SIGNALS if whole else ()
+    rows = [
+        *(tuple(over_time(t, field, of) for field, of in SIGNALS) for t in tracks),
+        tuple(
+            autocorrelation(white[field], f"ACF, {of}", named=field == SIGNALS[0][0])
+            for field, of in SIGNALS
+            if field in white
+        ),
+        tuple(cumulated(white[field], of) for field, of in more if field in white),
+        tuple(with_motion(moved[field], of) for field, of in more if field in moved),
+    ]
+    firsts = " and ".join(f"{w.acf1:.2f}" for field, _ in SIGNALS if (w := white.get(field)))
+    return Figure(
+        f"{name}, the worst free run of this joint: innovations, their autocorrelation and cumulative periodogram with "
+        "what 95 % (grey) and 99 % (blue) of white noise stay within, and their correlation with the motion before."
+        if whole
+        else f"{name}: autocorrelation of the innovations.",
+        f"{name}: the innovations have first autocorrelations of {firsts or 'unknown size'}; verdict: {e.verdict}.",
+        tuple(panel for row in rows for panel in row),
+        f"innovations-{e.log}-{e.joint}",
+        columns=2,
+        height=30,
+    )
+
+
+def over_time(t: Track, field: str, of: str) -> Panel:
+    """An innovation over time, settled."""
+    late = t.t - t.t[0] >= 1.0 if t.t[-1] - t.t[0] > 5 else t.t >= t.t[0]
+    marks = (Line(t.t[late], getattr(t, field)[late], "", "blue"),)
+    return Panel(f"{of.capitalize()} innovation", "time [s]", label(t, field, "innovation"), marks)
+
+
+def cumulated(w: Whiteness, of: str) -> Panel:
+    """A cumulative periodogram less the straight line of white noise, with its bands."""
+    marks: tuple[AnyMark, ...] = (
+        HBand(-w.periodogram_band_99, w.periodogram_band_99, "", "sky"),
+        HBand(-w.periodogram_band, w.periodogram_band, ""),
+        Line(w.cycles, w.cumulated - 2.0 * w.cycles, "", "blue"),
+    )
+    return Panel(f"Periodogram, {of}", "frequency [1/sample]", "excess power", marks)
+
+
+def with_motion(i: Innovation, of: str) -> Panel:
+    """The correlation with velocity, acceleration and the sign of the velocity, as many samples before."""
+    lag = i.lag.astype(float)
+    # Both panels of a row show the same lines: the first names some, the second the rest.
+    names = ("velocity", "acceleration", "") if of == SIGNALS[0][1] else ("", "", "sign of velocity")
+    marks: tuple[AnyMark, ...] = (
+        HBand(-i.band_99, i.band_99, "", "sky"),
+        HBand(-i.band, i.band, ""),
+        Line(lag, i.with_dq, names[0], "blue", "solid"),
+        Line(lag, i.with_ddq, names[1], "vermillion", "dashed"),
+        Line(lag, i.with_sign, names[2], "green", "dotted"),
+    )
+    return Panel(f"Motion and {of}", "lag [samples]", "correlation", marks)

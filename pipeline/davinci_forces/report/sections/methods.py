@@ -1,0 +1,178 @@
+"""How the numbers were made, with the equations."""
+
+from collections.abc import Iterator
+
+from davinci_forces.records import Fit
+from davinci_forces.report.content import Block, Bullets, Equation, Listing, Prose, Section, Table
+from davinci_forces.report.context import Context
+from davinci_forces.report.verdicts import thresholds
+
+SYMBOLS = (
+    ("$q, dot(q), dot.double(q)$", "position, velocity and acceleration of a joint", "rad or m"),
+    ("$tau$", "effort of a joint: torque where it turns, force where it slides", "N m or N"),
+    ('$tau_"ext"$', "external effort: what the robot exerts on its environment, joint by joint", "N m or N"),
+    ("$theta, hat(theta)$", "parameters of a joint's model, and their estimates", "as listed"),
+    ("$Phi$", "regressor: effort is $Phi theta$", ""),
+    ("$M, V, F, G$", "inertia, velocity terms, friction and gravity", ""),
+    ("$W$", "weights of weighted least squares", ""),
+    ("$i, K_m, eta$", "motor current, torque constant and gear ratio", "A, N m/A, –"),
+    ("$theta_m$", "motor angle", "rad"),
+    ("$N_p$", "number of periods that are averaged", ""),
+    ("$sigma$", "standard deviation of noise, of the signal named beside it", ""),
+    ("$T_s$", "sampling time", "s"),
+    ("$x, y, hat(x), tilde(y)$", "state and measurement of the filter, estimated state, innovation", ""),
+    ("$P, R, S, K$", "covariance of the state, of the measurement noise and of the innovation; Kalman gain", ""),
+    ("$w$", "process noise", ""),
+)
+REFERENCES = (
+    "Force Feedback in the da Vinci Surgical Robot. Master's thesis, Aalborg University: the models, the "
+    "identification and the filter that this analysis starts from.",
+    "Y. Wang, R. Gondokaryono, A. Munawar, G. S. Fischer: A convex optimization-based dynamic model identification "
+    "package for the da Vinci Research Kit. IEEE Robotics and Automation Letters 4 (4), 2019.",
+    "H. D. Patterson, R. Thompson: Recovery of inter-block information when block sizes are unequal. Biometrika 58 "
+    "(3), 1971.",
+    "H. White: A heteroskedasticity-consistent covariance matrix estimator and a direct test for heteroskedasticity. "
+    "Econometrica 48 (4), 1980.",
+    "G. M. Ljung, G. E. P. Box: On a measure of lack of fit in time series models. Biometrika 65 (2), 1978.",
+    "C. M. Jarque, A. K. Bera: A test for normality of observations and regression residuals. International "
+    "Statistical Review 55 (2), 1987.",
+    "H. R. Künsch: The jackknife and the bootstrap for general stationary observations. The Annals of Statistics "
+    "17 (3), 1989.",
+    "Y. Bar-Shalom, X. R. Li, T. Kirubarajan: Estimation with Applications to Tracking and Navigation. Wiley, 2001.",
+    "G. J. Bierman: Fixed interval smoothing with discrete measurements. International Journal of Control 18 (1), "
+    "1973.",
+    "S. O. Rice: Mathematical analysis of random noise. Bell System Technical Journal 23 (3), 1944.",
+    "M. S. Bartlett: An Introduction to Stochastic Processes. Cambridge University Press, 1955.",
+    "A. De Luca, R. Mattone: Actuator failure detection and isolation using generalized momenta. IEEE International "
+    "Conference on Robotics and Automation, 2003.",
+)
+
+
+def section(context: Context) -> Section:
+    """Prose and equations in the order of the stages; symbols, thresholds, a paragraph for a paper, and references."""
+    symbols = Table(
+        "Symbols.", ("Symbol", "Is", "Unit"), tuple((s, m, u or "–") for s, m, u in SYMBOLS), "symbols", "lll"
+    )
+    judged = Table(
+        "Every threshold that a verdict of this report rests on.",
+        ("Judged", "By", "Good", "Caution", "Problem"), thresholds(), "thresholds", "lllll",
+    )  # fmt: skip
+    paragraph = Section("A paragraph for a paper", "paragraph", (Listing(paragraph_for_paper(context)),))
+    references = Section("References", "references", (Bullets(REFERENCES),))
+    return Section("Methods", "methods", (*blocks(context), judged, symbols, paragraph, references))
+
+
+def paragraph_for_paper(context: Context) -> str:
+    """What was done, with this study's numbers, to be pasted."""
+    settings, robot = context.study.settings, context.study.robot
+    fits = context.own_fits()
+    joints = ", ".join(dict.fromkeys(fit.group.replace("_", " ") for fit in fits)) or "no joint"
+    logs = sorted({log for fit in fits for log in fit.logs})
+    random_walk = f"{settings.q_tau:g} (effort/s^0.5)" if settings.q_tau else "the slowest that shows a push of 1 s"
+    return (
+        f"External efforts of the {robot.title} ({joints}) were estimated from motor efforts and joint positions with "
+        f"davinci-forces {context.provenance.version}. Dynamic parameters were identified from {len(logs)} periodic "
+        f"excitation recording{'' if len(logs) == 1 else 's'} ({', '.join(logs)}), averaged over periods and "
+        f"differentiated in the frequency domain; the model used was {settings.fit}. Motion that does not repeat was "
+        f"low-pass filtered at {settings.lowpass:g} Hz with zero phase. The external effort was tracked by an extended "
+        f"Kalman filter with position, velocity and external effort as states, the last as a random walk of intensity "
+        f"{random_walk}. Standard errors allow for autocorrelated residuals, by restricted likelihood (Patterson and "
+        "Thompson, 1971); levels of free "
+        "motion were bootstrapped over blocks (Künsch, 1989)."
+    )
+
+
+def in_current(context: Context) -> str:
+    """Which joints' effort is a current, because no torque constant is known."""
+    joints = [joint.title.lower() for joint in context.study.robot.joints if joint.effort]
+    if not joints:
+        return ""
+    said = f" Of the {', '.join(joints)} no torque constant is known: effort is the motor's current, in A,"
+    return f"{said} and so are external effort and levels."
+
+
+def blocks(context: Context) -> Iterator[Block]:
+    """The section's content."""
+    settings = context.study.settings
+    yield Prose(
+        "**From the motor to the joint.** Logs of the motor side are carried to the joint through the gear ratio "
+        f"$eta$ and the torque constant $K_m$; logs of the joint side are used as they are.{in_current(context)}"
+    )
+    yield Equation(
+        "q = theta_m / eta, quad tau = eta K_m i",
+        "joint position is motor angle over gear ratio; effort is gear ratio times torque constant times current",
+        "motor",
+    )
+    yield Prose(
+        "**Periods.** The period is the shortest lag after which all moving joints repeat, refined until the "
+        "harmonics of the excitation fit the positions best. A sample rarely falls on a phase of the averaged period "
+        "exactly: a smooth harmonic fit carries it there, and what the fit leaves is averaged over the $N_p$ periods. "
+        "The variance between periods is that of one period; the mean's is smaller by $N_p$."
+    )
+    yield Equation(
+        "overline(x)(k) = 1/N_p sum_(m=1)^(N_p) x_m (k), "
+        "quad sigma_x^2 (k) = 1/(N_p - 1) sum_(m=1)^(N_p) (x_m (k) - overline(x)(k))^2",
+        "the mean over periods, and the variance between them",
+        "averaging",
+    )
+    how = "projection on the harmonics" if settings.derivative == "harmonics" else "the fast Fourier transform"
+    yield Prose(
+        f"**Differentiation.** Only the harmonics of the excitation are kept of the averaged position, by {how}, and "
+        "differentiated exactly."
+    )
+    yield Equation(
+        "cal(F)[(dif^n overline(q)) / (dif t^n)] = (j omega)^n Q(omega)",
+        "the spectrum of the n-th derivative is j omega to the n times that of the position",
+        "differentiation",
+    )
+    yield Prose(
+        f"Motion that does not repeat is low-passed forwards and backwards at {settings.lowpass:g} Hz "
+        "(fourth-order Butterworth, no delay), and differentiated by central differences."
+    )
+    yield Prose(
+        "**Identification.** The model of each joint is linear in its parameters. Least squares gives every averaged "
+        "sample the same weight; weighted least squares gives it the inverse of its variance, pooled over "
+        "neighbouring samples because the variance between few periods is itself uncertain. Both are solved by "
+        "orthogonal factorisation, never by the normal equations. Consistent parameters are the nearest that some "
+        "mechanism has."
+    )
+    yield Equation(
+        "hat(theta) = arg min_theta norm(W^(1/2) (tau - Phi(q, dot(q), dot.double(q)) theta))^2",
+        "the parameters minimise the weighted sum of squared differences between effort and regressor times parameters",
+        "estimation",
+    )
+    if any(fit.estimator == "wlse" for fit in context.catalogue.all(Fit)):
+        yield Prose('The weights are $W = "diag"(N_p \\/ sigma_tau^2)$; below four periods they are left out.')
+    yield Prose(
+        "**Filtering.** The state holds position, velocity and external effort, the last as a random walk. Each "
+        "sample is first corrected with its measurement and then carried to the next; the covariance is corrected in "
+        "Joseph's form. The external effort is what the robot exerts on its environment: a mass hung on a vertical "
+        "slide gives a negative one."
+    )
+    yield Equation(
+        'f(x, tau) = [dot(q), M^(-1) (tau - V - F - G - tau_"ext"), 0]^T, quad A = (partial f) / (partial x), quad '
+        "x_(k+1) = x_k + T_s f + 1/2 T_s^2 A f + w_k",
+        "the discrete model of position, velocity and external effort, to second order",
+        "model",
+    )
+    yield Equation(
+        "tilde(y)_k = y_k - H hat(x)_(k|k-1), quad S_k = H P_(k|k-1) H^T + R, quad K_k = P_(k|k-1) H^T S_k^(-1)",
+        "innovation, its covariance, and the Kalman gain",
+        "innovation",
+    )
+    yield Equation(
+        "hat(x)_(k|k) = hat(x)_(k|k-1) + K_k tilde(y)_k, "
+        "quad P_(k|k) = (I - K_k H) P_(k|k-1) (I - K_k H)^T + K_k R K_k^T",
+        "the corrected state and covariance",
+        "correction",
+    )
+    yield Prose(
+        "The measured effort drives the model, so its noise is process noise, as of an acceleration that is constant "
+        "over a sample. Where the velocity passes through zero, Coulomb friction is what it is on average, and the "
+        "doubt about its sign counts as noise. Contacts are found where the smoothed effort (Bierman, 1973) is above "
+        "what free motion crosses once in ten minutes (Rice, 1944).\n\n"
+        "**Whiteness** is judged by the autocorrelation, its 95 % band $1.96 \\/ sqrt(N)$, and the Ljung-Box statistic "
+        "over 20 lags; a signal is called white when its probability "
+        "exceeds 1 %. Innovations have to pass by their cumulative periodograms, too, whose distance from a straight "
+        "line is that of Kolmogorov and Smirnov (Bartlett, 1955)."
+    )

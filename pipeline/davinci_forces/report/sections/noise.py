@@ -1,0 +1,213 @@
+"""The noise of position, velocity and effort, from the spread between periods.  (6.3.3)"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from davinci_forces.records import Average, Column, PeriodResidual, Signal, Spectrum, Trajectory, Whiteness
+from davinci_forces.report.content import (
+    Bars,
+    Block,
+    Cell,
+    Figure,
+    Histogram,
+    Line,
+    OnScreen,
+    Panel,
+    Points,
+    Prose,
+    Reference,
+    Section,
+    Table,
+    Verdict,
+    literal,
+)
+from davinci_forces.report.context import Context, count, label, title
+from davinci_forces.report.plots import autocorrelation, histogram, normal_scores
+
+SIGNALS = {"q_noise": "position", "dq_noise": "velocity", "tau_noise": "effort"}
+OUTLIER = 3.0  # times the median period's noise, from which on a period is named
+BARS = 24  # periods at most that are drawn one by one
+
+
+def section(context: Context) -> Section | None:
+    """A table of standard deviations, the tests of the noise, and what averaging removed from each log."""
+    averages = context.catalogue.all(Average)
+    if not averages:
+        return None
+    return Section("Averaging and noise", "noise", tuple(blocks(context, averages)))
+
+
+def blocks(context: Context, averages: list[Average]) -> Iterator[Block]:
+    """The section's content."""
+    yield Prose(
+        "Every identification log repeats one period. Its periods are averaged, and what differs between them is "
+        "taken as noise, slow differences of the path included. The period itself is "
+        "estimated from the longest stretch in which the joints' motion repeats; the remarks say what is left out."
+    )
+    rows = tuple(
+        (
+            literal(a.log),
+            title(a.joint),
+            context.number(f"period.{a.log}", 6),
+            context.count(f"period.{a.log}.periods"),
+            *(context.number(f"noise.{a.log}.{a.joint}.{s}", 3) for s in ("sigma_q", "sigma_dq", "sigma_tau")),
+        )
+        for a in averages
+    )
+    header = ("Log", "Joint", "Period", "Periods", "Position noise", "Velocity noise", "Effort noise")
+    yield Table("Noise between periods (standard deviations of one sample).", header, rows, "noise-table", "llrrrrr")
+    yield tests(context, averages)
+    for average in averages:
+        yield from outliers(context, average)
+    folded = tuple(
+        OnScreen(f"{title(a.joint)} in {literal(a.log)}", f"noise-{a.log}-{a.joint}", figures)
+        for a in averages
+        if (figures := tuple(average_figures(context, a)))
+    )
+    if folded:
+        yield OnScreen("One period of each joint, its spectrum and derivatives, and its noise", "periods", folded)
+
+
+def tests(context: Context, averages: list[Average]) -> Table:
+    """Whether the noise is white and normal, signal by signal."""
+    header = ("Log", "Joint", "Signal", "ACF(1)", "White, $p$", "Normal, $p$", "Skewness", "Kurtosis")
+    rows = tuple(
+        (literal(a.log), title(a.joint), meaning, *statistics(context, f"whiteness.{a.log}.{a.joint}.{signal}"))
+        for a in averages
+        for signal, meaning in SIGNALS.items()
+    )
+    return Table(
+        "Is the noise white and normal? First autocorrelation, and the probabilities of a larger Ljung-Box and "
+        "Jarque-Bera statistic if it were; below 0.01 it is not. Noise of motion that is not white is what a real "
+        "encoder, its derivative and a jittering clock leave; the filter takes it as white.",
+        header,
+        rows,
+        "noise-tests",
+        "lllrrrrr",
+    )
+
+
+def statistics(context: Context, prefix: str) -> tuple[Cell, ...]:
+    """The tests of one signal."""
+    return (
+        context.number(f"{prefix}.acf1", 2),
+        *(context.probability(f"{prefix}.{name}") for name in ("ljung_box_p", "jarque_bera_p")),
+        *(context.number(f"{prefix}.{name}", 2) for name in ("skewness", "kurtosis")),
+    )
+
+
+def outliers(context: Context, average: Average) -> Iterator[Verdict]:
+    """Periods that are noisier than the others."""
+    for residual in context.catalogue.about(PeriodResidual, log=average.log, joint=average.joint):
+        for signal, meaning in SIGNALS.items():
+            rms = by_period(residual, average, getattr(residual, signal))
+            loud = [i for i, value in enumerate(rms, 1) if len(rms) > 2 and value > OUTLIER * np.median(rms)]
+            if loud:
+                times = ", ".join(f"{rms[i - 1] / np.median(rms):.1f}" for i in loud[:5])
+                name = f"**{title(average.joint)} in {literal(average.log)}**"
+                which = f"period{'' if len(loud) == 1 else 's'} {', '.join(map(str, loud[:5]))} of {len(rms)}"
+                said = f"{name}: {meaning} noise of {which} is {times} times that of the median period"
+                settle = "; the arm may still have been settling: see `skip`." if loud[0] == 1 else "."
+                yield Verdict("warn", said + settle)
+
+
+def by_period(residual: PeriodResidual, average: Average, noise: Column) -> Column:
+    """The root mean square of the noise in each period (M,)."""
+    number = np.minimum(((residual.t - average.t_start) / average.period + 1e-9).astype(int), average.periods - 1)
+    squares = np.bincount(number, noise**2, average.periods)
+    return np.sqrt(squares / np.maximum(np.bincount(number, minlength=average.periods), 1))
+
+
+def average_figures(context: Context, average: Average) -> Iterator[Block]:
+    """The figures of one log and joint."""
+    about = {"log": average.log, "joint": average.joint}
+    period_residuals = context.catalogue.about(PeriodResidual, **about)
+    trajectories = context.catalogue.about(Trajectory, **about)
+    spectra, signals = context.catalogue.about(Spectrum, **about), context.catalogue.about(Signal, **about)
+    if not (period_residuals and trajectories and spectra and signals):
+        return
+    whiteness = {w.signal: w for w in context.catalogue.about(Whiteness, **about)}
+    name = f"{title(average.joint)} in {literal(average.log)}"
+    yield Figure(
+        f"{name}: the mean of {average.periods} periods and the first of them; the position's spectrum with the "
+        "harmonics that are kept; velocity and acceleration from those harmonics and from differences of the logged "
+        "position and velocity.",
+        f"{name}: the mean of {count(average.periods, 'period')}, the spectrum of its position, and its derivatives.",
+        (one_period(average, signals[0]), spectrum(spectra[0]), *derivatives(average, trajectories[0])),
+        columns=2,
+        height=42,
+    )
+    yield Figure(
+        f"{name}: what averaging removed. Noise period by period, over that of the median period; histogram of the "
+        "effort noise with the normal density of the same standard deviation; normal probability plot of the position "
+        "noise; autocorrelation of the velocity noise with the 95 % band of white noise.",
+        f"{name}: the noise of each period, and its distribution and autocorrelation.",
+        tuple(noise_panels(period_residuals[0], average, whiteness)),
+        columns=2,
+        height=42,
+    )
+
+
+def one_period(average: Average, signal: Signal) -> Panel:
+    """The mean period and the first one.  Fig 6.6"""
+    since = signal.t - average.t_start
+    first = (since >= 0.0) & (since < average.period)
+    marks = (
+        Line(since[first], signal.tau[first], "first period", "sky"),
+        Line(average.t, average.tau, "mean", "vermillion"),
+    )
+    return Panel("Effort", "time [s]", label(average, "tau", "effort"), marks)
+
+
+def spectrum(s: Spectrum) -> Panel:
+    """The spectrum of the position, and the harmonics that are kept of it.  Fig 6.8"""
+    shown = slice(0, min(len(s.amplitude), max(4 * s.harmonics, 20)))
+    kept = np.arange(len(s.amplitude)) <= s.harmonics
+    f, a = s.frequency[shown], np.maximum(s.amplitude[shown], 1e-12)
+    k = kept[shown]
+    marks = (Points(f[k], a[k], "kept", "blue"), Points(f[~k], a[~k], "taken as noise", "grey"))
+    return Panel("Spectrum of the position", "frequency [Hz]", label(s, "amplitude", "amplitude"), marks, y_log=True)
+
+
+def derivatives(average: Average, trajectory: Trajectory) -> tuple[Panel, Panel]:
+    """Velocity and acceleration from the harmonics and by differences.  Fig 6.9"""
+    step = average.t[1] - average.t[0]
+    velocity = (
+        Line(average.t, np.gradient(average.q, step), "difference of position", "sky"),
+        Line(trajectory.t, trajectory.dq, "harmonics", "vermillion"),
+    )
+    acceleration = (
+        Line(average.t, np.gradient(average.dq, step), "difference of velocity", "sky"),
+        Line(trajectory.t, trajectory.ddq, "harmonics", "vermillion"),
+    )
+    return (
+        Panel("Velocity", "time [s]", label(trajectory, "dq", "velocity"), velocity),
+        Panel("Acceleration", "time [s]", label(trajectory, "ddq", "acceleration"), acceleration),
+    )
+
+
+def noise_panels(residual: PeriodResidual, average: Average, whiteness: dict[str, Whiteness]) -> Iterator[Panel]:
+    """Noise by period, histogram, normal probability plot and autocorrelation of what averaging removed.
+
+    Fig 6.7, 6.10, 6.11
+    """
+    periods = min(average.periods, BARS)
+    names = tuple(str(i) for i in range(1, periods + 1))
+    bars = []
+    for signal, meaning in SIGNALS.items():
+        rms = by_period(residual, average, getattr(residual, signal))
+        bars.append(Bars(names, rms[:periods] / (np.median(rms) or 1.0), meaning))
+    yield Panel("Noise by period", "period", "over the median period", tuple(bars))
+    edges, densities, grid, normal = histogram(residual.tau_noise)
+    shape = (Histogram(edges, densities, "", "sky"), Line(grid, normal, "normal", "vermillion"))
+    yield Panel("Effort noise", label(residual, "tau_noise", "effort"), "density", shape)
+    scores, ordered, slope, middle = normal_scores(residual.q_noise)
+    yield Panel(
+        "Position noise",
+        "normal quantile",
+        label(residual, "q_noise", "position"),
+        (Points(scores, ordered, "", "blue"), Reference(slope, middle, "normal", "vermillion")),
+    )
+    if w := whiteness.get("dq_noise"):
+        yield autocorrelation(w, "Velocity noise")

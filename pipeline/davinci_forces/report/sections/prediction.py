@@ -1,0 +1,133 @@
+"""How well the fits predict effort that they have not seen."""
+
+from collections.abc import Iterator
+
+from davinci_forces.records import Prediction
+from davinci_forces.report.content import (
+    Block,
+    Cell,
+    Figure,
+    Line,
+    OnScreen,
+    Panel,
+    Prose,
+    Section,
+    Table,
+    VSpan,
+    literal,
+)
+from davinci_forces.report.context import Context, fit_name, label, listed, title
+from davinci_forces.report.left_out import LEFT_OUT
+from davinci_forces.report.verdicts import percent
+
+
+def section(context: Context) -> Section | None:
+    """Scores of the fit that the filter uses on every log, the estimators compared once, and the worst predictions."""
+    predictions = context.catalogue.all(Prediction)
+    if not predictions:
+        return None
+    return Section("Prediction", "prediction", tuple(blocks(context, predictions)))
+
+
+def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
+    """The section's content."""
+    yield Prose(
+        "A fit is judged on data that it has not seen: validation logs, contact logs outside their contact windows, "
+        "and identification logs predicted from refits that leave the log out, with its neighbours where a joint has "
+        "more than 20, or, where it has only one, each of its periods in turn. On the path that was fitted the model's "
+        "error repeats, so such a score flatters. "
+        '$R^2$ is of the raw effort, and noise alone keeps it below its ceiling $1 - sigma^2 \\/ "var"(tau)$; the '
+        "model error is what differs beyond noise. Where a joint of an identification log stands still, friction takes "
+        "any value, and it is not judged; other logs are judged throughout."
+    )
+    used = [p for p in predictions if f"{p.model}.{p.estimator}" == context.used_fit(p.joint)]
+    header = ("Log", "Joint", "Left out", "Path", "Model error", "Of effort", "$R^2$", "Ceiling")
+    caption = "Prediction of unseen effort by the fit that the filter runs with, one row a run."
+    yield from listed(Table(caption, header, tuple(row(context, p) for p in used), "prediction-table", "llllrrrr"))
+    yield from estimators(context, predictions)
+    yield OnScreen("Every score of every fit in every run", "all-scores", (every_score(context, predictions),))
+    joints = dict.fromkeys(p.joint for p in used)
+    unseen = [p for p in used if p.role != "identification"] or used
+    worst = [
+        max((p for p in unseen if p.joint == joint), key=lambda p: p.model_error)
+        for joint in joints
+        if any(p.joint == joint for p in unseen)
+    ]
+    # The worst of all on paper.
+    worst.sort(key=lambda p: -p.model_error / (p.effort_rms or 1.0))
+    yield from (figure(context, p) for p in worst[:1])
+    if worst[1:]:
+        others = tuple(figure(context, p) for p in worst[1:])
+        yield OnScreen("The worst predicted run of each other joint", "worst-predicted", others)
+
+
+def row(context: Context, p: Prediction) -> tuple[Cell, ...]:
+    """The scores of one run."""
+    share = percent(p.model_error / p.effort_rms if p.effort_rms > 0 else float("nan"))
+    how = LEFT_OUT.get(p.scheme, "never fitted")
+    error, r2, ceiling = (context.number(f"{p.prefix}.{name}", 2) for name in ("model_error", "r2", "r2_ceiling"))
+    return literal(p.log), title(p.joint), how, p.path.removesuffix(" path"), error, share, r2, ceiling
+
+
+def every_score(context: Context, predictions: list[Prediction]) -> Table:
+    """All scores of all fits."""
+    names = ("rmse", "nrmse", "r2", "r2_ceiling", "model_error", "relative_error")
+    rows = tuple(
+        (
+            literal(p.log),
+            title(p.joint),
+            fit_name(p.model, p.estimator),
+            *(context.number(f"{p.prefix}.{name}", 3) for name in names),
+        )
+        for p in predictions
+    )
+    header = ("Log", "Joint", "Fit", "RMSE", "RMSE over range", "$R^2$", "Ceiling", "Model error", "Relative error")
+    caption = "Scores of raw effort, and the relative error, which compares low-passed efforts."
+    return Table(caption, header, rows, "scores-table", "lllrrrrrr")
+
+
+def estimators(context: Context, predictions: list[Prediction]) -> Iterator[Table]:
+    """The worst model error of every fit, joint by joint: which estimator predicts best."""
+    fits = list(dict.fromkeys((p.model, p.estimator) for p in predictions))
+    joints = list(dict.fromkeys(p.joint for p in predictions))
+    if len(fits) < 2:
+        return
+    errors = {fit: [worst(context, predictions, joint, *fit) for joint in joints] for fit in fits}
+    rows = tuple((fit_name(*fit), *found) for fit, found in errors.items() if any(cell != "–" for cell in found))
+    caption = "Every fit compared: its model error in the worst unseen run of each joint."
+    yield Table(caption, ("Fit", *map(title, joints)), rows, "estimators-table", "l" + "r" * len(joints))
+
+
+def worst(context: Context, predictions: list[Prediction], joint: str, model: str, estimator: str) -> Cell:
+    """The model error of one fit in the worst run of a joint that was not fitted."""
+    unseen = [p for p in predictions if p.joint == joint and p.role != "identification"]
+    unseen = unseen or [p for p in predictions if p.joint == joint]
+    unseen = [p for p in unseen if (p.model, p.estimator) == (model, estimator)]
+    if not unseen:
+        return "–"
+    return context.number(f"{max(unseen, key=lambda p: p.model_error).prefix}.model_error", 3)
+
+
+def figure(context: Context, p: Prediction) -> Figure:
+    """Measured and predicted effort of one log."""
+    name, effort = f"{title(p.joint)} in {literal(p.log)}", label(p, "tau", "effort")
+    windows = tuple(
+        VSpan(start, end, "contact" if i == 0 else "")
+        for i, (start, end) in enumerate(context.study.log(p.log).contact)
+    )
+    error = context.size(p, "model_error", p.model_error)
+    return Figure(
+        f"{name}, the worst run of this joint: measured effort and the model's ({fit_name(p.model, p.estimator)}), "
+        "and their difference.",
+        f"{name}: the model's effort differs from the measured one by {error} beyond noise.",
+        (
+            Panel(
+                "Effort", "time [s]", effort,
+                (*windows, Line(p.t, p.tau, "measured", "sky"), Line(p.t, p.tau_hat, "model", "vermillion", "dashed")),
+            ),
+            Panel("Measured minus model", "time [s]", effort, (*windows, Line(p.t, p.tau - p.tau_hat, "", "blue"))),
+        ),
+        f"prediction-figure-{p.log}-{p.joint}",
+        zoomable=True,
+        height=32,
+    )  # fmt: skip

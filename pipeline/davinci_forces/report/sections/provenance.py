@@ -1,0 +1,87 @@
+"""Where the numbers come from: files and their hashes, versions, settings."""
+
+from collections import Counter
+from dataclasses import asdict
+
+from davinci_forces.records import KINDS, LogSummary
+from davinci_forces.records.catalogue import Provenance
+from davinci_forces.report.content import Block, Listing, OnScreen, Prose, Section, Table, literal
+from davinci_forces.report.context import Context, listed
+
+PER_LINE = 4  # settings
+
+
+def section(context: Context) -> Section:
+    """Everything needed to tell whether a report is of these files and this code."""
+    provenance, study = context.provenance, context.study
+    raw = tuple((literal(file), f"`{sha[:16]}`") for file, sha in provenance.raw.items())
+    versions = tuple(provenance.packages.items())
+    said = [f"{name} = {value!r}" for name, value in asdict(study.settings).items()]
+    blocks: list[Block] = [
+        Prose(
+            f"Made by davinci-forces {provenance.version}. The report ID on page one is the first half of the SHA-256 "
+            "of `manifest.txt`, which lists raw files, study file, processed files and numbers, each with its own; two "
+            "reports of one ID say the same. `davinci-forces verify --id` shows whether files and pages are those of "
+            "an ID. Every number of the tables is in `results.json` under a key of its own, with the processed file "
+            "and field that it stands in."
+        ),
+        *listed(
+            Table("Raw files, with the first 16 digits of their SHA-256.", ("File", "SHA-256"), raw, "raw-files", "ll")
+        ),
+        OnScreen(
+            "Versions of packages", "versions", (Table("Versions.", ("Package", "Version"), versions, align="ll"),)
+        ),
+        Prose("Settings used, defaults included:"),
+        Listing("\n".join("; ".join(said[i : i + PER_LINE]) for i in range(0, len(said), PER_LINE))),
+    ]
+    if study.changed:
+        blocks += [Prose("Changes of the robot:"), Listing("\n".join(f"{k}: {v}" for k, v in study.changed.items()))]
+    blocks.append(
+        Prose(
+            f"{len(provenance.processed)} processed files stand behind this report; their hashes are in `manifest.txt`."
+        )
+    )
+    if provenance.processed:
+        blocks.append(OnScreen("What was made, and what there was nothing to make of", "made", (made(provenance),)))
+    summaries = context.catalogue.all(LogSummary)
+    if summaries:
+        tables = (start_times(summaries), channels(summaries))
+        blocks.append(OnScreen("Files, dates and channels of every log", "channels", tables))
+    if provenance.study:
+        blocks.append(OnScreen("The study file", "study-file", (Listing(provenance.study),)))
+    return Section("Provenance", "provenance", tuple(blocks))
+
+
+def made(provenance: Provenance) -> Table:
+    """How many files there are of each kind of record; of what was skipped, none."""
+    folders = Counter(folder for place in provenance.processed for folder in place.split("/")[:-1])
+    rows = tuple(
+        (name, str(folders[kind.folder()]) if folders[kind.folder()] else "skipped: nothing to make it of")
+        for name, kind in KINDS.items()
+    )
+    return Table("Records, and how many files of each were made.", ("Record", "Files"), rows)
+
+
+def channels(summaries: list[LogSummary]) -> Table:
+    """What each channel of every log feeds; channels that feed nothing are left out."""
+    rows = tuple(
+        (literal(summary.log), literal(summary.channel[i]), literal(summary.unit[i]) or "–", literal(summary.feeds[i]))
+        for summary in summaries
+        for i, feeds in enumerate(summary.feeds)
+        if feeds
+    )
+    return Table("Channels that feed the analysis.", ("Log", "Channel", "Unit in the log", "Feeds"), rows)
+
+
+def start_times(summaries: list[LogSummary]) -> Table:
+    """Files of every log, and when it was started."""
+    rows = tuple(
+        (
+            literal(summary.log),
+            literal(", ".join(summary.files)),
+            f"{literal(summary.started)} ({summary.zone or 'no zone given'})" if summary.started else "–",
+        )
+        for summary in summaries
+    )
+    caption = "Files of the logs, and the date and time of their first samples as they give it."
+    return Table(caption, ("Log", "File", "Started"), rows)

@@ -1,0 +1,67 @@
+"""What reviewers said of figures and runs, and whether the numbers are still those that they saw."""
+
+from collections.abc import Iterator
+from hashlib import sha256
+
+from davinci_forces.report.content import Block, Cell, Prose, Section, Table, Verdict, literal
+from davinci_forces.report.context import Context, count, listed
+from davinci_forces.study.review import Rating
+
+MARKS = {"accept": "● Accept", "doubt": "▲ Doubt", "reject": "✖ Reject"}
+
+
+def section(context: Context) -> Section | None:
+    """The ratings that the study holds in review.toml."""
+    return Section("Ratings", "review", tuple(blocks(context))) if context.ratings else None
+
+
+def blocks(context: Context) -> Iterator[Block]:
+    """What they come to, and each of them."""
+    now = sha256(context.results.json()).hexdigest()
+    old = [rating for rating in context.ratings if rating.results != now]
+    yield Prose(
+        "Reviewers rated figures and runs of this report, or of an earlier one, on its page; `review.toml` beside "
+        "study.toml holds what they said. Ratings are no part of the report's ID."
+    )
+    if old:
+        yield Verdict(
+            "warn",
+            f"The numbers have changed since {count(len(old), 'rating')} of {len(context.ratings)}: "
+            "`results.json` is not the one that was rated. Look again at what these are of.",
+        )
+    else:
+        yield Verdict("info", "All ratings are of the numbers that this report shows.")
+    rows = tuple(row(context, rating, rating.results == now) for rating in context.ratings)
+    yield from listed(
+        Table(
+            "Ratings, in the order of review.toml.",
+            ("Of", "Rating", "Comment", "Reviewer", "Date", "Numbers"),
+            rows,
+            "ratings",
+            "llllll",
+        )
+    )
+
+
+def row(context: Context, rating: Rating, same: bool) -> tuple[Cell, ...]:
+    """One rating."""
+    return (
+        subject(context, rating),
+        MARKS[rating.verdict],
+        literal(rating.comment) or "–",
+        literal(rating.reviewer) or "–",
+        literal(rating.date) or "–",
+        "as rated" if same else "changed since",
+    )
+
+
+def subject(context: Context, rating: Rating) -> str:
+    """What is rated: a figure that the report has, by its number; anything else by its name."""
+    if rating.subject == "figure" and rating.name in context.labels:
+        return f"[@{rating.name}]"
+    gone = (
+        ""
+        if rating.subject == "run" and rating.name in [log.name for log in context.study.logs]
+        else ", no longer here"
+    )
+    return f"{rating.subject} {literal(rating.name)}{gone}"

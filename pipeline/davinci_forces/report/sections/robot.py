@@ -1,0 +1,73 @@
+"""The robot that the analysis assumes: its chain, its links, and where its tip can go."""
+
+from collections.abc import Iterator
+
+from davinci_forces.records import Links, Pose, Workspace
+from davinci_forces.report.content import Block, Figure3D, Line3D, Points3D, Prose, Section, Table, literal
+from davinci_forces.report.context import Context
+
+
+def section(context: Context) -> Section | None:
+    """The chain and its table, where the robot's geometry is known."""
+    links = context.catalogue.all(Links)
+    if not links:
+        return None
+    return Section("The robot", "robot", tuple(blocks(context, links[0])))
+
+
+def blocks(context: Context, links: Links) -> Iterator[Block]:
+    """The section's content.  Tables 3.1, 4.2, Fig 3.5"""
+    worst = context.results["robot.worst_condition"].number(3)
+    yield Prose(
+        f"The {literal(context.study.robot.title)} as a Denavit-Hartenberg chain. The parallelogram's links share the "
+        "coordinate of the pitch, so that the tool pivots about a remote centre that nothing holds. Forces at the tip "
+        "follow from efforts at the joints through the Jacobian; its condition number reaches "
+        f"{worst} within the joints' limits, and is what the uncertainty of an effort can be multiplied by on its way "
+        "to a force."
+    )
+    rows = tuple(
+        (
+            literal(link),
+            literal(links.parent[i]),
+            "–" if links.moved_by[i] == 0 else f"$q_{links.moved_by[i]}$",
+            *(context.number(f"robot.link.{link}.{name}", 4) for name in ("alpha", "a", "d", "offset", "mass")),
+        )
+        for i, link in enumerate(links.link)
+    )
+    header = ("Link", "On", "Moved by", "$alpha$", "$a$", "$d$", "$theta$ at 0", "Mass")
+    yield Table("Denavit-Hartenberg parameters and masses of the links.", header, rows, "links-table", "lllrrrrr")
+    yield chain(context)
+
+
+def walk(pose: Pose) -> list[int]:
+    """The frames in an order in which one line passes along every link: to and fro where the chain branches."""
+    number = {name: i for i, name in enumerate(pose.link)}
+    path = [0]
+    for i in range(1, len(pose.link)):
+        up, down = ([start] for start in (path[-1], i))
+        for way in (up, down):
+            while way[-1] != 0:
+                way.append(number[pose.parent[way[-1]]])
+        meet = next(frame for frame in up if frame in down)
+        path += up[1 : up.index(meet) + 1] + down[: down.index(meet)][::-1]
+    return path
+
+
+def chain(context: Context) -> Figure3D:
+    """The chain at three configurations, and the places that its tip reaches."""
+    colours = {"zero": "black", "low": "blue", "high": "vermillion"}
+    configurations = {"zero": "q = 0", "low": "lower limits", "high": "upper limits"}
+    marks: list[Line3D | Points3D] = []
+    for workspace in context.catalogue.all(Workspace):
+        marks.append(Points3D(workspace.x, workspace.y, workspace.z, "places of the tip", "sky"))
+    for pose in context.catalogue.all(Pose):
+        path = walk(pose)
+        marks.append(
+            Line3D(pose.x[path], pose.y[path], pose.z[path], configurations[pose.pose], colours[pose.pose])  # type: ignore[arg-type]
+        )
+    return Figure3D(
+        "The chain at q = 0 and at both ends of the joints' ranges, with places that the tip reaches in between.",
+        "The robot's links as lines in space at three configurations, and the cloud of places of its tip.",
+        tuple(marks),
+        height=110,
+    )

@@ -1,0 +1,168 @@
+"""Every run: how it was recorded, what the filter tracked in it, and its traces."""
+
+from collections.abc import Iterator
+
+from davinci_forces.records import Explanation, FilterNoise, FreeSpace, LogSummary, Track
+from davinci_forces.report.content import (
+    Band,
+    Block,
+    Cell,
+    Figure,
+    Line,
+    OnScreen,
+    Panel,
+    Prose,
+    Section,
+    Table,
+    VSpan,
+    literal,
+)
+from davinci_forces.report.context import Context, count, label, listed, title
+from davinci_forces.report.recorded import recorded
+from davinci_forces.report.verdicts import band_in_words
+
+WORST = "the worst free run of this joint"
+ON_PAPER = 2  # joints whose worst run is drawn in the PDF, too
+LEVELS = ("free_rms", "detection_level")
+
+
+def section(context: Context) -> Section | None:
+    """What was recorded, a table over all tracks, the worst run of each joint, and every run on demand."""
+    tracks = context.catalogue.all(Track)
+    summaries = context.catalogue.all(LogSummary)
+    if not (tracks or summaries):
+        return None
+    found = (
+        (*recorded(context, summaries), *tracked(context, tracks)) if tracks else tuple(recorded(context, summaries))
+    )
+    return Section("Runs", "runs", found)
+
+
+def tracked(context: Context, tracks: list[Track]) -> Iterator[Block]:
+    """The external effort of all runs, the worst of each joint drawn, the others on demand."""
+    if not tracks:
+        return
+    yield from intro(context, tracks)
+    yield from listed(scores(context, tracks))
+    worst = list(worst_runs(context, tracks))
+    drawn = {(t.log, t.joint) for t in worst}
+    yield from (trace(context, t, WORST) for t in worst[:ON_PAPER])
+    if worst[ON_PAPER:]:
+        rest = tuple(trace(context, t, WORST) for t in worst[ON_PAPER:])
+        yield OnScreen("The worst free run of each other joint", "worst-runs", rest)
+    yield OnScreen(
+        "What the filter assumes of noise, run by run",
+        "filter-assumptions",
+        (assumptions(context, tracks),),
+    )
+    others = [t for t in tracks if (t.log, t.joint) not in drawn and not t.at_rest]
+    if others:
+        folded = tuple(
+            OnScreen(f"{title(t.joint)} in {literal(t.log)}", f"track-{t.log}-{t.joint}", (trace(context, t, ""),))
+            for t in others
+        )
+        yield OnScreen(f"Traces of {count(len(others), 'other run')}", "other-runs", folded)
+
+
+def intro(context: Context, tracks: list[Track]) -> Iterator[Prose]:
+    """What the filter does, and which joints it cannot say much about."""
+    explained = context.catalogue.all(Explanation)
+    tuned = ", tuned as [@filter-tuning] says" if context.catalogue.all(FilterNoise) else ""
+    told = " Whether both fit the data is told by its innovations ([@innovations])." if explained else ""
+    yield Prose(
+        f"An extended Kalman filter follows position, velocity and external effort of each joint by itself{tuned}."
+        + told
+    )
+    at_rest = [f"{title(t.joint)} in {literal(t.log)}" for t in tracks if t.at_rest]
+    if at_rest:
+        yield Prose(
+            f"Joints at rest are in the tables only ({', '.join(at_rest)}): at standstill friction takes any value up "
+            "to its Coulomb level, and external effort up to that level cannot be told from it."
+        )
+
+
+def worst_runs(context: Context, tracks: list[Track]) -> Iterator[Track]:
+    """Of each joint, the free run with the highest detection level that was not fitted."""
+    for joint in dict.fromkeys(track.joint for track in tracks):
+        if (space := context.worst_space(joint)) is not None:
+            yield from (track for track in tracks if (track.log, track.joint) == (space.log, joint))
+
+
+def scores(context: Context, tracks: list[Track]) -> Table:
+    """The external effort of every track in free space, and whether its band covers it."""
+    rows = tuple(
+        (
+            literal(t.log),
+            title(t.joint),
+            *(context.number(f"{t.filter}.{t.log}.{t.joint}.{name}", 2) for name in LEVELS),
+            *covered(context, t),
+        )
+        for t in tracks
+    )
+    header = ("Log", "Joint", "RMS", "Detection level", "Covered", "Band")
+    caption = (
+        "External effort where nothing touches the robot: its root mean square, the level that 99 % of samples stay "
+        "below, and the share that the 95 % band covers. Where contact is not known, nothing is said."
+    )
+    return Table(caption, header, rows, "free-space-table", "llrrrl")
+
+
+def covered(context: Context, t: Track) -> tuple[Cell, Cell]:
+    """Coverage of a run's band, and what it means."""
+    spaces = context.catalogue.about(FreeSpace, log=t.log, joint=t.joint, filter=t.filter)
+    said = band_in_words(spaces[0].coverage) if spaces else "–"
+    return context.number(f"{t.filter}.{t.log}.{t.joint}.coverage", 2), said
+
+
+def assumptions(context: Context, tracks: list[Track]) -> Table:
+    """What the filter assumed of noise."""
+    names = ("r_q", "r_dq", "q_dq", "q_tau")
+    rows = tuple(
+        (literal(t.log), title(t.joint), *(context.number(f"ekf.{t.log}.{t.joint}.{name}", 3) for name in names))
+        for t in tracks
+    )
+    return Table(
+        "Noise that the filter assumes (standard deviations): of the measured position and velocity, and of what the "
+        "noise of the effort adds to the velocity in a sample, by the likelihood of the innovations of identification "
+        "logs; and of the random walk of the external effort, the slowest that shows a push.",
+        ("Log", "Joint", "Position", "Velocity", "Process, $dot(q)$", "Random walk"),
+        rows,
+        "filter-noise",
+        "llrrrr",
+    )
+
+
+def trace(context: Context, t: Track, why: str) -> Figure:
+    """One run over time.  Fig 7.6-7.11"""
+    name, entry = f"{title(t.joint)} in {literal(t.log)}", context.study.log(t.log)
+    windows = tuple(
+        VSpan(start, end, "stated contact" if i == 0 else "") for i, (start, end) in enumerate(entry.contact)
+    )
+    sigma = 2 * t.tau_ext_std
+    # The first samples know nothing yet: their band would set the scale of the whole plot.
+    shown = slice(min(int(0.25 * t.rate), len(t) // 10), None)
+    largest = float(abs(t.tau_ext[shown]).max()) if len(t.tau_ext[shown]) else 0.0
+    return Figure(
+        f"{name}{f', {why}' if why else ''}: position; effort measured and modelled; external effort tracked by the "
+        "filter with two of its standard deviations, and measured minus modelled effort.",
+        f"{name}: the tracked external effort reaches {context.size(t, 'tau_ext', largest)}.",
+        (
+            Panel("Trajectory", "time [s]", label(t, "q", "position"), (*windows, Line(t.t, t.q, "", "blue"))),
+            Panel(
+                "Effort", "time [s]", label(t, "tau", "effort"),
+                (*windows, Line(t.t, t.tau, "measured", "sky"), Line(t.t, t.tau_hat, "model", "vermillion", "dashed")),
+            ),
+            Panel(
+                "External effort", "time [s]", label(t, "tau_ext", "external effort"),
+                (
+                    *windows,
+                    Line(t.t[shown], t.tau_ext_direct[shown], "measured minus model", "grey", "dotted"),
+                    Band(t.t[shown], (t.tau_ext - sigma)[shown], (t.tau_ext + sigma)[shown], "± 2 σ, in total", "sky"),
+                    Line(t.t[shown], t.tau_ext[shown], "filter", "vermillion"),
+                ),
+            ),
+        ),
+        f"track-figure-{t.log}-{t.joint}",
+        zoomable=True,
+        height=30,
+    )  # fmt: skip

@@ -1,0 +1,294 @@
+"""The answer: the external effort, how far to trust it, and what to look at first."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from davinci_forces.records import Contact, Diagnostic, Prediction, Record, Stiffness, Track
+from davinci_forces.report.content import (
+    Block,
+    Bullets,
+    Cell,
+    Figure,
+    HBand,
+    Line,
+    Panel,
+    Points,
+    Prose,
+    Section,
+    Table,
+    Verdict,
+    VSpan,
+    literal,
+)
+from davinci_forces.report.context import Context, count, label, title
+from davinci_forces.report.verdicts import (
+    CAUTION,
+    COVERED,
+    DETECTABLE,
+    DETECTED,
+    GOOD,
+    WORDS,
+    Trust,
+    band,
+    band_in_words,
+    percent,
+)
+
+
+def section(context: Context) -> Section:
+    """The answer on one page, then what the analysis warned of."""
+    return Section("The answer", "summary", tuple(blocks(context)))
+
+
+def blocks(context: Context) -> Iterator[Block]:
+    """The section's content."""
+    yield from failures(context)
+    if not context.own_fits():
+        yield nothing_identified(context)
+        return
+    trusts = [trust(context, joint) for joint in fitted_joints(context)]
+    contacts = context.catalogue.all(Contact)
+    yield Prose(opening(context, trusts, contacts))
+    panels = [panel for trusted in trusts for panel in effort_panel(context, trusted)]
+    if panels:
+        yield Figure(
+            caption(contacts),
+            f"External effort over time, one panel a joint: {'; '.join(map(spoken, contacts[:3])) or 'no contact'}.",
+            tuple(in_column(panels)),
+            label="answer-figure",
+            height=31,
+        )
+    yield trust_table(context, trusts)
+    yield Prose(thresholds_in_words(trusts))
+    yield from first_looks(context, trusts)
+    yield Prose("Reviewed by ______________________ on ______________   ☐ accept   ☐ accept with remarks   ☐ reject")
+
+
+def nothing_identified(context: Context) -> Verdict:
+    """Why there is no effort to show, and what there is instead."""
+    text = "No joint could be identified: there is no usable identification log, so no effort was tracked."
+    if context.catalogue.all(Stiffness):
+        return Verdict("info", f"{text} What sensors say of tissue is in [@tissue].")
+    return Verdict("bad", text)
+
+
+def thresholds_in_words(trusts: list[Trust]) -> str:
+    """From where on the verdicts of the table are what they are."""
+    by_error = (
+        f"error at most {percent(GOOD)} of the effort's root mean square on another path (caution: at most "
+        f"{percent(CAUTION)}, or the same path)"
+    )
+    by_level = "detection level at most a third of the effort sought (caution: up to it; set as `effort` in study.toml)"
+    asked = [trust.sought is not None for trust in trusts]
+    rule = by_level if all(asked) else f"{by_level}, else {by_error}" if any(asked) else by_error
+    return (
+        f"Of each joint, the worst run not fitted. Good: {rule}. A band is right at {percent(COVERED[0])} to "
+        f"{percent(COVERED[1])}. See [@thresholds]."
+    )
+
+
+def caption(contacts: list[Contact]) -> str:
+    """What the figure shows."""
+    level = "the grey band holds 95 % of samples where nothing touches the robot"
+    if not contacts:
+        return f"External effort on each joint in its worst run that was not fitted; {level}."
+    return (
+        "External effort on each joint, in the contact log on which its model errs most, with the windows of contact "
+        f"shaded and the peak in each; {level}."
+    )
+
+
+def fitted_joints(context: Context) -> list[str]:
+    """The joints that have a fit, in the robot's order."""
+    return list(dict.fromkeys(fit.group for fit in context.own_fits()))
+
+
+def trust(context: Context, joint: str) -> Trust:
+    """The worst unseen prediction of a joint by the fit that the filter uses, and its worst free space."""
+    fit = context.used_fit(joint)
+    scored = [p for p in context.catalogue.all(Prediction) if p.joint == joint and f"{p.model}.{p.estimator}" == fit]
+    scored = [p for p in scored if p.role != "contact" or context.study.log(p.log).contact]
+    others = [p for p in scored if p.role != "identification"] or scored
+    unseen = [p for p in others if p.path == "another path"] or others
+    return Trust(
+        joint,
+        max(unseen, key=lambda p: p.model_error, default=None),
+        context.worst_space(joint),
+        context.study.settings.effort.get(joint),
+    )
+
+
+def opening(context: Context, trusts: list[Trust], contacts: list[Contact]) -> str:
+    """One paragraph: what was estimated, and which contacts stand out."""
+    kind = "simulated " if context.study.simulated else ""
+    runs = len({track.log for track in context.catalogue.all(Track)})
+    windows = sum(len(contact) for contact in contacts)
+    above = sum(int(contact.above.sum()) for contact in contacts)
+    text = (
+        f"External effort, torque [N m] at joints that turn and force [N] at joints that slide, was estimated on "
+        f"{count(len(trusts), 'joint')} in {count(runs, kind + 'run')} of the {literal(context.study.robot.title)} "
+        "from motor currents and joint positions, without a force sensor. It is what the robot exerts on its "
+        "environment. "
+    )
+    if not windows:
+        return text + "The study states no contact windows, so no contact is measured."
+    return text + (
+        f"**{above} of {count(windows, 'window')} of contact, counted joint by joint, stand out from free space.** "
+        "Efforts below the detection level cannot be told from the model's error."
+    )
+
+
+def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
+    """The external effort of a joint in its most doubtful contact log, or where there is none, in its worst run."""
+    own = context.catalogue.about(Contact, joint=trusted.joint)
+    errors = {p.log: p.model_error for p in context.catalogue.about(Prediction, joint=trusted.joint)}
+    logs = sorted((c.log for c in own if len(joints_touched(context, c)) == 1), key=lambda log: errors.get(log, 0.0))
+    logs = logs or [c.log for c in own] or ([trusted.space.log] if trusted.space is not None else [])
+    for track in context.catalogue.about(Track, joint=trusted.joint, log=logs[-1]) if logs else []:
+        spans = [VSpan(start, end, "", "sky") for start, end in context.study.log(track.log).contact]
+        levels = [trusted.space.free_level] if trusted.space is not None else []
+        level = [HBand(-size, size, "free space: 95 % of samples") for size in levels]
+        calm = track.t - track.t[0] >= 1.0
+        line = Line(track.t[calm], track.tau_ext[calm], "external effort", "vermillion")
+        peaks = [named_peaks(track, c) for c in own if c.log == track.log]
+        heading = f"{title(track.joint)}, {track.log}"
+        effort = label(track, "tau_ext", "effort")
+        yield Panel(heading, "time [s]", effort, (*spans, *level, line, *peaks))
+
+
+def in_column(panels: list[Panel]) -> Iterator[Panel]:
+    """Panels below each other: the first has the legend, the last names the time."""
+    for i, panel in enumerate(panels):
+        marks = panel.marks if i == 0 else tuple(replace(mark, label="") for mark in panel.marks)
+        yield replace(panel, marks=marks, x_label=panel.x_label if i == len(panels) - 1 else "")
+
+
+def joints_touched(context: Context, contact: Contact) -> list[Contact]:
+    """The joints with contact windows in the same log."""
+    return [other for other in context.catalogue.about(Contact, log=contact.log) if other.above.any()]
+
+
+def named_peaks(track: Track, contact: Contact) -> Points:
+    """The peak in each window, with its value."""
+    places = []
+    for start, end in zip(contact.onset, contact.release, strict=True):
+        inside = np.flatnonzero((track.t >= start) & (track.t <= end))
+        places.append(inside[np.argmax(np.abs(track.tau_ext[inside]))])
+    return Points(track.t[places], track.tau_ext[places], "", "black", names=tuple(f"{p:+.3g}" for p in contact.peak))
+
+
+def spoken(contact: Contact) -> str:
+    """The peaks of a log in words, for those who cannot see the figure."""
+    unit = contact.origin.units["peak"] if contact.origin else ""
+    return f"{contact.joint.replace('_', ' ')} peaks at {', '.join(f'{p:+.3g}' for p in contact.peak)} {unit}"
+
+
+def trust_table(context: Context, trusts: list[Trust]) -> Table:
+    """One row a joint."""
+    sought = ("Sought",) if any(trust.sought for trust in trusts) else ()
+    header = ("Joint", "Verdict", "Model error", "Of effort", "$R^2$", "At most", "Detection level", *sought, "Covered")
+    return Table(
+        "How far to trust it: the model's error beyond noise, $R^2$ and the most that noise leaves of it, the level "
+        "that 99 % of free-space samples stay below, and how many of them the 95 % band covers.",
+        header,
+        tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts),
+        label="trust-table",
+        align="ll" + "r" * (len(header) - 2),
+    )
+
+
+def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell, ...]:
+    """The numbers of one joint, with the runs that they are of."""
+    p, space = trusted.prediction, trusted.space
+    row: list[Cell] = [title(trusted.joint), WORDS[trusted.level] + (", same path" if trusted.same_path else "")]
+    if p is None:
+        row += ["–"] * 4
+    else:
+        r2, ceiling = (context.number(f"{p.prefix}.{name}", 2) for name in ("r2", "r2_ceiling"))
+        row += [context.number(f"{p.prefix}.model_error", 2), percent(trusted.share), r2, ceiling]
+    key = f"{space.filter}.{space.log}.{space.joint}" if space is not None else ""
+    row.append(context.number(f"{key}.detection_level", 2))
+    if with_sought:
+        row.append(
+            context.size(space, "detection_level", trusted.sought, 3) if space is not None and trusted.sought else "–"
+        )
+    return *row, f"{percent(space.coverage)}, {band_in_words(space.coverage)}" if space is not None else "–"
+
+
+def first_looks(context: Context, trusts: list[Trust]) -> Iterator[Block]:
+    """The three things to look at first, worst first."""
+    looks = first_looks_in_order(context, trusts)
+    if looks:
+        yield Prose("**Look at these first.**")
+        yield Bullets(looks)
+
+
+def first_looks_in_order(context: Context, trusts: list[Trust]) -> tuple[str, ...]:
+    """The same as marked texts."""
+    return tuple(text for _, text in sorted(looks_at(context, trusts), key=lambda look: -look[0])[:3])
+
+
+def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:
+    """What deserves a look, with how much: 1 is where caution begins."""
+    for trusted in trusts:
+        yield from looks_at_model(context, trusted)
+        yield from looks_at_band(context, trusted)
+    yield from looks_at_paths(context, trusts)
+    for diagnostic in context.catalogue.all(Diagnostic):
+        for text in warning_texts(diagnostic):
+            yield 1.5, literal(text)
+
+
+def looks_at_paths(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:
+    """The joints that were judged on the path that was fitted, together."""
+    same = [trusted for trusted in trusts if trusted.same_path]
+    if same:
+        logs = dict.fromkeys(literal(trusted.prediction.log) for trusted in same if trusted.prediction is not None)
+        names, which = ", ".join(title(trusted.joint) for trusted in same), ", ".join(logs)
+        repeats = f"judged on the path that was fitted ({which}), where the model's error repeats; "
+        remedy = f"record a validation log on another path.{see(context, Prediction, 'prediction')}"
+        yield 4.0, f"**{names}**: {repeats}{remedy}"
+
+
+def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
+    """How far the model errs."""
+    p, name, see_runs = trusted.prediction, title(trusted.joint), see(context, Prediction, "prediction")
+    if p is not None and trusted.share > GOOD:
+        error = context.results[f"{p.prefix}.model_error"].number(2)
+        errs = f"the model errs by {error}, {percent(trusted.share)} of the effort."
+        yield trusted.share / GOOD, f"**{name}, {literal(p.log)}**: {errs}{see_runs}"
+
+
+def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
+    """Whether the effort that is sought can be seen, and whether the band covers."""
+    space, name, see_runs = trusted.space, title(trusted.joint), see(context, Track, "runs")
+    if space is None:
+        return
+    if trusted.sought and trusted.fineness > DETECTED:
+        level, sought = (context.size(space, "detection_level", x) for x in (space.detection_level, trusted.sought))
+        hides = "hides efforts of" if trusted.fineness > DETECTABLE else "is more than a third of"
+        told = f"the detection level of {level} {hides} {sought}, which the study seeks."
+        yield 3 * trusted.fineness, f"**{name}, {literal(space.log)}**: {told}{see_runs}"
+    if band(space.coverage) == "bad":
+        narrow = f"the 95 % band is too narrow, it covers {percent(space.coverage)} of free-space samples; "
+        judge = f"judge contacts by the detection level.{see_runs}"
+        yield 1.0 + 10 * (COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {narrow}{judge}"
+
+
+def see(context: Context, kind: type[Record], anchor: str) -> str:
+    """Where more is said, if it is: a section is there only if there are records for it."""
+    return f" See [@{anchor}]." if context.catalogue.all(kind) else ""
+
+
+def warning_texts(diagnostic: Diagnostic) -> Iterator[str]:
+    """The warnings of a diagnostic."""
+    pairs = zip(diagnostic.severity, diagnostic.text, strict=True)
+    yield from (text for severity, text in pairs if severity == "warning")
+
+
+def failures(context: Context) -> Iterator[Block]:
+    """What could not be done at all."""
+    for task, failed in context.provenance.failures.items():
+        yield Verdict("bad", f"**{literal(task)}** failed, and what depends on it is missing: {literal(failed)}")

@@ -1,0 +1,294 @@
+"""The force at the tip: over time, along the path, in every contact, and how large it looks in free space."""
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from davinci_forces.records import Column, Diagnostic, TipBudget, TipContact, TipForce
+from davinci_forces.report.content import (
+    Band,
+    Bars,
+    Block,
+    Bullets,
+    Cell,
+    Equation,
+    Figure,
+    Figure3D,
+    HLine,
+    Line,
+    Line3D,
+    OnScreen,
+    Panel,
+    Points3D,
+    Prose,
+    Section,
+    Table,
+    Verdict,
+    VSpan,
+    literal,
+)
+from davinci_forces.report.content.marks import AnyMark, Colour
+from davinci_forces.report.content.number import MINUS
+from davinci_forces.report.context import Context, label, title
+from davinci_forces.report.verdicts import NEAR_SINGULAR, NORMAL_95, band, percent
+
+AXES = {"x": "x0", "y": "y0, the roll axis", "z": "z0, up"}
+PATH_POINTS = 600  # of the path in space
+SETTLE = 1.0  # [s] that the range of the force is not taken from
+SPACING = 0.2  # [s] between the vectors that are drawn in a contact
+REACH = 0.5  # of the path's extent, that the largest force is long
+
+
+def section(context: Context) -> Section | None:
+    """The force at the tip of every log in which all joints that carry it move."""
+    forces = context.catalogue.all(TipForce)
+    if not forces:
+        return None
+    return Section("Force at the tip", "tip", tuple(blocks(context, forces)))
+
+
+def blocks(context: Context, forces: list[TipForce]) -> Iterator[Block]:
+    """The section's content."""
+    yield Prose(
+        "A force $f$ at the tip makes the external efforts of the joints that carry it what they are, and follows from "
+        "them where all of these joints move. It is what the robot exerts on its environment, in base axes, where "
+        "nothing but the tip is touched; the wrist is taken to be straight. Efforts are taken without delay, by the "
+        "smoother, and their covariance $C_tau$ holds the total standard deviations of the joints."
+    )
+    yield Equation(
+        'f = bold(J)_v^(-T) tau_"ext", quad C_f = bold(J)_v^(-T) C_tau bold(J)_v^(-1)',
+        "force is the inverse of the transposed Jacobian times external effort; its covariance follows from that of "
+        "the efforts",
+        "tip-force",
+    )
+    yield Prose(correlations(forces))
+    contacts = {contact.log: contact for contact in context.catalogue.all(TipContact)}
+    if contacts:
+        yield contact_table(context, list(contacts.values()))
+    yield level_table(context, forces)
+    yield from narrow(forces)
+    budgets = {budget.log: budget for budget in context.catalogue.all(TipBudget)}
+    first, *others = sorted(forces, key=lambda force: telling(force, contacts), reverse=True)
+    yield from log_blocks(first, contacts.get(first.log), budgets.get(first.log))
+    for force in others:
+        inside = tuple(log_blocks(force, contacts.get(force.log), budgets.get(force.log)))
+        yield OnScreen(f"Force at the tip in {literal(force.log)}", f"tip-{force.log}", inside)
+    left_out = [literal(text) for d in context.catalogue.about(Diagnostic, stage="resolve") for text in d.text]
+    if left_out:
+        yield OnScreen("Logs of contact without a force at the tip", "tip-left-out", (Bullets(tuple(left_out)),))
+
+
+def telling(force: TipForce, contacts: dict[str, TipContact]) -> tuple[bool, bool, float]:
+    """What a log is shown first by: whether the tip was touched, whether no parameter was fitted to it, and how large
+    its force looks in free space.
+    """
+    level = force.force_detection if np.isfinite(force.force_detection) else 0.0
+    return force.log in contacts, force.role != "identification", level
+
+
+def correlations(forces: Sequence[TipForce]) -> str:
+    """What is taken of how the joints' errors go together."""
+    known = [force for force in forces if force.correlation_from]
+    if not known:
+        return (
+            "The joints' errors are taken to be independent: there are not two other logs whose free motion agrees on "
+            "how they go together."
+        )
+    sizes = [max(abs(f.rho_12), abs(f.rho_13), abs(f.rho_23)) for f in known]
+    return (
+        "How the joints' errors go together is taken from the free motion of other logs, as far as these agree; "
+        f"correlations reach {max(sizes):.2f}."
+    )
+
+
+def contact_table(context: Context, contacts: Sequence[TipContact]) -> Table:
+    """The largest force of every contact, component by component."""
+    rows = tuple(row for contact in contacts for row in contact_rows(context, contact))
+    return Table(
+        "The force at the tip where it is largest in each contact, with its standard deviation; the force's size, and "
+        "in which direction it is known least, by how much. Windows that the study does not state were found on a "
+        "joint. Near a singular pose the force is marked.",
+        ("Log", "Window", "$f_x$", "$f_y$", "$f_z$", "$abs(f)$", "Least known", "along"),
+        rows,
+        "tip-contacts",
+        "llrrrrrl",
+    )
+
+
+def contact_rows(context: Context, contact: TipContact) -> Iterator[tuple[Cell, ...]]:
+    """One row a window."""
+    for i in range(len(contact)):
+        prefix = f"tip.{contact.log}.{i + 1}"
+        numbers = [context.number(f"{prefix}.{name}", 3) for name in ("f_x", "f_y", "f_z", "peak")]
+        weak = ", ".join(signed(x[i], 1) for x in (contact.weak_x, contact.weak_y, contact.weak_z))
+        window = f"{contact.onset[i]:.4g} to {contact.release[i]:.4g} s"
+        remark = ("" if contact.stated[i] else ", found") + (", near singular" if contact.near_singular[i] else "")
+        yield (literal(contact.log), window + remark, *numbers, context.number(f"{prefix}.sigma_1", 2), f"({weak})")
+
+
+def signed(value: float, decimals: int) -> str:
+    """A number with a sign as it is printed, and none where it is zero."""
+    return f"{round(value, decimals) + 0.0:.{decimals}f}".replace("-", MINUS)
+
+
+def level_table(context: Context, forces: Sequence[TipForce]) -> Table:
+    """How large the force looks where nothing is touched, and how well the poses tell it."""
+    rows = tuple(
+        (
+            literal(force.log),
+            force.role,
+            *(
+                context.number(f"tip.{force.log}.{name}", 3)
+                for name in ("free_rms", "free_level", "detection_level", "coverage", "condition", "near_singular")
+            ),
+        )
+        for force in forces
+    )
+    return Table(
+        "The size of the force at the tip where nothing touches the robot: root mean square, the levels that 95 % and "
+        "99 % of samples stay below, and the share of samples whose 95 % ellipsoid holds no force. A force below the "
+        "detection level cannot be told from free space. The condition number of the Jacobian, its median, says how "
+        f"much better the force is told in one direction than in another; above {NEAR_SINGULAR:g}, as where the tip is "
+        "within about a centimetre of the remote centre, a sample is near singular and not judged.",
+        ("Log", "Role", "RMS", "95 %", "Detection level", "Coverage", "Condition", "Near singular"),
+        rows,
+        "tip-levels",
+        "llrrrrrr",
+    )
+
+
+def narrow(forces: Sequence[TipForce]) -> Iterator[Verdict]:
+    """Logs whose band is too narrow."""
+    for force in forces:
+        if band(force.force_coverage) == "bad":
+            yield Verdict(
+                "bad",
+                f"**{literal(force.log)}**: the band of the force covers {percent(force.force_coverage)} of samples "
+                "in free space, so it is too narrow: trust the detection level rather than the standard deviations.",
+            )
+
+
+def log_blocks(force: TipForce, contact: TipContact | None, budget: TipBudget | None) -> Iterator[Block]:
+    """The figures of one log."""
+    name = literal(force.log)
+    yield Figure(
+        f"{name}: force at the tip with its 95 % band, and the condition number of the Jacobian."
+        f"{' Windows of contact are shaded.' if contact is not None else ''}",
+        f"Components of the force at the tip over time in {name}, and how well its poses tell it.",
+        (*(component_panel(force, axis, contact) for axis in AXES), condition_panel(force)),
+        f"tip-time-{force.log}",
+        zoomable=True,
+        height=32,
+    )
+    if contact is not None:
+        yield in_space(force, contact)
+    if budget is not None:
+        shown = OnScreen(
+            "What each joint's error comes to at the tip", f"tip-parts-{force.log}", (budget_figure(force, budget),)
+        )
+        yield shown
+
+
+def component_panel(force: TipForce, axis: str, contact: TipContact | None) -> Panel:
+    """One component over time."""
+    f, std = getattr(force, f"f_{axis}"), np.sqrt(getattr(force, f"c_{axis}{axis}"))
+    spans = [] if contact is None else [VSpan(*window) for window in windows(contact)]
+    marks: tuple[AnyMark, ...] = (
+        *spans,
+        Band(force.t, f - NORMAL_95 * std, f + NORMAL_95 * std, "95 % band" if axis == "x" else "", "blue"),
+        Line(force.t, f, "force" if axis == "x" else "", "vermillion", "solid"),
+    )
+    shown = reach(force, f - NORMAL_95 * std, f + NORMAL_95 * std)
+    return Panel(f"Along {AXES[axis]}", "time [s]", label(force, f"f_{axis}", "force"), marks, y_range=shown)
+
+
+def reach(force: TipForce, lower: Column, upper: Column) -> tuple[float, float] | None:
+    """What a band reaches over once the filter has settled: at its start it knows nothing, and would hide all else."""
+    values = np.concatenate([edge[force.t >= force.t[0] + SETTLE] for edge in (lower, upper)])
+    values = values[np.isfinite(values)]
+    if not len(values) or np.ptp(values) == 0.0:
+        return None
+    room = 0.05 * float(np.ptp(values))
+    return float(values.min()) - room, float(values.max()) + room
+
+
+def condition_panel(force: TipForce) -> Panel:
+    """How well the poses tell the force."""
+    near = bool(force.near_singular.any())
+    marks: tuple[AnyMark, ...] = (Line(force.t, np.minimum(force.condition, 1e6), "", "black"),)
+    if near:
+        marks = (*marks, HLine(NEAR_SINGULAR, "near singular"))
+    return Panel("Condition number of the Jacobian", "time [s]", "condition", marks, y_log=near)
+
+
+def in_space(force: TipForce, contact: TipContact) -> Figure3D:
+    """The path of the tip, with the force along it in every contact."""
+    path = np.column_stack([force.x, force.y, force.z])
+    extent = float(np.ptp(path, axis=0).max())
+    per_newton = REACH * extent / float(contact.f_peak.max())
+    few = np.unique(np.linspace(0, len(path) - 1, PATH_POINTS).round().astype(int))
+    at, f = sampled(force, contact)
+    here, largest = (np.column_stack([getattr(contact, n) for n in names]) for names in (("x", "y", "z"), F))
+    weak = np.column_stack([contact.weak_x, contact.weak_y, contact.weak_z]) * NORMAL_95 * contact.sigma_1[:, None]
+    ends = here + per_newton * largest
+    marks = (
+        line(path[few], "path of the tip", "grey"),
+        line(strokes(path[at], path[at] + per_newton * f), "force during contact", "sky"),
+        line(strokes(here, ends), "where it is largest", "vermillion"),
+        line(strokes(ends - per_newton * weak, ends + per_newton * weak), "95 % interval", "black"),
+        Points3D(
+            here[:, 0], here[:, 1], here[:, 2], "", "vermillion", tuple(str(i) for i in range(1, len(contact) + 1))
+        ),
+    )
+    return Figure3D(
+        f"{literal(force.log)}: the path of the tip, and the force that it exerts in each contact, numbered as in "
+        f"[@tip-contacts]; 1 N is {1e3 * per_newton:.2g} mm long. A black line at its end is the 95 % interval in the "
+        "direction in which the force is known least.",
+        f"The path of the tip in space in {literal(force.log)}, with the force in each contact as a line from it.",
+        marks,
+        f"tip-space-{force.log}",
+        height=88,
+    )
+
+
+F = ("f_x", "f_y", "f_z")
+
+
+def sampled(force: TipForce, contact: TipContact) -> tuple[Column, Column]:
+    """Samples within contacts, a fifth of a second apart, and the forces there."""
+    f = np.column_stack([getattr(force, name) for name in F])
+    times = [np.arange(start, end, SPACING) for start, end in windows(contact)]
+    at = np.unique(np.clip(np.searchsorted(force.t, np.concatenate(times)), 0, len(f) - 1))
+    at = at[np.isfinite(f[at, 0])]
+    return at, f[at]
+
+
+def strokes(start: Column, end: Column) -> Column:
+    """Separate lines from each start (N, 3) to its end, as one that is interrupted (3 N, 3)."""
+    return np.stack([start, end, np.full_like(start, np.nan)], axis=1).reshape(-1, 3)
+
+
+def line(points: Column, name: str, colour: Colour) -> Line3D:
+    """A line through points (N, 3)."""
+    return Line3D(points[:, 0], points[:, 1], points[:, 2], name, colour, "solid")
+
+
+def windows(contact: TipContact) -> list[tuple[float, float]]:
+    """Where each contact begins and ends."""
+    return list(zip(contact.onset.tolist(), contact.release.tolist(), strict=True))
+
+
+def budget_figure(force: TipForce, budget: TipBudget) -> Figure:
+    """What each joint's error comes to at the tip."""
+    names = tuple(title(joint) for joint in budget.of_joint)
+    parts = (("filter_force", "sensor noise and filter"), ("model_force", "model"), ("lag_force", "lag of the filter"))
+    bars = tuple(Bars(names, getattr(budget, part), said) for part, said in parts)
+    total = ", ".join(f"{name} {size:.2g} N" for name, size in zip(names, budget.total_force, strict=True))
+    return Figure(
+        f"{literal(force.log)}: what the errors of each joint's external effort come to at the tip, at the median "
+        f"pose, as standard deviations; in all {total}.",
+        f"Bars of the error that each joint adds to the force at the tip in {literal(force.log)}: {total}.",
+        (Panel("Error at the tip", "", label(budget, "filter_force", "force"), bars),),
+        f"tip-budget-{force.log}",
+        height=42,
+    )

@@ -1,0 +1,179 @@
+"""The report as one HTML file that needs nothing else: no network, no second file, no installed font."""
+
+import base64
+import hashlib
+import json
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from davinci_forces.report.content import Document, Equation, Figure, Figure3D, walk
+from davinci_forces.report.content.inline import Span, parse, printable
+from davinci_forces.report.content.layout import Placed, marked_texts, on_screen, place, references
+from davinci_forces.report.content.tables import columns
+from davinci_forces.report.figures.svg import svg
+from davinci_forces.report.figures.traces import ThinnedFigure, thin_figure
+from davinci_forces.report.writers.equations import Drawing, Formula, draw_formulas
+from davinci_forces.report.writers.miniature import LARGER, SMALL, miniature
+from davinci_forces.report.writers.numbers import Json, numbers_json
+from davinci_forces.report.writers.pictures import address, looks, shrink
+
+if TYPE_CHECKING:
+    from markupsafe import Markup
+
+TEMPLATES = Path(__file__).parent / "templates"
+LARGEST = 4_700_000  # [bytes] of a file, of which the traces get what everything else leaves
+POINT_BYTES = 11  # of a point of a trace: two numbers in single precision, in base 64
+MOST_POINTS, FEWEST_POINTS = 20_000, 2_000  # of one zoomable figure
+STILL_POINTS = 2_000  # of a figure that does not zoom, for those who want its numbers
+SIGN = "\0"  # which no text can hold: it is not printable
+SCRIPTS = ("contents.js", "figures.js", "tables.js")
+REVIEW_SCRIPTS = ("review.js",)
+TRACE_SCRIPTS = ("axes.js", "marks.js", "traces.js")
+
+
+def render(document: Document) -> bytes:
+    """The whole file; the same document gives the same bytes.
+
+    Raises
+    ------
+    ValueError
+        If a reference leads nowhere.
+    NotTypeset
+        If an equation is wrong.
+    """
+    placed = place(document)
+    figures = {item.anchor: item.block for item in _flatten(placed) if isinstance(item.block, Figure | Figure3D)}
+    zooms = {name: f for name, f in figures.items() if isinstance(f, Figure) and f.zoomable}
+    folded = on_screen(placed)
+    formulas, symbols = draw_formulas(_formulas(document))
+    page: Json = {
+        "document": document, "placed": placed, "references": references(placed), "formulas": formulas,
+        "pictures": {name: _picture(figure, name in folded) for name, figure in figures.items()}, "symbols": symbols,
+        "looks": looks(), "scripts": [
+            _script(name)
+            for name in SCRIPTS + (TRACE_SCRIPTS if zooms else ()) + (REVIEW_SCRIPTS if document.rated else ())
+        ],
+        "rated": _json(asdict(document.rated)) if document.rated else "",
+    }  # fmt: skip
+    still = {name: f for name, f in figures.items() if name not in zooms and not (isinstance(f, Figure) and f.small)}
+    numbers = {name: thin_figure(figure, STILL_POINTS) for name, figure in still.items()}
+    kept = {name: (numbers_json(one.figure), one.note) for name, one in numbers.items()}
+    text = _fill(page, [*kept, *zooms])
+    room = LARGEST - len(text.encode()) - sum(len(content) for content, _ in kept.values())
+    traces = _thin_figures(zooms, room)
+    kept |= {name: (numbers_json(one.figure), one.note) for name, one in traces.items()}
+    return _put_in(text, kept).encode()
+
+
+def _put_in(text: str, kept: dict[str, tuple[str, str]]) -> str:
+    """The page with its numbers and notes where `_fill` left signs for them, once it is known what room there is."""
+    parts = text.split(SIGN)
+    for i in range(1, len(parts), 2):
+        part, _, name = parts[i].partition(" ")
+        parts[i] = kept[name][part == "note"]
+    return "".join(parts)
+
+
+def _picture(figure: Figure | Figure3D, on_screen_only: bool) -> str:
+    """The address of a figure's picture; that of a trace which is not printed stands in for it only."""
+    if isinstance(figure, Figure) and (figure.small or (figure.zoomable and on_screen_only)):
+        return address(miniature(figure, SMALL if figure.small else LARGER))
+    return address(shrink(svg(figure)))
+
+
+def _thin_figures(zooms: dict[str, Figure], room: int) -> dict[str, ThinnedFigure]:
+    """Each zoomable figure in as many points as the file has room for."""
+    share = room // POINT_BYTES // max(len(zooms), 1)
+    limit = max(FEWEST_POINTS, min(MOST_POINTS, share))
+    return {name: thin_figure(figure, limit) for name, figure in zooms.items()}
+
+
+def _json(value: Any) -> str:
+    """Data for a script in the page, in which nothing can end the script's element."""
+    return json.dumps(value, ensure_ascii=False).replace("<", "\\u003c").replace(SIGN, "")
+
+
+def _script(name: str) -> str:
+    return (TEMPLATES / name).read_text(encoding="utf-8")
+
+
+def _formulas(document: Document) -> list[Formula]:
+    display = [Formula(block.typst, True) for block in walk(document) if isinstance(block, Equation)]
+    return [Formula(maths, False) for maths in marked_texts(document, "maths")] + display
+
+
+def _flatten(placed: tuple[Placed, ...]) -> list[Placed]:
+    return [item for parent in placed for item in (parent, *_flatten(parent.blocks))]
+
+
+def _fill(page: Json, names: list[str]) -> str:
+    """The page, with signs where the numbers of the named figures belong, and the notes on them."""
+    from jinja2 import Environment, FileSystemLoader, StrictUndefined
+    from markupsafe import Markup
+
+    environment = Environment(
+        loader=FileSystemLoader(TEMPLATES), autoescape=True, undefined=StrictUndefined, trim_blocks=True,
+        lstrip_blocks=True, finalize=_finalize,
+    )  # fmt: skip
+    environment.filters |= {"inline": _inline(page), "columns": columns, "raw": Markup, "attribute": _attribute}
+    numbers = {name: [Markup(f"{SIGN}{part} {name}{SIGN}") for part in ("numbers", "note")] for name in names}
+    hashes = [_hash(text) for text in page["scripts"]]
+    return environment.get_template("report.html").render(page, numbers=numbers, hashes=hashes)
+
+
+def _finalize(value: Any) -> Any:
+    """Text that is not HTML yet, without what no page can hold."""
+    return printable(value) if isinstance(value, str) and not hasattr(value, "__html__") else value
+
+
+def _attribute(text: str) -> "Markup":
+    """An address as an attribute holds it; it has no quotation mark, and `<` may stay."""
+    from markupsafe import Markup
+
+    return Markup(text.replace("&", "&amp;"))
+
+
+def _hash(text: str) -> str:
+    """What the content security policy calls a script that may run."""
+    return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
+
+
+def _inline(page: Json) -> Callable[[str], "Markup"]:
+    """A filter from marked text to HTML."""
+    from markupsafe import Markup
+
+    def maths(text: str) -> Markup:
+        return _maths(text, page["formulas"][Formula(text, False)])
+
+    def reference(text: str) -> Markup:
+        return Markup('<a href="#{}">{}</a>').format(text, page["references"][text])
+
+    def link(text: str, to: str) -> Markup:
+        return Markup('<a href="{}">{}</a>').format(to, text)
+
+    shapes: dict[str, Callable[[str], Any]] = {
+        "text": Markup.escape,
+        "code": Markup("<code>{}</code>").format,
+        "bold": Markup("<strong>{}</strong>").format,
+        "maths": maths,
+        "reference": reference,
+    }
+
+    def inline(text: str) -> Markup:
+        spans: tuple[Span, ...] = parse(text)
+        return Markup("").join(
+            link(span.text, span.to) if span.kind == "link" else shapes[span.kind](span.text) for span in spans
+        )
+
+    return inline
+
+
+def _maths(text: str, drawing: Drawing) -> "Markup":
+    from markupsafe import Markup
+
+    style = f"width:{drawing.width:.3f}em;height:{drawing.height:.3f}em;vertical-align:{-drawing.depth:.3f}em"
+    return Markup('<svg class="maths" role="img" aria-label="{}" viewBox="{}" style="{}">{}</svg>').format(
+        text, drawing.view, style, Markup(drawing.body)
+    )

@@ -1,0 +1,84 @@
+"""The numbers that a figure is drawn from, for the page: traces are drawn from them there, and saved as CSV."""
+
+import base64
+import json
+import math
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from davinci_forces.maths.arrays import Array
+from davinci_forces.report.content import Figure, Figure3D, Panel
+from davinci_forces.report.content.inline import printable
+from davinci_forces.report.figures.palette import assign_looks
+
+Json = dict[str, Any]
+PIXELS = 96 / 25.4  # of CSS in a millimetre
+
+
+def numbers_json(figure: Figure | Figure3D) -> str:
+    """The figure as JSON in which nothing can end the element that holds it."""
+    columns: dict[str, int] = {}  # encoded column -> its place; marks share those that are alike
+    panels = figure.panels if isinstance(figure, Figure) else (_space(figure),)
+    content = {
+        "across": figure.columns if isinstance(figure, Figure) else 1,
+        "height": round(figure.height * PIXELS),
+        "panels": [_panel(panel, columns) for panel in panels],
+        "columns": [json.loads(column) for column in columns],
+    }
+    return json.dumps(content, separators=(",", ":"), allow_nan=False).replace("<", "\\u003c")
+
+
+def _space(figure: Figure3D) -> Panel:
+    """The marks in space as those of a panel."""
+    return Panel("", figure.x_label, f"{figure.y_label}, {figure.z_label}", figure.marks)  # type: ignore[arg-type]
+
+
+def _panel(panel: Panel, columns: dict[str, int]) -> Json:
+    own = {field.name: _plain(getattr(panel, field.name)) for field in fields(panel) if field.name != "marks"}
+    return own | {"marks": [_mark(mark, columns) for mark in assign_looks(panel.marks)]}
+
+
+def _mark(mark: Any, columns: dict[str, int]) -> Json:
+    values = {field.name: getattr(mark, field.name) for field in fields(mark)}
+    arrays = {name: value for name, value in values.items() if isinstance(value, np.ndarray)}
+    places = {name: columns.setdefault(_encode(array), len(columns)) for name, array in arrays.items()}
+    others = {name: _plain(value) for name, value in values.items() if name not in arrays and value not in (None, ())}
+    return {"kind": type(mark).__name__, "columns": places} | others
+
+
+def _plain(value: Any) -> Any:
+    """A value as JSON has it: no sign that a page cannot show, no number that is none."""
+    if isinstance(value, tuple):
+        return [_plain(item) for item in value]
+    if isinstance(value, str):
+        return printable(value)
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def _encode(column: Array) -> str:
+    """A column as JSON: start, step and count where its steps are equal, else its bits in base 64.
+
+    Single precision (f) where that tells neighbouring samples apart, else double (d).
+    """
+    if (step := _equal_step(column)) is not None:
+        return json.dumps([float(column[0]), step, len(column)])
+    single = column.astype("<f4")
+    if float(np.nanmax(np.abs(column), initial=0.0)) > 2**20 * _typical_step(column):
+        return json.dumps("d" + base64.b64encode(column.astype("<f8").tobytes()).decode())
+    return json.dumps("f" + base64.b64encode(single.tobytes()).decode())
+
+
+def _equal_step(column: Array) -> float | None:
+    """The step between samples that are equally apart, to a millionth of it."""
+    if len(column) < 3 or not np.isfinite(column).all() or column[-1] == column[0]:
+        return None
+    step = float(column[-1] - column[0]) / (len(column) - 1)
+    even = column[0] + step * np.arange(len(column))
+    return step if float(np.max(np.abs(column - even))) <= 1e-6 * abs(step) else None
+
+
+def _typical_step(column: Array) -> float:
+    steps = np.abs(np.diff(column[np.isfinite(column)]))
+    return float(np.median(steps[steps > 0])) if np.any(steps > 0) else math.inf

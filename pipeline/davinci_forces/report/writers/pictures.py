@@ -1,0 +1,95 @@
+"""Figures as pictures of a page: SVG small enough to travel in it, which turns dark with the page."""
+
+import re
+from collections.abc import Callable
+from urllib.parse import quote
+
+from davinci_forces.report.figures.palette import COLOURS, DARK, SURROUNDINGS
+
+NAMES = {light: name for name, light in COLOURS.items()} | {light: name for name, (light, _) in SURROUNDINGS.items()}
+FONT = "system-ui,-apple-system,'Segoe UI',Roboto,Arial,'DejaVu Sans',sans-serif"
+# What an address cannot hold as it is, and is written by its number.
+ESCAPED = re.compile(r"[^ !&'()*+,./:;<=>?@\[\]_{|}~0-9A-Za-z-]+")
+
+
+def looks() -> tuple[str, str]:
+    """The colours of marks and of what surrounds them as CSS variables, on a light page and on a dark one."""
+    light = COLOURS | {name: pair[0] for name, pair in SURROUNDINGS.items()}
+    dark = DARK | {name: pair[1] for name, pair in SURROUNDINGS.items()}
+    return _variables(light), _variables(dark)
+
+
+def _variables(values: dict[str, str]) -> str:
+    return ";".join(f"--{name}:{value}" for name, value in values.items())
+
+
+def address(svg: str) -> str:
+    """The SVG as an address that holds all of it; `<` and `>` in it need no escape in an attribute, `&` does."""
+    return "data:image/svg+xml," + ESCAPED.sub(lambda signs: quote(signs[0]), svg)
+
+
+def shrink(svg: str) -> str:
+    """The same picture in a third of the letters: styles as classes, colours as variables, no names nobody uses."""
+    svg = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>|<defs>\s*<style.*?</style>\s*</defs>", "", svg, flags=re.DOTALL)
+    svg = svg.replace("xlink:href", "href").replace(' xmlns:xlink="http://www.w3.org/1999/xlink"', "")
+    svg = re.sub(r">\s+<", "><", svg)
+    used = set(re.findall(r'(?:href="#|url\(#)([^")]+)', svg))
+    styles: dict[str, str] = {}
+    svg = _in_tags(svg, lambda tag: _short_tag(tag, used, styles))
+    svg = _without_empty_groups(svg)
+    return re.sub(r"(<svg [^>]*>)", lambda tag: tag[1] + _sheet(svg, styles), svg, count=1)
+
+
+def _in_tags(svg: str, change: Callable[[str], str]) -> str:
+    """Change tags and no text: in text `<` is escaped."""
+    return re.sub(r"<[^<>]+>", lambda tag: change(tag[0]), svg)
+
+
+def _short_tag(tag: str, used: set[str], styles: dict[str, str]) -> str:
+    def name_class(style: re.Match[str]) -> str:
+        return f' class="{styles.setdefault(style[1], _letters(len(styles)))}"'
+
+    tag = re.sub(r' id="([^"]+)"', lambda name: name[0] if name[1] in used else "", tag)
+    tag = re.sub(r' transform="rotate\(-0 [^"]*"', "", tag)
+    return re.sub(r' style="([^"]*)"', name_class, tag).replace("\n", " ")
+
+
+def _letters(number: int) -> str:
+    """The name of a class: a, b, ..., z, ba, bb, ..."""
+    name = ""
+    while not name or number:
+        name, number = chr(97 + number % 26) + name, number // 26
+    return name
+
+
+def _without_empty_groups(svg: str) -> str:
+    """The SVG without groups that say nothing of what they hold."""
+    before = ""
+    while before != svg:
+        before, svg = svg, re.sub(r"<g>((?:(?!</?g\b).)*)</g>", r"\1", svg, flags=re.DOTALL)
+    return svg.replace("<defs></defs>", "").replace("<defs/>", "")
+
+
+def _sheet(svg: str, styles: dict[str, str]) -> str:
+    """The style sheet of a picture: its classes, and its colours in light and dark."""
+    classes = "".join(f".{name}{{{_declarations(style)}}}" for style, name in styles.items())
+    wanted = {name for name in NAMES.values() if f"var(--{name})" in classes}
+    light, dark = (_only(side, wanted) for side in looks())
+    return (
+        f"<style>:root{{{light}}}@media(prefers-color-scheme:dark){{:root{{{dark}}}}}"
+        f"*{{stroke-linejoin:round;stroke-linecap:butt}}{classes}</style>"
+    )
+
+
+def _only(variables: str, wanted: set[str]) -> str:
+    """Of the variables, those that are wanted."""
+    return ";".join(one for one in variables.split(";") if one.partition(":")[0].removeprefix("--") in wanted)
+
+
+def _declarations(style: str) -> str:
+    def name_colour(colour: re.Match[str]) -> str:
+        return f"var(--{NAMES[colour[0]]})" if colour[0] in NAMES else colour[0]
+
+    style = re.sub(r"font-family: [^;]*", f"font-family:{FONT}", style)
+    style = re.sub(r"#[0-9a-f]{6}", name_colour, style)
+    return re.sub(r"\s*([:;,])\s*", r"\1", style).strip(";")

@@ -1,0 +1,81 @@
+"""The chain and the bodies of the da Vinci's hand and tool: Tables 3.1, 4.1 and 4.2 as data.
+
+z0 points up, the hand rolls about +y0, and at q = 0 the tool points along -z0.
+"""
+
+from math import pi
+
+import numpy as np
+
+from davinci_forces.maths.mechanics.bodies import Bodies, cylinder
+from davinci_forces.maths.mechanics.chain import TableRow, denavit_hartenberg
+from davinci_forces.maths.mechanics.drives import Drives
+
+# Table 3.1: name, carried by, alpha [rad], a [m], d [m], theta [rad], coordinate (the index of its q).
+CHAIN = denavit_hartenberg(
+    [
+        TableRow("1", "0", -pi / 2, 0.0, 0.161, 0.0),  # base
+        TableRow("2", "1", -pi / 2, 0.0, -0.035, -pi / 2, 0),  # pivot plate
+        TableRow("3", "2", pi, 0.190, 0.0, 0.03, 1),  # parallelogram base
+        TableRow("4", "3", pi, 0.515, 0.0, 0.03 + pi / 2, 1),  # parallelogram upper bar
+        TableRow("5", "4", pi / 2, 0.040, 0.0, 0.0, 1),  # instrument holder
+        TableRow("6", "5", 0.0, 0.0, 0.282, 0.0, 2, slides=True),  # needle driver house
+        TableRow("7", "6", pi / 2, 0.0, 0.0, 0.0, 3),  # needle driver neck
+        TableRow("8", "7", pi / 2, 0.009, 0.0, pi / 2, 4),  # needle driver head
+        TableRow("9L", "8", 0.0, 0.009, 0.0, 0.0, 5),  # left jawbone
+        TableRow("9R", "8", 0.0, 0.009, 0.0, 0.0, 6),  # right jawbone
+    ],
+    tip="9L",
+)
+
+# Table 4.2, links 2 to 9R: mass [kg], height [m], radius [m]; then the cylinder's axis and the centre of mass as a
+# distance [m] along an axis of the link's frame of Table 3.1 (Table 4.1, Eq 4.17).  Fig 4.3 shows the axes of links 3
+# and 4; the others are those that reproduce Eq 6.7 and 6.10.  Link 6's centre lies along -z: the printed [0, -lc6, 0]
+# would put it 0.4 m sideways.
+X, Y, Z = 0, 1, 2
+CYLINDERS = (
+    (0.5, 0.22, 0.035, Y, Y, 0.0),
+    (4.0, 0.19, 0.1, X, X, -0.34),
+    (0.7, 0.515, 0.07, X, X, -0.257),
+    (0.7, 0.26, 0.035, Z, Z, -0.3),
+    (0.079, 0.1, 0.07, Z, Z, -0.4),
+    (0.079, 0.4, 0.035, Y, Y, -0.252),
+    (0.04, 0.009, 0.005, X, X, -0.0045),
+    (0.01, 0.009, 0.005, X, X, -0.0045),
+    (0.01, 0.009, 0.005, X, X, -0.0045),
+)
+HOLDER = CHAIN.links.index("5")
+GUESSED_LC5 = 0.2  # [m] with which the initial guesses of Tables 6.4-6.6 were computed; Table 4.1 prints 0.3
+
+
+def bodies(lc5: float = -CYLINDERS[HOLDER][5]) -> Bodies:
+    """The links as uniform cylinders, with the centre of the instrument holder `lc5` [m] from its frame.
+
+    They are in the links' own frames, as the dynamics take them.
+    """
+    return in_table_frames(lc5).within(CHAIN.of_links)
+
+
+def in_table_frames(lc5: float = -CYLINDERS[HOLDER][5]) -> Bodies:
+    """The same bodies as Tables 4.1 and 4.2 give them, in the frames of Table 3.1."""
+    centres = np.zeros((len(CYLINDERS), 3))
+    for centre, (*_, axis, along) in zip(centres, CYLINDERS, strict=True):
+        centre[axis] = along
+    centres[HOLDER, Z] = -lc5
+    inertias = [cylinder(mass, height, radius, axis) for mass, height, radius, axis, _, _ in CYLINDERS]
+    # With six coordinates or fewer there is one jaw.
+    counts_from = np.array([7 if name == "9R" else 0 for name in CHAIN.links])
+    return Bodies(np.array([body[0] for body in CYLINDERS]), centres, np.array(inertias), counts_from)
+
+
+BODIES = bodies()
+
+WRIST = ("instrument_roll", "instrument_pitch", "instrument_yaw", "grip")
+# Gear ratios of Table 6.3; friction of the initial guesses of Tables 6.4-6.6, which say nothing of the wrist; the
+# motors' inertia is neglected (4.29).
+DRIVES = Drives(
+    gear_ratio=np.array([200.0, 200.0, 1340.0, 7.5, 12.4, 12.0, 12.0]),
+    motor_inertia=np.zeros(7),
+    viscous=np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]),
+    coulomb=np.array([1.0, 0.1, 3.0, 0.0, 0.0, 0.0, 0.0]),
+)

@@ -1,0 +1,155 @@
+"""What the elements of a URDF say, as numbers and names; what is wrong is noted with its line."""
+
+import math
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias, pseudo_inertias
+from davinci_forces.maths.mechanics.placed import transform
+from davinci_forces.robots.urdf.elements import Element
+from davinci_forces.toml import shown
+from davinci_forces.toml.file import TomlFile
+
+NAME = re.compile(r"[\w ./:+-]{1,100}")  # of links and joints, as files, equations and messages can show them
+MOVING = ("revolute", "continuous", "prismatic")
+UNLIMITED = 1e9  # [N m, N or their rates] what a file says that knows no limit; URDF has no word for it
+ROUNDING = 1e-9  # of an inertia's eigenvalues, as a share of the largest, that printed digits may leave below 0
+TIP = "tip"  # what a file that we write calls the frame at the tip
+TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+
+
+class UrdfJoint(NamedTuple):
+    """One joint as its file has it."""
+
+    name: str
+    kind: str  # one of MOVING, or "fixed"
+    parent: str
+    child: str
+    placement: Array  # of the child's frame in the parent's at q = 0 (4, 4) [m]
+    axis: Array  # (3,) in the child's frame, of length 1
+    position: tuple[float, float]
+    velocity: float
+    effort: float
+    mimic: str  # the joint that moves it, or ""
+    multiplier: float
+    bias: float
+    line: int
+
+
+class Notes:
+    """What is said of one element: problems with its line, and what it is called."""
+
+    def __init__(self, file: TomlFile, element: Element) -> None:
+        self.file, self.element = file, element
+        named = element.attributes.get("name")
+        self.called = f"<{element.tag} name={shown(named)}>" if named is not None else f"<{element.tag}>"
+
+    def problem(self, text: str, at: Element | None = None) -> None:
+        """Note something wrong with the element, or with one in it."""
+        inner = "" if at is None or at is self.element else f" <{at.tag}>"
+        self.file.note((at or self.element).line, f"{self.called}{inner}: {text}")
+
+    def name(self, element: Element | None, key: str, says: str) -> str:
+        """A name that an element states, or ""."""
+        value = "" if element is None else element.attributes.get(key, "")
+        if not value:
+            self.problem(f"{says} is missing", element)
+        elif not NAME.fullmatch(value):
+            self.problem(f"{says} is {shown(value)}, and must be letters, digits, spaces and _./:+- only", element)
+        return value
+
+    def numbers(self, element: Element | None, key: str, default: Sequence[float]) -> list[float]:
+        """As many finite numbers as the default has, which is taken where nothing is stated, or what is wrong."""
+        if element is None or key not in element.attributes:
+            return list(default)
+        text = element.attributes[key]
+        try:
+            values = [float(word) for word in text.split()]
+        except ValueError:
+            values = []
+        if len(values) != len(default) or not all(map(math.isfinite, values)):
+            how = "a finite number" if len(default) == 1 else f"{len(default)} finite numbers with spaces between them"
+            self.problem(f"{key} must be {how}, not {shown(text)}", element)
+            return list(default)
+        return values
+
+    def number(self, element: Element | None, key: str, default: float) -> float:
+        """One finite number."""
+        return self.numbers(element, key, [default])[0]
+
+    def pose(self, element: Element | None) -> Array:
+        """The pose (4, 4) that an <origin> states."""
+        xyz, rpy = (self.numbers(element, key, [0.0] * 3) for key in ("xyz", "rpy"))
+        return transform(xyz, rpy)
+
+
+def inertial(link: Element, file: TomlFile) -> Array | None:
+    """The inertial parameters (10,) of a link in its frame; None where it states none."""
+    stated = link.first("inertial")
+    if stated is None:
+        return None
+    notes, mass = Notes(file, link), stated.first("mass")
+    m = notes.number(mass, "value", 0.0)
+    if mass is None or "value" not in mass.attributes:
+        notes.problem('its inertial has no mass; write <mass value="..."/> [kg], or leave the inertial out', stated)
+    if m < 0:
+        notes.problem(f"a mass of {m:g} kg; it must be 0 or more", mass)
+    tensor = stated.first("inertia")
+    xx, xy, xz, yy, yz, zz = (notes.number(tensor, key, 0.0) for key in TENSOR)
+    values = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    if values[0] < -ROUNDING * abs(values).max():
+        said = f"no body has this inertia, whose smallest principal moment is {values[0]:.3g} kg m^2"
+        notes.problem(f"{said}: correct its signs, or leave the inertial out", tensor)
+    about_centre = np.array([[0.0, 0.0, 0.0, 0.0, xx, xy, xz, yy, yz, zz]])
+    at, J = notes.pose(stated.first("origin")), pseudo_inertias(about_centre)[0]
+    J[3, 3] = m
+    return np.asarray(of_pseudo_inertias((at @ J @ at.T)[None])[0])
+
+
+def joint(element: Element, file: TomlFile) -> UrdfJoint:
+    """A joint; one of an unknown type is taken to be fixed, so that the links beyond it hang on something."""
+    notes, kind = Notes(file, element), element.attributes.get("type", "")
+    name = notes.name(element, "name", "its name")
+    parent = notes.name(element.first("parent"), "link", 'its <parent link="..."/>')
+    child = notes.name(element.first("child"), "link", 'its <child link="..."/>')
+    if kind not in (*MOVING, "fixed"):
+        remedy = "describe it by several of them" if kind in ("floating", "planar") else "correct it"
+        notes.problem(f"type is {shown(kind)}, and must be one of {', '.join(MOVING)} or fixed; {remedy}")
+        kind = "fixed"
+    axis = np.array(notes.numbers(element.first("axis"), "xyz", [1.0, 0.0, 0.0]))
+    length = float(np.linalg.norm(axis))
+    if not length:
+        notes.problem("xyz is 0 0 0, and an axis must point somewhere", element.first("axis"))
+    mimic = element.first("mimic")
+    bounds = _bounds(notes, element.first("limit"), kind)
+    return UrdfJoint(
+        name=name, kind=kind, parent=parent, child=child, placement=notes.pose(element.first("origin")),
+        axis=axis / (length or 1.0), position=bounds, velocity=_most(notes, element.first("limit"), "velocity"),
+        effort=_most(notes, element.first("limit"), "effort"),
+        mimic=notes.name(mimic, "joint", "the joint that it mimics") if mimic else "",
+        multiplier=notes.number(mimic, "multiplier", 1.0), bias=notes.number(mimic, "offset", 0.0), line=element.line,
+    )  # fmt: skip
+
+
+def _bounds(notes: Notes, limit: Element | None, kind: str) -> tuple[float, float]:
+    """The range of a joint's position; without one where it turns on and on, or states neither end."""
+    stated = limit is not None and {"lower", "upper"} & limit.attributes.keys()
+    if kind not in ("revolute", "prismatic") or not stated:
+        return -math.inf, math.inf
+    low, high = (notes.number(limit, key, 0.0) for key in ("lower", "upper"))
+    if low >= high:
+        said = f"lower is {low:g} and upper {high:g}: a joint that moves has a lower below its upper"
+        notes.problem(f'{said}; correct them, or write type="fixed" where it does not move', limit)
+    return low if low > -UNLIMITED else -math.inf, high if high < UNLIMITED else math.inf
+
+
+def _most(notes: Notes, limit: Element | None, key: str) -> float:
+    """A limit of velocity or effort; 0 is what many files say where it is not known."""
+    most = notes.number(limit, key, 0.0)
+    if most < 0:
+        notes.problem(f"{key} is {most:g}, and must be 0 or more", limit)
+    return most if 0 < most < UNLIMITED else math.inf

@@ -1,0 +1,6 @@
+"""What runs again, and why: planning a study's tasks, running them, and remembering what each was made from."""
+
+from davinci_forces.report import REPORT
+from davinci_forces.stages import STAGES
+
+STEPS = (*STAGES, REPORT)  # everything that a run does, in order

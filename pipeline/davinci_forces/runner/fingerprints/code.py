@@ -1,0 +1,75 @@
+"""The code that a result depends on: modules with everything of the pipeline that they import, by hash."""
+
+import re
+from collections.abc import Iterable, Iterator
+from functools import cache
+from pathlib import Path
+
+from davinci_forces.records import store
+
+PACKAGE = Path(__file__).parents[2]
+IMPORT = re.compile(r"^[ \t]*from (pipeline[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
+COMMENT = re.compile(r"#.*")
+
+
+@cache
+def code(*modules: str, without: str = "") -> dict[str, str]:
+    """The hash of modules and of everything of the pipeline that they import, directly or not.
+
+    What lies in the package `without` counts only where it is one of the modules.
+    """
+    files: dict[Path, None] = {}
+    for module in modules:
+        _collect(_files(module), files)
+    named = {file for module in modules for file in _files(module)}
+    left_out = PACKAGE.joinpath(*without.split(".")[1:]) if without else None
+    kept = (file for file in sorted(files) if file in named or left_out not in file.parents)
+    return {file.relative_to(PACKAGE.parent).as_posix(): _hash_of(file) for file in kept}
+
+
+def _collect(sources: Iterable[Path], files: dict[Path, None]) -> None:
+    for file in sources:
+        if file not in files:
+            files[file] = None
+            if file.suffix == ".py":
+                for module in _imports(file):
+                    _collect(_files(module), files)
+
+
+@cache
+def _imports(file: Path) -> tuple[str, ...]:
+    modules = []
+    for module, names in imported(file.read_text(encoding="utf-8")):
+        for name in names:
+            deeper = f"{module}.{name}"
+            modules.append(deeper if _files(deeper) else module)
+    return tuple(modules)
+
+
+def imported(source: str) -> Iterator[tuple[str, list[str]]]:
+    """What a module imports from the pipeline: each module, and the names from it.
+
+    Statements are found by how they begin: to parse all of a stage's modules would take longer than many a run.
+    """
+    for module, said in IMPORT.findall(source):
+        names = COMMENT.sub("", said).strip("() \n").split(",")
+        yield module, [name.split()[0] for name in names if name.strip()]
+
+
+@cache
+def _files(module: str) -> list[Path]:
+    """The file of a module; of a package its `__init__`, or all files where that imports its modules by name."""
+    place = PACKAGE.joinpath(*module.split(".")[1:])
+    if place.with_suffix(".py").is_file():
+        return [place.with_suffix(".py")]
+    if place == PACKAGE or not place.is_dir():
+        return []
+    init = place / "__init__.py"
+    if init.is_file() and "import_module" not in init.read_text(encoding="utf-8"):
+        return [init]
+    return sorted(f for f in place.rglob("*") if f.is_file() and "__pycache__" not in f.parts)
+
+
+@cache
+def _hash_of(file: Path) -> str:
+    return store.digest(file)

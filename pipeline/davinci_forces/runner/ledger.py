@@ -1,0 +1,214 @@
+"""What was made from what: one small JSON file per task, next to the records it made, and an index of them all.
+
+A task is current while its fingerprint (inputs by content, settings, robot, records as declared, code, version) and the
+content of its outputs are what its entry says.  Comparing an old entry with a new fingerprint gives the reason to run.
+"""
+
+import json
+import os
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from functools import cached_property
+from glob import glob
+from pathlib import Path
+from typing import Any
+
+from davinci_forces.records import store
+from davinci_forces.runner import index
+from davinci_forces.runner.fingerprints.canonical import hash_of_text
+from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, differences
+
+
+@dataclass(frozen=True)
+class Folders:
+    """The three folders of one study.  In the ledger a file is named `raw/...`, `processed/...` or `reports/...`."""
+
+    raw: Path
+    processed: Path
+    reports: Path
+
+    def file(self, name: str) -> Path:
+        """The file that a name in the ledger stands for."""
+        root, _, path = name.partition("/")
+        return Path(getattr(self, root)) / path
+
+    def inside(self, name: str) -> list[str]:
+        """The files right in the folder that a name stands for, as a bag of ROS 2 is one; any other name is a file."""
+        file = self.file(name)
+        if not file.is_dir():
+            return [name]
+        return sorted(f"{name.rstrip('/')}/{each.name}" for each in file.iterdir() if each.is_file())
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One task as it was last run."""
+
+    stage: str
+    task: str
+    fingerprint: dict[str, Any]
+    outputs: dict[str, str] = field(default_factory=dict)  # file -> sha256
+    failed: str = ""
+
+
+class Ledger:
+    """The entries of one study.  Entries, and the files whose hash is asked for, are read once a run.
+
+    They are read from their index where that holds them all, or `one_by_one`.
+    """
+
+    def __init__(self, folders: Folders, one_by_one: bool = False) -> None:
+        self.folders = folders
+        self._digests: dict[str, str] = {}
+        self.changes: list[tuple[Iterable[str], Iterable[str]]] = []  # files that went and came, one pair an entry
+        self.home = folders.processed / "tasks"
+        self._one_by_one, self._indexed = one_by_one, False
+
+    def place(self, stage: str, task: str) -> Path:
+        """Where the entry of a task is."""
+        return self.home / stage / f"{file_name(task)}.json"
+
+    @cached_property
+    def _entries(self) -> dict[str, dict[str, Entry]]:
+        indexed = {} if self._one_by_one else index.read(self.home, list(self._files()))
+        self._indexed = bool(indexed)
+        if not indexed:
+            return self._read_one_by_one()
+        return {stage: {name: Entry(**e) for name, e in named.items()} for stage, named in indexed.items()}
+
+    def _read_one_by_one(self) -> dict[str, dict[str, Entry]]:
+        entries: dict[str, dict[str, Entry]] = {}
+        shared: dict[tuple[tuple[str, str], ...], dict[str, str]] = {}
+        for stage, name, file in self._files():
+            entry = _read(file)
+            if entry:
+                # The code of a stage is the same for all its tasks, and most of what an entry holds.
+                code = entry.fingerprint.get("code", {})
+                entry.fingerprint["code"] = shared.setdefault(tuple(code.items()), code)
+                entries.setdefault(stage, {})[name] = entry
+        return entries
+
+    def _files(self) -> Iterator[tuple[str, str, str]]:
+        """Stage, task and file of every entry; as text, since paths would take as long as hashing what was made."""
+        for name in sorted(glob("*/*.json", root_dir=self.home)):
+            yield os.path.dirname(name), os.path.basename(name).removesuffix(".json"), f"{self.home}{os.sep}{name}"
+
+    def entry(self, stage: str, task: str) -> Entry | None:
+        """The entry of a task, or None when it has not run or its entry cannot be read."""
+        return self._entries.get(stage, {}).get(file_name(task))
+
+    def read(self, stage: str, task: str) -> Entry | None:
+        """The same, of one file alone: what another study has made is asked of one task."""
+        return _read(str(self.place(stage, task)))
+
+    def entries(self, stage: str | None = None) -> Iterator[Entry]:
+        """Every entry, or every one of a stage, in order."""
+        for name in sorted(self._entries) if stage is None else [stage]:
+            entries = self._entries.get(name, {})
+            yield from (entries[task] for task in sorted(entries))
+
+    def write(self, entry: Entry) -> None:
+        """Record what a task made."""
+        before = self.entry(entry.stage, entry.task)
+        self._forget_index()
+        store.write_bytes(self.place(entry.stage, entry.task), sealed(entry).encode())
+        self._entries.setdefault(entry.stage, {})[file_name(entry.task)] = entry
+        self.changes.append((before.outputs if before else (), entry.outputs))
+
+    def broken(self) -> Iterator[Path]:
+        """Entries that are not as they were written; other files there are no concern of ours."""
+        for stage, name, file in self._files():
+            if self.entry(stage, name) is None and os.path.isfile(file):
+                yield Path(file)
+
+    def remove(self, entry: Entry) -> None:
+        """Forget a task, and remove what it made, with the folders that this leaves empty."""
+        self._forget_index()
+        self._entries.get(entry.stage, {}).pop(file_name(entry.task), None)
+        self.changes.append((entry.outputs, ()))
+        for file in (*map(self.folders.file, entry.outputs), self.place(entry.stage, entry.task)):
+            file.unlink(missing_ok=True)
+            with suppress(OSError):  # a folder that holds more stays
+                file.parent.rmdir()
+                file.parent.parent.rmdir()
+
+    def write_index(self) -> None:
+        """Put the index of all entries in place, unless it is."""
+        if self._entries and not self._indexed:
+            store.write_bytes(self.home / index.NAME, self.index())
+            self._indexed = True
+
+    def index(self) -> bytes:
+        """The content that the index of the entries has."""
+        return index.written({s: {n: vars(e) for n, e in named.items()} for s, named in self._entries.items()})
+
+    def _forget_index(self) -> None:
+        """Remove the index, which is about to say less than the entries do."""
+        if self._indexed or not self.changes:
+            self.home.joinpath(index.NAME).unlink(missing_ok=True)
+            self._indexed = False
+
+    def made(self, outputs: Mapping[str, str]) -> None:
+        """Take the hashes of files as whoever wrote them says."""
+        self._digests.update(outputs)
+
+    def digest(self, name: str, fresh: bool = False) -> str:
+        """The hash of a file, read once a run; "" when it is not there."""
+        if fresh or name not in self._digests:
+            root, _, path = name.partition("/")
+            file = f"{getattr(self.folders, root)}{os.sep}{path}"
+            self._digests[name] = _digest(file)
+        return self._digests[name]
+
+    def reasons(self, entry: Entry | None, now: Fingerprint) -> list[str]:
+        """Why a task has to run; nothing when it is current."""
+        if entry is None:
+            return ["it has not run yet"]
+        if entry.failed:
+            return ["it failed last time"]
+        altered = [f"{name} was altered" for name, sha in entry.outputs.items() if self.digest(name) != sha]
+        return altered + differences(entry.fingerprint, now)
+
+
+LONGEST = 200  # bytes of a file's name, which with all endings may have 255
+
+
+def file_name(task: str) -> str:
+    """The name of a task as that of a file; one that is too long ends in its hash."""
+    name = task.replace("/", ".")
+    if len(name.encode()) <= LONGEST:
+        return name
+    return f"{name.encode()[: LONGEST - 17].decode(errors='ignore')}~{hash_of_text(name)[:16]}"
+
+
+SEAL = ',\n "seal": "{}"\n}}\n'  # what an entry ends with
+
+
+def sealed(entry: Entry) -> str:
+    """An entry as it is written, with a hash of its own text at the end, so that a change of it is noticed, too."""
+    text = json.dumps(vars(entry), indent=1, ensure_ascii=False, sort_keys=True)
+    return text.removesuffix("\n}") + SEAL.format(hash_of_text(text))
+
+
+def unsealed(text: str) -> Entry | None:
+    """An entry as it was written, or None where that is not so."""
+    content = text[: -len(SEAL.format("0" * 64))] + "\n}"
+    return Entry(**json.loads(content)) if text.endswith(SEAL.format(hash_of_text(content))) else None
+
+
+def _read(file: str) -> Entry | None:
+    try:
+        with open(file, "rb") as stream:
+            return unsealed(stream.read().decode())
+    except (OSError, ValueError, TypeError):
+        return None
+
+
+def _digest(file: str) -> str:
+    try:
+        return store.digest(file)
+    except OSError:  # it is asked afterwards what is wrong, as nearly every file is there
+        if os.path.isfile(file):
+            raise
+        return ""

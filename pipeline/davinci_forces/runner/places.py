@@ -1,0 +1,93 @@
+"""Where the records of a study are: an index of their files by kind, and by the log and joint that they are about."""
+
+from collections.abc import Iterable, Iterator
+
+from davinci_forces.records import KINDS, Record
+from davinci_forces.runner.ledger import Entry
+from davinci_forces.runner.signature import Kinds
+from davinci_forces.study import Study
+
+Located = tuple[str, str]  # kind of record, file below the processed folder: a Path costs ten times what a name does
+ANY = ""  # log or joint
+ORDER = {kind: i for i, kind in enumerate(KINDS.values())}
+
+
+class Places:
+    """The files that stages made, in the order of the study's logs and the robot's joints."""
+
+    def __init__(self, study: Study, entries: Iterable[Entry]) -> None:
+        self._logs = {entry.name: i for i, entry in enumerate(study.logs)}
+        self._joints = {joint.name: i for i, joint in enumerate(study.robot.joints)}
+        self._kinds = {kind.folder(): kind for kind in KINDS.values()}
+        self._names: dict[str, dict[str, dict[str, str]]] = {}  # by folder and log, with the joint
+        self._all: dict[str, dict[str, list[Located]]] = {}  # by kind and joint, what is about every log, in order
+        for entry in entries:
+            self.add(entry.outputs)
+
+    def add(self, outputs: Iterable[str]) -> None:
+        """Know of files that a task made."""
+        for kind, path, log, joint in self._about(outputs):
+            self._names.setdefault(kind.folder(), {}).setdefault(log, {})[path] = joint
+
+    def remove(self, outputs: Iterable[str]) -> None:
+        """Know no more of files that a task made."""
+        for kind, path, log, _ in self._about(outputs):
+            self._names.get(kind.folder(), {}).get(log, {}).pop(path, None)
+
+    def _about(self, outputs: Iterable[str]) -> Iterator[tuple[type[Record], str, str, str]]:
+        """The records among a task's files that are about a log of the study, or about none.
+
+        What is kept of their kinds in order is no more.
+        """
+        for name in outputs:
+            root, _, path = name.partition("/")
+            kind = self._kinds.get(path.partition("/")[0]) if root == "processed" else None
+            if kind:
+                log, joint = about(kind, path)
+                if log == ANY or log in self._logs:
+                    self._all.pop(kind.__name__, None)
+                    yield kind, path, log, joint
+
+    def of(self, kinds: Kinds, log: str = ANY, joint: str = ANY) -> tuple[Located, ...]:
+        """Files of these kinds about a log and a joint; a kind that is about no log or joint is about every one."""
+        located: tuple[Located, ...] = ()
+        for kind in sorted(kinds, key=ORDER.__getitem__) if len(kinds) > 1 else kinds:
+            of_joint = joint if is_about_joint(kind) else ANY
+            located += tuple(
+                self._sorted(kind, [log], of_joint) if log and is_about_log(kind) else self._of_all(kind, of_joint)
+            )
+        return located
+
+    def _of_all(self, kind: type[Record], joint: str) -> list[Located]:
+        """The files of a kind about a joint, of every log; many calls ask for them."""
+        by_joint = self._all.setdefault(kind.__name__, {})
+        if joint not in by_joint:
+            by_joint[joint] = self._sorted(kind, list(self._names.get(kind.folder(), ())), joint)
+        return by_joint[joint]
+
+    def _sorted(self, kind: type[Record], logs: Iterable[str], joint: str) -> list[Located]:
+        by_log = self._names.get(kind.folder(), {})
+        ranked = sorted(
+            (self._logs.get(log, -1), self._joints.get(of, len(self._joints)), path)
+            for log in logs
+            for path, of in by_log.get(log, {}).items()
+            if joint in (ANY, of)
+        )
+        return [(kind.__name__, path) for *_, path in ranked]
+
+
+def about(kind: type[Record], name: str) -> tuple[str, str]:
+    """The log and the joint that a file is about: `track/<log>/<joint>.parquet`; "" where it is about none."""
+    first, *others = name.removesuffix(".parquet").split("/")[1:]
+    key = dict(zip(kind.KEY, (first, *(part for other in others for part in other.split("."))), strict=False))
+    return key.get("log", ANY), key.get("joint", key.get("group", ANY))
+
+
+def is_about_log(kind: type[Record]) -> bool:
+    """Whether every record of a kind is about one log."""
+    return "log" in kind.KEY
+
+
+def is_about_joint(kind: type[Record]) -> bool:
+    """Whether every record of a kind is about one joint, or about the joint that a model is of."""
+    return "joint" in kind.KEY or "group" in kind.KEY

@@ -1,0 +1,139 @@
+"""Which calls of a stage a study and its records give, and everything that each of them depends on."""
+
+import importlib.metadata
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from typing import Any
+
+from davinci_forces.records import KINDS
+from davinci_forces.robots.robot import Kind
+from davinci_forces.runner.fingerprints.canonical import hash_of
+from davinci_forces.runner.fingerprints.code import code
+from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
+from davinci_forces.runner.fingerprints.schemas import schemas
+from davinci_forces.runner.ledger import Ledger
+from davinci_forces.runner.places import Located, Places, about, is_about_log
+from davinci_forces.runner.signature import Declaration
+from davinci_forces.study import Study
+
+VERSION = importlib.metadata.version("davinci-forces")
+
+
+@dataclass(frozen=True)
+class Task:
+    """One call of a stage: where its records are, what else it is handed, and all that its outputs depend on."""
+
+    stage: str
+    name: str  # "slide-1/hand_roll"
+    fingerprint: Fingerprint
+    records: dict[str, tuple[Located, ...]] = field(default_factory=dict)  # by parameter
+    given: dict[str, Any] = field(default_factory=dict)  # by parameter; for a log, its entry
+    settings: dict[str, Any] = field(default_factory=dict)
+    joints: dict[str, tuple[Kind, str]] = field(default_factory=dict)  # whose units its records are in
+
+
+class Plan:
+    """What there is to do on one study, as its records stand."""
+
+    def __init__(self, study: Study, ledger: Ledger) -> None:
+        self.study, self.ledger = study, ledger
+        self._entries = {entry.name: entry for entry in study.logs}
+        self._joints = {joint.name: (joint.kind, joint.effort) for joint in study.robot.joints}
+        self._hashes: dict[tuple[str, str], str] = {}
+        self._places = Places(study, ledger.entries())
+        self._seen = len(ledger.changes)
+
+    def places(self) -> Places:
+        """Where the records are that there are now."""
+        for gone, come in self.ledger.changes[self._seen :]:
+            self._places.remove(gone)
+            self._places.add(come)
+        self._seen = len(self.ledger.changes)
+        return self._places
+
+    def tasks(self, asks: Declaration, log: str = "") -> Iterator[Task]:
+        """Every call of a stage that the study and the records that are there give, or those about one log."""
+        if "weighings" in asks.given.values() and not self.study.weighings.each:
+            return
+        places = self.places()
+        logs = (log,) if log else tuple(self._entries)
+        if asks.each:
+            yield from self._each_record(asks, places, log)
+        elif asks.per_log:
+            yield from self._each_log(asks, places, logs)
+        elif "log" in asks.given.values():
+            yield from (self._task(asks, name, {}, name) for name in logs)
+        else:
+            records = {p: places.of(kinds) for p, kinds in asks.every.items()}
+            if any(records.values()) or not asks.reads:
+                yield self._task(asks, asks.name, records)
+
+    def _each_record(self, asks: Declaration, places: Places, of_log: str) -> Iterator[Task]:
+        [(parameter, kinds)] = asks.each.items()
+        for kind, place in places.of(kinds, of_log):
+            log, joint = about(KINDS[kind], place)
+            others = {p: places.of(k, log, joint) for p, k in (asks.optional | asks.every).items()}
+            name = _task_name(kind, place, len(kinds))
+            yield self._task(asks, name, {parameter: ((kind, place),), **others}, log, joint)
+
+    def _each_log(self, asks: Declaration, places: Places, logs: Iterable[str]) -> Iterator[Task]:
+        for log in logs:
+            own = {p: places.of(kinds, log) for p, kinds in asks.per_log.items()}
+            if any(own.values()):
+                others = {p: places.of(kinds, log) for p, kinds in asks.every.items()}
+                yield self._task(asks, log, {**own, **others}, log)
+
+    def _task(
+        self, asks: Declaration, name: str, records: dict[str, tuple[Located, ...]], log: str = "", joint: str = ""
+    ) -> Task:
+        given = {p: self._given(what, log, joint) for p, what in asks.given.items()}
+        settings = {name: getattr(self.study.settings, name) for name in asks.settings}
+        inputs = {f"processed/{place}" for located in records.values() for _, place in located}
+        if "log" in asks.given.values():
+            inputs |= {name for file in self._entries[log].files for name in self.ledger.folders.inside(f"raw/{file}")}
+        hashes = {
+            what: self._hash(what, {"entry": log, "joint": joint}.get(what, ""), given[p])
+            for p, what in asks.given.items()
+            if what != "log"
+        }
+        digests = {name: self.ledger.digest(name) for name in sorted(inputs)}
+        fingerprint = Fingerprint(digests, hashes, settings, schemas(asks.name), code_of(asks), VERSION)
+        return Task(asks.name, name, fingerprint, records, given, settings, self._joints)
+
+    def _given(self, what: str, log: str, joint: str) -> Any:
+        """What a task is handed besides records; of a log, what says how to open it."""
+        if what in ("log", "entry"):
+            return self._entries[log]
+        if what in ("weighings", "haptics"):
+            return getattr(self.study, what)
+        return self.study.robot.joint(joint) if what == "joint" else self.study.robot
+
+    def _hash(self, what: str, name: str, value: Any) -> str:
+        """The hash of what many tasks are handed, worked out once."""
+        if (what, name) not in self._hashes:
+            self._hashes[what, name] = hash_of(value)
+        return self._hashes[what, name]
+
+
+# What makes, checks and stores every record; the others of its folder declare records, and count as `schemas`.
+RECORDS = tuple(f"davinci_forces.records.{name}" for name in ("diagnostic", "record", "store"))
+
+
+def code_of(asks: Declaration) -> dict[str, str]:
+    """The code that is at work in a stage, by hash."""
+    opens = ("davinci_forces.logs",) if "log" in asks.given.values() else ()  # imported by none
+    return code(f"davinci_forces.stages.{asks.name}", *RECORDS, *opens, without="davinci_forces.records")
+
+
+def log_of(asks: Declaration, task: str) -> str:
+    """The log that a call of a stage is about, told by its name; "" for one that is about no single log."""
+    if asks.each:
+        [kinds] = asks.each.values()
+        names = task.split("/")[len(kinds) > 1 :]
+        return names[0] if all(map(is_about_log, kinds)) else ""
+    return task if asks.per_log or "log" in asks.given.values() else ""
+
+
+def _task_name(kind: str, place: str, kinds: int) -> str:
+    name = place.removesuffix(".parquet").partition("/")[2]
+    return f"{KINDS[kind].folder()}/{name}" if kinds > 1 else name

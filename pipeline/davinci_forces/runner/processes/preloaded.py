@@ -1,0 +1,12 @@
+"""What a worker has imported before it is handed a task; importing this is what it takes."""
+
+from davinci_forces.logs.isolated import orphans
+
+orphans.end_with_parent()  # before the seconds of importing
+
+from davinci_forces.runner import execution  # noqa: E402
+from davinci_forces.runner.processes import workers  # noqa: E402
+
+__all__ = ["execution"]
+
+workers.import_stages()

@@ -1,0 +1,112 @@
+"""The last reader of a run: the report, of every record that there is."""
+
+import hashlib
+import importlib.metadata
+from dataclasses import asdict, replace
+from pathlib import Path
+from time import perf_counter
+
+from davinci_forces.records import KINDS, Record, store
+from davinci_forces.records.catalogue import Catalogue, Provenance
+from davinci_forces.report import REPORT
+from davinci_forces.runner.execution import Outcome, said_of, without_folders
+from davinci_forces.runner.fingerprints.canonical import hash_of
+from davinci_forces.runner.fingerprints.code import code
+from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
+from davinci_forces.runner.ledger import Ledger
+from davinci_forces.runner.places import Located
+from davinci_forces.runner.plan import VERSION, Plan, Task
+from davinci_forces.runner.processes import arithmetic
+from davinci_forces.runner.results import stated
+from davinci_forces.study import Study, review
+from davinci_forces.study.review import Rating
+
+KEPT = 1 << 16  # rows of a record at most, to be held while the report is made
+PACKAGES = ("numpy", "scipy", "pandas", "pyarrow", "statsmodels", "numba", "matplotlib", "typst", "npTDMS")
+
+
+def task(plan: Plan) -> Task:
+    """What there is to report on one study, and all that the report depends on."""
+    study, ledger = plan.study, plan.ledger
+    located = plan.places().of(tuple(KINDS.values()))
+    inputs = [f"processed/{place}" for _, place in located] + [f"raw/{file}" for file in study_files(study)]
+    fingerprint = Fingerprint(
+        inputs={name: ledger.digest(name) for name in sorted(inputs)},
+        given={"study": hash_of(replace(study, folder=Path(study.name))), **review_given(study)},
+        settings=asdict(study.settings),
+        schemas={},
+        code=code("davinci_forces.report.report", "davinci_forces.records.store"),
+        version=VERSION,
+    )
+    return Task(REPORT, REPORT, fingerprint, {"records": located}, {"study": study})
+
+
+def perform(ledger: Ledger, task: Task) -> Outcome:
+    """Write the report; what went wrong is its outcome."""
+    start = perf_counter()
+    try:
+        files = written(ledger, task)
+        for name, content in files.items():
+            store.write_bytes(ledger.folders.reports / name, content)
+        made = {f"reports/{name}": hashlib.sha256(content).hexdigest() for name, content in files.items()}
+        return Outcome(task, made, seconds=perf_counter() - start)
+    except Exception as error:
+        said = said_of(error)
+        return Outcome(task, {}, without_folders(said, ledger.folders), (f"error: {said}",))
+
+
+def written(ledger: Ledger, task: Task) -> dict[str, bytes]:
+    """The files of the report, by name.
+
+    Raises
+    ------
+    BadRecord
+        If a record cannot be read.
+    """
+    from davinci_forces.report.report import write  # what it draws with takes longer to import than most runs take
+
+    study, located = task.given["study"], task.records["records"]
+    baseline = stated.read(study.folder / study.baseline) if study.baseline else None
+    return write(catalogue(ledger, located), study, provenance(study, ledger, located), baseline, ratings(study))
+
+
+def ratings(study: Study) -> tuple[Rating, ...]:
+    """What reviewers said of the study's report, where its folder holds that."""
+    file = study.folder / review.FILE
+    return review.read(file) if file.is_file() else ()
+
+
+def review_given(study: Study) -> dict[str, str]:
+    """What a page depends on besides what its ID is made of: a review is shown, and no input."""
+    file = study.folder / review.FILE
+    return {"review": store.digest(file)} if file.is_file() else {}
+
+
+def catalogue(ledger: Ledger, located: tuple[Located, ...]) -> Catalogue:
+    """The records at these places, each read when it is asked for."""
+
+    def read(kind: type[Record]) -> list[Record]:
+        places = [place for name, place in located if name == kind.__name__]
+        digests = [ledger.digest(f"processed/{place}") for place in places]
+        processed = ledger.folders.processed
+        return [store.read(kind, processed, Path(place), sha, KEPT) for place, sha in zip(places, digests, strict=True)]
+
+    return Catalogue(read)
+
+
+def provenance(study: Study, ledger: Ledger, located: tuple[Located, ...]) -> Provenance:
+    """Versions, every file with its hash, and what failed."""
+    named = (*study_files(study), *(file for entry in study.logs for file in entry.files))
+    files = [name.removeprefix("raw/") for file in named for name in ledger.folders.inside(f"raw/{file}")]
+    raw = {f"raw/{study.name}/{file}": ledger.digest(f"raw/{file}") for file in files}
+    processed = {place: ledger.digest(f"processed/{place}") for _, place in located}
+    failures = {f"{e.stage} {e.task}": e.failed for e in ledger.entries() if e.failed and e.stage != REPORT}
+    versions = {p: importlib.metadata.version(p) for p in PACKAGES} | {"arithmetic": arithmetic.described()}
+    text = (study.folder / "study.toml").read_text(encoding="utf-8", errors="replace")
+    return Provenance(study.name, VERSION, versions, raw, processed, failures, text)
+
+
+def study_files(study: Study) -> tuple[str, ...]:
+    """The files of a study besides its logs."""
+    names = ("study.toml", study.robot_file, "truth.toml" if study.truth else "", study.baseline)
+    return tuple(name for name in names if name)

@@ -1,0 +1,91 @@
+"""The reports of many studies, as a campaign shows them, and where its page goes."""
+
+import json
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+from davinci_forces.errors import BadRequest, MissingRecord
+from davinci_forces.records import store
+from davinci_forces.report.campaign.page import page
+from davinci_forces.report.campaign.studies import FLOORS, Campaigned, JointVerdict, joints_of, series_of
+from davinci_forces.report.verdicts import WORDS
+from davinci_forces.runner import runs
+from davinci_forces.runner.results import stated
+from davinci_forces.runner.results.drifting import findings
+
+
+def write(studies: Sequence[Path], reports: Path | None, out: Path | None) -> tuple[list[Path], list[str]]:
+    """Write the page of these studies; its files, and the studies that have no results and are left out.
+
+    Raises
+    ------
+    BadRequest
+        If no study has results, two have one name, or what one has cannot be read.
+    """
+    folders = [runs.folders(study, None, reports).reports for study in studies]
+    there = [folder for folder in folders if (folder / "results.json").is_file()]
+    left_out = [str(s) for s, folder in zip(studies, folders, strict=True) if folder not in there]
+    if not there:
+        names = ", ".join(left_out) or "none was named"
+        raise MissingRecord(f"no study has results ({names}); run `davinci-forces all` on them first")
+    if len({folder.name for folder in there}) < len(there):
+        raise BadRequest(f"two studies are called alike: {', '.join(map(str, there))}; a campaign tells them by name")
+    place = out or there[0].parent
+    every = [campaigned(folder, place) for folder in there]
+    by_date = all(study.when is not None for study in every)
+    ordered = sorted(every, key=lambda study: study.started) if by_date else every
+    series = [one for joint in joints_of(ordered) for one in series_of(ordered, joint)]
+    files = page(ordered, left_out, findings(series, ordered, by_date))
+    for name, content in files.items():
+        store.write_bytes(place / name, content)
+    return [place / name for name in files], left_out
+
+
+def campaigned(folder: Path, place: Path) -> Campaigned:
+    """One study, by the files of its report; `place` is the folder of the page that leads there."""
+    numbers, about = stated.read(folder / "results.json"), digest(folder / "summary.json")
+    joints = {
+        str(joint["joint"]): JointVerdict(
+            joint["verdict"],
+            bool(joint["same_path"]),
+            {n: joint[n] for n in FLOORS},
+        )
+        for joint in about["joints"]
+    }
+    return Campaigned(
+        folder.name, leads_to(folder / "report.html", place), about["robot"], bool(about["simulated"]),
+        about["started"], joints, numbers,
+    )  # fmt: skip
+
+
+def leads_to(file: Path, place: Path) -> str:
+    """The address of a file from a page in a folder."""
+    try:
+        return quote(Path(os.path.relpath(file.resolve(), place.resolve())).as_posix())
+    except ValueError:  # on another drive of Windows
+        return quote(file.resolve().as_posix())
+
+
+def digest(file: Path) -> dict[str, Any]:
+    """The content of a summary.json.
+
+    Raises
+    ------
+    BadRequest
+        If it is not there or not as a report wrote it.
+    """
+    again = "`davinci-forces report` makes it anew"
+    try:
+        content = json.loads(file.read_text(encoding="utf-8"))
+        texts = [content[name] for name in ("title", "robot", "started")]
+        odd = [joint["joint"] for joint in content["joints"] if joint["verdict"] not in WORDS]
+        if odd or not all(isinstance(text, str) for text in texts):
+            raise ValueError(f"verdicts of {odd}" if odd else "a text is none")
+    except FileNotFoundError:
+        raise MissingRecord(f"{file} is not there, as an earlier version made that report; {again}") from None
+    except (OSError, ValueError, TypeError, LookupError) as error:
+        raise BadRequest(f"{file} is not as the report wrote it ({error!r}); {again}") from None
+    return dict(content)

@@ -1,0 +1,72 @@
+"""Records and results as pandas DataFrames, for people who go on from where the pipeline ends."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+
+from davinci_forces.errors import BadRequest, MissingRecord
+from davinci_forces.records import KINDS, Record, store
+from davinci_forces.runner.ledger import Ledger
+from davinci_forces.runner.runs import folders
+
+
+def read(study: Path, kind: str, about: dict[str, str]) -> pd.DataFrame:
+    """All records of a kind, one below the other; see `davinci_forces.read`."""
+    if kind not in KINDS:
+        raise BadRequest(f"there is no record {kind!r}; there are {', '.join(KINDS)}")
+    unknown = set(about) - set(KINDS[kind].scalars())
+    if unknown:
+        raise BadRequest(f"{kind} has no {', '.join(sorted(unknown))}; it has {', '.join(KINDS[kind].scalars())}")
+    study_folders = folders(study, None, None)
+    outputs = sorted({name for entry in Ledger(study_folders).entries() for name in entry.outputs})
+    folder = f"processed/{KINDS[kind].folder()}/"
+    files = [Path(name).relative_to("processed") for name in outputs if name.startswith(folder)]
+    records = [store.read(KINDS[kind], study_folders.processed, file) for file in files]
+    records = [r for r in records if all(str(getattr(r, k)) == v for k, v in about.items())]
+    if not records:
+        raise MissingRecord(
+            f"{study} has no {kind} records{f' with {about}' if about else ''}; run `davinci-forces all {study}`"
+        )
+    frame = pd.concat([as_frame(record) for record in records], ignore_index=True)
+    for name in KINDS[kind].KEY:
+        frame[name] = frame[name].astype("category")
+    frame.attrs["units"] = units(records)
+    return frame
+
+
+def results(study: Path) -> pd.DataFrame:
+    """Every number of a study's results.json; see `davinci_forces.results`."""
+    file = folders(study, None, None).reports / "results.json"
+    names = ["key", "value", "std", "unit", "source"]
+    try:
+        rows = [[result[name] for name in names] for result in json.loads(file.read_text(encoding="utf-8"))]
+    except FileNotFoundError:
+        raise MissingRecord(f"{file} is not there; run `davinci-forces all {study}`") from None
+    except (ValueError, TypeError, LookupError) as error:
+        again = f"`davinci-forces report {study}` makes it anew"
+        raise MissingRecord(f"{file} is not as the report wrote it ({error!r}); {again}") from None
+    frame = pd.DataFrame(rows, columns=names).set_index("key")
+    return frame.astype({"value": float, "std": float})
+
+
+def as_frame(record: Record) -> pd.DataFrame:
+    """One record, its key and single scalars repeated on every row."""
+    scalars = {name: getattr(record, name) for name in record.scalars()}
+    repeated = {name: value for name, value in scalars.items() if not isinstance(value, tuple)}
+    columns = {name: getattr(record, name) for name in record.columns()}
+    rows = len(record) if columns else 1
+    return pd.DataFrame({**{k: [v] * rows for k, v in repeated.items()}, **columns})
+
+
+def units(records: list[Any]) -> dict[str, str | dict[str, str]]:
+    """The unit of each field; by joint where joints differ."""
+    units_by_joint: dict[str, dict[str, str]] = {}
+    for record in records:
+        for name, unit in record.origin.units.items():
+            units_by_joint.setdefault(name, {})[getattr(record, "joint", getattr(record, "group", ""))] = unit
+    return {
+        name: by_joint if len(set(by_joint.values())) > 1 else next(iter(by_joint.values()))
+        for name, by_joint in units_by_joint.items()
+    }

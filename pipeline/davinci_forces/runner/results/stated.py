@@ -1,0 +1,51 @@
+"""What a results.json states, of whichever study and version it is: the numbers in it by key."""
+
+import json
+import math
+from pathlib import Path
+from typing import Any
+
+from davinci_forces.errors import BadRequest
+from davinci_forces.report.changes import Stated, Value
+
+
+def read(file: Path) -> dict[str, Stated]:
+    """Every number of a results.json by its key, in the file's order.
+
+    Raises
+    ------
+    BadRequest
+        If the file cannot be read, or is not a results.json; the first number that is wrong is named.
+    """
+    try:
+        rows = json.loads(file.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BadRequest(f"{file}: {error.strerror}") from None
+    except (ValueError, RecursionError) as error:
+        raise BadRequest(f"{file} is no results.json: {error}") from None
+    if not isinstance(rows, list):
+        raise BadRequest(f"{file} is no results.json: it holds no list of numbers")
+    numbers: dict[str, Stated] = {}
+    for i, row in enumerate(rows, 1):
+        key, problem = _problem(row)
+        if key in numbers:
+            problem = "the key is there twice"
+        if problem:
+            raise BadRequest(f"{file}: number {i}{f' ({key})' if key else ''}: {problem}")
+        std = row.get("std")
+        known = std is not None and not math.isnan(std)
+        numbers[key] = Stated(row["value"], float(std) if known else None, row.get("unit") or "")
+    return numbers
+
+
+def _problem(row: Any) -> tuple[str, str]:
+    """The key of a number, and what is wrong with it, or ""."""
+    if not isinstance(row, dict) or not isinstance(row.get("key"), str):
+        return "", 'it is not {"key": ..., "value": ..., "std": ...}'
+    key: str = row["key"]
+    if "value" not in row or not isinstance(row["value"], Value):
+        return key, f"its value is {row.get('value')!r}, not a number"
+    std, unit = row.get("std"), row.get("unit", "")
+    if std is not None and (isinstance(std, bool) or not isinstance(std, int | float) or std < 0):
+        return key, f"its std is {std!r}, neither null nor a number from 0 on"
+    return key, "" if unit is None or isinstance(unit, str) else f"its unit is {unit!r}, not text"

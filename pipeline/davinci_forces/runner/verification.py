@@ -1,0 +1,174 @@
+"""Whether a study's files and numbers are those of a run on its logs, and its report the one that they give."""
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from davinci_forces.errors import NotReproduced, PipelineError
+from davinci_forces.report import REPORT
+from davinci_forces.report.identity import MANIFEST, identity
+from davinci_forces.runner import STEPS, index, reporting
+from davinci_forces.runner.ledger import Folders, Ledger, file_name
+from davinci_forces.runner.plan import Plan, Task
+from davinci_forces.runner.signature import declaration
+from davinci_forces.study import Study
+
+MOST = 5  # files or tasks that are named of many that differ alike
+
+
+@dataclass(frozen=True)
+class Verified:
+    """How much was compared, and what the report is called."""
+
+    raw: int
+    processed: int
+    reports: int
+    numbers: int
+    identity: str
+
+
+def verify(study: Study, folders: Folders, wanted: str = "") -> Verified:
+    """Hash every file that a run reads and makes, compare what was run with what there is to run, and make the report
+    anew; `wanted` is the report ID that it has to have, "" for any.
+
+    Raises
+    ------
+    NotReproduced
+        With everything that is not what it was, or what it would be, one a line.
+    """
+    ledger = Ledger(folders, one_by_one=True)
+    recorded = known_files(ledger)
+    problems = [f"{file} was altered: it is not as a stage wrote it" for file in ledger.broken()]
+    if not recorded and not problems:
+        raise NotReproduced(f"{folders.processed} holds no results; run `davinci-forces all {folders.raw}` first")
+    problems += [*altered_index(ledger), *altered_files(folders, ledger, recorded), *unknown_files(folders, recorded)]
+    plan = Plan(study, ledger)
+    report = reporting.task(plan)
+    problems += differences_from_plan(plan, report)
+    made, numbers = {}, 0
+    try:
+        made = reporting.written(ledger, report)
+        numbers = len(json.loads(made["results.json"]))
+    except PipelineError as error:
+        problems.append(f"the report cannot be made anew: {error}")
+    problems += [problem for name, content in made.items() for problem in altered_page(folders, name, content)]
+    is_called = identity(made[MANIFEST]) if made else ""
+    if wanted and is_called != wanted:
+        problems.append(
+            f"the report ID of these files is {is_called or 'unknown'}, not {wanted}: they are of another report"
+        )
+    if problems:
+        raise NotReproduced("\n".join(problems))
+    count = Counter(name.partition("/")[0] for name in recorded if ledger.digest(name))
+    return Verified(count["raw"], count["processed"], count["reports"], numbers, is_called)
+
+
+def known_files(ledger: Ledger) -> dict[str, dict[str, str]]:
+    """Every file that a task read or made, by the hashes that it had, each with the task that knew it so."""
+    recorded: dict[str, dict[str, str]] = {}
+    for entry in ledger.entries():
+        for name, sha in (*entry.fingerprint["inputs"].items(), *entry.outputs.items()):
+            recorded.setdefault(name, {}).setdefault(sha, f"{entry.stage} {entry.task}")
+    return recorded
+
+
+def altered_index(ledger: Ledger) -> Iterator[str]:
+    """Whether the index, where there is one, says what the entries do."""
+    file = ledger.home / index.NAME
+    if file.is_file() and file.read_bytes() != ledger.index():
+        yield f"{file} is not what the entries beside it say; remove it, it is made anew by the next run"
+
+
+def altered_files(folders: Folders, ledger: Ledger, recorded: dict[str, dict[str, str]]) -> Iterator[str]:
+    """Files whose content is not what was hashed when they were read or made, by each task that did."""
+    for name, hashes in sorted(recorded.items()):
+        file, now = folders.file(name), ledger.digest(name)
+        if not now and any(hashes):
+            yield f"{file} is gone"
+            continue
+        for was, task in hashes.items():
+            if now == was:
+                continue
+            if not was:
+                yield f"{file} is there now, and was not for {task}"
+            else:
+                yield f"{file} was altered: its SHA-256 is {now[:16]}..., and was {was[:16]}... for {task}"
+
+
+def unknown_files(folders: Folders, recorded: Iterable[str]) -> Iterator[str]:
+    """Files among the results that no stage made, but for those that begin with a dot, as systems leave them."""
+    known = set(recorded)
+    for root, folder in (("processed", folders.processed), ("reports", folders.reports)):
+        for file in sorted(folder.rglob("*")):
+            place = file.relative_to(folder)
+            ours = f"{root}/{place.as_posix()}" in known or place.parts[0] == "tasks"
+            if not ours and not file.name.startswith(".") and not file.is_dir():
+                yield f"{file} was made by no stage of this study"
+
+
+def differences_from_plan(plan: Plan, report: Task) -> Iterator[str]:
+    """What a run would do again, and entries in the ledger of what it would not do."""
+    ledger = plan.ledger
+    for name in sorted({entry.stage for entry in ledger.entries()} - {*STEPS}):
+        yield f"{ledger.folders.processed / 'tasks' / name} holds entries of {name}, and there is no such stage"
+    for name in STEPS:
+        tasks = [report] if name == REPORT else list(plan.tasks(declaration(name)))
+        planned = {file_name(task.name) for task in tasks}
+        extra = [entry.task for entry in ledger.entries(name) if file_name(entry.task) not in planned]
+        if extra:
+            yield f"{name}: the ledger has entries of what this study has no call for: {_some(extra)}"
+        yield from stale(ledger, name, tasks)
+
+
+def stale(ledger: Ledger, name: str, tasks: Iterable[Task]) -> Iterator[str]:
+    """Tasks that did not run as they would now; files that were altered are said of the files."""
+    by_reason: dict[str, list[str]] = {}
+    for task in tasks:
+        entry = ledger.entry(name, task.name)
+        if entry is None:
+            by_reason.setdefault("it is not in the ledger, so it has not run, or its entry was removed", []).append(
+                task.name
+            )
+        elif not entry.failed:
+            changed = (r for r in ledger.reasons(entry, task.fingerprint) if not r.endswith("was altered"))
+            for reason in list(changed)[:2]:
+                by_reason.setdefault(reason, []).append(task.name)
+    for reason, names in by_reason.items():
+        yield f"{name}: {_some(names)}: {reason}"
+
+
+def altered_page(folders: Folders, name: str, content: bytes) -> Iterator[str]:
+    """Whether a file of the report is what these records and this version give; of results.json, which numbers."""
+    file = folders.reports / name
+    if not file.is_file():
+        yield f"{file} is gone"
+    elif file.read_bytes() != content:
+        numbers = list(altered_numbers(str(file), file.read_bytes(), content)) if name == "results.json" else []
+        yield from numbers or [f"{file} is not what its records give when it is made anew"]
+
+
+def altered_numbers(file: str, found: bytes, made: bytes) -> Iterator[str]:
+    """Results that are not those that the records give, are gone, or are of no record."""
+    expected: dict[str, dict[str, Any]] = {result["key"]: result for result in json.loads(made)}
+    try:
+        results = [dict(result) for result in json.loads(found)]
+    except (ValueError, TypeError) as error:
+        yield f"{file} cannot be read: {error}"
+        return
+    seen = Counter(str(result.get("key")) for result in results)
+    yield from (f"{file}: {key} is gone" for key in expected if key not in seen)
+    yield from (f"{file}: {key} stands there {count} times" for key, count in seen.items() if count > 1)
+    for result in results:
+        key = str(result.get("key"))
+        if key not in expected:
+            yield f"{file}: {key} comes from no record of this study"
+            continue
+        for name, value in expected[key].items():
+            if name not in result or result[name] != value:
+                yield f"{file}: {key}: says {name} {result.get(name)!r}, but its records give {value!r}"
+
+
+def _some(names: list[str]) -> str:
+    return ", ".join(names[:MOST]) + (f" and {len(names) - MOST} more" if len(names) > MOST else "")

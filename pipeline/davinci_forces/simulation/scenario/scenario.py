@@ -1,0 +1,165 @@
+"""A scenario: what is simulated and recorded."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from davinci_forces.errors import PipelineError
+from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.excitation.fourier import Fourier, motion
+from davinci_forces.maths.simulation.actuators import Cascade, Motors, Regulator
+from davinci_forces.maths.simulation.friction import Friction
+from davinci_forces.maths.simulation.surroundings import SHAPES
+from davinci_forces.robots.robot import Joint, Robot
+
+
+class BadScenario(PipelineError):
+    """A scenario breaks its contract; every problem is listed, each with its place."""
+
+
+@dataclass(frozen=True)
+class SensorNoise:
+    """Standard deviations of noise, in the joint's units: white, and of the effort a slow drift as well."""
+
+    q: float = 0.0
+    dq: float = 0.0
+    tau: float = 0.0
+    drift: float = 0.0  # of the effort, correlated over
+    correlation: float = 1.0  # [s]
+
+
+@dataclass(frozen=True)
+class ForceSensor:
+    """A sensor of the force at the tip: the standard deviation of its noise [N], and how late it is [s]."""
+
+    noise: float
+    lag: float
+
+
+@dataclass(frozen=True)
+class SimulatedPush:
+    """An effort, or a force of the tip, that the robot exerts on its surroundings from start to end [s].  (7.8)"""
+
+    shape: str  # of SHAPES
+    start: float
+    end: float
+    peak: float  # [effort], or [N]
+    direction: tuple[float, float, float] | None = None  # of a force of the tip, base frame, of length 1
+
+    def at(self, t: Array) -> Array:
+        """The push at the times t (N,) [s]."""
+        return np.asarray(SHAPES[self.shape](t, self.start, self.end, self.peak))
+
+
+@dataclass(frozen=True)
+class Path:
+    """Positions to be at at given times, at constant speed or easing in and out between them."""
+
+    points: tuple[tuple[float, float], ...]  # time [s], position
+    ease: bool
+
+    def position(self, t: Array) -> Array:
+        """The position at the times t (N,) [s]; the first and the last position hold before and after."""
+        times, positions = np.array(self.points).T
+        if not self.ease:
+            return np.asarray(np.interp(t, times, positions))
+        part = np.interp(t, times, np.arange(len(times), dtype=float))
+        whole = np.floor(part)
+        eased = whole + (1 - np.cos(np.pi * (part - whole))) / 2
+        return np.asarray(np.interp(eased, np.arange(len(times)), positions))
+
+
+@dataclass(frozen=True)
+class Tissue:
+    """A spring with a damper below the height at which the tip is when the slide is at `surface`.  (8.1)"""
+
+    surface: float  # [m] of the slide
+    stiffness: float  # [N/m]
+    damping: float  # [N s/m]
+
+
+@dataclass(frozen=True)
+class SimulatedJoint:
+    """What a joint truly is, and how well its motion and its current are seen."""
+
+    joint: Joint
+    label: str  # how the laboratory names the joint's channels
+    encoder_step: float  # [rad] at the motor
+    current_step: float  # [A]
+    stops: tuple[float, float]  # where it cannot go beyond
+    noise: SensorNoise = field(default_factory=SensorNoise)
+    theta: tuple[float, ...] = ()  # of the joint's terms, where it follows its model exactly
+
+
+@dataclass(frozen=True)
+class Family:
+    """One way in which the arm behaves: its friction, and its noise by joint."""
+
+    friction: Friction
+    noise: dict[str, SensorNoise]
+
+
+@dataclass(frozen=True)
+class SimulatedArm:
+    """What drives the arm in closed loop."""
+
+    tick: float  # [s] of the motor drivers
+    rotors: Array  # J_m (n,) [kg m^2]
+    motors: Motors
+    control: Cascade | Regulator
+    families: dict[str, Family]
+
+
+@dataclass(frozen=True)
+class SimulatedLog:
+    """One recording: which joints move and how, which are at rest and where, and what they touch."""
+
+    name: str
+    file: str
+    role: str
+    duration: float  # [s]
+    moves: dict[str, Fourier | Path]
+    held: dict[str, float]
+    external: dict[str, tuple[SimulatedPush, ...]]
+    current_unit: str
+    clock: str  # "channel", or "header" where the file itself says the step
+    family: str = ""
+    lead: float = 0.0  # [s] that the robot runs before the recording starts
+    skip: float = 0.0  # [s] at the start that the study leaves out
+    tip: tuple[SimulatedPush, ...] = ()
+    mass: float = 0.0  # [kg] hung on the tip
+    tissue: Tissue | None = None
+    sensor: ForceSensor | None = None  # of the force at the tip
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The joints that are recorded."""
+        return (*self.moves, *self.held)
+
+    @property
+    def windows(self) -> list[tuple[float, float]]:
+        """When something pushes [s], in order."""
+        pushes = [push for each in self.external.values() for push in each]
+        return sorted({(push.start, push.end) for push in [*pushes, *self.tip]})
+
+    def position(self, joint: str, t: Array) -> Array:
+        """Where a joint is asked to be at the times t (N,) [s]; one that is not mentioned stays at zero."""
+        move = self.moves.get(joint)
+        if move is None:
+            return np.full_like(t, self.held.get(joint, 0.0))
+        return move.position(t) if isinstance(move, Path) else motion(move, t)[0]
+
+
+@dataclass(frozen=True)
+class Scenario:
+    """A study to be simulated: joint by joint from their models, or the whole arm in closed loop."""
+
+    name: str
+    title: str
+    robot: Robot
+    seed: int
+    rate: float  # [Hz] of the controller and the recorder
+    started: str  # the date that the recordings carry, ISO 8601
+    joints: dict[str, SimulatedJoint]
+    logs: tuple[SimulatedLog, ...]
+    arm: SimulatedArm | None = None

@@ -1,0 +1,62 @@
+"""Differentiate every averaged period exactly, by its harmonics."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from davinci_forces.maths.periods import harmonics as fourier
+from davinci_forces.records import Average, Column, Diagnostic, Spectrum, Trajectory, diagnostic
+from davinci_forces.robots.robot import Joint
+
+LEFT_OUT = 0.01  # share of the largest harmonic above which one that is left out is worth a remark
+
+
+def run(
+    average: Average, joint: Joint, *, derivative: str, harmonics: int
+) -> Iterator[Trajectory | Spectrum | Diagnostic]:
+    """Position, velocity and acceleration from the harmonics of the excitation.  (6.34)"""
+    orders = harmonics or joint.harmonics
+    q, dq, ddq = (differentiated(average, orders, order, derivative) for order in (0, 1, 2))
+    yield Trajectory(
+        log=average.log,
+        joint=average.joint,
+        rate=average.rate,
+        period=average.period,
+        periods=average.periods,
+        t_start=average.t_start,
+        harmonics=orders,
+        method=derivative,
+        sigma_q=average.sigma_q,
+        sigma_dq=average.sigma_dq,
+        sigma_tau=average.sigma_tau,
+        sigma_tau_white=average.sigma_tau_white,
+        t=average.t,
+        q=q,
+        dq=dq,
+        ddq=ddq,
+        tau=average.tau,
+        tau_var=average.tau_var,
+        count=average.count,
+    )
+    amplitude = fourier.amplitudes(average.q)
+    yield Spectrum(average.log, average.joint, orders, np.arange(len(amplitude)) / average.period, amplitude)
+    beyond = amplitude[orders + 1 :]
+    if len(beyond) and beyond.max() > LEFT_OUT * amplitude[1:].max():
+        highest = orders + 1 + int(beyond.argmax())
+        yield diagnostic(
+            "differentiate", f"{average.log}.{average.joint}", "warning",
+            f"{average.log}/{average.joint}: harmonic {highest} of the position is "
+            f"{beyond.max() / amplitude[1:].max():.1%} of the largest, and {orders} harmonics are kept; raise "
+            "`harmonics` in [settings] if it was commanded",
+        )  # fmt: skip
+
+
+def differentiated(average: Average, harmonics: int, order: int, method: str) -> Column:
+    """The averaged position, differentiated `order` times by either of two methods that agree to rounding."""
+    if method == "fft":
+        return fourier.differentiate_fft(average.q, average.period, harmonics, order)
+    omega = 2 * np.pi / average.period
+    c = fourier.project(average.t, average.q, omega, harmonics)
+    for _ in range(order):
+        c = fourier.derivative(c, omega)
+    return fourier.evaluate(c, average.t, omega)

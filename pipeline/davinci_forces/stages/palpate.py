@@ -1,0 +1,222 @@
+"""Palpate tissue: find every push of a tissue log, how stiff what it meets is, and which model predicts its force."""
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.signals.smoothing import lowpass as lowpass_of
+from davinci_forces.maths.tissue.palpation import Pushed, palpated
+from davinci_forces.maths.tissue.probing import Probing, known
+from davinci_forces.maths.tissue.stiffness import median_std
+from davinci_forces.maths.tissue.tissue import LAWS, FittedLaw, chosen, force_of, judged, moments, tangent
+from davinci_forces.maths.tissue.wrong import remarks
+from davinci_forces.records import Column, Diagnostic, Push, Stiffness, TissueModel, Touch, Track, diagnostic
+from davinci_forces.robots.robot import Kind, Robot
+from davinci_forces.study import WHOLE, LogEntry
+
+COUNTS = 0.9  # R2 of a straight line, above which a push counts
+FEWEST = 8  # samples that a log needs, and a push that models are judged by
+FILTER = "ekf"
+
+
+def run(
+    touches: Sequence[Touch], tracks: Sequence[Track], entry: LogEntry, robot: Robot, *, lowpass: float
+) -> Iterator[Push | Stiffness | TissueModel | Diagnostic]:
+    """The pushes of one tissue log, what they come to together, and what is wrong with them.
+
+    The force is that of a sensor's channel.  Where there is none, it is what the joint that slides exerts: its effort
+    less the model's, low-passed without delay.  The filter's own estimate comes later than the depth it belongs to,
+    which shifts first contact and opens a loop where there is none; the model's error is in both alike.
+    """
+    if entry.role != "tissue":
+        return
+    touch, slide = next(iter(touches), None), sliding(tracks, robot)
+    given = probing(touch, slide, lowpass)
+    if given is None or len(given.t) < FEWEST:
+        said = (
+            "no push can be found, because no force or no depth is known; give their channels, or an identification "
+            "log of the joint that slides"
+        )
+        yield diagnostic("palpate", entry.name, "warning", f"{entry.name}: {said}")
+        return
+    whole, windows = entry.contact == WHOLE, () if entry.contact == WHOLE else entry.contact
+    pushes = palpated(given, windows, whole, rate_of(given.t), lowpass)
+    touched = [push for push in pushes if push.line is not None]
+    said_of = [f"{entry.name}: {remark}" for remark in remarks(pushes)]
+    if said_of:
+        yield diagnostic("palpate", entry.name, "warning", *said_of)
+    if not touched:
+        return
+    models, best, why = judged_on(touched, clocked=bool(rate_of(given.t)))
+    yield from (record_of(push, entry.name, best) for push in touched)
+    by_joint = touch is None or not has_force(touch)
+    yield tissue_of(touched, entry.name, slide.joint if by_joint and slide else "force sensor", len(pushes))
+    if best is not None:
+        yield model_of(models, best, why, touched, entry.name)
+
+
+def sliding(tracks: Sequence[Track], robot: Robot) -> Track | None:
+    """The joint that pushes: of those that slide and move, the one that goes farthest."""
+    slides = [t for t in tracks if robot.joint(t.joint).kind is Kind.PRISMATIC and not t.at_rest and t.filter == FILTER]
+    return max(slides, key=lambda track: float(np.ptp(track.q)), default=None)
+
+
+def has_force(touch: Touch) -> bool:
+    """Whether a log has a force sensor's channels."""
+    return bool(np.isfinite(touch.force).any() or np.isfinite(touch.force_x).any())
+
+
+def probing(touch: Touch | None, slide: Track | None, cutoff: float) -> Probing | None:
+    """What a log says of pushes, by its own channels as far as it has them, and else by the joint that slides."""
+    if touch is not None and has_force(touch):
+        one = np.isfinite(touch.force).any()
+        force = touch.force[:, None] if one else np.column_stack([touch.force_x, touch.force_y, touch.force_z])
+        nothing = np.zeros(len(touch))
+        depth = depth_of(touch, slide, touch.t)
+        if depth is None:
+            return None
+        return known(Probing(touch.t, touch.push, depth, force, place_of(touch), nothing + np.nan, nothing))
+    if slide is None:
+        return None
+    direct, dq = np.zeros(len(slide)), np.zeros(len(slide))
+    for part in runs_of(slide.t, slide.rate):
+        direct[part] = lowpass_of(slide.tau_ext_direct[part], slide.rate, cutoff)
+        dq[part] = lowpass_of(slide.dq[part], slide.rate, cutoff)
+    depth = depth_of(touch, slide, slide.t)
+    assert depth is not None
+    push, place = np.zeros(len(slide), np.int64), np.full((len(slide), 3), np.nan)
+    if touch is not None:
+        nearest = np.clip(np.searchsorted(touch.t, slide.t), 0, len(touch) - 1)
+        push, place = touch.push[nearest], place_of(touch)[nearest]
+    return known(Probing(slide.t, push, depth, direct[:, None], place, dq, model_std(slide)))
+
+
+def model_std(slide: Track) -> Column:
+    """Standard deviation (N,) of the error that pushes may share: the model's, and of that which is not known, all.
+
+    Noise is in what a line leaves, there is no lag, and the offset of the day is the line's intercept.
+    """
+    return np.full(len(slide), slide.model_part) if slide.band_from else slide.tau_ext_std
+
+
+def depth_of(touch: Touch | None, slide: Track | None, t: Column) -> Array | None:
+    """Depth (N, 1), or position of the tip (N, 3), at times (N,): stated, else the tip's, else that of the slide."""
+    for columns in ((touch.depth,), (touch.x, touch.y, touch.z)) if touch is not None else ():
+        if np.isfinite(columns[0]).any():
+            return np.column_stack([x if t is touch.t else np.interp(t, touch.t, x) for x in columns])  # type: ignore[union-attr]
+    return None if slide is None else np.interp(t, slide.t, slide.q)[:, None]
+
+
+def place_of(touch: Touch) -> Array:
+    """Where the tip is (N, 3)."""
+    return np.column_stack([touch.x, touch.y, touch.z])
+
+
+def runs_of(t: Column, rate: float) -> list[slice]:
+    """The runs of samples without a gap between them; `rate` [Hz]."""
+    edges = [0, *(np.flatnonzero(np.diff(t) > 1.5 / rate) + 1).tolist(), len(t)]
+    return [slice(a, b) for a, b in pairwise(edges)]
+
+
+def rate_of(t: Column) -> float:
+    """The sampling rate [Hz]; 0 without a clock."""
+    return 1.0 / float(np.median(np.diff(t))) if np.isfinite(t).all() else 0.0
+
+
+def judged_on(pushes: Sequence[Pushed], *, clocked: bool) -> tuple[list[FittedLaw], FittedLaw | None, str]:
+    """Every model of the tissue by pushes that it has not seen, and the chosen one with why; of two pushes at least."""
+    long = [push for push in pushes if push.contact.inside.sum() >= FEWEST]
+    if len(long) < 2:
+        return [], None, ""
+    inside = [push.contact.inside for push in long]
+    given = moments([(p.below[i], p.rate[i], p.force[i]) for p, i in zip(long, inside, strict=True)])
+    models = [judged(given, law) for law in LAWS if clocked or not law.damped]
+    return models, *chosen(models)
+
+
+def record_of(push: Pushed, log: str, best: FittedLaw | None) -> Push:
+    """One push, with the force that the model gives; where none was chosen, the straight line's."""
+    inside, line = push.contact.inside, push.line
+    assert line is not None
+    fitted = line.c + line.k * push.depth
+    if best is not None:
+        fitted = force_of(best, push.below, push.rate)
+        fitted = fitted + float(np.mean((push.force - fitted)[inside]))
+    return Push(
+        log=log,
+        push=push.number,
+        contact=push.contact.state,
+        k_t=line.k,
+        k_t_std=float(np.hypot(line.k_std, push.k_std_model)),
+        k_t_std_model=push.k_std_model,
+        intercept=line.c,
+        r2=line.r2,
+        onset_depth=push.contact.onset,
+        onset_depth_std=push.contact.onset_std,
+        release_depth=push.contact.release,
+        t=push.t,
+        depth=push.depth,
+        force=push.force,
+        fitted=np.where(inside, fitted, np.nan),
+        x=push.place[:, 0],
+        y=push.place[:, 1],
+        z=push.place[:, 2],
+        inside=inside.astype(np.int64),
+        loading=push.contact.loading.astype(np.int64),
+    )
+
+
+def tissue_of(pushes: Sequence[Pushed], log: str, source: str, swings: int) -> Stiffness:
+    """The pushes of a log together: the median slope of those whose force is a straight line."""
+    lines = [push.line for push in pushes if push.line is not None]
+    k, own, r2 = (np.array([getattr(line, name) for line in lines]) for name in ("k", "k_std", "r2"))
+    model = np.array([push.k_std_model for push in pushes])
+    counts = r2 > COUNTS
+    common = float(np.median(model[counts])) if counts.any() else float("nan")
+    low, middle, high = np.quantile(k[counts], [0.25, 0.5, 0.75]) if counts.any() else [float("nan")] * 3
+    std = median_std(k[counts], own[counts], common) if counts.any() else float("nan")
+    lost = np.array([push.lost for push in pushes])
+    return Stiffness(
+        log=log,
+        source=source,
+        swings=swings,
+        stiffness=float(middle),
+        stiffness_std=std,
+        stiffness_std_model=common,
+        stiffness_q1=float(low),
+        stiffness_q3=float(high),
+        pushes=int(counts.sum()),
+        push=np.array([push.number for push in pushes]),
+        counted=counts.astype(np.int64),
+        k_t=k,
+        k_t_std=np.hypot(own, model),
+        r2=r2,
+        onset_depth=np.array([push.contact.onset for push in pushes]),
+        onset_depth_std=np.array([push.contact.onset_std for push in pushes]),
+        onset=np.array([push.t[int(np.argmax(push.contact.inside))] for push in pushes]),
+        k_t_loading=np.array([push.k_loading for push in pushes]),
+        k_t_unloading=np.array([push.k_unloading for push in pushes]),
+        lost=lost[:, 0],
+        lost_share=lost[:, 1],
+        **dict(zip("xyz", np.array([push.place[int(np.argmax(push.depth))] for push in pushes]).T, strict=True)),
+    )
+
+
+def model_of(models: Sequence[FittedLaw], best: FittedLaw, why: str, pushes: Sequence[Pushed], log: str) -> TissueModel:
+    """What each model of the tissue comes to, at half the usual depth."""
+    middle = float(np.median([push.below[push.contact.inside].max() for push in pushes])) / 2
+    stiff, damping = np.array([tangent(model, middle) for model in models]).T
+    return TissueModel(
+        log=log,
+        chosen=best.law.name,
+        why=why,
+        middle=middle,
+        law=np.array([model.law.name for model in models], object),
+        error=np.array([model.score for model in models]),
+        error_std=np.array([model.score_std for model in models]),
+        tangent=stiff,
+        damping=damping,
+        exponent=np.array([model.exponent for model in models]),
+    )

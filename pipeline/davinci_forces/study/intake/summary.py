@@ -1,0 +1,98 @@
+"""What was noticed of a log while it was read."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from davinci_forces.errors import BadLog
+from davinci_forces.logs.names import visible
+from davinci_forces.maths.signals.clock import GAP
+from davinci_forces.records import LogSummary
+from davinci_forces.study.intake.reading import Intake
+
+MOST_REPEATED = 0.1  # share of rows equal to the one before, above which the recorder was faster than the robot
+MOST_JITTER = 0.1  # of the sampling time
+
+
+def summary(intake: Intake) -> LogSummary:
+    """What the reader noticed, once the log is exhausted.
+
+    Raises
+    ------
+    BadLog
+        If nothing is left to analyse.
+    """
+    clock, log, entry, nan = intake.clock, intake.log, intake.entry, float("nan")
+    if clock.samples < 2 or clock.last - clock.first <= entry.skip:
+        until = f" and what comes after {entry.until:g} s left out" if intake.ended else ""
+        raise BadLog(
+            f"{log.path}: {clock.samples} samples are too few, with {entry.skip:g} s skipped at the start{until}"
+        )
+    feeds: dict[str, list[str]] = {}
+    for quantity, channel in intake.channels.items():
+        feeds.setdefault(channel.name, []).append(quantity)
+    for name in intake.clocks.times_used:
+        if "time" not in feeds.setdefault(name, []):
+            feeds[name].append("time")
+    names = [channel.name for channel in log.channels]
+    facts = {**log.facts, **({"comments": "; ".join(log.comments)} if log.comments else {})}
+    return LogSummary(
+        log=entry.name,
+        role=entry.role,
+        format=log.format,
+        files=entry.files,
+        started=log.started,
+        zone=log.zone,
+        rows=clock.samples,
+        rate=clock.rate if intake.clocked else nan,
+        duration=clock.last - clock.first if intake.clocked else nan,
+        jitter=clock.jitter if intake.clocked else nan,
+        longest_gap=clock.longest_gap if intake.clocked else nan,
+        backward=clock.backward,
+        repeated=clock.repeated,
+        duplicates=clock.duplicates,
+        dropped=log.dropped + intake.lost,
+        facts=tuple(visible(f"{key}: {value}") for key, value in facts.items()),
+        warnings=tuple(map(visible, log.warnings)),
+        channel=np.array([*map(visible, names)], object),
+        unit=np.array([visible(channel.unit) for channel in log.channels], object),
+        feeds=np.array([", ".join(feeds.get(name, [])) for name in names], object),
+        nulls=np.array([log.nulls.get(name, 0) for name in names]),
+        nans=np.array([log.nans.get(name, 0) for name in names]),
+    )
+
+
+def remarks(intake: Intake) -> Iterator[str]:
+    """What a reviewer should know about the clock and the rows."""
+    clock, entry = intake.clock, intake.entry
+    if intake.jumps:
+        when = ", ".join(f"{jump:.6g} s after {t - clock.first:.3f} s" for t, jump in intake.jumps[:5])
+        more = " ..." if len(intake.jumps) > 5 else ""
+        yield (
+            f"the clock jumps while the motion goes on, by {when}{more}: the times after it are set back; find out "
+            "why the recorder does so"
+        )
+    for start, end in entry.contact:
+        if start >= clock.last - clock.first or end <= entry.skip:
+            yield (
+                f"the contact window {start:g} to {end:g} s lies outside the log, which goes from "
+                f"{entry.skip:g} to {clock.last - clock.first:g} s; contact times count from the log's first "
+                "sample"
+            )
+    if entry.until is not None and not intake.ended and clock.last - clock.first < entry.until - GAP / clock.rate:
+        yield (
+            f"until = {entry.until:g} s leaves nothing out, because the log ends after "
+            f"{clock.last - clock.first:g} s; both count from its first sample"
+        )
+    if intake.lost:
+        yield f"the file is cut, and its last {intake.lost} rows lack some channels: they are left out"
+    if clock.duplicates > MOST_REPEATED * clock.samples:
+        yield (
+            f"{clock.duplicates} of {clock.samples} rows ({clock.duplicates / clock.samples:.0%}) repeat the one "
+            "before in every channel used: the recorder ran faster than the robot's measurements"
+        )
+    if clock.jitter * clock.rate > MOST_JITTER:
+        yield f"the time between samples varies by {clock.jitter * 1e3:.3g} ms around {1e3 / clock.rate:.3g} ms"
+    if clock.longest_gap * clock.rate > GAP:
+        gap = clock.longest_gap
+        yield f"the longest time between samples is {gap:.3g} s, {gap * clock.rate:.1f} samples"

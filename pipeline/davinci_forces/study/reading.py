@@ -1,0 +1,167 @@
+"""Reading `raw/<study>/study.toml`, and saying everything that is wrong with it at once, each with its line."""
+
+import math
+from dataclasses import Field, fields, replace
+from pathlib import Path
+from typing import Any
+
+from davinci_forces import robots, toml
+from davinci_forces.errors import BadRobot, BadStudy
+from davinci_forces.estimators import ESTIMATORS
+from davinci_forces.haptics import scenario as haptics
+from davinci_forces.robots import Robot, from_toml
+from davinci_forces.robots.models import VARIANTS
+from davinci_forces.study import HapticScenario, Settings, Study
+from davinci_forces.study.entries import entries_of, inside, lines_of_files
+from davinci_forces.study.plausible import checked
+from davinci_forces.toml import TomlTable
+
+# Variants by the estimators that they can be chosen with: a coupled arm needs a ridge.
+BEYOND = tuple(
+    f"{variant}.{how}" for variant in VARIANTS for how in ("lse", "ridge", "consistent")
+    if how == "ridge" or variant.startswith("independent+") or (how == "consistent" and variant != "independent")
+)  # fmt: skip
+CHOICES = {
+    "derivative": ("harmonics", "fft"),
+    "fit": ("chosen", *(f"independent.{estimator}" for estimator in ESTIMATORS), *BEYOND),
+}
+
+
+def read(folder: Path) -> Study:
+    """Read and validate `folder/study.toml`.  Whether the logs are there is asked by `Study.absent`.
+
+    Raises
+    ------
+    BadStudy
+        With every problem that the file has, and those of the robot's file, one a line; and then with every log that
+        is not there.
+    """
+    missing = "there is no such file; `davinci-forces new` writes one from a log"
+    return study_of(toml.read(folder / "study.toml", BadStudy, missing), folder)
+
+
+def study_of(table: TomlTable, folder: Path) -> Study:
+    """The study that the whole of a study.toml describes; raises as `read` does."""
+    name = folder.resolve().name
+    if name.partition(".")[0].lower() in from_toml.RESERVED:
+        table.problem(f"the study's folder is called {name!r}, which is reserved on Windows; rename it")
+    title, robot, simulated = table.text("title", name), _robot(table, folder), table.flag("simulated", False)
+    overrides = table.table("robot_overrides")
+    robot = _overridden(robot, overrides) if robot else None
+    robot = _with_tool(robot, table) if "tool" in table else robot
+    settings = _settings(table.table("settings"), robot)
+    scenario = _haptics(table, folder) if "haptics" in table else HapticScenario()
+    baseline = _baseline(table, folder)
+    logs = entries_of(table, robot)
+    table.close()
+    lines = lines_of_files(table, logs)
+    if table.file.problems():
+        for file, line in lines.items():
+            if not (folder / file).exists():
+                table.file.note(line, f"file {file!r} is not in {folder}")
+    table.file.refuse(BadStudy)
+    assert robot is not None
+    own = table.values["robot"] if table.values["robot"].endswith(robots.FILES) else ""
+    truth = _truth(folder) if simulated else {}
+    changed = overrides.values | ({"tool": table.values["tool"]} if "tool" in table else {})
+    return Study(folder, title, robot, simulated, settings, logs, changed, truth, scenario, baseline, own, lines)
+
+
+def _truth(folder: Path) -> dict[str, Any]:
+    """The ground truth of a simulated study, where its folder has a truth.toml."""
+    file = folder / "truth.toml"
+    return toml.read(file, BadStudy).values if file.exists() else {}
+
+
+def _baseline(table: TomlTable, folder: Path) -> str:
+    """The file of an earlier report's numbers, "" where none is named."""
+    if "baseline" not in table:
+        return ""
+    name = table.text("baseline")
+    if not name or not inside(name):
+        table.problem(f"baseline {name!r} lies outside the study; copy that results.json beside study.toml", "baseline")
+    elif not (folder / name).is_file():
+        table.problem(f"file {name!r} is not in {folder}; copy a results.json there as {name}", "baseline")
+    return name
+
+
+def _robot(table: TomlTable, folder: Path) -> Robot | None:
+    """The robot, or None where it cannot be told which joints it has."""
+    name = table.take(
+        "robot", None, (str,), f"one of {', '.join(robots.ROBOTS)}, or a file, {' or '.join(robots.FILES)}"
+    )
+    if name is None:
+        return None
+    if not inside(name):
+        table.problem(f"robot {name!r} lies outside the study", "robot")
+        return None
+    try:
+        robot, file = robots.described(name, folder)
+    except BadRobot as error:
+        table.problem(str(error), "robot")
+        return None
+    table.file.named += [file] if file else []
+    return robot
+
+
+def _haptics(table: TomlTable, folder: Path) -> HapticScenario:
+    """The scenario beside the study, its problems noted with the study's own."""
+    name = table.take("haptics", None, (str,), "a .toml file beside the study, as `davinci-forces haptics` takes it")
+    if name is None or not inside(name):
+        table.problem("haptics must name a file inside the study", "haptics")
+        return HapticScenario()
+    try:
+        described = toml.read(folder / name, BadStudy)
+    except BadStudy as error:
+        table.problem(str(error), "haptics")
+        return HapticScenario()
+    table.file.named.append(described.file)
+    return haptics.scenario_of(described)
+
+
+def _overridden(robot: Robot, overrides: TomlTable) -> Robot:
+    joints = {joint.name: joint for joint in robot.joints}
+    for name, changes in overrides.each():
+        if name in joints:
+            joints[name] = from_toml.change(joints[name], changes)
+        else:
+            overrides.problem(f"{robot.name} has no joint {name!r}; it has {', '.join(joints)}", name)
+    return replace(robot, joints=tuple(joints.values()))
+
+
+def _with_tool(robot: Robot | None, table: TomlTable) -> Robot | None:
+    """The robot with the tool that a study says it had."""
+    tool = table.table("tool")
+    length = checked(tool, "length", tool.number("length", words="a number of metres"), "tool")
+    tool.close()
+    try:
+        return robot.with_tool(length) if robot and math.isfinite(length) else robot
+    except BadRobot as error:
+        table.problem(str(error), "tool")
+        return robot
+
+
+def _settings(table: TomlTable, robot: Robot | None) -> Settings:
+    values = {field.name: _setting(table, field) for field in fields(Settings) if field.name != "effort"}
+    efforts = table.table("effort")
+    table.close()
+    return Settings(**values, effort=_sought(efforts, robot))
+
+
+def _sought(efforts: TomlTable, robot: Robot | None) -> dict[str, float]:
+    """The effort that the user wants to see on each joint."""
+    known = [joint.name for joint in robot.joints] if robot else list(efforts.values)
+    for name in efforts.values:
+        if name not in known:
+            efforts.problem(f"{robot.name if robot else ''} has no joint {name!r}; it has {', '.join(known)}", name)
+    named = [name for name in efforts.values if name in known]
+    return {name: checked(efforts, name, efforts.number(name), "effort") for name in named}
+
+
+def _setting(table: TomlTable, field: Field[Any]) -> Any:
+    name: str = field.name
+    default: Any = field.default
+    if field.type is str:
+        return table.text(name, default, CHOICES[name])
+    value = table.whole(name, default, -math.inf) if field.type is int else table.number(name, default)
+    return checked(table, name, value)

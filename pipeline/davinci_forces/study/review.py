@@ -1,0 +1,61 @@
+"""What reviewers said of a report: `raw/<study>/review.toml`, as the report's page exports it."""
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+from davinci_forces import toml
+from davinci_forces.errors import BadStudy
+from davinci_forces.toml import TomlTable
+
+FILE = "review.toml"
+VERDICTS = ("accept", "doubt", "reject")
+SUBJECTS = ("figure", "run")  # what is rated: a figure by its label, or a log by its name
+
+
+@dataclass(frozen=True)
+class Rating:
+    """What one reviewer said of a figure or a run, and the sha256 of the results.json that he saw."""
+
+    subject: str  # of SUBJECTS
+    name: str
+    verdict: str  # of VERDICTS
+    comment: str
+    reviewer: str
+    date: str
+    results: str
+
+
+def read(file: Path) -> tuple[Rating, ...]:
+    """Every rating of a file, in its order.
+
+    Raises
+    ------
+    BadStudy
+        With every problem of the file, each with its line.
+    """
+    table = toml.read(file, BadStudy)
+    ratings = tuple(_rating(entry) for entry in table.tables("rating"))
+    table.close()
+    table.file.refuse(BadStudy)
+    return ratings
+
+
+def _rating(table: TomlTable) -> Rating:
+    subjects = [subject for subject in SUBJECTS if subject in table]
+    if len(subjects) != 1:
+        table.problem('say what is rated, by either figure = "<its label>" or run = "<its log>"')
+    subject = subjects[0] if subjects else SUBJECTS[0]
+    rating = Rating(
+        subject,
+        table.text(subject, "" if not subjects else None),
+        table.text("verdict", choices=VERDICTS),
+        table.text("comment", ""),
+        table.text("reviewer", ""),
+        table.text("date", ""),
+        table.text("results"),
+    )
+    if rating.results and not re.fullmatch(r"[0-9a-f]{64}", rating.results):
+        table.problem(f"results must be the SHA-256 of a results.json, not {rating.results!r}", "results")
+    table.close()
+    return rating

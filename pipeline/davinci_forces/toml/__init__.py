@@ -1,0 +1,10 @@
+"""What people write down: tables of a TOML file, read key by key, and everything wrong with them said at once.
+
+Study, robot and scenario are read with it; every problem has its file and its line.
+"""
+
+from davinci_forces.toml.reading import parse, read
+from davinci_forces.toml.table import TomlTable
+from davinci_forces.toml.values import is_number, shown
+
+__all__ = ["TomlTable", "is_number", "parse", "read", "shown"]

@@ -1,0 +1,145 @@
+"""A table of a TOML file, read key by key; what is wrong is noted with its place and line, not raised one by one."""
+
+import math
+from collections.abc import Callable, Collection, Iterable
+from difflib import get_close_matches
+from typing import Any
+
+from davinci_forces.toml.file import TomlFile
+from davinci_forces.toml.lines import KeyPath
+from davinci_forces.toml.values import are_numbers, is_number, shown
+
+
+class TomlTable:
+    """One table.  The keys that were asked for are the known ones; `close` reports the others.
+
+    What is missing or wrong is noted, and the reading goes on with the default, or with NaN, "", () or an empty table.
+    """
+
+    def __init__(self, values: Any, file: TomlFile, path: KeyPath = (), place: str = "") -> None:
+        self.file, self.path, self.place, self.asked = file, path, place, dict[str, None]()
+        self.values: dict[str, Any] = values if isinstance(values, dict) else {}
+        if not isinstance(values, dict):
+            self.problem(f"must be a table, not {shown(values)}")
+
+    def __contains__(self, key: str) -> bool:
+        self.asked[key] = None
+        return key in self.values
+
+    def problem(self, text: str, *keys: str | int) -> None:
+        """Note something wrong with this table, or with what is at these keys below it."""
+        self.file.note(self.file.line((*self.path, *keys)), f"{self.place}: {text}" if self.place else text)
+
+    def number(
+        self,
+        key: str,
+        default: float | None = None,
+        low: float = -math.inf,
+        above: float = -math.inf,
+        words: str = "a number",
+    ) -> float:
+        """A finite number, at least `low` and greater than `above`."""
+        value = self.take(key, default, (int, float), words)
+        if value is None:
+            return math.nan
+        if not math.isfinite(value) or value < low or value <= above:
+            bounds = {f"greater than {above:g}": above, f"at least {low:g}": low}
+            demands = " and ".join(["finite", *(words for words, bound in bounds.items() if bound > -math.inf)])
+            self.problem(f"{key} must be {demands}, not {value!r}", key)
+            return math.nan
+        return float(value)
+
+    def whole(self, key: str, default: int | None = None, low: float = 0) -> int:
+        """A whole number, at least `low`."""
+        value = self.take(key, default, (int,), "a whole number")
+        if value is not None and value < low:
+            self.problem(f"{key} must be at least {low}, not {shown(value)}", key)
+        return 0 if value is None else int(value)
+
+    def text(self, key: str, default: str | None = None, choices: Collection[str] = ()) -> str:
+        """Text, one of the choices where there are any."""
+        words = f"one of {', '.join(choices)}" if choices else "text"
+        value = self.take(key, default, (str,), words, lambda value: not choices or value in choices)
+        return "" if value is None else str(value)
+
+    def flag(self, key: str, default: bool | None = None) -> bool:
+        """True or false."""
+        return bool(self.take(key, default, (bool,), "true or false"))
+
+    def numbers(
+        self, key: str, default: list[float] | None = None, count: int | None = None, words: str = ""
+    ) -> tuple[float, ...]:
+        """A list of finite numbers, as many as asked for."""
+        words = words or f"a list of {'' if count is None else f'{count} '}finite numbers"
+        value = self.take(key, default, (list,), words, lambda value: are_numbers(value, count))
+        return tuple(map(float, value or ()))
+
+    def pairs(
+        self, key: str, words: str, default: list[Any] | None = None, least: int = 0
+    ) -> tuple[tuple[float, float], ...]:
+        """A list of pairs of finite numbers, of at least so many."""
+        value = self.take(key, default, (list,), words, lambda value: all(are_numbers(pair, 2) for pair in value))
+        if value is not None and len(value) < least:
+            self.problem(f"{key} must be {words}, not {shown(value)}", key)
+        return tuple((float(a), float(b)) for a, b in value or ())
+
+    def texts(self, key: str, default: list[str] | None, choices: Collection[str]) -> tuple[str, ...]:
+        """A list of one or more of the choices."""
+        words = f"a list of {', '.join(map(repr, choices))}"
+        value = self.take(key, default, (list,), words, lambda value: value and all(x in [*choices] for x in value))
+        return tuple(value or ())
+
+    def table(self, key: str) -> "TomlTable":
+        """A table within this one; an empty one where it is missing."""
+        self.asked[key] = None
+        return TomlTable(self.values.get(key, {}), self.file, (*self.path, key), self._within(key))
+
+    def each(self) -> list[tuple[str, "TomlTable"]]:
+        """The tables that this one is made of, by key."""
+        return [(key, self.table(key)) for key in self.values]
+
+    def tables(self, key: str, none: str = "") -> list["TomlTable"]:
+        """The tables of a list, such as [[log]]; that there are none is a problem where `none` says which."""
+        words = f"a list of tables: write [[{key}]]"
+        entries = self.take(key, [], (list,), words, lambda value: all(isinstance(entry, dict) for entry in value))
+        if none and self.values.get(key, []) == []:
+            self.problem(none, key)
+        place = self._within(key)
+        return [TomlTable(e, self.file, (*self.path, key, i), f"{place} {i + 1}") for i, e in enumerate(entries)]
+
+    def unique(self, key: str, name: str, values: Iterable[tuple[int, str]], says: str) -> None:
+        """Note which tables of a list call themselves by a `name` that an earlier one has; `values` are by number."""
+        taken = set[str]()
+        for number, value in values:
+            if value in taken:
+                self.problem(f"{says} {value!r}", key, number, name)
+            taken.add(value)
+
+    def take(
+        self,
+        key: str,
+        default: Any,
+        kinds: tuple[type, ...],
+        words: str,
+        good: Callable[[Any], object] = lambda value: True,
+    ) -> Any:
+        """The value of a key, of one of these kinds and good, as `words` say; where it is not, the default."""
+        if key not in self:
+            if default is None:
+                self.problem(f"{key} is missing; it is {words}")
+            return default
+        value = self.values[key]
+        fits = type(value) is not int or float not in kinds or is_number(value)
+        if type(value) in kinds and fits and good(value):
+            return value
+        self.problem(f"{key} must be {words}, not {shown(value)}", key)
+        return default
+
+    def close(self) -> None:
+        """Report the keys that nothing asked for, and what they may have been meant to be."""
+        for key in self.values.keys() - self.asked.keys():
+            meant = "".join(f"; did you mean {near!r}?" for near in get_close_matches(key, self.asked, 1, 0.5))
+            self.problem(f"unknown key {key!r}; known are {', '.join(self.asked) or 'none'}{meant}", key)
+
+    def _within(self, key: str) -> str:
+        return f"{self.place}.{key}" if self.place else key

@@ -1,5 +1,0 @@
-"""LabVIEW measurement files (LVM), the text that LabVIEW writes with headers."""
-
-from pipeline.logs.lvm.reader import read, recognises
-
-__all__ = ["read", "recognises"]

@@ -1,5 +1,0 @@
-"""Columns of numbers in text, with or without a header, in whatever delimiter and decimal mark."""
-
-from pipeline.logs.text.reader import read, recognises
-
-__all__ = ["read", "recognises"]
