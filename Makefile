@@ -23,8 +23,21 @@ PYTEST := PYTHONDONTWRITEBYTECODE= $(BIN)/python -m pytest -n $(WORKERS) --dist 
 LOCK := uv pip compile -q --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-header
 UPGRADE ?=
 
-# Every module of pipeline/stages is a stage; the report follows them.  README.md says what each makes, in their order.
-STAGES := $(filter-out __init__,$(basename $(notdir $(wildcard pipeline/stages/*.py)))) report
+PACKAGE := pipeline/davinci_forces
+# Every module of stages/ is a stage; the report follows them.  README.md says what each makes, in their order.
+STAGES := $(filter-out __init__,$(basename $(notdir $(wildcard $(PACKAGE)/stages/*.py)))) report
+
+# Compiled files of rooms that are no more would keep their folders alive, and importable.
+define FORGET
+import pathlib, shutil
+for cache in [*pathlib.Path("pipeline").rglob("__pycache__")]:
+    if not any(cache.parent.glob("*.py")):
+        shutil.rmtree(cache)
+for folder in sorted((f for f in pathlib.Path("pipeline").rglob("*") if f.is_dir()), reverse=True):
+    if not any(folder.iterdir()):
+        folder.rmdir()
+endef
+export FORGET
 
 .PHONY: all quick test check format lint types oracles axe bench locks demo pictures clean help $(STAGES)
 
@@ -72,8 +85,8 @@ demo: $(READY) ## simulate the demonstration study anew
 	$(RUN) simulate davinci-demo raw/davinci-demo --force
 
 pictures: ## draw the README's pictures anew, from the report of the demonstration study (needs pdftoppm)
-	pdftoppm -r 65 -f 1 -singlefile -png reports/davinci-demo/report.pdf pipeline/report/pictures/page-one
-	pdftoppm -r 65 -f 8 -singlefile -png reports/davinci-demo/report.pdf pipeline/report/pictures/joint
+	pdftoppm -r 65 -f 1 -singlefile -png reports/davinci-demo/report.pdf $(PACKAGE)/report/pictures/page-one
+	pdftoppm -r 65 -f 8 -singlefile -png reports/davinci-demo/report.pdf $(PACKAGE)/report/pictures/joint
 
 clean: ## remove what was made: processed files, reports, environment
 	rm -rf .venv build *.egg-info processed/* reports/*
@@ -89,6 +102,7 @@ $(READY): requirements.lock pyproject.toml
 	  { echo "Python cannot make environments here; on Debian and Ubuntu run: apt-get install python3-venv"; exit 1; }
 	$(PYTHON) -m venv .venv
 	$(INSTALL) -r requirements.lock
+	@$(BIN)/python -c "$$FORGET"
 	$(PIP) install --no-deps --no-build-isolation -e .
 	@touch $@
 

@@ -12,7 +12,7 @@ from davinci_forces.stages import STAGES
 from davinci_forces.study import LogEntry, Settings, Study
 
 JOINTS = tuple(joint.name for joint in dvrk_psm.ROBOT.joints[:2])
-CODE = {f"davinci_forces/module_{i}.py": "0" * 64 for i in range(40)}  # about as many as a stage has
+CODE = {f"module_{i}.py": "0" * 64 for i in range(40)}  # about as many as a stage has
 
 
 def study(home: Path, logs: int) -> tuple[Study, Folders]:

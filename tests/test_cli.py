@@ -100,7 +100,7 @@ def test_a_command_is_completed():
 
 
 def test_importing_the_package_imports_nothing_heavy():
-    code = "import sys, pipeline; print({'pandas', 'numpy', 'scipy', 'numba', 'typer'} & set(sys.modules))"
+    code = "import sys, davinci_forces; print({'pandas', 'numpy', 'scipy', 'numba', 'typer'} & set(sys.modules))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "set()"
 

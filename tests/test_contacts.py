@@ -7,7 +7,7 @@ import pytest
 
 from davinci_forces.maths.contact.detection import FALSE_ALARMS, Quiet, alarm_level, events, quiet
 from davinci_forces.maths.contact.window import mean_size, summarise
-from davinci_forces.maths.signals.noise import model_error, noise_std, smoothed
+from davinci_forces.maths.signals.noise import noise_std, smoothed
 from davinci_forces.maths.signals.path import likeness, most_different
 from davinci_forces.maths.signals.smoothing import lowpass, share_passed
 from davinci_forces.maths.signals.windows import free_space
@@ -17,6 +17,7 @@ from davinci_forces.maths.uncertainty.bootstrap import (
     error_of_mean,
     error_of_pooled_mean,
     error_of_quantile,
+    model_error,
     standard_error,
 )
 from davinci_forces.maths.uncertainty.day_offset import day_offset

@@ -25,7 +25,7 @@ from davinci_forces.runner.signature import declaration
 from davinci_forces.study import Settings
 
 ROOT = Path(davinci_forces.__file__).parent
-HOME = ROOT.parent
+HOME = ROOT.parents[1]
 SOURCES = sorted(ROOT.rglob("*.py"))
 LISTS = {  # extension folder -> its choices
     "robots": robots.ROBOTS,
@@ -57,8 +57,9 @@ TIERS = (
     ("stages",),
     ("report",),
     ("simulation",),
-    ("excitation",),
     ("study",),
+    ("haptics",),
+    ("identification",),
     ("estimators", "filters"),
     ("logs", "records", "robots"),
     ("maths", "toml"),
@@ -66,9 +67,9 @@ TIERS = (
 )
 # The same inside maths, where what is computed from motion stands above what motion is.
 MATHS = (
-    ("simulation", "excitation", "contact", "selection", "haptics"),
-    ("estimation",),
-    ("models",),
+    ("simulation", "excitation", "contact", "tissue", "selection"),
+    ("estimation", "periods"),
+    ("models", "uncertainty"),
     ("mechanics", "signals"),
     ("arrays", "compiled", "constants", "units"),
 )
@@ -92,7 +93,7 @@ def imports(source: Path) -> set[str]:
     return names
 
 
-def rooms(source: Path, below: str = "pipeline") -> set[str]:
+def rooms(source: Path, below: str = "davinci_forces") -> set[str]:
     """The modules and folders right below a package that a module imports."""
     return {name.removeprefix(f"{below}.").split(".")[0] for name in imports(source) if name.startswith(f"{below}.")}
 
@@ -177,7 +178,7 @@ def test_arrays_are_named_once():
 @pytest.mark.parametrize("source", sorted((ROOT / "maths").rglob("*.py")), ids=lambda s: str(s.relative_to(ROOT)))
 def test_maths_is_numpy_scipy_and_numba_only(source):
     outside = {name.split(".")[0] for name in imports(source)}
-    assert outside - set(sys.stdlib_module_names) <= {"numpy", "scipy", "numba", "pipeline"} | SOLVERS.get(
+    assert outside - set(sys.stdlib_module_names) <= {"numpy", "scipy", "numba", "davinci_forces"} | SOLVERS.get(
         source.name, set()
     )
     assert rooms(source) <= {"maths", "errors"}
@@ -210,7 +211,7 @@ def sources(module) -> list[Path]:
 
 def choices(package) -> list[tuple[str, object]]:
     """The modules of an extension folder that its `__init__` lists, and what they export."""
-    listed = LISTS[package.__name__.removeprefix("pipeline.")]
+    listed = LISTS[package.__name__.removeprefix("davinci_forces.")]
     return [(name, import_module(f"{package.__name__}.{name}")) for name in listed]
 
 

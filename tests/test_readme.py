@@ -52,6 +52,7 @@ from davinci_forces.study.channels import OF_A_JOINT, OF_THE_LOG
 from davinci_forces.study.entries import ROLES
 from tests.conftest import ROOT
 
+PACKAGE = ROOT / "pipeline" / "davinci_forces"
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 SPAN = re.compile(r"`([^`]+)`")
 
@@ -126,7 +127,7 @@ def test_channels_are_those_that_there_are_with_the_units_taken():
 
 def test_formats_and_what_they_need_are_those_that_there_are():
     assert named(rows("format", "files")) == list(FORMATS)
-    code = "".join(source.read_text(encoding="utf-8") for source in (ROOT / "pipeline" / "logs").rglob("*.py"))
+    code = "".join(source.read_text(encoding="utf-8") for source in (PACKAGE / "logs").rglob("*.py"))
     required = dict(re.findall(r'require\(path, "(\w+)", "(\w+)"\)', code))
     table = rows("package", "licence")
     assert {spans(row[0])[0]: re.search(r"\[(\w+)\]", row[3])[1] for row in table} == required
@@ -171,11 +172,10 @@ def test_targets_of_the_makefile_are_all_told():
 
 
 def test_what_is_to_be_written_has_a_place_and_is_listed_in_one():
-    package = ROOT / "pipeline"
     for _, write, _, listed in rows("to add"):
-        assert (package / spans(write)[0]).parent.is_dir() or (package / spans(write.partition(" in ")[2])[0]).exists()
+        assert (PACKAGE / spans(write)[0]).parent.is_dir() or (PACKAGE / spans(write.partition(" in ")[2])[0]).exists()
         for file in (span for span in spans(listed) if span.endswith(".py")):
-            assert (package / file).is_file(), file
+            assert (PACKAGE / file).is_file(), file
 
 
 def test_old_names_are_gone_and_new_ones_there():
@@ -190,12 +190,11 @@ def test_old_names_are_gone_and_new_ones_there():
 
 
 def test_new_modules_are_there():
-    package = ROOT / "pipeline"
     for _, _, new in (row for row in rows("what", "0.1.0") if row[0] == "modules"):
         home = ""
         for place in spans(new.partition(";")[0]):
             home = place if not place.startswith(".") else f"{home.rpartition('.')[0]}{place}"
-            path = package / home.removesuffix(".*").replace(".", "/")
+            path = PACKAGE / home.removesuffix(".*").replace(".", "/")
             assert path.is_dir() or path.with_suffix(".py").is_file(), place
 
 
@@ -299,7 +298,7 @@ def test_the_study_file_of_the_readme_is_one(tmp_path):
 
 def test_what_python_is_offered_is_what_the_readme_shows():
     code = README.partition("```python\n")[2].partition("```")[0]
-    assert {f"davinci_forces.{name}(" for name in davinci_forces.__all__} <= set(re.findall(r"pipeline\.\w+\(", code))
+    assert set(davinci_forces.__all__) <= set(re.findall(r"davinci_forces\.(\w+)\(", code))
 
 
 def test_the_readme_leads_to_files_that_are_there():

@@ -69,19 +69,20 @@ def flat(said: str) -> str:
 def test_the_readers_of_logs_count_for_ingest_and_the_store_for_every_stage(finished):
     entry = json.loads((processed(finished) / "tasks" / "ingest" / "one.json").read_text())
     assert {
-        "davinci_forces/logs/text/reader.py",
-        "davinci_forces/logs/tdms/reader.py",
-        "davinci_forces/logs/blocks.py",
+        "logs/text/reader.py",
+        "logs/tdms/reader.py",
+        "logs/blocks.py",
     } <= set(entry["fingerprint"]["code"])
     for file in (processed(finished) / "tasks").glob("*/*.json"):
-        assert "davinci_forces/records/store.py" in json.loads(file.read_text())["fingerprint"]["code"], file
+        assert "records/store.py" in json.loads(file.read_text())["fingerprint"]["code"], file
 
 
 @pytest.mark.parametrize("file", sorted(PACKAGE.rglob("*.py")), ids=lambda file: file.relative_to(PACKAGE).as_posix())
 def test_no_import_of_a_module_is_overlooked(file):
     source = file.read_text(encoding="utf-8")
     statements = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ImportFrom))
-    parsed = [(str(s.module), [n.name for n in s.names]) for s in statements if str(s.module).startswith("pipeline")]
+    ours = (s for s in statements if str(s.module).startswith("davinci_forces"))
+    parsed = [(str(s.module), [n.name for n in s.names]) for s in ours]
     assert sorted(imported(source)) == sorted(parsed)
 
 

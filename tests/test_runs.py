@@ -170,13 +170,13 @@ def test_an_altered_processed_file_is_made_again(finished):
 @pytest.fixture
 def package(tmp_path) -> Path:
     """A copy of the package, so that its code can be edited."""
-    copy = tmp_path / "code" / "pipeline"
+    copy = tmp_path / "code" / "davinci_forces"
     return shutil.copytree(Path(davinci_forces.__file__).parent, copy, ignore=shutil.ignore_patterns("__pycache__"))
 
 
 def run_by(package: Path, *arguments: object) -> str:
     """What a copy of the package says."""
-    command = [sys.executable, "-m", "pipeline", *map(str, arguments)]
+    command = [sys.executable, "-m", "davinci_forces", *map(str, arguments)]
     environment = {**os.environ, "PYTHONPATH": str(package.parent)}
     done = subprocess.run(command, env=environment, cwd=package.parent, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
@@ -194,7 +194,7 @@ def test_editing_a_term_of_the_model_makes_the_fit_run_again_and_says_why(finish
     edit(package / "maths" / "models" / "terms.py", 'b={"sign(dq)": 1.0}', 'b={"sign(dq)": 2.0}')
     said = run_by(package, "fit", finished)
     assert "the robot changed" in said
-    assert "the code of davinci_forces/maths/models/terms.py changed" in said
+    assert "the code of maths/models/terms.py changed" in said
 
 
 def test_a_reworded_meaning_runs_what_stores_it_and_what_reads_that(finished, package):
@@ -206,7 +206,7 @@ def test_a_reworded_meaning_runs_what_stores_it_and_what_reads_that(finished, pa
         assert line.endswith(" current"), line
     assert re.search(r"^ekf: .* and 1 more: the declaration of Track changed$", said, re.M), said
     assert re.search(r"^whiteness: track/.*: processed/track/.*parquet changed$", said, re.M), said
-    assert re.search(r"^report: the code of davinci_forces/records/predict.py changed", said, re.M), said
+    assert re.search(r"^report: the code of records/predict.py changed", said, re.M), said
 
 
 @pytest.mark.parametrize("whole", [True, False], ids=["index", "no index"])
@@ -307,7 +307,7 @@ def test_units_meanings_and_origins_travel_with_the_file(analysed):
     made_from = json.loads(file.metadata.metadata[b"made_from"])
     assert made_from["inputs"].keys() == {"processed/signal/slide/instrument_slide.parquet"}
     assert made_from["settings"] == {"harmonics": 0, "lowpass": 17.0}
-    assert "davinci_forces/maths/periods/averaging.py" in made_from["code"]
+    assert "maths/periods/averaging.py" in made_from["code"]
 
 
 def test_floats_are_stored_byte_by_byte_and_compressed(analysed):

@@ -7,13 +7,23 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from davinci_forces.filters import ekf
+from davinci_forces.filters.innovations import coloured
+from davinci_forces.filters.innovations.innovations import innovations
+from davinci_forces.filters.innovations.search import search
+from davinci_forces.filters.innovations.timing import delays, mended
+from davinci_forces.filters.innovations.trials import (
+    CLOCK,
+    COLOUR,
+    CONTACT,
+    REVERSALS,
+    SIZES,
+    STEP,
+    WALK,
+    Passes,
+    Subject,
+)
+from davinci_forces.filters.innovations.verdict import finding, verdict
 from davinci_forces.filters.problem import NoiseModel
-from davinci_forces.innovations import coloured
-from davinci_forces.innovations.innovations import innovations
-from davinci_forces.innovations.search import search
-from davinci_forces.innovations.timing import delays, mended
-from davinci_forces.innovations.trials import CLOCK, COLOUR, CONTACT, REVERSALS, SIZES, STEP, WALK, Passes, Subject
-from davinci_forces.innovations.verdict import finding, verdict
 from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.models.independent import combined, inertia_of
 from davinci_forces.maths.signals import whiteness

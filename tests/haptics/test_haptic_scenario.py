@@ -17,7 +17,7 @@ from davinci_forces.runner.fingerprints.canonical import canonical
 from davinci_forces.study import HapticScenario, reading
 from tests import arm
 
-SHIPPED = files("davinci_forces.study").joinpath("haptics.toml").read_text(encoding="utf-8")
+SHIPPED = files("davinci_forces.haptics").joinpath("haptics.toml").read_text(encoding="utf-8")
 SHORT = """
 plan = [[0.0, -0.01], [0.5, 0.01], [1.0, -0.01]]
 [[hand]]

@@ -132,7 +132,9 @@ def test_a_child_ends_with_its_parent(tmp_path):
     import subprocess
 
     code = (
-        "from pathlib import Path; from davinci_forces.logs.isolated import start; from davinci_forces.logs.log import Options\n"
+        "from pathlib import Path\n"
+        "from davinci_forces.logs.isolated import start\n"
+        "from davinci_forces.logs.log import Options\n"
         f"print(start(Path({str(tmp_path / 'log.odd')!r}), Options(), {HERE!r}).facts['pid'], flush=True)\n"
         "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"
     )

@@ -11,12 +11,13 @@ from davinci_forces.maths.mechanics.rigid_body import gravity
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.simulation.actuators import Regulator
 from davinci_forces.maths.simulation.closed_loop import JointConstraints, Timing, simulate
+from davinci_forces.maths.simulation.path import Path
 from davinci_forces.maths.simulation.plant import arm
 from davinci_forces.maths.simulation.surroundings import nothing
 from davinci_forces.simulation import closed_loop
 from davinci_forces.simulation.motion import SimulatedRun
 from davinci_forces.simulation.scenario.reading import load
-from davinci_forces.simulation.scenario.scenario import BadScenario, Path, Scenario, SimulatedLog
+from davinci_forces.simulation.scenario.scenario import BadScenario, Scenario, SimulatedLog
 from davinci_forces.simulation.truth_toml import touched
 
 G = 9.81

@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 
 from davinci_forces import robots
 from davinci_forces.maths.simulation.actuators import Regulator
+from davinci_forces.maths.simulation.path import Path
 from davinci_forces.robots.davinci import ROBOT
 from davinci_forces.simulation.scenario.reading import _scenario, load, shipped
-from davinci_forces.simulation.scenario.scenario import BadScenario, ForceSensor, Path
+from davinci_forces.simulation.scenario.scenario import BadScenario, ForceSensor
 from davinci_forces.simulation.sensors import record_force
 from davinci_forces.toml import TomlTable
 from davinci_forces.toml.file import TomlFile

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 if TYPE_CHECKING:
-    from davinci_forces.excitation.request import Answer, ArmExcitation
-    from davinci_forces.excitation.trajectory import ExcitationTrajectory
+    from davinci_forces.simulation.excitation.request import Answer, ArmExcitation
+    from davinci_forces.simulation.excitation.trajectory import ExcitationTrajectory
 
 
 def run(
@@ -40,8 +40,8 @@ def run(
     starts may find more. All joints of an arm take minutes; each start is told of when it is done.
     """
     from davinci_forces.errors import BadRequest
-    from davinci_forces.excitation import table, trajectory
-    from davinci_forces.excitation.request import Request, answer
+    from davinci_forces.simulation.excitation import table, trajectory
+    from davinci_forces.simulation.excitation.request import Request, answer
 
     request = Request(robot, joint, evaluate, period, harmonics, criterion, (q, dq, ddq), starts, seed, samples)
     answered = answer(request, _say)
@@ -68,7 +68,7 @@ def _document(robot: str, answered: "Answer") -> dict[str, Any]:
 
 
 def _totals(arm: "ArmExcitation") -> dict[str, Any]:
-    from davinci_forces.excitation.trajectory import spread
+    from davinci_forces.simulation.excitation.trajectory import spread
 
     own = {"objective": arm.objective, "condition": arm.condition, "base_parameters": arm.base_parameters}
     return {**own, "starts": spread(arm.optima)}

@@ -51,7 +51,7 @@ def _write_template(file: Path) -> None:
 
     if file.exists():
         raise BadRequest(f"{file} is there already; name another file, or move it away")
-    store.write_bytes(file, files("davinci_forces.study").joinpath("haptics.toml").read_bytes())
+    store.write_bytes(file, files("davinci_forces.haptics").joinpath("haptics.toml").read_bytes())
     typer.echo(f"{file}: written; change its numbers, then run `davinci-forces haptics {file}`")
 
 

@@ -6,8 +6,8 @@ from davinci_forces.maths.signals.path import SAME_PATH as LIKE
 from davinci_forces.maths.signals.path import likeness
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.records import FittedPaths, Signal
-
-SAME_PATH, ANOTHER_PATH = "same path", "another path"
+from davinci_forces.records.predict import ANOTHER_PATH as ANOTHER_PATH
+from davinci_forces.records.predict import SAME_PATH as SAME_PATH
 
 
 def follows(signal: Signal, paths: FittedPaths) -> bool:

@@ -6,8 +6,9 @@ from typing import TypeVar
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans
-from davinci_forces.maths.signals.noise import model_error, smoothed, white_std
+from davinci_forces.maths.signals.noise import smoothed, white_std
 from davinci_forces.maths.signals.smoothing import share_passed
+from davinci_forces.maths.uncertainty.bootstrap import model_error
 from davinci_forces.records import Prediction, Signal, Smoothed
 
 AnySignal = TypeVar("AnySignal", Signal, Smoothed)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from davinci_forces.records.record import Column, Published, Record
 
 CHOSEN = "chosen"
+SAME_PATH, ANOTHER_PATH = "same path", "another path"  # as what was fitted
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,14 +5,14 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from davinci_forces.filters.assumed import assumed
+from davinci_forces.filters.innovations.innovations import Innovations, innovations
+from davinci_forces.filters.innovations.search import CauseSearch, search
+from davinci_forces.filters.innovations.timing import delays, mended
+from davinci_forces.filters.innovations.trials import CLOCK, Subject
+from davinci_forces.filters.innovations.verdict import finding, verdict
 from davinci_forces.identification.driving import Driving, Motions, driving, motions_of, named
 from davinci_forces.identification.refitting import refitted
 from davinci_forces.identification.used import describing, model_of
-from davinci_forces.innovations.innovations import Innovations, innovations
-from davinci_forces.innovations.search import CauseSearch, search
-from davinci_forces.innovations.timing import delays, mended
-from davinci_forces.innovations.trials import CLOCK, Subject
-from davinci_forces.innovations.verdict import finding, verdict
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.signals.reversals import moving

@@ -1,10 +1,9 @@
-"""How much of what a model leaves is noise, and how much is the model's own error."""
+"""How much of a signal is white noise."""
 
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Integers
 from davinci_forces.maths.signals.smoothing import lowpass, segments, share_passed
-from davinci_forces.maths.uncertainty.bootstrap import blocks, error_of_mean
 
 NORMAL_MAD = 0.6744897501960817  # median of |x| of a standard normal variable
 
@@ -26,17 +25,3 @@ def white_std(removed: Array, passed: float) -> float:
 def smoothed(x: Array, segment: Integers, rate: float, cutoff: float) -> Array:
     """The low-pass of each segment of a signal (N,), or of columns (N, ...)."""
     return np.concatenate([lowpass(x[part], rate, cutoff) for part in segments(segment)])
-
-
-def model_error(slow: Array, noise: float) -> tuple[float, float]:
-    """Root mean square of a low-passed residual (N,) beyond the noise in it, and its standard error.
-
-    `noise` is the standard deviation of the noise that passes the low-pass.  The standard error is that of the mean
-    square over blocks, carried over to its root.
-    """
-    squares = slow**2
-    excess = float(np.mean(squares)) - noise**2
-    error = float(np.sqrt(max(excess, 0.0)))
-    spread = error_of_mean([float(squares[part].mean()) for part in blocks(len(slow))])
-    # d sqrt(x) = dx / (2 sqrt(x)), which says nothing near 0: there the root of the spread is the bound.
-    return error, min(spread / (2.0 * error), float(np.sqrt(spread))) if error > 0 else float(np.sqrt(spread))

@@ -93,3 +93,17 @@ def _draws(n: int, seed: int) -> Integers:
 def _spread(drawn: Array, n: int) -> float:
     # A draw of as many blocks as there are understates a variance by (n - 1) / n.
     return float(np.sqrt(n / (n - 1)) * np.std(drawn))
+
+
+def model_error(slow: Array, noise: float) -> tuple[float, float]:
+    """Root mean square of a low-passed residual (N,) beyond the noise in it, and its standard error.
+
+    `noise` is the standard deviation of the noise that passes the low-pass.  The standard error is that of the mean
+    square over blocks, carried over to its root.
+    """
+    squares = slow**2
+    excess = float(np.mean(squares)) - noise**2
+    error = float(np.sqrt(max(excess, 0.0)))
+    spread = error_of_mean([float(squares[part].mean()) for part in blocks(len(slow))])
+    # d sqrt(x) = dx / (2 sqrt(x)), which says nothing near 0: there the root of the spread is the bound.
+    return error, min(spread / (2.0 * error), float(np.sqrt(spread))) if error > 0 else float(np.sqrt(spread))

@@ -8,7 +8,7 @@ from pathlib import Path
 from davinci_forces.records import store
 
 PACKAGE = Path(__file__).parents[2]
-IMPORT = re.compile(r"^[ \t]*from (pipeline[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
+IMPORT = re.compile(r"^[ \t]*from (davinci_forces[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
 COMMENT = re.compile(r"#.*")
 
 
@@ -24,7 +24,7 @@ def code(*modules: str, without: str = "") -> dict[str, str]:
     named = {file for module in modules for file in _files(module)}
     left_out = PACKAGE.joinpath(*without.split(".")[1:]) if without else None
     kept = (file for file in sorted(files) if file in named or left_out not in file.parents)
-    return {file.relative_to(PACKAGE.parent).as_posix(): _hash_of(file) for file in kept}
+    return {file.relative_to(PACKAGE).as_posix(): _hash_of(file) for file in kept}
 
 
 def _collect(sources: Iterable[Path], files: dict[Path, None]) -> None:

@@ -9,6 +9,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.excitation.fourier import Fourier, motion
 from davinci_forces.maths.simulation.actuators import Cascade, Motors, Regulator
 from davinci_forces.maths.simulation.friction import Friction
+from davinci_forces.maths.simulation.path import Path
 from davinci_forces.maths.simulation.surroundings import SHAPES
 from davinci_forces.robots.robot import Joint, Robot
 
@@ -49,24 +50,6 @@ class SimulatedPush:
     def at(self, t: Array) -> Array:
         """The push at the times t (N,) [s]."""
         return np.asarray(SHAPES[self.shape](t, self.start, self.end, self.peak))
-
-
-@dataclass(frozen=True)
-class Path:
-    """Positions to be at at given times, at constant speed or easing in and out between them."""
-
-    points: tuple[tuple[float, float], ...]  # time [s], position
-    ease: bool
-
-    def position(self, t: Array) -> Array:
-        """The position at the times t (N,) [s]; the first and the last position hold before and after."""
-        times, positions = np.array(self.points).T
-        if not self.ease:
-            return np.asarray(np.interp(t, times, positions))
-        part = np.interp(t, times, np.arange(len(times), dtype=float))
-        whole = np.floor(part)
-        eased = whole + (1 - np.cos(np.pi * (part - whole))) / 2
-        return np.asarray(np.interp(eased, np.arange(len(times)), positions))
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from davinci_forces.errors import BadRequest
-from davinci_forces.excitation.trajectory import ExcitationTrajectory
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.excitation.fourier import Fourier, motion
 from davinci_forces.maths.excitation.run_in import run_in, shortest
+from davinci_forces.simulation.excitation.trajectory import ExcitationTrajectory
 
 RUN_INS = 31  # lengths of the run-in that are tried, from a quarter of a period to a whole one
 

@@ -1,7 +1,7 @@
 """What a search for causes found, in words."""
 
-from davinci_forces.innovations.search import CLEARLY, CauseSearch
-from davinci_forces.innovations.trials import CLOCK, COLOUR, CONTACT, LEVEL, REVERSALS, SIZES, STEP, WALK, Trial
+from davinci_forces.filters.innovations.search import CLEARLY, CauseSearch
+from davinci_forces.filters.innovations.trials import CLOCK, COLOUR, CONTACT, LEVEL, REVERSALS, SIZES, STEP, WALK, Trial
 
 WHITE, LEFT_OUT, MENDED, UNEXPLAINED = "white", "left out", "mended", "unexplained"
 LEAVING = (CONTACT, REVERSALS)

@@ -9,13 +9,19 @@ import numpy as np
 
 from davinci_forces import robots
 from davinci_forces.errors import BadRequest
-from davinci_forces.excitation.trajectory import PERIODS, ExcitationTrajectory, coefficient_names, designed, problem_of
 from davinci_forces.maths.excitation.arm import ArmExcitationProblem, arm_observation, arm_problem, design_together
 from davinci_forces.maths.excitation.criterion import CRITERIA, condition
 from davinci_forces.maths.excitation.fourier import Fourier, Range
 from davinci_forces.maths.excitation.joint import ExcitationProblem
 from davinci_forces.maths.excitation.search import Tell, nothing
 from davinci_forces.robots.robot import Joint, Robot
+from davinci_forces.simulation.excitation.trajectory import (
+    PERIODS,
+    ExcitationTrajectory,
+    coefficient_names,
+    designed,
+    problem_of,
+)
 
 STARTS_OF_ARM = 2  # starts of one joint for one of the arm, which takes longer
 

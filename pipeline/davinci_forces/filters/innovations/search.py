@@ -10,7 +10,7 @@ from collections.abc import Iterator
 from itertools import combinations
 from typing import NamedTuple
 
-from davinci_forces.innovations.trials import (
+from davinci_forces.filters.innovations.trials import (
     CLOCK,
     COLOUR,
     CONTACT,
