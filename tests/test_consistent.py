@@ -14,8 +14,7 @@ from davinci_forces.maths.estimation import conic
 from davinci_forces.maths.estimation.conic import ENTRIES, nearest, scaled
 from davinci_forces.maths.estimation.least_squares import triangle
 from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias, pseudo_inertias
-from davinci_forces.maths.models.mechanism import Mechanism, of_signs
-from davinci_forces.maths.models.model import Motion
+from davinci_forces.maths.models.model import Mechanism, Motion, of_signs
 from davinci_forces.records import Diagnostic, Fit, Smoothed
 from davinci_forces.robots.dvrk_psm import ROBOT
 from davinci_forces.robots.models import coupled

@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from davinci_forces.maths.contact.detection import FALSE_ALARMS, Quiet, alarm_level, events, quiet
-from davinci_forces.maths.contact.window import mean_size, summarise
+from davinci_forces.maths.contact.detection import FALSE_ALARMS, Quiet, alarm_level, events, mean_size, quiet, summarise
 from davinci_forces.maths.signals.noise import noise_std, smoothed
 from davinci_forces.maths.signals.path import likeness, most_different
 from davinci_forces.maths.signals.smoothing import lowpass, share_passed
 from davinci_forces.maths.signals.windows import free_space
-from davinci_forces.maths.uncertainty import jackknife
+from davinci_forces.maths.uncertainty import bootstrap
 from davinci_forces.maths.uncertainty.bootstrap import (
     blocks,
     error_of_mean,
@@ -305,9 +304,9 @@ def test_the_offset_of_free_windows_has_a_standard_error_and_a_drift():
 def test_leaving_out_units_gives_the_standard_error_of_a_mean_of_units():
     random, unit = np.random.default_rng(5), np.repeat(np.arange(8), 50)
     x = random.normal(size=8)[unit]  # all that differs is between units
-    found = jackknife.standard_error(lambda kept: np.array([x[kept].mean()]), unit)
+    found = bootstrap.jackknife_std(lambda kept: np.array([x[kept].mean()]), unit)
     assert found == pytest.approx(x[::50].std(ddof=1) / np.sqrt(8))
-    assert np.isnan(jackknife.standard_error(lambda kept: np.array([x[kept].mean()]), np.zeros(len(x), int))).all()
+    assert np.isnan(bootstrap.jackknife_std(lambda kept: np.array([x[kept].mean()]), np.zeros(len(x), int))).all()
 
 
 def test_a_band_is_as_uncertain_as_its_logs_differ():

@@ -10,10 +10,9 @@ from scipy.signal import lfilter, sosfiltfilt
 from davinci_forces.errors import NotPeriodic
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.periods import period
-from davinci_forces.maths.periods.agreement import differing
+from davinci_forces.maths.periods.agreement import differing, stretch
 from davinci_forces.maths.periods.repetition import repetition
 from davinci_forces.maths.periods.steps import REACH, steps
-from davinci_forces.maths.periods.stretch import stretch
 from davinci_forces.records import Average, Diagnostic, Fit, Signal, Trajectory
 from davinci_forces.stages import average, differentiate, fit
 from davinci_forces.study import LogEntry

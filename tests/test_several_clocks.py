@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import davinci_forces
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.aligned import Alignment, Timed, aligned
+from davinci_forces.logs.joined import Alignment, Timed, aligned
 from davinci_forces.maths.signals.clock import GAP
 from tests import arm
 from tests.logs.test_clocks import said, tdms

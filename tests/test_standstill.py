@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.maths.models.independent import regressor
-from davinci_forces.maths.selection.blocks import path_blocks
-from davinci_forces.maths.selection.equations import gathered
+from davinci_forces.maths.selection.cross_validation import path_blocks
+from davinci_forces.maths.selection.ridge import gathered
 from davinci_forces.maths.signals.noise import noise_std
 from davinci_forces.maths.signals.smoothing import lowpass
 from davinci_forces.maths.signals.standstill import HOLD, standing

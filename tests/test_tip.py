@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from davinci_forces.maths.mechanics import kinematics, tip_force, workspace
-from davinci_forces.maths.uncertainty.joint_correlation import matrix, shared
+from davinci_forces.maths.mechanics.tip_force import matrix, shared
 from davinci_forces.records import (
     ArmCorrelation,
     Contact,

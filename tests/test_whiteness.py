@@ -27,7 +27,7 @@ from davinci_forces.filters.problem import NoiseModel
 from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.models.independent import combined, inertia_of
 from davinci_forces.maths.signals import whiteness
-from davinci_forces.maths.signals.reversals import moving
+from davinci_forces.maths.signals.standstill import moving
 from tests import arm
 from tests.test_ekf import NOISE, T_S, matched, simulate, walk
 

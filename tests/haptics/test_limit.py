@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from davinci_forces.haptics.maths.bimodal import THESIS, cqlf_limit
+from davinci_forces.haptics.maths.bimodal import THESIS, cqlf_limit, switching_limit
 from davinci_forces.haptics.maths.delay import delay_limit, sampled_limit
-from davinci_forces.haptics.maths.switching import switching_limit
 from davinci_forces.records import (
     Comparison,
     DelayLimit,

@@ -10,10 +10,9 @@ from scipy.optimize import brentq
 from scipy.sparse import csc_array
 
 from davinci_forces.haptics.maths import lmi, motion
-from davinci_forces.haptics.maths.bimodal import Hand, cqlf_limit, energy, mode
+from davinci_forces.haptics.maths.bimodal import Hand, cqlf_limit, energy, log_growth, mode, switching_limit
 from davinci_forces.haptics.maths.motion import switched, worst
-from davinci_forces.haptics.maths.switching import log_growth, switching_limit
-from davinci_forces.maths.estimation import solver
+from davinci_forces.maths.estimation import conic
 
 HANDS = (Hand(1.0, 1.0, 100.0), Hand(1.0, 30.0, 100.0), Hand(0.2, 0.05, 2000.0), Hand(1.0, 20.0, 100.0))
 
@@ -49,7 +48,7 @@ def test_a_map_takes_little_longer_than_its_bare_solves():
 
     hand, k_t = HANDS[0], np.linspace(1.0, 60.0, 900)
     A, bound = lmi.inequality(hand, 20.0)
-    settings, cones, nothing = solver.settings(lmi.TOLERANCE), [clarabel.PSDTriangleConeT(2)] * 3, csc_array((3, 3))
+    settings, cones, nothing = conic.settings(lmi.TOLERANCE), [clarabel.PSDTriangleConeT(2)] * 3, csc_array((3, 3))
 
     def bare():
         for _ in k_t:

@@ -13,7 +13,7 @@ from nptdms import ChannelObject, TdmsFile, TdmsWriter
 from numpy.testing import assert_allclose, assert_array_equal
 
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.local_time import clocks_may_change
+from davinci_forces.logs.text.stamps import clocks_may_change
 from davinci_forces.logs.timeline import ROUNDING, Timeline
 from tests.logs.lvm_writer import Style, Write, lvm
 from tests.logs.reading import read, times_of

@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 from davinci_forces.commands import inspect
-from davinci_forces.maths.signals.outline import Outline
+from davinci_forces.maths.signals.columns import Outline
 from tests.logs.lvm_writer import Style, Write, lvm
 from tests.logs.test_clocks import said, tdms
 

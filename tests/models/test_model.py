@@ -16,9 +16,8 @@ from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.models.independent import IndependentJoint
-from davinci_forces.maths.models.memory import deflection, driven
+from davinci_forces.maths.models.memory import deflection, driven, efforts, pieces
 from davinci_forces.maths.models.model import Motion
-from davinci_forces.maths.models.pieces import efforts, pieces
 from davinci_forces.records import Smoothed
 from davinci_forces.robots.davinci_chain import BODIES, CHAIN
 
@@ -85,7 +84,7 @@ def test_a_long_motion_piece_by_piece_is_the_whole_of_it(model, monkeypatch):
     Phi, known = model.regressor(motion)
     theta = np.random.default_rng(1).normal(size=(2, len(model.parameters)))
     which = np.arange(2000) % 2
-    monkeypatch.setattr("davinci_forces.maths.models.pieces.SAMPLES", 300)
+    monkeypatch.setattr("davinci_forces.maths.models.memory.SAMPLES", 300)
     every = list(pieces(model, motion, 7))
     assert [len(piece.motion.q) for piece in every] == [307, *[314] * 5, 207]
     for piece in every:
@@ -108,7 +107,7 @@ def test_rows_for_a_fit_are_low_passed_piece_by_piece_as_they_would_be_at_once(m
     ]
     log = observed(records, (), 4.0, 0)
     at_once = log.rows(coupled())
-    monkeypatch.setattr("davinci_forces.maths.models.pieces.SAMPLES", 700)
+    monkeypatch.setattr("davinci_forces.maths.models.memory.SAMPLES", 700)
     for piecewise, whole in zip(log.rows(coupled()), at_once, strict=True):
         assert_allclose(piecewise, whole, rtol=1e-9, atol=1e-12)
 

@@ -7,10 +7,18 @@ from numpy.testing import assert_allclose
 from davinci_forces.identification import unseen
 from davinci_forces.identification.candidates import Library
 from davinci_forces.identification.unseen import Refitted
-from davinci_forces.maths.selection.blocks import BLOCKS, MOST, left_out, path_blocks
-from davinci_forces.maths.selection.cross_validation import Judged, judged, preferred, standard_error, together
-from davinci_forces.maths.selection.equations import gathered, side_by_side
-from davinci_forces.maths.selection.ridge import Ridge, covariance, penalty, solve
+from davinci_forces.maths.selection.cross_validation import (
+    BLOCKS,
+    MOST,
+    Judged,
+    judged,
+    left_out,
+    path_blocks,
+    preferred,
+    standard_error,
+    together,
+)
+from davinci_forces.maths.selection.ridge import Ridge, covariance, gathered, penalty, side_by_side, solve
 from davinci_forces.robots import davinci
 from davinci_forces.robots.models import independent
 

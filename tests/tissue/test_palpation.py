@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from davinci_forces.maths.tissue.indentation import NONE, found
-from davinci_forces.maths.tissue.onset import hinge, onset_std
-from davinci_forces.maths.tissue.pushes import between_troughs, runs
+from davinci_forces.maths.tissue.indentation import NONE, found, hinge, onset_std
+from davinci_forces.maths.tissue.probing import between_troughs, runs
 from davinci_forces.maths.tissue.stiffness import median_std, slope_error, straight, work
 from davinci_forces.maths.tissue.tissue import LAWS, judged, moments
 from davinci_forces.study import WHOLE

@@ -11,7 +11,7 @@ import typer
 if TYPE_CHECKING:
     from davinci_forces.logs.log import Log, Options
     from davinci_forces.maths.signals.clock import ClockStatistics
-    from davinci_forces.maths.signals.outline import Outline
+    from davinci_forces.maths.signals.columns import Outline
 
 BARS = "▁▂▃▄▅▆▇█"
 MAX_SHARE = 0.1  # share of repeated rows, and of jitter in the sampling time, above which they are flagged
@@ -59,7 +59,7 @@ def describe(file: Path, head: int, options: "Options | None" = None) -> dict[st
     """
     from davinci_forces.logs import open_log
     from davinci_forces.logs.log import Options
-    from davinci_forces.study.timing import named_time
+    from davinci_forces.study.guessing import named_time
 
     log = open_log(file, options or Options())
     names = [channel.name for channel in log.channels if channel.kind in ("number", "time")]
@@ -89,7 +89,7 @@ def describe(file: Path, head: int, options: "Options | None" = None) -> dict[st
 def _survey(log: "Log", source: str, together: list[str], head: int) -> _Survey:
     """Read the channels of one clock, whose times `source` holds, if any does."""
     from davinci_forces.maths.signals.clock import ClockStatistics
-    from davinci_forces.maths.signals.outline import Outline
+    from davinci_forces.maths.signals.columns import Outline
 
     kinds = {channel.name: channel.kind for channel in log.channels if not channel.derived}
     measured = [name for name in together if kinds.get(name) == "number" and name != source]

@@ -62,8 +62,8 @@ def _hand(k_h: float, b_h: float, m: float, delay: float | None, rate: float | N
 def _limits(hand: "Hand", delay: float | None, rate: float | None) -> Limits:
     """Every limit [N/m] that was asked for; None is no limit."""
     from davinci_forces.haptics.maths import bimodal, lmi
+    from davinci_forces.haptics.maths.bimodal import switching_limit
     from davinci_forces.haptics.maths.delay import delay_limit, sampled_limit
-    from davinci_forces.haptics.maths.switching import switching_limit
 
     switching = switching_limit(hand)
     limits: Limits = {

@@ -1,7 +1,7 @@
 """Least squares with inertia and friction that are not negative, as no mechanism's are."""
 
 from davinci_forces.estimators.problem import Estimate, Regression, spread
-from davinci_forces.maths.estimation import bounded
+from davinci_forces.maths.estimation import least_squares
 
 
 def estimate(problem: Regression) -> Estimate:
@@ -10,5 +10,5 @@ def estimate(problem: Regression) -> Estimate:
     The standard errors are those of least squares: of a parameter that a bound holds back, they are too large.
     """
     weight, R = problem.weight, problem.triangle
-    theta = bounded.bounded(R, problem.known.signs(len(R.y)))
+    theta = least_squares.bounded(R, problem.known.signs(len(R.y)))
     return Estimate(theta, lambda: spread(problem, weight, R, theta))

@@ -5,7 +5,7 @@ Sousa and Cortesao, 2014 and 2019; Traversaro, Brossette, Escande and Nori, 2016
 
 from davinci_forces.estimators.problem import Estimate, Regression, spread
 from davinci_forces.maths.estimation.conic import nearest
-from davinci_forces.maths.models.mechanism import of_signs
+from davinci_forces.maths.models.model import of_signs
 
 
 def estimate(problem: Regression) -> Estimate:

@@ -7,8 +7,7 @@ squares; inertia and friction are not negative.
 import numpy as np
 
 from davinci_forces.estimators.problem import Estimate, Regression, Search, spread
-from davinci_forces.maths.estimation.bounded import bounded
-from davinci_forces.maths.estimation.least_squares import Triangle
+from davinci_forces.maths.estimation.least_squares import Triangle, bounded
 from davinci_forces.maths.estimation.swarm import CONSTRICTED, PARTICLES, THESIS, Manner, search
 from davinci_forces.maths.models.physical import Box, each_for_itself
 

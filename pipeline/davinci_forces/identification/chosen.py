@@ -9,8 +9,7 @@ import numpy as np
 from davinci_forces.identification.candidates import Candidate, Library
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.model import Model
-from davinci_forces.maths.selection.blocks import BLOCKS, MOST, left_out
-from davinci_forces.maths.selection.cross_validation import Judged, preferred, standard_error
+from davinci_forces.maths.selection.cross_validation import BLOCKS, MOST, Judged, left_out, preferred, standard_error
 from davinci_forces.maths.selection.ridge import covariance, scaled_equations
 from davinci_forces.robots.models import Reach
 from davinci_forces.robots.robot import Robot

@@ -10,8 +10,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation.conic import nearest
 from davinci_forces.maths.estimation.least_squares import Triangle
 from davinci_forces.maths.models.model import Model
-from davinci_forces.maths.selection.equations import Equations
-from davinci_forces.maths.selection.ridge import Ridge, scaled_equations
+from davinci_forces.maths.selection.ridge import Equations, Ridge, scaled_equations
 
 NOTHING = 1e-8  # of the effort's square, below which it costs nothing that the solver would tell
 

@@ -7,10 +7,10 @@ import numpy as np
 
 from davinci_forces.estimators.problem import NOTHING, Known, Regression
 from davinci_forces.maths.arrays import Array, Booleans, Integers
+from davinci_forces.maths.models.memory import pieces
 from davinci_forces.maths.models.model import Model, Motion
-from davinci_forces.maths.models.pieces import pieces
-from davinci_forces.maths.selection.blocks import BLOCKS, MOST, path_blocks, repetitions
-from davinci_forces.maths.selection.equations import Equations, gathered, side_by_side
+from davinci_forces.maths.selection.cross_validation import BLOCKS, MOST, path_blocks, repetitions
+from davinci_forces.maths.selection.ridge import Equations, gathered, side_by_side
 from davinci_forces.maths.signals.noise import smoothed
 from davinci_forces.maths.signals.smoothing import reach
 from davinci_forces.records import Average, Smoothed, Trajectory

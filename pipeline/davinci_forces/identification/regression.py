@@ -7,8 +7,8 @@ import numpy as np
 from davinci_forces.estimators.problem import NOTHING, Known, Regression
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.independent import IndependentJoint
+from davinci_forces.maths.models.memory import efforts
 from davinci_forces.maths.models.model import Model, Motion
-from davinci_forces.maths.models.pieces import efforts
 from davinci_forces.maths.periods.harmonics import kept_noise
 from davinci_forces.maths.signals.smoothing import motion, segments
 from davinci_forces.maths.signals.standstill import standing

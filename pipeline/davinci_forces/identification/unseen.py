@@ -15,11 +15,10 @@ from davinci_forces.identification.observations import Observed
 from davinci_forces.identification.paths import ANOTHER_PATH, SAME_PATH
 from davinci_forces.identification.scores import Judge, some
 from davinci_forces.maths.arrays import Array, Booleans, Integers
+from davinci_forces.maths.models.memory import efforts
 from davinci_forces.maths.models.model import Model
-from davinci_forces.maths.models.pieces import efforts
-from davinci_forces.maths.selection.blocks import BLOCKS, MOST
-from davinci_forces.maths.selection.equations import Equations
-from davinci_forces.maths.selection.ridge import Ridge, solve
+from davinci_forces.maths.selection.cross_validation import BLOCKS, MOST
+from davinci_forces.maths.selection.ridge import Equations, Ridge, solve
 from davinci_forces.records import Prediction
 from davinci_forces.records.predict import CHOSEN
 from davinci_forces.robots.models import Reach

@@ -11,9 +11,9 @@ import numpy as np
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs import open_log
-from davinci_forces.logs.local_time import REMARK, clocks_may_change
 from davinci_forces.logs.log import Block, Channel, Log, Options
 from davinci_forces.logs.names import unique
+from davinci_forces.logs.text.stamps import REMARK, clocks_may_change
 from davinci_forces.logs.timeline import Timeline
 from davinci_forces.maths.arrays import Array
 

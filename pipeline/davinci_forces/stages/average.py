@@ -6,11 +6,10 @@ import numpy as np
 
 from davinci_forces.errors import NotPeriodic
 from davinci_forces.maths.periods import averaging
-from davinci_forces.maths.periods.agreement import Difference, alike, alternation
+from davinci_forces.maths.periods.agreement import Difference, alike, alternation, stretch
 from davinci_forces.maths.periods.averaging import Folded, Phases, end, phases, whole_periods
 from davinci_forces.maths.periods.period import Period, refine, standard_error
 from davinci_forces.maths.periods.repetition import Repetition, repetition
-from davinci_forces.maths.periods.stretch import stretch
 from davinci_forces.maths.signals.noise import noise_std, smoothed
 from davinci_forces.maths.signals.smoothing import segments, share_passed
 from davinci_forces.records import Average, Counts, Diagnostic, PeriodResidual, Signal, diagnostic

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from davinci_forces.maths.arrays import Booleans, evenly
-from davinci_forces.maths.uncertainty import jackknife
+from davinci_forces.maths.uncertainty import bootstrap
 from davinci_forces.maths.uncertainty.error_band import BLOCKS, FEWEST
 from davinci_forces.records import ErrorBand, FilterNoise, FreeMotion
 
@@ -34,7 +34,7 @@ def band(joint: str, own: list[FreeMotion], speed: float) -> ErrorBand:
         joint=joint,
         speed=speed,
         band_rms=rms(columns, np.ones(len(logs), np.bool_)),
-        band_rms_std=float(jackknife.standard_error(lambda kept: np.array([rms(columns, kept)]), parts)[0]),
+        band_rms_std=float(bootstrap.jackknife_std(lambda kept: np.array([rms(columns, kept)]), parts)[0]),
         source=np.repeat(np.array([motion.log for motion in own], object), repeated),
         path_of=np.repeat(np.array([motion.path for motion in own], object), repeated),
         log_mean=np.repeat([motion.free_mean for motion in own], repeated),

@@ -15,7 +15,7 @@ from davinci_forces.identification.refitting import refitted
 from davinci_forces.identification.used import describing, model_of
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.driven import Driven
-from davinci_forces.maths.signals.reversals import moving
+from davinci_forces.maths.signals.standstill import moving
 from davinci_forces.maths.signals.whiteness import NORMAL_95, NORMAL_99, cross_correlation, mean_square_band
 from davinci_forces.maths.signals.windows import longest_run, outside, settled
 from davinci_forces.records import Choice, Explanation, FilterNoise, Fit, Innovation, Signal

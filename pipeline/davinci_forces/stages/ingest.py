@@ -7,8 +7,7 @@ from davinci_forces.logs.names import visible
 from davinci_forces.records import Diagnostic, LogSummary, Recording, Touch, diagnostic
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
-from davinci_forces.study.intake.mending import mended
-from davinci_forces.study.intake.reading import Intake
+from davinci_forces.study.intake.reading import Intake, mended
 from davinci_forces.study.intake.summary import remarks, summary
 
 

@@ -4,11 +4,10 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from davinci_forces.haptics.maths.bimodal import THESIS, cqlf_limit, energy
+from davinci_forces.haptics.maths.bimodal import THESIS, cqlf_limit, energy, switching_limit
 from davinci_forces.haptics.maths.delay import damping_needed, delay_limit, sampled_limit
 from davinci_forces.haptics.maths.lmi import holds
 from davinci_forces.haptics.maths.motion import at_contact, leaving_limit, switched, worst
-from davinci_forces.haptics.maths.switching import switching_limit
 from davinci_forces.maths.arrays import Array
 from davinci_forces.records import (
     Comparison,

@@ -5,8 +5,7 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 
 from davinci_forces.identification.used import describing
-from davinci_forces.maths.contact.detection import Event, events
-from davinci_forces.maths.contact.window import summarise
+from davinci_forces.maths.contact.detection import Event, events, summarise
 from davinci_forces.maths.signals.windows import free_space, settled
 from davinci_forces.records import Contact, Diagnostic, Fit, Threshold, Track, diagnostic
 from davinci_forces.robots.robot import Robot

@@ -19,10 +19,10 @@ from davinci_forces.identification.scores import Judge, some
 from davinci_forces.identification.used import describing, model_of, used
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.independent import IndependentJoint
+from davinci_forces.maths.models.memory import cut
 from davinci_forces.maths.models.model import Motion
-from davinci_forces.maths.models.pieces import cut
 from davinci_forces.maths.periods import averaging
-from davinci_forces.maths.selection.blocks import BLOCKS
+from davinci_forces.maths.selection.cross_validation import BLOCKS
 from davinci_forces.maths.signals.windows import outside
 from davinci_forces.records import (
     Choice,

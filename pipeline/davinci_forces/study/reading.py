@@ -12,8 +12,7 @@ from davinci_forces.haptics import scenario as haptics
 from davinci_forces.robots import Robot, from_toml
 from davinci_forces.robots.models import VARIANTS
 from davinci_forces.study import HapticScenario, Settings, Study
-from davinci_forces.study.entries import entries_of, inside, lines_of_files
-from davinci_forces.study.plausible import checked
+from davinci_forces.study.entries import checked, entries_of, inside, lines_of_files
 from davinci_forces.toml import TomlTable
 
 # Variants by the estimators that they can be chosen with: a coupled arm needs a ridge.

@@ -18,10 +18,19 @@ from davinci_forces.maths.units import SI, canonical, measures
 from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.study.arm_guess import DEFAULT, Arm, arm_of
 from davinci_forces.study.channels import OF_THE_LOG
-from davinci_forces.study.guessing import Holding, Meaning, clock_hint, guess, samples_of
-from davinci_forces.study.roles import Role, roles_of
+from davinci_forces.study.guessing import (
+    Holding,
+    Meaning,
+    Role,
+    clock_hint,
+    guess,
+    has_clock,
+    is_time,
+    named_time,
+    roles_of,
+    samples_of,
+)
 from davinci_forces.study.side_by_side import grouped, guess_joined, start_of
-from davinci_forces.study.timing import has_clock, is_time, named_time
 from davinci_forces.study.tissue_channels import is_tissue, tissue_channels, unit_of
 
 # Words of a channel's name that tell what it holds, the telling ones first.

@@ -3,8 +3,6 @@
 Study, robot and scenario are read with it; every problem has its file and its line.
 """
 
-from davinci_forces.toml.reading import parse, read
-from davinci_forces.toml.table import TomlTable
-from davinci_forces.toml.values import is_number, shown
+from davinci_forces.toml.table import TomlTable, is_number, parse, read, shown
 
 __all__ = ["TomlTable", "is_number", "parse", "read", "shown"]

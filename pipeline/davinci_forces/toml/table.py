@@ -1,13 +1,35 @@
 """A table of a TOML file, read key by key; what is wrong is noted with its place and line, not raised one by one."""
 
 import math
+import sys
+import tomllib
 from collections.abc import Callable, Collection, Iterable
 from difflib import get_close_matches
+from pathlib import Path
 from typing import Any
 
+from davinci_forces.errors import PipelineError
 from davinci_forces.toml.file import TomlFile
-from davinci_forces.toml.lines import KeyPath
-from davinci_forces.toml.values import are_numbers, is_number, shown
+from davinci_forces.toml.lines import KeyPath, lines_of
+
+
+def is_number(value: Any) -> bool:
+    """Whether a value of TOML is a number that a float holds: neither inf nor nan, nor an integer beyond both."""
+    return type(value) in (int, float) and abs(value) <= sys.float_info.max
+
+
+def are_numbers(value: Any, count: int | None = None) -> bool:
+    """Whether a value is a list of such numbers, as many as asked for."""
+    return isinstance(value, list) and all(map(is_number, value)) and count in (None, len(value))
+
+
+def shown(value: Any) -> str:
+    """A value as a problem shows it, cut where it is long."""
+    try:
+        text = repr(value)
+    except ValueError:  # more digits than Python writes
+        return "a number of thousands of digits"
+    return text if len(text) <= 80 else f"{text[:76]} ..."
 
 
 class TomlTable:
@@ -143,3 +165,39 @@ class TomlTable:
 
     def _within(self, key: str) -> str:
         return f"{self.place}.{key}" if self.place else key
+
+
+LARGEST = 4_000_000  # bytes: ten thousand logs with all their channels; what is larger was written by mistake
+
+
+def read(file: Path, kind: type[PipelineError], missing: str = "there is no such file") -> TomlTable:
+    """The whole of a file.  What it says is checked by who asks the table for it.
+
+    Raises
+    ------
+    PipelineError
+        Of that kind, if the file cannot be read or is not TOML.
+    """
+    try:
+        if (size := file.stat().st_size) > LARGEST:
+            raise kind(
+                f"{file}: it has {size / 1e6:.1f} MB, and what people write down has at most {LARGEST / 1e6:.0f}: is "
+                "it a log? Of a study this large, make several"
+            )
+        text = file.read_text(encoding="utf-8-sig")
+    except FileNotFoundError:
+        raise kind(f"{file}: {missing}") from None
+    except OSError as error:
+        raise kind(f"{file}: {error.strerror}") from None
+    except ValueError as error:  # of UTF-8
+        raise kind(f"{file}: {error}") from None
+    return parse(text, str(file), kind)
+
+
+def parse(text: str, name: str, kind: type[PipelineError]) -> TomlTable:
+    """The whole of a text of TOML, called `name` in problems; raises as `read` does."""
+    try:
+        values, lines = tomllib.loads(text), lines_of(text)
+    except (ValueError, RecursionError) as error:  # of TOML, and of numbers and nesting beyond Python's limits
+        raise kind(f"{name}: {error}") from None
+    return TomlTable(values, TomlFile(name, lines))

@@ -8,13 +8,30 @@ between them, however fast and wherever, makes it unstable.  The real one switch
     V = m dx^2/2 + K_H x^2/2 + K_T max(x, 0)^2/2,  dV/dt = -b dx^2,
 
 so that without delay it is stable for every K_T >= 0.
+
+The stiffest tissue under arbitrary switching, exactly: where the worst switching law just closes on itself.
+
+The two modes differ in the force K_T x only, which pushes back.  The worst law leaves it out while the hand moves
+away, and puts it in while it comes back, so that it switches on both axes of the phase plane, and alike in both halves.
+With omega^2 = K/m and the damping ratio zeta, a mode takes a speed v to the displacement X, and X to the speed v':
+
+    X  = v/omega   exp(-g(zeta)),        g = zeta/s  arccos(zeta)
+    v' = X omega   exp(-h(zeta)),        h = zeta/s  (pi - arccos(zeta)),     s = sqrt(1 - zeta^2)
+
+Half a turn of the worst law multiplies the speed by omega_1/omega_2 exp(-g(zeta_2) - h(zeta_1)), and K_T is the limit
+where that is 1: below it every switching law dies out, above it one does not.  For planar systems that is exact.
 """
 
+import math
 from typing import NamedTuple
 
 import numpy as np
+from scipy.optimize import brentq
 
 from davinci_forces.maths.arrays import Array
+
+THESIS_TISSUE = 457.24  # [N/m], section 8.2
+NEAR = 1e-6  # of a damping ratio to 1, where the series takes over
 
 
 class Hand(NamedTuple):
@@ -35,7 +52,6 @@ class Hand(NamedTuple):
 
 
 THESIS = Hand(1.0, 1.0, 100.0)  # m and b of section 8.3; it states no K_H, and 100 N/m is an arm held loosely
-THESIS_TISSUE = 457.24  # [N/m], section 8.2
 
 
 def mode(hand: Hand, k_t: float) -> Array:
@@ -55,3 +71,33 @@ def cqlf_limit(hand: Hand) -> float:
 def energy(hand: Hand, k_t: float, x: Array, dx: Array) -> Array:
     """V [J] of the model as it really switches, which falls wherever it moves; x [m], dx [m/s]."""
     return 0.5 * (hand.m * dx**2 + hand.k * x**2 + k_t * np.maximum(x, 0.0) ** 2)
+
+
+def switching_limit(hand: Hand) -> float:
+    """The K_T [N/m] at which the worst switching law neither grows nor dies out."""
+    high = cqlf_limit(hand)  # below which no law grows
+    while log_growth(hand, high) < 0.0:
+        high *= 2.0
+    return float(brentq(lambda k_t: log_growth(hand, k_t), 0.5 * high, high, xtol=1e-12 * high, rtol=1e-12))
+
+
+def log_growth(hand: Hand, k_t: float) -> float:
+    """The logarithm of what half a turn of the worst law multiplies a speed by; -inf where it never turns."""
+    soft, stiff = hand.damping_ratio(), hand.damping_ratio(k_t)
+    if stiff >= 1.0:
+        return -math.inf
+    return 0.5 * math.log1p(k_t / hand.k) - away(soft) - back(stiff)
+
+
+def away(zeta: float) -> float:
+    """g: what damping takes of the speed, as a logarithm, on the way from the axis to the turning point."""
+    if abs(1.0 - zeta) < NEAR:
+        return 1.0 + (zeta - 1.0) * 2.0 / 3.0
+    if zeta < 1.0:
+        return zeta / math.sqrt(1.0 - zeta**2) * math.acos(zeta)
+    return zeta / math.sqrt(zeta**2 - 1.0) * math.acosh(zeta)
+
+
+def back(zeta: float) -> float:
+    """h: the same on the way back, for zeta < 1; beyond, the axis is never reached."""
+    return zeta / math.sqrt(1.0 - zeta**2) * (math.pi - math.acos(zeta))

@@ -12,7 +12,7 @@ from scipy.sparse import csc_array
 
 from davinci_forces.haptics.maths.bimodal import Hand
 from davinci_forces.maths.arrays import Array, Booleans
-from davinci_forces.maths.estimation import solver
+from davinci_forces.maths.estimation import conic
 
 EXISTS = 1e-7  # t beyond what the solver's tolerance leaves
 TOLERANCE = 1e-9
@@ -27,7 +27,7 @@ def holds(hand: Hand, k_t: Array) -> Booleans:
     """Whether a common quadratic Lyapunov function exists for each stiffness k_t (N,) [N/m]."""
     import clarabel
 
-    settings, cones = solver.settings(TOLERANCE), [clarabel.PSDTriangleConeT(2)] * 3
+    settings, cones = conic.settings(TOLERANCE), [clarabel.PSDTriangleConeT(2)] * 3
     cost, nothing = np.array([0.0, 0.0, -1.0]), csc_array((3, 3))
     found = []
     for k in np.asarray(k_t, float).tolist():

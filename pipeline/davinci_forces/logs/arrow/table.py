@@ -11,7 +11,7 @@ import pyarrow.compute as pc
 from pyarrow import feather, ipc, parquet
 
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.columns import absent, integers, numbers
+from davinci_forces.logs.cells import absent, integers, numbers
 from davinci_forces.logs.log import Block, Channel, Log, Options
 from davinci_forces.logs.names import unique
 from davinci_forces.maths.arrays import Array

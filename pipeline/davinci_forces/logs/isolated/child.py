@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.isolated.wire import Message, receive, send
+from davinci_forces.logs.isolated.process import Message, receive, send
 from davinci_forces.logs.log import Log, Options
 from davinci_forces.maths.arrays import Array
 

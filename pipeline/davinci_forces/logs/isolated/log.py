@@ -8,8 +8,7 @@ from typing import Any
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.blocks import ahead
-from davinci_forces.logs.isolated.process import Ended, child
-from davinci_forces.logs.isolated.wire import Message
+from davinci_forces.logs.isolated.process import Ended, Message, child
 from davinci_forces.logs.log import Block, Channel, Clock, Log, Options
 from davinci_forces.maths.arrays import Array
 

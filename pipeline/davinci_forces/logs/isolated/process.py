@@ -1,16 +1,21 @@
 """The parent's side: children that are kept for the next log, and ended when they are late."""
 
 import atexit
+import json
 import os
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from threading import Timer
+from typing import IO, Any
 
-from davinci_forces.logs.isolated.wire import Message, receive, send
+import numpy as np
+
 from davinci_forces.maths.arrays import Array
+
+Message = dict[str, Any]
 
 KEPT = 2  # children that wait for a next log: starting one takes longer than reading a small file
 START = (
@@ -21,6 +26,38 @@ OUT_OF_TIME = 24  # the signal SIGXCPU, which Windows does not know
 PACKAGES = Path(__file__).parents[3]
 # One thread each, and Arrow's memory from the system: what libraries reserve beforehand counts as used.
 SPARING = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "ARROW_DEFAULT_MEMORY_POOL": "system"}
+
+
+def send(stream: IO[bytes], message: Message, columns: Sequence[Array] = ()) -> None:
+    """Write a message, and columns of one length."""
+    rows = len(columns[0]) if columns else 0
+    stream.write(json.dumps(message | {"shape": [len(columns), rows]}).encode() + b"\n")
+    for column in columns:
+        stream.write(np.ascontiguousarray(column, np.float64).data)
+    stream.flush()
+
+
+def receive(stream: IO[bytes]) -> tuple[Message, list[Array]]:
+    """Read a message and its columns.
+
+    Raises
+    ------
+    EOFError
+        If the other side is gone.
+    """
+    line = stream.readline()
+    if not line.endswith(b"\n"):
+        raise EOFError
+    message = json.loads(line)
+    columns, rows = message.pop("shape")
+    return message, [_column(stream, rows) for _ in range(columns)]
+
+
+def _column(stream: IO[bytes], rows: int) -> Array:
+    content = stream.read(8 * rows)
+    if len(content) < 8 * rows:
+        raise EOFError
+    return np.frombuffer(content, np.float64)
 
 
 class Ended(Exception):

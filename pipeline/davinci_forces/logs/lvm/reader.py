@@ -11,8 +11,7 @@ from davinci_forces.logs.log import Block, Channel, Clock, Log, Options
 from davinci_forces.logs.lvm.clocks import OwnClock, equal_columns
 from davinci_forces.logs.lvm.header import FOR_PEOPLE, MAGIC, BadHeader, Layout, X
 from davinci_forces.logs.lvm.rows import Reading
-from davinci_forces.logs.lvm.run import Run
-from davinci_forces.logs.lvm.walk import Walk
+from davinci_forces.logs.lvm.walk import Run, Walk
 from davinci_forces.logs.names import unique
 
 ROUNDING = 0.5e-6  # [s] LabVIEW writes six decimals

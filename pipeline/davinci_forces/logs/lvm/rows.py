@@ -1,5 +1,7 @@
 """One pass over the rows of a LabVIEW measurement file: numbers, the numbers of the writes, and what is odd."""
 
+import re
+from collections import Counter
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -8,17 +10,17 @@ from numpy.typing import NDArray
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.cells import UNREADABLE, Cells, NotANumber, marks, parse_carefully, parse_either
 from davinci_forces.logs.lines import Lines, decoded
-from davinci_forces.logs.local_time import REMARK, clocks_may_change
 from davinci_forces.logs.log import Block, Log
 from davinci_forces.logs.lvm.clocks import OwnClock, Sampling
 from davinci_forces.logs.lvm.header import BadHeader, Layout, X, unescaped
-from davinci_forces.logs.lvm.run import WRITTEN, Run
-from davinci_forces.logs.lvm.walk import Walk
-from davinci_forces.logs.remarks import Remarks
+from davinci_forces.logs.lvm.walk import WRITTEN, Run, Walk
+from davinci_forces.logs.text.stamps import REMARK, clocks_may_change
 from davinci_forces.maths.arrays import Array, Booleans
 
 DATED = 1e9  # [s] an x beyond this counts from 1904, not from the start of the file segment
 MOST_COMMENTS = 1000
+MOST = 5  # of a kind that are told one by one
+NUMBERS = re.compile(r"\d+")
 
 
 class Reading:
@@ -250,3 +252,24 @@ class Reading:
         if lines.damage:
             say(lines.damage)
         say.close()
+
+
+class Remarks:
+    """Adds to a list of warnings; those that differ in their numbers only are counted after the first few."""
+
+    def __init__(self, warnings: list[str]) -> None:
+        self.warnings = warnings
+        self.kinds: Counter[str] = Counter()
+
+    def __call__(self, remark: str) -> None:
+        """Remark on something."""
+        kind = NUMBERS.sub("#", remark)
+        self.kinds[kind] += 1
+        if self.kinds[kind] <= MOST:
+            self.warnings.append(remark)
+
+    def close(self) -> None:
+        """Say how many were not told."""
+        for kind, count in self.kinds.items():
+            if count > MOST:
+                self.warnings.append(f"{count - MOST} more times: {kind}")

@@ -13,12 +13,11 @@ from davinci_forces.logs.blocks import ahead
 from davinci_forces.logs.log import Block, Channel, Log, Options
 from davinci_forces.logs.names import unique
 from davinci_forces.logs.tdms import scaled
-from davinci_forces.logs.tdms.clocks import Sampled, clocks_of
+from davinci_forces.logs.tdms.clocks import Sampled, Waveforms, clocks_of
 from davinci_forces.logs.tdms.index import Index
 from davinci_forces.logs.tdms.metadata import COMPLEX, DAQMX_RAW, EPOCH, NUMBERS, TIME, Objects, names
 from davinci_forces.logs.tdms.samples import ROWS, Queue, pieces, rows_of, side_by_side
 from davinci_forces.logs.tdms.walk import TAG, Walk
-from davinci_forces.logs.tdms.waveforms import Waveforms
 from davinci_forces.logs.timeline import Timeline
 
 UNITS = ("unit_string", "ni_unitdescription", "unit", "units")

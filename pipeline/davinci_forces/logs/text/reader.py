@@ -12,10 +12,9 @@ from davinci_forces.errors import BadLog
 from davinci_forces.logs.blocks import ahead
 from davinci_forces.logs.cells import UNREADABLE, Cells, NotANumber, check, parse
 from davinci_forces.logs.lines import GZIP, Lines, decoded
-from davinci_forces.logs.local_time import REMARK, clocks_may_change
 from davinci_forces.logs.log import Block, Channel, Log, Options
 from davinci_forces.logs.text.dialect import NAMES, Dialect, Unclear, find, split
-from davinci_forces.logs.text.stamps import Unwrapped
+from davinci_forces.logs.text.stamps import REMARK, Unwrapped, clocks_may_change
 
 VALUE = rb"[+-]?((\d+MARK?\d*|MARK\d+)([eE][+-]?\d+)?|nan|inf|infinity)"
 NUMBERS = {

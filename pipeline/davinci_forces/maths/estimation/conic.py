@@ -15,10 +15,9 @@ from scipy.sparse import csc_array, diags_array, eye_array, hstack, vstack
 
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.maths.arrays import Array, Integers
-from davinci_forces.maths.estimation import solver
 from davinci_forces.maths.estimation.least_squares import Triangle
 from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias
-from davinci_forces.maths.models.mechanism import Mechanism
+from davinci_forces.maths.models.model import Mechanism
 
 TEN = 10  # inertial parameters of a link, and entries of a symmetric matrix of four rows
 ENTRIES = [(i, j) for j in range(4) for i in range(j + 1)]  # of the triangle of J, in the solver's order
@@ -31,6 +30,18 @@ AT_BOUND = 1e-8  # of the effort, below which a bound that holds is met exactly
 TOLERANCE = 1e-12  # asked of the solver
 STEP = 0.9  # share of the way to the edge of a cone that it goes at a time: nearer by, rounding stops it early
 GAP = 1e-8  # of the same squares, by which the best may be missed
+
+
+def settings(tolerance: float) -> Any:
+    """Of Clarabel: no words, one thread, nothing removed beforehand, and gaps and residuals of at most `tolerance`."""
+    import clarabel
+
+    chosen = clarabel.DefaultSettings()
+    chosen.verbose = False
+    chosen.max_threads = 1
+    chosen.presolve_enable = False
+    chosen.tol_gap_abs = chosen.tol_gap_rel = chosen.tol_feas = tolerance
+    return chosen
 
 
 class Made(NamedTuple):
@@ -160,6 +171,6 @@ def at_price(F: csc_array, y: Array, cones: Cones, price: float) -> tuple[Array,
 
 def careful() -> Any:
     """The solver's settings, with small steps."""
-    settings = solver.settings(TOLERANCE)
-    settings.max_step_fraction = STEP
-    return settings
+    cautious = settings(TOLERANCE)
+    cautious.max_step_fraction = STEP
+    return cautious

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.arrays import Array, Booleans
 
 
 class Triangle(NamedTuple):
@@ -39,3 +39,17 @@ def triangle(Phi: Array, tau: Array, weight: Array) -> Triangle:
     kernels.triangularise(Phi, tau, weight, R)
     scale = np.linalg.norm(R[:, :p], axis=0)
     return Triangle(R[:p, :p] / np.where(scale > 0, scale, 1.0), R[:p, p], float(R[p, p] ** 2), scale)
+
+
+def bounded(R: Triangle, positive: Booleans) -> Array:
+    """The parameters (p,) of least squares among those that are not negative where `positive` (p,) says so.
+
+    They are found by active sets (Stark and Parker, 1995), so a bound that holds is met exactly.
+    """
+    from scipy.optimize import lsq_linear
+
+    theta = R.theta
+    if (theta[positive] >= 0).all():
+        return theta
+    found = lsq_linear(R.U, R.y, (np.where(positive, 0.0, -np.inf), np.inf), method="bvls", tol=1e-14)
+    return np.asarray(found.x / R.scale)

@@ -17,10 +17,8 @@ from davinci_forces.maths.mechanics.bodies import PARAMETERS
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.rigid_body import regressor
 from davinci_forces.maths.models.bias import COULOMB, VISCOUS
-from davinci_forces.maths.models.mechanism import Mechanism
-from davinci_forces.maths.models.memory import driven
-from davinci_forces.maths.models.model import JointDynamics, Motion, Parameter, Regressor
-from davinci_forces.maths.models.pieces import SAMPLES, efforts
+from davinci_forces.maths.models.memory import SAMPLES, driven, efforts
+from davinci_forces.maths.models.model import JointDynamics, Mechanism, Motion, Parameter, Regressor
 from davinci_forces.maths.models.terms import Term
 
 RICH = 200  # random poses, velocities and accelerations that tell the base parameters

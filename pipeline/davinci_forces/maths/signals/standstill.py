@@ -9,6 +9,11 @@ HOLD = 1.0  # [s] in which a joint that stands still goes nowhere: longer than a
 STILL = 0.01  # of how far it goes in that time on average
 STILL_AT_MOST = 0.05  # where noise makes it seem to move; the slowest turns of an excitation cover twice that
 NOISE = 6.0  # standard deviations that noise makes a position range over
+BEFORE, AFTER = (
+    0.05,
+    0.25,
+)  # [s] around a reversal that are left out: by then a filter that shows pushes has forgotten it
+SLOW = 0.05  # of the root mean square of the velocity, below which friction may stick
 
 
 def standing(q: Array, dq: Array, segment: Integers, rate: float, q_std: float = 0.0, spread: int = 0) -> Booleans:
@@ -37,3 +42,14 @@ def _standing(q: Array, window: int, spread: int, least: float) -> Booleans:
     np.add.at(covers, np.maximum(first - spread, 0), 1)
     np.add.at(covers, np.minimum(first + window + spread, N), -1)
     return np.asarray(np.cumsum(covers[:-1]) > 0)
+
+
+def moving(dq: Array, T_s: float) -> Booleans:
+    """Whether each sample of a velocity (N,), low-passed without delay, is far from any reversal and no standstill."""
+    size = float(np.sqrt(np.mean(dq**2)))
+    standing = np.abs(dq) <= SLOW * size
+    standing[1:] |= np.sign(dq[1:]) != np.sign(dq[:-1])
+    since = np.cumsum(np.concatenate([[0], standing]))
+    k, N = np.arange(len(dq)), len(dq)
+    first, last = np.maximum(k - round(AFTER / T_s), 0), np.minimum(k + round(BEFORE / T_s) + 1, N)
+    return np.asarray(since[last] == since[first])

@@ -1,17 +1,100 @@
-"""One push into tissue: which of its samples are of contact, where that begins and ends, and which are loading."""
+"""One push into tissue: which of its samples are of contact, where that begins and ends, and which are loading.
+
+Where contact begins: the depth at which the force starts to rise, found together with how steeply it does.
+
+    f = c + k max(d - d0, 0)^n
+
+For a given d0 this is a straight line in the power, so d0 is searched for by itself, and c and k follow.  Tissue that
+stiffens as it is pressed bends so gently that a straight line would find contact late: n is 1 unless more fits clearly.
+"""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array, Booleans
-from davinci_forces.maths.tissue.onset import FEWEST, Hinge, hinge, onset_std
+from davinci_forces.maths.arrays import Array, Booleans, evenly
+from davinci_forces.maths.estimation.correlation import correlated
 
+CANDIDATES = 41  # onsets of a round; each further round looks between the neighbours of the best
+ROUNDS = 3
+MOST = 4000  # samples that a search goes through; of more, evenly spaced ones
+EXPONENTS = (1.5, 2.0)
+CURVED = 1.5  # by how much a straight line must leave more squares than a curve that is believed
+FEWEST = 3  # samples on either side of an onset, below which it is not known
 STANDS_OUT = 4.0  # standard deviations of what it leaves that the force must rise by
 BETTER = 1.05  # by how much a line must leave more squares than a hinge that is believed to bend
 ENOUGH = 6  # samples that a hinge is found from
-
 FOUND, WHOLE, NONE, TOO_EARLY = "found", "all", "no contact", "contact from the first sample"
+
+
+class Hinge(NamedTuple):
+    """The force before and after contact, with the squares that it leaves and those that a straight line does."""
+
+    onset: float  # d0
+    slope: float  # k
+    exponent: float  # n
+    level: float  # c, the force before contact
+    squares: float
+    squares_line: float  # of a straight line throughout
+    reach: float  # depth of the deepest sample below the onset
+    before: int  # samples, of those looked at, that are not as deep as the onset
+
+    @property
+    def rise(self) -> float:
+        """By how much the force changes from first contact to the deepest sample."""
+        return float(self.slope * self.reach**self.exponent)
+
+
+def hinge(depth: Array, force: Array) -> Hinge:
+    """The hinge through forces (N,) at depths (N,), N >= 4, in the exponent that they call for."""
+    straight = hinge_of(depth, force, 1.0)
+    curved = min((hinge_of(depth, force, n) for n in EXPONENTS), key=lambda h: h.squares)
+    return curved if curved.squares * CURVED < straight.squares else straight
+
+
+def hinge_of(depth: Array, force: Array, exponent: float) -> Hinge:
+    """The hinge of least squares through forces (N,) at depths (N,), that rises or falls with depth."""
+    few = evenly(len(depth), MOST)
+    d, f = depth[few], force[few]
+    low, high = float(d.min()), float(d.max())
+    best = np.linspace(low, high, CANDIDATES + 1)[:-1]
+    squares, slopes = _profile(d, f, best, exponent)
+    for _ in range(ROUNDS - 1):
+        i, step = int(np.argmin(squares)), best[1] - best[0]
+        best = np.linspace(max(best[i] - step, low), min(best[i] + step, high - 1e-3 * step), CANDIDATES)
+        squares, slopes = _profile(d, f, best, exponent)
+    i = int(np.argmin(squares))
+    onset, slope = float(best[i]), float(slopes[i])
+    past = np.clip(d - onset, 0.0, None) ** exponent
+    level = float(np.mean(f) - slope * np.mean(past))
+    line = float(_profile(d, f, np.array([low]), 1.0)[0][0])
+    return Hinge(onset, slope, exponent, level, float(squares[i]), line, high - onset, int((d < onset).sum()))
+
+
+def onset_std(depth: Array, force: Array, found: Hinge) -> float:
+    """The standard error of an onset, with residuals that are correlated; depths and forces (N,) in order of time.
+
+    By the derivatives of the hinge by c, k and d0: 1, (d - d0)^n, and -k n (d - d0)^(n - 1), the latter beyond d0.
+    """
+    past, n = np.clip(depth - found.onset, 0.0, None), found.exponent
+    residual = force - found.level - found.slope * past**n
+    F = np.column_stack([np.ones_like(past), past**n, np.where(past > 0, -found.slope * n * past ** (n - 1), 0.0)])
+    Q, R = np.linalg.qr(F)
+    if np.abs(np.diag(R)).min() <= 1e-12 * np.abs(np.diag(R)).max() or len(depth) <= 4:
+        return float("nan")
+    residual = residual - Q @ (Q.T @ residual)
+    variance = correlated(Q, residual, (0,), np.linalg.inv(R), len(depth) - 3).variance
+    return float(np.sqrt(variance[2]))
+
+
+def _profile(d: Array, f: Array, onsets: Array, exponent: float) -> tuple[Array, Array]:
+    """The squares (G,) that the best hinge of each onset (G,) leaves, and its slope (G,)."""
+    past = np.clip(d - onsets[:, None], 0.0, None) ** exponent
+    past = past - past.mean(axis=1, keepdims=True)
+    away = f - f.mean()
+    size = np.maximum((past**2).sum(axis=1), np.finfo(float).tiny)
+    slope = past @ away / size
+    return np.asarray((away**2).sum() - slope**2 * size), np.asarray(slope)
 
 
 class Indentation(NamedTuple):

@@ -6,17 +6,41 @@ the tissue, both alike: the slope of one over the other stays what the log says.
 """
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.tissue.indentation import into_tissue
-from davinci_forces.maths.tissue.pushes import between_troughs, runs
 
+RISES = 0.15  # of the range of what swings: a peak that stands out by less is none
 AT_REST = 0.1  # of a usual speed
 FEWEST = 4  # samples that say anything
 ONE_SIDED = 2.0  # by how much further a force has to go to one side of its median to be pushing there
+
+
+def between_troughs(x: Array, rises: float = RISES) -> list[slice]:
+    """Each swing of a signal (N,) up and down again, from the lowest sample before its peak to the lowest after it.
+
+    A peak is one that stands out by at least `rises` of the signal's range, but for the extreme 1 % of its samples; one
+    at an end of the signal counts.
+    """
+    from scipy.signal import find_peaks
+
+    low, high = np.quantile(x, [0.01, 0.99])
+    if not high > low:
+        return [slice(0, len(x))]
+    padded = np.concatenate([[x.min()], x, [x.min()]])
+    peaks = find_peaks(padded, prominence=rises * (high - low))[0] - 1
+    troughs = [a + int(np.argmin(x[a : b + 1])) for a, b in pairwise(peaks)]
+    return [slice(a, b) for a, b in pairwise([0, *troughs, len(x)]) if b > a]
+
+
+def runs(numbers: Integers) -> list[slice]:
+    """The runs of samples of one number (N,), in order."""
+    edges = [0, *(np.flatnonzero(np.diff(numbers)) + 1).tolist(), len(numbers)]
+    return [slice(a, b) for a, b in pairwise(edges) if b > a]
 
 
 class Probing(NamedTuple):

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers
-from davinci_forces.maths.uncertainty import jackknife
+from davinci_forces.maths.uncertainty import bootstrap
 
 EDGES = (0.25, 0.5, 1.0, 1.5)  # of the ranges, in root mean squares of the identification's velocity
 BINS = len(EDGES) + 1
@@ -66,7 +66,7 @@ def excess_std(of: SpeedCells) -> Array:
     if not len(of.samples):
         return np.zeros(BINS)
     left_out = without_each(of, of.mean_square - of.filter_square, units(of), together=not depends_on_speed(of))
-    return jackknife.of_left_out(np.maximum(left_out, 0.0))
+    return bootstrap.of_left_out(np.maximum(left_out, 0.0))
 
 
 def beyond(of: SpeedCells, together: bool) -> Array:

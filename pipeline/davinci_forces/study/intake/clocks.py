@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.aligned import Alignment, Follower, Timed, aligned
+from davinci_forces.logs.joined import Alignment, Follower, Timed, aligned
 from davinci_forces.logs.log import COUNTED, Block, Log
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals.clock import GAP

@@ -2,18 +2,77 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.log import Block, Channel, Log
+from davinci_forces.maths.arrays import Booleans
+from davinci_forces.maths.periods.steps import REACH, steps
 from davinci_forces.maths.signals.clock import ClockStatistics
 from davinci_forces.maths.units import SI, UNITS, canonical, measures, size
-from davinci_forces.records import Column, Recording, Touch
+from davinci_forces.records import Column, Counts, Recording, Touch
 from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.study import WHOLE, LogEntry, Source
-from davinci_forces.study.intake.clocks import UsedClocks
-from davinci_forces.study.intake.touch import touched
+from davinci_forces.study.intake.clocks import ALIGNED, UsedClocks
+
+# Channels of the log by the columns of a Touch; those of joints become recordings.
+TOUCHED = {
+    "depth": "depth", "force": "force", "force_x": "force_x", "force_y": "force_y", "force_z": "force_z",
+    "x": "tip_x", "y": "tip_y", "z": "tip_z",
+}  # fmt: skip
+
+
+class Quantities(Protocol):
+    """A reading of a log, as far as it is asked here."""
+
+    log: Log
+    entry: LogEntry
+    rows: int
+    sources: dict[str, Source]
+    channels: dict[str, Channel]
+
+    @property
+    def clocked(self) -> bool:
+        """Whether it is known when the samples were taken."""
+
+    def converted(self, block: Block, quantity: str) -> Column:
+        """A channel in SI."""
+
+
+def touched(reading: Quantities, block: Block, t: Column, kept: Booleans) -> Touch | None:
+    """What the channels of the log say of contact; NaN in columns that it has no channel of."""
+    if not set(reading.sources) & {*TOUCHED.values(), "push"}:
+        return None
+    unknown = np.full(len(t), np.nan)
+    columns = {
+        name: reading.converted(block, quantity) if quantity in reading.sources else unknown
+        for name, quantity in TOUCHED.items()
+    }
+    return Touch(
+        log=reading.entry.name,
+        role=reading.entry.role,
+        sample=(reading.rows + np.arange(len(t)))[kept],
+        push=_pushes(reading, block, len(t))[kept],
+        t=(t if reading.clocked else unknown)[kept],
+        **{name: column[kept] for name, column in columns.items()},
+    )
+
+
+def _pushes(reading: Quantities, block: Block, rows: int) -> Counts:
+    """The numbers of the pushes, 0 throughout where the log does not count them."""
+    if "push" not in reading.sources:
+        return np.zeros(rows, dtype=np.int64)
+    numbers = reading.converted(block, "push")
+    odd = np.flatnonzero((numbers != np.round(numbers)) | (np.abs(numbers) >= 2**53))
+    if len(odd):
+        raise BadLog(
+            f"{reading.log.path}: channel {reading.channels['push'].name!r} holds {numbers[odd[0]]:g} at row "
+            f"{reading.rows + int(odd[0])} (counted from 0), but the number of a push is a whole one; name another "
+            "channel, or leave push out, and pushes are found"
+        )
+    return numbers.astype(np.int64)
 
 
 @dataclass
@@ -195,3 +254,33 @@ class Intake:
                 f"{clock.bad_pair[0]:.9g} s, then {clock.bad_pair[1]:.9g} s; name another time channel, "
                 "or say rate = ... [Hz] to count samples instead"
             )
+
+
+def mended(intake: Intake, blocks: Iterator[Block]) -> Iterator[Block]:
+    """The blocks with steps of the clock taken out of its channel, where the motion tells that no time passed.
+
+    Of identification logs only: others lose nothing by a gap, and their contact windows count on their clock.
+    The end of a block waits for the next, which says how the motion goes on.
+    """
+    several = intake.clocks.are_several
+    name = ALIGNED if several else intake.clocks.time
+    whole = (intake.without_cut_end(block) for block in blocks)
+    if not (name or several) or intake.entry.role != "identification":
+        yield from whole
+        return
+    stated = intake.clocks.groups[0].is_stated and not several
+    scale = intake.sources["time"].sign * intake.scales["time"] if stated else 1.0
+    passed = 0.0  # by the channel, in its unit, while nothing moved on
+    waiting: Block = {}
+    for block in whole:
+        late = block | {name: block[name] - passed} if passed else block
+        joined = {key: np.concatenate([waiting[key], late[key]]) for key in late} if waiting else late
+        for i, jump in steps(intake.times(joined), intake.positions(joined)):
+            joined = joined | {name: joined[name] - np.where(np.arange(len(joined[name])) < i, 0.0, jump / scale)}
+            passed += jump / scale
+            intake.jumps.append((float(intake.times(joined)[i - 1]), jump))
+        ready = max(len(joined[name]) - 2 * REACH, 0)
+        waiting = {key: values[ready:] for key, values in joined.items()}
+        yield {key: values[:ready] for key, values in joined.items()}
+    if waiting:
+        yield waiting
