@@ -64,6 +64,27 @@ def test_the_wheel_holds_every_file_of_the_package(wheel):
     assert suffixes == {".py", ".toml", ".html", ".typ", ".css", ".js", ".png", ".typed"}
 
 
+@pytest.mark.medium
+def test_the_wheel_installs_one_package_only(wheel):
+    with zipfile.ZipFile(wheel) as archive:
+        tops = {name.split("/")[0] for name in archive.namelist()}
+    assert {top for top in tops if not top.endswith(".dist-info")} == {"davinci_forces"}
+
+
+@pytest.mark.medium
+def test_a_pipeline_of_the_user_s_hides_nothing_and_is_not_hidden(installed, tmp_path):
+    (tmp_path / "pipeline").mkdir()
+    (tmp_path / "pipeline" / "__init__.py").write_text("raise RuntimeError('the folder of the user')\n")
+    (tmp_path / "other").mkdir()
+    (tmp_path / "other" / "pipeline.py").write_text("USER = 1\n")
+    python = next(installed.glob("python*"))
+    assert run(python, "-m", "davinci_forces", "--version", cwd=tmp_path).startswith("davinci-forces ")
+    assert run(installed / "davinci-forces", "--version", cwd=tmp_path).startswith("davinci-forces ")
+    assert run(python, "-c", "import pipeline; print(pipeline.USER)", cwd=tmp_path / "other") == "1\n"
+    empty = "import importlib.util; print(importlib.util.find_spec('pipeline'))"
+    assert run(python, "-c", empty, cwd=installed) == "None\n"
+
+
 @pytest.mark.slow
 def test_an_installed_package_simulates_and_analyses_in_an_empty_folder(installed, tmp_path):
     program = installed / "davinci-forces"
