@@ -14,7 +14,7 @@ from davinci_forces.maths.estimation.identifiability import combinations, deviat
 from davinci_forces.maths.estimation.least_squares import triangle
 from davinci_forces.records import Diagnostic, Identifiability
 from davinci_forces.records.catalogue import Catalogue
-from davinci_forces.report.identified import wanting
+from davinci_forces.report.sections.joints import wanting
 from davinci_forces.robots.davinci import ROBOT
 from davinci_forces.stages import fit
 from tests import arm

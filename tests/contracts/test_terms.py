@@ -8,7 +8,7 @@ from davinci_forces.maths.models import kernels, terms
 from davinci_forces.maths.models.bias import bias as bias_of
 from davinci_forces.maths.models.independent import combined, inertia_of, regressor
 from davinci_forces.maths.models.terms import TERMS, Term
-from davinci_forces.report.writers.equations import Formula, draw_formulas
+from davinci_forces.report.writers.typesetting import Formula, draw_formulas
 from davinci_forces.robots.robot import Kind
 from tests.contracts.dimensions import has_a_dimension, is_effort
 

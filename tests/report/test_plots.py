@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from davinci_forces.report.plots import binned_means, correlation, explained_by
+from davinci_forces.report.sections.joints.residuals import binned_means, correlation, explained_by
 
 RNG = np.random.default_rng(1)
 X = RNG.uniform(-1.0, 1.0, 4000)

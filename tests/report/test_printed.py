@@ -10,10 +10,9 @@ from davinci_forces.records import Fit, FrictionMap, Origin, Residual, SwarmSear
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.report.content import Bullets, Line, Table
 from davinci_forces.report.context import Context
-from davinci_forces.report.friction import friction_maps
-from davinci_forces.report.overlaid import convergence, estimators
-from davinci_forces.report.printed import printed_beside
 from davinci_forces.report.results import collect
+from davinci_forces.report.sections.joints.estimators import convergence, estimators, printed_beside
+from davinci_forces.report.sections.joints.friction import friction_maps
 from davinci_forces.robots import davinci, dvrk_psm
 from davinci_forces.stages import fit
 from tests import arm

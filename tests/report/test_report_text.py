@@ -7,8 +7,7 @@ from report_documents import HOSTILE
 
 from davinci_forces.report.content import Document, Equation, Number, Prose, Section, Table, literal, numbers
 from davinci_forces.report.content.inline import Span, parse, printable
-from davinci_forces.report.content.layout import place, references
-from davinci_forces.report.content.tables import columns
+from davinci_forces.report.content.layout import columns, place, references
 from davinci_forces.report.writers.widths import BREAK, PAGE, allow_breaks, fit_columns
 
 anything = st.text(st.one_of(st.sampled_from("\\$`*[]@a "), st.characters()))

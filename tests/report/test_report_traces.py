@@ -9,7 +9,7 @@ from report_documents import zoomable
 from davinci_forces.report.content import Band, Figure, Line, Panel, Points
 from davinci_forces.report.content.document import HELD
 from davinci_forces.report.content.thinning import envelope, thin_mark
-from davinci_forces.report.figures.traces import thin_figure
+from davinci_forces.report.writers.numbers import thin_figure
 
 
 @given(st.integers(0, 2**31), st.integers(2, 3000), st.integers(1, 200))

@@ -5,14 +5,12 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from davinci_forces.records.catalogue import Catalogue, Provenance
+from davinci_forces.report.answer import answer, digest
 from davinci_forces.report.changes import Stated
 from davinci_forces.report.content import Document, Rated, Section, name_of, walk
 from davinci_forces.report.context import Context
-from davinci_forces.report.digest import digest
-from davinci_forces.report.identity import MANIFEST, identity, manifest
-from davinci_forces.report.results import collect
+from davinci_forces.report.results import MANIFEST, collect, identity, manifest
 from davinci_forces.report.sections import DOCUMENTS, section_builder
-from davinci_forces.report.terminal import answer
 from davinci_forces.report.writers import render_all
 from davinci_forces.study import Study
 from davinci_forces.study.review import Rating

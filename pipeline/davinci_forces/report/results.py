@@ -1,12 +1,13 @@
-"""Every number of a report under a stable key, with where it comes from: the content of results.json."""
+"""Every number of a report under a stable key, with its source (results.json), and the report ID (manifest.txt)."""
 
+import hashlib
 import json
 import math
 import re
 from dataclasses import asdict, dataclass
 
 from davinci_forces.records import KINDS, Record
-from davinci_forces.records.catalogue import Catalogue
+from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.records.quantities import PER_ROW
 from davinci_forces.records.record import Published
 from davinci_forces.report.content.number import Number
@@ -79,3 +80,26 @@ def format_unit(unit: str) -> str:
     """A unit as it is printed: powers as superscripts, a root as a root, and nothing for a pure number."""
     text = re.sub(r"(\w+)\^0\.5", r"√\1", "" if unit == "1" else unit)
     return re.sub(r"\^(\d)", lambda match: "⁰¹²³⁴⁵⁶⁷⁸⁹"[int(match[1])], text)
+
+
+MANIFEST = "manifest.txt"
+
+
+def manifest(provenance: Provenance, made: dict[str, bytes]) -> bytes:
+    """Every file that a run reads and makes, pages apart, as `sha256sum --check` takes it.
+
+    Names are `raw/<study>/...`, `processed/<study>/...` and `reports/<study>/...`, wherever these folders are; `made`
+    are the files of the report that hold its numbers.
+    """
+    study = provenance.name
+    files = {
+        **provenance.raw,
+        **{f"processed/{study}/{place}": sha for place, sha in provenance.processed.items()},
+        **{f"reports/{study}/{name}": hashlib.sha256(content).hexdigest() for name, content in made.items()},
+    }
+    return "".join(f"{sha}  {name}\n" for name, sha in sorted(files.items()) if sha).encode()
+
+
+def identity(listed: bytes) -> str:
+    """The report ID: 128 bits of the sha256 of its manifest."""
+    return hashlib.sha256(listed).hexdigest()[:32]

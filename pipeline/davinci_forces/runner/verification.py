@@ -8,7 +8,7 @@ from typing import Any
 
 from davinci_forces.errors import NotReproduced, PipelineError
 from davinci_forces.report import REPORT
-from davinci_forces.report.identity import MANIFEST, identity
+from davinci_forces.report.results import MANIFEST, identity
 from davinci_forces.runner import STEPS, index, reporting
 from davinci_forces.runner.ledger import Folders, Ledger, file_name
 from davinci_forces.runner.plan import Plan, Task

@@ -4,8 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from davinci_forces.report.campaign.findings import Findings, place
-from davinci_forces.report.campaign.studies import FLOORS, Campaigned, Series, joints_of
+from davinci_forces.report.campaign.studies import FLOORS, Campaigned, Findings, Series, joints_of, place
 from davinci_forces.report.content import (
     Block,
     Bullets,

@@ -1,7 +1,7 @@
-"""What a campaign knows of each study, and one number of a joint over all of them."""
+"""The studies of a campaign, each number of a joint over all of them, and what drifts or stands out."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from datetime import datetime
 from typing import NamedTuple
 
@@ -90,3 +90,50 @@ def series_of(studies: Sequence[Campaigned], joint: str) -> Iterator[Series]:
         value = np.array([one.number if one.number is not None else np.nan for one in stated])
         std = np.array([one.std or np.nan for one in stated])
         yield Series(joint, name, unit, tuple(s for s, _ in found), tuple(k for _, k in found), value, std)
+
+
+DAY = 86400.0  # [s]
+Place = tuple[str, str, str]  # joint, name and unit of a series
+
+
+class Slope(NamedTuple):
+    """By how much a number drifts a day, or a study, with its standard error."""
+
+    value: float
+    std: float
+
+
+@dataclass(frozen=True)
+class Findings:
+    """What of all series drifts, varies beyond its errors or stands out, many tests taken together."""
+
+    every: tuple[Series, ...]
+    by_date: bool
+    time: Mapping[str, float]  # of each study [days from the first], or which one it is in order
+    slopes: Mapping[Place, Slope] = field(default_factory=dict)  # of what drifts
+    varying: frozenset[Place] = frozenset()
+    outliers: Mapping[Place, tuple[int, ...]] = field(default_factory=dict)  # studies, by their place in the series
+    tests: int = 0
+    chance: float = 0.0  # that any of them tells falsely
+
+    def times(self, one: Series) -> Array:
+        """When the studies of a series were."""
+        return np.array([self.time[study.name] for study in one.studies])
+
+    @property
+    def unit(self) -> str:
+        """What a slope is by."""
+        return "day" if self.by_date else "study"
+
+    def stand_out(self, one: Series) -> tuple[int, ...]:
+        """Which of its studies stand out from the others."""
+        return self.outliers.get(place(one), ())
+
+    def tell(self, one: Series) -> bool:
+        """Whether there is anything to say of it."""
+        return place(one) in self.slopes or place(one) in self.varying or bool(self.stand_out(one))
+
+
+def place(one: Series) -> Place:
+    """What tells a series from the others."""
+    return one.joint, one.name, one.unit

@@ -1,4 +1,4 @@
-"""Numbering what a document holds, once for all writers: both print the same numbers and link the same references."""
+"""What all writers print alike: the numbers of blocks, references to them, and the columns of tables."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -8,6 +8,7 @@ from typing import Any
 from davinci_forces.report.content.document import (
     Block,
     Bullets,
+    Cell,
     Document,
     Equation,
     Figure,
@@ -21,7 +22,8 @@ from davinci_forces.report.content.document import (
     name_of,
     walk,
 )
-from davinci_forces.report.content.inline import Kind, parse
+from davinci_forces.report.content.inline import Kind, literal, parse
+from davinci_forces.report.content.number import Number
 
 KINDS: dict[type, str] = {Figure: "figure", Figure3D: "figure", Table: "table", Equation: "equation"}
 NAMES = {"figure": "Figure {}", "table": "Table {}", "equation": "Eq. ({})", "section": "Section {}"}
@@ -129,3 +131,44 @@ def _block(block: Block, counters: Counter[str], series: str) -> Placed:
     number = f"{series}{counters[series + kind]}"
     # A capital letter cannot be confused with a label, which has none.
     return Placed(block, kind, number, name_of(block) or f"{kind.capitalize()}-{number}")
+
+
+NO_BREAK = "\N{NO-BREAK SPACE}"
+
+
+@dataclass(frozen=True)
+class TextCell:
+    """One cell as it is printed, and the key of its number in results.json."""
+
+    text: str
+    key: str = ""
+
+
+@dataclass(frozen=True)
+class TextColumn:
+    """The header, alignment (l, c or r) and cells of a column."""
+
+    head: str
+    align: str
+    cells: tuple[TextCell, ...]
+
+
+def columns(table: Table) -> tuple[TextColumn, ...]:
+    """The columns of a table, ready to print."""
+    aligns = table.align or " " * len(table.header)
+    cells = zip(*table.rows, strict=True) if table.rows else ((),) * len(table.header)
+    return tuple(_column(head, align, tuple(c)) for head, align, c in zip(table.header, aligns, cells, strict=True))
+
+
+def _column(head: str, align: str, cells: tuple[Cell, ...]) -> TextColumn:
+    numbers = [cell for cell in cells if isinstance(cell, Number)]
+    unit = numbers[0].unit if len({number.unit for number in numbers}) == 1 else ""
+    head = f"{head} {literal(f'[{unit}]').replace(' ', NO_BREAK)}".strip() if unit else head
+    align = align.strip() or ("r" if numbers else "l")
+    return TextColumn(head, align, tuple(_text_cell(cell, bool(unit)) for cell in cells))
+
+
+def _text_cell(cell: Cell, unit_in_head: bool) -> TextCell:
+    if isinstance(cell, str):
+        return TextCell(cell)
+    return TextCell(literal(cell.text if unit_in_head else str(cell)), cell.key or "")

@@ -21,7 +21,7 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, fit_name, title
-from davinci_forces.report.left_out import MEASURES
+from davinci_forces.report.sections.parts import MEASURES
 
 SHOWN = 9  # runs at most in the PDF
 SAME = 1e-9  # relative errors closer than this are one

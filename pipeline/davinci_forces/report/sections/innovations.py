@@ -21,7 +21,7 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, count, label, listed, title
-from davinci_forces.report.plots import autocorrelation
+from davinci_forces.report.sections.parts import autocorrelation
 from davinci_forces.report.verdicts import findings_in_words
 
 UNEXPLAINED = "unexplained"  # a finding: no cause that was tried explains it

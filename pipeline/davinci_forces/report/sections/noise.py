@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from davinci_forces.maths.arrays import evenly
 from davinci_forces.records import Average, Column, PeriodResidual, Signal, Spectrum, Trajectory, Whiteness
 from davinci_forces.report.content import (
     Bars,
@@ -23,7 +24,7 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.plots import autocorrelation, histogram, normal_scores
+from davinci_forces.report.sections.parts import autocorrelation
 
 SIGNALS = {"q_noise": "position", "dq_noise": "velocity", "tau_noise": "effort"}
 OUTLIER = 3.0  # times the median period's noise, from which on a period is named
@@ -211,3 +212,27 @@ def noise_panels(residual: PeriodResidual, average: Average, whiteness: dict[str
     )
     if w := whiteness.get("dq_noise"):
         yield autocorrelation(w, "Velocity noise")
+
+
+def histogram(x: Column, bins: int = 40) -> tuple[Column, Column, Column, Column]:
+    """Edges and densities of a histogram, and the normal density of the same mean and standard deviation."""
+    densities, edges = np.histogram(x, bins=bins, density=True)
+    grid = np.linspace(edges[0], edges[-1], 200)
+    sigma = float(x.std()) or 1.0
+    normal = np.exp(-0.5 * ((grid - x.mean()) / sigma) ** 2) / (sigma * np.sqrt(2 * np.pi))
+    return edges, densities, grid, normal
+
+
+def normal_scores(x: Column) -> tuple[Column, Column, float, float]:
+    """A normal probability plot: theoretical quantiles, ordered values, and the line through the quartiles.
+
+    At most 500 points, evenly spread over the order, as more cannot be told apart on paper.
+    """
+    from scipy.stats import norm
+
+    ordered = np.sort(x)
+    scores = norm.ppf((np.arange(1, len(x) + 1) - 0.375) / (len(x) + 0.25))
+    shown = evenly(len(x), 500)
+    low, high = np.quantile(x, [0.25, 0.75])
+    slope = (high - low) / (2 * norm.ppf(0.75))
+    return scores[shown], ordered[shown], float(slope), float((low + high) / 2)

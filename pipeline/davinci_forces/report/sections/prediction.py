@@ -17,7 +17,7 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, fit_name, label, listed, title
-from davinci_forces.report.left_out import LEFT_OUT
+from davinci_forces.report.sections.parts import LEFT_OUT
 from davinci_forces.report.verdicts import percent
 
 

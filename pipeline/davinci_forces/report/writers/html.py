@@ -10,14 +10,12 @@ from typing import TYPE_CHECKING, Any
 
 from davinci_forces.report.content import Document, Equation, Figure, Figure3D, walk
 from davinci_forces.report.content.inline import Span, parse, printable
-from davinci_forces.report.content.layout import Placed, marked_texts, on_screen, place, references
-from davinci_forces.report.content.tables import columns
+from davinci_forces.report.content.layout import Placed, columns, marked_texts, on_screen, place, references
 from davinci_forces.report.figures.svg import svg
-from davinci_forces.report.figures.traces import ThinnedFigure, thin_figure
-from davinci_forces.report.writers.equations import Drawing, Formula, draw_formulas
 from davinci_forces.report.writers.miniature import LARGER, SMALL, miniature
-from davinci_forces.report.writers.numbers import Json, numbers_json
+from davinci_forces.report.writers.numbers import Json, ThinnedFigure, numbers_json, thin_figure
 from davinci_forces.report.writers.pictures import address, looks, shrink
+from davinci_forces.report.writers.typesetting import Drawing, Formula, draw_formulas
 
 if TYPE_CHECKING:
     from markupsafe import Markup

@@ -1,9 +1,9 @@
-"""The numbers that a figure is drawn from, for the page: traces are drawn from them there, and saved as CSV."""
+"""The numbers of a figure, in as many points as a page can carry: there they are drawn as traces and saved as CSV."""
 
 import base64
 import json
 import math
-from dataclasses import fields
+from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ import numpy as np
 from davinci_forces.maths.arrays import Array
 from davinci_forces.report.content import Figure, Figure3D, Panel
 from davinci_forces.report.content.inline import printable
+from davinci_forces.report.content.thinning import points_of, thin_mark
 from davinci_forces.report.figures.palette import assign_looks
 
 Json = dict[str, Any]
@@ -82,3 +83,50 @@ def _equal_step(column: Array) -> float | None:
 def _typical_step(column: Array) -> float:
     steps = np.abs(np.diff(column[np.isfinite(column)]))
     return float(np.median(steps[steps > 0])) if np.any(steps > 0) else math.inf
+
+
+@dataclass(frozen=True)
+class ThinnedFigure:
+    """A figure of few enough points, and how many it had."""
+
+    figure: Figure | Figure3D
+    samples: int
+    shown: int
+
+    @property
+    def note(self) -> str:
+        """The remark on it below its caption."""
+        if self.shown == self.samples:
+            return f"All {_group_digits(self.samples)} samples are shown."
+        return f"Min–max envelope of {_group_digits(self.samples)} samples in {_group_digits(self.shown)} points."
+
+
+def thin_figure(figure: Figure | Figure3D, limit: int) -> ThinnedFigure:
+    """Share `limit` points fairly between the marks of a figure; marks that need less than their share keep all.
+
+    One in space is left as it is.
+    """
+    if isinstance(figure, Figure3D):
+        samples = sum(len(mark.x) for mark in figure.marks)
+        return ThinnedFigure(figure, samples, samples)
+    sizes = [points_of(mark) for panel in figure.panels for mark in panel.marks]
+    shares = iter(_share_points(sizes, limit))
+    panels = tuple(
+        replace(panel, marks=tuple(thin_mark(m, next(shares)) for m in panel.marks)) for panel in figure.panels
+    )
+    result = replace(figure, panels=panels)
+    return ThinnedFigure(result, figure.samples, result.samples)
+
+
+def _share_points(sizes: list[int], limit: int) -> list[int]:
+    """Points for each mark: what it needs while that is below an equal share of what the greedier ones leave."""
+    shares, left = [0] * len(sizes), limit
+    order = sorted(range(len(sizes)), key=lambda i: sizes[i])
+    for rank, i in enumerate(order):
+        shares[i] = min(sizes[i], left // (len(order) - rank))
+        left -= shares[i]
+    return shares
+
+
+def _group_digits(count: int) -> str:
+    return f"{count:,}".replace(",", "\N{NARROW NO-BREAK SPACE}")

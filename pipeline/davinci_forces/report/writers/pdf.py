@@ -18,8 +18,7 @@ from davinci_forces.report.content import (
     Verdict,
 )
 from davinci_forces.report.content.inline import parse, printable
-from davinci_forces.report.content.layout import Placed, on_screen, place, references
-from davinci_forces.report.content.tables import NO_BREAK, columns
+from davinci_forces.report.content.layout import NO_BREAK, Placed, columns, on_screen, place, references
 from davinci_forces.report.figures.svg import svg
 from davinci_forces.report.writers.typesetting import typeset
 from davinci_forces.report.writers.widths import allow_breaks, fit_columns

@@ -5,8 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from davinci_forces.maths.estimation.drift import holm, scatter, stands_out, trend
-from davinci_forces.report.campaign.findings import DAY, Findings, Place, Slope, place
-from davinci_forces.report.campaign.studies import Campaigned, Series
+from davinci_forces.report.campaign.studies import DAY, Campaigned, Findings, Place, Series, Slope, place
 
 CHANCE = 0.05  # of any false alarm on the whole page
 Test = tuple[str, Place, int]  # what is asked, of which series, and of which of its studies

@@ -58,9 +58,7 @@ function newElement(tag, words = "", attributes = {}) {
 }
 
 function newButton(words, label, act) {
-  const button = document.createElement("button");
-  button.type = "button";
-  button.textContent = words;
+  const button = newElement("button", words, { type: "button" });
   if (label) button.setAttribute("aria-label", label);
   button.addEventListener("click", act);
   return button;
@@ -70,8 +68,7 @@ function newButton(words, label, act) {
 function toolsOf(figure) {
   let tools = figure.querySelector(":scope > .tools");
   if (!tools) {
-    tools = document.createElement("div");
-    tools.className = "tools";
+    tools = newElement("div", "", { class: "tools" });
     figure.querySelector(".drawing").after(tools);
   }
   return tools;

@@ -41,13 +41,9 @@ function prepareTable(region) {
 }
 
 function newSearch(name, count, state, update) {
-  const search = document.createElement("div");
-  search.className = "tools";
-  const field = document.createElement("input");
-  field.type = "search";
-  field.placeholder = "Filter rows";
-  field.setAttribute("aria-label", `Filter the rows of ${name}`);
-  const found = document.createElement("output");
+  const search = newElement("div", "", { class: "tools" });
+  const field = newElement("input", "", { type: "search", placeholder: "Filter rows", "aria-label": `Filter the rows of ${name}` });
+  const found = newElement("output");
   field.addEventListener("input", () => {
     state.words = field.value.trim().toLowerCase();
     const shown = update();
@@ -88,9 +84,7 @@ function valueOf(text) {
   return Number(`${number.replace("−", "-")}e${exponent || 0}`);
 }
 
-const note = document.createElement("div");
-note.className = "key";
-note.setAttribute("role", "status");
+const note = newElement("div", "", { class: "key", role: "status" });
 document.querySelector("main").append(note);
 
 document.addEventListener("click", (event) => {
@@ -101,12 +95,9 @@ document.addEventListener("click", (event) => {
 document.addEventListener("keydown", (event) => event.key === "Escape" && note.replaceChildren());
 
 async function showKey(key) {
-  const code = document.createElement("code");
-  code.textContent = key;
-  const link = document.createElement("a");
-  link.href = `#key=${encodeURIComponent(key)}`;
-  link.textContent = "link";
-  const said = document.createElement("span");
+  const code = newElement("code", key);
+  const link = newElement("a", "link", { href: `#key=${encodeURIComponent(key)}` });
+  const said = newElement("span");
   note.replaceChildren(code, said, link);
   said.textContent = (await copy(key, code)) ? "copied" : "";
 }

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from davinci_forces.records import Column, Fit, Residual, Trajectory, Whiteness
+from davinci_forces.records import Fit, Identifiability, Residual
 from davinci_forces.records.predict import CHOSEN
 from davinci_forces.records.record import slug
 from davinci_forces.report.content import (
@@ -13,26 +13,20 @@ from davinci_forces.report.content import (
     Cell,
     Equation,
     Figure,
-    Line,
     OnScreen,
     Panel,
-    Points,
     Prose,
     Section,
-    Stems,
     Table,
+    Tiles,
     Verdict,
     literal,
 )
-from davinci_forces.report.context import Context, fit_name, label, title
-from davinci_forces.report.friction import friction_maps
-from davinci_forces.report.identified import correlations, wanting
-from davinci_forces.report.left_out import left_out
-from davinci_forces.report.overlaid import convergence, estimators
-from davinci_forces.report.plots import autocorrelation, binned_means, correlation, explained_by
-from davinci_forces.report.printed import printed_beside
+from davinci_forces.report.context import Context, fit_name, title
 from davinci_forces.report.results import format_unit
-from davinci_forces.report.verdicts import percent
+from davinci_forces.report.sections.joints.estimators import convergence, estimators, left_out, printed_beside
+from davinci_forces.report.sections.joints.friction import friction_maps
+from davinci_forces.report.sections.joints.residuals import residual_blocks
 
 NAMES = {
     "lse": "least squares",
@@ -45,9 +39,6 @@ NAMES = {
     "tls": "total least squares",
     "consistent": "physically consistent least squares",
 }
-LAGS = 50  # of the cross-correlation, each way
-SEEN = 0.1  # share of a residual's variance that a motion explains, from which on the residual follows it
-REVERSALS = 2.0  # times as large around reversals as elsewhere, from which on that is said
 
 
 def section(context: Context) -> Section | None:
@@ -176,105 +167,36 @@ def compared(context: Context, fits: list[Fit]) -> Block:
     return OnScreen(f"{title(group)}: all fits, and what they rest on", f"all-fits-{group}", (table, *more))
 
 
-def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
-    """What a fit leaves of one log: over time, against the motion, and against itself."""
-    name = f"{title(residual.joint)} in {literal(residual.log)}"
-    errors, effort = residual.tau - residual.tau_hat, label(residual, "tau", "effort")
-    who = fit_name(residual.model, residual.estimator)
-    yield Figure(
-        f"{name}: averaged effort and model ({who}), and what the model leaves of it.",
-        f"{name}: the model follows the averaged effort up to {errors.std():.2g} (root mean square).",
-        (
-            Panel(
-                "Averaged effort and model", "time [s]", effort,
-                (
-                    Line(residual.t, residual.tau, "measured", "sky"),
-                    Line(residual.t, residual.tau_hat, "model", "vermillion", "dashed"),
-                ),
-            ),
-            Panel("Residual", "time [s]", effort, (Line(residual.t, errors, "", "blue"),)),
-        ),
-        f"fit-figure-{residual.log}-{residual.joint}",
-        columns=2,
-        height=42,
-    )  # fmt: skip
-    moved = context.catalogue.about(Trajectory, log=residual.log, joint=residual.joint)
-    q = moved[0].q if moved and len(moved[0].q) == len(errors) else None
-    against = [motion_panel(residual, errors, residual.dq, label(residual, "dq", "velocity"), by_direction=True)]
-    if q is not None:
-        against.insert(0, motion_panel(residual, errors, q, label(moved[0], "q", "position")))
-    tests = [*against, *own_correlations(context, residual, errors, q)]
-    yield Figure(
-        f"{name}: the residual against position and velocity (points: means of 1/40 of the range, bars: their "
-        "standard errors) and direction (its mean), its autocorrelation, and its cross-correlation with the motion.",
-        f"{name}: {in_words(residual, errors, q)}",
-        tuple(tests),
-        f"residual-figure-{residual.log}-{residual.joint}",
-        columns=2,
-        height=38,
-    )
-    yield Prose(in_words(residual, errors, q))
+def wanting(context: Context, joint: str) -> Iterator[Verdict]:
+    """What the identification logs of a joint do not tell; nothing where nothing is wanting."""
+    for told in context.catalogue.about(Identifiability, group=joint):
+        said = [literal(text) for text in (*told.together, *told.not_seen)]
+        if said:
+            text = "; ".join(said)
+            yield Verdict("info", f"{text[:1].upper()}{text[1:]}. {told.advice}.")
 
 
-def motion_panel(residual: Residual, errors: Column, x: Column, x_label: str, by_direction: bool = False) -> Panel:
-    """Means of the residual over ranges of one motion, flat at zero where no term is missing."""
-    middle, mean, std = binned_means(x, errors)
-    heading = f"Against {x_label.partition(' [')[0]}{' and direction' if by_direction else ''}"
-    points = Points(middle, mean, "", "blue", y_std=std)
-    lines = direction_means(x, errors) if by_direction else ()
-    return Panel(heading, x_label, label(residual, "tau", "residual"), (points, *lines))
+def correlations(context: Context, joint: str) -> Iterator[Block]:
+    """The correlation matrix of a joint's parameters, and the condition of what they were found from."""
+    for told in context.catalogue.about(Identifiability, group=joint):
+        names = tuple(dict.fromkeys(map(str, told.parameter)))
+        number = context.number(f"identifiability.{'.'.join(told.key)}.condition", 3)
+        yield Prose(
+            f"The columns of the regressor, scaled to one length, have the condition number {number}. What errors "
+            "in the effort make of two parameters is correlated as the figure shows: where it is near 1 or −1, only "
+            "a sum or a difference of the two is known well."
+        )
+        strongest = max((abs(r) for r, a, b in rows(told) if a != b), default=0.0)
+        numbered = tuple(f"θ{i} {name}" for i, name in enumerate(names, start=1))
+        yield Figure(
+            f"{title(joint)}: correlation of the errors of its parameters (least squares).",
+            f"A matrix of correlations between {', '.join(names)}: the strongest is {strongest:.2f}.",
+            (Panel("", "", "", (Tiles(told.correlation, numbered),)),),
+            f"correlation-{joint}",
+            height=12.0 + 9.0 * len(names),
+        )
 
 
-def direction_means(dq: Column, errors: Column) -> Iterator[Line]:
-    """The residual's mean in each direction of motion: against sign(dq)."""
-    for i, side in enumerate((dq < 0, dq > 0)):
-        if side.any():
-            ends, mean = np.array([0.0, dq[side][np.abs(dq[side]).argmax()]]), float(errors[side].mean())
-            yield Line(ends, np.full(2, mean), "" if i else "mean", "vermillion", "solid")
-
-
-def own_correlations(context: Context, residual: Residual, errors: Column, q: Column | None) -> Iterator[Panel]:
-    """The residual's correlation with itself and with the motion."""
-    signal = f"tau.{residual.model}.{residual.estimator}"
-    for w in context.catalogue.about(Whiteness, log=residual.log, joint=residual.joint, signal=signal):
-        yield autocorrelation(w, "Autocorrelation")
-    lags = np.arange(-min(LAGS, len(errors) // 4), min(LAGS, len(errors) // 4) + 1)
-    shown = lags.astype(np.float64)
-    position = () if q is None else (Line(shown, correlation(errors, q, lags), "with position", "green", "dashed"),)
-    marks = (
-        Stems(shown, correlation(errors, residual.dq, lags), "with velocity", "sky"),
-        Line(shown, correlation(errors, np.sign(residual.dq), lags), "with direction", "vermillion"),
-        *position,
-    )
-    yield Panel("Cross-correlation", "lag [samples]", "correlation", marks, y_range=(-1.0, 1.0))
-
-
-def in_words(residual: Residual, errors: Column, q: Column | None) -> str:
-    """What the residual follows, and what to try.
-
-    Least squares leave no straight line in any motion that is a column of the model, so means over ranges are asked.
-    """
-    motions = {"velocity": residual.dq} | ({} if q is None else {"position": q})
-    shares = {name: explained_by(x, errors) for name, x in motions.items()}
-    said = " and ".join(f"{percent(max(share, 0.0))} by {name}" for name, share in shares.items())
-    follows = max(shares, key=lambda name: shares[name])
-    text = f"Of the residual's variance, its means over ranges explain {said}"
-    if shares[follows] > SEEN:
-        tries = {
-            "position": "a spring, gravity or friction that varies with position, or the coupling to other joints",
-            "velocity": "friction with another shape, or coupling to other joints",
-        }
-        return f"{text}: it follows the {follows}. Worth trying: {tries[follows]}."
-    within = share_within_reversals(errors, residual.dq)
-    if within > REVERSALS:
-        return f"{text}, but around reversals it is {within:.1f} times as large as elsewhere. Worth trying: presliding."
-    return f"{text}: no term of one motion is missing that these plots could show."
-
-
-def share_within_reversals(errors: Column, dq: Column) -> float:
-    """Root mean square of the residual while slow, over that while fast; slow is a tenth of the rms velocity."""
-    slow = np.abs(dq) < 0.1 * float(np.sqrt(np.mean(dq**2)) or 1.0)
-    if not slow.any() or slow.all():
-        return 1.0
-    near, far = (float(np.sqrt(np.mean(errors[which] ** 2))) for which in (slow, ~slow))
-    return near / far if far else 1.0
+def rows(told: Identifiability) -> Iterator[tuple[float, str, str]]:
+    """Each correlation with the two parameters that it is of."""
+    return zip(told.correlation.tolist(), map(str, told.parameter), map(str, told.beside), strict=True)

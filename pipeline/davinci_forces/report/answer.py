@@ -1,9 +1,11 @@
-"""The answer as a terminal shows it: joints, the things to look at first, and tissue; also kept as summary.txt."""
+"""The answer without its page: as a terminal shows it (summary.txt), and as data (summary.json)."""
 
+import json
 import re
 from collections.abc import Sequence
+from typing import Any
 
-from davinci_forces.records import Stiffness
+from davinci_forces.records import LogSummary, Stiffness
 from davinci_forces.report.content.inline import parse
 from davinci_forces.report.context import Context
 from davinci_forces.report.sections.summary import first_looks_in_order, fitted_joints, trust, trust_row
@@ -35,3 +37,31 @@ def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
     """Rows as lines, each column as wide as its longest cell."""
     widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
     return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+
+
+def digest(context: Context) -> bytes:
+    """The content of summary.json; a key leads to its number in results.json, null where there is none."""
+    started = [s.started for s in context.catalogue.all(LogSummary) if s.started]
+    study = context.study
+    content = {
+        "title": study.title,
+        "robot": study.robot.name,
+        "simulated": study.simulated,
+        "started": min(started, default=""),
+        "joints": [_joint(context, joint) for joint in fitted_joints(context)],
+    }
+    return (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode()
+
+
+def _joint(context: Context, joint: str) -> dict[str, Any]:
+    """One joint as page one judges it: its verdict, and where its numbers are."""
+    trusted = trust(context, joint)
+    p, space = trusted.prediction, trusted.space
+    free = f"{space.filter}.{space.log}.{space.joint}" if space is not None else ""
+    keys = {
+        "model_error": f"{p.prefix}.model_error" if p is not None else "",
+        "detection_level": f"{free}.detection_level",
+        "coverage": f"{free}.coverage",
+    }
+    known = {name: key if key in context.results else None for name, key in keys.items()}
+    return {"joint": joint, "verdict": trusted.level, "same_path": trusted.same_path, **known}

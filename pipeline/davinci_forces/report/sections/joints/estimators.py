@@ -1,0 +1,190 @@
+"""The estimators of a joint beside each other, beside what was published, and where they were not fitted."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from davinci_forces.records import Average, Fit, Prediction, Residual, SwarmSearch
+from davinci_forces.records.predict import CHOSEN
+from davinci_forces.records.record import slug
+from davinci_forces.report.content import Block, Bullets, Cell, Figure, Line, OnScreen, Panel, Prose, Table, literal
+from davinci_forces.report.content.marks import Colour
+from davinci_forces.report.context import Context, estimator_name, fit_name, label, title
+from davinci_forces.report.results import format_unit
+from davinci_forces.report.sections.parts import LEFT_OUT, MEASURES
+from davinci_forces.robots.robot import Printed
+
+LOOKS: dict[str, Colour] = {
+    "lse": "vermillion",
+    "wlse": "blue",
+    "pso": "green",
+    "consistent": "purple",
+    "tls": "orange",
+}
+MEANT_TO_DIFFER = ("consistent", "tls")  # where least squares cannot be: drawn only where they do
+ALIKE = 1e-3  # of the effort's deviation, below which two efforts are drawn as one
+REACHED = 1e-6  # of the squared error: what is less is none
+WALLS: dict[str, Colour] = {"reflecting": "green", "clipping": "vermillion"}
+
+
+def estimators(context: Context, fit: Fit) -> Iterator[Figure]:
+    """The efforts of several estimators over the averaged effort of a joint's first log; those alike are named."""
+    every = context.catalogue.about(Residual, joint=fit.group, model=fit.model, log=fit.logs[0])
+    own = {residual.estimator: residual for residual in every if residual.estimator in LOOKS}
+    if "lse" not in own or len(own) < 2:
+        return
+    plain = own["lse"]
+    same = [name for name in MEANT_TO_DIFFER if name in own and apart(own[name], plain) < ALIKE]
+    own = {name: r for name, r in own.items() if name not in same}
+    others = {name: r for name, r in own.items() if name != "lse"}
+    if not others:
+        return
+    effort = label(plain, "tau", "effort")
+    name = f"{title(fit.group)} in {literal(plain.log)}"
+    named = ", ".join(map(estimator_name, own))
+    largest = max(float(abs(r.tau_hat - plain.tau_hat).max()) for r in others.values())
+    yield Figure(
+        f"{name}: averaged effort with the model's by {named}, and how far the others are from least squares."
+        f"{alike(same)}",
+        f"{name}: the estimators' efforts differ from least squares by {largest:.2g} at most.",
+        (
+            Panel(
+                "Averaged effort and models", "time [s]", effort,
+                (
+                    Line(plain.t, plain.tau, "measured", "sky"),
+                    *(Line(r.t, r.tau_hat, estimator_name(e), LOOKS[e]) for e, r in own.items()),
+                ),
+            ),
+            Panel(
+                "Less that of least squares", "time [s]", effort,
+                tuple(Line(r.t, r.tau_hat - plain.tau_hat, estimator_name(e), LOOKS[e]) for e, r in others.items()),
+            ),
+        ),
+        f"estimators-{fit.group}",
+        columns=2,
+        height=46,
+    )  # fmt: skip
+
+
+def apart(one: Residual, other: Residual) -> float:
+    """The largest difference of two models' efforts, in deviations of the effort."""
+    return float(abs(one.tau_hat - other.tau_hat).max() / (other.tau.std() or 1.0))
+
+
+def alike(names: list[str]) -> str:
+    """Which estimators are not drawn, as they say the same as least squares."""
+    verb = "is" if len(names) == 1 else "are"
+    return f" {' and '.join(map(estimator_name, names))} {verb} least squares' own." if names else ""
+
+
+def convergence(context: Context, joint: str) -> Iterator[Figure]:
+    """The least squared error that swarms knew, over iterations.  Fig 6.14"""
+    searches = context.catalogue.about(SwarmSearch, group=joint)
+    if not searches:
+        return
+    ends = " and ".join(f"with {s.walls} walls it {reached(s.excess)}" for s in searches)
+    lines = tuple(
+        Line(np.arange(1.0, len(s) + 1.0), s.best_mse, f"{s.walls} walls", WALLS.get(s.walls, "")) for s in searches
+    )
+    unit = label(searches[0], "best_mse", "mean squared error")
+    yield Figure(
+        f"{title(joint)}: the least mean squared error that the swarm knew after each iteration, of "
+        f"{searches[0].searched} parameters by {searches[0].particles} particles. The least that the known signs "
+        f"allow: {ends}.",
+        f"Squared error over iterations, falling until it stays: {ends}.",
+        (Panel("", "iteration", unit, lines, x_log=True, y_log=True),),
+        f"swarm-{joint}",
+        height=42,
+    )
+
+
+def reached(excess: float) -> str:
+    """How near a search came to the least squared error that there is."""
+    if excess < REACHED:
+        return "is reached"
+    return f"is exceeded by {100 * excess:.2g} %" if excess < 1 else f"is exceeded {1 + excess:.2g} times"
+
+
+DIGITS = 3  # of a number that has no standard error
+
+
+def printed_beside(context: Context, fit: Fit) -> Iterator[Block]:
+    """The printed table of a joint, each column beside this study's own; none where nothing was printed of it."""
+    joint = context.study.robot.joint(fit.group)
+    printed = joint.printed
+    if printed is None or joint.effort or any(len(c.theta) != len(fit.parameter) for c in printed.columns):
+        return
+    simulated = " The study is simulated: what it is made from, not the arm, is found here." * context.study.simulated
+    yield Prose(
+        f"{printed.name} of the thesis, with what this study finds: first guesses recomputed from the robot's masses "
+        f"and lengths, and every estimator on this study's own periods.{simulated}"
+    )
+    yield table(context, fit, printed)
+    yield Bullets(tuple(f"Misprint: {text[:1].lower()}{text[1:]}" for text in printed.misprints))
+
+
+def table(context: Context, fit: Fit, printed: Printed) -> Table:
+    """Parameters and mean squared error, printed and found."""
+    header = ["Parameter", "Unit"]
+    for column in printed.columns:
+        header += [f"{estimator_name(column.estimator) or 'Guess'}, printed", "here"]
+    rows: list[tuple[Cell, ...]] = []
+    for i, name in enumerate((*map(str, fit.parameter), "mse")):
+        last = i == len(fit.parameter)
+        unit = f"{format_unit(fit.unit[i]) or '–'}" if not last else "–"
+        pairs: list[Cell] = []
+        for column in printed.columns:
+            key = ".".join(
+                ("fit", fit.group, fit.model, column.estimator) if column.estimator else ("guess", fit.group)
+            )
+            value = column.mse if last else column.theta[i]
+            pairs += [f"{value:g}".replace("-", "−"), bare(context, f"{key}.{slug(name)}")]
+        rows.append(("mean squared error" if last else name, unit, *pairs))
+    caption = f"{title(fit.group)}: {printed.name} as printed, and as found here."
+    return Table(caption, tuple(header), tuple(rows), f"printed-{fit.group}", "ll" + "r" * (len(header) - 2))
+
+
+def bare(context: Context, key: str) -> Cell:
+    """A number without its unit and its standard error, which the joint's own tables have."""
+    number = context.number(key, DIGITS)
+    return number if isinstance(number, str) else replace(number, unit="", std=None)
+
+
+def left_out(context: Context, joint: str) -> Iterator[Block]:
+    """Every fit of a joint by the measure that all of them have, and the chosen one by that which it was chosen by."""
+    made = [p for p in context.catalogue.about(Prediction, joint=joint, role="identification") if p.model != CHOSEN]
+    if not made:
+        return
+    names = list(dict.fromkeys((p.model, p.estimator) for p in made))
+    rows = tuple(row(context, joint, [p for p in made if (p.model, p.estimator) == name]) for name in names)
+    header = ("Fit", "Left out", "Relative error", "Path blocks left out, raw samples")
+    caption = f"{title(joint)}: relative error of its fits where they were not fitted, in the worst log."
+    table = Table(caption, header, rows, f"left-out-{joint}", "llrr")
+    says = Prose(f"{MEASURES}{noise(context, joint)}")
+    yield OnScreen(f"{title(joint)}: its fits where they were not fitted", f"all-left-out-{joint}", (says, table))
+
+
+def row(context: Context, joint: str, of_fit: list[Prediction]) -> tuple[Cell, ...]:
+    """One fit, by its worst log, and the same of the chosen one by blocks of path."""
+    worst = max(of_fit, key=lambda p: p.relative_error)
+    chosen = context.catalogue.about(Prediction, joint=joint, role="identification", model=CHOSEN)
+    own = [p for p in chosen if p.estimator == f"{worst.model}.{worst.estimator}"]
+    blocks: Cell = "–"
+    if own:
+        blocks = context.number(f"{max(own, key=lambda p: p.relative_error).prefix}.relative_error", 3)
+    name = fit_name(worst.model, worst.estimator)
+    which = LEFT_OUT.get(worst.scheme, worst.scheme.removeprefix("leave ").removesuffix(" out"))
+    return f"**{name}**" if own else name, which, context.number(f"{worst.prefix}.relative_error", 3), blocks
+
+
+def noise(context: Context, joint: str) -> str:
+    """What of either error is noise, where periods tell."""
+    logs = [average.log for average in context.catalogue.about(Average, joint=joint)]
+    if not logs:
+        return ""
+    worst = max(logs, key=lambda log: context.results[f"noise.{log}.{joint}.relative_noise"].value)
+    least = context.number(f"noise.{worst}.{joint}.relative_noise", 2)
+    return (
+        f" Noise alone makes {least} of either: what neither repeats nor is as slow as motion, which no model can lose."
+    )

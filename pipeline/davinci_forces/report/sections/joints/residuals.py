@@ -1,0 +1,160 @@
+"""What a fit leaves of a log: over time, against the motion, and against itself."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from davinci_forces.records import Column, Counts, Residual, Trajectory, Whiteness
+from davinci_forces.report.content import (
+    Block,
+    Figure,
+    Line,
+    Panel,
+    Points,
+    Prose,
+    Stems,
+    literal,
+)
+from davinci_forces.report.context import Context, fit_name, label, title
+from davinci_forces.report.sections.parts import autocorrelation
+from davinci_forces.report.verdicts import percent
+
+LAGS = 50  # of the cross-correlation, each way
+SEEN = 0.1  # share of a residual's variance that a motion explains, from which on the residual follows it
+REVERSALS = 2.0  # times as large around reversals as elsewhere, from which on that is said
+
+
+def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
+    """What a fit leaves of one log: over time, against the motion, and against itself."""
+    name = f"{title(residual.joint)} in {literal(residual.log)}"
+    errors, effort = residual.tau - residual.tau_hat, label(residual, "tau", "effort")
+    who = fit_name(residual.model, residual.estimator)
+    yield Figure(
+        f"{name}: averaged effort and model ({who}), and what the model leaves of it.",
+        f"{name}: the model follows the averaged effort up to {errors.std():.2g} (root mean square).",
+        (
+            Panel(
+                "Averaged effort and model", "time [s]", effort,
+                (
+                    Line(residual.t, residual.tau, "measured", "sky"),
+                    Line(residual.t, residual.tau_hat, "model", "vermillion", "dashed"),
+                ),
+            ),
+            Panel("Residual", "time [s]", effort, (Line(residual.t, errors, "", "blue"),)),
+        ),
+        f"fit-figure-{residual.log}-{residual.joint}",
+        columns=2,
+        height=42,
+    )  # fmt: skip
+    moved = context.catalogue.about(Trajectory, log=residual.log, joint=residual.joint)
+    q = moved[0].q if moved and len(moved[0].q) == len(errors) else None
+    against = [motion_panel(residual, errors, residual.dq, label(residual, "dq", "velocity"), by_direction=True)]
+    if q is not None:
+        against.insert(0, motion_panel(residual, errors, q, label(moved[0], "q", "position")))
+    tests = [*against, *own_correlations(context, residual, errors, q)]
+    yield Figure(
+        f"{name}: the residual against position and velocity (points: means of 1/40 of the range, bars: their "
+        "standard errors) and direction (its mean), its autocorrelation, and its cross-correlation with the motion.",
+        f"{name}: {in_words(residual, errors, q)}",
+        tuple(tests),
+        f"residual-figure-{residual.log}-{residual.joint}",
+        columns=2,
+        height=38,
+    )
+    yield Prose(in_words(residual, errors, q))
+
+
+def motion_panel(residual: Residual, errors: Column, x: Column, x_label: str, by_direction: bool = False) -> Panel:
+    """Means of the residual over ranges of one motion, flat at zero where no term is missing."""
+    middle, mean, std = binned_means(x, errors)
+    heading = f"Against {x_label.partition(' [')[0]}{' and direction' if by_direction else ''}"
+    points = Points(middle, mean, "", "blue", y_std=std)
+    lines = direction_means(x, errors) if by_direction else ()
+    return Panel(heading, x_label, label(residual, "tau", "residual"), (points, *lines))
+
+
+def direction_means(dq: Column, errors: Column) -> Iterator[Line]:
+    """The residual's mean in each direction of motion: against sign(dq)."""
+    for i, side in enumerate((dq < 0, dq > 0)):
+        if side.any():
+            ends, mean = np.array([0.0, dq[side][np.abs(dq[side]).argmax()]]), float(errors[side].mean())
+            yield Line(ends, np.full(2, mean), "" if i else "mean", "vermillion", "solid")
+
+
+def own_correlations(context: Context, residual: Residual, errors: Column, q: Column | None) -> Iterator[Panel]:
+    """The residual's correlation with itself and with the motion."""
+    signal = f"tau.{residual.model}.{residual.estimator}"
+    for w in context.catalogue.about(Whiteness, log=residual.log, joint=residual.joint, signal=signal):
+        yield autocorrelation(w, "Autocorrelation")
+    lags = np.arange(-min(LAGS, len(errors) // 4), min(LAGS, len(errors) // 4) + 1)
+    shown = lags.astype(np.float64)
+    position = () if q is None else (Line(shown, correlation(errors, q, lags), "with position", "green", "dashed"),)
+    marks = (
+        Stems(shown, correlation(errors, residual.dq, lags), "with velocity", "sky"),
+        Line(shown, correlation(errors, np.sign(residual.dq), lags), "with direction", "vermillion"),
+        *position,
+    )
+    yield Panel("Cross-correlation", "lag [samples]", "correlation", marks, y_range=(-1.0, 1.0))
+
+
+def in_words(residual: Residual, errors: Column, q: Column | None) -> str:
+    """What the residual follows, and what to try.
+
+    Least squares leave no straight line in any motion that is a column of the model, so means over ranges are asked.
+    """
+    motions = {"velocity": residual.dq} | ({} if q is None else {"position": q})
+    shares = {name: explained_by(x, errors) for name, x in motions.items()}
+    said = " and ".join(f"{percent(max(share, 0.0))} by {name}" for name, share in shares.items())
+    follows = max(shares, key=lambda name: shares[name])
+    text = f"Of the residual's variance, its means over ranges explain {said}"
+    if shares[follows] > SEEN:
+        tries = {
+            "position": "a spring, gravity or friction that varies with position, or the coupling to other joints",
+            "velocity": "friction with another shape, or coupling to other joints",
+        }
+        return f"{text}: it follows the {follows}. Worth trying: {tries[follows]}."
+    within = share_within_reversals(errors, residual.dq)
+    if within > REVERSALS:
+        return f"{text}, but around reversals it is {within:.1f} times as large as elsewhere. Worth trying: presliding."
+    return f"{text}: no term of one motion is missing that these plots could show."
+
+
+def share_within_reversals(errors: Column, dq: Column) -> float:
+    """Root mean square of the residual while slow, over that while fast; slow is a tenth of the rms velocity."""
+    slow = np.abs(dq) < 0.1 * float(np.sqrt(np.mean(dq**2)) or 1.0)
+    if not slow.any() or slow.all():
+        return 1.0
+    near, far = (float(np.sqrt(np.mean(errors[which] ** 2))) for which in (slow, ~slow))
+    return near / far if far else 1.0
+
+
+def binned_means(x: Column, y: Column, bins: int = 40) -> tuple[Column, Column, Column]:
+    """Middles of equal ranges of x that hold samples, the mean of y in each, and its standard error."""
+    edges = np.linspace(x.min(), x.max(), bins + 1)
+    place = np.clip(np.digitize(x, edges) - 1, 0, bins - 1)
+    held = [y[place == i] for i in range(bins)]
+    full = [i for i, values in enumerate(held) if len(values)]
+    means = np.array([held[i].mean() for i in full])
+    stds = np.array([held[i].std() / np.sqrt(len(held[i])) for i in full])
+    return (edges[:-1] + edges[1:])[full] / 2, means, stds
+
+
+def correlation(x: Column, y: Column, lags: Counts) -> Column:
+    """The correlation of x(k) with y(k + lag) of periodic signals of one length, at every lag."""
+    x, y = x - x.mean(), y - y.mean()
+    scale = float(np.linalg.norm(x) * np.linalg.norm(y)) or 1.0
+    return np.array([x @ np.roll(y, -int(lag)) for lag in lags]) / scale
+
+
+def explained_by(x: Column, y: Column, bins: int = 40) -> float:
+    """The share of the variance of y that its means over ranges of x explain, less what chance explains.
+
+    The correlation ratio with Wherry's correction, 0 where y does not depend on x, however crookedly.
+    """
+    place = np.digitize(x, np.linspace(x.min(), x.max(), bins + 1)[1:-1])
+    counts = np.bincount(place, minlength=bins)
+    means = np.bincount(place, y, bins) / np.maximum(counts, 1)
+    left, ranges, spread = float(np.sum((y - means[place]) ** 2)), int((counts > 0).sum()), float(y.var() * len(y))
+    if not spread or len(y) <= ranges:
+        return 0.0
+    return 1.0 - left / spread * (len(y) - 1) / (len(y) - ranges)
