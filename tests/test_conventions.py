@@ -79,6 +79,8 @@ SOLVERS = {
     "solver.py": {"clarabel"},
     "lmi.py": {"clarabel"},
     "conic.py": {"clarabel"},
+    "whiteness.py": {"statsmodels"},
+    "drift.py": {"statsmodels"},
 }  # what modules of maths import beside them, where it is called
 
 
@@ -182,6 +184,13 @@ def test_maths_is_numpy_scipy_and_numba_only(source):
         source.name, set()
     )
     assert rooms(source) <= {"maths", "errors"}
+
+
+@pytest.mark.parametrize("source", SOURCES, ids=lambda s: str(s.relative_to(ROOT)))
+def test_statistics_are_imported_where_they_are_called(source):
+    module = ast.parse(source.read_text(encoding="utf-8"))
+    module.body = [node for node in module.body if isinstance(node, ast.Import | ast.ImportFrom)]
+    assert "statsmodels" not in ast.unparse(module)
 
 
 @pytest.mark.parametrize("source", sorted((ROOT / "stages").glob("*.py")), ids=lambda s: s.name)

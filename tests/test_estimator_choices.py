@@ -33,6 +33,20 @@ def test_far_samples_hardly_move_robust_parameters():
     assert (errors("huber", problems) < 0.5 * errors("lse", problems)).all()
 
 
+@pytest.mark.parametrize("weighted", [False, True])
+def test_robust_parameters_are_those_of_statsmodels(weighted):
+    from statsmodels.robust.norms import HuberT
+    from statsmodels.robust.robust_linear_model import RLM
+
+    p, random = problem(seed=2), np.random.default_rng(3)
+    p = replace(p, tau=p.tau + 3.0 * (random.random(K) < 0.2) * random.normal(size=K))
+    if weighted:
+        p = replace(p, periods=random.integers(1, 9, K))
+    root = np.sqrt(p.weight)
+    model = RLM(root * p.tau, root[:, None] * p.Phi, M=HuberT(1.345))
+    assert_allclose(estimator("huber")(p).theta, model.fit(tol=1e-12, maxiter=500, conv="coefs").params, atol=1e-6)
+
+
 def test_without_far_samples_robust_parameters_are_nearly_as_good():
     problems = [problem(seed) for seed in range(SEEDS)]
     assert (errors("huber", problems) < 1.1 * errors("lse", problems)).all()

@@ -83,6 +83,19 @@ def test_a_second_run_runs_no_stage_and_says_so(finished):
     assert contents(processed(finished)) | contents(reports(finished)) == before
 
 
+def test_a_second_run_imports_no_statistics(finished):
+    code = (
+        "import sys; from davinci_forces.cli import main\n"
+        "sys.argv = ['davinci-forces', 'all', sys.argv[1]]\n"
+        "try: main()\n"
+        "except SystemExit as done: assert not done.code, done.code\n"
+        "assert 'statsmodels' not in sys.modules\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code, str(finished)], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "nothing to do" in done.stdout + done.stderr
+
+
 def test_a_dry_run_says_what_would_run_and_why_and_changes_nothing(study, finished):
     new = write_study(study.parent / "new")
     said = call("all", new, "--dry-run")

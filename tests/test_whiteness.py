@@ -67,6 +67,17 @@ def test_the_tests_of_pieces_see_no_correlation_from_one_piece_to_the_next():
     assert whiteness.autocorrelation([np.tile(x, 3)], 100)[100] > 0.6
 
 
+def test_the_ljung_box_statistic_of_pieces_counts_the_pairs_within_them():
+    from scipy.stats import chi2
+
+    pieces = np.split(noise(0, 430), (15, 70, 200))  # the first is shorter than the largest lag
+    r = whiteness.autocorrelation(pieces, 20)
+    pairs = np.array([sum(max(len(x) - k, 0) for x in pieces) for k in range(1, 21)])
+    box = whiteness.ljung_box(pieces, r, 20)
+    by_hand = 430 * 432 * np.sum(r[1:] ** 2 / pairs)
+    assert_allclose(box, (by_hand, chi2.sf(by_hand, 20)), rtol=1e-12)
+
+
 def test_each_test_sees_its_own_departure():
     """Ljung and Box's a correlation at few lags, the periodogram one that is spread thinly over many."""
     thin = noise(1, 4000) + 0.35 * np.cumsum(noise(2, 4000)) / np.sqrt(4000) * 4
@@ -99,14 +110,15 @@ def test_shape_is_that_of_scipy():
     assert_allclose(whiteness.shape(x), (stats.skew(x), stats.kurtosis(x), found.pvalue), rtol=1e-9)
 
 
-def test_the_cross_correlation_is_the_one_by_hand_and_positive_lags_are_of_what_came_before():
+def test_the_cross_correlation_is_the_one_by_hand_with_what_came_before():
     u = noise(6, 300)
     x = np.concatenate([np.zeros(7), u[:-7]]) + 0.1 * noise(7, 300)
     r = whiteness.cross_correlation(x, u, 20)
     a, b = x - x.mean(), u - u.mean()
-    by_hand = [a[k:] @ b[: len(b) - k] if k >= 0 else a[:k] @ b[-k:] for k in range(-20, 21)]
+    by_hand = [a[k:] @ b[: len(b) - k] for k in range(21)]
     assert_allclose(r, np.array(by_hand) / np.linalg.norm(a) / np.linalg.norm(b), atol=1e-12)
-    assert np.argmax(r) == 20 + 7
+    assert np.argmax(r) == 7
+    assert_array_equal(whiteness.cross_correlation(x, np.ones(300), 20), np.zeros(21))
 
 
 def test_innovations_are_those_of_the_filter_and_each_as_large_as_stated():

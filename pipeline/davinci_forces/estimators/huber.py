@@ -27,6 +27,9 @@ def estimate(problem: Regression) -> Estimate:
 
     s is the deviation of the residuals by the median of their absolute values.  The standard errors are those of least
     squares on residuals s psi(r / s) over the share of samples that lie near.  (Huber, 1981, (7.6.5))
+
+    The parameters are those of statsmodels' RLM, which takes no weights, knows no standard errors of correlated
+    residuals and needs eight times as long for 600 000 rows.
     """
     weight, R = problem.weight, problem.triangle
     found = settled(problem, weight, R)

@@ -58,7 +58,7 @@ def _step(
     Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float,
 ) -> Any:  # fmt: skip
     now, _, _, _, _ = corrected(s, y_q, y_dq, R_q, R_dq)
-    q, dq, F, unsure = transition(now[0], now[1], now[2], now[6], drive, M, c_b, T_s)
+    q, dq, F, unsure = transition(now[0], now[1], now[2], now[6], drive, M, c_b, T_s, 0.5 * T_s * T_s)
     return now, spread(now, q, dq, F, Q_qq, Q_qd, Q_dd + unsure, Q_tau)
 
 
@@ -73,7 +73,7 @@ def _pass(
         s, i_q, i_dq, nis, _ = corrected(s, y_q[k], y_dq[k], R_q, R_dq)
         out_q[k], out_dq[k], out_tau[k], out_std[k] = s[0], s[1], s[2], s[8] ** 0.5
         out_iq[k], out_idq[k], out_nis[k] = i_q, i_dq, nis
-        q, dq, F, unsure = transition(s[0], s[1], s[2], s[6], drive[k], inertia[k], c_b, T_s)
+        q, dq, F, unsure = transition(s[0], s[1], s[2], s[6], drive[k], inertia[k], c_b, T_s, 0.5 * T_s * T_s)
         s = spread(s, q, dq, F, Q_qq, Q_qd, Q_dd + unsure, Q_tau)
 
 
@@ -87,6 +87,6 @@ def _likelihood(
         s, _, _, nis, det = corrected(s, y_q[k], y_dq[k], R_q, R_dq)
         if k >= settle:
             total -= 0.5 * (nis + np.log(det)) + LOG_2_PI
-        q, dq, F, unsure = transition(s[0], s[1], s[2], s[6], drive[k], inertia[k], c_b, T_s)
+        q, dq, F, unsure = transition(s[0], s[1], s[2], s[6], drive[k], inertia[k], c_b, T_s, 0.5 * T_s * T_s)
         s = spread(s, q, dq, F, Q_qq, Q_qd, Q_dd + unsure, Q_tau)
     return total

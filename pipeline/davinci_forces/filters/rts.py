@@ -26,11 +26,17 @@ STORED = 15  # of each sample: what was predicted, and the transition to the nex
 
 def track(recording: Driven, noise: NoiseModel) -> Tracked:
     """Filter a recording forwards and smooth it backwards; the innovations are the filter's."""
-    N = len(recording.q)
-    out, stored = np.empty((7, N)), np.empty((N, STORED))
-    _forwards(stored, *arguments(recording, noise), *out[4:])
-    _backwards(stored, noise.r_q**2, noise.r_dq**2, *out[:6])
-    return Tracked(*out)
+    innovations, stored = forwards(recording, noise)
+    out = np.empty((4, len(recording.q)))
+    _backwards(stored, noise.r_q**2, noise.r_dq**2, *out, *innovations[:2])
+    return Tracked(*out, *innovations)
+
+
+def forwards(recording: Driven, noise: NoiseModel) -> tuple[Array, Array]:
+    """The filter's innovations and NIS (3, N), and of each sample (N, `STORED`) its prediction and F to the next."""
+    out, stored = np.empty((3, len(recording.q))), np.empty((len(recording.q), STORED))
+    _forwards(stored, *arguments(recording, noise), *out)
+    return out, stored
 
 
 @cached(derivation, belief, stepping)
@@ -43,7 +49,7 @@ def _forwards(
             stored[k, i] = s[i]
         s, i_q, i_dq, nis, _ = corrected(s, y_q[k], y_dq[k], R_q, R_dq)
         out_iq[k], out_idq[k], out_nis[k] = i_q, i_dq, nis
-        q, dq, F, unsure = transition(s[0], s[1], s[2], s[6], drive[k], inertia[k], c_b, T_s)
+        q, dq, F, unsure = transition(s[0], s[1], s[2], s[6], drive[k], inertia[k], c_b, T_s, 0.5 * T_s * T_s)
         for i in range(6):
             stored[k, 9 + i] = F[i]
         s = spread(s, q, dq, F, Q_qq, Q_qd, Q_dd + unsure, Q_tau)

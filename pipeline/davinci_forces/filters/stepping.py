@@ -38,13 +38,18 @@ def covariances(noise: NoiseModel, T_s: float) -> tuple[float, float, float, flo
 
 
 @compiled
-def transition(q: float, dq: float, tau_ext: float, dq_var: float, drive: float, M: float, c_b: Any, T_s: float) -> Any:
-    """Position and velocity one sample later, F, and the variance that a doubtful sign adds to the velocity."""
+def transition(
+    q: float, dq: float, tau_ext: float, dq_var: float, drive: float, M: float, c_b: Any, T_s: float, h: float
+) -> Any:
+    """Position and velocity one sample later, F, and the variance that a doubtful sign adds to the velocity.
+
+    h is T_s^2 / 2; with 0 it is forward Euler's step.
+    """
     b, b_q, b_dq = bias(c_b, q, dq, 0.0)
     likely = math.erf(dq / math.sqrt(2.0 * dq_var + TINY))
     b += c_b[COULOMB] * (likely - np.sign(dq))
     unsure = (T_s * c_b[COULOMB] / M) ** 2 * (1.0 - likely * likely)
-    a_q, a_dq, a_tau, h = -b_q / M, -b_dq / M, -1.0 / M, 0.5 * T_s * T_s
+    a_q, a_dq, a_tau = -b_q / M, -b_dq / M, -1.0 / M
     ddq, of_dq = (drive - b - tau_ext) / M, T_s + h * a_dq
     F = (1.0 + h * a_q, of_dq, h * a_tau, of_dq * a_q, 1.0 + of_dq * a_dq + h * a_q, of_dq * a_tau)
     return q + T_s * dq + h * ddq, dq + T_s * ddq + h * (a_q * dq + a_dq * ddq), F, unsure

@@ -102,7 +102,7 @@ def described(own: Driving, made: Innovations, motion: tuple[Array, Array]) -> I
     low, high = mean_square_band(N)
     for name, x, std in (("innovation_q", made.q, made.q_std), ("innovation_dq", made.dq, made.dq_std)):
         normalised = (x / std)[kept]
-        with_dq, with_ddq, with_sign = (cross_correlation(normalised, u, lags)[lags:] for u in (dq, ddq, np.sign(dq)))
+        with_dq, with_ddq, with_sign = (cross_correlation(normalised, u, lags) for u in (dq, ddq, np.sign(dq)))
         yield Innovation(
             log=signal.log, joint=signal.joint, signal=name, tested=N, band=NORMAL_95 / N**0.5,
             band_99=NORMAL_99 / N**0.5, nis_own=float(np.mean(normalised**2)), nis_low=low, nis_high=high,

@@ -6,17 +6,13 @@ Without memory, phi = 0, its innovations are those of `ekf`.  It serves to tell 
 not white; for tracking, the noise that is white has fewer states and says the same of what is slow.
 """
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.filters import ekf, stepping
-from davinci_forces.filters.ekf import LOG_2_PI
+from davinci_forces.filters import ekf, kalman
 from davinci_forces.filters.problem import NoiseModel
-from davinci_forces.filters.stepping import arguments, transition
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.compiled import cached
-from davinci_forces.maths.models import bias as derivation
 from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.signals.windows import SETTLE
 
@@ -36,16 +32,23 @@ class Noise(NamedTuple):
 
 def innovations(recording: Driven, noise: Noise) -> tuple[Array, Array]:
     """Of position and velocity (N,)."""
-    out = np.empty((2, len(recording.q)))
-    _pass(0, *noise.phi, *arguments(recording, noise.white), *out)
-    return out[0], out[1]
+    out, _ = kalman.filtered(recording, noise.white, states(recording, noise))
+    return out[4], out[5]
 
 
 def log_likelihood(recording: Driven, noise: Noise) -> float:
     """Of the measurements, as that of `ekf`."""
     settle = min(round(SETTLE / recording.T_s), len(recording.q) // 2)
-    out = np.empty((2, len(recording.q)))
-    return float(_pass(settle, *noise.phi, *arguments(recording, noise.white), *out))
+    return kalman.filtered(recording, noise.white, states(recording, noise), settle)[1]
+
+
+def states(recording: Driven, noise: Noise) -> kalman.States:
+    """Those of `ekf` and the noise of each measurement, which is measured with it and forgotten by phi."""
+    model = kalman.states(recording, noise.white, 5)
+    for i, (r, phi) in enumerate(zip(noise.white[:2], noise.phi, strict=True)):
+        model.H[i, 3 + i], model.Phi[3 + i, 3 + i] = 1.0, phi
+        model.P[3 + i, 3 + i], model.Q[3 + i, 3 + i] = r**2, (1.0 - phi**2) * r**2
+    return model._replace(R=np.zeros(2))
 
 
 def likeliest(recording: Driven, start: NoiseModel, walks: bool, coloured: bool) -> Noise:
@@ -76,51 +79,3 @@ def likeliest(recording: Driven, start: NoiseModel, walks: bool, coloured: bool)
         options={"initial_simplex": simplex, "maxfev": TRIALS * size, "xatol": 1e-2, "fatol": 0.1},
     )  # fmt: skip
     return noise_at(found.x)
-
-
-@cached(derivation, stepping)
-def _pass(
-    settle: int, phi_q: float, phi_dq: float, s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any,
-    T_s: float, R_q: float, R_dq: float, Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float, out_q: Any, out_dq: Any,
-) -> float:  # fmt: skip
-    """The loop, with matrices of 5 by 5; the log-likelihood after `settle` samples."""
-    x, P, F, B, K, total = np.zeros(5), np.zeros((5, 5)), np.zeros((5, 5)), np.zeros((5, 5)), np.zeros((5, 2)), 0.0
-    x[0], x[1], P[0, 0], P[1, 1], P[2, 2], P[3, 3], P[4, 4] = s[0], s[1], s[3], s[6], s[8], R_q, R_dq
-    F[2, 2], F[3, 3], F[4, 4] = 1.0, phi_q, phi_dq
-    for k in range(len(y_q)):
-        i_q, i_dq = y_q[k] - x[0] - x[3], y_dq[k] - x[1] - x[4]
-        out_q[k], out_dq[k] = i_q, i_dq
-        s_qq = P[0, 0] + 2.0 * P[0, 3] + P[3, 3]
-        s_qd = P[0, 1] + P[0, 4] + P[3, 1] + P[3, 4]
-        s_dd = P[1, 1] + 2.0 * P[1, 4] + P[4, 4]
-        det = s_qq * s_dd - s_qd * s_qd
-        if k >= settle:
-            nis = (i_q * i_q * s_dd - 2.0 * i_q * i_dq * s_qd + i_dq * i_dq * s_qq) / det
-            total -= 0.5 * (nis + np.log(det)) + LOG_2_PI
-        for i in range(5):
-            g, h = P[i, 0] + P[i, 3], P[i, 1] + P[i, 4]
-            K[i, 0], K[i, 1] = (g * s_dd - h * s_qd) / det, (h * s_qq - g * s_qd) / det
-            B[i, 0], B[i, 1] = g, h
-        for i in range(5):
-            x[i] += K[i, 0] * i_q + K[i, 1] * i_dq
-            for j in range(5):
-                P[i, j] -= K[i, 0] * B[j, 0] + K[i, 1] * B[j, 1]
-        q, dq, top, unsure = transition(x[0], x[1], x[2], P[1, 1], drive[k], inertia[k], c_b, T_s)
-        x[0], x[1], x[3], x[4] = q, dq, phi_q * x[3], phi_dq * x[4]
-        for j in range(3):
-            F[0, j], F[1, j] = top[j], top[3 + j]
-        for i in range(5):
-            for j in range(5):
-                B[i, j] = 0.0
-                for m in range(5):
-                    B[i, j] += F[i, m] * P[m, j]
-        for i in range(5):
-            for j in range(i, 5):
-                p = 0.0
-                for m in range(5):
-                    p += B[i, m] * F[j, m]
-                P[i, j], P[j, i] = p, p
-        P[0, 0], P[0, 1], P[1, 0] = P[0, 0] + Q_qq, P[0, 1] + Q_qd, P[1, 0] + Q_qd
-        P[1, 1], P[2, 2] = P[1, 1] + Q_dd + unsure, P[2, 2] + Q_tau
-        P[3, 3], P[4, 4] = P[3, 3] + (1.0 - phi_q * phi_q) * R_q, P[4, 4] + (1.0 - phi_dq * phi_dq) * R_dq
-    return total

@@ -42,25 +42,26 @@ def centred(pieces: Sequence[Array]) -> list[Array]:
 
 def autocorrelation(pieces: Sequence[Array], lags: int) -> Array:
     """r (lags + 1,) of centred pieces; a pair of samples counts where both are in one piece."""
-    from scipy.fft import irfft, next_fast_len, rfft
+    from statsmodels.tsa.stattools import acovf
 
-    apart = np.zeros(lags)  # so that no lag reaches from one piece into another
-    x = np.concatenate([part for piece in pieces for part in (piece, apart)])
-    length = next_fast_len(len(x), real=True)
-    X = rfft(x, length)
-    products = irfft(X.real**2 + X.imag**2, length)[: lags + 1]
+    apart = np.full(lags, np.nan)  # so that no lag reaches from one piece into another
+    x = np.concatenate([part for piece in pieces for part in (piece, apart)][:-1])
+    products = acovf(x, demean=False, fft=False, missing="conservative", nlag=lags)
     return np.asarray(products / products[0])
 
 
 def ljung_box(pieces: Sequence[Array], r: Array, lags: int) -> LjungBox:
-    """The test of the first `lags` of an autocorrelation."""
-    from scipy.special import chdtrc
+    """The test of the first `lags` of an autocorrelation.
+
+    statsmodels counts n - k pairs at lag k, as one piece has them; r is scaled for the fewer that pieces have.
+    """
+    from statsmodels.tsa.stattools import q_stat
 
     k, lengths = np.arange(1, lags + 1), np.array([len(x) for x in pieces])
     n, pairs = int(lengths.sum()), np.maximum(lengths[:, None] - k, 0).sum(axis=0)
-    told = pairs > 0
-    Q = float(n * (n + 2) * np.sum(r[1 : lags + 1][told] ** 2 / pairs[told]))
-    return LjungBox(Q, float(chdtrc(int(told.sum()), Q)))
+    paired = pairs > 0
+    statistic, probability = q_stat(r[1 : lags + 1][paired] * np.sqrt((n - k[paired]) / pairs[paired]), n)
+    return LjungBox(float(statistic[-1]), float(probability[-1]))
 
 
 def cumulative_periodogram(pieces: Sequence[Array]) -> Cumulative:
@@ -113,25 +114,18 @@ def tests(pieces: Sequence[Array], lags: int) -> tuple[LjungBox, float]:
 
 
 def cross_correlation(x: Array, u: Array, lags: int) -> Array:
-    """The correlation (2 lags + 1,) of x(t) with u(t - k), k from -lags to lags: of lags above 0, u comes first."""
-    from scipy.fft import irfft, next_fast_len, rfft
+    """The correlation (lags + 1,) of x(t) with u(t - k), k from 0 to lags; 0 where u is constant."""
+    from statsmodels.tsa.stattools import ccf
 
-    x, u = x - x.mean(), u - u.mean()
-    length = next_fast_len(len(x) + lags, real=True)
-    products = irfft(rfft(x, length) * np.conj(rfft(u, length)), length)
-    scale = float(np.linalg.norm(x) * np.linalg.norm(u)) or 1.0
-    return np.asarray(np.concatenate([products[length - lags :], products[: lags + 1]]) / scale)
+    return np.asarray(ccf(x, u, adjusted=False, nlags=lags + 1)) if np.ptp(u) > 0 else np.zeros(lags + 1)
 
 
 def shape(x: Array) -> tuple[float, float, float]:
     """Skewness, excess kurtosis, and the probability of a larger Jarque-Bera statistic if x (N,) were normal."""
-    from scipy.special import chdtrc
+    from statsmodels.stats.stattools import jarque_bera
 
-    d = x - x.mean()
-    d2 = d * d
-    m2, m3, m4 = (float(np.mean(m)) for m in (d2, d2 * d, d2 * d2))
-    skewness, kurtosis = m3 / m2**1.5, m4 / m2**2 - 3.0
-    return skewness, kurtosis, float(chdtrc(2, len(x) / 6.0 * (skewness**2 + kurtosis**2 / 4.0)))
+    _, probability, skewness, kurtosis = map(float, jarque_bera(x - x.mean()))
+    return skewness, kurtosis - 3.0, probability
 
 
 def mean_square_band(N: int) -> tuple[float, float]:
