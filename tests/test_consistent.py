@@ -14,7 +14,7 @@ from davinci_forces.maths.estimation import conic
 from davinci_forces.maths.estimation.conic import ENTRIES, nearest, scaled
 from davinci_forces.maths.estimation.least_squares import triangle
 from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias, pseudo_inertias
-from davinci_forces.maths.models.model import Mechanism, Motion, of_signs
+from davinci_forces.maths.models.model import ArmMotion, Mechanism, of_signs
 from davinci_forces.records import Diagnostic, Fit, Smoothed
 from davinci_forces.robots.dvrk_psm import ROBOT
 from davinci_forces.robots.models import coupled
@@ -27,14 +27,14 @@ ARM = coupled(ROBOT, [0, 1, 2], [(), (), ()])
 RATE, N = 100.0, 3000
 
 
-def wandering(seed=0) -> Motion:
+def wandering(seed=0) -> ArmMotion:
     """A motion of all joints through their range that tells all base parameters."""
     t, rng = np.arange(N) / RATE, np.random.default_rng(seed)
     w, phase = rng.uniform(0.5, 6.0, (2, 3, 5))
     size = np.array([0.5, 0.5, 0.04])[:, None] / 5
     angle = w[None] * t[:, None, None] + phase
     q, dq, ddq = ((size * x).sum(axis=2) for x in (np.sin(angle), w * np.cos(angle), -(w**2) * np.sin(angle)))
-    return Motion(q, dq, ddq, 1.0 / RATE, np.zeros(N, np.int64))
+    return ArmMotion(q, dq, ddq, 1.0 / RATE, np.zeros(N, np.int64))
 
 
 def real_bodies(seed=0) -> np.ndarray:

@@ -1,8 +1,8 @@
 """Stage `explain`: which models of a joint a log is explained by."""
 
 import numpy as np
-
 from davinci_forces.identification.driving import driving, motions_of
+
 from davinci_forces.records import Fit
 from davinci_forces.robots import davinci
 from davinci_forces.robots.models import coupled, independent

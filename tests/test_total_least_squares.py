@@ -14,7 +14,7 @@ from davinci_forces.identification.folds import part
 from davinci_forces.identification.regression import averaged_motion, joined, pose, row_covariance
 from davinci_forces.maths.estimation.least_squares import triangle
 from davinci_forces.maths.models.independent import regressor
-from davinci_forces.maths.models.model import Motion
+from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.maths.periods.harmonics import derivative, evaluate, kept_noise, project
 from davinci_forces.records import Diagnostic, Fit
 from davinci_forces.robots.models import independent
@@ -29,8 +29,8 @@ T = PERIOD * np.arange(K) / K
 SHARE = np.array([0.2, 0.0, 0.2])  # of the deviations of q, dq and ddq that their noise has
 
 
-def motion_of(columns) -> Motion:
-    return Motion(*(x[:, None] for x in columns), PERIOD / K, np.zeros(K, np.int64))
+def motion_of(columns) -> ArmMotion:
+    return ArmMotion(*(x[:, None] for x in columns), PERIOD / K, np.zeros(K, np.int64))
 
 
 def measured(seed: int, name="hand_roll", share=SHARE, tau_std=0.02) -> Regression:
@@ -125,7 +125,7 @@ def test_the_derivatives_of_the_regressor_are_those_of_finite_differences():
     for name in arm.THETA:
         model, h = independent(arm.joint(name)), 1e-6
         q, dq, ddq = arm.excitation(name, T[5:-5:7] + 0.003)
-        J = model.sensitivity(Motion(q[:, None], dq[:, None], ddq[:, None], 0.1, np.zeros(len(q), np.int64)))
+        J = model.sensitivity(ArmMotion(q[:, None], dq[:, None], ddq[:, None], 0.1, np.zeros(len(q), np.int64)))
         terms = arm.joint(name).terms
         for i, step in enumerate(h * np.eye(3)):
             ahead, behind = (regressor(terms, q + s * step[0], dq + s * step[1], ddq + s * step[2]) for s in (1, -1))

@@ -4,7 +4,7 @@ import time
 
 import numpy as np
 
-from davinci_forces.maths.models.model import Motion
+from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.records import Choice, Smoothed
 from davinci_forces.robots.dvrk_psm import ROBOT
 from davinci_forces.robots.models import coupled
@@ -26,7 +26,7 @@ def smoothed() -> list[Smoothed]:
         w = 2 * np.pi * 0.1 * np.arange(1, 7)[:, None] * (1 + 0.05 * number)
         x = w[None] * t[:, None, None] + phase
         q, dq, ddq = (a * np.sin(x)).sum(1), (a * w * np.cos(x)).sum(1), (-a * w**2 * np.sin(x)).sum(1)
-        tau = model.regressor(Motion(q, dq, ddq, 1 / RATE, np.zeros(SAMPLES, int))).Phi @ theta
+        tau = model.regressor(ArmMotion(q, dq, ddq, 1 / RATE, np.zeros(SAMPLES, int))).Phi @ theta
         tau += 0.1 * tau.std(axis=0) * random.normal(size=tau.shape)
         for i, joint in enumerate(ROBOT.joints):
             zero = np.zeros(SAMPLES, int)

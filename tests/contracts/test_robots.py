@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from davinci_forces.maths.mechanics import kinematics, rigid_body
-from davinci_forces.maths.models.model import Motion
+from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.maths.models.terms import TERMS
 from davinci_forces.robots import ROBOTS, load
 from davinci_forces.robots.from_toml import wrong_name
@@ -76,7 +76,7 @@ def test_the_model_of_a_joint_has_an_inertia_and_a_bias_that_make_up_its_effort(
     """Which only a model with an inertia has: a term with a slope in the acceleration."""
     model, (q, dq, ddq) = independent(joint), motions(1)
     theta = np.random.default_rng(0).uniform(0.05, 5.0, len(model.parameters))
-    motion = Motion(q, dq, ddq, 0.01, np.zeros(len(q), int))
+    motion = ArmMotion(q, dq, ddq, 0.01, np.zeros(len(q), int))
     M = model.inertia(theta, q)[:, 0, 0]
     assert M.min() > 0
     # Efforts of up to 100 round at 1e-14.

@@ -17,7 +17,7 @@ from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.memory import deflection, driven, efforts, pieces
-from davinci_forces.maths.models.model import Motion
+from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.records import Smoothed
 from davinci_forces.robots.davinci_chain import BODIES, CHAIN
 
@@ -42,7 +42,7 @@ def wandering(N, seed=0, segments=1, periodic=False):
     a, phase = rng.normal(size=(2, 6)) * 0.1, rng.uniform(0, 6, (2, 6))
     angle = w * t[:, None, None] + phase
     q, dq, ddq = (np.sum(a * f, axis=2) for f in (np.sin(angle), w * np.cos(angle), -(w**2) * np.sin(angle)))
-    return Motion(q, dq, ddq, T_S, np.arange(N) * segments // N, periodic)
+    return ArmMotion(q, dq, ddq, T_S, np.arange(N) * segments // N, periodic)
 
 
 ROTOR, SPRING, OFFSET = np.array([0.3, 0.2]), np.array([1.5, 0.0]), np.array([0.0, -0.4])
@@ -190,7 +190,7 @@ def test_the_effort_of_an_independent_joint_is_what_its_filter_is_told():
 def test_a_deflection_is_that_of_the_differential_equation():
     """x_0 dz/dt = dq (1 - z sign dq) [Dahl 1968], which at constant velocity has a closed form."""
     N, v, x_0 = 200, 0.03, 0.01
-    motion = Motion(np.zeros((N, 1)), np.full((N, 1), -v), np.zeros((N, 1)), T_S, np.zeros(N, int))
+    motion = ArmMotion(np.zeros((N, 1)), np.full((N, 1), -v), np.zeros((N, 1)), T_S, np.zeros(N, int))
     z, _ = deflection(motion, 0, x_0)
     assert_allclose(z, -(1 - np.exp(-v * np.arange(N) * T_S / x_0)), rtol=1e-12, atol=1e-15)
 
@@ -200,7 +200,7 @@ def test_a_deflection_starts_anew_after_a_gap_and_is_known_after_a_few_displacem
     z, known = deflection(motion, 0, x_0)
     for start in range(0, 4000, 1000):
         part = slice(start, start + 1000)
-        alone, _ = deflection(Motion(*(x[part] for x in motion[:3]), T_S, motion.segment[part]), 0, x_0)
+        alone, _ = deflection(ArmMotion(*(x[part] for x in motion[:3]), T_S, motion.segment[part]), 0, x_0)
         assert_allclose(z[part], alone, atol=0)
         first = int(np.flatnonzero(known[part])[0])
         # Whatever the deflection was at the start, it is forgotten where it counts as known.

@@ -3,8 +3,13 @@
 from collections.abc import Callable
 from typing import NamedTuple
 
+import numpy as np
+
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.models.driven import Driven
+from davinci_forces.maths.models.model import JointDynamics
+from davinci_forces.maths.signals.smoothing import segments
+from davinci_forces.records import JointModel
 
 
 class NoiseModel(NamedTuple):
@@ -34,3 +39,23 @@ class Tracked(NamedTuple):
 
 # track(recording, noise)
 Filter = Callable[[Driven, NoiseModel], Tracked]
+
+
+def driven(model: JointModel, tau_hat: Array | None = None) -> list[Driven]:
+    """A joint of a log as filters take it: its segments as measured, as each gap starts a filter anew.
+
+    `tau_hat` (N,) is the effort that another fit gives, where that is to be taken off.
+    """
+    known = model.tau_known if tau_hat is None else model.tau_known + (tau_hat - model.tau_hat)
+    return _segments(model, model.q_measured, model.dq_measured, known)
+
+
+def driven_smooth(model: JointModel) -> list[Driven]:
+    """The same with the motion low-passed."""
+    return _segments(model, model.q, model.dq, model.tau_known)
+
+
+def _segments(model: JointModel, q: Array, dq: Array, known: Array) -> list[Driven]:
+    joint, first_std = JointDynamics(model.inertia, model.coefficients, known), float(np.std(model.tau)) or 1.0
+    whole = Driven(joint, q, dq, model.ddq, model.tau, 1.0 / model.rate, first_std)
+    return [whole.part(part) for part in segments(model.segment)]

@@ -6,14 +6,15 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.estimators.problem import NOTHING, Known, Regression
+from davinci_forces.identification.regression import recorded_motion
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.memory import pieces
-from davinci_forces.maths.models.model import Model, Motion
+from davinci_forces.maths.models.model import ArmMotion, Model
 from davinci_forces.maths.selection.cross_validation import BLOCKS, MOST, path_blocks, repetitions
 from davinci_forces.maths.selection.ridge import Equations, gathered, side_by_side
 from davinci_forces.maths.signals.noise import smoothed
 from davinci_forces.maths.signals.smoothing import reach
-from davinci_forces.records import Average, Smoothed, Trajectory
+from davinci_forces.records import Average, Motion, Trajectory
 
 PER_CUTOFF = 3  # samples kept per period of the low-pass's cutoff: more of them say nothing new
 
@@ -21,8 +22,8 @@ PER_CUTOFF = 3  # samples kept per period of the low-pass's cutoff: more of them
 class Observed(NamedTuple):
     """The joints of one log on one clock."""
 
-    records: tuple[Smoothed, ...]  # of n joints
-    motion: Motion
+    records: tuple[Motion, ...]  # of n joints
+    motion: ArmMotion
     tau: Array  # (N, n) effort, low-passed; NaN where a joint stands still: its friction takes any value
     block: Integers  # (N,) of the path
     period: Integers  # (N,) which repetition of the path; -1 where it does not repeat
@@ -63,14 +64,13 @@ class Observed(NamedTuple):
         return np.concatenate(rows), tau[samples], samples
 
 
-def observed(records: Sequence[Smoothed], averages: Iterable[Average], lowpass: float, number: int) -> Observed:
+def observed(records: Sequence[Motion], averages: Iterable[Average], lowpass: float, number: int) -> Observed:
     """The joints of one log, in their order, which share a clock."""
     first = records[0]
     own = {a.joint: a for a in averages if a.log == first.log}
     average = next(iter(own.values()), None)
-    q, dq, ddq = (np.stack([getattr(r, name) for r in records], axis=1) for name in ("q", "dq", "ddq"))
     tau = np.stack([smooth_effort(r, lowpass) for r in records], axis=1)
-    motion = Motion(q, dq, ddq, 1.0 / first.rate, first.segment)
+    motion = recorded_motion(records)
     moving, white = np.asarray(~np.isnan(tau).all(axis=1)), {joint: a.sigma_tau_white for joint, a in own.items()}
     block = path_blocks(first.t, average.period if average else 0.0, moving)
     period = np.full(len(first), -1)
@@ -81,7 +81,7 @@ def observed(records: Sequence[Smoothed], averages: Iterable[Average], lowpass: 
     return Observed(tuple(records), motion, tau, block, period, lowpass, number, white)
 
 
-def smooth_effort(record: Smoothed, lowpass: float) -> Array:
+def smooth_effort(record: Motion, lowpass: float) -> Array:
     """The effort (N,) of a joint through the low-pass; NaN where it stands still, throughout where it is at rest."""
     if record.at_rest:
         return np.full(len(record), np.nan)

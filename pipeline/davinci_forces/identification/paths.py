@@ -5,16 +5,16 @@ import numpy as np
 from davinci_forces.maths.signals.path import SAME_PATH as LIKE
 from davinci_forces.maths.signals.path import likeness
 from davinci_forces.maths.signals.smoothing import segments
-from davinci_forces.records import FittedPaths, Signal
+from davinci_forces.records import FittedPaths, Motion
 from davinci_forces.records.predict import ANOTHER_PATH as ANOTHER_PATH
 from davinci_forces.records.predict import SAME_PATH as SAME_PATH
 
 
-def follows(signal: Signal, paths: FittedPaths) -> bool:
+def follows(motion: Motion, paths: FittedPaths) -> bool:
     """Whether the longest segment of a recording is like one of the paths."""
-    part = max(segments(signal.segment), key=lambda s: s.stop - s.start)
+    part = max(segments(motion.segment), key=lambda s: s.stop - s.start)
     each = [np.flatnonzero(paths.source == log) for log in dict.fromkeys(paths.source)]
     likenesses = [
-        likeness(signal.t[part], signal.q[part], paths.q[rows], float(paths.period[rows[0]])) for rows in each
+        likeness(motion.t[part], motion.q_measured[part], paths.q[rows], float(paths.period[rows[0]])) for rows in each
     ]
     return max(likenesses) > LIKE

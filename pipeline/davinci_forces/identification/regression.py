@@ -8,11 +8,10 @@ from davinci_forces.estimators.problem import NOTHING, Known, Regression
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.memory import efforts
-from davinci_forces.maths.models.model import Model, Motion
+from davinci_forces.maths.models.model import ArmMotion, Model
 from davinci_forces.maths.periods.harmonics import kept_noise
-from davinci_forces.maths.signals.smoothing import motion, segments
 from davinci_forces.maths.signals.standstill import standing
-from davinci_forces.records import Signal, Trajectory
+from davinci_forces.records import JointModel, Motion, Trajectory
 
 
 def pose(model: IndependentJoint, trajectories: Sequence[Trajectory], known: Known = NOTHING) -> Regression:
@@ -65,31 +64,19 @@ def joined(parts: Sequence[Regression]) -> Regression:
     )
 
 
-def averaged_motion(trajectory: Trajectory) -> Motion:
+def averaged_motion(trajectory: Trajectory) -> ArmMotion:
     """One averaged period of a joint, which repeats."""
     columns = (trajectory.q, trajectory.dq, trajectory.ddq)
     q, dq, ddq = (x[:, None] for x in columns)
-    return Motion(q, dq, ddq, trajectory.period / len(q), np.zeros(len(q), np.int64), periodic=True)
+    return ArmMotion(q, dq, ddq, trajectory.period / len(q), np.zeros(len(q), np.int64), periodic=True)
 
 
-def measured_motion(signal: Signal, lowpass: float) -> Motion:
-    """A recording of a joint that need not repeat: low-passed, with its acceleration, each segment by itself."""
-    parts = [_smoothed(signal, part, lowpass) for part in segments(signal.segment)]
-    q, dq, ddq = (np.concatenate(columns)[:, None] for columns in zip(*parts, strict=True))
-    return Motion(q, dq, ddq, 1.0 / signal.rate, signal.segment)
+def recorded_motion(records: Sequence[Motion | JointModel]) -> ArmMotion:
+    """The low-passed motion of joints of one recording, in this order, which share a clock."""
+    q, dq, ddq = (np.stack([getattr(r, name) for r in records], axis=1) for name in ("q", "dq", "ddq"))
+    return ArmMotion(q, dq, ddq, 1.0 / records[0].rate, records[0].segment)
 
 
-def of_joints(motions: Sequence[Motion]) -> Motion:
-    """The motion of several joints of one recording, in this order."""
-    q, dq, ddq = (np.concatenate(columns, axis=1) for columns in zip(*(m[:3] for m in motions), strict=True))
-    return motions[0]._replace(q=q, dq=dq, ddq=ddq)
-
-
-def predicted(model: Model, theta: Array, motion: Motion, effort: int = 0) -> Array:
+def predicted(model: Model, theta: Array, motion: ArmMotion, effort: int = 0) -> Array:
     """One of the model's efforts (N,) along a motion."""
     return np.ascontiguousarray(efforts(model, theta, motion)[:, effort])
-
-
-def _smoothed(signal: Signal, part: slice, lowpass: float) -> tuple[Array, Array, Array]:
-    dq = signal.dq[part] if signal.velocity == "logged" else None
-    return motion(signal.q[part], dq, signal.rate, lowpass)

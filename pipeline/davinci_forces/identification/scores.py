@@ -1,7 +1,6 @@
 """How well an effort was predicted, on one footing: raw, and with effort and prediction through the same low-pass."""
 
 from dataclasses import replace
-from typing import TypeVar
 
 import numpy as np
 
@@ -9,9 +8,7 @@ from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals.noise import smoothed, white_std
 from davinci_forces.maths.signals.smoothing import share_passed
 from davinci_forces.maths.uncertainty.bootstrap import model_error
-from davinci_forces.records import Prediction, Signal, Smoothed
-
-AnySignal = TypeVar("AnySignal", Signal, Smoothed)
+from davinci_forces.records import Motion, Prediction
 
 FIRST = 1111  # samples that the published rival's errors are over
 
@@ -23,18 +20,18 @@ class Judge:
     periods tell it; else it is what a low-pass takes out of the error, which holds a ripple of the drive as well.
     """
 
-    def __init__(self, signal: Signal | Smoothed, free: Booleans, lowpass: float, white: float | None = None) -> None:
-        self.signal, self.lowpass, self.white = signal, lowpass, white
+    def __init__(self, motion: Motion, free: Booleans, lowpass: float, white: float | None = None) -> None:
+        self.motion, self.lowpass, self.white = motion, lowpass, white
         self.free = slice(None) if free.all() else free
-        tau = signal.tau[self.free]
-        self.smooth = self._smoothed(signal.tau)[self.free]
+        tau = motion.tau[self.free]
+        self.smooth = self._smoothed(motion.tau)[self.free]
         self.range, self.variance = float(np.ptp(tau)) or 1.0, float(tau.var()) or 1.0
         self.spread = float(np.linalg.norm(tau - tau.mean())) or 1.0
-        self.passed = share_passed(signal.rate, lowpass)
+        self.passed = share_passed(motion.rate, lowpass)
 
     def scored(self, model: str, name: str, role: str, scheme: str, path: str, tau_hat: Array) -> Prediction:
         """A prediction (N,) with its scores."""
-        whole_error = self.signal.tau - tau_hat
+        whole_error = self.motion.tau - tau_hat
         slow = self._smoothed(whole_error)
         noise = white_std(whole_error - slow, self.passed) if self.white is None else self.white
         error, slow = whole_error[self.free], slow[self.free]
@@ -42,8 +39,8 @@ class Judge:
         rmse = float(np.sqrt(error @ error / len(error)))
         beyond_noise, beyond_noise_std = model_error(slow, noise * np.sqrt(self.passed))
         return Prediction(
-            log=self.signal.log,
-            joint=self.signal.joint,
+            log=self.motion.log,
+            joint=self.motion.joint,
             model=model,
             estimator=name,
             role=role,
@@ -59,18 +56,18 @@ class Judge:
             effort_rms=float(np.sqrt(np.mean(self.smooth**2))),
             relative_error=relative(slow, self.smooth),
             relative_error_1111=relative(slow[:FIRST], self.smooth[:FIRST]),
-            t=self.signal.t,
-            tau=self.signal.tau,
+            t=self.motion.t,
+            tau=self.motion.tau,
             tau_hat=tau_hat,
         )
 
     def _smoothed(self, x: Array) -> Array:
-        return smoothed(x, self.signal.segment, self.signal.rate, self.lowpass)
+        return smoothed(x, self.motion.segment, self.motion.rate, self.lowpass)
 
 
-def some(signal: AnySignal, which: Booleans | slice) -> AnySignal:
+def some(motion: Motion, which: Booleans | slice) -> Motion:
     """Some of the samples (N,) of a recording."""
-    return replace(signal, **{name: getattr(signal, name)[which] for name in signal.columns()})
+    return replace(motion, **{name: getattr(motion, name)[which] for name in motion.columns()})
 
 
 def relative(error: Array, tau: Array) -> float:

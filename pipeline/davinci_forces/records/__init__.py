@@ -30,13 +30,12 @@ from davinci_forces.records.ingest import LogSummary, Recording, Touch
 from davinci_forces.records.limit import DelayLimit, HapticMotion, StabilityLimit, StabilityMap, TissueLimit
 from davinci_forces.records.measure import Contact
 from davinci_forces.records.palpate import Push, Stiffness, TissueModel
-from davinci_forces.records.predict import Prediction
+from davinci_forces.records.predict import JointModel, Prediction
 from davinci_forces.records.record import COLUMN_DTYPES, AnyRecord, Column, Counts, Labels, Names, Origin, Record
-from davinci_forces.records.resample import Signal
+from davinci_forces.records.resample import Motion, Signal
 from davinci_forces.records.resolve import TipBudget, TipContact, TipForce
 from davinci_forces.records.sense import SensorForce
 from davinci_forces.records.settle import FilterNoise
-from davinci_forces.records.smooth import Smoothed
 from davinci_forces.records.threshold import Threshold
 from davinci_forces.records.tune import Tuning
 from davinci_forces.records.weigh import FreeWeight, Weight
@@ -46,20 +45,20 @@ __all__ = [
     "COLUMN_DTYPES", "KINDS", "AnyRecord", "ArmCorrelation", "Average", "Choice", "Column", "Comparison", "Contact",
     "Control", "Counts", "CrossFit", "DelayLimit", "Diagnostic", "ErrorBand", "Excitation", "Explanation",
     "FilterNoise", "Fit", "FittedPaths", "FreeMotion", "FreeSpace", "FreeWeight", "FrictionMap", "Guess",
-    "HapticMotion", "HapticResponse", "HapticRun", "Identifiability", "Innovation", "JointCorrelation", "Labels",
-    "Links", "Load", "LogSummary", "Lyapunov", "MeasurementNoise", "Names", "Origin", "PeriodResidual", "Pose",
-    "Prediction", "Push", "Record", "Recording", "Residual", "SensorForce", "Signal", "Smoothed", "Spectrum",
-    "StabilityLimit", "StabilityMap", "Stiffness", "SwarmSearch", "Threshold", "TipBudget", "TipContact", "TipForce",
-    "TissueLimit", "TissueModel", "Touch", "Track", "Trajectory", "Tuning", "Weight", "Whiteness", "Workspace",
-    "diagnostic",
+    "HapticMotion", "HapticResponse", "HapticRun", "Identifiability", "Innovation", "JointCorrelation", "JointModel",
+    "Labels", "Links", "Load", "LogSummary", "Lyapunov", "MeasurementNoise", "Motion", "Names", "Origin",
+    "PeriodResidual", "Pose", "Prediction", "Push", "Record", "Recording", "Residual", "SensorForce", "Signal",
+    "Spectrum", "StabilityLimit", "StabilityMap", "Stiffness", "SwarmSearch", "Threshold", "TipBudget", "TipContact",
+    "TipForce", "TissueLimit", "TissueModel", "Touch", "Track", "Trajectory", "Tuning", "Weight", "Whiteness",
+    "Workspace", "diagnostic",
 ]  # fmt: skip
 
 KINDS: dict[str, type[Record]] = {
     kind.__name__: kind
     for kind in (
-        Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Touch, Signal, Average,
-        PeriodResidual, Trajectory, Spectrum, Smoothed, Fit, CrossFit, Identifiability, FittedPaths, MeasurementNoise,
-        Residual, SwarmSearch, Guess, Choice, FrictionMap, Prediction, Tuning, FilterNoise, FreeMotion, ErrorBand,
+        Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Touch, Signal, Motion, Average,
+        PeriodResidual, Trajectory, Spectrum, Fit, CrossFit, Identifiability, FittedPaths, MeasurementNoise, Residual,
+        SwarmSearch, Guess, Choice, FrictionMap, Prediction, JointModel, Tuning, FilterNoise, FreeMotion, ErrorBand,
         Track, FreeSpace, Threshold, Contact, Push, Stiffness, TissueModel, Load, Weight, FreeWeight, Comparison,
         StabilityMap, StabilityLimit, DelayLimit, TissueLimit, HapticMotion, HapticResponse, HapticRun,
         JointCorrelation, ArmCorrelation, TipForce, TipContact, TipBudget, SensorForce, Whiteness, Innovation,

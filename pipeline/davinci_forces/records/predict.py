@@ -1,9 +1,9 @@
-"""Records of predictions of effort that a fit has not seen."""
+"""Records of the effort that a fit predicts: where it has not seen the log, and as a filter is to know the joint."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from davinci_forces.records.record import Column, Published, Record
+from davinci_forces.records.record import Column, Counts, Published, Record
 
 CHOSEN = "chosen"
 SAME_PATH, ANOTHER_PATH = "same path", "another path"  # as what was fitted
@@ -50,3 +50,53 @@ class Prediction(Record):
         scores = ("rmse", "nrmse", "r2", "fit_percent", "r2_ceiling", "effort_rms")
         yield from self.publish(self.prefix, *scores, "relative_error", "relative_error_1111")
         yield Published(f"{self.prefix}.model_error", "model_error", std="model_error_std")
+
+
+@dataclass(frozen=True, eq=False)
+class JointModel(Record):
+    """The model of one joint along one log, by the fit that the setting `fit` leads to:
+
+        inertia ddq + b(q, dq) + tau_known + tau_ext = tau                                              (7.15), (7.16)
+
+    `tau_hat_unseen` is the effort of an identification log by refits that have not seen the sample, and NaN where there
+    are none.  It is NaN throughout other logs, which no fit has seen.
+    """
+
+    UNKNOWN = ("tau_hat_unseen",)
+
+    log: str
+    joint: str
+    role: str
+    model: str
+    estimator: str
+    stand_in: str
+    path: str
+    scheme: str  # of what has not seen the samples; "" where nothing has
+    path_unseen: str
+    rate: float
+    at_rest: int
+    constant: float
+    gravity_sine: float
+    gravity_cosine: float
+    spring: float
+    viscous: float
+    coulomb: float
+    presliding: float
+    t: Column
+    q: Column
+    dq: Column
+    ddq: Column
+    q_measured: Column
+    dq_measured: Column
+    tau: Column
+    segment: Counts
+    inertia: Column
+    tau_known: Column
+    tau_hat: Column
+    tau_hat_unseen: Column
+
+    @property
+    def coefficients(self) -> tuple[float, float, float, float, float, float, float]:
+        """Those of the bias b, in the order of `maths.models.bias.COEFFICIENTS`."""
+        gravity = (self.constant, self.gravity_sine, self.gravity_cosine)
+        return (*gravity, self.spring, self.viscous, self.coulomb, self.presliding)

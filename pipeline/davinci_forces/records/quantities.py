@@ -67,6 +67,10 @@ QUANTITIES = {
     "gaps": Quantity("interruptions of the recording"),
     "method": Quantity("how the recording was put on a uniform clock", ""),
     "velocity": Quantity("where the velocity comes from", ""),
+    "q_measured": Quantity("joint position as measured", "{position}"),
+    "dq_measured": Quantity("joint velocity as measured, or as derived from the position", "{position}/s"),
+    "cutoff": Quantity("frequency above which a low-pass takes out of the motion", "Hz"),
+    "effort_lag": Quantity("how much later than the motion the effort is measured", "s"),
     "value": Quantity("measured value", "{unit}"),
     # periods and noise
     "period": Quantity("length of one period", "s"),
@@ -134,6 +138,19 @@ QUANTITIES = {
     "score_std": Quantity("standard error of the score"),
     "training": Quantity("relative error of the fit to all data, the mean over joints"),
     "over_periods": Quantity("relative error on repeated periods left out, the mean over joints"),
+    # the model of a joint along a log
+    "stand_in": Quantity("why another fit stands in for the one that the settings name", ""),
+    "path_unseen": Quantity("the same of what the refits had not seen", ""),
+    "constant": Quantity("constant effort of the joint's own bias", "{effort}"),
+    "gravity_sine": Quantity("effort of the bias with the sine of the position", "{effort}"),
+    "gravity_cosine": Quantity("effort of the bias with the cosine of the position", "{effort}"),
+    "spring": Quantity("effort of the bias with the position", "{effort}/{position}"),
+    "coulomb": Quantity("Coulomb friction of the joint", "{effort}"),
+    "presliding": Quantity("friction of the joint in its presliding element", "{effort}"),
+    "tau_known": Quantity(
+        "effort that the measured motion determines: of other joints, of friction's memory", "{effort}"
+    ),
+    "tau_hat_unseen": Quantity("effort predicted by refits that have not seen the sample", "{effort}"),
     # predictions
     "path": Quantity("whether the recording follows a path that was fitted", ""),
     "rmse": Quantity("root mean squared error of the predicted effort", "{effort}"),
@@ -292,7 +309,7 @@ QUANTITIES = {
     "r_dq": Quantity("standard deviation of the velocity noise that the filter assumes", "{position}/s"),
     "q_dq": Quantity("standard deviation of the velocity's process noise per sample", "{position}/s"),
     "r_tau": Quantity("standard deviation of the effort noise that the filter assumes", "{effort}"),
-    "inertia": Quantity("inertia of the joint, the largest along its motion", "{inertia}"),
+    "inertia": Quantity("inertia of the joint; of a filter's noise the largest along its motion", "{inertia}"),
     "viscous": Quantity("viscous friction of the joint", "{effort} s/{position}"),
     "speed": Quantity("root mean square of the velocity", "{position}/s"),
     "likelihood_gain": Quantity("gain of the logarithm of the likelihood over the noise it began with"),

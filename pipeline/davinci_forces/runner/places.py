@@ -8,7 +8,7 @@ from davinci_forces.runner.signature import Kinds
 from davinci_forces.study import Study
 
 Located = tuple[str, str]  # kind of record, file below the processed folder: a Path costs ten times what a name does
-ANY = ""  # log or joint
+ANY = ""  # log, joint or role
 ORDER = {kind: i for i, kind in enumerate(KINDS.values())}
 
 
@@ -17,6 +17,7 @@ class Places:
 
     def __init__(self, study: Study, entries: Iterable[Entry]) -> None:
         self._logs = {entry.name: i for i, entry in enumerate(study.logs)}
+        self._roles = {entry.name: entry.role for entry in study.logs}
         self._joints = {joint.name: i for i, joint in enumerate(study.robot.joints)}
         self._kinds = {kind.folder(): kind for kind in KINDS.values()}
         self._names: dict[str, dict[str, dict[str, str]]] = {}  # by folder and log, with the joint
@@ -48,15 +49,20 @@ class Places:
                     self._all.pop(kind.__name__, None)
                     yield kind, path, log, joint
 
-    def of(self, kinds: Kinds, log: str = ANY, joint: str = ANY) -> tuple[Located, ...]:
-        """Files of these kinds about a log and a joint; a kind that is about no log or joint is about every one."""
+    def of(self, kinds: Kinds, log: str = ANY, joint: str = ANY, role: str = ANY) -> tuple[Located, ...]:
+        """Files of these kinds about a log and a joint; a kind that is about no log or joint is about every one.
+
+        Where a role is given, those of the logs of that role.
+        """
         located: tuple[Located, ...] = ()
         for kind in sorted(kinds, key=ORDER.__getitem__) if len(kinds) > 1 else kinds:
             of_joint = joint if is_about_joint(kind) else ANY
             located += tuple(
                 self._sorted(kind, [log], of_joint) if log and is_about_log(kind) else self._of_all(kind, of_joint)
             )
-        return located
+        if role == ANY:
+            return located
+        return tuple((kind, path) for kind, path in located if self._roles.get(about(KINDS[kind], path)[0]) == role)
 
     def _of_all(self, kind: type[Record], joint: str) -> list[Located]:
         """The files of a kind about a joint, of every log; many calls ask for them."""

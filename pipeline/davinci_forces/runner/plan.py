@@ -12,7 +12,7 @@ from davinci_forces.runner.fingerprints.code import code
 from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
 from davinci_forces.runner.fingerprints.schemas import schemas
 from davinci_forces.runner.ledger import Ledger
-from davinci_forces.runner.places import Located, Places, about, is_about_log
+from davinci_forces.runner.places import ANY, Located, Places, about, is_about_log
 from davinci_forces.runner.signature import Declaration
 from davinci_forces.study import Study
 
@@ -64,7 +64,7 @@ class Plan:
         elif "log" in asks.given.values():
             yield from (self._task(asks, name, {}, name) for name in logs)
         else:
-            records = {p: places.of(kinds) for p, kinds in asks.every.items()}
+            records = {p: places.of(kinds, role=asks.roles.get(p, ANY)) for p, kinds in asks.every.items()}
             if any(records.values()) or not asks.reads:
                 yield self._task(asks, asks.name, records)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, fields
 from functools import cache
 from importlib import import_module
 from inspect import Parameter, signature
-from typing import Any, get_args, get_origin, get_type_hints
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 from davinci_forces.logs.log import Log
 from davinci_forces.records import Record
@@ -31,6 +31,7 @@ class Declaration:
     optional: dict[str, Kinds]  # the record about the same, or None
     every: dict[str, Kinds]  # all records about the same
     given: dict[str, str]  # parameter -> "log", "entry", "joint", "robot", "weighings" or "haptics"
+    roles: dict[str, str]  # parameter -> role of the logs whose records it holds, where not of all
     settings: tuple[str, ...]
     makes: Kinds
 
@@ -45,11 +46,14 @@ class Declaration:
 def declaration(name: str) -> Declaration:
     """Read the signature of a stage."""
     run = import_module(f"davinci_forces.stages.{name}").run
-    hints = get_type_hints(run)
-    declared = Declaration(name, {}, {}, set(), {}, {}, {}, _settings(name, run), _kinds(_inner(hints.pop("return"))))
+    hints = get_type_hints(run, include_extras=True)
+    makes = _kinds(_inner(hints.pop("return")))
+    declared = Declaration(name, {}, {}, set(), {}, {}, {}, {}, _settings(name, run), makes)
     for parameter, hint in hints.items():
         if parameter in declared.settings:
             continue
+        if get_origin(hint) is Annotated:
+            hint, declared.roles[parameter] = get_args(hint)
         if hint in GIVEN:
             declared.given[parameter] = GIVEN[hint]
         elif get_origin(hint) in (Sequence, Collection):

@@ -9,6 +9,7 @@ The signature of `run` is the declaration of everything it needs:
     log: Log                    called once for each log of the study, opened
     average: Average | None     the record of that kind about the same, where there is one
     fits: Iterable[Fit]         all records of that kind about the same; the stage waits for them
+    motions: Annotated[Iterable[Motion], "identification"]   those of logs of one role only
     entry: LogEntry             what the study says of the log
     joint: Joint, robot: Robot  what the robot is
     weighings: Weighings        the masses of all weight logs; where the study has none, the stage is not called
@@ -22,7 +23,7 @@ does not grow with the study, unless it is the only one of its stage.  The repor
 """
 
 STAGES = (
-    "design", "ingest", "resample", "average", "differentiate", "smooth", "fit", "choose", "chart", "predict", "tune",
+    "design", "ingest", "resample", "average", "differentiate", "fit", "choose", "chart", "predict", "describe", "tune",
     "settle", "calibrate", "bound", "ekf", "assess", "threshold", "measure", "palpate", "hang", "weigh", "benchmark",
     "limit", "feel", "correlate", "combine", "resolve", "sense", "whiteness", "explain",
 )  # fmt: skip

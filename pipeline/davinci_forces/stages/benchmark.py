@@ -8,15 +8,15 @@ import numpy as np
 
 from davinci_forces.filters import DEFAULT, FILTERS, through
 from davinci_forces.filters.assumed import assumed
-from davinci_forces.filters.problem import NoiseModel
+from davinci_forces.filters.problem import NoiseModel, driven, driven_smooth
 from davinci_forces.filters.response import DURATION, half_sine, response
-from davinci_forces.identification.driving import Driving, driving, motions_of, named
-from davinci_forces.identification.used import FALLBACK, describing
+from davinci_forces.identification.joint_models import Along
+from davinci_forces.identification.used import FALLBACK, Identified
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.signals.windows import free_space, runs
 from davinci_forces.maths.uncertainty.free_space import levels
-from davinci_forces.records import Choice, Comparison, Diagnostic, FilterNoise, Fit, Signal, diagnostic
+from davinci_forces.records import Comparison, Diagnostic, FilterNoise, Fit, JointModel, diagnostic
 from davinci_forces.robots.robot import Kind, Robot
 from davinci_forces.study import LogEntry
 
@@ -26,64 +26,51 @@ INDEPENDENT = f"{DEFAULT}-independent"  # the default filter with the joint's ow
 
 
 def run(
-    signals: Sequence[Signal],
+    model: JointModel,
     fits: Iterable[Fit],
-    choices: Iterable[Choice],
-    noises: Iterable[FilterNoise],
+    noise: FilterNoise | None,
     entry: LogEntry,
     robot: Robot,
     *,
-    fit: str,
-    lowpass: float,
     q_tau: float,
 ) -> Iterator[Comparison | Diagnostic]:
-    """One Comparison per filter and joint that moves in a log that no parameter was fitted to.
+    """One Comparison per filter of a joint that moves in a log that no parameter was fitted to.
 
     Each filter has the slowest walk with which it shows a push, so that they are compared at the same speed.
     """
-    if entry.role == "identification" or not entry.tells_free_space:
+    free = free_space(model.t, entry.contact, model.rate)
+    unfitted = entry.role != "identification" and entry.tells_free_space
+    if not unfitted or model.at_rest or noise is None or int(free.sum()) < FEWEST:
         return
-    every, chosen, settled = list(fits), list(choices), {noise.joint: noise for noise in noises}
-    motions = motions_of(signals, lowpass)
-    for signal in signals:
-        if signal.at_rest or signal.joint not in settled or not describing(robot, every, signal.joint):
-            continue
-        free = free_space(signal.t, entry.contact, signal.rate)
-        if int(free.sum()) < FEWEST:
-            continue
-        kept, _ = named(signal, signals, every, chosen, robot, fit)
-        own = driving(signal, motions, kept, robot)
-        alone, _ = named(signal, signals, every, chosen, robot, FALLBACK)
-        tried = [(name.replace("_", "-"), name, own) for name in FILTERS]
-        if own.fit.model != "independent":
-            tried.append((INDEPENDENT, DEFAULT, driving(signal, motions, alone, robot)))
-        for label, name, by in tried:
-            if by.joint.inertia.min() > 0:
-                joint = robot.joint(signal.joint)
-                noise = assumed(settled[signal.joint], joint, 1.0 / signal.rate, q_tau, name)
-                yield from compared(label, name, by, noise, free, PUSH[joint.kind])
+    tried, identified = [(name.replace("_", "-"), name, model) for name in FILTERS], Identified(robot, fits)
+    alone = identified.used(model.joint, FALLBACK)
+    if alone is not None and model.model != "independent":
+        by_itself = Along(identified, [model]).under(model, alone)
+        tried += [(INDEPENDENT, DEFAULT, by_itself)] if by_itself.inertia.min() > 0 else []
+    joint = robot.joint(model.joint)
+    for label, name, by in tried:
+        assumes = assumed(noise, joint, 1.0 / model.rate, q_tau, name)
+        yield from compared(label, name, by, assumes, free, PUSH[joint.kind])
 
 
 def compared(
-    label: str, name: str, own: Driving, noise: NoiseModel, free: Booleans, push: float
+    label: str, name: str, model: JointModel, noise: NoiseModel, free: Booleans, push: float
 ) -> Iterator[Comparison | Diagnostic]:
     """What one filter makes of a joint of a log, and of the same with a push."""
-    signal, parts = own.signal, own.smooth_parts if name == "direct" else own.parts
+    parts = driven_smooth(model) if name == "direct" else driven(model)
     made = through(name, parts, noise)
     if not np.isfinite(made.tau_ext).all():
         return
-    space, added = levels(made.tau_ext[free], made.tau_ext_std[free]), pushed(own.signal.t, parts, free, push)
-    shown = response(through(name, added.parts, noise).tau_ext - made.tau_ext, own.signal.t, added.start, push)
+    space, added = levels(made.tau_ext[free], made.tau_ext_std[free]), pushed(model.t, parts, free, push)
+    shown = response(through(name, added.parts, noise).tau_ext - made.tau_ext, model.t, added.start, push)
     if label == DEFAULT and shown.share < 0.5:
-        said = (
-            f"{signal.log}/{signal.joint}: the filter is deaf: it shows {shown.share:.0%} of a push of {DURATION:g} s"
-        )
-        yield diagnostic("benchmark", f"{signal.log}.{signal.joint}", "warning", f"{said}; raise q_tau in [settings]")
+        said = f"{model.log}/{model.joint}: the filter is deaf: it shows {shown.share:.0%} of a push of {DURATION:g} s"
+        yield diagnostic("benchmark", f"{model.log}.{model.joint}", "warning", f"{said}; raise q_tau in [settings]")
     yield Comparison(
-        log=signal.log, joint=signal.joint, filter=label, role=signal.role, default=int(label == DEFAULT),
+        log=model.log, joint=model.joint, filter=label, role=model.role, default=int(label == DEFAULT),
         free_rms=space.rms, free_rms_std=space.rms_std, free_level=space.level_95, free_level_std=space.level_95_std,
         detection_level=space.level_99, detection_level_std=space.level_99_std, push_peak=push, push_share=shown.share,
-        push_delay=shown.delay, t=signal.t, tau_ext=made.tau_ext,
+        push_delay=shown.delay, t=model.t, tau_ext=made.tau_ext,
     )  # fmt: skip
 
 

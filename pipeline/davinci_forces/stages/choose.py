@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
+from typing import Annotated
 
 import numpy as np
 
@@ -12,20 +13,25 @@ from davinci_forces.identification.mechanisms import NOTHING, held
 from davinci_forces.identification.observations import Observed, observed
 from davinci_forces.identification.unseen import predictions
 from davinci_forces.maths.models.model import Model
-from davinci_forces.records import Average, Choice, Diagnostic, Fit, Prediction, Smoothed, diagnostic
+from davinci_forces.records import Average, Choice, Diagnostic, Fit, Motion, Prediction, diagnostic
 from davinci_forces.robots.models import Reach
 from davinci_forces.robots.robot import Robot
 
 
 def run(
-    smoothed: Iterable[Smoothed], averages: Iterable[Average], robot: Robot, *, fit: str, lowpass: float
+    motions: Annotated[Iterable[Motion], "identification"],
+    averages: Iterable[Average],
+    robot: Robot,
+    *,
+    fit: str,
+    lowpass: float,
 ) -> Iterator[Choice | Fit | Prediction | Diagnostic]:
     """One model for the whole arm: its parameters, and its predictions of what each refit had not seen.
 
     Where a log moves several joints, and the robot has a chain, the joints that move are described together; joints
     that move in other logs only keep their own terms.  A fit that the settings name is made, too.
     """
-    logs = by_log(smoothed, averages, robot, lowpass)
+    logs = by_log(motions, averages, robot, lowpass)
     separate, arm = to_describe(logs, robot)
     if not separate:
         return
@@ -52,11 +58,11 @@ def run(
         yield from predictions(candidate, candidate is selection.chosen, logs, robot, reaches)
 
 
-def by_log(smoothed: Iterable[Smoothed], averages: Iterable[Average], robot: Robot, lowpass: float) -> list[Observed]:
+def by_log(motions: Iterable[Motion], averages: Iterable[Average], robot: Robot, lowpass: float) -> list[Observed]:
     """The joints of each log, in the robot's order; of several clocks, the first joint's is kept."""
     joints, every = [joint.name for joint in robot.joints], list(averages)
-    records: dict[str, list[Smoothed]] = defaultdict(list)
-    for record in smoothed:
+    records: dict[str, list[Motion]] = defaultdict(list)
+    for record in motions:
         records[record.log].append(record)
     logs: list[Observed] = []
     for own in records.values():

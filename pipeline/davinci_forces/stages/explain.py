@@ -10,15 +10,16 @@ from davinci_forces.filters.innovations.search import CauseSearch, search
 from davinci_forces.filters.innovations.timing import delays, mended
 from davinci_forces.filters.innovations.trials import CLOCK, Subject
 from davinci_forces.filters.innovations.verdict import finding, verdict
-from davinci_forces.identification.driving import Driving, Motions, driving, motions_of, named
+from davinci_forces.filters.problem import driven
+from davinci_forces.identification.joint_models import Along
 from davinci_forces.identification.refitting import refitted
-from davinci_forces.identification.used import describing, model_of
+from davinci_forces.identification.used import Identified
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.signals.standstill import moving
 from davinci_forces.maths.signals.whiteness import NORMAL_95, NORMAL_99, cross_correlation, mean_square_band
 from davinci_forces.maths.signals.windows import longest_run, outside, settled
-from davinci_forces.records import Choice, Explanation, FilterNoise, Fit, Innovation, Signal
+from davinci_forces.records import Explanation, FilterNoise, Fit, Innovation, JointModel, Motion
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
@@ -28,74 +29,70 @@ THIS_LOG = "parameters of this log itself"
 
 
 def run(
-    signals: Sequence[Signal],
+    models: Sequence[JointModel],
+    motions: Sequence[Motion],
     fits: Iterable[Fit],
-    choices: Iterable[Choice],
     noises: Iterable[FilterNoise],
     entry: LogEntry,
     robot: Robot,
     *,
-    fit: str,
-    lowpass: float,
     q_tau: float,
 ) -> Iterator[Innovation | Explanation]:
     """Of each joint that is tracked and moves: its innovations over the longest run, and why they are not white.
 
     A cause is named only where the innovations pass every test without it.  Section 7.4
     """
-    if entry.role == "friction":
-        return
-    every, chosen, assumes = list(fits), list(choices), {noise.joint: noise for noise in noises}
-    owns, motions = [], motions_of(signals, lowpass)
-    for signal in signals:
-        if not signal.at_rest and signal.joint in assumes and describing(robot, every, signal.joint):
-            own = driving(signal, motions, named(signal, signals, every, chosen, robot, fit)[0], robot)
-            if own.joint.inertia.min() > 0:
-                joint = robot.joint(signal.joint)
-                owns.append((own, assumed(assumes[signal.joint], joint, 1.0 / signal.rate, q_tau)))
-    every_innovation = [innovations(longest(own), noise) for own, noise in owns]
-    late = delays([along(own)[0] for own, _ in owns], [made.q for made in every_innovation])
-    for (own, noise), made, delay in zip(owns, every_innovation, late, strict=True):
-        signal, part = own.signal, longest_run(own.signal.t, own.signal.rate)
-        motion, free = along(own), outside(signal.t, entry.contact)
-        yield from described(own, made, motion)
-        models = {name: longest(by) for name, by in others(own, motions, every, robot, free)}
+    assumes, along = {noise.joint: noise for noise in noises}, Along(Identified(robot, fits), motions)
+    moving_models = [model for model in models if not model.at_rest and model.joint in assumes]
+    every_noise = [
+        assumed(assumes[model.joint], robot.joint(model.joint), 1.0 / model.rate, q_tau) for model in moving_models
+    ]
+    every_innovation = [
+        innovations(longest(model), noise) for model, noise in zip(moving_models, every_noise, strict=True)
+    ]
+    late = delays([motion_of(model)[0] for model in moving_models], [made.q for made in every_innovation])
+    for model, noise, made, delay in zip(moving_models, every_noise, every_innovation, late, strict=True):
+        part = longest_run(model.t, model.rate)
+        motion, free = motion_of(model), outside(model.t, entry.contact)
+        yield from described(model, made, motion)
+        trials = dict(others(model, along, free))
         if delay.any():
-            models[CLOCK] = mended(longest(own), *motion, delay)
-        subject = Subject(models, noise, free[part], moving(motion[0], 1.0 / signal.rate))
-        yield explanation(signal, search(subject), entry, float(np.std(delay)))
+            trials[CLOCK] = mended(longest(model), *motion, delay)
+        subject = Subject(trials, noise, free[part], moving(motion[0], 1.0 / model.rate))
+        yield explanation(model, search(subject), entry, float(np.std(delay)))
 
 
-def along(own: Driving) -> tuple[Array, Array]:
+def motion_of(model: JointModel) -> tuple[Array, Array]:
     """Velocity and acceleration over the longest run, without noise."""
-    part = longest_run(own.signal.t, own.signal.rate)
-    return own.motion[1][part], own.motion[2][part]
+    part = longest_run(model.t, model.rate)
+    return model.dq[part], model.ddq[part]
 
 
-def longest(own: Driving) -> Driven:
-    """The longest run of a joint's recording."""
-    return max(own.parts, key=lambda part: len(part.q))
+def longest(model: JointModel, tau_hat: Array | None = None) -> Driven:
+    """The longest run of a joint's recording; `tau_hat` (N,) by another fit, where that is taken off."""
+    return max(driven(model, tau_hat), key=lambda part: len(part.q))
 
 
-def others(
-    own: Driving, motions: Motions, fits: Sequence[Fit], robot: Robot, free: Booleans
-) -> Iterator[tuple[str, Driving]]:
+def others(model: JointModel, along: Along, free: Booleans) -> Iterator[tuple[str, Driven]]:
     """The joint under the model in use; with parameters of this log itself; and under another structure of its own."""
-    yield "", own
-    yield THIS_LOG, own.by(refitted(own, motions, robot, free))
-    joint = own.signal.joint
-    structures = [fit for fit in fits if fit.group == joint and fit.model != own.fit.model]
-    told = [fit for fit in structures if motions.keys() >= set(model_of(robot, fit).joints)]  # of what the log holds
-    for fit in told[:1]:
-        other = driving(own.signal, motions, fit, robot)
-        if other.joint.inertia.min() > 0:
-            yield fit.model, other
+    identified, joint = along.identified, model.joint
+    fit = identified.used(joint, f"{model.model}.{model.estimator}")
+    yield "", longest(model)
+    if fit is not None:
+        yield THIS_LOG, longest(model, refitted(model, fit, along, free))
+    structures = [other for other in identified.fits if other.group == joint and other.model != model.model]
+    told = [
+        other for other in structures if along.motions.keys() >= set(identified.model(other).joints)
+    ]  # of what the log holds
+    for other in told[:1]:
+        under = along.under(model, other)
+        if under.inertia.min() > 0:
+            yield other.model, longest(under)
 
 
-def described(own: Driving, made: Innovations, motion: tuple[Array, Array]) -> Iterator[Innovation]:
+def described(model: JointModel, made: Innovations, motion: tuple[Array, Array]) -> Iterator[Innovation]:
     """The size of both innovations, and their correlation with the motion before."""
-    signal = own.signal
-    kept = settled(np.arange(len(made.q)) / signal.rate)
+    kept = settled(np.arange(len(made.q)) / model.rate)
     dq, ddq = (x[kept] for x in motion)
     N = int(kept.sum())
     lags = min(LAGS, N // 4)
@@ -104,19 +101,19 @@ def described(own: Driving, made: Innovations, motion: tuple[Array, Array]) -> I
         normalised = (x / std)[kept]
         with_dq, with_ddq, with_sign = (cross_correlation(normalised, u, lags) for u in (dq, ddq, np.sign(dq)))
         yield Innovation(
-            log=signal.log, joint=signal.joint, signal=name, tested=N, band=NORMAL_95 / N**0.5,
+            log=model.log, joint=model.joint, signal=name, tested=N, band=NORMAL_95 / N**0.5,
             band_99=NORMAL_99 / N**0.5, nis_own=float(np.mean(normalised**2)), nis_low=low, nis_high=high,
             lag=np.arange(lags + 1), with_dq=with_dq, with_ddq=with_ddq, with_sign=with_sign,
         )  # fmt: skip
 
 
-def explanation(signal: Signal, found: CauseSearch, entry: LogEntry, clock_std: float) -> Explanation:
+def explanation(model: JointModel, found: CauseSearch, entry: LogEntry, clock_std: float) -> Explanation:
     """What a search found, trial by trial."""
     trials, touched = found.trials, entry.role in ("contact", "tissue") and not entry.contact
     unstated = UNSTATED if touched and not (trials[0].white or found.explaining) else ""
     return Explanation(
-        log=signal.log,
-        joint=signal.joint,
+        log=model.log,
+        joint=model.joint,
         finding=finding(found),
         verdict=verdict(found) + unstated,
         clock_std=clock_std,

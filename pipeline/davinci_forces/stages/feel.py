@@ -7,9 +7,9 @@ import numpy as np
 from davinci_forces.haptics import loop as haptic
 from davinci_forces.haptics.maths.bimodal import Hand
 from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, AxisNoise, Body
-from davinci_forces.identification.used import FALLBACK, model_of, used
+from davinci_forces.identification.used import FALLBACK, Identified
 from davinci_forces.maths.models.bias import COULOMB, VISCOUS
-from davinci_forces.maths.models.model import Motion
+from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.records import FilterNoise, Fit, HapticResponse, HapticRun, Stiffness
 from davinci_forces.robots.robot import Joint, Kind, Robot
 from davinci_forces.study import HapticScenario
@@ -32,7 +32,7 @@ def run(
     if not tissues:
         return
     joint = next((joint for joint in robot.joints if joint.kind is Kind.PRISMATIC and not joint.effort), None)
-    body, arm_from = fitted(robot, list(fits), joint)
+    body, arm_from = fitted(robot, fits, joint)
     noise = next((noise_of(one) for one in noises if joint is not None and one.joint == joint.name), SLIDE_NOISE)
     scenario = haptic.filled(haptics, body, noise, float(np.median(tissues)), q_tau or (joint.q_tau if joint else 0.0))
     answer = haptic.response(scenario)
@@ -41,13 +41,16 @@ def run(
         yield felt(name, hand, scenario, answer)
 
 
-def fitted(robot: Robot, fits: list[Fit], joint: Joint | None) -> tuple[Body, str]:
+def fitted(robot: Robot, fits: Iterable[Fit], joint: Joint | None) -> tuple[Body, str]:
     """What slides as its own fit has it, and what it is called; as the thesis has it where there is no such fit."""
-    kept = used(robot, fits, (), joint.name, FALLBACK) if joint else None
+    identified = Identified(robot, fits)
+    kept = identified.used(joint.name, FALLBACK) if joint else None
     if kept is None or joint is None:
         return SLIDE, FROM_THESIS
     still = np.zeros((1, 1))
-    [dynamics] = model_of(robot, kept).joint_dynamics(kept.theta, Motion(still, still, still, 1.0, np.zeros(1, int)))
+    [dynamics] = identified.model(kept).joint_dynamics(
+        kept.theta, ArmMotion(still, still, still, 1.0, np.zeros(1, int))
+    )
     coulomb, viscous = max(dynamics.coefficients[COULOMB], 0.0), max(dynamics.coefficients[VISCOUS], 0.0)
     inertia = float(dynamics.inertia[0])
     if inertia <= 0.0:

@@ -1,7 +1,7 @@
 """Fit the parameters of every joint to all identification logs together, and without some, with every estimator."""
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 
@@ -35,8 +35,8 @@ from davinci_forces.records import (
     Guess,
     Identifiability,
     MeasurementNoise,
+    Motion,
     Residual,
-    Smoothed,
     SwarmSearch,
     Trajectory,
     diagnostic,
@@ -62,7 +62,11 @@ class Part(NamedTuple):
 
 
 def run(
-    trajectories: Iterable[Trajectory], smoothed: Iterable[Smoothed], robot: Robot, *, lowpass: float
+    trajectories: Iterable[Trajectory],
+    motions: Annotated[Iterable[Motion], "identification"],
+    robot: Robot,
+    *,
+    lowpass: float,
 ) -> Iterator[
     Fit | CrossFit | FittedPaths | Guess | Identifiability | MeasurementNoise | Residual | SwarmSearch | Diagnostic
 ]:
@@ -70,7 +74,7 @@ def run(
 
     A joint of several logs has a CrossFit, too, by which each of its logs can be predicted from others.
     """
-    averaged, samples = list(trajectories), list(smoothed)
+    averaged, samples = list(trajectories), list(motions)
     moving = [(s.log, s.joint) for s in samples if not s.at_rest]
     for joint in robot.joints:
         model, prior = independent(joint), known_of(joint)
@@ -192,7 +196,7 @@ def repeated(model: IndependentJoint, t: Trajectory, known: Known = NOTHING) -> 
     return Part(t.log, t.rate, t.periods, t.period, sigmas, t.t, t.q, t.dq, pose(model, [t], known))
 
 
-def unrepeated(model: IndependentJoint, record: Smoothed, lowpass: float, known: Known) -> Part:
+def unrepeated(model: IndependentJoint, record: Motion, lowpass: float, known: Known) -> Part:
     """Samples, motion and effort through one low-pass."""
     regression, kept = pose_samples(model, observed([record], (), lowpass, 0), known=known)
     step = float(np.median(np.diff(kept))) if len(kept) > 1 else 1.0

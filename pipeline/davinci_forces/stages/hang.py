@@ -1,17 +1,16 @@
 """Hang every weight on free motion, in thought, and on its own log: what it asks of the joints, beside the effort."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from davinci_forces.identification.regression import measured_motion
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.load import mirrored, moved_with, unit_load
 from davinci_forces.maths.periods.period import guess, refine
 from davinci_forces.maths.signals.noise import smoothed
 from davinci_forces.maths.signals.smoothing import segments
-from davinci_forces.records import Diagnostic, Load, Prediction, Signal, Track, diagnostic
+from davinci_forces.records import Diagnostic, JointModel, Load, Motion, diagnostic
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import HungMass, LogEntry, Weighings
 
@@ -20,14 +19,12 @@ PER_CUTOFF = 6.0  # rows kept per period of the low-pass's cutoff
 
 
 def run(
-    signals: Sequence[Signal],
-    tracks: Iterable[Track],
-    predictions: Iterable[Prediction],
+    models: Sequence[JointModel],
+    motions: Sequence[Motion],
     entry: LogEntry,
     robot: Robot,
     weighings: Weighings,
     *,
-    fit: str,
     lowpass: float,
 ) -> Iterator[Load | Diagnostic]:
     """One Load per joint that moves and weight: a weight log's own one, and all of them in free motion.
@@ -41,70 +38,70 @@ def run(
         said = f"{entry.name}: {robot.name} has no chain, so what a mass asks of its joints is not known"
         yield diagnostic("hang", entry.name, "note", f"{said}; nothing is weighed")
         return
-    moving = [track for track in tracks if not track.at_rest and len(track) == len(signals[0])]
-    tracked = [track for track in moving if not robot.joint(track.joint).effort]
-    if entry.role not in FREE and len(tracked) < len(moving):
-        which = ", ".join(track.joint for track in moving if track not in tracked)
+    moving = [model for model in models if not model.at_rest and len(model) == len(motions[0])]
+    weighed = [model for model in moving if not robot.joint(model.joint).effort]
+    if entry.role not in FREE and len(weighed) < len(moving):
+        which = ", ".join(model.joint for model in moving if model not in weighed)
         said = f"{entry.name}: the effort of {which} is a current, which weighs nothing, and is left out"
         yield diagnostic("hang", entry.name, "note", f"{said}; state torque_constant where it is known")
-    if not hung or not tracked or robot.chain is None:
+    if not hung or not weighed or robot.chain is None:
         return
-    motion = whole_motion(signals, robot, lowpass)
-    period = period_of([s for s in signals if s.joint in {t.joint for t in tracked}], robot)
-    efforts = {t.joint: (t.t, smoothed(t.tau - t.tau_hat, signals[0].segment, t.rate, lowpass)) for t in tracked}
+    motion = whole_motion(motions, robot)
+    period = period_of([m for m in motions if m.joint in {model.joint for model in weighed}], robot)
+    efforts = {model.joint: external(model, model.tau_hat, lowpass) for model in weighed}
     unseen = efforts
     if entry.role == "identification":
-        named = [p for p in predictions if fit in (p.model, f"{p.model}.{p.estimator}")]
-        unseen = {p.joint: (p.t, left(p, signals[0], lowpass)) for p in named}
+        unseen = {model.joint: external(model, model.tau_hat_unseen, lowpass) for model in weighed}
     for weighing in hung:
         sides = asked(robot.chain, robot, weighing.weight, motion)
-        for track in tracked:
-            column = [joint.name for joint in robot.joints].index(track.joint)
-            first = float(track.t[0]) - 0.5 / track.rate  # a sample is in the middle of its time
-            length = period or float(track.t[-1]) + 0.5 / track.rate - first
-            count = max(int(length * min(track.rate, PER_CUTOFF * lowpass) * (1 + 1e-9)), 1)
-            loads = [smoothed(side[:, column], signals[0].segment, track.rate, lowpass) for side in sides]
+        for model in weighed:
+            column = [joint.name for joint in robot.joints].index(model.joint)
+            first = float(model.t[0]) - 0.5 / model.rate  # a sample is in the middle of its time
+            length = period or float(model.t[-1]) + 0.5 / model.rate - first
+            count = max(int(length * min(model.rate, PER_CUTOFF * lowpass) * (1 + 1e-9)), 1)
+            loads = [smoothed(side[:, column], motions[0].segment, model.rate, lowpass) for side in sides]
             columns = {
-                "q": along(track.t, motion[0][:, column], first, length, count),
-                "load": along(track.t, loads[0], first, length, count),
-                "load_mirrored": along(track.t, loads[1], first, length, count),
-                "tau_ext": along(*efforts[track.joint], first, length, count),
-                "tau_ext_unseen": along(*unseen.get(track.joint, (track.t[:0], track.t[:0])), first, length, count),
+                "q": along(model.t, motion[0][:, column], first, length, count),
+                "load": along(model.t, loads[0], first, length, count),
+                "load_mirrored": along(model.t, loads[1], first, length, count),
+                "tau_ext": along(*efforts[model.joint], first, length, count),
+                "tau_ext_unseen": along(*unseen[model.joint], first, length, count),
             }
             kept = np.isfinite(columns["q"])
             yield Load(
-                log=track.log, joint=track.joint, weight=weighing.log, role=track.role, rate=count / length,
+                log=model.log, joint=model.joint, weight=weighing.log, role=model.role, rate=count / length,
                 period=period, t=((np.arange(count) + 0.5) / count * length)[kept],
                 **{name: values[kept] for name, values in columns.items()},
             )  # fmt: skip
 
 
-def whole_motion(signals: Sequence[Signal], robot: Robot, lowpass: float) -> tuple[Array, Array, Array]:
+def whole_motion(motions: Sequence[Motion], robot: Robot) -> tuple[Array, Array, Array]:
     """Position, velocity and acceleration (N, n) of all joints of the robot; 0 of those that the log does not hold."""
-    q, dq, ddq = np.zeros((3, len(signals[0]), len(robot.joints)))
+    q, dq, ddq = np.zeros((3, len(motions[0]), len(robot.joints)))
     names = [joint.name for joint in robot.joints]
-    for signal in signals:
-        if len(signal) == len(signals[0]):
-            measured, column = measured_motion(signal, lowpass), names.index(signal.joint)
-            q[:, column], dq[:, column], ddq[:, column] = measured.q[:, 0], measured.dq[:, 0], measured.ddq[:, 0]
+    for motion in motions:
+        if len(motion) == len(motions[0]):
+            column = names.index(motion.joint)
+            q[:, column], dq[:, column], ddq[:, column] = motion.q, motion.dq, motion.ddq
     return q, dq, ddq
 
 
-def period_of(signals: Sequence[Signal], robot: Robot) -> float:
+def period_of(motions: Sequence[Motion], robot: Robot) -> float:
     """The period [s] of joints that move together; 0 where they do not repeat."""
-    part = max(segments(signals[0].segment), key=lambda part: part.stop - part.start)
-    positions = [signal.q[part] for signal in signals]
+    part = max(segments(motions[0].segment), key=lambda part: part.stop - part.start)
+    positions = [motion.q_measured[part] for motion in motions]
     lag = guess(positions)
     if lag is None:
         return 0.0
-    orders = max(robot.joint(signal.joint).harmonics for signal in signals)
-    return refine(signals[0].t[part], positions, lag / signals[0].rate, orders)
+    orders = max(robot.joint(motion.joint).harmonics for motion in motions)
+    return refine(motions[0].t[part], positions, lag / motions[0].rate, orders)
 
 
-def left(prediction: Prediction, signal: Signal, lowpass: float) -> Array:
-    """What a prediction leaves of the effort, low-passed."""
-    segment = signal.segment[np.searchsorted(signal.t, prediction.t - 0.5 / signal.rate)]
-    return smoothed(prediction.tau - prediction.tau_hat, segment, signal.rate, lowpass)
+def external(model: JointModel, tau_hat: Array, lowpass: float) -> tuple[Array, Array]:
+    """The times (K,), and the low-passed effort (K,) that a prediction leaves, where there is one."""
+    kept = np.isfinite(tau_hat)
+    left = (model.tau - tau_hat)[kept]
+    return model.t[kept], smoothed(left, model.segment[kept], model.rate, lowpass) if kept.any() else left
 
 
 def asked(chain: Chain, robot: Robot, weight: HungMass, motion: tuple[Array, Array, Array]) -> tuple[Array, Array]:

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from davinci_forces.identification.used import describing
+from davinci_forces.identification.used import Identified
 from davinci_forces.maths.contact.detection import Event, events, summarise
 from davinci_forces.maths.signals.windows import free_space, settled
 from davinci_forces.records import Contact, Diagnostic, Fit, Threshold, Track, diagnostic
@@ -94,7 +94,7 @@ def hidden(track: Track, fits: Iterable[Fit], robot: Robot) -> Diagnostic:
     name = f"{track.log}/{track.joint}"
     levels = [
         abs(float(theta))
-        for fit in describing(robot, fits, track.joint)
+        for fit in Identified(robot, fits).describing(track.joint)
         if f"{fit.model}.{fit.estimator}" == "independent.lse"
         for parameter, theta in zip(fit.parameter, fit.theta, strict=True)
         if parameter == "Coulomb friction"

@@ -1,4 +1,4 @@
-"""Put every recording on a uniform clock, with its gaps marked and a velocity where none was logged."""
+"""Put every recording on a uniform clock, with its gaps marked, and low-pass and differentiate its motion."""
 
 from collections.abc import Iterator
 from itertools import pairwise
@@ -7,12 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from davinci_forces.errors import BadLog
+from davinci_forces.maths.arrays import Booleans
 from davinci_forces.maths.periods.harmonics import are_apart, even_step
 from davinci_forces.maths.signals.clock import GAP
 from davinci_forces.maths.signals.faults import saturated, stuck
-from davinci_forces.maths.signals.noise import smoothed
-from davinci_forces.maths.signals.smoothing import segments
-from davinci_forces.records import Column, Diagnostic, Recording, Signal, diagnostic
+from davinci_forces.maths.signals.noise import noise_std, smoothed, white_std
+from davinci_forces.maths.signals.smoothing import measured_motion, segments, share_passed
+from davinci_forces.maths.signals.standstill import standing
+from davinci_forces.maths.signals.windows import runs
+from davinci_forces.records import Column, Diagnostic, Motion, Recording, Signal, diagnostic
 from davinci_forces.robots.robot import Joint
 
 Indices = NDArray[np.intp]
@@ -23,10 +26,11 @@ SLOW = 5.0  # [Hz] below which a logged velocity is compared with that of the po
 FAR = 20.0  # times its limits, beyond which no position of a joint is
 AGREES = 0.1  # how far their ratio may be from 1
 FEWEST = 4  # samples that a cubic spline needs; a shorter segment is left out
+NAMED = 3  # stretches at most that a remark names
 
 
-def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signal | Diagnostic]:
-    """One Signal per recording.  Gaps start a new segment; nothing is ever interpolated across one.
+def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signal | Motion | Diagnostic]:
+    """One Signal and one Motion per recording.  Gaps start a new segment; nothing is interpolated across one.
 
     Raises
     ------
@@ -47,10 +51,11 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
         columns = [on_uniform_clock(recording, part, T_s) for part in parts]
     segment = np.repeat(np.arange(len(parts)), [len(t) for t, *_ in columns])
     t, q, dq, tau = (np.concatenate(column) if len(parts) > 1 else column[0] for column in zip(*columns, strict=True))
+    smooth = measured_motion(q, None if recording.velocity == "derived" else dq, segment, 1.0 / T_s, lowpass)
     if recording.velocity == "derived":
-        dq = derived(q, segment, 1.0 / T_s, lowpass)
+        dq = smooth[1]
     at_rest = not moves(q, joint)
-    yield Signal(
+    signal = Signal(
         log=recording.log,
         joint=recording.joint,
         role=recording.role,
@@ -65,7 +70,12 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
         tau=tau,
         segment=segment,
     )
+    yield signal
+    motion = without_noise(signal, smooth, lowpass)
+    yield motion
     yield from remarks(recording, method, cuts, sum(part.stop - part.start for part in parts))
+    if recording.role == "identification" and not at_rest and motion.standing.any():
+        yield diagnostic("resample", f"{recording.log}.{recording.joint}", "note", standstill(motion))
     wrong = [] if at_rest else [*disagreement(recording, q, dq, segment, 1.0 / T_s), *faults(recording, joint)]
     if wrong:
         yield diagnostic("resample", f"{recording.log}.{recording.joint}", "warning", *wrong)
@@ -83,6 +93,23 @@ def derived(q: Column, segment: Indices, rate: float, cutoff: float) -> Column:
     """The velocity (N,) of a low-passed position (N,), segment by segment."""
     slow = smoothed(q, segment, rate, cutoff)
     return np.concatenate([np.gradient(slow[part], 1.0 / rate) for part in segments(segment)])
+
+
+def without_noise(signal: Signal, smooth: tuple[Column, Column, Column], lowpass: float) -> Motion:
+    """The Motion of a joint, at rest, too: others may move about it; the noise is what the low-pass takes out."""
+    q, dq, ddq = smooth
+    passed, rate, segment = share_passed(signal.rate, lowpass), signal.rate, signal.segment
+    sigma_q = white_std(signal.q - q, passed)
+    logged = signal.velocity == "logged"
+    still = standing(q, dq, segment, rate, sigma_q * float(np.sqrt(passed)), round(rate / lowpass))
+    return Motion(
+        log=signal.log, joint=signal.joint, role=signal.role, rate=rate, velocity=signal.velocity,
+        cutoff=lowpass, effort_lag=0.0, at_rest=signal.at_rest, sigma_q=sigma_q,
+        sigma_dq=white_std(signal.dq - dq, passed) if logged else noise_std(dq, segment, rate, lowpass),
+        sigma_tau=noise_std(signal.tau, segment, rate, lowpass),
+        t=signal.t, q=q, dq=dq, ddq=ddq, q_measured=signal.q, dq_measured=signal.dq, tau=signal.tau, segment=segment,
+        standing=still.astype(np.int64),
+    )  # fmt: skip
 
 
 def disagreement(recording: Recording, q: Column, dq: Column, segment: Indices, rate: float) -> list[str]:
@@ -161,3 +188,13 @@ def remarks(recording: Recording, method: str, cuts: Indices, kept: int) -> Iter
         said.append(f"{name}: the clock is uneven, so the samples were put on a uniform one: {method}")
     if said:
         yield diagnostic("resample", f"{recording.log}.{recording.joint}", "note", *said)
+
+
+def standstill(motion: Motion) -> str:
+    """When a joint stands still, and what follows from that."""
+    still: Booleans = motion.standing > 0
+    parts = [f"{motion.t[part][0]:.2f} to {motion.t[part][-1]:.2f} s" for part in runs(still)]
+    where = ", ".join(parts[:NAMED]) + (f" and {len(parts) - NAMED} times more" if len(parts) > NAMED else "")
+    share = f"{100.0 * float(still.mean()):.2g} % of the log"
+    why = "friction takes any value there, so no model is fitted to its effort then, nor judged by it"
+    return f"{motion.log}/{motion.joint}: it stands still from {where}, {share}; {why}"

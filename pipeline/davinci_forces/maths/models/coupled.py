@@ -18,7 +18,7 @@ from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.rigid_body import regressor
 from davinci_forces.maths.models.bias import COULOMB, VISCOUS
 from davinci_forces.maths.models.memory import SAMPLES, driven, efforts
-from davinci_forces.maths.models.model import JointDynamics, Mechanism, Motion, Parameter, Regressor
+from davinci_forces.maths.models.model import ArmMotion, JointDynamics, Mechanism, Parameter, Regressor
 from davinci_forces.maths.models.terms import Term
 
 RICH = 200  # random poses, velocities and accelerations that tell the base parameters
@@ -75,7 +75,7 @@ class CoupledArm:
         added = np.repeat(NOT_NEGATIVE, len(self.rows))
         return Mechanism(A, L, np.r_[np.zeros(10 * L, np.bool_), added, np.array([t.positive for t in terms], bool)])
 
-    def regressor(self, motion: Motion) -> Regressor:
+    def regressor(self, motion: ArmMotion) -> Regressor:
         """Phi (N, m, p).  (6.3), (6.9)"""
         N, b = len(motion.q), len(self.base.columns)
         Phi, known = np.zeros((N, len(self.rows), b + sum(map(len, self.friction)))), np.ones(N, np.bool_)
@@ -103,11 +103,11 @@ class CoupledArm:
             columns[:, :, j, : len(base)] = self._of_links(q, still, still + unit)[:, :, base] - gravity
         return columns
 
-    def bias(self, theta: Array, motion: Motion) -> Array:
+    def bias(self, theta: Array, motion: ArmMotion) -> Array:
         """The effort (N, m) of this motion without what accelerates it.  (4.38)"""
         return efforts(self, theta, motion._replace(ddq=np.zeros_like(motion.ddq)))
 
-    def joint_dynamics(self, theta: Array, motion: Motion) -> tuple[JointDynamics, ...]:
+    def joint_dynamics(self, theta: Array, motion: ArmMotion) -> tuple[JointDynamics, ...]:
         """Each row with its own inertia, viscous and Coulomb friction; all else is known from the motion."""
         M, tau = self.inertia(theta, motion.q), efforts(self, theta, motion)
         views = []

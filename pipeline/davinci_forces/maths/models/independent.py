@@ -8,7 +8,14 @@ import numpy as np
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.models.bias import Coefficients, bias
 from davinci_forces.maths.models.memory import driven
-from davinci_forces.maths.models.model import JointDynamics, Mechanism, Motion, Parameter, Regressor, of_signs
+from davinci_forces.maths.models.model import (
+    ArmMotion,
+    JointDynamics,
+    Mechanism,
+    Parameter,
+    Regressor,
+    of_signs,
+)
 from davinci_forces.maths.models.terms import Term
 
 FUNCTIONS: dict[str, Callable[[Array, Array, Array | float], Array | float]] = {  # those of `bias`, of q, dq and z
@@ -57,7 +64,7 @@ class IndependentJoint:
         """Of a joint without bodies signs are known."""
         return of_signs(np.array([term.positive for term in self.terms]))
 
-    def regressor(self, motion: Motion) -> Regressor:
+    def regressor(self, motion: ArmMotion) -> Regressor:
         """Phi (N, 1, p).  (6.9), (6.12), (6.14)"""
         q, dq, ddq = (x[:, 0] for x in motion[:3])
         known, Phi = np.ones(len(q), np.bool_), np.zeros((len(q), 1, len(self.terms)))
@@ -69,7 +76,7 @@ class IndependentJoint:
             add(term, q, dq, ddq, z, Phi[:, 0, i])
         return Regressor(Phi, known)
 
-    def sensitivity(self, motion: Motion) -> Array:
+    def sensitivity(self, motion: ArmMotion) -> Array:
         """By how much the regressor moves with the motion: its derivatives by q, dq and ddq, (N, 3, p).
 
         The jump of sign(dq) has none, and what remembers the motion is taken as it stands.
@@ -89,12 +96,12 @@ class IndependentJoint:
         """What the parameters (p,) make of M at q (N, 1), (N, 1, 1, p)."""
         return np.tile(np.array([term.a for term in self.terms]), (len(q), 1, 1, 1))
 
-    def bias(self, theta: Array, motion: Motion) -> Array:
+    def bias(self, theta: Array, motion: ArmMotion) -> Array:
         """V + F + G (N, 1)."""
         still = motion._replace(ddq=np.zeros_like(motion.ddq))
         return np.asarray(self.regressor(still).Phi @ theta)
 
-    def joint_dynamics(self, theta: Array, motion: Motion) -> tuple[JointDynamics]:
+    def joint_dynamics(self, theta: Array, motion: ArmMotion) -> tuple[JointDynamics]:
         """The terms of the joint's own state as coefficients, those that measured motion drives as known effort."""
         c = combined(self.terms, theta)
         of_z = [theta_i * bool(term.scale) for theta_i, term in zip(theta, self.terms, strict=True)]

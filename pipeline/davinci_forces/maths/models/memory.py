@@ -14,14 +14,14 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.bias import deflect
-from davinci_forces.maths.models.model import Model, Motion
+from davinci_forces.maths.models.model import ArmMotion, Model
 from davinci_forces.maths.models.terms import Term
 
 RUN_IN = 3.0  # displacements of travel after which a deflection has forgotten how it started, to exp(-2 RUN_IN)
 SAMPLES = 1 << 15  # of a piece
 
 
-def driven(motion: Motion, joint: int, term: Term) -> tuple[Array, Booleans]:
+def driven(motion: ArmMotion, joint: int, term: Term) -> tuple[Array, Booleans]:
     """z (N,) of a term of one joint, and where it is known (N,): a deflection, a smooth sign or Stribeck's peak.
 
     A term without z has 0, known everywhere.
@@ -37,7 +37,7 @@ def driven(motion: Motion, joint: int, term: Term) -> tuple[Array, Booleans]:
     return np.zeros(len(dq)), known
 
 
-def deflection(motion: Motion, joint: int, x_0: float) -> tuple[Array, Booleans]:
+def deflection(motion: ArmMotion, joint: int, x_0: float) -> tuple[Array, Booleans]:
     """The deflection z (N,) of one joint, and where it is known (N,); `x_0` is in the joint's units.
 
     It starts relaxed after each gap, and is known once the joint has travelled `RUN_IN` displacements; a period is run
@@ -70,12 +70,12 @@ def _run(dq: Array, T_s: float, x_0: float, z: float) -> Array:
 class Piece(NamedTuple):
     """A part of a motion, with some of what is beside it."""
 
-    motion: Motion  # of the part and what is beside it
+    motion: ArmMotion  # of the part and what is beside it
     inside: slice  # where in that motion the part is
     place: slice  # where in the whole motion the part is
 
 
-def pieces(model: Model, motion: Motion, beside: int = 0) -> Iterator[Piece]:
+def pieces(model: Model, motion: ArmMotion, beside: int = 0) -> Iterator[Piece]:
     """A motion in parts, each with so many samples beside it on either side, as far as there are any."""
     N = len(motion.q)
     if N > SAMPLES:
@@ -86,14 +86,14 @@ def pieces(model: Model, motion: Motion, beside: int = 0) -> Iterator[Piece]:
         yield Piece(cut(motion, slice(first, min(stop + beside, N))), inside, slice(start, stop))
 
 
-def cut(motion: Motion, which: slice) -> Motion:
+def cut(motion: ArmMotion, which: slice) -> ArmMotion:
     """A motion at some of its samples."""
     columns = {name: getattr(motion, name)[which] for name in ("q", "dq", "ddq", "segment")}
     memory = {own: (z[which], known[which]) for own, (z, known) in motion.memory.items()}
     return motion._replace(**columns, memory=memory)
 
 
-def efforts(model: Model, theta: Array, motion: Motion, which: Integers | None = None) -> Array:
+def efforts(model: Model, theta: Array, motion: ArmMotion, which: Integers | None = None) -> Array:
     """Phi theta (N, m) of parameters (p,); of several (G, p), those that each sample names (N,)."""
     made = np.empty((len(motion.q), len(model.efforts)))
     for piece in pieces(model, motion):

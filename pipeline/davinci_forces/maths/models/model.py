@@ -53,7 +53,7 @@ class Parameter(NamedTuple):
     scale: float = 0.0  # the displacement or velocity that its column depends on, in the joint's units; 0 for none
 
 
-class Motion(NamedTuple):
+class ArmMotion(NamedTuple):
     """The motion of n joints on a uniform clock, in the joints' units."""
 
     q: Array  # (N, n)
@@ -118,7 +118,7 @@ class Model(Protocol):
         """What its parameters are made of, and what of it no mechanism has."""
         ...
 
-    def regressor(self, motion: Motion) -> Regressor:
+    def regressor(self, motion: ArmMotion) -> Regressor:
         """Phi with tau = Phi theta.  (6.38)"""
         ...
 
@@ -126,10 +126,10 @@ class Model(Protocol):
         """M (N, m, m) at q (N, n), of the joints whose effort it gives.  (6.5)"""
         ...
 
-    def bias(self, theta: Array, motion: Motion) -> Array:
+    def bias(self, theta: Array, motion: ArmMotion) -> Array:
         """The effort (N, m) of this motion without what accelerates it.  (4.38)"""
         ...
 
-    def joint_dynamics(self, theta: Array, motion: Motion) -> tuple[JointDynamics, ...]:
+    def joint_dynamics(self, theta: Array, motion: ArmMotion) -> tuple[JointDynamics, ...]:
         """Each joint whose effort it gives, as a filter takes it.  (7.15), (7.16)"""
         ...

@@ -54,16 +54,37 @@ def _sections(rate: float, cutoff: float) -> Array:
     return np.asarray(butter(ORDER, cutoff, fs=rate, output="sos"))
 
 
-def motion(q: Array, dq: Array | None, rate: float, cutoff: float) -> tuple[Array, Array, Array]:
-    """Position, velocity and acceleration (N,) each, from a logged velocity where there is one.
+def measured_motion(
+    q: Array, dq: Array | None, segment: Integers, rate: float, cutoff: float, lag: float = 0.0
+) -> tuple[Array, Array, Array]:
+    """Position, velocity and acceleration (N,) each of a motion that need not repeat, every segment by itself.
 
-    Differences are central; the ends are one-sided.
+    They are low-passed, from a logged velocity where there is one; differences are central, at the ends one-sided.
+    `lag` [s] is how much later the effort is measured: each sample has the motion so long before it, those at the start
+    of a segment its first.
     """
+    parts = [_motion(q[part], None if dq is None else dq[part], rate, cutoff, lag) for part in segments(segment)]
+    position, velocity, acceleration = (np.concatenate(columns) for columns in zip(*parts, strict=True))
+    return position, velocity, acceleration
+
+
+def _motion(q: Array, dq: Array | None, rate: float, cutoff: float, lag: float) -> tuple[Array, Array, Array]:
     smooth = lowpass(q, rate, cutoff)
     if len(q) < 2:
         return smooth, np.zeros_like(q), np.zeros_like(q)
     velocity = np.gradient(smooth, 1.0 / rate) if dq is None else lowpass(dq, rate, cutoff)
-    return smooth, velocity, np.gradient(velocity, 1.0 / rate)
+    acceleration = np.gradient(velocity, 1.0 / rate)
+    return _before(smooth, lag * rate), _before(velocity, lag * rate), _before(acceleration, lag * rate)
+
+
+def _before(x: Array, samples: float) -> Array:
+    """A low-passed signal (N,) so many samples before, by a cubic spline; at either end as it begins or ends."""
+    if samples == 0.0:
+        return x
+    from scipy.interpolate import make_interp_spline
+
+    k = np.arange(len(x), dtype=float)
+    return np.asarray(make_interp_spline(k, x, k=min(3, len(x) - 1))(np.clip(k - samples, 0.0, k[-1])))
 
 
 def segments(segment: Integers) -> Iterator[slice]:
