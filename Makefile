@@ -24,8 +24,10 @@ LOCK := uv pip compile -q --universal --python-version 3.11 --generate-hashes --
 UPGRADE ?=
 
 PACKAGE := pipeline/davinci_forces
-# Every module of stages/ is a stage; the report follows them.  README.md says what each makes, in their order.
-STAGES := $(filter-out __init__,$(basename $(notdir $(wildcard $(PACKAGE)/stages/*.py)))) report
+# Every module of stages/ is a stage, and its folders are groups of them.  README.md says what each makes.
+MODULES := $(wildcard $(PACKAGE)/stages/*.py $(PACKAGE)/stages/*/*.py)
+STAGES := $(subst _,-,$(filter-out __init__,$(basename $(notdir $(MODULES))))) report
+GROUPS := $(notdir $(patsubst %/__init__.py,%,$(wildcard $(PACKAGE)/stages/*/__init__.py)))
 
 # Compiled files of rooms that are no more would keep their folders alive, and importable.
 define FORGET
@@ -39,12 +41,12 @@ for folder in sorted((f for f in pathlib.Path("pipeline").rglob("*") if f.is_dir
 endef
 export FORGET
 
-.PHONY: all quick test check format lint types oracles axe bench locks demo pictures clean help $(STAGES)
+.PHONY: all quick test check format lint types oracles axe bench locks demo pictures clean help $(STAGES) $(GROUPS)
 
 all: $(READY) ## analyse every study in raw/ whose logs are here (STUDY=raw/x for one, JOBS=n for processes)
 	$(RUN) all $(STUDY) --jobs $(JOBS)
 
-$(STAGES): $(READY)
+$(STAGES) $(GROUPS): $(READY)
 	$(RUN) $@ $(or $(STUDY),raw/davinci-demo) --jobs $(JOBS)
 
 quick: $(READY_TO_TEST) ## run the tests that take moments, for while you work
@@ -93,7 +95,8 @@ clean: ## remove what was made: processed files, reports, environment
 
 help: ## list what can be made
 	@grep -hE '^[a-z]+:.*##' $(MAKEFILE_LIST) | sed -E 's/^([a-z]+):[^#]*## /  \1\t/' | expand -t 12
-	@echo "  one stage of STUDY (raw/davinci-demo unless given): $(STAGES)"
+	@echo "  one stage of STUDY (raw/davinci-demo unless given), and what it needs: $(STAGES)"
+	@echo "  or one group of stages: $(GROUPS)"
 
 $(READY): requirements.lock pyproject.toml
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \

@@ -4,11 +4,11 @@ from pathlib import Path
 
 from davinci_forces.records import Diagnostic, Record
 from davinci_forces.robots import dvrk_psm
+from davinci_forces.runner.graph import every_step
 from davinci_forces.runner.ledger import Entry, Folders, Ledger
 from davinci_forces.runner.places import is_about_log
 from davinci_forces.runner.plan import Plan
 from davinci_forces.runner.signature import declaration
-from davinci_forces.stages import STAGES
 from davinci_forces.study import LogEntry, Settings, Study
 
 JOINTS = tuple(joint.name for joint in dvrk_psm.ROBOT.joints[:2])
@@ -20,13 +20,13 @@ def study(home: Path, logs: int) -> tuple[Study, Folders]:
     folders = Folders(home / "raw" / "lab", home / "processed" / "lab", home / "reports" / "lab")
     entries = tuple(LogEntry(f"log-{i}", (f"{i}.csv",), "identification", ()) for i in range(logs))
     ledger = Ledger(folders)
-    for stage in STAGES:
-        kinds = [kind for kind in declaration(stage).makes if kind is not Diagnostic]
+    for step in every_step():
+        kinds = [kind for kind in declaration(step).makes if kind is not Diagnostic]
         for log in ["", *(entry.name for entry in entries)]:
             places = [place for kind in kinds if is_about_log(kind) == bool(log) for place in places_of(kind, log)]
             if places:
                 outputs = {f"processed/{place}": "0" * 64 for place in places}
-                ledger.write(Entry(stage, log or stage, {"code": CODE}, outputs))
+                ledger.write(Entry(step, log or step.rpartition(".")[2], {"code": CODE}, outputs))
     return Study(folders.raw, "Many logs", dvrk_psm.ROBOT, False, Settings(), entries), folders
 
 
@@ -40,10 +40,10 @@ def places_of(kind: type[Record], log: str) -> list[str]:
 
 
 def planned(lab: Study, folders: Folders) -> int:
-    """Plan every stage and ask why each of its tasks has to run; how many there are."""
+    """Plan every step and ask why each of its tasks has to run; how many there are."""
     plan, tasks = Plan(lab, Ledger(folders)), 0
-    for stage in STAGES:
-        for task in plan.tasks(declaration(stage)):
-            plan.ledger.reasons(plan.ledger.entry(stage, task.name), task.fingerprint)
+    for step in every_step():
+        for task in plan.tasks(declaration(step)):
+            plan.ledger.reasons(plan.ledger.entry(step, task.name), task.fingerprint)
             tasks += 1
     return tasks

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 from davinci_forces.errors import NotPeriodic
 from davinci_forces.maths.periods import averaging, harmonics, period
 from davinci_forces.records import Average, Diagnostic, PeriodResidual
-from davinci_forces.stages import average
+from davinci_forces.stages.recordings import average
 from davinci_forces.study import LogEntry
 from tests import arm
 

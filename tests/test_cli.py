@@ -19,7 +19,8 @@ import davinci_forces
 from davinci_forces import commands
 from davinci_forces.cli import app
 from davinci_forces.errors import BadRequest, BadStudy, MissingRecord
-from davinci_forces.runner import STEPS, runs
+from davinci_forces.runner import ALL, runs
+from davinci_forces.stages import GROUPS, module
 from tests.arm import write_study
 
 EVERY = typer.main.get_command(app).commands
@@ -61,12 +62,12 @@ def test_help_shows_every_description_as_it_is_written(name):
         assert " ".join(says.replace("`", "").split()) in shown, parameter.name
 
 
-@pytest.mark.parametrize("name", STEPS)
-def test_a_step_is_explained_by_its_own_module(name):
-    module = import_module("davinci_forces.report.report" if name == "report" else f"davinci_forces.stages.{name}")
-    words = re.sub(r"[`\\]", "", " ".join(inspect.getdoc(module).split()))
+@pytest.mark.parametrize("name", ALL)
+def test_a_stage_is_explained_by_its_own_module(name):
+    described = import_module("davinci_forces.report.report" if name == "report" else module(name))
+    words = re.sub(r"[`\\]", "", " ".join(inspect.getdoc(described).split()))
     assert words[:60] in " ".join(call(name, "--help").split())
-    assert "No such command" in call("step", "raw/mine", code=2)
+    assert "No such command" in call("stage", "raw/mine", code=2)
 
 
 def test_a_code_span_is_shown_without_a_backslash():
@@ -96,7 +97,7 @@ def test_every_shell_gets_a_script_that_completes_commands(shell):
 
 def test_a_command_is_completed():
     asked = {"_DAVINCI_FORCES_COMPLETE": "complete_bash", "COMP_WORDS": "davinci-forces in", "COMP_CWORD": "1"}
-    assert complete(**asked).split() == ["ingest", "inspect"]
+    assert complete(**asked).split() == ["inspect", "ingest"]
 
 
 def test_importing_the_package_imports_nothing_heavy():
@@ -108,7 +109,7 @@ def test_importing_the_package_imports_nothing_heavy():
 def test_a_quiet_run_says_nothing_where_all_is_well(study, tmp_path, monkeypatch):
     assert call("ingest", study, "--quiet") == ""
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("davinci_forces.cli.STEPS", ("ingest", "resample"))
+    monkeypatch.setattr("davinci_forces.cli.ALL", ("ingest", "resample"))
     elsewhere = tmp_path / "raw" / "elsewhere"  # whose logs are not there
     shutil.copytree(study, elsewhere, ignore=shutil.ignore_patterns("*.csv"))
     assert call("all", "--quiet") == ""
@@ -146,7 +147,7 @@ def test_a_pattern_that_the_shell_left_is_expanded(study, tmp_path, monkeypatch)
     shutil.copytree(study, tmp_path / "raw" / "other")
     (tmp_path / "raw" / "notes.txt").touch()
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("davinci_forces.cli.STEPS", ("ingest",))
+    monkeypatch.setattr("davinci_forces.cli.ALL", ("ingest",))
     call("all", "raw/*")
     assert {folder.name for folder in (tmp_path / "processed").iterdir()} == {"arm", "other"}
     said = call("ingest", "raw/*", code=1)
@@ -216,5 +217,19 @@ def test_results_that_are_not_what_the_report_wrote_say_so(study, text):
         davinci_forces.results(study)
 
 
+def test_help_shows_where_to_start_then_the_stages_in_panels_of_their_groups_then_the_rest():
+    panels: list[tuple[str, list[str]]] = []
+    for line in call("--help").splitlines():
+        if title := re.match(r"╭─ ([\w ]+) ─", line):
+            panels.append((title[1], []))
+        elif row := re.match(r"│ ([a-z-]+) ", line):
+            panels[-1][1].append(row[1])
+    options, first, *groups, others = panels
+    assert options[0] == "Options"
+    assert first == ("Start here", ["all", "new", "inspect", "compare", "report"])
+    assert groups == [(name, [*dict.fromkeys((name, *stages))]) for name, stages in GROUPS.items()]
+    assert others == ("Other commands", [name for name in commands.COMMANDS if name not in first[1]])
+
+
 def test_every_stage_and_command_is_there():
-    assert set(EVERY) == {"all", *STEPS, *commands.COMMANDS}
+    assert set(EVERY) == {"all", *ALL, *GROUPS, *commands.COMMANDS}

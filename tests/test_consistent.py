@@ -18,7 +18,7 @@ from davinci_forces.maths.models.model import ArmMotion, Mechanism, of_signs
 from davinci_forces.records import Diagnostic, Fit, Smoothed
 from davinci_forces.robots.dvrk_psm import ROBOT
 from davinci_forces.robots.models import coupled
-from davinci_forces.stages import choose, fit
+from davinci_forces.stages.model import choose, fit
 from tests import arm
 from tests.contracts.test_estimators import NAMES, PHI, THETA, K, problem
 from tests.test_estimation import trajectory

@@ -31,7 +31,7 @@ from davinci_forces.maths.uncertainty.error_band import (
 )
 from davinci_forces.maths.uncertainty.free_space import levels
 from davinci_forces.records import Threshold, Track
-from davinci_forces.stages import assess, measure, threshold
+from davinci_forces.stages.forces import assess, measure
 from tests import arm
 from tests.test_averaging import entry
 
@@ -147,7 +147,7 @@ def test_a_contact_stands_out_when_its_peak_exceeds_the_level_of_unseen_free_spa
         *assess.run(track(noise(2, 5.0), log="fitted", role="identification"), entry(role="identification")),
         *assess.run(track(noise(3, 9.0), joint="hand_pitch", role="validation"), entry(role="validation")),
     ]
-    [contact] = measured(track(noise(0) + push), threshold.run(spaces), entry(role="contact", contact=windows))
+    [contact] = measured(track(noise(0) + push), assess.gather(spaces), entry(role="contact", contact=windows))
     assert contact.level_from == "check"  # neither what was fitted nor another joint
     assert list(contact.above) == [1, int(abs(contact.peak[1]) > contact.detection_level)]
     assert contact.peak[0] == pytest.approx(2.0, abs=0.5)
@@ -161,8 +161,8 @@ def test_nothing_is_said_of_a_joint_at_rest_or_of_a_contact_log_without_windows(
     assert not list(assess.run(track(noise()), entry(role="contact")))
     [space] = assess.run(track(noise()), entry(role="validation"))
     about = entry(role="contact", contact=((9.0, 11.0),))
-    assert measured(track(noise()), threshold.run([space]), about)
-    [hidden] = measured(track(noise(), at_rest=1), threshold.run([space]), about)
+    assert measured(track(noise()), assess.gather([space]), about)
+    [hidden] = measured(track(noise(), at_rest=1), assess.gather([space]), about)
     assert "the joint is at rest, where contact of up to its stiction cannot be told" in hidden.text[0]
 
 

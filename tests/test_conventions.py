@@ -17,10 +17,11 @@ from typer.testing import CliRunner
 
 import davinci_forces
 from davinci_forces import commands, estimators, filters, logs, robots, stages
-from davinci_forces.cli import STEPS, app
+from davinci_forces.cli import ALL, app
 from davinci_forces.records import KINDS, Record
 from davinci_forces.records.quantities import QUANTITIES
 from davinci_forces.report import sections, writers
+from davinci_forces.runner.graph import every_step
 from davinci_forces.runner.signature import declaration
 from davinci_forces.study import Settings
 
@@ -32,7 +33,6 @@ LISTS = {  # extension folder -> its choices
     "estimators": estimators.ESTIMATORS,
     "filters": filters.FILTERS,
     "logs": logs.FORMATS,
-    "stages": stages.STAGES,
     "report.sections": sections.SECTIONS,
     "report.writers": writers.WRITERS,
     "commands": commands.COMMANDS,
@@ -42,7 +42,6 @@ EXPORTED = {  # extension folder -> the name that a choice exports
     "estimators": "estimate",
     "filters": "track",
     "logs": "recognises",
-    "stages": "run",
     "report.sections": "section",
     "report.writers": "render",
     "commands": "run",
@@ -120,13 +119,33 @@ def test_imports_of_maths_point_downwards(source):
         assert tier(room, MATHS) > tier(home, MATHS), f"maths.{home} imports maths.{room}"
 
 
-@pytest.mark.parametrize("folder", ["stages", "report.sections", "estimators", "filters", "commands"])
+@pytest.mark.parametrize("folder", ["report.sections", "estimators", "filters", "commands"])
 def test_choices_of_a_folder_do_not_import_each_other(folder):
     package = f"davinci_forces.{folder}"
     listed = {name for name, _ in choices(import_module(package))}
     for name in sorted(listed):
         for source in sources(import_module(f"{package}.{name}")):
             assert not rooms(source, package) & listed - {name}, f"{package}.{name}"
+
+
+@pytest.mark.parametrize("stage", stages.STAGES)
+def test_a_stage_imports_no_other(stage):
+    assert not rooms(Path(import_module(stages.module(stage)).__file__), "davinci_forces.stages")
+
+
+def test_every_stage_is_listed_in_the_group_whose_folder_it_is_in():
+    modules = [dotted(source) for source in (ROOT / "stages").rglob("*.py") if source.name != "__init__.py"]
+    assert sorted(modules) == sorted(map(stages.module, stages.STAGES))
+    assert len(set(stages.STAGES)) == len(stages.STAGES)
+
+
+def test_a_group_of_one_stage_has_its_name_and_any_other_a_name_of_its_own():
+    rooms_of_the_package = {place.stem for place in ROOT.iterdir()}
+    for group, members in stages.GROUPS.items():
+        if len(members) == 1:
+            assert members == (group,)
+        else:
+            assert group not in {*ALL, *commands.COMMANDS, *rooms_of_the_package}
 
 
 def test_no_two_modules_import_each_other():
@@ -140,7 +159,7 @@ def test_no_two_modules_import_each_other():
 
 def dotted(source: Path) -> str:
     """The name by which a module is imported."""
-    return ".".join(source.relative_to(HOME).with_suffix("").parts).removesuffix(".__init__")
+    return ".".join(source.relative_to(ROOT.parent).with_suffix("").parts).removesuffix(".__init__")
 
 
 def cycle(graph: dict[str, set[str]]) -> list[str]:
@@ -193,7 +212,7 @@ def test_statistics_are_imported_where_they_are_called(source):
     assert "statsmodels" not in ast.unparse(module)
 
 
-@pytest.mark.parametrize("source", sorted((ROOT / "stages").glob("*.py")), ids=lambda s: s.name)
+@pytest.mark.parametrize("source", sorted((ROOT / "stages").rglob("*.py")), ids=lambda s: s.name)
 def test_a_stage_opens_no_file(source):
     opening = {"pathlib", "os", "pyarrow", "pyarrow.parquet", "davinci_forces.records.store", "shutil", "io"}
     assert not imports(source) & opening
@@ -268,36 +287,43 @@ def test_every_unit_template_is_filled_by_both_kinds_of_joint():
 
 def test_a_stage_reads_only_what_an_earlier_stage_made():
     made: set = set()
-    for name in stages.STAGES:
-        asks = declaration(name)
-        assert set(asks.reads) <= made, name
+    for step in every_step():
+        asks = declaration(step)
+        assert set(asks.reads) <= made, step
         made |= set(asks.makes)
 
 
 def test_every_setting_is_asked_for_by_a_stage_but_for_what_the_user_wants_to_see():
-    asked = {s for name in stages.STAGES for s in declaration(name).settings}
+    asked = {s for step in every_step() for s in declaration(step).settings}
     assert asked | {"effort"} == {f.name for f in fields(Settings)}
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="no make on the path")
-def test_make_knows_every_step_of_a_run():
+def test_make_knows_every_stage_and_group():
     said = subprocess.run(["make", "-s", "help"], cwd=HOME, capture_output=True, text=True, check=True).stdout
     [listed] = re.findall(r"^  one stage of STUDY .*: (.*)$", said, re.M)
-    assert sorted(listed.split()) == sorted(STEPS)
+    assert sorted(listed.split()) == sorted(ALL)
+    [listed] = re.findall(r"^  or one group of stages: (.*)$", said, re.M)
+    assert sorted(listed.split()) == sorted(stages.GROUPS.keys() - {*ALL})
 
 
-@pytest.mark.parametrize("name", [*STEPS, *commands.COMMANDS])
+@pytest.mark.parametrize("name", [*ALL, *stages.GROUPS, *commands.COMMANDS])
 def test_every_stage_and_command_explains_itself(name):
     shown = CliRunner().invoke(app, [name, "--help"], env={"COLUMNS": "200", "TERM": "dumb"})
     assert shown.exit_code == 0
-    package = "stages" if name in stages.STAGES else "report" if name in STEPS else "commands"
-    said = " ".join(import_module(f"davinci_forces.{package}.{name}").__doc__.split())
+    modules = {
+        **{group: f"davinci_forces.stages.{group}" for group in stages.GROUPS},
+        **{stage: stages.module(stage) for stage in stages.STAGES},
+        **{command: f"davinci_forces.commands.{command}" for command in commands.COMMANDS},
+        "report": "davinci_forces.report.report",
+    }
+    said = " ".join(import_module(modules[name]).__doc__.split())
     assert said in " ".join(shown.output.split())
 
 
 def test_the_readme_names_every_command():
     text = (HOME / "README.md").read_text()
-    for name in ("all", *STEPS, *commands.COMMANDS):
+    for name in ("all", *ALL, *commands.COMMANDS):
         assert f"`{name}`" in text or f"davinci-forces {name}" in text, name
 
 

@@ -19,8 +19,9 @@ from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.models.independent import combined, inertia_of
 from davinci_forces.records import Diagnostic, ErrorBand, Fit, MeasurementNoise, Track, Whiteness
-from davinci_forces.stages import ekf as stage
-from davinci_forces.stages import fit, settle, tune, whiteness
+from davinci_forces.stages.forces import ekf as stage
+from davinci_forces.stages.forces import tune, whiteness
+from davinci_forces.stages.model import fit
 from tests import arm
 from tests.test_averaging import entry
 from tests.test_estimation import trajectory
@@ -212,7 +213,7 @@ def identified():
     fits, noises = ([r for r in made if isinstance(r, kind)] for kind in (Fit, MeasurementNoise))
     about = (entry(), arm.ARM)
     tunings = list(tune.run([signal], fits, [], noises, *about, fit="independent.lse", lowpass=17.0))
-    return fits, list(settle.run(tunings))
+    return fits, list(tune.gather(tunings))
 
 
 def test_an_inertia_that_is_not_positive_is_left_to_what_fit_says_of_it():

@@ -25,7 +25,8 @@ from davinci_forces.records import (
     Trajectory,
 )
 from davinci_forces.robots.models import independent
-from davinci_forces.stages import average, differentiate, fit, predict, smooth
+from davinci_forces.stages.model import fit, predict
+from davinci_forces.stages.recordings import average, differentiate, smooth
 from tests import arm
 from tests.test_averaging import entry
 
@@ -243,7 +244,7 @@ def test_a_joint_is_fitted_anew_at_most_twenty_times_however_many_its_logs_are(m
     one = trajectory(arm.signal(periods=4, rate=20.0))
     calls = []
     monkeypatch.setattr(
-        "davinci_forces.stages.fit.estimator", lambda name: lambda p: calls.append(name) or estimator(name)(p)
+        "davinci_forces.stages.model.fit.estimator", lambda name: lambda p: calls.append(name) or estimator(name)(p)
     )
     for logs in (20, 30, 60):
         calls.clear()

@@ -1,4 +1,4 @@
-"""Stage `explain`: which models of a joint a log is explained by."""
+"""Stage `whiteness`: which models of a joint a log is explained by."""
 
 import numpy as np
 from davinci_forces.identification.driving import driving, motions_of
@@ -6,7 +6,7 @@ from davinci_forces.identification.driving import driving, motions_of
 from davinci_forces.records import Fit
 from davinci_forces.robots import davinci
 from davinci_forces.robots.models import coupled, independent
-from davinci_forces.stages.explain import THIS_LOG, others
+from davinci_forces.stages.forces.whiteness import THIS_LOG, others
 from tests import arm
 
 ROLL = davinci.ROBOT.joint("hand_roll")

@@ -73,7 +73,7 @@ def test_a_stage_that_failed_once_leaves_nothing_behind(raw, monkeypatch):  # no
 
     edit(folder / "study.toml", 'robot = "arm.toml"', 'robot = "arm.toml"\n[settings]\nlowpass = 12.0')
     with monkeypatch.context() as patch:
-        patch.setattr("davinci_forces.stages.fit.run", fail)
+        patch.setattr("davinci_forces.stages.model.fit.run", fail)
         call("all", folder, code=1)
     edit(folder / "study.toml", "\n[settings]\nlowpass = 12.0", "")
     call("all", folder)
@@ -151,14 +151,14 @@ def test_where_nothing_can_be_written_what_needs_no_writing_is_done(raw, read_on
 RUN = """
 import sys
 from pathlib import Path
-from davinci_forces.runner import STEPS
+from davinci_forces.runner import ALL
 from davinci_forces.runner.processes import arithmetic
 arithmetic.pin()
 from davinci_forces.runner import runs
 from davinci_forces.runner.processes import workers
 workers.ALONE = -1.0
 if __name__ == "__main__":
-    sys.exit(0 if runs.run(Path(sys.argv[1]), STEPS, jobs=2) else 1)
+    sys.exit(0 if runs.run(Path(sys.argv[1]), ALL, jobs=2) else 1)
 """
 
 

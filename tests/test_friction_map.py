@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.signals.velocity_map import RANGES, over_velocity
 from davinci_forces.records import Fit, FrictionMap, Signal
-from davinci_forces.stages import chart, fit
+from davinci_forces.stages.model import chart, fit
 from tests import arm
 from tests.test_averaging import entry
 from tests.test_estimation import trajectory

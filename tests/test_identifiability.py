@@ -16,7 +16,7 @@ from davinci_forces.records import Diagnostic, Identifiability
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.report.sections.joints import wanting
 from davinci_forces.robots.davinci import ROBOT
-from davinci_forces.stages import fit
+from davinci_forces.stages.model import fit
 from tests import arm
 from tests.contracts.test_estimators import NAMES, PHI, SIGMA, THETA, K, M, problem
 from tests.test_estimation import trajectory

@@ -14,7 +14,8 @@ from davinci_forces.maths.periods.agreement import differing, stretch
 from davinci_forces.maths.periods.repetition import repetition
 from davinci_forces.maths.periods.steps import REACH, steps
 from davinci_forces.records import Average, Diagnostic, Fit, Signal, Trajectory
-from davinci_forces.stages import average, differentiate, fit
+from davinci_forces.stages.model import fit
+from davinci_forces.stages.recordings import average, differentiate
 from davinci_forces.study import LogEntry
 from tests import arm
 

@@ -9,11 +9,11 @@ import pytest
 from davinci_forces.records import KINDS, Fit, LogSummary, MeasurementNoise, Signal, Track, Whiteness
 from davinci_forces.robots import dvrk_psm
 from davinci_forces.runner.fingerprints.schemas import schemas
+from davinci_forces.runner.graph import every_step
 from davinci_forces.runner.ledger import Entry, Folders, Ledger
 from davinci_forces.runner.places import about
 from davinci_forces.runner.plan import Plan
 from davinci_forces.runner.signature import declaration
-from davinci_forces.stages import STAGES
 from davinci_forces.study import LogEntry, Settings, Study
 from tests import many
 
@@ -132,9 +132,19 @@ def test_what_a_call_reads_does_not_grow_with_the_logs(few_and_many):
     reads = []
     for study, folders in few_and_many:
         plan = Plan(study, Ledger(folders))
-        tasks = {stage: list(plan.tasks(declaration(stage))) for stage in STAGES}
+        tasks = {step: list(plan.tasks(declaration(step))) for step in every_step()}
         reads.append({s: max(len(t.fingerprint.inputs) for t in every) for s, every in tasks.items() if len(every) > 1})
-        pooled = {"design", "fit", "choose", "settle", "bound", "threshold", "combine", "limit", "feel"}
+        pooled = {
+            "design",
+            "fit",
+            "choose",
+            "tune.gather",
+            "calibrate.gather",
+            "assess.gather",
+            "resolve.gather",
+            "limit",
+            "feel",
+        }
         assert {s for s, every in tasks.items() if len(every) == 1} == pooled
     assert reads[0] == reads[1]
 

@@ -45,8 +45,9 @@ from davinci_forces.records import (
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.report.results import collect
 from davinci_forces.robots.robot import Joint
-from davinci_forces.runner import STEPS
-from davinci_forces.runner.signature import declaration
+from davinci_forces.runner import ALL
+from davinci_forces.runner.graph import every_step
+from davinci_forces.runner.signature import declaration, stage_of
 from davinci_forces.study import HungMass, LogEntry, Settings, reading
 from davinci_forces.study.channels import OF_A_JOINT, OF_THE_LOG
 from davinci_forces.study.entries import ROLES
@@ -79,7 +80,8 @@ def named(table: list[list[str]]) -> list[str]:
 
 
 def makers(kind: type) -> list[str]:
-    return [name for name in stages.STAGES if kind in declaration(name).makes]
+    """The stages that make a kind of record, in order."""
+    return list(dict.fromkeys(stage_of(step) for step in every_step() if kind in declaration(step).makes))
 
 
 def test_records_are_those_that_there_are_with_their_folders_and_stages():
@@ -156,7 +158,7 @@ def test_keys_of_a_study_and_its_logs_are_all_told():
 
 
 def test_stages_commands_and_options_are_those_that_there_are():
-    assert named(rows("stage", "does")) == list(STEPS)
+    assert named(rows("stage", "does")) == list(ALL)
     assert named(rows("command", "does")) == list(commands.COMMANDS)
     options = {o for p in typer.main.get_command(app).commands["fit"].params for o in p.opts if o.startswith("--")}
     assert {option.split()[0] for option in named(rows("option", "does"))} == options - {"--help"}

@@ -24,7 +24,7 @@ from davinci_forces.runner.ledger import Folders
 from davinci_forces.runner.lock import locked
 from davinci_forces.runner.plan import Task
 from davinci_forces.runner.signature import declaration
-from davinci_forces.stages import resample
+from davinci_forces.stages.recordings import resample
 from tests import arm
 from tests.test_runs import call, processed, reports
 
@@ -171,7 +171,7 @@ def test_a_study_of_which_no_file_is_there_says_so_and_stops(raw):
 @pytest.mark.parametrize("named", [True, False])
 def test_a_broken_study_does_not_stop_the_others(raw, monkeypatch, named):
     monkeypatch.chdir(raw.parent)
-    monkeypatch.setattr("davinci_forces.cli.STEPS", ("ingest",))
+    monkeypatch.setattr("davinci_forces.cli.ALL", ("ingest",))
     for name in ("a", "c"):
         (raw / name).mkdir()
     (raw / "a" / "study.toml").write_text("title = 3")

@@ -21,7 +21,9 @@ from davinci_forces.errors import BadRequest, MissingRecord
 from davinci_forces.estimators import ESTIMATORS
 from davinci_forces.records import store
 from davinci_forces.runner import ledger, reporting
-from davinci_forces.stages import STAGES
+from davinci_forces.runner.ledger import Ledger
+from davinci_forces.runner.runs import folders
+from davinci_forces.stages import GROUPS, STAGES
 from tests.arm import write_robot, write_study
 
 FIRST = '[[log]]\nname = "roll"'  # how the first log of the study begins
@@ -307,9 +309,33 @@ def test_a_run_that_is_killed_resumes_to_the_same_bytes(study, analysed):
     assert contents(reports(study)) == contents(reports(analysed))
 
 
-def test_a_stage_out_of_order_says_what_to_run(study):
-    said = call("fit", study, code=1)
-    assert "fit has nothing to work on: there are no Trajectory or Smoothed records; run ingest first" in said
+def ran(study: Path) -> set[str]:
+    return {entry.stage for entry in Ledger(folders(study, None, None)).entries()}
+
+
+def test_a_stage_of_a_fresh_study_runs_what_it_needs_and_nothing_else(study):
+    said = call("fit", study)
+    assert ran(study) == {"ingest", "resample", "smooth", "average", "differentiate", "fit"}
+    assert "fit: it has not run yet" in said
+    again = call("fit", study).splitlines()[1:]
+    assert again == ["fit: 1 of 1 current", f"{study}: nothing to do, every stage is current"]
+
+
+def test_a_group_of_a_fresh_study_runs_its_stages_and_what_they_need(study):
+    said = call("model", study, "--dry-run")
+    assert "ingest: roll, slide, check and 1 more: would run: it has not run yet" in said
+    assert "predict: waits for" in said
+    assert not [line for line in said.splitlines() if line.startswith(("design", "tune", "ekf", "report"))]
+    assert davinci_forces.run(study, "model", quiet=True)
+    assert ran(study) == {*GROUPS["recordings"], *GROUPS["model"]}
+
+
+def test_what_a_stage_needs_runs_where_it_is_not_current_and_is_not_forced(finished):
+    tasks = processed(finished) / "tasks"
+    (tasks / "average" / "slide.json").unlink()
+    said = call("fit", finished, "--force").splitlines()[1:]
+    assert said[:2] == ["average: slide: it has not run yet", "fit: --force"]
+    assert not [line for line in said if line.startswith(("ingest", "resample", "smooth", "differentiate"))]
 
 
 def test_units_meanings_and_origins_travel_with_the_file(analysed):
@@ -422,7 +448,7 @@ def test_all_takes_the_studies_of_raw_and_skips_those_without_logs(study, monkey
     other.mkdir()
     write_robot(other)
     (other / "study.toml").write_text((study / "study.toml").read_text())
-    monkeypatch.setattr("davinci_forces.cli.STEPS", ("ingest",))
+    monkeypatch.setattr("davinci_forces.cli.ALL", ("ingest",))
     said = call("all")
     assert "raw/elsewhere: skipped, its logs are not here (roll.csv ...)" in said
     assert (tmp_path / "processed" / "arm" / "recording" / "roll" / "hand_roll.parquet").exists()

@@ -11,7 +11,7 @@ from davinci_forces.maths.periods import averaging
 from davinci_forces.records import Average, Signal, Trajectory
 from davinci_forces.robots.dvrk_psm import ROBOT
 from davinci_forces.robots.models import independent
-from davinci_forces.stages import average, differentiate
+from davinci_forces.stages.recordings import average, differentiate
 from tests.test_averaging import entry
 
 JOINTS = tuple(joint.name for joint in ROBOT.joints)

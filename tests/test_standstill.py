@@ -13,7 +13,8 @@ from davinci_forces.maths.signals.noise import noise_std
 from davinci_forces.maths.signals.smoothing import lowpass
 from davinci_forces.maths.signals.standstill import HOLD, standing
 from davinci_forces.records import Average, Choice, Diagnostic, Fit, Prediction, Smoothed, Trajectory
-from davinci_forces.stages import average, choose, differentiate, fit, predict, smooth
+from davinci_forces.stages.model import choose, fit, predict
+from davinci_forces.stages.recordings import average, differentiate, smooth
 from davinci_forces.study import LogEntry
 from tests import arm
 

@@ -17,7 +17,7 @@ from davinci_forces.maths.models.terms import offset
 from davinci_forces.records import Fit, SwarmSearch
 from davinci_forces.robots.davinci import ROBOT
 from davinci_forces.robots.davinci_chain import CHAIN, DRIVES, bodies, in_table_frames
-from davinci_forces.stages import fit
+from davinci_forces.stages.model import fit
 from tests import arm
 from tests.test_estimation import trajectory
 

@@ -22,7 +22,7 @@ from davinci_forces.records import (
 from davinci_forces.report import verdicts
 from davinci_forces.report.sections import tip
 from davinci_forces.robots import load
-from davinci_forces.stages import combine, correlate, resolve
+from davinci_forces.stages.tip import resolve
 from tests.test_averaging import entry
 
 RATE = 100.0
@@ -70,7 +70,7 @@ def noise(seed: int, correlation=None) -> np.ndarray:
 
 def run(robot: str, of: list[Track], correlations=(), contacts=(), **about) -> dict[type, object]:
     about = {"name": "push", "role": "contact", "contact": (WINDOW,)} | about
-    made = list(resolve.run(of, contacts, correlations, entry(**about), load(robot, Path())))
+    made = list(resolve.apply(of, contacts, correlations, entry(**about), load(robot, Path())))
     assert len({type(record) for record in made}) == len(made)
     return {type(record): record for record in made}
 
@@ -141,23 +141,23 @@ def test_how_errors_go_together_is_measured_in_free_space_of_joints_that_all_mov
     R, robot = matrix(0.6, -0.3, 0.2), load("davinci", Path())
     about = entry(name="push", role="contact", contact=(WINDOW,))
     pushed = tracks("davinci", noise(2, R) + efforts("davinci", 100.0 * PUSH))
-    [found] = correlate.run(pushed, about, robot)
+    [found] = resolve.run(pushed, about, robot)
     within = 4 / np.sqrt(found.tested)
     assert (found.rho_12, found.rho_13, found.rho_23) == pytest.approx((0.6, -0.3, 0.2), abs=within)
-    assert not list(correlate.run(tracks("davinci", noise(2), at_rest=(0, 1, 0)), about, robot))
-    assert not list(correlate.run(pushed[:2], about, robot))
-    assert not list(correlate.run(pushed, replace(about, contact=()), robot))
-    assert not list(correlate.run(pushed, about, replace(robot, chain=None)))
+    assert not list(resolve.run(tracks("davinci", noise(2), at_rest=(0, 1, 0)), about, robot))
+    assert not list(resolve.run(pushed[:2], about, robot))
+    assert not list(resolve.run(pushed, replace(about, contact=()), robot))
+    assert not list(resolve.run(pushed, about, replace(robot, chain=None)))
 
 
 def test_what_is_kept_of_correlations_does_not_grow_with_the_study():
     robot = load("davinci", Path())
     few = [JointCorrelation(f"log-{i}", 1000, 0.1, 0.2, 0.3) for i in range(3)]
-    [arm] = combine.run(few, robot)
+    [arm] = resolve.gather(few, robot)
     assert list(arm.source) == ["log-0", "log-1", "log-2"]
-    [arm] = combine.run([replace(few[0], log=f"log-{i}") for i in range(100)], robot)
-    assert len(arm) == combine.LOGS
-    assert not list(combine.run([], robot))
+    [arm] = resolve.gather([replace(few[0], log=f"log-{i}") for i in range(100)], robot)
+    assert len(arm) == resolve.LOGS
+    assert not list(resolve.gather([], robot))
 
 
 def test_a_joint_at_rest_or_without_a_track_leaves_the_force_unknown_and_that_is_said():
@@ -173,7 +173,7 @@ def test_a_joint_at_rest_or_without_a_track_leaves_the_force_unknown_and_that_is
 
 def test_a_robot_without_a_geometry_has_no_tip():
     robot = replace(load("davinci", Path()), chain=None)
-    assert not list(resolve.run(tracks("davinci", noise(3)), [], [], entry(role="contact"), robot))
+    assert not list(resolve.apply(tracks("davinci", noise(3)), [], [], entry(role="contact"), robot))
 
 
 def test_samples_near_a_singular_pose_are_marked_and_not_judged():

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from davinci_forces.records import Choice, Diagnostic, Fit, Signal
-from davinci_forces.stages import choose, fit, smooth
+from davinci_forces.stages.model import choose, fit
+from davinci_forces.stages.recordings import smooth
 from tests import arm
 from tests.test_averaging import entry
 from tests.test_estimation import trajectory

@@ -18,7 +18,7 @@ from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.maths.periods.harmonics import derivative, evaluate, kept_noise, project
 from davinci_forces.records import Diagnostic, Fit
 from davinci_forces.robots.models import independent
-from davinci_forces.stages import fit
+from davinci_forces.stages.model import fit
 from tests import arm
 from tests.contracts.test_estimators import NAMES, PHI, problem
 from tests.test_estimation import trajectory

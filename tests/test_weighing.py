@@ -11,7 +11,7 @@ from davinci_forces.maths.mechanics.load import unit_load
 from davinci_forces.maths.periods.shift import circular, rolled, straight
 from davinci_forces.records import Diagnostic, FreeWeight, Load, Prediction, Signal, Track, Weight
 from davinci_forces.robots import dvrk_psm
-from davinci_forces.stages import hang, weigh
+from davinci_forces.stages import weigh
 from davinci_forces.study import HungMass, Weighing, Weighings
 from tests.arm import ARM
 from tests.test_averaging import entry
@@ -151,9 +151,9 @@ def analysed(logs, weighing, robot=ROBOT):
     for signals, tracks, predictions in logs:
         first = signals[0]
         its = entry(name=first.log, role=first.role, weight=weighing.weight if first.log == weighing.log else None)
-        for record in hang.run(signals, tracks, predictions, its, robot, about, fit="chosen", lowpass=17.0):
+        for record in weigh.run(signals, tracks, predictions, its, robot, about, fit="chosen", lowpass=17.0):
             (loads if isinstance(record, Load) else said).append(record)
-    made = list(weigh.run(loads, robot, about))
+    made = list(weigh.gather(loads, robot, about))
     weights = [record for record in made if isinstance(record, Weight)]
     free = {record.log: record for record in made if isinstance(record, FreeWeight)}
     texts = [text for d in (*said, *made) if isinstance(d, Diagnostic) for text in d.text]
@@ -277,7 +277,7 @@ def test_joints_count_by_how_well_their_models_do_in_free_motion():
 
 
 def test_a_tare_of_a_motion_that_does_not_repeat_is_subtracted_too(monkeypatch):
-    monkeypatch.setattr(hang, "guess", lambda signals: None)
+    monkeypatch.setattr(weigh, "guess", lambda signals: None)
     t = T[: len(T) - 300]
     logs = [
         log("fitted", "identification", 103),

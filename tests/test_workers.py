@@ -17,13 +17,12 @@ import pytest
 from davinci_forces.runner.console import Console
 from davinci_forces.runner.execution import Outcome
 from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
-from davinci_forces.runner.graph import WHOLE, Graph, Part
+from davinci_forces.runner.graph import WHOLE, Graph, Part, every_step, needed
 from davinci_forces.runner.plan import Task
 from davinci_forces.runner.processes import workers
 from davinci_forces.runner.processes.workers import Crew, Others, pool
 from davinci_forces.runner.runner import Runner
 from davinci_forces.runner.runs import folders
-from davinci_forces.stages import STAGES
 from davinci_forces.study import reading
 from tests import arm
 
@@ -244,28 +243,29 @@ def order(names) -> list[list[Part]]:
 
 
 def test_every_part_of_a_run_begins_once_and_after_the_stages_before_it():
-    batches = order([*STAGES, "report"])
+    steps = needed(["report"])
+    batches = order(steps)
     begun = [part for batch in batches for part in batch]
-    assert len(begun) == len(set(begun)) == len(Graph([*STAGES, "report"], LOGS).parts)
+    assert len(begun) == len(set(begun)) == len(Graph(steps, LOGS).parts)
     assert begun[-1] == Part("report", WHOLE)
-    stages = [part.stage for part in begun]
-    assert stages == sorted(stages, key=[*STAGES, "report"].index)
+    named = [part.step for part in begun]
+    assert named == sorted(named, key=steps.index)
 
 
 def test_a_log_waits_for_what_is_made_of_it_and_a_stage_of_all_logs_for_all():
-    graph = Graph(STAGES, LOGS)
+    graph = Graph(every_step(), LOGS)
     begun = [part for batch in iter(graph.next, []) for part in batch]
-    assert {part.stage for part in begun} == {"design", "ingest"}
+    assert {part.step for part in begun} == {"design", "ingest"}
     graph.done(Part("ingest", "one"))
     assert graph.next() == [Part("resample", "one")]
     for stage in ("resample", "average", "differentiate", "smooth"):
         graph.done(Part(stage, "one"))
     waiting = [part for batch in iter(graph.next, []) for part in batch]
     assert {part.log for part in waiting} <= {"one"}
-    assert not {part.stage for part in waiting} & {"fit", "choose", "predict", "tune"}
+    assert not {part.step for part in waiting} & {"fit", "choose", "predict", "tune"}
     for stage in ("ingest", "resample", "average", "differentiate", "smooth"):
         for log in LOGS:
             if (stage, log) != ("ingest", "one") and log == "two":
                 graph.done(Part(stage, log))
         graph.done(Part(stage, WHOLE))
-    assert {part.stage for batch in iter(graph.next, []) for part in batch} >= {"fit", "choose"}
+    assert {part.step for batch in iter(graph.next, []) for part in batch} >= {"fit", "choose"}

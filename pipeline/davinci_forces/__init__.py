@@ -29,30 +29,30 @@ def read(study: str | Path, record: str, **about: str) -> "pd.DataFrame":
 
 
 def run(study: str | Path, *stages: str, force: bool = False, jobs: int = 1, quiet: bool = False) -> bool:
-    """Run stages on a study, and the report, in their order, or all where none is named; whether every task succeeded.
+    """Run stages, groups of them or the report, and what they need, or all where none is named; whether all went well.
 
     What is current is skipped, as on the command line.  `jobs` is the number of processes.
 
     Raises
     ------
     BadRequest
-        If there is no such stage.
+        If there is no such stage or group.
     PipelineError
-        If the study is wrong, another run is working on it, or a stage has nothing to work on.
+        If the study is wrong, or another run is working on it.
     """
     from davinci_forces.errors import BadRequest
-    from davinci_forces.runner import STEPS
+    from davinci_forces.runner import ALL
     from davinci_forces.runner.processes import arithmetic
+    from davinci_forces.stages import GROUPS
 
     arithmetic.pin()
-
-    unknown = [name for name in stages if name not in STEPS]
-    if unknown:
-        raise BadRequest(f"there is no stage {unknown[0]!r}; there are {', '.join(STEPS)}")
+    if unknown := [name for name in stages if name not in (*ALL, *GROUPS)]:
+        groups = ", ".join(name for name in GROUPS if name not in ALL)
+        said = f"there is no stage {unknown[0]!r}; there are {', '.join(ALL)}, and the groups {groups}"
+        raise BadRequest(said)
     from davinci_forces.runner import runs
 
-    names = [name for name in STEPS if name in stages] or STEPS
-    return runs.run(Path(study), names, force=force, jobs=jobs, verbosity="quiet" if quiet else "normal")
+    return runs.run(Path(study), stages or ALL, force=force, jobs=jobs, verbosity="quiet" if quiet else "normal")
 
 
 def results(study: str | Path) -> "pd.DataFrame":

@@ -18,35 +18,42 @@ from typer.core import TyperCommand, TyperGroup
 from davinci_forces.commands import COMMANDS
 from davinci_forces.errors import PipelineError
 from davinci_forces.report import REPORT
-from davinci_forces.runner import STEPS
+from davinci_forces.runner import ALL
 from davinci_forces.runner.processes import arithmetic
+from davinci_forces.stages import GROUPS, module
 
 if TYPE_CHECKING:
     from davinci_forces.runner.console import Verbosity
 
-STEP = "step"  # what the command that the steps are copies of is called until then
+STAGE = "stage"  # what the command that those of stages and groups are copies of is called until then
+FIRST, OTHERS = "Start here", "Other commands"  # panels of the help, before those of the groups and after them
+BEGIN = ("all", "new", "inspect", "compare", REPORT)
 
 
-class Steps(TyperGroup):
-    """Commands, of which those that are steps of a run differ in name and help only: what they take is read once."""
+class Stages(TyperGroup):
+    """Commands in panels.  Those that run stages differ in name and help only: what they take is read once."""
 
     def __init__(self, *, commands: dict[str, Any], **attributes: Any) -> None:
-        step = commands.pop(STEP)
-        modules = {name: "report/report" if name == REPORT else f"stages/{name}" for name in STEPS}
-        steps = {name: renamed(step, name, docstring(module)) for name, module in modules.items()}
-        super().__init__(commands=steps | commands, **attributes)
+        stage = commands.pop(STAGE)
+        commands[REPORT] = renamed(stage, REPORT, "davinci_forces.report.report", FIRST)
+        for group, stages in GROUPS.items():
+            if group not in stages:
+                commands[group] = renamed(stage, group, f"davinci_forces.stages.{group}.__init__", group)
+            commands |= {name: renamed(stage, name, module(name), group) for name in stages}
+        names = [*BEGIN, *(name for name in commands if name not in COMMANDS), *COMMANDS]
+        super().__init__(commands={name: commands[name] for name in names}, **attributes)
 
 
-def renamed(command: TyperCommand, name: str, words: str) -> TyperCommand:
-    """A command by another name, with other help."""
+def renamed(command: TyperCommand, name: str, described: str, panel: str) -> TyperCommand:
+    """A command by another name, with the help of a module, in a panel."""
     other = copy(command)
-    other.name, other.help = name, as_written(words)
+    other.name, other.help, other.rich_help_panel = name, as_written(docstring(described)), panel
     return other
 
 
 def docstring(module: str) -> str:
     """What a module says of itself, which is what its file begins with; importing all would take seconds."""
-    file = Path(__file__).parent / f"{module}.py"
+    file = Path(__file__).parent.joinpath(*module.split(".")[1:]).with_suffix(".py")
     return cleandoc(file.read_text(encoding="utf-8").split('"""', 2)[1])
 
 
@@ -56,7 +63,7 @@ def as_written(words: str) -> str:
 
 
 app = typer.Typer(
-    cls=Steps,
+    cls=Stages,
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
@@ -167,9 +174,9 @@ def run_stages(study: Path, names: tuple[str, ...], *how: Any) -> bool:
         return False
 
 
-@app.command(STEP, rich_help_panel="Stages, in order", cls=ShownAsWritten)
+@app.command(STAGE, cls=ShownAsWritten)
 @guarded
-def run_step(
+def run_named(
     context: typer.Context,
     study: StudyFolder,
     processed: Processed = None,
@@ -181,7 +188,7 @@ def run_step(
     verbose: Verbose = False,
     dry_run: DryRun = False,
 ) -> None:
-    """Run the step whose name the command has."""
+    """Run the stage or group whose name the command has, and what it needs."""
     from davinci_forces.runner import runs
 
     says = verbosity(quiet, verbose)
@@ -190,7 +197,7 @@ def run_step(
         raise typer.Exit(1)
 
 
-@app.command("all", rich_help_panel="Stages, in order", cls=ShownAsWritten)
+@app.command("all", rich_help_panel=FIRST, cls=ShownAsWritten)
 @guarded
 def run_all(
     studies: Studies = None,
@@ -208,12 +215,12 @@ def run_all(
 
     says = verbosity(quiet, verbose)
     named = runs.studies(studies or [], says)
-    good = [run_stages(study, STEPS, processed, reports, force, jobs, says, dry_run, cluster) for study in named]
+    good = [run_stages(study, ALL, processed, reports, force, jobs, says, dry_run, cluster) for study in named]
     if not all(good):
         raise typer.Exit(1)
 
 
 for other in COMMANDS:
-    module = import_module(f"davinci_forces.commands.{other}")
-    added = app.command(other, help=module.__doc__, rich_help_panel="Other commands", cls=ShownAsWritten)
-    added(guarded(module.run))
+    code = import_module(f"davinci_forces.commands.{other}")
+    panel = FIRST if other in BEGIN else OTHERS
+    app.command(other, help=code.__doc__, rich_help_panel=panel, cls=ShownAsWritten)(guarded(code.run))

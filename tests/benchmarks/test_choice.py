@@ -8,7 +8,7 @@ from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.records import Choice, Smoothed
 from davinci_forces.robots.dvrk_psm import ROBOT
 from davinci_forces.robots.models import coupled
-from davinci_forces.stages import choose
+from davinci_forces.stages.model import choose
 
 LOGS, SAMPLES, RATE = 6, 6000, 200.0
 AT_MOST = 15.0  # [s] of one core

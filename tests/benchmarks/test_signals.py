@@ -6,7 +6,7 @@ import numpy as np
 from scipy.fft import irfft, next_fast_len, rfft
 
 from davinci_forces.maths.periods import averaging
-from davinci_forces.stages import whiteness
+from davinci_forces.stages.forces import whiteness
 
 SAMPLES = 1_000_000
 RATE, PERIOD = 1000.0, 5.0  # Hz, s

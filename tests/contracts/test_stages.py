@@ -14,20 +14,25 @@ from davinci_forces.records import Diagnostic, Record
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.report import report
 from davinci_forces.runner import execution
+from davinci_forces.runner.graph import every_step
 from davinci_forces.runner.plan import Task
-from davinci_forces.runner.signature import declaration
-from davinci_forces.stages import STAGES
+from davinci_forces.runner.signature import declaration, function_of, steps
+from davinci_forces.stages import STAGES, module
 from tests.contracts.conftest import Lab, shorten
 
-STAGE = pytest.mark.parametrize("name", STAGES)
+STEP = pytest.mark.parametrize("step", every_step())
 
 
-@STAGE
-def test_the_declaration_parses_and_the_stage_says_what_it_does(name: str):
-    module = import_module(f"davinci_forces.stages.{name}")
-    assert module.__doc__
-    assert module.run.__doc__
-    asks = declaration(name)
+@pytest.mark.parametrize("stage", STAGES)
+def test_a_stage_says_what_it_does_and_exports_what_can_run(stage: str):
+    assert import_module(module(stage)).__doc__
+    assert stage in steps(stage)
+
+
+@STEP
+def test_the_declaration_parses_and_the_function_says_what_it_does(step: str):
+    assert function_of(step).__doc__
+    asks = declaration(step)
     groups = [asks.each, asks.per_log, asks.every]
     assert len(asks.each) <= 1  # of two, the runner could not tell how often to call it
     assert [parameter for group in groups for parameter, kinds in group.items() if not kinds] == []
@@ -35,7 +40,7 @@ def test_the_declaration_parses_and_the_stage_says_what_it_does(name: str):
 
 
 def arguments(lab: Lab, task: Task) -> dict[str, Any]:
-    """What the runner would hand to a stage; records that cannot be written into."""
+    """What the runner would hand to a step; records that cannot be written into."""
     handed = execution.arguments(lab.folders, task)
     handed |= {p: list(handed[p]) for p in task.records if isinstance(handed[p], execution.InTurn)}
     for record in [r for p in task.records for r in (handed[p] if isinstance(handed[p], list) else [handed[p]]) if r]:
@@ -65,11 +70,11 @@ def same(one: Record, other: Record) -> None:
         assert_array_equal(getattr(one, name), getattr(other, name), err_msg=f"{one}: {name}")
 
 
-@STAGE
-def test_the_same_records_give_the_same_records_and_nothing_else_is_read(name: str, lab: Lab, monkeypatch):
+@STEP
+def test_the_same_records_give_the_same_records_and_nothing_else_is_read(step: str, lab: Lab, monkeypatch):
     """Twice on the very same arguments, which stay as they are, and with the study's files moved away meanwhile."""
     shorten(monkeypatch)
-    run, asks = import_module(f"davinci_forces.stages.{name}").run, declaration(name)
+    run, asks = function_of(step), declaration(step)
     files = [lab.folders.processed, *([] if "log" in asks.given.values() else [lab.study.folder])]
     made: Counter[tuple[str, ...]] = Counter()
     kinds: set[type[Record]] = set()
@@ -83,6 +88,12 @@ def test_the_same_records_give_the_same_records_and_nothing_else_is_read(name: s
         made.update({(type(record).__name__, *record.key) for record in first})
     assert kinds | {Diagnostic} == {*asks.makes, Diagnostic}
     assert [key for key, tasks in made.items() if tasks > 1] == []  # one would overwrite the other
+
+
+def test_no_two_tasks_make_the_same_file(lab: Lab):
+    """Nor do two steps of a stage say anything under one name: one would overwrite the other."""
+    made = Counter(name for entry in lab.plan.ledger.entries() for name in entry.outputs)
+    assert [name for name, tasks in made.items() if tasks > 1] == []
 
 
 def test_the_report_of_the_same_records_is_the_same(lab: Lab, catalogue: Catalogue, monkeypatch):

@@ -12,7 +12,7 @@ from davinci_forces.haptics.maths.delay import sampled_limit
 from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE
 from davinci_forces.records import FilterNoise, Fit, HapticResponse, HapticRun
 from davinci_forces.robots import davinci
-from davinci_forces.stages import feel
+from davinci_forces.stages.tissue import feel
 from davinci_forces.study import HapticScenario
 from tests.haptics.test_limit import stiffness
 

@@ -16,7 +16,7 @@ from davinci_forces.records import (
     TissueLimit,
 )
 from davinci_forces.robots import davinci
-from davinci_forces.stages import limit
+from davinci_forces.stages.tissue import limit
 
 K = 457.24
 

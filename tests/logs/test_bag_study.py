@@ -11,14 +11,12 @@ from typer.testing import CliRunner
 
 import davinci_forces
 from davinci_forces.cli import app
-from davinci_forces.stages import STAGES
 from tests.conftest import ROOT
 from tests.logs.bag_writer import joint_state, write
 
 DEMO = ROOT / "raw" / "davinci-demo"
 LOGS = ("matched-roll-excitation", "matched-roll-validation", "matched-roll-contact", "matched-slide-excitation")
 BAGS = dict(zip(LOGS, ("one.bag", "two", "three_mcap", "four.bag"), strict=True))
-STEPS = [name for name in STAGES[: STAGES.index("ekf") + 1] if name not in ("design", "chart")] + ["report"]
 TOLERANCE = 1e-6  # relative; times are rounded to nanoseconds
 
 
@@ -37,7 +35,7 @@ def study(folder: Path, tables: dict[str, str]) -> Path:
 
 
 def results(folder: Path) -> dict[str, float]:
-    assert davinci_forces.run(folder, *STEPS, quiet=True)
+    assert davinci_forces.run(folder, quiet=True)
     home = folder.parents[1] / "reports" / folder.name / "results.json"
     beginning = ("fit.", "predict.", "ekf.")
     return {r["key"]: r["value"] for r in json.loads(home.read_text()) if r["key"].startswith(beginning)}

@@ -14,7 +14,7 @@ from davinci_forces.report.results import collect
 from davinci_forces.report.sections.joints.estimators import convergence, estimators, printed_beside
 from davinci_forces.report.sections.joints.friction import friction_maps
 from davinci_forces.robots import davinci, dvrk_psm
-from davinci_forces.stages import fit
+from davinci_forces.stages.model import fit
 from tests import arm
 from tests.test_estimation import trajectory
 

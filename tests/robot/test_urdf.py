@@ -17,7 +17,7 @@ from davinci_forces.maths.mechanics import kinematics, rigid_body
 from davinci_forces.maths.mechanics.placed import roll_pitch_yaw, transform
 from davinci_forces.robots.davinci import ROBOT as DAVINCI
 from davinci_forces.robots.urdf import elements, reading, writing
-from davinci_forces.stages import resolve
+from davinci_forces.stages.tip import resolve
 from davinci_forces.study import LogEntry
 from davinci_forces.toml.file import TomlFile
 
@@ -360,5 +360,5 @@ def test_of_an_arm_of_more_than_three_joints_no_force_at_the_tip_is_made_up():
     """The chain would be taken to stand still beyond the third."""
     arm = replace(DAVINCI, joints=robot(writing.text(DAVINCI)).joints)
     touched = LogEntry(name="touch", files=("a.csv",), role="contact", channels=())
-    [said] = resolve.run([], [], [], touched, arm)
+    [said] = resolve.apply([], [], [], touched, arm)
     assert "touch: no force at the tip: davinci has 7 joints, and a force at the tip is told by 3" in said.text[0]

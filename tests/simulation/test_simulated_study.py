@@ -20,7 +20,8 @@ from davinci_forces.simulation import study_folder
 from davinci_forces.simulation.scenario.reading import load
 from davinci_forces.simulation.scenario.scenario import SensorNoise
 from davinci_forces.simulation.sensors import drift, generator, stepped
-from davinci_forces.stages import average, differentiate, fit
+from davinci_forces.stages.model import fit
+from davinci_forces.stages.recordings import average, differentiate
 from davinci_forces.study import Study, reading
 
 app = typer.Typer()

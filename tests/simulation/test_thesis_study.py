@@ -7,7 +7,6 @@ import pytest
 import davinci_forces
 from davinci_forces.robots.davinci import ROBOT
 from davinci_forces.simulation.scenario.reading import load
-from davinci_forces.stages import STAGES
 from tests.test_runs import call
 
 PERIODS = 10
@@ -42,8 +41,6 @@ def test_the_families_differ_in_nothing_but_friction():
 def study(tmp_path_factory):
     folder = tmp_path_factory.mktemp("lab") / "raw" / "davinci-thesis"
     call("simulate", "davinci-thesis", folder)
-    for stage in STAGES[STAGES.index("ingest") : STAGES.index("predict") + 1]:
-        call(stage, folder)
     call("report", folder)
     return folder
 

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from davinci_forces.records import Diagnostic, Push, Stiffness, TissueModel, Touch, Track
-from davinci_forces.stages import palpate
+from davinci_forces.stages.tissue import palpate
 from tests import arm
 from tests.test_averaging import entry
 

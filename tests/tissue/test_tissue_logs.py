@@ -11,7 +11,7 @@ from davinci_forces.cli import app
 from davinci_forces.errors import BadStudy
 from davinci_forces.logs import open_log
 from davinci_forces.records import Touch
-from davinci_forces.stages import ingest
+from davinci_forces.stages.recordings import ingest
 from davinci_forces.study import WHOLE, reading
 from tests import arm
 

@@ -74,7 +74,7 @@ def test_a_log_without_a_force_is_said():
 
 
 def test_a_log_of_another_role_is_left_alone():
-    from davinci_forces.stages import palpate
+    from davinci_forces.stages.tissue import palpate
     from tests import arm
     from tests.test_averaging import entry
 

@@ -3,4 +3,4 @@
 from davinci_forces.report import REPORT
 from davinci_forces.stages import STAGES
 
-STEPS = (*STAGES, REPORT)  # everything that a run does, in order
+ALL = (*STAGES, REPORT)  # everything that a run may do, in order

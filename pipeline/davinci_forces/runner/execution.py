@@ -1,4 +1,4 @@
-"""Running one task: read its records, call its stage, write what it makes.  In this process or in another."""
+"""Running one task: read its records, call its function, write what it makes.  In this process or in another."""
 
 import errno
 import os
@@ -7,7 +7,6 @@ from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
-from importlib import import_module
 from pathlib import Path
 from time import perf_counter
 from typing import Any
@@ -21,7 +20,7 @@ from davinci_forces.robots.robot import Kind
 from davinci_forces.runner.ledger import Folders, file_name
 from davinci_forces.runner.places import Located, is_about_log
 from davinci_forces.runner.plan import Task
-from davinci_forces.runner.signature import declaration
+from davinci_forces.runner.signature import declaration, function_of
 from davinci_forces.study import LogEntry
 
 
@@ -47,9 +46,8 @@ def perform(folders: Folders, task: Task) -> Outcome:
     messages: list[str] = []
     start = perf_counter()
     try:
-        run = import_module(f"davinci_forces.stages.{task.stage}").run
         with _writer(folders, task) as writer:
-            for record in run(**arguments(folders, task)):
+            for record in function_of(task.step)(**arguments(folders, task)):
                 writer.write(record)
                 messages += _messages(record)
                 del record  # before the stage makes the next
@@ -58,7 +56,8 @@ def perform(folders: Folders, task: Task) -> Outcome:
         said = said_of(error)
         failed = without_folders(said, folders)
         with _writer(folders, task) as writer:
-            writer.write(diagnostic(task.stage, file_name(task.name), "error", failed))
+            stage, _, function = task.step.partition(".")  # two functions of a stage may both fail for one log
+            writer.write(diagnostic(stage, file_name(f"{task.subject}.{function}".rstrip(".")), "error", failed))
         return Outcome(task, _made(writer), failed, (f"error: {said}",), perf_counter() - start)
     finally:
         store.release()
@@ -84,8 +83,8 @@ def without_folders(message: str, folders: Folders) -> str:
 
 
 def arguments(folders: Folders, task: Task) -> dict[str, Any]:
-    """Everything that a task's stage is called with."""
-    asks = declaration(task.stage)
+    """Everything that a task's function is called with."""
+    asks = declaration(task.step)
     handed: dict[str, Any] = dict(task.settings)
     for parameter, located in task.records.items():
         if parameter in asks.in_turn:

@@ -1,29 +1,30 @@
-"""What waits for what: the calls of a stage about one log need what was made of that log, and only a stage that reads
+"""What waits for what: the calls of a step about one log need what was made of that log, and only a step that reads
 all logs waits for all of them.
 """
 
 from collections.abc import Iterable, Sequence
 from functools import cache
 from heapq import heappop, heappush
+from itertools import takewhile
 from typing import NamedTuple
 
 from davinci_forces.report import REPORT
 from davinci_forces.runner.places import is_about_log
-from davinci_forces.runner.signature import Declaration, declaration
-from davinci_forces.stages import STAGES
+from davinci_forces.runner.signature import Declaration, declaration, stage_of, steps
+from davinci_forces.stages import GROUPS, STAGES
 
-WHOLE = ""  # in place of a log: all that a stage has to do
+WHOLE = ""  # in place of a log: all that a step has to do
 
 
 class Part(NamedTuple):
-    """What a stage has to do about one log; or the whole of it, which where it goes log by log is when all are done."""
+    """What a step has to do about one log; or the whole of it, which where it goes log by log is when all are done."""
 
-    stage: str
+    step: str
     log: str
 
 
 class Graph:
-    """The parts of a run in the order in which they may begin: of those that are ready, the earliest stage first."""
+    """The parts of a run in the order in which they may begin: of those that are ready, the earliest step first."""
 
     def __init__(self, names: Sequence[str], logs: Sequence[str]) -> None:
         self.parts = [part for name in names for part in _parts(name, logs)]
@@ -40,9 +41,9 @@ class Graph:
                 heappush(self._ready, (self._rank[part], part))
 
     def next(self) -> list[Part]:
-        """The parts of one stage that may begin and have not; none where all have, or wait for one that is not done."""
+        """The parts of one step that may begin and have not; none where all have, or wait for one that is not done."""
         batch: list[Part] = []
-        while self._ready and (not batch or self._ready[0][1].stage == batch[0].stage):
+        while self._ready and (not batch or self._ready[0][1].step == batch[0].step):
             batch.append(heappop(self._ready)[1])
         return batch
 
@@ -54,32 +55,59 @@ class Graph:
                 heappush(self._ready, (self._rank[follower], follower))
 
 
+def stages_of(names: Iterable[str]) -> set[str]:
+    """The stages that names stand for, of which some are those of groups; the report stands for itself."""
+    return {stage for name in names for stage in GROUPS.get(name, (name,))}
+
+
+def needed(names: Iterable[str]) -> list[str]:
+    """The steps of these stages and groups and, before them, those that make what they read, in their order."""
+    named = stages_of(names)
+    everything = REPORT in named  # which it reads
+    last = max((i for i, stage in enumerate(STAGES) if everything or stage in named), default=-1)
+    read: set[type] = set()
+    wanted = [REPORT] * everything
+    for step in reversed(every_step(last)):
+        asks = declaration(step)
+        if everything or stage_of(step) in named or read & {*asks.makes}:
+            wanted.append(step)
+            read |= {*asks.reads}
+    return wanted[::-1]
+
+
+@cache
+def every_step(last: int = len(STAGES) - 1) -> tuple[str, ...]:
+    """The steps of all stages, or of those up to one by its number, in their order."""
+    return tuple(step for stage in STAGES[: last + 1] for step in steps(stage))
+
+
 def goes_by_log(asks: Declaration) -> bool:
-    """Whether every call of a stage is about one log."""
+    """Whether every call of a step is about one log."""
     kinds = [kind for kinds in asks.each.values() for kind in kinds]
     return bool("log" in asks.given.values() or asks.per_log or (kinds and all(map(is_about_log, kinds))))
 
 
-def _parts(name: str, logs: Sequence[str]) -> list[Part]:
-    by_log = name != REPORT and goes_by_log(declaration(name))
-    return [*(Part(name, log) for log in logs if by_log), Part(name, WHOLE)]
+def _parts(step: str, logs: Sequence[str]) -> list[Part]:
+    by_log = step != REPORT and goes_by_log(declaration(step))
+    return [*(Part(step, log) for log in logs if by_log), Part(step, WHOLE)]
 
 
 def _awaited(part: Part, names: Iterable[str], logs: Sequence[str]) -> list[Part]:
-    """The parts that make what this one reads, as far as one of these stages makes it at all."""
-    if part.stage == REPORT:
+    """The parts that make what this one reads, as far as one of these steps makes it at all."""
+    if part.step == REPORT:
         return [Part(name, WHOLE) for name in names if name != REPORT]
-    if part.log == WHOLE and goes_by_log(declaration(part.stage)):
-        return [Part(part.stage, log) for log in logs]
-    return [Part(name, part.log if own else WHOLE) for name, own in _makers(part.stage)]
+    if part.log == WHOLE and goes_by_log(declaration(part.step)):
+        return [Part(part.step, log) for log in logs]
+    return [Part(name, part.log if own else WHOLE) for name, own in _makers(part.step)]
 
 
 @cache
-def _makers(stage: str) -> tuple[tuple[str, bool], ...]:
-    """The stages that make what this one reads, each with whether what they made of a log is enough for that log."""
-    asks = declaration(stage)
+def _makers(step: str) -> tuple[tuple[str, bool], ...]:
+    """The steps that make what this one reads, each with whether what they made of a log is enough for that log."""
+    asks = declaration(step)
+    earlier = takewhile(lambda name: name != step, every_step(STAGES.index(stage_of(step))))
     return tuple(
         (name, goes_by_log(asks) and goes_by_log(declaration(name)) and is_about_log(kind))
-        for name in STAGES[: STAGES.index(stage)]
+        for name in earlier
         for kind in {*declaration(name).makes} & {*asks.reads}
     )

@@ -45,7 +45,7 @@ class Folders:
 class Entry:
     """One task as it was last run."""
 
-    stage: str
+    stage: str  # or a further step of one: "tune.gather"
     task: str
     fingerprint: dict[str, Any]
     outputs: dict[str, str] = field(default_factory=dict)  # file -> sha256

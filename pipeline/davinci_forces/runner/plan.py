@@ -1,4 +1,4 @@
-"""Which calls of a stage a study and its records give, and everything that each of them depends on."""
+"""Which calls of a step a study and its records give, and everything that each of them depends on."""
 
 import importlib.metadata
 from collections.abc import Iterable, Iterator
@@ -13,7 +13,8 @@ from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
 from davinci_forces.runner.fingerprints.schemas import schemas
 from davinci_forces.runner.ledger import Ledger
 from davinci_forces.runner.places import ANY, Located, Places, about, is_about_log
-from davinci_forces.runner.signature import Declaration
+from davinci_forces.runner.signature import Declaration, stage_of
+from davinci_forces.stages import module
 from davinci_forces.study import Study
 
 VERSION = importlib.metadata.version("davinci-forces")
@@ -21,15 +22,21 @@ VERSION = importlib.metadata.version("davinci-forces")
 
 @dataclass(frozen=True)
 class Task:
-    """One call of a stage: where its records are, what else it is handed, and all that its outputs depend on."""
+    """One call of a step: where its records are, what else it is handed, and all that its outputs depend on."""
 
-    stage: str
+    step: str
     name: str  # "slide-1/hand_roll"
     fingerprint: Fingerprint
     records: dict[str, tuple[Located, ...]] = field(default_factory=dict)  # by parameter
     given: dict[str, Any] = field(default_factory=dict)  # by parameter; for a log, its entry
     settings: dict[str, Any] = field(default_factory=dict)
     joints: dict[str, tuple[Kind, str]] = field(default_factory=dict)  # whose units its records are in
+
+    @property
+    def subject(self) -> str:
+        """What it is about, by a name that no other task of its stage has."""
+        function = self.step.partition(".")[2]
+        return self.name if function in ("", self.name) else f"{function}.{self.name}"
 
 
 class Plan:
@@ -52,7 +59,7 @@ class Plan:
         return self._places
 
     def tasks(self, asks: Declaration, log: str = "") -> Iterator[Task]:
-        """Every call of a stage that the study and the records that are there give, or those about one log."""
+        """Every call of a step that the study and the records that are there give, or those about one log."""
         if "weighings" in asks.given.values() and not self.study.weighings.each:
             return
         places = self.places()
@@ -66,7 +73,7 @@ class Plan:
         else:
             records = {p: places.of(kinds, role=asks.roles.get(p, ANY)) for p, kinds in asks.every.items()}
             if any(records.values()) or not asks.reads:
-                yield self._task(asks, asks.name, records)
+                yield self._task(asks, asks.name.rpartition(".")[2], records)
 
     def _each_record(self, asks: Declaration, places: Places, of_log: str) -> Iterator[Task]:
         [(parameter, kinds)] = asks.each.items()
@@ -120,13 +127,13 @@ RECORDS = tuple(f"davinci_forces.records.{name}" for name in ("diagnostic", "rec
 
 
 def code_of(asks: Declaration) -> dict[str, str]:
-    """The code that is at work in a stage, by hash."""
+    """The code that is at work in a step, by hash."""
     opens = ("davinci_forces.logs",) if "log" in asks.given.values() else ()  # imported by none
-    return code(f"davinci_forces.stages.{asks.name}", *RECORDS, *opens, without="davinci_forces.records")
+    return code(module(stage_of(asks.name)), *RECORDS, *opens, without="davinci_forces.records")
 
 
 def log_of(asks: Declaration, task: str) -> str:
-    """The log that a call of a stage is about, told by its name; "" for one that is about no single log."""
+    """The log that a call of a step is about, told by its name; "" for one that is about no single log."""
     if asks.each:
         [kinds] = asks.each.values()
         names = task.split("/")[len(kinds) > 1 :]

@@ -100,7 +100,8 @@ def provenance(study: Study, ledger: Ledger, located: tuple[Located, ...]) -> Pr
     files = [name.removeprefix("raw/") for file in named for name in ledger.folders.inside(f"raw/{file}")]
     raw = {f"raw/{study.name}/{file}": ledger.digest(f"raw/{file}") for file in files}
     processed = {place: ledger.digest(f"processed/{place}") for _, place in located}
-    failures = {f"{e.stage} {e.task}": e.failed for e in ledger.entries() if e.failed and e.stage != REPORT}
+    failed = [entry for entry in ledger.entries() if entry.failed and entry.stage != REPORT]
+    failures = {" ".join([*entry.stage.split("."), entry.task]): entry.failed for entry in failed}
     versions = {p: importlib.metadata.version(p) for p in PACKAGES} | {"arithmetic": arithmetic.described()}
     text = (study.folder / "study.toml").read_text(encoding="utf-8", errors="replace")
     return Provenance(study.name, VERSION, versions, raw, processed, failures, text)

@@ -17,7 +17,7 @@ def reused(ledger: Ledger, task: Task) -> str:
     now = json.loads(json.dumps(asdict(task.fingerprint)))
     for other in sorted(processed.parent.iterdir()):
         there = replace(ledger.folders, processed=other)
-        entry = None if other == processed else Ledger(there).read(task.stage, task.name)
+        entry = None if other == processed else Ledger(there).read(task.step, task.name)
         same = entry and not entry.failed and entry.fingerprint == now
         if entry and same and (contents := _contents(there, entry)):
             _take(ledger, entry, contents)

@@ -14,6 +14,7 @@ from davinci_forces.runner.execution import Outcome
 from davinci_forces.runner.ledger import Folders
 from davinci_forces.runner.processes.workers import Others, pool, prepare
 from davinci_forces.runner.runner import Runner
+from davinci_forces.runner.signature import stage_of
 from davinci_forces.study import Study, reading
 
 
@@ -136,7 +137,7 @@ def run(
     dry_run: bool = False,
     cluster: str = "",
 ) -> bool:
-    """Run stages on one study and say what was done, or only what would be; whether every task succeeded."""
+    """Run stages on one study, and what they need; say what was done, or only what would be; whether all succeeded."""
     study = load(folder)
     speaks = console(verbosity)
     kind = Narrator if verbosity == "verbose" else Runner
@@ -183,5 +184,5 @@ class Narrator(Runner):
     """A runner that says of every task, too, when it is done, and how long it took."""
 
     def _record(self, outcome: Outcome) -> None:
-        self.console.say(f"{outcome.task.stage}: {outcome.task.name}: took {outcome.seconds:.2f} s")
+        self.console.say(f"{stage_of(outcome.task.step)}: {outcome.task.name}: took {outcome.seconds:.2f} s")
         super()._record(outcome)

@@ -1,7 +1,7 @@
-"""What a stage asks for and promises, read from the signature of its `run`."""
+"""What the steps of a stage ask for and promise, read from the signatures of the functions that it exports."""
 
 import types
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cache
 from importlib import import_module
@@ -11,8 +11,10 @@ from typing import Annotated, Any, get_args, get_origin, get_type_hints
 from davinci_forces.logs.log import Log
 from davinci_forces.records import Record
 from davinci_forces.robots.robot import Joint, Robot
+from davinci_forces.stages import module
 from davinci_forces.study import HapticScenario, LogEntry, Settings, Weighings
 
+FUNCTIONS = ("run", "gather", "apply")  # that a stage may export, in the order of their steps
 Kinds = tuple[type[Record], ...]
 GIVEN = {
     Log: "log", LogEntry: "entry", Joint: "joint", Robot: "robot", Weighings: "weighings", HapticScenario: "haptics",
@@ -22,9 +24,9 @@ SETTINGS = tuple(f.name for f in fields(Settings))
 
 @dataclass(frozen=True)
 class Declaration:
-    """What a stage reads, by parameter, and what it makes."""
+    """What a step reads, by parameter, and what it makes."""
 
-    name: str
+    name: str  # of the step
     each: dict[str, Kinds]  # called once for each record of these kinds
     per_log: dict[str, Kinds]  # called once a log, with all its records of these kinds
     in_turn: set[str]  # those of these parameters whose records are read when the stage comes to them
@@ -37,18 +39,37 @@ class Declaration:
 
     @property
     def reads(self) -> Kinds:
-        """The kinds of record that must exist before the stage runs."""
+        """The kinds of record that must exist before the step runs."""
         groups = (self.each, self.per_log, self.optional, self.every)
         return tuple(dict.fromkeys(kind for group in groups for kinds in group.values() for kind in kinds))
 
 
 @cache
-def declaration(name: str) -> Declaration:
-    """Read the signature of a stage."""
-    run = import_module(f"davinci_forces.stages.{name}").run
-    hints = get_type_hints(run, include_extras=True)
+def steps(stage: str) -> tuple[str, ...]:
+    """The steps of a stage, one for each function that it exports: "tune" for `run`, "tune.gather", "tune.apply"."""
+    exported = vars(import_module(module(stage)))
+    return tuple(stage if name == "run" else f"{stage}.{name}" for name in FUNCTIONS if name in exported)
+
+
+def stage_of(step: str) -> str:
+    """The stage that a step belongs to; the report is one of its own."""
+    return step.partition(".")[0]
+
+
+def function_of(step: str) -> Callable[..., Iterator[Record]]:
+    """The function of a step."""
+    stage, _, name = step.partition(".")
+    function: Callable[..., Iterator[Record]] = getattr(import_module(module(stage)), name or "run")
+    return function
+
+
+@cache
+def declaration(step: str) -> Declaration:
+    """Read the signature of a step."""
+    function = function_of(step)
+    hints = get_type_hints(function, include_extras=True)
     makes = _kinds(_inner(hints.pop("return")))
-    declared = Declaration(name, {}, {}, set(), {}, {}, {}, {}, _settings(name, run), makes)
+    declared = Declaration(step, {}, {}, set(), {}, {}, {}, {}, _settings(step, function), makes)
     for parameter, hint in hints.items():
         if parameter in declared.settings:
             continue
@@ -69,11 +90,11 @@ def declaration(name: str) -> Declaration:
     return declared
 
 
-def _settings(name: str, run: Any) -> tuple[str, ...]:
-    asked = [p.name for p in signature(run).parameters.values() if p.kind is Parameter.KEYWORD_ONLY]
+def _settings(step: str, function: Any) -> tuple[str, ...]:
+    asked = [p.name for p in signature(function).parameters.values() if p.kind is Parameter.KEYWORD_ONLY]
     unknown = sorted(set(asked) - set(SETTINGS))
     if unknown:
-        raise TypeError(f"stage {name} asks for settings that do not exist: {', '.join(unknown)}")
+        raise TypeError(f"{step} asks for settings that do not exist: {', '.join(unknown)}")
     return tuple(asked)
 
 

@@ -2,17 +2,18 @@
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from davinci_forces.errors import NotReproduced, PipelineError
 from davinci_forces.report import REPORT
 from davinci_forces.report.results import MANIFEST, identity
-from davinci_forces.runner import STEPS, index, reporting
+from davinci_forces.runner import index, reporting
+from davinci_forces.runner.graph import every_step
 from davinci_forces.runner.ledger import Folders, Ledger, file_name
 from davinci_forces.runner.plan import Plan, Task
-from davinci_forces.runner.signature import declaration
+from davinci_forces.runner.signature import declaration, stage_of
 from davinci_forces.study import Study
 
 MOST = 5  # files or tasks that are named of many that differ alike
@@ -111,22 +112,23 @@ def unknown_files(folders: Folders, recorded: Iterable[str]) -> Iterator[str]:
 def differences_from_plan(plan: Plan, report: Task) -> Iterator[str]:
     """What a run would do again, and entries in the ledger of what it would not do."""
     ledger = plan.ledger
-    for name in sorted({entry.stage for entry in ledger.entries()} - {*STEPS}):
+    steps = (*every_step(), REPORT)
+    for name in sorted({entry.stage for entry in ledger.entries()} - {*steps}):
         yield f"{ledger.folders.processed / 'tasks' / name} holds entries of {name}, and there is no such stage"
-    for name in STEPS:
-        tasks = [report] if name == REPORT else list(plan.tasks(declaration(name)))
+    for step in steps:
+        tasks = [report] if step == REPORT else list(plan.tasks(declaration(step)))
         planned = {file_name(task.name) for task in tasks}
-        extra = [entry.task for entry in ledger.entries(name) if file_name(entry.task) not in planned]
+        extra = [entry.task for entry in ledger.entries(step) if file_name(entry.task) not in planned]
         if extra:
-            yield f"{name}: the ledger has entries of what this study has no call for: {_some(extra)}"
-        yield from stale(ledger, name, tasks)
+            yield f"{stage_of(step)}: the ledger has entries of what this study has no call for: {_some(extra)}"
+        yield from stale(ledger, tasks)
 
 
-def stale(ledger: Ledger, name: str, tasks: Iterable[Task]) -> Iterator[str]:
-    """Tasks that did not run as they would now; files that were altered are said of the files."""
+def stale(ledger: Ledger, tasks: Sequence[Task]) -> Iterator[str]:
+    """Tasks of a step that did not run as they would now; files that were altered are said of the files."""
     by_reason: dict[str, list[str]] = {}
     for task in tasks:
-        entry = ledger.entry(name, task.name)
+        entry = ledger.entry(task.step, task.name)
         if entry is None:
             by_reason.setdefault("it is not in the ledger, so it has not run, or its entry was removed", []).append(
                 task.name
@@ -136,7 +138,7 @@ def stale(ledger: Ledger, name: str, tasks: Iterable[Task]) -> Iterator[str]:
             for reason in list(changed)[:2]:
                 by_reason.setdefault(reason, []).append(task.name)
     for reason, names in by_reason.items():
-        yield f"{name}: {_some(names)}: {reason}"
+        yield f"{stage_of(tasks[0].step)}: {_some(names)}: {reason}"
 
 
 def altered_page(folders: Folders, name: str, content: bytes) -> Iterator[str]:

@@ -1,7 +1,13 @@
-"""What is done, in order: one module per stage, and its name in the list below.
+"""What is done, in order: one module per stage, in the folder of its group, and its name in the groups below.
 
-A stage is a module whose docstring says what it does and whose `run` is a pure function from records to records.
-The signature of `run` is the declaration of everything it needs:
+A stage is a module whose docstring says what it does.  It exports up to three pure functions from records to records,
+of which none waits for more than it reads:
+
+    run      what is done first, as a rule about one log or record
+    gather   brings together what `run` made of every log
+    apply    goes back to the logs with what `gather` made
+
+The signature of each is the declaration of everything it needs:
 
     signal: Signal              called once for each record of that kind; `Track | Residual` takes either kind
     signals: Sequence[Signal]   called once a log, with the records of all its joints
@@ -19,11 +25,23 @@ The signature of `run` is the declaration of everything it needs:
 
 "About the same" is about the log and the joint of the call, as far as the call and the record are about any: a call for
 a log and a joint gets the fits of its joint, and one that is about neither gets all there are.  So what a call reads
-does not grow with the study, unless it is the only one of its stage.  The report is no stage: it reads everything.
+does not grow with the study, unless it is the only one of its function.  The report is no stage: it reads everything.
 """
 
-STAGES = (
-    "design", "ingest", "resample", "average", "differentiate", "fit", "choose", "chart", "predict", "describe", "tune",
-    "settle", "calibrate", "bound", "ekf", "assess", "threshold", "measure", "palpate", "hang", "weigh", "benchmark",
-    "limit", "feel", "correlate", "combine", "resolve", "sense", "whiteness", "explain",
-)  # fmt: skip
+# What makes a record stands before what reads it.  A group of one stage has its name, and no folder.
+GROUPS = {
+    "design": ("design",),
+    "recordings": ("ingest", "resample", "average", "differentiate"),
+    "model": ("fit", "choose", "chart", "predict"),
+    "forces": ("tune", "calibrate", "ekf", "assess", "measure", "benchmark", "whiteness"),
+    "tip": ("resolve", "sense"),
+    "weigh": ("weigh",),
+    "tissue": ("palpate", "limit", "feel"),
+}
+STAGES = tuple(stage for stages in GROUPS.values() for stage in stages)
+
+
+def module(stage: str) -> str:
+    """The name by which the module of a stage is imported."""
+    group = next(group for group, stages in GROUPS.items() if stage in stages)
+    return ".".join(["davinci_forces.stages", *([] if group == stage else [group]), stage.replace("-", "_")])

@@ -1,4 +1,4 @@
-"""What a stage knows of the records that it reads and writes, by hash: their declarations, not the code of those."""
+"""What a step knows of the records that it reads and writes, by hash: their declarations, not the code of those."""
 
 from collections.abc import Callable
 from dataclasses import fields
@@ -14,9 +14,9 @@ from davinci_forces.runner.signature import declaration
 
 
 @cache
-def schemas(stage: str) -> dict[str, str]:
-    """The hash of the declaration of each kind of record that a stage reads or makes."""
-    asks = declaration(stage)
+def schemas(step: str) -> dict[str, str]:
+    """The hash of the declaration of each kind of record that a step reads or makes."""
+    asks = declaration(step)
     hashes = {kind.__name__: _hash(kind, _as_read) for kind in asks.reads}
     return hashes | {kind.__name__: _hash(kind, _as_written) for kind in asks.makes}
 

@@ -17,7 +17,7 @@ from typing import Any
 from davinci_forces.logs.isolated import orphans
 from davinci_forces.runner.execution import Outcome
 from davinci_forces.runner.plan import Task
-from davinci_forces.stages import STAGES
+from davinci_forces.stages import STAGES, module
 
 Perform = Callable[[Task], Outcome]
 Share = list[tuple[Perform, Task]]
@@ -62,7 +62,7 @@ def _await(sentinel: int) -> None:
 def import_stages() -> None:
     """Import what tasks run."""
     for name in STAGES:
-        import_module(f"davinci_forces.stages.{name}")
+        import_module(module(name))
 
 
 def perform_all(share: Sequence[tuple[Perform, Task]]) -> list[Made]:
@@ -94,7 +94,7 @@ class Crew:
         self._waiting: deque[tuple[Perform, Task]] = deque()
         self._running: dict[Future[list[Made]], Share] = {}
         self._ended: SimpleQueue[Future[list[Made]]] = SimpleQueue()
-        self._usual: dict[str, float] = {}  # [s] that a task of a stage takes
+        self._usual: dict[str, float] = {}  # [s] that a task of a step takes
         self._worked = 0.0  # [s] in this process
         self._prepared = False
         self._started: Executor | None = None
@@ -146,15 +146,15 @@ class Crew:
         """Whether others are there, or worth starting; they are prepared as soon as the work in sight is enough."""
         if self._started or self.others is None:
             return self._started is not None
-        ahead = sum(self._usual.get(task.stage, 0.0) for _, task in self._waiting)
+        ahead = sum(self._usual.get(task.step, 0.0) for _, task in self._waiting)
         if not self._prepared and self._worked + ahead > ALONE:
             self.others.prepare()
             self._prepared = True
         return self._worked > ALONE and len(self._waiting) > 1  # who is alone would have others wait
 
     def _learn(self, task: Task, seconds: float) -> None:
-        """Remember how long tasks of a stage take."""
-        self._usual[task.stage] = (self._usual.get(task.stage, seconds) + seconds) / 2
+        """Remember how long tasks of a step take."""
+        self._usual[task.step] = (self._usual.get(task.step, seconds) + seconds) / 2
 
     def _hand_over(self) -> None:
         assert self._started is not None
@@ -174,7 +174,7 @@ class Crew:
         left = len(self._waiting) + sum(map(len, self._running.values()))
         share, seconds = [self._waiting.popleft()], 0.0
         while True:
-            seconds += self._usual.get(share[-1][1].stage, HANDED)
+            seconds += self._usual.get(share[-1][1].step, HANDED)
             if not self._waiting or seconds >= HANDED or len(share) * SHARES * hands >= left:
                 return share
             share.append(self._waiting.popleft())

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array, Booleans, Integers
+from davinci_forces.maths.arrays import Array, Booleans, Integers, evenly
 from davinci_forces.maths.mechanics import tip_force
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import along, jacobian, tip
@@ -16,6 +16,7 @@ from davinci_forces.records import (
     ArmCorrelation,
     Contact,
     Diagnostic,
+    JointCorrelation,
     TipBudget,
     TipContact,
     TipForce,
@@ -26,11 +27,41 @@ from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
 ARM = 3  # joints that carry the tip; the wrist is taken to be straight
-FEWEST = 100  # samples of free space, below which nothing is said of its level
+FEWEST = 100  # samples of free space, below which nothing is said of it
+LOGS = 20  # at most, that a correlation is taken from
 UNKNOWN = FreeSpaceLevels(*[float("nan")] * len(FreeSpaceLevels._fields))
 
 
-def run(
+def run(tracks: Sequence[Track], entry: LogEntry, robot: Robot) -> Iterator[JointCorrelation]:
+    """One JointCorrelation of a log; none where a joint is at rest, or where it is not known when it was touched."""
+    own = [track for joint in robot.joints[:ARM] for track in tracks if track.joint == joint.name and not track.at_rest]
+    if robot.chain is None or len(robot.joints) != ARM or len(own) < ARM or not entry.tells_free_space:
+        return
+    calm = [(start - SETTLE, end) for start, end in entry.contact]  # the smoother sees a contact coming
+    free = free_space(own[0].t, calm, own[0].rate)
+    errors = np.array([track.tau_ext_smooth[free] for track in own])
+    if errors.shape[1] < FEWEST or not errors.std(1).all():
+        return
+    rho = np.corrcoef(errors)
+    yield JointCorrelation(entry.name, errors.shape[1], float(rho[0, 1]), float(rho[0, 2]), float(rho[1, 2]))
+
+
+def gather(correlations: Iterable[JointCorrelation], robot: Robot) -> Iterator[ArmCorrelation]:
+    """One ArmCorrelation where any log tells of it."""
+    own = list(correlations)
+    if not own:
+        return
+    some = [own[i] for i in evenly(len(own), LOGS)]
+    yield ArmCorrelation(
+        robot=robot.name,
+        source=np.array([one.log for one in some], object),
+        rho_12=np.array([one.rho_12 for one in some]),
+        rho_13=np.array([one.rho_13 for one in some]),
+        rho_23=np.array([one.rho_23 for one in some]),
+    )
+
+
+def apply(
     tracks: Sequence[Track],
     contacts: Iterable[Contact],
     correlations: Iterable[ArmCorrelation],

@@ -1,6 +1,6 @@
-"""Tune the filter's noise to identification logs: that of the greatest likelihood of its innovations."""
+"""Tune the filter's noise to identification logs, by the likelihood of its innovations, and settle it for all logs."""
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from davinci_forces.filters import ekf
 from davinci_forces.filters.problem import NoiseModel, driven
 from davinci_forces.filters.tuning import tuned
 from davinci_forces.maths.signals.noise import noise_std
-from davinci_forces.records import JointModel, MeasurementNoise, Tuning
+from davinci_forces.records import FilterNoise, JointModel, MeasurementNoise, Tuning
 
 FINEST = 1e-9  # of a range: a noiseless log would leave innovations without a covariance to be judged by
 
@@ -56,3 +56,18 @@ def start(model: JointModel, between: MeasurementNoise, lowpass: float) -> Noise
         for x, slow in pairs
     ]
     return NoiseModel(sizes[0], sizes[1], 0.0, sizes[2] / model.rate / float(model.inertia.mean()), 0.0)
+
+
+def gather(tunings: Iterable[Tuning]) -> Iterator[FilterNoise]:
+    """One FilterNoise per joint; the inertia is the largest, with which the filter is slowest."""
+    every: dict[str, list[Tuning]] = {}
+    for tuning in tunings:
+        every.setdefault(tuning.joint, []).append(tuning)
+    for joint, own in every.items():
+        r_q, r_dq, r_tau, q_tau, viscous, speed, rate = np.median(
+            [(t.r_q, t.r_dq, t.r_tau, t.q_tau, t.viscous, t.speed, t.rate) for t in own], axis=0
+        ).tolist()
+        yield FilterNoise(
+            joint=joint, logs=tuple(t.log for t in own), rate=rate, r_q=r_q, r_dq=r_dq, r_tau=r_tau, q_tau=q_tau,
+            inertia=max(t.inertia for t in own), viscous=viscous, speed=speed,
+        )  # fmt: skip
