@@ -8,8 +8,11 @@ import numpy as np
 from davinci_forces.maths.models.independent import combined, inertia_of, regressor
 from davinci_forces.maths.models.model import JointDynamics
 from davinci_forces.maths.models.terms import coulomb, gravity_cos, gravity_sin, inertia, lifted_mass, viscous
-from davinci_forces.records import Signal
+from davinci_forces.maths.signals.smoothing import measured_motion
+from davinci_forces.records import Diagnostic, JointModel, Motion, Signal
 from davinci_forces.robots.robot import Joint, Kind, Limits, Robot
+from davinci_forces.stages.model import predict
+from davinci_forces.stages.recordings import resample
 
 HAND = Limits(q=(-0.6, 0.6), dq=(-1.2, 1.2), ddq=(-1.2, 1.2))
 SLIDE = Limits(q=(-0.07, 0.11), dq=(-2.0, 2.0), ddq=(-3.0, 3.0))
@@ -89,6 +92,18 @@ def signal(
     at_rest = int(np.ptp(q) < 0.01)
     columns = {"t": t, "q": q, "dq": dq, "tau": tau, "segment": np.zeros(len(t), int)}
     return Signal(log, name, role, rate, "as recorded", "logged", 0, at_rest, **columns)
+
+
+def motion(signal, cutoff=17.0) -> Motion:
+    """The Motion of a Signal, as `resample` makes it."""
+    dq = signal.dq if signal.velocity == "logged" else None
+    smooth = measured_motion(signal.q, dq, signal.segment, signal.rate, cutoff)
+    return resample.without_noise(signal, smooth, cutoff)
+
+
+def models(signals, fits, predictions=(), fit="independent.lse", robot=ARM) -> list[JointModel | Diagnostic]:
+    """What `predict` makes of the joints of a log."""
+    return list(predict.apply([motion(s) for s in signals], predictions, fits, robot, fit=fit))
 
 
 def write_csv(file: Path, signals, extra=None) -> None:

@@ -15,7 +15,7 @@ from davinci_forces.maths.estimation.conic import ENTRIES, nearest, scaled
 from davinci_forces.maths.estimation.least_squares import triangle
 from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias, pseudo_inertias
 from davinci_forces.maths.models.model import ArmMotion, Mechanism, of_signs
-from davinci_forces.records import Diagnostic, Fit, Smoothed
+from davinci_forces.records import Diagnostic, Fit, Motion
 from davinci_forces.robots.dvrk_psm import ROBOT
 from davinci_forces.robots.models import coupled
 from davinci_forces.stages.model import choose, fit
@@ -233,14 +233,16 @@ def test_what_the_solver_does_not_reach_is_refused_with_how_far_it_came(monkeypa
 # The stages
 
 
-def smoothed(tau: np.ndarray) -> list[Smoothed]:
+def smoothed(tau: np.ndarray) -> list[Motion]:
     """The records of a log in which the three joints move so."""
     motion = wandering()
     about = dict.fromkeys(("sigma_q", "sigma_dq", "sigma_tau"), 1e-4) | {"log": "one", "rate": RATE, "at_rest": 0}
+    about |= {"role": "identification", "velocity": "logged", "cutoff": 17.0, "effort_lag": 0.0}
     t, segment = np.arange(N) / RATE, np.zeros(N, int)
     return [
-        Smoothed(joint=joint.name, t=t, q=motion.q[:, i], dq=motion.dq[:, i], ddq=motion.ddq[:, i], tau=tau[:, i],
-                 segment=segment, standing=np.zeros(N, int), **about)
+        Motion(joint=joint.name, t=t, q=motion.q[:, i], dq=motion.dq[:, i], ddq=motion.ddq[:, i], tau=tau[:, i],
+               q_measured=motion.q[:, i], dq_measured=motion.dq[:, i], segment=segment, standing=np.zeros(N, int),
+               **about)
         for i, joint in enumerate(ROBOT.joints[:3])
     ]  # fmt: skip
 

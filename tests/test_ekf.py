@@ -211,9 +211,8 @@ def identified():
     signal = arm.signal()
     made = list(fit.run([trajectory(signal)], [], arm.ARM, lowpass=17.0))
     fits, noises = ([r for r in made if isinstance(r, kind)] for kind in (Fit, MeasurementNoise))
-    about = (entry(), arm.ARM)
-    tunings = list(tune.run([signal], fits, [], noises, *about, fit="independent.lse", lowpass=17.0))
-    return fits, list(tune.gather(tunings))
+    [model], [noise] = arm.models([signal], fits), noises
+    return fits, list(tune.gather(list(tune.run(model, noise, lowpass=17.0))))
 
 
 def test_an_inertia_that_is_not_positive_is_left_to_what_fit_says_of_it():
@@ -221,21 +220,17 @@ def test_an_inertia_that_is_not_positive_is_left_to_what_fit_says_of_it():
     signal = arm.signal()
     backward = replace(signal, tau=-signal.tau)
     made = list(fit.run([trajectory(backward)], [], arm.ARM, lowpass=17.0))
-    fits, noises = ([r for r in made if isinstance(r, kind)] for kind in (Fit, MeasurementNoise))
-    said = list(tune.run([signal], fits, [], noises, entry(), arm.ARM, fit="independent.lse", lowpass=17.0))
-    (text,) = [text for diagnostic in said for text in diagnostic.text]
+    fits = [r for r in made if isinstance(r, Fit)]
+    (text,) = [text for diagnostic in arm.models([signal], fits) for text in diagnostic.text]
     assert "the inertia of independent.lse is not positive" in text
     assert "what `fit` says of hand_roll tells why" in text
     assert any("hand_roll: " in t and "inertia" in t for r in made if isinstance(r, Diagnostic) for t in r.text)
 
 
 def tracked(identified, signal, bands=(), **changes):
-    fits, noises = identified
-    made = stage.run(
-        [signal], fits, [], noises, bands, [], entry(role=signal.role, **changes), arm.ARM, fit="independent.lse",
-        lowpass=17.0, q_tau=0.0,
-    )  # fmt: skip
-    return list(made)
+    fits, [noise] = identified
+    [model], about = arm.models([signal], fits), entry(role=signal.role, **changes)
+    return list(stage.run(model, noise, next(iter(bands), None), about, arm.joint(signal.joint), q_tau=0.0))
 
 
 def pushed(**changes):
@@ -325,18 +320,15 @@ def test_a_clock_that_is_wrong_by_a_thousand_is_said_and_not_believed(identified
 
 
 def test_a_joint_without_a_fit_is_noted_not_guessed(identified):
-    [made] = tracked(identified, arm.signal("hand_pitch"))
+    [made] = arm.models([arm.signal("hand_pitch")], identified[0])
     assert isinstance(made, Diagnostic)
     assert "no identification log moves this joint" in made.text[0]
 
 
 def test_a_fit_that_does_not_exist_is_refused_with_those_there_are(identified):
     says = "no fit 'coupled.pso'; set fit in [settings] to one of independent.lse, "
-    fits, noises = identified
-    about = (entry(), arm.ARM)
-    run = stage.run([arm.signal()], fits, [], noises, [], [], *about, fit="coupled.pso", lowpass=17.0, q_tau=0.0)
     with pytest.raises(PipelineError, match=re.escape(says)):
-        list(run)
+        arm.models([arm.signal()], identified[0], fit="coupled.pso")
 
 
 def test_white_noise_is_called_white_as_often_as_the_level_says():

@@ -26,7 +26,7 @@ from davinci_forces.records import (
 )
 from davinci_forces.robots.models import independent
 from davinci_forces.stages.model import fit, predict
-from davinci_forces.stages.recordings import average, differentiate, smooth
+from davinci_forces.stages.recordings import average, differentiate
 from tests import arm
 from tests.test_averaging import entry
 
@@ -172,9 +172,9 @@ def test_a_harmonic_that_is_left_out_is_remarked_on():
 
 def predictions(signal, role, fitted, trajectories=(), **changes):
     made, about = fitted_to(trajectories), entry(name=signal.log, role=role, **changes)
-    paths, cross_fits = ([r for r in made if isinstance(r, kind)] for kind in (FittedPaths, CrossFit))
-    own, smoothed = [t for t in trajectories if t.log == signal.log], smooth.run(signal, about, lowpass=17.0)
-    every = predict.run([signal], smoothed, own, paths, fitted, cross_fits, [], about, arm.ARM, lowpass=17.0)
+    identified = [*fitted, *(r for r in made if isinstance(r, (FittedPaths, CrossFit)))]
+    own = [t for t in trajectories if t.log == signal.log]
+    every = predict.run([arm.motion(replace(signal, role=role))], own, identified, about, arm.ARM, lowpass=17.0)
     return [r for r in every if not isinstance(r, Prediction) or r.model != "chosen"]
 
 

@@ -1,9 +1,10 @@
 """Stage `whiteness`: which models of a joint a log is explained by."""
 
 import numpy as np
-from davinci_forces.identification.driving import driving, motions_of
 
-from davinci_forces.records import Fit
+from davinci_forces.identification.joint_models import Along
+from davinci_forces.identification.used import Identified
+from davinci_forces.records import Fit, JointModel
 from davinci_forces.robots import davinci
 from davinci_forces.robots.models import coupled, independent
 from davinci_forces.stages.forces.whiteness import THIS_LOG, others
@@ -23,9 +24,10 @@ def fit(model: str) -> Fit:
 
 def told_by(signals) -> list[str]:
     """What the roll of a log with these joints is explained by, where it was fitted alone and with the whole arm."""
-    motions, fits = motions_of(signals, 17.0), [fit("independent"), fit("coupled")]
-    own = driving(signals[0], motions, fits[0], davinci.ROBOT)
-    return [name for name, _ in others(own, motions, fits, davinci.ROBOT, np.ones(len(signals[0]), bool))]
+    fits = [fit("independent"), fit("coupled")]
+    along = Along(Identified(davinci.ROBOT, fits), [arm.motion(signal) for signal in signals])
+    model = next(m for m in arm.models(signals, fits, robot=davinci.ROBOT) if isinstance(m, JointModel))
+    return [name for name, _ in others(model, along, np.ones(len(model), bool))]
 
 
 def test_a_log_without_the_other_joints_is_explained_by_what_needs_them_not():

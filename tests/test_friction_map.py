@@ -1,5 +1,7 @@
 """Friction over velocity: what the rest of a model leaves of the effort, in both directions and on both branches."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -9,7 +11,6 @@ from davinci_forces.maths.signals.velocity_map import RANGES, over_velocity
 from davinci_forces.records import Fit, FrictionMap, Signal
 from davinci_forces.stages.model import chart, fit
 from tests import arm
-from tests.test_averaging import entry
 from tests.test_estimation import trajectory
 
 T = np.arange(2000) / 200.0
@@ -17,7 +18,7 @@ T = np.arange(2000) / 200.0
 
 def charts(signal: Signal, fitted: Signal, role: str = "identification") -> list[FrictionMap]:
     fits = [r for r in fit.run([trajectory(fitted)], [], arm.ARM, lowpass=17.0) if isinstance(r, Fit)]
-    return list(chart.run(signal, fits, entry(role=role), arm.ARM, lowpass=17.0))
+    return list(chart.run(arm.motion(replace(signal, role=role)), fits, arm.ARM, lowpass=17.0))
 
 
 def test_means_are_those_of_the_samples_in_a_range_and_on_a_branch():

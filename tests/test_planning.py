@@ -3,6 +3,7 @@
 import pickle
 import sys
 from collections import Counter
+from dataclasses import replace
 
 import pytest
 
@@ -33,7 +34,8 @@ def plan(tmp_path) -> Plan:
         ledger.write(Entry(stage, task, {"code": {}}, outputs))
 
     for log in (*LOGS, "gone"):
-        write("resample", log, *(f"signal/{log}/{joint}" for joint in (PITCH, ROLL)))
+        write("resample", log, *(f"{kind}/{log}/{joint}" for kind in ("signal", "motion") for joint in (PITCH, ROLL)))
+        write("predict", log, *(f"joint_model/{log}/{joint}" for joint in (PITCH, ROLL)))
         write("differentiate", log, *(f"trajectory/{log}/{joint}" for joint in (PITCH, ROLL)))
     joints = (PITCH, ROLL)
     pooled = [f"{kind}/{joint}/independent.lse" for kind in ("fit", "cross_fit") for joint in joints]
@@ -73,16 +75,25 @@ def test_a_call_gets_the_records_about_its_own_log_and_joint(plan):
     handed = {p: [str(place) for _, place in r] for p, r in tasks["zebra"].records.items()}
     joints = (ROLL, PITCH)
     assert handed == {
-        "signals": [f"signal/zebra/{joint}.parquet" for joint in joints],
-        "smoothed": [],
+        "motions": [f"motion/zebra/{joint}.parquet" for joint in joints],
         "trajectories": [f"trajectory/zebra/{joint}.parquet" for joint in joints],
-        "paths": [f"fitted_paths/{joint}.parquet" for joint in joints],
-        "fits": [f"fit/{joint}/independent.lse.parquet" for joint in joints],
-        "cross_fits": [f"cross_fit/{joint}/independent.lse.parquet" for joint in joints],
-        "choices": [],
+        "fits": [
+            *(f"{kind}/{joint}/independent.lse.parquet" for kind in ("fit", "cross_fit") for joint in joints),
+            *(f"fitted_paths/{joint}.parquet" for joint in joints),
+        ],
     }
     [whole] = plan.tasks(declaration("fit"))
     assert len(whole.records["trajectories"]) == len(LOGS) * 2
+
+
+def test_a_fit_reads_the_motion_of_identification_logs_only(plan):
+    first, second = plan.study.logs
+    study = replace(plan.study, logs=(first, replace(second, role="validation")))
+    for stage in ("fit", "choose"):
+        [task] = Plan(study, plan.ledger).tasks(declaration(stage))
+        assert [place for _, place in task.records["motions"]] == [
+            f"motion/{first.name}/{joint}.parquet" for joint in (ROLL, PITCH)
+        ]
 
 
 @pytest.mark.parametrize("stage", ["ingest", "average", "resample", "predict", "ekf"])
@@ -104,7 +115,7 @@ def test_what_is_read_counts_by_name_type_and_unit_and_what_is_written_by_meanin
     from davinci_forces.records.quantities import QUANTITIES
 
     before = {stage: schemas(stage) for stage in ("predict", "fit", "whiteness")}
-    read = {"Signal", "Trajectory", "FittedPaths", "Fit", "CrossFit", "Smoothed", "Choice"}
+    read = {"Motion", "Trajectory", "FittedPaths", "Fit", "CrossFit", "Choice"}
     assert before["predict"].keys() == {*read, "Prediction", "Diagnostic"}
 
     def changed(**what: str) -> set[tuple[str, str]]:

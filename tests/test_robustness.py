@@ -89,13 +89,13 @@ def test_no_import_of_a_module_is_overlooked(file):
 def test_records_that_a_stage_comes_to_in_turn_are_read_then_and_not_kept(finished):
     """Or a stage of a long log would need memory for all joints, though it looks at one."""
     where = processed(finished)
-    [file] = (where / "signal").rglob("*.parquet")
+    [file] = (where / "motion").rglob("*.parquet")
     place = file.relative_to(where).as_posix()
     task = Task("predict", "one", Fingerprint({f"processed/{place}": ""}, {}, {}, {}, {}, ""))
-    signals = execution.InTurn(Folders(finished, where, where), task, (("Signal", place),))
-    assert declaration("predict").in_turn == {"signals"}
-    assert len(signals) == 1
-    [first], [again] = signals, signals
+    motions = execution.InTurn(Folders(finished, where, where), task, (("Motion", place),))
+    assert declaration("predict").in_turn == {"motions"}
+    assert len(motions) == 1
+    [first], [again] = motions, motions
     assert first.t.tolist() == again.t.tolist()
     held = weakref.ref(first)
     del first
@@ -376,7 +376,7 @@ def rest(columns):
 def test_a_stuck_sensor_a_saturated_drive_and_a_wrong_unit_are_said():
     assert remarked(lambda columns: None) == ""
     assert "stands still from 5.000 to 5.990 s and then jumps" in remarked(stop_sensor)
-    assert "stands still" not in remarked(rest)
+    assert "the position stands still" not in remarked(rest)
     limit = np.quantile(arm.signal("hand_roll", rate=100.0, periods=2).tau, 0.9)
     assert "was saturated" in remarked(lambda c: c.update(tau=np.minimum(c["tau"], limit)))
     in_mrad = remarked(lambda c: c.update(q=1000.0 * c["q"], dq=1000.0 * c["dq"]))

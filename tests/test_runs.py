@@ -315,7 +315,7 @@ def ran(study: Path) -> set[str]:
 
 def test_a_stage_of_a_fresh_study_runs_what_it_needs_and_nothing_else(study):
     said = call("fit", study)
-    assert ran(study) == {"ingest", "resample", "smooth", "average", "differentiate", "fit"}
+    assert ran(study) == {"ingest", "resample", "average", "differentiate", "fit"}
     assert "fit: it has not run yet" in said
     again = call("fit", study).splitlines()[1:]
     assert again == ["fit: 1 of 1 current", f"{study}: nothing to do, every stage is current"]
@@ -335,7 +335,7 @@ def test_what_a_stage_needs_runs_where_it_is_not_current_and_is_not_forced(finis
     (tasks / "average" / "slide.json").unlink()
     said = call("fit", finished, "--force").splitlines()[1:]
     assert said[:2] == ["average: slide: it has not run yet", "fit: --force"]
-    assert not [line for line in said if line.startswith(("ingest", "resample", "smooth", "differentiate"))]
+    assert not [line for line in said if line.startswith(("ingest", "resample", "differentiate"))]
 
 
 def test_units_meanings_and_origins_travel_with_the_file(analysed):

@@ -12,9 +12,9 @@ from davinci_forces.maths.selection.ridge import gathered
 from davinci_forces.maths.signals.noise import noise_std
 from davinci_forces.maths.signals.smoothing import lowpass
 from davinci_forces.maths.signals.standstill import HOLD, standing
-from davinci_forces.records import Average, Choice, Diagnostic, Fit, Prediction, Smoothed, Trajectory
+from davinci_forces.records import Average, Choice, Diagnostic, Fit, Prediction, Recording, Trajectory
 from davinci_forces.stages.model import choose, fit, predict
-from davinci_forces.stages.recordings import average, differentiate, smooth
+from davinci_forces.stages.recordings import average, differentiate, resample
 from davinci_forces.study import LogEntry
 from tests import arm
 
@@ -104,17 +104,16 @@ def stopped(stuck: float):
 
 def chosen(signal, named="chosen"):
     """What the stages up to `predict` make of one log."""
-    smoothed = list(smooth.run(signal, ENTRY, lowpass=LOWPASS))
+    motion = arm.motion(signal, LOWPASS)
     [mean] = [r for r in average.run([signal], ENTRY, arm.ARM, harmonics=0, lowpass=LOWPASS) if isinstance(r, Average)]
-    records = [r for r in smoothed if isinstance(r, Smoothed)]
     joint = arm.joint("hand_roll")
     [own] = [
         r for r in differentiate.run(mean, joint, derivative="harmonics", harmonics=0) if isinstance(r, Trajectory)
     ]
-    made = list(choose.run(records, [mean], arm.ARM, fit=named, lowpass=LOWPASS))
-    fits = [r for r in fit.run([own], records, arm.ARM, lowpass=LOWPASS) if isinstance(r, Fit)]
-    cv = predict.run([signal], records, [own], [], fits, [], [], ENTRY, arm.ARM, lowpass=LOWPASS)
-    return [*smoothed, mean, *made, *(r for r in cv if isinstance(r, Prediction))]
+    made = list(choose.run([motion], [mean], arm.ARM, fit=named, lowpass=LOWPASS))
+    fits = [r for r in fit.run([own], [motion], arm.ARM, lowpass=LOWPASS) if isinstance(r, Fit)]
+    cv = predict.run([motion], [own], fits, ENTRY, arm.ARM, lowpass=LOWPASS)
+    return [mean, *made, *(r for r in cv if isinstance(r, Prediction))]
 
 
 @pytest.fixture(scope="module")
@@ -136,12 +135,20 @@ def test_what_friction_holds_in_a_stop_moves_no_parameter_and_no_score(held):
         assert a.relative_error < 0.05
 
 
-def test_the_reviewer_is_told_when_a_joint_stands_still(held):
-    [note] = [r for r in kinds(held[0.2], Diagnostic) if r.stage == "smooth"]
+def resampled(signal, role="identification"):
+    columns = {name: getattr(signal, name) for name in ("t", "q", "dq", "tau")}
+    recording = Recording("run", "hand_roll", role, RATE, "logged", **columns)
+    return list(resample.run(recording, arm.joint("hand_roll"), lowpass=LOWPASS))
+
+
+def test_the_reviewer_is_told_when_a_joint_stands_still():
+    signal, _ = stopped(0.2)
+    [note] = kinds(resampled(signal), Diagnostic)
     assert note.severity[0] == "note"
     assert "run/hand_roll: it stands still from 3" in note.text[0]
     assert "to 45.99 s, 13 % of the log" in note.text[0]
-    assert not [r for r in smooth.run(arm.signal(), ENTRY, lowpass=LOWPASS) if isinstance(r, Diagnostic)]
+    assert not kinds(resampled(arm.signal()), Diagnostic)
+    assert not kinds(resampled(signal, "validation"), Diagnostic)
 
 
 def test_every_fit_states_its_error_without_a_period_beside_the_joint_s_own_and_over_the_same_samples(held):

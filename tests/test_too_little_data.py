@@ -5,9 +5,7 @@ import pytest
 
 from davinci_forces.records import Choice, Diagnostic, Fit, Signal
 from davinci_forces.stages.model import choose, fit
-from davinci_forces.stages.recordings import smooth
 from tests import arm
-from tests.test_averaging import entry
 from tests.test_estimation import trajectory
 
 RATE = 100.0
@@ -29,9 +27,9 @@ def constant(samples: int) -> Signal:
 
 def said(stage, *signals) -> tuple[list, str]:
     """What a stage makes of signals that do not repeat, and what it says."""
-    smoothed = [record for s in signals for record in smooth.run(s, entry(), lowpass=17.0)]
+    motions = [arm.motion(s) for s in signals]
     settings = {"lowpass": 17.0, **({"fit": "chosen"} if stage is choose else {})}
-    made = list(stage.run(*(([], smoothed) if stage is fit else (smoothed, [])), arm.ARM, **settings))
+    made = list(stage.run(*(([], motions) if stage is fit else (motions, [])), arm.ARM, **settings))
     texts = [text for record in made if isinstance(record, Diagnostic) for text in record.text]
     return [record for record in made if not isinstance(record, Diagnostic)], " ".join(texts)
 

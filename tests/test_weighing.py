@@ -9,10 +9,11 @@ from numpy.testing import assert_allclose
 from davinci_forces.maths.contact.weighing import PARTS, Rows, Weighed, better, offset, weighed, widening
 from davinci_forces.maths.mechanics.load import unit_load
 from davinci_forces.maths.periods.shift import circular, rolled, straight
-from davinci_forces.records import Diagnostic, FreeWeight, Load, Prediction, Signal, Track, Weight
+from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Motion, Signal, Weight
 from davinci_forces.robots import dvrk_psm
 from davinci_forces.stages import weigh
 from davinci_forces.study import HungMass, Weighing, Weighings
+from tests import arm
 from tests.arm import ARM
 from tests.test_averaging import entry
 
@@ -122,36 +123,36 @@ def left_by_the_model(t, seed):
 
 
 def log(name, role, seed, hung=None, path=0.0, day=0.0, t=T):
-    """Signals, tracks and predictions of one log; `hung` says what truly hangs."""
+    """Models and motions of one log; `hung` says what truly hangs."""
     q, dq, ddq = motion(path, t)
     tau = left_by_the_model(t, seed) + day
     if hung is not None:
         tau = tau + MASS * unit_load(ROBOT.chain, "end_link", hung, q, dq, ddq)
     segment = np.zeros(len(t), int)
-    signals = [
-        Signal(name, joint, role, RATE, "as recorded", "logged", 0, 0, t=t, q=q[:, i], dq=dq[:, i], tau=tau[:, i],
-               segment=segment) for i, joint in enumerate(JOINTS)
+    motions = [
+        arm.motion(Signal(name, joint, role, RATE, "as recorded", "logged", 0, 0, t=t, q=q[:, i], dq=dq[:, i],
+                          tau=tau[:, i], segment=segment)) for i, joint in enumerate(JOINTS)
     ]  # fmt: skip
-    tracks, predictions = [], []
-    for i, joint in enumerate(JOINTS):
-        scalars = dict.fromkeys(Track.scalars(), 0.0) | {"log": name, "joint": joint, "role": role, "model": "m"}
-        scalars |= {"estimator": "e", "filter": "ekf", "at_rest": 0, "rate": RATE}
-        columns = dict.fromkeys(Track.columns(), np.zeros(len(t))) | {"t": t, "tau": tau[:, i], "q": q[:, i]}
-        tracks.append(Track(**scalars, **columns))
-        scores = dict.fromkeys(Prediction.scalars(), 0.0) | {"log": name, "joint": joint, "role": role}
-        scores |= {"model": "chosen", "estimator": "m.e", "scheme": "s", "path": "p"}
-        predictions.append(Prediction(**scores, t=t, tau=tau[:, i], tau_hat=np.zeros(len(t))))
-    return signals, tracks, predictions
+    return [described(one) for one in motions], motions
+
+
+def described(one):
+    """A model that predicts no effort, refits or not."""
+    scalars = dict.fromkeys(JointModel.scalars(), 0.0) | {"model": "m", "estimator": "e", "scheme": "s", "path": "p"}
+    columns = dict.fromkeys(JointModel.columns(), np.zeros(len(one)))
+    names = (*Motion.scalars(), *Motion.columns())
+    kept = {name: getattr(one, name) for name in names if name in scalars or name in columns}
+    return JointModel(**(scalars | columns | kept))
 
 
 def analysed(logs, weighing, robot=ROBOT):
     """What both stages make of logs: by kind."""
     about = Weighings((weighing,))
     loads, said = [], []
-    for signals, tracks, predictions in logs:
-        first = signals[0]
+    for models, motions in logs:
+        first = motions[0]
         its = entry(name=first.log, role=first.role, weight=weighing.weight if first.log == weighing.log else None)
-        for record in weigh.run(signals, tracks, predictions, its, robot, about, fit="chosen", lowpass=17.0):
+        for record in weigh.run(models, motions, its, robot, about, lowpass=17.0):
             (loads if isinstance(record, Load) else said).append(record)
     made = list(weigh.gather(loads, robot, about))
     weights = [record for record in made if isinstance(record, Weight)]

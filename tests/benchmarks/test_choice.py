@@ -5,7 +5,7 @@ import time
 import numpy as np
 
 from davinci_forces.maths.models.model import ArmMotion
-from davinci_forces.records import Choice, Smoothed
+from davinci_forces.records import Choice, Motion
 from davinci_forces.robots.dvrk_psm import ROBOT
 from davinci_forces.robots.models import coupled
 from davinci_forces.stages.model import choose
@@ -14,7 +14,7 @@ LOGS, SAMPLES, RATE = 6, 6000, 200.0
 AT_MOST = 15.0  # [s] of one core
 
 
-def smoothed() -> list[Smoothed]:
+def smoothed() -> list[Motion]:
     """Six logs of an arm whose three joints move, each on a path of its own that does not repeat."""
     random = np.random.default_rng(0)
     t, model = np.arange(SAMPLES) / RATE, coupled(ROBOT, [0, 1, 2], [(), (), ()])
@@ -31,8 +31,9 @@ def smoothed() -> list[Smoothed]:
         for i, joint in enumerate(ROBOT.joints):
             zero = np.zeros(SAMPLES, int)
             columns = {"t": t, "q": q[:, i], "dq": dq[:, i], "ddq": ddq[:, i], "tau": tau[:, i]}
-            columns |= {"segment": zero, "standing": zero}
-            records.append(Smoothed(f"run{number}", joint.name, RATE, 0, 0.0, 0.0, 0.0, **columns))
+            columns |= {"q_measured": q[:, i], "dq_measured": dq[:, i], "segment": zero, "standing": zero}
+            about = ("identification", RATE, "logged", 17.0, 0.0, 0, 0.0, 0.0, 0.0)
+            records.append(Motion(f"run{number}", joint.name, *about, **columns))
     return records
 
 

@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import contextmanager
 from importlib import import_module
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ from davinci_forces.stages import STAGES, module
 from tests.contracts.conftest import Lab, shorten
 
 STEP = pytest.mark.parametrize("step", every_step())
+MOST = 7  # parameters of a function of a stage: records, what the study says, and settings
 
 
 @pytest.mark.parametrize("stage", STAGES)
@@ -37,6 +39,11 @@ def test_the_declaration_parses_and_the_function_says_what_it_does(step: str):
     assert len(asks.each) <= 1  # of two, the runner could not tell how often to call it
     assert [parameter for group in groups for parameter, kinds in group.items() if not kinds] == []
     assert asks.makes
+
+
+@STEP
+def test_a_function_of_a_stage_asks_for_at_most_seven_things(step: str):
+    assert len(signature(function_of(step)).parameters) <= MOST
 
 
 def arguments(lab: Lab, task: Task) -> dict[str, Any]:

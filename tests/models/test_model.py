@@ -18,7 +18,7 @@ from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.memory import deflection, driven, efforts, pieces
 from davinci_forces.maths.models.model import ArmMotion
-from davinci_forces.records import Smoothed
+from davinci_forces.records import Motion
 from davinci_forces.robots.davinci_chain import BODIES, CHAIN
 
 DAHL = terms.presliding(0.01)
@@ -101,8 +101,9 @@ def test_rows_for_a_fit_are_low_passed_piece_by_piece_as_they_would_be_at_once(m
     motion, tau = wandering(3000, segments=2), np.random.default_rng(2).normal(size=(3000, 2))
     t, still = np.arange(3000) * T_S, np.zeros(3000, np.int64)
     columns = zip(("one", "two"), motion.q.T, motion.dq.T, motion.ddq.T, tau.T, strict=True)
+    about = ("identification", 1 / T_S, "logged", 4.0, 0.0, 0, 0.0, 0.0, 0.0)
     records = [
-        Smoothed("log", name, 1 / T_S, 0, 0.0, 0.0, 0.0, t, q, dq, ddq, own, motion.segment, still)
+        Motion("log", name, *about, t, q, dq, ddq, q, dq, own, motion.segment, still)
         for name, q, dq, ddq, own in columns
     ]
     log = observed(records, (), 4.0, 0)

@@ -56,6 +56,8 @@ def driven_smooth(model: JointModel) -> list[Driven]:
 
 
 def _segments(model: JointModel, q: Array, dq: Array, known: Array) -> list[Driven]:
-    joint, first_std = JointDynamics(model.inertia, model.coefficients, known), float(np.std(model.tau)) or 1.0
+    gravity, friction = (model.gravity_sine, model.gravity_cosine), (model.viscous, model.coulomb, model.presliding)
+    joint = JointDynamics(model.inertia, (model.constant, *gravity, model.spring, *friction), known)
+    first_std = float(np.std(model.tau)) or 1.0
     whole = Driven(joint, q, dq, model.ddq, model.tau, 1.0 / model.rate, first_std)
     return [whole.part(part) for part in segments(model.segment)]

@@ -14,6 +14,9 @@ from davinci_forces.maths.models.model import ArmMotion, JointDynamics
 from davinci_forces.records import Fit, JointModel, Motion
 from davinci_forces.robots.models import ARM
 
+# What a record calls the coefficients of the bias, in their order in `maths.models.bias`.
+BIAS = ("constant", "gravity_sine", "gravity_cosine", "spring", "viscous", "coulomb", "presliding")
+
 
 class Along:
     """What fits say of the joints of one log; what the joints of an arm share is worked out once."""
@@ -52,11 +55,10 @@ class Along:
     def by(self, fit: Fit, joint: str) -> dict[str, Any]:
         """The fields of a JointModel that follow from a fit."""
         dynamics = self.dynamics(fit, joint)
-        names = ("constant", "gravity_sine", "gravity_cosine", "spring", "viscous", "coulomb", "presliding")
         return {
             "model": fit.model, "estimator": fit.estimator, "inertia": dynamics.inertia, "tau_known": dynamics.known,
             "tau_hat": self.tau_hat(fit, joint),
-            **dict(zip(names, map(float, dynamics.coefficients), strict=True)),
+            **dict(zip(BIAS, map(float, dynamics.coefficients), strict=True)),
         }  # fmt: skip
 
     def under(self, model: JointModel, fit: Fit) -> JointModel:

@@ -94,9 +94,3 @@ class JointModel(Record):
     tau_known: Column
     tau_hat: Column
     tau_hat_unseen: Column
-
-    @property
-    def coefficients(self) -> tuple[float, float, float, float, float, float, float]:
-        """Those of the bias b, in the order of `maths.models.bias.COEFFICIENTS`."""
-        gravity = (self.constant, self.gravity_sine, self.gravity_cosine)
-        return (*gravity, self.spring, self.viscous, self.coulomb, self.presliding)

@@ -57,7 +57,7 @@ def run(
     hung = [w for w in weighings.each if entry.role in FREE or w.log == entry.name]
     if hung and robot.chain is None:
         said = f"{entry.name}: {robot.name} has no chain, so what a mass asks of its joints is not known"
-        yield diagnostic("weigh", entry.name, "note", f"{said}; nothing is loaded")
+        yield diagnostic("weigh", entry.name, "note", f"{said}; nothing is weighed")
         return
     moving = [model for model in models if not model.at_rest and len(model) == len(motions[0])]
     loaded = [model for model in moving if not robot.joint(model.joint).effort]

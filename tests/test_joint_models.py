@@ -1,0 +1,145 @@
+"""The motion of a joint without noise, and its model along a log, which all later stages start from."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose, assert_array_equal
+
+from davinci_forces.filters.problem import driven
+from davinci_forces.maths.models.bias import bias
+from davinci_forces.maths.models.independent import regressor
+from davinci_forces.maths.signals.noise import noise_std
+from davinci_forces.maths.signals.smoothing import lowpass, measured_motion
+from davinci_forces.records import Diagnostic, Fit, JointModel, Motion, Prediction, Recording, Signal
+from davinci_forces.stages.model import fit, predict
+from davinci_forces.stages.recordings import resample
+from davinci_forces.study.entries import ROLES
+from tests import arm
+from tests.test_averaging import entry
+from tests.test_estimation import trajectory
+
+RATE, CUTOFF = 100.0, 17.0
+
+
+def resampled(role="identification", velocity="logged", gap=False) -> tuple[Signal, Motion]:
+    signal = arm.signal(periods=2)
+    kept = np.abs(signal.t - 12.0) > 1.0 if gap else np.ones(len(signal), bool)
+    columns = {name: getattr(signal, name)[kept] for name in ("t", "q", "dq", "tau")}
+    made = list(resample.run(Recording("run", "hand_roll", role, RATE, velocity, **columns), arm.joint("hand_roll"),
+                             lowpass=CUTOFF))  # fmt: skip
+    return tuple(next(record for record in made if isinstance(record, kind)) for kind in (Signal, Motion))
+
+
+@pytest.mark.parametrize("role", ROLES)
+def test_every_log_has_its_motion_whatever_its_role(role):
+    signal, motion = resampled(role, gap=True)
+    assert (motion.role, motion.cutoff, motion.effort_lag, motion.at_rest) == (role, CUTOFF, 0.0, 0)
+    for name, measured in (("t", "t"), ("q", "q_measured"), ("dq", "dq_measured"), ("tau", "tau"), ("segment",) * 2):
+        assert_array_equal(getattr(signal, name), getattr(motion, measured))
+    assert set(motion.segment) == {0, 1}
+    for number in (0, 1):
+        part = motion.segment == number
+        assert_array_equal(motion.q[part], lowpass(signal.q[part], signal.rate, CUTOFF))
+        assert_array_equal(motion.dq[part], lowpass(signal.dq[part], signal.rate, CUTOFF))
+        assert_array_equal(motion.ddq[part], np.gradient(motion.dq[part], 1.0 / signal.rate))
+    for x, sigma in ((signal.q, "sigma_q"), (signal.dq, "sigma_dq"), (signal.tau, "sigma_tau")):
+        assert getattr(motion, sigma) == noise_std(x, signal.segment, signal.rate, CUTOFF)
+
+
+def test_a_velocity_that_was_not_logged_is_that_of_the_low_passed_position():
+    signal, motion = resampled(velocity="derived")
+    assert_array_equal(motion.dq, np.gradient(motion.q, 1.0 / signal.rate))
+    assert_array_equal(signal.dq, motion.dq)
+    assert motion.sigma_dq == noise_std(signal.dq, signal.segment, signal.rate, CUTOFF)
+
+
+def test_a_lag_of_the_effort_gives_the_motion_so_long_before_within_each_segment():
+    t, lag = np.arange(2000) / RATE, 0.0137
+    segment = (t > 9.0).astype(int)
+    columns = [
+        measured_motion(np.sin(4 * t), 4 * np.cos(4 * t), segment, RATE, CUTOFF, lag=late) for late in (0.0, lag)
+    ]
+    inside = (np.abs(t - 9.0) > 0.5) & (t > 0.5) & (t < 19.5)
+    for at_once, before, wanted in zip(*columns, (np.sin, lambda x: 4 * np.cos(x)), strict=False):
+        assert_allclose(before[inside], wanted(4 * (t - lag))[inside], atol=1e-3)
+        first = np.flatnonzero(segment)[0]
+        assert before[0] == pytest.approx(at_once[0])
+        assert before[first] == pytest.approx(at_once[first])
+
+
+@pytest.fixture(scope="module")
+def identified() -> tuple[Signal, list[Fit], list[Prediction]]:
+    """Three periods and a half of the roll, their fits, and what refits without a period predict of them."""
+    signal = arm.signal(periods=3.5)
+    own, motion = trajectory(signal), arm.motion(signal)
+    fits = [r for r in fit.run([own], [motion], arm.ARM, lowpass=CUTOFF) if isinstance(r, Fit)]
+    made = predict.run([motion], [own], fits, entry(), arm.ARM, lowpass=CUTOFF)
+    return signal, fits, [r for r in made if isinstance(r, Prediction)]
+
+
+def test_the_model_of_a_joint_is_its_fit_along_the_low_passed_motion(identified):
+    signal, fits, _ = identified
+    [model], motion = arm.models([signal], fits, fit="independent.huber"), arm.motion(signal)
+    theta = next(f.theta for f in fits if f.estimator == "huber")
+    assert (model.model, model.estimator, model.stand_in) == ("independent", "huber", "")
+    terms = arm.joint("hand_roll").terms
+    assert_allclose(model.tau_hat, regressor(terms, motion.q, motion.dq, motion.ddq) @ theta)
+    b, _, _ = bias(driven(model)[0].joint.coefficients, model.q, model.dq, 0.0)
+    assert_allclose(model.inertia * model.ddq + b + model.tau_known, model.tau_hat)
+    assert_array_equal(model.q_measured, signal.q)
+
+
+def test_an_identification_log_is_predicted_by_refits_that_had_not_seen_the_sample(identified):
+    signal, fits, predictions = identified
+    [model] = arm.models([signal], fits, predictions)
+    refit = next(p for p in predictions if p.estimator == "lse")
+    there = signal.t < refit.t[-1] + 0.5 / RATE
+    assert_array_equal(model.tau_hat_unseen[there], refit.tau_hat)
+    assert np.isnan(model.tau_hat_unseen[~there]).sum() > 0.4 * 10.0 * RATE
+    assert (model.scheme, model.path, model.path_unseen) == ("leave one period out", "same path", "same path")
+    # A period of more effort moves what is predicted of the others, and not what is of its own.
+    more = replace(signal, tau=signal.tau + np.where((signal.t >= 10.0) & (signal.t < 20.0), np.sign(signal.dq), 0.0))
+    altered = predict.run([arm.motion(more)], [trajectory(more)], fits, entry(), arm.ARM, lowpass=CUTOFF)
+    [other] = arm.models([more], fits, [r for r in altered if isinstance(r, Prediction)])
+    moved = np.abs(other.tau_hat_unseen - model.tau_hat_unseen)
+    assert np.median(moved[1000:2000]) < 0.05 * np.median(moved[:1000])
+
+
+def test_no_refit_is_asked_of_a_log_that_no_fit_has_seen(identified):
+    signal, fits, predictions = identified
+    [model] = arm.models([replace(signal, role="validation")], fits, predictions)
+    assert np.isnan(model.tau_hat_unseen).all()
+    assert (model.scheme, model.path, model.path_unseen) == ("validation", "another path", "another path")
+    [model] = arm.models([signal], fits)
+    assert (model.scheme, model.path_unseen) == ("", "")
+
+
+def test_a_joint_without_a_model_says_why_once(identified):
+    signal, fits, _ = identified
+    backward = [replace(f, theta=-f.theta) for f in fits]
+    for role in ("identification", "validation", "contact", "weight", "tissue"):
+        each = replace(signal, role=role), replace(arm.signal("hand_pitch", periods=3.5), role=role)
+        model, pitch = arm.models(each, fits)
+        assert isinstance(model, JointModel)
+        assert isinstance(pitch, Diagnostic)
+        assert "run/hand_pitch: no identification log moves this joint" in pitch.text[0]
+        [wrong] = arm.models(each[:1], backward)
+        assert "the inertia of independent.lse is not positive" in wrong.text[0]
+    assert not arm.models([replace(signal, role="friction")], fits)
+
+
+def test_where_a_log_lacks_joints_of_the_chosen_model_that_of_the_joint_by_itself_stands_in(identified):
+    from davinci_forces.robots import davinci
+    from tests.test_explain import fit as of_roll
+
+    fits = [of_roll("independent"), of_roll("coupled")]
+    [note, model] = arm.models([identified[0]], fits, fit="coupled.lse", robot=davinci.ROBOT)
+    assert "the log does not hold the other joints that coupled.lse needs, so independent.lse is used" in note.text[0]
+    assert (model.model, note.text[0].endswith(model.stand_in)) == ("independent", True)
+
+
+def test_the_stage_has_a_record_of_its_own_for_every_joint_that_a_fit_describes(identified):
+    signal, fits, _ = identified
+    made = list(predict.apply([arm.motion(signal)], [], fits, arm.ARM, fit="independent.lse"))
+    assert [record.key for record in made] == [("run", "hand_roll")]
