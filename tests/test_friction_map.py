@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.signals.velocity_map import RANGES, over_velocity
 from davinci_forces.records import Fit, FrictionMap, Signal
-from davinci_forces.stages.model import chart, fit
+from davinci_forces.stages.model import choose, fit
 from tests import arm
 from tests.test_estimation import trajectory
 
@@ -18,7 +18,7 @@ T = np.arange(2000) / 200.0
 
 def charts(signal: Signal, fitted: Signal, role: str = "identification") -> list[FrictionMap]:
     fits = [r for r in fit.run([trajectory(fitted)], [], arm.ARM, lowpass=17.0) if isinstance(r, Fit)]
-    return list(chart.run(arm.motion(replace(signal, role=role)), fits, arm.ARM, lowpass=17.0))
+    return list(choose.apply(arm.motion(replace(signal, role=role)), fits, arm.ARM, lowpass=17.0))
 
 
 def test_means_are_those_of_the_samples_in_a_range_and_on_a_branch():

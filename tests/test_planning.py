@@ -153,8 +153,8 @@ def test_what_a_call_reads_does_not_grow_with_the_logs(few_and_many):
             "calibrate.gather",
             "assess.gather",
             "resolve.gather",
-            "limit",
-            "feel",
+            "haptic-limits",
+            "haptic-limits.gather",
         }
         assert {s for s, every in tasks.items() if len(every) == 1} == pooled
     assert reads[0] == reads[1]

@@ -1,4 +1,4 @@
-"""Stage `feel`: the simulated loop of a study, with what the study found of joint, noise and tissue."""
+"""Stage `haptic-limits`: the simulated loop of a study, with what the study found of joint, noise and tissue."""
 
 from dataclasses import replace
 
@@ -12,7 +12,7 @@ from davinci_forces.haptics.maths.delay import sampled_limit
 from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE
 from davinci_forces.records import FilterNoise, Fit, HapticResponse, HapticRun
 from davinci_forces.robots import davinci
-from davinci_forces.stages.tissue import feel
+from davinci_forces.stages.tissue import haptic_limits
 from davinci_forces.study import HapticScenario
 from tests.haptics.test_limit import stiffness
 
@@ -37,7 +37,7 @@ def noise(joint="instrument_slide") -> FilterNoise:
 
 
 def made(tissues, fits=(), noises=(), scenario=SCENARIO) -> list:
-    return list(feel.run(tissues, fits, noises, scenario, davinci.ROBOT, q_tau=0.0))
+    return list(haptic_limits.gather(tissues, fits, noises, scenario, davinci.ROBOT, q_tau=0.0))
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +72,7 @@ def test_a_stated_stiffness_takes_the_place_of_the_measured_one():
 
 
 def test_what_slides_is_the_joint_as_it_was_fitted():
-    body, arm_from = feel.fitted(davinci.ROBOT, [fit()], davinci.ROBOT.joint("instrument_slide"))
+    body, arm_from = haptic_limits.fitted(davinci.ROBOT, [fit()], davinci.ROBOT.joint("instrument_slide"))
     assert arm_from == "instrument_slide"
     assert_allclose([body.inertia, body.viscous, *body.coulomb], [2.0, 3.0, 4.5, 4.5])
     assert_allclose(body.gravity, -0.2 * 9.81)
@@ -80,8 +80,8 @@ def test_what_slides_is_the_joint_as_it_was_fitted():
 
 @pytest.mark.parametrize("fits", [[], [fit((-3.0, 1.0, 1.0, 1.0))]])
 def test_without_a_fit_that_can_be_it_is_the_thesis_s(fits):
-    assert feel.fitted(davinci.ROBOT, fits, davinci.ROBOT.joint("instrument_slide")) == (SLIDE, "the thesis")
-    assert feel.fitted(davinci.ROBOT, fits, None) == (SLIDE, "the thesis")
+    assert haptic_limits.fitted(davinci.ROBOT, fits, davinci.ROBOT.joint("instrument_slide")) == (SLIDE, "the thesis")
+    assert haptic_limits.fitted(davinci.ROBOT, fits, None) == (SLIDE, "the thesis")
 
 
 def test_the_filter_s_noise_is_the_joint_s(monkeypatch):

@@ -1,11 +1,14 @@
-"""Stage `limit`, and what the report says of it: the thesis's hand beside measured tissue and the filter's lag."""
+"""Stage `haptic-limits`, and what the report says of it: the thesis's hand beside measured tissue and a lag."""
 
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
+from davinci_forces.haptics.maths import thesis
 from davinci_forces.haptics.maths.bimodal import THESIS, cqlf_limit, switching_limit
 from davinci_forces.haptics.maths.delay import delay_limit, sampled_limit
+from davinci_forces.haptics.maths.lmi import holds
+from davinci_forces.haptics.maths.motion import leaving_limit
 from davinci_forces.records import (
     Comparison,
     DelayLimit,
@@ -16,7 +19,7 @@ from davinci_forces.records import (
     TissueLimit,
 )
 from davinci_forces.robots import davinci
-from davinci_forces.stages.tissue import limit
+from davinci_forces.stages.tissue import haptic_limits
 
 K = 457.24
 
@@ -35,7 +38,7 @@ def comparison(joint, delay, default=1) -> Comparison:
 
 
 def made(tissues, comparisons=()) -> list:
-    return list(limit.run(tissues, comparisons, davinci.ROBOT))
+    return list(haptic_limits.run(tissues, comparisons, davinci.ROBOT))
 
 
 def only(records, kind):
@@ -56,6 +59,16 @@ def test_the_map_is_cut_by_the_exact_border(records):
     assert np.array_equal(cells.has_cqlf == 1, cells.tissue_stiffness < border)
     assert 100 < cells.has_cqlf.sum() < 800
     assert (exact.k_t_switching > exact.k_t_cqlf).all()
+
+
+def test_what_is_shipped_of_the_thesis_s_hand_is_what_is_found_of_it():
+    for k, proved in zip(thesis.K_H.tolist(), thesis.PROVED, strict=True):
+        assert holds(THESIS._replace(k=k), thesis.K_T).tolist() == [i < proved for i in range(len(thesis.K_T))]
+    held = [sampled_limit(THESIS, delay, thesis.LINK_RATE) for delay in thesis.DELAYS.tolist()]
+    assert_allclose(thesis.HELD, held, rtol=1e-9)
+    simulated = thesis.DELAYS[thesis.SIMULATED].tolist()
+    leaving = [leaving_limit(THESIS, delay, delay_limit(THESIS, delay)) for delay in simulated]
+    assert_allclose(thesis.LEAVING, leaving, rtol=1e-9)
 
 
 def test_the_delay_s_limits_are_those_of_the_thesis_s_hand(records):

@@ -32,11 +32,11 @@ does not grow with the study, unless it is the only one of its function.  The re
 GROUPS = {
     "design": ("design",),
     "recordings": ("ingest", "resample", "average", "differentiate"),
-    "model": ("fit", "choose", "chart", "predict"),
+    "model": ("fit", "choose", "predict"),
     "forces": ("tune", "calibrate", "ekf", "assess", "measure", "benchmark", "whiteness"),
     "tip": ("resolve", "sense"),
     "weigh": ("weigh",),
-    "tissue": ("palpate", "limit", "feel"),
+    "tissue": ("palpate", "haptic-limits"),
 }
 STAGES = tuple(stage for stages in GROUPS.values() for stage in stages)
 

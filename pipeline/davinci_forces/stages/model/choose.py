@@ -1,4 +1,4 @@
-"""Choose a model of the arm by leaving out blocks of path, and fit it to all identification logs."""
+"""Choose a model of the arm by leaving out blocks of path, fit it to all identification logs and chart its friction."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
@@ -11,11 +11,27 @@ from davinci_forces.identification.candidates import Candidate, Library, candida
 from davinci_forces.identification.chosen import BlockEstimate, Selection, parameters, selected
 from davinci_forces.identification.mechanisms import NOTHING, held
 from davinci_forces.identification.observations import Observed, observed
+from davinci_forces.identification.regression import recorded_motion
 from davinci_forces.identification.unseen import predictions
+from davinci_forces.identification.used import Identified
 from davinci_forces.maths.models.model import Model
-from davinci_forces.records import Average, Choice, Diagnostic, Fit, Motion, Prediction, diagnostic
+from davinci_forces.maths.signals.noise import smoothed
+from davinci_forces.maths.signals.velocity_map import over_velocity
+from davinci_forces.records import (
+    Average,
+    Choice,
+    Diagnostic,
+    Fit,
+    FrictionMap,
+    Motion,
+    Prediction,
+    diagnostic,
+)
 from davinci_forces.robots.models import Reach
 from davinci_forces.robots.robot import Robot
+
+CHARTED_ROLES = ("identification", "friction")
+CHARTED_ESTIMATORS = ("lse", "ridge")  # the plain ones
 
 
 def run(
@@ -175,4 +191,39 @@ def fitted(candidate: Candidate, estimator: str, model: Model, library: Library,
         theta=estimate.theta,
         theta_std=estimate.theta_std,
         theta_std_classical=estimate.theta_std_classical,
+    )
+
+
+def apply(motion: Motion, fits: Iterable[Fit], robot: Robot, *, lowpass: float) -> Iterator[FrictionMap]:
+    """One FrictionMap per log that tells of friction, joint and model of the joint by itself.
+
+    Of a coupled arm the rest of the effort depends on other joints, which a log of one does not hold.
+    """
+    if motion.role not in CHARTED_ROLES or motion.at_rest:
+        return
+    identified = Identified(robot, fits)
+    for fit in identified.describing(motion.joint):
+        if fit.estimator in CHARTED_ESTIMATORS and fit.model.startswith("independent"):
+            yield charted(motion, fit, identified, lowpass)
+
+
+def charted(motion: Motion, fit: Fit, identified: Identified, lowpass: float) -> FrictionMap:
+    """tau - Phi_other theta_other, and Phi_friction theta_friction, as means over ranges of velocity."""
+    Phi, known = identified.model(fit).regressor(recorded_motion([motion]))
+    friction = np.array(["friction" in str(name) for name in fit.parameter])
+    left = smoothed(motion.tau, motion.segment, motion.rate, lowpass) - Phi[:, 0] @ np.where(friction, 0.0, fit.theta)
+    modelled = Phi[:, 0] @ np.where(friction, fit.theta, 0.0)
+    dq, ddq = motion.dq[known], motion.ddq[known]
+    found = over_velocity(dq, ddq, np.column_stack([left, modelled])[known])
+    return FrictionMap(
+        log=motion.log,
+        joint=motion.joint,
+        model=fit.model,
+        estimator=fit.estimator,
+        role=motion.role,
+        dq=found.dq,
+        gaining=found.gaining.astype(int),
+        tau_friction=found.mean[:, 0],
+        tau_friction_std=found.std[:, 0],
+        tau_friction_hat=found.mean[:, 1],
     )

@@ -1,0 +1,73 @@
+"""Steps of stages: what one needs of the others, and what an earlier version called stages."""
+
+import json
+import shutil
+from pathlib import Path
+
+import pytest
+
+import davinci_forces
+from davinci_forces.runner.graph import every_step, needed
+from davinci_forces.runner.ledger import Entry, Ledger
+from davinci_forces.runner.runs import folders
+from davinci_forces.runner.signature import stage_of, steps
+
+FIT = ["ingest", "resample", "smooth", "average", "differentiate", "fit"]
+
+
+@pytest.fixture
+def finished(analysed, tmp_path) -> Path:
+    """A copy of an analysed study, to be changed."""
+    shutil.copytree(analysed.parent.parent, tmp_path, dirs_exist_ok=True)
+    return tmp_path / "raw" / "arm"
+
+
+def test_a_stage_has_a_step_for_each_function_that_it_exports_in_their_order():
+    assert steps("fit") == ("fit",)
+    assert steps("tune") == ("tune", "tune.gather")
+    assert steps("resolve") == ("resolve", "resolve.gather", "resolve.apply")
+
+
+def test_a_stage_needs_the_steps_that_make_what_it_reads_and_no_other():
+    assert needed(["fit"]) == FIT
+    ekf = needed(["ekf"])
+    assert {"tune.gather", "calibrate", "calibrate.gather", "predict"} <= {*ekf}
+    assert not {"design", "choose.apply", "assess", "benchmark", "whiteness"} & {*ekf}
+    assert ekf == [step for step in every_step() if step in ekf]
+
+
+def test_a_group_needs_its_stages_whole_and_what_they_read():
+    model = needed(["model"])
+    assert model == [*FIT, "choose", "choose.apply", "predict"]
+    assert needed(["weigh"])[-2:] == ["weigh", "weigh.gather"]
+
+
+def test_names_in_any_order_are_taken_in_that_of_the_stages_and_the_report_needs_everything():
+    assert needed(["ekf", "fit"]) == needed(["ekf"])
+    assert needed(["fit", "report"]) == [*every_step(), "report"]
+
+
+def test_a_step_waits_for_those_before_it_and_says_the_name_of_its_stage(finished, capsys):
+    ledger = Ledger(folders(finished, None, None))
+    assert [stage_of(entry.stage) for entry in ledger.entries("tune.gather")] == ["tune"]
+    ledger.place("tune", "roll").unlink()
+    ledger.place("tune.gather", "gather").unlink()
+    assert davinci_forces.run(finished, "tune")
+    said = capsys.readouterr().out.splitlines()[1:]
+    assert said == ["tune: roll: it has not run yet", "tune: gather: it has not run yet", "tune: 3 of 5 current"]
+
+
+def test_what_was_made_under_the_name_of_a_stage_that_is_no_more_goes_and_is_made_anew(finished, capsys):
+    ledger = Ledger(folders(finished, None, None))
+    [entry] = ledger.entries("tune.gather")
+    stray = "processed/filter_noise/old.parquet"
+    shutil.copy(ledger.folders.file(next(iter(entry.outputs))), ledger.folders.file(stray))
+    sha = ledger.digest(stray)
+    ledger.write(Entry("settle", "settle", entry.fingerprint, {**entry.outputs, stray: sha}))
+    ledger.place("tune.gather", "gather").unlink()
+    assert json.loads(ledger.place("settle", "settle").read_text())["stage"] == "settle"
+    assert davinci_forces.run(finished, "tune")
+    assert "removed 3 files of settle under names that an earlier version used" in capsys.readouterr().out
+    assert not ledger.folders.file(stray).exists()
+    assert not ledger.place("settle", "settle").parent.exists()
+    assert all(ledger.folders.file(name).exists() for name in entry.outputs)
