@@ -5,7 +5,7 @@ from importlib import import_module
 
 import pytest
 
-from davinci_forces.records import KINDS
+from davinci_forces.records import KINDS, Track
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.report.changes import Stated
 from davinci_forces.report.content import Document, Equation, Figure, Figure3D, Number, Section, Table, name_of, walk
@@ -103,3 +103,13 @@ def test_the_sections_together_are_a_document_whose_labels_differ_and_whose_refe
     for _, names in DOCUMENTS.values():
         sections = tuple(section for name in names if (section := written(name, full)))
         assert len(place(Document("A test", "arm", True, sections))) == len(names)
+
+
+def test_methods_tell_of_the_stages_that_ran_and_of_no_other(lab: Lab, catalogue: Catalogue):
+    def told(about: Context) -> set[str | None]:
+        return {block.label for block in walk(written("methods", about)) if isinstance(block, Equation)}
+
+    every = {"motor", "averaging", "differentiation", "estimation", "model", "innovation", "correction"}
+    assert told(context(lab, catalogue)) == every
+    assert told(context(lab, without(catalogue, Track))) == every - {"model", "innovation", "correction"}
+    assert told(context(lab, without(catalogue, *KINDS.values()))) == set()

@@ -1,5 +1,6 @@
 """The PDF: text is text, figures are lines, nothing leaves the page; as poppler reads it, where it is installed."""
 
+import random
 import re
 import shutil
 import subprocess
@@ -97,6 +98,49 @@ def test_no_table_leaves_the_page_and_a_long_one_repeats_its_header(columns: int
     pages = read(rendered).rstrip("\f").split("\f")
     assert len(pages) > 1
     assert all("f0" in page for page in pages)
+
+
+@poppler
+def test_no_cell_of_any_table_leaves_the_page() -> None:
+    rng = random.Random(1)
+
+    def words() -> str:
+        return " ".join("".join(rng.choices("abcW_-/", k=rng.randint(1, 60))) for _ in range(rng.randint(1, 4)))
+
+    sizes = [(rng.randint(1, 12), rng.randint(1, 4)) for _ in range(40)]
+    tables = [
+        Table(
+            "T",
+            tuple(words() for _ in range(columns)),
+            tuple(tuple(words() for _ in range(columns)) for _ in range(rows)),
+        )
+        for columns, rows in sizes
+    ]
+    edges = [float(x) for x in re.findall(r'xMax="([\d.]+)"', read(pdf.render(one(*tables)), "-bbox"))]
+    assert len(edges) > 500
+    assert max(edges) <= (210 - 20) * MILLIMETRE + 0.5
+
+
+@poppler
+def test_letters_are_the_largest_at_which_no_line_of_a_table_breaks() -> None:
+    def height(columns: int) -> float:
+        row = ("realistic-validation",) * columns
+        page = read(pdf.render(one(Table("T", ("h",) * columns, (row,)))), "-bbox")
+        [top, bottom] = re.findall(r'yMin="([\d.]+)"[^>]*yMax="([\d.]+)">realistic-validation', page)[0]
+        return float(bottom) - float(top)
+
+    assert height(1) == pytest.approx(height(6), rel=1e-3)
+    assert height(7) == pytest.approx(height(1) * 8 / 9, rel=1e-3)
+
+
+@poppler
+def test_a_long_word_breaks_after_a_sign_and_loses_nothing() -> None:
+    word = "_".join(f"folder{i}" * 3 for i in range(12))
+    lines = re.sub("\N{ZERO WIDTH SPACE}", "", read(pdf.render(one(Prose(word))))).split("\n")
+    parts = [line for line in lines if line.startswith("folder")]
+    assert len(parts) > 2
+    assert "".join(parts) == word
+    assert all(line.endswith("_") for line in parts[:-1])
 
 
 @poppler

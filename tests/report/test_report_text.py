@@ -5,10 +5,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from report_documents import HOSTILE
 
-from davinci_forces.report.content import Document, Equation, Number, Prose, Section, Table, literal, numbers
+from davinci_forces.report.content import Document, Equation, Number, Prose, Section, Table, literal
 from davinci_forces.report.content.inline import Span, parse, printable
 from davinci_forces.report.content.layout import columns, place, references
-from davinci_forces.report.writers.widths import BREAK, PAGE, allow_breaks, fit_columns
 
 anything = st.text(st.one_of(st.sampled_from("\\$`*[]@a "), st.characters()))
 
@@ -70,10 +69,6 @@ def test_a_table_whose_rows_do_not_fit_its_header_is_refused() -> None:
         Table("T", ("a", "b"), (("1",),))
 
 
-def test_the_numbers_of_a_document_are_found_in_reading_order(full: Document) -> None:
-    assert [number.key for number in numbers(full)] == ["fit.a", None, None, None, "one.a"]
-
-
 def test_a_unit_that_a_column_shares_moves_to_its_header_and_others_stay() -> None:
     table = Table("T", ("name", "a", "b"), (("x", Number(1, "N m"), Number(1, "N")), ("y", "–", Number(2, "m"))))
     name, a, b = columns(table)
@@ -81,19 +76,3 @@ def test_a_unit_that_a_column_shares_moves_to_its_header_and_others_stay() -> No
     assert [cell.text for cell in a.cells] == ["1.000", "–"]
     assert [cell.text for cell in b.cells] == ["1.000 N", "2.000 m"]
     assert [column.align for column in (name, a, b)] == ["l", "r", "r"]
-
-
-@given(st.lists(st.lists(st.text("abc _", max_size=90), min_size=2, max_size=2), min_size=1, max_size=12))
-def test_fitted_columns_never_add_up_to_more_than_the_page_and_can_be_read(cells: list[list[str]]) -> None:
-    fitted = fit_columns(cells)
-    assert fitted.size >= 8
-    widths = [w for w in fitted.widths if w is not None]
-    assert sum(widths) <= PAGE + 1e-6
-    assert len(widths) in (0, len(cells))
-
-
-@given(st.text("ab/_.- ", max_size=200), st.integers(5, 50))
-def test_long_words_may_break_and_lose_nothing(text: str, longest: int) -> None:
-    broken = allow_breaks(text, longest)
-    assert broken.replace(BREAK, "") == text
-    assert all(len(piece) <= longest + 1 for piece in broken.replace(BREAK, " ").split())

@@ -1,6 +1,6 @@
 """What every section is handed: the records, the results, and how to name things."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 from davinci_forces.records import Fit, FreeSpace, Prediction, Record
@@ -8,15 +8,13 @@ from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.records.predict import CHOSEN
 from davinci_forces.records.quantities import QUANTITIES
 from davinci_forces.report.changes import Stated
-from davinci_forces.report.content import Block, Number, OnScreen, Table, literal
+from davinci_forces.report.content import Number, literal
 from davinci_forces.report.results import Results, format_unit
 from davinci_forces.study import Study
 from davinci_forces.study.review import Rating
 
 PLAIN = "independent.lse"  # the fit that every other one is compared with
-THESIS_TISSUE = 457.24  # [N/m], section 8.2
 ACRONYMS = ("lse", "wlse", "pso", "iv", "tls")  # of estimators
-PAPER = 18  # rows of a table at most, in the PDF
 
 
 @dataclass(frozen=True)
@@ -34,6 +32,10 @@ class Context:
     def number(self, key: str, digits: int = 4) -> Number | str:
         """The result of that key as a cell, or a dash where there is none."""
         return self.results[key].number(digits) if key in self.results else "–"
+
+    def numbers(self, prefix: str, names: Iterable[str], digits: int = 3) -> tuple[Number | str, ...]:
+        """The results `<prefix>.<name>` as cells."""
+        return tuple(self.number(f"{prefix}.{name}", digits) for name in names)
 
     def probability(self, key: str) -> Number | str:
         """A probability as a cell: below 0.001 it is only said to be."""
@@ -72,12 +74,6 @@ class Context:
     def own_fits(self) -> list[Fit]:
         """The fits of the joints' own terms, one joint at a time."""
         return self.catalogue.about(Fit, model="independent")
-
-
-def listed(table: Table) -> Iterator[Block]:
-    """A table as it is, or on screen where it has more rows than paper has room for."""
-    long = len(table.rows) > PAPER
-    yield OnScreen(table.caption.partition(";")[0].rstrip("."), f"all-{table.label}", (table,)) if long else table
 
 
 def fit_name(model: str, estimator: str) -> str:

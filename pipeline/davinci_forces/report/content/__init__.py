@@ -17,7 +17,6 @@ from davinci_forces.report.content.document import (
     Table,
     Verdict,
     name_of,
-    numbers,
     walk,
 )
 from davinci_forces.report.content.inline import literal
@@ -45,5 +44,5 @@ __all__ = [
     "AnyMark", "Band", "Bars", "Block", "Bullets", "Cell", "Document", "Equation", "Figure", "Figure3D", "HBand",
     "HLine", "Histogram", "Level", "Line", "Line3D", "Listing", "Number", "OnScreen", "Panel", "Points", "Points3D",
     "Prose", "Rated", "Reference", "Section", "Stems", "Table", "Tiles", "VLine", "VSpan", "Verdict", "literal",
-    "name_of", "numbers", "walk",
+    "name_of", "walk",
 ]  # fmt: skip

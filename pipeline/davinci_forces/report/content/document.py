@@ -198,10 +198,3 @@ def walk(parent: Document | Section | OnScreen) -> Iterator[Block]:
 def name_of(block: Block) -> str | None:
     """What references call a block: its label, or the anchor of a section or of what is on screen only."""
     return block.anchor if isinstance(block, Section | OnScreen) else getattr(block, "label", None)
-
-
-def numbers(document: Document) -> Iterator[Number]:
-    """Every number in the tables, in reading order."""
-    for block in walk(document):
-        if isinstance(block, Table):
-            yield from (cell for row in block.rows for cell in row if isinstance(cell, Number))

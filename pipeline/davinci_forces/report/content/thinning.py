@@ -23,13 +23,8 @@ def _thinned(mark: AnyMark, limit: int) -> AnyMark:
 
 
 @_thinned.register(Line)
-def _(mark: Line, limit: int) -> AnyMark:
-    kept = _kept_indices(mark.x, mark.y, limit)
-    return replace(mark, x=mark.x[kept], y=mark.y[kept])
-
-
 @_thinned.register(Stems)
-def _(mark: Stems, limit: int) -> AnyMark:
+def _(mark: Line | Stems, limit: int) -> AnyMark:
     kept = _kept_indices(mark.x, mark.y, limit)
     return replace(mark, x=mark.x[kept], y=mark.y[kept])
 

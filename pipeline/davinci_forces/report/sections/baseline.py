@@ -4,8 +4,9 @@ from collections.abc import Iterator, Mapping, Sequence
 
 from davinci_forces.report.changes import Change, Stated, changes
 from davinci_forces.report.content import Block, Listing, Number, OnScreen, Prose, Section, Table, literal
-from davinci_forces.report.context import PAPER, Context, count
+from davinci_forces.report.context import Context, count
 from davinci_forces.report.results import format_unit
+from davinci_forces.report.sections.parts import listed
 
 MOST = 300  # rows of a table; `davinci-forces compare` has them all
 
@@ -57,7 +58,7 @@ def table(context: Context, changed: Sequence[Change]) -> Iterator[Block]:
         f"{said} since the baseline, the largest first: a, b, and their difference over its standard error.",
         ("Number", "a, the baseline", "b, now", "Standard errors"), rows, "baseline-changes", "lrrr",
     )  # fmt: skip
-    yield OnScreen("Changes since the baseline", "all-baseline-changes", (whole,)) if len(rows) > PAPER else whole
+    yield from listed(whole, "Changes since the baseline")
 
 
 def before_text(change: Change) -> str:

@@ -21,7 +21,7 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, fit_name, title
-from davinci_forces.report.sections.parts import MEASURES
+from davinci_forces.report.sections.parts import MEASURES, listed
 
 SHOWN = 9  # runs at most in the PDF
 SAME = 1e-9  # relative errors closer than this are one
@@ -30,9 +30,7 @@ SAME = 1e-9  # relative errors closer than this are one
 def section(context: Context) -> Section | None:
     """The choice with its scores, and what it is worth on unseen logs; none where nothing was chosen."""
     choices = context.catalogue.all(Choice)
-    if not choices:
-        return None
-    return Section("Choice of the model", "choice", tuple(blocks(context, choices[0])))
+    return Section("Choice of the model", "choice", tuple(blocks(context, choices[0]))) if choices else None
 
 
 def blocks(context: Context, choice: Choice) -> Iterator[Block]:
@@ -81,7 +79,7 @@ def row(context: Context, choice: Choice, i: int) -> tuple[Cell, ...]:
     """The scores of one candidate; the chosen one is bold."""
     name = literal(str(choice.candidate[i]))
     key = f"choice.{choice.group}.{slug(str(choice.candidate[i]))}"
-    scores = (context.number(f"{key}.{score}", 3) for score in ("score", "training", "over_periods"))
+    scores = context.numbers(key, ("score", "training", "over_periods"))
     named = f"**{name}**" if choice.candidate[i] == choice.chosen else name
     return named, context.count(f"{key}.parameters"), *scores, "yes" if choice.physical[i] else "no"
 
@@ -134,8 +132,7 @@ def unseen(context: Context) -> Iterator[Block]:
     )
     header = ("Log", "Joint", "Path", "Chosen", "Joint by itself")
     table = Table("Relative error on logs that no parameter was fitted to.", header, rows, "choice-unseen", "lllrr")
-    long = len(rows) > SHOWN
-    yield OnScreen("The chosen model beside each joint by itself, run by run", "unseen", (table,)) if long else table
+    yield from listed(table, "The chosen model beside each joint by itself, run by run", SHOWN)
 
 
 def parameters(context: Context) -> Iterator[Block]:

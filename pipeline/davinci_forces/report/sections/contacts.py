@@ -5,19 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Contact, Stiffness, Track, Weight
-from davinci_forces.report.content import (
-    Block,
-    Cell,
-    Figure,
-    HBand,
-    Panel,
-    Points,
-    Prose,
-    Section,
-    Table,
-    literal,
-)
-from davinci_forces.report.context import Context, count, label, listed, title
+from davinci_forces.report.content import Block, Cell, Figure, HBand, Panel, Points, Prose, Section, Table, literal
+from davinci_forces.report.context import Context, count, label, title
+from davinci_forces.report.sections.parts import listed
 from davinci_forces.study import LogEntry
 
 
@@ -64,7 +54,7 @@ def rows(context: Context, contact: Contact) -> Iterator[tuple[Cell, ...]]:
     """One row a window."""
     for i, above in enumerate(contact.above, 1):
         key = f"contact.{contact.log}.{contact.joint}.{i}"
-        numbers = (context.number(f"{key}.{name}", 3) for name in ("onset", "release", "peak", "mean", "impulse"))
+        numbers = context.numbers(key, ("onset", "release", "peak", "mean", "impulse"))
         yield (literal(contact.log), title(contact.joint), *numbers, told(contact, i - 1, bool(above)))
 
 

@@ -14,9 +14,7 @@ def section(context: Context) -> Section | None:
     """How the robot's controllers behave in simulation, where it has any."""
     names = {run.controller for run in context.catalogue.all(Control)}
     studies = [study for study in context.study.robot.control if study.name in names]
-    if not studies:
-        return None
-    return Section("Control, in simulation", "control", tuple(blocks(context, studies)))
+    return Section("Control, in simulation", "control", tuple(blocks(context, studies))) if studies else None
 
 
 def blocks(context: Context, studies: list[ControlStudy]) -> Iterator[Block]:
@@ -113,4 +111,4 @@ def runs_of(context: Context, study: ControlStudy) -> list[Control]:
 def row(context: Context, name: str, run: Control, numbers: tuple[str, ...]) -> tuple[Cell, ...]:
     """One joint of a study with some of its numbers."""
     key = f"control.{run.controller}.{run.joint}"
-    return (name, title(run.joint), *(context.number(f"{key}.{number}", 3) for number in numbers))
+    return (name, title(run.joint), *context.numbers(key, numbers))

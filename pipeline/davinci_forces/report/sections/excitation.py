@@ -12,9 +12,7 @@ SOURCES = {"table-6.1": "Table 6.1", "table-6.1-corrected": "Table 6.1, misprint
 def section(context: Context) -> Section | None:
     """Objectives and limits of every trajectory."""
     excitations = context.catalogue.all(Excitation)
-    if not excitations:
-        return None
-    return Section("Excitation", "excitation", tuple(blocks(context, excitations)))
+    return Section("Excitation", "excitation", tuple(blocks(context, excitations))) if excitations else None
 
 
 def blocks(context: Context, excitations: list[Excitation]) -> Iterator[Block]:
@@ -33,7 +31,7 @@ def blocks(context: Context, excitations: list[Excitation]) -> Iterator[Block]:
             (
                 title(e.joint),
                 source_label(e),
-                *(context.number(f"excitation.{e.joint}.{e.source}.{name}", 5) for name in ("objective", "condition")),
+                *context.numbers(f"excitation.{e.joint}.{e.source}", ("objective", "condition"), 5),
                 context.number(f"excitation.{e.joint}.{e.source}.excess_q", 2),
             )
             for e in excitations
@@ -61,11 +59,7 @@ def coefficients(context: Context, excitations: list[Excitation]) -> Table:
     """The Fourier coefficients of every trajectory."""
     names = ("a0", "a1", "b1", "a2", "b2")
     rows = tuple(
-        (
-            title(e.joint),
-            source_label(e),
-            *(context.number(f"excitation.{e.joint}.{e.source}.{name}", 4) for name in names),
-        )
+        (title(e.joint), source_label(e), *context.numbers(f"excitation.{e.joint}.{e.source}", names, 4))
         for e in excitations
     )
     header = ("Joint", "Trajectory", *(f"${name[0]}_{name[1]}$" for name in names))

@@ -73,7 +73,7 @@ def tuning(context: Context, noises: list[FilterNoise]) -> Table:
     rows: tuple[tuple[Cell, ...], ...] = tuple(
         (
             title(noise.joint),
-            *(context.number(f"tuning.{noise.joint}.{name}", 3) for name in ("r_q", "r_dq", "r_tau", "q_tau")),
+            *context.numbers(f"tuning.{noise.joint}", ("r_q", "r_dq", "r_tau", "q_tau")),
             literal(", ".join(noise.logs)),
         )
         for noise in noises
@@ -88,8 +88,7 @@ def budget(context: Context, tracks: list[Track]) -> Table:
     """What the deviation of each joint's worst free run is made of, beside what that run shows."""
     names = ("filter_part", "model_part", "lag_part", "free_rms", "coverage")
     rows: tuple[tuple[Cell, ...], ...] = tuple(
-        (title(t.joint), literal(t.log), *(context.number(f"ekf.{t.log}.{t.joint}.{name}", 2) for name in names))
-        for t in tracks
+        (title(t.joint), literal(t.log), *context.numbers(f"ekf.{t.log}.{t.joint}", names, 2)) for t in tracks
     )
     header = ("Joint", "Worst free run", "Filter", "Model", "Lag", "RMS found", "Covered by 95 % band")
     return Table(
@@ -110,7 +109,7 @@ def comparison(context: Context, compared: list[Comparison]) -> Table:
     )
     return Table(
         caption,
-        ("Joint", "Filter", "RMS", "Detection level", "Push shown", "Delay [s]"),
+        ("Joint", "Filter", "RMS", "Detection level", "Push shown", "Delay"),
         rows,
         "filter-comparison",
         "llrrrr",

@@ -13,7 +13,6 @@ from davinci_forces.report.content import (
     Figure,
     Level,
     Line,
-    OnScreen,
     Panel,
     Prose,
     Section,
@@ -23,14 +22,13 @@ from davinci_forces.report.content import (
 )
 from davinci_forces.report.content.number import MINUS
 from davinci_forces.report.context import PLAIN, Context, count, fit_name, label, title
+from davinci_forces.report.sections.parts import first_on_paper, run_name
 from davinci_forces.report.verdicts import NORMAL_95, WITHIN
 
 
 def section(context: Context) -> Section | None:
     """Parameters and external efforts, estimated and true; only of a simulated study."""
-    if not context.study.truth:
-        return None
-    return Section("Comparison with ground truth", "truth", tuple(blocks(context)))
+    return Section("Comparison with ground truth", "truth", tuple(blocks(context))) if context.study.truth else None
 
 
 def blocks(context: Context) -> Iterator[Block]:
@@ -52,10 +50,8 @@ def blocks(context: Context) -> Iterator[Block]:
     tip = list(tip_forces(context))
     yield from tip
     shown = 0 if tip else 1  # on paper, where no force at the tip shows the same
-    yield from figures[:shown]
-    if figures[shown:]:
-        name = f"{count(len(figures) - shown, 'comparison')} of tracked and true effort"
-        yield OnScreen(name, "more-truth", tuple(figures[shown:]))
+    name = f"{count(len(figures) - shown, 'comparison')} of tracked and true effort"
+    yield from first_on_paper(figures, name, "more-truth", shown)
 
 
 def of_friction(context: Context) -> Iterator[Block]:
@@ -127,7 +123,7 @@ def parameters(context: Context, joint: str, path: tuple[str, ...], theta: dict[
 def effort_figure(track: Track, pushes: list[dict[str, Any]]) -> Figure:
     """The effort exerted on a joint, and the filter's estimate of it."""
     t, effort = true_effort(pushes, float(track.t[-1]))
-    name = f"{title(track.joint)} in {literal(track.log)}"
+    name = run_name(track.log, track.joint)
     marks = (Line(track.t, track.tau_ext, "filter", "vermillion"), Line(t, effort, "true", "black"))
     return Figure(
         f"{name}: external effort tracked by the filter, and true external effort.",
@@ -165,9 +161,7 @@ def tip_forces(context: Context) -> Iterator[Block]:
         yield judged([size for pair in pairs for size in off(*pair)])
     forces = [force for force in context.catalogue.all(TipForce) if force.log in pushed]
     figures = [force_figure(force, pushed[force.log]) for force in forces]
-    yield from figures[:1]
-    if figures[1:]:
-        yield OnScreen("Force at the tip, found and true, in other logs", "more-tip-truth", tuple(figures[1:]))
+    yield from first_on_paper(figures, "Force at the tip, found and true, in other logs", "more-tip-truth")
 
 
 def at_the_tip(log: dict[str, Any]) -> list[Push]:
@@ -196,7 +190,7 @@ def compared(context: Context, pairs: list[tuple[TipContact, int, Push]]) -> Tab
     rows: list[tuple[Cell, ...]] = []
     for contact, i, push in pairs:
         true = (f"{x:.3g}".replace("-", MINUS) for x in force_of(push))
-        numbers = (context.number(f"tip.{contact.log}.{i + 1}.{f}", 3) for f in COMPONENTS)
+        numbers = context.numbers(f"tip.{contact.log}.{i + 1}", COMPONENTS)
         rows.append((literal(contact.log), str(i + 1), *true, *numbers, f"{max(off(contact, i, push)):.1f}"))
     return Table(
         "The force at the tip where it is largest in each contact [N], true and found, and by how many of its standard "

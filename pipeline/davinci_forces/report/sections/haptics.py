@@ -54,7 +54,7 @@ def blocks(context: Context, runs: list[HapticRun]) -> Iterator[Block]:
 def verdict(context: Context, run: HapticRun) -> Verdict:
     """Whether a hand is stable against the tissue, and where its limit is."""
     key, name = f"haptics.{run.hand}", f"**Simulated**, hand “{literal(run.hand)}”"
-    limit, margin = (context.number(f"{key}.{number}", 2) for number in ("k_t_settles", "stiffness_margin"))
+    limit, margin = context.numbers(key, ("k_t_settles", "stiffness_margin"), 2)
     where = f"it settles against tissue up to {limit}, {margin} times the measured one"
     if not run.k_t_settles > 0.0:
         where = "no limit of the tissue's stiffness was found"
@@ -82,7 +82,7 @@ def told(context: Context, responses: list[HapticResponse]) -> str:
         one.arm_from, f"as the fit of the {title(one.arm_from).lower()} has it, which the filter knows, too"
     )
     names = ("tissue_stiffness", "rendered_stiffness", "at_frequency", "felt_delay")
-    true, felt, frequency, late = (context.number(f"haptics.{name}", 3) for name in names)
+    true, felt, frequency, late = context.numbers("haptics", names)
     return (
         f"{said}\n\nWhat slides is {arm}: the model's error on the real arm comes on top. Tissue of {true} feels like "
         f"{felt} to a hand that moves at {frequency}, {late} late. A hand in contact that no longer settles swings "
@@ -170,7 +170,7 @@ def margins(context: Context, runs: list[HapticRun]) -> Table:
     names = ("hand_mass", "hand_damping", "hand_stiffness", "true_peak", "felt_peak", "k_t_settles", "k_t_response")
     rows: list[tuple[Cell, ...]] = []
     for run in runs:
-        cells = (context.number(f"haptics.{run.hand}.{name}", 3) for name in (*names, "delay_margin"))
+        cells = context.numbers(f"haptics.{run.hand}", (*names, "delay_margin"))
         rows.append((literal(run.hand), *cells))
     header = (
         "Hand", "Mass", "$b_H$", "$K_H$", "True peak", "Felt peak", "Settles up to", "By response", "Delay it bears",

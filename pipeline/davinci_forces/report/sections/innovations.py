@@ -20,8 +20,8 @@ from davinci_forces.report.content import (
     Table,
     literal,
 )
-from davinci_forces.report.context import Context, count, label, listed, title
-from davinci_forces.report.sections.parts import autocorrelation
+from davinci_forces.report.context import Context, count, label, title
+from davinci_forces.report.sections.parts import autocorrelation, first_on_paper, listed, run_name
 from davinci_forces.report.verdicts import findings_in_words
 
 UNEXPLAINED = "unexplained"  # a finding: no cause that was tried explains it
@@ -51,14 +51,12 @@ def blocks(context: Context, explained: list[Explanation]) -> Iterator[Block]:
     yield from listed(verdicts(context, explained))
     drawn = [e for e in explained if is_worst(context, e)]
     drawn.sort(key=lambda e: least_probability(e)[0])
-    yield from (figure(context, e, whole=True) for e in drawn[:1])
-    if drawn[1:]:
-        worst = tuple(figure(context, e, whole=True) for e in drawn[1:])
-        yield OnScreen("Innovations of the worst free run of each other joint", "innovations-worst", worst)
+    figures = [figure(context, e, whole=True) for e in drawn]
+    yield from first_on_paper(figures, "Innovations of the worst free run of each other joint", "innovations-worst")
     yield OnScreen("Tests of the innovations, run by run", "innovation-tests", (tests(context, explained),))
     others = tuple(
         OnScreen(
-            f"{title(e.joint)} in {literal(e.log)}",
+            run_name(e.log, e.joint),
             f"why-{e.log}-{e.joint}",
             (trials(e),) if e in drawn or e.finding != UNEXPLAINED else (figure(context, e, whole=False), trials(e)),
         )
@@ -90,7 +88,7 @@ def verdicts(context: Context, explained: list[Explanation]) -> Table:
         (
             literal(e.log),
             title(e.joint),
-            *(context.number(f"ekf.{e.log}.{e.joint}.{name}", 3) for name in ("nis_q", "nis_dq")),
+            *context.numbers(f"ekf.{e.log}.{e.joint}", ("nis_q", "nis_dq")),
             literal(e.verdict),
         )
         for e in explained
@@ -126,7 +124,7 @@ def statistics(context: Context, prefix: str) -> tuple[Cell, ...]:
     """The numbers of one run's innovations."""
     probabilities = ("ljung_box_p_q", "ljung_box_p_dq", "periodogram_p_q", "periodogram_p_dq")
     return (
-        *(context.number(f"{prefix}.{name}", 2) for name in ("nis_mean", "acf1_q", "acf1_dq")),
+        *context.numbers(prefix, ("nis_mean", "acf1_q", "acf1_dq"), 2),
         *(context.probability(f"{prefix}.{name}") for name in probabilities),
         context.number(f"{prefix}.clock_std", 2),
     )
@@ -168,7 +166,7 @@ def printed(probability: float) -> str:
 
 def figure(context: Context, e: Explanation, whole: bool) -> Figure:
     """Autocorrelation, cumulative periodogram, correlation with the motion; over time, if `whole`.  Fig 7.9-7.11"""
-    name, about = f"{title(e.joint)} in {literal(e.log)}", {"log": e.log, "joint": e.joint}
+    name, about = run_name(e.log, e.joint), {"log": e.log, "joint": e.joint}
     white = {w.signal: w for w in context.catalogue.about(Whiteness, **about)}
     moved = {i.signal: i for i in context.catalogue.about(Innovation, **about)}
     tracks = context.catalogue.about(Track, **about) if whole else []

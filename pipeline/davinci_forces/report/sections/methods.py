@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from davinci_forces.records import Fit
+from davinci_forces.records import Average, Fit, LogSummary, Record, Signal, Track, Trajectory, Whiteness
 from davinci_forces.report.content import Block, Bullets, Equation, Listing, Prose, Section, Table
 from davinci_forces.report.context import Context
 from davinci_forces.report.verdicts import thresholds
@@ -46,6 +46,106 @@ REFERENCES = (
     "A. De Luca, R. Mattone: Actuator failure detection and isolation using generalized momenta. IEEE International "
     "Conference on Robotics and Automation, 2003.",
 )
+# What a stage does, by the records that it makes; in braces, what the study sets.
+METHODS: tuple[tuple[type[Record], tuple[Block, ...]], ...] = (
+    (LogSummary, (
+        Prose(
+            "**From the motor to the joint.** Logs of the motor side are carried to the joint through the gear ratio "
+            "$eta$ and the torque constant $K_m$; logs of the joint side are used as they are.{in_current}"
+        ),
+        Equation(
+            "q = theta_m / eta, quad tau = eta K_m i",
+            "joint position is motor angle over gear ratio; effort is gear ratio times torque constant times current",
+            "motor",
+        ),
+    )),
+    (Average, (
+        Prose(
+            "**Periods.** The period is the shortest lag after which all moving joints repeat, refined until the "
+            "harmonics of the excitation fit the positions best. A sample rarely falls on a phase of the averaged "
+            "period exactly: a smooth harmonic fit carries it there, and what the fit leaves is averaged over the "
+            "$N_p$ periods. The variance between periods is that of one period; the mean's is smaller by $N_p$."
+        ),
+        Equation(
+            "overline(x)(k) = 1/N_p sum_(m=1)^(N_p) x_m (k), "
+            "quad sigma_x^2 (k) = 1/(N_p - 1) sum_(m=1)^(N_p) (x_m (k) - overline(x)(k))^2",
+            "the mean over periods, and the variance between them",
+            "averaging",
+        ),
+    )),
+    (Trajectory, (
+        Prose(
+            "**Differentiation.** Only the harmonics of the excitation are kept of the averaged position, by {by}, and "
+            "differentiated exactly."
+        ),
+        Equation(
+            "cal(F)[(dif^n overline(q)) / (dif t^n)] = (j omega)^n Q(omega)",
+            "the spectrum of the n-th derivative is j omega to the n times that of the position",
+            "differentiation",
+        ),
+    )),
+    (Signal, (
+        Prose(
+            "Motion that does not repeat is low-passed forwards and backwards at {lowpass} Hz (fourth-order "
+            "Butterworth, no delay), and differentiated by central differences."
+        ),
+    )),
+    (Fit, (
+        Prose(
+            "**Identification.** The model of each joint is linear in its parameters. Least squares gives every "
+            "averaged sample the same weight; weighted least squares gives it the inverse of its variance, pooled over "
+            "neighbouring samples because the variance between few periods is itself uncertain. Both are solved by "
+            "orthogonal factorisation, never by the normal equations. Consistent parameters are the nearest that some "
+            "mechanism has."
+        ),
+        Equation(
+            "hat(theta) = arg min_theta norm(W^(1/2) (tau - Phi(q, dot(q), dot.double(q)) theta))^2",
+            "the parameters minimise the weighted sum of squared differences between effort and regressor times "
+            "parameters",
+            "estimation",
+        ),
+        Prose('The weights are $W = "diag"(N_p \\/ sigma_tau^2)$; below four periods they are left out.'),
+    )),
+    (Track, (
+        Prose(
+            "**Filtering.** The state holds position, velocity and external effort, the last as a random walk. Each "
+            "sample is first corrected with its measurement and then carried to the next; the covariance is corrected "
+            "in Joseph's form. The external effort is what the robot exerts on its environment: a mass hung on a "
+            "vertical slide gives a negative one."
+        ),
+        Equation(
+            'f(x, tau) = [dot(q), M^(-1) (tau - V - F - G - tau_"ext"), 0]^T, quad A = (partial f) / (partial x), quad '
+            "x_(k+1) = x_k + T_s f + 1/2 T_s^2 A f + w_k",
+            "the discrete model of position, velocity and external effort, to second order",
+            "model",
+        ),
+        Equation(
+            "tilde(y)_k = y_k - H hat(x)_(k|k-1), quad S_k = H P_(k|k-1) H^T + R, quad K_k = P_(k|k-1) H^T S_k^(-1)",
+            "innovation, its covariance, and the Kalman gain",
+            "innovation",
+        ),
+        Equation(
+            "hat(x)_(k|k) = hat(x)_(k|k-1) + K_k tilde(y)_k, "
+            "quad P_(k|k) = (I - K_k H) P_(k|k-1) (I - K_k H)^T + K_k R K_k^T",
+            "the corrected state and covariance",
+            "correction",
+        ),
+        Prose(
+            "The measured effort drives the model, so its noise is process noise, as of an acceleration that is "
+            "constant over a sample. Where the velocity passes through zero, Coulomb friction is what it is on "
+            "average, and the doubt about its sign counts as noise. Contacts are found where the smoothed effort "
+            "(Bierman, 1973) is above what free motion crosses once in ten minutes (Rice, 1944)."
+        ),
+    )),
+    (Whiteness, (
+        Prose(
+            "**Whiteness** is judged by the autocorrelation, its 95 % band $1.96 \\/ sqrt(N)$, and the Ljung-Box "
+            "statistic over 20 lags; a signal is called white when its probability exceeds 1 %. Innovations have to "
+            "pass by their cumulative periodograms, too, whose distance from a straight line is that of Kolmogorov and "
+            "Smirnov (Bartlett, 1955)."
+        ),
+    )),
+)  # fmt: skip
 
 
 def section(context: Context) -> Section:
@@ -92,87 +192,10 @@ def in_current(context: Context) -> str:
 
 
 def blocks(context: Context) -> Iterator[Block]:
-    """The section's content."""
+    """What each stage did that made records, in their order."""
     settings = context.study.settings
-    yield Prose(
-        "**From the motor to the joint.** Logs of the motor side are carried to the joint through the gear ratio "
-        f"$eta$ and the torque constant $K_m$; logs of the joint side are used as they are.{in_current(context)}"
-    )
-    yield Equation(
-        "q = theta_m / eta, quad tau = eta K_m i",
-        "joint position is motor angle over gear ratio; effort is gear ratio times torque constant times current",
-        "motor",
-    )
-    yield Prose(
-        "**Periods.** The period is the shortest lag after which all moving joints repeat, refined until the "
-        "harmonics of the excitation fit the positions best. A sample rarely falls on a phase of the averaged period "
-        "exactly: a smooth harmonic fit carries it there, and what the fit leaves is averaged over the $N_p$ periods. "
-        "The variance between periods is that of one period; the mean's is smaller by $N_p$."
-    )
-    yield Equation(
-        "overline(x)(k) = 1/N_p sum_(m=1)^(N_p) x_m (k), "
-        "quad sigma_x^2 (k) = 1/(N_p - 1) sum_(m=1)^(N_p) (x_m (k) - overline(x)(k))^2",
-        "the mean over periods, and the variance between them",
-        "averaging",
-    )
-    how = "projection on the harmonics" if settings.derivative == "harmonics" else "the fast Fourier transform"
-    yield Prose(
-        f"**Differentiation.** Only the harmonics of the excitation are kept of the averaged position, by {how}, and "
-        "differentiated exactly."
-    )
-    yield Equation(
-        "cal(F)[(dif^n overline(q)) / (dif t^n)] = (j omega)^n Q(omega)",
-        "the spectrum of the n-th derivative is j omega to the n times that of the position",
-        "differentiation",
-    )
-    yield Prose(
-        f"Motion that does not repeat is low-passed forwards and backwards at {settings.lowpass:g} Hz "
-        "(fourth-order Butterworth, no delay), and differentiated by central differences."
-    )
-    yield Prose(
-        "**Identification.** The model of each joint is linear in its parameters. Least squares gives every averaged "
-        "sample the same weight; weighted least squares gives it the inverse of its variance, pooled over "
-        "neighbouring samples because the variance between few periods is itself uncertain. Both are solved by "
-        "orthogonal factorisation, never by the normal equations. Consistent parameters are the nearest that some "
-        "mechanism has."
-    )
-    yield Equation(
-        "hat(theta) = arg min_theta norm(W^(1/2) (tau - Phi(q, dot(q), dot.double(q)) theta))^2",
-        "the parameters minimise the weighted sum of squared differences between effort and regressor times parameters",
-        "estimation",
-    )
-    if any(fit.estimator == "wlse" for fit in context.catalogue.all(Fit)):
-        yield Prose('The weights are $W = "diag"(N_p \\/ sigma_tau^2)$; below four periods they are left out.')
-    yield Prose(
-        "**Filtering.** The state holds position, velocity and external effort, the last as a random walk. Each "
-        "sample is first corrected with its measurement and then carried to the next; the covariance is corrected in "
-        "Joseph's form. The external effort is what the robot exerts on its environment: a mass hung on a vertical "
-        "slide gives a negative one."
-    )
-    yield Equation(
-        'f(x, tau) = [dot(q), M^(-1) (tau - V - F - G - tau_"ext"), 0]^T, quad A = (partial f) / (partial x), quad '
-        "x_(k+1) = x_k + T_s f + 1/2 T_s^2 A f + w_k",
-        "the discrete model of position, velocity and external effort, to second order",
-        "model",
-    )
-    yield Equation(
-        "tilde(y)_k = y_k - H hat(x)_(k|k-1), quad S_k = H P_(k|k-1) H^T + R, quad K_k = P_(k|k-1) H^T S_k^(-1)",
-        "innovation, its covariance, and the Kalman gain",
-        "innovation",
-    )
-    yield Equation(
-        "hat(x)_(k|k) = hat(x)_(k|k-1) + K_k tilde(y)_k, "
-        "quad P_(k|k) = (I - K_k H) P_(k|k-1) (I - K_k H)^T + K_k R K_k^T",
-        "the corrected state and covariance",
-        "correction",
-    )
-    yield Prose(
-        "The measured effort drives the model, so its noise is process noise, as of an acceleration that is constant "
-        "over a sample. Where the velocity passes through zero, Coulomb friction is what it is on average, and the "
-        "doubt about its sign counts as noise. Contacts are found where the smoothed effort (Bierman, 1973) is above "
-        "what free motion crosses once in ten minutes (Rice, 1944).\n\n"
-        "**Whiteness** is judged by the autocorrelation, its 95 % band $1.96 \\/ sqrt(N)$, and the Ljung-Box statistic "
-        "over 20 lags; a signal is called white when its probability "
-        "exceeds 1 %. Innovations have to pass by their cumulative periodograms, too, whose distance from a straight "
-        "line is that of Kolmogorov and Smirnov (Bartlett, 1955)."
-    )
+    by = "projection on the harmonics" if settings.derivative == "harmonics" else "the fast Fourier transform"
+    words = {"lowpass": f"{settings.lowpass:g}", "in_current": in_current(context), "by": by}
+    for kind, method in METHODS:
+        if context.catalogue.all(kind):
+            yield from (Prose(block.text.format(**words)) if isinstance(block, Prose) else block for block in method)

@@ -24,7 +24,7 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.sections.parts import autocorrelation
+from davinci_forces.report.sections.parts import autocorrelation, run_name
 
 SIGNALS = {"q_noise": "position", "dq_noise": "velocity", "tau_noise": "effort"}
 OUTLIER = 3.0  # times the median period's noise, from which on a period is named
@@ -34,9 +34,7 @@ BARS = 24  # periods at most that are drawn one by one
 def section(context: Context) -> Section | None:
     """A table of standard deviations, the tests of the noise, and what averaging removed from each log."""
     averages = context.catalogue.all(Average)
-    if not averages:
-        return None
-    return Section("Averaging and noise", "noise", tuple(blocks(context, averages)))
+    return Section("Averaging and noise", "noise", tuple(blocks(context, averages))) if averages else None
 
 
 def blocks(context: Context, averages: list[Average]) -> Iterator[Block]:
@@ -52,7 +50,7 @@ def blocks(context: Context, averages: list[Average]) -> Iterator[Block]:
             title(a.joint),
             context.number(f"period.{a.log}", 6),
             context.count(f"period.{a.log}.periods"),
-            *(context.number(f"noise.{a.log}.{a.joint}.{s}", 3) for s in ("sigma_q", "sigma_dq", "sigma_tau")),
+            *context.numbers(f"noise.{a.log}.{a.joint}", ("sigma_q", "sigma_dq", "sigma_tau")),
         )
         for a in averages
     )
@@ -62,7 +60,7 @@ def blocks(context: Context, averages: list[Average]) -> Iterator[Block]:
     for average in averages:
         yield from outliers(context, average)
     folded = tuple(
-        OnScreen(f"{title(a.joint)} in {literal(a.log)}", f"noise-{a.log}-{a.joint}", figures)
+        OnScreen(run_name(a.log, a.joint), f"noise-{a.log}-{a.joint}", figures)
         for a in averages
         if (figures := tuple(average_figures(context, a)))
     )
@@ -94,7 +92,7 @@ def statistics(context: Context, prefix: str) -> tuple[Cell, ...]:
     return (
         context.number(f"{prefix}.acf1", 2),
         *(context.probability(f"{prefix}.{name}") for name in ("ljung_box_p", "jarque_bera_p")),
-        *(context.number(f"{prefix}.{name}", 2) for name in ("skewness", "kurtosis")),
+        *context.numbers(prefix, ("skewness", "kurtosis"), 2),
     )
 
 
@@ -129,7 +127,7 @@ def average_figures(context: Context, average: Average) -> Iterator[Block]:
     if not (period_residuals and trajectories and spectra and signals):
         return
     whiteness = {w.signal: w for w in context.catalogue.about(Whiteness, **about)}
-    name = f"{title(average.joint)} in {literal(average.log)}"
+    name = run_name(average.log, average.joint)
     yield Figure(
         f"{name}: the mean of {average.periods} periods and the first of them; the position's spectrum with the "
         "harmonics that are kept; velocity and acceleration from those harmonics and from differences of the logged "

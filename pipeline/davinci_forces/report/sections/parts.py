@@ -1,8 +1,13 @@
-"""What several sections share: panels, tables that are long, and words."""
+"""What several sections share: what is on paper and what on screen, marks of a run, and words."""
+
+from collections.abc import Iterator, Sequence
 
 from davinci_forces.records import Whiteness
-from davinci_forces.report.content import HBand, Panel, Stems
+from davinci_forces.report.content import Block, HBand, OnScreen, Panel, Stems, Table, VSpan, literal
+from davinci_forces.report.context import Context, title
 
+PAPER = 18  # rows of a table at most, in the PDF
+THESIS_TISSUE = 457.24  # [N/m], section 8.2
 LEFT_OUT = {
     "leave one log out": "the log",
     "leave one period out": "a period",
@@ -14,6 +19,30 @@ MEASURES = (
     "period repeats the path of the others, so every parameter gains. With path blocks left out, on raw samples, it "
     "says what to expect on a path that is new; that is larger, and what a model is chosen by."
 )
+
+
+def listed(table: Table, name: str = "", most: int = PAPER) -> Iterator[Block]:
+    """A table as it is, or on screen where it has more rows than paper has room for, under a name or its caption."""
+    name = name or table.caption.partition(";")[0].rstrip(".")
+    yield OnScreen(name, f"all-{table.label}", (table,)) if len(table.rows) > most else table
+
+
+def first_on_paper(blocks: Sequence[Block], name: str, anchor: str, number: int = 1) -> Iterator[Block]:
+    """The first blocks as they are, the others on screen under a name."""
+    yield from blocks[:number]
+    if blocks[number:]:
+        yield OnScreen(name, anchor, tuple(blocks[number:]))
+
+
+def run_name(log: str, joint: str) -> str:
+    """A joint in a log, as the beginning of a caption."""
+    return f"{title(joint)} in {literal(log)}"
+
+
+def contact_spans(context: Context, log: str, name: str) -> tuple[VSpan, ...]:
+    """The windows of contact that the study states of a log, the first named in the legend."""
+    windows = context.study.log(log).contact
+    return tuple(VSpan(start, end, "" if i else name) for i, (start, end) in enumerate(windows))
 
 
 def autocorrelation(w: Whiteness, heading: str, named: bool = True) -> Panel:

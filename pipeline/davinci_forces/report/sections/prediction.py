@@ -3,30 +3,16 @@
 from collections.abc import Iterator
 
 from davinci_forces.records import Prediction
-from davinci_forces.report.content import (
-    Block,
-    Cell,
-    Figure,
-    Line,
-    OnScreen,
-    Panel,
-    Prose,
-    Section,
-    Table,
-    VSpan,
-    literal,
-)
-from davinci_forces.report.context import Context, fit_name, label, listed, title
-from davinci_forces.report.sections.parts import LEFT_OUT
+from davinci_forces.report.content import Block, Cell, Figure, Line, OnScreen, Panel, Prose, Section, Table, literal
+from davinci_forces.report.context import Context, fit_name, label, title
+from davinci_forces.report.sections.parts import LEFT_OUT, contact_spans, first_on_paper, listed, run_name
 from davinci_forces.report.verdicts import percent
 
 
 def section(context: Context) -> Section | None:
     """Scores of the fit that the filter uses on every log, the estimators compared once, and the worst predictions."""
     predictions = context.catalogue.all(Prediction)
-    if not predictions:
-        return None
-    return Section("Prediction", "prediction", tuple(blocks(context, predictions)))
+    return Section("Prediction", "prediction", tuple(blocks(context, predictions))) if predictions else None
 
 
 def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
@@ -55,17 +41,15 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     ]
     # The worst of all on paper.
     worst.sort(key=lambda p: -p.model_error / (p.effort_rms or 1.0))
-    yield from (figure(context, p) for p in worst[:1])
-    if worst[1:]:
-        others = tuple(figure(context, p) for p in worst[1:])
-        yield OnScreen("The worst predicted run of each other joint", "worst-predicted", others)
+    figures = [figure(context, p) for p in worst]
+    yield from first_on_paper(figures, "The worst predicted run of each other joint", "worst-predicted")
 
 
 def row(context: Context, p: Prediction) -> tuple[Cell, ...]:
     """The scores of one run."""
     share = percent(p.model_error / p.effort_rms if p.effort_rms > 0 else float("nan"))
     how = LEFT_OUT.get(p.scheme, "never fitted")
-    error, r2, ceiling = (context.number(f"{p.prefix}.{name}", 2) for name in ("model_error", "r2", "r2_ceiling"))
+    error, r2, ceiling = context.numbers(p.prefix, ("model_error", "r2", "r2_ceiling"), 2)
     return literal(p.log), title(p.joint), how, p.path.removesuffix(" path"), error, share, r2, ceiling
 
 
@@ -73,12 +57,7 @@ def every_score(context: Context, predictions: list[Prediction]) -> Table:
     """All scores of all fits."""
     names = ("rmse", "nrmse", "r2", "r2_ceiling", "model_error", "relative_error")
     rows = tuple(
-        (
-            literal(p.log),
-            title(p.joint),
-            fit_name(p.model, p.estimator),
-            *(context.number(f"{p.prefix}.{name}", 3) for name in names),
-        )
+        (literal(p.log), title(p.joint), fit_name(p.model, p.estimator), *context.numbers(p.prefix, names))
         for p in predictions
     )
     header = ("Log", "Joint", "Fit", "RMSE", "RMSE over range", "$R^2$", "Ceiling", "Model error", "Relative error")
@@ -110,11 +89,8 @@ def worst(context: Context, predictions: list[Prediction], joint: str, model: st
 
 def figure(context: Context, p: Prediction) -> Figure:
     """Measured and predicted effort of one log."""
-    name, effort = f"{title(p.joint)} in {literal(p.log)}", label(p, "tau", "effort")
-    windows = tuple(
-        VSpan(start, end, "contact" if i == 0 else "")
-        for i, (start, end) in enumerate(context.study.log(p.log).contact)
-    )
+    name, effort = run_name(p.log, p.joint), label(p, "tau", "effort")
+    windows = contact_spans(context, p.log, "contact")
     error = context.size(p, "model_error", p.model_error)
     return Figure(
         f"{name}, the worst run of this joint: measured effort and the model's ({fit_name(p.model, p.estimator)}), "

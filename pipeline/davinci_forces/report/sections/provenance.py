@@ -6,7 +6,8 @@ from dataclasses import asdict
 from davinci_forces.records import KINDS, LogSummary
 from davinci_forces.records.catalogue import Provenance
 from davinci_forces.report.content import Block, Listing, OnScreen, Prose, Section, Table, literal
-from davinci_forces.report.context import Context, listed
+from davinci_forces.report.context import Context
+from davinci_forces.report.sections.parts import listed
 
 PER_LINE = 4  # settings
 

@@ -4,7 +4,8 @@ from collections.abc import Iterator
 from hashlib import sha256
 
 from davinci_forces.report.content import Block, Cell, Prose, Section, Table, Verdict, literal
-from davinci_forces.report.context import Context, count, listed
+from davinci_forces.report.context import Context, count
+from davinci_forces.report.sections.parts import listed
 from davinci_forces.study.review import Rating
 
 MARKS = {"accept": "● Accept", "doubt": "▲ Doubt", "reject": "✖ Reject"}

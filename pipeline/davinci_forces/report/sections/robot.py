@@ -10,9 +10,7 @@ from davinci_forces.report.context import Context
 def section(context: Context) -> Section | None:
     """The chain and its table, where the robot's geometry is known."""
     links = context.catalogue.all(Links)
-    if not links:
-        return None
-    return Section("The robot", "robot", tuple(blocks(context, links[0])))
+    return Section("The robot", "robot", tuple(blocks(context, links[0]))) if links else None
 
 
 def blocks(context: Context, links: Links) -> Iterator[Block]:
@@ -30,7 +28,7 @@ def blocks(context: Context, links: Links) -> Iterator[Block]:
             literal(link),
             literal(links.parent[i]),
             "–" if links.moved_by[i] == 0 else f"$q_{links.moved_by[i]}$",
-            *(context.number(f"robot.link.{link}.{name}", 4) for name in ("alpha", "a", "d", "offset", "mass")),
+            *context.numbers(f"robot.link.{link}", ("alpha", "a", "d", "offset", "mass"), 4),
         )
         for i, link in enumerate(links.link)
     )

@@ -18,10 +18,10 @@ from davinci_forces.report.content import (
     Section,
     Table,
     Verdict,
-    VSpan,
     literal,
 )
-from davinci_forces.report.context import Context, count, label, listed, title
+from davinci_forces.report.context import Context, count, label, title
+from davinci_forces.report.sections.parts import contact_spans, first_on_paper, listed, run_name
 from davinci_forces.report.verdicts import band_in_words
 
 WORST = "the worst free run of this joint"
@@ -49,20 +49,15 @@ def tracked(context: Context, tracks: list[Track]) -> Iterator[Block]:
     yield from listed(scores(context, tracks))
     worst = list(worst_runs(context, tracks))
     drawn = {(t.log, t.joint) for t in worst}
-    yield from (trace(context, t, WORST) for t in worst[:ON_PAPER])
-    if worst[ON_PAPER:]:
-        rest = tuple(trace(context, t, WORST) for t in worst[ON_PAPER:])
-        yield OnScreen("The worst free run of each other joint", "worst-runs", rest)
+    traces = [trace(context, t, WORST) for t in worst]
+    yield from first_on_paper(traces, "The worst free run of each other joint", "worst-runs", ON_PAPER)
     yield OnScreen(
-        "What the filter assumes of noise, run by run",
-        "filter-assumptions",
-        (assumptions(context, tracks),),
+        "What the filter assumes of noise, run by run", "filter-assumptions", (assumptions(context, tracks),)
     )
     others = [t for t in tracks if (t.log, t.joint) not in drawn and not t.at_rest]
     if others:
         folded = tuple(
-            OnScreen(f"{title(t.joint)} in {literal(t.log)}", f"track-{t.log}-{t.joint}", (trace(context, t, ""),))
-            for t in others
+            OnScreen(run_name(t.log, t.joint), f"track-{t.log}-{t.joint}", (trace(context, t, ""),)) for t in others
         )
         yield OnScreen(f"Traces of {count(len(others), 'other run')}", "other-runs", folded)
 
@@ -76,7 +71,7 @@ def intro(context: Context, tracks: list[Track]) -> Iterator[Prose]:
         f"An extended Kalman filter follows position, velocity and external effort of each joint by itself{tuned}."
         + told
     )
-    at_rest = [f"{title(t.joint)} in {literal(t.log)}" for t in tracks if t.at_rest]
+    at_rest = [run_name(t.log, t.joint) for t in tracks if t.at_rest]
     if at_rest:
         yield Prose(
             f"Joints at rest are in the tables only ({', '.join(at_rest)}): at standstill friction takes any value up "
@@ -97,7 +92,7 @@ def scores(context: Context, tracks: list[Track]) -> Table:
         (
             literal(t.log),
             title(t.joint),
-            *(context.number(f"{t.filter}.{t.log}.{t.joint}.{name}", 2) for name in LEVELS),
+            *context.numbers(f"{t.filter}.{t.log}.{t.joint}", LEVELS, 2),
             *covered(context, t),
         )
         for t in tracks
@@ -120,10 +115,7 @@ def covered(context: Context, t: Track) -> tuple[Cell, Cell]:
 def assumptions(context: Context, tracks: list[Track]) -> Table:
     """What the filter assumed of noise."""
     names = ("r_q", "r_dq", "q_dq", "q_tau")
-    rows = tuple(
-        (literal(t.log), title(t.joint), *(context.number(f"ekf.{t.log}.{t.joint}.{name}", 3) for name in names))
-        for t in tracks
-    )
+    rows = tuple((literal(t.log), title(t.joint), *context.numbers(f"ekf.{t.log}.{t.joint}", names)) for t in tracks)
     return Table(
         "Noise that the filter assumes (standard deviations): of the measured position and velocity, and of what the "
         "noise of the effort adds to the velocity in a sample, by the likelihood of the innovations of identification "
@@ -137,10 +129,7 @@ def assumptions(context: Context, tracks: list[Track]) -> Table:
 
 def trace(context: Context, t: Track, why: str) -> Figure:
     """One run over time.  Fig 7.6-7.11"""
-    name, entry = f"{title(t.joint)} in {literal(t.log)}", context.study.log(t.log)
-    windows = tuple(
-        VSpan(start, end, "stated contact" if i == 0 else "") for i, (start, end) in enumerate(entry.contact)
-    )
+    name, windows = run_name(t.log, t.joint), contact_spans(context, t.log, "stated contact")
     sigma = 2 * t.tau_ext_std
     # The first samples know nothing yet: their band would set the scale of the whole plot.
     shown = slice(min(int(0.25 * t.rate), len(t) // 10), None)
@@ -176,16 +165,11 @@ def recorded(context: Context, summaries: list[LogSummary]) -> Iterator[Block]:
     if not summaries:
         return
     yield from listed(overview(context, summaries))
-    clean = [summary for summary in summaries if not remarks(summary)]
-    if clean:
-        all_of_them = len(clean) == len(summaries)
-        which = "Every log was" if all_of_them else f"{len(clean)} of {count(len(summaries), 'log')} were"
+    remarked = {summary.log: texts for summary in summaries if (texts := remarks(summary))}
+    if clean := len(summaries) - len(remarked):
+        which = f"{clean} of {count(len(summaries), 'log')} were" if remarked else "Every log was"
         yield Verdict("good", f"{which} read without a remark.")
-    yield from (
-        Verdict("warn", f"**{literal(summary.log)}**: {literal('; '.join(remarks(summary)))}.")
-        for summary in summaries
-        if remarks(summary)
-    )
+    yield from (Verdict("warn", f"**{literal(log)}**: {literal('; '.join(texts))}.") for log, texts in remarked.items())
     methods = sorted({(s.method, s.velocity) for s in context.catalogue.all(Signal)})
     if methods:
         yield Prose("How the recordings were put on a uniform clock, and where their velocities come from:")

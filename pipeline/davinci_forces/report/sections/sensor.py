@@ -17,7 +17,8 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.content.marks import AnyMark
-from davinci_forces.report.context import Context, label, listed, title
+from davinci_forces.report.context import Context, label, title
+from davinci_forces.report.sections.parts import listed
 from davinci_forces.report.verdicts import NORMAL_95, band_in_words
 
 ANCHOR = 0.0307  # root mean square error over range of a neural network on the dVRK, Yang et al. (2024)
@@ -57,7 +58,7 @@ def table(context: Context, every: Sequence[SensorForce]) -> Table:
         (
             literal(one.log),
             axis_name(one.axis),
-            *(context.number(f"sensor.{one.log}.{one.axis}.{name}", 3) for name in names),
+            *context.numbers(f"sensor.{one.log}.{one.axis}", names),
             band_in_words(one.sensor_coverage),
         )
         for one in every

@@ -22,13 +22,11 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.content.marks import AnyMark, Colour
-from davinci_forces.report.context import THESIS_TISSUE, Context, label, title
+from davinci_forces.report.context import Context, label, title
+from davinci_forces.report.sections.parts import THESIS_TISSUE
 
 MS = 1e3
-LAWS: dict[str, tuple[str, Colour]] = {
-    "worst": ("worst", "vermillion"),
-    "at contact": ("as it is", "blue"),
-}
+LAWS: dict[str, tuple[str, Colour]] = {"worst": ("worst", "vermillion"), "at contact": ("as it is", "blue")}
 
 
 def section(context: Context) -> Section | None:
@@ -183,12 +181,7 @@ def delay_panel(delayed: DelayLimit, tissues: list[TissueLimit]) -> Panel:
     late = [tissue for tissue in tissues if tissue.force_lag > 0.0]
     marks += [VLine(MS * tissue.force_lag, "filter's lag") for tissue in late[:1]]
     return Panel(
-        "With delay",
-        "delay of the force [ms]",
-        "stiffness of tissue [N/m]",
-        tuple(marks),
-        x_log=True,
-        y_log=True,
+        "With delay", "delay of the force [ms]", "stiffness of tissue [N/m]", tuple(marks), x_log=True, y_log=True
     )
 
 
@@ -199,7 +192,7 @@ def asked(context: Context, tissues: list[TissueLimit]) -> Table:
         (
             literal(tissue.log),
             context.number(f"tissue.{tissue.log}.stiffness"),
-            *(context.number(f"stability.{tissue.log}.{name}", 3) for name in names),
+            *context.numbers(f"stability.{tissue.log}", names),
         )
         for tissue in tissues
     )

@@ -206,7 +206,7 @@ def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell
     if p is None:
         row += ["–"] * 4
     else:
-        r2, ceiling = (context.number(f"{p.prefix}.{name}", 2) for name in ("r2", "r2_ceiling"))
+        r2, ceiling = context.numbers(p.prefix, ("r2", "r2_ceiling"), 2)
         row += [context.number(f"{p.prefix}.model_error", 2), percent(trusted.share), r2, ceiling]
     key = f"{space.filter}.{space.log}.{space.joint}" if space is not None else ""
     row.append(context.number(f"{key}.detection_level", 2))

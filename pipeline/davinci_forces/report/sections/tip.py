@@ -42,9 +42,7 @@ REACH = 0.5  # of the path's extent, that the largest force is long
 def section(context: Context) -> Section | None:
     """The force at the tip of every log in which all joints that carry it move."""
     forces = context.catalogue.all(TipForce)
-    if not forces:
-        return None
-    return Section("Force at the tip", "tip", tuple(blocks(context, forces)))
+    return Section("Force at the tip", "tip", tuple(blocks(context, forces))) if forces else None
 
 
 def blocks(context: Context, forces: list[TipForce]) -> Iterator[Block]:
@@ -137,9 +135,9 @@ def level_table(context: Context, forces: Sequence[TipForce]) -> Table:
         (
             literal(force.log),
             force.role,
-            *(
-                context.number(f"tip.{force.log}.{name}", 3)
-                for name in ("free_rms", "free_level", "detection_level", "coverage", "condition", "near_singular")
+            *context.numbers(
+                f"tip.{force.log}",
+                ("free_rms", "free_level", "detection_level", "coverage", "condition", "near_singular"),
             ),
         )
         for force in forces

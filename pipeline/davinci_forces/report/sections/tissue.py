@@ -25,7 +25,8 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.content.marks import AnyMark, Colour
-from davinci_forces.report.context import THESIS_TISSUE, Context, title
+from davinci_forces.report.context import Context, title
+from davinci_forces.report.sections.parts import THESIS_TISSUE
 from davinci_forces.report.verdicts import NORMAL_95, STIFF, STIFFER, graded
 
 THESIS_ROBOT = "davinci"
@@ -241,10 +242,7 @@ def each_push(context: Context, tissues: Sequence[Stiffness]) -> Iterator[Table]
     names = ("k_t", "r2", "onset_depth", "k_t_loading", "k_t_unloading", "lost", "lost_share")
     for tissue in tissues:
         prefix = f"tissue.{tissue.log}"
-        rows = tuple(
-            (str(push), *(context.number(f"{prefix}.{push}.{name}", 3) for name in names))
-            for push in tissue.push.tolist()
-        )
+        rows = tuple((str(push), *context.numbers(f"{prefix}.{push}", names)) for push in tissue.push.tolist())
         if len(rows) <= MANY:
             yield Table(f"{literal(tissue.log)}: every push.", header, rows, f"pushes-{tissue.log}", "lrrrrrrr")
 
@@ -256,7 +254,7 @@ def model_tables(context: Context, models: Sequence[TissueModel]) -> Iterator[Ta
     for model in models:
         for name in model.law.tolist():
             prefix = f"tissue.{model.log}.{name.lower().replace('-', '_').replace(' ', '_')}"
-            numbers = (context.number(f"{prefix}.{field}", 3) for field in ("error", "tangent", "damping", "exponent"))
+            numbers = context.numbers(prefix, ("error", "tangent", "damping", "exponent"))
             rows.append((literal(model.log), name, *numbers, "chosen" if name == model.chosen else ""))
     if rows:
         caption = "Models of the tissue; stiffness and damping are at half the usual depth below first contact."

@@ -56,7 +56,7 @@ def summary(context: Context, weights: list[Weight]) -> Table:
             literal(weight.log),
             literal(weight.moves_with),
             "–" if math.isnan(weight.stated_mass) else str(Number(weight.stated_mass, "kg")),
-            *(context.number(f"weight.{weight.log}.{name}", 3) for name in ("mass", "mass_mirrored", "scale")),
+            *context.numbers(f"weight.{weight.log}", ("mass", "mass_mirrored", "scale")),
             weight.side,
         )
         for weight in weights
@@ -148,10 +148,7 @@ def figure(weight: Weight, loads: list[Load]) -> Figure:
 def by_joint(context: Context, weight: Weight) -> Table:
     """What each joint says of the mass."""
     names = ("mass", "joint_offset", "left_rms", "free_error")
-    rows = tuple(
-        (title(joint), *(context.number(f"weight.{weight.log}.{joint}.{name}", 3) for name in names))
-        for joint in weight.loaded
-    )
+    rows = tuple((title(joint), *context.numbers(f"weight.{weight.log}.{joint}", names)) for joint in weight.loaded)
     return Table(
         f"{literal(weight.log)}, joint by joint: the mass by that joint alone, with the standard error that parts of "
         "the path tell; its offset of the day; and the root mean square of what mass and offset leave, beside what the "

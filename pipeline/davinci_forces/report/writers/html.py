@@ -14,7 +14,7 @@ from davinci_forces.report.content.layout import Placed, columns, marked_texts, 
 from davinci_forces.report.figures.svg import svg
 from davinci_forces.report.writers.miniature import LARGER, SMALL, miniature
 from davinci_forces.report.writers.numbers import Json, ThinnedFigure, numbers_json, thin_figure
-from davinci_forces.report.writers.pictures import address, looks, shrink
+from davinci_forces.report.writers.pictures import NAMES, address, looks, shrink
 from davinci_forces.report.writers.typesetting import Drawing, Formula, draw_formulas
 
 if TYPE_CHECKING:
@@ -49,7 +49,7 @@ def render(document: Document) -> bytes:
     page: Json = {
         "document": document, "placed": placed, "references": references(placed), "formulas": formulas,
         "pictures": {name: _picture(figure, name in folded) for name, figure in figures.items()}, "symbols": symbols,
-        "looks": looks(), "scripts": [
+        "looks": looks(NAMES.values()), "scripts": [
             _script(name)
             for name in SCRIPTS + (TRACE_SCRIPTS if zooms else ()) + (REVIEW_SCRIPTS if document.rated else ())
         ],

@@ -1,7 +1,7 @@
 """Figures as pictures of a page: SVG small enough to travel in it, which turns dark with the page."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from urllib.parse import quote
 
 from davinci_forces.report.figures.palette import COLOURS, DARK, SURROUNDINGS
@@ -12,15 +12,11 @@ FONT = "system-ui,-apple-system,'Segoe UI',Roboto,Arial,'DejaVu Sans',sans-serif
 ESCAPED = re.compile(r"[^ !&'()*+,./:;<=>?@\[\]_{|}~0-9A-Za-z-]+")
 
 
-def looks() -> tuple[str, str]:
-    """The colours of marks and of what surrounds them as CSS variables, on a light page and on a dark one."""
+def looks(used: Collection[str]) -> tuple[str, ...]:
+    """The colours used of marks and of what surrounds them as CSS variables, on a light page and on a dark one."""
     light = COLOURS | {name: pair[0] for name, pair in SURROUNDINGS.items()}
     dark = DARK | {name: pair[1] for name, pair in SURROUNDINGS.items()}
-    return _variables(light), _variables(dark)
-
-
-def _variables(values: dict[str, str]) -> str:
-    return ";".join(f"--{name}:{value}" for name, value in values.items())
+    return tuple(";".join(f"--{name}:{side[name]}" for name in side if name in used) for side in (light, dark))
 
 
 def address(svg: str) -> str:
@@ -73,17 +69,11 @@ def _without_empty_groups(svg: str) -> str:
 def _sheet(svg: str, styles: dict[str, str]) -> str:
     """The style sheet of a picture: its classes, and its colours in light and dark."""
     classes = "".join(f".{name}{{{_declarations(style)}}}" for style, name in styles.items())
-    wanted = {name for name in NAMES.values() if f"var(--{name})" in classes}
-    light, dark = (_only(side, wanted) for side in looks())
+    light, dark = looks([name for name in NAMES.values() if f"var(--{name})" in classes])
     return (
         f"<style>:root{{{light}}}@media(prefers-color-scheme:dark){{:root{{{dark}}}}}"
         f"*{{stroke-linejoin:round;stroke-linecap:butt}}{classes}</style>"
     )
-
-
-def _only(variables: str, wanted: set[str]) -> str:
-    """Of the variables, those that are wanted."""
-    return ";".join(one for one in variables.split(";") if one.partition(":")[0].removeprefix("--") in wanted)
 
 
 def _declarations(style: str) -> str:

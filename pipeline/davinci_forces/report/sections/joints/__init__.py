@@ -27,6 +27,7 @@ from davinci_forces.report.results import format_unit
 from davinci_forces.report.sections.joints.estimators import convergence, estimators, left_out, printed_beside
 from davinci_forces.report.sections.joints.friction import friction_maps
 from davinci_forces.report.sections.joints.residuals import residual_blocks
+from davinci_forces.report.sections.parts import run_name
 
 NAMES = {
     "lse": "least squares",
@@ -77,11 +78,7 @@ def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
         if i == 0:
             yield from shown
         else:
-            yield OnScreen(
-                f"{title(residual.joint)} in {literal(residual.log)}",
-                f"residual-{residual.log}-{residual.joint}",
-                shown,
-            )
+            yield OnScreen(run_name(residual.log, residual.joint), f"residual-{residual.log}-{residual.joint}", shown)
     yield from implausible(fits)
     yield from left_out(context, first.group)
     yield compared(context, fits)
@@ -147,7 +144,7 @@ def compared(context: Context, fits: list[Fit]) -> Block:
     for fit in fits:
         key = ".".join(("fit", *fit.key))
         values = (context.number(f"{key}.{slug(name)}", 3) for name in names)
-        scores = (context.number(f"{key}.{name}", 3) for name in ("mse", "r2", "condition"))
+        scores = context.numbers(key, ("mse", "r2", "condition"))
         rows.append((fit_name(fit.model, fit.estimator), *scores, *values))
     group = fits[0].group
     caption = (

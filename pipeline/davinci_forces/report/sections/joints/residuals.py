@@ -5,18 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Column, Counts, Residual, Trajectory, Whiteness
-from davinci_forces.report.content import (
-    Block,
-    Figure,
-    Line,
-    Panel,
-    Points,
-    Prose,
-    Stems,
-    literal,
-)
-from davinci_forces.report.context import Context, fit_name, label, title
-from davinci_forces.report.sections.parts import autocorrelation
+from davinci_forces.report.content import Block, Figure, Line, Panel, Points, Prose, Stems
+from davinci_forces.report.context import Context, fit_name, label
+from davinci_forces.report.sections.parts import autocorrelation, run_name
 from davinci_forces.report.verdicts import percent
 
 LAGS = 50  # of the cross-correlation, each way
@@ -26,7 +17,7 @@ REVERSALS = 2.0  # times as large around reversals as elsewhere, from which on t
 
 def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
     """What a fit leaves of one log: over time, against the motion, and against itself."""
-    name = f"{title(residual.joint)} in {literal(residual.log)}"
+    name = run_name(residual.log, residual.joint)
     errors, effort = residual.tau - residual.tau_hat, label(residual, "tau", "effort")
     who = fit_name(residual.model, residual.estimator)
     yield Figure(
