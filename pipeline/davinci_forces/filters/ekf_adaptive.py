@@ -19,4 +19,4 @@ def track(recording: Driven, noise: NoiseModel) -> Tracked:
     """Filter a recording: correct with y_k, then predict with tau_k."""
     forgets = 1.0 - float(np.exp(-recording.T_s / WINDOW))
     model = kalman.states(recording, noise)._replace(forgets=forgets)
-    return Tracked(*kalman.filtered(recording, noise, model)[0])
+    return Tracked(*kalman.filtered(recording, model))

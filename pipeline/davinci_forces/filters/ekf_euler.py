@@ -21,4 +21,4 @@ def track(recording: Driven, noise: NoiseModel) -> Tracked:
     left_q, left_dq = (0.25 * T_s**4 * float(np.mean(x**2)) for x in (recording.ddq, jerk))
     model = kalman.states(recording, noise)._replace(order=1, doubts=False)
     model.Q[:2, :2] = np.diag([noise.q_q**2 + left_q, noise.q_dq**2 + left_dq])
-    return Tracked(*kalman.filtered(recording, noise, model)[0])
+    return Tracked(*kalman.filtered(recording, model))

@@ -20,4 +20,4 @@ def track(recording: Driven, noise: NoiseModel) -> Tracked:
     model.P[3, 3] = recording.first_std**2
     model.Phi[2, 3] = T_s
     model.Q[2:, 2:] = noise.q_tau**2 / T_s**2 * np.array([[T_s**2 / 3.0, T_s / 2.0], [T_s / 2.0, 1.0]])
-    return Tracked(*kalman.filtered(recording, noise, model)[0])
+    return Tracked(*kalman.filtered(recording, model))

@@ -24,11 +24,15 @@ TINY = 1e-300
 
 def arguments(recording: Driven, noise: NoiseModel) -> tuple[Any, ...]:
     """A recording and its noise as the compiled passes take them."""
-    joint = recording.joint
-    columns = (recording.q, recording.dq, recording.tau - joint.known, joint.inertia)
     before = belief.first(float(recording.q[0]), float(recording.dq[0]), noise.r_q, noise.r_dq, recording.first_std)
-    contiguous = [np.ascontiguousarray(x, float) for x in columns]
-    return (before, *contiguous, joint.coefficients, recording.T_s, *covariances(noise, recording.T_s))
+    return (before, *columns(recording), *covariances(noise, recording.T_s))
+
+
+def columns(recording: Driven) -> tuple[Any, ...]:
+    """Position, velocity, drive and inertia (N,) of a recording, the coefficients of its bias, and T_s."""
+    joint = recording.joint
+    samples = (recording.q, recording.dq, recording.tau - joint.known, joint.inertia)
+    return (*(np.ascontiguousarray(x, float) for x in samples), joint.coefficients, recording.T_s)
 
 
 def covariances(noise: NoiseModel, T_s: float) -> tuple[float, float, float, float, float, float]:

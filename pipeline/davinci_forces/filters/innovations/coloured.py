@@ -32,23 +32,23 @@ class Noise(NamedTuple):
 
 def innovations(recording: Driven, noise: Noise) -> tuple[Array, Array]:
     """Of position and velocity (N,)."""
-    out, _ = kalman.filtered(recording, noise.white, states(recording, noise))
-    return out[4], out[5]
+    _, _, _, _, i_q, i_dq, _ = kalman.filtered(recording, states(recording, noise))
+    return i_q, i_dq
 
 
 def log_likelihood(recording: Driven, noise: Noise) -> float:
     """Of the measurements, as that of `ekf`."""
     settle = min(round(SETTLE / recording.T_s), len(recording.q) // 2)
-    return kalman.filtered(recording, noise.white, states(recording, noise), settle)[1]
+    return kalman.log_likelihood(recording, states(recording, noise), settle)
 
 
 def states(recording: Driven, noise: Noise) -> kalman.States:
     """Those of `ekf` and the noise of each measurement, which is measured with it and forgotten by phi."""
     model = kalman.states(recording, noise.white, 5)
     for i, (r, phi) in enumerate(zip(noise.white[:2], noise.phi, strict=True)):
-        model.H[i, 3 + i], model.Phi[3 + i, 3 + i] = 1.0, phi
-        model.P[3 + i, 3 + i], model.Q[3 + i, 3 + i] = r**2, (1.0 - phi**2) * r**2
-    return model._replace(R=np.zeros(2))
+        v = (3 + i, 3 + i)
+        model.P[v], model.Phi[v], model.Q[v] = r**2, phi, (1.0 - phi**2) * r**2
+    return model._replace(R=np.zeros(2), in_q=(0, 3), in_dq=(1, 4))
 
 
 def likeliest(recording: Driven, start: NoiseModel, walks: bool, coloured: bool) -> Noise:
