@@ -34,7 +34,7 @@ from tests.test_averaging import entry
 def trajectory(signal) -> Trajectory:
     averages = average.run([signal], entry(name=signal.log), arm.ARM, harmonics=0, lowpass=17.0)
     [mean] = [r for r in averages if isinstance(r, Average)]
-    made = differentiate.run(mean, arm.joint(signal.joint), derivative="harmonics", harmonics=0)
+    made = differentiate.run(mean, arm.joint(signal.joint), harmonics=0)
     return next(r for r in made if isinstance(r, Trajectory))
 
 
@@ -143,16 +143,17 @@ def test_logs_of_a_joint_are_pooled():
     assert (both["lse"].theta_std_classical < one["lse"].theta_std_classical).all()
 
 
-def test_both_ways_of_differentiating_agree():
+def test_a_period_is_differentiated_as_its_spectrum_is():
     [mean] = [
         r for r in average.run([arm.signal()], entry(), arm.ARM, harmonics=0, lowpass=17.0) if isinstance(r, Average)
     ]
-    made = [
-        next(differentiate.run(mean, arm.joint("hand_roll"), derivative=d, harmonics=0)) for d in ("harmonics", "fft")
-    ]
-    for name in ("q", "dq", "ddq"):
-        a, b = (getattr(m, name) for m in made)
-        assert_allclose(a, b, atol=1e-12 * np.abs(b).max())
+    made = next(differentiate.run(mean, arm.joint("hand_roll"), harmonics=0))
+    spectrum = np.fft.rfft(mean.q)
+    spectrum[made.harmonics + 1 :] = 0.0
+    omega = 2 * np.pi / mean.period * np.arange(len(spectrum))
+    for order, name in enumerate(("q", "dq", "ddq")):
+        expected = np.fft.irfft((1j * omega) ** order * spectrum, n=len(mean.q))
+        assert_allclose(getattr(made, name), expected, atol=1e-12 * np.abs(expected).max())
 
 
 def test_derivatives_are_those_of_the_trajectory():
@@ -166,7 +167,7 @@ def test_a_harmonic_that_is_left_out_is_remarked_on():
     signal = arm.signal("hand_roll")
     object.__setattr__(signal, "q", signal.q + 0.05 * np.sin(2 * np.pi * 5 * signal.t / 10))
     [mean] = [r for r in average.run([signal], entry(), arm.ARM, harmonics=0, lowpass=17.0) if isinstance(r, Average)]
-    made = list(differentiate.run(mean, arm.joint("hand_roll"), derivative="harmonics", harmonics=0))
+    made = list(differentiate.run(mean, arm.joint("hand_roll"), harmonics=0))
     assert "harmonic 5 of the position is" in str(made[-1].text)
 
 

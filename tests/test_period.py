@@ -55,7 +55,7 @@ def run(*signals, **changes) -> tuple[list[Average], list[str]]:
 
 
 def fitted(mean: Average) -> Fit:
-    made = differentiate.run(mean, arm.joint(mean.joint), derivative="harmonics", harmonics=0)
+    made = differentiate.run(mean, arm.joint(mean.joint), harmonics=0)
     [trajectory] = [record for record in made if isinstance(record, Trajectory)]
     return next(record for record in fit.run([trajectory], [], arm.ARM, lowpass=17.0) if isinstance(record, Fit))
 

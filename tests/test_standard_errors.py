@@ -40,7 +40,7 @@ def problems(averages: list[Average]) -> dict[str, Regression]:
     made = {}
     for mean in averages:
         joint = ROBOT.joint(mean.joint)
-        records = differentiate.run(mean, joint, derivative="harmonics", harmonics=0)
+        records = differentiate.run(mean, joint, harmonics=0)
         made[joint.name] = pose(independent(joint), [r for r in records if isinstance(r, Trajectory)])
     return made
 

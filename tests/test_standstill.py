@@ -107,9 +107,7 @@ def chosen(signal, named="chosen"):
     motion = arm.motion(signal, LOWPASS)
     [mean] = [r for r in average.run([signal], ENTRY, arm.ARM, harmonics=0, lowpass=LOWPASS) if isinstance(r, Average)]
     joint = arm.joint("hand_roll")
-    [own] = [
-        r for r in differentiate.run(mean, joint, derivative="harmonics", harmonics=0) if isinstance(r, Trajectory)
-    ]
+    [own] = [r for r in differentiate.run(mean, joint, harmonics=0) if isinstance(r, Trajectory)]
     made = list(choose.run([motion], [mean], arm.ARM, fit=named, lowpass=LOWPASS))
     fits = [r for r in fit.run([own], [motion], arm.ARM, lowpass=LOWPASS) if isinstance(r, Fit)]
     cv = predict.run([motion], [own], fits, ENTRY, arm.ARM, lowpass=LOWPASS)

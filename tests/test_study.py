@@ -17,6 +17,7 @@ from davinci_forces.runner.reporting import study_files
 from davinci_forces.study import reading
 from davinci_forces.toml import TomlTable
 from davinci_forces.toml.file import TomlFile
+from tests.arm import write_study
 from tests.test_runs import call
 
 GOOD = """title = "T"
@@ -226,6 +227,24 @@ def test_settings_at_their_limits_are_taken(tmp_path):
     (tmp_path / "study.toml").write_text(GOOD.replace("[[log]]", limits))
     settings = reading.read(tmp_path).settings
     assert (settings.lowpass, settings.harmonics, settings.fit) == (1e5, 100, "independent.wlse")
+
+
+@pytest.mark.parametrize("value", ['"harmonics"', '"fft"'])
+def test_a_setting_of_earlier_versions_is_remarked_on_once_and_changes_nothing(tmp_path, value):
+    plain = read(tmp_path, GOOD)
+    assert plain.remarks == ()
+    old = read(tmp_path, GOOD.replace("[[log]]", f"[settings]\nderivative = {value}\n[[log]]"))
+    line = f"{tmp_path / 'study.toml'}:4: the setting 'derivative' has no effect any more; remove it"
+    assert (old.settings, old.remarks) == (plain.settings, (line,))
+    with pytest.raises(BadStudy, match="unknown key 'derivatives'"):
+        read(tmp_path, GOOD.replace("[[log]]", f"[settings]\nderivatives = {value}\n[[log]]"))
+
+
+def test_a_run_says_that_a_setting_has_no_effect(tmp_path):
+    study = write_study(tmp_path / "raw" / "arm")
+    file = study / "study.toml"
+    file.write_text(file.read_text().replace("[[log]]", '[settings]\nderivative = "fft"\n[[log]]', 1))
+    assert call("ingest", study).count("the setting 'derivative' has no effect any more") == 1
 
 
 @pytest.mark.parametrize("name", ["con", "NUL", "com1.old"])

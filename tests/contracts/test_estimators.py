@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from davinci_forces.errors import NotIdentifiable
-from davinci_forces.estimators import ESTIMATORS
+from davinci_forces.estimators import ESTIMATORS, title_of
 from davinci_forces.estimators.problem import Estimate, Estimator, Regression
 from davinci_forces.maths.models.independent import regressor
 from tests import arm
@@ -58,6 +58,12 @@ def agree(one: np.ndarray, other: np.ndarray, Phi: np.ndarray = PHI) -> None:
     """Parameters that differ by rounding only, each measured by what it contributes to the effort."""
     size = np.linalg.norm(Phi, axis=0)
     assert np.linalg.norm((one - other) * size) <= rounding(Phi) * np.linalg.norm(Phi @ THETA)
+
+
+def test_every_estimator_has_a_title_of_its_own():
+    titles = {name: title_of(name) for name in ESTIMATORS}
+    assert len({*titles, *titles.values()}) == 2 * len(ESTIMATORS)
+    assert title_of("ridge") == "ridge"
 
 
 @ESTIMATOR

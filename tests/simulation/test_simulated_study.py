@@ -127,7 +127,7 @@ def test_every_unbiased_estimator_finds_the_truth_of_averaged_periods_within_its
     (average_of,) = [
         r for r in average.run([signal], entry, study.robot, harmonics=0, lowpass=17.0) if isinstance(r, Average)
     ]
-    made = differentiate.run(average_of, it, derivative="harmonics", harmonics=0)
+    made = differentiate.run(average_of, it, harmonics=0)
     trajectories = [r for r in made if isinstance(r, Trajectory)]
     fits = {r.estimator: r for r in fit.run(trajectories, [], study.robot, lowpass=17.0) if isinstance(r, Fit)}
     assert set(fits) == set(ESTIMATORS)

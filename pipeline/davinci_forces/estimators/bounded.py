@@ -3,6 +3,8 @@
 from davinci_forces.estimators.problem import Estimate, Regression, spread
 from davinci_forces.maths.estimation import least_squares
 
+NAME = "bounded least squares"
+
 
 def estimate(problem: Regression) -> Estimate:
     """theta = arg min |tau - Phi theta|^2 with theta_i >= 0 where physics knows the sign; the global minimum.

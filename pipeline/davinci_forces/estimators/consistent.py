@@ -7,6 +7,8 @@ from davinci_forces.estimators.problem import Estimate, Regression, spread
 from davinci_forces.maths.estimation.conic import nearest
 from davinci_forces.maths.models.model import of_signs
 
+NAME = "physically consistent least squares"
+
 
 def estimate(problem: Regression) -> Estimate:
     """theta = arg min |tau - Phi theta|^2 among what some mechanism has; of a joint without bodies, signs alone.

@@ -8,6 +8,7 @@ from davinci_forces.estimators.problem import Estimate, Regression, Spread, fact
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation.least_squares import Triangle
 
+NAME = "robust least squares"
 FAR = 1.345  # deviations of the residuals beyond which they are far: 95 % as efficient as least squares on normal noise
 TO_DEVIATION = 1.4826  # of normal residuals, from the median of their absolute values
 STEPS = 200

@@ -13,6 +13,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation.correlation import correlated
 from davinci_forces.maths.estimation.identifiability import not_told_apart
 
+NAME = "instrumental variables"
 LAG = 3  # samples before and after: beyond the reach of what a low-pass leaves of noise
 
 

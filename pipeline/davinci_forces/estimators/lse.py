@@ -2,6 +2,8 @@
 
 from davinci_forces.estimators.problem import Estimate, Regression, spread
 
+NAME = "least squares"
+
 
 def estimate(problem: Regression) -> Estimate:
     """theta = (Phi' W Phi)^-1 Phi' W tau, W the number of periods, by QR of the weighted rows.  (6.46), (6.50)

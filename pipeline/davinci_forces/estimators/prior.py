@@ -6,6 +6,7 @@ from davinci_forces.estimators.problem import Estimate, Regression, spread
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation.least_squares import Triangle
 
+NAME = "least squares with a prior"
 STRENGTHS = np.geomspace(1e-32, 1e3, 141)  # lambda, beside columns of unit length
 
 

@@ -11,6 +11,7 @@ from davinci_forces.maths.estimation.least_squares import Triangle, bounded
 from davinci_forces.maths.estimation.swarm import CONSTRICTED, PARTICLES, THESIS, Manner, search
 from davinci_forces.maths.models.physical import Box, each_for_itself
 
+NAME = "particle swarm"
 SEED = 0
 REACH = 10.0  # standard errors
 

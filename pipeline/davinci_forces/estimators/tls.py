@@ -19,6 +19,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation.correlation import correlated
 from davinci_forces.maths.estimation.least_squares import Triangle
 
+NAME = "total least squares"
 EXACT = 1e-12  # of the noisiest combination's variance, below which one has no noise
 STEPS = 100
 SETTLED = 1e-10  # of the effort's noise

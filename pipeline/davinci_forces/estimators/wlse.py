@@ -7,6 +7,7 @@ from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators.problem import Estimate, Regression, factored, spread
 from davinci_forces.maths.arrays import Array
 
+NAME = "weighted least squares"
 FEWEST = 4  # periods: fewer say too little about their own spread
 DEGREES = 200  # degrees of freedom behind each weight, which leave it uncertain by 10 %
 CLEARLY = 3.0  # standard errors by which residuals have to exceed the noise,

@@ -16,7 +16,6 @@ class Trajectory(Record):
     periods: int
     t_start: float
     harmonics: int
-    method: str
     sigma_q: float
     sigma_dq: float
     sigma_tau: float

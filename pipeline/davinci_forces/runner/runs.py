@@ -109,7 +109,7 @@ def results_of(name: Path, reports: Path | None = None) -> Path:
 
 
 def load(folder: Path) -> Study:
-    """Read a study, and say which files of its logs are not there; those logs will fail, and no other.
+    """Read a study, and warn of outdated settings and of missing files; logs without files will fail, and no other.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def load(folder: Path) -> Study:
     lines = [f"{folder / 'study.toml'}:{study.lines[name]}: file {name!r} is not in {folder}" for name in absent]
     if len(absent) == study.files:
         raise BadStudy("\n".join(lines))
-    for line in lines:
+    for line in (*study.remarks, *lines):
         typer.secho(f"warning: {line}", fg="yellow", err=True)
     return study
 

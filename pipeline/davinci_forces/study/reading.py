@@ -21,9 +21,9 @@ BEYOND = tuple(
     if how == "ridge" or variant.startswith("independent+") or (how == "consistent" and variant != "independent")
 )  # fmt: skip
 CHOICES = {
-    "derivative": ("harmonics", "fft"),
     "fit": ("chosen", *(f"independent.{estimator}" for estimator in ESTIMATORS), *BEYOND),
 }
+OUTDATED = ("derivative",)  # settings without effect that earlier versions had
 
 
 def read(folder: Path) -> Study:
@@ -48,6 +48,7 @@ def study_of(table: TomlTable, folder: Path) -> Study:
     overrides = table.table("robot_overrides")
     robot = _overridden(robot, overrides) if robot else None
     robot = _with_tool(robot, table) if "tool" in table else robot
+    remarks = _remarks(table.table("settings"))
     settings = _settings(table.table("settings"), robot)
     scenario = _haptics(table, folder) if "haptics" in table else HapticScenario()
     baseline = _baseline(table, folder)
@@ -63,7 +64,9 @@ def study_of(table: TomlTable, folder: Path) -> Study:
     own = table.values["robot"] if table.values["robot"].endswith(robots.FILES) else ""
     truth = _truth(folder) if simulated else {}
     changed = overrides.values | ({"tool": table.values["tool"]} if "tool" in table else {})
-    return Study(folder, title, robot, simulated, settings, logs, changed, truth, scenario, baseline, own, lines)
+    return Study(
+        folder, title, robot, simulated, settings, logs, changed, truth, scenario, baseline, own, lines, remarks
+    )
 
 
 def _truth(folder: Path) -> dict[str, Any]:
@@ -140,10 +143,20 @@ def _with_tool(robot: Robot | None, table: TomlTable) -> Robot | None:
         return robot
 
 
+def _remarks(settings: TomlTable) -> tuple[str, ...]:
+    """One warning, with its line, for each outdated setting that the file gives."""
+    return tuple(
+        f"{settings.file.name}:{settings.file.line((*settings.path, name))}: the setting {name!r} has no effect any "
+        "more; remove it"
+        for name in OUTDATED
+        if name in settings.values
+    )
+
+
 def _settings(table: TomlTable, robot: Robot | None) -> Settings:
     values = {field.name: _setting(table, field) for field in fields(Settings) if field.name != "effort"}
     efforts = table.table("effort")
-    table.close()
+    table.close(OUTDATED)
     return Settings(**values, effort=_sought(efforts, robot))
 
 

@@ -16,7 +16,6 @@ class Settings:
     """How a study is analysed.  Stages name the settings they use as keyword arguments."""
 
     lowpass: float = 17.0  # [Hz] zero-phase low-pass where velocities and accelerations are differences
-    derivative: str = "harmonics"  # how periodic motion is differentiated: "harmonics" or "fft"
     harmonics: int = 0  # of the excitation; 0 takes the robot's
     fit: str = "chosen"  # the Fit that the filter runs with
     q_tau: float = 0.0  # random walk of the external effort [effort/s^0.5]; 0 is the slowest that shows a push
@@ -127,6 +126,7 @@ class Study:
     baseline: str = ""  # the results.json in the study's folder that the report is compared with, if there is one
     robot_file: str = ""  # the .toml or .urdf in the study's folder that describes the robot, if there is one
     lines: dict[str, int] = field(default_factory=dict, compare=False)  # of study.toml, by the file of a log they name
+    remarks: tuple[str, ...] = field(default=(), compare=False)  # what its author should know, each with its line
 
     @property
     def name(self) -> str:

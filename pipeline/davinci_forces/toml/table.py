@@ -157,9 +157,9 @@ class TomlTable:
         self.problem(f"{key} must be {words}, not {shown(value)}", key)
         return default
 
-    def close(self) -> None:
-        """Report the keys that nothing asked for, and what they may have been meant to be."""
-        for key in self.values.keys() - self.asked.keys():
+    def close(self, outdated: Collection[str] = ()) -> None:
+        """Report the keys that nothing asked for, outdated ones apart, and what they may have been meant to be."""
+        for key in self.values.keys() - self.asked.keys() - set(outdated):
             meant = "".join(f"; did you mean {near!r}?" for near in get_close_matches(key, self.asked, 1, 0.5))
             self.problem(f"unknown key {key!r}; known are {', '.join(self.asked) or 'none'}{meant}", key)
 

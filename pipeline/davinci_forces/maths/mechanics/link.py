@@ -145,9 +145,13 @@ def shifted_inertia(m: float, r: Vector, inertia: Inertia) -> Inertia:
     return (h[0] + m * r[0], h[1] + m * r[1], h[2] + m * r[2]), upper, lower
 
 
-def carried_inertia(row: Row, slides: bool, turn: Turn, q: Number, m: float, inertia: Inertia) -> Inertia:
-    """The inertia of what a link carries, itself included, about its carrier's origin in its carrier's axes."""
-    inertia = shifted_inertia(m, (0.0 * q, 0.0 * q, q), inertia) if slides else turned_inertia(turn, inertia)
+def moved_inertia(slides: bool, turn: Turn, q: Number, m: float, inertia: Inertia) -> Inertia:
+    """The inertia of what a link carries, itself included, in the frame of its joint at q = 0."""
+    return shifted_inertia(m, (0.0 * q, 0.0 * q, q), inertia) if slides else turned_inertia(turn, inertia)
+
+
+def carried_inertia(row: Row, m: float, inertia: Inertia) -> Inertia:
+    """The inertia of what a link carries in the frame of its joint at q = 0, in its carrier's frame."""
     h, (xx, xy, xz), (yy, yz, zz) = inertia
     x, y, z = times(row, (xx, xy, xz)), times(row, (xy, yy, yz)), times(row, (xz, yz, zz))  # columns of R I
     a, b, c = times(row, (x[0], y[0], z[0])), times(row, (x[1], y[1], z[1])), times(row, (x[2], y[2], z[2]))

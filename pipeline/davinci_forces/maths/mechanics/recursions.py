@@ -3,104 +3,152 @@
 Recursive Newton-Euler and composite rigid bodies (Featherstone 2008, chapters 5 and 6), and the regressor.  Where a
 coordinate moves several links, it collects the effort of all of them.
 
-The functions run as they are on lists of arrays of samples or of floats, and compiled on floats or vectors of samples
-(`kernels`).  `q`, `dq`, `ddq` and `turns`, (cos q, sin q), hold one number a coordinate, and results are put into
-lists that the caller gives.  `work` is for what they keep of every body in between, the base first: three vectors each.
+One source for numpy and for compiled loops (`kernels`).  The last axis of every array has S samples, and `samples` are
+the indices to compute with: one slice of all in numpy, `range(S)` where it is compiled.  `joints` (n + 1, 5, S) holds
+cos q, sin q, q, dq, ddq of each coordinate, and zeros for what never moves.  `work` (bodies, numbers, S) is space for
+what is kept of every body in between, the base first, and 0 before its first use.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from typing import Any
 
 from davinci_forces.maths.mechanics import link
-from davinci_forces.maths.mechanics.link import Number, Vector, plus
+from davinci_forces.maths.mechanics.link import Vector, plus
 from davinci_forces.maths.mechanics.tree import Tree
 
-Numbers = Sequence[Number]
-Turns = Sequence[tuple[Number, Number]]
-Work = list[tuple[Vector, Vector, Vector]]
+Samples = Iterable[Any]
 
 
-def work_space(tree: Tree, zero: Number, each: int = 2) -> Work:
-    """Space for so many things of each body; `zero` is of the kind of number that it is for."""
-    none = zero, zero, zero
-    return [(none, none, none)] * (each * (len(tree.parent) + 1))
+def vector(numbers: Any, first: int, s: Any) -> Vector:
+    """Three numbers of a body, from `first` on."""
+    return numbers[first, s], numbers[first + 1, s], numbers[first + 2, s]
 
 
-def inverse_dynamics(
-    tree: Tree, gravity: float, turns: Turns, q: Numbers, dq: Numbers, ddq: Numbers, work: Work, tau: Any
-) -> None:
-    """Put the effort of each coordinate into tau; with gravity 0, and ddq 0, it is C dq.  (4.27)
+def put(numbers: Any, first: int, s: Any, x: Vector) -> None:
+    """Keep three numbers of a body, from `first` on."""
+    numbers[first, s], numbers[first + 1, s], numbers[first + 2, s] = x
 
-    The work space is for two things of each body: motion and wrench.
+
+def fill(numbers: Any, value: float, samples: Samples) -> None:
+    """Give all samples one value."""
+    for s in samples:
+        numbers[s] = value
+
+
+def add(total: Any, wrench: Any, slides: bool, samples: Samples) -> None:
+    """Add what a joint exerts of a wrench on its link: its force along z, or its moment about z."""
+    part = wrench[2 if slides else 5]
+    for s in samples:
+        total[s] += part[s]
+
+
+def motions(tree: Tree, gravity: float, joints: Any, work: Any, samples: Samples) -> None:
+    """Put the motion of every link into the first 9 numbers of its body."""
+    fill(work[0, 8], gravity, samples)  # standing still feels like accelerating upwards with g
+    for i in range(len(tree.parent)):
+        row, slides, joint = tree.rows[i], tree.slides[i], joints[tree.coordinate[i]]
+        carrier, body = work[tree.parent[i]], work[i + 1]
+        for s in samples:
+            motion = vector(carrier, 0, s), vector(carrier, 3, s), vector(carrier, 6, s)
+            turn = joint[0, s], joint[1, s]
+            w, e, a = link.moved(row, slides, turn, joint[2, s], joint[3, s], joint[4, s], motion)
+            put(body, 0, s, w)
+            put(body, 3, s, e)
+            put(body, 6, s, a)
+
+
+def inverse_dynamics(tree: Tree, gravity: float, joints: Any, work: Any, tau: Any, samples: Samples) -> None:
+    """Put the effort of each coordinate into tau (n, S); with gravity 0, and ddq 0, it is C dq.  (4.27)
+
+    The work space has 15 numbers of each body: motion and wrench.
     """
-    L, zero = len(tree.parent), 0.0 * q[0]
-    none = zero, zero, zero
-    work[0] = none, none, (zero, zero, zero + gravity)  # standing still feels like accelerating upwards with g
+    motions(tree, gravity, joints, work, samples)
+    for i in range(len(tree.parent)):
+        row, body = tree.rows[i], work[i + 1]
+        for s in samples:
+            f, n = link.wrench_of(row, (vector(body, 0, s), vector(body, 3, s), vector(body, 6, s)))
+            put(body, 9, s, f)
+            put(body, 12, s, n)
     for k in range(tree.n):
-        tau[k] = zero
-    for i in range(L):
-        k, row = tree.coordinate[i], tree.rows[i]
-        motion = link.moved(row, tree.slides[i], turns[k], q[k], dq[k], ddq[k], work[tree.parent[i]])
-        f, n = link.wrench_of(row, motion)
-        work[i + 1], work[L + i + 2] = motion, (f, n, none)
-    for i in range(L - 1, -1, -1):
-        k, slides, carrier = tree.coordinate[i], tree.slides[i], tree.parent[i]
-        f, n, _ = work[L + i + 2]
-        tau[k] = tau[k] + link.along(slides, (f, n))
-        if carrier > 0:
-            f, n = link.carried(tree.rows[i], slides, turns[k], q[k], (f, n))
-            its_f, its_n, _ = work[L + 1 + carrier]
-            work[L + 1 + carrier] = plus(its_f, f), plus(its_n, n), none
+        fill(tau[k], 0.0, samples)
+    for i in range(len(tree.parent) - 1, -1, -1):
+        row, slides, joint = tree.rows[i], tree.slides[i], joints[tree.coordinate[i]]
+        carrier, body = work[tree.parent[i]], work[i + 1]
+        add(tau[tree.coordinate[i]], body[9:], slides, samples)
+        for s in samples:
+            wrench = vector(body, 9, s), vector(body, 12, s)
+            f, n = link.carried(row, slides, (joint[0, s], joint[1, s]), joint[2, s], wrench)
+            put(carrier, 9, s, plus(vector(carrier, 9, s), f))
+            put(carrier, 12, s, plus(vector(carrier, 12, s), n))
 
 
-def mass_matrix(tree: Tree, turns: Turns, q: Numbers, work: Work, M: Any) -> None:
-    """Put M into a list by rows.  (4.38)
+def mass_matrix(tree: Tree, joints: Any, work: Any, M: Any, samples: Samples) -> None:
+    """Fill M (n, n, S).  (4.38)
 
-    The work space is for one thing of each body: first moment and inertia of all that it carries.
+    The work space has 9 numbers of each body: first moment and inertia of all that it carries.  The base's are those
+    of the wrench that one unit of a joint's acceleration takes, on its way inwards.
     """
-    zero, n, L = 0.0 * q[0], tree.n, len(tree.parent)
-    for k in range(n * n):
-        M[k] = zero
-    for i in range(L):
-        r = tree.rows[i]
-        h, upper = (zero + r[13], zero + r[14], zero + r[15]), (zero + r[16], zero + r[17], zero + r[18])
-        work[i + 1] = h, upper, (zero + r[19], zero + r[20], zero + r[21])
-    for i in range(L - 1, -1, -1):
-        k, m, slides, carrier = tree.coordinate[i], tree.carried[i], tree.slides[i], tree.parent[i]
-        wrench = link.unit_wrench(slides, m, work[i + 1])
-        M[k * n + k] = M[k * n + k] + link.along(slides, wrench)
-        if carrier > 0:
-            h, upper, lower = link.carried_inertia(tree.rows[i], slides, turns[k], q[k], m, work[i + 1])
-            whole = work[carrier]
-            work[carrier] = plus(whole[0], h), plus(whole[1], upper), plus(whole[2], lower)
+    wrench = work[0]
+    for k in range(tree.n):
+        for o in range(tree.n):
+            fill(M[k, o], 0.0, samples)
+    for i in range(len(tree.parent)):
+        for c in range(9):
+            fill(work[i + 1, c], tree.rows[i][13 + c], samples)
+    for i in range(len(tree.parent) - 1, -1, -1):
+        k, slides, m, body = tree.coordinate[i], tree.slides[i], tree.carried[i], work[i + 1]
+        for s in samples:
+            f, n = link.unit_wrench(slides, m, (vector(body, 0, s), vector(body, 3, s), vector(body, 6, s)))
+            put(wrench, 0, s, f)
+            put(wrench, 3, s, n)
+        add(M[k, k], wrench, slides, samples)
+        if tree.parent[i] > 0:
+            row, joint, carrier = tree.rows[i], joints[k], work[tree.parent[i]]
+            for s in samples:
+                inertia = vector(body, 0, s), vector(body, 3, s), vector(body, 6, s)
+                h, upper, lower = link.moved_inertia(slides, (joint[0, s], joint[1, s]), joint[2, s], m, inertia)
+                put(body, 0, s, h)
+                put(body, 3, s, upper)
+                put(body, 6, s, lower)
+            for s in samples:
+                inertia = vector(body, 0, s), vector(body, 3, s), vector(body, 6, s)
+                h, upper, lower = link.carried_inertia(row, m, inertia)
+                put(carrier, 0, s, plus(vector(carrier, 0, s), h))
+                put(carrier, 3, s, plus(vector(carrier, 3, s), upper))
+                put(carrier, 6, s, plus(vector(carrier, 6, s), lower))
         j = i
         while tree.parent[j] > 0:
-            o = tree.coordinate[j]
-            wrench = link.carried(tree.rows[j], tree.slides[j], turns[o], q[o], wrench)
+            row, slides, joint = tree.rows[j], tree.slides[j], joints[tree.coordinate[j]]
+            for s in samples:
+                push = vector(wrench, 0, s), vector(wrench, 3, s)
+                f, n = link.carried(row, slides, (joint[0, s], joint[1, s]), joint[2, s], push)
+                put(wrench, 0, s, f)
+                put(wrench, 3, s, n)
             j = tree.parent[j] - 1
-            o, effort = tree.coordinate[j], link.along(tree.slides[j], wrench)
-            M[k * n + o] = M[k * n + o] + effort
-            M[o * n + k] = M[o * n + k] + effort
+            add(M[k, tree.coordinate[j]], wrench, tree.slides[j], samples)
+            add(M[tree.coordinate[j], k], wrench, tree.slides[j], samples)
 
 
-def regressor(
-    tree: Tree, gravity: float, turns: Turns, q: Numbers, dq: Numbers, ddq: Numbers, work: Work, Y: Any
-) -> None:
-    """Put the ten columns of link i and coordinate k, where it moves the link, into Y[k L + i].  (6.3)
+def regressor(tree: Tree, gravity: float, joints: Any, work: Any, Y: Any, samples: Samples) -> None:
+    """Put the ten columns of link i and coordinate k, where it moves the link, into Y[k, i] (10, S).  (6.3)
 
-    The work space is for n + 1 things of each body: its motion, and its Jacobian by each coordinate in its own axes.
+    The work space has 9 numbers of (n + 1) (L + 1) bodies: their motions, and then, coordinate by coordinate, their
+    velocities by one unit of it.
     """
-    n, L, zero = tree.n, len(tree.parent), 0.0 * q[0]
-    none = zero, zero, zero
-    work[0] = none, none, (zero, zero, zero + gravity)
-    for i in range(L):
-        own, row, slides = tree.coordinate[i], tree.rows[i], tree.slides[i]
-        motion = link.moved(row, slides, turns[own], q[own], dq[own], ddq[own], work[tree.parent[i]])
-        work[i + 1] = motion
-        for k in range(n):
+    motions(tree, gravity, joints, work, samples)
+    bodies = len(tree.parent) + 1
+    for i in range(bodies - 1):
+        row, slides, joint, motion = tree.rows[i], tree.slides[i], joints[tree.coordinate[i]], work[i + 1]
+        for k in range(tree.n):
             if tree.moves[i][k]:
-                unit, carrier = (1.0 if k == own else 0.0), (k + 1) * (L + 1) + tree.parent[i]
-                w, v, _ = work[carrier]
-                w, v = link.moved_velocity(row, slides, turns[own], q[own], unit, (w, v))
-                work[(k + 1) * (L + 1) + i + 1] = w, v, none
-                Y[k * L + i] = link.columns(motion, (w, v))
+                unit, first = (1.0 if k == tree.coordinate[i] else 0.0), (k + 1) * bodies
+                carrier, body, columns = work[first + tree.parent[i]], work[first + i + 1], Y[k, i]
+                for s in samples:
+                    turn, before = (joint[0, s], joint[1, s]), (vector(carrier, 0, s), vector(carrier, 3, s))
+                    J = link.moved_velocity(row, slides, turn, joint[2, s], unit, before)
+                    put(body, 0, s, J[0])
+                    put(body, 3, s, J[1])
+                    wea = vector(motion, 0, s), vector(motion, 3, s), vector(motion, 6, s)
+                    ten = link.columns(wea, J)
+                    for c in range(10):
+                        columns[c, s] = ten[c]

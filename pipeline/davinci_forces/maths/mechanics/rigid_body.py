@@ -6,9 +6,6 @@ Shapes: q, dq, ddq, tau are (..., n) in rad or m, their rates, and N m or N.  An
 below the chain's own, the later coordinates are at rest at 0.
 """
 
-from math import cos, sin
-from typing import Any
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -23,6 +20,7 @@ from davinci_forces.maths.mechanics.tree import Tree, folded, tree_of
 
 __all__ = ["base_parameters", "coriolis", "gravity", "inverse_dynamics", "mass_matrix", "regressor"]
 
+ALL = (slice(None),)  # samples at once
 COMPILE_FROM = 20_000  # samples; fewer are done before the kernels are loaded
 
 
@@ -36,10 +34,10 @@ def mass_matrix(chain: Chain, bodies: Bodies, q: ArrayLike, drives: Drives | Non
         M = np.empty((*q.shape, n))
         mass_matrices(tree, _rows(q), M.reshape(-1, n, n))
     else:
-        entries: list[Any] = [0.0] * (n * n)
-        lists, at = tree.lists(), _numbers(q)
-        recursions.mass_matrix(lists, _turns(at), at, recursions.work_space(lists, 0.0), entries)
-        M = np.stack(entries, axis=-1).reshape(*q.shape, n)
+        joints = _joints(q, q, q)
+        entries, work = np.empty((n, n, joints.shape[2])), np.zeros((len(tree.parent) + 1, 9, joints.shape[2]))
+        recursions.mass_matrix(tree.lists(), joints, work, entries, ALL)
+        M = np.moveaxis(entries, -1, 0).reshape(*q.shape, n)
     return M if drives is None else np.asarray(M + np.diag(drives.inertia))
 
 
@@ -72,28 +70,19 @@ def regressor(chain: Chain, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Arra
     n, L = q.shape[-1], len(chain.parent)
     N = q.size // n
     tree = tree_of(chain.reduced(n), np.zeros((L, 10)))
-    entries: list[Any] = [None] * (n * L)
-    lists, at = tree.lists(), _numbers(q)
-    work = recursions.work_space(lists, 0.0, n + 1)
-    recursions.regressor(lists, GRAVITY, _turns(at), at, _numbers(dq), _numbers(ddq), work, entries)
-    Y = np.zeros((n, L, 10, N))
-    for entry, ten in zip(entries, Y.reshape(n * L, 10, N), strict=True):
-        if entry is not None:
-            ten[:] = np.reshape(entry, (10, N))
+    work, Y = np.zeros(((n + 1) * (L + 1), 9, N)), np.zeros((n, L, 10, N))
+    recursions.regressor(tree.lists(), GRAVITY, _joints(q, dq, ddq), work, Y, ALL)
     return np.moveaxis(Y, -1, 0).reshape(*q.shape, 10 * L)
 
 
 def compiled_regressor(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
     """Y (..., n, 10 L) of `regressor` by the kernels however few the samples, for those who ask often."""
     from davinci_forces.maths.mechanics.kernels import regressors
-    from davinci_forces.maths.mechanics.vector import LANES
 
     n, L = q.shape[-1], len(chain.parent)
-    if q.size < LANES * n:  # they cannot do fewer
-        return regressor(chain, q, dq, ddq)
-    Y = np.zeros((*q.shape, 10 * L))
+    Y = np.empty((*q.shape, 10 * L))
     tree = tree_of(chain.reduced(n), np.zeros((L, 10)))
-    regressors(tree, GRAVITY, _rows(q), _rows(dq), _rows(ddq), Y.reshape(-1, n, 10 * L))
+    regressors(tree, GRAVITY, _rows(q), _rows(dq), _rows(ddq), Y.reshape(-1, n, L, 10))
     return Y
 
 
@@ -109,11 +98,10 @@ def _newton_euler(tree: Tree, g: float, q: Array, dq: Array, ddq: Array) -> Arra
         tau = np.empty(q.shape)
         kernels.inverse_dynamics(tree, g, _rows(q), _rows(dq), _rows(ddq), _rows(tau))
         return tau
-    efforts: list[Any] = [0.0] * tree.n
-    tree, at = tree.lists(), _numbers(q)
-    work = recursions.work_space(tree, 0.0)
-    recursions.inverse_dynamics(tree, g, _turns(at), at, _numbers(dq), _numbers(ddq), work, efforts)
-    return np.stack(efforts, axis=-1).reshape(q.shape)
+    joints = _joints(q, dq, ddq)
+    efforts, work = np.empty((tree.n, joints.shape[2])), np.zeros((len(tree.parent) + 1, 15, joints.shape[2]))
+    recursions.inverse_dynamics(tree.lists(), g, joints, work, efforts, ALL)
+    return efforts.T.reshape(q.shape)
 
 
 def _many(q: Array) -> bool:
@@ -126,12 +114,9 @@ def _rows(x: Array) -> Array:
     return np.ascontiguousarray(x, float).reshape(-1, x.shape[-1])
 
 
-def _numbers(x: Array) -> list[Any]:
-    """One array of N samples a coordinate of (..., n), or one float, and a 0 for what never moves."""
-    columns = x.reshape(-1, x.shape[-1]).T
-    return [*(columns[:, 0].tolist() if columns.shape[1] == 1 else columns.copy()), 0.0]
-
-
-def _turns(q: list[Any]) -> list[Any]:
-    """cos and sin of every coordinate."""
-    return [(np.cos(x), np.sin(x)) if np.ndim(x) else (cos(x), sin(x)) for x in q]
+def _joints(q: Array, dq: Array, ddq: Array) -> Array:
+    """cos q, sin q, q, dq, ddq of every coordinate (n + 1, 5, N), and zeros for what never moves."""
+    joints = np.zeros((q.shape[-1] + 1, 5, q.size // q.shape[-1]))
+    for i, x in enumerate((np.cos(q), np.sin(q), q, dq, ddq)):
+        joints[:-1, i] = x.reshape(-1, q.shape[-1]).T
+    return joints

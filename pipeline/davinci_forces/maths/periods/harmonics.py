@@ -165,18 +165,6 @@ def derivative(c: Array, omega: float) -> Array:
     return turned
 
 
-def differentiate_fft(x: Array, period: float, harmonics: int, order: int) -> Array:
-    """Differentiate one period in the frequency domain, keeping its mean and first harmonics only.
-
-    Each kept line of the spectrum is multiplied by (j omega)^order; the others are taken as noise.  `x` is (K,), evenly
-    sampled, its last sample not repeating the first; returns (K,).  `order` 0 smooths.  (6.34)
-    """
-    spectrum = np.fft.rfft(x)
-    spectrum[harmonics + 1 :] = 0.0
-    omega = 2 * np.pi / period * np.arange(len(spectrum))
-    return np.fft.irfft((1j * omega) ** order * spectrum, n=len(x))
-
-
 def amplitudes(x: Array) -> Array:
     """Amplitude of the mean and of each harmonic of one period, (K // 2 + 1,)."""
     spectrum = np.abs(np.fft.rfft(x)) / len(x)

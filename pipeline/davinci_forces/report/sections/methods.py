@@ -75,8 +75,8 @@ METHODS: tuple[tuple[type[Record], tuple[Block, ...]], ...] = (
     )),
     (Trajectory, (
         Prose(
-            "**Differentiation.** Only the harmonics of the excitation are kept of the averaged position, by {by}, and "
-            "differentiated exactly."
+            "**Differentiation.** Only the harmonics of the excitation are kept of the averaged position, by projection "
+            "on the harmonics, and differentiated exactly."
         ),
         Equation(
             "cal(F)[(dif^n overline(q)) / (dif t^n)] = (j omega)^n Q(omega)",
@@ -194,8 +194,7 @@ def in_current(context: Context) -> str:
 def blocks(context: Context) -> Iterator[Block]:
     """What each stage did that made records, in their order."""
     settings = context.study.settings
-    by = "projection on the harmonics" if settings.derivative == "harmonics" else "the fast Fourier transform"
-    words = {"lowpass": f"{settings.lowpass:g}", "in_current": in_current(context), "by": by}
+    words = {"lowpass": f"{settings.lowpass:g}", "in_current": in_current(context)}
     for kind, method in METHODS:
         if context.catalogue.all(kind):
             yield from (Prose(block.text.format(**words)) if isinstance(block, Prose) else block for block in method)

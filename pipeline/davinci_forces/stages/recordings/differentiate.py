@@ -11,12 +11,10 @@ from davinci_forces.robots.robot import Joint
 LEFT_OUT = 0.01  # share of the largest harmonic above which one that is left out is worth a remark
 
 
-def run(
-    average: Average, joint: Joint, *, derivative: str, harmonics: int
-) -> Iterator[Trajectory | Spectrum | Diagnostic]:
+def run(average: Average, joint: Joint, *, harmonics: int) -> Iterator[Trajectory | Spectrum | Diagnostic]:
     """Position, velocity and acceleration from the harmonics of the excitation.  (6.34)"""
     orders = harmonics or joint.harmonics
-    q, dq, ddq = (differentiated(average, orders, order, derivative) for order in (0, 1, 2))
+    q, dq, ddq = differentiated(average, orders)
     yield Trajectory(
         log=average.log,
         joint=average.joint,
@@ -25,7 +23,6 @@ def run(
         periods=average.periods,
         t_start=average.t_start,
         harmonics=orders,
-        method=derivative,
         sigma_q=average.sigma_q,
         sigma_dq=average.sigma_dq,
         sigma_tau=average.sigma_tau,
@@ -51,12 +48,10 @@ def run(
         )  # fmt: skip
 
 
-def differentiated(average: Average, harmonics: int, order: int, method: str) -> Column:
-    """The averaged position, differentiated `order` times by either of two methods that agree to rounding."""
-    if method == "fft":
-        return fourier.differentiate_fft(average.q, average.period, harmonics, order)
+def differentiated(average: Average, harmonics: int) -> Iterator[Column]:
+    """The averaged position (K,) by its first harmonics, its velocity and its acceleration.  (6.34)"""
     omega = 2 * np.pi / average.period
     c = fourier.project(average.t, average.q, omega, harmonics)
-    for _ in range(order):
+    for _ in range(3):
+        yield fourier.evaluate(c, average.t, omega)
         c = fourier.derivative(c, omega)
-    return fourier.evaluate(c, average.t, omega)

@@ -5,6 +5,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from davinci_forces.estimators import title_of
+from davinci_forces.maths.models.terms import TERMS
 from davinci_forces.records import Fit, Identifiability, Residual
 from davinci_forces.records.predict import CHOSEN
 from davinci_forces.records.record import slug
@@ -28,18 +30,6 @@ from davinci_forces.report.sections.joints.estimators import convergence, estima
 from davinci_forces.report.sections.joints.friction import friction_maps
 from davinci_forces.report.sections.joints.residuals import residual_blocks
 from davinci_forces.report.sections.parts import run_name
-
-NAMES = {
-    "lse": "least squares",
-    "wlse": "weighted least squares",
-    "pso": "particle swarm",
-    "bounded": "bounded least squares",
-    "prior": "least squares with a prior",
-    "huber": "robust least squares",
-    "iv": "instrumental variables",
-    "tls": "total least squares",
-    "consistent": "physically consistent least squares",
-}
 
 
 def section(context: Context) -> Section | None:
@@ -90,16 +80,11 @@ def implausible(fits: list[Fit]) -> Iterator[Verdict]:
         negative = [
             f"{name} ({value:.2g} ± {std:.1g})"
             for name, value, std in zip(fit.parameter, fit.theta, fit.theta_std, strict=True)
-            if value < 0 and physical(name)
+            if value < 0 and name in TERMS and TERMS[name].positive
         ]
         if negative:
-            who = f"{NAMES.get(fit.estimator, fit.estimator)} ({fit.model})"
+            who = f"{title_of(fit.estimator)} ({fit.model})"
             yield Verdict("warn", f"{who} finds a negative {', '.join(negative)}, which no mechanism has.")
-
-
-def physical(name: str) -> bool:
-    """Whether a parameter cannot be negative."""
-    return name in ("inertia", "lifted mass", "viscous friction", "Coulomb friction")
 
 
 def parameters(context: Context, fit: Fit) -> Table:
@@ -114,7 +99,7 @@ def parameters(context: Context, fit: Fit) -> Table:
     mse = context.number(f"{'.'.join(('fit', *fit.key))}.mse", 3)
     return Table(
         f"Parameters of the {literal(fit.group.replace('_', ' '))} ({fit.model}, "
-        f"{NAMES.get(fit.estimator, fit.estimator)}), {standing(context, fit)}, from {literal(', '.join(fit.logs))}; "
+        f"{title_of(fit.estimator)}), {standing(context, fit)}, from {literal(', '.join(fit.logs))}; "
         f"mean squared error {mse} of the averaged effort.",
         ("Symbol", "Parameter", "Unit", "Value", "Classical standard error", "$z$"),
         tuple(rows),
