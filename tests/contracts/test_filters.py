@@ -11,9 +11,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from scipy.stats import chi2
+from scipy.stats import chi2, multivariate_normal
 
-from davinci_forces.filters import FILTERS, tracker
+from davinci_forces.filters import FILTERS, kalman, tracker
 from davinci_forces.filters.belief import FIRST
 from davinci_forces.filters.problem import Filter, NoiseModel
 from davinci_forces.maths.models.driven import Driven
@@ -126,6 +126,40 @@ def test_every_smoothed_state_is_the_batch_least_squares_estimate(N: int):
     assert_allclose(made.tau_ext, states[:, 2], rtol=0, atol=1e-8 * FIRST_STD)
     # A variance of 4 before anything is measured, less all but 10^-7 of it: seven digits, and what P costs beside.
     assert_allclose(made.tau_ext_std, deviations[:, 2], rtol=1e-4)
+
+
+def textbook(y: np.ndarray, tau: np.ndarray, model: kalman.States) -> tuple[np.ndarray, float]:
+    """tau_ext, its deviation and both innovations (4, N) of a filter in matrices, and the log-likelihood."""
+    n, joint, total, rows = len(model.x), swaying(y.shape[1]), 0.0, []
+    x, P, H = np.array(model.x), model.P, np.zeros((2, n))
+    H[0, list(model.in_q)] = H[1, list(model.in_dq)] = 1.0
+    for k in range(y.shape[1]):
+        i, S = y[:, k] - H @ x, H @ P @ H.T + np.diag(model.R)
+        K = np.linalg.solve(S, H @ P).T
+        total += multivariate_normal.logpdf(i, cov=S)
+        x, P = x + K @ i, (np.eye(n) - K @ H) @ P @ (np.eye(n) - K @ H).T + K @ np.diag(model.R) @ K.T
+        rows.append([x[2], np.sqrt(P[2, 2]), *i])
+        F, (of_motion, u) = model.Phi.copy(), transition(joint, k, tau[k], "ekf_euler" if model.order == 1 else "ekf")
+        F[:2, :3] = of_motion[:2]
+        F[1, 3:] = -0.5 * T_S * (model.order - 1) / joint.inertia[k] * model.Phi[2, 3:]
+        x, P = F @ x + np.append(u, np.zeros(n - 3)), F @ P @ F.T + model.Q
+    return np.transpose(rows), total
+
+
+@pytest.mark.parametrize("order", [1, 2])
+@pytest.mark.parametrize("n", [3, 4, 5])
+def test_the_filter_of_any_number_of_states_is_the_textbooks(n: int, order: int):
+    _, y, tau = simulate(300, NOISE, seed=1)
+    run = recording(swaying(300), *y, tau)
+    model = kalman.states(run, NOISE, n)._replace(order=order)
+    if n > 3:
+        model.Phi[2:, 2:] += np.triu(np.linspace(-0.1, 0.02, (n - 2) ** 2).reshape(n - 2, n - 2))
+        model.P[3:, 3:], model.Q[3:, 3:] = 0.5 * np.eye(n - 3), 1e-3 * np.eye(n - 3)
+    if n > 4:
+        model = model._replace(in_q=(0, 3), in_dq=(1, 4), R=0.5 * model.R)
+    made, (expected, total) = kalman.filtered(run, model), textbook(y, tau, model)
+    assert_allclose(made[2:6], expected, rtol=1e-6, atol=1e-9)
+    assert kalman.log_likelihood(run, model, 0) == pytest.approx(total, rel=1e-8)
 
 
 @STEPPED

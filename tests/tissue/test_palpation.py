@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.maths.tissue.indentation import NONE, found, hinge, onset_std
-from davinci_forces.maths.tissue.probing import between_troughs, runs
+from davinci_forces.maths.tissue.probing import between_troughs
 from davinci_forces.maths.tissue.stiffness import median_std, slope_error, straight, work
 from davinci_forces.maths.tissue.tissue import LAWS, judged, moments
 from davinci_forces.study import WHOLE
@@ -253,7 +254,7 @@ def test_swings_are_told_by_their_troughs_and_numbers_by_their_runs():
     assert [p.start for p in between_troughs(1 - np.cos(2 * np.pi * t / 2.5))] == [0, 250, 500, 750]
     assert between_troughs(t) == [slice(0, 1000)]
     assert between_troughs(np.ones(7)) == [slice(0, 7)]
-    assert runs(np.array([3, 3, 1, 1, 1, 3])) == [slice(0, 2), slice(2, 5), slice(5, 6)]
+    assert list(segments(np.array([3, 3, 1, 1, 1, 3]))) == [slice(0, 2), slice(2, 5), slice(5, 6)]
     assert work(np.array([0.0, 1.0, 2.0]), np.array([0.0, 2.0, 2.0])) == 3.0
 
 

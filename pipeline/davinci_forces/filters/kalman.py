@@ -68,13 +68,13 @@ def _run(recording: Driven, model: States, settle: int, out: Array) -> float:
     x, P, R, Phi, Q, in_q, in_dq, order, doubts, forgets = model
     h = 0.5 * recording.T_s**2 * (order - 1)
     noises = (in_q, in_dq, *R.tolist(), Phi.copy(), Q, h, float(doubts), forgets)
-    return float(_pass(x, P.copy(), *noises, *columns(recording), settle, out))
+    return float(_pass(settle, out, x, P.copy(), *noises, *columns(recording)))
 
 
 @cached(derivation, stepping)
 def _pass(
-    start: Any, P: Any, in_q: Any, in_dq: Any, R_q: float, R_dq: float, F: Any, Q: Any, h: float, doubts: float,
-    forgets: float, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, settle: int, out: Any,
+    settle: int, out: Any, start: Any, P: Any, in_q: Any, in_dq: Any, R_q: float, R_dq: float, F: Any, Q: Any, h: float,
+    doubts: float, forgets: float, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float,
 ) -> float:  # fmt: skip
     """The loop.  `start` is a tuple, whose length n the compiler knows: twice as fast."""
     n, first_q, first_dq, C_q, C_dq, total = len(start), R_q, R_dq, 0.0, 0.0, 0.0

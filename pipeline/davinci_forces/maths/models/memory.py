@@ -7,7 +7,6 @@ would.
 """
 
 from collections.abc import Iterator
-from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -16,6 +15,7 @@ from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.bias import deflect
 from davinci_forces.maths.models.model import ArmMotion, Model
 from davinci_forces.maths.models.terms import Term
+from davinci_forces.maths.signals.smoothing import segments
 
 RUN_IN = 3.0  # displacements of travel after which a deflection has forgotten how it started, to exp(-2 RUN_IN)
 SAMPLES = 1 << 15  # of a piece
@@ -45,16 +45,14 @@ def deflection(motion: ArmMotion, joint: int, x_0: float) -> tuple[Array, Boolea
     """
     dq = motion.dq[:, joint]
     z, known = np.empty(len(dq)), np.empty(len(dq), np.bool_)
-    edges = [0, *(np.flatnonzero(np.diff(motion.segment)) + 1).tolist(), len(dq)]
-    for start, stop in pairwise(edges):
-        part = np.ascontiguousarray(dq[start:stop])
-        z_0 = 0.0
+    for part in segments(motion.segment):
+        v, z_0 = np.ascontiguousarray(dq[part]), 0.0
         if motion.periodic:
-            before = _run(part, motion.T_s, x_0, z_0)
-            z_0 = float(deflect(before[-1], part[-1], motion.T_s, x_0))
-        z[start:stop] = _run(part, motion.T_s, x_0, z_0)
-        travel = np.cumsum(np.abs(part)) * motion.T_s
-        known[start:stop] = motion.periodic or travel >= RUN_IN * x_0
+            before = _run(v, motion.T_s, x_0, z_0)
+            z_0 = float(deflect(before[-1], v[-1], motion.T_s, x_0))
+        z[part] = _run(v, motion.T_s, x_0, z_0)
+        travel = np.cumsum(np.abs(v)) * motion.T_s
+        known[part] = motion.periodic or travel >= RUN_IN * x_0
     return z, known
 
 

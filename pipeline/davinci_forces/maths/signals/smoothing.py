@@ -88,7 +88,7 @@ def _before(x: Array, samples: float) -> Array:
 
 
 def segments(segment: Integers) -> Iterator[slice]:
-    """The segments of a signal: runs of samples without a gap, by the number of the segment of each sample."""
+    """The runs of samples of one number (N,), in order: such as the segments of a signal, without a gap."""
     if len(segment) == 0:
         return
     edges = [0, *(np.flatnonzero(np.diff(segment)) + 1).tolist(), len(segment)]

@@ -1,11 +1,11 @@
 """Which samples of a recording are evaluated."""
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans
+from davinci_forces.maths.signals.smoothing import segments
 
 SETTLE = 1.0  # [s] of a filter's transient, left out of the statistics of the whole run
 
@@ -28,8 +28,7 @@ def free_space(t: Array, windows: Sequence[tuple[float, float]], rate: float) ->
     gap, and after each window; `rate` [Hz].
     """
     after = [(start, end + SETTLE) for start, end in windows]
-    gaps = [0, *(np.flatnonzero(np.diff(t) > 1.5 / rate) + 1).tolist(), len(t)]
-    calm = np.concatenate([settled(t[a:b]) for a, b in pairwise(gaps)])
+    calm = np.concatenate([settled(t[part]) for part in unbroken(t, 1.5 / rate)])
     return np.asarray(outside(t, after) & calm)
 
 
@@ -41,5 +40,9 @@ def runs(which: Booleans) -> list[slice]:
 
 def longest_run(t: Array, rate: float) -> slice:
     """The longest segment, a run of samples without a gap; `rate` [Hz]."""
-    edges = [0, *(np.flatnonzero(np.diff(t) > 1.5 / rate) + 1).tolist(), len(t)]
-    return max((slice(a, b) for a, b in pairwise(edges)), key=lambda part: part.stop - part.start)
+    return max(unbroken(t, 1.5 / rate), key=lambda part: part.stop - part.start)
+
+
+def unbroken(t: Array, gap: float) -> list[slice]:
+    """The runs of samples whose times (N,) are no more than `gap` [s] apart."""
+    return list(segments(np.cumsum(np.diff(t, prepend=t[:1]) > gap)))

@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers
+from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.maths.tissue.indentation import into_tissue
 
 RISES = 0.15  # of the range of what swings: a peak that stands out by less is none
@@ -35,12 +36,6 @@ def between_troughs(x: Array, rises: float = RISES) -> list[slice]:
     peaks = find_peaks(padded, prominence=rises * (high - low))[0] - 1
     troughs = [a + int(np.argmin(x[a : b + 1])) for a, b in pairwise(peaks)]
     return [slice(a, b) for a, b in pairwise([0, *troughs, len(x)]) if b > a]
-
-
-def runs(numbers: Integers) -> list[slice]:
-    """The runs of samples of one number (N,), in order."""
-    edges = [0, *(np.flatnonzero(np.diff(numbers)) + 1).tolist(), len(numbers)]
-    return [slice(a, b) for a, b in pairwise(edges) if b > a]
 
 
 class Probing(NamedTuple):
@@ -100,7 +95,7 @@ def parts(given: Probing, windows: Sequence[tuple[float, float]]) -> list[slice]
         bounds = [np.searchsorted(given.t, (start, np.nextafter(end, np.inf))) for start, end in sorted(windows)]
         return [slice(int(a), int(b)) for a, b in bounds if b > a]
     if np.any(given.push != given.push[0]):
-        return runs(given.push)
+        return list(segments(given.push))
     return between_troughs(given.depth[:, 0] if given.depth.shape[1] == 1 else given.size)
 
 

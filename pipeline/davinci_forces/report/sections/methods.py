@@ -75,8 +75,8 @@ METHODS: tuple[tuple[type[Record], tuple[Block, ...]], ...] = (
     )),
     (Trajectory, (
         Prose(
-            "**Differentiation.** Only the harmonics of the excitation are kept of the averaged position, by projection "
-            "on the harmonics, and differentiated exactly."
+            "**Differentiation.** Only the harmonics of the excitation are kept of the averaged position, by "
+            "projection on the harmonics, and differentiated exactly."
         ),
         Equation(
             "cal(F)[(dif^n overline(q)) / (dif t^n)] = (j omega)^n Q(omega)",

@@ -1,7 +1,6 @@
 """Put every recording on a uniform clock, with its gaps marked, and low-pass and differentiate its motion."""
 
 from collections.abc import Iterator
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +13,7 @@ from davinci_forces.maths.signals.faults import saturated, stuck
 from davinci_forces.maths.signals.noise import noise_std, smoothed, white_std
 from davinci_forces.maths.signals.smoothing import measured_motion, segments, share_passed
 from davinci_forces.maths.signals.standstill import standing
-from davinci_forces.maths.signals.windows import runs
+from davinci_forces.maths.signals.windows import runs, unbroken
 from davinci_forces.records import Column, Diagnostic, Motion, Recording, Signal, diagnostic
 from davinci_forces.robots.robot import Joint
 
@@ -38,8 +37,9 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
         If no segment between gaps holds more than a few samples.
     """
     T_s = even_step(recording.t) or float(np.median(np.diff(recording.t)))
-    cuts = np.flatnonzero(np.diff(recording.t) > GAP * T_s) + 1
-    parts = [slice(a, b) for a, b in pairwise([0, *cuts.tolist(), len(recording)]) if b - a >= FEWEST]
+    whole = unbroken(recording.t, GAP * T_s)
+    cuts = [part.start for part in whole[1:]]
+    parts = [part for part in whole if part.stop - part.start >= FEWEST]
     if not parts:
         raise BadLog(f"{recording.log}/{recording.joint}: no segment without a gap holds {FEWEST} samples")
     if all(is_even(recording.t[part], T_s) for part in parts):
@@ -176,7 +176,7 @@ def on_uniform_clock(recording: Recording, part: slice, T_s: float) -> tuple[Col
     return clock, *np.ascontiguousarray(make_interp_spline(t, np.column_stack(columns), k=3)(clock).T)
 
 
-def remarks(recording: Recording, method: str, cuts: Indices, kept: int) -> Iterator[Diagnostic]:
+def remarks(recording: Recording, method: str, cuts: list[int], kept: int) -> Iterator[Diagnostic]:
     """What was done to the clock, where anything was."""
     name, said = f"{recording.log}/{recording.joint}", []
     if len(cuts):

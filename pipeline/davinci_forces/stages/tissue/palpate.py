@@ -1,12 +1,12 @@
 """Palpate tissue: find every push of a tissue log, how stiff what it meets is, and which model predicts its force."""
 
 from collections.abc import Iterator, Sequence
-from itertools import pairwise
 
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals.smoothing import lowpass as lowpass_of
+from davinci_forces.maths.signals.windows import unbroken
 from davinci_forces.maths.tissue.palpation import Pushed, palpated, remarks
 from davinci_forces.maths.tissue.probing import Probing, known
 from davinci_forces.maths.tissue.stiffness import median_std
@@ -80,7 +80,7 @@ def probing(touch: Touch | None, slide: Track | None, cutoff: float) -> Probing 
     if slide is None:
         return None
     direct, dq = np.zeros(len(slide)), np.zeros(len(slide))
-    for part in runs_of(slide.t, slide.rate):
+    for part in unbroken(slide.t, 1.5 / slide.rate):
         direct[part] = lowpass_of(slide.tau_ext_direct[part], slide.rate, cutoff)
         dq[part] = lowpass_of(slide.dq[part], slide.rate, cutoff)
     depth = depth_of(touch, slide, slide.t)
@@ -111,12 +111,6 @@ def depth_of(touch: Touch | None, slide: Track | None, t: Column) -> Array | Non
 def place_of(touch: Touch) -> Array:
     """Where the tip is (N, 3)."""
     return np.column_stack([touch.x, touch.y, touch.z])
-
-
-def runs_of(t: Column, rate: float) -> list[slice]:
-    """The runs of samples without a gap between them; `rate` [Hz]."""
-    edges = [0, *(np.flatnonzero(np.diff(t) > 1.5 / rate) + 1).tolist(), len(t)]
-    return [slice(a, b) for a, b in pairwise(edges)]
 
 
 def rate_of(t: Column) -> float:
