@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 from davinci_forces.records import Fit, FreeSpace, Prediction, Record
 from davinci_forces.records.catalogue import Catalogue, Provenance
@@ -29,9 +30,9 @@ class Context:
     labels: frozenset[str] = frozenset()  # of what stands before a section in its document
     baseline: Mapping[str, Stated] | None = None  # the numbers of an earlier report, where the study names one
 
-    def number(self, key: str, digits: int = 4) -> Number | str:
-        """The result of that key as a cell, or a dash where there is none."""
-        return self.results[key].number(digits) if key in self.results else "–"
+    def number(self, key: str, digits: int = 4, **looks: Any) -> Number | str:
+        """The result of that key as a cell, or a dash where there is none; `looks` are fields of a Number."""
+        return replace(self.results[key].number(digits), **looks) if key in self.results else "–"
 
     def numbers(self, prefix: str, names: Iterable[str], digits: int = 3) -> tuple[Number | str, ...]:
         """The results `<prefix>.<name>` as cells."""
@@ -39,8 +40,7 @@ class Context:
 
     def probability(self, key: str) -> Number | str:
         """A probability as a cell: below 0.001 it is only said to be."""
-        number = self.number(key, 2)
-        return number if isinstance(number, str) else replace(number, least=0.001)
+        return self.number(key, 2, least=0.001)
 
     def count(self, key: str) -> Number | str:
         """The result of that key, which is a whole number, as a cell."""

@@ -69,16 +69,6 @@ def band_in_words(coverage: float) -> str:
     return {"bad": "too narrow", "info": "too wide", "good": "right"}[band(coverage)]
 
 
-def findings_in_words() -> dict[str, str]:
-    """What was found of innovations, from the best to the least known."""
-    return {
-        "white": "white throughout",
-        "left out": "white outside contact or reversals",
-        "mended": "white but for a cause that was tested",
-        "unexplained": "not white, which no tested cause explains",
-    }
-
-
 def percent(share: float) -> str:
     """A share as it is printed."""
     return "–" if math.isnan(share) else f"{100 * share:.0f} %"

@@ -113,8 +113,8 @@ def joint_section(joint: str, studies: Sequence[Campaigned], told: Findings) -> 
     floors = [name for name in names if name in FLOORS.values()]
     parameters = [name for name in names if name not in floors]
     tables = (
-        table(joint, "Parameters", "parameters", parameters, own, studies),
-        table(joint, "How far to trust it", "floors", floors, own, studies),
+        table(joint, "parameters", "parameters", parameters, own, studies),
+        table(joint, "how far to trust it", "floors", floors, own, studies),
     )
     return Section(title(joint), f"joint-{joint}", (*([figure] if drawn else []), *tables))
 
@@ -138,13 +138,7 @@ def table(
     heads = [words(name)[:1].upper() + words(name)[1:] for name in names]
     header = ("Recorded", "Study", *(["Verdict"] if verdict else []), *map(literal, heads))
     align = ("lll" if verdict else "ll") + "r" * len(names)
-    return Table(
-        f"{title(joint)}: {said[:1].lower() + said[1:]}, in every study.",
-        header,
-        rows,
-        f"campaign-{joint}-{label}",
-        align,
-    )
+    return Table(f"{title(joint)}: {said}, in every study.", header, rows, f"campaign-{joint}-{label}", align)
 
 
 def words(name: str) -> str:

@@ -65,9 +65,8 @@ def draw_panel(axes: "Axes", panel: Panel, width: float, height: float, x_label:
     """Draw a panel into a cell of this width and height [mm], without what stands above it."""
     _draw_marks(axes, panel, width)
     _set_ranges(axes, panel)
-    bars = any(isinstance(mark, Bars) for mark in panel.marks)
     tiles = any(isinstance(mark, Tiles) for mark in panel.marks)
-    named = bars or tiles
+    named = tiles or any(isinstance(mark, Bars) for mark in panel.marks)
     across = panel.x_label if named else _ticks(axes, "x", panel.x_log, panel.x_label, 4 if width < 70 else 8)
     up = panel.y_label if tiles else _ticks(axes, "y", panel.y_log, panel.y_label, 5)
     axes.set_xlabel(wrap_label(across, width - 18) if x_label else "", parse_math=False)

@@ -55,7 +55,7 @@ def viscous_friction(context: Context, study: ControlStudy) -> str:
 def response(context: Context, study: ControlStudy) -> Figure:
     """Positions, velocities and the Lyapunov function of a study."""
     until = SHOWN * study.duration
-    runs = context.catalogue.about(Control, controller=study.name)
+    runs = runs_of(context, study)
     names = [joint.name for joint in context.study.robot.joints]
     q = tuple(Line(run.t[run.t < until], run.q[run.t < until], title(run.joint)) for run in runs)
     identified = [run for run in runs if run.joint in names]

@@ -25,6 +25,10 @@ from davinci_forces.report.context import PLAIN, Context, count, fit_name, label
 from davinci_forces.report.sections.parts import first_on_paper, run_name
 from davinci_forces.report.verdicts import NORMAL_95, WITHIN
 
+SHAPES = {"triangle": ((0.0, 0.0), (0.5, 1.0), (1.0, 0.0)), "pulse": ((0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0))}
+COMPONENTS = ("f_x", "f_y", "f_z")
+Push = dict[str, Any]
+
 
 def section(context: Context) -> Section | None:
     """Parameters and external efforts, estimated and true; only of a simulated study."""
@@ -80,8 +84,7 @@ def errors_by_family(context: Context, family: dict[str, str]) -> Table:
             title(p.joint),
             literal(family.get(p.log, "") or "–"),
             fit_name(p.model, p.estimator),
-            context.number(f"{p.prefix}.model_error", 2),
-            context.number(f"{p.prefix}.effort_rms", 2),
+            *context.numbers(p.prefix, ("model_error", "effort_rms"), 2),
         )
         for p in sorted(used, key=lambda p: (p.joint, p.model, family.get(p.log, "")))
     )
@@ -120,7 +123,7 @@ def parameters(context: Context, joint: str, path: tuple[str, ...], theta: dict[
     yield Verdict("good" if good else "bad", f"**{title(joint)}**: {judgement} within four of their standard errors.")
 
 
-def effort_figure(track: Track, pushes: list[dict[str, Any]]) -> Figure:
+def effort_figure(track: Track, pushes: list[Push]) -> Figure:
     """The effort exerted on a joint, and the filter's estimate of it."""
     t, effort = true_effort(pushes, float(track.t[-1]))
     name = run_name(track.log, track.joint)
@@ -133,12 +136,7 @@ def effort_figure(track: Track, pushes: list[dict[str, Any]]) -> Figure:
     )
 
 
-SHAPES = {"triangle": ((0.0, 0.0), (0.5, 1.0), (1.0, 0.0)), "pulse": ((0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0))}
-COMPONENTS = ("f_x", "f_y", "f_z")
-Push = dict[str, Any]
-
-
-def true_effort(pushes: list[dict[str, Any]], end: float) -> tuple[Any, Any]:
+def true_effort(pushes: list[Push], end: float) -> tuple[Any, Any]:
     """Times [s] and values (n,) of the corners of the effort that was exerted."""
     corners = [(0.0, 0.0)]
     for push in sorted(pushes, key=lambda p: float(p["start"])):

@@ -22,9 +22,14 @@ from davinci_forces.report.content import (
 )
 from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.parts import autocorrelation, first_on_paper, listed, run_name
-from davinci_forces.report.verdicts import findings_in_words
 
 UNEXPLAINED = "unexplained"  # a finding: no cause that was tried explains it
+FINDINGS = {  # from the best to the least known
+    "white": "white throughout",
+    "left out": "white outside contact or reversals",
+    "mended": "white but for a cause that was tested",
+    UNEXPLAINED: "not white, which no tested cause explains",
+}
 SIGNALS = (("innovation_q", "position"), ("innovation_dq", "velocity"))
 
 
@@ -70,7 +75,7 @@ def summary(explained: list[Explanation]) -> str:
     counts = Counter(e.finding for e in explained)
     said = [
         f"{counts[finding]} {'is' if counts[finding] == 1 else 'are'} {words}"
-        for finding, words in findings_in_words().items()
+        for finding, words in FINDINGS.items()
         if counts[finding]
     ]
     return f"Of {count(len(explained), 'run')} of moving joints, {', '.join(said)}."

@@ -104,7 +104,7 @@ def outliers(context: Context, average: Average) -> Iterator[Verdict]:
             loud = [i for i, value in enumerate(rms, 1) if len(rms) > 2 and value > OUTLIER * np.median(rms)]
             if loud:
                 times = ", ".join(f"{rms[i - 1] / np.median(rms):.1f}" for i in loud[:5])
-                name = f"**{title(average.joint)} in {literal(average.log)}**"
+                name = f"**{run_name(average.log, average.joint)}**"
                 which = f"period{'' if len(loud) == 1 else 's'} {', '.join(map(str, loud[:5]))} of {len(rms)}"
                 said = f"{name}: {meaning} noise of {which} is {times} times that of the median period"
                 settle = "; the arm may still have been settling: see `skip`." if loud[0] == 1 else "."

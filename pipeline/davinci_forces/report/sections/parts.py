@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator, Sequence
 
-from davinci_forces.records import Whiteness
-from davinci_forces.report.content import Block, HBand, OnScreen, Panel, Stems, Table, VSpan, literal
-from davinci_forces.report.context import Context, title
+from davinci_forces.records import Prediction, Residual, Track, Whiteness
+from davinci_forces.report.content import AnyMark, Block, HBand, Line, OnScreen, Panel, Stems, Table, VSpan, literal
+from davinci_forces.report.context import Context, label, title
 
 PAPER = 18  # rows of a table at most, in the PDF
 THESIS_TISSUE = 457.24  # [N/m], section 8.2
@@ -43,6 +43,13 @@ def contact_spans(context: Context, log: str, name: str) -> tuple[VSpan, ...]:
     """The windows of contact that the study states of a log, the first named in the legend."""
     windows = context.study.log(log).contact
     return tuple(VSpan(start, end, "" if i else name) for i, (start, end) in enumerate(windows))
+
+
+def effort_panel(record: Track | Prediction | Residual, *spans: VSpan, heading: str = "Effort") -> Panel:
+    """Effort over time, measured and modelled."""
+    model = Line(record.t, record.tau_hat, "model", "vermillion", "dashed")
+    marks: tuple[AnyMark, ...] = (*spans, Line(record.t, record.tau, "measured", "sky"), model)
+    return Panel(heading, "time [s]", label(record, "tau", "effort"), marks)
 
 
 def autocorrelation(w: Whiteness, heading: str, named: bool = True) -> Panel:

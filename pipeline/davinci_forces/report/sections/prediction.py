@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from davinci_forces.records import Prediction
 from davinci_forces.report.content import Block, Cell, Figure, Line, OnScreen, Panel, Prose, Section, Table, literal
 from davinci_forces.report.context import Context, fit_name, label, title
-from davinci_forces.report.sections.parts import LEFT_OUT, contact_spans, first_on_paper, listed, run_name
+from davinci_forces.report.sections.parts import LEFT_OUT, contact_spans, effort_panel, first_on_paper, listed, run_name
 from davinci_forces.report.verdicts import percent
 
 
@@ -89,19 +89,15 @@ def worst(context: Context, predictions: list[Prediction], joint: str, model: st
 
 def figure(context: Context, p: Prediction) -> Figure:
     """Measured and predicted effort of one log."""
-    name, effort = run_name(p.log, p.joint), label(p, "tau", "effort")
-    windows = contact_spans(context, p.log, "contact")
-    error = context.size(p, "model_error", p.model_error)
+    name, windows = run_name(p.log, p.joint), contact_spans(context, p.log, "contact")
+    error, beyond = Line(p.t, p.tau - p.tau_hat, "", "blue"), context.size(p, "model_error", p.model_error)
     return Figure(
         f"{name}, the worst run of this joint: measured effort and the model's ({fit_name(p.model, p.estimator)}), "
         "and their difference.",
-        f"{name}: the model's effort differs from the measured one by {error} beyond noise.",
+        f"{name}: the model's effort differs from the measured one by {beyond} beyond noise.",
         (
-            Panel(
-                "Effort", "time [s]", effort,
-                (*windows, Line(p.t, p.tau, "measured", "sky"), Line(p.t, p.tau_hat, "model", "vermillion", "dashed")),
-            ),
-            Panel("Measured minus model", "time [s]", effort, (*windows, Line(p.t, p.tau - p.tau_hat, "", "blue"))),
+            effort_panel(p, *windows),
+            Panel("Measured minus model", "time [s]", label(p, "tau", "effort"), (*windows, error)),
         ),
         f"prediction-figure-{p.log}-{p.joint}",
         zoomable=True,

@@ -1,6 +1,7 @@
 """Where the numbers come from: files and their hashes, versions, settings."""
 
 from collections import Counter
+from collections.abc import Iterator
 from dataclasses import asdict
 
 from davinci_forces.records import KINDS, LogSummary
@@ -14,43 +15,39 @@ PER_LINE = 4  # settings
 
 def section(context: Context) -> Section:
     """Everything needed to tell whether a report is of these files and this code."""
+    return Section("Provenance", "provenance", tuple(blocks(context)))
+
+
+def blocks(context: Context) -> Iterator[Block]:
+    """The section's content."""
     provenance, study = context.provenance, context.study
-    raw = tuple((literal(file), f"`{sha[:16]}`") for file, sha in provenance.raw.items())
-    versions = tuple(provenance.packages.items())
-    said = [f"{name} = {value!r}" for name, value in asdict(study.settings).items()]
-    blocks: list[Block] = [
-        Prose(
-            f"Made by davinci-forces {provenance.version}. The report ID on page one is the first half of the SHA-256 "
-            "of `manifest.txt`, which lists raw files, study file, processed files and numbers, each with its own; two "
-            "reports of one ID say the same. `davinci-forces verify --id` shows whether files and pages are those of "
-            "an ID. Every number of the tables is in `results.json` under a key of its own, with the processed file "
-            "and field that it stands in."
-        ),
-        *listed(
-            Table("Raw files, with the first 16 digits of their SHA-256.", ("File", "SHA-256"), raw, "raw-files", "ll")
-        ),
-        OnScreen(
-            "Versions of packages", "versions", (Table("Versions.", ("Package", "Version"), versions, align="ll"),)
-        ),
-        Prose("Settings used, defaults included:"),
-        Listing("\n".join("; ".join(said[i : i + PER_LINE]) for i in range(0, len(said), PER_LINE))),
-    ]
-    if study.changed:
-        blocks += [Prose("Changes of the robot:"), Listing("\n".join(f"{k}: {v}" for k, v in study.changed.items()))]
-    blocks.append(
-        Prose(
-            f"{len(provenance.processed)} processed files stand behind this report; their hashes are in `manifest.txt`."
-        )
+    yield Prose(
+        f"Made by davinci-forces {provenance.version}. The report ID on page one is the first half of the SHA-256 of "
+        "`manifest.txt`, which lists raw files, study file, processed files and numbers, each with its own; two "
+        "reports of one ID say the same. `davinci-forces verify --id` shows whether files and pages are those of an "
+        "ID. Every number of the tables is in `results.json` under a key of its own, with the processed file and field "
+        "that it stands in."
     )
-    if provenance.processed:
-        blocks.append(OnScreen("What was made, and what there was nothing to make of", "made", (made(provenance),)))
-    summaries = context.catalogue.all(LogSummary)
-    if summaries:
+    raw = tuple((literal(file), f"`{sha[:16]}`") for file, sha in provenance.raw.items())
+    caption = "Raw files, with the first 16 digits of their SHA-256."
+    yield from listed(Table(caption, ("File", "SHA-256"), raw, "raw-files", "ll"))
+    versions = Table("Versions.", ("Package", "Version"), tuple(provenance.packages.items()), align="ll")
+    yield OnScreen("Versions of packages", "versions", (versions,))
+    yield Prose("Settings used, defaults included:")
+    settings = [f"{name} = {value!r}" for name, value in asdict(study.settings).items()]
+    yield Listing("\n".join("; ".join(settings[i : i + PER_LINE]) for i in range(0, len(settings), PER_LINE)))
+    if study.changed:
+        yield Prose("Changes of the robot:")
+        yield Listing("\n".join(f"{k}: {v}" for k, v in study.changed.items()))
+    number = len(provenance.processed)
+    yield Prose(f"{number} processed files stand behind this report; their hashes are in `manifest.txt`.")
+    if number:
+        yield OnScreen("What was made, and what there was nothing to make of", "made", (made(provenance),))
+    if summaries := context.catalogue.all(LogSummary):
         tables = (start_times(summaries), channels(summaries))
-        blocks.append(OnScreen("Files, dates and channels of every log", "channels", tables))
+        yield OnScreen("Files, dates and channels of every log", "channels", tables)
     if provenance.study:
-        blocks.append(OnScreen("The study file", "study-file", (Listing(provenance.study),)))
-    return Section("Provenance", "provenance", tuple(blocks))
+        yield OnScreen("The study file", "study-file", (Listing(provenance.study),))
 
 
 def made(provenance: Provenance) -> Table:

@@ -60,9 +60,5 @@ def subject(context: Context, rating: Rating) -> str:
     """What is rated: a figure that the report has, by its number; anything else by its name."""
     if rating.subject == "figure" and rating.name in context.labels:
         return f"[@{rating.name}]"
-    gone = (
-        ""
-        if rating.subject == "run" and rating.name in [log.name for log in context.study.logs]
-        else ", no longer here"
-    )
-    return f"{rating.subject} {literal(rating.name)}{gone}"
+    here = rating.subject == "run" and rating.name in [log.name for log in context.study.logs]
+    return f"{rating.subject} {literal(rating.name)}{'' if here else ', no longer here'}"

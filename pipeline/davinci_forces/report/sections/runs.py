@@ -1,7 +1,6 @@
 """Every run: how it was recorded, what the filter tracked in it, and its traces."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 from davinci_forces.records import Diagnostic, Explanation, FilterNoise, FreeSpace, LogSummary, Signal, Track
 from davinci_forces.report.content import (
@@ -11,7 +10,6 @@ from davinci_forces.report.content import (
     Cell,
     Figure,
     Line,
-    Number,
     OnScreen,
     Panel,
     Prose,
@@ -21,7 +19,7 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.sections.parts import contact_spans, first_on_paper, listed, run_name
+from davinci_forces.report.sections.parts import contact_spans, effort_panel, first_on_paper, listed, run_name
 from davinci_forces.report.verdicts import band_in_words
 
 WORST = "the worst free run of this joint"
@@ -31,14 +29,8 @@ LEVELS = ("free_rms", "detection_level")
 
 def section(context: Context) -> Section | None:
     """What was recorded, a table over all tracks, the worst run of each joint, and every run on demand."""
-    tracks = context.catalogue.all(Track)
-    summaries = context.catalogue.all(LogSummary)
-    if not (tracks or summaries):
-        return None
-    found = (
-        (*recorded(context, summaries), *tracked(context, tracks)) if tracks else tuple(recorded(context, summaries))
-    )
-    return Section("Runs", "runs", found)
+    content = (*recorded(context, context.catalogue.all(LogSummary)), *tracked(context, context.catalogue.all(Track)))
+    return Section("Runs", "runs", content) if content else None
 
 
 def tracked(context: Context, tracks: list[Track]) -> Iterator[Block]:
@@ -140,10 +132,7 @@ def trace(context: Context, t: Track, why: str) -> Figure:
         f"{name}: the tracked external effort reaches {context.size(t, 'tau_ext', largest)}.",
         (
             Panel("Trajectory", "time [s]", label(t, "q", "position"), (*windows, Line(t.t, t.q, "", "blue"))),
-            Panel(
-                "Effort", "time [s]", label(t, "tau", "effort"),
-                (*windows, Line(t.t, t.tau, "measured", "sky"), Line(t.t, t.tau_hat, "model", "vermillion", "dashed")),
-            ),
+            effort_panel(t, *windows),
             Panel(
                 "External effort", "time [s]", label(t, "tau_ext", "external effort"),
                 (
@@ -205,19 +194,13 @@ def overview(context: Context, summaries: list[LogSummary]) -> Table:
             context.number(f"log.{summary.log}.rate", 5),
             context.number(f"log.{summary.log}.duration", 5),
             context.number(f"log.{summary.log}.jitter", 2),
-            period_length(context, summary),
+            context.number(f"period.{summary.log}", 6, std=None),
             context.count(f"period.{summary.log}.periods"),
         )
         for summary in summaries
     )
     header = ("Log", "Role", "Format", "Samples", "Rate", "Duration", "Clock jitter", "Period", "Periods")
     return Table("The logs of the study.", header, rows, label="recorded-table", align="lllrrrrrr")
-
-
-def period_length(context: Context, summary: LogSummary) -> Number | str:
-    """The period of a log, without its standard error, which the section on averaging gives."""
-    number = context.number(f"period.{summary.log}", 6)
-    return number if isinstance(number, str) else replace(number, std=None)
 
 
 def remarks(summary: LogSummary) -> list[str]:

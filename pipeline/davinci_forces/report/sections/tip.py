@@ -181,10 +181,8 @@ def log_blocks(force: TipForce, contact: TipContact | None, budget: TipBudget | 
     if contact is not None:
         yield in_space(force, contact)
     if budget is not None:
-        shown = OnScreen(
-            "What each joint's error comes to at the tip", f"tip-parts-{force.log}", (budget_figure(force, budget),)
-        )
-        yield shown
+        figure = budget_figure(force, budget)
+        yield OnScreen("What each joint's error comes to at the tip", f"tip-parts-{force.log}", (figure,))
 
 
 def component_panel(force: TipForce, axis: str, contact: TipContact | None) -> Panel:

@@ -1,7 +1,6 @@
 """A page a joint: its equation, its parameters, and what the fit leaves unexplained."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -94,7 +93,7 @@ def parameters(context: Context, fit: Fit) -> Table:
         key = ".".join(("fit", *fit.key, slug(name)))
         z = fit.theta[i] / fit.theta_std[i] if fit.theta_std[i] > 0 else np.nan
         unit = format_unit(fit.unit[i]) or "–"
-        values = (unitless(context, name) for name in (key, f"{key}.std_classical"))
+        values = (context.number(name, 2, unit="") for name in (key, f"{key}.std_classical"))
         rows.append((f"$theta_{i + 1}$", name, unit, *values, f"{z:.1f}" if np.isfinite(z) else "–"))
     mse = context.number(f"{'.'.join(('fit', *fit.key))}.mse", 3)
     return Table(
@@ -114,12 +113,6 @@ def standing(context: Context, fit: Fit) -> str:
     if used.removeprefix(f"{CHOSEN}.") == f"{fit.model}.{fit.estimator}":
         return "which the filter runs with"
     return f"beside which the filter runs with {fit_name(*used.split('.', 1))}"
-
-
-def unitless(context: Context, key: str) -> Cell:
-    """A number whose unit stands in a column of its own."""
-    number = context.number(key, 2)
-    return number if isinstance(number, str) else replace(number, unit="")
 
 
 def compared(context: Context, fits: list[Fit]) -> Block:

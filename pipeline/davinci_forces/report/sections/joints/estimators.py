@@ -1,7 +1,6 @@
 """The estimators of a joint beside each other, beside what was published, and where they were not fitted."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 
@@ -135,20 +134,15 @@ def table(context: Context, fit: Fit, printed: Printed) -> Table:
         unit = f"{format_unit(fit.unit[i]) or '–'}" if not last else "–"
         pairs: list[Cell] = []
         for column in printed.columns:
-            key = ".".join(
-                ("fit", fit.group, fit.model, column.estimator) if column.estimator else ("guess", fit.group)
-            )
+            prefix = f"fit.{fit.group}.{fit.model}.{column.estimator}" if column.estimator else f"guess.{fit.group}"
             value = column.mse if last else column.theta[i]
-            pairs += [f"{value:g}".replace("-", "−"), bare(context, f"{key}.{slug(name)}")]
+            pairs += [
+                f"{value:g}".replace("-", "−"),
+                context.number(f"{prefix}.{slug(name)}", DIGITS, unit="", std=None),
+            ]
         rows.append(("mean squared error" if last else name, unit, *pairs))
     caption = f"{title(fit.group)}: {printed.name} as printed, and as found here."
     return Table(caption, tuple(header), tuple(rows), f"printed-{fit.group}", "ll" + "r" * (len(header) - 2))
-
-
-def bare(context: Context, key: str) -> Cell:
-    """A number without its unit and its standard error, which the joint's own tables have."""
-    number = context.number(key, DIGITS)
-    return number if isinstance(number, str) else replace(number, unit="", std=None)
 
 
 def left_out(context: Context, joint: str) -> Iterator[Block]:
@@ -157,15 +151,15 @@ def left_out(context: Context, joint: str) -> Iterator[Block]:
     if not made:
         return
     names = list(dict.fromkeys((p.model, p.estimator) for p in made))
-    rows = tuple(row(context, joint, [p for p in made if (p.model, p.estimator) == name]) for name in names)
+    rows = tuple(left_out_row(context, joint, [p for p in made if (p.model, p.estimator) == name]) for name in names)
     header = ("Fit", "Left out", "Relative error", "Path blocks left out, raw samples")
     caption = f"{title(joint)}: relative error of its fits where they were not fitted, in the worst log."
     table = Table(caption, header, rows, f"left-out-{joint}", "llrr")
-    says = Prose(f"{MEASURES}{noise(context, joint)}")
+    says = Prose(f"{MEASURES}{noise_share(context, joint)}")
     yield OnScreen(f"{title(joint)}: its fits where they were not fitted", f"all-left-out-{joint}", (says, table))
 
 
-def row(context: Context, joint: str, of_fit: list[Prediction]) -> tuple[Cell, ...]:
+def left_out_row(context: Context, joint: str, of_fit: list[Prediction]) -> tuple[Cell, ...]:
     """One fit, by its worst log, and the same of the chosen one by blocks of path."""
     worst = max(of_fit, key=lambda p: p.relative_error)
     chosen = context.catalogue.about(Prediction, joint=joint, role="identification", model=CHOSEN)
@@ -178,7 +172,7 @@ def row(context: Context, joint: str, of_fit: list[Prediction]) -> tuple[Cell, .
     return f"**{name}**" if own else name, which, context.number(f"{worst.prefix}.relative_error", 3), blocks
 
 
-def noise(context: Context, joint: str) -> str:
+def noise_share(context: Context, joint: str) -> str:
     """What of either error is noise, where periods tell."""
     logs = [average.log for average in context.catalogue.about(Average, joint=joint)]
     if not logs:

@@ -7,7 +7,7 @@ import numpy as np
 from davinci_forces.records import Column, Counts, Residual, Trajectory, Whiteness
 from davinci_forces.report.content import Block, Figure, Line, Panel, Points, Prose, Stems
 from davinci_forces.report.context import Context, fit_name, label
-from davinci_forces.report.sections.parts import autocorrelation, run_name
+from davinci_forces.report.sections.parts import autocorrelation, effort_panel, run_name
 from davinci_forces.report.verdicts import percent
 
 LAGS = 50  # of the cross-correlation, each way
@@ -24,13 +24,7 @@ def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
         f"{name}: averaged effort and model ({who}), and what the model leaves of it.",
         f"{name}: the model follows the averaged effort up to {errors.std():.2g} (root mean square).",
         (
-            Panel(
-                "Averaged effort and model", "time [s]", effort,
-                (
-                    Line(residual.t, residual.tau, "measured", "sky"),
-                    Line(residual.t, residual.tau_hat, "model", "vermillion", "dashed"),
-                ),
-            ),
+            effort_panel(residual, heading="Averaged effort and model"),
             Panel("Residual", "time [s]", effort, (Line(residual.t, errors, "", "blue"),)),
         ),
         f"fit-figure-{residual.log}-{residual.joint}",
