@@ -23,6 +23,7 @@ from davinci_forces.records import store
 from davinci_forces.runner import ledger, reporting
 from davinci_forces.runner.ledger import Ledger
 from davinci_forces.runner.runs import folders
+from davinci_forces.runner.signature import stage_of
 from davinci_forces.stages import GROUPS, STAGES
 from tests.arm import write_robot, write_study
 
@@ -310,7 +311,8 @@ def test_a_run_that_is_killed_resumes_to_the_same_bytes(study, analysed):
 
 
 def ran(study: Path) -> set[str]:
-    return {entry.stage for entry in Ledger(folders(study, None, None)).entries()}
+    """The stages that have run, by their entries."""
+    return {stage_of(entry.stage) for entry in Ledger(folders(study, None, None)).entries()}
 
 
 def test_a_stage_of_a_fresh_study_runs_what_it_needs_and_nothing_else(study):

@@ -5,8 +5,10 @@ import shutil
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 import davinci_forces
+from davinci_forces.cli import app
 from davinci_forces.runner.graph import every_step, needed
 from davinci_forces.runner.ledger import Entry, Ledger
 from davinci_forces.runner.runs import folders
@@ -55,6 +57,30 @@ def test_a_step_waits_for_those_before_it_and_says_the_name_of_its_stage(finishe
     assert davinci_forces.run(finished, "tune")
     said = capsys.readouterr().out.splitlines()[1:]
     assert said == ["tune: roll: it has not run yet", "tune: gather: it has not run yet", "tune: 3 of 5 current"]
+
+
+def test_what_would_run_is_told_once_a_stage(finished):
+    ledger = Ledger(folders(finished, None, None))
+    ledger.place("tune", "check").unlink()  # which makes nothing, as it identifies nothing
+    said = CliRunner().invoke(app, ["calibrate", str(finished), "--dry-run"]).output.splitlines()[1:]
+    assert said == ["tune: check: would run: it has not run yet", "calibrate: waits for what tune makes"]
+    said = CliRunner().invoke(app, ["tune", str(finished), "--dry-run"]).output.splitlines()[1:]
+    assert said == ["tune: check: would run: it has not run yet", "tune: 4 of 5 current"]
+
+
+@pytest.mark.parametrize(
+    ("function", "subject"), [("tip.resolve.apply", "apply.push"), ("forces.tune.gather", "gather")]
+)
+def test_a_step_that_fails_leaves_a_diagnostic_that_is_its_own(finished, monkeypatch, capsys, function, subject):
+    def fail(**_):
+        raise ZeroDivisionError("for a test")
+
+    monkeypatch.setattr(f"davinci_forces.stages.{function}", fail)
+    _, stage, _ = function.split(".")
+    assert not davinci_forces.run(finished, stage, force=True)
+    assert f"{stage}: error: ZeroDivisionError: for a test" in capsys.readouterr().err
+    made = {name for entry in Ledger(folders(finished, None, None)).entries() if entry.failed for name in entry.outputs}
+    assert f"processed/diagnostic/{stage}/{subject}.parquet" in made
 
 
 def test_what_was_made_under_the_name_of_a_stage_that_is_no_more_goes_and_is_made_anew(finished, capsys):

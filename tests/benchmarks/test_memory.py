@@ -119,7 +119,7 @@ def test_the_stages_of_a_long_log_take_little_more_memory_than_it_does(tmp_path:
     shown, _ = peak("run", study, "report")
     numbers = 8 * COLUMNS * sum(len(signal) for signal in signals) / MB
     report(f"{len(signals[0])} samples of three joints, {numbers:.0f} MB: {', '.join(STAGES)} take {own:.0f} MB")
-    report(f"their report {shown:.0f} MB")
+    report(f"the stages after them and the report {shown:.0f} MB")
     assert own < LIBRARIES + TIMES * numbers
     assert shown < LIBRARIES + TIMES * numbers
 

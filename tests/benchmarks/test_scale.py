@@ -65,7 +65,7 @@ def quiet(study: Path) -> Runner:
 
 
 def seconds_of_stages(study: Path) -> dict[str, float]:
-    """What each stage takes, run by itself."""
+    """What each stage takes, run after the others, of which it finds that they are current."""
     taken = {}
     for name in STAGES:
         start = time.process_time()

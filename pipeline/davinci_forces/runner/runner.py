@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field
 from functools import cached_property, partial
+from itertools import groupby
 
 from davinci_forces.errors import BadRequest
 from davinci_forces.records import KINDS, store
@@ -82,15 +83,15 @@ class Runner:
     def preview(self, names: Iterable[str]) -> Iterator[str]:
         """What a run of these stages would do and why, as far as that is known before it: it changes nothing."""
         before = ""
-        for step in self._needed(names):
-            tasks, stage = self._tasks(step), stage_of(step)
+        for stage, steps in groupby(self._needed(names), stage_of):
+            tasks = [task for step in steps for task in self._tasks(step)]
             by_reason: dict[str, list[str]] = {}
             for task in tasks:
                 if reasons := self._reasons(task):
                     by_reason.setdefault(_brief(reasons), []).append(task.name)
-            yield from (f"{_listed(step, due)}: would run: {reason}" for reason, due in by_reason.items())
+            yield from (f"{_listed(stage, due)}: would run: {reason}" for reason, due in by_reason.items())
             if before and not by_reason:
-                yield from [f"{stage}: waits for what {before} makes"] * (stage != before)
+                yield f"{stage}: waits for what {before} makes"
             elif stage in self._named and len(tasks) > (due := sum(map(len, by_reason.values()))):
                 yield f"{stage}: {len(tasks) - due} of {len(tasks)} current"
             before = stage if by_reason else before
@@ -156,7 +157,7 @@ class Runner:
         progress = self._progress[step]
         if not progress.awaited:  # all that it does is known
             for reason, tasks_of in progress.reasons.items():
-                self.console.say(f"{_listed(step, tasks_of)}: {reason}")
+                self.console.say(f"{_listed(stage_of(step), tasks_of)}: {reason}")
             progress.reasons.clear()
         how = (
             partial(reporting.perform, self.ledger)
@@ -262,9 +263,8 @@ def _brief(reasons: list[str]) -> str:
     return "; ".join(reasons[:2]) + (f"; and {len(reasons) - 2} more" if len(reasons) > 2 else "")
 
 
-def _listed(step: str, tasks: list[str]) -> str:
+def _listed(stage: str, tasks: list[str]) -> str:
     """A stage and its tasks; one that is called once is not named twice."""
-    stage = stage_of(step)
     if tasks == [stage]:
         return stage
     return f"{stage}: " + ", ".join(tasks[:3]) + (f" and {len(tasks) - 3} more" if len(tasks) > 3 else "")
