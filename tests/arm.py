@@ -13,6 +13,7 @@ from davinci_forces.records import Diagnostic, JointModel, Motion, Signal
 from davinci_forces.robots.robot import Joint, Kind, Limits, Robot
 from davinci_forces.stages.model import predict
 from davinci_forces.stages.recordings import resample
+from davinci_forces.study import LogEntry
 
 HAND = Limits(q=(-0.6, 0.6), dq=(-1.2, 1.2), ddq=(-1.2, 1.2))
 SLIDE = Limits(q=(-0.07, 0.11), dq=(-2.0, 2.0), ddq=(-3.0, 3.0))
@@ -102,8 +103,9 @@ def motion(signal, cutoff=17.0) -> Motion:
 
 
 def models(signals, fits, predictions=(), fit="independent.lse", robot=ARM) -> list[JointModel | Diagnostic]:
-    """What `predict` makes of the joints of a log."""
-    return list(predict.apply([motion(s) for s in signals], predictions, fits, robot, fit=fit))
+    """What `predict` makes of the joints of a log, beside predictions."""
+    entry = LogEntry(signals[0].log, (f"{signals[0].log}.csv",), signals[0].role, ())
+    return list(predict.apply([motion(s) for s in signals], predictions, fits, entry, robot, fit=fit))
 
 
 def write_csv(file: Path, signals, extra=None) -> None:

@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.identification.regression import recorded_motion
+from davinci_forces.identification.regression import joined_motion, recorded_motion
 from davinci_forces.identification.used import Identified
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.models.memory import efforts
 from davinci_forces.maths.models.model import ArmMotion, JointDynamics
-from davinci_forces.records import Fit, JointModel, Motion
+from davinci_forces.records import Fit, JointModel, Motion, Prediction
+from davinci_forces.records.predict import CHOSEN
 from davinci_forces.robots.models import ARM
 
 # What a record calls the coefficients of the bias, in their order in `maths.models.bias`.
@@ -22,17 +23,24 @@ class Along:
     """What fits say of the joints of one log; what the joints of an arm share is worked out once."""
 
     def __init__(self, identified: Identified, motions: Iterable[Motion | JointModel]) -> None:
-        self.identified, self.motions = identified, {motion.joint: motion for motion in motions}
+        self.identified = identified
+        self._motions = {motion.joint: recorded_motion(motion) for motion in motions}  # whose other columns may go
         self._efforts: dict[tuple[str, ...], Array] = {}
         self._dynamics: dict[tuple[str, ...], tuple[JointDynamics, ...]] = {}
 
-    def held(self, motion: Motion) -> set[str]:
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The joints that the log holds."""
+        return tuple(self._motions)
+
+    def held(self, joint: str) -> set[str]:
         """The joints that the log holds on the clock of one of them."""
-        return {joint for joint, other in self.motions.items() if len(other) == len(motion)}
+        length = len(self._motions[joint].q)
+        return {other for other, motion in self._motions.items() if len(motion.q) == length}
 
     def motion(self, fit: Fit) -> ArmMotion:
         """The motion that a fit's model takes, low-passed; the log has to hold its joints."""
-        return recorded_motion([self.motions[name] for name in self.identified.model(fit).joints])
+        return joined_motion([self._motions[name] for name in self.identified.model(fit).joints])
 
     def tau_hat(self, fit: Fit, joint: str) -> Array:
         """The effort (N,) that a fit gives for a joint."""
@@ -65,3 +73,21 @@ class Along:
         """A joint under another fit; refits that had not seen it there are none of."""
         unknown: dict[str, Any] = {"scheme": "", "path_unseen": "", "tau_hat_unseen": np.full(len(model), np.nan)}
         return replace(model, **self.by(fit, model.joint), **unknown)
+
+
+def refits_of(predictions: Iterable[Prediction], used: dict[str, Fit], setting: str) -> dict[str, Prediction]:
+    """What refits that left data of a log out predict of each joint, in place of the fit that describes it."""
+    refits: dict[str, Prediction] = {}
+    for prediction in predictions:
+        fit = used.get(prediction.joint)
+        wanted = (CHOSEN,) if setting == CHOSEN else (fit.model, fit.estimator) if fit else ()
+        if fit and prediction.joint not in refits and (prediction.model, prediction.estimator)[: len(wanted)] == wanted:
+            refits[prediction.joint] = prediction
+    return refits
+
+
+def at_samples(prediction: Prediction, motion: Motion) -> Array:
+    """The predicted effort (N,) at the samples of a recording; NaN at those that are not predicted."""
+    half = 0.5 / motion.rate
+    at = np.minimum(np.searchsorted(prediction.t, motion.t - half), len(prediction) - 1)
+    return np.where(np.abs(prediction.t[at] - motion.t) < half, prediction.tau_hat[at], np.nan)

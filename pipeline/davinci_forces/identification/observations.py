@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.estimators.problem import NOTHING, Known, Regression
-from davinci_forces.identification.regression import recorded_motion
+from davinci_forces.identification.regression import joined_motion, recorded_motion
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.memory import pieces
 from davinci_forces.maths.models.model import ArmMotion, Model
@@ -70,7 +70,7 @@ def observed(records: Sequence[Motion], averages: Iterable[Average], lowpass: fl
     own = {a.joint: a for a in averages if a.log == first.log}
     average = next(iter(own.values()), None)
     tau = np.stack([smooth_effort(r, lowpass) for r in records], axis=1)
-    motion = recorded_motion(records)
+    motion = joined_motion([recorded_motion(record) for record in records])
     moving, white = np.asarray(~np.isnan(tau).all(axis=1)), {joint: a.sigma_tau_white for joint, a in own.items()}
     block = path_blocks(first.t, average.period if average else 0.0, moving)
     period = np.full(len(first), -1)

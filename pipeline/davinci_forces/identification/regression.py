@@ -71,10 +71,17 @@ def averaged_motion(trajectory: Trajectory) -> ArmMotion:
     return ArmMotion(q, dq, ddq, trajectory.period / len(q), np.zeros(len(q), np.int64), periodic=True)
 
 
-def recorded_motion(records: Sequence[Motion | JointModel]) -> ArmMotion:
-    """The low-passed motion of joints of one recording, in this order, which share a clock."""
-    q, dq, ddq = (np.stack([getattr(r, name) for r in records], axis=1) for name in ("q", "dq", "ddq"))
-    return ArmMotion(q, dq, ddq, 1.0 / records[0].rate, records[0].segment)
+def recorded_motion(record: Motion | JointModel) -> ArmMotion:
+    """The low-passed motion of a joint of one recording."""
+    return ArmMotion(record.q[:, None], record.dq[:, None], record.ddq[:, None], 1.0 / record.rate, record.segment)
+
+
+def joined_motion(motions: Sequence[ArmMotion]) -> ArmMotion:
+    """The motion of several joints of one recording, in this order, which share a clock."""
+    if len(motions) == 1:
+        return motions[0]
+    q, dq, ddq = (np.concatenate(columns, axis=1) for columns in zip(*(m[:3] for m in motions), strict=True))
+    return motions[0]._replace(q=q, dq=dq, ddq=ddq)
 
 
 def predicted(model: Model, theta: Array, motion: ArmMotion, effort: int = 0) -> Array:

@@ -75,6 +75,7 @@ def declaration(step: str) -> Declaration:
             continue
         if get_origin(hint) is Annotated:
             hint, declared.roles[parameter] = get_args(hint)
+            declared.in_turn.add(parameter)
         if hint in GIVEN:
             declared.given[parameter] = GIVEN[hint]
         elif get_origin(hint) in (Sequence, Collection):

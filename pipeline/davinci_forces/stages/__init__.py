@@ -15,7 +15,7 @@ The signature of each is the declaration of everything it needs:
     log: Log                    called once for each log of the study, opened
     average: Average | None     the record of that kind about the same, where there is one
     fits: Iterable[Fit]         all records of that kind about the same; the stage waits for them
-    motions: Annotated[Iterable[Motion], "identification"]   those of logs of one role only
+    motions: Annotated[Iterable[Motion], "identification"]   those of logs of one role, each read when it is come to
     entry: LogEntry             what the study says of the log
     joint: Joint, robot: Robot  what the robot is
     weighings: Weighings        the masses of all weight logs; where the study has none, the stage is not called

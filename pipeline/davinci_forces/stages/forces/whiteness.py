@@ -1,6 +1,6 @@
 """Test whether what averaging, fit and filter leave is white noise, and explain why innovations are not."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 
 import numpy as np
 
@@ -105,7 +105,7 @@ def statistics(x: Column) -> dict[str, object]:
 
 def apply(
     models: Sequence[JointModel],
-    motions: Sequence[Motion],
+    motions: Collection[Motion],
     fits: Iterable[Fit],
     noises: Iterable[FilterNoise],
     entry: LogEntry,
@@ -117,7 +117,8 @@ def apply(
 
     A cause is named only where the innovations pass every test without it.  Section 7.4
     """
-    assumes, along = {noise.joint: noise for noise in noises}, Along(Identified(robot, fits), motions)
+    assumes, modelled = {noise.joint: noise for noise in noises}, {model.joint for model in models}
+    along = Along(Identified(robot, fits), [*models, *(m for m in motions if m.joint not in modelled)])
     moving_models = [model for model in models if not model.at_rest and model.joint in assumes]
     every_noise = [
         assumed(assumes[model.joint], robot.joint(model.joint), 1.0 / model.rate, q_tau) for model in moving_models
@@ -156,10 +157,8 @@ def others(model: JointModel, along: Along, free: Booleans) -> Iterator[tuple[st
     if fit is not None:
         yield THIS_LOG, longest(model, refitted(model, fit, along, free))
     structures = [other for other in identified.fits if other.group == joint and other.model != model.model]
-    told = [
-        other for other in structures if along.motions.keys() >= set(identified.model(other).joints)
-    ]  # of what the log holds
-    for other in told[:1]:
+    possible = [other for other in structures if set(along.joints) >= set(identified.model(other).joints)]
+    for other in possible[:1]:  # of those whose joints the log holds
         under = along.under(model, other)
         if under.inertia.min() > 0:
             yield other.model, longest(under)

@@ -209,7 +209,7 @@ def apply(motion: Motion, fits: Iterable[Fit], robot: Robot, *, lowpass: float) 
 
 def charted(motion: Motion, fit: Fit, identified: Identified, lowpass: float) -> FrictionMap:
     """tau - Phi_other theta_other, and Phi_friction theta_friction, as means over ranges of velocity."""
-    Phi, known = identified.model(fit).regressor(recorded_motion([motion]))
+    Phi, known = identified.model(fit).regressor(recorded_motion(motion))
     friction = np.array(["friction" in str(name) for name in fit.parameter])
     left = smoothed(motion.tau, motion.segment, motion.rate, lowpass) - Phi[:, 0] @ np.where(friction, 0.0, fit.theta)
     modelled = Phi[:, 0] @ np.where(friction, fit.theta, 0.0)

@@ -74,14 +74,16 @@ def run(
 
     A joint of several logs has a CrossFit, too, by which each of its logs can be predicted from others.
     """
-    averaged, samples = list(trajectories), list(motions)
-    moving = [(s.log, s.joint) for s in samples if not s.at_rest]
+    averaged, moving, unaveraged = list(trajectories), list[tuple[str, str]](), list[Motion]()
+    repeating = {(t.log, t.joint) for t in averaged}
+    for motion in motions:
+        if not motion.at_rest:
+            moving.append((motion.log, motion.joint))
+            unaveraged += [motion] if moving[-1] not in repeating else []
     for joint in robot.joints:
         model, prior = independent(joint), known_of(joint)
         parts = [repeated(model, t, prior) for t in averaged if t.joint == joint.name]
-        known = {part.log for part in parts}
-        once = [s for s in samples if s.joint == joint.name and not s.at_rest and s.log not in known]
-        parts += [unrepeated(model, s, lowpass, prior) for s in once]
+        parts += [unrepeated(model, motion, lowpass, prior) for motion in unaveraged if motion.joint == joint.name]
         if parts:
             others = moving_with(joint.name, [part.log for part in parts], moving)
             yield from of_joint(model, parts, robot, joint, others)

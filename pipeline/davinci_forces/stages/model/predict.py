@@ -1,4 +1,4 @@
-"""Predict the effort of logs that a fit has not seen, and score it; identification logs by leaving data out."""
+"""Predict the effort of logs that a fit has not seen, and score it; and model every joint along every log."""
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import replace
@@ -10,7 +10,7 @@ from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators import ESTIMATORS, estimator
 from davinci_forces.estimators.problem import Known, Regression
 from davinci_forces.identification.folds import folds
-from davinci_forces.identification.joint_models import Along
+from davinci_forces.identification.joint_models import Along, at_samples, refits_of
 from davinci_forces.identification.known import known_of
 from davinci_forces.identification.observations import averaged, observed, pose_samples
 from davinci_forces.identification.paths import ANOTHER_PATH, SAME_PATH
@@ -55,9 +55,8 @@ def run(
     model says of identification logs comes with the choice.
     """
     if entry.role in ("validation", "contact"):
-        recorded = list(motions)
-        along = Along(Identified(robot, fits), recorded)
-        for motion in recorded:
+        along = Along(Identified(robot, fits), motions)
+        for motion in motions:
             if not motion.at_rest:
                 yield from unseen(motion, along, entry, lowpass)
     elif entry.role == "identification":
@@ -91,7 +90,7 @@ def unseen(motion: Motion, along: Along, entry: LogEntry, lowpass: float) -> Ite
     identified = along.identified
     own = [f for f in identified.fits if f.group == motion.joint and f.model == "independent"]
     chosen = identified.used(motion.joint, CHOSEN)
-    if chosen is not None and not set(identified.model(chosen).joints) <= along.held(motion):
+    if chosen is not None and not set(identified.model(chosen).joints) <= along.held(motion.joint):
         missing = f"{name}: the log does not hold the other joints that the chosen model needs"
         said = f"{missing}, so {FALLBACK} stands in for it; add their channels"
         yield diagnostic("predict", f"{motion.log}.{motion.joint}", "note", said)
@@ -112,7 +111,7 @@ def without_the_log(
     part = some(motion, kept)
     judge, along = (
         Judge(part, part.standing == 0, lowpass, own.sigma_tau_white if own else None),
-        recorded_motion([part]),
+        recorded_motion(part),
     )
     for fit in cross_fits:
         left_out = [str(names).split(", ") for names in fit.left_out]
@@ -130,7 +129,7 @@ def without_a_period(
     """Predict each period of a log from fits to the other periods; only the effort is left out, not the path."""
     part = some(motion, whole_periods(motion.t, own))
     runs, others = without_folds(part, own, model, known)
-    Phi = model.regressor(recorded_motion([part])).Phi[:, 0]
+    Phi = model.regressor(recorded_motion(part)).Phi[:, 0]
     judge = Judge(part, part.standing == 0, lowpass, own.sigma_tau_white)
     for name in ESTIMATORS:
         try:
@@ -196,9 +195,10 @@ def whole_periods(t: Array, own: Trajectory) -> slice:
 
 
 def apply(
-    motions: Sequence[Motion],
+    motions: Collection[Motion],
     predictions: Collection[Prediction],
     fits: Iterable[Fit | Choice | FittedPaths],
+    entry: LogEntry,
     robot: Robot,
     *,
     fit: str,
@@ -210,14 +210,12 @@ def apply(
     PipelineError
         If there is no fit of the name that the settings say.
     """
-    if motions[0].role == "friction":
+    if entry.role == "friction":
         return
-    identified = Identified(robot, fits)
+    identified, is_fitted = Identified(robot, fits), entry.role == "identification"
     along = Along(identified, motions)
-    used = {
-        m.joint: identified.used_along(m.joint, fit, along.held(m)) for m in motions if identified.describing(m.joint)
-    }
-    is_fitted = motions[0].role == "identification"
+    described = [joint for joint in along.joints if identified.describing(joint)]
+    used = {joint: identified.used_along(joint, fit, along.held(joint)) for joint in described}
     refits = refits_of(predictions, {joint: own for joint, (own, _) in used.items()}, fit) if is_fitted else {}
     for motion in motions:
         about, name = f"{motion.log}.{motion.joint}.model", f"{motion.log}/{motion.joint}"
@@ -240,26 +238,8 @@ def apply(
             path_unseen=refit.path if refit else "" if is_fitted else path,
             rate=motion.rate, at_rest=motion.at_rest, t=motion.t, q=motion.q, dq=motion.dq, ddq=motion.ddq,
             q_measured=motion.q_measured, dq_measured=motion.dq_measured, tau=motion.tau, segment=motion.segment,
-            tau_hat_unseen=predicted_at(refit, motion) if refit else np.full(len(motion), np.nan), **terms,
+            tau_hat_unseen=at_samples(refit, motion) if refit else np.full(len(motion), np.nan), **terms,
         )  # fmt: skip
-
-
-def refits_of(predictions: Iterable[Prediction], used: dict[str, Fit], setting: str) -> dict[str, Prediction]:
-    """What refits that left data of a log out predict of each joint, in place of the fit that describes it."""
-    refits: dict[str, Prediction] = {}
-    for prediction in predictions:
-        fit = used.get(prediction.joint)
-        wanted = (CHOSEN,) if setting == CHOSEN else (fit.model, fit.estimator) if fit else ()
-        if fit and prediction.joint not in refits and (prediction.model, prediction.estimator)[: len(wanted)] == wanted:
-            refits[prediction.joint] = prediction
-    return refits
-
-
-def predicted_at(prediction: Prediction, motion: Motion) -> Array:
-    """The predicted effort (N,) at the samples of a recording; NaN at those that are not predicted."""
-    half = 0.5 / motion.rate
-    at = np.minimum(np.searchsorted(prediction.t, motion.t - half), len(prediction) - 1)
-    return np.where(np.abs(prediction.t[at] - motion.t) < half, prediction.tau_hat[at], np.nan)
 
 
 def not_positive(motion: Motion, fit: Fit) -> str:
