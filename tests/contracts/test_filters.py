@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.testing import assert_allclose
 from scipy.stats import chi2, multivariate_normal
 
-from davinci_forces.filters import FILTERS, kalman, tracker
+from davinci_forces.filters import FILTERS, kalman, title, tracker
 from davinci_forces.filters.belief import FIRST
 from davinci_forces.filters.problem import Filter, NoiseModel
 from davinci_forces.maths.models.driven import Driven
@@ -244,6 +244,10 @@ def test_measurement_noise_that_grows_is_noticed_only_by_the_filter_that_adapts(
     adapting, other = (tracker(name)(recording(joint, *y, np.zeros(N)), NOISE).nis for name in ("ekf_adaptive", "ekf"))
     assert adapting[late].mean() == pytest.approx(2.0, abs=0.15)
     assert other[late].mean() > 10.0
+
+
+def test_every_filter_says_what_a_report_calls_it():
+    assert len({title(name) for name in FILTERS}) == len(FILTERS)
 
 
 @FILTER

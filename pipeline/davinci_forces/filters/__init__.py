@@ -1,4 +1,4 @@
-"""How external effort is tracked: one module per filter, exporting `track`, and its name in the list below."""
+"""How external effort is tracked: one module per filter, exporting `track` and `NAME`, listed below."""
 
 from collections.abc import Sequence
 from importlib import import_module
@@ -17,6 +17,11 @@ def tracker(name: str) -> Filter:
     """The filter of that name."""
     track: Filter = import_module(f"davinci_forces.filters.{name}").track
     return track
+
+
+def title(name: str) -> str:
+    """What the filter of that name is called in a report."""
+    return str(import_module(f"davinci_forces.filters.{name}").NAME)
 
 
 def through(name: str, recordings: Sequence[Driven], noise: NoiseModel) -> Tracked:

@@ -11,6 +11,8 @@ from davinci_forces.filters.problem import NoiseModel, Tracked
 from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.driven import Driven
 
+NAME = "Measured minus model"
+
 
 def track(recording: Driven, noise: NoiseModel) -> Tracked:
     """As the motion that is handed over has it; its deviation is that of the noise of the effort."""

@@ -21,6 +21,7 @@ from davinci_forces.maths.models.bias import Coefficients
 from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.signals.windows import SETTLE
 
+NAME = "Extended Kalman filter"
 LOG_2_PI = float(np.log(2.0 * np.pi))
 
 

@@ -12,6 +12,7 @@ from davinci_forces.filters import kalman
 from davinci_forces.filters.problem import NoiseModel, Tracked
 from davinci_forces.maths.models.driven import Driven
 
+NAME = "The same, adaptive noise"
 WINDOW = 1.0  # [s] over which innovations are forgotten
 
 

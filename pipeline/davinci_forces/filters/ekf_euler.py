@@ -13,6 +13,8 @@ from davinci_forces.filters import kalman
 from davinci_forces.filters.problem import NoiseModel, Tracked
 from davinci_forces.maths.models.driven import Driven
 
+NAME = "The same, forward Euler"
+
 
 def track(recording: Driven, noise: NoiseModel) -> Tracked:
     """Filter a recording: correct with y_k, then predict with tau_k.  (7.6), (7.7)"""

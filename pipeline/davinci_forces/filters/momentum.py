@@ -14,6 +14,8 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.driven import Driven
 
+NAME = "Momentum observer"
+
 
 def track(recording: Driven, noise: NoiseModel) -> Tracked:
     """Exact over a sample of constant drive; its deviation is what noise of effort and velocity makes of it."""

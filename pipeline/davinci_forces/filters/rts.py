@@ -20,6 +20,7 @@ from davinci_forces.maths.compiled import cached
 from davinci_forces.maths.models import bias as derivation
 from davinci_forces.maths.models.driven import Driven
 
+NAME = "Smoother"
 LEFT = 1e-12  # of a variance, below which a difference from it is rounding
 STORED = 15  # of each sample: what was predicted, and the transition to the next
 

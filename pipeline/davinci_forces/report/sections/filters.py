@@ -6,20 +6,11 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from davinci_forces import filters
 from davinci_forces.records import Comparison, FilterNoise, Track
 from davinci_forces.report.content import Block, Cell, Figure, Line, OnScreen, Panel, Prose, Section, Table, literal
 from davinci_forces.report.context import Context, label, title
 
-NAMES = {
-    "ekf": "Extended Kalman filter",
-    "ekf-euler": "The same, forward Euler",
-    "ekf-independent": "The same, own terms only",
-    "ekf-adaptive": "The same, adaptive noise",
-    "rts": "Smoother",
-    "rate": "Kalman filter with rate",
-    "momentum": "Momentum observer",
-    "direct": "Measured minus model",
-}
 SHOWN = 8.0  # [s] of a run, in which filters can be told apart
 DRAWN = {
     "direct": ("grey", "dotted"),
@@ -120,7 +111,13 @@ def compared_row(context: Context, c: Comparison) -> tuple[Cell, ...]:
     """One filter on one joint."""
     names = (("free_rms", 2), ("detection_level", 2), ("push_share", 2), ("push_delay", 1))
     numbers = (context.number(f"{c.filter}.{c.log}.{c.joint}.{name}", digits) for name, digits in names)
-    return (title(c.joint), NAMES.get(c.filter, literal(c.filter)), *numbers)
+    return (title(c.joint), name_of(c.filter), *numbers)
+
+
+def name_of(label: str) -> str:
+    """What the filter of a comparison is called; one is the default again, with the joint's own terms."""
+    name = label.replace("-", "_")
+    return filters.title(name) if name in filters.FILTERS else "The same, own terms only"
 
 
 def overlaid(compared: list[Comparison]) -> Figure:
@@ -144,6 +141,6 @@ def panel(compared: list[Comparison], named: bool) -> Panel:
     some = [by_name[name] for name in DRAWN if name in by_name]
     middle = float(np.mean(some[0].t))
     near = np.abs(some[0].t - middle) <= 0.5 * SHOWN
-    lines = tuple(Line(c.t[near], c.tau_ext[near], NAMES[c.filter] if named else "", *DRAWN[c.filter]) for c in some)  # type: ignore[arg-type]
+    lines = tuple(Line(c.t[near], c.tau_ext[near], name_of(c.filter) if named else "", *DRAWN[c.filter]) for c in some)  # type: ignore[arg-type]
     heading = f"{title(some[0].joint)} in {some[0].log}"
     return Panel(heading, "time [s]", label(some[0], "tau_ext", "external effort"), lines)
