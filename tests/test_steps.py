@@ -14,7 +14,7 @@ from davinci_forces.runner.ledger import Entry, Ledger
 from davinci_forces.runner.runs import folders
 from davinci_forces.runner.signature import stage_of, steps
 
-FIT = ["ingest", "resample", "smooth", "average", "differentiate", "fit"]
+FIT = ["ingest", "resample", "average", "differentiate", "fit"]
 
 
 @pytest.fixture
@@ -40,7 +40,7 @@ def test_a_stage_needs_the_steps_that_make_what_it_reads_and_no_other():
 
 def test_a_group_needs_its_stages_whole_and_what_they_read():
     model = needed(["model"])
-    assert model == [*FIT, "choose", "choose.apply", "predict"]
+    assert model == [*FIT, "choose", "choose.apply", "predict", "predict.apply"]
     assert needed(["weigh"])[-2:] == ["weigh", "weigh.gather"]
 
 

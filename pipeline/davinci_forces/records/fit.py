@@ -27,6 +27,7 @@ class Fit(Record):
     phi: Labels
     unit: Labels
     scale: Column
+    positive: Column
     theta: Column
     theta_std: Column
     theta_std_classical: Column

@@ -103,6 +103,7 @@ QUANTITIES = {
     "condition": Quantity("condition number of the regressor, or of the tip's Jacobian"),
     "samples": Quantity("number of samples fitted, K"),
     "correlated_lags": Quantity("lags over which residuals are correlated, each counting by its correlation"),
+    "positive": Quantity("1 where physics knows that the parameter is not negative"),
     "scale": Quantity("displacement or velocity that the term depends on, in the joint's units; 0 for none"),
     # what the data tell of parameters
     "scaled_condition": Quantity("condition number of the regressor's columns, each scaled to unit length"),

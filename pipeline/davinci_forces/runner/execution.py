@@ -20,7 +20,7 @@ from davinci_forces.robots.robot import Kind
 from davinci_forces.runner.ledger import Folders, file_name
 from davinci_forces.runner.places import Located, is_about_log
 from davinci_forces.runner.plan import Task
-from davinci_forces.runner.signature import declaration, function_of
+from davinci_forces.runner.signature import declaration, function_of, stage_of
 from davinci_forces.study import LogEntry
 
 
@@ -56,8 +56,7 @@ def perform(folders: Folders, task: Task) -> Outcome:
         said = said_of(error)
         failed = without_folders(said, folders)
         with _writer(folders, task) as writer:
-            stage, _, function = task.step.partition(".")  # two functions of a stage may both fail for one log
-            writer.write(diagnostic(stage, file_name(f"{task.subject}.{function}".rstrip(".")), "error", failed))
+            writer.write(diagnostic(stage_of(task.step), file_name(task.subject), "error", failed))
         return Outcome(task, _made(writer), failed, (f"error: {said}",), perf_counter() - start)
     finally:
         store.release()

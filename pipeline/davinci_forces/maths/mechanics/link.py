@@ -1,4 +1,4 @@
-"""The dynamics of one link on numbers, which are floats, arrays of samples, or the compiled vectors of `vector`.
+"""The dynamics of one link on numbers, which are floats or arrays of samples.
 
 Every link has a frame at its joint: it turns about, or slides along, that frame's z.  A `row` of `Tree.rows` holds what
 is constant: the rotation (by rows) and the place of this frame at q = 0 in its carrier, and the ten inertial
@@ -110,11 +110,6 @@ def carried(row: Row, slides: bool, turn: Turn, q: Number, wrench: Wrench) -> Wr
         f, n = turned_back(turn, f), turned_back(turn, n)
     f, n = times(row, f), times(row, n)
     return f, plus(n, cross(place(row), f))
-
-
-def along(slides: bool, wrench: Wrench) -> Number:
-    """What a joint has to exert of a wrench on its link."""
-    return wrench[0][2] if slides else wrench[1][2]
 
 
 def unit_wrench(slides: bool, m: float, inertia: Inertia) -> Wrench:

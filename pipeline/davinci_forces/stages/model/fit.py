@@ -232,6 +232,7 @@ def summarised(
         phi=np.array([parameter.typst for parameter in model.parameters], object),
         unit=np.array([parameter.unit for parameter in model.parameters], object),
         scale=np.array([parameter.scale for parameter in model.parameters]),
+        positive=np.array([parameter.positive for parameter in model.parameters], float),
         theta=estimate.theta,
         theta_std=estimate.theta_std,
         theta_std_classical=estimate.theta_std_classical,

@@ -78,8 +78,8 @@ def implausible(fits: list[Fit]) -> Iterator[Verdict]:
     for fit in fits:
         negative = [
             f"{name} ({value:.2g} ± {std:.1g})"
-            for name, value, std in zip(fit.parameter, fit.theta, fit.theta_std, strict=True)
-            if value < 0 and name in TERMS and TERMS[name].positive
+            for name, value, std, positive in zip(fit.parameter, fit.theta, fit.theta_std, fit.positive, strict=True)
+            if value < 0 and positive
         ]
         if negative:
             who = f"{title_of(fit.estimator)} ({fit.model})"
