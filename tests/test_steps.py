@@ -52,20 +52,20 @@ def test_names_in_any_order_are_taken_in_that_of_the_stages_and_the_report_needs
 def test_a_step_waits_for_those_before_it_and_says_the_name_of_its_stage(finished, capsys):
     ledger = Ledger(folders(finished, None, None))
     assert [stage_of(entry.stage) for entry in ledger.entries("tune.gather")] == ["tune"]
-    ledger.place("tune", "roll").unlink()
+    ledger.place("tune", "roll/hand_roll").unlink()
     ledger.place("tune.gather", "gather").unlink()
     assert davinci_forces.run(finished, "tune")
     said = capsys.readouterr().out.splitlines()[1:]
-    assert said == ["tune: roll: it has not run yet", "tune: gather: it has not run yet", "tune: 3 of 5 current"]
+    assert said == ["tune: roll/hand_roll: it has not run yet", "tune: gather: it has not run yet", "tune: 3 of 5 current"]
 
 
 def test_what_would_run_is_told_once_a_stage(finished):
     ledger = Ledger(folders(finished, None, None))
-    ledger.place("tune", "check").unlink()  # which makes nothing, as it identifies nothing
+    ledger.place("tune", "check/hand_roll").unlink()  # which makes nothing, as it identifies nothing
     said = CliRunner().invoke(app, ["calibrate", str(finished), "--dry-run"]).output.splitlines()[1:]
-    assert said == ["tune: check: would run: it has not run yet", "calibrate: waits for what tune makes"]
+    assert said == ["tune: check/hand_roll: would run: it has not run yet", "calibrate: waits for what tune makes"]
     said = CliRunner().invoke(app, ["tune", str(finished), "--dry-run"]).output.splitlines()[1:]
-    assert said == ["tune: check: would run: it has not run yet", "tune: 4 of 5 current"]
+    assert said == ["tune: check/hand_roll: would run: it has not run yet", "tune: 4 of 5 current"]
 
 
 @pytest.mark.parametrize(

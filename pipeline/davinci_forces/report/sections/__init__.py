@@ -1,6 +1,6 @@
 """What a report says, in order: one module per section, exporting `section`, and its name in the list below.
 
-section(context: Context) -> Section | None        None where a study has nothing to say on it
+section(context: Context) -> Section | None        None where a study has nothing to say on it; they share `parts`
 """
 
 from collections.abc import Callable

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.estimators import title_of
-from davinci_forces.maths.models.terms import TERMS
 from davinci_forces.records import Fit, Identifiability, Residual
 from davinci_forces.records.predict import CHOSEN
 from davinci_forces.records.record import slug
