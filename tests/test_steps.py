@@ -56,7 +56,11 @@ def test_a_step_waits_for_those_before_it_and_says_the_name_of_its_stage(finishe
     ledger.place("tune.gather", "gather").unlink()
     assert davinci_forces.run(finished, "tune")
     said = capsys.readouterr().out.splitlines()[1:]
-    assert said == ["tune: roll/hand_roll: it has not run yet", "tune: gather: it has not run yet", "tune: 3 of 5 current"]
+    assert said == [
+        "tune: roll/hand_roll: it has not run yet",
+        "tune: gather: it has not run yet",
+        "tune: 3 of 5 current",
+    ]
 
 
 def test_what_would_run_is_told_once_a_stage(finished):

@@ -7,7 +7,7 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.uncertainty.error_band import BLOCKS, SpeedCells, centred, excess, excess_std, speed_bin
 from davinci_forces.records import ErrorBand
-from davinci_forces.records.predict import ANOTHER_PATH
+from davinci_forces.records.prediction import ANOTHER_PATH
 
 OWN = "its own other blocks"  # where there is nothing else
 

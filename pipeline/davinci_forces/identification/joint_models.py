@@ -12,7 +12,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.models.memory import efforts
 from davinci_forces.maths.models.model import ArmMotion, JointDynamics
 from davinci_forces.records import Fit, JointModel, Motion, Prediction
-from davinci_forces.records.predict import CHOSEN
+from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.robots.models import ARM
 
 # What a record calls the coefficients of the bias, in their order in `maths.models.bias`.

@@ -6,8 +6,8 @@ from davinci_forces.maths.signals.path import SAME_PATH as LIKE
 from davinci_forces.maths.signals.path import likeness
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.records import FittedPaths, Motion
-from davinci_forces.records.predict import ANOTHER_PATH as ANOTHER_PATH
-from davinci_forces.records.predict import SAME_PATH as SAME_PATH
+from davinci_forces.records.prediction import ANOTHER_PATH as ANOTHER_PATH
+from davinci_forces.records.prediction import SAME_PATH as SAME_PATH
 
 
 def follows(motion: Motion, paths: FittedPaths) -> bool:

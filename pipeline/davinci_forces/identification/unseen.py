@@ -20,7 +20,7 @@ from davinci_forces.maths.models.model import Model
 from davinci_forces.maths.selection.cross_validation import BLOCKS, MOST
 from davinci_forces.maths.selection.ridge import Equations, Ridge, solve
 from davinci_forces.records import Prediction
-from davinci_forces.records.predict import CHOSEN
+from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.robots.models import Reach
 from davinci_forces.robots.robot import Robot
 

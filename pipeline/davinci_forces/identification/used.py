@@ -6,7 +6,7 @@ from davinci_forces.errors import PipelineError
 from davinci_forces.identification.paths import ANOTHER_PATH, SAME_PATH, follows
 from davinci_forces.maths.models.model import Model
 from davinci_forces.records import Choice, CrossFit, Fit, FittedPaths, Motion
-from davinci_forces.records.predict import CHOSEN
+from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.robots.models import ARM, described
 from davinci_forces.robots.robot import Robot
 

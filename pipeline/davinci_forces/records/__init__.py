@@ -1,45 +1,68 @@
 """The records that flow between stages, one module for each stage that makes them; see `record`."""
 
-from davinci_forces.records.assess import FreeSpace
-from davinci_forces.records.average import Average, PeriodResidual
-from davinci_forces.records.benchmark import Comparison
-from davinci_forces.records.bound import ErrorBand
-from davinci_forces.records.calibrate import FreeMotion
-from davinci_forces.records.chart import FrictionMap
-from davinci_forces.records.choose import Choice
-from davinci_forces.records.combine import ArmCorrelation
-from davinci_forces.records.correlate import JointCorrelation
-from davinci_forces.records.design import Control, Excitation, Links, Lyapunov, Pose, Workspace
-from davinci_forces.records.diagnostic import Diagnostic, diagnostic
-from davinci_forces.records.differentiate import Spectrum, Trajectory
-from davinci_forces.records.ekf import Track
-from davinci_forces.records.explain import Explanation, Innovation
-from davinci_forces.records.feel import HapticResponse, HapticRun
-from davinci_forces.records.fit import (
+from davinci_forces.records.forces import (
+    Comparison,
+    Contact,
+    ErrorBand,
+    FilterNoise,
+    FreeMotion,
+    FreeSpace,
+    Threshold,
+    Track,
+    Tuning,
+)
+from davinci_forces.records.model import (
+    Choice,
     CrossFit,
     Fit,
     FittedPaths,
+    FrictionMap,
     Guess,
     Identifiability,
     MeasurementNoise,
     Residual,
     SwarmSearch,
 )
-from davinci_forces.records.hang import Load
-from davinci_forces.records.ingest import LogSummary, Recording, Touch
-from davinci_forces.records.limit import DelayLimit, HapticMotion, StabilityLimit, StabilityMap, TissueLimit
-from davinci_forces.records.measure import Contact
-from davinci_forces.records.palpate import Push, Stiffness, TissueModel
-from davinci_forces.records.predict import JointModel, Prediction
-from davinci_forces.records.record import COLUMN_DTYPES, AnyRecord, Column, Counts, Labels, Names, Origin, Record
-from davinci_forces.records.resample import Motion, Signal
-from davinci_forces.records.resolve import TipBudget, TipContact, TipForce
-from davinci_forces.records.sense import SensorForce
-from davinci_forces.records.settle import FilterNoise
-from davinci_forces.records.threshold import Threshold
-from davinci_forces.records.tune import Tuning
-from davinci_forces.records.weigh import FreeWeight, Weight
-from davinci_forces.records.whiteness import Whiteness
+from davinci_forces.records.plan import Control, Excitation, Links, Lyapunov, Pose, Workspace
+from davinci_forces.records.prediction import JointModel, Prediction
+from davinci_forces.records.record import (
+    COLUMN_DTYPES,
+    AnyRecord,
+    Column,
+    Counts,
+    Diagnostic,
+    Labels,
+    Names,
+    Origin,
+    Record,
+    diagnostic,
+)
+from davinci_forces.records.recordings import (
+    Average,
+    LogSummary,
+    Motion,
+    PeriodResidual,
+    Recording,
+    Signal,
+    Spectrum,
+    Touch,
+    Trajectory,
+)
+from davinci_forces.records.tip import ArmCorrelation, JointCorrelation, SensorForce, TipBudget, TipContact, TipForce
+from davinci_forces.records.tissue import (
+    DelayLimit,
+    HapticMotion,
+    HapticResponse,
+    HapticRun,
+    Push,
+    StabilityLimit,
+    StabilityMap,
+    Stiffness,
+    TissueLimit,
+    TissueModel,
+)
+from davinci_forces.records.weight import FreeWeight, Load, Weight
+from davinci_forces.records.whiteness import Explanation, Innovation, Whiteness
 
 __all__ = [
     "COLUMN_DTYPES", "KINDS", "AnyRecord", "ArmCorrelation", "Average", "Choice", "Column", "Comparison", "Contact",

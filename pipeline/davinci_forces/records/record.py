@@ -8,7 +8,7 @@ kind from another: they are its place on disk.  `published` says which of its nu
 
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple, Self, TypeVar
 
 import numpy as np
@@ -145,3 +145,20 @@ AnyRecord = TypeVar("AnyRecord", bound=Record)
 def slug(text: str) -> str:
     """A name as it stands in a key: 'gravity, sine' is gravity_sine."""
     return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnostic(Record):
+    """What a stage wants the reviewer to know: something left out, assumed, or wrong."""
+
+    KEY = ("stage", "subject")
+
+    stage: str
+    subject: str
+    severity: Labels
+    text: Labels
+
+
+def diagnostic(stage: str, subject: str, severity: str, *texts: str) -> Diagnostic:
+    """A diagnostic of one or more lines of one severity."""
+    return Diagnostic(stage, subject, np.array([severity] * len(texts), object), np.array(texts, object))

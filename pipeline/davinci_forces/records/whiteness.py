@@ -1,9 +1,9 @@
-"""Records of tests of what should be white noise."""
+"""Records of signals that should be white, and of why they are not."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from davinci_forces.records.record import Column, Counts, Published, Record
+from davinci_forces.records.record import Column, Counts, Labels, Published, Record
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,3 +47,55 @@ class Whiteness(Record):
         for name in ("acf1", "ljung_box_p", "periodogram_p", "jarque_bera_p"):
             yield Published(f"{prefix}.{name}_{signal}", name)
         yield Published(f"{prefix}.white", "all_white")
+
+
+@dataclass(frozen=True, eq=False)
+class Innovation(Record):
+    """One innovation of the default filter: its size beside the stated one, and what it has to do with the motion."""
+
+    KEY = ("log", "joint", "signal")
+
+    log: str
+    joint: str
+    signal: str
+    tested: int
+    band: float
+    band_99: float
+    nis_own: float
+    nis_low: float
+    nis_high: float
+    lag: Counts
+    with_dq: Column
+    with_ddq: Column
+    with_sign: Column
+
+    def published(self) -> Iterator[Published]:
+        """Its normalised square, by itself."""
+        yield Published(f"ekf.{self.log}.{self.joint}.nis_{self.signal.removeprefix('innovation_')}", "nis_own")
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation(Record):
+    """Why the innovations of the default filter are not white; its rows are what was left out or mended, and tested.
+
+    `finding` is white, left out, mended, or unexplained.
+    """
+
+    log: str
+    joint: str
+    finding: str
+    verdict: str
+    clock_std: float
+    without: Labels
+    explains: Counts
+    left: Counts
+    ljung_box_p_q: Column
+    ljung_box_p_dq: Column
+    periodogram_p_q: Column
+    periodogram_p_dq: Column
+    walk: Column
+
+    def published(self) -> Iterator[Published]:
+        """By how much the times of samples are off, where other joints can tell."""
+        if self.clock_std > 0.0:
+            yield from self.publish(f"ekf.{self.log}.{self.joint}", "clock_std")

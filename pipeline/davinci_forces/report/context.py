@@ -6,7 +6,7 @@ from typing import Any
 
 from davinci_forces.records import Fit, FreeSpace, Prediction, Record
 from davinci_forces.records.catalogue import Catalogue, Provenance
-from davinci_forces.records.predict import CHOSEN
+from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.records.quantities import QUANTITIES
 from davinci_forces.report.changes import Stated
 from davinci_forces.report.content import Number, literal

@@ -123,7 +123,7 @@ class Plan:
 
 
 # What makes, checks and stores every record; the others of its folder declare records, and count as `schemas`.
-RECORDS = tuple(f"davinci_forces.records.{name}" for name in ("diagnostic", "record", "store"))
+RECORDS = tuple(f"davinci_forces.records.{name}" for name in ("record", "store"))
 
 
 def code_of(asks: Declaration) -> dict[str, str]:

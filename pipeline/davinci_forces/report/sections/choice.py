@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Choice, Fit, Prediction
-from davinci_forces.records.predict import CHOSEN
+from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.records.record import slug
 from davinci_forces.report.content import (
     Block,

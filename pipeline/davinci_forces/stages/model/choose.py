@@ -17,16 +17,7 @@ from davinci_forces.identification.used import Identified
 from davinci_forces.maths.models.model import Model
 from davinci_forces.maths.signals.noise import smoothed
 from davinci_forces.maths.signals.velocity_map import over_velocity
-from davinci_forces.records import (
-    Average,
-    Choice,
-    Diagnostic,
-    Fit,
-    FrictionMap,
-    Motion,
-    Prediction,
-    diagnostic,
-)
+from davinci_forces.records import Average, Choice, Diagnostic, Fit, FrictionMap, Motion, Prediction, diagnostic
 from davinci_forces.robots.models import Reach
 from davinci_forces.robots.robot import Robot
 

@@ -40,7 +40,7 @@ from davinci_forces.records import (
     SwarmSearch,
     Trajectory,
     diagnostic,
-)  # fmt: skip
+)
 from davinci_forces.robots.models import independent
 from davinci_forces.robots.robot import Joint, Robot
 

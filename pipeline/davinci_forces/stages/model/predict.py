@@ -34,7 +34,7 @@ from davinci_forces.records import (
     Trajectory,
     diagnostic,
 )
-from davinci_forces.records.predict import CHOSEN
+from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.robots.models import independent
 from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.study import LogEntry

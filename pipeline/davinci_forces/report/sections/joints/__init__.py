@@ -6,7 +6,7 @@ import numpy as np
 
 from davinci_forces.estimators import title_of
 from davinci_forces.records import Fit, Identifiability, Residual
-from davinci_forces.records.predict import CHOSEN
+from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.records.record import slug
 from davinci_forces.report.content import (
     Block,

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Average, Fit, Prediction, Residual, SwarmSearch
-from davinci_forces.records.predict import CHOSEN
+from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.records.record import slug
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, Line, OnScreen, Panel, Prose, Table, literal
 from davinci_forces.report.content.marks import Colour

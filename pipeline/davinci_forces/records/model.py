@@ -1,9 +1,9 @@
-"""Records of what all identification logs say together: parameters, what they leave of the effort, paths and noise."""
+"""Records of the models of joints: their parameters, the choice among them, and friction over velocity."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from davinci_forces.records.record import Column, Labels, Names, Published, Record, slug
+from davinci_forces.records.record import Column, Counts, Labels, Names, Published, Record, slug
 
 
 @dataclass(frozen=True, eq=False)
@@ -166,3 +166,58 @@ class Residual(Record):
     dq: Column
     tau: Column
     tau_hat: Column
+
+
+@dataclass(frozen=True, eq=False)
+class Choice(Record):
+    """The model that describes a joint, or the arm, as cross-validation chose it from candidates."""
+
+    KEY = ("group",)
+    UNKNOWN = ("over_periods",)
+    ROWS = "candidate"
+
+    group: str
+    model: str
+    friction: str
+    estimator: str
+    chosen: str  # the candidate, by name
+    best: str  # the one of the least score
+    why: str
+    logs: Names
+    candidate: Labels
+    variant: Labels
+    parameters: Counts
+    physical: Counts
+    score: Column
+    score_std: Column
+    training: Column
+    over_periods: Column
+
+    def published(self) -> Iterator[Published]:
+        """The scores of every candidate."""
+        for i, candidate in enumerate(self.candidate):
+            prefix = f"choice.{self.group}.{slug(candidate)}"
+            yield Published(f"{prefix}.score", "score", std="score_std", row=i)
+            for name in ("training", "over_periods", "parameters"):
+                yield Published(f"{prefix}.{name}", name, row=i)
+
+
+@dataclass(frozen=True, eq=False)
+class FrictionMap(Record):
+    """What a fit's other terms leave of the effort of one joint in one log, and its friction, over velocity.
+
+    Each row is the mean over a range of velocity, of samples that gain speed or of those that lose it.
+    """
+
+    KEY = ("log", "joint", "model", "estimator")
+
+    log: str
+    joint: str
+    model: str
+    estimator: str
+    role: str
+    dq: Column
+    gaining: Counts
+    tau_friction: Column
+    tau_friction_std: Column
+    tau_friction_hat: Column

@@ -1,4 +1,4 @@
-"""Records of what is known of a robot before anything is recorded: geometry, control studies, excitation."""
+"""Records of a robot before its logs: its chain, its controllers, and what excites it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

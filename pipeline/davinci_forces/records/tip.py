@@ -1,9 +1,38 @@
-"""Records of the force at the tip."""
+"""Records of the force at the tip, and of a sensor beside it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 from davinci_forces.records.record import Column, Counts, Labels, Published, Record
+
+
+@dataclass(frozen=True, eq=False)
+class JointCorrelation(Record):
+    """How the external efforts of the joints that carry the tip go together in one log, where nothing touches it."""
+
+    KEY = ("log",)
+
+    log: str
+    tested: int
+    rho_12: float
+    rho_13: float
+    rho_23: float
+
+
+@dataclass(frozen=True, eq=False)
+class ArmCorrelation(Record):
+    """How the external efforts of the joints that carry the tip go together in free space, of at most 20 logs.
+
+    What is taken of a log is made of the rows of the others.
+    """
+
+    KEY = ("robot",)
+
+    robot: str
+    source: Labels
+    rho_12: Column
+    rho_13: Column
+    rho_23: Column
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,3 +162,45 @@ class TipBudget(Record):
                 yield Published(f"{prefix}.{key}", name, row=i)
             for key, name in (("model_part", "model_force"), ("total", "total_force")):
                 yield Published(f"{prefix}.{key}", name, std=f"{name}_std", row=i)
+
+
+@dataclass(frozen=True, eq=False)
+class SensorForce(Record):
+    """The force that was estimated in one log beside what a force sensor showed, and how far apart they are.
+
+    `axis` is x, y or z of the base, `vector` for all three together, `size` where the sensor shows only that, or the
+    joint that slides along the sensor's axis.  Of a vector the columns are the sizes of both forces.
+    """
+
+    KEY = ("log", "axis")
+    UNKNOWN = ("measured_force", "estimated_force", "estimated_force_std")
+
+    log: str
+    axis: str
+    role: str
+    tested: int
+    force_error: float
+    force_error_std: float
+    force_bias: float
+    force_bias_std: float
+    force_error_max: float
+    force_range: float
+    force_relative_error: float
+    force_relative_error_std: float
+    sensor_lag: float
+    sensor_lag_std: float
+    sensor_coverage: float
+    sensor_coverage_std: float
+    t: Column
+    measured_force: Column
+    estimated_force: Column
+    estimated_force_std: Column
+
+    def published(self) -> Iterator[Published]:
+        """Error, bias, range, lag and coverage."""
+        prefix = f"sensor.{self.log}.{self.axis}"
+        for key, name in (("rmse", "force_error"), ("bias", "force_bias"), ("relative_error", "force_relative_error"),
+                          ("lag", "sensor_lag"), ("coverage", "sensor_coverage")):  # fmt: skip
+            yield Published(f"{prefix}.{key}", name, std=f"{name}_std")
+        yield Published(f"{prefix}.largest", "force_error_max")
+        yield Published(f"{prefix}.range", "force_range")

@@ -1,9 +1,33 @@
-"""Records of hung masses."""
+"""Records of masses that hang on the arm."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 from davinci_forces.records.record import Column, Labels, Published, Record
+
+
+@dataclass(frozen=True, eq=False)
+class Load(Record):
+    """What a kilogram, hung as in a weight log, asks of one joint along a log's path, and the external effort there.
+
+    Where the log's motion repeats, rows are one period, averaged; both efforts are low-passed alike, without delay.
+    """
+
+    KEY = ("log", "joint", "weight")
+    UNKNOWN = ("tau_ext_unseen",)
+
+    log: str
+    joint: str
+    weight: str
+    role: str
+    rate: float
+    period: float
+    t: Column
+    q: Column
+    load: Column
+    load_mirrored: Column
+    tau_ext: Column
+    tau_ext_unseen: Column
 
 
 @dataclass(frozen=True, eq=False)

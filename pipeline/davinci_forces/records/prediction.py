@@ -1,4 +1,4 @@
-"""Records of the effort that a fit predicts: where it has not seen the log, and as a filter is to know the joint."""
+"""Records of what a fit says of a log: the effort that it predicts, and the joint as filters take it."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

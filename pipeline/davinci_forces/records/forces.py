@@ -1,0 +1,271 @@
+"""Records of the external effort on joints: what a filter assumes, what it tracks, and how far that may be off."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from davinci_forces.records.record import Column, Counts, Labels, Names, Published, Record
+
+
+@dataclass(frozen=True, eq=False)
+class Tuning(Record):
+    """The noise of one joint in one identification log, as the likelihood of a filter's innovations has it."""
+
+    log: str
+    joint: str
+    rate: float
+    r_q: float
+    r_dq: float
+    r_tau: float
+    q_tau: float
+    inertia: float
+    viscous: float
+    speed: float
+    likelihood_gain: float
+    tested: int
+
+
+@dataclass(frozen=True, eq=False)
+class FilterNoise(Record):
+    """The noise that the filter assumes of a joint: the median of its identification logs."""
+
+    KEY = ("joint",)
+
+    joint: str
+    logs: Names
+    rate: float
+    r_q: float
+    r_dq: float
+    r_tau: float
+    q_tau: float
+    inertia: float
+    viscous: float
+    speed: float
+
+    def published(self) -> Iterator[Published]:
+        """The noise, and the walk that shows a push at the rate of the identification logs."""
+        yield from self.publish(f"tuning.{self.joint}", "r_q", "r_dq", "r_tau", "q_tau")
+
+
+@dataclass(frozen=True, eq=False)
+class FreeMotion(Record):
+    """What a filter makes of one joint of a log in which nothing touches the robot, by a fit that has not seen it.
+
+    A row is a block of the log, a sixth of it, at one range of speeds.
+    """
+
+    log: str
+    joint: str
+    path: str
+    scheme: str
+    tested: int
+    free_mean: float
+    block: Counts
+    speed_bin: Counts
+    count: Counts
+    mean_square: Column
+    filter_square: Column
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorBand(Record):
+    """The errors of a joint's external effort in free motion that no fit had seen, of at most 20 logs, block by block.
+
+    A log's own band is made of the rows of the others.
+    """
+
+    KEY = ("joint",)
+
+    joint: str
+    speed: float
+    band_rms: float
+    band_rms_std: float
+    source: Labels
+    path_of: Labels
+    block: Counts
+    speed_bin: Counts
+    count: Counts
+    mean_square: Column
+    filter_square: Column
+    log_mean: Column
+
+    def published(self) -> Iterator[Published]:
+        """The error over all rows."""
+        yield Published(f"band.{self.joint}.band_rms", "band_rms", std="band_rms_std")
+
+
+@dataclass(frozen=True, eq=False)
+class Track(Record):
+    """The external effort on one joint during one log, as a filter tracked it, and how far it may be off.
+
+    Its standard deviation is the total: the filter's own, the model's error on free motion that no fit had seen, what
+    the filter lags behind, and the offset of the day, where `free` windows tell one.
+    """
+
+    log: str
+    joint: str
+    model: str
+    estimator: str
+    filter: str
+    role: str
+    path: str
+    at_rest: int
+    rate: float
+    tau_ext_rms: float
+    nis_mean: float
+    r_q: float
+    r_dq: float
+    q_dq: float
+    q_tau: float
+    day_offset: float
+    day_offset_std: float
+    filter_part: float
+    model_part: float
+    model_part_std: float
+    lag_part: float
+    smooth_rise: float
+    band_from: str
+    t: Column
+    q: Column
+    dq: Column
+    tau: Column
+    tau_hat: Column
+    tau_ext: Column
+    tau_ext_std: Column
+    tau_ext_std_filter: Column
+    tau_ext_smooth: Column
+    tau_ext_direct: Column
+    innovation_q: Column
+    innovation_dq: Column
+    nis: Column
+
+    def published(self) -> Iterator[Published]:
+        """What the filter found outside contacts, the noise that it assumes, and what its deviation is made of."""
+        prefix = f"{self.filter}.{self.log}.{self.joint}"
+        names = ("tau_ext_rms", "nis_mean", "r_q", "r_dq", "q_dq", "q_tau", "filter_part", "lag_part")
+        yield from self.publish(prefix, *names)
+        yield Published(f"{prefix}.model_part", "model_part", std="model_part_std")
+        yield Published(f"{prefix}.day_offset", "day_offset", std="day_offset_std")
+
+
+@dataclass(frozen=True, eq=False)
+class FreeSpace(Record):
+    """The external effort that one filter states on one joint of one log, where nothing touched the robot."""
+
+    log: str
+    joint: str
+    filter: str
+    role: str
+    tested: int
+    free_rms: float
+    free_rms_std: float
+    free_level: float
+    free_level_std: float
+    detection_level: float
+    detection_level_std: float
+    coverage: float
+    coverage_std: float
+    smooth_rms: float
+    smooth_max: float
+    crossings: float
+
+    def published(self) -> Iterator[Published]:
+        """The levels, and the coverage of the stated band."""
+        prefix = f"{self.filter}.{self.log}.{self.joint}"
+        for name in ("free_rms", "free_level", "detection_level", "coverage"):
+            yield Published(f"{prefix}.{name}", name, std=f"{name}_std")
+
+
+@dataclass(frozen=True, eq=False)
+class Threshold(Record):
+    """The detection level that contacts on a joint are judged by: that of its worst free space."""
+
+    KEY = ("joint", "filter")
+
+    joint: str
+    filter: str
+    detection_level: float
+    detection_level_std: float
+    alarm_level: float
+    alarm_level_std: float
+    level_from: str  # the log whose free space it is
+
+    def published(self) -> Iterator[Published]:
+        """Both levels."""
+        prefix = f"threshold.{self.joint}"
+        for name in ("detection_level", "alarm_level"):
+            yield Published(f"{prefix}.{name}", name, std=f"{name}_std")
+
+
+@dataclass(frozen=True, eq=False)
+class Contact(Record):
+    """The contacts of one log: what one joint exerted on its environment, against its detection level.
+
+    The windows that the study states come first, then what was found beside them.  A window in which nothing was found
+    begins and ends as it is stated.
+    """
+
+    log: str
+    joint: str
+    filter: str
+    detection_level: float
+    alarm_level: float
+    level_from: str  # the log whose free space sets the detection level
+    stated: Counts
+    found: Counts
+    onset: Column
+    onset_std: Column
+    release: Column
+    release_std: Column
+    duration: Column
+    duration_std: Column
+    peak: Column
+    peak_std: Column
+    mean: Column
+    mean_std: Column
+    impulse: Column
+    impulse_std: Column
+    above: Counts
+
+    def published(self) -> Iterator[Published]:
+        """Every contact, numbered from 1."""
+        for i in range(len(self)):
+            prefix = f"contact.{self.log}.{self.joint}.{i + 1}"
+            for name in ("peak", "mean", "impulse", "onset", "release", "duration"):
+                yield Published(f"{prefix}.{name}", name, std=f"{name}_std", row=i)
+            for name in ("above", "stated", "found"):
+                yield Published(f"{prefix}.{name}", name, row=i)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison(Record):
+    """One filter on one joint of a log: what it makes of free space, and of a push that was added in software.
+
+    Of the default filter the free space is said in FreeSpace.
+    """
+
+    KEY = ("log", "joint", "filter")
+
+    log: str
+    joint: str
+    filter: str
+    role: str
+    default: int
+    free_rms: float
+    free_rms_std: float
+    free_level: float
+    free_level_std: float
+    detection_level: float
+    detection_level_std: float
+    push_peak: float
+    push_share: float
+    push_delay: float
+    t: Column
+    tau_ext: Column
+
+    def published(self) -> Iterator[Published]:
+        """Its levels in free space, and how much of a push it shows, how late."""
+        prefix = f"{self.filter}.{self.log}.{self.joint}"
+        if not self.default:
+            for name in ("free_rms", "free_level", "detection_level"):
+                yield Published(f"{prefix}.{name}", name, std=f"{name}_std")
+        yield from self.publish(prefix, "push_share", "push_delay")

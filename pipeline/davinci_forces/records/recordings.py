@@ -1,0 +1,207 @@
+"""Records of what was measured: as it was read, on a uniform clock, and averaged over periods."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from davinci_forces.records.record import Column, Counts, Labels, Names, Published, Record
+
+
+@dataclass(frozen=True, eq=False)
+class LogSummary(Record):
+    """How one log was read: what the reader noticed, and what each of its channels is used for."""
+
+    KEY = ("log",)
+
+    log: str
+    role: str
+    format: str
+    files: Names
+    started: str
+    zone: str
+    rows: int
+    rate: float
+    duration: float
+    jitter: float
+    longest_gap: float
+    backward: int
+    repeated: int
+    duplicates: int
+    dropped: int
+    facts: Names
+    warnings: Names
+    channel: Labels
+    unit: Labels
+    feeds: Labels
+    nulls: Counts
+    nans: Counts
+
+    def published(self) -> Iterator[Published]:
+        """What the reader noticed of the clock and the rows."""
+        names = ("rows", "rate", "duration", "jitter", "longest_gap", "duplicates", "dropped")
+        yield from self.publish(f"log.{self.log}", *names)
+
+
+@dataclass(frozen=True, eq=False)
+class Touch(Record):
+    """What the channels of one log beyond its joints say of contact, as recorded; NaN without such a channel."""
+
+    KEY = ("log",)
+    UNKNOWN = ("t", "depth", "force", "force_x", "force_y", "force_z", "x", "y", "z")
+
+    log: str
+    role: str
+    sample: Counts
+    push: Counts
+    t: Column  # NaN of a log without a clock
+    depth: Column
+    force: Column
+    force_x: Column
+    force_y: Column
+    force_z: Column
+    x: Column
+    y: Column
+    z: Column
+
+
+@dataclass(frozen=True, eq=False)
+class Recording(Record):
+    """One joint during one log, as recorded: at the log's own clock, in joint units."""
+
+    log: str
+    joint: str
+    role: str
+    rate: float
+    velocity: str  # "logged", or "derived": dq is then zero here and filled in when the clock is made uniform
+    t: Column
+    q: Column
+    dq: Column
+    tau: Column
+
+
+@dataclass(frozen=True, eq=False)
+class Signal(Record):
+    """One joint during one log on a uniform clock, with its velocity; a gap starts a new segment."""
+
+    log: str
+    joint: str
+    role: str
+    rate: float
+    method: str
+    velocity: str
+    gaps: int
+    at_rest: int
+    t: Column
+    q: Column
+    dq: Column
+    tau: Column
+    segment: Counts
+
+
+@dataclass(frozen=True, eq=False)
+class Motion(Record):
+    """The motion of one joint during one log, low-passed without delay, beside what was measured of it.
+
+    The noise is what the low-pass takes out.  Where the joint stands still, friction takes any value up to its Coulomb
+    level: nothing is fitted to its effort there.
+    """
+
+    log: str
+    joint: str
+    role: str
+    rate: float
+    velocity: str
+    cutoff: float
+    effort_lag: float
+    at_rest: int
+    sigma_q: float
+    sigma_dq: float
+    sigma_tau: float
+    t: Column
+    q: Column
+    dq: Column
+    ddq: Column
+    q_measured: Column
+    dq_measured: Column
+    tau: Column
+    segment: Counts
+    standing: Counts
+
+
+@dataclass(frozen=True, eq=False)
+class Average(Record):
+    """One period of a joint, averaged over the periods of a recording, with the spread between them."""
+
+    log: str
+    joint: str
+    rate: float
+    period: float
+    period_std: float
+    stated_period: float
+    periods: int
+    t_start: float
+    sigma_q: float
+    sigma_dq: float
+    sigma_tau: float
+    sigma_tau_white: float
+    relative_noise: float
+    t: Column
+    q: Column
+    dq: Column
+    tau: Column
+    q_var: Column
+    dq_var: Column
+    tau_var: Column
+    count: Counts
+
+    def published(self) -> Iterator[Published]:
+        """The period, which the joints of a log share, and the noise between periods."""
+        yield Published(f"period.{self.log}", "period", std="period_std")
+        yield Published(f"period.{self.log}.periods", "periods")
+        yield from self.publish(f"noise.{self.log}.{self.joint}", "sigma_q", "sigma_dq", "sigma_tau", "relative_noise")
+
+
+@dataclass(frozen=True, eq=False)
+class PeriodResidual(Record):
+    """What averaging removed: each sample minus the mean of the periods at its phase."""
+
+    log: str
+    joint: str
+    t: Column
+    q_noise: Column
+    dq_noise: Column
+    tau_noise: Column
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory(Record):
+    """One averaged period with its velocity and acceleration, free of noise, and how large that was."""
+
+    log: str
+    joint: str
+    rate: float
+    period: float
+    periods: int
+    t_start: float
+    harmonics: int
+    sigma_q: float
+    sigma_dq: float
+    sigma_tau: float
+    sigma_tau_white: float
+    t: Column
+    q: Column
+    dq: Column
+    ddq: Column
+    tau: Column
+    tau_var: Column
+    count: Counts
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum(Record):
+    """Amplitude of each harmonic of an averaged period: the harmonics kept, and the rest taken as noise."""
+
+    log: str
+    joint: str
+    harmonics: int
+    frequency: Column
+    amplitude: Column

@@ -1,0 +1,255 @@
+"""Records of pushes into tissue, and of a hand that feels it."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from davinci_forces.records.record import Column, Counts, Labels, Published, Record, slug
+
+EACH = 20  # pushes of a log, up to which every one of them is in results.json
+
+
+@dataclass(frozen=True, eq=False)
+class Push(Record):
+    """One push into tissue: force against depth, the straight line through its contact, and where that begins."""
+
+    KEY = ("log", "push")
+    UNKNOWN = ("t", "x", "y", "z", "fitted")
+
+    log: str
+    push: int
+    contact: str  # "found", "stated", "all", or "contact from the first sample"
+    k_t: float
+    k_t_std: float
+    k_t_std_model: float
+    intercept: float
+    r2: float
+    onset_depth: float
+    onset_depth_std: float
+    release_depth: float
+    t: Column
+    depth: Column
+    force: Column
+    fitted: Column  # by the model that was chosen; NaN where nothing is touched
+    x: Column
+    y: Column
+    z: Column
+    inside: Counts
+    loading: Counts
+
+
+@dataclass(frozen=True, eq=False)
+class Stiffness(Record):
+    """How stiff the tissue of one log is: the pushes, one a row, and their median."""
+
+    KEY = ("log",)
+    ROWS = "push"
+    UNKNOWN = (
+        "k_t_std", "onset_depth", "onset_depth_std", "onset", "k_t_loading", "k_t_unloading", "lost", "lost_share",
+        "x", "y", "z",
+    )  # fmt: skip
+
+    log: str
+    source: str  # what the force was measured by
+    swings: int  # pushes that were looked at
+    stiffness: float
+    stiffness_std: float
+    stiffness_std_model: float
+    stiffness_q1: float
+    stiffness_q3: float
+    pushes: int
+    push: Counts
+    counted: Counts
+    k_t: Column
+    k_t_std: Column
+    r2: Column
+    onset_depth: Column
+    onset_depth_std: Column
+    onset: Column
+    k_t_loading: Column
+    k_t_unloading: Column
+    lost: Column
+    lost_share: Column
+    x: Column
+    y: Column
+    z: Column
+
+    def published(self) -> Iterator[Published]:
+        """The median over the pushes that count, its quartiles, how many they are; and each push where they are few."""
+        prefix = f"tissue.{self.log}"
+        yield Published(f"{prefix}.stiffness", "stiffness", std="stiffness_std")
+        yield from self.publish(prefix, "stiffness_q1", "stiffness_q3", "pushes")
+        for i in range(len(self) if len(self) <= EACH else 0):
+            own = f"{prefix}.{self.push[i]}"
+            yield Published(f"{own}.k_t", "k_t", std="k_t_std", row=i)
+            yield Published(f"{own}.onset_depth", "onset_depth", std="onset_depth_std", row=i)
+            for name in ("r2", "k_t_loading", "k_t_unloading", "lost", "lost_share", "onset"):
+                yield Published(f"{own}.{name}", name, row=i)
+
+
+@dataclass(frozen=True, eq=False)
+class TissueModel(Record):
+    """Which model of tissue predicts the pushes of one log best that it has not seen."""
+
+    KEY = ("log",)
+    ROWS = "law"
+
+    log: str
+    chosen: str
+    why: str
+    middle: float
+    law: Labels
+    error: Column
+    error_std: Column
+    tangent: Column
+    damping: Column
+    exponent: Column
+
+    def published(self) -> Iterator[Published]:
+        """What each model comes to."""
+        for i, name in enumerate(self.law):
+            prefix = f"tissue.{self.log}.{slug(str(name))}"
+            yield Published(f"{prefix}.error", "error", std="error_std", row=i)
+            for field in ("tangent", "damping", "exponent"):
+                yield Published(f"{prefix}.{field}", field, row=i)
+
+
+@dataclass(frozen=True, eq=False)
+class StabilityMap(Record):
+    """Where a common quadratic Lyapunov function was found, over stiffnesses of hand and tissue.  Fig 8.9"""
+
+    KEY = ("robot",)
+
+    robot: str
+    hand_mass: float
+    hand_damping: float
+    k_h: Column
+    tissue_stiffness: Column
+    has_cqlf: Counts
+
+
+@dataclass(frozen=True, eq=False)
+class StabilityLimit(Record):
+    """The stiffest tissue over the stiffness of the hand, without delay."""
+
+    KEY = ("robot",)
+
+    robot: str
+    hand_mass: float
+    hand_damping: float
+    k_h: Column
+    k_t_cqlf: Column
+    k_t_switching: Column
+
+
+@dataclass(frozen=True, eq=False)
+class DelayLimit(Record):
+    """The stiffest tissue of one hand over how late the force comes."""
+
+    KEY = ("robot",)
+    UNKNOWN = ("k_t_leaving",)
+
+    robot: str
+    hand_mass: float
+    hand_damping: float
+    hand_stiffness: float
+    link_rate: float
+    k_t_cqlf: float
+    k_t_switching: float
+    delay: Column
+    k_t_delay: Column
+    k_t_held: Column
+    k_t_leaving: Column
+
+    def published(self) -> Iterator[Published]:
+        """The hand, and its limits without delay."""
+        names = ("hand_mass", "hand_damping", "hand_stiffness", "link_rate", "k_t_cqlf", "k_t_switching")
+        yield from self.publish("stability", *names)
+
+
+@dataclass(frozen=True, eq=False)
+class TissueLimit(Record):
+    """The tissue of one log beside the limits of that hand."""
+
+    KEY = ("log",)
+
+    log: str
+    stiffness: float
+    k_h_needed: float
+    lag_of: str
+    force_lag: float
+    k_t_lag: float
+    damping_needed: float
+
+    def published(self) -> Iterator[Published]:
+        """What the tissue asks of the hand, by the Lyapunov function and by the filter's lag."""
+        yield from self.publish(f"stability.{self.log}", "k_h_needed", "force_lag", "k_t_lag", "damping_needed")
+
+
+@dataclass(frozen=True, eq=False)
+class HapticMotion(Record):
+    """How a hand moves against tissue beyond the limits of arbitrary switching, by a law.  Fig 8.8, 8.10"""
+
+    KEY = ("robot", "switching")
+
+    robot: str
+    switching: str
+    tissue_stiffness: float
+    t: Column
+    hand_x: Column
+    hand_dx: Column
+    V: Column
+
+
+@dataclass(frozen=True, eq=False)
+class HapticResponse(Record):
+    """What lies between a hand in the tissue and the force that it feels, over the frequency of its motion."""
+
+    KEY = ("robot",)
+
+    robot: str
+    arm_from: str
+    tissue_stiffness: float
+    at_frequency: float
+    rendered_stiffness: float
+    transparency: float
+    felt_delay: float
+    frequency: Column
+    felt_share: Column
+    felt_late: Column
+
+    def published(self) -> Iterator[Published]:
+        """The tissue as it is and as it is felt."""
+        names = ("tissue_stiffness", "at_frequency", "rendered_stiffness", "transparency", "felt_delay")
+        yield from self.publish("haptics", *names)
+
+
+@dataclass(frozen=True, eq=False)
+class HapticRun(Record):
+    """One hand going in and out of the tissue, what it feels, and how far it is from unstable.  Fig 8.12"""
+
+    KEY = ("hand",)
+
+    hand: str
+    hand_mass: float
+    hand_damping: float
+    hand_stiffness: float
+    out_of_reach: int
+    true_peak: float
+    felt_peak: float
+    felt_error: float
+    k_t_settles: float
+    k_t_response: float
+    stiffness_margin: float
+    delay_margin: float
+    t: Column
+    plan_x: Column
+    hand_x: Column
+    arm_x: Column
+    true_force: Column
+    felt_force: Column
+
+    def published(self) -> Iterator[Published]:
+        """The hand, the forces, and the margins."""
+        names = ("hand_mass", "hand_damping", "hand_stiffness", "out_of_reach", "true_peak", "felt_peak", "felt_error")
+        margins = ("k_t_settles", "k_t_response", "stiffness_margin", "delay_margin")
+        yield from self.publish(f"haptics.{self.hand}", *names, *margins)
