@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from browser import CHROMIUM, Browser
+from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 from davinci_forces.cli import app
@@ -214,6 +215,19 @@ def test_what_is_constant_alarms_no_more_often_than_stated():
         p = [trend(np.arange(10.0), x, np.ones(10)).p, scatter(x, np.ones(10)), *stands_out(x, np.ones(10)).tolist()]
         alarms += bool(holm(p, 0.05).any())
     assert alarms <= 15 + 4 * np.sqrt(15)
+
+
+def test_a_trend_through_values_that_scatter_is_that_of_statsmodels():
+    from statsmodels.api import WLS, add_constant
+
+    random = np.random.default_rng(4)
+    t, std = np.arange(12.0), random.uniform(0.5, 2.0, 12)
+    x = 0.2 * t + 3.0 * std * random.normal(size=12)
+    fit = WLS(x, add_constant(t), weights=std**-2).fit()
+    assert fit.scale > 1.0
+    assert_allclose(trend(t, x, std), (fit.params[1], fit.bse[1], fit.pvalues[1]), rtol=1e-9)
+    quiet = trend(t, 0.2 * t, std)  # whose errors WLS would take to be nothing
+    assert quiet.std == pytest.approx(fit.bse[1] / np.sqrt(fit.scale), rel=1e-9)
 
 
 def test_holm_stops_at_the_first_test_that_does_not_tell():

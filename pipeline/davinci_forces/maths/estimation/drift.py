@@ -25,7 +25,10 @@ class Trend(NamedTuple):
 
 
 def trend(t: Array, x: Array, std: Array) -> Trend | None:
-    """The weighted line through values (n,) at times (n,); None where there are fewer than three times."""
+    """The weighted line through values (n,) at times (n,); None where there are fewer than three times.
+
+    That of statsmodels' WLS, which would take errors as smaller than stated where values scatter less.
+    """
     if len(np.unique(t)) < FEWEST:
         return None
     w, late = std**-2, t - np.average(t, weights=std**-2)
