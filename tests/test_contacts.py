@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from davinci_forces.maths.contact.detection import FALSE_ALARMS, Quiet, alarm_level, events, mean_size, quiet, summarise
-from davinci_forces.maths.signals.noise import noise_std, smoothed
-from davinci_forces.maths.signals.path import likeness, most_different
-from davinci_forces.maths.signals.smoothing import lowpass, share_passed
+from davinci_forces.maths.periods.shift import likeness, most_different
+from davinci_forces.maths.signals.smoothing import lowpass, noise_std, share_passed, smoothed
 from davinci_forces.maths.signals.windows import free_space
 from davinci_forces.maths.uncertainty import bootstrap
 from davinci_forces.maths.uncertainty.bootstrap import (

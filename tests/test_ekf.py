@@ -8,11 +8,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.errors import PipelineError
-from davinci_forces.filters import belief, ekf, rts, tracker
-from davinci_forces.filters.assumed import assumed
-from davinci_forces.filters.lag import lag
+from davinci_forces.filters import ekf, rts, stepping, tracker
 from davinci_forces.filters.problem import NoiseModel
-from davinci_forces.filters.response import at_rest, slowest
+from davinci_forces.filters.response import assumed, at_rest, lag, slowest
 from davinci_forces.filters.stepping import covariances
 from davinci_forces.filters.tuning import likeliest_walk, tuned
 from davinci_forces.maths.models.bias import bias
@@ -111,7 +109,7 @@ def test_the_steady_state_is_the_riccati_solution():
 def test_one_sample_at_a_time_is_the_whole_recording_at_once():
     recording, _ = matched("hand_roll", N=500)
     made = ekf.track(recording, NOISE)
-    s = belief.first(recording.q[0], recording.dq[0], NOISE.r_q, NOISE.r_dq, recording.first_std)
+    s = stepping.first(recording.q[0], recording.dq[0], NOISE.r_q, NOISE.r_dq, recording.first_std)
     joint = recording.joint
     for k, y in enumerate(zip(recording.q, recording.dq, strict=True)):
         drive = recording.tau[k] - joint.known[k]

@@ -12,7 +12,7 @@ from numpy.testing import assert_allclose
 from davinci_forces.estimators import ESTIMATORS, estimator
 from davinci_forces.estimators.problem import Regression
 from davinci_forces.estimators.wlse import pooled
-from davinci_forces.identification.folds import folds
+from davinci_forces.identification.scores import folds
 from davinci_forces.records import (
     Average,
     CrossFit,

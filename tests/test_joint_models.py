@@ -9,8 +9,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 from davinci_forces.filters.problem import driven
 from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.independent import regressor
-from davinci_forces.maths.signals.noise import noise_std
-from davinci_forces.maths.signals.smoothing import lowpass, measured_motion
+from davinci_forces.maths.signals.smoothing import lowpass, measured_motion, noise_std
 from davinci_forces.records import Diagnostic, Fit, JointModel, Motion, Prediction, Recording, Signal
 from davinci_forces.stages.model import fit, predict
 from davinci_forces.stages.recordings import resample

@@ -7,11 +7,9 @@ import pytest
 from typer.testing import CliRunner
 
 from davinci_forces.cli import app
-from davinci_forces.runner.fingerprints.canonical import hash_of_text
-from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
+from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, hash_of_text
 from davinci_forces.runner.ledger import Entry, Folders, Ledger
-from davinci_forces.runner.plan import Task
-from davinci_forces.runner.reuse import reused
+from davinci_forces.runner.plan import Task, reused
 from davinci_forces.stages import design
 
 SAME = Fingerprint({}, {"robot": "a"}, {"shape": [1, 2]}, {}, {"design.py": "b"}, "1")

@@ -17,9 +17,8 @@ from davinci_forces.errors import BadRequest
 from davinci_forces.records import Diagnostic, PeriodResidual, Recording, store
 from davinci_forces.robots import davinci
 from davinci_forces.runner import execution
-from davinci_forces.runner.fingerprints.canonical import canonical, hash_of
 from davinci_forces.runner.fingerprints.code import PACKAGE, code, imported
-from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
+from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, canonical, hash_of
 from davinci_forces.runner.ledger import Folders
 from davinci_forces.runner.lock import locked
 from davinci_forces.runner.plan import Task

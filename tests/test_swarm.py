@@ -8,7 +8,7 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from davinci_forces.estimators import pso
 from davinci_forces.estimators.problem import Known, Regression
-from davinci_forces.identification.known import known_of
+from davinci_forces.identification.regression import known_of
 from davinci_forces.maths.estimation.least_squares import bounded, triangle
 from davinci_forces.maths.estimation.swarm import CONSTRICTED, THESIS, search
 from davinci_forces.maths.models.independent import regressor

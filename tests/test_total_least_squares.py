@@ -10,8 +10,8 @@ from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators import estimator
 from davinci_forces.estimators.problem import Regression
 from davinci_forces.estimators.tls import Noise, smallest
-from davinci_forces.identification.folds import part
 from davinci_forces.identification.regression import averaged_motion, joined, pose, row_covariance
+from davinci_forces.identification.scores import part
 from davinci_forces.maths.estimation.least_squares import triangle
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.model import ArmMotion

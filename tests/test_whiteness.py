@@ -8,9 +8,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from davinci_forces.filters import ekf
 from davinci_forces.filters.innovations import coloured
-from davinci_forces.filters.innovations.innovations import innovations
-from davinci_forces.filters.innovations.search import search
-from davinci_forces.filters.innovations.timing import delays, mended
+from davinci_forces.filters.innovations.innovations import delays, innovations, mended
+from davinci_forces.filters.innovations.search import finding, search, verdict
 from davinci_forces.filters.innovations.trials import (
     CLOCK,
     COLOUR,
@@ -22,7 +21,6 @@ from davinci_forces.filters.innovations.trials import (
     Passes,
     Subject,
 )
-from davinci_forces.filters.innovations.verdict import finding, verdict
 from davinci_forces.filters.problem import NoiseModel
 from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.models.independent import combined, inertia_of

@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.filters import belief, stepping
-from davinci_forces.filters.belief import Belief, corrected, spread
+from davinci_forces.filters import stepping
 from davinci_forces.filters.problem import NoiseModel, Tracked
-from davinci_forces.filters.stepping import arguments, covariances, transition
+from davinci_forces.filters.stepping import Belief, arguments, corrected, covariances, spread, transition
 from davinci_forces.maths.compiled import cached
 from davinci_forces.maths.models import bias as derivation
 from davinci_forces.maths.models.bias import Coefficients
@@ -53,7 +52,7 @@ def step(
     return now, after
 
 
-@cached(derivation, belief, stepping)
+@cached(derivation, stepping)
 def _step(
     s: Any, y_q: float, y_dq: float, drive: float, M: float, c_b: Any, T_s: float, R_q: float, R_dq: float,
     Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float,
@@ -63,7 +62,7 @@ def _step(
     return now, spread(now, q, dq, F, Q_qq, Q_qd, Q_dd + unsure, Q_tau)
 
 
-@cached(derivation, belief, stepping)
+@cached(derivation, stepping)
 def _pass(
     s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float, Q_qq: float,
     Q_qd: float, Q_dd: float, Q_tau: float, out_q: Any, out_dq: Any, out_tau: Any, out_std: Any, out_iq: Any,
@@ -78,7 +77,7 @@ def _pass(
         s = spread(s, q, dq, F, Q_qq, Q_qd, Q_dd + unsure, Q_tau)
 
 
-@cached(derivation, belief, stepping)
+@cached(derivation, stepping)
 def _likelihood(
     settle: int, s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float,
     Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float,

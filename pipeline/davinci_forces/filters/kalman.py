@@ -12,10 +12,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from davinci_forces.filters import stepping
-from davinci_forces.filters.belief import FIRST
 from davinci_forces.filters.ekf import LOG_2_PI
 from davinci_forces.filters.problem import NoiseModel
-from davinci_forces.filters.stepping import columns, covariances, transition
+from davinci_forces.filters.stepping import FIRST, columns, covariances, transition
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import cached
 from davinci_forces.maths.models import bias as derivation

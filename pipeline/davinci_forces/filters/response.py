@@ -3,15 +3,19 @@
 The push is a half-sine of 1 s.  A filter shows it where it returns 90 % of its peak, at most 0.1 s late.
 """
 
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
+from davinci_forces.filters import DEFAULT, ekf, rts, tracker
 from davinci_forces.filters.problem import Filter, NoiseModel
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.models.bias import VISCOUS
 from davinci_forces.maths.models.driven import Driven, standing
+from davinci_forces.records import FilterNoise
+from davinci_forces.robots.robot import Joint
 
 DURATION = 1.0  # [s] of the push
 SHARE, DELAY = 0.9, 0.1  # of its peak that is returned, and how late at most [s]
@@ -70,3 +74,31 @@ def slowest(track: Filter, inertia: float, viscous: float, T_s: float, noise: No
         share, delay = at_rest(track, inertia, viscous, T_s, noise._replace(q_tau=middle))
         low, high = (low, middle) if share >= SHARE and delay <= DELAY else (middle, high)
     return high
+
+
+def assumed(settled: FilterNoise, joint: Joint, T_s: float, q_tau: float, name: str = DEFAULT) -> NoiseModel:
+    """The noise of a sample of T_s [s] for the filter of that name.
+
+    The effort's noise drives the model, as an acceleration that is constant over a sample.  `q_tau` is the walk of the
+    external effort [effort/s^0.5] that the settings name; where that is 0 the joint's own counts, and where that is
+    0, too, the slowest with which this filter shows a push.
+    """
+    q_tau = q_tau or joint.q_tau
+    noise = NoiseModel(settled.r_q, settled.r_dq, 0.0, settled.r_tau * T_s / settled.inertia, q_tau * T_s**0.5)
+    return noise if q_tau else noise._replace(
+        q_tau=slowest(tracker(name), settled.inertia, settled.viscous, T_s, noise)
+    )  # fmt: skip
+
+
+def lag(recordings: Sequence[Driven], noise: NoiseModel) -> tuple[Array, Array]:
+    """The smoothed external effort (N,) of all recordings, and that less what the filter makes of it.
+
+    The filter sees it as the effort of a joint at rest, where it is linear: position and velocity stay 0.
+    """
+    smooth = [rts.track(recording, noise).tau_ext for recording in recordings]
+    pushes = (
+        standing(part.joint.inertia, part.joint.coefficients[VISCOUS], tau_ext, part.T_s, part.first_std)
+        for part, tau_ext in zip(recordings, smooth, strict=True)
+    )
+    followed = np.concatenate([ekf.track(push, noise).tau_ext for push in pushes])
+    return np.concatenate(smooth), np.concatenate(smooth) - followed

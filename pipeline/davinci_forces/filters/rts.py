@@ -11,10 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.filters import belief, stepping
-from davinci_forces.filters.belief import corrected, gains, spread
+from davinci_forces.filters import stepping
 from davinci_forces.filters.problem import NoiseModel, Tracked
-from davinci_forces.filters.stepping import arguments, transition
+from davinci_forces.filters.stepping import arguments, corrected, gains, spread, transition
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import cached
 from davinci_forces.maths.models import bias as derivation
@@ -40,7 +39,7 @@ def forwards(recording: Driven, noise: NoiseModel) -> tuple[Array, Array]:
     return out, stored
 
 
-@cached(derivation, belief, stepping)
+@cached(derivation, stepping)
 def _forwards(
     stored: Any, s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float,
     Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float, out_iq: Any, out_idq: Any, out_nis: Any,
@@ -56,7 +55,7 @@ def _forwards(
         s = spread(s, q, dq, F, Q_qq, Q_qd, Q_dd + unsure, Q_tau)
 
 
-@cached(belief)
+@cached(stepping)
 def _backwards(
     stored: Array, R_q: float, R_dq: float, out_q: Any, out_dq: Any, out_tau: Any, out_std: Any, i_q: Any, i_dq: Any
 ) -> None:

@@ -5,6 +5,12 @@
 
 Where the velocity passes through 0, nobody knows the sign of Coulomb friction: it is c_f erf(dq / sqrt(2 P_dq)) on
 average, and c_f^2 (1 - erf^2) about that, which counts as noise of the drive.
+
+What a filter believes of one joint, corrected by a measurement and carried to the next sample.
+
+    x = [q, dq, tau_ext],    y = [q, dq] + v,    v ~ N(0, diag(r_q^2, r_dq^2))                      (7.6), (7.11)-(7.16)
+
+A belief is x and the upper half of P, as nine numbers.
 """
 
 import math
@@ -12,7 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.filters import belief
 from davinci_forces.filters.problem import NoiseModel
 from davinci_forces.maths.compiled import compiled
 from davinci_forces.maths.models.bias import COULOMB
@@ -20,11 +25,14 @@ from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.models.kernels import bias
 
 TINY = 1e-300
+# The first position and velocity are as measured, and count for nothing beside what is measured: 10^6 times the
+# variance.  More than that would leave the smoother without digits.
+FIRST = 1e6
 
 
 def arguments(recording: Driven, noise: NoiseModel) -> tuple[Any, ...]:
     """A recording and its noise as the compiled passes take them."""
-    before = belief.first(float(recording.q[0]), float(recording.dq[0]), noise.r_q, noise.r_dq, recording.first_std)
+    before = first(float(recording.q[0]), float(recording.dq[0]), noise.r_q, noise.r_dq, recording.first_std)
     return (before, *columns(recording), *covariances(noise, recording.T_s))
 
 
@@ -57,3 +65,76 @@ def transition(
     ddq, of_dq = (drive - b - tau_ext) / M, T_s + h * a_dq
     F = (1.0 + h * a_q, of_dq, h * a_tau, of_dq * a_q, 1.0 + of_dq * a_dq + h * a_q, of_dq * a_tau)
     return q + T_s * dq + h * ddq, dq + T_s * ddq + h * (a_q * dq + a_dq * ddq), F, unsure
+
+
+Belief = tuple[float, float, float, float, float, float, float, float, float]
+Transition = tuple[float, float, float, float, float, float]  # F = [f11 f12 f13; f21 f22 f23; 0 0 1], row by row
+
+
+def first(q: float, dq: float, r_q: float, r_dq: float, first_std: float) -> Belief:
+    """Before the first sample, at its position and velocity; not the printed x = 0 and P = Q_0.  (7.6)"""
+    return q, dq, 0.0, FIRST * r_q * r_q, 0.0, 0.0, FIRST * r_dq * r_dq, 0.0, first_std * first_std
+
+
+@compiled
+def gains(s: Any, R_q: float, R_dq: float) -> Any:
+    """S^-1 (3 numbers) and K = P H' S^-1 (6, row by row), and det S."""
+    _, _, _, a, b, c, d, e, _ = s
+    s_qq, s_dd = a + R_q, d + R_dq
+    det = s_qq * s_dd - b * b
+    v_qq, v_qd, v_dd = s_dd / det, -b / det, s_qq / det
+    return (
+        v_qq, v_qd, v_dd,
+        a * v_qq + b * v_qd, a * v_qd + b * v_dd,
+        b * v_qq + d * v_qd, b * v_qd + d * v_dd,
+        c * v_qq + e * v_qd, c * v_qd + e * v_dd,
+        det,
+    )  # fmt: skip
+
+
+@compiled
+def corrected(s: Any, y_q: float, y_dq: float, R_q: float, R_dq: float) -> Any:
+    """The belief after a measurement, the innovations, their normalised square and det S.  (7.6)
+
+    Joseph form, P = (I - K H) P (I - K H)' + K R K', symmetric and positive for any gain.
+    """
+    x_q, x_dq, x_tau, a, b, c, d, e, f = s
+    v_qq, v_qd, v_dd, k11, k12, k21, k22, k31, k32, det = gains(s, R_q, R_dq)
+    i_q, i_dq = y_q - x_q, y_dq - x_dq
+    nis = i_q * (v_qq * i_q + v_qd * i_dq) + i_dq * (v_qd * i_q + v_dd * i_dq)
+    m11, m12, m21, m22 = 1.0 - k11, -k12, -k21, 1.0 - k22
+    p11, p12, p13 = m11 * a + m12 * b, m11 * b + m12 * d, m11 * c + m12 * e
+    p21, p22, p23 = m21 * a + m22 * b, m21 * b + m22 * d, m21 * c + m22 * e
+    p31, p32, p33 = c - k31 * a - k32 * b, e - k31 * b - k32 * d, f - k31 * c - k32 * e
+    after = (
+        x_q + k11 * i_q + k12 * i_dq,
+        x_dq + k21 * i_q + k22 * i_dq,
+        x_tau + k31 * i_q + k32 * i_dq,
+        p11 * m11 + p12 * m12 + k11 * R_q * k11 + k12 * R_dq * k12,
+        p11 * m21 + p12 * m22 + k11 * R_q * k21 + k12 * R_dq * k22,
+        p13 - p11 * k31 - p12 * k32 + k11 * R_q * k31 + k12 * R_dq * k32,
+        p21 * m21 + p22 * m22 + k21 * R_q * k21 + k22 * R_dq * k22,
+        p23 - p21 * k31 - p22 * k32 + k21 * R_q * k31 + k22 * R_dq * k32,
+        p33 - p31 * k31 - p32 * k32 + k31 * R_q * k31 + k32 * R_dq * k32,
+    )
+    return after, i_q, i_dq, nis, det
+
+
+@compiled
+def spread(s: Any, q: float, dq: float, F: Any, Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float) -> Any:
+    """The belief at the next sample: q and dq are there, P is F P F' + Q.  (7.7)"""
+    _, _, tau_ext, a, b, c, d, e, f = s
+    f11, f12, f13, f21, f22, f23 = F
+    n11, n12, n13 = f11 * a + f12 * b + f13 * c, f11 * b + f12 * d + f13 * e, f11 * c + f12 * e + f13 * f
+    n21, n22, n23 = f21 * a + f22 * b + f23 * c, f21 * b + f22 * d + f23 * e, f21 * c + f22 * e + f23 * f
+    return (
+        q,
+        dq,
+        tau_ext,
+        n11 * f11 + n12 * f12 + n13 * f13 + Q_qq,
+        n21 * f11 + n22 * f12 + n23 * f13 + Q_qd,
+        n13,
+        n21 * f21 + n22 * f22 + n23 * f23 + Q_dd,
+        n23,
+        f + Q_tau,
+    )

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.filters import belief, ekf
+from davinci_forces.filters import ekf, stepping
 from davinci_forces.filters.problem import NoiseModel
 from davinci_forces.filters.response import slowest
 from davinci_forces.haptics.maths.bimodal import THESIS_TISSUE, Hand
@@ -194,12 +194,12 @@ def streaming(scenario: HapticScenario) -> Callable[[SensorReading], float]:
     """The extended Kalman filter, which makes a force of one reading after the other.  (7.6), (7.7)"""
     known, T_s = scenario.known or SLIDE, 1.0 / scenario.rate
     noise, c_b = assumed(scenario), coefficients(known)
-    predicted: belief.Belief | None = None
+    predicted: stepping.Belief | None = None
 
     def make(reading: SensorReading) -> float:
         nonlocal predicted
         if predicted is None:
-            predicted = belief.first(reading.q, reading.dq, noise.r_q, noise.r_dq, _parts(scenario)[1].tau)
+            predicted = stepping.first(reading.q, reading.dq, noise.r_q, noise.r_dq, _parts(scenario)[1].tau)
         now, predicted = ekf.step(predicted, (reading.q, reading.dq), reading.tau, known.inertia, c_b, T_s, noise)
         return now[2]
 

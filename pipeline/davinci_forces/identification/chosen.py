@@ -8,11 +8,15 @@ import numpy as np
 
 from davinci_forces.identification.candidates import Candidate, Library
 from davinci_forces.maths.arrays import Array, Booleans
+from davinci_forces.maths.estimation.conic import nearest
+from davinci_forces.maths.estimation.least_squares import Triangle
 from davinci_forces.maths.models.model import Model
 from davinci_forces.maths.selection.cross_validation import BLOCKS, MOST, Judged, left_out, preferred, standard_error
-from davinci_forces.maths.selection.ridge import covariance, scaled_equations
+from davinci_forces.maths.selection.ridge import Equations, Ridge, covariance, scaled_equations
 from davinci_forces.robots.models import Reach
 from davinci_forces.robots.robot import Robot
+
+NOTHING = 1e-8  # of the effort's square, below which it costs nothing that the solver would tell
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,3 +149,42 @@ def parameters(
                 condition=float(np.sqrt(np.linalg.cond(scaled_equations(together, ridge)[0]))),
             ),
         )
+
+
+class Held(NamedTuple):
+    """Parameters that a mechanism can have, and what each effort's model errs by with them and without."""
+
+    estimate: BlockEstimate
+    rmse: Array  # (m,)
+    rmse_free: Array  # (m,)
+    excess: float  # of the criterion over its least, as a share of the effort's square
+
+
+def held(model: Model, library: Library, equations: Equations, ridge: Ridge, free: BlockEstimate) -> Held:
+    """The parameters nearest to a candidate's that a mechanism can have, from the equations (of one cell) of all logs.
+
+    The standard errors stay the candidate's, as those of the estimator `consistent` stay least squares'.
+
+    Raises
+    ------
+    NotIdentifiable
+        If the conic program is not solved.
+    """
+    made = nearest(factor(equations, ridge), model.mechanism)
+    errors, squares = equations.errors(made.theta)[0], float(equations.squares.sum())
+    estimate = free._replace(
+        theta=made.theta, mse=float((errors / library.samples).sum()), r2=float(1.0 - errors.sum() / squares)
+    )
+    rmse, rmse_free = (np.sqrt(x / library.samples) for x in (errors, equations.errors(free.theta)[0]))
+    return Held(estimate, rmse, rmse_free, made.excess)
+
+
+def factor(equations: Equations, ridge: Ridge) -> Triangle:
+    """A triangle that asks for the same parameters as a ridge: |U D theta - y|^2 but for a constant.
+
+    U' U = D^-1 (G + lambda P) D^-1, and U' y = D^-1 r
+    """
+    scaled, size = scaled_equations(equations, ridge)
+    U = np.asarray(np.linalg.cholesky(scaled).T, np.float64)
+    y = np.linalg.solve(U.T, ridge.weights @ equations.right[0] / size)
+    return Triangle(U, y, max(float(ridge.weights @ equations.squares[0] - y @ y), 0.0), size)

@@ -8,7 +8,7 @@ import numpy as np
 
 from davinci_forces.identification.regression import joined_motion, recorded_motion
 from davinci_forces.identification.used import Identified
-from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.memory import efforts
 from davinci_forces.maths.models.model import ArmMotion, JointDynamics
 from davinci_forces.records import Fit, JointModel, Motion, Prediction
@@ -17,6 +17,7 @@ from davinci_forces.robots.models import ARM
 
 # What a record calls the coefficients of the bias, in their order in `maths.models.bias`.
 BIAS = ("constant", "gravity_sine", "gravity_cosine", "spring", "viscous", "coulomb", "presliding")
+LEAST = 1e-3  # of the largest singular value: what a log tells less well stays as it was
 
 
 class Along:
@@ -91,3 +92,18 @@ def at_samples(prediction: Prediction, motion: Motion) -> Array:
     half = 0.5 / motion.rate
     at = np.minimum(np.searchsorted(prediction.t, motion.t - half), len(prediction) - 1)
     return np.where(np.abs(prediction.t[at] - motion.t) < half, prediction.tau_hat[at], np.nan)
+
+
+def refitted(joint: JointModel, fit: Fit, along: Along, free: Booleans) -> Array:
+    """tau_hat (N,) of a fit corrected by least squares of what it leaves of a joint's log, over the free samples (N,).
+
+    Phi (theta + D d),    d = arg min |tau - tau_hat - Phi D d|,    D scales each column of Phi to length 1
+    """
+    model = along.identified.model(fit)
+    regressor = model.regressor(along.motion(fit))
+    told = free & regressor.known
+    Phi = regressor.Phi[:, model.efforts.index(joint.joint)]
+    length = np.linalg.norm(Phi[told], axis=0)
+    scale = np.divide(1.0, length, out=np.zeros_like(length), where=length > 0)
+    d, *_ = np.linalg.lstsq(Phi[told] * scale, (joint.tau - joint.tau_hat)[told], rcond=LEAST)
+    return np.asarray(joint.tau_hat + Phi @ (scale * d))

@@ -12,8 +12,7 @@ from davinci_forces.maths.models.memory import pieces
 from davinci_forces.maths.models.model import ArmMotion, Model
 from davinci_forces.maths.selection.cross_validation import BLOCKS, MOST, path_blocks, repetitions
 from davinci_forces.maths.selection.ridge import Equations, gathered, side_by_side
-from davinci_forces.maths.signals.noise import smoothed
-from davinci_forces.maths.signals.smoothing import reach
+from davinci_forces.maths.signals.smoothing import reach, smoothed
 from davinci_forces.records import Average, Motion, Trajectory
 
 PER_CUTOFF = 3  # samples kept per period of the low-pass's cutoff: more of them say nothing new

@@ -7,11 +7,14 @@ import numpy as np
 from davinci_forces.estimators.problem import NOTHING, Known, Regression
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.independent import IndependentJoint
+from davinci_forces.maths.models.lumping import ROUNDING, lumping
 from davinci_forces.maths.models.memory import efforts
 from davinci_forces.maths.models.model import ArmMotion, Model
+from davinci_forces.maths.models.physical import Box
 from davinci_forces.maths.periods.harmonics import kept_noise
 from davinci_forces.maths.signals.standstill import standing
 from davinci_forces.records import JointModel, Motion, Trajectory
+from davinci_forces.robots.robot import Joint
 
 
 def pose(model: IndependentJoint, trajectories: Sequence[Trajectory], known: Known = NOTHING) -> Regression:
@@ -87,3 +90,17 @@ def joined_motion(motions: Sequence[ArmMotion]) -> ArmMotion:
 def predicted(model: Model, theta: Array, motion: ArmMotion, effort: int = 0) -> Array:
     """One of the model's efforts (N,) along a motion."""
     return np.ascontiguousarray(efforts(model, theta, motion)[:, effort])
+
+
+def known_of(joint: Joint) -> Known:
+    """The signs that physics knows; where the robot has a table of it, what the parameters are made of, and a guess."""
+    positive = np.array([term.positive for term in joint.terms])
+    if joint.physical is None or joint.effort:  # a current does not say how much its motor pushes
+        return Known(positive)
+    made = lumping(joint.physical, joint.gear_ratio, tuple(term.name for term in joint.terms))
+    if made is None:
+        return Known(positive)
+    guess, lower, upper = np.array([(x.guess, x.lower, x.upper) for x in joint.physical.parameters]).T
+    theta = made.theta(guess)
+    # What masses leave of each other by rounding is no guess; taken for one, it would be believed to all its digits.
+    return Known(positive, Box(lower, upper, made), np.where(np.abs(theta) > ROUNDING, theta, 0.0))

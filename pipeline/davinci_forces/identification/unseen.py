@@ -10,10 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.identification.candidates import Candidate, Library
-from davinci_forces.identification.folds import folds
 from davinci_forces.identification.observations import Observed
-from davinci_forces.identification.paths import ANOTHER_PATH, SAME_PATH
-from davinci_forces.identification.scores import Judge, some
+from davinci_forces.identification.scores import Judge, folds, some
+from davinci_forces.identification.used import ANOTHER_PATH, SAME_PATH
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.memory import efforts
 from davinci_forces.maths.models.model import Model

@@ -2,15 +2,31 @@
 
 from collections.abc import Collection, Iterable
 
+import numpy as np
+
 from davinci_forces.errors import PipelineError
-from davinci_forces.identification.paths import ANOTHER_PATH, SAME_PATH, follows
 from davinci_forces.maths.models.model import Model
+from davinci_forces.maths.periods.shift import SAME_PATH as LIKE
+from davinci_forces.maths.periods.shift import likeness
+from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.records import Choice, CrossFit, Fit, FittedPaths, Motion
+from davinci_forces.records.prediction import ANOTHER_PATH as ANOTHER_PATH
 from davinci_forces.records.prediction import CHOSEN
+from davinci_forces.records.prediction import SAME_PATH as SAME_PATH
 from davinci_forces.robots.models import ARM, described
 from davinci_forces.robots.robot import Robot
 
 FALLBACK = "independent.lse"  # of joints that the chosen model does not describe
+
+
+def follows(motion: Motion, paths: FittedPaths) -> bool:
+    """Whether the longest segment of a recording is like one of the paths."""
+    part = max(segments(motion.segment), key=lambda s: s.stop - s.start)
+    each = [np.flatnonzero(paths.source == log) for log in dict.fromkeys(paths.source)]
+    likenesses = [
+        likeness(motion.t[part], motion.q_measured[part], paths.q[rows], float(paths.period[rows[0]])) for rows in each
+    ]
+    return max(likenesses) > LIKE
 
 
 class Identified:

@@ -2,11 +2,17 @@
 
 A task is current while its fingerprint (inputs by content, settings, robot, records as declared, code, version) and the
 content of its outputs are what its entry says.  Comparing an old entry with a new fingerprint gives the reason to run.
+
+All entries of a ledger in one file, so that a run that finds nothing to do reads one and not thousands.
+
+It is there while it holds what the entries do: the first entry that is written or removed takes it away, and a run that
+ends puts it back.  Where an entry is newer, or any is missing, all are read one by one.  Nothing is believed for the
+index's sake, since a task is current only where its files are what its entry says, and `verify` reads the entries.
 """
 
 import json
 import os
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,9 +21,12 @@ from pathlib import Path
 from typing import Any
 
 from davinci_forces.records import store
-from davinci_forces.runner import index
-from davinci_forces.runner.fingerprints.canonical import hash_of_text
-from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, differences
+from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, differences, hash_of_text
+
+LONGEST = 200  # bytes of a file's name, which with all endings may have 255
+SEAL = ',\n "seal": "{}"\n}}\n'  # what an entry ends with
+INDEX = "index.json"
+SHARED = "code", "schemas", "settings"  # parts of a fingerprint that are the same for many tasks
 
 
 @dataclass(frozen=True)
@@ -71,7 +80,7 @@ class Ledger:
 
     @cached_property
     def _entries(self) -> dict[str, dict[str, Entry]]:
-        indexed = {} if self._one_by_one else index.read(self.home, list(self._files()))
+        indexed = {} if self._one_by_one else read_index(self.home, list(self._files()))
         self._indexed = bool(indexed)
         if not indexed:
             return self._read_one_by_one()
@@ -136,17 +145,17 @@ class Ledger:
     def write_index(self) -> None:
         """Put the index of all entries in place, unless it is."""
         if self._entries and not self._indexed:
-            store.write_bytes(self.home / index.NAME, self.index())
+            store.write_bytes(self.home / INDEX, self.index())
             self._indexed = True
 
     def index(self) -> bytes:
         """The content that the index of the entries has."""
-        return index.written({s: {n: vars(e) for n, e in named.items()} for s, named in self._entries.items()})
+        return index_of({s: {n: vars(e) for n, e in named.items()} for s, named in self._entries.items()})
 
     def _forget_index(self) -> None:
         """Remove the index, which is about to say less than the entries do."""
         if self._indexed or not self.changes:
-            self.home.joinpath(index.NAME).unlink(missing_ok=True)
+            self.home.joinpath(INDEX).unlink(missing_ok=True)
             self._indexed = False
 
     def made(self, outputs: Mapping[str, str]) -> None:
@@ -171,18 +180,12 @@ class Ledger:
         return altered + differences(entry.fingerprint, now)
 
 
-LONGEST = 200  # bytes of a file's name, which with all endings may have 255
-
-
 def file_name(task: str) -> str:
     """The name of a task as that of a file; one that is too long ends in its hash."""
     name = task.replace("/", ".")
     if len(name.encode()) <= LONGEST:
         return name
     return f"{name.encode()[: LONGEST - 17].decode(errors='ignore')}~{hash_of_text(name)[:16]}"
-
-
-SEAL = ',\n "seal": "{}"\n}}\n'  # what an entry ends with
 
 
 def sealed(entry: Entry) -> str:
@@ -212,3 +215,49 @@ def _digest(file: str) -> str:
         if os.path.isfile(file):
             raise
         return ""
+
+
+Entries = dict[str, dict[str, dict[str, Any]]]  # by stage, and by the name of the entry's file
+
+
+def read_index(folder: Path, files: Collection[tuple[str, str, str]]) -> Entries:
+    """The entries of these stages, names and files, or none where the index is not whole, of just these and newer."""
+    try:
+        written = os.stat(folder / INDEX).st_mtime_ns
+        if any(os.stat(file).st_mtime_ns > written for *_, file in files):
+            return {}
+        content = _unsealed(folder.joinpath(INDEX).read_text(encoding="utf-8"))
+        entries: Entries = content["entries"]
+        if {(stage, name) for stage, named in entries.items() for name in named} != {each[:2] for each in files}:
+            return {}
+        for entry in (entry for named in entries.values() for entry in named.values()):
+            entry["fingerprint"] |= {part: content["shared"][i] for part, i in entry.pop("shared").items()}
+    except (OSError, ValueError, TypeError, LookupError):
+        return {}
+    return entries
+
+
+def index_of(entries: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> bytes:
+    """The content of the index of entries, which are as `read_index` gives them."""
+    numbers: dict[str, int] = {}  # of what is shared, by its text
+    brief: Entries = {}
+    for stage, named in sorted(entries.items()):
+        for name, entry in sorted(named.items()):
+            own = {part: value for part, value in entry["fingerprint"].items() if part not in SHARED}
+            texts = {part: _text(entry["fingerprint"][part]) for part in SHARED if part in entry["fingerprint"]}
+            shared = {part: numbers.setdefault(text, len(numbers)) for part, text in texts.items()}
+            brief.setdefault(stage, {})[name] = {**entry, "fingerprint": own, "shared": shared}
+    text = _text({"entries": brief, "shared": list(map(json.loads, numbers))})
+    return f"{hash_of_text(text)}\n{text}".encode()
+
+
+def _unsealed(text: str) -> Any:
+    """What an index holds below the hash of it in its first line."""
+    sha, _, content = text.partition("\n")
+    if sha != hash_of_text(content):
+        raise ValueError("not as it was written")
+    return json.loads(content)
+
+
+def _text(value: Any) -> str:
+    return json.dumps(value, ensure_ascii=False, sort_keys=True, separators=(",", ":"))

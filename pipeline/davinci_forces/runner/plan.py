@@ -1,23 +1,25 @@
 """Which calls of a step a study and its records give, and everything that each of them depends on."""
 
 import importlib.metadata
+import json
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from hashlib import sha256
 from typing import Any
 
-from davinci_forces.records import KINDS
+from davinci_forces.records import KINDS, store
 from davinci_forces.robots.robot import Kind
-from davinci_forces.runner.fingerprints.canonical import hash_of
 from davinci_forces.runner.fingerprints.code import code
-from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
-from davinci_forces.runner.fingerprints.schemas import schemas
-from davinci_forces.runner.ledger import Ledger
+from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, hash_of, schemas
+from davinci_forces.runner.ledger import Entry, Folders, Ledger
 from davinci_forces.runner.places import ANY, Located, Places, about, is_about_log
 from davinci_forces.runner.signature import Declaration, stage_of
 from davinci_forces.stages import module
 from davinci_forces.study import Study
 
 VERSION = importlib.metadata.version("davinci-forces")
+# What makes, checks and stores every record; the others of its folder declare records, and count as `schemas`.
+RECORDS = tuple(f"davinci_forces.records.{name}" for name in ("record", "store"))
 
 
 @dataclass(frozen=True)
@@ -122,10 +124,6 @@ class Plan:
         return self._hashes[what, name]
 
 
-# What makes, checks and stores every record; the others of its folder declare records, and count as `schemas`.
-RECORDS = tuple(f"davinci_forces.records.{name}" for name in ("record", "store"))
-
-
 def code_of(asks: Declaration) -> dict[str, str]:
     """The code that is at work in a step, by hash."""
     opens = ("davinci_forces.logs",) if "log" in asks.given.values() else ()  # imported by none
@@ -144,3 +142,38 @@ def log_of(asks: Declaration, task: str) -> str:
 def _task_name(kind: str, place: str, kinds: int) -> str:
     name = place.removesuffix(".parquet").partition("/")[2]
     return f"{KINDS[kind].folder()}/{name}" if kinds > 1 else name
+
+
+def reused(ledger: Ledger, task: Task) -> str:
+    """Copy the files of this task from a study beside this one that made them of the same; its name, or ""."""
+    processed = ledger.folders.processed
+    if task.fingerprint.inputs:
+        return ""
+    now = json.loads(json.dumps(asdict(task.fingerprint)))
+    for other in sorted(processed.parent.iterdir()):
+        there = replace(ledger.folders, processed=other)
+        entry = None if other == processed else Ledger(there).read(task.step, task.name)
+        same = entry and not entry.failed and entry.fingerprint == now
+        if entry and same and (contents := _contents(there, entry)):
+            _take(ledger, entry, contents)
+            return other.name
+    return ""
+
+
+def _contents(there: Folders, entry: Entry) -> dict[str, bytes]:
+    """The files of an entry, or none where one of them is not what the entry says."""
+    if not all(there.file(name).is_file() for name in entry.outputs):
+        return {}
+    contents = {name: there.file(name).read_bytes() for name in entry.outputs}
+    whole = all(sha256(contents[name]).hexdigest() == sha for name, sha in entry.outputs.items())
+    return contents if whole else {}
+
+
+def _take(ledger: Ledger, entry: Entry, contents: dict[str, bytes]) -> None:
+    before = ledger.entry(entry.stage, entry.task)
+    for stale in set(before.outputs if before else ()) - set(contents):
+        ledger.folders.file(stale).unlink(missing_ok=True)
+    for name, content in contents.items():
+        store.write_bytes(ledger.folders.file(name), content)
+        ledger.digest(name, fresh=True)
+    ledger.write(entry)

@@ -10,9 +10,8 @@ from davinci_forces.records import KINDS, Record, store
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.report import REPORT
 from davinci_forces.runner.execution import Outcome, said_of, without_folders
-from davinci_forces.runner.fingerprints.canonical import hash_of
 from davinci_forces.runner.fingerprints.code import code
-from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
+from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, hash_of
 from davinci_forces.runner.ledger import Ledger
 from davinci_forces.runner.places import Located
 from davinci_forces.runner.plan import VERSION, Plan, Task

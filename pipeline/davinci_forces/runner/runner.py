@@ -16,9 +16,8 @@ from davinci_forces.runner.execution import Outcome, perform
 from davinci_forces.runner.graph import WHOLE, Graph, Part, every_step, goes_by_log, needed, stages_of
 from davinci_forces.runner.ledger import Entry, Folders, Ledger, file_name
 from davinci_forces.runner.lock import locked
-from davinci_forces.runner.plan import Plan, Task, log_of
+from davinci_forces.runner.plan import Plan, Task, log_of, reused
 from davinci_forces.runner.processes.workers import Crew, Others
-from davinci_forces.runner.reuse import reused
 from davinci_forces.runner.signature import declaration, stage_of
 from davinci_forces.study import Study
 

@@ -9,9 +9,9 @@ from typing import Any
 from davinci_forces.errors import NotReproduced, PipelineError
 from davinci_forces.report import REPORT
 from davinci_forces.report.results import MANIFEST, identity
-from davinci_forces.runner import index, reporting
+from davinci_forces.runner import reporting
 from davinci_forces.runner.graph import every_step
-from davinci_forces.runner.ledger import Folders, Ledger, file_name
+from davinci_forces.runner.ledger import INDEX, Folders, Ledger, file_name
 from davinci_forces.runner.plan import Plan, Task
 from davinci_forces.runner.signature import declaration, stage_of
 from davinci_forces.study import Study
@@ -77,7 +77,7 @@ def known_files(ledger: Ledger) -> dict[str, dict[str, str]]:
 
 def altered_index(ledger: Ledger) -> Iterator[str]:
     """Whether the index, where there is one, says what the entries do."""
-    file = ledger.home / index.NAME
+    file = ledger.home / INDEX
     if file.is_file() and file.read_bytes() != ledger.index():
         yield f"{file} is not what the entries beside it say; remove it, it is made anew by the next run"
 

@@ -23,8 +23,7 @@ from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.load import mirrored, moved_with, unit_load
 from davinci_forces.maths.periods.period import guess, refine
 from davinci_forces.maths.periods.shift import circular, straight
-from davinci_forces.maths.signals.noise import smoothed
-from davinci_forces.maths.signals.smoothing import segments
+from davinci_forces.maths.signals.smoothing import segments, smoothed
 from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Motion, Weight, diagnostic
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import HungMass, LogEntry, Weighing, Weighings

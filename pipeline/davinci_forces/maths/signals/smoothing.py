@@ -9,6 +9,7 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, Integers
 
 ORDER = 4  # of the Butterworth filter, run forwards and backwards
+NORMAL_MAD = 0.6744897501960817  # median of |x| of a standard normal variable
 
 
 def lowpass(x: Array, rate: float, cutoff: float) -> Array:
@@ -94,3 +95,22 @@ def segments(segment: Integers) -> Iterator[slice]:
     edges = [0, *(np.flatnonzero(np.diff(segment)) + 1).tolist(), len(segment)]
     for start, stop in pairwise(edges):
         yield slice(start, stop)
+
+
+def noise_std(residual: Array, segment: Integers, rate: float, cutoff: float) -> float:
+    """Standard deviation of the white noise in a residual (N,), from what a low-pass at `cutoff` [Hz] takes out of it.
+
+    The model's error is slower than that but for jumps where the motion turns, so the median is taken, which a few
+    jumps do not move.  0 where the sampling rate leaves the low-pass nothing to take out.
+    """
+    return white_std(residual - smoothed(residual, segment, rate, cutoff), share_passed(rate, cutoff))
+
+
+def white_std(removed: Array, passed: float) -> float:
+    """Standard deviation of white noise, from what a low-pass that lets a share of its power through took out (N,)."""
+    return float(np.median(np.abs(removed)) / NORMAL_MAD / np.sqrt(1.0 - passed)) if passed < 1.0 else 0.0
+
+
+def smoothed(x: Array, segment: Integers, rate: float, cutoff: float) -> Array:
+    """The low-pass of each segment of a signal (N,), or of columns (N, ...)."""
+    return np.concatenate([lowpass(x[part], rate, cutoff) for part in segments(segment)])

@@ -1,7 +1,67 @@
 """All that the outputs of a task depend on, and in words what of it changed."""
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass
+from datetime import date, time
+from enum import Enum
+from functools import cache
+from hashlib import sha256
+from pathlib import PurePath
 from typing import Any
+
+import numpy as np
+
+from davinci_forces.records import COLUMN_DTYPES, Record
+from davinci_forces.records.quantities import QUANTITIES
+from davinci_forces.runner.signature import declaration
+
+PLAIN = (str, float, int, bool, type(None))
+REASONS = {  # part of a fingerprint -> what is said of what changed in it
+    "given": "the {} changed",
+    "schemas": "the declaration of {} changed",
+    "code": "the code of {} changed",
+    "inputs": "{} changed",
+}
+
+
+def hash_of_text(text: str) -> str:
+    """The sha256 of a text."""
+    return sha256(text.encode()).hexdigest()
+
+
+def hash_of(value: Any) -> str:
+    """The sha256 of a value by all that it holds: arrays by their bytes, of which `repr` shows a few digits."""
+    return hash_of_text(canonical(value))
+
+
+def canonical(value: Any) -> str:
+    """A text that two values share only if they hold the same.
+
+    Raises
+    ------
+    TypeError
+        If the value holds something of which that cannot be said.
+    """
+    if type(value) in PLAIN:  # most of what anything holds
+        return repr(value)
+    if is_dataclass(value) and not isinstance(value, type):
+        items = (f"{f.name}={canonical(getattr(value, f.name))}" for f in fields(value))
+        return f"{type(value).__name__}({', '.join(items)})"
+    if isinstance(value, np.ndarray) and not value.dtype.hasobject:
+        return f"array({value.dtype.str}, {value.shape}, {sha256(value.tobytes()).hexdigest()})"
+    if isinstance(value, dict):
+        return f"{{{', '.join(sorted(f'{canonical(k)}: {canonical(v)}' for k, v in value.items()))}}}"
+    if isinstance(value, list | tuple):
+        return f"{type(value).__name__}({', '.join(map(canonical, value))})"
+    if isinstance(value, Enum):
+        return f"{type(value).__name__}.{value.name}"
+    if isinstance(value, PurePath):
+        return f"path({value.as_posix()!r})"
+    if isinstance(value, np.generic):
+        return canonical(value.item())
+    if isinstance(value, int | float | str | date | time):
+        return repr(value)
+    raise TypeError(f"a {type(value).__name__} has no canonical text")
 
 
 @dataclass(frozen=True)
@@ -14,14 +74,6 @@ class Fingerprint:
     schemas: dict[str, str]  # kind of record read or made -> sha256 of its declaration
     code: dict[str, str]  # module -> sha256
     version: str
-
-
-REASONS = {  # part of a fingerprint -> what is said of what changed in it
-    "given": "the {} changed",
-    "schemas": "the declaration of {} changed",
-    "code": "the code of {} changed",
-    "inputs": "{} changed",
-}
 
 
 def differences(then: dict[str, Any], now: Fingerprint) -> list[str]:
@@ -37,3 +89,28 @@ def differences(then: dict[str, Any], now: Fingerprint) -> list[str]:
         old, new = then.get(what, {}), getattr(now, what)
         changed += [reason.format(name) for name in sorted(old.keys() | new.keys()) if old.get(name) != new.get(name)]
     return changed
+
+
+@cache
+def schemas(step: str) -> dict[str, str]:
+    """The hash of the declaration of each kind of record that a step reads or makes."""
+    asks = declaration(step)
+    hashes = {kind.__name__: _hash(kind, _as_read) for kind in asks.reads}
+    return hashes | {kind.__name__: _hash(kind, _as_written) for kind in asks.makes}
+
+
+def _hash(kind: type[Record], described: Callable[[str, Any], tuple[str, ...]]) -> str:
+    declared = [described(f.name, f.type) for f in fields(kind)]  # type: ignore[arg-type]
+    return hash_of((kind.__name__, kind.KEY, kind.UNKNOWN, declared))
+
+
+def _as_read(name: str, type_: Any) -> tuple[str, ...]:
+    """What a reader relies on of a field: its name, type and unit."""
+    stored = str(np.dtype(COLUMN_DTYPES[type_])) if type_ in COLUMN_DTYPES else str(type_)
+    return name, stored, QUANTITIES[name].unit
+
+
+def _as_written(name: str, type_: Any) -> tuple[str, ...]:
+    """All that a file holds of a field: the meaning of a column, too."""
+    meaning = (QUANTITIES[name].meaning,) if type_ in COLUMN_DTYPES else ()
+    return *_as_read(name, type_), *meaning

@@ -14,8 +14,8 @@ from uuid import uuid4
 from davinci_forces.errors import BadRequest
 from davinci_forces.records import store
 from davinci_forces.runner.execution import Outcome, perform
-from davinci_forces.runner.fingerprints.canonical import hash_of
 from davinci_forces.runner.fingerprints.code import PACKAGE
+from davinci_forces.runner.fingerprints.fingerprint import hash_of
 from davinci_forces.runner.ledger import Folders
 from davinci_forces.runner.plan import Task
 from davinci_forces.runner.processes import arithmetic

@@ -7,9 +7,8 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.filters import DEFAULT, FILTERS, through
-from davinci_forces.filters.assumed import assumed
 from davinci_forces.filters.problem import NoiseModel, driven, driven_smooth
-from davinci_forces.filters.response import DURATION, half_sine, response
+from davinci_forces.filters.response import DURATION, assumed, half_sine, response
 from davinci_forces.identification.joint_models import Along
 from davinci_forces.identification.used import FALLBACK, Identified
 from davinci_forces.maths.arrays import Array, Booleans

@@ -5,9 +5,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from davinci_forces.filters import DEFAULT, diverges, through
-from davinci_forces.filters.assumed import assumed
-from davinci_forces.filters.lag import lag
 from davinci_forces.filters.problem import driven
+from davinci_forces.filters.response import assumed, lag
 from davinci_forces.maths.arrays import Booleans, evenly
 from davinci_forces.maths.signals.windows import free_space
 from davinci_forces.maths.uncertainty import bootstrap

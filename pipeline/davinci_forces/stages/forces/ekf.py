@@ -5,11 +5,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.filters import DEFAULT, diverges, rts, through
-from davinci_forces.filters.assumed import assumed
 from davinci_forces.filters.error_bands import ModelVariance, model_variance
-from davinci_forces.filters.lag import lag
 from davinci_forces.filters.problem import NoiseModel, driven
-from davinci_forces.filters.response import rise
+from davinci_forces.filters.response import assumed, lag, rise
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.maths.signals.windows import free_space, settled

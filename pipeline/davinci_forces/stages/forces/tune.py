@@ -7,7 +7,7 @@ import numpy as np
 from davinci_forces.filters import ekf
 from davinci_forces.filters.problem import NoiseModel, driven
 from davinci_forces.filters.tuning import tuned
-from davinci_forces.maths.signals.noise import noise_std
+from davinci_forces.maths.signals.smoothing import noise_std
 from davinci_forces.records import FilterNoise, JointModel, MeasurementNoise, Tuning
 
 FINEST = 1e-9  # of a range: a noiseless log would leave innovations without a covariance to be judged by

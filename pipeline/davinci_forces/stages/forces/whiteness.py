@@ -4,15 +4,12 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 
 import numpy as np
 
-from davinci_forces.filters.assumed import assumed
-from davinci_forces.filters.innovations.innovations import Innovations, innovations
-from davinci_forces.filters.innovations.search import CauseSearch, search
-from davinci_forces.filters.innovations.timing import delays, mended
+from davinci_forces.filters.innovations.innovations import Innovations, delays, innovations, mended
+from davinci_forces.filters.innovations.search import CauseSearch, finding, search, verdict
 from davinci_forces.filters.innovations.trials import CLOCK, Subject
-from davinci_forces.filters.innovations.verdict import finding, verdict
 from davinci_forces.filters.problem import driven
-from davinci_forces.identification.joint_models import Along
-from davinci_forces.identification.refitting import refitted
+from davinci_forces.filters.response import assumed
+from davinci_forces.identification.joint_models import Along, refitted
 from davinci_forces.identification.used import Identified
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.driven import Driven

@@ -8,14 +8,13 @@ import numpy as np
 
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.identification.candidates import Candidate, Library, candidates, reach_of
-from davinci_forces.identification.chosen import BlockEstimate, Selection, parameters, selected
-from davinci_forces.identification.mechanisms import NOTHING, held
+from davinci_forces.identification.chosen import NOTHING, BlockEstimate, Selection, held, parameters, selected
 from davinci_forces.identification.observations import Observed, observed
 from davinci_forces.identification.regression import recorded_motion
 from davinci_forces.identification.unseen import predictions
 from davinci_forces.identification.used import Identified
 from davinci_forces.maths.models.model import Model
-from davinci_forces.maths.signals.noise import smoothed
+from davinci_forces.maths.signals.smoothing import smoothed
 from davinci_forces.maths.signals.velocity_map import over_velocity
 from davinci_forces.records import Average, Choice, Diagnostic, Fit, FrictionMap, Motion, Prediction, diagnostic
 from davinci_forces.robots.models import Reach

@@ -8,7 +8,6 @@ import numpy as np
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators import ESTIMATORS, estimator
 from davinci_forces.estimators.problem import NOTHING, Estimate, Known, Regression, Search
-from davinci_forces.identification.folds import folds, refits
 from davinci_forces.identification.identifiability import (
     advice,
     flat,
@@ -19,13 +18,13 @@ from davinci_forces.identification.identifiability import (
     not_seen,
     together,
 )
-from davinci_forces.identification.known import known_of
 from davinci_forces.identification.observations import observed, pose_samples
-from davinci_forces.identification.regression import joined, pose
+from davinci_forces.identification.regression import joined, known_of, pose
+from davinci_forces.identification.scores import folds, refits
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation.identifiability import Told, told
 from davinci_forces.maths.models.independent import IndependentJoint
-from davinci_forces.maths.signals.path import SAME_PATH, most_different
+from davinci_forces.maths.periods.shift import SAME_PATH, most_different
 from davinci_forces.records import (
     Column,
     CrossFit,

@@ -9,14 +9,11 @@ import numpy as np
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators import ESTIMATORS, estimator
 from davinci_forces.estimators.problem import Known, Regression
-from davinci_forces.identification.folds import folds
 from davinci_forces.identification.joint_models import Along, at_samples, refits_of
-from davinci_forces.identification.known import known_of
 from davinci_forces.identification.observations import averaged, observed, pose_samples
-from davinci_forces.identification.paths import ANOTHER_PATH, SAME_PATH
-from davinci_forces.identification.regression import pose, predicted, recorded_motion, stands_still
-from davinci_forces.identification.scores import Judge, some
-from davinci_forces.identification.used import FALLBACK, Identified
+from davinci_forces.identification.regression import known_of, pose, predicted, recorded_motion, stands_still
+from davinci_forces.identification.scores import Judge, folds, some
+from davinci_forces.identification.used import ANOTHER_PATH, FALLBACK, SAME_PATH, Identified
 from davinci_forces.maths.arrays import Array, Integers
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.periods import averaging

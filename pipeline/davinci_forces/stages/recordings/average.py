@@ -10,8 +10,7 @@ from davinci_forces.maths.periods.agreement import Difference, alike, alternatio
 from davinci_forces.maths.periods.averaging import Folded, Phases, end, phases, whole_periods
 from davinci_forces.maths.periods.period import Period, refine, standard_error
 from davinci_forces.maths.periods.repetition import Repetition, repetition
-from davinci_forces.maths.signals.noise import noise_std, smoothed
-from davinci_forces.maths.signals.smoothing import segments, share_passed
+from davinci_forces.maths.signals.smoothing import noise_std, segments, share_passed, smoothed
 from davinci_forces.records import Average, Counts, Diagnostic, PeriodResidual, Signal, diagnostic
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry

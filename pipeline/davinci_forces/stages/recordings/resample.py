@@ -10,8 +10,14 @@ from davinci_forces.maths.arrays import Booleans
 from davinci_forces.maths.periods.harmonics import are_apart, even_step
 from davinci_forces.maths.signals.clock import GAP
 from davinci_forces.maths.signals.faults import saturated, stuck
-from davinci_forces.maths.signals.noise import noise_std, smoothed, white_std
-from davinci_forces.maths.signals.smoothing import measured_motion, segments, share_passed
+from davinci_forces.maths.signals.smoothing import (
+    measured_motion,
+    noise_std,
+    segments,
+    share_passed,
+    smoothed,
+    white_std,
+)
 from davinci_forces.maths.signals.standstill import standing
 from davinci_forces.maths.signals.windows import runs, unbroken
 from davinci_forces.records import Column, Diagnostic, Motion, Recording, Signal, diagnostic
