@@ -246,7 +246,7 @@ def test_a_joint_of_another_arm_is_identified_from_what_new_writes_corrected_or_
     new(study / "joint_1.csv")
     file = study / "study.toml"
     file.write_text(file.read_text().replace("# skip = 1.0", correction))
-    for stage in ("ingest", "resample", "average", "smooth", "differentiate", "fit", "choose", "predict"):
+    for stage in ("ingest", "resample", "average", "differentiate", "fit", "choose", "predict"):
         call(stage, study)
     errors = davinci_forces.read(study, "Prediction").drop_duplicates(["model", "estimator"])
     assert {"leave one period out", "leave a block of path out"} == set(errors["scheme"])

@@ -8,7 +8,7 @@ import davinci_forces
 
 JOINTS = ("shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint", "wrist_1_joint", "wrist_2_joint", "wrist_3_joint")
 LOGS = (("learn", "fourier_50s_12harm.csv", "identification"), ("check", "fourier_20s_8harm.csv", "validation"))
-STAGES = ("ingest", "resample", "average", "smooth", "differentiate", "fit", "choose", "predict")
+STAGES = ("ingest", "resample", "average", "differentiate", "fit", "choose", "predict")
 pytestmark = pytest.mark.slow
 
 

@@ -258,12 +258,12 @@ def test_a_log_waits_for_what_is_made_of_it_and_a_stage_of_all_logs_for_all():
     assert {part.step for part in begun} == {"design", "ingest"}
     graph.done(Part("ingest", "one"))
     assert graph.next() == [Part("resample", "one")]
-    for stage in ("resample", "average", "differentiate", "smooth"):
+    for stage in ("resample", "average", "differentiate"):
         graph.done(Part(stage, "one"))
     waiting = [part for batch in iter(graph.next, []) for part in batch]
     assert {part.log for part in waiting} <= {"one"}
     assert not {part.step for part in waiting} & {"fit", "choose", "predict", "tune"}
-    for stage in ("ingest", "resample", "average", "differentiate", "smooth"):
+    for stage in ("ingest", "resample", "average", "differentiate"):
         for log in LOGS:
             if (stage, log) != ("ingest", "one") and log == "two":
                 graph.done(Part(stage, log))

@@ -6,10 +6,11 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from davinci_forces.errors import NotReproduced, PipelineError
+from davinci_forces.errors import NotReproduced
 from davinci_forces.report import REPORT
 from davinci_forces.report.results import MANIFEST, identity
 from davinci_forces.runner import reporting
+from davinci_forces.runner.execution import said_of
 from davinci_forces.runner.graph import every_step
 from davinci_forces.runner.ledger import INDEX, Folders, Ledger, file_name
 from davinci_forces.runner.plan import Plan, Task
@@ -52,8 +53,8 @@ def verify(study: Study, folders: Folders, wanted: str = "") -> Verified:
     try:
         made = reporting.written(ledger, report)
         numbers = len(json.loads(made["results.json"]))
-    except PipelineError as error:
-        problems.append(f"the report cannot be made anew: {error}")
+    except Exception as error:  # whatever becomes of a report that lacks what was altered
+        problems.append(f"the report cannot be made anew: {said_of(error)}")
     problems += [problem for name, content in made.items() for problem in altered_page(folders, name, content)]
     is_called = identity(made[MANIFEST]) if made else ""
     if wanted and is_called != wanted:
