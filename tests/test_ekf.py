@@ -9,12 +9,11 @@ from numpy.testing import assert_allclose
 
 from davinci_forces.errors import PipelineError
 from davinci_forces.filters import ekf, rts, stepping, tracker
-from davinci_forces.filters.problem import NoiseModel
+from davinci_forces.filters.problem import Driven, NoiseModel
 from davinci_forces.filters.response import assumed, at_rest, lag, slowest
 from davinci_forces.filters.stepping import covariances
 from davinci_forces.filters.tuning import likeliest_walk, tuned
 from davinci_forces.maths.models.bias import bias
-from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.models.independent import combined, inertia_of
 from davinci_forces.records import Diagnostic, ErrorBand, Fit, MeasurementNoise, Track, Whiteness
 from davinci_forces.stages.forces import ekf as stage

@@ -173,9 +173,13 @@ def test_a_harmonic_that_is_left_out_is_remarked_on():
 
 def predictions(signal, role, fitted, trajectories=(), **changes):
     made, about = fitted_to(trajectories), entry(name=signal.log, role=role, **changes)
-    identified = [*fitted, *(r for r in made if isinstance(r, (FittedPaths, CrossFit)))]
-    own = [t for t in trajectories if t.log == signal.log]
-    every = predict.run([arm.motion(replace(signal, role=role))], own, identified, about, arm.ARM, lowpass=17.0)
+    identified = [*fitted, *(r for r in made if isinstance(r, FittedPaths))]
+    motions, own = [arm.motion(replace(signal, role=role))], [t for t in trajectories if t.log == signal.log]
+    refits = [r for r in made if isinstance(r, CrossFit)]
+    every = [
+        *fit.apply(motions, own, refits, about, arm.ARM, lowpass=17.0),
+        *predict.run(motions, identified, about, arm.ARM, lowpass=17.0),
+    ]
     return [r for r in every if not isinstance(r, Prediction) or r.model != "chosen"]
 
 

@@ -73,7 +73,7 @@ def identified() -> tuple[Signal, list[Fit], list[Prediction]]:
     signal = arm.signal(periods=3.5)
     own, motion = trajectory(signal), arm.motion(signal)
     fits = [r for r in fit.run([own], [motion], arm.ARM, lowpass=CUTOFF) if isinstance(r, Fit)]
-    made = predict.run([motion], [own], fits, entry(), arm.ARM, lowpass=CUTOFF)
+    made = fit.apply([motion], [own], [], entry(), arm.ARM, lowpass=CUTOFF)
     return signal, fits, [r for r in made if isinstance(r, Prediction)]
 
 
@@ -99,7 +99,7 @@ def test_an_identification_log_is_predicted_by_refits_that_had_not_seen_the_samp
     assert (model.scheme, model.path, model.path_unseen) == ("leave one period out", "same path", "same path")
     # A period of more effort moves what is predicted of the others, and not what is of its own.
     more = replace(signal, tau=signal.tau + np.where((signal.t >= 10.0) & (signal.t < 20.0), np.sign(signal.dq), 0.0))
-    altered = predict.run([arm.motion(more)], [trajectory(more)], fits, entry(), arm.ARM, lowpass=CUTOFF)
+    altered = fit.apply([arm.motion(more)], [trajectory(more)], [], entry(), arm.ARM, lowpass=CUTOFF)
     [other] = arm.models([more], fits, [r for r in altered if isinstance(r, Prediction)])
     moved = np.abs(other.tau_hat_unseen - model.tau_hat_unseen)
     assert np.median(moved[1000:2000]) < 0.05 * np.median(moved[:1000])

@@ -12,7 +12,7 @@ from davinci_forces.maths.selection.ridge import gathered
 from davinci_forces.maths.signals.smoothing import lowpass, noise_std
 from davinci_forces.maths.signals.standstill import HOLD, standing
 from davinci_forces.records import Average, Choice, Diagnostic, Fit, Prediction, Recording, Trajectory
-from davinci_forces.stages.model import choose, fit, predict
+from davinci_forces.stages.model import choose, fit
 from davinci_forces.stages.recordings import average, differentiate, resample
 from davinci_forces.study import LogEntry
 from tests import arm
@@ -108,8 +108,7 @@ def chosen(signal, named="chosen"):
     joint = arm.joint("hand_roll")
     [own] = [r for r in differentiate.run(mean, joint, harmonics=0) if isinstance(r, Trajectory)]
     made = list(choose.run([motion], [mean], arm.ARM, fit=named, lowpass=LOWPASS))
-    fits = [r for r in fit.run([own], [motion], arm.ARM, lowpass=LOWPASS) if isinstance(r, Fit)]
-    cv = predict.run([motion], [own], fits, ENTRY, arm.ARM, lowpass=LOWPASS)
+    cv = fit.apply([motion], [own], [], ENTRY, arm.ARM, lowpass=LOWPASS)
     return [mean, *made, *(r for r in cv if isinstance(r, Prediction))]
 
 

@@ -14,7 +14,7 @@ from davinci_forces.runner.ledger import Entry, Ledger
 from davinci_forces.runner.runs import folders
 from davinci_forces.runner.signature import stage_of, steps
 
-FIT = ["ingest", "resample", "average", "differentiate", "fit"]
+FIT = ["ingest", "resample", "average", "differentiate", "fit", "fit.apply"]
 
 
 @pytest.fixture
@@ -25,7 +25,7 @@ def finished(analysed, tmp_path) -> Path:
 
 
 def test_a_stage_has_a_step_for_each_function_that_it_exports_in_their_order():
-    assert steps("fit") == ("fit",)
+    assert steps("fit") == ("fit", "fit.apply")
     assert steps("tune") == ("tune", "tune.gather")
     assert steps("resolve") == ("resolve", "resolve.gather", "resolve.apply")
 

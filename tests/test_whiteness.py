@@ -21,8 +21,7 @@ from davinci_forces.filters.innovations.trials import (
     Passes,
     Subject,
 )
-from davinci_forces.filters.problem import NoiseModel
-from davinci_forces.maths.models.driven import Driven
+from davinci_forces.filters.problem import Driven, NoiseModel
 from davinci_forces.maths.models.independent import combined, inertia_of
 from davinci_forces.maths.signals import whiteness
 from davinci_forces.maths.signals.standstill import moving

@@ -12,9 +12,8 @@ from numpy.testing import assert_allclose
 
 from davinci_forces.filters import rts
 from davinci_forces.filters.ekf import track
-from davinci_forces.filters.problem import NoiseModel
+from davinci_forces.filters.problem import Driven, NoiseModel
 from davinci_forces.filters.stepping import FIRST, covariances
-from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.models.model import JointDynamics
 from davinci_forces.records import Track
 from davinci_forces.records.store import Writer

@@ -36,7 +36,7 @@ FILTER = """
 import numpy as np
 from davinci_forces.filters.ekf import track
 from davinci_forces.filters.problem import NoiseModel
-from davinci_forces.maths.models.driven import Driven
+from davinci_forces.filters.problem import Driven
 from davinci_forces.maths.models.model import JointDynamics
 t = np.arange(4000) * 1e-3
 joint = JointDynamics(np.full(4000, 0.5), (0.1, 0.7, -0.2, 0.0, 0.3, 0.2, 0.0), np.zeros(4000))

@@ -14,9 +14,8 @@ from numpy.testing import assert_allclose
 from scipy.stats import chi2, multivariate_normal
 
 from davinci_forces.filters import FILTERS, kalman, title, tracker
-from davinci_forces.filters.problem import Filter, NoiseModel
+from davinci_forces.filters.problem import Driven, Filter, NoiseModel
 from davinci_forces.filters.stepping import FIRST
-from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.models.model import JointDynamics
 from davinci_forces.maths.models.terms import inertia, offset, stiffness, viscous
 from tests import arm

@@ -7,6 +7,7 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from davinci_forces.filters import ekf
+from davinci_forces.filters.problem import Driven
 from davinci_forces.haptics import loop as haptic
 from davinci_forces.haptics.maths.bimodal import THESIS, Hand
 from davinci_forces.haptics.maths.delay import delay_limit, held, sampled_limit
@@ -14,7 +15,6 @@ from davinci_forces.haptics.maths.feeling import harmonic, response_limit
 from davinci_forces.haptics.maths.motion import switched
 from davinci_forces.haptics.maths.simulated_loop import Clocks, FeltTissue, Grip, simulate
 from davinci_forces.haptics.scenario import FIRM, SLIDE, AxisNoise, HapticScenario
-from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.models.model import JointDynamics
 
 K = 457.24

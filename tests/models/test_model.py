@@ -7,14 +7,13 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.filters import FILTERS, tracker
-from davinci_forces.filters.problem import NoiseModel
+from davinci_forces.filters.problem import Driven, NoiseModel
 from davinci_forces.identification.observations import observed
 from davinci_forces.maths.mechanics.rigid_body import inverse_dynamics, mass_matrix
 from davinci_forces.maths.models import bias as derivation
 from davinci_forces.maths.models import kernels, terms
 from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.coupled import CoupledArm
-from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.memory import deflection, driven, efforts, pieces
 from davinci_forces.maths.models.model import ArmMotion

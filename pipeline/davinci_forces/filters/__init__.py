@@ -5,8 +5,7 @@ from importlib import import_module
 
 import numpy as np
 
-from davinci_forces.filters.problem import Filter, NoiseModel, Tracked
-from davinci_forces.maths.models.driven import Driven
+from davinci_forces.filters.problem import Driven, Filter, NoiseModel, Tracked
 
 FILTERS = ("ekf", "ekf_euler", "ekf_adaptive", "rts", "rate", "momentum", "direct")
 DEFAULT = "ekf"  # the others are compared with it

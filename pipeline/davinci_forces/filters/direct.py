@@ -7,9 +7,8 @@ With the motion that is handed over, q, dq and ddq:
 
 import numpy as np
 
-from davinci_forces.filters.problem import NoiseModel, Tracked
+from davinci_forces.filters.problem import Driven, NoiseModel, Tracked
 from davinci_forces.maths.models.bias import bias
-from davinci_forces.maths.models.driven import Driven
 
 NAME = "Measured minus model"
 

@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 
 from davinci_forces.filters import stepping
-from davinci_forces.filters.problem import NoiseModel, Tracked
+from davinci_forces.filters.problem import Driven, NoiseModel, Tracked
 from davinci_forces.filters.stepping import Belief, arguments, corrected, covariances, spread, transition
 from davinci_forces.maths.compiled import cached
 from davinci_forces.maths.models import bias as derivation
 from davinci_forces.maths.models.bias import Coefficients
-from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.signals.windows import SETTLE
 
 NAME = "Extended Kalman filter"

@@ -9,8 +9,7 @@ joint.  All else is as in `ekf`.
 import numpy as np
 
 from davinci_forces.filters import kalman
-from davinci_forces.filters.problem import NoiseModel, Tracked
-from davinci_forces.maths.models.driven import Driven
+from davinci_forces.filters.problem import Driven, NoiseModel, Tracked
 
 NAME = "The same, adaptive noise"
 WINDOW = 1.0  # [s] over which innovations are forgotten

@@ -10,8 +10,7 @@ What a step leaves out of position and velocity is process noise, by the root me
 import numpy as np
 
 from davinci_forces.filters import kalman
-from davinci_forces.filters.problem import NoiseModel, Tracked
-from davinci_forces.maths.models.driven import Driven
+from davinci_forces.filters.problem import Driven, NoiseModel, Tracked
 
 NAME = "The same, forward Euler"
 

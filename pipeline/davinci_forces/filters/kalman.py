@@ -13,12 +13,11 @@ import numpy as np
 
 from davinci_forces.filters import stepping
 from davinci_forces.filters.ekf import LOG_2_PI
-from davinci_forces.filters.problem import NoiseModel
+from davinci_forces.filters.problem import Driven, NoiseModel
 from davinci_forces.filters.stepping import FIRST, columns, covariances, transition
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import cached
 from davinci_forces.maths.models import bias as derivation
-from davinci_forces.maths.models.driven import Driven
 
 LEAST, MOST = 0.1, 1e3  # of the variance of a measurement, between which it may follow the innovations
 

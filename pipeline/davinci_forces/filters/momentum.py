@@ -9,10 +9,9 @@ of `q_tau` a sample seen through the noise of effort and velocity, so that filte
 
 import numpy as np
 
-from davinci_forces.filters.problem import NoiseModel, Tracked
+from davinci_forces.filters.problem import Driven, NoiseModel, Tracked
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.models.bias import bias
-from davinci_forces.maths.models.driven import Driven
 
 NAME = "Momentum observer"
 

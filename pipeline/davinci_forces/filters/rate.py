@@ -9,8 +9,7 @@ sample, times the sample.
 import numpy as np
 
 from davinci_forces.filters import kalman
-from davinci_forces.filters.problem import NoiseModel, Tracked
-from davinci_forces.maths.models.driven import Driven
+from davinci_forces.filters.problem import Driven, NoiseModel, Tracked
 
 NAME = "Kalman filter with rate"
 

@@ -10,10 +10,9 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.filters import DEFAULT, ekf, rts, tracker
-from davinci_forces.filters.problem import Filter, NoiseModel
+from davinci_forces.filters.problem import Driven, Filter, NoiseModel, standing
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.models.bias import VISCOUS
-from davinci_forces.maths.models.driven import Driven, standing
 from davinci_forces.records import FilterNoise
 from davinci_forces.robots.robot import Joint
 

@@ -12,12 +12,11 @@ from typing import Any
 import numpy as np
 
 from davinci_forces.filters import stepping
-from davinci_forces.filters.problem import NoiseModel, Tracked
+from davinci_forces.filters.problem import Driven, NoiseModel, Tracked
 from davinci_forces.filters.stepping import arguments, corrected, gains, spread, transition
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import cached
 from davinci_forces.maths.models import bias as derivation
-from davinci_forces.maths.models.driven import Driven
 
 NAME = "Smoother"
 LEFT = 1e-12  # of a variance, below which a difference from it is rounding

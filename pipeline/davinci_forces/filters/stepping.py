@@ -18,10 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.filters.problem import NoiseModel
+from davinci_forces.filters.problem import Driven, NoiseModel
 from davinci_forces.maths.compiled import compiled
 from davinci_forces.maths.models.bias import COULOMB
-from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.models.kernels import bias
 
 TINY = 1e-300

@@ -10,10 +10,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from davinci_forces.filters import ekf
-from davinci_forces.filters.problem import NoiseModel
+from davinci_forces.filters.problem import Driven, NoiseModel
 from davinci_forces.filters.response import slowest
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.models.driven import Driven
 
 ROUNDS = 4  # of likelihood and push in turn
 FARTHEST = np.log(1e3)  # that the likelihood may take a deviation from where it starts

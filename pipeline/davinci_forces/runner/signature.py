@@ -1,11 +1,14 @@
 """What the steps of a stage ask for and promise, read from the signatures of the functions that it exports."""
 
+import re
 import types
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from functools import cache
 from importlib import import_module
+from importlib.util import find_spec
 from inspect import Parameter, signature
+from pathlib import Path
 from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 from davinci_forces.logs.log import Log
@@ -15,6 +18,7 @@ from davinci_forces.stages import module
 from davinci_forces.study import HapticScenario, LogEntry, Settings, Weighings
 
 FUNCTIONS = ("run", "gather", "apply")  # that a stage may export, in the order of their steps
+FUNCTION = re.compile(r"^def (\w+)\(", re.MULTILINE)
 Kinds = tuple[type[Record], ...]
 GIVEN = {
     Log: "log", LogEntry: "entry", Joint: "joint", Robot: "robot", Weighings: "weighings", HapticScenario: "haptics",
@@ -46,8 +50,12 @@ class Declaration:
 
 @cache
 def steps(stage: str) -> tuple[str, ...]:
-    """The steps of a stage, one for each function that it exports: "tune" for `run`, "tune.gather", "tune.apply"."""
-    exported = vars(import_module(module(stage)))
+    """The steps of a stage, one for each function that it exports: "tune" for `run`, "tune.gather", "tune.apply".
+
+    They are read from the text of its module: to import all stages takes longer than to read a log.
+    """
+    spec = find_spec(module(stage))
+    exported = set(FUNCTION.findall(Path(str(spec and spec.origin)).read_text(encoding="utf-8")))
     return tuple(stage if name == "run" else f"{stage}.{name}" for name in FUNCTIONS if name in exported)
 
 

@@ -11,9 +11,8 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.filters import ekf, kalman
-from davinci_forces.filters.problem import NoiseModel
+from davinci_forces.filters.problem import Driven, NoiseModel
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.signals.windows import SETTLE
 
 MOST = 2000  # samples that the likelihood is of

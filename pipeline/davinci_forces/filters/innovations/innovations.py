@@ -16,9 +16,8 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.filters import rts
-from davinci_forces.filters.problem import NoiseModel
+from davinci_forces.filters.problem import Driven, NoiseModel
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.models.driven import Driven
 
 LEAST = 1e-3  # of an innovation's variance that is never due to the clock
 

@@ -7,10 +7,9 @@ import numpy as np
 
 from davinci_forces.filters import DEFAULT, tracker
 from davinci_forces.filters.innovations import coloured
-from davinci_forces.filters.problem import NoiseModel
+from davinci_forces.filters.problem import Driven, NoiseModel
 from davinci_forces.filters.tuning import likeliest_walk
 from davinci_forces.maths.arrays import Array, Booleans
-from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.signals.whiteness import tests
 from davinci_forces.maths.signals.windows import SETTLE, runs, settled
 

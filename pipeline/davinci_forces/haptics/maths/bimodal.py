@@ -26,7 +26,6 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import brentq
 
 from davinci_forces.maths.arrays import Array
 
@@ -75,6 +74,8 @@ def energy(hand: Hand, k_t: float, x: Array, dx: Array) -> Array:
 
 def switching_limit(hand: Hand) -> float:
     """The K_T [N/m] at which the worst switching law neither grows nor dies out."""
+    from scipy.optimize import brentq
+
     high = cqlf_limit(hand)  # below which no law grows
     while log_growth(hand, high) < 0.0:
         high *= 2.0

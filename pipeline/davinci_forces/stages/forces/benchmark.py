@@ -7,12 +7,11 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.filters import DEFAULT, FILTERS, through
-from davinci_forces.filters.problem import NoiseModel, driven, driven_smooth
+from davinci_forces.filters.problem import Driven, NoiseModel, driven, driven_smooth
 from davinci_forces.filters.response import DURATION, assumed, half_sine, response
 from davinci_forces.identification.joint_models import Along
 from davinci_forces.identification.used import FALLBACK, Identified
 from davinci_forces.maths.arrays import Array, Booleans
-from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.signals.windows import free_space, runs
 from davinci_forces.maths.uncertainty.free_space import levels
 from davinci_forces.records import Comparison, Diagnostic, FilterNoise, Fit, JointModel, diagnostic

@@ -31,16 +31,14 @@ def run(
     free = free_space(model.t, entry.contact, model.rate)
     if int(free.sum()) < FEWEST_SAMPLES:
         return
-    parts = driven(model, np.where(np.isnan(model.tau_hat_unseen), model.tau_hat, model.tau_hat_unseen))
     assumes = assumed(noise, joint, 1.0 / model.rate, q_tau)
+    parts = driven(model, np.where(np.isnan(model.tau_hat_unseen), model.tau_hat, model.tau_hat_unseen))
     made = through(DEFAULT, parts, assumes)
     if diverges(made):
         return
+    late = lag(parts, assumes)[1]
     _, block, speed_bin, count, mean_square, filter_square, _ = cells(
-        made.tau_ext[free],
-        (made.tau_ext_std**2 + lag(parts, assumes)[1] ** 2)[free],
-        model.dq_measured[free],
-        noise.speed,
+        made.tau_ext[free], (made.tau_ext_std**2 + late**2)[free], model.dq_measured[free], noise.speed
     )
     yield FreeMotion(
         log=model.log, joint=model.joint, path=model.path_unseen, scheme=model.scheme, tested=int(free.sum()),

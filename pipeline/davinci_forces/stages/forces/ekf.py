@@ -48,6 +48,7 @@ def tracked(
         if not np.isfinite(made.tau_ext).all():
             return
     smooth, late = lag(parts, noise)
+    smooth_rise = rise(rts.track, parts[0], noise)
     offset = day_offset(model.t, model.tau - model.tau_hat, entry.free)
     if offset.drifts:
         yield drifting(model, offset)
@@ -80,7 +81,7 @@ def tracked(
         model_part=model_part,
         model_part_std=float(np.sqrt(model_part**2 + np.mean(beyond.std))) - model_part,
         lag_part=rms(late[calm]),
-        smooth_rise=rise(rts.track, parts[0], noise),
+        smooth_rise=smooth_rise,
         band_from=beyond.told_by,
         t=model.t,
         q=made.q,

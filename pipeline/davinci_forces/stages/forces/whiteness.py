@@ -7,12 +7,11 @@ import numpy as np
 from davinci_forces.filters.innovations.innovations import Innovations, delays, innovations, mended
 from davinci_forces.filters.innovations.search import CauseSearch, finding, search, verdict
 from davinci_forces.filters.innovations.trials import CLOCK, Subject
-from davinci_forces.filters.problem import driven
+from davinci_forces.filters.problem import Driven, driven
 from davinci_forces.filters.response import assumed
 from davinci_forces.identification.joint_models import Along, refitted
 from davinci_forces.identification.used import Identified
 from davinci_forces.maths.arrays import Array, Booleans
-from davinci_forces.maths.models.driven import Driven
 from davinci_forces.maths.signals import whiteness
 from davinci_forces.maths.signals.standstill import moving
 from davinci_forces.maths.signals.whiteness import NORMAL_95, NORMAL_99, cross_correlation, mean_square_band

@@ -1,6 +1,6 @@
 """Fit the parameters of every joint to all identification logs together, and without some, with every estimator."""
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import Annotated, NamedTuple
 
 import numpy as np
@@ -18,6 +18,7 @@ from davinci_forces.identification.identifiability import (
     not_seen,
     together,
 )
+from davinci_forces.identification.left_out import left_out
 from davinci_forces.identification.observations import observed, pose_samples
 from davinci_forces.identification.regression import joined, known_of, pose
 from davinci_forces.identification.scores import folds, refits
@@ -35,6 +36,7 @@ from davinci_forces.records import (
     Identifiability,
     MeasurementNoise,
     Motion,
+    Prediction,
     Residual,
     SwarmSearch,
     Trajectory,
@@ -42,6 +44,7 @@ from davinci_forces.records import (
 )
 from davinci_forces.robots.models import independent
 from davinci_forces.robots.robot import Joint, Robot
+from davinci_forces.study import LogEntry
 
 PATHS = 20  # at most, that a recording is compared with
 
@@ -86,6 +89,25 @@ def run(
         if parts:
             others = moving_with(joint.name, [part.log for part in parts], moving)
             yield from of_joint(model, parts, robot, joint, others)
+
+
+def apply(
+    motions: Collection[Motion],
+    trajectories: Iterable[Trajectory],
+    cross_fits: Iterable[CrossFit],
+    entry: LogEntry,
+    robot: Robot,
+    *,
+    lowpass: float,
+) -> Iterator[Prediction | Diagnostic]:
+    """One Prediction per estimator and joint of an identification log, by refits without some of it."""
+    if entry.role != "identification":
+        return
+    periods, refits = {t.joint: t for t in trajectories}, list(cross_fits)
+    for motion in motions:
+        if not motion.at_rest:
+            others = [fit for fit in refits if fit.group == motion.joint]
+            yield from left_out(motion, periods.get(motion.joint), others, robot.joint(motion.joint), lowpass)
 
 
 def of_joint(
