@@ -24,11 +24,11 @@ from davinci_forces.maths.uncertainty.error_band import (
     cells,
     excess,
     excess_std,
+    levels,
     means,
     units,
     without_each,
 )
-from davinci_forces.maths.uncertainty.free_space import levels
 from davinci_forces.records import Threshold, Track
 from davinci_forces.stages.forces import assess, measure
 from tests import arm

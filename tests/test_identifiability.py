@@ -10,8 +10,7 @@ from numpy.testing import assert_allclose
 from davinci_forces.estimators import estimator
 from davinci_forces.estimators.problem import Estimate, Spread, factored
 from davinci_forces.identification.identifiability import advice, hardly_described, inertia_at_fault, not_seen, together
-from davinci_forces.maths.estimation.identifiability import combinations, deviation, pairs, told
-from davinci_forces.maths.estimation.least_squares import triangle
+from davinci_forces.maths.estimation.least_squares import combinations, deviation, pairs, told, triangle
 from davinci_forces.records import Diagnostic, Identifiability
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.report.sections.joints import wanting

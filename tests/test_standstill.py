@@ -7,8 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.maths.models.independent import regressor
-from davinci_forces.maths.selection.cross_validation import path_blocks
-from davinci_forces.maths.selection.ridge import gathered
+from davinci_forces.maths.selection import gathered, path_blocks
 from davinci_forces.maths.signals.smoothing import lowpass, noise_std
 from davinci_forces.maths.signals.standstill import HOLD, standing
 from davinci_forces.records import Average, Choice, Diagnostic, Fit, Prediction, Recording, Trajectory

@@ -12,7 +12,7 @@ from davinci_forces.identification.regression import known_of
 from davinci_forces.maths.estimation.least_squares import bounded, triangle
 from davinci_forces.maths.estimation.swarm import CONSTRICTED, THESIS, search
 from davinci_forces.maths.models.independent import regressor
-from davinci_forces.maths.models.reduced_joint import reduced_parameters
+from davinci_forces.maths.models.lumping import reduced_parameters
 from davinci_forces.maths.models.terms import offset
 from davinci_forces.records import Fit, SwarmSearch
 from davinci_forces.robots.davinci import ROBOT

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from davinci_forces.maths.mechanics import kinematics, tip_force, workspace
+from davinci_forces.maths.mechanics import kinematics, tip_force
 from davinci_forces.maths.mechanics.tip_force import matrix, shared
 from davinci_forces.records import (
     ArmCorrelation,
@@ -177,11 +177,11 @@ def test_a_robot_without_a_geometry_has_no_tip():
 
 
 def test_samples_near_a_singular_pose_are_marked_and_not_judged():
-    centre = float(workspace.singular_slides(load("davinci", Path()).chain, 0.0)[0])
+    centre = float(tip_force.singular_slides(load("davinci", Path()).chain, 0.0)[0])
     q = path("davinci", centre + 0.03)
     made = run("davinci", tracks("davinci", noise(5), q), role="validation", contact=())
     force = made[TipForce]
-    near = force.condition > workspace.NEAR_SINGULAR
+    near = force.condition > tip_force.NEAR_SINGULAR
     assert 0 < near.sum() < len(T) / 2
     np.testing.assert_array_equal(force.near_singular, near)
     assert force.near_share == pytest.approx(near.mean())
@@ -193,7 +193,7 @@ def test_samples_near_a_singular_pose_are_marked_and_not_judged():
 
 def test_a_sample_at_a_singular_pose_is_not_known_and_is_no_peak():
     q, chain = path("davinci"), load("davinci", Path()).chain
-    q[1000, 2] = workspace.singular_slides(chain, q[1000, 1])[0]
+    q[1000, 2] = tip_force.singular_slides(chain, q[1000, 1])[0]
     made = run("davinci", tracks("davinci", efforts("davinci", PUSH, q), q))
     assert np.isnan(made[TipForce].f_x[1000])
     assert np.isfinite(np.delete(made[TipForce].f_x, 1000)).all()
@@ -242,7 +242,7 @@ def test_a_force_that_is_known_nowhere_is_still_shown():
     low, high = tip.component_panel(force, "z", contact).y_range
     assert low < 0.0
     assert high > 12.0
-    assert verdicts.NEAR_SINGULAR == workspace.NEAR_SINGULAR
+    assert verdicts.NEAR_SINGULAR == tip_force.NEAR_SINGULAR
     assert not tip.condition_panel(force).y_log
     assert tip.condition_panel(replace(force, near_singular=np.ones(len(T), int))).y_log
 

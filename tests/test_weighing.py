@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from davinci_forces.maths.contact.weighing import PARTS, Rows, Weighed, better, offset, weighed, widening
-from davinci_forces.maths.mechanics.load import unit_load
+from davinci_forces.maths.contact.weighing import PARTS, Rows, Weighed, better, offset, unit_load, weighed, widening
 from davinci_forces.maths.periods.shift import circular, rolled, straight
 from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Motion, Signal, Weight
 from davinci_forces.robots import dvrk_psm

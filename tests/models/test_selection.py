@@ -7,18 +7,23 @@ from numpy.testing import assert_allclose
 from davinci_forces.identification import unseen
 from davinci_forces.identification.candidates import Library
 from davinci_forces.identification.unseen import Refitted
-from davinci_forces.maths.selection.cross_validation import (
+from davinci_forces.maths.selection import (
     BLOCKS,
     MOST,
     Judged,
+    Ridge,
+    covariance,
+    gathered,
     judged,
     left_out,
     path_blocks,
+    penalty,
     preferred,
+    side_by_side,
+    solve,
     standard_error,
     together,
 )
-from davinci_forces.maths.selection.ridge import Ridge, covariance, gathered, penalty, side_by_side, solve
 from davinci_forces.robots import davinci
 from davinci_forces.robots.models import independent
 

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 
 from davinci_forces.maths.mechanics import rigid_body
-from davinci_forces.maths.mechanics.base_parameters import base_parameters
-from davinci_forces.robots import dvrk_psm_chain
+from davinci_forces.maths.mechanics.bodies import base_parameters
+from davinci_forces.robots import dvrk_psm
 from davinci_forces.robots.davinci_chain import BODIES, CHAIN
 
-PSM = dvrk_psm_chain.CHAIN
+PSM = dvrk_psm.CHAIN
 ARMS = pytest.mark.parametrize(("chain", "n"), [(CHAIN, 3), (CHAIN, 6), (CHAIN, 7), (PSM, 3), (PSM, 6)])
 
 

@@ -6,7 +6,7 @@ import pytest
 from davinci_forces.maths.mechanics import kinematics
 from davinci_forces.maths.mechanics.chain import FIXED, TableRow, denavit_hartenberg, modified_denavit_hartenberg
 from davinci_forces.robots.davinci_chain import CHAIN as DAVINCI
-from davinci_forces.robots.dvrk_psm_chain import CHAIN as PSM
+from davinci_forces.robots.dvrk_psm import CHAIN as PSM
 
 POSES = 100
 

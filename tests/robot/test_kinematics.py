@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from davinci_forces.maths.mechanics import kinematics, workspace
+from davinci_forces.maths.mechanics import kinematics, tip_force
 from davinci_forces.robots.davinci import ROBOT
 from davinci_forces.robots.davinci_chain import CHAIN
 from tests.robot import thesis_matrices as thesis
@@ -92,22 +92,22 @@ def test_the_arm_is_singular_where_the_errata_of_the_thesis_say():
     for pitch in (-0.5, -0.2, 0.1, 0.4):
         expected = sorted([-0.1101, 0.0343 * np.tan(pitch) - 0.1101])
         # The printed numbers have four digits.
-        np.testing.assert_allclose(workspace.singular_slides(CHAIN, pitch), expected, atol=1e-4)
+        np.testing.assert_allclose(tip_force.singular_slides(CHAIN, pitch), expected, atol=1e-4)
 
 
 def test_at_a_singular_slide_the_jacobian_has_no_inverse_whatever_the_roll():
     for roll, pitch in ((0.0, 0.3), (0.5, -0.4), (-0.3, 0.0)):
-        for slide in workspace.singular_slides(CHAIN, pitch):
+        for slide in tip_force.singular_slides(CHAIN, pitch):
             J_v, _ = kinematics.jacobian(CHAIN, [roll, pitch, slide])
-            assert workspace.condition(J_v) > 1e6
-            assert workspace.is_singular(CHAIN, np.array([roll, pitch, slide]))
+            assert tip_force.condition(J_v) > 1e6
+            assert tip_force.is_singular(CHAIN, np.array([roll, pitch, slide]))
 
 
 def test_inside_the_limits_the_arm_is_never_singular_and_its_condition_number_reaches_about_60():
     grid = np.stack(np.meshgrid(*[np.linspace(*pair, 21) for pair in LIMITS]), -1).reshape(-1, 3)
-    worst = workspace.condition(kinematics.jacobian(CHAIN, grid)[0]).max()
+    worst = tip_force.condition(kinematics.jacobian(CHAIN, grid)[0]).max()
     assert 55 < worst < 70
 
 
 def test_a_jacobian_without_rank_has_an_infinite_condition_number():
-    assert workspace.condition(np.zeros((3, 3))) == np.inf
+    assert tip_force.condition(np.zeros((3, 3))) == np.inf

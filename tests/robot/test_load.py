@@ -5,8 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.maths.constants import GRAVITY
+from davinci_forces.maths.contact.weighing import mirrored, moved_with, unit_load
 from davinci_forces.maths.mechanics.kinematics import frames, remote_centre
-from davinci_forces.maths.mechanics.load import mirrored, moved_with, unit_load
 from davinci_forces.robots import davinci, dvrk_psm
 
 CHAINS = {"davinci": davinci.ROBOT.chain, "dvrk_psm": dvrk_psm.ROBOT.chain}

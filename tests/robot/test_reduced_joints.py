@@ -5,10 +5,9 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import pytest
 
-from davinci_forces.maths.mechanics.bodies import Bodies
+from davinci_forces.maths.mechanics.bodies import Bodies, Drives
 from davinci_forces.maths.mechanics.chain import denavit_hartenberg
-from davinci_forces.maths.mechanics.drives import Drives
-from davinci_forces.maths.models.reduced_joint import reduced_parameters
+from davinci_forces.maths.models.lumping import reduced_parameters
 from davinci_forces.robots.davinci import ROBOT
 from davinci_forces.robots.davinci_chain import BODIES, CHAIN, DRIVES, GUESSED_LC5, in_table_frames
 

@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 
 from davinci_forces.maths.mechanics import rigid_body
-from davinci_forces.maths.mechanics.bodies import Bodies
+from davinci_forces.maths.mechanics.bodies import Bodies, Drives
 from davinci_forces.maths.mechanics.chain import Chain
-from davinci_forces.maths.mechanics.drives import Drives
-from davinci_forces.robots import dvrk_psm_chain
+from davinci_forces.robots import dvrk_psm
 from davinci_forces.robots.davinci_chain import BODIES, CHAIN, DRIVES, in_table_frames
 from tests.robot import lagrangian
 from tests.robot import thesis_matrices as thesis
@@ -102,7 +101,7 @@ def branching(seed: int = 7) -> Chain:
 
 # A coordinate may turn one link and slide another: c and b of `branching` share the second one.
 OTHERS = {
-    "dvrk": (dvrk_psm_chain.CHAIN, lagrangian.random_bodies(11)),
+    "dvrk": (dvrk_psm.CHAIN, lagrangian.random_bodies(11)),
     "placements": (branching(), lagrangian.random_bodies(7)),
 }
 

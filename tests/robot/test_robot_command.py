@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 from davinci_forces.cli import guarded
 from davinci_forces.commands import robot
 from davinci_forces.errors import BadRobot
-from davinci_forces.maths.mechanics import kinematics, rigid_body, workspace
+from davinci_forces.maths.mechanics import kinematics, rigid_body, tip_force
 from davinci_forces.robots.davinci_chain import BODIES, CHAIN
 
 KEYS = ["frames", "tip", "jacobian_v", "jacobian_w", "mass", "coriolis", "gravity", "condition", "warnings", "joints"]
@@ -72,7 +72,7 @@ def test_a_singular_pose_has_no_condition_number_and_says_why(pose):
     found = document("davinci", "--at", pose)
     assert found["condition"] is None
     assert "singular" in found["warnings"][-1]
-    assert f"above {workspace.SINGULAR:g}" in found["warnings"][-1]
+    assert f"above {tip_force.SINGULAR:g}" in found["warnings"][-1]
     assert "-0.1101" in found["warnings"][-1]
     assert "condition of J_v   singular" in asked("davinci", "--at", pose).stdout
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from davinci_forces.errors import BadRobot
-from davinci_forces.maths.mechanics import kinematics, tip_force, workspace
+from davinci_forces.maths.mechanics import kinematics, tip_force
 from davinci_forces.robots import ROBOTS, load
-from davinci_forces.robots.dvrk_psm_chain import REACH, TOOL, WRIST
+from davinci_forces.robots.dvrk_psm import REACH, TOOL, WRIST
 
 ARMS = {name: load(name, Path()) for name in ROBOTS}
 ARM = pytest.mark.parametrize("name", ARMS)
@@ -76,7 +76,7 @@ def test_the_covariance_is_that_of_forces_from_efforts_that_scatter(name: str):
 
 
 def test_at_a_singular_pose_the_force_is_not_known_and_elsewhere_it_is():
-    slide = workspace.singular_slides(DAVINCI, 0.3)[0]
+    slide = tip_force.singular_slides(DAVINCI, 0.3)[0]
     J, _ = kinematics.jacobian(DAVINCI, [[0.1, 0.3, slide], [0.1, 0.3, slide + 0.05]])
     f, C = tip_force.from_efforts(J, np.ones((2, 3)), np.eye(3))
     assert np.isnan(f[0]).all()
@@ -85,11 +85,11 @@ def test_at_a_singular_pose_the_force_is_not_known_and_elsewhere_it_is():
 
 
 def test_a_centimetre_from_the_remote_centre_is_near_singular_and_the_box_of_the_thesis_is_not():
-    centre = workspace.singular_slides(DAVINCI, 0.0)[0]
+    centre = tip_force.singular_slides(DAVINCI, 0.0)[0]
     J, _ = kinematics.jacobian(DAVINCI, [[0.0, 0.0, centre + lever] for lever in (-0.004, -0.2)])
-    assert list(workspace.condition(J) > workspace.NEAR_SINGULAR) == [True, False]
+    assert list(tip_force.condition(J) > tip_force.NEAR_SINGULAR) == [True, False]
     grid = np.stack(np.meshgrid(*[np.linspace(*joint.limits.q, 11) for joint in ARMS["davinci"].joints]), -1)
-    assert workspace.condition(kinematics.jacobian(DAVINCI, grid.reshape(-1, 3))[0]).max() < workspace.NEAR_SINGULAR
+    assert tip_force.condition(kinematics.jacobian(DAVINCI, grid.reshape(-1, 3))[0]).max() < tip_force.NEAR_SINGULAR
 
 
 def test_the_half_axes_of_the_ellipsoid_make_up_the_covariance():

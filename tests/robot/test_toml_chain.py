@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from davinci_forces import robots
 from davinci_forces.errors import BadRobot
 from davinci_forces.maths.mechanics import kinematics, rigid_body
-from davinci_forces.robots.dvrk_psm_chain import CHAIN
+from davinci_forces.robots.dvrk_psm import CHAIN
 
 TWO = """
 name = "two"

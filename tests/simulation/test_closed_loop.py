@@ -10,15 +10,13 @@ from davinci_forces.maths.mechanics import kinematics
 from davinci_forces.maths.mechanics.rigid_body import gravity
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.simulation.actuators import Regulator
-from davinci_forces.maths.simulation.closed_loop import JointConstraints, Timing, simulate
-from davinci_forces.maths.simulation.path import Path
-from davinci_forces.maths.simulation.plant import arm
-from davinci_forces.maths.simulation.surroundings import nothing
-from davinci_forces.simulation import closed_loop
+from davinci_forces.maths.simulation.closed_loop import JointConstraints, Timing, arm, simulate
+from davinci_forces.maths.simulation.surroundings import Path, nothing
+from davinci_forces.simulation import motion
 from davinci_forces.simulation.motion import SimulatedRun
 from davinci_forces.simulation.scenario.reading import load
 from davinci_forces.simulation.scenario.scenario import BadScenario, Scenario, SimulatedLog
-from davinci_forces.simulation.truth_toml import touched
+from davinci_forces.simulation.study_folder import touched
 
 G = 9.81
 SLIDE = "instrument_slide"
@@ -34,7 +32,7 @@ def log(name: str, **changes) -> SimulatedLog:
 
 
 def run(entry: SimulatedLog) -> SimulatedRun:
-    return closed_loop.run(scenario(), entry)
+    return motion.simulated(scenario(), entry)
 
 
 def identified(entry: SimulatedLog, joint: str) -> tuple[np.ndarray, np.ndarray]:
@@ -49,7 +47,7 @@ def identified(entry: SimulatedLog, joint: str) -> tuple[np.ndarray, np.ndarray]
     a, b = x[1:3], x[3:5]
     q, dq, ddq = x[0] + cos @ a + sin @ b, -sin @ (w * a) + cos @ (w * b), -cos @ (w**2 * a) - sin @ (w**2 * b)
     F = regressor(scenario().robot.joint(joint).terms, q, dq, ddq)
-    return np.linalg.lstsq(F, tau, rcond=None)[0], closed_loop.theta(scenario(), "matched")[joint]
+    return np.linalg.lstsq(F, tau, rcond=None)[0], motion.theta(scenario(), "matched")[joint]
 
 
 @pytest.mark.parametrize(("name", "joint"), [("roll", "hand_roll"), ("pitch", "hand_pitch"), ("slide", SLIDE)])
@@ -64,12 +62,12 @@ def test_recordings_with_matched_friction_have_the_parameters_that_were_put_in(n
 
 
 def test_the_slides_parameters_are_its_links_masses_and_its_rotor():
-    theta = closed_loop.theta(scenario(), "matched")[SLIDE]
+    theta = motion.theta(scenario(), "matched")[SLIDE]
     assert theta == pytest.approx([0.079 + 0.079 + 0.04 + 0.01, 1340.0**2 * 1e-6, 3.2723, 3.9840], rel=1e-9)
 
 
 def test_friction_that_no_joint_model_has_leaves_no_parameters_to_be_true():
-    assert closed_loop.theta(scenario(), "realistic") == {}
+    assert motion.theta(scenario(), "realistic") == {}
 
 
 def test_the_same_scenario_gives_the_same_motion():
@@ -132,7 +130,7 @@ def test_gains_that_the_ticks_are_too_slow_for_are_refused():
     nowhere = {name: replace(joint, stops=(-np.inf, np.inf)) for name, joint in scenario().joints.items()}
     unstable = replace(scenario(), arm=replace(what, control=wild, motors=limits), joints=nowhere)
     with pytest.raises(BadScenario, match="log matched-roll-contact: the loop is unstable"):
-        closed_loop.run(unstable, log("matched-roll-contact", duration=5.0, lead=0.0, external={}))
+        motion.simulated(unstable, log("matched-roll-contact", duration=5.0, lead=0.0, external={}))
 
 
 def test_slow_motion_shows_friction_with_hysteresis_and_asymmetry():

@@ -7,9 +7,9 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from davinci_forces.maths.simulation.actuators import Motors, Regulator
+from davinci_forces.maths.simulation.closed_loop import arm
 from davinci_forces.maths.simulation.continuous import Regulated, regulate
 from davinci_forces.maths.simulation.control import current_after, pi
-from davinci_forces.maths.simulation.plant import arm
 from davinci_forces.robots.davinci import ROBOT
 
 K_P = np.array([500, 500, 500, 10, 10, 1.0])  # Table 5.1

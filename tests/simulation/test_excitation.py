@@ -7,8 +7,16 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from davinci_forces.maths.excitation.criterion import condition, determinant, triangle
-from davinci_forces.maths.excitation.fourier import Fourier, instants, motion, observation, ranges
+from davinci_forces.maths.excitation.fourier import (
+    Fourier,
+    condition,
+    determinant,
+    instants,
+    motion,
+    observation,
+    ranges,
+    triangle,
+)
 from davinci_forces.maths.excitation.joint import ExcitationProblem, design, impossible, within
 from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.independent import regressor

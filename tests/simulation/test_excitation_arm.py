@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from davinci_forces.maths.excitation.arm import ArmExcitationProblem, arm_observation, arm_problem, design_together
-from davinci_forces.maths.excitation.criterion import determinant
-from davinci_forces.maths.excitation.fourier import Fourier, instants, motion
+from davinci_forces.maths.excitation.fourier import Fourier, determinant, instants, motion
 from davinci_forces.maths.excitation.joint import ExcitationProblem, design
 from davinci_forces.maths.mechanics.rigid_body import inverse_dynamics
 from davinci_forces.robots.davinci import ROBOT

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from davinci_forces.maths.excitation.fourier import Fourier, motion
-from davinci_forces.maths.excitation.run_in import run_in, shortest
+from davinci_forces.maths.excitation.fourier import Fourier, motion, run_in, shortest
 
 SERIES = Fourier(0.05, (0.2, 0.2), (0.1, 0.3), 10.0)
 

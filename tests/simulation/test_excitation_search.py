@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from davinci_forces.maths.excitation.directions import delayed, extremes, fitted, from_standstill
 from davinci_forces.maths.excitation.fourier import Fourier, motion, ranges
+from davinci_forces.maths.excitation.joint import delayed, extremes, fitted, from_standstill
 from davinci_forces.maths.excitation.search import descend, lowest
 
 LIMITS = ((-0.3, 0.5), (-1.0, 0.2), (-np.inf, 2.0))

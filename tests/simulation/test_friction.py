@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from davinci_forces.maths.simulation.friction import Friction, bristle, level, steady
+from davinci_forces.maths.simulation.step import Friction, bristle, level, steady
 
 ONE = np.ones(1)
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from davinci_forces import robots
 from davinci_forces.maths.simulation.actuators import Regulator
-from davinci_forces.maths.simulation.path import Path
+from davinci_forces.maths.simulation.surroundings import Path
 from davinci_forces.robots.davinci import ROBOT
 from davinci_forces.simulation.scenario.reading import _scenario, load, shipped
 from davinci_forces.simulation.scenario.scenario import BadScenario, ForceSensor

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from davinci_forces.maths.mechanics import kinematics, rigid_body
+from davinci_forces.maths.simulation.closed_loop import arm
 from davinci_forces.maths.simulation.continuous import at
-from davinci_forces.maths.simulation.plant import arm
 from davinci_forces.robots.davinci import ROBOT
 
 random = np.random.default_rng(4)

@@ -6,10 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
+from davinci_forces.maths.simulation.closed_loop import arm
 from davinci_forces.maths.simulation.continuous import at as dynamics
-from davinci_forces.maths.simulation.friction import Friction
-from davinci_forces.maths.simulation.plant import arm
-from davinci_forces.maths.simulation.step import State, middle, step
+from davinci_forces.maths.simulation.step import Friction, State, middle, step
 from davinci_forces.robots.davinci import ROBOT
 
 G = 9.81

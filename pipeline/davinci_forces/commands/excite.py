@@ -40,14 +40,14 @@ def run(
     starts may find more. All joints of an arm take minutes; each start is told of when it is done.
     """
     from davinci_forces.errors import BadRequest
-    from davinci_forces.simulation.excitation import table, trajectory
+    from davinci_forces.simulation.excitation import trajectory
     from davinci_forces.simulation.excitation.request import Request, answer
 
     request = Request(robot, joint, evaluate, period, harmonics, criterion, (q, dq, ddq), starts, seed, samples)
     answered = answer(request, _say)
     try:
         if csv:
-            csv.write_text(table.csv(answered.trajectories, rate, run_in), encoding="utf-8", newline="\n")
+            csv.write_text(trajectory.table(answered.trajectories, rate, run_in), encoding="utf-8", newline="\n")
         if plot:
             trajectory.plot(answered.trajectories, plot)
     except OSError as error:

@@ -69,7 +69,7 @@ def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]
     import numpy as np
 
     from davinci_forces.errors import BadRequest
-    from davinci_forces.maths.mechanics import kinematics, workspace
+    from davinci_forces.maths.mechanics import kinematics, tip_force
 
     chain = robot.chain
     if chain is None and (q or dq):
@@ -85,7 +85,7 @@ def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]
     pose, rates = np.array(q), np.array(dq + [0.0] * (len(q) - len(dq)))
     T = kinematics.frames(chain, pose)
     J_v, J_w = kinematics.jacobian(chain, pose)
-    singular = bool(workspace.is_singular(chain, pose))
+    singular = bool(tip_force.is_singular(chain, pose))
     return {
         "frames": {
             name: {"origin": t[:3, 3].tolist(), "rotation": t[:3, :3].tolist()}
@@ -95,7 +95,7 @@ def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]
         "jacobian_v": J_v.tolist(),
         "jacobian_w": J_w.tolist(),
         **_dynamics(robot, pose, rates),
-        "condition": None if singular else float(workspace.condition(J_v[..., : workspace.ARM])),
+        "condition": None if singular else float(tip_force.condition(J_v[..., : tip_force.ARM])),
         "warnings": _outside(robot, q) + ([_singular(chain, q)] if singular else []),
         "joints": _joints(robot),
     }
@@ -147,7 +147,7 @@ def _outside(robot: "Robot", q: list[float]) -> list[str]:
 
 def _singular(chain: Any, q: list[float]) -> str:
     """Why the pose has no condition number, and where such poses lie."""
-    from davinci_forces.maths.mechanics.workspace import ARM, SINGULAR, singular_slides
+    from davinci_forces.maths.mechanics.tip_force import ARM, SINGULAR, singular_slides
 
     kinds = [set(chain.slides[chain.coordinate == k].tolist()) for k in range(ARM)]
     of_a_slide = kinds == [{False}, {False}, {True}]

@@ -11,7 +11,7 @@ from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators.problem import ALIKE, CONDITION, Estimate, Regression, Spread
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation.correlation import correlated
-from davinci_forces.maths.estimation.identifiability import not_told_apart
+from davinci_forces.maths.estimation.least_squares import not_told_apart
 
 NAME = "instrumental variables"
 LAG = 3  # samples before and after: beyond the reach of what a low-pass leaves of noise

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.estimation.correlation import correlated
-from davinci_forces.maths.estimation.identifiability import not_told_apart
-from davinci_forces.maths.estimation.least_squares import Triangle, triangle
+from davinci_forces.maths.estimation.least_squares import Triangle, not_told_apart, triangle
 from davinci_forces.maths.models.physical import Box
 
 ROUNDING = 1e-13  # of the longest column, below which one is nothing but rounding

@@ -20,8 +20,8 @@ from davinci_forces.haptics.maths.simulated_loop import Axis, Clocks, Felt, Felt
 from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, AxisNoise, Body, HapticScenario
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.models.bias import Coefficients
-from davinci_forces.maths.simulation.friction import Friction
-from davinci_forces.maths.simulation.path import Path
+from davinci_forces.maths.simulation.step import Friction
+from davinci_forces.maths.simulation.surroundings import Path
 
 FREE = np.zeros((0, 2))  # nobody puts the hand anywhere
 PRESS, MORE = 10.0, 0.3  # [N] that a hand presses with, and share of it that is let go of at once

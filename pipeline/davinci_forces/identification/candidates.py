@@ -14,8 +14,7 @@ from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.model import Model
 from davinci_forces.maths.models.terms import Term, presliding
-from davinci_forces.maths.selection.cross_validation import Judged, judged, together
-from davinci_forces.maths.selection.ridge import Equations, Ridge, solve
+from davinci_forces.maths.selection import Equations, Judged, Ridge, judged, solve, together
 from davinci_forces.robots.models import ARM, AddedFriction, Reach, coupled, frictions, independent, rounded
 from davinci_forces.robots.robot import Robot
 

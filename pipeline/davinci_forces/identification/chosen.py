@@ -11,8 +11,18 @@ from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.estimation.conic import nearest
 from davinci_forces.maths.estimation.least_squares import Triangle
 from davinci_forces.maths.models.model import Model
-from davinci_forces.maths.selection.cross_validation import BLOCKS, MOST, Judged, left_out, preferred, standard_error
-from davinci_forces.maths.selection.ridge import Equations, Ridge, covariance, scaled_equations
+from davinci_forces.maths.selection import (
+    BLOCKS,
+    MOST,
+    Equations,
+    Judged,
+    Ridge,
+    covariance,
+    left_out,
+    preferred,
+    scaled_equations,
+    standard_error,
+)
 from davinci_forces.robots.models import Reach
 from davinci_forces.robots.robot import Robot
 

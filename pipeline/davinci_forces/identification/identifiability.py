@@ -6,7 +6,7 @@ import numpy as np
 
 from davinci_forces.estimators.problem import Estimate, Regression
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.estimation.identifiability import Told, combinations, deviation, pairs
+from davinci_forces.maths.estimation.least_squares import Told, combinations, deviation, pairs
 from davinci_forces.robots import ROBOTS
 from davinci_forces.robots.robot import Joint, Robot
 

@@ -16,7 +16,7 @@ from davinci_forces.identification.used import ANOTHER_PATH, SAME_PATH
 from davinci_forces.maths.arrays import Array, Integers
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.periods import averaging
-from davinci_forces.maths.selection.cross_validation import BLOCKS
+from davinci_forces.maths.selection import BLOCKS
 from davinci_forces.records import (
     CrossFit,
     Diagnostic,

@@ -10,8 +10,7 @@ from davinci_forces.identification.regression import joined_motion, recorded_mot
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.memory import pieces
 from davinci_forces.maths.models.model import ArmMotion, Model
-from davinci_forces.maths.selection.cross_validation import BLOCKS, MOST, path_blocks, repetitions
-from davinci_forces.maths.selection.ridge import Equations, gathered, side_by_side
+from davinci_forces.maths.selection import BLOCKS, MOST, Equations, gathered, path_blocks, repetitions, side_by_side
 from davinci_forces.maths.signals.smoothing import reach, smoothed
 from davinci_forces.records import Average, Motion, Trajectory
 

@@ -16,8 +16,7 @@ from davinci_forces.identification.used import ANOTHER_PATH, SAME_PATH
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.memory import efforts
 from davinci_forces.maths.models.model import Model
-from davinci_forces.maths.selection.cross_validation import BLOCKS, MOST
-from davinci_forces.maths.selection.ridge import Equations, Ridge, solve
+from davinci_forces.maths.selection import BLOCKS, MOST, Equations, Ridge, solve
 from davinci_forces.records import Prediction
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.robots.models import Reach

@@ -1,10 +1,14 @@
-"""The first-generation da Vinci arm of the thesis: hand roll, hand pitch and instrument slide."""
+"""The first-generation da Vinci arm of the thesis: hand roll, hand pitch and instrument slide.
+
+With what the thesis prints of it: its excitation trajectories, the parameters of its joints and what is wrong with
+them, and the control studies of chapter 5.
+"""
+
+from math import pi
 
 from davinci_forces.maths.models.terms import coulomb, gravity_cos, gravity_sin, inertia, lifted_mass, viscous
-from davinci_forces.robots import davinci_physical, davinci_printed
-from davinci_forces.robots.davinci_chain import BODIES, CHAIN, DRIVES, WRIST
-from davinci_forces.robots.davinci_control import CONTROL
-from davinci_forces.robots.robot import Joint, Kind, Limits, Robot
+from davinci_forces.robots.davinci_chain import BODIES, CHAIN, DRIVES, PITCH_PARTS, ROLL_PARTS, SLIDE_PARTS, WRIST
+from davinci_forces.robots.robot import ControlStudy, Joint, Kind, Limits, Printed, PrintedColumn, Robot
 
 TORQUE_CONSTANT = 0.0438  # [N m/A], of every motor.  Table 6.3
 # Table 6.1 as printed; the roll's b1 and the slide's a0 are misprints, for their rows do not give their objectives or
@@ -21,6 +25,76 @@ INSERTION = (
 HAND = Limits(q=(-0.6, 0.6), dq=(-1.2, 1.2), ddq=(-1.2, 1.2))  # Table 6.2
 SLIDE = Limits(q=(-0.0672, 0.1097), dq=(-2.0, 2.0), ddq=(-3.0, 3.0))
 
+# The parameters that the thesis prints, Tables 6.4 to 6.6, and what is wrong with them.
+GUESSES = "The printed error of the initial guesses does not belong to the printed guesses."
+ROLL_PRINTED = Printed(
+    "Table 6.4",
+    (
+        PrintedColumn("", (0.3843, 0.194, 1.0, 1.0), 1.3899),
+        PrintedColumn("wlse", (0.4521, 0.0110, 0.3707, 0.2203), 0.0199),
+        PrintedColumn("lse", (0.4528, 0.0103, 0.3706, 0.21968), 0.0197),
+        PrintedColumn("pso", (0.4528, 0.0103, 0.3705, 0.2197), 0.0197),
+    ),
+    (GUESSES, "The guessed inertia of 0.3843 cannot be reproduced from Tables 4.1 and 4.2."),
+)
+PITCH_PRINTED = Printed(
+    "Table 6.5",
+    (
+        PrintedColumn("", (0.2961, 1.9475, 0.115, 1.0, 0.1), 2.9145),
+        PrintedColumn("wlse", (0.2381, 0.1350, 0.064, 0.9110, 0.4151), 0.0461),
+        PrintedColumn("lse", (0.2384, 0.1343, 0.0705, 0.9064, 0.4155), 0.0460),
+        PrintedColumn("pso", (0.2406, 0.1345, 0.0704, 0.9061, 0.4156), 0.0460),
+    ),
+    (
+        GUESSES,
+        "The guessed 0.115 of gravity's cosine was computed with +0.01 (m3 + m4) in place of −0.01 (m3 + m4).",
+        "The 0.064 that weighted least squares are said to find for it should be about 0.070.",
+    ),
+)
+SLIDE_PRINTED = Printed(
+    "Table 6.6",
+    (
+        PrintedColumn("", (0.141, 1e-6, 1.0, 3.0), 8.8435),
+        PrintedColumn("wlse", (2.4610, -0.0750, 3.2723, 3.9842), 1.8100),
+        PrintedColumn("lse", (2.5626, -0.0712, 3.2723, 3.9840), 1.8101),
+        PrintedColumn("pso", (2.485, 0.0003, 3.1939, 3.9975), 2.2986),
+    ),
+    (
+        GUESSES,
+        "The guessed mass of 0.141 kg cannot be reproduced from Tables 4.1 and 4.2.",
+        "The 2.4610 kg that weighted least squares are said to find should be about 2.561.",
+        "The error of 2.2986 of the swarm is not what its bounds cost, which is 0.0007: the swarm stuck.",
+        "The sign of the inertia is 0.3 standard deviations from zero: it was not seen.",
+    ),
+)
+
+# Tables 5.1 and 5.4: hand roll, hand pitch, instrument slide, instrument roll, pitch and yaw.
+K_P = (500.0, 500.0, 500.0, 10.0, 10.0, 1.0)
+K_D = (50.0, 50.0, 40.0, 2.0, 0.2, 0.02)
+K_I = (50.0, 50.0, 40.0, 2.0, 1.0, 0.1)
+NONE = (0.0,) * 6
+# Tables 5.2 and 5.3, which start the slide at 0.2 m, beyond its limit of Table 6.2, which the simulation does not have.
+POSE = (-pi / 8, pi / 8, 0.2, -pi / 4, -pi / 4, -pi / 4)
+# The thesis does not state the friction of its simulation; this is that of the initial guesses of Tables 6.4-6.6.
+VISCOUS = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
+LIGHT = "gravity compensated with 0.9 of the masses"
+CONTROL = (
+    ControlStudy(
+        "pd-to-zero", "PD with gravity compensation, from the pose to zero",
+        POSE, NONE, K_P, K_D, NONE, VISCOUS, known_masses=1.0, duration=3.0,
+    ),
+    ControlStudy(
+        "pd-to-pose", "PD with gravity compensation, from zero to the pose",
+        NONE, POSE, K_P, K_D, NONE, VISCOUS, known_masses=1.0, duration=3.0,
+    ),
+    ControlStudy(
+        "pd-light", f"PD, {LIGHT}", NONE, POSE, K_P, K_D, NONE, VISCOUS, known_masses=0.9, duration=60.0,
+    ),
+    ControlStudy(
+        "pid-light", f"PID, {LIGHT}", NONE, POSE, K_P, K_D, K_I, VISCOUS, known_masses=0.9, duration=60.0,
+    ),
+)  # fmt: skip
+
 ROBOT = Robot(
     name="davinci",
     title="da Vinci arm, first generation",
@@ -34,8 +108,8 @@ ROBOT = Robot(
             gear_ratio=200.0,
             torque_constant=TORQUE_CONSTANT,
             published=ROLL,
-            physical=davinci_physical.ROLL,
-            printed=davinci_printed.ROLL,
+            physical=ROLL_PARTS,
+            printed=ROLL_PRINTED,
         ),
         Joint(
             name="hand_pitch",
@@ -46,8 +120,8 @@ ROBOT = Robot(
             gear_ratio=200.0,
             torque_constant=TORQUE_CONSTANT,
             published=PITCH,
-            physical=davinci_physical.PITCH,
-            printed=davinci_printed.PITCH,
+            physical=PITCH_PARTS,
+            printed=PITCH_PRINTED,
         ),
         Joint(
             name="instrument_slide",
@@ -58,8 +132,8 @@ ROBOT = Robot(
             gear_ratio=1340.0,
             torque_constant=TORQUE_CONSTANT,
             published=INSERTION,
-            physical=davinci_physical.SLIDE,
-            printed=davinci_printed.SLIDE,
+            physical=SLIDE_PARTS,
+            printed=SLIDE_PRINTED,
         ),
     ),
     chain=CHAIN,

@@ -1,15 +1,19 @@
 """The chain and the bodies of the da Vinci's hand and tool: Tables 3.1, 4.1 and 4.2 as data.
 
 z0 points up, the hand rolls about +y0, and at q = 0 the tool points along -z0.
+
+Of the physical parameters of its joints, 12, 21 and 7, they are the first guesses, by which the thesis computed those
+of Tables 6.4-6.6.  It does not print the box in which it searched.  This one holds every value that such a link or
+motor could have, and no more, the same for all of a kind.
 """
 
 from math import pi
 
 import numpy as np
 
-from davinci_forces.maths.mechanics.bodies import Bodies, cylinder
+from davinci_forces.maths.mechanics.bodies import Bodies, Drives, cylinder
 from davinci_forces.maths.mechanics.chain import TableRow, denavit_hartenberg
-from davinci_forces.maths.mechanics.drives import Drives
+from davinci_forces.maths.models.physical import Physical, PhysicalTable, Quality
 
 # Table 3.1: name, carried by, alpha [rad], a [m], d [m], theta [rad], coordinate (the index of its q).
 CHAIN = denavit_hartenberg(
@@ -46,6 +50,24 @@ CYLINDERS = (
 )
 HOLDER = CHAIN.links.index("5")
 GUESSED_LC5 = 0.2  # [m] with which the initial guesses of Tables 6.4-6.6 were computed; Table 4.1 prints 0.3
+WRIST = ("instrument_roll", "instrument_pitch", "instrument_yaw", "grip")
+# Gear ratios of Table 6.3; friction of the initial guesses of Tables 6.4-6.6, which say nothing of the wrist; the
+# motors' inertia is neglected (4.29).
+DRIVES = Drives(
+    gear_ratio=np.array([200.0, 200.0, 1340.0, 7.5, 12.4, 12.0, 12.0]),
+    motor_inertia=np.zeros(7),
+    viscous=np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]),
+    coulomb=np.array([1.0, 0.1, 3.0, 0.0, 0.0, 0.0, 0.0]),
+)
+BOX = {
+    Quality.MASS: (0.0, 5.0),  # [kg]
+    Quality.CENTRE: (0.0, 0.6),  # [m]; the longest bar measures 0.515 m
+    Quality.MOMENT: (0.0, 0.1),  # [kg m^2]
+    Quality.ROTOR: (0.0, 5e-5),  # [kg m^2]
+    Quality.VISCOUS: (0.0, 20.0),
+    Quality.COULOMB: (0.0, 20.0),
+}
+AXES = {"x": 0, "y": 1, "z": 2}
 
 
 def bodies(lc5: float = -CYLINDERS[HOLDER][5]) -> Bodies:
@@ -70,12 +92,59 @@ def in_table_frames(lc5: float = -CYLINDERS[HOLDER][5]) -> Bodies:
 
 BODIES = bodies()
 
-WRIST = ("instrument_roll", "instrument_pitch", "instrument_yaw", "grip")
-# Gear ratios of Table 6.3; friction of the initial guesses of Tables 6.4-6.6, which say nothing of the wrist; the
-# motors' inertia is neglected (4.29).
-DRIVES = Drives(
-    gear_ratio=np.array([200.0, 200.0, 1340.0, 7.5, 12.4, 12.0, 12.0]),
-    motor_inertia=np.zeros(7),
-    viscous=np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0, 0.0]),
-    coulomb=np.array([1.0, 0.1, 3.0, 0.0, 0.0, 0.0, 0.0]),
+
+GUESSED = in_table_frames(GUESSED_LC5)
+
+
+def motor(joint: int) -> tuple[Physical, ...]:
+    """The rotor's inertia, and the friction of motor and joint together."""
+    guesses = (
+        (f"Jm{joint + 1}", Quality.ROTOR, DRIVES.motor_inertia),
+        (f"v{joint + 1}", Quality.VISCOUS, DRIVES.viscous),
+        (f"c{joint + 1}", Quality.COULOMB, DRIVES.coulomb),
+    )
+    return tuple(Physical(name, quality, float(x[joint]), *BOX[quality]) for name, quality, x in guesses)
+
+
+def masses(*links: str) -> tuple[Physical, ...]:
+    """Masses by link."""
+    at = map(CHAIN.links.index, links)
+    guesses = zip(links, GUESSED.masses[list(at)].tolist(), strict=True)
+    return tuple(Physical(f"m{link}", Quality.MASS, guess, *BOX[Quality.MASS], link) for link, guess in guesses)
+
+
+def centres(*links: str) -> tuple[Physical, ...]:
+    """How far centres of mass are from the origins of the links' frames, along the axis that they lie on."""
+    found = []
+    for link in links:
+        centre = GUESSED.centres[CHAIN.links.index(link)]
+        axis = int(np.abs(centre).argmax())
+        found.append(Physical(f"lc{link}", Quality.CENTRE, float(-centre[axis]), *BOX[Quality.CENTRE], link, axis))
+    return tuple(found)
+
+
+def moments(*named: str) -> tuple[Physical, ...]:
+    """Moments of inertia, by axis and link."""
+    found = []
+    for name in named:
+        axis, link = AXES[name[0]], name[1:]
+        guess = float(GUESSED.inertias[CHAIN.links.index(link), axis, axis])
+        found.append(Physical(f"I{name}", Quality.MOMENT, guess, *BOX[Quality.MOMENT], link, axis))
+    return tuple(found)
+
+
+def table(joint: int, *parameters: tuple[Physical, ...]) -> PhysicalTable:
+    """The physical parameters of a joint of the arm's three."""
+    return PhysicalTable(CHAIN, joint, 3, (*motor(joint), *(x for part in parameters for x in part)))
+
+
+# (6.7) leaves out links 6 to 9.
+ROLL_PARTS = table(0, masses("3", "4", "5"), centres("3", "5"), moments("y2", "y3", "x4", "x5"))
+# (6.10) leaves out Iz7, which only adds to Iy6; the print's signs do not matter, for the chain says how each enters.
+PITCH_PARTS = table(
+    1,
+    masses("3", "4", "5", "6", "7", "8", "9L"),
+    centres("3", "5", "6", "7", "8", "9L"),
+    moments("z3", "y5", "y6", "y8", "y9L"),
 )
+SLIDE_PARTS = table(2, masses("6", "7", "8", "9L"))

@@ -1,13 +1,49 @@
-"""The same arm driven by the da Vinci Research Kit, which logs effort at the joint, already in N m and N."""
+"""The same arm driven by the da Vinci Research Kit, which logs effort at the joint, already in N m and N.
+
+The chain is from its published geometry.  The base frame is where the back link is pivoted, z up and y along the axis
+of the yaw; the remote centre lies on that axis, at (0, L2, 0), and at q = 0 the tool points along -z through it.  Two
+bars that stay parallel to the axis of the yaw carry the end link, which turns about the remote centre without being
+held there.  Masses are not published.
+
+Wang, Gondokaryono, Munawar and Fischer, A convex optimization-based dynamic model identification package for the da
+Vinci Research Kit, 2019.
+"""
 
 from dataclasses import replace
+from math import pi
 
+from davinci_forces.maths.mechanics.chain import TableRow, modified_denavit_hartenberg
 from davinci_forces.robots import davinci
-from davinci_forces.robots.dvrk_psm_chain import CHAIN, TOOL
 from davinci_forces.robots.robot import Robot, Tool
 
-# Excitation trajectories of the public identification data have six harmonics (Wang et al. 2019).
-HARMONICS = 6
+L1, L2, L3 = 0.096, 0.516, 0.04009  # [m] of the bars and the back link
+H1, H2 = 0.14454, 0.03808  # [m] from the back link's corner to the lower bar, and on to the upper one
+CARRIAGE = 0.04009  # [m] of the carriage from the end link's axis
+REACH = 0.4318  # [m] from the remote centre to the carriage at q3 = 0, along the tool
+TOOL, WRIST = 0.4162, 0.0091  # [m] of the tool's shaft, and from the wrist's pitch to its yaw
+
+ROLL, PITCH, SLIDE, TOOL_ROLL, WRIST_PITCH, WRIST_YAW = range(6)
+
+CHAIN = modified_denavit_hartenberg(
+    [
+        TableRow("yaw", "0", pi / 2, 0.0, 0.0, pi / 2, ROLL),  # turns about -y
+        TableRow("back_link", "yaw", -pi / 2, 0.0, 0.0, -pi / 2, PITCH),  # turns about -x
+        TableRow("back_link_corner", "back_link", 0.0, L3, 0.0, pi / 2),
+        TableRow("lower_bar", "back_link_corner", 0.0, H1, 0.0, pi / 2, PITCH, sign=-1),
+        TableRow("upper_bar", "back_link_corner", 0.0, H1 + H2, 0.0, pi / 2, PITCH, sign=-1),
+        TableRow("end_link", "lower_bar", 0.0, L2, 0.0, 0.0, PITCH),
+        TableRow("front_link", "lower_bar", 0.0, L1, 0.0, pi, PITCH),
+        TableRow("carriage", "end_link", -pi / 2, CARRIAGE, H1 - REACH, 0.0, SLIDE, slides=True),
+        TableRow("counterweight", "back_link", -pi / 2, L3, 0.0, 0.0, SLIDE, slides=True),
+        TableRow("tool_roll", "carriage", 0.0, 0.0, TOOL, 0.0, TOOL_ROLL),
+        TableRow("wrist_pitch", "tool_roll", pi / 2, 0.0, 0.0, pi / 2, WRIST_PITCH),
+        TableRow("wrist_yaw", "wrist_pitch", -pi / 2, WRIST, 0.0, pi / 2, WRIST_YAW),
+    ],
+    tip="wrist_yaw",
+)
+
+
+HARMONICS = 6  # of the excitation trajectories of the public identification data.  Wang et al. 2019
 
 ROBOT = Robot(
     name="dvrk_psm",

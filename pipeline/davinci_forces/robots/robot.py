@@ -7,9 +7,8 @@ from enum import Enum
 from typing import NamedTuple
 
 from davinci_forces.errors import BadRobot
-from davinci_forces.maths.mechanics.bodies import Bodies
+from davinci_forces.maths.mechanics.bodies import Bodies, Drives
 from davinci_forces.maths.mechanics.chain import Chain
-from davinci_forces.maths.mechanics.drives import Drives
 from davinci_forces.maths.models.physical import PhysicalTable
 from davinci_forces.maths.models.terms import Term
 

@@ -1,14 +1,19 @@
 """A simulated study on disk: every log, study.toml and truth.toml, put in place when all of it is there."""
 
+import json
 import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
+
 from davinci_forces.errors import BadRequest
-from davinci_forces.simulation import closed_loop, prescribed, study_toml, truth_toml, writers
-from davinci_forces.simulation.motion import SimulatedRun
-from davinci_forces.simulation.scenario.scenario import Scenario, SensorNoise, SimulatedLog
+from davinci_forces.maths.excitation.fourier import Fourier
+from davinci_forces.simulation import writers
+from davinci_forces.simulation.motion import SimulatedRun, hung_at, simulated, theta
+from davinci_forces.simulation.scenario.scenario import Scenario, SensorNoise, SimulatedLog, SimulatedPush
 from davinci_forces.simulation.sensors import SimulatedChannel, generator, record, record_force
 
 TRUTH = "truth.toml"
@@ -28,8 +33,8 @@ def write(scenario: Scenario, folder: Path, force: bool, say: Callable[[str], No
         new, old = Path(temporary) / "new", Path(temporary) / "old"
         new.mkdir()
         entries, truths = zip(*(_log(scenario, log, new, say) for log in scenario.logs), strict=True)
-        _text(new / "study.toml", study_toml.study(scenario, entries))
-        _text(new / TRUTH, truth_toml.truth(scenario, truths))
+        _text(new / "study.toml", study_text(scenario, entries))
+        _text(new / TRUTH, truth_text(scenario, truths))
         if folder.exists():
             folder.rename(old)
         shutil.move(new, folder)
@@ -50,12 +55,12 @@ def check(folder: Path, force: bool) -> None:
 
 
 def _log(scenario: Scenario, log: SimulatedLog, folder: Path, say: Callable[[str], None]) -> tuple[str, str]:
-    run = closed_loop.run(scenario, log) if scenario.arm else prescribed.simulate(scenario, log)
+    run = simulated(scenario, log)
     channels, path = recorded(scenario, log, run), folder / log.file
     writers.write(path, channels, scenario.rate, scenario.started)
     size = path.stat().st_size / 1e6
     say(f"{log.name}: {len(run.t)} samples of {', '.join(log.joints)} -> {log.file}, {size:.2f} MB")
-    return study_toml.entry(scenario, log, path, channels), truth_toml.entry(log, run)
+    return study_entry(scenario, log, path, channels), truth_entry(log, run)
 
 
 def recorded(scenario: Scenario, log: SimulatedLog, run: SimulatedRun) -> list[SimulatedChannel]:
@@ -77,3 +82,100 @@ def noise_of(scenario: Scenario, family: str, joint: str) -> SensorNoise:
 
 def _text(file: Path, text: str) -> None:
     file.write_text(text, encoding="utf-8", newline="\n")
+
+
+def study_text(scenario: Scenario, entries: Sequence[str]) -> str:
+    """The whole of study.toml."""
+    head = f"title = {toml(scenario.title)}\nrobot = {toml(scenario.robot.name)}\nsimulated = true\n"
+    return "# Written by `davinci-forces simulate`: simulated data.\n" + "\n".join([head, *entries])
+
+
+def study_entry(scenario: Scenario, log: SimulatedLog, path: Path, channels: Sequence[SimulatedChannel]) -> str:
+    """The [[log]] of one recording in study.toml."""
+    lines = ["[[log]]", f"name = {toml(log.name)}", f"file = {toml(log.file)}", f"role = {toml(log.role)}"]
+    periods = {move.period for move in log.moves.values() if isinstance(move, Fourier)}
+    if len(periods) == 1 and log.role in ("identification", "validation"):
+        lines.append(f"period = {toml(periods.pop())}")
+    if log.skip:
+        lines.append(f"skip = {toml(log.skip)}")
+    if log.windows:
+        lines.append(f"contact = {toml([list(window) for window in log.windows])}")
+    if log.role == "weight":
+        place = [round(float(x), 4) for x in hung_at(scenario)]
+        joint = toml(scenario.robot.joints[-1].name)
+        lines.append(f"weight = {{ mass = {toml(log.mass)}, moves_with = {joint}, position = {toml(place)} }}")
+    lines.append("[log.channels]")
+    for channel in channels:
+        name = toml(writers.named(path, channel))
+        if channel.quantity == "time":
+            lines.append(f"time = {name}")
+        else:
+            lines.append(f"{toml(channel.quantity)} = {{ channel = {name}, unit = {toml(channel.unit)} }}")
+    return "\n".join(lines) + "\n"
+
+
+def toml(value: object) -> str:
+    """A text, a number, true or false, or a list of them; TOML writes them as JSON does."""
+    return json.dumps(value, ensure_ascii=False)
+
+
+def truth_text(scenario: Scenario, entries: Sequence[str]) -> str:
+    """The whole of truth.toml: parameters and noise of each joint, by family where there are any, then the logs."""
+    lines = ["# What is true of the simulated recordings of this study.", "simulated = true"]
+    lines += [f"scenario = {toml(scenario.name)}", f"seed = {scenario.seed}"]
+    if scenario.arm is None:
+        lines += _theta("theta", scenario, {name: np.array(j.theta) for name, j in scenario.joints.items()})
+        for name, simulated in scenario.joints.items():
+            lines += _noise(f"noise.{name}", simulated.noise)
+    else:
+        for name, family in scenario.arm.families.items():
+            lines += _theta(f"theta.{name}", scenario, theta(scenario, name))
+            for joint, noise in family.noise.items():
+                lines += _noise(f"noise.{name}.{joint}", noise)
+    return "\n".join([*lines, "", *entries])
+
+
+def truth_entry(log: SimulatedLog, run: SimulatedRun) -> str:
+    """The [[log]] of one recording in truth.toml: what was pushed when, what hung there, when anything was touched."""
+    lines = ["[[log]]", f"name = {toml(log.name)}", f"role = {toml(log.role)}"]
+    if log.family:
+        lines.append(f"family = {toml(log.family)}")
+    if log.mass:
+        lines.append(f"mass = {toml(log.mass)}")
+    if log.sensor:
+        lines.append(f"sensor = {{ noise = {toml(log.sensor.noise)}, lag = {toml(log.sensor.lag)} }}")
+    if log.tissue:
+        lines += [f"stiffness = {toml(log.tissue.stiffness)}", f"surface = {toml(log.tissue.surface)}"]
+        lines.append(f"touched = {toml(touched(run))}")
+    for joint, pushes in log.external.items():
+        for push in pushes:
+            lines += ["", "[[log.push]]", f"joint = {toml(joint)}", *_push(push)]
+    for push in log.tip:
+        lines += ["", "[[log.push]]", f"direction = {toml(push.direction)}", *_push(push)]
+    return "\n".join(lines) + "\n"
+
+
+def touched(run: SimulatedRun) -> list[list[float]]:
+    """When the tip touched something: [onset, end] of each time [s], to a sample."""
+    if run.force is None:
+        return []
+    contact = np.concatenate([[False], np.linalg.norm(run.force, axis=1) > 0, [False]])
+    edges = np.flatnonzero(contact[1:] != contact[:-1])
+    return [[float(run.t[start]), float(run.t[end - 1])] for start, end in edges.reshape(-1, 2).tolist()]
+
+
+def _theta(place: str, scenario: Scenario, parameters: dict[str, NDArray[np.float64]]) -> list[str]:
+    lines = []
+    for name, values in parameters.items():
+        terms = scenario.robot.joint(name).terms
+        lines += ["", f"[{place}.{name}]"]
+        lines += [f"{toml(t.name)} = {toml(p)}" for t, p in zip(terms, values.tolist(), strict=True)]
+    return lines
+
+
+def _noise(place: str, noise: SensorNoise) -> list[str]:
+    return ["", f"[{place}]", *(f"{key} = {toml(value)}" for key, value in vars(noise).items())]
+
+
+def _push(push: SimulatedPush) -> list[str]:
+    return [f"{key} = {toml(getattr(push, key))}" for key in ("shape", "start", "end", "peak")]

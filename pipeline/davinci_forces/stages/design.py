@@ -5,10 +5,10 @@ from itertools import product
 
 import numpy as np
 
-from davinci_forces.maths.excitation import criterion, fourier
+from davinci_forces.maths.excitation import fourier
 from davinci_forces.maths.excitation.fourier import Fourier
 from davinci_forces.maths.excitation.joint import ExcitationProblem, design
-from davinci_forces.maths.mechanics import workspace
+from davinci_forces.maths.mechanics import tip_force
 from davinci_forces.maths.mechanics.bodies import Bodies
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import frames, jacobian, tip
@@ -40,7 +40,7 @@ def geometry(robot: Robot, chain: Chain) -> Iterator[Links | Pose | Workspace]:
     condition, names = np.array([]), np.array(chain.names, object)
     if limited:
         grid = np.array(list(product(*(np.linspace(low, high, GRID) for low, high in limits.tolist()))))
-        condition = workspace.condition(jacobian(chain, grid)[0])
+        condition = tip_force.condition(jacobian(chain, grid)[0])
     yield links(robot, chain, float(condition.max()) if limited else float("nan"))
     poses = {"zero": np.zeros(n)} | ({"low": limits[:, 0], "high": limits[:, 1]} if limited else {})
     for name, q in poses.items():
@@ -75,8 +75,8 @@ def table(chain: Chain) -> dict[str, Column]:
 
 def control(robot: Robot, chain: Chain, bodies: Bodies) -> Iterator[Control | Lyapunov]:
     """The robot's control studies, with friction that is viscous only.  Section 5.2, Fig 5.2-5.6"""
+    from davinci_forces.maths.simulation.closed_loop import arm
     from davinci_forces.maths.simulation.continuous import regulate
-    from davinci_forces.maths.simulation.plant import arm
 
     for study in robot.control:
         start, target, K_p, K_d, K_i, viscous = map(
@@ -152,8 +152,8 @@ def described(joint: Joint, source: str, series: Fourier) -> Excitation:
         joint=joint.name,
         source=source,
         period=series.period,
-        objective=float(criterion.determinant(F)),
-        condition=float(10 ** criterion.condition(F)),
+        objective=float(fourier.determinant(F)),
+        condition=float(10 ** fourier.condition(F)),
         coefficients=tuple(series.x.tolist()),
         excess_q=excess[0],
         excess_dq=excess[1],

@@ -13,14 +13,16 @@ from davinci_forces.maths.contact.weighing import (
     Rows,
     Weighed,
     better,
+    mirrored,
     model_errors,
+    moved_with,
     offset,
     residual,
+    unit_load,
     weighed,
     widening,
 )
 from davinci_forces.maths.mechanics.chain import Chain
-from davinci_forces.maths.mechanics.load import mirrored, moved_with, unit_load
 from davinci_forces.maths.periods.period import guess, refine
 from davinci_forces.maths.periods.shift import circular, straight
 from davinci_forces.maths.signals.smoothing import segments, smoothed

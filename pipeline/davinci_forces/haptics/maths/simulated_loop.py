@@ -21,12 +21,11 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import cached, compiled
-from davinci_forces.maths.simulation import control, friction
+from davinci_forces.maths.simulation import control
 from davinci_forces.maths.simulation import step as stepping
 from davinci_forces.maths.simulation.actuators import Cascade, Device, Loops, Motors
 from davinci_forces.maths.simulation.control import drive, follow, read
-from davinci_forces.maths.simulation.friction import Friction
-from davinci_forces.maths.simulation.step import State, at_rest, middle, step
+from davinci_forces.maths.simulation.step import Friction, State, at_rest, middle, step
 
 RUBBING = 1e-3  # w [m/s], below which the tissue's friction gives way
 
@@ -159,7 +158,7 @@ def _parts(fixed: Any, loop: Any) -> Any:
     )
 
 
-@cached(control, friction, stepping)
+@cached(control, stepping)
 def _sense(device: Any, fixed: Any, tissue: Any, clocks: Any, noise: Any, loop: Any, k: int, readings: Any) -> None:
     """A turn of the controller begins: it follows what it was told, and the sensors are read."""
     now, h = k * clocks.turn, clocks.tick
@@ -191,7 +190,7 @@ def _say(device: Any, loop: Any, message: int) -> None:
     loop.said[message, 1] = loop.hand[1]
 
 
-@cached(control, friction, stepping)
+@cached(control, stepping)
 def _move(
     grip: Any, device: Any, fixed: Any, tissue: Any, clocks: Any, push: Any, loop: Any, k: int, ticks: Any
 ) -> None:

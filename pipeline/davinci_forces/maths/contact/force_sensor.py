@@ -14,7 +14,7 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.mechanics.tip_force import CHI_SQUARED_95
 from davinci_forces.maths.uncertainty.bootstrap import blocks, standard_error
-from davinci_forces.maths.uncertainty.free_space import NORMAL_95
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 
 STEPS = 25  # of a lag to either side, at most
 STEP = 0.01  # [s] between lags that are tried, at least: smooth forces tell the rest by a parabola

@@ -4,14 +4,25 @@
 
 x_j is what a kilogram asks of joint j and b_j an offset of the day, which takes the mean off both.  It is allowed only
 where the column varies enough to be told from it.
+
+The mass is a point fixed to one of the arm's links.  Section 7.5
+
+    tau_load = m (J' (a + g up)),    a = J ddq + dJ/dt dq                                          (4.27), (7.30)
+
+Positions are in metres from the remote centre, in axes fixed to the link that at q = 0 are the base axes.
 """
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers
+from davinci_forces.maths.mechanics.bodies import Bodies
+from davinci_forces.maths.mechanics.chain import Chain
+from davinci_forces.maths.mechanics.kinematics import frames, remote_centre
+from davinci_forces.maths.mechanics.rigid_body import inverse_dynamics
 
 PARTS = 6  # of a path, as the choice of a model leaves them out
 # The share of a column's power that an offset has to leave: with less, it would more than double the standard error.
@@ -101,3 +112,45 @@ def widening(free: Sequence[Weighed], common: float) -> float:
     """
     ratios = [w.mass**2 / (w.std**2 + common**2) for w in free if w.std > 0]
     return max(1.0, float(np.sqrt(np.mean(ratios)))) if ratios else 1.0
+
+
+def moved_with(chain: Chain, coordinate: int) -> str:
+    """The link that moves with a coordinate and carries the tip: of a parallelogram, the one that turns about the
+    remote centre.
+
+    Raises
+    ------
+    ValueError
+        If the coordinate moves nothing between base and tip.
+    """
+    body = int(chain.body[chain.names.index(chain.tip)])
+    while body > 0:
+        if chain.coordinate[body - 1] == coordinate:
+            return chain.links[body - 1]
+        body = int(chain.parent[body - 1])
+    raise ValueError(f"coordinate {coordinate} does not move {chain.tip}")
+
+
+def mirrored(position: ArrayLike) -> Array:
+    """The position (3,) at the same height on the other side of the link: turned by half a turn about the vertical."""
+    return np.asarray(position, float) * (-1.0, -1.0, 1.0)
+
+
+def unit_load(chain: Chain, link: str, position: ArrayLike, q: Array, dq: Array, ddq: Array) -> Array:
+    """The effort (N, n) that a mass of 1 kg, hung on a link at a position (3,), asks of the first n coordinates along
+    a motion (N, n): gravity and inertia.  A mass m adds m times it to the effort that the motion takes.
+    """
+    n, L = q.shape[1], len(chain.links)
+    masses, centres = np.zeros(L), np.zeros((L, 3))
+    which = chain.links.index(link)
+    masses[which], centres[which] = 1.0, in_link(chain, link, position, n)
+    hung = Bodies(masses, centres, np.zeros((L, 3, 3)), np.zeros(L, np.int64))
+    return inverse_dynamics(chain, hung, q, dq, ddq)
+
+
+def in_link(chain: Chain, link: str, position: ArrayLike, n: int) -> Array:
+    """The same position (3,) in the link's own frame [m], which does not depend on q."""
+    frame = chain.names.index(link)
+    own = frames(chain, np.zeros(n))[frame] @ np.linalg.inv(chain.offset[frame])
+    at = np.append(remote_centre(chain) + np.asarray(position, float), 1.0)
+    return np.asarray(np.linalg.solve(own, at)[:3])

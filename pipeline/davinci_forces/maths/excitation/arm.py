@@ -13,13 +13,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.excitation.criterion import CRITERIA
-from davinci_forces.maths.excitation.directions import delayed, fitted, from_standstill
-from davinci_forces.maths.excitation.fourier import Fourier, basis, instants
-from davinci_forces.maths.excitation.joint import ExcitationProblem, impossible, within
+from davinci_forces.maths.excitation.fourier import CRITERIA, Fourier, basis, instants
+from davinci_forces.maths.excitation.joint import (
+    ExcitationProblem,
+    delayed,
+    fitted,
+    from_standstill,
+    impossible,
+    within,
+)
 from davinci_forces.maths.excitation.search import Tell, lowest, nothing
+from davinci_forces.maths.mechanics.bodies import base_parameters
 from davinci_forces.maths.mechanics.chain import Chain
-from davinci_forces.maths.mechanics.rigid_body import base_parameters, compiled_regressor
+from davinci_forces.maths.mechanics.rigid_body import compiled_regressor
 
 RICH = 200  # random samples that show which columns depend on others
 AT_ONCE = 8  # trajectories, whose regressors fit into a processor's cache

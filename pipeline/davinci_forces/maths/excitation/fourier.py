@@ -1,10 +1,21 @@
-"""Trajectories as finite Fourier series: their motion, their exact ranges, and how well they excite a joint.
+"""Trajectories as finite Fourier series: their motion, exact ranges and run-in, and how well they excite a joint.
 
 The coefficients of a series are also written as one vector x = (a0, a1, b1, a2, b2, ...), in which position, velocity
 and acceleration are linear.  Section 6.3
+
+The criteria say how well a regressor F (..., K, p), one or many, tells its parameters apart; what is infinite has no
+full rank.
+
+From standing still the way into a trajectory is along itself, slow at first:
+
+    q(sigma(t)),    dq sigma',    ddq sigma'^2 + dq sigma'',    sigma' = 10 u^3 - 15 u^4 + 6 u^5,    u = 1 + t / T
+
+over -T <= t <= 0.  sigma' rises from 0 to 1 with sigma'' = 0 at both ends, so position, velocity and acceleration are
+continuous, as is jerk.  Positions and velocities keep every limit that the periodic trajectory keeps; accelerations
+keep theirs where T is long enough.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +26,11 @@ from davinci_forces.maths.models.terms import Term
 
 Range = tuple[float, float]
 SAMPLES = 300  # K, of one period without its end point: what reproduces Table 6.1
+# Numbers of a matrix that is made a triangle at once: for more, the library starts threads, which thousands of times a
+# second cost more than they save, and on a busy machine 20 times as much.
+BLOCK = 8000
+FINE = 4000  # instants of a run-in at which the limits are asked for
+ROOM = 1e-5  # of a limit, for what may be between them
 
 
 @dataclass(frozen=True)
@@ -89,3 +105,65 @@ def observation(terms: Sequence[Term], series: Fourier, samples: int = SAMPLES) 
 def _columns(constant: float, sines: Array, cosines: Array) -> Array:
     pairs = np.stack([sines, cosines], axis=2).reshape(len(sines), -1)
     return np.column_stack([np.full(len(sines), constant), pairs])
+
+
+Criterion = Callable[[Array], Array]
+
+
+def determinant(F: Array) -> Array:
+    """-log10 det(F^T F) (...).  (6.20)"""
+    diagonal = np.abs(np.diagonal(triangle(F), axis1=-2, axis2=-1))
+    return _where_full_rank(F, diagonal.min(-1), diagonal.max(-1), lambda: -2 * np.log10(diagonal).sum(-1))
+
+
+def condition(F: Array) -> Array:
+    """log10 of the condition number (...)."""
+    s: Array = np.asarray(np.linalg.svd(triangle(F), compute_uv=False), np.float64)
+    return _where_full_rank(F, s[..., -1], s[..., 0], lambda: np.log10(s[..., 0] / s[..., -1]))
+
+
+def triangle(F: Array) -> Array:
+    """R (..., p, p) of F = Q R, from the R of blocks of samples where there are many."""
+    samples, parameters = F.shape[-2:]
+    rows = max(2 * parameters, BLOCK // parameters)
+    if samples <= rows:
+        return np.asarray(np.linalg.qr(F, mode="r"))
+    blocks = [np.linalg.qr(F[..., i : i + rows, :], mode="r") for i in range(0, samples, rows)]
+    return triangle(np.concatenate(blocks, axis=-2))
+
+
+def _where_full_rank(F: Array, smallest: Array, largest: Array, value: Callable[[], Array]) -> Array:
+    samples, parameters = F.shape[-2:]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        full = (samples >= parameters) & (smallest > samples * np.finfo(float).eps * largest)
+        return np.where(full, value(), np.inf)
+
+
+CRITERIA: dict[str, Criterion] = {"determinant": determinant, "condition": condition}
+
+
+def run_in(series: Fourier, t: Array, duration: float) -> tuple[Array, Array, Array]:
+    """Position, velocity and acceleration (K,) at the times t (K,) [s] from -duration, at rest, to 0, at full speed."""
+    u = 1 + t / duration
+    path = duration * (u**4 * (2.5 - 3 * u + u**2) - 0.5)
+    speed = u**3 * (10 - 15 * u + 6 * u**2)
+    rise = 30 * (u * (1 - u)) ** 2 / duration
+    q, dq, ddq = motion(series, path)
+    return q, speed * dq, speed**2 * ddq + rise * dq
+
+
+def shortest(series: Sequence[Fourier], accelerations: Sequence[Range], durations: Array) -> float | None:
+    """The first of these durations [s] in which the run-in of every series keeps its limits of acceleration, or None.
+
+    A series that leaves the limits by itself may use in its run-in what it uses anyway.
+    """
+    bounds = []
+    for one, (low, high) in zip(series, accelerations, strict=True):
+        lowest, highest = ranges(one)[2]
+        bounds.append((min(low * (1 - ROOM), lowest), max(high * (1 - ROOM), highest)))
+    for duration in durations.tolist():
+        t = np.linspace(-duration, 0.0, FINE)
+        used = [run_in(one, t, duration)[2] for one in series]
+        if all(low <= ddq.min() and ddq.max() <= high for ddq, (low, high) in zip(used, bounds, strict=True)):
+            return float(duration)
+    return None

@@ -1,20 +1,29 @@
-"""The trajectory that tells most about a joint, within limits that hold at every instant.  Section 6.3.2"""
+"""The trajectory that tells most about a joint, within limits that hold at every instant.  Section 6.3.2
+
+The search goes over any numbers, which are made trajectories within the limits, so that it is free of them.  The
+numbers z (..., 1 + 2 N_f) are those of a series x = (a0, a1, b1, ...), but for two of them: z[0] places the mean in the
+slack that the harmonics leave.  And since time may start anywhere, it starts at a standstill, where the a_k add up to
+zero, so a_N is known and its place is free for how far that standstill is from an instant of the criterion's.  Friction
+jumps there, and with it the criterion: the best trajectories come to rest within millionths of a sample of such an
+instant.
+"""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.excitation.criterion import CRITERIA
-from davinci_forces.maths.excitation.directions import delayed, fitted, from_standstill
-from davinci_forces.maths.excitation.fourier import SAMPLES, Fourier, Range, basis, instants, ranges
+from davinci_forces.maths.excitation.fourier import CRITERIA, SAMPLES, Fourier, Range, basis, instants, ranges
 from davinci_forces.maths.excitation.search import Tell, lowest, nothing
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.terms import Term
 
 MARGIN = 1e-9  # of the limits, so that they also hold for numbers rounded on paper
+GRID = 96  # instants a harmonic at which an extreme is looked for, and found to 1e-7 of it
 
 
 @dataclass(frozen=True)
@@ -100,3 +109,77 @@ def within(problem: ExcitationProblem, series: Fourier) -> Fourier:
         return series
     shrunk = (series.x - problem.centre) / (scale * (1 + MARGIN))
     return Fourier.of(problem.centre + shrunk, series.period)
+
+
+Indices = NDArray[np.intp]
+
+
+def fitted(z: Array, limits: tuple[Range, Range, Range], period: float) -> Array:
+    """Coefficients x (S, 1 + 2 N_f) of series that keep the limits, to about 1e-7 of them.
+
+    Harmonics c of size n, where 1 touches a limit, become 2 c / (1 + n^2): of all sizes up to 1, and flat at 1.
+    """
+    low, high = limits[0]
+    lowest, highest = extremes(z[:, 1:], period)
+    n = (highest[0] - lowest[0]) / (high - low)
+    for i in (1, 2):
+        n = np.maximum(n, np.maximum(lowest[i] / limits[i][0], highest[i] / limits[i][1]))
+    scale = 2 / (1 + n**2)
+    slack = high - low - scale * (highest[0] - lowest[0])
+    mean = low - scale * lowest[0] + slack * (1 + np.sin(z[:, 0])) / 2
+    return np.column_stack([mean, scale[:, None] * z[:, 1:]])
+
+
+def from_standstill(z: Array, samples: int) -> tuple[Array, Array]:
+    """z (S, 1 + 2 N_f) with all harmonics, which stand still at 0; and the phase (S,) [rad] by which to move them.
+
+    The cube makes phases that are small, against that between two of `samples` instants, as likely as larger ones.
+    """
+    free = z[:, -2]
+    known = z.copy()
+    known[:, -2] = -z[:, 1:-2:2].sum(axis=1)
+    return known, np.pi / samples * free**3
+
+
+def delayed(z: Array, phase: Array) -> Array:
+    """z (S, 1 + 2 N_f) as of series that are later by this phase (S,) [rad] of the period."""
+    k = np.arange(1, z.shape[1] // 2 + 1)
+    velocity = (z[:, 1::2] - 1j * z[:, 2::2]) * np.exp(-1j * k * phase[:, None])  # a cos + b sin = Re(velocity e^i)
+    moved = z.copy()
+    moved[:, 1::2], moved[:, 2::2] = velocity.real, -velocity.imag
+    return moved
+
+
+def extremes(c: Array, period: float) -> tuple[Array, Array]:
+    """The lowest and highest position, velocity and acceleration (3, S) of harmonics c (S, 2 N_f) about a mean of 0.
+
+    Where the series turns on a grid, the parabola through the turn and its neighbours says when it is extreme, to the
+    second order of a step, and so how far, to the fourth.
+    """
+    harmonics = c.shape[1] // 2
+    grid = c @ _grid(period, harmonics)
+    before, values, after = grid[..., :-2], grid[..., 1:-1].copy(), grid[..., 2:]
+    turning = np.unravel_index(np.flatnonzero((values >= before) == (values >= after)), values.shape)
+    rise, bend = after[turning] - before[turning], before[turning] - 2 * values[turning] + after[turning]
+    step = np.divide(-rise, 2 * bend, out=np.zeros_like(rise), where=bend != 0)
+    values[turning] = _values(c, period, turning[0], turning[1], (turning[2] + step) / (GRID * harmonics))
+    return values.min(axis=-1), values.max(axis=-1)
+
+
+def _values(c: Array, period: float, derivative: Indices, of: Indices, where: Array) -> Array:
+    """Position (0), velocity (1) or acceleration (2) of the series `of` (P,) of c `where` (P,) in the period."""
+    jw = 2j * np.pi / period * np.arange(1, c.shape[1] // 2 + 1)
+    phasors = (c[:, ::2] - 1j * c[:, 1::2]).T * np.array([1 / jw, np.ones_like(jw), jw])[..., None]
+    turn = np.exp(2j * np.pi * where)
+    total = np.zeros_like(turn)
+    for phasor in reversed(np.swapaxes(phasors, 0, 1)):  # Horner's scheme
+        total = (total + phasor[derivative, of]) * turn
+    return np.asarray(total.real)
+
+
+@lru_cache(maxsize=8)
+def _grid(period: float, harmonics: int) -> Array:
+    """Bases of position, velocity and acceleration (3, 2 N_f, G + 2) over a period and a step to both sides."""
+    steps = GRID * harmonics
+    t = np.arange(-1.0, steps + 1, dtype=np.float64) * (period / steps)
+    return np.stack([B[:, 1:].T for B in basis(period, harmonics, t)])

@@ -1,9 +1,22 @@
-"""What the links of an arm weigh, and where."""
+"""What the links of an arm weigh, and where; and what motors and gears add to it: reflected inertia and friction.
+
+    eta tau_m = (eta^2 J_m + M) ddq + V + G + F + tau_ext,    F = v dq + c sign(dq)          (4.26), (4.28), (A.16)
+
+Everything is a coordinate's own: drives do not couple.  Shapes: (n,) for a property, (..., n) for a motion.
+
+Which combinations of all inertial parameters an arm's motion can tell:
+
+    tau = Y(q, dq, ddq) pi,    Y P = Y_b [1 K],    beta = pi_b + K pi_d                                      (6.3)
+
+P sorts the columns of Y into p base columns and those that depend on them.  Gautier, Numerical calculation of the base
+inertial parameters of robots, 1991.
+"""
 
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from davinci_forces.maths.arrays import Array
 
@@ -11,6 +24,9 @@ from davinci_forces.maths.arrays import Array
 # about the origin of the link's frame (not its centre of mass), in which the dynamics are linear.
 PARAMETERS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 _UPPER = np.triu_indices(3)
+# Of a column's own size, what has to be left of it when the columns taken before are subtracted: rounding leaves 1e-15
+# times the condition number of those, and the least that is left of a true one of the arms here is 1e-3.
+NEGLIGIBLE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,3 +113,70 @@ def of_pseudo_inertias(J: Array) -> Array:
     S = J[:, :3, :3]
     inertia = np.trace(S, axis1=1, axis2=2)[:, None, None] * np.eye(3) - S
     return np.concatenate([J[:, 3, 3:], J[:, :3, 3], inertia[:, *_UPPER]], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Drives:
+    """One drive a coordinate (n,): everything at the joint's side except the motor's own inertia.
+
+    `viscous` and `coulomb` are those of joint and motor together, as the joint feels them.  (A.11)
+    """
+
+    gear_ratio: Array  # eta [-], or [rad/m] for a prismatic joint
+    motor_inertia: Array  # J_m [kg m^2]
+    viscous: Array  # v [N m s/rad], or [N s/m]
+    coulomb: Array  # c [N m], or [N]
+
+    def reduced(self, n: int) -> "Drives":
+        """Those of the first n coordinates."""
+        return Drives(self.gear_ratio[:n], self.motor_inertia[:n], self.viscous[:n], self.coulomb[:n])
+
+    @property
+    def inertia(self) -> Array:
+        """The motors' inertia at the joints, eta^2 J_m (n,).  (4.28), which (4.29) neglects and (6.7)-(6.13) keep"""
+        return np.asarray(self.gear_ratio**2 * self.motor_inertia)
+
+    def friction(self, dq: ArrayLike) -> Array:
+        """F (..., n) at the velocities dq (..., n).  (4.26)"""
+        dq = np.asarray(dq, float)
+        return np.asarray(self.viscous * dq + self.coulomb * np.sign(dq))
+
+
+class BaseParameters(NamedTuple):
+    """What the motion can tell of the inertial parameters: beta = K pi, p combinations of the 10 L."""
+
+    columns: NDArray[np.int64]  # (p,) of Y, which span all the others: tau = Y[:, columns] beta
+    combination: Array  # K (p, 10 L): how all parameters enter each
+    condition: float  # of the base columns, each scaled to unit length
+
+    def names(self, links: tuple[str, ...]) -> list[str]:
+        """Each base parameter by the link and parameter that leads it, as `Ixx of 5`."""
+        return [f"{PARAMETERS[c % 10]} of {links[c // 10]}" for c in self.columns]
+
+
+def base_parameters(Y: Array) -> BaseParameters:
+    """Reduce the regressor (..., 10 L) of a motion to independent columns.
+
+    They are taken in the order of Y, from the base outwards, each that does not depend on those before it: the same
+    ones whatever the motion, as in the grouping by hand (Khalil and Kleinfinger 1987).  The motion must be rich (random
+    poses, velocities and accelerations will do): what it does not show is left out.
+    """
+    from scipy.linalg import qr, solve_triangular  # which every command would load
+
+    (R,) = qr(Y.reshape(-1, Y.shape[-1]), mode="r")  # it has the dependences of Y's columns, in as many rows
+    scale = np.linalg.norm(R, axis=0)
+    seen = np.flatnonzero(scale > NEGLIGIBLE * scale.max())
+    unit = R[:, seen] / scale[seen]
+    Q = np.empty((len(unit), 0))
+    taken = list[int]()
+    for column, x in enumerate(unit.T):
+        left = x - Q @ (Q.T @ x)
+        left -= Q @ (Q.T @ left)  # once more, for what the first has left by rounding
+        if (size := np.linalg.norm(left)) > NEGLIGIBLE:
+            Q = np.column_stack([Q, left / size])
+            taken.append(column)
+    triangle = np.triu(Q.T @ unit[:, taken])
+    K = np.zeros((len(taken), len(scale)))
+    K[:, seen] = solve_triangular(triangle, Q.T @ unit) * scale[seen] / scale[seen[taken]][:, None]
+    K[:, seen[taken]] = np.eye(len(taken))
+    return BaseParameters(seen[taken], K, float(np.linalg.cond(triangle)))

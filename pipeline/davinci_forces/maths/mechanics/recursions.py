@@ -13,8 +13,8 @@ from collections.abc import Iterable
 from typing import Any
 
 from davinci_forces.maths.mechanics import link
+from davinci_forces.maths.mechanics.chain import Tree
 from davinci_forces.maths.mechanics.link import Vector, plus
-from davinci_forces.maths.mechanics.tree import Tree
 
 Samples = Iterable[Any]
 

@@ -12,13 +12,8 @@ from numpy.typing import ArrayLike
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.constants import GRAVITY
 from davinci_forces.maths.mechanics import recursions
-from davinci_forces.maths.mechanics.base_parameters import base_parameters
-from davinci_forces.maths.mechanics.bodies import Bodies
-from davinci_forces.maths.mechanics.chain import Chain
-from davinci_forces.maths.mechanics.drives import Drives
-from davinci_forces.maths.mechanics.tree import Tree, folded, tree_of
-
-__all__ = ["base_parameters", "coriolis", "gravity", "inverse_dynamics", "mass_matrix", "regressor"]
+from davinci_forces.maths.mechanics.bodies import Bodies, Drives
+from davinci_forces.maths.mechanics.chain import Chain, Tree, folded, tree_of
 
 ALL = (slice(None),)  # samples at once
 COMPILE_FROM = 20_000  # samples; fewer are done before the kernels are loaded

@@ -12,8 +12,7 @@ from functools import cache
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.mechanics.base_parameters import BaseParameters, base_parameters
-from davinci_forces.maths.mechanics.bodies import PARAMETERS
+from davinci_forces.maths.mechanics.bodies import PARAMETERS, BaseParameters, base_parameters
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.rigid_body import regressor
 from davinci_forces.maths.models.bias import COULOMB, VISCOUS

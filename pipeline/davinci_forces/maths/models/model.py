@@ -5,7 +5,7 @@
 Identification asks for Phi, prediction for Phi theta; a filter tracks each joint by itself and asks what it is to know
 of it.  Shapes: N samples, n joints, m efforts, p parameters.
 
-What the parameters of a model are made of, and what of it no mechanism has: negative mass, inertia, friction.
+No mechanism has negative mass, inertia or friction, of which parameters are made:
 
     theta = A x,    J_l(x) >= 0 of every link,    x_i >= 0 where physics knows it
 

@@ -1,7 +1,8 @@
 """A robot in closed loop, as the laboratory runs it: motors, drivers, controller, friction, stops, and what it touches.
 
 Time goes in ticks of the motor drivers.  Every so many ticks the controller reads the encoders and sets what the
-drivers follow, and the recorder takes a sample; between ticks the arm moves by one implicit step.
+drivers follow, and the recorder takes a sample; between ticks the arm moves by one implicit step of its
+rigid body, whose inertia, bias and tip are compiled for one configuration.
 """
 
 from collections.abc import Callable
@@ -12,10 +13,13 @@ from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import compiled
+from davinci_forces.maths.constants import GRAVITY
+from davinci_forces.maths.mechanics.bodies import Bodies
+from davinci_forces.maths.mechanics.chain import Chain, Tree, folded, tree_of
+from davinci_forces.maths.mechanics.kernels import mass_and_bias, place_and_jacobian
 from davinci_forces.maths.simulation.actuators import Cascade, Loops, Motors, Regulator
 from davinci_forces.maths.simulation.control import drive, follow, pi, read
-from davinci_forces.maths.simulation.friction import Friction
-from davinci_forces.maths.simulation.step import at_rest, middle, step
+from davinci_forces.maths.simulation.step import Friction, at_rest, middle, step
 from davinci_forces.maths.simulation.surroundings import Surroundings, on_tip, weigh
 
 
@@ -171,3 +175,39 @@ def _record(state: Any, tau: Any, external: Any, force: Any, k: int, out: Any) -
         out.q[k, i], out.dq[k, i], out.tau[k, i], out.tau_ext[k, i] = state.q[i], state.dq[i], tau[i], external[i]
     for c in range(3):
         out.force[k, c] = force[c]
+
+
+class PlantData(NamedTuple):
+    """What the two functions of the plant are told: the arm, its rotors, and what its tip is fixed to."""
+
+    tree: Tree
+    rest: Array  # no acceleration (n,)
+    rotors: Array  # eta^2 J_m (n,)
+    body: int  # that carries the tip
+    tip: tuple[float, float, float]  # in that body's frame [m]
+
+
+def arm(chain: Chain, bodies: Bodies, rotors: Array) -> Plant:
+    """The arm with as many joints as there are `rotors` (n,), eta^2 J_m; later coordinates stay at rest at 0."""
+    n = len(rotors)
+    chain, parameters = folded(chain.reduced(n), bodies.parameters(n).reshape(-1, 10))
+    frame = chain.names.index(chain.tip)
+    x, y, z = chain.offset[frame, :3, 3].tolist()
+    data = PlantData(
+        tree_of(chain, parameters), np.zeros(n), rotors.astype(np.float64), int(chain.body[frame]), (x, y, z)
+    )
+    return Plant(dynamics, _tip, data)
+
+
+@compiled
+def dynamics(body: Any, q: Any, dq: Any, M: Any, b: Any) -> None:
+    """Fill M, with the rotors', and b = C dq + G.  (A.12)"""
+    mass_and_bias(body.tree, GRAVITY, q, dq, body.rest, M, b)
+    for i in range(len(q)):
+        M[i, i] += body.rotors[i]
+
+
+@compiled
+def _tip(body: Any, q: Any, J: Any) -> Any:
+    """Fill the Jacobian (3, n) of the tip, and give its position (3,).  (7.23)"""
+    return np.array(place_and_jacobian(body.tree, body.body, body.tip, q, J))

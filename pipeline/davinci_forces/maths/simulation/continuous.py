@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import cached
 from davinci_forces.maths.mechanics import kernels, link, recursions
-from davinci_forces.maths.simulation import plant as arms
+from davinci_forces.maths.simulation import closed_loop as arms
 from davinci_forces.maths.simulation.actuators import Regulator
 from davinci_forces.maths.simulation.closed_loop import Plant
 from davinci_forces.maths.simulation.control import lyapunov

@@ -1,8 +1,9 @@
-"""What touches a simulated robot: efforts at its joints, forces on its tip, a weight, tissue.
+"""What touches a simulated robot: efforts at its joints, forces on its tip, a weight, tissue; and where it is to be.
 
 Efforts and forces are those that the robot exerts on its surroundings (7.8).
 """
 
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -75,3 +76,21 @@ def weigh(tip: Any, data: Any, q: Any, dq: Any, J: Any, drift: Any) -> None:
         drift[k] = GRAVITY if k == 2 else 0.0
         for i in range(len(q)):
             drift[k] += (ahead[k, i] - J[k, i]) * dq[i] / h
+
+
+@dataclass(frozen=True)
+class Path:
+    """Positions to be at at given times, at constant speed or easing in and out between them."""
+
+    points: tuple[tuple[float, float], ...]  # time [s], position
+    ease: bool
+
+    def position(self, t: Array) -> Array:
+        """The position at the times t (N,) [s]; the first and the last position hold before and after."""
+        times, positions = np.array(self.points).T
+        if not self.ease:
+            return np.asarray(np.interp(t, times, positions))
+        part = np.interp(t, times, np.arange(len(times), dtype=float))
+        whole = np.floor(part)
+        eased = whole + (1 - np.cos(np.pi * (part - whole))) / 2
+        return np.asarray(np.interp(eased, np.arange(len(times)), positions))

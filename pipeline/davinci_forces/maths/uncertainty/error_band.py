@@ -1,20 +1,26 @@
 """The variance of an external effort's error beyond what the filter says itself, by speed where it depends on speed.
 
 It comes from free motion that no fit had seen: mean squares over blocks of a log and ranges of speed, less the filter's
-own.  Logs count alike, however long they are.
+own.  Logs count alike, however long they are.  Whether the stated band then covers what the effort looks like where
+nothing touches the robot, `levels` says.
 """
 
 from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array, Booleans, Integers
+from davinci_forces.maths.arrays import Array, Booleans, Integers, evenly
 from davinci_forces.maths.uncertainty import bootstrap
+from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, error_of_quantile
 
 EDGES = (0.25, 0.5, 1.0, 1.5)  # of the ranges, in root mean squares of the identification's velocity
 BINS = len(EDGES) + 1
 BLOCKS = 6
 FEWEST = 3  # logs, below which it is blocks that are left out for a standard error
+DETECTED = 0.99  # share of free-space samples below the detection level
+USUAL = 0.95
+NORMAL_95 = 1.959963984540054
+MOST = 20_000  # samples that a bootstrap goes through; of more, evenly spaced ones
 
 
 class SpeedCells(NamedTuple):
@@ -133,3 +139,32 @@ def _of_ranges(total: Array, logs: Integers, together: bool) -> Array:
 def _ratio(total: Array, count: Array | Integers) -> Array:
     """Means; zero of nothing."""
     return np.divide(total, count, out=np.zeros(np.shape(total)), where=count > 0)
+
+
+class FreeSpaceLevels(NamedTuple):
+    """Levels of |tau_ext| in free space, with standard errors by block bootstrap."""
+
+    rms: float
+    rms_std: float
+    level_95: float
+    level_95_std: float
+    level_99: float
+    level_99_std: float
+    coverage: float  # share of samples within 1.96 stated standard deviations
+    coverage_std: float
+
+
+def levels(tau_ext: Array, std: Array) -> FreeSpaceLevels:
+    """The levels of an external effort (N,) whose stated standard deviation is `std` (N,), in free space."""
+    few = evenly(len(tau_ext), MOST)
+    size, inside = np.abs(tau_ext[few]), (np.abs(tau_ext[few]) <= NORMAL_95 * std[few]).astype(float)
+    return FreeSpaceLevels(
+        rms=float(np.sqrt(np.mean(size**2))),
+        rms_std=error_of_pooled_mean(size**2, of=np.sqrt),
+        level_95=float(np.quantile(size, USUAL)),
+        level_95_std=error_of_quantile(size, USUAL),
+        level_99=float(np.quantile(size, DETECTED)),
+        level_99_std=error_of_quantile(size, DETECTED),
+        coverage=float(np.mean(inside)),
+        coverage_std=error_of_pooled_mean(inside),
+    )

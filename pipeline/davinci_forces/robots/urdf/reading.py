@@ -7,8 +7,9 @@ study says it in [robot_overrides.<joint>]: gear_ratio and torque_constant, or e
 import heapq
 import math
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,7 +22,6 @@ from davinci_forces.maths.models.terms import Term, coulomb, gravity_cos, gravit
 from davinci_forces.robots.robot import ANYWHERE, Joint, Kind, Limits, Robot
 from davinci_forces.robots.urdf import elements
 from davinci_forces.robots.urdf.elements import Element
-from davinci_forces.robots.urdf.mimicry import Mover, driven
 from davinci_forces.robots.urdf.tables import MOVING, TIP, Notes, UrdfJoint, inertial, joint
 from davinci_forces.toml.file import TomlFile
 
@@ -29,6 +29,14 @@ HARMONICS = 10  # of an excitation that nobody has described: more than most hav
 TIPS = (TIP, "tcp", "tool0", "ee_link")  # what the frame at the tip is called, as far as there is a custom
 POSES = 20  # random ones, at which a joint that feels gravity does so
 FRICTION = (viscous, coulomb, offset)
+
+
+class Mover(NamedTuple):
+    """A joint at sign times the position of the joint `by`, plus a bias; `by` is "" of one that does not move."""
+
+    by: str
+    sign: int = 1
+    bias: float = 0.0
 
 
 def described(file: Path) -> tuple[Robot | None, TomlFile]:
@@ -52,7 +60,7 @@ def robot_of(outermost: Element, file: TomlFile, stem: str) -> Robot | None:
     joints = [joint(element, file) for element in outermost.all("joint")]
     root = _root(outermost, links, joints, file)
     by_name = {one.name: one for one in joints}
-    moved = driven(by_name, file)
+    moved = movers(by_name, file)
     ordered = _outwards(root, joints)
     coordinates = _coordinates(ordered, file)
     if not coordinates:
@@ -180,3 +188,39 @@ def _joint(own: UrdfJoint, name: str, feels_gravity: bool) -> Joint:
     rates = (-own.velocity, own.velocity) if math.isfinite(own.velocity) else ANYWHERE
     limits = Limits(own.position, rates, ANYWHERE, own.effort)
     return Joint(name, own.name, kind, (inertia, *turning, *FRICTION), limits, harmonics=HARMONICS)
+
+
+def movers(joints: Mapping[str, UrdfJoint], file: TomlFile) -> dict[str, Mover]:
+    """How each joint is moved; what is wrong with a mimic is noted."""
+    return {name: _mover(one, joints, file) for name, one in joints.items()}
+
+
+def _mover(joint: UrdfJoint, joints: Mapping[str, UrdfJoint], file: TomlFile) -> Mover:
+    """Along the joints that mimic each other, to the one that moves by itself."""
+    sign, bias, seen, one = 1.0, 0.0, [joint.name], joint
+    while one.kind != "fixed" and one.mimic:
+        sign, bias = sign * one.multiplier, bias + sign * one.bias
+        following = joints.get(one.mimic)
+        wrong = _wrong(one, following, seen)
+        if wrong:
+            if one is joint:
+                file.note(one.line, f"<joint name={one.name!r}> <mimic>: {wrong}")
+            return Mover("")
+        assert following is not None
+        one = following
+        seen.append(one.name)
+    return Mover("" if one.kind == "fixed" or not sign else one.name, 1 if sign >= 0 else -1, bias)
+
+
+def _wrong(joint: UrdfJoint, following: UrdfJoint | None, seen: list[str]) -> str:
+    """What is wrong with what a joint mimics, or ""."""
+    if following is None:
+        return f"there is no joint {joint.mimic!r}; correct the name"
+    if following.name in seen:
+        return f"{' mimics '.join([*seen, following.name])}: one of them must move by itself"
+    if following.kind == "fixed":
+        return f"joint {joint.mimic!r} is fixed; name one that moves, or make this one fixed, too"
+    if joint.multiplier not in (-1.0, 0.0, 1.0):
+        said = f"multiplier is {joint.multiplier:g}, and links that share a coordinate go by 1 or -1 times it"
+        return f'{said}; where it carries little, write type="fixed" and no mimic, or describe it as a joint of its own'
+    return ""

@@ -10,8 +10,7 @@ import numpy as np
 from davinci_forces import robots
 from davinci_forces.errors import BadRequest
 from davinci_forces.maths.excitation.arm import ArmExcitationProblem, arm_observation, arm_problem, design_together
-from davinci_forces.maths.excitation.criterion import CRITERIA, condition
-from davinci_forces.maths.excitation.fourier import Fourier, Range
+from davinci_forces.maths.excitation.fourier import CRITERIA, Fourier, Range, condition
 from davinci_forces.maths.excitation.joint import ExcitationProblem
 from davinci_forces.maths.excitation.search import Tell, nothing
 from davinci_forces.robots.robot import Joint, Robot

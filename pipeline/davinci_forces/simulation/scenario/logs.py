@@ -8,8 +8,7 @@ from pathlib import Path as File
 import numpy as np
 
 from davinci_forces.maths.excitation.fourier import Fourier
-from davinci_forces.maths.simulation.path import Path
-from davinci_forces.maths.simulation.surroundings import SHAPES
+from davinci_forces.maths.simulation.surroundings import SHAPES, Path
 from davinci_forces.robots.from_toml import NAME
 from davinci_forces.simulation.scenario.scenario import (
     ForceSensor,

@@ -8,9 +8,8 @@ from davinci_forces.errors import PipelineError
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.excitation.fourier import Fourier, motion
 from davinci_forces.maths.simulation.actuators import Cascade, Motors, Regulator
-from davinci_forces.maths.simulation.friction import Friction
-from davinci_forces.maths.simulation.path import Path
-from davinci_forces.maths.simulation.surroundings import SHAPES
+from davinci_forces.maths.simulation.step import Friction
+from davinci_forces.maths.simulation.surroundings import SHAPES, Path
 from davinci_forces.robots.robot import Joint, Robot
 
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from davinci_forces.maths.contact.detection import Quiet, alarm_level, quiet
 from davinci_forces.maths.signals.windows import free_space
-from davinci_forces.maths.uncertainty.free_space import levels
+from davinci_forces.maths.uncertainty.error_band import levels
 from davinci_forces.records import FreeSpace, Threshold, Track
 from davinci_forces.study import LogEntry
 

@@ -13,7 +13,7 @@ from davinci_forces.identification.joint_models import Along
 from davinci_forces.identification.used import FALLBACK, Identified
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals.windows import free_space, runs
-from davinci_forces.maths.uncertainty.free_space import levels
+from davinci_forces.maths.uncertainty.error_band import levels
 from davinci_forces.records import Comparison, Diagnostic, FilterNoise, Fit, JointModel, diagnostic
 from davinci_forces.robots.robot import Kind, Robot
 from davinci_forces.study import LogEntry

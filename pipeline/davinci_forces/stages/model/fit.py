@@ -23,7 +23,7 @@ from davinci_forces.identification.observations import observed, pose_samples
 from davinci_forces.identification.regression import joined, known_of, pose
 from davinci_forces.identification.scores import folds, refits
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.estimation.identifiability import Told, told
+from davinci_forces.maths.estimation.least_squares import Told, told
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.periods.shift import SAME_PATH, most_different
 from davinci_forces.records import (

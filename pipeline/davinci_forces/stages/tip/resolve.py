@@ -8,10 +8,9 @@ from davinci_forces.maths.arrays import Array, Booleans, Integers, evenly
 from davinci_forces.maths.mechanics import tip_force
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import along, jacobian, tip
-from davinci_forces.maths.mechanics.tip_force import matrix, shared
-from davinci_forces.maths.mechanics.workspace import NEAR_SINGULAR, condition
+from davinci_forces.maths.mechanics.tip_force import NEAR_SINGULAR, condition, matrix, shared
 from davinci_forces.maths.signals.windows import SETTLE, free_space
-from davinci_forces.maths.uncertainty.free_space import NORMAL_95, FreeSpaceLevels, levels
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95, FreeSpaceLevels, levels
 from davinci_forces.records import (
     ArmCorrelation,
     Contact,
