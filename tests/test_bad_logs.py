@@ -265,7 +265,7 @@ def test_a_clock_that_jumps_in_a_log_of_another_role_has_a_gap(lab):
 def test_a_clock_is_set_back_wherever_the_blocks_of_a_log_end(tmp_path, rows):
     from davinci_forces.logs import open_log
     from davinci_forces.study import reading as study
-    from davinci_forces.study.intake.reading import Intake, mended
+    from davinci_forces.study.intake import Intake, mended
 
     signal = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5)
     speed = np.abs(arm.excitation("hand_roll", signal.t, 2.0)[1])

@@ -68,9 +68,9 @@ def flat(said: str) -> str:
 def test_the_readers_of_logs_count_for_ingest_and_the_store_for_every_stage(finished):
     entry = json.loads((processed(finished) / "tasks" / "ingest" / "one.json").read_text())
     assert {
-        "logs/text/reader.py",
-        "logs/tdms/reader.py",
-        "logs/blocks.py",
+        "logs/text/__init__.py",
+        "logs/tdms/__init__.py",
+        "logs/log.py",
     } <= set(entry["fingerprint"]["code"])
     for file in (processed(finished) / "tasks").glob("*/*.json"):
         assert "records/store.py" in json.loads(file.read_text())["fingerprint"]["code"], file

@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from davinci_forces.errors import BadRequest
 from davinci_forces.haptics.maths.bimodal import THESIS, Hand
-from davinci_forces.haptics.maths.delay import damping_needed, delay_limit, discretised, sampled_limit, spectral_radius
+from davinci_forces.haptics.maths.delay import damping_needed, delay_limit, discretised, sampled_limit
 from davinci_forces.haptics.maths.motion import FINE, flow, grows, late, leaving_limit
 
 PRESSED = 1.0  # [N]
@@ -16,6 +16,22 @@ DELAYS = (0.005, 0.05, 0.3)
 def simulated(hand: Hand, k_t: float, delay: float, rate: float, push: float = PRESSED) -> bool:
     """Whether a motion of the hand grows, after its slowest swing has come sixty times."""
     return grows(hand, late(hand, k_t, delay, rate, push, 60.0 * 2.0 * np.pi / hand.frequency))
+
+
+def spectral_radius(hand: Hand, k_t: float, delay: float, rate: float) -> float:
+    """The largest modulus of the roots of the sampled hand in contact: it is stable below 1."""
+    Phi, early, late, samples = discretised(hand, delay, rate)
+    n = samples + 1  # forces that are remembered
+    A = np.zeros((2 + n, 2 + n))
+    A[:2, :2] = Phi
+    A[2, 0] = -k_t
+    A[3:, 2:-1] = np.eye(n - 1)
+    A[:2, 1 + n] += late
+    if samples:
+        A[:2, n] += early
+    else:
+        A[:2, 0] -= k_t * early
+    return float(np.abs(np.linalg.eigvals(A)).max())
 
 
 @pytest.mark.parametrize("hand", [THESIS, Hand(1.0, 10.0, 300.0), Hand(0.5, 2.0, 50.0)])

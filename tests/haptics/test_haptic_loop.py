@@ -10,8 +10,7 @@ from davinci_forces.filters import ekf
 from davinci_forces.filters.problem import Driven
 from davinci_forces.haptics import loop as haptic
 from davinci_forces.haptics.maths.bimodal import THESIS, Hand
-from davinci_forces.haptics.maths.delay import delay_limit, held, sampled_limit
-from davinci_forces.haptics.maths.feeling import harmonic, response_limit
+from davinci_forces.haptics.maths.delay import delay_limit, harmonic, held, response_limit, sampled_limit
 from davinci_forces.haptics.maths.motion import switched
 from davinci_forces.haptics.maths.simulated_loop import Clocks, FeltTissue, Grip, simulate
 from davinci_forces.haptics.scenario import FIRM, SLIDE, AxisNoise, HapticScenario

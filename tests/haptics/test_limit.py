@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from davinci_forces.haptics.maths import thesis
+from davinci_forces.haptics.maths import bimodal
 from davinci_forces.haptics.maths.bimodal import THESIS, cqlf_limit, switching_limit
 from davinci_forces.haptics.maths.delay import delay_limit, sampled_limit
 from davinci_forces.haptics.maths.lmi import holds
@@ -62,13 +62,13 @@ def test_the_map_is_cut_by_the_exact_border(records):
 
 
 def test_what_is_shipped_of_the_thesis_s_hand_is_what_is_found_of_it():
-    for k, proved in zip(thesis.K_H.tolist(), thesis.PROVED, strict=True):
-        assert holds(THESIS._replace(k=k), thesis.K_T).tolist() == [i < proved for i in range(len(thesis.K_T))]
-    held = [sampled_limit(THESIS, delay, thesis.LINK_RATE) for delay in thesis.DELAYS.tolist()]
-    assert_allclose(thesis.HELD, held, rtol=1e-9)
-    simulated = thesis.DELAYS[thesis.SIMULATED].tolist()
+    for k, proved in zip(bimodal.K_H.tolist(), bimodal.PROVED, strict=True):
+        assert holds(THESIS._replace(k=k), bimodal.K_T).tolist() == [i < proved for i in range(len(bimodal.K_T))]
+    held = [sampled_limit(THESIS, delay, bimodal.LINK_RATE) for delay in bimodal.DELAYS.tolist()]
+    assert_allclose(bimodal.HELD, held, rtol=1e-9)
+    simulated = bimodal.DELAYS[bimodal.SIMULATED].tolist()
     leaving = [leaving_limit(THESIS, delay, delay_limit(THESIS, delay)) for delay in simulated]
-    assert_allclose(thesis.LEAVING, leaving, rtol=1e-9)
+    assert_allclose(bimodal.LEAVING, leaving, rtol=1e-9)
 
 
 def test_the_delay_s_limits_are_those_of_the_thesis_s_hand(records):

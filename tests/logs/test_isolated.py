@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.isolated import log as isolated
+from davinci_forces.logs import isolated
 from davinci_forces.logs.isolated import process
 from davinci_forces.logs.log import Channel, Log, Options
 

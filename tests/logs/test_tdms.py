@@ -13,9 +13,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 from numpy.typing import NDArray
 
 from davinci_forces.errors import BadLog
-from davinci_forces.logs import blocks
+from davinci_forces.logs import log as asked
 from davinci_forces.logs.tdms import samples as tdms_samples
-from davinci_forces.logs.tdms import scaled as tdms_scaled
 from davinci_forces.logs.tdms import walk as tdms_walk
 from tests.logs.cutting import is_cut_honestly
 from tests.logs.reading import read
@@ -128,7 +127,7 @@ def test_blocks_of_any_size_give_the_same_samples(
     contents += [] if interleaved else [segment(table, chunks=chunks) * 4 for chunks in (2, 12)]
     for module, name, value in (
         (tdms_walk, "BLOCK", block), (tdms_walk, "SMALL", block), (tdms_samples, "BLOCK", block),
-        (tdms_samples, "ROWS", 5), (blocks, "ROWS", 7),
+        (tdms_samples, "ROWS", 5), (asked, "ROWS", 7),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, value)
     holds(contents[0], joined([table] * 6))
@@ -295,7 +294,7 @@ def test_channels_that_are_called_alike_are_remarked_on() -> None:
 def test_values_of_daq_cards_are_read_as_npTDMS_reads_them_however_long_their_chunks(
     monkeypatch: pytest.MonkeyPatch, chunk: int
 ) -> None:
-    monkeypatch.setattr(tdms_scaled, "ROWS", chunk)
+    monkeypatch.setattr(tdms_samples, "ROWS", chunk)
     raw = {f"a/{i}": np.arange(i, 40 + i, dtype=np.int16) for i in range(3)}
     content = daqmx(raw, slope=0.5, chunks=4) * 3
     _, samples = read(content, "log.tdms")

@@ -82,17 +82,10 @@ def _known(value: float) -> float | None:
 
 def _write_csv(file: Path, run: object) -> None:
     """What one hand felt, a row a turn of the controller."""
-    columns = {
-        "t [s]": "t",
-        "plan [m]": "plan",
-        "hand [m]": "x",
-        "arm [m]": "q",
-        "true [N]": "true",
-        "felt [N]": "felt",
-    }
-    rows = zip(*(getattr(run, name).tolist() for name in columns.values()), strict=True)
+    fields = {"t [s]": "t", "plan [m]": "plan", "hand [m]": "x", "arm [m]": "q", "true [N]": "true", "felt [N]": "felt"}
+    rows = zip(*(getattr(run, name).tolist() for name in fields.values()), strict=True)
     file.parent.mkdir(parents=True, exist_ok=True)
-    lines = [",".join(columns), *(",".join(f"{x:.9g}" for x in row) for row in rows)]
+    lines = [",".join(fields), *(",".join(f"{x:.9g}" for x in row) for row in rows)]
     file.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
 
 

@@ -1,5 +1,6 @@
 """Show what a log holds: channels, units, samples, clock, what is odd about it, and its first rows."""
 
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import zip_longest
@@ -20,21 +21,19 @@ MAX_SHARE = 0.1  # share of repeated rows, and of jitter in the sampling time, a
 def run(
     file: Annotated[Path, typer.Argument(help="A log, of any format that the README lists.")],
     head: Annotated[int, typer.Option(min=0, help="Rows to show.")] = 5,
-    json: Annotated[bool, typer.Option("--json", help="Print it for a program to read.")] = False,
+    as_json: Annotated[bool, typer.Option("--json", help="Print it for a program to read.")] = False,
     dtype: Annotated[str | None, typer.Option(help="Of raw binary numbers: float64, '<int16' ...")] = None,
     columns: Annotated[str | None, typer.Option(help="Of a row of them: their number, or names, as in t,q,i.")] = None,
 ) -> None:
     """Show what a log holds: channels, units, samples, clock, warnings, first rows."""
-    import json as writer
-
     from davinci_forces.logs.log import Options
 
     of = int(columns) if columns and columns.isdecimal() else tuple(columns.split(",")) if columns else None
     description = describe(file, head, Options(dtype=dtype, columns=of))
-    if json:
-        typer.echo(writer.dumps(description, indent=1, ensure_ascii=False, allow_nan=False))
+    if as_json:
+        typer.echo(json.dumps(description, indent=1, ensure_ascii=False, allow_nan=False))
     else:
-        from davinci_forces.logs.names import visible
+        from davinci_forces.logs.log import visible
 
         typer.echo("\n".join(visible(line) for line in lines(description)))
 
@@ -88,31 +87,24 @@ def describe(file: Path, head: int, options: "Options | None" = None) -> dict[st
 
 def _survey(log: "Log", source: str, together: list[str], head: int) -> _Survey:
     """Read the channels of one clock, whose times `source` holds, if any does."""
+    import numpy as np
+
     from davinci_forces.maths.signals.clock import ClockStatistics
     from davinci_forces.maths.signals.columns import Outline
 
     kinds = {channel.name: channel.kind for channel in log.channels if not channel.derived}
     measured = [name for name in together if kinds.get(name) == "number" and name != source]
-    survey = _Survey(
-        ClockStatistics(), {name: Outline() for name in together}, {name: [] for name in together},
-    )  # fmt: skip
+    survey = _Survey(ClockStatistics(), {name: Outline() for name in together}, {name: [] for name in together})
     for block in log.blocks(together):
         count = len(next(iter(block.values())))
-        t = block[source] if source in block else _counted(log, survey.rows, count)
+        number = survey.rows + np.arange(count, dtype=float)  # counts samples where the log has no clock
+        t = block.get(source, log.clock.start + number * log.clock.step if log.clock else number)
         survey.statistics.update(t, [block[name] for name in measured])
         for name in together:
             survey.outlines[name].update(block[name])
             survey.first[name].extend(block[name][: max(0, head - survey.rows)].tolist())
         survey.rows += count
     return survey
-
-
-def _counted(log: "Log", rows: int, count: int) -> Any:
-    """Times by the log's clock [s]; samples are counted where it has none."""
-    import numpy as np
-
-    number = rows + np.arange(count, dtype=float)
-    return log.clock.start + number * log.clock.step if log.clock else number
 
 
 def _clock(log: "Log", source: str, clock: "ClockStatistics") -> dict[str, Any]:

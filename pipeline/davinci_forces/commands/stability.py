@@ -62,10 +62,9 @@ def _hand(k_h: float, b_h: float, m: float, delay: float | None, rate: float | N
 def _limits(hand: "Hand", delay: float | None, rate: float | None) -> Limits:
     """Every limit [N/m] that was asked for; None is no limit."""
     from davinci_forces.haptics.maths import bimodal, lmi
-    from davinci_forces.haptics.maths.bimodal import switching_limit
     from davinci_forces.haptics.maths.delay import delay_limit, sampled_limit
 
-    switching = switching_limit(hand)
+    switching = bimodal.switching_limit(hand)
     limits: Limits = {
         "k_t_cqlf": bimodal.cqlf_limit(hand),
         "k_t_lmi": lmi.lmi_limit(hand, switching),

@@ -14,8 +14,7 @@ from davinci_forces.filters import ekf, stepping
 from davinci_forces.filters.problem import NoiseModel
 from davinci_forces.filters.response import slowest
 from davinci_forces.haptics.maths.bimodal import THESIS_TISSUE, Hand
-from davinci_forces.haptics.maths.delay import held
-from davinci_forces.haptics.maths.feeling import Complex, harmonic, largest, response_limit, settles
+from davinci_forces.haptics.maths.delay import Complex, harmonic, held, largest, response_limit, settles
 from davinci_forces.haptics.maths.simulated_loop import Axis, Clocks, Felt, FeltTissue, Grip, SensorReading, simulate
 from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, AxisNoise, Body, HapticScenario
 from davinci_forces.maths.arrays import Array
@@ -156,7 +155,7 @@ def _run(scenario: HapticScenario, hand: Hand, push: Array, noise: Array, start:
     )
     tissue = FeltTissue(stiffness, scenario.damping, scenario.friction)
     grip = Grip(*held(hand, scenario.tick), put)
-    maker = streaming(scenario) if scenario.filtered else _true_force
+    maker = streaming(scenario) if scenario.filtered else lambda reading: reading.force  # as a sensor at the tip has it
     return simulate(grip, scenario.device, _axis(scenario), tissue, clocks, push, noise, (start, 0.0), maker)
 
 
@@ -183,11 +182,6 @@ def _axis(scenario: HapticScenario) -> Axis:
         np.array([[body.inertia]]), np.array([body.gravity]), friction, scenario.motor, scenario.law, stops,
         scenario.exact,
     )  # fmt: skip
-
-
-def _true_force(reading: SensorReading) -> float:
-    """The force as a sensor at the tip would send it."""
-    return reading.force
 
 
 def streaming(scenario: HapticScenario) -> Callable[[SensorReading], float]:

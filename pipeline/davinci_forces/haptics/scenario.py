@@ -89,9 +89,7 @@ class HapticScenario:
     stiffness: float | None = None  # [N/m]
     damping: float = 5.0  # [N s/m]
     friction: float = 0.05  # along the tool, over the force that presses
-    plan: tuple[tuple[float, float], ...] = (
-        PLAN  # where the hand would be if it felt nothing: [s], [m] from the surface
-    )
+    plan: tuple[tuple[float, float], ...] = PLAN  # where the hand is that feels nothing: [s], [m] from the surface
 
     @property
     def duration(self) -> float:

@@ -8,8 +8,7 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from davinci_forces.logs.log import Block, Channel, Log
-from davinci_forces.logs.names import unique
+from davinci_forces.logs.log import Block, Channel, Log, unique
 from davinci_forces.maths.arrays import Array
 
 CELLS = 1 << 20  # of a block, at most
@@ -88,20 +87,16 @@ class ArrayLog(Log):
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, as `Log.blocks` says."""
         self._start_anew(names, kinds=("number", "time"))
-        arrays = {id(array): array for array, _ in map(self.of.__getitem__, names)}
+        of = {name: self.of[name] for name in names}
+        arrays = {id(array): array for array, _ in of.values()}
         rows = max((array.rows for array in arrays.values()), default=0)
         step = max(1, CELLS // max(1, sum(array.columns for array in arrays.values())))
         for first in range(0, rows, step):
             last = min(first + step, rows)
             parts = {which: _filled(array, first, last) for which, array in arrays.items()}
-            block = {}
-            for name in names:
-                array, column = self.of[name]
-                lacking = max(0, last - max(first, array.rows))
-                block[name] = np.ascontiguousarray(parts[id(array)][:, column])
-                self.nulls[name] += lacking
-                self.nans[name] += int(np.count_nonzero(np.isnan(block[name]))) - lacking
-            yield block
+            lacking = {name: max(0, last - max(first, array.rows)) for name, (array, _) in of.items()}
+            columns = {name: parts[id(array)][:, column] for name, (array, column) in of.items()}
+            yield self.tallied({name: np.ascontiguousarray(column) for name, column in columns.items()}, lacking)
 
 
 def _filled(array: Named, first: int, last: int) -> Array:

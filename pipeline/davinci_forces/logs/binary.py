@@ -9,9 +9,7 @@ from typing import BinaryIO
 import numpy as np
 
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.blocks import ahead
-from davinci_forces.logs.log import Block, Channel, Log, Options
-from davinci_forces.logs.names import unique, unit_in
+from davinci_forces.logs.log import Block, Channel, Log, Options, ahead, unique, unit_in
 
 SUFFIXES = (".bin", ".dat")
 # LabVIEW counts bits and numpy's short names count bytes, so that i8 and u8, which are both, are refused.
@@ -81,10 +79,7 @@ class BinaryLog(Log):
         number = {channel.name: i for i, channel in enumerate(self.channels)}
         with self.path.open("rb") as file:
             for rows in self._rows(file):
-                block = {name: rows[:, number[name]].astype(np.float64) for name in names}
-                for name, values in block.items():
-                    self.nans[name] += int(np.count_nonzero(np.isnan(values)))
-                yield block
+                yield self.tallied({name: rows[:, number[name]].astype(np.float64) for name in names})
 
     def _rows(self, file: BinaryIO) -> Iterator[np.ndarray[tuple[int, int], np.dtype[np.generic]]]:
         """The rows of every piece, so many at a time."""

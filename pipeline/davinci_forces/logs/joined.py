@@ -16,8 +16,7 @@ import numpy as np
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs import open_log
-from davinci_forces.logs.log import COUNTED, Block, Channel, Log, Options
-from davinci_forces.logs.names import unique
+from davinci_forces.logs.log import COUNTED, Block, Channel, Log, Options, unique
 from davinci_forces.logs.parts import ABSOLUTE, SAMPLED, require_different, starts_of
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals.clock import GAP, ClockStatistics, cubic, means

@@ -14,12 +14,15 @@ needs none: `Log.clock` says it.  Several clocks are read at the same time throu
 what a pass over a file needs is kept by `blocks` itself.
 """
 
+import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass, field
 from difflib import get_close_matches
 from pathlib import Path
+from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +31,11 @@ from davinci_forces.errors import BadLog
 
 Block = dict[str, NDArray[np.float64]]  # channel name -> samples; every array of a block has one length
 COUNTED = "samples"  # unit of a channel of times that only counts them
+# What a terminal or a page would obey or hide instead of showing it.
+CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]")
+IN_BRACKETS = re.compile(r".*\S\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*")
+ROWS = 1 << 16  # of a block, or fewer
+CELLS = 1 << 20  # of a block of many channels
 
 
 @dataclass(frozen=True)
@@ -183,6 +191,91 @@ class Log(ABC):
         if len(clocks := self.by_clock(names)) > 1:
             raise BadLog(f"{self.path}: {', '.join(map(repr, names))} have {len(clocks)} clocks; read them one by one")
 
+    def tallied(self, block: Block, missing: Mapping[str, int] = MappingProxyType({})) -> Block:
+        """A block to be handed on, whose NaNs are counted: of each channel so many are missing, the others logged."""
+        for name, values in block.items():
+            self.nulls[name] += missing.get(name, 0)
+            self.nans[name] += int(np.count_nonzero(np.isnan(values))) - missing.get(name, 0)
+        return block
+
 
 def _listed(channels: Sequence[Channel], joint: str = ", ") -> str:
     return joint.join(repr(channel.name) for channel in channels) or "none"
+
+
+def unique(names: Sequence[str], taken: Iterable[str] = ()) -> tuple[str, ...]:
+    """The names with `_1`, `_2` ... after those that came before, and `column_<number>` for empty ones."""
+    seen: dict[str, None] = dict.fromkeys(taken)
+    for column, name in enumerate(names):
+        name = name or f"column_{column}"
+        free, number = name, 0
+        while free in seen:
+            number += 1
+            free = f"{name}_{number}"
+        seen[free] = None
+    return tuple(seen)[len(seen) - len(names) :]
+
+
+def unit_in(name: str) -> str:
+    """The unit of a name such as `q [rad]` or `q (rad)`, else ""."""
+    unit = IN_BRACKETS.fullmatch(name)
+    return unit.group(1) if unit else ""
+
+
+def visible(text: str) -> str:
+    """Text of a log with its control characters written out, as in `\\x1b`, for people to read."""
+    return CONTROL.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
+
+
+def renamed(written: Sequence[str], names: Sequence[str]) -> list[str]:
+    """What to say of channels that had to be renamed, because they are called like another."""
+    return [
+        f"column {i} is called {own!r} like another; it is read as {name!r}"
+        for i, (own, name) in enumerate(zip(written, names, strict=True))
+        if own and own != name
+    ]
+
+
+def ahead(blocks: Iterator[Block]) -> Iterator[Block]:
+    """The same samples in blocks of at least `ROWS` rows or `CELLS` cells, but for the last.
+
+    Each is made while the one before is used: parsing and compressing both leave the interpreter free, so that reading
+    and storing a log share two processors.  A log of one block needs no second one, which takes longer to start.
+    """
+    made = _gathered(blocks)
+    block = next(made, None)
+    if block and not _is_full(_rows(block), len(block)):
+        yield block
+    elif block:
+        with ThreadPoolExecutor(max_workers=1) as reader:
+            while block:
+                following = reader.submit(next, made, None)
+                yield block
+                block = following.result()
+
+
+def _gathered(blocks: Iterator[Block]) -> Iterator[Block]:
+    waiting: list[Block] = []
+    rows = 0
+    for block in blocks:
+        waiting.append(block)
+        rows += _rows(block)
+        if _is_full(rows, len(block)):
+            yield _joined(waiting)
+            waiting, rows = [], 0
+    if rows:
+        yield _joined(waiting)
+
+
+def _rows(block: Block) -> int:
+    return len(next(iter(block.values()), ()))
+
+
+def _is_full(rows: int, channels: int) -> bool:
+    return rows >= ROWS or rows * channels >= CELLS
+
+
+def _joined(blocks: Sequence[Block]) -> Block:
+    if len(blocks) == 1:
+        return blocks[0]
+    return {name: np.concatenate([block[name] for block in blocks]) for name in blocks[0]}

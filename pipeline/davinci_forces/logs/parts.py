@@ -11,8 +11,7 @@ import numpy as np
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs import open_log
-from davinci_forces.logs.log import Block, Channel, Log, Options
-from davinci_forces.logs.names import unique
+from davinci_forces.logs.log import Block, Channel, Log, Options, unique
 from davinci_forces.logs.text.stamps import REMARK, clocks_may_change
 from davinci_forces.logs.timeline import Timeline
 from davinci_forces.maths.arrays import Array
@@ -38,11 +37,12 @@ def open_parts(files: Sequence[Path], options: Options) -> Log:
 def require_different(files: Sequence[Path]) -> None:
     """Refuse a file that is given twice, or beside a copy of itself."""
     sizes: dict[int, list[Path]] = {}
-    for file in files:
-        for other in sizes.setdefault(file.stat().st_size if file.is_file() else -1, []):
-            if file.is_file() and (file.samefile(other) or cmp(file, other, shallow=False)):
+    for file in filter(Path.is_file, files):
+        of_its_size = sizes.setdefault(file.stat().st_size, [])
+        for other in of_its_size:
+            if file.samefile(other) or cmp(file, other, shallow=False):
                 raise BadLog(f"{file}: it holds the same bytes as {other.name}; name every part of a log once")
-        sizes[file.stat().st_size if file.is_file() else -1].append(file)
+        of_its_size.append(file)
 
 
 class Parts(Log):
@@ -94,7 +94,8 @@ class Parts(Log):
             made = clocks[0] if clocks[0] not in names else ""
             [time] = [own] if own else unique([made or "time"], [*names, *self.times])
             self.times[time] = together
-        main = next((time for time, together in self.times.items() if _is_own(self.parts[0], together)), "")
+        clocks_of_first = ((time, self.parts[0].by_clock(sorted(of)[:1])) for time, of in self.times.items())
+        main = next((time for time, clock in clocks_of_first if "" in clock), "")
         self.clock, self.time = None, main
         of = {name: time for time, together in self.times.items() for name in together}
         told = (replace(c, time="" if of.get(c.name, main) == main else of[c.name]) for c in written)
@@ -138,12 +139,10 @@ class Parts(Log):
         own = _partition(part)[together]
         others = [name for name in names if name != time]
         counted = [] if own or others else sorted(together)[:1]  # something has to say how many samples there are
-        rows = 0
         for block in part.blocks([*others, *([own] if own else []), *counted]):
             count = len(next(iter(block.values())))
             t = axis.counted(number, part, count) if not own else axis.read(number, part, own, block[own])
             yield {name: t if name == time else block[name] for name in names}
-            rows += count
 
 
 def _written(log: Log) -> list[tuple[str, str, str]]:
@@ -157,10 +156,6 @@ def _partition(log: Log) -> dict[frozenset[str], str]:
     sampled = [c.name for c in log.channels if c.kind in SAMPLED and not c.derived]
     groups = log.by_clock(sampled)
     return {frozenset(names): own or log.time for own, names in groups.items()}
-
-
-def _is_own(log: Log, together: frozenset[str]) -> bool:
-    return "" in log.by_clock(sorted(together)[:1])
 
 
 def starts_of(parts: Sequence[Log]) -> list[datetime]:

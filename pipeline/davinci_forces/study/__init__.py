@@ -1,6 +1,156 @@
 """What was recorded, and how it is to be analysed: study.toml as data, and the reading of it."""
 
+import math
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
 from davinci_forces.haptics.scenario import HapticScenario
-from davinci_forces.study.study import WHOLE, HungMass, LogEntry, Settings, Source, Study, Weighing, Weighings
+from davinci_forces.robots.robot import Robot
 
 __all__ = ["WHOLE", "HapticScenario", "HungMass", "LogEntry", "Settings", "Source", "Study", "Weighing", "Weighings"]
+
+WHOLE = ((0.0, math.inf),)  # the windows of a log that is in contact throughout
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a study is analysed.  Stages name the settings they use as keyword arguments."""
+
+    lowpass: float = 17.0  # [Hz] zero-phase low-pass where velocities and accelerations are differences
+    harmonics: int = 0  # of the excitation; 0 takes the robot's
+    fit: str = "chosen"  # the Fit that the filter runs with
+    q_tau: float = 0.0  # random walk of the external effort [effort/s^0.5]; 0 is the slowest that shows a push
+    effort: dict[str, float] = field(default_factory=dict)  # what the user wants to see on each joint [effort]
+
+
+@dataclass(frozen=True)
+class Source:
+    """The channel that feeds one quantity of a log, and how its values become SI."""
+
+    quantity: str  # "hand_roll.q", "time", ...
+    channel: str | int
+    measures: str
+    unit: str | None = None
+    sign: int = 1
+    offset: float = 0.0
+    scale: float = 1.0
+
+    @property
+    def joint(self) -> str:
+        """The joint that the quantity is of, or "" for one of the whole log."""
+        return self.quantity.rpartition(".")[0]
+
+    @property
+    def symbol(self) -> str:
+        """The quantity without its joint."""
+        return self.quantity.rpartition(".")[2]
+
+
+@dataclass(frozen=True)
+class HungMass:
+    """A mass hung on the arm, at a point fixed to a link.  Section 7.5"""
+
+    moves_with: str  # a joint, for the link that turns about the remote centre with it, or a link
+    position: tuple[float, float, float]  # [m] from the remote centre, in the link's axes that at q = 0 are the base's
+    mass: float | None = None  # [kg] where it is known
+
+
+@dataclass(frozen=True)
+class Weighing:
+    """A weight log as every log is asked about it."""
+
+    log: str
+    weight: HungMass
+    tare: str  # the log to be subtracted, or ""
+
+
+@dataclass(frozen=True)
+class Weighings:
+    """All weight logs of a study that say where the mass hangs."""
+
+    each: tuple[Weighing, ...]
+
+
+@dataclass(frozen=True)
+class LogEntry:
+    """One [[log]] of a study."""
+
+    name: str
+    files: tuple[str, ...]  # relative to the study
+    role: str
+    channels: tuple[Source, ...]
+    join: bool = False  # whether the files stand side by side, else they are parts in order
+    period: float | None = None
+    rate: float | None = None
+    skip: float = 0.0
+    until: float | None = None
+    contact: tuple[tuple[float, float], ...] = ()  # [s] known windows; WHOLE where all samples are of contact
+    free: tuple[tuple[float, float], ...] = ()
+    weight: HungMass | None = None
+    tare: str = ""  # the log of the same path that is subtracted from a weight log
+    delimiter: str | None = None
+    decimal: str | None = None
+    header: bool | None = None
+    encoding: str | None = None
+    dtype: str | None = None  # of raw binary numbers
+    columns: int | tuple[str, ...] | None = None  # of a row of them: how many, or their names
+
+    @property
+    def tells_free_space(self) -> bool:
+        """Whether it is known when nothing touched the robot."""
+        return self.role in ("identification", "validation") or (self.role == "contact" and bool(self.contact))
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """The joints that the log has channels of, in the order of the file."""
+        return tuple(dict.fromkeys(source.joint for source in self.channels if source.joint))
+
+    @property
+    def needs_clock(self) -> bool:
+        """Whether its samples say nothing without the time between them; pushes of depth and force do."""
+        return self.role != "tissue" or bool(self.joints)
+
+
+@dataclass(frozen=True)
+class Study:
+    """A study, validated."""
+
+    folder: Path
+    title: str
+    robot: Robot
+    simulated: bool
+    settings: Settings
+    logs: tuple[LogEntry, ...]
+    changed: dict[str, Any] = field(default_factory=dict)  # what the study says of the robot, for the report
+    truth: dict[str, Any] = field(default_factory=dict)  # ground truth of a simulated study: its truth.toml
+    haptics: HapticScenario = field(default_factory=HapticScenario)  # what is simulated of a hand that feels the tissue
+    baseline: str = ""  # the results.json in the study's folder that the report is compared with, if there is one
+    robot_file: str = ""  # the .toml or .urdf in the study's folder that describes the robot, if there is one
+    lines: dict[str, int] = field(default_factory=dict, compare=False)  # of study.toml, by the file of a log they name
+    remarks: tuple[str, ...] = field(default=(), compare=False)  # what its author should know, each with its line
+
+    @property
+    def name(self) -> str:
+        """The folder's name."""
+        return self.folder.resolve().name
+
+    def log(self, name: str) -> LogEntry:
+        """The log of that name."""
+        return next(entry for entry in self.logs if entry.name == name)
+
+    @property
+    def weighings(self) -> Weighings:
+        """The weight logs."""
+        return Weighings(
+            tuple(Weighing(e.name, e.weight, e.tare) for e in self.logs if e.weight and e.role == "weight")
+        )
+
+    @property
+    def files(self) -> int:
+        """How many files its logs are in."""
+        return sum(len(entry.files) for entry in self.logs)
+
+    def absent(self) -> tuple[str, ...]:
+        """Files of logs that are not there."""
+        return tuple(file for entry in self.logs for file in entry.files if not (self.folder / file).exists())

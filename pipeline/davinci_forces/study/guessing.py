@@ -1,7 +1,7 @@
 """What the channels of a log hold where their names do not name a joint: by numbers in names, else by content."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
@@ -248,7 +248,9 @@ def roles_of(names: Sequence[str], guesses: Sequence[Holding]) -> list[Role]:
     found = [word or _by_motion(guess, covered) for guess, word in zip(guesses, told, strict=True)]
     if any(role.role == "identification" for role in found) or not any(guess.moving for guess in guesses):
         return found
-    return [*_one_identified(found, guesses)]
+    first = [bool(guess.moving) for guess in guesses].index(True)
+    found[first] = Role("identification", f"{found[first].reason}; but there is no other log to identify from")
+    return found
 
 
 def _by_word(name: str) -> Role | None:
@@ -278,12 +280,3 @@ def _by_motion(guess: Holding, covered: set[int]) -> Role:
         which = ", ".join(str(joint + 1) for joint in sorted(new))
         return Role("identification", f"it moves joint {which}, which no log that repeats does")
     return Role("validation", "its motion does not repeat, and that of another log does")
-
-
-def _one_identified(found: Sequence[Role], guesses: Sequence[Holding]) -> Iterator[Role]:
-    """The same with the first log that moves as the one to identify from, as there is no other."""
-    first = [bool(guess.moving) for guess in guesses].index(True)
-    for i, role in enumerate(found):
-        yield (
-            Role("identification", f"{role.reason}; but there is no other log to identify from") if i == first else role
-        )

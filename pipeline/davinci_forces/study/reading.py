@@ -20,9 +20,8 @@ BEYOND = tuple(
     f"{variant}.{how}" for variant in VARIANTS for how in ("lse", "ridge", "consistent")
     if how == "ridge" or variant.startswith("independent+") or (how == "consistent" and variant != "independent")
 )  # fmt: skip
-CHOICES = {
-    "fit": ("chosen", *(f"independent.{estimator}" for estimator in ESTIMATORS), *BEYOND),
-}
+CHOICES = {"fit": ("chosen", *(f"independent.{estimator}" for estimator in ESTIMATORS), *BEYOND)}
+TRUTH = "truth.toml"  # the ground truth of a simulated study, where its folder has it
 OUTDATED = ("derivative",)  # settings without effect that earlier versions had
 
 
@@ -62,17 +61,11 @@ def study_of(table: TomlTable, folder: Path) -> Study:
     table.file.refuse(BadStudy)
     assert robot is not None
     own = table.values["robot"] if table.values["robot"].endswith(robots.FILES) else ""
-    truth = _truth(folder) if simulated else {}
+    truth = toml.read(folder / TRUTH, BadStudy).values if simulated and (folder / TRUTH).exists() else {}
     changed = overrides.values | ({"tool": table.values["tool"]} if "tool" in table else {})
     return Study(
         folder, title, robot, simulated, settings, logs, changed, truth, scenario, baseline, own, lines, remarks
     )
-
-
-def _truth(folder: Path) -> dict[str, Any]:
-    """The ground truth of a simulated study, where its folder has a truth.toml."""
-    file = folder / "truth.toml"
-    return toml.read(file, BadStudy).values if file.exists() else {}
 
 
 def _baseline(table: TomlTable, folder: Path) -> str:

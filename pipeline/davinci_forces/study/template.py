@@ -16,8 +16,8 @@ from davinci_forces.logs.joined import Joined
 from davinci_forces.logs.log import Channel, Log
 from davinci_forces.maths.units import SI, canonical, measures
 from davinci_forces.robots.robot import Joint, Robot
-from davinci_forces.study.arm_guess import DEFAULT, Arm, arm_of
-from davinci_forces.study.channels import OF_THE_LOG
+from davinci_forces.study.belonging import DEFAULT, Arm, arm_of, grouped, guess_joined, split
+from davinci_forces.study.channels import OF_THE_LOG, is_tissue, tissue_channels, unit_of
 from davinci_forces.study.guessing import (
     Holding,
     Meaning,
@@ -30,8 +30,6 @@ from davinci_forces.study.guessing import (
     roles_of,
     samples_of,
 )
-from davinci_forces.study.side_by_side import grouped, guess_joined, start_of
-from davinci_forces.study.tissue_channels import is_tissue, tissue_channels, unit_of
 
 # Words of a channel's name that tell what it holds, the telling ones first.
 WORDS = {
@@ -62,9 +60,8 @@ class Drawn:
     @property
     def name(self) -> str:
         """The name of its first file, as a study may call a log."""
-        name = self.files[0].name.partition(".")[0]
-        if len(self.files) > 1:
-            name = start_of(self.files[0])
+        first = self.files[0]
+        name = split(first)[0] if len(self.files) > 1 else first.name.partition(".")[0]
         return re.sub(r"[^a-z0-9_-]+", "-", name.lower()).strip("-_") or "log"
 
 
@@ -118,8 +115,8 @@ def _drawn(files: list[Path], robot: Robot) -> Drawn:
         joined = Joined([open_log(file) for file in files])
         return Drawn(files, joined, guess_joined(joined))
     log = open_log(files[0])
-    named = any(_guess(channel, robot) not in ("", "time") for channel in log.channels)
-    return Drawn(files, log, Holding() if named or is_tissue([*_touching(log, robot).values()]) else guess(log))
+    named = _names_joints(log, robot) or is_tissue([*_touching(log, robot).values()])
+    return Drawn(files, log, Holding() if named else guess(log))
 
 
 def _alike(drawn: list[Drawn]) -> list[Drawn]:
@@ -180,11 +177,13 @@ def _rate(log: Log, found: Holding, tissue: bool) -> Iterator[str]:
 
 def _touching(log: Log, robot: Robot) -> dict[str, str]:
     """Channels that tell of pushes into tissue, by name, where no channel is of a joint."""
-    return (
-        {}
-        if any(_guess(channel, robot) not in ("", "time") for channel in log.channels)
-        else tissue_channels([channel for channel in log.channels if not is_time(channel)])
-    )
+    if _names_joints(log, robot):
+        return {}
+    return tissue_channels([channel for channel in log.channels if not is_time(channel)])
+
+
+def _names_joints(log: Log, robot: Robot) -> bool:
+    return any(_guess(channel, robot) not in ("", "time") for channel in log.channels)
 
 
 def _channels(drawn: Drawn, robot: Robot, touching: dict[str, str]) -> Iterator[str]:

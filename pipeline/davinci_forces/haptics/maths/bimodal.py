@@ -9,10 +9,9 @@ between them, however fast and wherever, makes it unstable.  The real one switch
 
 so that without delay it is stable for every K_T >= 0.
 
-The stiffest tissue under arbitrary switching, exactly: where the worst switching law just closes on itself.
-
-The two modes differ in the force K_T x only, which pushes back.  The worst law leaves it out while the hand moves
-away, and puts it in while it comes back, so that it switches on both axes of the phase plane, and alike in both halves.
+The stiffest tissue under arbitrary switching, exactly, is where the worst switching law just closes on itself.  The two
+modes differ in the force K_T x only, which pushes back.  The worst law leaves it out while the hand moves away, and
+puts it in while it comes back, so that it switches on both axes of the phase plane, and alike in both halves.
 With omega^2 = K/m and the damping ratio zeta, a mode takes a speed v to the displacement X, and X to the speed v':
 
     X  = v/omega   exp(-g(zeta)),        g = zeta/s  arccos(zeta)
@@ -31,6 +30,35 @@ from davinci_forces.maths.arrays import Array
 
 THESIS_TISSUE = 457.24  # [N/m], section 8.2
 NEAR = 1e-6  # of a damping ratio to 1, where the series takes over
+# What takes seconds to find of the thesis's hand and is the same in every study, as numbers, which tests find again.
+SOFTEST, STIFFEST = 1.0, 1e5  # [N/m] hands
+K_H, K_T = np.geomspace(SOFTEST, STIFFEST, 30), np.geomspace(0.5, 2e3, 30)  # [N/m] hands and tissues of the map
+DELAYS = np.geomspace(1e-3, 0.5, 55)  # [s]
+SIMULATED = slice(18, None, 9)  # of the delays, at which the hand that leaves the tissue is simulated
+LINK_RATE = 100.0  # [Hz] of messages, chapter 9
+# Of each hand of the map, the tissues, from the softest on, for which `lmi.holds`.
+PROVED = (
+    7, 7, 8, 8, 9, 9, 10, 11, 11, 12, 13, 13, 14, 14, 15, 16, 17, 17, 18, 19, 19, 20, 21, 21, 22, 23, 23, 24, 25,
+    25,
+)  # fmt: skip
+# [N/m] `delay.sampled_limit` of each delay at that rate.
+HELD = (
+    167.09132452095844, 163.76653710101584, 160.19105826948277, 156.36177491875574, 152.27869772527805,
+    147.94540170726037, 143.3694072223424, 138.56247043556272, 133.54075245898127, 128.32483943775333,
+    122.9395921412851, 117.41381304288058, 111.77973089305058, 106.07231638501256, 100.32845626057407,
+    94.58602548171498, 88.8829063289324, 83.2560082299938, 77.7403420891632, 72.3681978725536, 67.16846494994716,
+    62.16774829252174, 57.38769161993552, 52.843622374354005, 48.54670742568506, 44.504131026497134,
+    40.71938371751873, 37.1938175313959, 33.92526912638836, 30.907637265110196, 28.13334851975981,
+    25.594473640372083, 23.280602106759996, 21.181321535521008, 19.285997741970938, 17.58405547197676,
+    16.065545234049534, 14.721537279724567, 13.54451134771404, 12.529046896842285, 11.672638536710002,
+    10.976992248623343, 10.450130801024713, 10.110155915438893, 9.991824508808316, 10.159681208458373,
+    10.734308974921793, 11.94789278116265, 14.255706578798465, 18.482229295646924, 25.574513026342466,
+    35.27063234937405, 45.75508918133681, 55.492032799221484, 63.89019209613135,
+)  # fmt: skip
+# [N/m] `motion.leaving_limit` of each delay that is simulated.
+LEAVING = (
+    416.321006868175, 112.70170340262258, 38.25106184546224, 22.067132844844714, 127.46037697679003,
+)  # fmt: skip
 
 
 class Hand(NamedTuple):

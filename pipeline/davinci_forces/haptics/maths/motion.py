@@ -84,10 +84,7 @@ def flow(hand: Hand, k_t: float, state: State, t: float) -> State:
     even = cmath.cosh(w * t).real
     odd = (cmath.sinh(w * t) / w).real if w else t
     shrink = math.exp(-sigma * t)
-    return (
-        shrink * (even * x + odd * (sigma * x + dx)),
-        shrink * (even * dx + odd * (-square * x - sigma * dx)),
-    )
+    return shrink * (even * x + odd * (sigma * x + dx)), shrink * (even * dx + odd * (-square * x - sigma * dx))
 
 
 def late(hand: Hand, k_t: float, delay: float, rate: float, push: float, duration: float) -> Swing:

@@ -5,8 +5,6 @@ from pathlib import Path
 from davinci_forces.logs import isolated
 from davinci_forces.logs.log import Log, Options
 
-__all__ = ["read", "recognises"]
-
 BEGINNINGS = (b"PAR1", b"ARROW1\0\0", b"FEA1")
 
 

@@ -12,8 +12,7 @@ from pyarrow import feather, ipc, parquet
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.cells import absent, integers, numbers
-from davinci_forces.logs.log import Block, Channel, Log, Options
-from davinci_forces.logs.names import unique
+from davinci_forces.logs.log import Block, Channel, Log, Options, unique
 from davinci_forces.maths.arrays import Array
 
 ROWS = 1 << 14  # of a batch
@@ -84,11 +83,9 @@ def _kind(what: pa.DataType) -> str:
     if pa.types.is_timestamp(what):
         return "time"
     # A dictionary is a column of labels, whatever the labels are.
-    numeric = any(
-        test(what)
-        for test in (pa.types.is_integer, pa.types.is_floating, pa.types.is_boolean, pa.types.is_decimal,
-                     pa.types.is_duration)
-    )  # fmt: skip
+    of = pa.types
+    tests = (of.is_integer, of.is_floating, of.is_boolean, of.is_decimal, of.is_duration)
+    numeric = any(test(what) for test in tests)
     return "number" if numeric else "text"
 
 
@@ -104,14 +101,10 @@ class ArrowLog(Log):
         """Read the samples of these channels, as `Log.blocks` says."""
         self._start_anew(names, kinds=("number", "time"))
         for batch in self.batches([self.columns[name] for name in names]):
-            block = {}
-            for name in names:
-                column = batch.column(self.columns[name])
-                block[name] = _numbers(column, self.origin)
-                self.nulls[name] += column.null_count
-                self.nans[name] += int(np.count_nonzero(np.isnan(block[name]))) - column.null_count
+            columns = {name: batch.column(self.columns[name]) for name in names}
+            block = {name: _numbers(column, self.origin) for name, column in columns.items()}
             if batch.num_rows:
-                yield block
+                yield self.tallied(block, {name: column.null_count for name, column in columns.items()})
 
 
 def _numbers(column: pa.Array, origin: int) -> Array:

@@ -5,8 +5,6 @@ from pathlib import Path
 from davinci_forces.logs import isolated
 from davinci_forces.logs.log import Log, Options
 
-__all__ = ["read", "recognises"]
-
 SIGNATURE = b"\x89HDF\r\n\x1a\n"
 MAY_BEGIN_AT = (0, 512, 1024, 2048)  # behind a block of the user's
 

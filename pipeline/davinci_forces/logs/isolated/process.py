@@ -1,8 +1,10 @@
-"""The parent's side: children that are kept for the next log, and ended when they are late."""
+"""The parent's side: children that are kept for the next log, and ended when they are late or their parent ends."""
 
 import atexit
+import ctypes
 import json
 import os
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator, Sequence
@@ -19,13 +21,14 @@ Message = dict[str, Any]
 
 KEPT = 2  # children that wait for a next log: starting one takes longer than reading a small file
 START = (
-    "import sys; sys.path[:] = {path!r}; from davinci_forces.logs.isolated import orphans; orphans.end_with_parent(); "
-    "from davinci_forces.logs.isolated.child import serve; serve()"
+    "import sys; sys.path[:] = {path!r}; from davinci_forces.logs.isolated.process import end_with_parent; "
+    "end_with_parent(); from davinci_forces.logs.isolated.child import serve; serve()"
 )
 OUT_OF_TIME = 24  # the signal SIGXCPU, which Windows does not know
 PACKAGES = Path(__file__).parents[3]
 # One thread each, and Arrow's memory from the system: what libraries reserve beforehand counts as used.
 SPARING = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "ARROW_DEFAULT_MEMORY_POOL": "system"}
+PR_SET_PDEATHSIG = 1  # of Linux's prctl(2): the signal that a process gets when the thread that started it ends
 
 
 def send(stream: IO[bytes], message: Message, columns: Sequence[Array] = ()) -> None:
@@ -165,3 +168,13 @@ def close_all() -> None:
     """End the children that wait."""
     while _waiting:
         _waiting.pop().close()
+
+
+def end_with_parent() -> None:
+    """Have the system end this process with the one that started it, which only Linux can.
+
+    Unlike a thread that waits for the end of the other process, this needs no turn of the interpreter, for which a
+    thread waits as long as others compile or import.
+    """
+    if sys.platform == "linux":
+        ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)

@@ -7,8 +7,8 @@ from datetime import datetime
 from decimal import Decimal
 
 from davinci_forces.logs.lines import decoded
-from davinci_forces.logs.lvm.clocks import Sampling
-from davinci_forces.logs.names import unique
+from davinci_forces.logs.log import unique
+from davinci_forces.logs.timeline import Sampling
 
 MAGIC = b"LabVIEW Measurement"
 END = b"***End_of_Header***"

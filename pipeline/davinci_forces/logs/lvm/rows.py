@@ -11,10 +11,10 @@ from davinci_forces.errors import BadLog
 from davinci_forces.logs.cells import UNREADABLE, Cells, NotANumber, marks, parse_carefully, parse_either
 from davinci_forces.logs.lines import Lines, decoded
 from davinci_forces.logs.log import Block, Log
-from davinci_forces.logs.lvm.clocks import OwnClock, Sampling
 from davinci_forces.logs.lvm.header import BadHeader, Layout, X, unescaped
 from davinci_forces.logs.lvm.walk import WRITTEN, Run, Walk
 from davinci_forces.logs.text.stamps import REMARK, clocks_may_change
+from davinci_forces.logs.timeline import OwnClock, Sampling
 from davinci_forces.maths.arrays import Array, Booleans
 
 DATED = 1e9  # [s] an x beyond this counts from 1904, not from the start of the file segment
@@ -106,9 +106,10 @@ class Reading:
         x = cells.columns[0] if run.layout.file.x_columns != "No" else None
         self.first = self.first or run.layout
         before = self.rows_in_segment if run.layout is self.file_segment else 0
-        made = {"write": self._writes(run, x, cells.rows), "elapsed": self._elapsed(run, x, cells.rows, before)}
+        elapsed = self._since_start(run, x, cells.rows, before, self.first.measured)
+        made = (self._writes(run, x, cells.rows), elapsed)
         self._look_at(run, cells.rows)
-        for name, values in zip(self.derived, made.values(), strict=False):
+        for name, values in zip(self.derived, made, strict=False):
             if name in self.names:
                 block[name] = values
         if self.own and self.own.time in self.names:
@@ -120,11 +121,8 @@ class Reading:
         if held is not None:
             block = {name: values[held] for name, values in block.items()}
             empty = {name: which[held] for name, which in empty.items()}
-        for name, values in block.items():
-            nulls = int(np.count_nonzero(empty[name])) if name in empty else 0
-            self.log.nulls[name] += nulls
-            self.log.nans[name] += int(np.count_nonzero(np.isnan(values))) - nulls
-        return {name: block[name] for name in self.names}
+        nulls = {name: int(np.count_nonzero(which)) for name, which in empty.items()}
+        return self.log.tallied({name: block[name] for name in self.names}, nulls)
 
     def _held(self, run: Run, cells: Cells) -> Booleans | None:
         """Rows that hold a sample of the channels of this clock; None where all do."""
@@ -192,13 +190,11 @@ class Reading:
             self.went_back = f"line {run.line(int(i))}: x {word} {x[i]:g} in row {self.rows + int(i) + 1}"
         self.back += len(rows)
 
-    def _elapsed(self, run: Run, x: Array | None, rows: int, before: int) -> Array:
-        """Time since the start of the first file segment [s]; `before` rows of the run's first one came already."""
-        assert self.first is not None
-        return self._since_start(run, x, rows, before, self.first.measured)
-
     def _since_start(self, run: Run, x: Array | None, rows: int, before: int, channel: str) -> Array:
-        """The same by what the headers say of a channel."""
+        """Time since the start of the first file segment [s] by what the headers say of a channel.
+
+        `before` rows of the run's first file segment came already.
+        """
         firsts = np.array([row for row, _ in run.file_segments])
         counts = np.diff(firsts, append=rows)
         said = [layout.sampling.get(channel) or layout.first_sampling for _, layout in run.file_segments]
@@ -226,7 +222,7 @@ class Reading:
     def _close(self) -> None:
         """What is known only at the end of the file."""
         self._check_samples()
-        walk, say = self.walk, self.say
+        walk, lines, say = self.walk, self.lines, self.say
         if self.rows and walk.layout is not self.file_segment:
             say(f"line {walk.line}: the file ends behind the header of a file segment, which holds no rows")
         if not self.rows:
@@ -238,10 +234,6 @@ class Reading:
             say(f"line {walk.first_narrow}: the first of {walk.narrow} rows with too few cells, filled with nulls")
         for cells, line in sorted(walk.wide.items()):
             say(f"line {line}: rows of {cells} cells begin, more than the header names; see column_<number>")
-        self._close_end()
-
-    def _close_end(self) -> None:
-        say, lines = self.say, self.lines
         if lines.cut and self.walk.state == "row":
             self.log.dropped += 1
             say(f"line {lines.cut_at}: the file ends within this row, which is dropped")

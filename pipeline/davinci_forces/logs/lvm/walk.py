@@ -13,8 +13,8 @@ import numpy as np
 
 from davinci_forces.logs.cells import NUMBER
 from davinci_forces.logs.lines import Block
-from davinci_forces.logs.lvm.clocks import refined
 from davinci_forces.logs.lvm.header import END, MAGIC, BadHeader, FileHeader, Layout, X, dated, file_header, layout
+from davinci_forces.logs.timeline import refined
 
 WRITTEN = re.compile(rb"-?\d+[.,]\d+(E[+-]?\d+)?|NaN|-?Inf")  # as LabVIEW writes a number: always with a fraction
 SMALL = 1 << 16  # [bytes] of a block that is taken line by line

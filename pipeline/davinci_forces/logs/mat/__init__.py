@@ -5,8 +5,6 @@ from pathlib import Path
 from davinci_forces.logs import isolated
 from davinci_forces.logs.log import Log, Options
 
-__all__ = ["read", "recognises"]
-
 
 def recognises(path: Path, head: bytes) -> bool:
     """Whether the file says so, or is named so and is no text."""

@@ -6,8 +6,6 @@ from davinci_forces.errors import BadLog
 from davinci_forces.logs import isolated
 from davinci_forces.logs.log import Log, Options
 
-__all__ = ["read", "recognises"]
-
 BEGINNINGS = (b"#ROSBAG V", b"\x89MCAP0\r\n", b"SQLite format 3\0")
 METADATA = b"rosbag2_bagfile_information:"  # what the description of a bag in a folder begins with
 

@@ -3,18 +3,97 @@
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import UTC, datetime, timedelta
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.log import Block, Channel, Log, Options
-from davinci_forces.logs.ros.messages import KNOWN, Layout, Unlike, layout_of
+from davinci_forces.logs.log import Block, Channel, Log, Options, unique
 from davinci_forces.logs.ros.storage import Bag
 
+JOINTS = "sensor_msgs/msg/JointState"
+STATES = ("position", "velocity", "effort")  # of a joint, in SI: rad or m by the joint, which the message does not say
+# Messages with a header and vectors: what holds them, and their names with their units.
+VECTORS = {
+    "geometry_msgs/msg/WrenchStamped": ("wrench", {"force": "N", "torque": "N m"}),
+    "geometry_msgs/msg/TwistStamped": ("twist", {"linear": "m/s", "angular": "rad/s"}),
+    "geometry_msgs/msg/PoseStamped": ("pose", {"position": "m", "orientation": ""}),
+    "geometry_msgs/msg/TransformStamped": ("transform", {"translation": "m", "rotation": ""}),
+}
+KNOWN = (JOINTS, *VECTORS)
 ROWS = 1 << 13  # messages of a block
 EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+
+
+class Unlike(ValueError):
+    """A message that is not like the first of its topic, with words for how."""
+
+
+class Vectors:
+    """Vectors and quaternions; `columns` are their components: "force.x"."""
+
+    names: Sequence[str] = ()  # of joints, which these have none of
+
+    def __init__(self, kind: str, message: Any) -> None:
+        self.holder, units = VECTORS[kind]
+        axes = {name: tuple("xyzw" if hasattr(getattr(self._held(message), name), "w") else "xyz") for name in units}
+        self.paths = tuple((name, axis) for name in units for axis in axes[name])
+        self.columns = tuple(Channel(f"{name}.{axis}", units[name]) for name, axis in self.paths)
+
+    def _held(self, message: Any) -> Any:
+        return getattr(message, self.holder)
+
+    def numbers(self, message: Any) -> Sequence[float]:
+        """The components of one message."""
+        held = self._held(message)
+        return [getattr(getattr(held, name), axis) for name, axis in self.paths]
+
+
+class Joints:
+    """Position, velocity and effort of joints, in the order of the first message: "effort[0]", "effort[outer_yaw]"."""
+
+    def __init__(self, first: Any) -> None:
+        self.names: list[str] = list(first.name)
+        self.counts = [len(getattr(first, state)) for state in STATES]
+        if self.names and any(count not in (0, len(self.names)) for count in self.counts):
+            raise Unlike(f"names {len(self.names)} joints and has {self._counted(self.counts)}")
+        known = unique(self.names)
+        self.columns = tuple(
+            Channel(f"{state}[{i}]", alias=f"{state}[{known[i]}]" if self.names else "")
+            for state, count in zip(STATES, self.counts, strict=True)
+            for i in range(count)
+        )
+        self.orders: dict[tuple[str, ...], list[int] | None] = {tuple(self.names): None}
+
+    def numbers(self, message: Any) -> Sequence[float] | None:
+        """The states of one message, by name where its joints come in another order; None where it has none of them."""
+        arrays = [getattr(message, state) for state in STATES]
+        names = tuple(message.name)
+        if names not in self.orders:
+            if self.names and names and not set(self.names) & set(names):
+                return None
+            self.orders[names] = self._order(names)
+        order = self.orders[names]
+        for had, array in zip(self.counts, arrays, strict=True):
+            if len(array) != (had and len(names)) and (names or len(array) != had):
+                counts = self._counted([len(array) for array in arrays])
+                raise Unlike(f"has {counts}, where the first one has {self._counted(self.counts)}")
+        if order is None:
+            return list(chain.from_iterable(arrays))
+        return [array[i] for array in arrays if len(array) for i in order]
+
+    def _order(self, names: tuple[str, ...]) -> list[int]:
+        """Where the joints of the first message are in another one."""
+        if missing := [name for name in self.names if name not in names]:
+            raise Unlike(f"lacks {', '.join(missing)}, which the first one has")
+        if not self.names or len(set(self.names)) < len(self.names):
+            raise Unlike(f"is of {', '.join(names) or 'joints without names'}, where the first one is not")
+        return [names.index(name) for name in self.names]
+
+    def _counted(self, counts: Sequence[int]) -> str:
+        return ", ".join(f"{count} of {state}" for count, state in zip(counts, STATES, strict=True))
 
 
 @dataclass
@@ -23,7 +102,7 @@ class Topic:
 
     name: str  # "/PSM1/measured_js"
     connections: list[Any]
-    layout: Layout
+    layout: Vectors | Joints
     stamped: bool  # whether headers say when, else only the recorder does
     first: int  # [ns] since 1970
 
@@ -98,13 +177,13 @@ def _topics(log: Log, bag: Bag) -> list[Topic]:
 
 def _topic(log: Log, name: str, kind: str, connections: list[Any], received: int, message: Any) -> Topic:
     try:
-        layout = layout_of(kind, message)
+        layout = Joints(message) if kind == JOINTS else Vectors(kind, message)
     except Unlike as how:
         raise BadLog(f"{log.path}: message 0 of {name} {how}") from None
     stamped = _stamp(message) != 0
     if not stamped:
         log.warnings.append(f"the headers of {name} carry no time: its clock is when the recorder had the messages")
-    joints = ", ".join(getattr(layout, "names", []))
+    joints = ", ".join(layout.names)
     count = sum(connection.msgcount for connection in connections)
     log.facts[name] = f"{_short(kind)}, {count} messages" + (f", joints {joints}" if joints else "")
     return Topic(name, connections, layout, stamped, _stamp(message) or received)
@@ -162,7 +241,5 @@ class BagLog(Log):
 
     def _block(self, names: Sequence[str], where: Sequence[int], rows: list[list[float]]) -> Block:
         table = np.array(rows, np.float64)
-        block = {name: np.ascontiguousarray(table[:, column]) for name, column in zip(names, where, strict=True)}
-        for name, values in block.items():
-            self.nans[name] += int(np.count_nonzero(np.isnan(values)))
-        return block
+        columns = zip(names, where, strict=True)
+        return self.tallied({name: np.ascontiguousarray(table[:, column]) for name, column in columns})

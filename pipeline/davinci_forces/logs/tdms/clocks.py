@@ -6,8 +6,7 @@ from datetime import datetime
 from math import isfinite
 from typing import Any, NamedTuple
 
-from davinci_forces.logs.log import Channel, Clock
-from davinci_forces.logs.names import unique
+from davinci_forces.logs.log import Channel, Clock, unique
 from davinci_forces.logs.tdms.metadata import EPOCH
 from davinci_forces.logs.tdms.walk import Region
 from davinci_forces.logs.timeline import Timeline, together

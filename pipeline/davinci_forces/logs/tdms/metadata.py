@@ -18,7 +18,8 @@ NUMBERS = {
     0x19: "f4", 0x1A: "f8", BOOLEAN: "u1",
 }  # fmt: skip
 COMPLEX = (0x08000C, 0x10000D)
-SIZES = {0x1B: 16, TIME: 16, COMPLEX[0]: 8, COMPLEX[1]: 16}  # [bytes] of those that are no plain number
+SIZES = {0x1B: 16, TIME: 16, COMPLEX[0]: 8, COMPLEX[1]: 16}  # [bytes] of what is no text
+SIZES |= {kind: np.dtype(code).itemsize for kind, code in NUMBERS.items()}
 OCTETS = {"I": 4, "Q": 8, "q": 8}  # [bytes] of the numbers of which metadata are made
 EPOCH = datetime(1904, 1, 1, tzinfo=UTC)
 
@@ -132,8 +133,7 @@ class _Cursor:
             raise IndexError(f"an array of {dimension} dimensions; TDMS 2.0 has only one")
         if kind == STRING:
             return Samples(kind, count, self.number("Q"))
-        size = np.dtype(NUMBERS[kind]).itemsize if kind in NUMBERS else SIZES[kind]
-        return Samples(kind, count, count * size)
+        return Samples(kind, count, count * SIZES[kind])
 
     def daqmx(self, header: int) -> Samples:
         _, dimension, count = self.number("I"), self.number("I"), self.number("Q")

@@ -1,17 +1,101 @@
-"""The samples of TDMS regions as numbers, in pieces of bounded size, and channels of different lengths side by side."""
+"""Where the samples of a TDMS file lie, so that any channel is read without another, and these as numbers.
 
-from collections.abc import Iterator, Sequence
+They come in pieces of bounded size, and channels of different lengths side by side.
+
+npTDMS reads channels that need more than their bytes: raw values of DAQ cards, and scales that the file describes.  It
+is always given the open file, never its path: it would trust an index file of whatever age and state in the same
+folder.
+"""
+
+import io
+import logging
+import re
+from array import array
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import Any, BinaryIO
 
 import numpy as np
 from numpy.typing import NDArray
 
 from davinci_forces.logs.log import Block
+from davinci_forces.logs.tdms.metadata import names
 from davinci_forces.logs.tdms.walk import BLOCK, Column, Region
 
 ROWS = 1 << 17  # of a piece
 VALUES = 1 << 20  # of a block
 FAR = 1 << 16  # [bytes] between what is wanted of two records, which cost more to read than to pass over
+COUNT = "NI_Number_Of_Scales"
+NUMBERED = re.compile(r"NI_Scale\[(\d{1,6})\]_")
+MOST = 1000  # scales of a channel
+# What npTDMS knows; it would return values of any other scale unscaled.
+SCALES = frozenset(
+    ["Polynomial", "Linear", "RTD", "Strain", "Table", "Thermistor", "Thermocouple", "Add", "Subtract", "AdvancedAPI"]
+)
+
+
+@dataclass(frozen=True)
+class Records:
+    """What records of one kind hold: where the samples of each channel lie, and how many there are."""
+
+    columns: dict[str, Column]
+    counts: dict[str, int]
+
+
+@dataclass
+class Index:
+    """The regions of a file.  A region is four numbers, so that millions of them fit."""
+
+    kinds: list[Records] = field(default_factory=list)
+    _holding: dict[str, list[int]] = field(default_factory=dict)  # by path: the kinds that hold samples of it
+    _by_kind: list[NDArray[np.intp]] = field(default_factory=list)  # numbers of regions, once all are there
+    _numbers: dict[tuple[object, ...], int] = field(default_factory=dict)  # of the kinds
+    _regions: tuple["array[int]", ...] = field(default_factory=lambda: tuple(array("q") for _ in range(4)))
+
+    def add(self, region: Region) -> None:
+        """Take in a region."""
+        self._by_kind = []
+        last = self.kinds[self._regions[3][-1]] if self.kinds else None
+        if last and last.columns == region.columns and last.counts == region.counts:
+            kind = self._regions[3][-1]
+        else:
+            key = (*region.columns.items(), *region.counts.items())
+            kind = self._numbers.setdefault(key, len(self.kinds))
+            if kind == len(self.kinds):
+                self.kinds.append(Records(region.columns, region.counts))
+                for path in (path for path, count in region.counts.items() if count):
+                    self._holding.setdefault(path, []).append(kind)
+        for numbers, value in zip(self._regions, (region.position, region.records, region.stride, kind), strict=True):
+            numbers.append(value)
+
+    def together(self, paths: Sequence[str]) -> list[list[str]]:
+        """The channels that can be read in one go: those with as many samples as each other in every record."""
+        groups: dict[tuple[tuple[int, int], ...], list[str]] = {}
+        for path in paths:
+            counts = ((kind, self.kinds[kind].counts[path]) for kind in self._holding.get(path, ()))
+            groups.setdefault(tuple(counts), []).append(path)
+        return list(groups.values())
+
+    def regions(self, path: str) -> Iterator[Region]:
+        """The regions that hold samples of a channel, in order."""
+        position, records, stride, _ = self._regions
+        for i in self._places(path) if path in self._holding else ():
+            of = self.kinds[self._regions[3][i]]
+            yield Region(position[i], records[i], stride[i], of.columns, of.counts)
+
+    def _places(self, path: str) -> list[int]:
+        """Numbers of the regions that hold samples of a channel, in order."""
+        if not self._by_kind and self.kinds:
+            kind = np.frombuffer(self._regions[3], np.int64)
+            order = np.argsort(kind, kind="stable")
+            self._by_kind = np.split(order, np.searchsorted(kind[order], np.arange(1, len(self.kinds))))
+        holding = [self._by_kind[kind] for kind in self._holding.get(path, ())]
+        places: list[int] = (holding[0] if len(holding) == 1 else np.sort(np.concatenate(holding))).tolist()
+        return places
+
+    def largest_chunk(self, paths: Sequence[str]) -> int:
+        """Most samples of any of these channels in one record."""
+        return max((self.kinds[kind].counts[p] for p in paths for kind in self._holding.get(p, ())), default=0)
 
 
 def rows_of(channels: int) -> int:
@@ -132,3 +216,78 @@ def side_by_side(queues: Sequence[Queue], most: int = ROWS) -> Iterator[tuple[Bl
             block |= part
             lacking |= dict.fromkeys(queue.paths, short)
         yield block, lacking
+
+
+class Part(io.RawIOBase):
+    """The first `size` bytes of a file, for a reader that must not see the damage behind them."""
+
+    def __init__(self, file: BinaryIO, size: int) -> None:
+        self.file, self.size, self.at = file, size, 0
+
+    def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
+        """Go to a byte, as files do."""
+        self.at = offset + {io.SEEK_SET: 0, io.SEEK_CUR: self.at, io.SEEK_END: self.size}[whence]
+        return self.at
+
+    def tell(self) -> int:
+        """The byte that is read next."""
+        return self.at
+
+    def readinto(self, buffer: Any) -> int:
+        """Fill a buffer as far as there are bytes."""
+        room = memoryview(buffer).cast("B")
+        self.file.seek(self.at)
+        data = self.file.read(max(0, min(len(room), self.size - self.at)))
+        room[: len(data)] = data
+        self.at += len(data)
+        return len(data)
+
+
+def is_scaled(properties: dict[str, Any]) -> bool:
+    """Whether the values are still to be scaled as the properties say."""
+    return properties.get("NI_Scaling_Status", "unscaled") != "scaled" and (
+        properties.get(COUNT, 0) not in (0, "0") or any(name.endswith("_Scale_Type") for name in properties)
+    )
+
+
+def problem(properties: dict[str, Any]) -> str:
+    """Why the scales cannot be applied, or ""; a count that was damaged would have npTDMS look for billions."""
+    kinds = {str(value) for name, value in properties.items() if name.endswith("_Scale_Type")}
+    if unknown := sorted(kinds - SCALES):
+        return f"has a scale of unknown kind: {', '.join(unknown)}"
+    numbers = [int(match[1]) for name in properties if (match := NUMBERED.match(name))]
+    count, most = properties.get(COUNT, 0), max([0, *numbers]) + 1
+    if not isinstance(count, int) or not 0 <= count <= min(most, MOST):
+        return f"says that it has {count!r} scales and describes {len(kinds)}: the file is damaged; record it again"
+    return ""
+
+
+def applied(read: Iterator[Block], scales: Mapping[str, dict[str, Any]]) -> Iterator[Block]:
+    """The samples with those of some channels scaled as their properties say.
+
+    npTDMS would read all of a chunk for every piece of it, which takes as long as their product.
+    """
+    from nptdms.base_segment import RawChannelDataChunk
+    from nptdms.scaling import get_scaling
+
+    of = {path: scaling for path, said in scales.items() if (scaling := get_scaling(said, {}, {}))}
+    for piece in read:
+        raw = {path: RawChannelDataChunk.channel_data(piece[path]) for path in of}
+        yield piece | {path: np.asarray(each.scale(raw[path]), np.float64) for path, each in of.items()}
+
+
+def scaled_pieces(file: BinaryIO, size: int, paths: Sequence[str], chunk: int) -> Iterator[Block]:
+    """The scaled samples of channels that always come together; `chunk` is how many of each do."""
+    from nptdms import TdmsFile
+    from nptdms.log import log_manager
+
+    log_manager.set_level(logging.ERROR)  # what is amiss with the file we have said already
+    with TdmsFile.open(Part(file, size)) as opened:
+        of = {path: names(path) for path in paths}
+        if chunk <= ROWS:
+            for each in opened.data_chunks():
+                yield {path: np.asarray(each[g][c][:], dtype=np.float64) for path, (g, c) in of.items()}
+            return
+        channels = {path: opened[group][channel] for path, (group, channel) in of.items()}
+        for first in range(0, len(channels[paths[0]]), ROWS):
+            yield {path: np.asarray(c[first : first + ROWS], dtype=np.float64) for path, c in channels.items()}

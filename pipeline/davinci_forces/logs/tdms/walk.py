@@ -192,7 +192,7 @@ def _regions(
 
 def _interleaved(active: dict[str, Samples], order: str, data: int, length: int) -> Iterator[Region]:
     """One record per row; a row that is cut is no record."""
-    sizes = {path: _size(samples) for path, samples in active.items()}
+    sizes = {path: SIZES.get(samples.kind, 0) for path, samples in active.items()}
     row = sum(sizes.values())
     if len({samples.count for samples in active.values()}) > 1 or not all(sizes.values()):
         raise Damaged("interleaved channels of unequal lengths, or of text")
@@ -213,7 +213,7 @@ def _contiguous(active: dict[str, Samples], counts: dict[str, int], order: str) 
         count = counts[path]
         if dtype := _dtype(samples.kind, order):
             columns[path] = Column(dtype, offset, dtype.itemsize, count)
-        offset += samples.octets if samples.kind == STRING else count * _size(samples)
+        offset += samples.octets if samples.kind == STRING else count * SIZES.get(samples.kind, 0)
     return columns
 
 
@@ -230,7 +230,7 @@ def _left_over(active: dict[str, Samples], left: int, size: int, whole: bool) ->
         return {path: samples.count * left // size for path, samples in active.items()}
     counts = {}
     for path, samples in active.items():
-        counts[path] = min(samples.count, left // _size(samples))
+        counts[path] = min(samples.count, left // SIZES.get(samples.kind, 0))
         left = max(left - samples.octets, 0)
     return counts
 
@@ -249,11 +249,6 @@ def _joined(region: Region, file_segments: int, stride: int) -> Region | None:
 def _chunk_size(active: dict[str, Samples]) -> int:
     cards = {samples.widths: samples.count for samples in active.values() if samples.kind == DAQMX_RAW}
     return sum(samples.octets for samples in active.values()) + sum(sum(w) * count for w, count in cards.items())
-
-
-def _size(samples: Samples) -> int:
-    """Bytes of one sample; 0 for text."""
-    return np.dtype(NUMBERS[samples.kind]).itemsize if samples.kind in NUMBERS else SIZES.get(samples.kind, 0)
 
 
 def _dtype(kind: int, order: str) -> np.dtype[Any] | None:

@@ -6,8 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from davinci_forces.logs.log import Options
-from davinci_forces.logs.names import renamed, unique, unit_in
+from davinci_forces.logs.log import Options, renamed, unique, unit_in
 from davinci_forces.logs.text.stamps import Stamps, begun, stamps_of, tells_time
 from davinci_forces.maths.units import canonical, measures
 

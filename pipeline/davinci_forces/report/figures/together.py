@@ -15,7 +15,7 @@ from davinci_forces.report.figures.svg import draw_svg, drawn
 FEWEST = 8  # figures that are worth another process, which takes as long to begin
 MOST = 4  # processes, this one among them
 PROGRAM = (
-    "from davinci_forces.logs.isolated import orphans; orphans.end_with_parent(); "
+    "from davinci_forces.logs.isolated.process import end_with_parent; end_with_parent(); "
     "from davinci_forces.report.figures.together import serve; serve()"
 )
 

@@ -1,8 +1,8 @@
 """What a worker has imported before it is handed a task; importing this is what it takes."""
 
-from davinci_forces.logs.isolated import orphans
+from davinci_forces.logs.isolated import process
 
-orphans.end_with_parent()  # before the seconds of importing
+process.end_with_parent()  # before the seconds of importing
 
 from davinci_forces.runner import execution  # noqa: E402
 from davinci_forces.runner.processes import workers  # noqa: E402

@@ -14,7 +14,7 @@ from threading import Thread
 from time import perf_counter
 from typing import Any
 
-from davinci_forces.logs.isolated import orphans
+from davinci_forces.logs.isolated import process
 from davinci_forces.runner.execution import Outcome
 from davinci_forces.runner.plan import Task
 from davinci_forces.stages import STAGES, module
@@ -48,7 +48,7 @@ def pool(jobs: int) -> Executor:
 
 def end_with_parent() -> None:
     """End this process when the one that started it has ended, however that came, or the one that began the run."""
-    orphans.end_with_parent()
+    process.end_with_parent()
     parent = parent_process()
     if parent is not None:
         Thread(target=_await, args=(parent.sentinel,), daemon=True).start()

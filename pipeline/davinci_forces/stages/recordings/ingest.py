@@ -2,12 +2,11 @@
 
 from collections.abc import Iterator
 
-from davinci_forces.logs.log import Log
-from davinci_forces.logs.names import visible
+from davinci_forces.logs.log import Log, visible
 from davinci_forces.records import Diagnostic, LogSummary, Recording, Touch, diagnostic
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
-from davinci_forces.study.intake.reading import Intake, mended
+from davinci_forces.study.intake import Intake, mended
 from davinci_forces.study.intake.summary import remarks, summary
 
 

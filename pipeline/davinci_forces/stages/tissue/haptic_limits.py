@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from davinci_forces.haptics import loop as haptic
-from davinci_forces.haptics.maths import thesis
+from davinci_forces.haptics.maths import bimodal
 from davinci_forces.haptics.maths.bimodal import THESIS, Hand, cqlf_limit, energy, switching_limit
 from davinci_forces.haptics.maths.delay import damping_needed, delay_limit, sampled_limit
 from davinci_forces.haptics.maths.motion import at_contact, switched, worst
@@ -54,14 +54,14 @@ def run(
 
 def mapped(robot: Robot) -> StabilityMap:
     """Whether the solver found a Lyapunov function, cell by cell.  (8.10), Fig 8.9"""
-    k_h, k_t = np.repeat(thesis.K_H, len(thesis.K_T)), np.tile(thesis.K_T, len(thesis.K_H))
-    found = np.arange(len(thesis.K_T)) < np.array(thesis.PROVED)[:, None]
+    k_h, k_t = np.repeat(bimodal.K_H, len(bimodal.K_T)), np.tile(bimodal.K_T, len(bimodal.K_H))
+    found = np.arange(len(bimodal.K_T)) < np.array(bimodal.PROVED)[:, None]
     return StabilityMap(robot.name, THESIS.m, THESIS.b, k_h, k_t, found.ravel().astype(int))
 
 
 def limits(robot: Robot) -> StabilityLimit:
     """The exact borders beside that map."""
-    k_h = np.geomspace(thesis.SOFTEST, thesis.STIFFEST, 101)
+    k_h = np.geomspace(bimodal.SOFTEST, bimodal.STIFFEST, 101)
     hands = [THESIS._replace(k=k) for k in k_h.tolist()]
     proved, switching = (np.array([limit(hand) for hand in hands]) for limit in (cqlf_limit, switching_limit))
     return StabilityLimit(robot.name, THESIS.m, THESIS.b, k_h, proved, switching)
@@ -69,20 +69,20 @@ def limits(robot: Robot) -> StabilityLimit:
 
 def delayed(robot: Robot) -> DelayLimit:
     """The limit over the delay, of a force that changes at once and of one that the link holds."""
-    late = np.array([delay_limit(THESIS, delay) for delay in thesis.DELAYS.tolist()])
-    leaving = np.full(len(thesis.DELAYS), np.nan)
-    leaving[thesis.SIMULATED] = thesis.LEAVING
+    late = np.array([delay_limit(THESIS, delay) for delay in bimodal.DELAYS.tolist()])
+    leaving = np.full(len(bimodal.DELAYS), np.nan)
+    leaving[bimodal.SIMULATED] = bimodal.LEAVING
     return DelayLimit(
         robot=robot.name,
         hand_mass=THESIS.m,
         hand_damping=THESIS.b,
         hand_stiffness=THESIS.k,
-        link_rate=thesis.LINK_RATE,
+        link_rate=bimodal.LINK_RATE,
         k_t_cqlf=cqlf_limit(THESIS),
         k_t_switching=switching_limit(THESIS),
-        delay=thesis.DELAYS,
+        delay=bimodal.DELAYS,
         k_t_delay=late,
-        k_t_held=np.array(thesis.HELD),
+        k_t_held=np.array(bimodal.HELD),
         k_t_leaving=leaving,
     )
 
@@ -109,14 +109,14 @@ def asked(tissue: Stiffness, joint: str, lag: float) -> TissueLimit:
     m, b, k_t = THESIS.m, THESIS.b, tissue.stiffness
     needed = m * (max(k_t - b**2 / m, 0.0) / (2.0 * b)) ** 2
     known = lag > 0.0
-    total = lag + 0.5 / thesis.LINK_RATE  # a held force is half a sample later
+    total = lag + 0.5 / bimodal.LINK_RATE  # a held force is half a sample later
     return TissueLimit(
         log=tissue.log,
         stiffness=k_t,
         k_h_needed=needed,
         lag_of=joint,
         force_lag=lag,
-        k_t_lag=sampled_limit(THESIS, lag, thesis.LINK_RATE) if known else float("nan"),
+        k_t_lag=sampled_limit(THESIS, lag, bimodal.LINK_RATE) if known else float("nan"),
         damping_needed=damping_needed(THESIS, k_t, total) if known else float("nan"),
     )
 

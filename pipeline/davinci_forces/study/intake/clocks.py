@@ -106,13 +106,10 @@ class UsedClocks:
         first, *others = (self._timed(log, group) for log, group in zip(logs, self.groups, strict=True))
         followers = {_listed(group.names): each for group, each in zip(self.groups[1:], others, strict=True)}
         try:
-            for t, block in aligned(first, followers, self.done, self._refuse):
+            for t, block in aligned(first, followers, self.done, lambda why: BadLog(f"{self.log.path}: {why}")):
                 yield block | {ALIGNED: t}
         finally:
             self._noticed(logs)
-
-    def _refuse(self, problem: str) -> BadLog:
-        return BadLog(f"{self.log.path}: {problem}")
 
     def _timed(self, log: Log, group: Together) -> Iterator[Timed]:
         rows = 0

@@ -5,10 +5,10 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.names import visible
+from davinci_forces.logs.log import visible
 from davinci_forces.maths.signals.clock import GAP
 from davinci_forces.records import LogSummary
-from davinci_forces.study.intake.reading import Intake
+from davinci_forces.study.intake import Intake
 
 MOST_REPEATED = 0.1  # share of rows equal to the one before, above which the recorder was faster than the robot
 MOST_JITTER = 0.1  # of the sampling time

@@ -1,15 +1,22 @@
-"""Which robot logs are of, by how many joints they have and where these go; and a robot.toml where none fits."""
+"""What logs are of: which files hold signals of one recording, and which robot was recorded.
 
+The robot shows in how many joints logs have, and in where these go; a robot.toml is written where none fits.
+"""
+
+import re
 import tomllib
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
 from davinci_forces import robots
 from davinci_forces.errors import BadRobot
+from davinci_forces.logs.joined import Joined
+from davinci_forces.maths.signals import columns
 from davinci_forces.robots.from_toml import robot_of
 from davinci_forces.robots.robot import Kind, Robot
-from davinci_forces.study.guessing import Holding
+from davinci_forces.study.guessing import SET, WORDS, Holding, Meaning, motion, samples_of
 from davinci_forces.toml import TomlTable
 from davinci_forces.toml.file import TomlFile
 
@@ -19,6 +26,7 @@ WIDTHS = (3, 6, 7)  # positions that a log of the arm may hold: what it has, its
 REACH = 0.3  # [m] within which the instrument slides
 TURNS = 1.6  # [rad] within which the hand turns
 TERMS = ("inertia", "gravity, sine", "gravity, cosine", "viscous friction", "Coulomb friction")
+OF_NO_JOINT = ("force", "forces", "wrench", "ft", "m")  # files of recordings that hold no quantity of a joint
 
 
 class Arm(NamedTuple):
@@ -87,3 +95,63 @@ def robot_text(n: int, current: bool) -> str:
         if current:
             lines.append('effort = "A"  # a current; where its constant is known, torque_constant = ... [N m/A]')
     return "\n".join(lines) + "\n"
+
+
+def grouped(files: Sequence[Path]) -> list[list[Path]]:
+    """The files by the recording that they are of, in their order; alone where none shares the start of its name."""
+    groups: dict[tuple[Path, str], list[Path]] = {}
+    for file in files:
+        start, signal = split(file)
+        groups.setdefault((file.parent, start if signal else file.name), []).append(file)
+    together: list[list[Path]] = []
+    for members in groups.values():
+        symbols = {symbol_of(file.stem) for file in members}
+        together += (
+            [members] if len(members) > 1 and "q" in symbols and symbols & {"i", "tau"} else [[f] for f in members]
+        )
+    return sorted(together, key=lambda members: files.index(members[0]))
+
+
+def symbol_of(stem: str) -> str:
+    """The symbol that the signal in a file's name tells, or ""; what was only wanted tells none."""
+    words = re.findall(r"[a-z]+", split(Path(stem))[1].lower())
+    return next((s for s, telling in WORDS.items() if words and words[0] in telling and not set(SET) & set(words)), "")
+
+
+def split(file: Path) -> tuple[str, str]:
+    """The start of a file's name, which those of one recording share, and its signal: `run`, `q_actual`."""
+    name = file.name.partition(".")[0]
+    known = {*OF_NO_JOINT, *(word for words in WORDS.values() for word in words)}
+    for match in re.finditer(r"[_-]+", name):
+        if name[match.end() :].lower().partition("_")[0] in known:
+            return name[: match.start()], name[match.end() :]
+    return name, ""
+
+
+def guess_joined(log: Joined) -> Holding:
+    """What the channels of joined files hold: joints in the order of columns, beside a time that rises throughout.
+
+    Raises
+    ------
+    BadLog
+        Where a file is damaged.
+    """
+    told: dict[str, Meaning] = {}
+    samples = {}
+    times = []
+    for stem, part in log.parts.items():
+        names = [c.name for c in part.channels if c.kind == "number" and not c.derived]
+        values = samples_of(part, names)
+        first = columns.rising([values[name] for name in names])
+        times.append(first)
+        left = [name for i, name in enumerate(names) if i != first]
+        symbol = symbol_of(stem)
+        if symbol and symbol not in {each.symbol for each in told.values()}:
+            for k, name in enumerate(left):
+                told[f"{stem}/{name}"] = Meaning(symbol, k, f"column {k + 1} of the signal that its file's name tells")
+                samples[f"{stem}/{name}"] = values[name]
+    joints = 1 + max((each.joint for each in told.values()), default=-1)
+    found = Holding(told, joints)
+    if len(set(times)) == 1 and times[0] is not None:
+        found = replace(found, time=str(times[0]), why_time="a column that rises throughout in every file, in seconds")
+    return motion(found, samples)
