@@ -9,6 +9,7 @@ from numpy.testing import assert_allclose
 from davinci_forces.maths.mechanics.kinematics import tip
 from davinci_forces.records import Control, Excitation, Links, Lyapunov, Pose, Workspace
 from davinci_forces.robots import davinci, dvrk_psm, from_toml
+from davinci_forces.robots.davinci_chain import DRIVES
 from davinci_forces.stages import design
 
 
@@ -118,8 +119,8 @@ def test_a_robot_of_any_number_of_joints_has_a_design():
 
 def test_every_coordinate_of_the_da_vinci_has_a_name_and_a_drive():
     robot = davinci.ROBOT
-    assert len(robot.coordinates) == robot.chain.n == len(robot.drives.gear_ratio) == len(set(robot.coordinates))
-    assert list(robot.drives.gear_ratio[:3]) == [joint.gear_ratio for joint in robot.joints]
+    assert len(robot.coordinates) == robot.chain.n == len(DRIVES.gear_ratio) == len(set(robot.coordinates))
+    assert list(DRIVES.gear_ratio[:3]) == [joint.gear_ratio for joint in robot.joints]
 
 
 def test_a_robot_without_geometry_or_published_excitation_has_nothing_to_design():

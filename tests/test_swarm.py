@@ -12,7 +12,7 @@ from davinci_forces.identification.regression import known_of
 from davinci_forces.maths.estimation.least_squares import bounded, triangle
 from davinci_forces.maths.estimation.swarm import CONSTRICTED, THESIS, search
 from davinci_forces.maths.models.independent import regressor
-from davinci_forces.maths.models.lumping import reduced_parameters
+from davinci_forces.maths.models.physical import reduced_parameters
 from davinci_forces.maths.models.terms import offset
 from davinci_forces.records import Fit, SwarmSearch
 from davinci_forces.robots.davinci import ROBOT
@@ -104,7 +104,7 @@ def test_physical_parameters_lump_as_the_chain_does(lc5):
     names = [x.name for x in joint.physical.parameters]
     x = np.array([x.guess for x in joint.physical.parameters])
     x[names.index("lc5")] = lc5
-    chain = reduced_parameters(CHAIN, bodies(lc5), 1, drives=DRIVES.reduced(3))
+    chain = reduced_parameters(CHAIN, bodies(lc5), 1, drives=DRIVES)
     found = dict(zip((term.name for term in joint.terms), known_of(joint).box.lumping.theta(x), strict=True))
     assert found["gravity, sine"] == pytest.approx(chain["gravity, sine"], abs=1e-12)
     assert found["gravity, cosine"] == pytest.approx(chain["gravity, cosine"], abs=1e-12)

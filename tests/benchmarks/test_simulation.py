@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import pytest
 
-from davinci_forces.simulation import motion
+from davinci_forces.simulation.motion import simulated
 from davinci_forces.simulation.scenario.reading import load
 
 AT_LEAST = 50.0  # times faster than real time, with the wrist fixed
@@ -15,7 +15,7 @@ AT_LEAST = 50.0  # times faster than real time, with the wrist fixed
 def test_a_minute_of_closed_loop_is_simulated_fifty_times_faster_than_it_lasts(name, capsys):
     scenario = load("davinci-demo")
     log = replace(next(log for log in scenario.logs if log.name == name), duration=60.0, lead=0.0)
-    motion.simulated(scenario, replace(log, duration=0.1))  # compiles
+    simulated(scenario, replace(log, duration=0.1))  # compiles
     best = min(_seconds(scenario, log) for _ in range(5))
     with capsys.disabled():
         print(
@@ -26,5 +26,5 @@ def test_a_minute_of_closed_loop_is_simulated_fifty_times_faster_than_it_lasts(n
 
 def _seconds(scenario, log) -> float:
     start = time.perf_counter()
-    motion.simulated(scenario, log)
+    simulated(scenario, log)
     return time.perf_counter() - start

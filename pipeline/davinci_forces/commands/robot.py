@@ -1,6 +1,8 @@
 """Print a robot: its joints, and at one pose frames, tip, Jacobian, M, C dq and G; or the robot as URDF."""
 
 import json
+import math
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -25,8 +27,6 @@ def run(
 
     Of a robot whose geometry is not known, its joints.
     """
-    from pathlib import Path
-
     from davinci_forces.robots import load
 
     arm = load(robot, Path())
@@ -43,8 +43,6 @@ def run(
 
 def _values(option: str, text: str) -> list[float]:
     """Numbers separated by commas."""
-    import math
-
     from davinci_forces.errors import BadRequest
 
     values = []
@@ -103,8 +101,6 @@ def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]
 
 def _joints(robot: "Robot") -> dict[str, Any]:
     """What is said of each joint: its kind, unit of effort, limits (null where there are none) and terms."""
-    import math
-
     return {
         joint.name: {
             "kind": joint.kind.value,
@@ -192,8 +188,6 @@ def _joint_lines(robot: "Robot") -> list[str]:
 
 def _moves(joint: "Joint") -> str:
     """How a joint moves, as far as it is limited."""
-    import math
-
     (low, high), (_, fastest), most = joint.limits.q, joint.limits.dq, joint.limits.effort
     position = joint.unit("{position}")
     words = [joint.kind.value, f"{low:g} to {high:g} {position}" if math.isfinite(high - low) else "without an end"]

@@ -69,7 +69,7 @@ def filled(
     return replace(
         scenario,
         body=own,
-        known=scenario.known or (body if scenario.body is None else own),
+        known=scenario.known or own,
         noise=scenario.noise or noise,
         stiffness=scenario.stiffness or stiffness,
         q_tau=scenario.q_tau or q_tau,

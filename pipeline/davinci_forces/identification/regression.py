@@ -7,10 +7,9 @@ import numpy as np
 from davinci_forces.estimators.problem import NOTHING, Known, Regression
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.independent import IndependentJoint
-from davinci_forces.maths.models.lumping import ROUNDING, lumping
 from davinci_forces.maths.models.memory import efforts
 from davinci_forces.maths.models.model import ArmMotion, Model
-from davinci_forces.maths.models.physical import Box
+from davinci_forces.maths.models.physical import ROUNDING, Box, lumping
 from davinci_forces.maths.periods.harmonics import kept_noise
 from davinci_forces.maths.signals.standstill import standing
 from davinci_forces.records import JointModel, Motion, Trajectory

@@ -3,6 +3,7 @@
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from datetime import datetime, timedelta
 from decimal import Decimal
 
 import numpy as np
@@ -12,6 +13,14 @@ from davinci_forces.maths.arrays import Array
 
 ROUNDING = 1.5e-6  # [s] two starts written in whole microseconds may be off by so much
 SKEW = 0.02  # of a sampling time: channels that stray less than this from each other were sampled together
+
+
+def moment(zero: datetime, seconds: int, microseconds: int = 0) -> datetime | None:
+    """The moment so long after `zero`; None for one that no calendar holds."""
+    try:
+        return zero + timedelta(seconds=seconds, microseconds=microseconds)
+    except OverflowError:
+        return None
 
 
 @dataclass

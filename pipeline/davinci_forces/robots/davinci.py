@@ -4,26 +4,36 @@ With what the thesis prints of it: its excitation trajectories, the parameters o
 them, and the control studies of chapter 5.
 """
 
+from dataclasses import replace
 from math import pi
 
 from davinci_forces.maths.models.terms import coulomb, gravity_cos, gravity_sin, inertia, lifted_mass, viscous
-from davinci_forces.robots.davinci_chain import BODIES, CHAIN, DRIVES, PITCH_PARTS, ROLL_PARTS, SLIDE_PARTS, WRIST
+from davinci_forces.robots.davinci_chain import BODIES, CHAIN, PITCH_PARTS, ROLL_PARTS, SLIDE_PARTS, WRIST
 from davinci_forces.robots.robot import ControlStudy, Joint, Kind, Limits, Printed, PrintedColumn, Robot
 
-TORQUE_CONSTANT = 0.0438  # [N m/A], of every motor.  Table 6.3
+HAND = Limits(q=(-0.6, 0.6), dq=(-1.2, 1.2), ddq=(-1.2, 1.2))  # Table 6.2
+SLIDE = Limits(q=(-0.0672, 0.1097), dq=(-2.0, 2.0), ddq=(-3.0, 3.0))
+TORQUE_CONSTANT = 0.0438  # [N m/A], of every motor.  Table 6.3, as the gear ratios
+# Hand roll (6.8), hand pitch (6.11) and instrument slide (6.13), before what is printed of them.
+ROLL = Joint(
+    "hand_roll", "Hand roll", Kind.REVOLUTE, (inertia, gravity_sin, viscous, coulomb), HAND, 200.0, TORQUE_CONSTANT
+)
+PITCH_TERMS = (inertia, gravity_sin, gravity_cos, viscous, coulomb)
+PITCH = Joint("hand_pitch", "Hand pitch", Kind.REVOLUTE, PITCH_TERMS, HAND, 200.0, TORQUE_CONSTANT)
+SLIDE_TERMS = (lifted_mass, inertia, viscous, coulomb)
+INSERTION = Joint("instrument_slide", "Instrument slide", Kind.PRISMATIC, SLIDE_TERMS, SLIDE, 1340.0, TORQUE_CONSTANT)
+
 # Table 6.1 as printed; the roll's b1 and the slide's a0 are misprints, for their rows do not give their objectives or
 # break their limits.
-ROLL = (
+ROLL_PUBLISHED = (
     ("table-6.1", (10.0, -0.1848, 0.0260, 0.0813, 0.0609, -0.4261)),
     ("table-6.1-corrected", (10.0, -0.1848, 0.0260, -0.2783, 0.0609, -0.4261)),
 )
-PITCH = (("table-6.1", (10.0, -0.1912, 0.2861, -0.0639, 0.1741, 0.3701)),)
-INSERTION = (
+PITCH_PUBLISHED = (("table-6.1", (10.0, -0.1912, 0.2861, -0.0639, 0.1741, 0.3701)),)
+SLIDE_PUBLISHED = (
     ("table-6.1", (5.0, -0.0164, 0.0001, 0.0002, -0.1632, -0.1350)),
     ("table-6.1-corrected", (5.0, 0.0200, 0.0001, 0.0002, -0.1632, -0.1350)),
 )
-HAND = Limits(q=(-0.6, 0.6), dq=(-1.2, 1.2), ddq=(-1.2, 1.2))  # Table 6.2
-SLIDE = Limits(q=(-0.0672, 0.1097), dq=(-2.0, 2.0), ddq=(-3.0, 3.0))
 
 # The parameters that the thesis prints, Tables 6.4 to 6.6, and what is wrong with them.
 GUESSES = "The printed error of the initial guesses does not belong to the printed guesses."
@@ -99,46 +109,12 @@ ROBOT = Robot(
     name="davinci",
     title="da Vinci arm, first generation",
     joints=(
-        Joint(
-            name="hand_roll",
-            title="Hand roll",
-            kind=Kind.REVOLUTE,
-            terms=(inertia, gravity_sin, viscous, coulomb),  # (6.8)
-            limits=HAND,
-            gear_ratio=200.0,
-            torque_constant=TORQUE_CONSTANT,
-            published=ROLL,
-            physical=ROLL_PARTS,
-            printed=ROLL_PRINTED,
-        ),
-        Joint(
-            name="hand_pitch",
-            title="Hand pitch",
-            kind=Kind.REVOLUTE,
-            terms=(inertia, gravity_sin, gravity_cos, viscous, coulomb),  # (6.11)
-            limits=HAND,
-            gear_ratio=200.0,
-            torque_constant=TORQUE_CONSTANT,
-            published=PITCH,
-            physical=PITCH_PARTS,
-            printed=PITCH_PRINTED,
-        ),
-        Joint(
-            name="instrument_slide",
-            title="Instrument slide",
-            kind=Kind.PRISMATIC,
-            terms=(lifted_mass, inertia, viscous, coulomb),  # (6.13)
-            limits=SLIDE,
-            gear_ratio=1340.0,
-            torque_constant=TORQUE_CONSTANT,
-            published=INSERTION,
-            physical=SLIDE_PARTS,
-            printed=SLIDE_PRINTED,
-        ),
+        replace(ROLL, published=ROLL_PUBLISHED, physical=ROLL_PARTS, printed=ROLL_PRINTED),
+        replace(PITCH, published=PITCH_PUBLISHED, physical=PITCH_PARTS, printed=PITCH_PRINTED),
+        replace(INSERTION, published=SLIDE_PUBLISHED, physical=SLIDE_PARTS, printed=SLIDE_PRINTED),
     ),
     chain=CHAIN,
     bodies=BODIES,
     wrist=WRIST,
-    drives=DRIVES,
     control=CONTROL,
 )

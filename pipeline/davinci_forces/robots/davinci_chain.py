@@ -67,7 +67,7 @@ BOX = {
     Quality.VISCOUS: (0.0, 20.0),
     Quality.COULOMB: (0.0, 20.0),
 }
-AXES = {"x": 0, "y": 1, "z": 2}
+AXES = {"x": X, "y": Y, "z": Z}
 
 
 def bodies(lc5: float = -CYLINDERS[HOLDER][5]) -> Bodies:

@@ -147,17 +147,13 @@ def _not_zero(table: TomlTable, key: str, default: float) -> float:
 
 def _limits(table: TomlTable) -> Limits:
     limits = table.table("limits")
-    q, dq, ddq = (_bounds(limits, name) if name in limits else ANYWHERE for name in ("q", "dq", "ddq"))
+    pairs = [limits.take(name, [*ANYWHERE], (list,), "[lower, upper]", _are_bounds) for name in ("q", "dq", "ddq")]
+    q, dq, ddq = ((float(low), float(high)) for low, high in pairs)
     changed = Limits(q, dq, ddq)
     if "effort" in limits:
         changed = replace(changed, effort=limits.number("effort", above=0.0, words="the most effort of its drive"))
     limits.close()
     return changed
-
-
-def _bounds(limits: TomlTable, name: str) -> tuple[float, float]:
-    low, high = limits.take(name, list(ANYWHERE), (list,), "[lower, upper]", _are_bounds)
-    return float(low), float(high)
 
 
 def _are_bounds(pair: list[Any]) -> bool:

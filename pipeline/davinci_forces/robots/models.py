@@ -100,13 +100,10 @@ def described(robot: Robot, name: str, group: str, parameters: Sequence[str], sc
     if structure == "independent":
         return independent(robot.joint(group), _driven(variant, by_name, ""), variant)
     names = [joint.name for joint in robot.joints]
-    rows = [names.index(group)] if group != ARM else [i for i, n in enumerate(names) if _viscous(n) in by_name]
+    moving = [i for i, n in enumerate(names) if f"{viscous.name} of {n}" in by_name]
+    rows = [names.index(group)] if group != ARM else moving
     suffixes = [f" of {names[row]}" if group == ARM and len(rows) > 1 else "" for row in rows]
     return coupled(robot, rows, [_driven(variant, by_name, suffix) for suffix in suffixes], variant, group)
-
-
-def _viscous(joint: str) -> str:
-    return f"{viscous.name} of {joint}"
 
 
 def _driven(variant: str, scales: dict[str, float], suffix: str) -> tuple[Term, ...]:

@@ -7,7 +7,7 @@ from enum import Enum
 from typing import NamedTuple
 
 from davinci_forces.errors import BadRobot
-from davinci_forces.maths.mechanics.bodies import Bodies, Drives
+from davinci_forces.maths.mechanics.bodies import Bodies
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.models.physical import PhysicalTable
 from davinci_forces.maths.models.terms import Term
@@ -128,7 +128,6 @@ class Robot:
     chain: Chain | None = None
     bodies: Bodies | None = None
     wrist: tuple[str, ...] = ()
-    drives: Drives | None = None  # of all coordinates of the chain
     control: tuple[ControlStudy, ...] = ()
     tool: Tool | None = None  # where it is known which part of the chain it is, so that another may take its place
     file: str = field(default="", compare=False)  # that describes it, where a file does

@@ -11,7 +11,7 @@ from davinci_forces.maths.mechanics import kinematics
 from davinci_forces.maths.mechanics.bodies import Bodies, Drives
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.models.independent import regressor
-from davinci_forces.maths.models.lumping import reduced_parameters
+from davinci_forces.maths.models.physical import reduced_parameters
 from davinci_forces.maths.simulation.closed_loop import JointConstraints, Timing, arm, simulate
 from davinci_forces.maths.simulation.surroundings import UP, Surroundings
 from davinci_forces.simulation.scenario.scenario import BadScenario, Scenario, SimulatedArm, SimulatedLog

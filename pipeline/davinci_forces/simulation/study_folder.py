@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from davinci_forces.errors import BadRequest
 from davinci_forces.maths.excitation.fourier import Fourier
-from davinci_forces.simulation import writers
+from davinci_forces.simulation import sensors
 from davinci_forces.simulation.motion import SimulatedRun, hung_at, simulated, theta
 from davinci_forces.simulation.scenario.scenario import Scenario, SensorNoise, SimulatedLog, SimulatedPush
 from davinci_forces.simulation.sensors import SimulatedChannel, generator, record, record_force
@@ -57,7 +57,7 @@ def check(folder: Path, force: bool) -> None:
 def _log(scenario: Scenario, log: SimulatedLog, folder: Path, say: Callable[[str], None]) -> tuple[str, str]:
     run = simulated(scenario, log)
     channels, path = recorded(scenario, log, run), folder / log.file
-    writers.write(path, channels, scenario.rate, scenario.started)
+    sensors.write(path, channels, scenario.rate, scenario.started)
     size = path.stat().st_size / 1e6
     say(f"{log.name}: {len(run.t)} samples of {', '.join(log.joints)} -> {log.file}, {size:.2f} MB")
     return study_entry(scenario, log, path, channels), truth_entry(log, run)
@@ -68,16 +68,11 @@ def recorded(scenario: Scenario, log: SimulatedLog, run: SimulatedRun) -> list[S
     channels = [SimulatedChannel("time", "Time", "s", run.t)] if log.clock == "channel" else []
     for name, motion in run.motions.items():
         random = generator(scenario.seed, log.name, name)
-        noise = noise_of(scenario, log.family, name)
+        noise = scenario.arm.families[log.family].noise[name] if scenario.arm else scenario.joints[name].noise
         channels += record(scenario.joints[name], motion, noise, scenario.rate, log.current_unit, random)
     if log.sensor and run.force is not None:
         channels += record_force(log.sensor, run.t, run.force, generator(scenario.seed, log.name, "force"))
     return channels
-
-
-def noise_of(scenario: Scenario, family: str, joint: str) -> SensorNoise:
-    """The noise of a joint: of its family, where the whole arm is simulated."""
-    return scenario.arm.families[family].noise[joint] if scenario.arm else scenario.joints[joint].noise
 
 
 def _text(file: Path, text: str) -> None:
@@ -106,7 +101,7 @@ def study_entry(scenario: Scenario, log: SimulatedLog, path: Path, channels: Seq
         lines.append(f"weight = {{ mass = {toml(log.mass)}, moves_with = {joint}, position = {toml(place)} }}")
     lines.append("[log.channels]")
     for channel in channels:
-        name = toml(writers.named(path, channel))
+        name = toml(sensors.named(path, channel))
         if channel.quantity == "time":
             lines.append(f"time = {name}")
         else:
@@ -138,10 +133,7 @@ def truth_text(scenario: Scenario, entries: Sequence[str]) -> str:
 def truth_entry(log: SimulatedLog, run: SimulatedRun) -> str:
     """The [[log]] of one recording in truth.toml: what was pushed when, what hung there, when anything was touched."""
     lines = ["[[log]]", f"name = {toml(log.name)}", f"role = {toml(log.role)}"]
-    if log.family:
-        lines.append(f"family = {toml(log.family)}")
-    if log.mass:
-        lines.append(f"mass = {toml(log.mass)}")
+    lines += [f"{key} = {toml(value)}" for key, value in (("family", log.family), ("mass", log.mass)) if value]
     if log.sensor:
         lines.append(f"sensor = {{ noise = {toml(log.sensor.noise)}, lag = {toml(log.sensor.lag)} }}")
     if log.tissue:

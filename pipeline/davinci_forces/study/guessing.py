@@ -159,7 +159,8 @@ def _by_content(log: Log, names: Sequence[str]) -> Holding:
     time = own or ("" if first is None else names[first])
     why = "" if own or not time else _rises(samples[time])
     left = [name for name in names if name != time]
-    t = samples.get(time) if time else _counted(log, len(samples[names[0]]))
+    rows = np.arange(len(samples[names[0]]), dtype=np.float64)
+    t = samples.get(time) if time else rows * log.clock.step if log.clock else None
     blocks = columns.blocks([samples[name] for name in left], t)
     found = Holding(time=time, why_time=why)
     if blocks is None:
@@ -177,11 +178,6 @@ def _by_content(log: Log, names: Sequence[str]) -> Holding:
     told |= {name: Meaning("i" if is_current else "tau", k, why_effort) for k, name in enumerate(left[2 * n : 3 * n])}
     rate = 0.0 if t is not None else columns.round_rate(blocks.rate)
     return motion(replace(found, told=told, joints=n, rate=rate), samples)
-
-
-def _counted(log: Log, rows: int) -> Array | None:
-    """Times by the log's own clock [s], where it has one."""
-    return np.arange(rows, dtype=np.float64) * log.clock.step if log.clock else None
 
 
 def _rate(t: Array) -> float:

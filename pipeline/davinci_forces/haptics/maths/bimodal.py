@@ -102,7 +102,7 @@ def energy(hand: Hand, k_t: float, x: Array, dx: Array) -> Array:
 
 def switching_limit(hand: Hand) -> float:
     """The K_T [N/m] at which the worst switching law neither grows nor dies out."""
-    from scipy.optimize import brentq
+    from scipy.optimize import brentq  # here, so that who reads a hand from a file loads no solver
 
     high = cqlf_limit(hand)  # below which no law grows
     while log_growth(hand, high) < 0.0:

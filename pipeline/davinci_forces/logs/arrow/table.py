@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +13,7 @@ from pyarrow import feather, ipc, parquet
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.cells import absent, integers, numbers
 from davinci_forces.logs.log import Block, Channel, Log, Options, unique
+from davinci_forces.logs.timeline import moment
 from davinci_forces.maths.arrays import Array
 
 ROWS = 1 << 14  # of a batch
@@ -36,7 +37,9 @@ def opened(path: Path, options: Options) -> Log:
     schema, batches = _file(path)
     if not schema.names or len(set(schema.names)) < len(schema.names):
         raise BadLog(f"{path}: its columns are {', '.join(schema.names) or 'none'}; each needs a name of its own")
-    log = ArrowLog(path, "arrow", _channels(schema), batches=batches)
+    names = zip(unique(schema.names), schema, strict=True)
+    channels = tuple(Channel(name, _unit(column), _kind(column.type)) for name, column in names)
+    log = ArrowLog(path, "arrow", channels, batches=batches)
     log.columns = dict(zip((channel.name for channel in log.channels), schema.names, strict=True))
     _describe_time(log)
     return log
@@ -65,11 +68,6 @@ def _records(path: Path, names: Sequence[str]) -> Iterator[pa.RecordBatch]:
         batch.validate(full=True)
         for first in range(0, batch.num_rows, ROWS):
             yield batch.slice(first, ROWS)
-
-
-def _channels(schema: pa.Schema) -> tuple[Channel, ...]:
-    names = unique(schema.names)
-    return tuple(Channel(name, _unit(each), _kind(each.type)) for name, each in zip(names, schema, strict=True))
 
 
 def _unit(column: pa.Field) -> str:
@@ -127,13 +125,7 @@ def _describe_time(log: ArrowLog) -> None:
         known = pc.drop_null(batch.column(0))
         if len(known):
             log.origin = known[0].cast(pa.int64()).as_py() // PER_SECOND[known.type.unit]
-            log.started = _date(log.origin)
+            began = moment(EPOCH, log.origin)
+            log.started = began.replace(tzinfo=None).isoformat() if began else ""
             log.zone = "UTC" if known.type.tz else "local"
             return
-
-
-def _date(seconds: int) -> str:
-    try:
-        return (EPOCH + timedelta(seconds=seconds)).replace(tzinfo=None).isoformat()
-    except OverflowError:
-        return ""

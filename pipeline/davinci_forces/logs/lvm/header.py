@@ -122,7 +122,7 @@ def layout(lines: Sequence[bytes], columns: bytes, file: FileHeader, line: int, 
     unit_labels = tags.get("Y_Unit_Label", [])
     for i in measured:
         units[i] = unit_labels[i - 1] if i <= len(unit_labels) else ""
-    x_unit = next((cell for cell in tags.get("X_Unit_Label", []) if cell), "s")
+    x_unit = _first(tags, "X_Unit_Label") or "s"
     units = [x_unit if names[i] and _is_x(i, file) else unit for i, unit in enumerate(units)]
     samples = [int(cell) for cell in tags.get("Samples", []) if cell.isdecimal()]
     start, started = _started(tags, file)
@@ -218,7 +218,7 @@ def _names(cells: list[str], file: FileHeader, line: int) -> tuple[list[str], li
 
 
 def _check(tags: dict[str, list[str]], channels: int, line: int, remarks: list[str]) -> None:
-    dimension = next((cell for cell in tags.get("X_Dimension", []) if cell), "Time")
+    dimension = _first(tags, "X_Dimension") or "Time"
     if dimension != "Time":
         raise BadHeader(f"the x axis is {dimension}, not time: this is no recording over time; choose another file")
     stated = _first(tags, "Channels")

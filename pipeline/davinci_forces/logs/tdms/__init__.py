@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime, timedelta
+from datetime import datetime
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -15,7 +15,7 @@ from davinci_forces.logs.tdms.clocks import Sampled, Waveforms, clocks_of
 from davinci_forces.logs.tdms.metadata import COMPLEX, DAQMX_RAW, EPOCH, NUMBERS, TIME, Objects, names
 from davinci_forces.logs.tdms.samples import ROWS, Index, Queue, pieces, rows_of, side_by_side
 from davinci_forces.logs.tdms.walk import TAG, Walk
-from davinci_forces.logs.timeline import Timeline
+from davinci_forces.logs.timeline import Timeline, moment
 
 UNITS = ("unit_string", "ni_unitdescription", "unit", "units")
 
@@ -190,7 +190,7 @@ def _describe_time(
 ) -> None:
     """When the log started, and the clocks that time stamps and waveform properties give."""
     kinds = {channel.name: channel.kind for channel in log.channels}
-    stamped = _moment(log.origin) if log.origin else None
+    stamped = moment(EPOCH, log.origin) if log.origin else None
     started = stamped or waveforms.started
     timelines = waveforms.timelines(started, properties)
     sampled = {
@@ -208,14 +208,6 @@ def _describe_time(
             log.warnings.append(
                 f"the file's later writes say another start or interval: {name!r} begins anew at sample {some}"
             )
-
-
-def _moment(second: int) -> datetime | None:
-    """The moment of a second since 1904; None for one that no calendar holds."""
-    try:
-        return EPOCH + timedelta(seconds=second)
-    except OverflowError:
-        return None
 
 
 def _first_second(file: BinaryIO, index: Index, path: str) -> int | None:

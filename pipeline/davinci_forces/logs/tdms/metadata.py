@@ -5,10 +5,12 @@ Layout as National Instruments publishes it ("TDMS File Format Internal Structur
 
 import struct
 from dataclasses import dataclass, field
-from datetime import UTC, datetime, timedelta
+from datetime import UTC, datetime
 from typing import Any
 
 import numpy as np
+
+from davinci_forces.logs.timeline import moment
 
 NO_DATA, AS_BEFORE = 0xFFFFFFFF, 0
 DAQMX, DIGITAL = 0x1269, 0x126A  # raw data of a DAQ card that still has to be scaled
@@ -122,10 +124,7 @@ class _Cursor:
         parts = ("Q", "q") if self.order == "<" else ("q", "Q")
         first, second = self.number(parts[0]), self.number(parts[1])
         fraction, seconds = (first, second) if self.order == "<" else (second, first)
-        try:
-            return EPOCH + timedelta(seconds=seconds, microseconds=round(fraction / 2**64 * 1e6))
-        except OverflowError:
-            return None
+        return moment(EPOCH, seconds, round(fraction / 2**64 * 1e6))
 
     def samples(self) -> Samples:
         kind, dimension, count = self.number("I"), self.number("I"), self.number("Q")

@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.mechanics.bodies import Bodies
 from davinci_forces.maths.mechanics.chain import Chain
-from davinci_forces.maths.mechanics.kinematics import frames, remote_centre
+from davinci_forces.maths.mechanics.kinematics import frames, remote_centre, to_base
 from davinci_forces.maths.mechanics.rigid_body import inverse_dynamics
 
 PARTS = 6  # of a path, as the choice of a model leaves them out
@@ -123,11 +123,9 @@ def moved_with(chain: Chain, coordinate: int) -> str:
     ValueError
         If the coordinate moves nothing between base and tip.
     """
-    body = int(chain.body[chain.names.index(chain.tip)])
-    while body > 0:
+    for body in to_base(chain, int(chain.body[chain.names.index(chain.tip)])):
         if chain.coordinate[body - 1] == coordinate:
             return chain.links[body - 1]
-        body = int(chain.parent[body - 1])
     raise ValueError(f"coordinate {coordinate} does not move {chain.tip}")
 
 

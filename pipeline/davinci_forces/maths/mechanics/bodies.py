@@ -127,10 +127,6 @@ class Drives:
     viscous: Array  # v [N m s/rad], or [N s/m]
     coulomb: Array  # c [N m], or [N]
 
-    def reduced(self, n: int) -> "Drives":
-        """Those of the first n coordinates."""
-        return Drives(self.gear_ratio[:n], self.motor_inertia[:n], self.viscous[:n], self.coulomb[:n])
-
     @property
     def inertia(self) -> Array:
         """The motors' inertia at the joints, eta^2 J_m (n,).  (4.28), which (4.29) neglects and (6.7)-(6.13) keep"""
@@ -148,10 +144,6 @@ class BaseParameters(NamedTuple):
     columns: NDArray[np.int64]  # (p,) of Y, which span all the others: tau = Y[:, columns] beta
     combination: Array  # K (p, 10 L): how all parameters enter each
     condition: float  # of the base columns, each scaled to unit length
-
-    def names(self, links: tuple[str, ...]) -> list[str]:
-        """Each base parameter by the link and parameter that leads it, as `Ixx of 5`."""
-        return [f"{PARAMETERS[c % 10]} of {links[c // 10]}" for c in self.columns]
 
 
 def base_parameters(Y: Array) -> BaseParameters:

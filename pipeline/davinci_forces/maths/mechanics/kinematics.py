@@ -58,7 +58,7 @@ def jacobian(
 def _jacobian(chain: Chain, T: Array, n: int, body: int, at: Array) -> tuple[Array, Array]:
     """J_v and J_omega (..., 3, n) of a body's point that is at `at` (..., 3) in the base frame, with all bodies' T."""
     J_v, J_w = np.zeros((2, *T.shape[:-3], 3, n))
-    for carrier in _to_base(chain, body):
+    for carrier in to_base(chain, body):
         k, z, origin = chain.coordinate[carrier - 1], T[..., carrier, :3, 2], T[..., carrier, :3, 3]
         if FIXED < k < n:
             J_v[..., k] += z if chain.slides[carrier - 1] else np.cross(z, at - origin)
@@ -71,7 +71,7 @@ def along(of: Callable[[Array], Array], q: Array) -> Array:
     return np.concatenate([of(q[i : i + AT_ONCE]) for i in range(0, max(len(q), 1), AT_ONCE)])
 
 
-def _to_base(chain: Chain, body: int) -> Iterator[int]:
+def to_base(chain: Chain, body: int) -> Iterator[int]:
     """A body and those that carry it, without the base."""
     while body > 0:
         yield body
@@ -85,7 +85,7 @@ def remote_centre(chain: Chain) -> Array:
     where it is for all q is a property of the parallelogram.  Section 2.2
     """
     tip_body = int(chain.body[chain.names.index(chain.tip)])
-    body = next(body for body in _to_base(chain, tip_body) if chain.coordinate[body - 1] == 1)
+    body = next(body for body in to_base(chain, tip_body) if chain.coordinate[body - 1] == 1)
     v, w = (J.T for J in _jacobian(chain, _bodies(chain, np.zeros(2)), 2, body, np.zeros(3)))  # v + w x p = 0 for both
     cross = np.cross(np.eye(3), w[:, None, :])  # row i of -[w]x: e_i x w
     return np.asarray(np.linalg.lstsq(np.concatenate(np.swapaxes(cross, 1, 2)), v.ravel(), rcond=None)[0])

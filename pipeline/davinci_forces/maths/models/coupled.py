@@ -78,7 +78,7 @@ class CoupledArm:
         """Phi (N, m, p).  (6.3), (6.9)"""
         N, b = len(motion.q), len(self.base.columns)
         Phi, known = np.zeros((N, len(self.rows), b + sum(map(len, self.friction)))), np.ones(N, np.bool_)
-        Phi[:, :, :b] = self._of_links(motion.q, motion.dq, motion.ddq)[:, :, self.base.columns]
+        Phi[:, :, :b] = of_links(self.chain, self.rows, motion.q, motion.dq, motion.ddq)[:, :, self.base.columns]
         for row, joint, term, column in self._frictions():
             z, started = driven(motion, joint, term)
             known &= started
@@ -96,10 +96,10 @@ class CoupledArm:
         """What the parameters (p,) make of M at q (N, n), (N, m, m, p): M is linear in them."""
         still, base = np.zeros_like(q), self.base.columns
         columns = np.zeros((len(q), len(self.rows), len(self.rows), len(self.parameters)))
-        gravity = self._of_links(q, still, still)[:, :, base]
+        gravity = of_links(self.chain, self.rows, q, still, still)[:, :, base]
         for j, row in enumerate(self.rows):
-            unit = np.eye(q.shape[1])[row]
-            columns[:, :, j, : len(base)] = self._of_links(q, still, still + unit)[:, :, base] - gravity
+            unit = still + np.eye(q.shape[1])[row]
+            columns[:, :, j, : len(base)] = of_links(self.chain, self.rows, q, still, unit)[:, :, base] - gravity
         return columns
 
     def bias(self, theta: Array, motion: ArmMotion) -> Array:
@@ -119,10 +119,6 @@ class CoupledArm:
             views.append(JointDynamics(M[:, i, i], (0.0, 0.0, 0.0, 0.0, viscous, coulomb, 0.0), known))
         return tuple(views)
 
-    def _of_links(self, q: Array, dq: Array, ddq: Array) -> Array:
-        """The columns (N, m, 10 L + 3 m) of the inertial parameters, and of what drives and cables add to each row."""
-        return of_links(self.chain, self.rows, q, dq, ddq)
-
     def _frictions(self) -> list[tuple[int, int, Term, int]]:
         """Row, joint, term and column of Phi of every term of friction."""
         pairs = [(i, joint, term) for i, joint in enumerate(self.rows) for term in self.friction[i]]
@@ -135,12 +131,8 @@ class CoupledArm:
     def _link_parameter(self, column: int) -> Parameter:
         link, which = self.chain.links[column // 10], PARAMETERS[column % 10]
         symbol = f'{which[0]}_({which[1:]},"{link}")' if which != "m" else f'm_"{link}"'
-        return Parameter(
-            f"{which} of {link}",
-            f"partial tau \\/ partial {symbol}",
-            LINK_UNITS[column % 10] + self.units[0]["gain"],
-            False,
-        )
+        unit = LINK_UNITS[column % 10] + self.units[0]["gain"]
+        return Parameter(f"{which} of {link}", f"partial tau \\/ partial {symbol}", unit, False)
 
     def _added_parameter(self, column: int) -> Parameter:
         which, row = divmod(column, len(self.rows))

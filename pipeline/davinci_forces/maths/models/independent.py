@@ -8,14 +8,7 @@ import numpy as np
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.models.bias import Coefficients, bias
 from davinci_forces.maths.models.memory import driven
-from davinci_forces.maths.models.model import (
-    ArmMotion,
-    JointDynamics,
-    Mechanism,
-    Parameter,
-    Regressor,
-    of_signs,
-)
+from davinci_forces.maths.models.model import ArmMotion, JointDynamics, Mechanism, Parameter, Regressor, of_signs
 from davinci_forces.maths.models.terms import Term
 
 FUNCTIONS: dict[str, Callable[[Array, Array, Array | float], Array | float]] = {  # those of `bias`, of q, dq and z

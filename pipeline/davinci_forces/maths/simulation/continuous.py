@@ -81,10 +81,3 @@ def _slope(
     rate[:n] = dq
     rate[n : 2 * n] = np.linalg.solve(M, tau - b - viscous * dq)
     rate[2 * n :] = target - state[:n]
-
-
-def at(plant: Plant, q: Array, dq: Array) -> tuple[Array, Array]:
-    """Inertia (n, n) and bias (n,) of a plant at one configuration."""
-    M, b = np.empty((len(q), len(q))), np.empty(len(q))
-    plant.dynamics(plant.data, np.ascontiguousarray(q), np.ascontiguousarray(dq), M, b)
-    return M, b

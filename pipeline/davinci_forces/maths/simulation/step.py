@@ -65,11 +65,6 @@ def bristle(friction: Friction, i: int, v: float, z: float, h: float) -> tuple[f
     return constant, slope, decay
 
 
-def steady(friction: Friction, i: int, v: Array) -> Array:
-    """The effort (K,) that keeps joint i sliding at constant velocities v (K,) that are not zero.  Fig 6.21"""
-    return np.array([level(friction, i, x) * np.sign(x) + friction.viscous[i] * x for x in v.tolist()])
-
-
 class State(NamedTuple):
     """The mechanical state of n joints, changed in place by a step."""
 

@@ -28,11 +28,6 @@ class Surroundings(NamedTuple):
     at_tip: bool  # whether anything but efforts and the mass acts
 
 
-def nothing(ticks: int, n: int) -> Surroundings:
-    """Free space."""
-    return Surroundings(np.zeros((ticks, n)), np.zeros((ticks, 3)), 0.0, 0.0, 0.0, np.zeros(3), UP.copy(), False)
-
-
 def triangle(t: Array, start: float, end: float, peak: float) -> Array:
     """An effort that rises from zero to its peak midway between start and end, and falls again.  Section 7.3"""
     return peak * np.clip(1 - np.abs(2 * t - start - end) / (end - start), 0, None)

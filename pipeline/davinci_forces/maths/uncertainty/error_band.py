@@ -64,7 +64,8 @@ def excess(of: SpeedCells) -> Array:
     """The variance (BINS,) beyond the filter's own; the same at all speeds where speed does not tell more."""
     if not len(of.samples):
         return np.zeros(BINS)
-    return beyond(of, together=not depends_on_speed(of))
+    left = means(of, of.mean_square - of.filter_square, together=not depends_on_speed(of))
+    return np.maximum(left, 0.0)
 
 
 def excess_std(of: SpeedCells) -> Array:
@@ -73,11 +74,6 @@ def excess_std(of: SpeedCells) -> Array:
         return np.zeros(BINS)
     left_out = without_each(of, of.mean_square - of.filter_square, units(of), together=not depends_on_speed(of))
     return bootstrap.of_left_out(np.maximum(left_out, 0.0))
-
-
-def beyond(of: SpeedCells, together: bool) -> Array:
-    """The variance (BINS,) beyond the filter's own, by range of speed or of all ranges together."""
-    return np.maximum(means(of, of.mean_square - of.filter_square, together), 0.0)
 
 
 def units(of: SpeedCells) -> Integers:

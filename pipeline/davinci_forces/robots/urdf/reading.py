@@ -20,9 +20,8 @@ from davinci_forces.maths.mechanics.placed import PlacedLink, assembled
 from davinci_forces.maths.mechanics.rigid_body import regressor
 from davinci_forces.maths.models.terms import Term, coulomb, gravity_cos, gravity_sin, inertia, offset, viscous
 from davinci_forces.robots.robot import ANYWHERE, Joint, Kind, Limits, Robot
-from davinci_forces.robots.urdf import elements
-from davinci_forces.robots.urdf.elements import Element
-from davinci_forces.robots.urdf.tables import MOVING, TIP, Notes, UrdfJoint, inertial, joint
+from davinci_forces.robots.urdf import tables
+from davinci_forces.robots.urdf.tables import MOVING, TIP, Element, Notes, UrdfJoint, inertial, joint
 from davinci_forces.toml.file import TomlFile
 
 HARMONICS = 10  # of an excitation that nobody has described: more than most have, and below most noise
@@ -44,7 +43,7 @@ def described(file: Path) -> tuple[Robot | None, TomlFile]:
     that is not XML.
     """
     notes = TomlFile(str(file), {})
-    return robot_of(elements.read(file), notes, file.stem), notes
+    return robot_of(tables.read(file), notes, file.stem), notes
 
 
 def robot_of(outermost: Element, file: TomlFile, stem: str) -> Robot | None:
@@ -60,7 +59,7 @@ def robot_of(outermost: Element, file: TomlFile, stem: str) -> Robot | None:
     joints = [joint(element, file) for element in outermost.all("joint")]
     root = _root(outermost, links, joints, file)
     by_name = {one.name: one for one in joints}
-    moved = movers(by_name, file)
+    moved = {one.name: _mover(one, by_name, file) for one in joints}
     ordered = _outwards(root, joints)
     coordinates = _coordinates(ordered, file)
     if not coordinates:
@@ -190,13 +189,11 @@ def _joint(own: UrdfJoint, name: str, feels_gravity: bool) -> Joint:
     return Joint(name, own.name, kind, (inertia, *turning, *FRICTION), limits, harmonics=HARMONICS)
 
 
-def movers(joints: Mapping[str, UrdfJoint], file: TomlFile) -> dict[str, Mover]:
-    """How each joint is moved; what is wrong with a mimic is noted."""
-    return {name: _mover(one, joints, file) for name, one in joints.items()}
-
-
 def _mover(joint: UrdfJoint, joints: Mapping[str, UrdfJoint], file: TomlFile) -> Mover:
-    """Along the joints that mimic each other, to the one that moves by itself."""
+    """How a joint is moved: along those that mimic each other, to the one that moves by itself.
+
+    What is wrong with its mimic is noted.
+    """
     sign, bias, seen, one = 1.0, 0.0, [joint.name], joint
     while one.kind != "fixed" and one.mimic:
         sign, bias = sign * one.multiplier, bias + sign * one.bias

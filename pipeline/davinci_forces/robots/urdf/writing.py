@@ -35,20 +35,17 @@ def text(robot: Robot) -> str:
     """
     if robot.chain is None:
         raise BadRobot(f"robot {robot.name} has no chain: its geometry is not known, and a URDF is made of it")
+    title = robot.title.replace("--", "- -").rstrip("-")  # which a comment may not hold
     weightless = "" if robot.bodies else "; what its links weigh is not known"
     lines = [
         '<?xml version="1.0" encoding="utf-8"?>',
-        f"<!-- {_comment(robot.title)}, in m, rad and kg, z up{weightless} -->",
+        f"<!-- {title}, in m, rad and kg, z up{weightless} -->",
         f"<robot name={quoteattr(robot.name)}>",
         f"  <link name={quoteattr(robot.chain.names[0])}/>",
         *(f"  {line}" for line in _body(_turned(robot, robot.chain), robot.chain)),
         "</robot>",
     ]
     return "\n".join(lines) + "\n"
-
-
-def _comment(words: str) -> str:
-    return words.replace("--", "- -").rstrip("-")
 
 
 class _Turned(NamedTuple):

@@ -68,7 +68,8 @@ def answer(request: Request, tell: Tell = nothing) -> Answer:
     BadRequest, BadRobot
         If the request makes no sense or cannot be met.
     """
-    robot = load(request.robot)
+    named = Path(request.robot)  # a listed robot, or a .toml file
+    robot = robots.load(named.name, named.parent) if named.suffix == ".toml" else robots.load(request.robot, Path())
     together = request.joint == "all"
     joints = robot.joints if together else (robot.joint(request.joint),)
     if request.criterion not in CRITERIA:
@@ -94,17 +95,9 @@ def _of_arm(request: Request, robot: Robot, problem: ArmExcitationProblem, tell:
     return Answer(
         [ExcitationTrajectory(*part) for part in parts],
         ArmExcitation(
-            float(CRITERIA[request.criterion](F)),
-            float(10 ** condition(F)),
-            F.shape[-1],
-            tuple(found.optima.tolist()),
+            float(CRITERIA[request.criterion](F)), float(10 ** condition(F)), F.shape[-1], tuple(found.optima.tolist())
         ),
     )
-
-
-def load(robot: str) -> Robot:
-    """A listed robot, or the one of a .toml file."""
-    return robots.load(Path(robot).name, Path(robot).parent) if robot.endswith(".toml") else robots.load(robot, Path())
 
 
 def _problem(request: Request, joint: Joint, period: float) -> ExcitationProblem:

@@ -11,16 +11,7 @@ import numpy as np
 
 from davinci_forces.errors import BadRequest
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.excitation.fourier import (
-    CRITERIA,
-    Fourier,
-    condition,
-    motion,
-    observation,
-    ranges,
-    run_in,
-    shortest,
-)
+from davinci_forces.maths.excitation import fourier
 from davinci_forces.maths.excitation.joint import ExcitationProblem, design
 from davinci_forces.robots.robot import Joint, Kind
 
@@ -35,23 +26,25 @@ class ExcitationTrajectory:
 
     joint: Joint
     problem: ExcitationProblem
-    series: Fourier
+    series: fourier.Fourier
     optima: tuple[float, ...] = ()  # the criterion that each start of a search for it has come to
 
     @property
     def objective(self) -> float:
         """The criterion: -log10 det(F^T F), or log10 of the condition number.  (6.20)"""
-        return float(CRITERIA[self.problem.criterion](self._F()))
+        return float(fourier.CRITERIA[self.problem.criterion](self._F()))
 
     @property
     def condition(self) -> float:
         """The condition number of F."""
-        return float(10 ** condition(self._F()))
+        return float(10 ** fourier.condition(self._F()))
 
     @property
     def broken(self) -> list[str]:
         """The limits that the trajectory does not keep, one a line."""
-        names = zip(("q", "dq", "ddq"), ("", "/s", "/s^2"), ranges(self.series), self.problem.limits, strict=True)
+        names = zip(
+            ("q", "dq", "ddq"), ("", "/s", "/s^2"), fourier.ranges(self.series), self.problem.limits, strict=True
+        )
         unit = self.joint.unit("{position}")
         return [
             f"{name} goes from {lowest:.4f} to {highest:.4f} {unit}{per}, its limits are {low:g} and {high:g}"
@@ -71,14 +64,14 @@ class ExcitationTrajectory:
             "coefficients": dict(zip(names, x, strict=True)),
             "period": self.series.period,
             "samples": self.problem.samples,
-            "ranges": {s: list(r) for s, r in zip(symbols, ranges(self.series), strict=True)},
+            "ranges": {s: list(r) for s, r in zip(symbols, fourier.ranges(self.series), strict=True)},
             "limits": {s: list(r) for s, r in zip(symbols, self.problem.limits, strict=True)},
             "within_limits": not self.broken,
             **({"starts": spread(self.optima)} if self.optima else {}),
         }
 
     def _F(self) -> Array:
-        return observation(self.problem.terms, self.series, self.problem.samples)
+        return fourier.observation(self.problem.terms, self.series, self.problem.samples)
 
 
 def spread(optima: Sequence[float]) -> dict[str, float | int | None]:
@@ -148,7 +141,7 @@ def _draw(axes: Any, excitation: ExcitationTrajectory) -> None:
     unit = excitation.joint.unit("{position}")
     labels = (f"position [{unit}]", f"velocity [{unit}/s]", f"acceleration [{unit}/s²]")
     for ax, values, limits, label in zip(
-        axes, motion(excitation.series, t), excitation.problem.limits, labels, strict=True
+        axes, fourier.motion(excitation.series, t), excitation.problem.limits, labels, strict=True
     ):
         ax.plot(t, values, color="#0072b2")
         for limit in limits:
@@ -200,7 +193,7 @@ def _run_in_samples(excitations: Sequence[ExcitationTrajectory], samples: int, r
     """The samples of the shortest run-in that keeps the limits."""
     durations = np.unique(np.linspace(samples / 4, samples, RUN_INS).round().clip(1)) / rate
     accelerations = [e.problem.limits[2] for e in excitations]
-    if duration := shortest([e.series for e in excitations], accelerations, durations):
+    if duration := fourier.shortest([e.series for e in excitations], accelerations, durations):
         return round(duration * rate)
     raise BadRequest(
         "no run-in of up to a period keeps the limits of acceleration; write the period alone, with --no-run-in, and "
@@ -208,7 +201,7 @@ def _run_in_samples(excitations: Sequence[ExcitationTrajectory], samples: int, r
     )
 
 
-def _with_run_in(series: Fourier, t: Array, before: int) -> Array:
+def _with_run_in(series: fourier.Fourier, t: Array, before: int) -> Array:
     """Position, velocity and acceleration (3, K) at t, the first `before` of which are of the run-in."""
-    moving = np.array(motion(series, t[before:]))
-    return np.hstack([run_in(series, t[:before], -t[0]), moving]) if before else moving
+    moving = np.array(fourier.motion(series, t[before:]))
+    return np.hstack([fourier.run_in(series, t[:before], -t[0]), moving]) if before else moving

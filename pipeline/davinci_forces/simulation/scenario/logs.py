@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path as File
 
@@ -10,13 +11,7 @@ import numpy as np
 from davinci_forces.maths.excitation.fourier import Fourier
 from davinci_forces.maths.simulation.surroundings import SHAPES, Path
 from davinci_forces.robots.from_toml import NAME
-from davinci_forces.simulation.scenario.scenario import (
-    ForceSensor,
-    SimulatedJoint,
-    SimulatedLog,
-    SimulatedPush,
-    Tissue,
-)
+from davinci_forces.simulation.scenario.scenario import ForceSensor, SimulatedJoint, SimulatedLog, SimulatedPush, Tissue
 from davinci_forces.study.entries import ROLES
 from davinci_forces.toml import TomlTable
 
@@ -96,18 +91,10 @@ def _of_arm(
     roles_table = table.table("role_in")
     roles = {family: roles_table.text(family, log.role, ROLES) for family in families}
     roles_table.close()
-    shared = {**vars(log), "lead": lead, "skip": skip, "mass": mass, "tip": tip, "tissue": tissue, "sensor": sensor}
+    shared = replace(log, lead=lead, skip=skip, mass=mass, tip=tip, tissue=tissue, sensor=sensor)
     return [
-        SimulatedLog(
-            **{
-                **shared,
-                "name": f"{family}-{log.name}",
-                "file": f"{family}_{log.file}",
-                "family": family,
-                "role": roles[family],
-            }
-        )
-        for family in wanted
+        replace(shared, name=f"{name}-{log.name}", file=f"{name}_{log.file}", family=name, role=roles[name])
+        for name in wanted
     ]
 
 

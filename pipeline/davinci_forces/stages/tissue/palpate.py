@@ -7,9 +7,8 @@ import numpy as np
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals.smoothing import lowpass as lowpass_of
 from davinci_forces.maths.signals.windows import unbroken
-from davinci_forces.maths.tissue.palpation import Pushed, palpated, remarks
-from davinci_forces.maths.tissue.probing import Probing, known
-from davinci_forces.maths.tissue.stiffness import median_std
+from davinci_forces.maths.tissue.indentation import median_std
+from davinci_forces.maths.tissue.palpation import Probing, Pushed, known, palpated, remarks
 from davinci_forces.maths.tissue.tissue import LAWS, FittedLaw, chosen, force_of, judged, moments, tangent
 from davinci_forces.records import Column, Diagnostic, Push, Stiffness, TissueModel, Touch, Track, diagnostic
 from davinci_forces.robots.robot import Kind, Robot
