@@ -69,18 +69,27 @@ def test_a_log_that_has_left_the_study_has_no_records(plan):
     assert not [place for _, place in plan.places().of(tuple(KINDS.values())) if "gone" in place]
 
 
-def test_a_call_gets_the_records_about_its_own_log_and_joint(plan):
-    tasks = {task.name: task for task in plan.tasks(declaration("predict"))}
+def handed(plan: Plan, step: str) -> dict[str, list[str]]:
+    """The places of the records that the call of a step about one log is handed."""
+    tasks = {task.name: task for task in plan.tasks(declaration(step))}
     assert list(tasks) == list(LOGS)
-    handed = {p: [str(place) for _, place in r] for p, r in tasks["zebra"].records.items()}
+    return {parameter: [str(place) for _, place in located] for parameter, located in tasks["zebra"].records.items()}
+
+
+def test_a_call_gets_the_records_about_its_own_log_and_joint(plan):
     joints = (ROLL, PITCH)
-    assert handed == {
-        "motions": [f"motion/zebra/{joint}.parquet" for joint in joints],
-        "trajectories": [f"trajectory/zebra/{joint}.parquet" for joint in joints],
+    motions = [f"motion/zebra/{joint}.parquet" for joint in joints]
+    assert handed(plan, "predict") == {
+        "motions": motions,
         "fits": [
-            *(f"{kind}/{joint}/independent.lse.parquet" for kind in ("fit", "cross_fit") for joint in joints),
+            *(f"fit/{joint}/independent.lse.parquet" for joint in joints),
             *(f"fitted_paths/{joint}.parquet" for joint in joints),
         ],
+    }
+    assert handed(plan, "fit.apply") == {
+        "motions": motions,
+        "trajectories": [f"trajectory/zebra/{joint}.parquet" for joint in joints],
+        "cross_fits": [f"cross_fit/{joint}/independent.lse.parquet" for joint in joints],
     }
     [whole] = plan.tasks(declaration("fit"))
     assert len(whole.records["trajectories"]) == len(LOGS) * 2
@@ -115,7 +124,7 @@ def test_what_is_read_counts_by_name_type_and_unit_and_what_is_written_by_meanin
     from davinci_forces.records.quantities import QUANTITIES
 
     before = {stage: schemas(stage) for stage in ("predict", "fit", "whiteness")}
-    read = {"Motion", "Trajectory", "FittedPaths", "Fit", "CrossFit", "Choice"}
+    read = {"Motion", "FittedPaths", "Fit", "Choice"}
     assert before["predict"].keys() == {*read, "Prediction", "Diagnostic"}
 
     def changed(**what: str) -> set[tuple[str, str]]:

@@ -206,7 +206,7 @@ def edit(file: Path, old: str, new: str) -> None:
 
 
 def test_editing_a_term_of_the_model_makes_the_fit_run_again_and_says_why(finished, package):
-    assert "fit: 1 of 1 current" in run_by(package, "fit", finished)
+    assert "fit: 5 of 5 current" in run_by(package, "fit", finished)
     edit(package / "maths" / "models" / "terms.py", 'b={"sign(dq)": 1.0}', 'b={"sign(dq)": 2.0}')
     said = run_by(package, "fit", finished)
     assert "the robot changed" in said
@@ -214,15 +214,15 @@ def test_editing_a_term_of_the_model_makes_the_fit_run_again_and_says_why(finish
 
 
 def test_a_reworded_meaning_runs_what_stores_it_and_what_reads_that(finished, package):
-    edit(package / "records" / "quantities.py", "standard deviation of the external effort", "how uncertain it is")
-    edit(package / "records" / "predict.py", "The scores.", "How good it is.")
+    edit(package / "records" / "quantities" / "forces.py", "standard deviation of the external effort", "how uncertain it is")
+    edit(package / "records" / "prediction.py", "The scores.", "How good it is.")
     said = run_by(package, "all", finished)
     for stage in ("design", "ingest", "resample", "average", "differentiate", "fit", "predict"):
         [line] = [line for line in said.splitlines() if line.startswith(f"{stage}: ")]
         assert line.endswith(" current"), line
     assert re.search(r"^ekf: .* and 1 more: the declaration of Track changed$", said, re.M), said
     assert re.search(r"^whiteness: track/.*: processed/track/.*parquet changed$", said, re.M), said
-    assert re.search(r"^report: the code of records/predict.py changed", said, re.M), said
+    assert re.search(r"^report: the code of records/prediction.py changed", said, re.M), said
 
 
 @pytest.mark.parametrize("whole", [True, False], ids=["index", "no index"])
@@ -320,7 +320,7 @@ def test_a_stage_of_a_fresh_study_runs_what_it_needs_and_nothing_else(study):
     assert ran(study) == {"ingest", "resample", "average", "differentiate", "fit"}
     assert "fit: it has not run yet" in said
     again = call("fit", study).splitlines()[1:]
-    assert again == ["fit: 1 of 1 current", f"{study}: nothing to do, every stage is current"]
+    assert again == ["fit: 5 of 5 current", f"{study}: nothing to do, every stage is current"]
 
 
 def test_a_group_of_a_fresh_study_runs_its_stages_and_what_they_need(study):
