@@ -51,13 +51,11 @@ def parse(text: str) -> tuple[Span, ...]:
 
 def _span(match: re.Match[str]) -> Span:
     if match["link"]:
-        return Span("link", printable(_unescaped(match["link"])), match["to"])
+        return Span("link", _unescaped(match["link"]), match["to"])
     kind, text = match.lastgroup, match[match.lastgroup or 0]
     if kind == "escaped":
         return Span("text", text)
-    if kind in ("code", "bold"):
-        text = _unescaped(text)
-    return Span(kind, printable(text))  # type: ignore[arg-type]
+    return Span(kind, _unescaped(text) if kind in ("code", "bold") else text)  # type: ignore[arg-type]
 
 
 def _unescaped(text: str) -> str:

@@ -67,25 +67,28 @@ def place(document: Document) -> tuple[Placed, ...]:
     return tuple(_section(section, str(i), 1, counters) for i, section in enumerate(document.sections, 1))
 
 
+def flatten(placed: tuple[Placed, ...]) -> Iterator[Placed]:
+    """Every block in reading order, each before what it holds."""
+    for item in placed:
+        yield item
+        yield from flatten(item.blocks)
+
+
 def references(placed: tuple[Placed, ...]) -> dict[str, str]:
     """What a reference to each label or anchor prints: {'roll-residual': 'Figure 3'}."""
     printed: dict[str, str] = {}
-    for item in placed:
+    for item in flatten(placed):
         if item.number and name_of(item.block):
             printed[item.anchor] = NAMES[item.kind].format(item.number)
         elif isinstance(item.block, OnScreen):
             printed[item.anchor] = f"“{''.join(span.text for span in parse(item.block.title))}”"
-        printed |= references(item.blocks)
     return printed
 
 
 def on_screen(placed: tuple[Placed, ...]) -> frozenset[str]:
     """The anchors of all that the PDF leaves out."""
-    left: set[str] = set()
-    for item in placed:
-        inside = on_screen(item.blocks) | {child.anchor for child in item.blocks}
-        left |= inside | {item.anchor} if item.kind == "onscreen" else on_screen(item.blocks)
-    return frozenset(left - {""})
+    folded = tuple(item for item in flatten(placed) if item.kind == "onscreen")
+    return frozenset(item.anchor for item in flatten(folded) if item.anchor)
 
 
 def marked_texts(document: Document, kind: Kind) -> Iterator[str]:

@@ -1,7 +1,7 @@
 """Thinning marks of many samples, without hiding an extreme."""
 
 from dataclasses import replace
-from functools import singledispatch
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,35 +13,20 @@ Indices = NDArray[np.intp]
 
 
 def thin_mark(mark: AnyMark, limit: int) -> AnyMark:
-    """The mark in at most `limit` points; one of fewer stays as it is."""
-    return _thinned(mark, limit) if points_of(mark) > limit else mark
-
-
-@singledispatch
-def _thinned(mark: AnyMark, limit: int) -> AnyMark:
-    raise TypeError(f"a mark has points to leave out, {type(mark).__name__} has none")
-
-
-@_thinned.register(Line)
-@_thinned.register(Stems)
-def _(mark: Line | Stems, limit: int) -> AnyMark:
-    kept = _kept_indices(mark.x, mark.y, limit)
-    return replace(mark, x=mark.x[kept], y=mark.y[kept])
-
-
-@_thinned.register(Points)
-def _(mark: Points, limit: int) -> AnyMark:
-    kept = _kept_indices(mark.x, mark.y, limit)
-    return replace(mark, x=mark.x[kept], y=mark.y[kept], y_std=None if mark.y_std is None else mark.y_std[kept])
-
-
-@_thinned.register(Band)
-def _(mark: Band, limit: int) -> AnyMark:
-    if not is_sorted(mark.x):
+    """The mark in at most `limit` points; one of fewer stays as it is, and so does a band that is no course of time."""
+    if not isinstance(mark, Line | Points | Band | Stems) or points_of(mark) <= limit:
         return mark
-    starts = _range_starts(mark.x, limit // 2)
-    lower, upper = np.fmin.reduceat(mark.lower, starts), np.fmax.reduceat(mark.upper, starts)
-    return replace(mark, x=mark.x[starts], lower=lower, upper=upper)
+    if isinstance(mark, Band):
+        if not is_sorted(mark.x):
+            return mark
+        starts = _range_starts(mark.x, limit // 2)
+        lower, upper = np.fmin.reduceat(mark.lower, starts), np.fmax.reduceat(mark.upper, starts)
+        return replace(mark, x=mark.x[starts], lower=lower, upper=upper)
+    kept = _kept_indices(mark.x, mark.y, limit)
+    columns: dict[str, Any] = {"x": mark.x[kept], "y": mark.y[kept]}
+    if isinstance(mark, Points) and mark.y_std is not None:
+        columns["y_std"] = mark.y_std[kept]
+    return replace(mark, **columns)
 
 
 def envelope(x: Array, y: Array, bins: int) -> Indices:

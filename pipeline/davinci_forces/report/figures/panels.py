@@ -64,7 +64,10 @@ def _lines(text: str) -> int:
 def draw_panel(axes: "Axes", panel: Panel, width: float, height: float, x_label: bool) -> None:
     """Draw a panel into a cell of this width and height [mm], without what stands above it."""
     _draw_marks(axes, panel, width)
-    _set_ranges(axes, panel)
+    if panel.x_range:
+        axes.set_xlim(*panel.x_range)
+    if panel.y_range:
+        axes.set_ylim(*panel.y_range)
     tiles = any(isinstance(mark, Tiles) for mark in panel.marks)
     named = tiles or any(isinstance(mark, Bars) for mark in panel.marks)
     across = panel.x_label if named else _ticks(axes, "x", panel.x_log, panel.x_label, 4 if width < 70 else 8)
@@ -81,13 +84,6 @@ def _draw_marks(axes: "Axes", panel: Panel, width: float) -> None:
             draw_mark(thin_mark(mark, max_points(mark, width)), axes, 2 + 0.01 * order)
     if any(isinstance(mark, Points | Stems) for mark in panel.marks):
         axes.margins(x=0.03)  # room for symbols at the ends
-
-
-def _set_ranges(axes: "Axes", panel: Panel) -> None:
-    if panel.x_range:
-        axes.set_xlim(*panel.x_range)
-    if panel.y_range:
-        axes.set_ylim(*panel.y_range)
 
 
 def make_room_for_names(axes: "Axes", panel: Panel, height: float) -> None:

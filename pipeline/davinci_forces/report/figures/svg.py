@@ -2,7 +2,6 @@
 
 import io
 import re
-from functools import singledispatch
 from typing import TYPE_CHECKING, Any
 from weakref import WeakKeyDictionary
 
@@ -105,14 +104,10 @@ def _tenths(number: int) -> str:
     return text if text.startswith("-") else f" {text}"
 
 
-@singledispatch
-def draw_figure(figure: Any) -> "Canvas":
+def draw_figure(figure: Figure | Figure3D) -> "Canvas":
     """A figure on a canvas of the page's width."""
-    raise TypeError(f"{type(figure).__name__} is not a figure")
-
-
-@draw_figure.register(Figure)
-def _(figure: Figure) -> "Canvas":
+    if isinstance(figure, Figure3D):
+        return _draw_space(figure)
     canvas = _canvas(figure.height)
     width = WIDTH / figure.columns
     shared: Axes | None = None
@@ -135,8 +130,7 @@ def _canvas(height: float) -> "Canvas":
     return canvas
 
 
-@draw_figure.register(Figure3D)
-def _(figure: Figure3D) -> "Canvas":
+def _draw_space(figure: Figure3D) -> "Canvas":
     canvas = _canvas(figure.height)
     legend = plan_heading(Panel("", "", "", figure.marks), WIDTH)  # type: ignore[arg-type]
     height = figure.height - legend.height

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from davinci_forces.report.content import Document, Equation, Figure, Figure3D, walk
 from davinci_forces.report.content.inline import Span, parse, printable
-from davinci_forces.report.content.layout import Placed, columns, marked_texts, on_screen, place, references
+from davinci_forces.report.content.layout import columns, flatten, marked_texts, on_screen, place, references
 from davinci_forces.report.figures.svg import svg
 from davinci_forces.report.writers.miniature import LARGER, SMALL, miniature
 from davinci_forces.report.writers.numbers import Json, ThinnedFigure, numbers_json, thin_figure
@@ -28,6 +28,7 @@ STILL_POINTS = 2_000  # of a figure that does not zoom, for those who want its n
 SIGN = "\0"  # which no text can hold: it is not printable
 SCRIPTS = ("contents.js", "figures.js", "tables.js")
 REVIEW_SCRIPTS = ("review.js",)
+SHAPES = {"text": "{}", "code": "<code>{}</code>", "bold": "<strong>{}</strong>"}
 TRACE_SCRIPTS = ("axes.js", "marks.js", "traces.js")
 
 
@@ -42,7 +43,7 @@ def render(document: Document) -> bytes:
         If an equation is wrong.
     """
     placed = place(document)
-    figures = {item.anchor: item.block for item in _flatten(placed) if isinstance(item.block, Figure | Figure3D)}
+    figures = {item.anchor: item.block for item in flatten(placed) if isinstance(item.block, Figure | Figure3D)}
     zooms = {name: f for name, f in figures.items() if isinstance(f, Figure) and f.zoomable}
     folded = on_screen(placed)
     formulas, symbols = draw_formulas(_formulas(document))
@@ -102,10 +103,6 @@ def _formulas(document: Document) -> list[Formula]:
     return [Formula(maths, False) for maths in marked_texts(document, "maths")] + display
 
 
-def _flatten(placed: tuple[Placed, ...]) -> list[Placed]:
-    return [item for parent in placed for item in (parent, *_flatten(parent.blocks))]
-
-
 def _fill(page: Json, names: list[str]) -> str:
     """The page, with signs where the numbers of the named figures belong, and the notes on them."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -142,30 +139,16 @@ def _inline(page: Json) -> Callable[[str], "Markup"]:
     """A filter from marked text to HTML."""
     from markupsafe import Markup
 
-    def maths(text: str) -> Markup:
-        return _maths(text, page["formulas"][Formula(text, False)])
+    def shaped(span: Span) -> Markup:
+        if span.kind == "maths":
+            return _maths(span.text, page["formulas"][Formula(span.text, False)])
+        if span.kind == "reference":
+            return Markup('<a href="#{}">{}</a>').format(span.text, page["references"][span.text])
+        if span.kind == "link":
+            return Markup('<a href="{}">{}</a>').format(span.to, span.text)
+        return Markup(SHAPES[span.kind]).format(span.text)
 
-    def reference(text: str) -> Markup:
-        return Markup('<a href="#{}">{}</a>').format(text, page["references"][text])
-
-    def link(text: str, to: str) -> Markup:
-        return Markup('<a href="{}">{}</a>').format(to, text)
-
-    shapes: dict[str, Callable[[str], Any]] = {
-        "text": Markup.escape,
-        "code": Markup("<code>{}</code>").format,
-        "bold": Markup("<strong>{}</strong>").format,
-        "maths": maths,
-        "reference": reference,
-    }
-
-    def inline(text: str) -> Markup:
-        spans: tuple[Span, ...] = parse(text)
-        return Markup("").join(
-            link(span.text, span.to) if span.kind == "link" else shapes[span.kind](span.text) for span in spans
-        )
-
-    return inline
+    return lambda text: Markup("").join(map(shaped, parse(text)))
 
 
 def _maths(text: str, drawing: Drawing) -> "Markup":

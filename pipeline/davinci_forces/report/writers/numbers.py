@@ -65,10 +65,9 @@ def _encode(column: Array) -> str:
     """
     if (step := _equal_step(column)) is not None:
         return json.dumps([float(column[0]), step, len(column)])
-    single = column.astype("<f4")
-    if float(np.nanmax(np.abs(column), initial=0.0)) > 2**20 * _typical_step(column):
-        return json.dumps("d" + base64.b64encode(column.astype("<f8").tobytes()).decode())
-    return json.dumps("f" + base64.b64encode(single.tobytes()).decode())
+    close = float(np.nanmax(np.abs(column), initial=0.0)) > 2**20 * _typical_step(column)
+    letter, form = ("d", "<f8") if close else ("f", "<f4")
+    return json.dumps(letter + base64.b64encode(column.astype(form).tobytes()).decode())
 
 
 def _equal_step(column: Array) -> float | None:

@@ -15,13 +15,6 @@ class NotTypeset(PipelineError):
     """Typst refuses the report, or warns about it."""
 
 
-def _drawing_fonts() -> str:
-    """The folder of the fonts that figures are drawn with, the same on every machine."""
-    import matplotlib as mpl
-
-    return str(Path(mpl.get_data_path()) / "fonts/ttf")
-
-
 def typeset(template: Path, content: Any, output: Literal["pdf", "svg"]) -> list[bytes]:
     """Compile a template that reads `content` as data, never as markup; one item per page of SVG, one for a PDF.
 
@@ -30,9 +23,11 @@ def typeset(template: Path, content: Any, output: Literal["pdf", "svg"]) -> list
     NotTypeset
         If Typst fails or warns, with its own message.
     """
+    import matplotlib as mpl
     import typst
 
-    fonts: list[Any] = [_drawing_fonts()] if output == "pdf" else []
+    # The fonts that figures are drawn with, the same on every machine.
+    fonts: list[Any] = [Path(mpl.get_data_path()) / "fonts/ttf"] if output == "pdf" else []
     try:
         pages: Any
         pages, warnings = typst.compile_with_warnings(
