@@ -8,9 +8,8 @@ the excitation's harmonics kept, little noise is left, and both agree.
 import numpy as np
 
 from davinci_forces.errors import NotIdentifiable
-from davinci_forces.estimators.problem import ALIKE, CONDITION, Estimate, Regression, Spread
+from davinci_forces.estimators.problem import ALIKE, CONDITION, Estimate, Regression, spread_by
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.estimation.correlation import correlated
 from davinci_forces.maths.estimation.least_squares import not_told_apart
 
 NAME = "instrumental variables"
@@ -35,16 +34,7 @@ def estimate(problem: Regression) -> Estimate:
         said = f"the motion {LAG} samples before and after does not tell {alike} apart"
         raise NotIdentifiable(f"{said}: condition number {condition:.1e}")
     theta = np.linalg.solve(seen, Q.T @ (problem.tau * root[:, 0])) / R.scale
-
-    def spread() -> Spread:
-        D = np.linalg.inv(seen) / R.scale[:, None]
-        residual = root[:, 0] * (problem.tau - problem.Phi @ theta)
-        degrees = int((weight > 0).sum()) - len(theta)
-        classical = np.sqrt(residual @ residual / degrees * (D**2).sum(axis=1))
-        found = correlated(Q, residual, problem.starts, D, degrees)
-        return Spread(classical, np.sqrt(found.variance), found.lags)
-
-    return Estimate(theta, spread)
+    return Estimate(theta, lambda: spread_by(problem, weight, theta, Q, np.linalg.inv(seen) / R.scale[:, None]))
 
 
 def instruments(problem: Regression) -> Array:

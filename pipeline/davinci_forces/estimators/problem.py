@@ -148,6 +148,15 @@ def factored(problem: Regression, weight: Array) -> Triangle:
     return R
 
 
+def spread_by(problem: Regression, weight: Array, theta: Array, Q: Array, D: Array) -> Spread:
+    """The standard errors of parameters theta = D Q' tau (p,), of orthonormal columns Q (K, p) and D (p, p)."""
+    residual = np.sqrt(weight) * (problem.tau - problem.Phi @ theta)
+    degrees = int((weight > 0).sum()) - len(theta)
+    classical = np.sqrt(residual @ residual / degrees * (D**2).sum(axis=1))
+    found = correlated(Q, residual, problem.starts, D, degrees)
+    return Spread(classical, np.sqrt(found.variance), found.lags)
+
+
 def spread(problem: Regression, weight: Array, R: Triangle, theta: Array, residual: Array | None = None) -> Spread:
     """The standard errors of parameters that are those of least squares, or close to them.
 

@@ -14,9 +14,8 @@ import numpy as np
 from scipy.linalg import qr
 
 from davinci_forces.errors import NotIdentifiable
-from davinci_forces.estimators.problem import Estimate, Regression, Spread
+from davinci_forces.estimators.problem import Estimate, Regression, Spread, spread_by
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.estimation.correlation import correlated
 from davinci_forces.maths.estimation.least_squares import Triangle
 
 NAME = "total least squares"
@@ -109,11 +108,6 @@ def smallest(R: Triangle, noise: Noise, v: float) -> Array:
 
 def spread(problem: Regression, weight: Array, R: Triangle, C: Array, theta: Array) -> Spread:
     """The standard errors, by G = Phi' Phi - C in place of Phi' Phi."""
-    root = np.sqrt(weight)
-    Q = problem.Phi * root[:, None] @ (np.linalg.inv(R.U) / R.scale[:, None])
+    Q = problem.Phi * np.sqrt(weight)[:, None] @ (np.linalg.inv(R.U) / R.scale[:, None])
     D = np.linalg.solve(R.U.T @ R.U - C, R.U.T) / R.scale[:, None]
-    residual = root * (problem.tau - problem.Phi @ theta)
-    degrees = int((weight > 0).sum()) - len(theta)
-    classical = np.sqrt(residual @ residual / degrees * (D**2).sum(axis=1))
-    found = correlated(Q, residual, problem.starts, D, degrees)
-    return Spread(classical, np.sqrt(found.variance), found.lags)
+    return spread_by(problem, weight, theta, Q, D)

@@ -166,12 +166,11 @@ def _hands(table: TomlTable) -> tuple[tuple[str, Hand], ...]:
 
 
 def _device(table: TomlTable) -> Device:
-    usual = HapticScenario().device
     return Device(
-        table.number("motion_scale", usual.motion, above=0.0),
-        table.number("force_scale", usual.force, low=0.0),
-        table.number("strongest", above=0.0) if "strongest" in table else usual.strongest,
-        table.number("position_step", usual.step, low=0.0),
+        table.number("motion_scale", DEVICE.motion, above=0.0),
+        table.number("force_scale", DEVICE.force, low=0.0),
+        table.number("strongest", above=0.0) if "strongest" in table else DEVICE.strongest,
+        table.number("position_step", DEVICE.step, low=0.0),
     )
 
 

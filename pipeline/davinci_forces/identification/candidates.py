@@ -83,8 +83,8 @@ class Candidate(NamedTuple):
 
     def ridges(self) -> Iterator[Ridge]:
         """How the parameters of each library are found."""
-        yield from (Ridge(self.strength, w, library.combination) for library, w in zip(
-            self.libraries, self.weights, strict=True))  # fmt: skip
+        for library, weights in zip(self.libraries, self.weights, strict=True):
+            yield Ridge(self.strength, weights, library.combination)
 
     def size(self, reaches: dict[str, Reach]) -> int:
         """How many parameters it has."""

@@ -80,10 +80,12 @@ def selected(candidates: Sequence[Candidate], reaches: dict[str, Reach], count: 
     )
 
 
-def judge(candidate: Candidate, schemes: Sequence[Booleans], reaches: dict[str, Reach]) -> Judged | None:
+def judge(
+    candidate: Candidate, schemes: Sequence[Booleans], reaches: dict[str, Reach], by_period: bool = False
+) -> Judged | None:
     """A candidate's errors on what is left out; None where the rest does not tell its parameters apart."""
     try:
-        return candidate.judged(schemes, reaches)
+        return candidate.judged(schemes, reaches, by_period)
     except np.linalg.LinAlgError:
         return None
 
@@ -103,10 +105,8 @@ def over_periods(candidate: Candidate, reaches: dict[str, Reach], count: int) ->
     groups = np.array([number == k for k in range(MOST) if squares[number == k].any()])
     if len(groups) < 2 or not all((squares[~group].sum(axis=0) > 0).all() for group in groups):
         return float("nan")
-    try:
-        return candidate.judged([groups], reaches, by_period=True).score
-    except np.linalg.LinAlgError:
-        return float("nan")
+    judged = judge(candidate, [groups], reaches, by_period=True)
+    return judged.score if judged else float("nan")
 
 
 def reason(candidates: Sequence[Candidate], verdicts: Sequence[Judged], sizes: Sequence[int], i: int, best: int) -> str:
@@ -138,27 +138,23 @@ def parameters(
     block = np.tile(np.arange(BLOCKS), count)
     whole = candidate.parameters(reaches)
     without = [candidate.parameters(reaches, block == b) for b in range(BLOCKS)]
-    for i, (model, library) in enumerate(zip(candidate.models(robot, reaches), candidate.libraries, strict=True)):
+    each = zip(candidate.models(robot, reaches), candidate.libraries, candidate.ridges(), strict=True)
+    for i, (model, library, ridge) in enumerate(each):
         theta, thetas = whole[i], np.array([part[i] for part in without])
         cells = library.by_block.columns(library.columns(candidate.friction, reaches))
-        ridge = list(candidate.ridges())[i]
         together = cells.of(np.ones(len(cells.gram), np.bool_))
-        errors, squares = together.errors(theta)[0], together.squares[0]
-        samples = library.samples
+        errors, samples = together.errors(theta)[0], library.samples
         jackknife = (BLOCKS - 1) / BLOCKS * ((thetas - thetas.mean(axis=0)) ** 2).sum(axis=0)
-        yield (
-            model,
-            library,
-            BlockEstimate(
-                theta=theta,
-                theta_std_classical=np.sqrt(np.diag(covariance(together, ridge, errors / samples))),
-                theta_std=np.sqrt(jackknife),
-                samples=int(samples.max()),
-                mse=float((errors / samples).sum()),
-                r2=float(1.0 - errors.sum() / squares.sum()),
-                condition=float(np.sqrt(np.linalg.cond(scaled_equations(together, ridge)[0]))),
-            ),
+        estimate = BlockEstimate(
+            theta=theta,
+            theta_std_classical=np.sqrt(np.diag(covariance(together, ridge, errors / samples))),
+            theta_std=np.sqrt(jackknife),
+            samples=int(samples.max()),
+            mse=float((errors / samples).sum()),
+            r2=float(1.0 - errors.sum() / together.squares[0].sum()),
+            condition=float(np.sqrt(np.linalg.cond(scaled_equations(together, ridge)[0]))),
         )
+        yield model, library, estimate
 
 
 class Held(NamedTuple):

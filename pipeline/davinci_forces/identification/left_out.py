@@ -48,10 +48,8 @@ def without_the_log(
     """Predict a log from fits to other identification logs."""
     kept = whole_periods(motion.t, own) if own is not None else slice(None)
     part = some(motion, kept)
-    judge, along = (
-        Judge(part, part.standing == 0, lowpass, own.sigma_tau_white if own else None),
-        recorded_motion(part),
-    )
+    judge = Judge(part, part.standing == 0, lowpass, own.sigma_tau_white if own else None)
+    along = recorded_motion(part)
     for fit in cross_fits:
         left_out = [str(names).split(", ") for names in fit.left_out]
         rows = [row for row, names in enumerate(left_out) if motion.log in names]

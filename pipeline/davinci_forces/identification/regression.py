@@ -68,8 +68,7 @@ def joined(parts: Sequence[Regression]) -> Regression:
 
 def averaged_motion(trajectory: Trajectory) -> ArmMotion:
     """One averaged period of a joint, which repeats."""
-    columns = (trajectory.q, trajectory.dq, trajectory.ddq)
-    q, dq, ddq = (x[:, None] for x in columns)
+    q, dq, ddq = (x[:, None] for x in (trajectory.q, trajectory.dq, trajectory.ddq))
     return ArmMotion(q, dq, ddq, trajectory.period / len(q), np.zeros(len(q), np.int64), periodic=True)
 
 

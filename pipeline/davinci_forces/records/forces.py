@@ -3,15 +3,13 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from davinci_forces.records.record import Column, Counts, Labels, Names, Published, Record
+from davinci_forces.records.record import Column, Counts, JointRecord, Labels, LogJointRecord, Names, Published
 
 
 @dataclass(frozen=True, eq=False)
-class Tuning(Record):
+class Tuning(LogJointRecord):
     """The noise of one joint in one identification log, as the likelihood of a filter's innovations has it."""
 
-    log: str
-    joint: str
     rate: float
     r_q: float
     r_dq: float
@@ -25,12 +23,9 @@ class Tuning(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class FilterNoise(Record):
+class FilterNoise(JointRecord):
     """The noise that the filter assumes of a joint: the median of its identification logs."""
 
-    KEY = ("joint",)
-
-    joint: str
     logs: Names
     rate: float
     r_q: float
@@ -47,14 +42,12 @@ class FilterNoise(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class FreeMotion(Record):
+class FreeMotion(LogJointRecord):
     """What a filter makes of one joint of a log in which nothing touches the robot, by a fit that has not seen it.
 
     A row is a block of the log, a sixth of it, at one range of speeds.
     """
 
-    log: str
-    joint: str
     path: str
     scheme: str
     tested: int
@@ -67,15 +60,12 @@ class FreeMotion(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class ErrorBand(Record):
+class ErrorBand(JointRecord):
     """The errors of a joint's external effort in free motion that no fit had seen, of at most 20 logs, block by block.
 
     A log's own band is made of the rows of the others.
     """
 
-    KEY = ("joint",)
-
-    joint: str
     speed: float
     band_rms: float
     band_rms_std: float
@@ -90,19 +80,17 @@ class ErrorBand(Record):
 
     def published(self) -> Iterator[Published]:
         """The error over all rows."""
-        yield Published(f"band.{self.joint}.band_rms", "band_rms", std="band_rms_std")
+        yield from self.publish(f"band.{self.joint}", "band_rms", with_std=True)
 
 
 @dataclass(frozen=True, eq=False)
-class Track(Record):
+class Track(LogJointRecord):
     """The external effort on one joint during one log, as a filter tracked it, and how far it may be off.
 
     Its standard deviation is the total: the filter's own, the model's error on free motion that no fit had seen, what
     the filter lags behind, and the offset of the day, where `free` windows tell one.
     """
 
-    log: str
-    joint: str
     model: str
     estimator: str
     filter: str
@@ -143,16 +131,13 @@ class Track(Record):
         prefix = f"{self.filter}.{self.log}.{self.joint}"
         names = ("tau_ext_rms", "nis_mean", "r_q", "r_dq", "q_dq", "q_tau", "filter_part", "lag_part")
         yield from self.publish(prefix, *names)
-        yield Published(f"{prefix}.model_part", "model_part", std="model_part_std")
-        yield Published(f"{prefix}.day_offset", "day_offset", std="day_offset_std")
+        yield from self.publish(prefix, "model_part", "day_offset", with_std=True)
 
 
 @dataclass(frozen=True, eq=False)
-class FreeSpace(Record):
+class FreeSpace(LogJointRecord):
     """The external effort that one filter states on one joint of one log, where nothing touched the robot."""
 
-    log: str
-    joint: str
     filter: str
     role: str
     tested: int
@@ -171,17 +156,15 @@ class FreeSpace(Record):
     def published(self) -> Iterator[Published]:
         """The levels, and the coverage of the stated band."""
         prefix = f"{self.filter}.{self.log}.{self.joint}"
-        for name in ("free_rms", "free_level", "detection_level", "coverage"):
-            yield Published(f"{prefix}.{name}", name, std=f"{name}_std")
+        yield from self.publish(prefix, "free_rms", "free_level", "detection_level", "coverage", with_std=True)
 
 
 @dataclass(frozen=True, eq=False)
-class Threshold(Record):
+class Threshold(JointRecord):
     """The detection level that contacts on a joint are judged by: that of its worst free space."""
 
     KEY = ("joint", "filter")
 
-    joint: str
     filter: str
     detection_level: float
     detection_level_std: float
@@ -192,20 +175,17 @@ class Threshold(Record):
     def published(self) -> Iterator[Published]:
         """Both levels."""
         prefix = f"threshold.{self.joint}"
-        for name in ("detection_level", "alarm_level"):
-            yield Published(f"{prefix}.{name}", name, std=f"{name}_std")
+        yield from self.publish(prefix, "detection_level", "alarm_level", with_std=True)
 
 
 @dataclass(frozen=True, eq=False)
-class Contact(Record):
+class Contact(LogJointRecord):
     """The contacts of one log: what one joint exerted on its environment, against its detection level.
 
     The windows that the study states come first, then what was found beside them.  A window in which nothing was found
     begins and ends as it is stated.
     """
 
-    log: str
-    joint: str
     filter: str
     detection_level: float
     alarm_level: float
@@ -230,14 +210,14 @@ class Contact(Record):
         """Every contact, numbered from 1."""
         for i in range(len(self)):
             prefix = f"contact.{self.log}.{self.joint}.{i + 1}"
-            for name in ("peak", "mean", "impulse", "onset", "release", "duration"):
-                yield Published(f"{prefix}.{name}", name, std=f"{name}_std", row=i)
-            for name in ("above", "stated", "found"):
-                yield Published(f"{prefix}.{name}", name, row=i)
+            yield from self.publish(
+                prefix, "peak", "mean", "impulse", "onset", "release", "duration", row=i, with_std=True
+            )
+            yield from self.publish(prefix, "above", "stated", "found", row=i)
 
 
 @dataclass(frozen=True, eq=False)
-class Comparison(Record):
+class Comparison(LogJointRecord):
     """One filter on one joint of a log: what it makes of free space, and of a push that was added in software.
 
     Of the default filter the free space is said in FreeSpace.
@@ -245,8 +225,6 @@ class Comparison(Record):
 
     KEY = ("log", "joint", "filter")
 
-    log: str
-    joint: str
     filter: str
     role: str
     default: int
@@ -266,6 +244,5 @@ class Comparison(Record):
         """Its levels in free space, and how much of a push it shows, how late."""
         prefix = f"{self.filter}.{self.log}.{self.joint}"
         if not self.default:
-            for name in ("free_rms", "free_level", "detection_level"):
-                yield Published(f"{prefix}.{name}", name, std=f"{name}_std")
+            yield from self.publish(prefix, "free_rms", "free_level", "detection_level", with_std=True)
         yield from self.publish(prefix, "push_share", "push_delay")

@@ -3,7 +3,17 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from davinci_forces.records.record import Column, Counts, Labels, Names, Published, Record, slug
+from davinci_forces.records.record import (
+    Column,
+    Counts,
+    JointRecord,
+    Labels,
+    LogJointRecord,
+    Names,
+    Published,
+    Record,
+    slug,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,12 +137,9 @@ class Identifiability(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class FittedPaths(Record):
+class FittedPaths(JointRecord):
     """The paths that were fitted on a joint, one period of each in turn; of many, those that differ most."""
 
-    KEY = ("joint",)
-
-    joint: str
     source: Labels  # the log that follows the path
     period: Column
     t: Column
@@ -140,25 +147,20 @@ class FittedPaths(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class MeasurementNoise(Record):
+class MeasurementNoise(JointRecord):
     """The noise of a joint between periods, the root mean square over its identification logs."""
 
-    KEY = ("joint",)
-
-    joint: str
     sigma_q: float
     sigma_dq: float
     sigma_tau: float
 
 
 @dataclass(frozen=True, eq=False)
-class Residual(Record):
+class Residual(LogJointRecord):
     """The averaged effort of one identification log, and the effort that a fit gives for it."""
 
     KEY = ("log", "joint", "model", "estimator")
 
-    log: str
-    joint: str
     model: str
     estimator: str
     rate: float
@@ -198,12 +200,11 @@ class Choice(Record):
         for i, candidate in enumerate(self.candidate):
             prefix = f"choice.{self.group}.{slug(candidate)}"
             yield Published(f"{prefix}.score", "score", std="score_std", row=i)
-            for name in ("training", "over_periods", "parameters"):
-                yield Published(f"{prefix}.{name}", name, row=i)
+            yield from self.publish(prefix, "training", "over_periods", "parameters", row=i)
 
 
 @dataclass(frozen=True, eq=False)
-class FrictionMap(Record):
+class FrictionMap(LogJointRecord):
     """What a fit's other terms leave of the effort of one joint in one log, and its friction, over velocity.
 
     Each row is the mean over a range of velocity, of samples that gain speed or of those that lose it.
@@ -211,8 +212,6 @@ class FrictionMap(Record):
 
     KEY = ("log", "joint", "model", "estimator")
 
-    log: str
-    joint: str
     model: str
     estimator: str
     role: str

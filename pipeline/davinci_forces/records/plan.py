@@ -3,18 +3,16 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from davinci_forces.records.record import Column, Counts, Labels, Published, Record
+from davinci_forces.records.record import Column, Counts, JointRecord, Labels, Published, Record, RobotRecord
 
 
 @dataclass(frozen=True, eq=False)
-class Links(Record):
+class Links(RobotRecord):
     """The links of a robot: Denavit-Hartenberg parameters and masses.  Tables 3.1 and 4.2"""
 
-    KEY = ("robot",)
     UNKNOWN = ("alpha", "a", "d", "offset", "mass")
     ROWS = "link"
 
-    robot: str
     worst_condition: float
     link: Labels
     parent: Labels
@@ -29,17 +27,15 @@ class Links(Record):
         """The geometry of every link, and the worst condition of the tip's Jacobian."""
         yield Published("robot.worst_condition", "worst_condition")
         for i, link in enumerate(self.link):
-            for name in ("alpha", "a", "d", "offset", "mass"):
-                yield Published(f"robot.link.{link}.{name}", name, row=i)
+            yield from self.publish(f"robot.link.{link}", "alpha", "a", "d", "offset", "mass", row=i)
 
 
 @dataclass(frozen=True, eq=False)
-class Pose(Record):
+class Pose(RobotRecord):
     """Where the frames of a robot's chain are at one configuration."""
 
     KEY = ("robot", "pose")
 
-    robot: str
     pose: str
     link: Labels
     parent: Labels
@@ -49,12 +45,9 @@ class Pose(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Workspace(Record):
+class Workspace(RobotRecord):
     """Places that the tip can reach within the limits, and how well efforts tell the force there."""
 
-    KEY = ("robot",)
-
-    robot: str
     x: Column
     y: Column
     z: Column
@@ -104,12 +97,11 @@ class Lyapunov(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Excitation(Record):
+class Excitation(JointRecord):
     """One period of an excitation trajectory, published or designed, with what it is worth and what it exceeds."""
 
     KEY = ("joint", "source")
 
-    joint: str
     source: str
     period: float
     objective: float

@@ -3,14 +3,14 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from davinci_forces.records.record import Column, Counts, Published, Record
+from davinci_forces.records.record import Column, Counts, LogJointRecord, Published
 
 CHOSEN = "chosen"
 SAME_PATH, ANOTHER_PATH = "same path", "another path"  # as what was fitted
 
 
 @dataclass(frozen=True, eq=False)
-class Prediction(Record):
+class Prediction(LogJointRecord):
     """The effort of a log that a fit has not seen, and the effort that the fit predicts for it.
 
     Of the chosen model, whatever it is, `model` is "chosen" and `estimator` names its fit.
@@ -18,8 +18,6 @@ class Prediction(Record):
 
     KEY = ("log", "joint", "model", "estimator")
 
-    log: str
-    joint: str
     model: str
     estimator: str
     role: str
@@ -49,11 +47,11 @@ class Prediction(Record):
         """The scores."""
         scores = ("rmse", "nrmse", "r2", "fit_percent", "r2_ceiling", "effort_rms")
         yield from self.publish(self.prefix, *scores, "relative_error", "relative_error_1111")
-        yield Published(f"{self.prefix}.model_error", "model_error", std="model_error_std")
+        yield from self.publish(self.prefix, "model_error", with_std=True)
 
 
 @dataclass(frozen=True, eq=False)
-class JointModel(Record):
+class JointModel(LogJointRecord):
     """The model of one joint along one log, by the fit that the setting `fit` leads to:
 
         inertia ddq + b(q, dq) + tau_known + tau_ext = tau                                              (7.15), (7.16)
@@ -64,8 +62,6 @@ class JointModel(Record):
 
     UNKNOWN = ("tau_hat_unseen",)
 
-    log: str
-    joint: str
     role: str
     model: str
     estimator: str

@@ -45,7 +45,7 @@ class Published(NamedTuple):
 class Record:
     """What all records share; never made itself."""
 
-    KEY: ClassVar[Names] = ("log", "joint")
+    KEY: ClassVar[Names]
     UNKNOWN: ClassVar[Names] = ()  # columns in which NaN says that a number is not known
     ROWS: ClassVar[str] = ""  # the column that names the rows, where rows have names
     origin: ClassVar[Origin | None] = None  # set on the instances that `store` read
@@ -92,9 +92,9 @@ class Record:
         """The numbers of this record that belong in results.json."""
         return iter(())
 
-    def publish(self, prefix: str, *names: str) -> Iterator[Published]:
-        """Scalars under `<prefix>.<name>`."""
-        return (Published(f"{prefix}.{name}", name) for name in names)
+    def publish(self, prefix: str, *names: str, row: int | None = None, with_std: bool = False) -> Iterator[Published]:
+        """Scalars, or a row of columns, under `<prefix>.<name>`, with their standard errors or without."""
+        return (Published(f"{prefix}.{name}", name, f"{name}_std" if with_std else "", row) for name in names)
 
     def row_name(self, row: int) -> str:
         """What a row is called where a number is traced back to it."""
@@ -115,14 +115,11 @@ class Record:
             if f.type in COLUMN_DTYPES:
                 column = np.asarray(getattr(self, f.name), dtype=COLUMN_DTYPES[f.type])
                 object.__setattr__(self, f.name, column)
-        self._check_lengths()
-        for name in self.columns():
-            self._checked(name, getattr(self, name))
-
-    def _check_lengths(self) -> None:
         lengths = {name: len(getattr(self, name)) for name in self.columns()}
         if len(set(lengths.values())) > 1:
             raise BadRecord(f"{self}: columns differ in length: {lengths}")
+        for name in lengths:
+            self._checked(name, getattr(self, name))
 
     def _checked(self, name: str, column: NDArray[Any]) -> NDArray[Any]:
         """A column, once it is known that its numbers are finite."""
@@ -140,6 +137,42 @@ class Record:
 
 
 AnyRecord = TypeVar("AnyRecord", bound=Record)
+
+
+@dataclass(frozen=True, eq=False)
+class LogRecord(Record):
+    """A record of one log."""
+
+    KEY: ClassVar[Names] = ("log",)
+
+    log: str
+
+
+@dataclass(frozen=True, eq=False)
+class LogJointRecord(LogRecord):
+    """A record of one joint during one log."""
+
+    KEY: ClassVar[Names] = ("log", "joint")
+
+    joint: str
+
+
+@dataclass(frozen=True, eq=False)
+class JointRecord(Record):
+    """A record of one joint over all logs."""
+
+    KEY: ClassVar[Names] = ("joint",)
+
+    joint: str
+
+
+@dataclass(frozen=True, eq=False)
+class RobotRecord(Record):
+    """A record of the whole robot."""
+
+    KEY: ClassVar[Names] = ("robot",)
+
+    robot: str
 
 
 def slug(text: str) -> str:

@@ -3,16 +3,13 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from davinci_forces.records.record import Column, Counts, Labels, Names, Published, Record
+from davinci_forces.records.record import Column, Counts, Labels, LogJointRecord, LogRecord, Names, Published
 
 
 @dataclass(frozen=True, eq=False)
-class LogSummary(Record):
+class LogSummary(LogRecord):
     """How one log was read: what the reader noticed, and what each of its channels is used for."""
 
-    KEY = ("log",)
-
-    log: str
     role: str
     format: str
     files: Names
@@ -42,13 +39,11 @@ class LogSummary(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Touch(Record):
+class Touch(LogRecord):
     """What the channels of one log beyond its joints say of contact, as recorded; NaN without such a channel."""
 
-    KEY = ("log",)
     UNKNOWN = ("t", "depth", "force", "force_x", "force_y", "force_z", "x", "y", "z")
 
-    log: str
     role: str
     sample: Counts
     push: Counts
@@ -64,11 +59,9 @@ class Touch(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Recording(Record):
+class Recording(LogJointRecord):
     """One joint during one log, as recorded: at the log's own clock, in joint units."""
 
-    log: str
-    joint: str
     role: str
     rate: float
     velocity: str  # "logged", or "derived": dq is then zero here and filled in when the clock is made uniform
@@ -79,11 +72,9 @@ class Recording(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Signal(Record):
+class Signal(LogJointRecord):
     """One joint during one log on a uniform clock, with its velocity; a gap starts a new segment."""
 
-    log: str
-    joint: str
     role: str
     rate: float
     method: str
@@ -98,15 +89,13 @@ class Signal(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Motion(Record):
+class Motion(LogJointRecord):
     """The motion of one joint during one log, low-passed without delay, beside what was measured of it.
 
     The noise is what the low-pass takes out.  Where the joint stands still, friction takes any value up to its Coulomb
     level: nothing is fitted to its effort there.
     """
 
-    log: str
-    joint: str
     role: str
     rate: float
     velocity: str
@@ -128,11 +117,9 @@ class Motion(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Average(Record):
+class Average(LogJointRecord):
     """One period of a joint, averaged over the periods of a recording, with the spread between them."""
 
-    log: str
-    joint: str
     rate: float
     period: float
     period_std: float
@@ -161,11 +148,9 @@ class Average(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class PeriodResidual(Record):
+class PeriodResidual(LogJointRecord):
     """What averaging removed: each sample minus the mean of the periods at its phase."""
 
-    log: str
-    joint: str
     t: Column
     q_noise: Column
     dq_noise: Column
@@ -173,11 +158,9 @@ class PeriodResidual(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Trajectory(Record):
+class Trajectory(LogJointRecord):
     """One averaged period with its velocity and acceleration, free of noise, and how large that was."""
 
-    log: str
-    joint: str
     rate: float
     period: float
     periods: int
@@ -197,11 +180,9 @@ class Trajectory(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Spectrum(Record):
+class Spectrum(LogJointRecord):
     """Amplitude of each harmonic of an averaged period: the harmonics kept, and the rest taken as noise."""
 
-    log: str
-    joint: str
     harmonics: int
     frequency: Column
     amplitude: Column

@@ -138,7 +138,8 @@ def read(kind: type[AnyRecord], folder: Path, place: Path, sha256: str = "", lon
         metadata = {key.decode(): stored[key].decode() for key in (b"record", b"scalars", b"units")}
         if metadata["record"] != kind.__name__:
             raise KeyError(metadata["record"])
-        scalars = {name: _scalar(value) for name, value in json.loads(metadata["scalars"]).items()}
+        written = json.loads(metadata["scalars"])
+        scalars = {name: tuple(value) if isinstance(value, list) else value for name, value in written.items()}
         units = json.loads(metadata["units"]) | {f.name: f.metadata[b"unit"].decode() for f in described}
         if longest is None or file.metadata.num_rows <= longest:
             table = file.read()
@@ -251,7 +252,3 @@ def _values(column: pa.ChunkedArray) -> np.ndarray[Any, Any]:
     dtype = np.dtype(str(column.type))
     chunks = [np.frombuffer(c.buffers()[1] or b"", dtype)[c.offset : c.offset + len(c)] for c in column.chunks]
     return chunks[0] if len(chunks) == 1 else np.concatenate(chunks or [np.empty(0, dtype)])
-
-
-def _scalar(value: Any) -> Any:
-    return tuple(value) if isinstance(value, list) else value

@@ -3,16 +3,13 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from davinci_forces.records.record import Column, Counts, Labels, Published, Record
+from davinci_forces.records.record import Column, Counts, Labels, LogRecord, Published, RobotRecord
 
 
 @dataclass(frozen=True, eq=False)
-class JointCorrelation(Record):
+class JointCorrelation(LogRecord):
     """How the external efforts of the joints that carry the tip go together in one log, where nothing touches it."""
 
-    KEY = ("log",)
-
-    log: str
     tested: int
     rho_12: float
     rho_13: float
@@ -20,15 +17,12 @@ class JointCorrelation(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class ArmCorrelation(Record):
+class ArmCorrelation(RobotRecord):
     """How the external efforts of the joints that carry the tip go together in free space, of at most 20 logs.
 
     What is taken of a log is made of the rows of the others.
     """
 
-    KEY = ("robot",)
-
-    robot: str
     source: Labels
     rho_12: Column
     rho_13: Column
@@ -36,16 +30,14 @@ class ArmCorrelation(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class TipForce(Record):
+class TipForce(LogRecord):
     """The force that the tip exerts on its environment during one log, in base axes, with its covariance.
 
     It is that of the external efforts without delay, where nothing but the tip is touched; NaN at singular poses.
     """
 
-    KEY = ("log",)
     UNKNOWN = ("f_x", "f_y", "f_z", "c_xx", "c_yy", "c_zz", "c_xy", "c_xz", "c_yz")
 
-    log: str
     role: str
     filter: str
     model: str
@@ -90,15 +82,12 @@ class TipForce(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class TipContact(Record):
+class TipContact(LogRecord):
     """The force at the tip in each contact of one log, at the time at which it is largest.
 
     The windows that the study states come first, then what was found beside them on any joint.
     """
 
-    KEY = ("log",)
-
-    log: str
     filter: str
     stated: Counts
     onset: Column
@@ -133,18 +122,15 @@ class TipContact(Record):
             prefix = f"tip.{self.log}.{i + 1}"
             for key, name in (("f_x", "f_x"), ("f_y", "f_y"), ("f_z", "f_z"), ("peak", "f_peak")):
                 yield Published(f"{prefix}.{key}", name, std=f"{name}_std", row=i)
-            for name in ("sigma_1", "sigma_2", "sigma_3"):
-                yield Published(f"{prefix}.{name}", name, std=f"{name}_std", row=i)
+            yield from self.publish(prefix, "sigma_1", "sigma_2", "sigma_3", row=i, with_std=True)
 
 
 @dataclass(frozen=True, eq=False)
-class TipBudget(Record):
+class TipBudget(LogRecord):
     """What each joint's error comes to at the tip, at the median pose of one log's free space."""
 
-    KEY = ("log",)
     ROWS = "of_joint"
 
-    log: str
     of_joint: Labels
     lever: Column
     filter_force: Column
@@ -165,7 +151,7 @@ class TipBudget(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class SensorForce(Record):
+class SensorForce(LogRecord):
     """The force that was estimated in one log beside what a force sensor showed, and how far apart they are.
 
     `axis` is x, y or z of the base, `vector` for all three together, `size` where the sensor shows only that, or the
@@ -175,7 +161,6 @@ class SensorForce(Record):
     KEY = ("log", "axis")
     UNKNOWN = ("measured_force", "estimated_force", "estimated_force_std")
 
-    log: str
     axis: str
     role: str
     tested: int

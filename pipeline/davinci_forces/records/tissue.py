@@ -3,19 +3,18 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from davinci_forces.records.record import Column, Counts, Labels, Published, Record, slug
+from davinci_forces.records.record import Column, Counts, Labels, LogRecord, Published, Record, RobotRecord, slug
 
 EACH = 20  # pushes of a log, up to which every one of them is in results.json
 
 
 @dataclass(frozen=True, eq=False)
-class Push(Record):
+class Push(LogRecord):
     """One push into tissue: force against depth, the straight line through its contact, and where that begins."""
 
     KEY = ("log", "push")
     UNKNOWN = ("t", "x", "y", "z", "fitted")
 
-    log: str
     push: int
     contact: str  # "found", "stated", "all", or "contact from the first sample"
     k_t: float
@@ -38,17 +37,15 @@ class Push(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Stiffness(Record):
+class Stiffness(LogRecord):
     """How stiff the tissue of one log is: the pushes, one a row, and their median."""
 
-    KEY = ("log",)
     ROWS = "push"
     UNKNOWN = (
         "k_t_std", "onset_depth", "onset_depth_std", "onset", "k_t_loading", "k_t_unloading", "lost", "lost_share",
         "x", "y", "z",
     )  # fmt: skip
 
-    log: str
     source: str  # what the force was measured by
     swings: int  # pushes that were looked at
     stiffness: float
@@ -76,24 +73,20 @@ class Stiffness(Record):
     def published(self) -> Iterator[Published]:
         """The median over the pushes that count, its quartiles, how many they are; and each push where they are few."""
         prefix = f"tissue.{self.log}"
-        yield Published(f"{prefix}.stiffness", "stiffness", std="stiffness_std")
+        yield from self.publish(prefix, "stiffness", with_std=True)
         yield from self.publish(prefix, "stiffness_q1", "stiffness_q3", "pushes")
         for i in range(len(self) if len(self) <= EACH else 0):
             own = f"{prefix}.{self.push[i]}"
-            yield Published(f"{own}.k_t", "k_t", std="k_t_std", row=i)
-            yield Published(f"{own}.onset_depth", "onset_depth", std="onset_depth_std", row=i)
-            for name in ("r2", "k_t_loading", "k_t_unloading", "lost", "lost_share", "onset"):
-                yield Published(f"{own}.{name}", name, row=i)
+            yield from self.publish(own, "k_t", "onset_depth", row=i, with_std=True)
+            yield from self.publish(own, "r2", "k_t_loading", "k_t_unloading", "lost", "lost_share", "onset", row=i)
 
 
 @dataclass(frozen=True, eq=False)
-class TissueModel(Record):
+class TissueModel(LogRecord):
     """Which model of tissue predicts the pushes of one log best that it has not seen."""
 
-    KEY = ("log",)
     ROWS = "law"
 
-    log: str
     chosen: str
     why: str
     middle: float
@@ -108,18 +101,14 @@ class TissueModel(Record):
         """What each model comes to."""
         for i, name in enumerate(self.law):
             prefix = f"tissue.{self.log}.{slug(str(name))}"
-            yield Published(f"{prefix}.error", "error", std="error_std", row=i)
-            for field in ("tangent", "damping", "exponent"):
-                yield Published(f"{prefix}.{field}", field, row=i)
+            yield from self.publish(prefix, "error", row=i, with_std=True)
+            yield from self.publish(prefix, "tangent", "damping", "exponent", row=i)
 
 
 @dataclass(frozen=True, eq=False)
-class StabilityMap(Record):
+class StabilityMap(RobotRecord):
     """Where a common quadratic Lyapunov function was found, over stiffnesses of hand and tissue.  Fig 8.9"""
 
-    KEY = ("robot",)
-
-    robot: str
     hand_mass: float
     hand_damping: float
     k_h: Column
@@ -128,12 +117,9 @@ class StabilityMap(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class StabilityLimit(Record):
+class StabilityLimit(RobotRecord):
     """The stiffest tissue over the stiffness of the hand, without delay."""
 
-    KEY = ("robot",)
-
-    robot: str
     hand_mass: float
     hand_damping: float
     k_h: Column
@@ -142,13 +128,11 @@ class StabilityLimit(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class DelayLimit(Record):
+class DelayLimit(RobotRecord):
     """The stiffest tissue of one hand over how late the force comes."""
 
-    KEY = ("robot",)
     UNKNOWN = ("k_t_leaving",)
 
-    robot: str
     hand_mass: float
     hand_damping: float
     hand_stiffness: float
@@ -167,12 +151,9 @@ class DelayLimit(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class TissueLimit(Record):
+class TissueLimit(LogRecord):
     """The tissue of one log beside the limits of that hand."""
 
-    KEY = ("log",)
-
-    log: str
     stiffness: float
     k_h_needed: float
     lag_of: str
@@ -186,12 +167,11 @@ class TissueLimit(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class HapticMotion(Record):
+class HapticMotion(RobotRecord):
     """How a hand moves against tissue beyond the limits of arbitrary switching, by a law.  Fig 8.8, 8.10"""
 
     KEY = ("robot", "switching")
 
-    robot: str
     switching: str
     tissue_stiffness: float
     t: Column
@@ -201,12 +181,9 @@ class HapticMotion(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class HapticResponse(Record):
+class HapticResponse(RobotRecord):
     """What lies between a hand in the tissue and the force that it feels, over the frequency of its motion."""
 
-    KEY = ("robot",)
-
-    robot: str
     arm_from: str
     tissue_stiffness: float
     at_frequency: float

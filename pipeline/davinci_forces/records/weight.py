@@ -3,11 +3,11 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from davinci_forces.records.record import Column, Labels, Published, Record
+from davinci_forces.records.record import Column, Labels, LogJointRecord, LogRecord, Published
 
 
 @dataclass(frozen=True, eq=False)
-class Load(Record):
+class Load(LogJointRecord):
     """What a kilogram, hung as in a weight log, asks of one joint along a log's path, and the external effort there.
 
     Where the log's motion repeats, rows are one period, averaged; both efforts are low-passed alike, without delay.
@@ -16,8 +16,6 @@ class Load(Record):
     KEY = ("log", "joint", "weight")
     UNKNOWN = ("tau_ext_unseen",)
 
-    log: str
-    joint: str
     weight: str
     role: str
     rate: float
@@ -31,13 +29,11 @@ class Load(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Weight(Record):
+class Weight(LogRecord):
     """The mass that hangs on the arm in one log, from the external effort of the joints that it loads."""
 
-    KEY = ("log",)
     ROWS = "loaded"
 
-    log: str
     moves_with: str
     tare: str  # the log that was subtracted
     stated_mass: float  # NaN where the study gives none
@@ -65,21 +61,19 @@ class Weight(Record):
         """The mass by the side as stated and by the other one, the scale, and what the tare looks like."""
         for key, field in (("mass", "mass"), ("mass_mirrored", "mass_mirrored"), ("scale", "mass_scale")):
             yield Published(f"weight.{self.log}.{key}", field, std=f"{field}_std")
-        yield Published(f"weight.{self.log}.tare_mass", "tare_mass", std="tare_mass_std")
+        yield from self.publish(f"weight.{self.log}", "tare_mass", with_std=True)
         yield from self.publish(f"weight.{self.log}", "run_std", "fit_std", "widening")
         for i, joint in enumerate(self.loaded):
             yield Published(f"weight.{self.log}.{joint}.mass", "mass_alone", std="mass_alone_std", row=i)
-            for name in ("joint_offset", "left_rms", "free_error"):
-                yield Published(f"weight.{self.log}.{joint}.{name}", name, row=i)
+            yield from self.publish(f"weight.{self.log}.{joint}", "joint_offset", "left_rms", "free_error", row=i)
 
 
 @dataclass(frozen=True, eq=False)
-class FreeWeight(Record):
+class FreeWeight(LogRecord):
     """The mass that seems to hang on the arm in a log of free motion, where nothing does."""
 
     KEY = ("log", "weight")
 
-    log: str
     weight: str
     role: str
     free_mass: float

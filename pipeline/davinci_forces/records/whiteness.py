@@ -3,17 +3,15 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from davinci_forces.records.record import Column, Counts, Labels, Published, Record
+from davinci_forces.records.record import Column, Counts, Labels, LogJointRecord, Published
 
 
 @dataclass(frozen=True, eq=False)
-class Whiteness(Record):
+class Whiteness(LogJointRecord):
     """Whether a signal that should be white is: its autocorrelation and the tests of it."""
 
     KEY = ("log", "joint", "signal")
 
-    log: str
-    joint: str
     signal: str
     tested: int
     band: float
@@ -50,13 +48,11 @@ class Whiteness(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Innovation(Record):
+class Innovation(LogJointRecord):
     """One innovation of the default filter: its size beside the stated one, and what it has to do with the motion."""
 
     KEY = ("log", "joint", "signal")
 
-    log: str
-    joint: str
     signal: str
     tested: int
     band: float
@@ -75,14 +71,12 @@ class Innovation(Record):
 
 
 @dataclass(frozen=True, eq=False)
-class Explanation(Record):
+class Explanation(LogJointRecord):
     """Why the innovations of the default filter are not white; its rows are what was left out or mended, and tested.
 
     `finding` is white, left out, mended, or unexplained.
     """
 
-    log: str
-    joint: str
     finding: str
     verdict: str
     clock_std: float

@@ -106,9 +106,8 @@ def grouped(files: Sequence[Path]) -> list[list[Path]]:
     together: list[list[Path]] = []
     for members in groups.values():
         symbols = {symbol_of(file.stem) for file in members}
-        together += (
-            [members] if len(members) > 1 and "q" in symbols and symbols & {"i", "tau"} else [[f] for f in members]
-        )
+        is_one = len(members) > 1 and "q" in symbols and symbols & {"i", "tau"}
+        together += [members] if is_one else [[file] for file in members]
     return sorted(together, key=lambda members: files.index(members[0]))
 
 

@@ -143,8 +143,7 @@ def _end(table: TomlTable) -> float | None:
 
 def _delimiter(table: TomlTable) -> str | None:
     if table.values.get("delimiter") == "":
-        problem = "delimiter must not be empty; leave it out, and it is found from the file"
-        table.problem(problem, "delimiter")
+        table.problem("delimiter must not be empty; leave it out, and it is found from the file", "delimiter")
     return table.text("delimiter") if "delimiter" in table else None
 
 

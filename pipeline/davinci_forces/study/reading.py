@@ -159,8 +159,7 @@ def _sought(efforts: TomlTable, robot: Robot | None) -> dict[str, float]:
     for name in efforts.values:
         if name not in known:
             efforts.problem(f"{robot.name if robot else ''} has no joint {name!r}; it has {', '.join(known)}", name)
-    named = [name for name in efforts.values if name in known]
-    return {name: checked(efforts, name, efforts.number(name), "effort") for name in named}
+    return {name: checked(efforts, name, efforts.number(name), "effort") for name in efforts.values if name in known}
 
 
 def _setting(table: TomlTable, field: Field[Any]) -> Any:

@@ -9,10 +9,8 @@ HOLD = 1.0  # [s] in which a joint that stands still goes nowhere: longer than a
 STILL = 0.01  # of how far it goes in that time on average
 STILL_AT_MOST = 0.05  # where noise makes it seem to move; the slowest turns of an excitation cover twice that
 NOISE = 6.0  # standard deviations that noise makes a position range over
-BEFORE, AFTER = (
-    0.05,
-    0.25,
-)  # [s] around a reversal that are left out: by then a filter that shows pushes has forgotten it
+# [s] around a reversal that are left out: by then a filter that shows pushes has forgotten it.
+BEFORE, AFTER = 0.05, 0.25
 SLOW = 0.05  # of the root mean square of the velocity, below which friction may stick
 
 

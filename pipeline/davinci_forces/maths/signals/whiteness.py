@@ -67,6 +67,7 @@ def ljung_box(pieces: Sequence[Array], r: Array, lags: int) -> LjungBox:
 def cumulative_periodogram(pieces: Sequence[Array]) -> Cumulative:
     """Of centred pieces, by the ordinates between frequency 0 and half a cycle a sample, both left out."""
     from scipy.fft import rfft
+    from scipy.stats import kstwo
 
     several = [_ordinates(np.asarray(rfft(x)), len(x)) for x in pieces if len(x) > 2]
     frequency, ordinate = several[0]
@@ -79,19 +80,12 @@ def cumulative_periodogram(pieces: Sequence[Array]) -> Cumulative:
     step = 1.0 / (q - 1)
     above = share[:-1] - step * np.arange(q - 1)  # a step of the straight line's samples lower, and higher
     distance = float(max(above.max(), step - above.min()))
-    return Cumulative(frequency, share, distance, chance_of(distance, q - 1))
+    return Cumulative(frequency, share, distance, float(kstwo.sf(distance, q - 1)))
 
 
 def _ordinates(X: Array, length: int) -> tuple[Array, Array]:
     inner = X[1 : (length - 1) // 2 + 1]
     return np.arange(1, len(inner) + 1) / length, (inner.real**2 + inner.imag**2) / length
-
-
-def chance_of(distance: float, steps: int) -> float:
-    """The probability that uniform samples stray farther from a straight line."""
-    from scipy.stats import kstwo
-
-    return float(kstwo.sf(distance, steps))
 
 
 def distance_of(probability: float, ordinates: int) -> float:
