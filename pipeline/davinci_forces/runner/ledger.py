@@ -118,8 +118,13 @@ class Ledger:
             yield from (entries[task] for task in sorted(entries))
 
     def write(self, entry: Entry) -> None:
-        """Record what a task made."""
+        """Record what a task made, by hashes that are taken as the entry says; what it made before and does no more is
+        removed.
+        """
         before = self.entry(entry.stage, entry.task)
+        for stale in set(before.outputs if before else ()) - set(entry.outputs):
+            self.folders.file(stale).unlink(missing_ok=True)
+        self._digests.update(entry.outputs)
         self._forget_index()
         store.write_bytes(self.place(entry.stage, entry.task), sealed(entry).encode())
         self._entries.setdefault(entry.stage, {})[file_name(entry.task)] = entry
@@ -158,13 +163,9 @@ class Ledger:
             self.home.joinpath(INDEX).unlink(missing_ok=True)
             self._indexed = False
 
-    def made(self, outputs: Mapping[str, str]) -> None:
-        """Take the hashes of files as whoever wrote them says."""
-        self._digests.update(outputs)
-
-    def digest(self, name: str, fresh: bool = False) -> str:
+    def digest(self, name: str) -> str:
         """The hash of a file, read once a run; "" when it is not there."""
-        if fresh or name not in self._digests:
+        if name not in self._digests:
             root, _, path = name.partition("/")
             file = f"{getattr(self.folders, root)}{os.sep}{path}"
             self._digests[name] = _digest(file)

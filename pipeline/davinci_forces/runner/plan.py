@@ -155,7 +155,9 @@ def reused(ledger: Ledger, task: Task) -> str:
         entry = None if other == processed else Ledger(there).read(task.step, task.name)
         same = entry and not entry.failed and entry.fingerprint == now
         if entry and same and (contents := _contents(there, entry)):
-            _take(ledger, entry, contents)
+            for name, content in contents.items():
+                store.write_bytes(ledger.folders.file(name), content)
+            ledger.write(entry)
             return other.name
     return ""
 
@@ -167,13 +169,3 @@ def _contents(there: Folders, entry: Entry) -> dict[str, bytes]:
     contents = {name: there.file(name).read_bytes() for name in entry.outputs}
     whole = all(sha256(contents[name]).hexdigest() == sha for name, sha in entry.outputs.items())
     return contents if whole else {}
-
-
-def _take(ledger: Ledger, entry: Entry, contents: dict[str, bytes]) -> None:
-    before = ledger.entry(entry.stage, entry.task)
-    for stale in set(before.outputs if before else ()) - set(contents):
-        ledger.folders.file(stale).unlink(missing_ok=True)
-    for name, content in contents.items():
-        store.write_bytes(ledger.folders.file(name), content)
-        ledger.digest(name, fresh=True)
-    ledger.write(entry)

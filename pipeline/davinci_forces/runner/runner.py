@@ -227,12 +227,8 @@ class Runner:
         return self.force and stage_of(task.step) in self._named
 
     def _record(self, outcome: Outcome) -> None:
-        """Remember what a task made, and remove what it made before and does no more."""
+        """Remember what a task made."""
         task, stage = outcome.task, stage_of(outcome.task.step)
-        before = self.ledger.entry(task.step, task.name)
-        for stale in set(before.outputs if before else ()) - set(outcome.outputs):
-            self.folders.file(stale).unlink(missing_ok=True)
-        self.ledger.made(outcome.outputs)
         self.ledger.write(Entry(task.step, task.name, dict(vars(task.fingerprint)), outcome.outputs, outcome.failed))
         self.ran += 1
         self.failures += bool(outcome.failed)

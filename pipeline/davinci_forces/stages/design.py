@@ -129,11 +129,8 @@ def excitations(joint: Joint) -> Iterator[Excitation]:
         yield described(joint, source, Fourier.of(np.array(x), period))
     if joint.published and all(np.isfinite(pair).all() for pair in limits_of(joint)):
         period = joint.published[0][1][0]
-        yield described(
-            joint,
-            "found",
-            design(ExcitationProblem(joint.terms, limits_of(joint), period, 2, "determinant"), STARTS, 0).series,
-        )
+        problem = ExcitationProblem(joint.terms, limits_of(joint), period, 2, "determinant")
+        yield described(joint, "found", design(problem, STARTS, 0).series)
 
 
 def limits_of(joint: Joint) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:

@@ -46,13 +46,14 @@ def run(track: Track, entry: LogEntry) -> Iterator[FreeSpace]:
 
 
 def gather(spaces: Iterable[FreeSpace]) -> Iterator[Threshold]:
-    """One Threshold per joint and filter of which there is any free space."""
+    """One Threshold per joint and filter of which there is any free space: the highest level of any log."""
     every: dict[tuple[str, str], list[FreeSpace]] = {}
     for space in spaces:
         every.setdefault((space.joint, space.filter), []).append(space)
     for (joint, name), own in every.items():
-        judge = worst(own)
-        alarms, loudest = max(((alarm(space), space) for space in unseen(own)), key=lambda pair: pair[0])
+        judging = [space for space in own if space.role != "identification"] or own  # that no parameter was fitted to
+        judge = max(judging, key=lambda space: space.detection_level)
+        alarms, loudest = max(((alarm(space), space) for space in judging), key=lambda pair: pair[0])
         yield Threshold(
             joint, name, judge.detection_level, judge.detection_level_std, alarms,
             alarms * loudest.free_rms_std / loudest.free_rms if loudest.free_rms else 0.0, judge.log,
@@ -62,13 +63,3 @@ def gather(spaces: Iterable[FreeSpace]) -> Iterator[Threshold]:
 def alarm(space: FreeSpace) -> float:
     """The effort that this free motion crosses no more than once in ten minutes; it scales with the motion's size."""
     return alarm_level([Quiet(space.smooth_rms, space.smooth_max, space.crossings)])
-
-
-def worst(spaces: list[FreeSpace]) -> FreeSpace:
-    """The free space with the highest detection level."""
-    return max(unseen(spaces), key=lambda space: space.detection_level)
-
-
-def unseen(spaces: list[FreeSpace]) -> list[FreeSpace]:
-    """Those of logs that no parameter was fitted to, where there are any."""
-    return [space for space in spaces if space.role != "identification"] or spaces

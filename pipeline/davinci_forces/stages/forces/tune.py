@@ -10,6 +10,7 @@ from davinci_forces.filters.tuning import tuned
 from davinci_forces.maths.signals.smoothing import noise_std
 from davinci_forces.records import FilterNoise, JointModel, MeasurementNoise, Tuning
 
+USUAL = ("rate", "r_q", "r_dq", "r_tau", "q_tau", "viscous", "speed")  # of which the median of all logs is taken
 FINEST = 1e-9  # of a range: a noiseless log would leave innovations without a covariance to be judged by
 
 
@@ -64,10 +65,5 @@ def gather(tunings: Iterable[Tuning]) -> Iterator[FilterNoise]:
     for tuning in tunings:
         every.setdefault(tuning.joint, []).append(tuning)
     for joint, own in every.items():
-        r_q, r_dq, r_tau, q_tau, viscous, speed, rate = np.median(
-            [(t.r_q, t.r_dq, t.r_tau, t.q_tau, t.viscous, t.speed, t.rate) for t in own], axis=0
-        ).tolist()
-        yield FilterNoise(
-            joint=joint, logs=tuple(t.log for t in own), rate=rate, r_q=r_q, r_dq=r_dq, r_tau=r_tau, q_tau=q_tau,
-            inertia=max(t.inertia for t in own), viscous=viscous, speed=speed,
-        )  # fmt: skip
+        usual = {name: float(np.median([getattr(t, name) for t in own])) for name in USUAL}
+        yield FilterNoise(joint=joint, logs=tuple(t.log for t in own), inertia=max(t.inertia for t in own), **usual)

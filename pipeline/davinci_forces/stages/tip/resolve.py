@@ -206,10 +206,8 @@ def touching(
 def half_axes_std(force: TipForce, own: Sequence[Track], chain: Chain, at: Integers, sigma: Array) -> Array:
     """The standard errors (K, 3) of the half-axes at samples (K,): what each joint's model variance adds by its own."""
     J, _ = jacobian(chain, np.stack([track.q[at] for track in own], axis=-1))
-    std, rho = (
-        np.stack([track.tau_ext_std[at] for track in own], axis=-1),
-        matrix(force.rho_12, force.rho_13, force.rho_23),
-    )
+    std = np.stack([track.tau_ext_std[at] for track in own], axis=-1)
+    rho = matrix(force.rho_12, force.rho_13, force.rho_23)
     squares = np.zeros(sigma.shape)
     for i, track in enumerate(own):
         wider = std.copy()

@@ -8,7 +8,7 @@ from davinci_forces.haptics import loop as haptic
 from davinci_forces.haptics.maths import bimodal
 from davinci_forces.haptics.maths.bimodal import THESIS, Hand, cqlf_limit, energy, switching_limit
 from davinci_forces.haptics.maths.delay import damping_needed, delay_limit, sampled_limit
-from davinci_forces.haptics.maths.motion import at_contact, switched, worst
+from davinci_forces.haptics.maths.motion import Law, at_contact, switched, worst
 from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, AxisNoise, Body
 from davinci_forces.identification.used import FALLBACK, Identified
 from davinci_forces.maths.models.bias import COULOMB, VISCOUS
@@ -46,7 +46,7 @@ def run(
     yield limits(robot)
     yield delayed(robot)
     for law in (worst, at_contact):
-        yield moved(robot, law.__name__.replace("_", " "))
+        yield moved(robot, law)
     joint, lag = slowest(list(comparisons), robot)
     for one in tissues:
         yield asked(one, joint, lag)
@@ -87,13 +87,12 @@ def delayed(robot: Robot) -> DelayLimit:
     )
 
 
-def moved(robot: Robot, law: str) -> HapticMotion:
+def moved(robot: Robot, law: Law) -> HapticMotion:
     """The hand let go beside the tissue, by the worst switching or by the one there is.  Fig 8.8, 8.10"""
     k_t = BEYOND * switching_limit(THESIS)
-    motion = switched(
-        THESIS, k_t, (-0.01, 0.0), TURNS * 2.0 * np.pi / THESIS.frequency, worst if law == "worst" else at_contact
-    )
-    return HapticMotion(robot.name, law, k_t, *motion, energy(THESIS, k_t, motion.x, motion.dx))
+    motion = switched(THESIS, k_t, (-0.01, 0.0), TURNS * 2.0 * np.pi / THESIS.frequency, law)
+    name = law.__name__.replace("_", " ")
+    return HapticMotion(robot.name, name, k_t, *motion, energy(THESIS, k_t, motion.x, motion.dx))
 
 
 def slowest(comparisons: list[Comparison], robot: Robot) -> tuple[str, float]:
@@ -136,7 +135,8 @@ def gather(
         return
     joint = next((joint for joint in robot.joints if joint.kind is Kind.PRISMATIC and not joint.effort), None)
     body, arm_from = fitted(robot, fits, joint)
-    noise = next((noise_of(one) for one in noises if joint is not None and one.joint == joint.name), SLIDE_NOISE)
+    settled = [AxisNoise(one.r_q, one.r_dq, one.r_tau) for one in noises if joint and one.joint == joint.name]
+    noise = next(iter(settled), SLIDE_NOISE)
     scenario = haptic.filled(haptics, body, noise, float(np.median(tissues)), q_tau or (joint.q_tau if joint else 0.0))
     answer = haptic.response(scenario)
     yield rendered(robot, FROM_FILE if haptics.body else arm_from, scenario, answer)
@@ -159,11 +159,6 @@ def fitted(robot: Robot, fits: Iterable[Fit], joint: Joint | None) -> tuple[Body
     if inertia <= 0.0:
         return SLIDE, FROM_THESIS
     return Body(inertia, dynamics.coefficients[0], viscous, (coulomb, coulomb), (coulomb, coulomb)), joint.name
-
-
-def noise_of(settled: FilterNoise) -> AxisNoise:
-    """What the filter takes the noise of the joint for."""
-    return AxisNoise(settled.r_q, settled.r_dq, settled.r_tau)
 
 
 def rendered(robot: Robot, arm_from: str, scenario: HapticScenario, answer: haptic.FeltResponse) -> HapticResponse:
