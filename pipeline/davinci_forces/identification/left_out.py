@@ -12,7 +12,6 @@ from davinci_forces.estimators.problem import Known, Regression
 from davinci_forces.identification.observations import averaged, observed, pose_samples
 from davinci_forces.identification.regression import known_of, pose, predicted, recorded_motion, stands_still
 from davinci_forces.identification.scores import Judge, folds, some
-from davinci_forces.identification.used import ANOTHER_PATH, SAME_PATH
 from davinci_forces.maths.arrays import Array, Integers
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.periods import averaging
@@ -25,6 +24,7 @@ from davinci_forces.records import (
     Trajectory,
     diagnostic,
 )
+from davinci_forces.records.prediction import ANOTHER_PATH, SAME_PATH
 from davinci_forces.robots.models import independent
 from davinci_forces.robots.robot import Joint
 

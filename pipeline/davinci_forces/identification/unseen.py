@@ -12,13 +12,12 @@ import numpy as np
 from davinci_forces.identification.candidates import Candidate, Library
 from davinci_forces.identification.observations import Observed
 from davinci_forces.identification.scores import Judge, folds, some
-from davinci_forces.identification.used import ANOTHER_PATH, SAME_PATH
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.memory import efforts
 from davinci_forces.maths.models.model import Model
 from davinci_forces.maths.selection import BLOCKS, MOST, Equations, Ridge, solve
 from davinci_forces.records import Prediction
-from davinci_forces.records.prediction import CHOSEN
+from davinci_forces.records.prediction import ANOTHER_PATH, CHOSEN, SAME_PATH
 from davinci_forces.robots.models import Reach
 from davinci_forces.robots.robot import Robot
 

@@ -10,9 +10,7 @@ from davinci_forces.maths.periods.shift import SAME_PATH as LIKE
 from davinci_forces.maths.periods.shift import likeness
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.records import Choice, CrossFit, Fit, FittedPaths, Motion
-from davinci_forces.records.prediction import ANOTHER_PATH as ANOTHER_PATH
-from davinci_forces.records.prediction import CHOSEN
-from davinci_forces.records.prediction import SAME_PATH as SAME_PATH
+from davinci_forces.records.prediction import ANOTHER_PATH, CHOSEN, SAME_PATH
 from davinci_forces.robots.models import ARM, described
 from davinci_forces.robots.robot import Robot
 

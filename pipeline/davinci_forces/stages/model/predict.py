@@ -6,7 +6,7 @@ import numpy as np
 
 from davinci_forces.identification.joint_models import Along, at_samples, refits_of
 from davinci_forces.identification.scores import Judge
-from davinci_forces.identification.used import FALLBACK, SAME_PATH, Identified
+from davinci_forces.identification.used import FALLBACK, Identified
 from davinci_forces.maths.signals.windows import outside
 from davinci_forces.records import (
     Choice,
@@ -18,7 +18,7 @@ from davinci_forces.records import (
     Prediction,
     diagnostic,
 )
-from davinci_forces.records.prediction import CHOSEN
+from davinci_forces.records.prediction import CHOSEN, SAME_PATH
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
