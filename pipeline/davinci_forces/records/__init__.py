@@ -88,3 +88,6 @@ KINDS: dict[str, type[Record]] = {
         Explanation, Diagnostic,
     )
 }  # fmt: skip
+
+# Folders of the kinds that earlier versions wrote, whose files are removed.  Whoever removes a kind adds its folder.
+FORMER_FOLDERS = ("intake", "logsummary", "noise", "note", "periodresidual", "smoothed", "tissue")

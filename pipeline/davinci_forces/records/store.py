@@ -8,7 +8,7 @@ same bytes.  A file appears under its own name only when it is whole.
 import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import Field, fields
 from functools import cache, partial
@@ -180,13 +180,21 @@ def digest(file: Path | str) -> str:
 
 def write_bytes(file: Path, content: bytes) -> None:
     """Write a file so that it is there whole or not at all."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    whole = unnamed()(file)
+    write_together({file: content})
+
+
+def write_together(contents: Mapping[Path, bytes]) -> None:
+    """Write files that belong together: all are whole before the first gets its name, the last one's name says so."""
+    name = unnamed()
     try:
-        whole.write_bytes(content)
-        whole.replace(file)
+        for file, content in contents.items():
+            file.parent.mkdir(parents=True, exist_ok=True)
+            name(file).write_bytes(content)
+        for file in contents:
+            name(file).replace(file)
     finally:
-        whole.unlink(missing_ok=True)
+        for file in contents:
+            name(file).unlink(missing_ok=True)
 
 
 def leftovers(folder: Path) -> Iterator[Path]:

@@ -3,6 +3,9 @@
 A task is current while its fingerprint (inputs by content, settings, robot, records as declared, code, version) and the
 content of its outputs are what its entry says.  Comparing an old entry with a new fingerprint gives the reason to run.
 
+A study may come from somebody else, and an entry names files that are removed.  So an entry counts only if it is in its
+own place and names nothing but records, of kinds that there are or were, and files of the report.
+
 All entries of a ledger in one file, so that a run that finds nothing to do reads one and not thousands.
 
 It is there while it holds what the entries do: the first entry that is written or removed takes it away, and a run that
@@ -12,21 +15,29 @@ index's sake, since a task is current only where its files are what its entry sa
 
 import json
 import os
+import re
+from collections import Counter
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from glob import glob
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 from typing import Any
 
-from davinci_forces.records import store
+from davinci_forces.records import FORMER_FOLDERS, KINDS, store
+from davinci_forces.report import FILES
 from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, differences, hash_of_text
 
 LONGEST = 200  # bytes of a file's name, which with all endings may have 255
 SEAL = ',\n "seal": "{}"\n}}\n'  # what an entry ends with
 INDEX = "index.json"
+UNREADABLE = OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError  # what JSON of others raises
+PARTS = "inputs", "given", "settings", "schemas", "code"  # of a fingerprint, that are tables
 SHARED = "code", "schemas", "settings"  # parts of a fingerprint that are the same for many tasks
+FOLDERS = "|".join((*(kind.folder() for kind in KINDS.values()), *FORMER_FOLDERS))
+RECORD = rf"processed/(?:{FOLDERS})/(?:(?!\.\.?/)[^/\\:\0]+/)?[^/\\:\0]+\.parquet"
+OUTPUT = re.compile(f"{RECORD}|reports/(?:{'|'.join(map(re.escape, FILES))})")
 
 
 @dataclass(frozen=True)
@@ -73,6 +84,7 @@ class Ledger:
         self.changes: list[tuple[Iterable[str], Iterable[str]]] = []  # files that went and came, one pair an entry
         self.home = folders.processed / "tasks"
         self._one_by_one, self._indexed = one_by_one, False
+        self._void: dict[str, str] = {}  # files that are no entry, each with the reason
 
     def place(self, stage: str, task: str) -> Path:
         """Where the entry of a task is."""
@@ -81,21 +93,25 @@ class Ledger:
     @cached_property
     def _entries(self) -> dict[str, dict[str, Entry]]:
         indexed = {} if self._one_by_one else read_index(self.home, list(self._files()))
-        self._indexed = bool(indexed)
-        if not indexed:
-            return self._read_one_by_one()
-        return {stage: {name: Entry(**e) for name, e in named.items()} for stage, named in indexed.items()}
+        with suppress(*UNREADABLE):
+            entries = {s: {n: checked(Entry(**e), s, n) for n, e in named.items()} for s, named in indexed.items()}
+            self._indexed = bool(entries)
+            return entries or self._read_one_by_one()
+        return self._read_one_by_one()
 
     def _read_one_by_one(self) -> dict[str, dict[str, Entry]]:
         entries: dict[str, dict[str, Entry]] = {}
         shared: dict[tuple[tuple[str, str], ...], dict[str, str]] = {}
         for stage, name, file in self._files():
-            entry = _read(file)
-            if entry:
-                # The code of a stage is the same for all its tasks, and most of what an entry holds.
-                code = entry.fingerprint.get("code", {})
-                entry.fingerprint["code"] = shared.setdefault(tuple(code.items()), code)
-                entries.setdefault(stage, {})[name] = entry
+            try:
+                entry = _read(file)
+            except UNREADABLE as error:
+                self._void[file] = str(error)
+                continue
+            # The code of a stage is the same for all its tasks, and most of what an entry holds.
+            code = entry.fingerprint["code"]
+            entry.fingerprint["code"] = shared.setdefault(tuple(code.items()), code)
+            entries.setdefault(stage, {})[name] = entry
         return entries
 
     def _files(self) -> Iterator[tuple[str, str, str]]:
@@ -109,7 +125,9 @@ class Ledger:
 
     def read(self, stage: str, task: str) -> Entry | None:
         """The same, of one file alone: what another study has made is asked of one task."""
-        return _read(str(self.place(stage, task)))
+        with suppress(*UNREADABLE):
+            return _read(str(self.place(stage, task)))
+        return None
 
     def entries(self, stage: str | None = None) -> Iterator[Entry]:
         """Every entry, or every one of a stage, in order."""
@@ -118,34 +136,52 @@ class Ledger:
             yield from (entries[task] for task in sorted(entries))
 
     def write(self, entry: Entry) -> None:
-        """Record what a task made, by hashes that are taken as the entry says; what it made before and does no more is
-        removed.
+        """Record what a task made, by hashes that are taken as the entry says; what it made before, and no task does
+        now, is removed.
         """
         before = self.entry(entry.stage, entry.task)
-        for stale in set(before.outputs if before else ()) - set(entry.outputs):
-            self.folders.file(stale).unlink(missing_ok=True)
+        self._outputs.update([*entry.outputs])
+        gone = self._remove_outputs(before.outputs if before else ())
         self._digests.update(entry.outputs)
         self._forget_index()
         store.write_bytes(self.place(entry.stage, entry.task), sealed(entry).encode())
         self._entries.setdefault(entry.stage, {})[file_name(entry.task)] = entry
-        self.changes.append((before.outputs if before else (), entry.outputs))
+        self.changes.append((gone, entry.outputs))
 
-    def broken(self) -> Iterator[Path]:
-        """Entries that are not as they were written; other files there are no concern of ours."""
-        for stage, name, file in self._files():
-            if self.entry(stage, name) is None and os.path.isfile(file):
-                yield Path(file)
+    def void(self) -> dict[str, str]:
+        """Files in the place of entries that are none, each with the reason."""
+        return self._void if self._entries is not None else {}
 
     def remove(self, entry: Entry) -> None:
-        """Forget a task, and remove what it made, with the folders that this leaves empty."""
+        """Forget a task, and remove its outputs, with the folders that this leaves empty."""
         self._forget_index()
+        self.changes.append((self._remove_outputs(entry.outputs), ()))
         self._entries.get(entry.stage, {}).pop(file_name(entry.task), None)
-        self.changes.append((entry.outputs, ()))
-        for file in (*map(self.folders.file, entry.outputs), self.place(entry.stage, entry.task)):
+        self._unlink(f"processed/tasks/{entry.stage}/{file_name(entry.task)}.json")
+
+    def _remove_outputs(self, names: Iterable[str]) -> list[str]:
+        """Remove what a task does not make any more, unless another does: a file may pass from stage to stage."""
+        self._outputs.subtract([*names])
+        gone = [name for name in names if self._outputs[name] <= 0]
+        for name in gone:
+            self._unlink(name)
+        return gone
+
+    @cached_property
+    def _outputs(self) -> Counter[str]:
+        """How many entries name each output."""
+        return Counter(name for entry in self.entries() for name in entry.outputs)
+
+    def _unlink(self, name: str) -> None:
+        """Remove a file, unless a link leads to its folder, and the folders below the study's that are empty then."""
+        self._digests.pop(name, None)
+        file, (root, *parts) = self.folders.file(name), PurePosixPath(name).parts
+        home: Path = getattr(self.folders, root)
+        if file.parent.resolve() == home.resolve().joinpath(*parts[:-1]):
             file.unlink(missing_ok=True)
             with suppress(OSError):  # a folder that holds more stays
-                file.parent.rmdir()
-                file.parent.parent.rmdir()
+                for folder in list(file.parents)[: len(parts) - 1]:
+                    folder.rmdir()
 
     def write_index(self) -> None:
         """Put the index of all entries in place, unless it is."""
@@ -201,12 +237,40 @@ def unsealed(text: str) -> Entry | None:
     return Entry(**json.loads(content)) if text.endswith(SEAL.format(hash_of_text(content))) else None
 
 
-def _read(file: str) -> Entry | None:
-    try:
-        with open(file, "rb") as stream:
-            return unsealed(stream.read().decode())
-    except (OSError, ValueError, TypeError):
-        return None
+def checked(entry: Entry, stage: str, name: str) -> Entry:
+    """The entry, if it is one that a run writes under this stage and name.
+
+    Raises
+    ------
+    ValueError
+        If it is of another task, or names a file that no stage writes, which a run would remove.
+    TypeError
+        If a part of it is of another type.
+    """
+    fingerprint = entry.fingerprint if isinstance(entry.fingerprint, dict) else {}
+    tables = [entry.outputs, *map(fingerprint.get, PARTS)]
+    if not all(isinstance(table, dict) for table in tables):
+        raise TypeError("it is not as a stage writes it")
+    hashes = (
+        value for table in (entry.outputs, fingerprint["inputs"], fingerprint["code"]) for value in table.values()
+    )
+    if not all(isinstance(text, str) for text in (entry.stage, entry.task, entry.failed, *hashes)):
+        raise TypeError("it is not as a stage writes it")
+    if (entry.stage, file_name(entry.task)) != (stage, name):
+        raise ValueError(f"it is of another task, {entry.stage} {entry.task}")
+    for output in entry.outputs:
+        if not OUTPUT.fullmatch(output):
+            raise ValueError(f"it names {output!r} as an output, which no stage writes")
+    return entry
+
+
+def _read(file: str) -> Entry:
+    """The entry in a file; raises as `checked` does, and where the file cannot be read or its hash is another."""
+    with open(file, "rb") as stream:
+        entry = unsealed(stream.read().decode())
+    if entry is None:
+        raise ValueError("it is not as a stage wrote it")
+    return checked(entry, os.path.basename(os.path.dirname(file)), os.path.basename(file).removesuffix(".json"))
 
 
 def _digest(file: str) -> str:
@@ -233,7 +297,7 @@ def read_index(folder: Path, files: Collection[tuple[str, str, str]]) -> Entries
             return {}
         for entry in (entry for named in entries.values() for entry in named.values()):
             entry["fingerprint"] |= {part: content["shared"][i] for part, i in entry.pop("shared").items()}
-    except (OSError, ValueError, TypeError, LookupError):
+    except UNREADABLE:
         return {}
     return entries
 

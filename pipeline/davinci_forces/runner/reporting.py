@@ -41,17 +41,20 @@ def task(plan: Plan) -> Task:
 
 
 def perform(ledger: Ledger, task: Task) -> Outcome:
-    """Write the report; what went wrong is its outcome."""
+    """Write the report, all of it or nothing; what went wrong is its outcome, and the pages that were there stay."""
     start = perf_counter()
     try:
         files = written(ledger, task)
-        for name, content in files.items():
-            store.write_bytes(ledger.folders.reports / name, content)
+        store.write_together({ledger.folders.reports / name: content for name, content in files.items()})
         made = {f"reports/{name}": hashlib.sha256(content).hexdigest() for name, content in files.items()}
         return Outcome(task, made, seconds=perf_counter() - start)
     except Exception as error:
-        said = said_of(error)
-        return Outcome(task, {}, without_folders(said, ledger.folders), (f"error: {said}",))
+        said, before = said_of(error), ledger.entry(task.step, task.name)
+        older = before.outputs if before else {}
+        messages = [f"error: {said}"]
+        if any(map(ledger.digest, older)):
+            messages.append(f"the pages in {ledger.folders.reports} are those of an earlier run")
+        return Outcome(task, older, without_folders(said, ledger.folders), tuple(messages))
 
 
 def written(ledger: Ledger, task: Task) -> dict[str, bytes]:

@@ -71,6 +71,8 @@ class Runner:
         ):
             if self.writable:
                 self._remove_leftovers()
+                for file, reason in self.ledger.void().items():
+                    self.console.warn(f"{file} does not count, and nothing it names is removed: {reason}")
                 self._remove_obsolete(steps)
             self._run(Graph(steps, [entry.name for entry in self.study.logs]))
             if self.writable:

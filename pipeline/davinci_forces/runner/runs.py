@@ -168,16 +168,17 @@ def run_on_cluster(runner: Runner, names: Sequence[str], address: str) -> bool:
 
 
 def conclude(runner: Runner, folder: Path) -> None:
-    """Say what came out: the answer, how long it took, and where it is."""
-    answer = runner.folders.reports / "summary.txt"
-    if answer.exists():
-        runner.console.say(printable(answer.read_text(encoding="utf-8").rstrip()))
+    """Say what came out: the answer, how long it took, and where it is; of a report that failed, only the time."""
+    report = runner.ledger.entry(REPORT, REPORT)
+    files = report.outputs if report and not report.failed else {}
+    if "reports/summary.txt" in files:
+        answer = (runner.folders.reports / "summary.txt").read_text(encoding="utf-8")
+        runner.console.say(printable(answer.rstrip()))
     if runner.ran:
         runner.console.say(durations(runner.seconds))
     for file in ("report.html", "report.pdf", "robot.html", "results.json"):
-        made = runner.folders.reports / file
-        if made.exists():
-            runner.console.say(f"{folder}: see {made}")
+        if f"reports/{file}" in files:
+            runner.console.say(f"{folder}: see {runner.folders.reports / file}")
 
 
 class Narrator(Runner):

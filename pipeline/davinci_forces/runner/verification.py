@@ -42,7 +42,7 @@ def verify(study: Study, folders: Folders, wanted: str = "") -> Verified:
     """
     ledger = Ledger(folders, one_by_one=True)
     recorded = known_files(ledger)
-    problems = [f"{file} was altered: it is not as a stage wrote it" for file in ledger.broken()]
+    problems = [f"{file} was altered: {reason}" for file, reason in ledger.void().items()]
     if not recorded and not problems:
         raise NotReproduced(f"{folders.processed} holds no results; run `davinci-forces all {folders.raw}` first")
     problems += [*altered_index(ledger), *altered_files(folders, ledger, recorded), *unknown_files(folders, recorded)]
