@@ -13,11 +13,12 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
-from davinci_forces.errors import PipelineError
+from davinci_forces.errors import BadRecord, NotReproduced, PipelineError
 from davinci_forces.records import KINDS, store
+from davinci_forces.runner import recomputation, reporting, verification
 from davinci_forces.runner.ledger import Folders, Ledger
 from tests.test_robustness import analysed, finished, flat  # noqa: F401 - fixtures
-from tests.test_runs import call, processed, reports
+from tests.test_runs import call, contents, processed, reports
 
 
 def ledger_of(study: Path) -> Ledger:
@@ -120,6 +121,115 @@ def test_verify_names_what_was_done(finished, tamper):  # noqa: F811
     assert TAMPERINGS[tamper] in flat(call("verify", finished, code=1))
 
 
+def add_hidden_page(study):
+    (reports(study) / ".report.html").write_text("all is well")
+
+
+def add_hidden_record(study):
+    (processed(study) / "fit" / ".git").mkdir()
+    (processed(study) / "fit" / ".git" / "config").write_text("")
+
+
+def add_junk_among_entries(study):
+    (processed(study) / "tasks" / "ingest" / "one.json.bak").write_text("{}")
+
+
+def add_hidden_entry(study):
+    folder = processed(study) / "tasks" / "ingest"
+    shutil.copy(folder / "one.json", folder / ".one.json")
+
+
+def add_folder_among_entries(study):
+    (processed(study) / "tasks" / "fit" / "old").mkdir()
+    (processed(study) / "tasks" / "fit" / "old" / "fit.json").write_text("{}")
+
+
+def leave_a_record_half_written(study):
+    (processed(study) / "fit" / "hand_roll" / ".independent.lse.parquet.partial").write_text("")
+
+
+def link(file: Path) -> None:
+    """Move a file or folder away, and leave a link to it."""
+    away = file.parents[2] / f"{file.name} is here"
+    shutil.move(file, away)
+    file.symlink_to(away)
+
+
+def link_a_page(study):
+    link(reports(study) / "report.pdf")
+
+
+def link_a_folder_of_records(study):
+    link(processed(study) / "track")
+
+
+def link_a_folder_of_entries(study):
+    link(processed(study) / "tasks" / "ekf")
+
+
+def link_by_the_name_of_a_file_of_the_system(study):
+    (reports(study) / ".DS_Store").symlink_to(study)
+
+
+STRAYS = {
+    add_hidden_page: "reports/lab/.report.html was made by no stage",
+    add_hidden_record: "fit/.git/config was made by no stage",
+    add_junk_among_entries: "ingest/one.json.bak was made by no stage",
+    add_hidden_entry: "ingest/.one.json was made by no stage",
+    add_folder_among_entries: "fit/old/fit.json was made by no stage",
+    leave_a_record_half_written: ".independent.lse.parquet.partial was made by no stage",
+    link_a_page: "report.pdf is a link to",
+    link_a_folder_of_records: "processed/lab/track is a link to",
+    link_a_folder_of_entries: "processed/lab/tasks/ekf is a link to",
+    link_by_the_name_of_a_file_of_the_system: "reports/lab/.DS_Store is a link to",
+}
+
+
+def test_verify_names_every_file_that_no_stage_made_and_every_link_among_results(finished):  # noqa: F811
+    for stray in STRAYS:
+        stray(finished)
+    said = flat(call("verify", finished, code=1))
+    assert [words for words in STRAYS.values() if words not in said] == []
+
+
+def test_verify_passes_files_of_the_system_and_those_in_raw_that_the_study_does_not_name(finished):  # noqa: F811
+    others = [
+        processed(finished) / ".lock",
+        processed(finished) / ".DS_Store",
+        processed(finished) / "fit" / "Thumbs.db",
+        processed(finished) / "tasks" / "fit" / "desktop.ini",
+        reports(finished) / "._report.html",
+        finished / "notes.txt",
+        finished / "photos" / "arm.jpg",
+    ]
+    (finished / "photos").mkdir()
+    for file in others:
+        file.touch()
+    said = flat(call("verify", finished))
+    assert "are unchanged" in said
+    assert f"not compared, since they are no part of the results: {', '.join(sorted(map(str, others)))}" in said
+
+
+def test_what_a_study_names_in_raw_is_not_said_to_be_left_out(tmp_path):
+    for name in ("raw/lab", "disk", "processed/lab", "reports/lab"):
+        (tmp_path / name).mkdir(parents=True)
+    for name in ("raw/lab/study.toml", "raw/lab/review.toml", "raw/lab/old.csv", "disk/one.csv"):
+        (tmp_path / name).touch()
+    for link, to in (("data", "disk"), ("photos", "disk"), ("two.csv", "disk/one.csv")):
+        (tmp_path / "raw" / "lab" / link).symlink_to(tmp_path / to)
+    folders = Folders(*(tmp_path / root / "lab" for root in ("raw", "processed", "reports")))
+    read = ["raw/study.toml", "raw/data/one.csv", "raw/two.csv"]
+    others = [str(folders.raw / name) for name in ("old.csv", "photos")]
+    assert verification.unknown_files(folders, read) == ([], others)
+
+
+def test_results_may_be_on_a_disk_that_is_linked_to(finished, tmp_path):  # noqa: F811
+    link(processed(finished))
+    shutil.move(reports(finished), tmp_path / "disk")
+    reports(finished).symlink_to(tmp_path / "disk")
+    assert "are unchanged" in call("verify", finished)
+
+
 def forge_everything(study: Path) -> None:
     """A parameter that is altered in its record, with every hash that knows of it, and the report made of that."""
     ledger = ledger_of(study)
@@ -148,6 +258,143 @@ def test_a_printed_page_tells_a_report_that_was_forged_with_all_its_files(finish
     assert forged != printed
     said = flat(call("verify", finished, "--id", printed, code=1))
     assert f"the report ID of these files is {forged}, not {printed}" in said
+
+
+@pytest.fixture
+def temporary(tmp_path, monkeypatch) -> Path:
+    """Where temporary folders are made."""
+    folder = tmp_path / "temporary"
+    folder.mkdir()
+    monkeypatch.setattr("tempfile.tempdir", str(folder))
+    return folder
+
+
+@pytest.fixture
+def another_processor(monkeypatch):
+    """Results were made here, and from now on this is another processor."""
+    reporting.environment.cache_clear()
+    monkeypatch.setattr("davinci_forces.runner.processes.arithmetic.described", lambda: "BLAS of another kind")
+    yield
+    reporting.environment.cache_clear()
+
+
+@pytest.mark.medium
+def test_an_honest_study_comes_from_raw_byte_for_byte_and_is_not_touched(finished, temporary):  # noqa: F811
+    before = contents(finished.parent.parent)
+    files = sum(not name.startswith(("raw/", "temporary/")) and "/tasks/" not in name for name in before) - 1  # .lock
+    said = flat(call("verify", finished, "--again"))
+    assert f"recomputed from raw/: {files} files are the same, byte for byte" in said
+    assert not [*temporary.iterdir()]
+    assert contents(finished.parent.parent) == before
+
+
+@pytest.mark.medium
+def test_what_was_forged_with_all_its_hashes_does_not_come_from_raw(finished, temporary):  # noqa: F811
+    forge_everything(finished)
+    assert "are unchanged" in call("verify", finished)
+    said = flat(call("verify", finished, "--again", "--jobs", 2, code=1))
+    forged = processed(finished) / "fit" / "hand_roll" / "independent.lse.parquet"
+    assert re.search(rf"error: \d+ of \d+ files are not, byte for byte, what raw/ gives: {forged}, ", said)
+    assert f"{reports(finished) / 'results.json'}" in said
+    assert not [*temporary.iterdir()]
+
+
+@pytest.mark.medium
+def test_on_another_processor_numbers_are_compared(finished, temporary, another_processor):  # noqa: F811
+    said = flat(call("verify", finished, "--again"))
+    compared = "recomputed from raw/: other processor or packages, not compared by bytes; of"
+    assert compared in said
+    assert "0 differ by more than 1e-9 of themselves; 0 differ by more than their standard deviation" in said
+    forge_everything(finished)
+    said = flat(call("verify", finished, "--again", code=1))
+    assert compared in said
+    assert re.search(r"\d are not what raw/ gives \(fit.hand_roll.independent.lse.inertia, ", said)
+    assert not [*temporary.iterdir()]
+
+
+@pytest.mark.medium
+def test_a_stage_that_fails_only_when_it_is_recomputed_is_named(finished, temporary, monkeypatch):  # noqa: F811
+    def fail(*_, **__):
+        raise BadRecord("no tuning today")
+
+    monkeypatch.setattr("davinci_forces.stages.forces.tune.gather", fail)
+    said = flat(call("verify", finished, "--again", code=1))
+    assert "error: recomputed from raw/, tune.gather fails on gather: no tuning today" in said
+    assert not [*temporary.iterdir()]
+
+
+def test_a_recomputation_that_is_interrupted_leaves_nothing(finished, temporary, monkeypatch):  # noqa: F811
+    def interrupt(folder, names, processed, reports, **_):
+        assert processed.parent.parent == temporary
+        processed.mkdir()
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("davinci_forces.runner.runs.run", interrupt)
+    with pytest.raises(KeyboardInterrupt):
+        recomputation.recompute(ledger_of(finished).folders, by_bytes=True)
+    assert not [*temporary.iterdir()]
+
+
+def row(value: float, std: float | None = None, unit: str = "N") -> dict:
+    return {"value": value, "std": std, "unit": unit}
+
+
+@pytest.mark.parametrize(
+    ("key", "stored", "computed", "said"),
+    [
+        ("fit.a.lse.inertia", row(1.0, 0.1), row(1.0 + 1e-12, 0.1), []),
+        ("fit.a.lse.inertia", row(1.009, 0.1), row(1.0, 0.1), ["different"]),
+        ("fit.a.lse.inertia", row(1.011, 0.1), row(1.0, 0.1), ["different", "other"]),
+        ("fit.a.lse.inertia", row(1.2, 0.1), row(1.0, 0.1), ["different", "far", "other"]),
+        ("fit.a.lse.inertia", row(1.2, 9.0), row(1.0, 0.1), ["different", "far", "other"]),
+        ("fit.a.lse.inertia", row(1.0, 0.12), row(1.0, 0.1), ["other"]),
+        ("fit.a.lse.inertia", row(1.0, 0.1), row(1.0), ["other"]),
+        ("fit.a.lse.inertia", row(1.0), row(1.0, 0.1), ["other"]),
+        ("fit.a.lse.inertia", row(1.0, unit="kg"), row(1.0), ["other"]),
+        ("fit.a.lse.mse", row(1.0 + 9e-7), row(1.0), ["different"]),
+        ("fit.a.lse.mse", row(1.0 + 2e-6), row(1.0), ["different", "other"]),
+        ("correlation.a.offset.inertia", row(1e-16), row(-7e-17), []),
+        ("fit.a.lse.inertia", None, row(1.0), ["new"]),
+        ("fit.a.pso.inertia", row(1.0), None, ["gone"]),
+        ("fit.a.pso.inertia", row(1.2, 0.1), row(1.0, 0.1), ["different", "searched", "far"]),
+        ("ekf-adaptive.one.a.free_rms", row(1.2), row(1.0), ["different", "searched"]),
+        ("ekf.one.a.push_delay", row(0.1), row(0.11), ["different", "searched"]),
+        ("ekf.one.a.free_rms", row(0.1), row(0.11), ["different", "other"]),
+    ],
+)
+def test_what_is_said_of_a_number_that_another_processor_computes(key, stored, computed, said):
+    words = {
+        "different": "differ by more than 1e-9 of themselves",
+        "far": "differ by more than their standard deviation",
+        "searched": "differ, and are not judged, since a search or a count of samples gives them",
+        "new": "are not in results.json",
+        "gone": "do not come from raw/",
+        "other": "are not what raw/ gives",
+    }
+    assert [*recomputation.differences(key, stored, computed)] == [words[each] for each in said]
+    before, now = ({key: each} if each else {} for each in (stored, computed))
+    if {*said} & {"new", "gone", "other"}:
+        with pytest.raises(NotReproduced, match=f"1 {words[said[-1]]} \\({key}\\)"):
+            recomputation.compare_numbers(before, now)
+    else:
+        [line] = recomputation.compare_numbers(before, now)
+        assert all(f"1 {words[each]} ({key})" in line for each in said)
+
+
+def test_an_entry_knows_the_packages_and_the_processor_that_it_was_made_with(finished, monkeypatch):  # noqa: F811
+    ledger = ledger_of(finished)
+    reporting.environment.cache_clear()
+    here = reporting.environment()
+    assert {entry.environment for entry in ledger.entries()} == {here}
+    assert recomputation.has_same_environment(ledger.folders)
+    others = ("importlib.metadata.version", "platform.python_version", "platform.machine")
+    for changed in (*others, "davinci_forces.runner.processes.arithmetic.described"):
+        with monkeypatch.context() as patched:
+            patched.setattr(changed, lambda *_: "another")
+            reporting.environment.cache_clear()
+            assert reporting.environment() != here, changed
+            assert not recomputation.has_same_environment(ledger.folders)
+    reporting.environment.cache_clear()
 
 
 def test_the_id_on_the_page_is_the_hash_of_a_manifest_of_all_files(finished):  # noqa: F811

@@ -13,16 +13,25 @@ def run(
     wanted: Annotated[
         str, typer.Option("--id", help="The report ID on a printed page that these files have to have.")
     ] = "",
+    again: Annotated[
+        bool, typer.Option("--again", help="Recompute everything from raw/ in a temporary folder, and compare.")
+    ] = False,
+    jobs: Annotated[int, typer.Option(min=1, help="Processes to recompute with.")] = 1,
 ) -> None:
     """Verify a study; what differs is named, and the exit code is 1."""
-    from davinci_forces.runner import runs, verification
+    from davinci_forces.runner import recomputation, runs, verification
     from davinci_forces.study import reading
 
-    found = verification.verify(
-        reading.read(study), runs.folders(study, processed, reports), "".join(wanted.split()).lower()
-    )
+    folders = runs.folders(study, processed, reports)
+    pages = not again or recomputation.has_same_environment(folders)
+    verified = verification.verify(reading.read(study), folders, "".join(wanted.split()).lower(), pages)
     typer.echo(
-        f"{study}: {found.raw} raw, {found.processed} processed and {found.reports} report files are unchanged, all "
-        f"{found.numbers} numbers of results.json are those of their records, and the report made anew is the same; "
-        f"its ID is {found.identity}"
+        f"{study}: {verified.raw} raw, {verified.processed} processed and {verified.reports} report files are "
+        f"unchanged, all {verified.numbers} numbers of results.json are those of their records, and the "
+        f"{'report' if pages else 'results.json'} made anew is the same; its ID is {verified.identity}"
     )
+    if verified.unrelated:
+        typer.echo(f"{study}: not compared, since they are no part of the results: {', '.join(verified.unrelated)}")
+    if again:
+        for line in recomputation.recompute(folders, pages, jobs):
+            typer.echo(f"{study}: {line}")

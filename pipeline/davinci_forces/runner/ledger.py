@@ -70,6 +70,7 @@ class Entry:
     fingerprint: dict[str, Any]
     outputs: dict[str, str] = field(default_factory=dict)  # file -> sha256
     failed: str = ""
+    environment: str = ""  # hash of the packages and the processor that it ran with
 
 
 class Ledger:
@@ -254,7 +255,7 @@ def checked(entry: Entry, stage: str, name: str) -> Entry:
     hashes = (
         value for table in (entry.outputs, fingerprint["inputs"], fingerprint["code"]) for value in table.values()
     )
-    if not all(isinstance(text, str) for text in (entry.stage, entry.task, entry.failed, *hashes)):
+    if not all(isinstance(text, str) for text in (entry.stage, entry.task, entry.failed, entry.environment, *hashes)):
         raise TypeError("it is not as a stage writes it")
     if (entry.stage, file_name(entry.task)) != (stage, name):
         raise ValueError(f"it is of another task, {entry.stage} {entry.task}")

@@ -2,9 +2,13 @@
 
 import hashlib
 import importlib.metadata
+import platform
 from dataclasses import asdict, replace
+from functools import cache
 from pathlib import Path
 from time import perf_counter
+
+import numpy as np
 
 from davinci_forces.records import KINDS, Record, store
 from davinci_forces.records.catalogue import Catalogue, Provenance
@@ -21,7 +25,7 @@ from davinci_forces.study import Study, review
 from davinci_forces.study.review import Rating
 
 KEPT = 1 << 16  # rows of a record at most, to be held while the report is made
-PACKAGES = ("numpy", "scipy", "pandas", "pyarrow", "statsmodels", "numba", "matplotlib", "typst", "npTDMS")
+PACKAGES = "numpy", "scipy", "pandas", "pyarrow", "statsmodels", "numba", "clarabel", "matplotlib", "typst", "npTDMS"
 
 
 def task(plan: Plan) -> Task:
@@ -104,9 +108,20 @@ def provenance(study: Study, ledger: Ledger, located: tuple[Located, ...]) -> Pr
     processed = {place: ledger.digest(f"processed/{place}") for _, place in located}
     failed = [entry for entry in ledger.entries() if entry.failed and entry.stage != REPORT]
     failures = {" ".join([*entry.stage.split("."), entry.task]): entry.failed for entry in failed}
-    versions = {p: importlib.metadata.version(p) for p in PACKAGES} | {"arithmetic": arithmetic.described()}
     text = (study.folder / "study.toml").read_text(encoding="utf-8", errors="replace")
-    return Provenance(study.name, VERSION, versions, raw, processed, failures, text)
+    return Provenance(study.name, VERSION, versions(), raw, processed, failures, text)
+
+
+def versions() -> dict[str, str]:
+    """The packages that results and pages are made with, and how this process reckons."""
+    return {p: importlib.metadata.version(p) for p in PACKAGES} | {"arithmetic": arithmetic.described()}
+
+
+@cache
+def environment() -> str:
+    """The hash of what the bytes of a run depend on besides code and data: packages, and the kind of processor."""
+    instructions = np.show_config(mode="dicts").get("SIMD Extensions")  # whose sines differ in the last digit
+    return hash_of([versions(), platform.python_version(), platform.system(), platform.machine(), instructions])[:16]
 
 
 def study_files(study: Study) -> tuple[str, ...]:

@@ -231,7 +231,8 @@ class Runner:
     def _record(self, outcome: Outcome) -> None:
         """Remember what a task made."""
         task, stage = outcome.task, stage_of(outcome.task.step)
-        self.ledger.write(Entry(task.step, task.name, dict(vars(task.fingerprint)), outcome.outputs, outcome.failed))
+        fingerprint, environment = dict(vars(task.fingerprint)), reporting.environment()
+        self.ledger.write(Entry(task.step, task.name, fingerprint, outcome.outputs, outcome.failed, environment))
         self.ran += 1
         self.failures += bool(outcome.failed)
         self.seconds[stage] += outcome.seconds

@@ -1,6 +1,8 @@
 """Whether a study's files and numbers are those of a run on its logs, and its report the one that they give."""
 
 import json
+import os
+import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -15,9 +17,13 @@ from davinci_forces.runner.graph import every_step
 from davinci_forces.runner.ledger import INDEX, Folders, Ledger, file_name
 from davinci_forces.runner.plan import Plan, Task
 from davinci_forces.runner.signature import declaration, stage_of
-from davinci_forces.study import Study
+from davinci_forces.study import Study, review
 
 MOST = 5  # files or tasks that are named of many that differ alike
+PAGES = ".html", ".pdf"
+ENTRY = re.compile(r"processed/tasks/[^./][^/]*/[^./][^/]*\.json")  # what a ledger reads
+# Files that systems leave in any folder, the lock of a run, and the mark by which workers of a cluster know a folder.
+BESIDES = re.compile(r"(.*/)?(\.DS_Store|Thumbs\.db|desktop\.ini|\._[^/]*)|processed/\.(lock|run-[0-9a-f]{12})")
 
 
 @dataclass(frozen=True)
@@ -29,11 +35,12 @@ class Verified:
     reports: int
     numbers: int
     identity: str
+    unrelated: tuple[str, ...]  # files beside these that are no results
 
 
-def verify(study: Study, folders: Folders, wanted: str = "") -> Verified:
+def verify(study: Study, folders: Folders, wanted: str = "", pages: bool = True) -> Verified:
     """Hash every file that a run reads and makes, compare what was run with what there is to run, and make the report
-    anew; `wanted` is the report ID that it has to have, "" for any.
+    anew; `wanted` is the report ID that it has to have, "" for any.  Without `pages` only its numbers are compared.
 
     Raises
     ------
@@ -45,7 +52,8 @@ def verify(study: Study, folders: Folders, wanted: str = "") -> Verified:
     problems = [f"{file} was altered: {reason}" for file, reason in ledger.void().items()]
     if not recorded and not problems:
         raise NotReproduced(f"{folders.processed} holds no results; run `davinci-forces all {folders.raw}` first")
-    problems += [*altered_index(ledger), *altered_files(folders, ledger, recorded), *unknown_files(folders, recorded)]
+    strays, unrelated = unknown_files(folders, recorded)
+    problems += [*altered_index(ledger), *altered_files(folders, ledger, recorded), *strays]
     plan = Plan(study, ledger)
     report = reporting.task(plan)
     problems += differences_from_plan(plan, report)
@@ -55,7 +63,8 @@ def verify(study: Study, folders: Folders, wanted: str = "") -> Verified:
         numbers = len(json.loads(made["results.json"]))
     except Exception as error:  # whatever becomes of a report that lacks what was altered
         problems.append(f"the report cannot be made anew: {said_of(error)}")
-    problems += [problem for name, content in made.items() for problem in altered_page(folders, name, content)]
+    compared = [name for name in made if pages or not name.endswith(PAGES)]
+    problems += [problem for name in compared for problem in altered_page(folders, name, made[name])]
     is_called = identity(made[MANIFEST]) if made else ""
     if wanted and is_called != wanted:
         problems.append(
@@ -64,7 +73,7 @@ def verify(study: Study, folders: Folders, wanted: str = "") -> Verified:
     if problems:
         raise NotReproduced("\n".join(problems))
     count = Counter(name.partition("/")[0] for name in recorded if ledger.digest(name))
-    return Verified(count["raw"], count["processed"], count["reports"], numbers, is_called)
+    return Verified(count["raw"], count["processed"], count["reports"], numbers, is_called, tuple(unrelated))
 
 
 def known_files(ledger: Ledger) -> dict[str, dict[str, str]]:
@@ -99,15 +108,28 @@ def altered_files(folders: Folders, ledger: Ledger, recorded: dict[str, dict[str
                 yield f"{file} was altered: its SHA-256 is {now[:16]}..., and was {was[:16]}... for {task}"
 
 
-def unknown_files(folders: Folders, recorded: Iterable[str]) -> Iterator[str]:
-    """Files among the results that no stage made, but for those that begin with a dot, as systems leave them."""
-    known = set(recorded)
-    for root, folder in (("processed", folders.processed), ("reports", folders.reports)):
-        for file in sorted(folder.rglob("*")):
-            place = file.relative_to(folder)
-            ours = f"{root}/{place.as_posix()}" in known or place.parts[0] == "tasks"
-            if not ours and not file.name.startswith(".") and not file.is_dir():
-                yield f"{file} was made by no stage of this study"
+def unknown_files(folders: Folders, recorded: Iterable[str]) -> tuple[list[str], list[str]]:
+    """What is wrong with links, and with files that no stage made, among the results; and the files that are no part
+    of them: those of the system, and in raw/ those that no stage read.
+    """
+    known = {*recorded, f"processed/tasks/{INDEX}", f"raw/{review.FILE}"}
+    problems: list[str] = []
+    unrelated: list[str] = []
+    for root in ("processed", "reports", "raw"):
+        home = str(getattr(folders, root))
+        for folder, inside, files in os.walk(home):
+            links = [each for each in inside if os.path.islink(f"{folder}{os.sep}{each}")]  # which it does not follow
+            for file in (f"{folder}{os.sep}{each}" for each in (*files, *links)):
+                name = f"{root}{file[len(home) :]}".replace(os.sep, "/")
+                if root != "raw" and os.path.islink(file):
+                    problems.append(f"{file} is a link to {os.readlink(file)}; results are not read through links")
+                elif name in known or ENTRY.fullmatch(name) or (links and any(k.startswith(f"{name}/") for k in known)):
+                    continue
+                elif root == "raw" or BESIDES.fullmatch(name):
+                    unrelated.append(file)
+                else:
+                    problems.append(f"{file} was made by no stage of this study")
+    return sorted(problems), sorted(unrelated)
 
 
 def differences_from_plan(plan: Plan, report: Task) -> Iterator[str]:
@@ -121,7 +143,7 @@ def differences_from_plan(plan: Plan, report: Task) -> Iterator[str]:
         planned = {file_name(task.name) for task in tasks}
         extra = [entry.task for entry in ledger.entries(step) if file_name(entry.task) not in planned]
         if extra:
-            yield f"{stage_of(step)}: the ledger has entries of what this study has no call for: {_some(extra)}"
+            yield f"{stage_of(step)}: the ledger has entries of what this study has no call for: {listing(extra)}"
         yield from stale(ledger, tasks)
 
 
@@ -139,7 +161,7 @@ def stale(ledger: Ledger, tasks: Sequence[Task]) -> Iterator[str]:
             for reason in list(changed)[:2]:
                 by_reason.setdefault(reason, []).append(task.name)
     for reason, names in by_reason.items():
-        yield f"{stage_of(tasks[0].step)}: {_some(names)}: {reason}"
+        yield f"{stage_of(tasks[0].step)}: {listing(names)}: {reason}"
 
 
 def altered_page(folders: Folders, name: str, content: bytes) -> Iterator[str]:
@@ -173,5 +195,6 @@ def altered_numbers(file: str, found: bytes, made: bytes) -> Iterator[str]:
                 yield f"{file}: {key}: says {name} {result.get(name)!r}, but its records give {value!r}"
 
 
-def _some(names: list[str]) -> str:
+def listing(names: Sequence[str]) -> str:
+    """The first of many names, and how many more there are."""
     return ", ".join(names[:MOST]) + (f" and {len(names) - MOST} more" if len(names) > MOST else "")
