@@ -193,7 +193,8 @@ def package(tmp_path) -> Path:
 def run_by(package: Path, *arguments: object) -> str:
     """What a copy of the package says."""
     command = [sys.executable, "-m", "davinci_forces", *map(str, arguments)]
-    environment = {**os.environ, "PYTHONPATH": str(package.parent)}
+    compiled = str(package.parent / "compiled")  # else what each copy compiles would fill the user's cache
+    environment = {**os.environ, "PYTHONPATH": str(package.parent), "NUMBA_CACHE_DIR": compiled}
     done = subprocess.run(command, env=environment, cwd=package.parent, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
     return done.stdout

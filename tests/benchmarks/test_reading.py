@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 import pyarrow.csv as csv
+import pyarrow.parquet as pq
 import pytest
 
 from davinci_forces.logs import open_log
@@ -41,6 +42,9 @@ def test_lvm_to_parquet_costs_little_more_than_parsing_its_rows(tmp_path: Path, 
     bare, took = seconds(
         lambda: csv.read_csv(tmp_path / "body.txt", parse_options=plain), lambda: ours(path, tmp_path / "log.parquet")
     )
+    rows, parsed = pq.read_table(tmp_path / "log.parquet"), csv.read_csv(tmp_path / "body.txt", parse_options=plain)
+    for one, other in zip(rows.columns, parsed.columns[-rows.num_columns :], strict=True):
+        np.testing.assert_array_equal(one.slice(1), other)  # the bare parser takes the first row for names
     report(f"lvm, {size // MB} MB: {took:.3f} s, bare parser {bare:.3f} s, ratio {took / bare:.2f} (at most {most})")
     assert took <= most * bare
 
@@ -57,6 +61,7 @@ def test_contiguous_tdms_costs_little_more_than_nptdms(tmp_path: Path, full: boo
     rival, took = seconds(
         lambda: nptdms(path, tmp_path / "rival.parquet"), lambda: ours(path, tmp_path / "log.parquet")
     )
+    same(tmp_path)
     report(f"tdms contiguous, {size // MB} MB: {took:.3f} s, npTDMS {rival:.3f} s, ratio {took / rival:.2f}")
     assert took <= most * rival
 
@@ -85,10 +90,19 @@ def test_tdms_written_one_sample_at_a_time_is_read_far_faster_than_by_nptdms(
     faster(path, tmp_path, f"one sample per call, in {layout}", least, report, repeats=1)
 
 
+def same(folder: Path) -> None:
+    """What was written is what the rival wrote."""
+    log, rival = (pq.read_table(folder / f"{name}.parquet") for name in ("log", "rival"))
+    assert len(log) > 0
+    for one, other in zip(log.columns, rival.columns, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
 def faster(path: Path, folder: Path, what: str, least: float, report: Report, repeats: int) -> None:
     rival, took = seconds(
         lambda: nptdms(path, folder / "rival.parquet"), lambda: ours(path, folder / "log.parquet"), repeats=repeats
     )
+    same(folder)
     size = path.stat().st_size // MB
     report(f"tdms {what}, {size} MB: {took:.3f} s, npTDMS {rival:.3f} s, {rival / took:.1f} x (at least {least})")
     assert rival >= least * took
@@ -122,6 +136,7 @@ def test_values_of_daq_cards_cost_little_more_than_with_nptdms(tmp_path: Path, f
 
 def little_more(path: Path, what: str, report: Report) -> None:
     """Reading all channels takes at most twice as long as with npTDMS."""
+    assert ours_alone(path) == pytest.approx(nptdms_alone(path), rel=1e-9)
     rival, took = seconds(lambda: nptdms_alone(path), lambda: ours_alone(path))
     report(f"tdms {what}, {path.stat().st_size / MB:.2f} MB: {took:.4f} s, npTDMS {rival:.4f} s, {took / rival:.2f} x")
     assert took <= 2 * rival

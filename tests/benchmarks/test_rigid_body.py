@@ -8,7 +8,7 @@ import pytest
 
 from davinci_forces.maths.mechanics import rigid_body
 from davinci_forces.robots.davinci_chain import BODIES, CHAIN
-from tests.robot.pinocchio_arm import tree
+from tests.robot.pinocchio_arm import Tree, tree
 
 pin = pytest.importorskip("pinocchio", reason="Pinocchio, the rival, is not installed: `make bench` installs it")
 
@@ -16,18 +16,48 @@ n = 6
 ROUNDS, OURS = 5, 8
 
 
-def seconds(ours: Callable[[], object], theirs: Callable[[], object]) -> tuple[float, float]:
-    """The shortest of some runs of each, by turns: what else the machine does can only add, and it comes and goes.
+def motions(N: int) -> np.ndarray:
+    return np.random.default_rng(0).uniform(-1, 1, (3, N, n))
+
+
+def in_tree(arm: Tree, motion: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(motion @ arm.E.T)
+
+
+def seconds(
+    make: Callable[[], np.ndarray], ours: Callable[[np.ndarray], object], theirs: Callable[[np.ndarray], object]
+) -> tuple[float, float]:
+    """The shortest of some runs of each, by turns, of motions made anew: what else the machine does can only add.
 
     Ours are run more often because they are shorter, and so have the same chance of an undisturbed one.
     """
     best = [np.inf, np.inf]
     for _ in range(ROUNDS):
         for which, f in [(0, ours)] * OURS + [(1, theirs)]:
+            motion = make()
             start = time.perf_counter()
-            f()
+            f(motion)
             best[which] = min(best[which], time.perf_counter() - start)
     return best[0], best[1]
+
+
+def agree(name: str, arm: Tree, ours: Callable[..., np.ndarray]) -> None:
+    """Assert that ours are Pinocchio's, projected on the six coordinates; the regressor, times the parameters."""
+    motion = motions(20_000)[:, :100]
+    found = ours(*motions(20_000))[:100]
+    for k, (q, dq, ddq) in enumerate(in_tree(arm, motion).swapaxes(0, 1)):
+        upper = np.triu(pin.crba(arm.model, arm.data, q))
+        gravity = pin.computeGeneralizedGravity(arm.model, arm.data, q).copy()
+        tau = pin.rnea(arm.model, arm.data, q, dq, ddq).copy()
+        expected = {
+            "inverse dynamics": tau,
+            "M": (upper + np.triu(upper, 1).T) @ arm.E,
+            "C dq": pin.nonLinearEffects(arm.model, arm.data, q, dq) - gravity,
+            "G": gravity,
+            "regressor": tau,
+        }[name]
+        own = found[k] @ BODIES.parameters(n) if name == "regressor" else found[k]
+        np.testing.assert_allclose(own, arm.E.T @ expected, rtol=0, atol=1e-12)
 
 
 @pytest.fixture(scope="module")
@@ -72,11 +102,11 @@ def test_dynamics_of_many_samples_are_faster_than_pinocchio_sample_by_sample(nam
     ours, theirs, times = CASES[name]
     N = (20_000 if name == "regressor" else 100_000) if full else 20_000  # 20 000 regressors fill 100 MB
     arm = tree(pin, CHAIN, BODIES, n)
-    motions = np.random.default_rng(0).uniform(-1, 1, (3, N, n))
-    in_tree = np.ascontiguousarray(motions @ arm.E.T)
-    ours(*motions)  # compiles
+    agree(name, arm, ours)  # compiles, too
     took, rival = seconds(
-        lambda: ours(*motions), lambda: [theirs(arm, *motion) for motion in zip(*in_tree, strict=True)]
+        lambda: motions(N),
+        lambda motion: ours(*motion),
+        lambda motion: [theirs(arm, *sample) for sample in zip(*in_tree(arm, motion), strict=True)],
     )
     with capsys.disabled():
         print(

@@ -30,14 +30,16 @@ def full(request) -> bool:
 
 def seconds_of_planning(study: Study, where: Folders) -> float:
     start = time.process_time()
-    many.planned(study, where)
-    return time.process_time() - start
+    tasks = many.planned(study, where)
+    taken = time.process_time() - start
+    assert tasks > 15 * len(study.logs)
+    return taken
 
 
 def test_planning_is_linear_in_the_logs(tmp_path, full, capsys):
     few = 1000 if full else 100
     studies = [many.study(tmp_path / str(n), n) for n in (few, 10 * few)]
-    assert many.planned(*studies[0]) > 15 * few
+    many.planned(*studies[0])  # imports the stages
     least, most = (min(seconds_of_planning(*study) for _ in range(3)) for study in studies)
     with capsys.disabled():
         print(f"\nplanning {few} logs {least:.2f} s, ten times as many {most / least:.1f} times that", end="")
@@ -84,7 +86,9 @@ def seconds_of_hashing(where: Folders) -> float:
 
 def seconds_afresh(study: Path) -> float:
     """What finding nothing to do takes a process of its own, from its start on."""
-    code = "import sys, time, pipeline; davinci_forces.run(*sys.argv[1:], quiet=True); print(time.process_time())"
+    code = (
+        "import sys, time, davinci_forces as it; assert it.run(*sys.argv[1:], quiet=True); print(time.process_time())"
+    )
     done = subprocess.run([sys.executable, "-c", code, study, *STAGES], capture_output=True, text=True, check=True)
     return float(done.stdout)
 
@@ -112,7 +116,9 @@ def test_a_log_costs_the_same_in_a_study_of_many(tmp_path, full, capsys):
 
 def seconds_of_jobs(study: Path, jobs: int) -> float:
     """How long a process of its own takes from ingest to whiteness, by the clock."""
-    code = "import sys, pipeline; davinci_forces.run(sys.argv[1], *sys.argv[3:], jobs=int(sys.argv[2]), quiet=True)"
+    code = (
+        "import sys, davinci_forces as it; assert it.run(sys.argv[1], *sys.argv[3:], jobs=int(sys.argv[2]), quiet=True)"
+    )
     names = STAGES[STAGES.index("ingest") : STAGES.index("whiteness") + 1]
     start = time.perf_counter()
     subprocess.run([sys.executable, "-c", code, study, str(jobs), *names], check=True, stdout=subprocess.DEVNULL)
@@ -125,6 +131,11 @@ def test_two_processes_take_little_more_than_half_the_time_of_one(tmp_path, full
     logs, period = (100, 10.4) if full else (20, 10.4)
     one, two = (lab(tmp_path / str(jobs), logs, period, 100.0) for jobs in (1, 2))
     alone, shared = seconds_of_jobs(one, 1), seconds_of_jobs(two, 2)
+    tracks = [
+        sorted(f.name for f in (folders(s, None, None).processed / "track").rglob("*.parquet")) for s in (one, two)
+    ]
+    assert len(tracks[0]) >= logs // 3
+    assert tracks[0] == tracks[1]
     with capsys.disabled():
         print(
             f"\n{logs} logs of a minute take {alone:.0f} s, two processes are {alone / shared:.2f} times as fast",

@@ -30,7 +30,7 @@ def loop(x):
     for i in range(len(x)):
         s = 0.9 * s + x[i]
     return s
-loop(np.ones(4000))
+assert abs(loop(np.ones(4000)) - 10.0) < 1e-9
 """
 FILTER = """
 import numpy as np
@@ -41,7 +41,8 @@ from davinci_forces.maths.models.model import JointDynamics
 t = np.arange(4000) * 1e-3
 joint = JointDynamics(np.full(4000, 0.5), (0.1, 0.7, -0.2, 0.0, 0.3, 0.2, 0.0), np.zeros(4000))
 noise = NoiseModel(1e-4, 1e-3, 1e-5, 1e-3, 0.05)
-track(Driven(joint, np.sin(t), np.cos(t), -np.sin(t), np.sin(t), 1e-3, 1.0), noise)
+tracked = track(Driven(joint, np.sin(t), np.cos(t), -np.sin(t), np.sin(t), 1e-3, 1.0), noise)
+assert np.isfinite(tracked.tau_ext).all() and np.abs(tracked.tau_ext).max() > 0.1
 """
 
 

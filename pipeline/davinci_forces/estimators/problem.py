@@ -164,7 +164,8 @@ def spread(problem: Regression, weight: Array, R: Triangle, theta: Array, residu
     """
     inverse = np.linalg.inv(R.U)
     root = np.sqrt(weight)
-    Q = problem.Phi * root[:, None] @ (inverse / R.scale[:, None])
+    Q = ((inverse.T / R.scale) @ problem.Phi.T).T  # each column in one piece, as its transform wants it
+    Q *= root[:, None]
     if residual is None:
         residual = root * (problem.tau - problem.Phi @ theta)
     degrees = int((weight > 0).sum()) - len(theta)

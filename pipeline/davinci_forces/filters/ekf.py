@@ -11,11 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.filters import stepping
 from davinci_forces.filters.problem import Driven, NoiseModel, Tracked
 from davinci_forces.filters.stepping import Belief, arguments, corrected, covariances, spread, transition
 from davinci_forces.maths.compiled import cached
-from davinci_forces.maths.models import bias as derivation
 from davinci_forces.maths.models.bias import Coefficients
 from davinci_forces.maths.signals.windows import SETTLE
 
@@ -51,7 +49,7 @@ def step(
     return now, after
 
 
-@cached(derivation, stepping)
+@cached
 def _step(
     s: Any, y_q: float, y_dq: float, drive: float, M: float, c_b: Any, T_s: float, R_q: float, R_dq: float,
     Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float,
@@ -61,7 +59,7 @@ def _step(
     return now, spread(now, q, dq, F, Q_qq, Q_qd, Q_dd + unsure, Q_tau)
 
 
-@cached(derivation, stepping)
+@cached
 def _pass(
     s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float, Q_qq: float,
     Q_qd: float, Q_dd: float, Q_tau: float, out_q: Any, out_dq: Any, out_tau: Any, out_std: Any, out_iq: Any,
@@ -76,7 +74,7 @@ def _pass(
         s = spread(s, q, dq, F, Q_qq, Q_qd, Q_dd + unsure, Q_tau)
 
 
-@cached(derivation, stepping)
+@cached
 def _likelihood(
     settle: int, s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float,
     Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float,

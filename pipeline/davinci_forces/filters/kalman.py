@@ -11,13 +11,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from davinci_forces.filters import stepping
 from davinci_forces.filters.ekf import LOG_2_PI
 from davinci_forces.filters.problem import Driven, NoiseModel
 from davinci_forces.filters.stepping import FIRST, columns, covariances, transition
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import cached
-from davinci_forces.maths.models import bias as derivation
 
 LEAST, MOST = 0.1, 1e3  # of the variance of a measurement, between which it may follow the innovations
 
@@ -69,7 +67,7 @@ def _run(recording: Driven, model: States, settle: int, out: Array) -> float:
     return float(_pass(settle, out, x, P.copy(), *noises, *columns(recording)))
 
 
-@cached(derivation, stepping)
+@cached
 def _pass(
     settle: int, out: Any, start: Any, P: Any, in_q: Any, in_dq: Any, R_q: float, R_dq: float, F: Any, Q: Any, h: float,
     doubts: float, forgets: float, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float,

@@ -11,12 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.filters import stepping
 from davinci_forces.filters.problem import Driven, NoiseModel, Tracked
 from davinci_forces.filters.stepping import arguments, corrected, gains, spread, transition
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import cached
-from davinci_forces.maths.models import bias as derivation
 
 NAME = "Smoother"
 LEFT = 1e-12  # of a variance, below which a difference from it is rounding
@@ -38,7 +36,7 @@ def forwards(recording: Driven, noise: NoiseModel) -> tuple[Array, Array]:
     return out, stored
 
 
-@cached(derivation, stepping)
+@cached
 def _forwards(
     stored: Any, s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float,
     Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float, out_iq: Any, out_idq: Any, out_nis: Any,
@@ -54,7 +52,7 @@ def _forwards(
         s = spread(s, q, dq, F, Q_qq, Q_qd, Q_dd + unsure, Q_tau)
 
 
-@cached(stepping)
+@cached
 def _backwards(
     stored: Array, R_q: float, R_dq: float, out_q: Any, out_dq: Any, out_tau: Any, out_std: Any, i_q: Any, i_dq: Any
 ) -> None:

@@ -1,46 +1,141 @@
-"""Compiling the loops that numpy cannot take over.  No fastmath: a result must not depend on the compiler's mood."""
+"""Compiling the loops that numpy cannot take over.  No fastmath: a result must not depend on the compiler's mood.
 
+Numba compiles a function anew when its own file changes, but not when what it inlines does.  The folder of compiled
+code is therefore named by a hash of all of it.  Whoever reads compiled code runs it, so only the user may write there.
+"""
+
+import atexit
+import os
+import re
+import shutil
+import stat
+import sys
+import tempfile
+import time
 from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from hashlib import sha256
+from importlib.metadata import version
 from pathlib import Path
-from types import ModuleType
+from threading import Lock
 from typing import Any, TypeVar
 
-from numba import njit
+fcntl: Any
+try:
+    import fcntl
+except ImportError:  # Windows, which removes no file that a process holds open
+    fcntl = None
+
+PACKAGE = Path(__file__).parents[1]
+SOURCES = ("maths", "filters", "haptics/maths")  # folders of all that compiled code depends on
+NAME = re.compile("compiled-[0-9a-f]{32}")
+MAX_UNUSED = 30 * 86400.0  # [s]
+MIN_FOLDERS = 5  # kept however long they are unused
 
 F = TypeVar("F", bound=Callable[..., object])
+_setting = Lock()
 
 
-def compiled(function: F) -> F:
+def compiled(function: F, **options: Any) -> F:
     """The function, compiled when it is first called, anew in every process."""
-    made: F = njit(function)
+    from numba import njit
+
+    made: F = njit(**options)(function)
     return made
 
 
 def inlined(function: F) -> F:
     """The function as part of every compiled function that calls it."""
-    made: F = njit(inline="always")(function)
-    return made
+    return compiled(function, inline="always")
 
 
-def cached(*inlines: ModuleType) -> Callable[[F], F]:
-    """A decorator: the function, compiled once an installation and kept on disk.
+def cached(function: F) -> F:
+    """The function, compiled once an installation and kept on disk."""
+    from numba import config
 
-    `inlines` are the modules whose functions become part of it: compiled code that is older than one of them is
-    dropped, because the compiler's own cache looks at the function's file only.
+    with _setting:  # threads may import several modules at once
+        before, config.CACHE_DIR = config.CACHE_DIR, str(folder())
+        try:
+            return compiled(function, cache=True, error_model="numpy")
+        finally:
+            config.CACHE_DIR = before
+
+
+@cache
+def folder() -> Path:
+    """The folder of what numba makes of these sources; others that are unused for long are removed."""
+    digest = sha256(f"{sys.version} {version('numba')} {version('llvmlite')}".encode())
+    for file in sorted(file for room in SOURCES for file in PACKAGE.joinpath(room).rglob("*.py")):
+        digest.update(f"\n{file.relative_to(PACKAGE).as_posix()} {sha256(file.read_bytes()).hexdigest()}".encode())
+    name = f"compiled-{digest.hexdigest()[:32]}"
+    try:
+        place = private(home() / name)
+        os.utime(place)  # its last use
+        place.chmod(0o700)
+    except OSError:
+        place = private(temporary() / name)
+    with suppress(OSError):  # a file system without locks
+        lock(os.open(place / "used", os.O_RDWR | os.O_CREAT, 0o600), alone=False)  # until this process ends
+        remove_unused(place.parent)
+    return place
+
+
+@cache
+def home() -> Path:
+    """The folder of all compiled code: in NUMBA_CACHE_DIR where that is set, else in the user's cache folder.
+
+    Where there is none, or others could write to it, it is a temporary one, shared with processes that start later.
     """
+    user, chosen = os.environ.get("HOME", ""), os.environ.get("NUMBA_CACHE_DIR")
+    linux = os.environ.get("XDG_CACHE_HOME") or os.path.join(user, ".cache")
+    others = {"win32": os.environ.get("LOCALAPPDATA", ""), "darwin": os.path.join(user, "Library", "Caches")}
+    base = Path(others.get(sys.platform, linux))
+    with suppress(OSError):
+        if chosen:
+            return private(Path(chosen, "davinci-forces").absolute(), parents=True)
+        if base.is_absolute():
+            return private(private(base.resolve()) / "davinci-forces")
+    return temporary()
 
-    def compile_once(function: F) -> F:
-        kernel: Any = njit(cache=True, error_model="numpy")(function)
-        forget_older(kernel, *inlines)
-        made: F = kernel
-        return made
 
-    return compile_once
+@cache
+def temporary() -> Path:
+    """A folder for this process and those that it starts from now on, removed when this process ends."""
+    place = os.environ["NUMBA_CACHE_DIR"] = tempfile.mkdtemp(prefix="davinci-forces-")
+    atexit.register(shutil.rmtree, place, ignore_errors=True)
+    return private(Path(place, "davinci-forces"))
 
 
-def forget_older(kernel: Any, *inlines: ModuleType) -> None:
-    """Drop a kernel's compiled code that is older than what it has inlined."""
-    newest = max((Path(str(module.__file__)).stat().st_mtime for module in inlines), default=0.0)
-    for index in Path(kernel.stats.cache_path).glob(f"*.{kernel.py_func.__name__}-*.nbi"):
-        if index.stat().st_mtime < newest:
-            index.unlink(missing_ok=True)
+def private(place: Path, parents: bool = False) -> Path:
+    """The folder, made where there is none.
+
+    Raises
+    ------
+    PermissionError
+        If it is a link or another user's, or others may write to it.
+    """
+    place.mkdir(mode=0o700, parents=parents, exist_ok=True)
+    status = place.lstat()
+    alone = os.name == "nt" or (status.st_uid == os.geteuid() and not status.st_mode & 0o022)
+    if not (stat.S_ISDIR(status.st_mode) and alone):
+        raise PermissionError(f"{place} is no folder to which this user alone may write")
+    return place
+
+
+def lock(file: int, alone: bool) -> None:
+    """Lock an open file, with others who use its folder or alone; raises OSError if somebody else has it."""
+    if fcntl:
+        fcntl.flock(file, fcntl.LOCK_NB | (fcntl.LOCK_EX if alone else fcntl.LOCK_SH))
+
+
+def remove_unused(place: Path) -> None:
+    """Remove what no process has used for `MAX_UNUSED`, but for the last `MIN_FOLDERS`."""
+    folders = (each for each in place.iterdir() if NAME.fullmatch(each.name) and not each.is_symlink())
+    for each in sorted(folders, key=lambda each: each.stat().st_mtime)[:-MIN_FOLDERS]:
+        with suppress(OSError):  # it is in use, another's, or removed by another process
+            if each.stat().st_mtime < time.time() - MAX_UNUSED:
+                with open(private(each) / "used", "ab") as file:
+                    lock(file.fileno(), alone=True)
+                (each / "used").unlink()
+                shutil.rmtree(each)

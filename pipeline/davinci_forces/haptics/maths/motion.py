@@ -103,7 +103,7 @@ def late(hand: Hand, k_t: float, delay: float, rate: float, push: float, duratio
     return Swing(np.arange(ticks) / rate, x - x_0, dx)
 
 
-@cached()
+@cached
 def _late(Phi: Array, early: Array, after: Array, pushed: Array, k_t: float, held: Array, x: Array, dx: Array) -> None:
     """Fill x and dx (N,) from their first; `held` goes round, and holds the force of each of the ticks before."""
     n = len(held)

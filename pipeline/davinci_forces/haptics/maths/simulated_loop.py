@@ -21,8 +21,6 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import cached, compiled
-from davinci_forces.maths.simulation import control
-from davinci_forces.maths.simulation import step as stepping
 from davinci_forces.maths.simulation.actuators import Cascade, Device, Loops, Motors
 from davinci_forces.maths.simulation.control import drive, follow, read
 from davinci_forces.maths.simulation.step import Friction, State, at_rest, middle, step
@@ -158,7 +156,7 @@ def _parts(fixed: Any, loop: Any) -> Any:
     )
 
 
-@cached(control, stepping)
+@cached
 def _sense(device: Any, fixed: Any, tissue: Any, clocks: Any, noise: Any, loop: Any, k: int, readings: Any) -> None:
     """A turn of the controller begins: it follows what it was told, and the sensors are read."""
     now, h = k * clocks.turn, clocks.tick
@@ -190,7 +188,7 @@ def _say(device: Any, loop: Any, message: int) -> None:
     loop.said[message, 1] = loop.hand[1]
 
 
-@cached(control, stepping)
+@cached
 def _move(
     grip: Any, device: Any, fixed: Any, tissue: Any, clocks: Any, push: Any, loop: Any, k: int, ticks: Any
 ) -> None:

@@ -14,9 +14,11 @@ is left when p columns have been fitted: the residuals' own correlation is biase
 little where a period holds only a dozen correlation times.
 """
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array
 
@@ -25,7 +27,11 @@ SHORTEST = 0.3  # [samples]
 LONGEST = 0.25  # of the longest log
 WHITE = np.array([0.0, 0.03, 0.1, 0.3, 0.6])  # shares a of white noise in the variance
 SINGLE, BANDS = 64, 120  # frequencies that stand alone, and bands of those beyond
+ROWS = 8192  # at a time: few enough to stay in the processor's cache
 SMALLEST = np.finfo(float).tiny
+
+
+Spectra = list[tuple[NDArray[np.complex128], int]]  # of each log: F (p + 1, K // 2 + 1) of columns and residuals, and K
 
 
 class Bands(NamedTuple):
@@ -51,37 +57,48 @@ def correlated(Q: Array, residual: Array, starts: tuple[int, ...], D: Array, deg
     Each log is a period that begins where `starts` says; `degrees` are K - p.  Where residuals are larger in one part
     of the period than in another, so is what parameters that depend on this part may err by.
     """
-    bands = banded(Q, residual, starts)
-    S, lags = candidates(bands.frequency, max(np.diff([*starts, len(Q)])))
+    spectra = transformed(Q, residual, starts)
+    bands = banded(spectra)
+    S, lags = candidates(bands.frequency, max(K for _, K in spectra))
     share, scale = weighed(bands, S, degrees)
     mean = (share * scale) @ S
     covariance = np.einsum("b,bij->ij", mean, bands.basis)
     variance = np.einsum("ki,ij,kj->k", D, covariance, D)
-    factor = unevenness(Q, residual, starts, D, np.maximum(mean, SMALLEST), bands.frequency)
+    factor = unevenness(spectra, D, np.maximum(mean, SMALLEST), bands.frequency)
     return Correlated(variance * factor, float(share @ lags))
 
 
-def banded(Q: Array, residual: Array, starts: tuple[int, ...]) -> Bands:
-    """The columns' and the residuals' spectra, in bands that widen with frequency."""
+def transformed(Q: Array, residual: Array, starts: tuple[int, ...]) -> Spectra:
+    """The Fourier transforms of each log's part of columns (K, p) and residuals (K,)."""
+    lengths = np.diff([*starts, len(Q)])
+    ends = np.cumsum(lengths // 2 + 1)
+    memory = np.empty((Q.shape[1] + 1, ends[-1]), complex)  # at once, which costs a third of asking log by log
+    spectra = []
+    for first, K, F in zip(starts, lengths.tolist(), np.split(memory, ends[:-1], axis=1), strict=True):
+        np.fft.rfft(Q[first : first + K].T, norm="ortho", out=F[:-1])
+        np.fft.rfft(residual[first : first + K], norm="ortho", out=F[-1])
+        spectra.append((F, K))
+    return spectra
+
+
+def banded(spectra: Spectra) -> Bands:
+    """The columns' and the residuals' spectra, in bands that widen with frequency; logs of one length share theirs."""
     parts = []
-    for own, r in zip(np.split(Q, starts[1:]), np.split(residual, starts[1:]), strict=True):
-        f, g = np.fft.rfft(own, axis=0, norm="ortho"), np.fft.rfft(r, norm="ortho")
-        w = np.full(len(g), 2.0)
-        w[0] = 1.0
-        w[-1] = 1.0 + len(r) % 2 if len(r) > 1 else 1.0
-        edges = np.unique(np.r_[: min(SINGLE, len(g)), np.geomspace(SINGLE, len(g), BANDS)[:-1].astype(int)])
-        edges = edges[edges < len(g)]
+    for K in dict.fromkeys(K for _, K in spectra):
+        logs, n = [F for F, samples in spectra if samples == K], K // 2 + 1
+        edges = np.unique(np.r_[: min(SINGLE, n), np.geomspace(SINGLE, n, BANDS)[:-1].astype(int)])
+        edges = edges[edges < n]
+        w = np.full(n, 2.0)
+        w[[0, -1]] = 1.0, 1.0 + K % 2 if K > 1 else 1.0
         count = np.add.reduceat(w, edges)
-        basis = [np.add.reduceat(w[:, None] * (f[:, [i]] * f.conj()).real, edges) for i in range(f.shape[1])]
-        parts.append(
-            Bands(
-                np.add.reduceat(w * np.arange(len(g)), edges) / count * 2 * np.pi / len(r),
-                count,
-                np.stack(basis, axis=1),
-                np.add.reduceat(w[:, None] * (f.conj() * g[:, None]).real, edges),
-                np.add.reduceat(w * np.abs(g) ** 2, edges),
-            )
-        )
+        frequency = np.add.reduceat(w * np.arange(n), edges) / count * 2 * np.pi / K
+        numbers = [F.view(float) for F in logs]  # real and imaginary parts, in turn
+        columns = (np.hstack([x[:, a:b] for x in numbers]) for a, b in pairwise(2 * np.append(edges, n)))
+        G = np.stack([2.0 * band @ band.T for band in columns])
+        for k in np.flatnonzero(w == 1.0):  # which have no negative frequency beside them
+            alone = np.column_stack([F[:, k].real for F in logs])
+            G[-1 if k else 0] -= alone @ alone.T
+        parts.append(Bands(frequency, len(logs) * count, G[:, :-1, :-1], G[:, :-1, -1], G[:, -1, -1]))
     return Bands(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
@@ -106,7 +123,7 @@ def weighed(bands: Bands, S: Array, degrees: int) -> tuple[Array, Array]:
     return share / share.sum(), squares / degrees
 
 
-def unevenness(Q: Array, residual: Array, starts: tuple[int, ...], D: Array, S: Array, frequency: Array) -> Array:
+def unevenness(spectra: Spectra, D: Array, S: Array, frequency: Array) -> Array:
     """By how much the variances (p,) of D y differ from those of innovations that are as large everywhere.
 
     With u = Omega^(-1/2) e the innovations and h the rows of D Q' Omega^(1/2), D Q' e = sum of h_k u_k: its variance is
@@ -114,10 +131,15 @@ def unevenness(Q: Array, residual: Array, starts: tuple[int, ...], D: Array, S: 
     """
     order = np.argsort(frequency, kind="stable")
     sums = np.zeros((3, len(D)))
-    for own, r in zip(np.split(Q, starts[1:]), np.split(residual, starts[1:]), strict=True):
-        K = len(r)
-        root = np.sqrt(np.interp(2 * np.pi * np.arange(K // 2 + 1) / K, frequency[order], S[order]))
-        u2 = np.fft.irfft(np.fft.rfft(r) / root, K) ** 2
-        h2 = (np.fft.irfft(np.fft.rfft(own, axis=0) * root[:, None], K, axis=0) @ D.T) ** 2
-        sums += np.stack([u2 @ h2, h2.sum(axis=0), np.full(len(D), u2.sum())])
-    return np.asarray(np.where(sums[2] > 0, sums[0] * len(Q) / np.maximum(sums[1] * sums[2], SMALLEST), 1.0))
+    for F, K in spectra:
+        root = np.sqrt(np.interp(2 * np.pi * np.arange(F.shape[1]) / K, frequency[order], S[order]))
+        numbers, both = F.view(float), np.repeat(root, 2)
+        numbers[:-1] *= both
+        numbers[-1] /= both
+        columns = np.fft.irfft(F, K, norm="ortho")
+        for first in range(0, K, ROWS):
+            some = columns[:, first : first + ROWS]
+            u2, h2 = some[-1] ** 2, (D @ some[:-1]) ** 2
+            sums += np.stack([h2 @ u2, h2.sum(axis=1), np.full(len(D), u2.sum())])
+    samples = sum(K for _, K in spectra)
+    return np.asarray(np.where(sums[2] > 0, sums[0] * samples / np.maximum(sums[1] * sums[2], SMALLEST), 1.0))

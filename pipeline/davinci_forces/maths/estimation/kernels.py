@@ -27,7 +27,7 @@ def dot(x: Any, y: Any, n: int) -> float:
     return (a + b) + (c + d)
 
 
-@cached()
+@cached
 def triangularise(Phi: Any, tau: Any, weight: Any, R: Any) -> None:
     """Write the triangle R (p + 1, p + 1) of the rows sqrt(w) [Phi tau], by Householder's reflections block by block.
 
@@ -71,7 +71,7 @@ def beyond(x: Any, factors: Any, C: Any, y: Any, monomials: Any) -> float:
     return total
 
 
-@cached()
+@cached
 def fly(
     x: Any,
     v: Any,

@@ -2,7 +2,7 @@
 
 The innermost loops run over samples, LANES of them and one after the other in memory, so that the compiler lets the
 processor compute with several at once.  Import this module only where it is used: compiling it, or reading it back from
-the cache beside this file, takes longer than thousands of samples of numpy.
+the cache on disk, takes longer than thousands of samples of numpy.
 """
 
 from collections.abc import Callable
@@ -27,8 +27,6 @@ def _functions(module: ModuleType) -> list[Callable[..., object]]:
 for _function in (*_functions(link), *_functions(recursions)):
     register_jitable(forceinline=True)(_function)  # a loop with a call in it is done sample by sample
 
-_kernel = cached(link, recursions)
-
 
 @register_jitable(forceinline=True)  # type: ignore[untyped-decorator]
 def load(q: Any, dq: Any, ddq: Any, joints: Any) -> None:
@@ -39,7 +37,7 @@ def load(q: Any, dq: Any, ddq: Any, joints: Any) -> None:
             joints[k, 3, s], joints[k, 4, s] = dq[s, k], ddq[s, k]
 
 
-@_kernel
+@cached
 def mass_and_bias(tree: Any, gravity: Any, q: Any, dq: Any, ddq: Any, M: Any, bias: Any) -> None:
     """Put M(q) (n, n) and the effort (n,) of one sample into arrays; with ddq 0 this is C dq + G.  (4.41)"""
     n, L, samples = tree.n, len(tree.parent), range(1)
@@ -50,7 +48,7 @@ def mass_and_bias(tree: Any, gravity: Any, q: Any, dq: Any, ddq: Any, M: Any, bi
     recursions.mass_matrix(tree, joints, work, M.reshape(n, n, 1), samples)
 
 
-@_kernel
+@cached
 def place_and_jacobian(tree: Any, body: Any, point: Any, q: Any, J: Any) -> Any:
     """Put J_v (3, n) of a point of a body into J, and give its place in the base frame; `point` is in the body's.
 
@@ -76,7 +74,7 @@ def place_and_jacobian(tree: Any, body: Any, point: Any, q: Any, J: Any) -> Any:
     return point
 
 
-@_kernel
+@cached
 def inverse_dynamics(tree: Any, gravity: Any, q: Any, dq: Any, ddq: Any, tau: Any) -> None:
     """Put the efforts of N samples into tau; all are (N, n)."""
     n, L = tree.n, len(tree.parent)
@@ -90,7 +88,7 @@ def inverse_dynamics(tree: Any, gravity: Any, q: Any, dq: Any, ddq: Any, tau: An
                 tau[first + s, k] = efforts[k, s]
 
 
-@_kernel
+@cached
 def mass_matrices(tree: Any, q: Any, M: Any) -> None:
     """Put the mass matrices (N, n, n) of N poses (N, n) into M."""
     n, L = tree.n, len(tree.parent)
@@ -105,7 +103,7 @@ def mass_matrices(tree: Any, q: Any, M: Any) -> None:
                     M[first + s, k, o] = entries[k, o, s]
 
 
-@_kernel
+@cached
 def regressors(tree: Any, gravity: Any, q: Any, dq: Any, ddq: Any, Y: Any) -> None:
     """Put the regressors (N, n, 10 L) of N samples (N, n) into Y."""
     n, L = tree.n, len(tree.parent)

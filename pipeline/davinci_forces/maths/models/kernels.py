@@ -12,7 +12,7 @@ bias = inlined(derivation.bias)
 deflect = inlined(derivation.deflect)
 
 
-@cached(derivation)
+@cached
 def deflections(dq: Any, T_s: float, x_0: float, z: float, out: Any) -> None:
     """Write the deflection at each sample (N,) of velocities dq (N,), from z at the first."""
     for k in range(len(dq)):

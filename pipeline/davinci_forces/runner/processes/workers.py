@@ -15,6 +15,7 @@ from time import perf_counter
 from typing import Any
 
 from davinci_forces.logs.isolated import process
+from davinci_forces.maths import compiled
 from davinci_forces.runner.execution import Outcome
 from davinci_forces.runner.plan import Task
 from davinci_forces.stages import STAGES, module
@@ -33,6 +34,7 @@ METHOD = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
 
 def prepare() -> None:
     """Have a process import what the stages import, where the system can copy it then, and do not wait for that."""
+    compiled.home()  # a temporary one is shared with processes that start from now on
     if METHOD == "forkserver":
         from multiprocessing import forkserver
 
