@@ -21,12 +21,6 @@ from pathlib import Path
 from threading import Lock
 from typing import Any, TypeVar
 
-fcntl: Any
-try:
-    import fcntl
-except ImportError:  # Windows, which removes no file that a process holds open
-    fcntl = None
-
 PACKAGE = Path(__file__).parents[1]
 SOURCES = ("maths", "filters", "haptics/maths")  # folders of all that compiled code depends on
 NAME = re.compile("compiled-[0-9a-f]{32}")
@@ -75,8 +69,7 @@ def folder() -> Path:
         place.chmod(0o700)
     except OSError:
         place = private(temporary() / name)
-    with suppress(OSError):  # a file system without locks
-        lock(os.open(place / "used", os.O_RDWR | os.O_CREAT, 0o600), alone=False)  # until this process ends
+    with suppress(OSError):  # another process removes them, too
         remove_unused(place.parent)
     return place
 
@@ -123,19 +116,9 @@ def private(place: Path, parents: bool = False) -> Path:
     return place
 
 
-def lock(file: int, alone: bool) -> None:
-    """Lock an open file, with others who use its folder or alone; raises OSError if somebody else has it."""
-    if fcntl:
-        fcntl.flock(file, fcntl.LOCK_NB | (fcntl.LOCK_EX if alone else fcntl.LOCK_SH))
-
-
 def remove_unused(place: Path) -> None:
-    """Remove what no process has used for `MAX_UNUSED`, but for the last `MIN_FOLDERS`."""
+    """Remove folders that no process has chosen for `MAX_UNUSED`, but for the last `MIN_FOLDERS`."""
     folders = (each for each in place.iterdir() if NAME.fullmatch(each.name) and not each.is_symlink())
     for each in sorted(folders, key=lambda each: each.stat().st_mtime)[:-MIN_FOLDERS]:
-        with suppress(OSError):  # it is in use, another's, or removed by another process
-            if each.stat().st_mtime < time.time() - MAX_UNUSED:
-                with open(private(each) / "used", "ab") as file:
-                    lock(file.fileno(), alone=True)
-                (each / "used").unlink()
-                shutil.rmtree(each)
+        if each.stat().st_mtime < time.time() - MAX_UNUSED:
+            shutil.rmtree(private(each), ignore_errors=True)
