@@ -8,14 +8,19 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import pytest
 
 from davinci_forces.errors import BadRequest
-from davinci_forces.runner.ledger import Folders
+from davinci_forces.runner.ledger import Folders, Ledger
+from davinci_forces.runner.plan import Plan
 from davinci_forces.runner.processes import arithmetic, cluster, workers
+from davinci_forces.runner.runs import folders
+from davinci_forces.runner.signature import declaration
+from davinci_forces.study import reading
 from tests import arm
 from tests.test_robustness import flat
 from tests.test_runs import call, contents, processed
@@ -33,12 +38,16 @@ class Local:
 
     address: str
     log: Path
+    settings: dict[str, str] = field(default_factory=dict)  # of Dask
     processes: list[subprocess.Popen] = field(default_factory=list)
 
     def start(self, *words: str, **environment: str) -> subprocess.Popen:
         with self.log.open("ab") as log:
             process = subprocess.Popen(
-                [*MODULE, *words], stdout=log, stderr=log, env={**os.environ, **arithmetic.wanted(), **environment}
+                [*MODULE, *words],
+                stdout=log,
+                stderr=log,
+                env={**os.environ, **arithmetic.wanted(), **self.settings, **environment},
             )
         self.processes.append(process)
         return process
@@ -48,17 +57,26 @@ class Local:
         return self.start("distributed.cli.dask_worker", self.address, *options, **environment)
 
 
-@pytest.fixture
-def local(tmp_path) -> Iterator[Local]:
+@contextmanager
+def cluster_of(log: Path, protocol: str, **settings: str) -> Iterator[Local]:
     with socket.socket() as free:
         free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    here = Local(f"tcp://127.0.0.1:{port}", tmp_path / "dask.log")
-    here.start("distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard")
-    yield here
-    for process in here.processes:
-        process.kill()
-        process.wait()
+        port = str(free.getsockname()[1])
+    here = Local(f"{protocol}://127.0.0.1:{port}", log, settings)
+    options = ("--protocol", protocol, "--host", "127.0.0.1", "--port", port, "--no-dashboard")
+    here.start("distributed.cli.dask_scheduler", *options)
+    try:
+        yield here
+    finally:
+        for process in here.processes:
+            process.kill()
+            process.wait()
+
+
+@pytest.fixture
+def local(tmp_path) -> Iterator[Local]:
+    with cluster_of(tmp_path / "dask.log", "tcp") as here:
+        yield here
 
 
 def study_of(folder: Path, count: int) -> Path:
@@ -108,6 +126,117 @@ sys.exit(0 if runs.run(Path(study), names, cluster=address) else 1)
 """
 
 
+MAIN = """
+from davinci_forces.cli import main
+from davinci_forces.runner.processes import workers
+workers.ALONE = -1.0
+main()
+"""
+
+
+def command(*words: str) -> subprocess.Popen:
+    """The command line, which has others run every task."""
+    return subprocess.Popen(
+        [sys.executable, "-c", MAIN, *words], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory) -> Path:
+    """A study that one process has run."""
+    study = study_of(tmp_path_factory.mktemp("whole") / "raw" / "lab", 6)
+    call("measure", study)
+    return study
+
+
+@pytest.fixture
+def begun(whole, tmp_path) -> Path:
+    """The same study, of which nothing is done."""
+    shutil.copytree(whole, tmp_path / "raw" / "lab")
+    return tmp_path / "raw" / "lab"
+
+
+def wait_until_made(file: Path, run: subprocess.Popen) -> None:
+    while run.poll() is None and not file.exists():
+        time.sleep(0.02)
+    assert run.poll() is None, run.communicate()
+
+
+@pytest.mark.parametrize("record", ["recording", "motion", "fit", "track"])
+def test_a_scheduler_that_is_killed_ends_the_run_in_one_line_and_costs_nothing_made(local, whole, begun, record):
+    local.add_worker(), local.add_worker()
+    run = command("measure", str(begun), "--cluster", local.address)
+    wait_until_made(processed(begun) / record, run)
+    local.processes[0].kill()
+    _, said = run.communicate(timeout=60)
+    assert said == f"error: the scheduler at {local.address} is gone; what was finished is kept: run again\n"
+    assert run.returncode == 1
+    assert (processed(begun) / record).exists()
+    assert not [file for file in processed(begun).iterdir() if file.name.startswith(".run-")]
+    for worker in local.processes[1:]:  # which write what they are at until they notice
+        worker.kill()
+        worker.wait()
+    call("measure", begun)
+    assert contents(processed(begun)) == contents(processed(whole))
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no signals")
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("record", ["recording", "fit"])
+def test_a_run_on_a_cluster_that_is_stopped_says_so_and_goes_on_next_time(local, whole, begun, record, number):
+    local.add_worker()
+    run = command("measure", str(begun), "--cluster", local.address)
+    wait_until_made(processed(begun) / record, run)
+    run.send_signal(number)
+    _, said = run.communicate(timeout=60)
+    assert (said, run.returncode) == ("stopped; run again to go on\n", 128 + number)
+    for worker in local.processes[1:]:
+        worker.kill()
+        worker.wait()
+    call("measure", begun)
+    assert contents(processed(begun)) == contents(processed(whole))
+
+
+def test_a_task_that_fails_when_its_run_has_ended_leaves_no_diagnostic(tmp_path, monkeypatch):
+    """The next run may have removed what it was writing, and writes diagnostics of its own."""
+    study = arm.write_study(tmp_path / "raw" / "arm")
+    where = folders(study, None, None)
+    task = next(Plan(reading.read(study), Ledger(where)).tasks(declaration("ingest"), "roll"))
+    terms = cluster.own_terms(".run-x")
+    where.processed.mkdir(parents=True)
+    (where.processed / terms.mark).touch()
+
+    def end(files, options):
+        (where.processed / terms.mark).unlink(missing_ok=True)
+        raise FileNotFoundError(2, "No such file or directory", "x.partial")
+
+    monkeypatch.setattr("davinci_forces.runner.execution.open_parts", end)
+    with pytest.raises(FileNotFoundError):
+        cluster.perform_there(terms, where, task)
+    assert not contents(where.processed)
+
+
+@pytest.mark.skipif(shutil.which("openssl") is None, reason="openssl makes the certificates")
+def test_a_cluster_is_reached_by_tls_with_certificates_in_dasks_configuration_and_not_without(whole, begun, tmp_path):
+    names = {"CERT": str(tmp_path / "cert.pem"), "KEY": str(tmp_path / "key.pem")}
+    request = ["openssl", "req", "-x509", "-newkey", "rsa:2048", "-nodes", "-subj", "/CN=lab", "-days", "2"]
+    out = ["-out", names["CERT"], "-keyout", names["KEY"]]
+    subprocess.run([*request, *out], check=True, capture_output=True)
+    each = {f"{who}__{what}": file for who in ("SCHEDULER", "WORKER", "CLIENT") for what, file in names.items()}
+    settings = {f"DASK_DISTRIBUTED__COMM__TLS__{key}": file for key, file in {**each, "CA_FILE": names["CERT"]}.items()}
+    with cluster_of(tmp_path / "dask.log", "tls", **settings) as there:
+        there.add_worker()
+        said = flat(call("measure", begun, "--cluster", there.address, code=1))
+        assert f"{there.address} needs certificates: set distributed.comm.tls.ca-file" in said
+        assert not (processed(begun) / "recording").exists()
+        options = ("measure", str(begun), "--cluster", there.address)
+        ran = subprocess.run(
+            [sys.executable, "-c", MAIN, *options], env=os.environ | settings, capture_output=True, check=False
+        )
+        assert ran.returncode == 0, ran.stderr
+    assert contents(processed(begun)) == contents(processed(whole))
+
+
 def test_an_address_where_nobody_is_is_said(tmp_path, monkeypatch):
     monkeypatch.setattr(cluster, "PATIENCE", 1.0)
     study = arm.write_study(tmp_path / "raw" / "arm")
@@ -126,15 +255,15 @@ def test_a_worker_that_reckons_otherwise_is_refused(local, tmp_path, monkeypatch
 
 def test_a_worker_that_lacks_the_folder_or_holds_other_code_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(cluster, "PATIENCE", 0.1)
-    folders = Folders(tmp_path / "raw", tmp_path / "processed", tmp_path / "reports")
+    there = Folders(tmp_path / "raw", tmp_path / "processed", tmp_path / "reports")
     terms = cluster.own_terms(".run-x")
     with pytest.raises(BadRequest, match=r"does not see .*processed; a cluster needs the same folders"):
-        cluster.require(terms, folders)
-    folders.processed.mkdir()
-    (folders.processed / ".run-x").touch()
-    cluster.require(terms, folders)
+        cluster.require(terms, there)
+    there.processed.mkdir()
+    (there.processed / ".run-x").touch()
+    cluster.require(terms, there)
     with pytest.raises(BadRequest, match="holds another version of davinci-forces"):
-        cluster.require(replace(terms, code="0"), folders)
+        cluster.require(replace(terms, code="0"), there)
     older = tuple((name, "1.0" if name == "numpy" else version) for name, version in terms.versions)
     with pytest.raises(BadRequest, match=r"has numpy \S+ instead of 1\.0"):
-        cluster.require(replace(terms, versions=older), folders)
+        cluster.require(replace(terms, versions=older), there)

@@ -5,11 +5,14 @@ import shutil
 import signal
 import subprocess
 import sys
+import time
 from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
+import pyarrow.csv
 import pytest
+from pyarrow import parquet
 
 from davinci_forces.records.store import PARTIAL
 from tests.test_robustness import flat, raw, small  # noqa: F401 - fixtures
@@ -207,3 +210,190 @@ def test_whoever_of_a_run_is_killed_whenever_the_bytes_are_the_same_and_nobody_i
     call("all", folder)
     assert not partial_files(raw.parent)
     assert (contents(processed(folder)), contents(reports(folder))) == wanted
+
+
+COMMAND = """
+import sys
+from davinci_forces.cli import main
+from davinci_forces.runner.processes import workers
+workers.ALONE = -1.0
+if __name__ == "__main__":
+    exec(sys.argv.pop(1))
+    print("begins", flush=True)
+    main()
+"""
+DRAWING = """
+from davinci_forces.report.figures import together
+from davinci_forces.report import writers
+together.FEWEST = 1
+draw, typeset = together._draw, writers.renderer
+def say_and_draw(figures):
+    print("draws", flush=True)
+    draw(figures)
+def say_and_render(ending):
+    print("drawn", flush=True)
+    return typeset(ending)
+together._draw, writers.renderer = say_and_draw, say_and_render
+"""
+STOPPED = "stopped; run again to go on\n"
+
+
+@pytest.fixture(scope="module")
+def done(tmp_path_factory):
+    """A study that has run to its end, and what that made."""
+    folder = small(tmp_path_factory.mktemp("done") / "raw" / "lab", ("one",))
+    call("all", folder)
+    return contents(processed(folder)), contents(reports(folder))
+
+
+@pytest.fixture(scope="module")
+def fitted(tmp_path_factory):
+    """What fitting a study to its end makes."""
+    folder = small(tmp_path_factory.mktemp("fitted") / "raw" / "lab", ("one",))
+    call("fit", folder)
+    return contents(processed(folder))
+
+
+@pytest.fixture
+def begin(tmp_path):
+    """Starts the command line in a group of its own, as a terminal does, and waits until its code is there."""
+    script, started = tmp_path / "command.py", []
+    script.write_text(COMMAND)
+
+    def run(*words: str, first: str = "") -> subprocess.Popen:
+        started.append(
+            subprocess.Popen(
+                [sys.executable, str(script), first, *words],
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+                start_new_session=True,
+                preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+            )
+        )
+        assert started[-1].stdout.readline() == "begins\n"
+        return started[-1]
+
+    yield run
+    for run in started:
+        with suppress(ProcessLookupError):
+            os.killpg(run.pid, signal.SIGKILL)
+        run.communicate()
+
+
+def stopped(run: subprocess.Popen, how: str) -> tuple[str, int]:
+    """What a run says, and its exit code, when it is stopped; nobody is left."""
+    started = children(run.pid)
+    number = signal.SIGTERM if how == "SIGTERM" else signal.SIGINT
+    if how == "SIGTERM":
+        run.send_signal(number)
+    else:
+        os.killpg(run.pid, number)
+    if how == "twice":
+        time.sleep(0.1)
+        with suppress(ProcessLookupError):
+            os.killpg(run.pid, number)
+    started = {*started, *children(run.pid)}
+    _, said = run.communicate(timeout=60)
+    assert end_within(5.0, started)
+    return said, run.returncode
+
+
+LINUX = pytest.mark.skipif(sys.platform != "linux", reason="asks /proc who is there")
+HOW = {"SIGINT": 130, "SIGTERM": 143, "twice": 130}
+
+
+@LINUX
+@pytest.mark.medium
+@pytest.mark.parametrize(
+    ("jobs", "until", "how"),
+    [("1", "recording", "SIGINT"), ("2", "recording", "SIGTERM"), ("2", "fit", "SIGINT"), ("2", "fit", "twice")],
+)
+def test_a_run_that_is_stopped_says_so_in_one_line_and_goes_on_next_time(raw, begin, fitted, jobs, until, how):  # noqa: F811
+    folder = small(raw / "lab", ("one",))
+    run = begin("fit", str(folder), "--jobs", jobs)
+    while run.poll() is None and not (processed(folder) / until).exists():
+        time.sleep(0.01)
+    assert stopped(run, how) == (STOPPED, HOW[how])
+    assert not partial_files(raw.parent)
+    call("fit", folder)
+    assert contents(processed(folder)) == fitted
+
+
+@LINUX
+@pytest.mark.medium
+@pytest.mark.parametrize(("figures", "how"), [(True, "SIGINT"), (True, "SIGTERM"), (False, "SIGINT"), (False, "twice")])
+def test_a_report_that_is_stopped_leaves_nobody_that_draws_and_no_half_page(raw, begin, done, figures, how):  # noqa: F811
+    """While other processes draw figures, or while threads set pages, which cannot be ended."""
+    folder = small(raw / "lab", ("one",))
+    for where, made in ((processed(folder), done[0]), (reports(folder), done[1])):
+        for name, content in made.items():
+            (where / name).parent.mkdir(parents=True, exist_ok=True)
+            (where / name).write_bytes(content)
+    for page in reports(folder).iterdir():
+        page.unlink()
+    run = begin("all", str(folder), first=DRAWING)
+    line = run.stdout.readline()
+    while line and not line.startswith("drawn" if not figures else "draws"):
+        line = run.stdout.readline()
+    assert stopped(run, how) == (STOPPED, HOW[how])
+    assert not partial_files(raw.parent)
+
+
+@LINUX
+@pytest.mark.medium
+@pytest.mark.parametrize(("jobs", "how"), [("1", "SIGINT"), ("1", "SIGTERM"), ("2", "SIGINT")])
+def test_a_run_that_is_stopped_while_a_child_reads_a_log_leaves_no_child(raw, begin, jobs, how):  # noqa: F811
+    folder = small(raw / "lab", ("one",))
+    table = pyarrow.csv.read_csv(folder / "one.csv")
+    parquet.write_table(pyarrow.concat_tables([table] * 10_000), folder / "one.parquet", row_group_size=1000)
+    edit(folder / "study.toml", "one.csv", "one.parquet")
+    run = begin("ingest", str(folder), "--jobs", jobs)
+    while run.poll() is None and not any(map(reads_log, children(run.pid))):
+        time.sleep(0.01)
+    assert stopped(run, how) == (STOPPED, HOW[how])
+    assert not partial_files(raw.parent)
+
+
+def reads_log(pid: int) -> bool:
+    """Whether a process is one that reads a log for another."""
+    with suppress(OSError):
+        return b"isolated.child" in Path(f"/proc/{pid}/cmdline").read_bytes()
+    return False
+
+
+@LINUX
+@pytest.mark.medium
+def test_who_imports_the_package_keeps_his_handlers_of_signals(raw):  # noqa: F811
+    text = """
+import signal, sys
+from pathlib import Path
+from davinci_forces.runner import runs
+import davinci_forces.cli
+before = [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+assert runs.run(Path(sys.argv[1]), ["ingest"], jobs=2)
+assert before == [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
+assert before == [signal.default_int_handler, signal.SIG_DFL]
+assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
+"""
+    command = [sys.executable, "-c", text, str(small(raw / "lab"))]
+    subprocess.run(command, check=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL))
+
+
+@LINUX
+@pytest.mark.slow
+def test_whenever_a_run_is_stopped_it_says_one_line_and_the_next_goes_on(raw, begin, done):  # noqa: F811
+    stops, rng = int(os.environ.get("DAVINCI_FORCES_KILLS", "12")), np.random.default_rng(1)
+    folder = small(raw / "lab", ("one",))
+    for attempt in range(stops):
+        how = str(rng.choice(list(HOW)))
+        run = begin("all", str(folder), "--jobs", "1" if attempt % 3 == 2 else "2")
+        with suppress(subprocess.TimeoutExpired):
+            run.wait(rng.uniform(0.1, 9.0))
+        if run.poll() is None:
+            assert stopped(run, how) == (STOPPED, HOW[how])
+        assert not partial_files(raw.parent)
+        if attempt % 4 == 3:
+            shutil.rmtree(processed(folder))
+    call("all", folder)
+    assert (contents(processed(folder)), contents(reports(folder))) == done

@@ -1,14 +1,19 @@
 """Runs in a world that is not kind: missing files, full disks, two runs at once, altered results."""
 
 import ast
+import contextlib
+import errno
 import gc
 import json
+import os
 import shutil
+import socket
 import subprocess
 import sys
 import weakref
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
+from datetime import UTC, datetime
 
 import numpy as np
 import pytest
@@ -20,7 +25,8 @@ from davinci_forces.runner import execution
 from davinci_forces.runner.fingerprints.code import PACKAGE, code, imported
 from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, canonical, hash_of
 from davinci_forces.runner.ledger import Folders
-from davinci_forces.runner.lock import locked
+from davinci_forces.runner.lock import holder as holder_now
+from davinci_forces.runner.lock import locked, parsed
 from davinci_forces.runner.plan import Task
 from davinci_forces.runner.signature import declaration
 from davinci_forces.stages.recordings import resample
@@ -268,19 +274,12 @@ def test_a_lock_file_that_nobody_holds_counts_for_nothing(tmp_path):
         pass
 
 
-def test_many_runs_at_once_hold_the_lock_one_after_the_other(tmp_path):
-    """Each appends to a file what would be torn if two were inside at once."""
-    text = """
+AFTER = """
 import sys, time
 from pathlib import Path
 from davinci_forces.errors import BadRequest
-from davinci_forces.records import Diagnostic, PeriodResidual, Recording, store
-from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
-from davinci_forces.runner.ledger import Folders
 from davinci_forces.runner.lock import locked
-from davinci_forces.runner.plan import Task
-from davinci_forces.runner.signature import declaration
-folder, done = Path(sys.argv[1]), 0
+folder, done = Path(sys.argv[-1]), 0
 while done < 40:
     try:
         with locked(folder):
@@ -291,8 +290,193 @@ while done < 40:
     except BadRequest:
         time.sleep(0.0005)
 """
-    runs_ = [subprocess.Popen([sys.executable, "-c", text, str(tmp_path)]) for _ in range(3)]
+
+
+def test_many_runs_at_once_hold_the_lock_one_after_the_other(tmp_path):
+    """Each appends to a file what would be torn if two were inside at once."""
+    runs_ = [subprocess.Popen([sys.executable, "-c", AFTER, str(tmp_path)]) for _ in range(3)]
     assert [run.wait() for run in runs_] == [0, 0, 0]
+
+
+NO_FLOCK = """
+import errno, os, sys
+try:
+    import fcntl
+except ImportError:  # Windows
+    import msvcrt
+def refuse(*_):
+    raise OSError(getattr(errno, sys.argv[1]), os.strerror(getattr(errno, sys.argv[1])))
+if "fcntl" in globals():
+    fcntl.flock = refuse
+else:
+    msvcrt.locking = refuse
+"""
+REFUSALS = ("ENOSYS", "ENOTSUP", "ENOLCK")
+
+
+@pytest.fixture(params=REFUSALS)
+def without_flock(request, monkeypatch):
+    """A file system that cannot lock files, as NFS, SMB and FUSE may be: here, and in processes that begin so."""
+
+    def refuse(*_):
+        raise OSError(getattr(errno, request.param), "the file system has no locks")
+
+    flock = pytest.importorskip("fcntl") and "fcntl.flock"
+    monkeypatch.setattr(flock, refuse)
+    return request.param
+
+
+def hold_without_flock(error, folder):
+    """A process that holds the lock of a folder where the file system has none, and what the lock says."""
+    text = NO_FLOCK + HOLD.replace("sys.argv[1]", "sys.argv[2]")
+    other = subprocess.Popen([sys.executable, "-c", text, error, str(folder)], stdout=subprocess.PIPE, text=True)
+    assert other.stdout.readline() == "held\n"
+    return other
+
+
+def test_without_flock_the_lock_of_a_living_run_is_refused_and_that_of_a_dead_one_taken(tmp_path, without_flock):
+    other = hold_without_flock(without_flock, tmp_path)
+    try:
+        [said] = os.listdir(tmp_path / ".lock")
+        taken = parsed(said).taken
+        assert abs(datetime.now(UTC) - datetime.fromisoformat(f"{taken}+00:00")).total_seconds() < 600
+        with pytest.raises(BadRequest, match="another run is working on this study") as refused, locked(tmp_path):
+            pass
+        assert f"process {other.pid} on {socket.gethostname()}" in str(refused.value)
+        assert f"{taken[:19]} UTC" in str(refused.value)
+    finally:
+        other.kill()
+        other.communicate()
+    assert os.listdir(tmp_path / ".lock") == [said]
+    with locked(tmp_path), pytest.raises(BadRequest, match=f"process {os.getpid()} on"), locked(tmp_path):
+        pass
+    assert not list(tmp_path.iterdir())
+
+
+def left_by(folder, **what):
+    """A lock that was left by a run that differs so from one of this process."""
+    stale = replace(holder_now(), **what)
+    (folder / ".lock").mkdir()
+    (folder / ".lock" / stale.name).touch()
+    return stale
+
+
+def test_without_flock_a_later_process_of_the_same_number_is_told_from_the_one_that_ended(tmp_path, without_flock):
+    left_by(tmp_path, start="00000000.1")
+    with locked(tmp_path):
+        assert [parsed(name).start for name in os.listdir(tmp_path / ".lock")] == [holder_now().start]
+
+
+@pytest.mark.parametrize("host", ["elsewhere.0", f"{socket.gethostname()}.0"], ids=["host", "container"])
+@pytest.mark.parametrize("as_file", [False, True])
+def test_without_flock_the_lock_of_another_host_is_never_taken(tmp_path, without_flock, host, as_file):
+    theirs = left_by(tmp_path, host=host, process="4711", start="00000000.1", taken="2026-01-02 03:04:05.000000")
+    file = tmp_path / ".lock" / theirs.name
+    if as_file:  # by a run whose host could lock the file
+        shutil.rmtree(tmp_path / ".lock")
+        file = tmp_path / ".lock"
+        file.write_text(theirs.name)
+    for _ in range(2):
+        with pytest.raises(BadRequest) as refused, locked(tmp_path):
+            pass
+        told = f"process 4711 on {host[:-2]}, which took the lock at 2026-01-02 03:04:05 UTC"
+        assert told in str(refused.value)
+        assert str(refused.value).endswith(f"delete {file}")
+    file.unlink()
+    with locked(tmp_path):
+        pass
+
+
+@pytest.mark.parametrize("content", ["", "of a run that was killed", "4711\nlab\n", "host=&process=x&start=&taken="])
+def test_without_flock_what_names_nobody_holds_nothing(tmp_path, without_flock, content):
+    (tmp_path / ".lock").write_text(content)
+    with locked(tmp_path):
+        pass
+    (tmp_path / ".lock").mkdir()  # of a run that was killed as it let go
+    with locked(tmp_path):
+        pass
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_lock_says_who_holds_it_and_nothing_once_it_is_free(tmp_path):
+    with locked(tmp_path):
+        assert parsed((tmp_path / ".lock").read_text()).process == str(os.getpid())
+        with pytest.raises(BadRequest, match=f"process {os.getpid()} on {socket.gethostname()}"), locked(tmp_path):
+            pass
+    assert (tmp_path / ".lock").read_bytes() == b""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="links and pipes of POSIX")
+def test_a_lock_that_is_a_link_or_a_pipe_has_nothing_written_and_nobody_wait(tmp_path):
+    (tmp_path / "precious").write_text("content")
+    (tmp_path / ".lock").symlink_to(tmp_path / "precious")
+    with pytest.raises(OSError, match="lock"), locked(tmp_path):
+        pass
+    assert (tmp_path / "precious").read_text() == "content"
+    (tmp_path / ".lock").unlink()
+    os.mkfifo(tmp_path / ".lock")
+    with contextlib.suppress(OSError), locked(tmp_path):
+        pass
+
+
+RACE = """
+import time
+from pathlib import Path
+from davinci_forces.errors import BadRequest
+from davinci_forces.runner.lock import locked
+for line in sys.stdin:
+    folder = Path(line.strip())
+    while not (folder / "go").exists():
+        pass
+    try:
+        with locked(folder):
+            print("won", flush=True)
+            while not (folder / "over").exists():
+                time.sleep(0.001)
+    except BadRequest as error:
+        print(str(error), flush=True)
+"""
+
+
+@pytest.mark.medium
+@pytest.mark.parametrize("left", ["folder", "file", "nothing"])
+def test_without_flock_exactly_one_of_many_runs_takes_a_lock_that_was_left(tmp_path, left):
+    ran = [
+        subprocess.Popen(
+            [sys.executable, "-c", NO_FLOCK + RACE, "ENOTSUP"], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
+        for _ in range(3)
+    ]
+    try:
+        for i in range(100):
+            folder = tmp_path / str(i)
+            folder.mkdir()
+            if left != "nothing":
+                stale = left_by(folder, start="00000000.1")
+            if left == "file":
+                shutil.rmtree(folder / ".lock")
+                (folder / ".lock").write_text(stale.name)
+            for run in ran:
+                run.stdin.write(f"{folder}\n")
+                run.stdin.flush()
+            (folder / "go").touch()
+            said = {run: run.stdout.readline() for run in ran}
+            (folder / "over").touch()
+            [winner] = [run for run, line in said.items() if line == "won\n"]
+            others = [line for run, line in said.items() if run is not winner]
+            assert all(f"process {winner.pid} on" in line for line in others), others
+    finally:
+        for run in ran:
+            run.stdin.close()
+            run.wait()
+            run.stdout.close()
+
+
+@pytest.mark.medium
+def test_without_flock_many_runs_at_once_hold_the_lock_one_after_the_other(tmp_path):
+    ran = [subprocess.Popen([sys.executable, "-c", NO_FLOCK + AFTER, "ENOLCK", str(tmp_path)]) for _ in range(3)]
+    assert [run.wait() for run in ran] == [0, 0, 0]
+    assert not list(tmp_path.iterdir())
 
 
 def test_the_title_of_a_study_named_by_a_dot_is_its_folder(raw, monkeypatch):

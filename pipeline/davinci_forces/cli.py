@@ -1,7 +1,10 @@
 """Contact forces of a da Vinci arm from its motor currents, without a force sensor: from logs to a report."""
 
+import os
 import re
+import signal
 import sys
+from _thread import start_new_thread
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor
 from contextlib import contextmanager
@@ -10,6 +13,7 @@ from functools import wraps
 from importlib import import_module
 from inspect import cleandoc
 from pathlib import Path
+from time import sleep
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -25,6 +29,7 @@ from davinci_forces.stages import GROUPS, module
 if TYPE_CHECKING:
     from davinci_forces.runner.console import Verbosity
 
+GRACE = 3.0  # [s] that a run which is stopped has to end by itself
 STAGE = "stage"  # what the command that those of stages and groups are copies of is called until then
 FIRST, OTHERS = "Start here", "Other commands"  # panels of the help, before those of the groups and after them
 BEGIN = ("all", "new", "inspect", "compare", REPORT)
@@ -101,7 +106,43 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # names in logs need not fit the console's encoding
             stream.reconfigure(errors="replace")
-    app()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        if signal.getsignal(number) != signal.SIG_IGN:  # as in the background of a script
+            signal.signal(number, stop)
+    try:
+        app()
+    except Stopped as stopped:
+        stopped.say()
+        sys.exit(stopped.code)
+
+
+class Stopped(SystemExit):
+    """A signal asked for the end of the run."""
+
+    said = False
+
+    @classmethod
+    def say(cls) -> None:
+        """Say so, once."""
+        if not cls.said:
+            cls.said = True
+            typer.echo("stopped; run again to go on", err=True)
+
+
+def stop(number: int, _: object) -> None:
+    """Raise `Stopped`, as often as it may be asked for; and end the process where that does not, or not in time."""
+    for each in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(each, signal.SIG_IGN)
+    sys.unraisablehook = lambda _: None  # where it was raised in vain, as in a destructor
+    start_new_thread(leave, (128 + number,))  # one of `threading` waits for a lock that this thread may hold
+    raise Stopped(128 + number)
+
+
+def leave(code: int) -> None:
+    """End this process after a while, whatever it waits for."""
+    sleep(GRACE)
+    Stopped.say()
+    os._exit(code)
 
 
 @contextmanager

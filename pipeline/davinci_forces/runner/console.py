@@ -1,5 +1,6 @@
 """How a run speaks: lines for a log, on a terminal a bar as well, and at its end the answer, times and files."""
 
+import atexit
 import sys
 from collections.abc import Callable
 from contextlib import suppress
@@ -61,6 +62,7 @@ class Bar:
         progress = Progress(*columns, console=Terminal(stderr=True), transient=True)
         progress.add_task(stage, total=total)
         progress.start()
+        atexit.register(progress.stop)  # which gives the cursor back where a run is stopped
         return progress
 
 

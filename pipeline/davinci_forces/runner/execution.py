@@ -35,13 +35,14 @@ class Outcome:
     seconds: float = 0.0
 
 
-def perform(folders: Folders, task: Task) -> Outcome:
+def perform(folders: Folders, task: Task, mark: Path | None = None) -> Outcome:
     """Run one task.  Whatever goes wrong is its outcome, so that it costs no other task.
 
     Raises
     ------
-    OSError
-        If not even a diagnostic of what went wrong can be written.
+    Exception
+        If not even a diagnostic of what went wrong can be written, or the run has ended, whose mark is then gone: the
+        next one may have removed what this task was writing.
     """
     messages: list[str] = []
     start = perf_counter()
@@ -53,6 +54,8 @@ def perform(folders: Folders, task: Task) -> Outcome:
                 del record  # before the stage makes the next
         return Outcome(task, _made(writer), messages=tuple(messages), seconds=perf_counter() - start)
     except Exception as error:
+        if mark and not mark.exists():
+            raise
         said = said_of(error)
         failed = without_folders(said, folders)
         with _writer(folders, task) as writer:

@@ -1,39 +1,209 @@
-"""One run at a time on a study: two would take each other's half written files away."""
+"""One run at a time on a study: two would take each other's half written files away.
+
+The system locks the file `.lock` where the file system can.  Elsewhere `.lock` is a folder of one file, whose name
+says who runs: no folder replaces one that holds a file, and one run alone can rename the file of a run that has ended.
+"""
 
 import os
+import shutil
+import socket
+import subprocess
+import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from functools import cache
+from hashlib import sha256
 from pathlib import Path
-
-from filelock import FileLock, Timeout
+from urllib.parse import parse_qsl, urlencode
+from uuid import uuid4
 
 from davinci_forces.errors import BadRequest
 
-NAME = ".lock"  # it stays when a run has ended: what counts is whether a process holds it
+NAME = ".lock"  # the file stays when a run has ended: what counts is whether a process holds it
+BUSY, REMEDY = "another run is working on this study", "wait until it has ended, or stop it"
+MAX_TRIES = 100  # to take a lock that others take and release meanwhile
+FLAGS = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)  # a pipe must not wait
+OFFSET = 1 << 30  # [bytes] of what Windows locks, so that others can read what is before
+
+
+@dataclass(frozen=True)
+class Holder:
+    """A process that holds a lock."""
+
+    host: str
+    process: str
+    start: str  # of the process, which tells it from a later one of the same number
+    taken: str
+
+    @property
+    def name(self) -> str:
+        """The name of a file that says all of this."""
+        return urlencode(vars(self))
+
+    def require_end(self, folder: Path, file: Path) -> None:
+        """Raise `BadRequest` unless the process that holds the lock of a folder by a file is known to have ended."""
+        says = f"process {self.process} on {self.host.rpartition('.')[0]}, which took the lock at {self.taken[:19]} UTC"
+        if self.host != this_host():
+            raise BadRequest(
+                f"{folder}: a run of another host or container has this lock: {says}; whether it has ended "
+                f"cannot be seen from here: make sure that it has, then delete {file}"
+            )
+        start = start_of(int(self.process))
+        if start is not None and (start == self.start or "" in (start, self.start)):
+            raise BadRequest(f"{folder}: {BUSY}: {says}; {REMEDY}")
+
+
+def holder() -> Holder:
+    """This process, from now on."""
+    taken = datetime.now(UTC).replace(tzinfo=None).isoformat(" ", "microseconds")
+    return Holder(this_host(), str(os.getpid()), start_of(os.getpid()) or "", taken)
+
+
+def parsed(name: str) -> Holder | None:
+    """The holder that a name is of, if it is of one."""
+    try:
+        holder = Holder(**dict(parse_qsl(name, keep_blank_values=True)))
+        int(holder.process)
+    except (TypeError, ValueError):
+        return None
+    return holder
+
+
+@cache
+def this_host() -> str:
+    """The name of this host, and what tells it and its containers apart, and from others of that name."""
+    marks = []
+    with suppress(OSError):  # another system than Linux
+        marks = [os.readlink("/proc/self/ns/pid"), Path("/etc/machine-id").read_text(encoding="utf-8")]
+    return f"{socket.gethostname()[:64]}.{sha256(''.join(marks).encode()).hexdigest()[:12]}"
+
+
+def start_of(process: int) -> str | None:
+    """When a process began, as no other of its number did; empty if the system does not say, `None` if it has ended."""
+    if sys.platform == "win32":
+        return _start_on_windows(process)
+    try:
+        os.getpgid(process)
+        if sys.platform != "linux":
+            command, english = ["ps", "-o", "lstart=", "-p", str(process)], {"LC_ALL": "C", "TZ": "UTC"}
+            return subprocess.run(command, env=os.environ | english, capture_output=True, text=True).stdout.strip()
+        state, *fields = Path(f"/proc/{process}/stat").read_text(encoding="utf-8").rpartition(")")[2].split()
+        boot = Path("/proc/sys/kernel/random/boot_id").read_text(encoding="utf-8")
+        return None if state in "ZX" else f"{boot[:8]}.{fields[18]}"
+    except (ProcessLookupError, OverflowError):
+        return None
+    except OSError:  # it is of another user, and hidden
+        return ""
+
+
+def _start_on_windows(process: int) -> str | None:
+    import ctypes
+
+    kernel = ctypes.WinDLL("kernel32", use_last_error=True)  # type: ignore[attr-defined,unused-ignore]
+    kernel.OpenProcess.restype = ctypes.c_void_p
+    handle = ctypes.c_void_p(kernel.OpenProcess(0x1000, False, process))  # PROCESS_QUERY_LIMITED_INFORMATION
+    if not handle:
+        return "" if ctypes.get_last_error() == 5 else None  # type: ignore[attr-defined,unused-ignore]  # access denied
+    code, times = ctypes.c_ulong(), [ctypes.c_uint64() for _ in range(4)]
+    kernel.GetExitCodeProcess(handle, ctypes.byref(code))
+    kernel.GetProcessTimes(handle, *map(ctypes.byref, times))
+    kernel.CloseHandle(handle)
+    return str(times[0].value) if code.value == 259 else None  # STILL_ACTIVE
 
 
 @contextmanager
 def locked(folder: Path) -> Iterator[bool]:
-    """Hold the lock of a processed folder.  The system lets go of it when the process ends, however it ends.
+    """Hold the lock of a processed folder.  That of a process that ended, however it ended, counts for nothing.
 
     A folder that cannot be written to needs no lock, and gets none: whether it is held is what the context gives.
 
     Raises
     ------
     BadRequest
-        If another process holds it.
+        If another process holds it, or one of another host may do so.
     """
     if folder.is_dir() and not os.access(folder, os.W_OK):
         yield False
         return
     folder.mkdir(parents=True, exist_ok=True)
-    lock = FileLock(folder / NAME, timeout=0)
-    try:
-        lock.acquire()
-    except Timeout:
-        said = f"{folder}: another run is working on this study; wait until it has ended, or stop it"
-        raise BadRequest(said) from None
+    file, me = folder / NAME, holder()
+    for _ in range(MAX_TRIES):
+        descriptor = _lock_by_system(file, me)
+        if descriptor is not None or _lock_by_name(file, me):
+            break
+    else:
+        raise BadRequest(f"{file} cannot be taken; if no other run is about to begin, delete it")
     try:
         yield True
     finally:
-        lock.release()
+        if descriptor is not None:
+            os.ftruncate(descriptor, 0)
+            os.close(descriptor)
+        else:
+            (file / me.name).unlink(missing_ok=True)
+            with suppress(OSError):  # another run's folder has taken the place of this empty one
+                file.rmdir()
+
+
+def _lock_by_system(file: Path, me: Holder) -> int | None:
+    """Have the system lock a file, and write into it who holds it; `None` where the file system has no locks."""
+    try:
+        descriptor = os.open(file, FLAGS, 0o666)
+    except (IsADirectoryError, PermissionError) as error:  # which Windows says of a folder
+        if isinstance(error, PermissionError) and not file.is_dir():
+            raise
+        return None
+    try:
+        if sys.platform == "win32":
+            import msvcrt
+
+            os.lseek(descriptor, OFFSET, os.SEEK_SET)
+            msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
+            os.lseek(descriptor, 0, os.SEEK_SET)
+        else:
+            import fcntl
+
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except OSError as error:
+        is_held = isinstance(error, BlockingIOError | PermissionError)
+        os.lseek(descriptor, 0, os.SEEK_SET)
+        other = parsed(os.read(descriptor, 1000).decode("utf-8", "replace"))
+        os.close(descriptor)
+        if other:
+            other.require_end(file.parent, file)
+        if is_held:
+            raise BadRequest(f"{file.parent}: {BUSY}; {REMEDY}") from None
+        with suppress(OSError):  # another run has put a folder here
+            file.unlink()
+        return None
+    with suppress(OSError):  # a full disk
+        os.ftruncate(descriptor, 0)
+        os.write(descriptor, me.name.encode())
+    return descriptor
+
+
+def _lock_by_name(file: Path, me: Holder) -> bool:
+    """Hold a lock by a folder of this name, and a file in it whose name says who does; whether no other was faster."""
+    try:
+        names = sorted(os.listdir(file))
+    except OSError:
+        names = []
+    for name in names:
+        if name != me.name and (other := parsed(name)):
+            other.require_end(file.parent, file / name)
+    folder = file.with_name(f"{NAME}-{uuid4().hex}")
+    try:
+        if names:
+            os.rename(file / names[0], file / me.name)
+        else:
+            with suppress(OSError):  # Windows does not replace an empty folder
+                file.rmdir()
+            folder.mkdir()
+            (folder / me.name).touch()
+            os.rename(folder, file)
+    except OSError:
+        shutil.rmtree(folder, ignore_errors=True)
+        return False
+    return True

@@ -2,7 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from contextlib import closing
+from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property, partial
 from itertools import groupby
@@ -67,6 +67,7 @@ class Runner:
         self.seconds = dict.fromkeys(map(stage_of, steps), 0.0)
         with (
             locked(self.folders.processed) as self.writable,
+            self._tidied(),
             closing(Crew(self.others)) as self._crew,
         ):
             if self.writable:
@@ -76,8 +77,6 @@ class Runner:
                 self._remove_obsolete(steps)
             self._run(Graph(steps, [entry.name for entry in self.study.logs]))
             if self.writable:
-                if self.others:  # of whom one may have been ended, which of a cluster's is not even known
-                    self._remove_leftovers()
                 self.ledger.write_index()
         return self.failures == 0
 
@@ -104,6 +103,17 @@ class Runner:
 
     def _tasks(self, step: str, log: str = WHOLE) -> list[Task]:
         return [reporting.task(self.plan)] if step == REPORT else list(self.plan.tasks(declaration(step), log))
+
+    @contextmanager
+    def _tidied(self) -> Iterator[None]:
+        """Remove what is left half written where a run is stopped, and by others that may have been ended unseen."""
+        tidy = self.perform is None  # workers of a cluster go on with what they are at
+        try:
+            yield
+            tidy = self.others is not None
+        finally:
+            if tidy and self.writable:
+                self._remove_leftovers()
 
     def _remove_leftovers(self) -> None:
         """Remove what an interrupted run, or a process that was ended, left half written."""

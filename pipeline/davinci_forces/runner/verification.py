@@ -23,7 +23,9 @@ MOST = 5  # files or tasks that are named of many that differ alike
 PAGES = ".html", ".pdf"
 ENTRY = re.compile(r"processed/tasks/[^./][^/]*/[^./][^/]*\.json")  # what a ledger reads
 # Files that systems leave in any folder, the lock of a run, and the mark by which workers of a cluster know a folder.
-BESIDES = re.compile(r"(.*/)?(\.DS_Store|Thumbs\.db|desktop\.ini|\._[^/]*)|processed/\.(lock|run-[0-9a-f]{12})")
+BESIDES = re.compile(
+    r"(.*/)?(\.DS_Store|Thumbs\.db|desktop\.ini|\._[^/]*)|processed/\.(lock(-[0-9a-f]+)?(/.*)?|run-[0-9a-f]{12})"
+)
 
 
 @dataclass(frozen=True)

@@ -74,10 +74,11 @@ class Child:
         path = [str(PACKAGES), *(entry or os.getcwd() for entry in sys.path)]
         self.owner = os.getpid()
         self.late = False
-        self.process = subprocess.Popen(
-            [sys.executable, "-S", "-c", START.format(path=path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-            stderr=subprocess.DEVNULL, env=os.environ | SPARING,
-        )  # fmt: skip
+        with uninterrupted():
+            self.process = subprocess.Popen(
+                [sys.executable, "-S", "-c", START.format(path=path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                stderr=subprocess.DEVNULL, env=os.environ | SPARING,
+            )  # fmt: skip
 
     def answers(self, request: Message) -> Iterator[tuple[Message, list[Array]]]:
         """Ask, and hand on what comes back, piece by piece.
@@ -168,6 +169,19 @@ def close_all() -> None:
     """End the children that wait."""
     while _waiting:
         _waiting.pop().close()
+
+
+@contextmanager
+def uninterrupted() -> Iterator[None]:
+    """Start processes that Ctrl-C passes over, which a terminal sends to all: their parent ends them."""
+    if sys.platform == "win32":
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def end_with_parent() -> None:

@@ -9,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
+from davinci_forces.logs.isolated.process import uninterrupted
 from davinci_forces.report.content import Figure, Figure3D
 from davinci_forces.report.figures.svg import draw_svg, drawn
 
@@ -50,10 +51,11 @@ def _draw(figures: list[Figure | Figure3D]) -> None:
 def _ask(share: list[Figure | Figure3D]) -> "subprocess.Popen[bytes]":
     """Have another process draw a share.  It starts anew: a fork would inherit locks of threads that it has not."""
     path = os.pathsep.join(filter(None, [str(Path(__file__).parents[3]), os.environ.get("PYTHONPATH")]))
-    process = subprocess.Popen(
-        [sys.executable, "-P", "-c", PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-        env=os.environ | {"PYTHONPATH": path},
-    )  # fmt: skip
+    with uninterrupted():
+        process = subprocess.Popen(
+            [sys.executable, "-P", "-c", PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL, env=os.environ | {"PYTHONPATH": path},
+        )  # fmt: skip
     _send(share, process.stdin)
     return process
 

@@ -1,5 +1,6 @@
 """Workers of a Dask cluster: they see the same folders under the same paths, and hold the same code, or are refused."""
 
+import logging
 import socket
 from collections.abc import Iterator
 from concurrent.futures import Executor
@@ -21,6 +22,7 @@ from davinci_forces.runner.plan import Task
 from davinci_forces.runner.processes import arithmetic
 
 PACKAGES = ("numpy", "scipy", "numba", "pyarrow", "statsmodels", "clarabel")  # that results are made with
+LOGGERS = ("distributed.client", "tornado.application")  # of tracebacks of a connection that is lost
 PATIENCE = 10.0  # [s] that a shared file system may take to show a file to others
 
 
@@ -55,7 +57,7 @@ def perform_there(terms: Terms, folders: Folders, task: Task) -> Outcome:
         If this worker does not see the study's folders, or its code or libraries are others.
     """
     require(terms, folders)
-    return perform(folders, task)
+    return perform(folders, task, folders.processed / terms.mark)
 
 
 @cache
@@ -91,26 +93,39 @@ def connected(address: str, folders: Folders) -> Iterator[tuple[Executor, int, T
     Raises
     ------
     BadRequest
-        If there is no scheduler at the address, workers end again and again, or Dask is not installed.
+        If there is no scheduler at the address or it ends, workers end again and again, or Dask is not installed.
     """
     try:
-        from distributed import Client, KilledWorker
+        from distributed import Client, KilledWorker, Security
     except ImportError:
         raise BadRequest(
             "--cluster needs Dask, which is not installed: python -m pip install 'davinci-forces[cluster]'"
         ) from None
     try:
+        if address.startswith("tls:") and not Security().get_connection_args("client")["ssl_context"]:
+            names = "ca-file, client.cert and client.key"
+            raise BadRequest(f"{address} needs certificates: set distributed.comm.tls.{names} in Dask's configuration")
         client = Client(address, timeout=PATIENCE, set_as_default=False)
-    except (OSError, ValueError) as error:
+    except (OSError, RuntimeError, ValueError) as error:
         raise BadRequest(f"no scheduler of a Dask cluster answers at {address}: {error}") from None
     terms = own_terms(f".run-{uuid4().hex[:12]}")
     mark = folders.processed / terms.mark
     folders.processed.mkdir(parents=True, exist_ok=True)
     mark.touch()
+    levels = {logger: logger.level for logger in map(logging.getLogger, LOGGERS)}
+    for logger in levels:
+        logger.setLevel(logging.CRITICAL)
     try:
         yield client.get_executor(pure=False), max(sum(client.nthreads().values()), 1), terms
     except KilledWorker as error:
         raise BadRequest(f"workers of the cluster ended again and again, perhaps for want of memory: {error}") from None
+    except Exception:
+        if client.status == "running":
+            raise
+        says = f"the scheduler at {address} is gone; what was finished is kept: run again"
+        raise BadRequest(says) from None
     finally:
         mark.unlink(missing_ok=True)
         client.close()
+        for logger, level in levels.items():
+            logger.setLevel(level)

@@ -1,6 +1,7 @@
 """Processes that tasks run in: a pool of this machine's, which ends with its parent and is replaced where it breaks."""
 
 import os
+import signal
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
@@ -36,10 +37,12 @@ def prepare() -> None:
     """Have a process import what the stages import, where the system can copy it then, and do not wait for that."""
     compiled.home()  # a temporary one is shared with processes that start from now on
     if METHOD == "forkserver":
-        from multiprocessing import forkserver
+        from multiprocessing import forkserver, resource_tracker
 
         forkserver.set_forkserver_preload(["davinci_forces.runner.processes.preloaded"])
-        forkserver.ensure_running()
+        resource_tracker.ensure_running()  # which would let Ctrl-C through again
+        with process.uninterrupted():
+            forkserver.ensure_running()
 
 
 def pool(jobs: int) -> Executor:
@@ -51,6 +54,7 @@ def pool(jobs: int) -> Executor:
 def end_with_parent() -> None:
     """End this process when the one that started it has ended, however that came, or the one that began the run."""
     process.end_with_parent()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # where the system cannot start processes that ignore it
     parent = parent_process()
     if parent is not None:
         Thread(target=_await, args=(parent.sentinel,), daemon=True).start()
@@ -220,9 +224,15 @@ class Crew:
         return self.others.start()
 
     def close(self) -> None:
-        """Let the others end."""
+        """Let the others end; at once where the run ends before their tasks do, which nobody takes any more."""
         if self._started is not None:
             for future in self._running:
                 future.cancel()
-            self._started.shutdown()
+            if self._running:
+                others = list((getattr(self._started, "_processes", None) or {}).values())
+                for other in others:
+                    other.kill()
+                for other in others:
+                    other.join()
+            self._started.shutdown(wait=not self._running)
             self._started = None
