@@ -8,8 +8,6 @@ from functools import cache
 from pathlib import Path
 from time import perf_counter
 
-import numpy as np
-
 from davinci_forces.records import KINDS, Record, store
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.report import REPORT
@@ -120,8 +118,8 @@ def versions() -> dict[str, str]:
 @cache
 def environment() -> str:
     """The hash of what the bytes of a run depend on besides code and data: packages, and the kind of processor."""
-    instructions = np.show_config(mode="dicts").get("SIMD Extensions")  # whose sines differ in the last digit
-    return hash_of([versions(), platform.python_version(), platform.system(), platform.machine(), instructions])[:16]
+    machine = platform.python_version(), platform.system(), platform.machine(), arithmetic.instructions()
+    return hash_of((versions(), *machine))[:16]
 
 
 def study_files(study: Study) -> tuple[str, ...]:

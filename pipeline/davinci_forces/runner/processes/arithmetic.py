@@ -41,6 +41,14 @@ def described() -> str:
     return f"BLAS with one thread, kernels: {wanted().get('OPENBLAS_CORETYPE', f'those for this {platform.machine()}')}"
 
 
+@cache
+def instructions() -> str:
+    """The instruction sets that numpy computes with beyond the least: sines of two sets differ in the last digit."""
+    import numpy as np
+
+    return " ".join(np.show_config(mode="dicts").get("SIMD Extensions", {}).get("found", ()))
+
+
 _as_it_was = False  # numpy loaded before `pin` was called
 
 

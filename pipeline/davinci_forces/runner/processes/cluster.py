@@ -40,6 +40,7 @@ def own_terms(mark: str = "") -> Terms:
     """What this process has."""
     code = {file.relative_to(PACKAGE).as_posix(): store.digest(file) for file in sorted(PACKAGE.rglob("*.py"))}
     versions = {"Python": python_version(), "arithmetic": arithmetic.described()}
+    versions["instructions"] = arithmetic.instructions()
     for name in PACKAGES:
         try:
             versions[name] = version(name)
