@@ -62,6 +62,7 @@ TIERS = (
     ("estimators", "filters"),
     ("logs", "records", "robots"),
     ("maths", "toml"),
+    ("files",),
     ("errors",),
 )
 # The same inside maths, where what is computed from motion stands above what motion is.
@@ -172,7 +173,7 @@ def cycle(graph: dict[str, set[str]]) -> list[str]:
 
 
 def test_a_newcomer_finds_his_way_in_the_package():
-    entries = [p for p in ROOT.iterdir() if p.name != "__pycache__"]
+    entries = [p for p in ROOT.iterdir() if p.name not in ("__pycache__", "py.typed")]  # which nobody reads
     assert len(entries) <= 20, sorted(p.name for p in entries)
 
 
@@ -229,6 +230,54 @@ def test_the_report_computes_no_physics(source):
     physics = {name for name in imports(source) if name.startswith(("davinci_forces.maths", "davinci_forces.robots"))}
     data = ("davinci_forces.maths.arrays.", "davinci_forces.robots.robot.")
     assert not [name for name in physics if not name.startswith(data)]
+
+
+OPENING = {
+    "open", "read_text", "read_bytes", "write_text", "write_bytes", "memory_map", "OSFile", "ParquetFile", "read_table",
+    "open_file", "File", "loadmat", "whosmat", "fromfile", "memmap", "cmp",
+}  # fmt: skip
+OPENS = {  # a module that opens files otherwise than through `files`, and why it may
+    "files.py": "it is the door",
+    "cli.py": "the package's own code",
+    "maths/compiled.py": "the package's own code",
+    "runner/signature.py": "the package's own code",
+    "runner/fingerprints/code.py": "the package's own code",
+    "report/writers/html.py": "the package's own templates",
+    "report/writers/typesetting.py": "the package's own templates",
+    "simulation/scenario/reading.py": "the package's own scenarios",
+    "commands/haptics.py": "the package's own scenario",
+    "runner/processes/arithmetic.py": "what Linux says of the processor",
+    "runner/lock.py": "its own lock, which may be no file, and what Linux says of processes",
+    "records/store.py": "a library in C, after `require_file`",
+    "logs/arrow/table.py": "a library in C, after `open_log`",
+    "logs/hdf5/datasets.py": "a library in C, after `open_log`",
+    "logs/mat/variables.py": "a library in C, after `open_log`",
+    "logs/ros/storage.py": "a library in C, after `isolated` has asked of every file of a bag",
+    "logs/tdms/samples.py": "a library, given an opened file",
+    "logs/parts.py": "a library, given what is a file",
+    "simulation/sensors.py": "it writes into a new folder",
+    "simulation/study_folder.py": "it writes into a new folder",
+    "commands/excite.py": "it writes, after `require_file`",
+}
+
+
+def opening(source: Path) -> set[str]:
+    """Names of what a module calls that opens files; the door's own functions, called by name, are not among them."""
+    calls = [n.func for n in ast.walk(ast.parse(source.read_text(encoding="utf-8"))) if isinstance(n, ast.Call)]
+    methods = {func.attr for func in calls if isinstance(func, ast.Attribute)} & OPENING
+    functions = {func.id for func in calls if isinstance(func, ast.Name)} & {"open", "loadmat", "whosmat", "cmp"}
+    return methods | functions
+
+
+def test_files_are_opened_through_one_door():
+    """A pipe or a device keeps whoever opens it waiting; an exception that is none any more is to be removed."""
+    opens = {source.relative_to(ROOT).as_posix(): found for source in SOURCES if (found := opening(source))}
+    assert opens.keys() == OPENS.keys(), opens
+
+
+def test_what_is_printed_goes_through_one_place():
+    prints = [s for s in SOURCES if re.search(r"typer\.s?echo|\bprint\(", s.read_text(encoding="utf-8"))]
+    assert [source.relative_to(ROOT).as_posix() for source in prints] == ["runner/console.py"]
 
 
 def sources(module) -> list[Path]:

@@ -19,7 +19,6 @@ import davinci_forces
 from davinci_forces.cli import app
 from davinci_forces.errors import BadRequest, MissingRecord
 from davinci_forces.estimators import ESTIMATORS
-from davinci_forces.records import store
 from davinci_forces.runner import ledger, reporting
 from davinci_forces.runner.ledger import Ledger
 from davinci_forces.runner.runs import folders
@@ -235,8 +234,8 @@ def test_entries_and_files_are_read_once_a_run_and_entries_only_where_no_index_h
     if not whole:
         (processed(finished) / "tasks" / "index.json").unlink()
     hashed, read = Counter(), Counter()
-    digest, entry = store.digest, ledger._read
-    monkeypatch.setattr(store, "digest", lambda file: hashed.update([Path(file)]) or digest(file))
+    digest, entry = ledger.digest, ledger._read
+    monkeypatch.setattr(ledger, "digest", lambda file: hashed.update([Path(file)]) or digest(file))
     monkeypatch.setattr(ledger, "_read", lambda file: read.update([Path(file)]) or entry(file))
     assert "nothing to do" in call("all", finished)
     assert set(processed(finished).rglob("*.parquet")) <= set(hashed)

@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from davinci_forces.errors import BadRecord, NotReproduced, PipelineError
+from davinci_forces.files import digest
 from davinci_forces.records import KINDS, store
 from davinci_forces.runner import recomputation, reporting, verification
 from davinci_forces.runner.ledger import Folders, Ledger
@@ -240,7 +241,7 @@ def forge_everything(study: Path) -> None:
     theta = table["theta"].to_numpy() * 1.5
     altered = table.set_column(table.schema.get_field_index("theta"), table.schema.field("theta"), pa.array(theta))
     pq.write_table(altered.replace_schema_metadata(about), file)
-    sha = store.digest(file)
+    sha = digest(file)
     for entry in list(ledger.entries()):
         inputs = {key: sha if key == name else was for key, was in entry.fingerprint["inputs"].items()}
         outputs = {key: sha if key == name else was for key, was in entry.outputs.items()}
@@ -404,7 +405,7 @@ def test_the_id_on_the_page_is_the_hash_of_a_manifest_of_all_files(finished):  #
     assert shown in (reports(finished) / "report.html").read_text()
     listed = dict(line.split("  ")[::-1] for line in manifest.decode().splitlines())
     root = finished.parent.parent
-    assert {name: store.digest(root / name) for name in listed} == listed
+    assert {name: digest(root / name) for name in listed} == listed
     records = {file.relative_to(root).as_posix() for file in processed(finished).rglob("*.parquet")}
     pages = {"report.html", "report.pdf", "robot.html", "robot.pdf", "manifest.txt"}
     made = {f.relative_to(root).as_posix() for f in reports(finished).iterdir() if f.name not in pages}

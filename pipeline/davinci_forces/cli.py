@@ -23,6 +23,7 @@ from davinci_forces.commands import COMMANDS
 from davinci_forces.errors import PipelineError
 from davinci_forces.report import REPORT
 from davinci_forces.runner import ALL
+from davinci_forces.runner.console import echo
 from davinci_forces.runner.processes import arithmetic
 from davinci_forces.stages import GROUPS, module
 
@@ -102,6 +103,9 @@ class ShownAsWritten(TyperCommand):
 
 def main() -> None:
     """Run the command line."""
+    if sys.getfilesystemencoding() == "ascii" and os.environ.get("PYTHONUTF8") != "1":
+        # Which names no file with an umlaut.  Anew, as children are, which get the environment.
+        os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], os.environ | {"PYTHONUTF8": "1"})
     arithmetic.pin()
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # names in logs need not fit the console's encoding
@@ -126,7 +130,7 @@ class Stopped(SystemExit):
         """Say so, once."""
         if not cls.said:
             cls.said = True
-            typer.echo("stopped; run again to go on", err=True)
+            echo("stopped; run again to go on", err=True)
 
 
 def stop(number: int, _: object) -> None:
@@ -153,11 +157,15 @@ def messages() -> Iterator[None]:
     except BrokenPipeError:  # whoever read the output has gone, and needs no message
         raise
     except (PipelineError, OSError) as error:
-        typer.secho(f"error: {error}", fg="red", err=True)
+        echo(f"error: {error}", fg="red", err=True)
+        raise typer.Exit(1) from None
+    except UnicodeEncodeError as error:
+        near = error.object[max(error.start - 40, 0) : error.end + 40]
+        echo(f"error: a name is not in UTF-8, near {near!r}; rename the file or the folder", fg="red", err=True)
         raise typer.Exit(1) from None
     except BrokenExecutor:
         says = "a process of this run was ended from outside, perhaps for want of memory; run again with fewer --jobs"
-        typer.secho(f"error: {says}: what was finished is kept", fg="red", err=True)
+        echo(f"error: {says}: what was finished is kept", fg="red", err=True)
         raise typer.Exit(1) from None
 
 
@@ -177,7 +185,7 @@ def tell_version(asked: bool) -> None:
     if asked:
         from importlib.metadata import version
 
-        typer.echo(f"davinci-forces {version('davinci-forces')}")
+        echo(f"davinci-forces {version('davinci-forces')}")
         raise typer.Exit
 
 

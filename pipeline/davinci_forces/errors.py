@@ -39,3 +39,10 @@ class NotReproduced(PipelineError):
 
 class BadRequest(PipelineError):
     """What was asked on the command line cannot be done."""
+
+
+class NotAFile(PipelineError, OSError):
+    """A pipe, a device, a socket, a folder or an endless file stands where a file is read."""
+
+    def __str__(self) -> str:
+        return f"{self.filename}: {self.strerror}"

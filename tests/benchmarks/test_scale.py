@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from davinci_forces.records import store
+from davinci_forces.files import digest
 from davinci_forces.runner.console import Console
 from davinci_forces.runner.ledger import Folders
 from davinci_forces.runner.runner import Runner
@@ -80,7 +80,7 @@ def seconds_of_hashing(where: Folders) -> float:
     files = [f for root in (where.raw, where.processed) for f in root.rglob("*") if f.is_file()]
     start = time.process_time()
     for file in files:
-        store.digest(file)
+        digest(file)
     return time.process_time() - start
 
 

@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from davinci_forces.runner.console import echo
+
 
 def run(
     studies: Annotated[
@@ -21,6 +23,6 @@ def run(
 
     files, left_out = campaign.write(list(runs.studies(studies or [])), reports, out)
     for study in left_out:
-        typer.secho(f"{study}: left out, as it has no results; run `davinci-forces all {study}`", fg="yellow", err=True)
+        echo(f"{study}: left out, as it has no results; run `davinci-forces all {study}`", fg="yellow", err=True)
     for file in files:
-        typer.echo(f"see {file}")
+        echo(f"see {file}")

@@ -11,6 +11,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from davinci_forces.runner.console import echo
+
 if TYPE_CHECKING:
     from davinci_forces.report.changes import Change, Stated
 
@@ -30,11 +32,11 @@ def run(
     before, after = (stated.read(file) for file in files)
     found = changes(before, after)
     if as_json:
-        typer.echo(json.dumps([_row(each) for each in found], indent=1, ensure_ascii=False, allow_nan=False))
+        echo(json.dumps([_row(each) for each in found], indent=1, ensure_ascii=False, allow_nan=False))
         return
     for name, file, numbers in zip("ab", files, (before, after), strict=True):
-        typer.echo(f"{name}: {file}, {len(numbers)} numbers")
-    typer.echo("\n".join(_lines(found, before, after)))
+        echo(f"{name}: {file}, {len(numbers)} numbers")
+    echo("\n".join(_lines(found, before, after)))
 
 
 def _row(each: "Change") -> dict[str, Any]:

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from davinci_forces.runner.console import echo
+
 if TYPE_CHECKING:
     from davinci_forces.simulation.excitation.request import Answer, ArmExcitation
     from davinci_forces.simulation.excitation.trajectory import ExcitationTrajectory
@@ -40,10 +42,14 @@ def run(
     starts may find more. All joints of an arm take minutes; each start is told of when it is done.
     """
     from davinci_forces.errors import BadRequest
+    from davinci_forces.files import require_file
     from davinci_forces.simulation.excitation import trajectory
     from davinci_forces.simulation.excitation.request import Request, answer
 
     request = Request(robot, joint, evaluate, period, harmonics, criterion, (q, dq, ddq), starts, seed, samples)
+    for file in filter(None, (csv, plot)):
+        if file.exists():
+            require_file(file)  # writing to a pipe waits for whoever reads it
     answered = answer(request, _say)
     try:
         if csv:
@@ -52,11 +58,11 @@ def run(
             trajectory.plot(answered.trajectories, plot)
     except OSError as error:
         raise BadRequest(f"{error.filename}: {error.strerror}") from None
-    typer.echo(json.dumps(_document(robot, answered), indent=2) if as_json else _format_text(answered))
+    echo(json.dumps(_document(robot, answered), indent=2) if as_json else _format_text(answered))
 
 
 def _say(start: int, starts: int, value: float) -> None:
-    typer.echo(f"start {start} of {starts}: objective {value:.4f}", err=True)
+    echo(f"start {start} of {starts}: objective {value:.4f}", err=True)
 
 
 def _document(robot: str, answered: "Answer") -> dict[str, Any]:

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from davinci_forces.runner.console import echo
+
 if TYPE_CHECKING:
     from davinci_forces.haptics.scenario import HapticScenario
 
@@ -33,7 +35,7 @@ def run(
 
     whole = haptic.filled(haptics.read(scenario) if scenario else haptics.HapticScenario())
     answer = _answer(whole, csv)
-    typer.echo(json.dumps(answer, indent=2, allow_nan=False) if as_json else _format_text(answer))
+    echo(json.dumps(answer, indent=2, allow_nan=False) if as_json else _format_text(answer))
 
 
 def _write_template(file: Path) -> None:
@@ -47,12 +49,12 @@ def _write_template(file: Path) -> None:
     from importlib.resources import files
 
     from davinci_forces.errors import BadRequest
-    from davinci_forces.records import store
+    from davinci_forces.files import write_bytes
 
     if file.exists():
         raise BadRequest(f"{file} is there already; name another file, or move it away")
-    store.write_bytes(file, files("davinci_forces.haptics").joinpath("haptics.toml").read_bytes())
-    typer.echo(f"{file}: written; change its numbers, then run `davinci-forces haptics {file}`")
+    write_bytes(file, files("davinci_forces.haptics").joinpath("haptics.toml").read_bytes())
+    echo(f"{file}: written; change its numbers, then run `davinci-forces haptics {file}`")
 
 
 def _answer(scenario: "HapticScenario", csv: Path | None) -> Answer:
@@ -82,11 +84,12 @@ def _known(value: float) -> float | None:
 
 def _write_csv(file: Path, run: object) -> None:
     """What one hand felt, a row a turn of the controller."""
+    from davinci_forces.files import write_bytes
+
     fields = {"t [s]": "t", "plan [m]": "plan", "hand [m]": "x", "arm [m]": "q", "true [N]": "true", "felt [N]": "felt"}
     rows = zip(*(getattr(run, name).tolist() for name in fields.values()), strict=True)
-    file.parent.mkdir(parents=True, exist_ok=True)
     lines = [",".join(fields), *(",".join(f"{x:.9g}" for x in row) for row in rows)]
-    file.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")
+    write_bytes(file, ("\n".join(lines) + "\n").encode())
 
 
 def _format_text(answer: Answer) -> str:

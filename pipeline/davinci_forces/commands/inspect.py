@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from davinci_forces.runner.console import echo
+
 if TYPE_CHECKING:
     from davinci_forces.logs.log import Log, Options
     from davinci_forces.maths.signals.clock import ClockStatistics
@@ -31,11 +33,11 @@ def run(
     of = int(columns) if columns and columns.isdecimal() else tuple(columns.split(",")) if columns else None
     description = describe(file, head, Options(dtype=dtype, columns=of))
     if as_json:
-        typer.echo(json.dumps(description, indent=1, ensure_ascii=False, allow_nan=False))
+        echo(json.dumps(description, indent=1, ensure_ascii=False, allow_nan=False))
     else:
-        from davinci_forces.logs.log import visible
+        from davinci_forces.files import visible
 
-        typer.echo("\n".join(visible(line) for line in lines(description)))
+        echo("\n".join(visible(line) for line in lines(description)))
 
 
 @dataclass

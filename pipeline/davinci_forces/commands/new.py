@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from davinci_forces.runner.console import echo
+
 
 def run(
     files: Annotated[list[Path], typer.Argument(help="Logs, in the folder of the study: raw/<study>/<log>.")],
@@ -16,19 +18,19 @@ def run(
 ) -> None:
     """Describe logs in a study.toml, which is never overwritten."""
     from davinci_forces.errors import BadRequest
-    from davinci_forces.records import store
+    from davinci_forces.files import write_bytes
     from davinci_forces.study import template
 
     folder = study or files[0].parent
     draft = template.describe(files, folder, robot)
     if show:
-        typer.echo(draft.text)
+        echo(draft.text)
         return
     target = folder / "study.toml"
     if target.exists():
         raise BadRequest(f"{target} is there already; move it away, or print the new one with --print")
     if draft.robot_file:
-        store.write_bytes(folder / draft.robot_file, draft.robot_text.encode())
-        typer.echo(f"{folder / draft.robot_file}: written; check the kinds of its joints and their terms")
-    store.write_bytes(target, draft.text.encode())
-    typer.echo(f"{target}: written; check the channels, then run `davinci-forces all {folder}`")
+        write_bytes(folder / draft.robot_file, draft.robot_text.encode())
+        echo(f"{folder / draft.robot_file}: written; check the kinds of its joints and their terms")
+    write_bytes(target, draft.text.encode())
+    echo(f"{target}: written; check the channels, then run `davinci-forces all {folder}`")

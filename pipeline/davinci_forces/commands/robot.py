@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from davinci_forces.runner.console import echo
+
 if TYPE_CHECKING:
     from davinci_forces.robots.robot import Joint, Robot
 
@@ -33,12 +35,12 @@ def run(
     if urdf:
         from davinci_forces.robots.urdf import writing
 
-        typer.echo(writing.text(arm), nl=False)
+        echo(writing.text(arm), nl=False)
         return
     n = arm.chain.n if arm.chain else 0
     q = _values("--at", at) if at is not None else [0.0] * (min(DEFAULT, n) if arm.wrist else n)
     document = _document(arm, q, _values("--dq", dq) if dq is not None else [])
-    typer.echo(json.dumps(document, indent=2, allow_nan=False) if as_json else _format_text(arm, q, document))
+    echo(json.dumps(document, indent=2, allow_nan=False) if as_json else _format_text(arm, q, document))
 
 
 def _values(option: str, text: str) -> list[float]:

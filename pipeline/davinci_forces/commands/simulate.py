@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from davinci_forces.runner.console import echo
+
 
 def run(
     scenario: Annotated[str, typer.Argument(help="A shipped scenario by its name, or the path of a .toml file.")],
@@ -18,6 +20,6 @@ def run(
 
     study_folder.check(out, force)
     try:
-        study_folder.write(load(scenario), out, force, typer.echo)
+        study_folder.write(load(scenario), out, force, echo)
     except OSError as error:
         raise BadRequest(f"{error.filename}: {error.strerror}") from None

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from davinci_forces.runner.console import echo
+
 if TYPE_CHECKING:
     from davinci_forces.haptics.maths.bimodal import Hand
 
@@ -29,9 +31,9 @@ def run(
     limits = _limits(hand, delay, rate)
     if as_json:
         asked = {"k_h": k_h, "b_h": b_h, "m": m, "delay": delay, "rate": rate}
-        typer.echo(json.dumps(asked | limits, indent=2, allow_nan=False))
+        echo(json.dumps(asked | limits, indent=2, allow_nan=False))
     else:
-        typer.echo(_format_text(hand, limits, delay, rate))
+        echo(_format_text(hand, limits, delay, rate))
 
 
 def _hand(k_h: float, b_h: float, m: float, delay: float | None, rate: float | None) -> "Hand":

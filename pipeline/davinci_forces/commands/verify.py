@@ -5,6 +5,8 @@ from typing import Annotated
 
 import typer
 
+from davinci_forces.runner.console import echo
+
 
 def run(
     study: Annotated[Path, typer.Argument(help="Folder of a study: raw/<study>, which holds study.toml.")],
@@ -25,13 +27,13 @@ def run(
     folders = runs.folders(study, processed, reports)
     pages = not again or recomputation.has_same_environment(folders)
     verified = verification.verify(reading.read(study), folders, "".join(wanted.split()).lower(), pages)
-    typer.echo(
+    echo(
         f"{study}: {verified.raw} raw, {verified.processed} processed and {verified.reports} report files are "
         f"unchanged, all {verified.numbers} numbers of results.json are those of their records, and the "
         f"{'report' if pages else 'results.json'} made anew is the same; its ID is {verified.identity}"
     )
     if verified.unrelated:
-        typer.echo(f"{study}: not compared, since they are no part of the results: {', '.join(verified.unrelated)}")
+        echo(f"{study}: not compared, since they are no part of the results: {', '.join(verified.unrelated)}")
     if again:
         for line in recomputation.recompute(folders, pages, jobs):
-            typer.echo(f"{study}: {line}")
+            echo(f"{study}: {line}")

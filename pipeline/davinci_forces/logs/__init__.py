@@ -4,6 +4,7 @@ from importlib import import_module
 from pathlib import Path
 
 from davinci_forces.errors import BadLog
+from davinci_forces.files import open_file
 from davinci_forces.logs.log import Log, Options
 
 # Text last: it recognises whatever looks like columns of numbers, and raw binary whatever has that name before it.
@@ -23,7 +24,7 @@ def open_log(path: Path, options: Options = Options()) -> Log:  # noqa: B008 - f
         raise BadLog(f"{path}: there is no such file")
     if path.is_dir() and not (path / BAG).is_file():
         raise BadLog(f"{path}: it is a folder without {BAG}, so it is no bag of ROS 2; name a file in it")
-    with (path / BAG if path.is_dir() else path).open("rb") as file:
+    with open_file(path / BAG if path.is_dir() else path) as file:
         head = file.read(4096)
     if not head:
         raise BadLog(f"{path}: the file is empty (0 bytes); record it again, or take it out of study.toml")

@@ -9,6 +9,7 @@ from typing import BinaryIO
 import numpy as np
 
 from davinci_forces.errors import BadLog
+from davinci_forces.files import open_file
 from davinci_forces.logs.log import Block, Channel, Log, Options, ahead, unique, unit_in
 
 SUFFIXES = (".bin", ".dat")
@@ -77,7 +78,7 @@ class BinaryLog(Log):
 
     def _blocks(self, names: Sequence[str]) -> Iterator[Block]:
         number = {channel.name: i for i, channel in enumerate(self.channels)}
-        with self.path.open("rb") as file:
+        with open_file(self.path) as file:
             for rows in self._rows(file):
                 yield self.tallied({name: rows[:, number[name]].astype(np.float64) for name in names})
 
@@ -102,7 +103,7 @@ def _pieces(path: Path, dtype: np.dtype[np.generic], columns: int) -> tuple[Piec
     of the file are no chance, and neither are two before numbers that would be 1e-300 if they were numbers.
     """
     size, row = path.stat().st_size, columns * dtype.itemsize
-    with path.open("rb") as file:
+    with open_file(path) as file:
         sized, end = _sized(file, size, dtype, columns)
     if sized and (end == size or (columns > 1 and dtype.kind == "f")):
         if end < size:

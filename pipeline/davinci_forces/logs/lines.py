@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.errors import BadLog
+from davinci_forces.files import open_file
 
 SIZE = 4 << 20  # [bytes] of a block
 LONGEST = 64 << 20  # [bytes] of a line
@@ -51,7 +52,7 @@ class Lines:
     damage: str = ""  # what kept a compressed file from being read to its end
 
     def __post_init__(self) -> None:
-        with self.path.open("rb") as file:
+        with open_file(self.path) as file:
             start = file.read(4)
         self.zipped = start.startswith(GZIP)
         self.mark = next((mark for mark in MARKS if start.startswith(mark)), b"")
@@ -90,7 +91,7 @@ class Lines:
         self.cut, self.cut_at = remainder, line
 
     def _bytes(self, size: int) -> Iterator[bytes]:
-        with self.path.open("rb") as file:
+        with open_file(self.path) as file:
             pieces = iter(lambda: file.read(size), b"")
             yield from self._unzipped(pieces, size) if self.zipped else pieces
 

@@ -31,8 +31,6 @@ from davinci_forces.errors import BadLog
 
 Block = dict[str, NDArray[np.float64]]  # channel name -> samples; every array of a block has one length
 COUNTED = "samples"  # unit of a channel of times that only counts them
-# What a terminal or a page would obey or hide instead of showing it.
-CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u200e\u200f\u2028-\u202e\u2066-\u2069]")
 IN_BRACKETS = re.compile(r".*\S\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*")
 ROWS = 1 << 16  # of a block, or fewer
 CELLS = 1 << 20  # of a block of many channels
@@ -220,11 +218,6 @@ def unit_in(name: str) -> str:
     """The unit of a name such as `q [rad]` or `q (rad)`, else ""."""
     unit = IN_BRACKETS.fullmatch(name)
     return unit.group(1) if unit else ""
-
-
-def visible(text: str) -> str:
-    """Text of a log with its control characters written out, as in `\\x1b`, for people to read."""
-    return CONTROL.sub(lambda match: match[0].encode("unicode_escape").decode(), text)
 
 
 def renamed(written: Sequence[str], names: Sequence[str]) -> list[str]:

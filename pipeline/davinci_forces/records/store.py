@@ -5,22 +5,21 @@ field and what the file was made from.  Nothing in a file changes from run to ru
 same bytes.  A file appears under its own name only when it is whole.
 """
 
-import hashlib
 import json
 import os
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import Field, fields
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
-from uuid import uuid4
 
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
 from davinci_forces.errors import BadRecord, BadRequest, MissingRecord, PipelineError
+from davinci_forces.files import PARTIAL, digest, require_file, unnamed
 from davinci_forces.records import AnyRecord, Column, Counts, Labels, Names, Origin, Record
 from davinci_forces.records.quantities import QUANTITIES
 
@@ -28,7 +27,6 @@ Unit = Callable[[str], str]
 
 ARROW: dict[Any, pa.DataType] = {Column: pa.float64(), Counts: pa.int64(), Labels: pa.string()}
 ROWS = 1 << 24  # at most in a row group: a recording in one of them is read without a copy
-PARTIAL = ".partial"  # what the name of a file that is still being written ends with
 
 
 def path(kind: type[Record], key: Names) -> Path:
@@ -131,9 +129,7 @@ def read(kind: type[AnyRecord], folder: Path, place: Path, sha256: str = "", lon
         If it is not a record of this kind, as this version writes it; of a long one, whenever a column is not.
     """
     whole = folder / place
-    if not whole.exists():
-        raise MissingRecord(f"{whole} is not there; run the stage that writes {kind.__name__} records first")
-    with _understood(kind, whole), pq.ParquetFile(whole) as file:
+    with _opened(kind, whole) as file:
         stored, described = file.metadata.metadata or {}, file.schema_arrow
         metadata = {key.decode(): stored[key].decode() for key in (b"record", b"scalars", b"units")}
         if metadata["record"] != kind.__name__:
@@ -151,10 +147,14 @@ def read(kind: type[AnyRecord], folder: Path, place: Path, sha256: str = "", lon
 
 
 @contextmanager
-def _understood(kind: type[Record], whole: Path) -> Iterator[None]:
-    """Say of whatever cannot be read in a file that it is not a record of this kind."""
+def _opened(kind: type[Record], whole: Path) -> Iterator[pq.ParquetFile]:
+    """The file of a record; of whatever cannot be read in it, it is said that it is not a record of this kind."""
     try:
-        yield
+        require_file(whole)  # as a library in C would wait for a pipe
+        with pq.ParquetFile(whole) as file:
+            yield file
+    except FileNotFoundError:
+        raise MissingRecord(f"{whole} is not there; run the stage that writes {kind.__name__} records first") from None
     except (pa.ArrowException, PipelineError, LookupError, TypeError, ValueError, OSError, MemoryError) as error:
         raise BadRecord(
             f"{whole}: not a {kind.__name__} as this version writes it ({error}); run with --force"
@@ -163,38 +163,13 @@ def _understood(kind: type[Record], whole: Path) -> Iterator[None]:
 
 def _column_of(kind: type[Record], whole: Path, name: str) -> np.ndarray[Any, Any]:
     """One column of the record in a file."""
-    with _understood(kind, whole), pq.ParquetFile(whole) as file:
+    with _opened(kind, whole) as file:
         return _values(file.read([name])[name])
 
 
 def release() -> None:
     """Give back what Arrow keeps of the memory in which records were read and written."""
     pa.default_memory_pool().release_unused()
-
-
-def digest(file: Path | str) -> str:
-    """The sha256 of a file's bytes."""
-    with open(file, "rb") as stream:
-        return hashlib.file_digest(stream, "sha256").hexdigest()
-
-
-def write_bytes(file: Path, content: bytes) -> None:
-    """Write a file so that it is there whole or not at all."""
-    write_together({file: content})
-
-
-def write_together(contents: Mapping[Path, bytes]) -> None:
-    """Write files that belong together: all are whole before the first gets its name, the last one's name says so."""
-    name = unnamed()
-    try:
-        for file, content in contents.items():
-            file.parent.mkdir(parents=True, exist_ok=True)
-            name(file).write_bytes(content)
-        for file in contents:
-            name(file).replace(file)
-    finally:
-        for file in contents:
-            name(file).unlink(missing_ok=True)
 
 
 def leftovers(folder: Path) -> Iterator[Path]:
@@ -214,12 +189,6 @@ def leftovers(folder: Path) -> Iterator[Path]:
                     "put all results elsewhere with --processed and --reports"
                 )
         yield from (Path(home, file) for file in files if file.endswith(PARTIAL))
-
-
-def unnamed() -> Callable[[Path], Path]:
-    """What files are called while they are written: of two processes that write one file, neither has the other's."""
-    token = uuid4().hex[:12]
-    return lambda file: file.with_name(f"{file.name}.{token}{PARTIAL}")
 
 
 def _encoding(described: pa.Schema) -> dict[str, Any]:

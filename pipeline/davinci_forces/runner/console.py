@@ -5,9 +5,11 @@ import sys
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import typer
+
+from davinci_forces.files import visible
 
 if TYPE_CHECKING:
     from rich.progress import Progress
@@ -19,7 +21,7 @@ Verbosity = Literal["quiet", "normal", "verbose"]
 class Console:
     """How a run speaks: a line at a time, and how far it is."""
 
-    say: Callable[[str], None]
+    say: Callable[..., None]  # a line, and how it looks
     warn: Callable[[str], None]
     progress: Callable[[str, int, int], None] = lambda stage, done, total: None
 
@@ -28,12 +30,12 @@ def console(verbosity: Verbosity) -> Console:
     """Lines for a log; on a terminal, a bar as well.  Warnings are never left out."""
     bar = Bar() if verbosity == "normal" and sys.stderr.isatty() else None
 
-    def say(line: str) -> None:
+    def say(line: str, **looks: Any) -> None:
         if verbosity != "quiet":
-            typer.echo(line)
+            echo(line, **looks)
 
     def warn(line: str) -> None:
-        typer.secho(line, fg="yellow", err=True)
+        echo(line, err=True, fg="yellow")
 
     return Console(say, warn, bar.show) if bar else Console(say, warn)
 
@@ -72,9 +74,9 @@ def durations(seconds: dict[str, float]) -> str:
     return f"took {sum(seconds.values()):.1f} s" + (f": {', '.join(long)}" if long else "")
 
 
-def printable(text: str) -> str:
-    """A text as this terminal can show it: its marks as letters where it knows none."""
-    with suppress(UnicodeEncodeError, LookupError):
-        text.encode(sys.stdout.encoding or "utf-8")
-        return text
-    return text.encode("ascii", "replace").decode()
+def echo(text: str, err: bool = False, **looks: Any) -> None:
+    """Print a text as this terminal can show it: what it would obey written out, and letters where it has no marks."""
+    text, encoding = visible(text, "\n\t"), (sys.stderr if err else sys.stdout).encoding or "utf-8"
+    with suppress(LookupError):
+        text = text.encode(encoding, "replace").decode(encoding)
+    typer.secho(text, err=err, **looks)

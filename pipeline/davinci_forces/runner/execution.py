@@ -12,6 +12,7 @@ from time import perf_counter
 from typing import Any
 
 from davinci_forces.errors import BadLog, PipelineError
+from davinci_forces.files import digest
 from davinci_forces.logs.joined import open_joined
 from davinci_forces.logs.log import Log, Options
 from davinci_forces.logs.parts import open_parts
@@ -145,7 +146,7 @@ def _writer(folders: Folders, task: Task) -> Iterator[store.Writer]:
 
 
 def _made(writer: store.Writer) -> dict[str, str]:
-    return {f"processed/{place.as_posix()}": store.digest(writer.folder / place) for place in writer.places}
+    return {f"processed/{place.as_posix()}": digest(writer.folder / place) for place in writer.places}
 
 
 def _log(folders: Folders, entry: LogEntry) -> Log:

@@ -25,7 +25,8 @@ from glob import glob
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from davinci_forces.records import FORMER_FOLDERS, KINDS, store
+from davinci_forces.files import digest, read_bytes, write_bytes
+from davinci_forces.records import FORMER_FOLDERS, KINDS
 from davinci_forces.report import FILES
 from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, differences, hash_of_text
 
@@ -145,7 +146,7 @@ class Ledger:
         gone = self._remove_outputs(before.outputs if before else ())
         self._digests.update(entry.outputs)
         self._forget_index()
-        store.write_bytes(self.place(entry.stage, entry.task), sealed(entry).encode())
+        write_bytes(self.place(entry.stage, entry.task), sealed(entry).encode())
         self._entries.setdefault(entry.stage, {})[file_name(entry.task)] = entry
         self.changes.append((gone, entry.outputs))
 
@@ -187,7 +188,7 @@ class Ledger:
     def write_index(self) -> None:
         """Put the index of all entries in place, unless it is."""
         if self._entries and not self._indexed:
-            store.write_bytes(self.home / INDEX, self.index())
+            write_bytes(self.home / INDEX, self.index())
             self._indexed = True
 
     def index(self) -> bytes:
@@ -267,8 +268,7 @@ def checked(entry: Entry, stage: str, name: str) -> Entry:
 
 def _read(file: str) -> Entry:
     """The entry in a file; raises as `checked` does, and where the file cannot be read or its hash is another."""
-    with open(file, "rb") as stream:
-        entry = unsealed(stream.read().decode())
+    entry = unsealed(read_bytes(file).decode())
     if entry is None:
         raise ValueError("it is not as a stage wrote it")
     return checked(entry, os.path.basename(os.path.dirname(file)), os.path.basename(file).removesuffix(".json"))
@@ -276,7 +276,7 @@ def _read(file: str) -> Entry:
 
 def _digest(file: str) -> str:
     try:
-        return store.digest(file)
+        return digest(file)
     except OSError:  # it is asked afterwards what is wrong, as nearly every file is there
         if os.path.isfile(file):
             raise
@@ -292,7 +292,7 @@ def read_index(folder: Path, files: Collection[tuple[str, str, str]]) -> Entries
         written = os.stat(folder / INDEX).st_mtime_ns
         if any(os.stat(file).st_mtime_ns > written for *_, file in files):
             return {}
-        content = _unsealed(folder.joinpath(INDEX).read_text(encoding="utf-8"))
+        content = _unsealed(read_bytes(folder / INDEX).decode())
         entries: Entries = content["entries"]
         if {(stage, name) for stage, named in entries.items() for name in named} != {each[:2] for each in files}:
             return {}

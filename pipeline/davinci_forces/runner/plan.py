@@ -7,7 +7,8 @@ from dataclasses import asdict, dataclass, field, replace
 from hashlib import sha256
 from typing import Any
 
-from davinci_forces.records import KINDS, store
+from davinci_forces.files import read_bytes, write_bytes
+from davinci_forces.records import KINDS
 from davinci_forces.robots.robot import Kind
 from davinci_forces.runner.fingerprints.code import code
 from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, hash_of, schemas
@@ -156,7 +157,7 @@ def reused(ledger: Ledger, task: Task) -> str:
         same = entry and not entry.failed and entry.fingerprint == now
         if entry and same and (contents := _contents(there, entry)):
             for name, content in contents.items():
-                store.write_bytes(ledger.folders.file(name), content)
+                write_bytes(ledger.folders.file(name), content)
             ledger.write(entry)
             return other.name
     return ""
@@ -166,6 +167,6 @@ def _contents(there: Folders, entry: Entry) -> dict[str, bytes]:
     """The files of an entry, or none where one of them is not what the entry says."""
     if not all(there.file(name).is_file() for name in entry.outputs):
         return {}
-    contents = {name: there.file(name).read_bytes() for name in entry.outputs}
+    contents = {name: read_bytes(there.file(name)) for name in entry.outputs}
     whole = all(sha256(contents[name]).hexdigest() == sha for name, sha in entry.outputs.items())
     return contents if whole else {}

@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from davinci_forces.errors import NotReproduced
+from davinci_forces.files import read_bytes
 from davinci_forces.runner import ALL, reporting, runs
 from davinci_forces.runner.ledger import Folders, Ledger
 from davinci_forces.runner.signature import stage_of
@@ -60,7 +61,7 @@ def recompute(folders: Folders, by_bytes: bool, jobs: int = 1) -> list[str]:
             raise NotReproduced("\n".join(failures))
         if by_bytes:
             return compare_files(stored, computed)
-        stated = (json.loads((each.reports / "results.json").read_bytes()) for each in (folders, anew))
+        stated = (json.loads(read_bytes(each.reports / "results.json")) for each in (folders, anew))
         return compare_numbers(*({row["key"]: row for row in rows} for rows in stated))
 
 

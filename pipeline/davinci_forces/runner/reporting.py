@@ -8,6 +8,7 @@ from functools import cache
 from pathlib import Path
 from time import perf_counter
 
+from davinci_forces.files import digest, read_bytes, text_of, write_together
 from davinci_forces.records import KINDS, Record, store
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.report import REPORT
@@ -47,7 +48,7 @@ def perform(ledger: Ledger, task: Task) -> Outcome:
     start = perf_counter()
     try:
         files = written(ledger, task)
-        store.write_together({ledger.folders.reports / name: content for name, content in files.items()})
+        write_together({ledger.folders.reports / name: content for name, content in files.items()})
         made = {f"reports/{name}": hashlib.sha256(content).hexdigest() for name, content in files.items()}
         return Outcome(task, made, seconds=perf_counter() - start)
     except Exception as error:
@@ -77,13 +78,13 @@ def written(ledger: Ledger, task: Task) -> dict[str, bytes]:
 def ratings(study: Study) -> tuple[Rating, ...]:
     """What reviewers said of the study's report, where its folder holds that."""
     file = study.folder / review.FILE
-    return review.read(file) if file.is_file() else ()
+    return review.read(file) if file.exists() else ()
 
 
 def review_given(study: Study) -> dict[str, str]:
     """What a page depends on besides what its ID is made of: a review is shown, and no input."""
     file = study.folder / review.FILE
-    return {"review": store.digest(file)} if file.is_file() else {}
+    return {"review": digest(file)} if file.is_file() else {}
 
 
 def catalogue(ledger: Ledger, located: tuple[Located, ...]) -> Catalogue:
@@ -106,7 +107,7 @@ def provenance(study: Study, ledger: Ledger, located: tuple[Located, ...]) -> Pr
     processed = {place: ledger.digest(f"processed/{place}") for _, place in located}
     failed = [entry for entry in ledger.entries() if entry.failed and entry.stage != REPORT]
     failures = {" ".join([*entry.stage.split("."), entry.task]): entry.failed for entry in failed}
-    text = (study.folder / "study.toml").read_text(encoding="utf-8", errors="replace")
+    text = text_of(read_bytes(study.folder / "study.toml"), errors="replace")
     return Provenance(study.name, VERSION, versions(), raw, processed, failures, text)
 
 

@@ -5,11 +5,10 @@ from functools import partial
 from glob import glob
 from pathlib import Path
 
-import typer
-
 from davinci_forces.errors import BadRequest, BadStudy, MissingRecord
+from davinci_forces.files import read_bytes, text_of
 from davinci_forces.report import REPORT
-from davinci_forces.runner.console import Verbosity, console, durations, printable
+from davinci_forces.runner.console import Verbosity, console, durations, echo
 from davinci_forces.runner.execution import Outcome
 from davinci_forces.runner.ledger import Folders
 from davinci_forces.runner.processes.workers import Others, pool, prepare
@@ -49,7 +48,7 @@ def studies(named: Sequence[Path], verbosity: Verbosity = "normal") -> Iterator[
         if len(absent) < study.files:
             yield folder
         elif verbosity != "quiet":
-            typer.echo(f"{folder}: skipped, its logs are not here ({absent[0]} ...); study.toml says where to get them")
+            echo(f"{folder}: skipped, its logs are not here ({absent[0]} ...); study.toml says where to get them")
 
 
 def matching(name: Path) -> list[Path]:
@@ -93,7 +92,7 @@ def results_of(name: Path, reports: Path | None = None) -> Path:
     MissingRecord
         If a study has no results yet.
     """
-    if name.is_file():
+    if name.exists() and not name.is_dir():
         return name
     folder = one(name)
     if (folder / "study.toml").is_file():
@@ -122,7 +121,7 @@ def load(folder: Path) -> Study:
     if len(absent) == study.files:
         raise BadStudy("\n".join(lines))
     for line in (*study.remarks, *lines):
-        typer.secho(f"warning: {line}", fg="yellow", err=True)
+        echo(f"warning: {line}", fg="yellow", err=True)
     return study
 
 
@@ -143,7 +142,7 @@ def run(
     kind = Narrator if verbosity == "verbose" else Runner
     places = folders(folder.resolve() if cluster else folder, processed, reports)
     runner = kind(study, places, speaks, force, Others(partial(pool, jobs), jobs, prepare) if jobs > 1 else None)
-    speaks.say(typer.style(f"{folder}: {study.title}{' (SIMULATED)' if study.simulated else ''}", bold=True))
+    speaks.say(f"{folder}: {study.title}{' (SIMULATED)' if study.simulated else ''}", bold=True)
     if dry_run:
         for line in runner.preview(names):
             speaks.say(line)
@@ -154,7 +153,7 @@ def run(
     if REPORT in names:
         conclude(runner, folder)
     if not good:
-        typer.secho(f"{folder}: {runner.failures} of {runner.ran} tasks failed", fg="red", err=True)
+        echo(f"{folder}: {runner.failures} of {runner.ran} tasks failed", fg="red", err=True)
     return good
 
 
@@ -172,8 +171,7 @@ def conclude(runner: Runner, folder: Path) -> None:
     report = runner.ledger.entry(REPORT, REPORT)
     files = report.outputs if report and not report.failed else {}
     if "reports/summary.txt" in files:
-        answer = (runner.folders.reports / "summary.txt").read_text(encoding="utf-8")
-        runner.console.say(printable(answer.rstrip()))
+        runner.console.say(text_of(read_bytes(runner.folders.reports / "summary.txt")).rstrip())
     if runner.ran:
         runner.console.say(durations(runner.seconds))
     for file in ("report.html", "report.pdf", "robot.html", "results.json"):

@@ -6,9 +6,11 @@ import re
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from davinci_forces.errors import NotReproduced
+from davinci_forces.files import read_bytes
 from davinci_forces.report import REPORT
 from davinci_forces.report.results import MANIFEST, identity
 from davinci_forces.runner import reporting
@@ -90,7 +92,7 @@ def known_files(ledger: Ledger) -> dict[str, dict[str, str]]:
 def altered_index(ledger: Ledger) -> Iterator[str]:
     """Whether the index, where there is one, says what the entries do."""
     file = ledger.home / INDEX
-    if file.is_file() and file.read_bytes() != ledger.index():
+    if os.path.lexists(file) and not _holds(file, ledger.index()):
         yield f"{file} is not what the entries beside it say; remove it, it is made anew by the next run"
 
 
@@ -99,7 +101,7 @@ def altered_files(folders: Folders, ledger: Ledger, recorded: dict[str, dict[str
     for name, hashes in sorted(recorded.items()):
         file, now = folders.file(name), ledger.digest(name)
         if not now and any(hashes):
-            yield f"{file} is gone"
+            yield f"{file} is {'no file' if os.path.lexists(file) else 'gone'}"
             continue
         for was, task in hashes.items():
             if now == was:
@@ -169,11 +171,20 @@ def stale(ledger: Ledger, tasks: Sequence[Task]) -> Iterator[str]:
 def altered_page(folders: Folders, name: str, content: bytes) -> Iterator[str]:
     """Whether a file of the report is what these records and this version give; of results.json, which numbers."""
     file = folders.reports / name
-    if not file.is_file():
+    if not os.path.lexists(file):
         yield f"{file} is gone"
-    elif file.read_bytes() != content:
-        numbers = list(altered_numbers(str(file), file.read_bytes(), content)) if name == "results.json" else []
+    elif not _holds(file, content):
+        of_numbers = name == "results.json" and file.is_file()
+        numbers = list(altered_numbers(str(file), read_bytes(file), content)) if of_numbers else []
         yield from numbers or [f"{file} is not what its records give when it is made anew"]
+
+
+def _holds(file: Path, content: bytes) -> bool:
+    """Whether a file has this content, and is one."""
+    try:
+        return read_bytes(file, len(content)) == content
+    except OSError:
+        return False
 
 
 def altered_numbers(file: str, found: bytes, made: bytes) -> Iterator[str]:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from davinci_forces.errors import PipelineError
+from davinci_forces.files import read_bytes, text_of
 from davinci_forces.toml.file import TomlFile
 from davinci_forces.toml.lines import KeyPath, lines_of
 
@@ -168,6 +169,7 @@ class TomlTable:
 
 
 LARGEST = 4_000_000  # bytes: ten thousand logs with all their channels; what is larger was written by mistake
+BEYOND = f"and what people write down has at most {LARGEST / 1e6:.0f}: is it a log? Of a study this large, make several"
 
 
 def read(file: Path, kind: type[PipelineError], missing: str = "there is no such file") -> TomlTable:
@@ -179,12 +181,7 @@ def read(file: Path, kind: type[PipelineError], missing: str = "there is no such
         Of that kind, if the file cannot be read or is not TOML.
     """
     try:
-        if (size := file.stat().st_size) > LARGEST:
-            raise kind(
-                f"{file}: it has {size / 1e6:.1f} MB, and what people write down has at most {LARGEST / 1e6:.0f}: is "
-                "it a log? Of a study this large, make several"
-            )
-        text = file.read_text(encoding="utf-8-sig")
+        text = text_of(read_bytes(file, LARGEST, BEYOND), "utf-8-sig")
     except FileNotFoundError:
         raise kind(f"{file}: {missing}") from None
     except OSError as error:

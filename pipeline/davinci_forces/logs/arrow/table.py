@@ -11,6 +11,7 @@ import pyarrow.compute as pc
 from pyarrow import feather, ipc, parquet
 
 from davinci_forces.errors import BadLog
+from davinci_forces.files import open_file
 from davinci_forces.logs.cells import absent, integers, numbers
 from davinci_forces.logs.log import Block, Channel, Log, Options, unique
 from davinci_forces.logs.timeline import moment
@@ -46,7 +47,7 @@ def opened(path: Path, options: Options) -> Log:
 
 
 def _file(path: Path) -> tuple[pa.Schema, Batches]:
-    with path.open("rb") as file:
+    with open_file(path) as file:
         head = file.read(4)
     if head == b"PAR1":
         opened = parquet.ParquetFile(path, pre_buffer=False, buffer_size=BUFFER)  # or all of a row group is held

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from davinci_forces.errors import BadLog
+from davinci_forces.files import require_file
 from davinci_forces.logs.isolated.process import Ended, Message, child
 from davinci_forces.logs.log import Block, Channel, Clock, Log, Options, ahead
 from davinci_forces.maths.arrays import Array
@@ -104,7 +105,11 @@ def _request(path: Path, options: Options, reader: str) -> Message:
 
 
 def _size(path: Path) -> int:
-    return sum(_size(file) for file in path.iterdir()) if path.is_dir() else path.stat().st_size
+    """The bytes of a log, of a folder those of the files right in it; each is one, as libraries do not ask."""
+    files = [file for file in path.iterdir() if not file.is_dir()] if path.is_dir() else [path]
+    for file in files:
+        require_file(file)
+    return sum(file.stat().st_size for file in files)
 
 
 def _answers(path: Path, request: Message) -> Iterator[tuple[dict[str, Any], list[Array]]]:

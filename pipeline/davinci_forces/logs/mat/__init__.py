@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from davinci_forces.files import open_file
 from davinci_forces.logs import isolated
 from davinci_forces.logs.log import Log, Options
 
@@ -19,7 +20,7 @@ def read(path: Path, options: Options) -> Log:
     BadLog
         If it cannot be read, or is of version 7.3 and h5py is not installed.
     """
-    with path.open("rb") as file:
+    with open_file(path) as file:
         if file.read(512).startswith(b"MATLAB 7.3"):
             isolated.require(path, "h5py", "hdf5")
     return isolated.start(path, options, "davinci_forces.logs.mat.variables")

@@ -10,6 +10,7 @@ from scipy.io import loadmat, whosmat
 from scipy.io.matlab import MatlabFunction, MatlabOpaque
 
 from davinci_forces.errors import BadLog
+from davinci_forces.files import open_file
 from davinci_forces.logs.arrays import ArrayLog, Named, matlab_object, take_in
 from davinci_forces.logs.log import Log, Options
 
@@ -27,7 +28,7 @@ def opened(path: Path, options: Options) -> Log:
         If it holds no variable of samples.
     """
     log = ArrayLog(path, "mat", ())
-    with path.open("rb") as file:
+    with open_file(path) as file:
         head = file.read(128)
     said = head[:116].split(b"\0")[0].decode("ascii", "replace").strip() if head.startswith(b"MATLAB") else ""
     if said:

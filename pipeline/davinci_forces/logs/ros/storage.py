@@ -14,6 +14,7 @@ from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
 from davinci_forces.errors import BadLog
+from davinci_forces.files import open_file
 
 RULE = "=" * 80 + "\n"  # between definitions in IDL
 LITERAL = "/:"  # what of a path an address of SQLite may hold as it is
@@ -63,7 +64,7 @@ class Bag:
 
 
 def _head(path: Path) -> bytes:
-    with path.open("rb") as file:
+    with open_file(path) as file:
         return file.read(32)
 
 

@@ -9,6 +9,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from davinci_forces.errors import BadLog
+from davinci_forces.files import open_file
 from davinci_forces.logs.log import Block, Channel, Log, Options, ahead, unique
 from davinci_forces.logs.tdms import samples
 from davinci_forces.logs.tdms.clocks import Sampled, Waveforms, clocks_of
@@ -35,7 +36,7 @@ def read(path: Path, options: Options) -> Log:
     """
     warnings: list[str] = []
     index, waveforms = Index(), Waveforms()
-    with path.open("rb") as file:
+    with open_file(path) as file:
         walk = Walk(file, path.stat().st_size, warnings.append)
         for region in walk.regions():
             index.add(region)
@@ -120,7 +121,7 @@ class TdmsLog(Log):
         paths = [path_of[name] for name in dict.fromkeys(asked_for)]
         plain = self.index.together([path for path in paths if path not in self.scaled])
         scaled = self.index.together([path for path in paths if path in self.scaled])
-        with self.path.open("rb") as file:
+        with open_file(self.path) as file:
             queues = [Queue(self._source(file, group), group) for group in (*plain, *scaled)]
             for block, lacking in side_by_side(queues, rows_of(len(paths))):
                 missing = {self.names[path]: count for path, count in lacking.items()}

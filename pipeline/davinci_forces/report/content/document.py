@@ -8,9 +8,10 @@ Words in figures, listings, and the title and study of a document are shown as t
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
-from typing import Literal
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Literal, TypeVar
 
+from davinci_forces.report.content.inline import printable
 from davinci_forces.report.content.marks import Line3D, Panel, Points3D
 from davinci_forces.report.content.number import Number
 from davinci_forces.report.content.thinning import points_of, thin_mark
@@ -18,6 +19,7 @@ from davinci_forces.study.review import Rating
 
 Cell = str | Number
 Level = Literal["good", "warn", "bad", "info"]
+Part = TypeVar("Part", bound=Any)
 HELD = 1 << 16  # points of a mark at most: several times what a page shows, so that thinning again hides nothing
 
 
@@ -108,7 +110,15 @@ class Figure:
 
 def _held(panel: Panel) -> Panel:
     """A panel with what is kept of its marks."""
-    return replace(panel, marks=tuple(thin_mark(mark, HELD) for mark in panel.marks))
+    return _shown(replace(panel, marks=tuple(_shown(thin_mark(mark, HELD)) for mark in panel.marks)))
+
+
+def _shown(part: Part) -> Part:
+    """A panel or a mark with its words as a page can show them."""
+    held = {f.name: getattr(part, f.name) for f in fields(part)}
+    words: dict[str, Any] = {name: printable(value) for name, value in held.items() if isinstance(value, str)}
+    words |= {"names": tuple(map(printable, held["names"]))} if "names" in held else {}
+    return replace(part, **words)
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,6 +135,9 @@ class Figure3D:
     elevation: float = 20.0
     azimuth: float = -60.0
     height: float = 100.0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "marks", tuple(map(_shown, self.marks)))
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,8 @@ meaning away.
 import re
 from typing import Literal, NamedTuple
 
+from davinci_forces.files import visible
+
 Kind = Literal["text", "code", "bold", "maths", "reference", "link"]
 
 MARK = re.compile(
@@ -16,7 +18,6 @@ MARK = re.compile(
     r"|\[(?P<link>(?:\\.|[^\[\]\\])+)\]\((?P<to>[\w./%~-]+)\)",
     re.DOTALL,
 )
-CONTROL = re.compile(r"[\x00-\x08\x0b\x0c\x0e-\x1f\x7f-\x9f\u2028\u2029\ud800-\udfff\ufffe\uffff]")
 
 
 class Span(NamedTuple):
@@ -33,8 +34,8 @@ def literal(text: str) -> str:
 
 
 def printable(text: str) -> str:
-    """Replace what no page can show (control characters, lone surrogates) by the replacement character."""
-    return CONTROL.sub("\N{REPLACEMENT CHARACTER}", text)
+    """A text as a page can show it: control characters and marks of direction written out, but for ends of lines."""
+    return visible(text, "\t\n\r")
 
 
 def parse(text: str) -> tuple[Span, ...]:

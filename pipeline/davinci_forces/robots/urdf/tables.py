@@ -15,6 +15,7 @@ from xml.parsers import expat
 import numpy as np
 
 from davinci_forces.errors import BadRobot
+from davinci_forces.files import read_bytes
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias, pseudo_inertias
 from davinci_forces.maths.mechanics.placed import transform
@@ -22,6 +23,7 @@ from davinci_forces.toml import shown
 from davinci_forces.toml.file import TomlFile
 
 LARGEST = 4_000_000  # bytes; what people describe has some thousands of lines, and shapes are in files of their own
+BEYOND = f"and a robot's description has at most {LARGEST / 1e6:.0f}: keep shapes in files of their own"
 NAME = re.compile(r"[\w ./:+-]{1,100}")  # of links and joints, as files, equations and messages can show them
 MOVING = ("revolute", "continuous", "prismatic")
 UNLIMITED = 1e9  # [N m, N or their rates] what a file says that knows no limit; URDF has no word for it
@@ -57,10 +59,7 @@ def read(file: Path) -> Element:
         If the file cannot be read, is not XML, or has a document type.
     """
     try:
-        if (size := file.stat().st_size) > LARGEST:
-            said = f"it has {size / 1e6:.1f} MB, and a robot's description has at most {LARGEST / 1e6:.0f}"
-            raise BadRobot(f"{file}: {said}: keep shapes in files of their own")
-        text = file.read_bytes()
+        text = read_bytes(file, LARGEST, BEYOND)
     except FileNotFoundError:
         raise BadRobot(f"{file}: there is no such robot file") from None
     except OSError as error:

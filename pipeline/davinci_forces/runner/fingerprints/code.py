@@ -5,7 +5,7 @@ from collections.abc import Iterable, Iterator
 from functools import cache
 from pathlib import Path
 
-from davinci_forces.records import store
+from davinci_forces.files import digest
 
 PACKAGE = Path(__file__).parents[2]
 IMPORT = re.compile(r"^[ \t]*from (davinci_forces[\w.]*) import (\([^)]*\)|.*)", re.MULTILINE)
@@ -72,4 +72,4 @@ def _files(module: str) -> list[Path]:
 
 @cache
 def _hash_of(file: Path) -> str:
-    return store.digest(file)
+    return digest(file)

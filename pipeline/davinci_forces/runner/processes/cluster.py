@@ -13,7 +13,7 @@ from time import sleep
 from uuid import uuid4
 
 from davinci_forces.errors import BadRequest
-from davinci_forces.records import store
+from davinci_forces.files import digest
 from davinci_forces.runner.execution import Outcome, perform
 from davinci_forces.runner.fingerprints.code import PACKAGE
 from davinci_forces.runner.fingerprints.fingerprint import hash_of
@@ -38,7 +38,7 @@ class Terms:
 @cache
 def own_terms(mark: str = "") -> Terms:
     """What this process has."""
-    code = {file.relative_to(PACKAGE).as_posix(): store.digest(file) for file in sorted(PACKAGE.rglob("*.py"))}
+    code = {file.relative_to(PACKAGE).as_posix(): digest(file) for file in sorted(PACKAGE.rglob("*.py"))}
     versions = {"Python": python_version(), "arithmetic": arithmetic.described()}
     versions["instructions"] = arithmetic.instructions()
     for name in PACKAGES:

@@ -10,8 +10,8 @@ from urllib.parse import quote
 import numpy as np
 
 from davinci_forces.errors import BadRequest, MissingRecord
+from davinci_forces.files import read_bytes, write_bytes
 from davinci_forces.maths.estimation.drift import holm, scatter, stands_out, trend
-from davinci_forces.records import store
 from davinci_forces.report.campaign.page import page
 from davinci_forces.report.campaign.studies import (
     DAY,
@@ -56,7 +56,7 @@ def write(studies: Sequence[Path], reports: Path | None, out: Path | None) -> tu
     series = [one for joint in joints_of(ordered) for one in series_of(ordered, joint)]
     files = page(ordered, left_out, findings(series, ordered, by_date))
     for name, content in files.items():
-        store.write_bytes(place / name, content)
+        write_bytes(place / name, content)
     return [place / name for name in files], left_out
 
 
@@ -95,7 +95,7 @@ def digest(file: Path) -> dict[str, Any]:
     """
     again = "`davinci-forces report` makes it anew"
     try:
-        content = json.loads(file.read_text(encoding="utf-8"))
+        content = json.loads(read_bytes(file))
         texts = [content[name] for name in ("title", "robot", "started")]
         odd = [joint["joint"] for joint in content["joints"] if joint["verdict"] not in WORDS]
         if odd or not all(isinstance(text, str) for text in texts):

@@ -7,6 +7,7 @@ from typing import Any
 import pandas as pd
 
 from davinci_forces.errors import BadRequest, MissingRecord
+from davinci_forces.files import read_bytes
 from davinci_forces.records import KINDS, Record, store
 from davinci_forces.runner.ledger import Ledger
 from davinci_forces.runner.runs import folders
@@ -41,7 +42,7 @@ def results(study: Path) -> pd.DataFrame:
     file = folders(study, None, None).reports / "results.json"
     names = ["key", "value", "std", "unit", "source"]
     try:
-        rows = [[result[name] for name in names] for result in json.loads(file.read_text(encoding="utf-8"))]
+        rows = [[result[name] for name in names] for result in json.loads(read_bytes(file))]
     except FileNotFoundError:
         raise MissingRecord(f"{file} is not there; run `davinci-forces all {study}`") from None
     except (ValueError, TypeError, LookupError) as error:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from davinci_forces.errors import BadRequest
+from davinci_forces.files import read_bytes
 from davinci_forces.report.changes import Stated, Value
 
 
@@ -18,7 +19,7 @@ def read(file: Path) -> dict[str, Stated]:
         If the file cannot be read, or is not a results.json; the first number that is wrong is named.
     """
     try:
-        rows = json.loads(file.read_text(encoding="utf-8"))
+        rows = json.loads(read_bytes(file))
     except OSError as error:
         raise BadRequest(f"{file}: {error.strerror}") from None
     except (ValueError, RecursionError) as error:

@@ -44,7 +44,7 @@ def load(scenario: str) -> Scenario:
     if scenario in shipped():
         text = files("davinci_forces.simulation").joinpath("shipped", f"{scenario}.toml").read_text(encoding="utf-8")
         table = toml.parse(text, scenario, BadScenario)
-    elif File(scenario).is_file():
+    elif File(scenario).exists():
         table = toml.read(File(scenario), BadScenario)
     else:
         raise BadScenario(f"there is no scenario {scenario!r}; there are {', '.join(shipped())}, or name a .toml file")

@@ -2,7 +2,8 @@
 
 from collections.abc import Iterator
 
-from davinci_forces.logs.log import Log, visible
+from davinci_forces.files import visible
+from davinci_forces.logs.log import Log
 from davinci_forces.records import Diagnostic, LogSummary, Recording, Touch, diagnostic
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.log import visible
+from davinci_forces.files import visible
 from davinci_forces.maths.signals.clock import GAP
 from davinci_forces.records import LogSummary
 from davinci_forces.study.intake import Intake
