@@ -214,7 +214,7 @@ def test_a_missing_number_is_no_number():
 @pytest.mark.parametrize("text", [b"\xff", b"a =", b"a = " + b"[" * 5000 + b"]" * 5000, b"a = 1" + b"0" * 5000])
 def test_a_file_that_is_not_toml_is_named(tmp_path, text):
     (tmp_path / "x.toml").write_bytes(text)
-    with pytest.raises(BadRequest, match=r"x\.toml: "):
+    with pytest.raises(BadRequest, match=r"x\.toml:(1:)? "):
         read(tmp_path / "x.toml", BadRequest)
 
 

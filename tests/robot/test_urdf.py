@@ -331,10 +331,9 @@ def test_a_file_that_is_not_there_is_said(tmp_path):
         robots.load("arm.urdf", tmp_path)
 
 
-def test_a_description_as_deep_as_it_is_long_is_read_without_recursion():
-    made, problems = parsed("<robot>" + "<link>" * 50_000 + "</link>" * 50_000 + "</robot>")
-    assert made is None
-    assert any("its name is missing" in problem for problem in problems)
+def test_a_description_as_deep_as_it_is_long_is_refused():
+    with pytest.raises(BadRobot, match=r"arm\.urdf:1: it has more than 30 elements inside each other"):
+        parsed("<robot>" + "<link>" * 50_000 + "</link>" * 50_000 + "</robot>")
 
 
 @given(data=st.data())

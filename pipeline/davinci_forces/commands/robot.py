@@ -46,6 +46,7 @@ def run(
 def _values(option: str, text: str) -> list[float]:
     """Numbers separated by commas."""
     from davinci_forces.errors import BadRequest
+    from davinci_forces.toml import unlikely
 
     values = []
     for place, word in enumerate(text.split(","), start=1):
@@ -55,6 +56,8 @@ def _values(option: str, text: str) -> list[float]:
             raise BadRequest(f"{option} {text}: value {place} is {word.strip()!r}, not a number") from None
         if not math.isfinite(values[-1]):
             raise BadRequest(f"{option} {text}: value {place} is {word.strip()}, and must be finite")
+        if wrong := unlikely(f"value {place}", values[-1], "motion"):
+            raise BadRequest(f"{option} {text}: {wrong}")
     return values
 
 

@@ -46,6 +46,7 @@ def _hand(k_h: float, b_h: float, m: float, delay: float | None, rate: float | N
     """
     from davinci_forces.errors import BadRequest
     from davinci_forces.haptics.maths.bimodal import Hand
+    from davinci_forces.toml import unlikely
 
     above = {"--k-h": (k_h, "N/m"), "--b-h": (b_h, "N s/m"), "--m": (m, "kg"), "--rate": (rate, "Hz")}
     wrong = [
@@ -55,6 +56,9 @@ def _hand(k_h: float, b_h: float, m: float, delay: float | None, rate: float | N
     ]
     if delay is not None and not 0.0 <= delay < float("inf"):
         wrong.append(f"--delay {delay:g}: must be 0 or a positive number [s]")
+    asked = (("--k-h", k_h, "stiffness"), ("--b-h", b_h, "damping"), ("--m", m, "mass"), ("--delay", delay, "time"),
+             ("--rate", rate, "rate"))  # fmt: skip
+    wrong = wrong or [f"{said}, not {x:g}" for option, x, kind in asked if (said := unlikely(option, x or 0.0, kind))]
     if wrong:
         without = "; a hand without damping never comes to rest" if b_h == 0.0 else ""
         raise BadRequest("; ".join(wrong) + without)

@@ -54,7 +54,7 @@ from davinci_forces.maths.mechanics.chain import (
     modified_denavit_hartenberg,
 )
 from davinci_forces.maths.models.terms import TERMS, Term
-from davinci_forces.robots.robot import ANYWHERE, Joint, Kind, Limits, Robot
+from davinci_forces.robots.robot import ANYWHERE, MOST_JOINTS, Joint, Kind, Limits, Robot
 from davinci_forces.toml import TomlTable, is_number, shown
 from davinci_forces.toml.file import TomlFile
 
@@ -80,7 +80,7 @@ def robot_of(table: TomlTable, stem: str) -> Robot | None:
     """A robot, its problems noted; None where it cannot be told which joints it has."""
     name = table.text("name", stem)
     title = table.text("title", name)
-    entries = table.tables("joint", "it has no [[joint]]")
+    entries = table.tables("joint", "it has no [[joint]]", most=MOST_JOINTS)
     joints = [_joint(entry) for entry in entries]
     table.unique("joint", "name", ((i, joint.name) for i, joint in enumerate(joints) if joint), "two joints are named")
     known = tuple(joint for joint in joints if joint)
@@ -124,7 +124,7 @@ def change(joint: Joint, table: TomlTable) -> Joint:
         harmonics=table.take(
             "harmonics", joint.harmonics, (int,), "a whole number from 1 to 100", lambda x: 1 <= x <= 100
         ),
-        q_tau=float(table.take("q_tau", joint.q_tau, (int, float), "a number from 0 on", lambda x: 0 <= x < math.inf)),
+        q_tau=table.number("q_tau", joint.q_tau, low=0.0, words="a number from 0 on"),
     )
     if changed.effort != joint.effort and "limits" not in table:  # which is then in another unit
         changed = replace(changed, limits=replace(changed.limits, effort=math.inf))
@@ -142,16 +142,21 @@ def _terms(table: TomlTable) -> tuple[Term, ...]:
 
 
 def _not_zero(table: TomlTable, key: str, default: float) -> float:
-    return float(table.take(key, default, (int, float), "a number other than 0", lambda x: x != 0 and is_number(x)))
+    value = table.take(key, default, (int, float), "a number other than 0", lambda x: x != 0 and is_number(x))
+    return float(value) if table.likely(key, (value,)) else default
 
 
 def _limits(table: TomlTable) -> Limits:
     limits = table.table("limits")
     pairs = [limits.take(name, [*ANYWHERE], (list,), "[lower, upper]", _are_bounds) for name in ("q", "dq", "ddq")]
+    for name, pair in zip(("q", "dq", "ddq"), pairs, strict=True):
+        limits.likely(name, (end for end in pair if end not in ANYWHERE))
     q, dq, ddq = ((float(low), float(high)) for low, high in pairs)
     changed = Limits(q, dq, ddq)
     if "effort" in limits:
-        changed = replace(changed, effort=limits.number("effort", above=0.0, words="the most effort of its drive"))
+        changed = replace(
+            changed, effort=limits.number("effort", above=0.0, words="the most effort of its drive", kind="force")
+        )
     limits.close()
     return changed
 
@@ -176,7 +181,7 @@ class _Weight(NamedTuple):
 
 def carried(table: TomlTable, joints: Sequence[Joint]) -> Carried:
     """The chain that a robot's file describes, what is wrong with it noted; nothing where it has no [[link]]."""
-    entries = table.tables("link")
+    entries = table.tables("link", most=MOST_JOINTS)
     if not entries:
         return Carried()
     convention = table.text("convention", "modified", tuple(CONVENTIONS))

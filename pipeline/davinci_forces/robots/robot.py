@@ -13,6 +13,8 @@ from davinci_forces.maths.models.physical import PhysicalTable
 from davinci_forces.maths.models.terms import Term
 
 ANYWHERE = (-math.inf, math.inf)
+MOST_JOINTS = 200  # that move, or what takes their squares takes minutes; a humanoid with both hands has 80
+MOST_LINKS = 1000  # of a URDF, with frames that are fixed: sensors, tools, screws
 
 
 class Kind(Enum):

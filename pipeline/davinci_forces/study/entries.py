@@ -2,6 +2,7 @@
 
 import os
 from collections.abc import Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -11,21 +12,12 @@ from davinci_forces.robots.from_toml import wrong_name
 from davinci_forces.study import WHOLE, HungMass, LogEntry
 from davinci_forces.study.channels import Channels
 from davinci_forces.toml import TomlTable, shown
+from davinci_forces.toml.lines import MOST_LISTED
 
-# The least and the greatest value, and the unit: beyond these a slip of the pen or of the unit is the likelier reason.
-PLAUSIBLE = {
-    "period": (1e-6, 1e6, "s"),
-    "rate": (1e-3, 1e7, "Hz"),
-    "skip": (0.0, 1e6, "s"),
-    "until": (1e-3, 1e6, "s"),
-    "lowpass": (1e-6, 1e5, "Hz"),
-    "harmonics": (0, 100, ""),
-    "effort": (1e-9, 1e6, "N m or N"),
-    "tool": (1e-3, 10.0, "m"),
-    "q_tau": (0.0, 1e6, "effort/s^0.5"),
-}
+MAY_BE_0 = ("skip", "harmonics", "q_tau")
 ROLES = ("identification", "validation", "contact", "weight", "tissue", "friction")
 TARES = ("validation", "identification")  # roles of logs in which nothing touches the arm
+MOST_NAMED = 100  # logs that a problem lists
 FARTHEST = 3.0  # [m] from the remote centre, beyond which a position is more likely in another unit
 WINDOWS = "a list of [start, end] in seconds, from 0 on"
 SEVERAL = ("files", "join")  # keys of several files: parts in order, or side by side
@@ -37,23 +29,21 @@ def optional(table: TomlTable, key: str) -> float | None:
     return checked(table, key, table.number(key)) if key in table else None
 
 
-def checked(table: TomlTable, key: str, value: float, kind: str = "") -> float:
-    """A number as it is, noted where it is not plausible; `kind` says as what, where the key is a name."""
-    least, most, unit = PLAUSIBLE[kind or key]
-    if value < 0 or (value == 0 and least > 0):
+def checked(table: TomlTable, key: str, value: float) -> float:
+    """A number as it is, noted where it is negative, or 0 and may not be that."""
+    if value < 0 or (value == 0 and key not in MAY_BE_0 and key in table.values):
         table.problem(f"{key} must be positive, not {shown(value)}", key)
-    elif value < least or value > most:
-        table.problem(f"{key} must lie between {least:g} and {most:g} {unit}".rstrip() + f", not {shown(value)}", key)
     return value
 
 
 def entries_of(study: TomlTable, robot: Robot | None) -> tuple[LogEntry, ...]:
     """Every [[log]]; `robot` is None where the study names none that is known."""
-    tables = study.tables("log", "it has no [[log]] table, so there is nothing to analyse")
+    tables = study.tables("log", "it has no [[log]] table, so there is nothing to analyse", most=MOST_LISTED)
     logs = tuple(_entry(study, i, table, robot) for i, table in enumerate(tables))
     study.unique("log", "name", enumerate(log.name for log in logs), "two logs are named")
+    named = {log.name: log for log in logs}
     for i, log in enumerate(logs):
-        if log.tare and (wrong := _wrong_tare(log, logs)):
+        if log.tare and (wrong := _wrong_tare(log, named)):
             study.problem(f"log {log.name!r}: {wrong}", "log", i, "tare")
     return logs
 
@@ -180,13 +170,13 @@ def _windows(table: TomlTable, key: str) -> tuple[tuple[float, float], ...]:
     return windows
 
 
-def _wrong_tare(log: LogEntry, logs: Sequence[LogEntry]) -> str:
+def _wrong_tare(log: LogEntry, named: dict[str, LogEntry]) -> str:
     """What is wrong with a log's tare, or ""."""
     if log.role != "weight":
         return f"tare = {log.tare!r} is for logs of role weight, and this one's is {log.role}"
-    tare = next((other for other in logs if other.name == log.tare), None)
+    tare = named.get(log.tare)
     if tare is None:
-        return f"tare = {log.tare!r} is not a log of this study; it has {', '.join(other.name for other in logs)}"
+        return f"tare = {log.tare!r} is not a log of this study; it has {', '.join(islice(named, MOST_NAMED))}"
     if tare.role not in TARES:
         role = f"its tare {log.tare!r} has the role {tare.role}"
         return f"{role}; a tare is free motion along the same path, of role {' or '.join(TARES)}"

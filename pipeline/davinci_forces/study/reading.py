@@ -127,7 +127,7 @@ def _overridden(robot: Robot, overrides: TomlTable) -> Robot:
 def _with_tool(robot: Robot | None, table: TomlTable) -> Robot | None:
     """The robot with the tool that a study says it had."""
     tool = table.table("tool")
-    length = checked(tool, "length", tool.number("length", words="a number of metres"), "tool")
+    length = checked(tool, "length", tool.number("length", words="a number of metres", kind="tool"))
     tool.close()
     try:
         return robot.with_tool(length) if robot and math.isfinite(length) else robot
@@ -159,7 +159,9 @@ def _sought(efforts: TomlTable, robot: Robot | None) -> dict[str, float]:
     for name in efforts.values:
         if name not in known:
             efforts.problem(f"{robot.name if robot else ''} has no joint {name!r}; it has {', '.join(known)}", name)
-    return {name: checked(efforts, name, efforts.number(name), "effort") for name in efforts.values if name in known}
+    return {
+        name: checked(efforts, name, efforts.number(name, kind="effort")) for name in efforts.values if name in known
+    }
 
 
 def _setting(table: TomlTable, field: Field[Any]) -> Any:

@@ -5,13 +5,17 @@ import sys
 import tomllib
 from collections.abc import Callable, Collection, Iterable
 from difflib import get_close_matches
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 from davinci_forces.errors import PipelineError
 from davinci_forces.files import read_bytes, text_of
 from davinci_forces.toml.file import TomlFile
-from davinci_forces.toml.lines import KeyPath, lines_of
+from davinci_forces.toml.lines import KeyPath, excess, lines_of
+from davinci_forces.toml.ranges import unlikely
+
+LONGEST_NAME = 100  # characters of an unknown key that are compared with those of the known
 
 
 def is_number(value: Any) -> bool:
@@ -60,8 +64,9 @@ class TomlTable:
         low: float = -math.inf,
         above: float = -math.inf,
         words: str = "a number",
+        kind: str = "",
     ) -> float:
-        """A finite number, at least `low` and greater than `above`."""
+        """A finite number, at least `low` and greater than `above`, and of a likely size for its key or `kind`."""
         value = self.take(key, default, (int, float), words)
         if value is None:
             return math.nan
@@ -70,14 +75,21 @@ class TomlTable:
             demands = " and ".join(["finite", *(words for words, bound in bounds.items() if bound > -math.inf)])
             self.problem(f"{key} must be {demands}, not {value!r}", key)
             return math.nan
-        return float(value)
+        return float(value) if self.likely(key, (value,), kind) else math.nan
+
+    def likely(self, key: str, values: Iterable[float], kind: str = "") -> bool:
+        """Whether numbers that the table gives have likely sizes; the first that has not is noted."""
+        wrong = next(((said, x) for x in values if key in self.values and (said := unlikely(key, x, kind))), None)
+        if wrong:
+            self.problem(f"{wrong[0]}, not {shown(wrong[1])}", key)
+        return not wrong
 
     def whole(self, key: str, default: int | None = None, low: float = 0) -> int:
         """A whole number, at least `low`."""
         value = self.take(key, default, (int,), "a whole number")
         if value is not None and value < low:
             self.problem(f"{key} must be at least {low}, not {shown(value)}", key)
-        return 0 if value is None else int(value)
+        return 0 if value is None or not self.likely(key, (value,)) else int(value)
 
     def text(self, key: str, default: str | None = None, choices: Collection[str] = ()) -> str:
         """Text, one of the choices where there are any."""
@@ -94,8 +106,8 @@ class TomlTable:
     ) -> tuple[float, ...]:
         """A list of finite numbers, as many as asked for."""
         words = words or f"a list of {'' if count is None else f'{count} '}finite numbers"
-        value = self.take(key, default, (list,), words, lambda value: are_numbers(value, count))
-        return tuple(map(float, value or ()))
+        value = self.take(key, default, (list,), words, lambda value: are_numbers(value, count)) or ()
+        return tuple(map(float, value)) if self.likely(key, value) else ()
 
     def pairs(
         self, key: str, words: str, default: list[Any] | None = None, least: int = 0
@@ -104,7 +116,8 @@ class TomlTable:
         value = self.take(key, default, (list,), words, lambda value: all(are_numbers(pair, 2) for pair in value))
         if value is not None and len(value) < least:
             self.problem(f"{key} must be {words}, not {shown(value)}", key)
-        return tuple((float(a), float(b)) for a, b in value or ())
+        pairs = tuple((float(a), float(b)) for a, b in value or ())
+        return pairs if self.likely(key, chain.from_iterable(pairs)) else ()
 
     def texts(self, key: str, default: list[str] | None, choices: Collection[str]) -> tuple[str, ...]:
         """A list of one or more of the choices."""
@@ -121,13 +134,18 @@ class TomlTable:
         """The tables that this one is made of, by key."""
         return [(key, self.table(key)) for key in self.values]
 
-    def tables(self, key: str, none: str = "") -> list["TomlTable"]:
-        """The tables of a list, such as [[log]]; that there are none is a problem where `none` says which."""
+    def tables(self, key: str, none: str = "", most: int = 1000) -> list["TomlTable"]:
+        """The tables of a list, such as [[log]]; that there are none is a problem where `none` says which.
+
+        Of more than `most`, which is a problem, too, those beyond are left out.
+        """
         words = f"a list of tables: write [[{key}]]"
         entries = self.take(key, [], (list,), words, lambda value: all(isinstance(entry, dict) for entry in value))
         if none and self.values.get(key, []) == []:
             self.problem(none, key)
-        place = self._within(key)
+        if len(entries) > most:
+            self.problem(f"it has {len(entries)} [[{key}]], and may have {most}; make several files of it", key, most)
+        place, entries = self._within(key), entries[:most]
         return [TomlTable(e, self.file, (*self.path, key, i), f"{place} {i + 1}") for i, e in enumerate(entries)]
 
     def unique(self, key: str, name: str, values: Iterable[tuple[int, str]], says: str) -> None:
@@ -160,8 +178,9 @@ class TomlTable:
 
     def close(self, outdated: Collection[str] = ()) -> None:
         """Report the keys that nothing asked for, outdated ones apart, and what they may have been meant to be."""
-        for key in self.values.keys() - self.asked.keys() - set(outdated):
-            meant = "".join(f"; did you mean {near!r}?" for near in get_close_matches(key, self.asked, 1, 0.5))
+        for key in (key for key in self.values if key not in self.asked and key not in outdated):
+            near_ones = [] if self.file.is_full else get_close_matches(key[:LONGEST_NAME], self.asked, 1, 0.5)
+            meant = "".join(f"; did you mean {near!r}?" for near in near_ones)
             self.problem(f"unknown key {key!r}; known are {', '.join(self.asked) or 'none'}{meant}", key)
 
     def _within(self, key: str) -> str:
@@ -193,6 +212,8 @@ def read(file: Path, kind: type[PipelineError], missing: str = "there is no such
 
 def parse(text: str, name: str, kind: type[PipelineError]) -> TomlTable:
     """The whole of a text of TOML, called `name` in problems; raises as `read` does."""
+    if wrong := excess(text):
+        raise kind(f"{name}:{wrong}: of a study this large, make several; of numbers this many, a log")
     try:
         values, lines = tomllib.loads(text), lines_of(text)
     except (ValueError, RecursionError) as error:  # of TOML, and of numbers and nesting beyond Python's limits

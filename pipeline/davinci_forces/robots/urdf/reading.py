@@ -19,7 +19,7 @@ from davinci_forces.maths.mechanics.chain import FIXED, Chain
 from davinci_forces.maths.mechanics.placed import PlacedLink, assembled
 from davinci_forces.maths.mechanics.rigid_body import regressor
 from davinci_forces.maths.models.terms import Term, coulomb, gravity_cos, gravity_sin, inertia, offset, viscous
-from davinci_forces.robots.robot import ANYWHERE, Joint, Kind, Limits, Robot
+from davinci_forces.robots.robot import ANYWHERE, MOST_JOINTS, Joint, Kind, Limits, Robot
 from davinci_forces.robots.urdf import tables
 from davinci_forces.robots.urdf.tables import MOVING, TIP, Element, Notes, UrdfJoint, inertial, joint
 from davinci_forces.toml.file import TomlFile
@@ -62,6 +62,9 @@ def robot_of(outermost: Element, file: TomlFile, stem: str) -> Robot | None:
     moved = {one.name: _mover(one, by_name, file) for one in joints}
     ordered = _outwards(root, joints)
     coordinates = _coordinates(ordered, file)
+    if (moving := sum(one.kind != "fixed" for one in joints)) > MOST_JOINTS:
+        said = f"it has {moving} joints that move, and may have {MOST_JOINTS}"
+        Notes(file, outermost).problem(f'{said}; write type="fixed" for those that do not matter')
     if not coordinates:
         Notes(file, outermost).problem(f"no joint moves; one must be {', '.join(MOVING)}")
     if file.problems():

@@ -6,6 +6,7 @@ none, and entities that expand a thousandfold, or that name other files, come wi
 
 import math
 import re
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -19,11 +20,16 @@ from davinci_forces.files import read_bytes
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias, pseudo_inertias
 from davinci_forces.maths.mechanics.placed import transform
+from davinci_forces.robots.robot import MOST_LINKS
 from davinci_forces.toml import shown
 from davinci_forces.toml.file import TomlFile
+from davinci_forces.toml.ranges import unlikely
 
 LARGEST = 4_000_000  # bytes; what people describe has some thousands of lines, and shapes are in files of their own
 BEYOND = f"and a robot's description has at most {LARGEST / 1e6:.0f}: keep shapes in files of their own"
+DEEPEST = 30  # elements inside each other; what simulators add goes ten deep
+MOST_ELEMENTS = 30_000  # 30 for each of the most links, with what they look like and what they touch with
+MOST_ATTRIBUTES = 30
 NAME = re.compile(r"[\w ./:+-]{1,100}")  # of links and joints, as files, equations and messages can show them
 MOVING = ("revolute", "continuous", "prismatic")
 UNLIMITED = 1e9  # [N m, N or their rates] what a file says that knows no limit; URDF has no word for it
@@ -72,8 +78,18 @@ def parse(text: bytes, name: str) -> Element:
     parser = expat.ParserCreate()
     outermost = Element("", {}, 0)
     open_elements = [outermost]
+    counts = Counter[str]()
 
     def start(tag: str, attributes: dict[str, str]) -> None:
+        counts.update(("element", tag) if len(open_elements) == 2 else ("element",))
+        for what, number, most in (
+            ("elements inside each other", len(open_elements), DEEPEST), ("elements", counts["element"], MOST_ELEMENTS),
+            ("joints", counts["joint"], MOST_LINKS), ("links", counts["link"], MOST_LINKS),
+            ("attributes in an element", len(attributes), MOST_ATTRIBUTES),
+        ):  # fmt: skip
+            if number > most:
+                said = f"it has more than {most} {what}, and a robot has fewer"
+                raise BadRobot(f"{name}:{parser.CurrentLineNumber}: {said}; describe an arm of it in a file of its own")
         element = Element(tag, attributes, parser.CurrentLineNumber)
         open_elements[-1].inner.append(element)
         open_elements.append(element)
@@ -150,6 +166,13 @@ class Notes:
         if len(values) != len(default) or not all(map(math.isfinite, values)):
             how = "a finite number" if len(default) == 1 else f"{len(default)} finite numbers with spaces between them"
             self.problem(f"{key} must be {how}, not {shown(text)}", element)
+            return list(default)
+        limits = element.tag == "limit"  # of which the largest are none
+        likely = (
+            unlikely(key, x, "force" if key == "effort" else "") for x in values if abs(x) < UNLIMITED or not limits
+        )
+        if wrong := next(filter(None, likely), ""):
+            self.problem(f"{wrong}, not {shown(text)}", element)
             return list(default)
         return values
 

@@ -21,6 +21,7 @@ from davinci_forces.simulation.excitation.trajectory import (
     designed,
     problem_of,
 )
+from davinci_forces.toml import unlikely
 
 STARTS_OF_ARM = 2  # starts of one joint for one of the arm, which takes longer
 
@@ -76,6 +77,8 @@ def answer(request: Request, tell: Tell = nothing) -> Answer:
         raise BadRequest(f"--criterion is one of {', '.join(CRITERIA)}, not {request.criterion!r}")
     if request.period is not None and not (math.isfinite(request.period) and request.period > 0):
         raise BadRequest(f"--period must be positive, not {request.period:g}")
+    if wrong := unlikely("--period", request.period or 0.0, "period"):
+        raise BadRequest(f"{wrong}, not {request.period:g}")
     if together and request.evaluate:
         raise BadRequest("--evaluate judges one joint; name it instead of `all`")
     period = request.period or max(PERIODS[joint.kind] for joint in joints)
@@ -132,4 +135,6 @@ def _numbers(option: str, text: str) -> list[float]:
         raise BadRequest(f"{option} takes numbers with commas between them, not {text!r}") from None
     if not all(map(math.isfinite, values)):
         raise BadRequest(f"{option} takes finite numbers, not {text!r}")
+    if wrong := next(filter(None, (unlikely(option, x, "motion") for x in values)), ""):
+        raise BadRequest(f"{wrong}, not {text!r}")
     return values

@@ -14,6 +14,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.excitation import fourier
 from davinci_forces.maths.excitation.joint import ExcitationProblem, design
 from davinci_forces.robots.robot import Joint, Kind
+from davinci_forces.toml import unlikely
 
 PERIODS = {Kind.REVOLUTE: 10.0, Kind.PRISMATIC: 5.0}  # [s] of Table 6.1
 PLOTS = (".svg", ".png", ".pdf")
@@ -177,6 +178,8 @@ def _samples(excitations: Sequence[ExcitationTrajectory], rate: float) -> int:
     """The samples of one period."""
     if not (math.isfinite(rate) and rate > 0):
         raise BadRequest(f"--rate must be positive, not {rate:g}")
+    if wrong := unlikely("--rate", rate, "rate"):
+        raise BadRequest(f"{wrong}, not {rate:g}")
     period = excitations[0].series.period
     samples = round(period * rate)
     if any(e.series.period != period for e in excitations):
