@@ -257,7 +257,7 @@ OPENS = {  # a module that opens files otherwise than through `files`, and why i
     "logs/parts.py": "a library, given what is a file",
     "simulation/sensors.py": "it writes into a new folder",
     "simulation/study_folder.py": "it writes into a new folder",
-    "commands/excite.py": "it writes, after `require_file`",
+    "commands/excite.py": "it writes where it is asked to, be it to /dev/stdout",
 }
 
 

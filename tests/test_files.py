@@ -169,13 +169,6 @@ def test_any_file_of_any_kind_costs_a_message_at_most(server):
             assert Path(file).name in answer["said"], (file, kind, words, answer)
 
 
-def test_a_table_is_not_written_into_a_pipe(tmp_path):
-    os.mkfifo(tmp_path / "t.csv")
-    child = Server.alone(tmp_path, "excite", "davinci", "hand_pitch", "--evaluate", "0,0,.1", "--csv", "t.csv")
-    assert child["code"] == 1
-    assert "t.csv: it is a pipe, not a file" in child["said"]
-
-
 def test_a_bag_in_a_folder_that_holds_a_pipe_is_refused(tmp_path):
     (tmp_path / "bag").mkdir()
     (tmp_path / "bag" / "metadata.yaml").write_text("rosbag2_bagfile_information:\n")

@@ -42,14 +42,10 @@ def run(
     starts may find more. All joints of an arm take minutes; each start is told of when it is done.
     """
     from davinci_forces.errors import BadRequest
-    from davinci_forces.files import require_file
     from davinci_forces.simulation.excitation import trajectory
     from davinci_forces.simulation.excitation.request import Request, answer
 
     request = Request(robot, joint, evaluate, period, harmonics, criterion, (q, dq, ddq), starts, seed, samples)
-    for file in filter(None, (csv, plot)):
-        if file.exists():
-            require_file(file)  # writing to a pipe waits for whoever reads it
     answered = answer(request, _say)
     try:
         if csv:
