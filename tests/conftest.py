@@ -1,6 +1,7 @@
 """What every test may ask for, which tests take long, and how a run speaks of what it did not check."""
 
 import os
+import signal
 import time
 from collections import defaultdict
 from collections.abc import Callable
@@ -12,6 +13,10 @@ from typer.testing import CliRunner
 
 from davinci_forces.runner.processes import arithmetic
 
+if (
+    signal.getsignal(signal.SIGINT) == signal.SIG_IGN
+):  # as of a run in the background, whose children would pass it over
+    signal.signal(signal.SIGINT, signal.default_int_handler)
 arithmetic.pin()  # before anything loads numpy, as on the command line
 os.environ["MPLBACKEND"] = "Agg"
 # How long examples take is a matter of the machine and of what else it does: no test fails of it.

@@ -4,6 +4,7 @@ from pathlib import Path
 
 from davinci_forces.records import Diagnostic, Record
 from davinci_forces.robots import dvrk_psm
+from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
 from davinci_forces.runner.graph import every_step
 from davinci_forces.runner.ledger import Entry, Folders, Ledger
 from davinci_forces.runner.places import is_about_log
@@ -26,7 +27,9 @@ def study(home: Path, logs: int) -> tuple[Study, Folders]:
             places = [place for kind in kinds if is_about_log(kind) == bool(log) for place in places_of(kind, log)]
             if places:
                 outputs = {f"processed/{place}": "0" * 64 for place in places}
-                ledger.write(Entry(step, log or step.rpartition(".")[2], {"code": CODE}, outputs))
+                ledger.write(
+                    Entry(step, log or step.rpartition(".")[2], vars(Fingerprint({}, {}, {}, {}, CODE, "")), outputs)
+                )
     return Study(folders.raw, "Many logs", dvrk_psm.ROBOT, False, Settings(), entries), folders
 
 

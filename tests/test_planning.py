@@ -9,7 +9,7 @@ import pytest
 
 from davinci_forces.records import KINDS, Fit, LogSummary, MeasurementNoise, Signal, Track, Whiteness
 from davinci_forces.robots import dvrk_psm
-from davinci_forces.runner.fingerprints.fingerprint import schemas
+from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, schemas
 from davinci_forces.runner.graph import every_step
 from davinci_forces.runner.ledger import Entry, Folders, Ledger
 from davinci_forces.runner.places import about
@@ -20,6 +20,7 @@ from tests import many
 
 ROLL, PITCH = (joint.name for joint in dvrk_psm.ROBOT.joints[:2])
 LOGS = ("zebra", "aardvark")
+NOTHING = Fingerprint({}, {}, {}, {}, {}, "")
 
 
 @pytest.fixture
@@ -31,7 +32,7 @@ def plan(tmp_path) -> Plan:
 
     def write(stage: str, task: str, *names: str) -> None:
         outputs = {f"processed/{name}.parquet": "0" for name in names}
-        ledger.write(Entry(stage, task, {"code": {}}, outputs))
+        ledger.write(Entry(stage, task, vars(NOTHING), outputs))
 
     for log in (*LOGS, "gone"):
         write("resample", log, *(f"{kind}/{log}/{joint}" for kind in ("signal", "motion") for joint in (PITCH, ROLL)))

@@ -114,11 +114,11 @@ def _held(panel: Panel) -> Panel:
 
 
 def _shown(part: Part) -> Part:
-    """A panel or a mark with its words as a page can show them."""
-    held = {f.name: getattr(part, f.name) for f in fields(part)}
-    words: dict[str, Any] = {name: printable(value) for name, value in held.items() if isinstance(value, str)}
-    words |= {"names": tuple(map(printable, held["names"]))} if "names" in held else {}
-    return replace(part, **words)
+    """A panel or a mark with its words as a page can show them; the same one where they can be shown."""
+    values = {f.name: getattr(part, f.name) for f in fields(part)}
+    words: dict[str, Any] = {name: printable(value) for name, value in values.items() if isinstance(value, str)}
+    words |= {"names": tuple(map(printable, values["names"]))} if "names" in values else {}
+    return replace(part, **words) if any(words[name] != values[name] for name in words) else part
 
 
 @dataclass(frozen=True, eq=False)
