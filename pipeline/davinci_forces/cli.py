@@ -4,6 +4,7 @@ import os
 import re
 import signal
 import sys
+import threading
 from _thread import start_new_thread
 from collections.abc import Callable, Iterator
 from concurrent.futures import BrokenExecutor
@@ -138,6 +139,7 @@ def stop(number: int, _: object) -> None:
     for each in (signal.SIGINT, signal.SIGTERM):
         signal.signal(each, signal.SIG_IGN)
     sys.unraisablehook = lambda _: None  # where it was raised in vain, as in a destructor
+    threading.excepthook = lambda _: None  # of threads whose processes end
     start_new_thread(leave, (128 + number,))  # one of `threading` waits for a lock that this thread may hold
     raise Stopped(128 + number)
 

@@ -226,13 +226,13 @@ class Crew:
     def close(self) -> None:
         """Let the others end; at once where the run ends before their tasks do, which nobody takes any more."""
         if self._started is not None:
-            for future in self._running:
+            pool = getattr(self._started, "_processes", None) if self._running else None
+            others = list((pool or {}).values())
+            for other in others:
+                other.kill()
+            for other in others:
+                other.join()
+            for future in () if others else self._running:  # a pool cannot tell a cancelled one that it has broken
                 future.cancel()
-            if self._running:
-                others = list((getattr(self._started, "_processes", None) or {}).values())
-                for other in others:
-                    other.kill()
-                for other in others:
-                    other.join()
             self._started.shutdown(wait=not self._running)
             self._started = None
