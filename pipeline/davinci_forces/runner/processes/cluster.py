@@ -22,7 +22,7 @@ from davinci_forces.runner.plan import Task
 from davinci_forces.runner.processes import arithmetic
 
 PACKAGES = ("numpy", "scipy", "numba", "pyarrow", "statsmodels", "clarabel")  # that results are made with
-LOGGERS = ("distributed.client", "tornado.application")  # of tracebacks of a connection that is lost
+LOGGERS = ("distributed", "distributed.client", "tornado.application", "asyncio")  # of tracebacks of a lost connection
 PATIENCE = 10.0  # [s] that a shared file system may take to show a file to others
 
 
@@ -128,5 +128,5 @@ def connected(address: str, folders: Folders) -> Iterator[tuple[Executor, int, T
     finally:
         mark.unlink(missing_ok=True)
         client.close()
-        for logger, level in levels.items():
-            logger.setLevel(level)
+    for logger, level in levels.items():  # not after an error: what a lost connection leaves behind speaks later
+        logger.setLevel(level)
