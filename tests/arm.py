@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from davinci_forces.maths.models.independent import combined, inertia_of, regressor
+from davinci_forces.maths.models.independent import bias_coefficients, inertia_of, regressor
 from davinci_forces.maths.models.model import JointDynamics
 from davinci_forces.maths.models.terms import coulomb, gravity_cos, gravity_sin, inertia, lifted_mass, viscous
 from davinci_forces.maths.signals.smoothing import measured_motion
@@ -66,7 +66,7 @@ def excitation(name: str, t, period=None):
 
 def dynamics(terms, theta, N) -> JointDynamics:
     """What a filter is told of a joint of these terms."""
-    return JointDynamics(np.full(N, inertia_of(terms, theta)), combined(terms, theta), np.zeros(N))
+    return JointDynamics(np.full(N, inertia_of(terms, theta)), bias_coefficients(terms, theta), np.zeros(N))
 
 
 def signal(

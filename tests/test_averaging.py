@@ -174,7 +174,7 @@ def test_a_log_that_does_not_repeat_is_not_averaged_and_says_so():
 
 
 def test_a_stated_period_that_the_data_do_not_have_is_refused():
-    with pytest.raises(NotPeriodic, match=r"the study states 3\.0 s"):
+    with pytest.raises(NotPeriodic, match=r"the study states a period of 3\.0 s"):
         run([arm.signal(periods=1.4)], period=3.0)
 
 

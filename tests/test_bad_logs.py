@@ -133,7 +133,7 @@ def test_a_binary_log_that_was_cut_keeps_its_whole_rows_with_a_warning(lab):
     (lab / "bad.tdms").write_bytes(content[: -8 * 40])
     (lab / "study.toml").write_text((lab / "study.toml").read_text().replace("bad.csv", "bad.tdms"))
     said = run(lab)
-    assert "its last 40 rows lack some channels: they are left out" in said
+    assert "its last 40 rows lack some channels and are left out" in said
     assert "error" not in said
     import davinci_forces
 
@@ -150,7 +150,7 @@ def test_an_unknown_unit_in_the_log_asks_for_one_in_the_study(lab):
     text = (lab / "study.toml").read_text()
     head, tail = text.rsplit('"hand_roll.tau" = "hand_roll.tau"', 1)
     (lab / "study.toml").write_text(head + '"hand_roll.tau" = "hand_roll.tau [lbf]"' + tail)
-    assert "is in 'lbf', which is not known, but hand_roll.tau needs torque; say unit = ..." in run(lab)
+    assert "is in 'lbf', which is an unknown unit, but hand_roll.tau needs torque; give its unit" in run(lab)
 
 
 def test_a_log_and_a_study_that_disagree_on_a_unit_are_an_error(lab):
@@ -158,7 +158,7 @@ def test_a_log_and_a_study_that_disagree_on_a_unit_are_an_error(lab):
     text = (lab / "study.toml").read_text()
     head, tail = text.rsplit('"hand_roll.q" = "hand_roll.q"', 1)
     (lab / "study.toml").write_text(head + '"hand_roll.q" = { channel = "hand_roll.q [deg]", unit = "rad" }' + tail)
-    assert "says 'deg' and study.toml says 'rad'" in run(lab)
+    assert "is in 'deg', but study.toml says 'rad'" in run(lab)
 
 
 def test_a_log_without_a_clock_asks_for_a_rate(lab):
@@ -166,7 +166,7 @@ def test_a_log_without_a_clock_asks_for_a_rate(lab):
     head, tail = text.rsplit('time = "time"\n', 1)
     (lab / "study.toml").write_text(head + tail)
     edit(lab, lambda lines: [line.replace("time", "sample") for line in lines])
-    assert "the log carries no clock; name its time channel in [log.channels], or say rate = ... [Hz]" in run(lab)
+    assert "the log has no clock; name its time channel in [log.channels], or give rate = ... [Hz]" in run(lab)
 
 
 def test_units_signs_and_offsets_come_to_the_joint_in_si(lab):
@@ -220,7 +220,7 @@ def test_an_end_that_the_log_does_not_reach_is_remarked_on(lab):
 
 def test_too_little_before_the_end_is_refused(lab):
     describe(lab, more="until = 0.005")
-    assert "1 samples are too few, with 0 s skipped at the start and what comes after 0.005 s left out" in run(lab)
+    assert "1 samples are too few, with 0 s skipped at the start and those after 0.005 s left out" in run(lab)
 
 
 def test_a_gap_is_marked_and_not_bridged(lab):
@@ -243,7 +243,7 @@ def test_a_clock_that_jumps_while_the_motion_goes_on_is_set_back_and_said_to_be(
     signal = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5)
     arm.write_csv(lab / "bad.csv", [replace(signal, t=signal.t + np.where(signal.t < 4.2, 0.0, jump))])
     said = run(lab)
-    assert f"bad: the clock jumps while the motion goes on, by {jump:.6g} s after 4.180 s" in said
+    assert f"bad: the clock jumps while the motion continues, by {jump:.6g} s after 4.180 s" in said
     assert "gap" not in said
     good, bad = (davinci_forces.read(lab, "Recording", log=name) for name in ("good", "bad"))
     np.testing.assert_allclose(bad["t"], good["t"], atol=1e-6)

@@ -132,7 +132,7 @@ def test_a_verbose_run_names_every_task_with_its_time(study):
 
 @pytest.mark.medium
 def test_tasks_that_run_together_say_what_each_took(study, monkeypatch):
-    monkeypatch.setattr("davinci_forces.runner.processes.workers.ALONE", -1.0)
+    monkeypatch.setattr("davinci_forces.runner.processes.workers.SECONDS_ALONE", -1.0)
     said = call("ingest", study, "--verbose", "--jobs", 2)
     done = re.findall(r"^ingest: (\w+): took \d+\.\d\d s$", said, re.M)
     assert {*done} == {"roll", "slide", "check", "push"}
@@ -151,9 +151,9 @@ def test_a_pattern_that_the_shell_left_is_expanded(study, tmp_path, monkeypatch)
     call("all", "raw/*")
     assert {folder.name for folder in (tmp_path / "processed").iterdir()} == {"arm", "other"}
     said = call("ingest", "raw/*", code=1)
-    assert "raw/* stands for 2 studies, raw/arm, raw/other: name one of them" in said
-    assert "4 of 4 current" in call("ingest", "raw/?rm")
-    assert "nothing*: no folder has a name like this" in call("all", "raw/nothing*", code=1)
+    assert "raw/* matches 2 studies, raw/arm, raw/other: name one of them" in said
+    assert "4 of 4 up to date" in call("ingest", "raw/?rm")
+    assert "nothing*: no folder matches" in call("all", "raw/nothing*", code=1)
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="Windows has no names with * or ?")
@@ -204,7 +204,7 @@ def test_results_are_read_by_key_with_what_is_known_of_their_error(analysed):
 
 
 def test_results_that_are_not_there_say_what_to_run(study):
-    with pytest.raises(MissingRecord, match=r"results.json is not there; run `davinci-forces all .*arm`"):
+    with pytest.raises(MissingRecord, match=r"results.json does not exist; run `davinci-forces all .*arm`"):
         davinci_forces.results(study)
 
 

@@ -47,7 +47,7 @@ class Local:
                 [*MODULE, *words],
                 stdout=log,
                 stderr=log,
-                env={**os.environ, **arithmetic.wanted(), **self.settings, **environment},
+                env={**os.environ, **arithmetic.blas_variables(), **self.settings, **environment},
             )
         self.processes.append(process)
         return process
@@ -91,7 +91,7 @@ def study_of(folder: Path, count: int) -> Path:
 
 
 def test_a_cluster_gives_the_same_bytes_though_a_worker_is_killed(local, tmp_path, monkeypatch):
-    monkeypatch.setattr(workers, "ALONE", -1.0)
+    monkeypatch.setattr(workers, "SECONDS_ALONE", -1.0)
     study = study_of(tmp_path / "one" / "raw" / "lab", RECORDINGS)
     there = tmp_path / "two" / "raw" / "lab"
     shutil.copytree(study, there)
@@ -120,7 +120,7 @@ from davinci_forces.runner.processes import arithmetic
 arithmetic.pin()
 from davinci_forces.runner import runs
 from davinci_forces.runner.processes import workers
-workers.ALONE = -1.0
+workers.SECONDS_ALONE = -1.0
 study, address, *names = sys.argv[1:]
 sys.exit(0 if runs.run(Path(study), names, cluster=address) else 1)
 """
@@ -129,7 +129,7 @@ sys.exit(0 if runs.run(Path(study), names, cluster=address) else 1)
 MAIN = """
 from davinci_forces.cli import main
 from davinci_forces.runner.processes import workers
-workers.ALONE = -1.0
+workers.SECONDS_ALONE = -1.0
 main()
 """
 
@@ -169,7 +169,10 @@ def test_a_scheduler_that_is_killed_ends_the_run_in_one_line_and_costs_nothing_m
     wait_until_made(processed(begun) / record, run)
     local.processes[0].kill()
     _, said = run.communicate(timeout=60)
-    assert said == f"error: the scheduler at {local.address} is gone; what was finished is kept: run again\n"
+    assert (
+        said
+        == f"error: the scheduler at {local.address} does not answer any more; finished tasks are kept: run again\n"
+    )
     assert run.returncode == 1
     assert (processed(begun) / record).exists()
     assert not [file for file in processed(begun).iterdir() if file.name.startswith(".run-")]
@@ -189,7 +192,7 @@ def test_a_run_on_a_cluster_that_is_stopped_says_so_and_goes_on_next_time(local,
     wait_until_made(processed(begun) / record, run)
     run.send_signal(number)
     _, said = run.communicate(timeout=60)
-    assert (said, run.returncode) == ("stopped; run again to go on\n", 128 + number)
+    assert (said, run.returncode) == ("stopped; run again to continue\n", 128 + number)
     for worker in local.processes[1:]:
         worker.kill()
         worker.wait()
@@ -238,14 +241,14 @@ def test_a_cluster_is_reached_by_tls_with_certificates_in_dasks_configuration_an
 
 
 def test_an_address_where_nobody_is_is_said(tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster, "PATIENCE", 1.0)
+    monkeypatch.setattr(cluster, "CONNECT_TIMEOUT", 1.0)
     study = arm.write_study(tmp_path / "raw" / "arm")
     said = flat(call("ingest", study, "--cluster", "tcp://127.0.0.1:9", code=1))
     assert "no scheduler of a Dask cluster answers at tcp://127.0.0.1:9" in said
 
 
 def test_a_worker_that_reckons_otherwise_is_refused(local, tmp_path, monkeypatch):
-    monkeypatch.setattr(workers, "ALONE", -1.0)
+    monkeypatch.setattr(workers, "SECONDS_ALONE", -1.0)
     local.add_worker(OPENBLAS_NUM_THREADS="2")
     study = arm.write_study(tmp_path / "raw" / "arm")
     said = flat(call("ingest", study, "--cluster", local.address, code=1))
@@ -254,16 +257,16 @@ def test_a_worker_that_reckons_otherwise_is_refused(local, tmp_path, monkeypatch
 
 
 def test_a_worker_that_lacks_the_folder_or_holds_other_code_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr(cluster, "PATIENCE", 0.1)
+    monkeypatch.setattr(cluster, "CONNECT_TIMEOUT", 0.1)
     there = Folders(tmp_path / "raw", tmp_path / "processed", tmp_path / "reports")
     terms = cluster.own_terms(".run-x")
     with pytest.raises(BadRequest, match=r"does not see .*processed; a cluster needs the same folders"):
-        cluster.require(terms, there)
+        cluster.require_terms(terms, there)
     there.processed.mkdir()
     (there.processed / ".run-x").touch()
-    cluster.require(terms, there)
-    with pytest.raises(BadRequest, match="holds another version of davinci-forces"):
-        cluster.require(replace(terms, code="0"), there)
+    cluster.require_terms(terms, there)
+    with pytest.raises(BadRequest, match="has another version of davinci-forces"):
+        cluster.require_terms(replace(terms, code="0"), there)
     older = tuple((name, "1.0" if name == "numpy" else version) for name, version in terms.versions)
     with pytest.raises(BadRequest, match=r"has numpy \S+ instead of 1\.0"):
-        cluster.require(replace(terms, versions=older), there)
+        cluster.require_terms(replace(terms, versions=older), there)

@@ -88,9 +88,9 @@ def test_rows_name_what_changed_came_and_went(tmp_path):
         {"key": "new", "a": None, "b": 4.0, "std": None, "z": None},
     ]
     said = call("compare", a, b)
-    assert "2 of the 3 numbers that both have changed" in said
-    assert "1 went:\n  gone" in said
-    assert "1 came:\n  new" in said
+    assert "2 of the 3 shared numbers changed" in said
+    assert "1 removed:\n  gone" in said
+    assert "1 added:\n  new" in said
     assert "+4.0" in said
 
 
@@ -153,7 +153,7 @@ def test_two_runs_of_the_same_data_find_nothing(analysed, tmp_path):
         ('[{"key": "x", "value": 1, "std": -1}]', "(x): its std is -1"),
         ('[{"key": "x", "value": 1, "std": true}]', "(x): its std is True"),
         ('[{"key": "x", "value": 1, "unit": 1}]', "(x): its unit is 1"),
-        ('[{"key": "x", "value": 1}, {"key": "x", "value": 2}]', "number 2 (x): the key is there twice"),
+        ('[{"key": "x", "value": 1}, {"key": "x", "value": 2}]', "number 2 (x): the key appears twice"),
     ],
 )
 def test_what_is_no_results_json_is_said_to_be_none(tmp_path, text, words):
@@ -206,7 +206,7 @@ def test_a_report_says_what_changed_since_its_baseline_and_is_made_anew_when_tha
     call("report", finished)
     page = (finished.parents[1] / "reports/arm/report.html").read_text()
     assert "Since the baseline" in page
-    assert "1 came and 1 went" in page
+    assert "New numbers: 1; missing: 1" in page
     assert "gone.&lt;b&gt;" in page
     assert changed_key in page
     assert "nothing to do" in call("report", finished)

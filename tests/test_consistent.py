@@ -11,7 +11,7 @@ from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators import estimator
 from davinci_forces.estimators.problem import Known
 from davinci_forces.maths.estimation import conic
-from davinci_forces.maths.estimation.conic import ENTRIES, nearest, scaled
+from davinci_forces.maths.estimation.conic import ENTRIES, nearest, scale_unknowns
 from davinci_forces.maths.estimation.least_squares import triangle
 from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias, pseudo_inertias
 from davinci_forces.maths.models.model import ArmMotion, Mechanism, of_signs
@@ -139,7 +139,7 @@ def test_the_arm_is_the_nearest_by_the_conditions_of_karush_kuhn_and_tucker(nois
     mechanism, size = ARM.mechanism, np.sqrt(R.y @ R.y + R.squares)
     made = nearest(R, mechanism)
     F = (R.U * R.scale) @ mechanism.matrix
-    cones = scaled(F, mechanism)
+    cones = scale_unknowns(F, mechanism)
     z = np.linalg.lstsq(cones.scale.toarray()[:, cones.seen], made.x / size, rcond=None)[0]
     gradient = (F @ cones.scale)[:, cones.seen].T @ (F @ made.x - R.y) / size  # by unknowns of about one size
     for link in range(cones.links):
@@ -223,8 +223,8 @@ def test_what_the_solver_does_not_reach_is_refused_with_how_far_it_came(monkeypa
         settings.max_iter = 2
         return settings
 
-    careful = conic.careful
-    monkeypatch.setattr(conic, "careful", hasty)
+    careful = conic.careful_settings
+    monkeypatch.setattr(conic, "careful_settings", hasty)
     R, *_ = pose(impossible(), 1e-3)
     with pytest.raises(NotIdentifiable, match=r"the conic program was not solved \(MaxIterations after 2 steps\)"):
         nearest(R, ARM.mechanism)
@@ -283,7 +283,7 @@ def test_what_it_costs_a_joint_is_said_where_least_squares_find_what_no_mechanis
     made = list(fit.run([trajectory(replace(signal, tau=tau + noise))], [], arm.ARM, lowpass=17.0))
     fits = {r.estimator: r for r in made if isinstance(r, Fit)}
     said = [text for r in made if isinstance(r, Diagnostic) for text in r.text]
-    (text,) = [text for text in said if "no mechanism has a negative inertia, as lse finds" in text]
+    (text,) = [text for text in said if "lse estimates a negative inertia, which no mechanism has" in text]
     for name in ("consistent", "lse"):
         assert f"{np.sqrt(fits[name].mse):.3g}" in text
     plain = fit.run([trajectory(signal)], [], arm.ARM, lowpass=17.0)

@@ -162,7 +162,7 @@ def test_nothing_is_said_of_a_joint_at_rest_or_of_a_contact_log_without_windows(
     about = entry(role="contact", contact=((9.0, 11.0),))
     assert measured(track(noise()), assess.gather([space]), about)
     [hidden] = measured(track(noise(), at_rest=1), assess.gather([space]), about)
-    assert "the joint is at rest, where contact of up to its stiction cannot be told" in hidden.text[0]
+    assert "the joint is at rest, so a contact of up to its stiction cannot be told" in hidden.text[0]
 
 
 def test_noise_is_told_from_the_error_of_a_model():

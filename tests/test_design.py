@@ -80,7 +80,7 @@ def test_the_lyapunov_function_starts_at_the_energy_of_the_stretched_controller(
 
 def test_an_error_between_two_steps_of_the_solver_is_that_of_the_motion():
     t = np.array([0.0, 1.0, 7.0, 12.0])
-    run = design.watched(davinci.ROBOT.control[0], "hand_roll", t, t**3, 3 * t**2, 0.0, 1500.0)
+    run = design.control_record(davinci.ROBOT.control[0], "hand_roll", t, t**3, 3 * t**2, 0.0, 1500.0)
     assert run.error_10 == pytest.approx(500.0, rel=1e-12)
 
 
@@ -91,7 +91,7 @@ def test_overshoot_and_settling_are_those_of_the_response():
     w_d = w * np.sqrt(1 - zeta**2)
     step = 1 - np.exp(-zeta * w * t) * (np.cos(w_d * t) + zeta / np.sqrt(1 - zeta**2) * np.sin(w_d * t))
     study = davinci.ROBOT.control[0]
-    run = design.watched(study, "a", t, 1.0 - 2.0 * step, np.zeros_like(t), 1.0, -1.0)
+    run = design.control_record(study, "a", t, 1.0 - 2.0 * step, np.zeros_like(t), 1.0, -1.0)
     assert run.overshoot == pytest.approx(np.exp(-np.pi * zeta / np.sqrt(1 - zeta**2)), rel=1e-4)
     assert abs(step[t >= run.settling_time] - 1).max() <= 0.02
     assert abs(step[t < run.settling_time][-1] - 1) > 0.02

@@ -14,7 +14,7 @@ from davinci_forces.filters.response import assumed, at_rest, lag, slowest
 from davinci_forces.filters.stepping import covariances
 from davinci_forces.filters.tuning import likeliest_walk, tuned
 from davinci_forces.maths.models.bias import bias
-from davinci_forces.maths.models.independent import combined, inertia_of
+from davinci_forces.maths.models.independent import bias_coefficients, inertia_of
 from davinci_forces.records import Diagnostic, ErrorBand, Fit, MeasurementNoise, Track, Whiteness
 from davinci_forces.stages.forces import ekf as stage
 from davinci_forces.stages.forces import tune, whiteness
@@ -33,7 +33,7 @@ def simulate(used, theta, tau_ext, tau, noise, seed=0, x=(0.1, -0.2), finer=20):
     The motion is stepped so finely that its own error does not count.
     """
     rng, (q, dq), rows = np.random.default_rng(seed), x, []
-    M, c, h = inertia_of(used, theta), combined(used, theta), T_S / finer
+    M, c, h = inertia_of(used, theta), bias_coefficients(used, theta), T_S / finer
     for k in range(len(tau)):
         rows.append((q + noise.r_q * rng.normal(), dq + noise.r_dq * rng.normal()))
         pushed = noise.q_dq / T_S * rng.normal()  # an acceleration that is constant over the sample
@@ -57,7 +57,7 @@ def matched(name, seed=0, N=6000):
     theta[-1] = 0.0  # Coulomb friction jumps at reversals, where no linearisation holds
     tau_ext = walk(N, NOISE.q_tau, seed + 1000)
     t = np.arange(N) * T_S
-    tau = tau_ext + 3 * inertia_of(used, theta) * np.sin(2 * t) + combined(used, theta)[0]
+    tau = tau_ext + 3 * inertia_of(used, theta) * np.sin(2 * t) + bias_coefficients(used, theta)[0]
     return recorded(used, theta, simulate(used, theta, tau_ext, tau, NOISE, seed), tau), tau_ext
 
 
@@ -122,7 +122,7 @@ def thesis_triangle(seed=0):
     theta, used = np.array([0.2384, 0.1343, 0.0705, 0.9064, 0.4155]), arm.joint("hand_pitch").terms
     finer, N = 50, 6000
     h, rng, (q, dq) = T_S / finer, np.random.default_rng(seed), (0.0, 0.06 * np.pi)
-    M, c, w = inertia_of(used, theta), combined(used, theta), 0.2 * np.pi
+    M, c, w = inertia_of(used, theta), bias_coefficients(used, theta), 0.2 * np.pi
     tau_ext, rows = np.clip(1 - np.abs(np.arange(N) * T_S - 30.0) / 5.0, 0, None), []
     for k in range(N):
         for i in range(finer):
@@ -220,7 +220,7 @@ def test_an_inertia_that_is_not_positive_is_left_to_what_fit_says_of_it():
     fits = [r for r in made if isinstance(r, Fit)]
     (text,) = [text for diagnostic in arm.models([signal], fits) for text in diagnostic.text]
     assert "the inertia of independent.lse is not positive" in text
-    assert "what `fit` says of hand_roll tells why" in text
+    assert "the remarks of stage fit on hand_roll say why" in text
     assert any("hand_roll: " in t and "inertia" in t for r in made if isinstance(r, Diagnostic) for t in r.text)
 
 

@@ -11,7 +11,7 @@ from numpy.testing import assert_allclose
 
 from davinci_forces.estimators import ESTIMATORS, estimator
 from davinci_forces.estimators.problem import Regression
-from davinci_forces.estimators.wlse import pooled
+from davinci_forces.estimators.wlse import pool_variance
 from davinci_forces.identification.scores import folds
 from davinci_forces.records import (
     Average,
@@ -125,7 +125,7 @@ def test_few_periods_leave_the_weights_out_and_the_rest_goes_on():
 def test_pooling_keeps_the_mean_variance_and_never_leaves_a_weight_infinite(K, M, seed):
     var = np.random.default_rng(seed).chisquare(2, size=K)
     var[0] = 0.0
-    smooth = pooled(var, np.full(K, M))
+    smooth = pool_variance(var, np.full(K, M))
     assert (smooth > 0).all()
     assert smooth.mean() == pytest.approx(var.mean(), rel=1e-9)
 
@@ -284,7 +284,7 @@ def test_of_many_fitted_paths_those_that_differ_most_are_kept_and_it_is_said_whe
     def kept(paths: int) -> tuple[set[int], str]:
         every = [replace(one, log=f"log-{i}", q=np.sin((1 + i % paths) * phase)) for i in range(60)]
         model = independent(arm.joint("hand_roll"))
-        made = list(fit.fitted_paths("hand_roll", [fit.repeated(model, t) for t in every]))
+        made = list(fit.fitted_paths("hand_roll", [fit.periodic_part(model, t) for t in every]))
         [kept] = (r for r in made if isinstance(r, FittedPaths))
         logs = [int(log.removeprefix("log-")) % paths for log in dict.fromkeys(kept.source)]
         assert len(logs) == 20

@@ -9,8 +9,8 @@ from scipy.optimize import nnls
 
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators import estimator
-from davinci_forces.estimators.problem import Known, Regression, factored
-from davinci_forces.estimators.wlse import pooled
+from davinci_forces.estimators.problem import Known, Regression, factorise
+from davinci_forces.estimators.wlse import pool_variance
 from davinci_forces.maths.models.independent import regressor
 from tests import arm
 from tests.contracts.test_estimators import NAMES, PHI, SEEDS, THETA, K, problem
@@ -106,7 +106,7 @@ def test_what_the_model_leaves_beyond_noise_makes_weights_equal():
     """Weights of the noise alone trust the quiet half, where the model errs as it does elsewhere."""
     quiet = np.where(np.arange(K) < K // 2, 1.0, 0.03)
     wrong = 0.3 * np.sin(2 * np.pi * 5 * np.arange(K) / K)
-    weigh = {"noise": lambda p: factored(p, p.periods / pooled(p.tau_var, p.periods)).theta}
+    weigh = {"noise": lambda p: factorise(p, p.periods / pool_variance(p.tau_var, p.periods)).theta}
     weigh |= {name: lambda p, name=name: estimator(name)(p).theta for name in ("lse", "wlse")}
 
     def off(name, error):

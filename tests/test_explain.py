@@ -7,7 +7,7 @@ from davinci_forces.identification.used import Identified
 from davinci_forces.records import Fit, JointModel
 from davinci_forces.robots import davinci
 from davinci_forces.robots.models import coupled, independent
-from davinci_forces.stages.forces.whiteness import THIS_LOG, others
+from davinci_forces.stages.forces.whiteness import THIS_LOG, alternatives
 from tests import arm
 
 ROLL = davinci.ROBOT.joint("hand_roll")
@@ -27,7 +27,7 @@ def told_by(signals) -> list[str]:
     fits = [fit("independent"), fit("coupled")]
     along = Along(Identified(davinci.ROBOT, fits), [arm.motion(signal) for signal in signals])
     model = next(m for m in arm.models(signals, fits, robot=davinci.ROBOT) if isinstance(m, JointModel))
-    return [name for name, _ in others(model, along, np.ones(len(model), bool))]
+    return [name for name, _ in alternatives(model, along, np.ones(len(model), bool))]
 
 
 def test_a_log_without_the_other_joints_is_explained_by_what_needs_them_not():

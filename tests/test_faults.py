@@ -107,7 +107,7 @@ def test_a_name_that_no_file_can_have_costs_its_own_log_and_no_other(raw):  # no
     long = "x" * 250
     edit(folder / "study.toml", 'name = "two"', f'name = "{long}"')
     said = flat(call("ingest", folder, code=1))
-    assert "give it a shorter one in study.toml" in said
+    assert "give the log a shorter name in study.toml" in said
     assert (processed(folder) / "recording" / "one" / "hand_roll.parquet").exists()
     assert not [file for file in processed(folder).rglob(f"{long}*/*") if file.is_file()]
     assert "1 of 2 tasks failed" in said
@@ -120,7 +120,7 @@ def test_a_study_file_that_is_a_log_by_mistake_is_refused_unread(raw, monkeypatc
         file.writelines(f"k{i} = 1\n" for i in range(700_000))
     monkeypatch.delattr("tomllib.loads")
     said = flat(call("all", folder, code=1))
-    assert "study.toml: it has 8.3 MB, and what people write down has at most 4" in said
+    assert "study.toml: it has 8.3 MB, more than the 4 MB that are read" in said
 
 
 @pytest.fixture
@@ -159,7 +159,7 @@ from davinci_forces.runner.processes import arithmetic
 arithmetic.pin()
 from davinci_forces.runner import runs
 from davinci_forces.runner.processes import workers
-workers.ALONE = -1.0
+workers.SECONDS_ALONE = -1.0
 if __name__ == "__main__":
     sys.exit(0 if runs.run(Path(sys.argv[1]), ALL, jobs=2) else 1)
 """
@@ -216,7 +216,7 @@ COMMAND = """
 import sys
 from davinci_forces.cli import main
 from davinci_forces.runner.processes import workers
-workers.ALONE = -1.0
+workers.SECONDS_ALONE = -1.0
 if __name__ == "__main__":
     exec(sys.argv.pop(1))
     print("begins", flush=True)
@@ -225,7 +225,7 @@ if __name__ == "__main__":
 DRAWING = """
 from davinci_forces.report.figures import together
 from davinci_forces.report import writers
-together.FEWEST = 1
+together.MIN_FIGURES_PER_PROCESS = 1
 draw, typeset = together._draw, writers.renderer
 def say_and_draw(figures):
     print("draws", flush=True)
@@ -235,7 +235,7 @@ def say_and_render(ending):
     return typeset(ending)
 together._draw, writers.renderer = say_and_draw, say_and_render
 """
-STOPPED = "stopped; run again to go on\n"
+STOPPED = "stopped; run again to continue\n"
 
 
 @pytest.fixture(scope="module")

@@ -142,7 +142,7 @@ def test_without_a_force_at_the_tip_the_joint_that_slides_is_compared_with_its_s
 def test_a_log_with_a_sensor_and_nothing_to_compare_says_so():
     [said] = sensed(touch(PUSH))
     assert isinstance(said, Diagnostic)
-    assert "its force sensor is compared with nothing" in said.text[0]
+    assert "its force sensor is not compared with an estimate" in said.text[0]
     at_rest = tracks(ROBOT, np.zeros((len(T), 3)), at_rest=(1, 1, 1))
     assert isinstance(sensed(touch(PUSH), [], at_rest)[0], Diagnostic)
 
@@ -178,7 +178,7 @@ def test_a_simulated_sensor_gives_the_error_the_lag_and_the_coverage_that_were_s
     made = {axis: store.read(SensorForce, simulated, Path("sensor_force", LOG, f"{axis}.parquet")) for axis in AXES}
     force = store.read(TipForce, simulated, Path("tip_force", f"{LOG}.parquet"))
     [log] = [log for log in scenario.load("davinci-demo").logs if log.name == LOG]
-    true = sum(np.outer(push.at(force.t - LAG), np.array(push.direction)) for push in log.tip)
+    true = sum(np.outer(push.effort_at(force.t - LAG), np.array(push.direction)) for push in log.tip)
     judged = (force.t >= 1.0) & (force.near_singular == 0)
     squares = 0.0
     for i, axis in enumerate("xyz"):

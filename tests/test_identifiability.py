@@ -8,12 +8,12 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.estimators import estimator
-from davinci_forces.estimators.problem import Estimate, Spread, factored
+from davinci_forces.estimators.problem import Estimate, StandardErrors, factorise
 from davinci_forces.identification.identifiability import advice, hardly_described, inertia_at_fault, not_seen, together
 from davinci_forces.maths.estimation.least_squares import combinations, deviation, pairs, told, triangle
 from davinci_forces.records import Diagnostic, Identifiability
 from davinci_forces.records.catalogue import Catalogue
-from davinci_forces.report.sections.joints import wanting
+from davinci_forces.report.sections.joints import unidentified_parameters
 from davinci_forces.robots.davinci import ROBOT
 from davinci_forces.stages.model import fit
 from tests import arm
@@ -28,7 +28,7 @@ def of(Phi: np.ndarray):
 
 
 def test_the_correlation_of_parameters_is_that_of_their_errors():
-    found = told(factored(problem(seed=0), np.full(K, float(M))))
+    found = told(factorise(problem(seed=0), np.full(K, float(M))))
     thetas = np.array([estimator("lse")(problem(seed)).theta for seed in range(1000)])
     assert_allclose(found.correlation, np.corrcoef(thetas.T), atol=4 / np.sqrt(1000))
     assert_allclose(np.diag(found.correlation), 1.0, rtol=1e-12)
@@ -41,7 +41,7 @@ def test_the_condition_is_that_of_scaled_columns_whatever_their_units():
 
 def test_the_deviation_of_a_sum_of_parameters_is_that_of_its_errors():
     weights, seeds = np.array([1.0, 2.0, 0.0, -1.0]), 2000
-    found = told(factored(problem(seed=0), np.full(K, float(M))))
+    found = told(factorise(problem(seed=0), np.full(K, float(M))))
     std = SIGMA / np.sqrt(M) * np.sqrt(np.diag(np.linalg.inv(PHI.T @ PHI)))
     sums = [estimator("lse")(problem(seed)).theta @ weights for seed in range(seeds)]
     assert deviation(found.correlation, std, weights) == pytest.approx(np.std(sums), rel=4 / np.sqrt(2 * seeds))
@@ -53,7 +53,7 @@ def test_parameters_that_move_together_are_named_with_their_correlation():
     ((i, j, r),) = pairs(found, 0.95)
     assert (i, j) == (1, 4)
     names = [*NAMES, "gravity, cosine"]
-    assert f"gravity, sine and gravity, cosine move together: correlation {r:.2f}" in together(names, found)
+    assert f"the estimates of gravity, sine and gravity, cosine are correlated: {r:.2f}" in together(names, found)
     assert together(NAMES, of(PHI)) == []
 
 
@@ -79,13 +79,15 @@ def test_a_parameter_that_cannot_be_told_from_zero_is_not_seen_and_its_share_is_
 
 def test_advice_is_a_command_for_that_joint_and_only_where_something_is_wanting():
     assert advice(ROBOT, ROBOT.joint("hand_pitch"), ()) == ""
-    assert "`davinci-forces excite davinci hand_pitch`" in advice(ROBOT, ROBOT.joint("hand_pitch"), ("x is not seen",))
-    assert "`davinci-forces excite arm.toml hand_roll`" in advice(arm.ARM, ROLL, ("x is not seen",))
+    assert "`davinci-forces excite davinci hand_pitch`" in advice(
+        ROBOT, ROBOT.joint("hand_pitch"), ("x is not significant",)
+    )
+    assert "`davinci-forces excite arm.toml hand_roll`" in advice(arm.ARM, ROLL, ("x is not significant",))
 
 
 def guess(theta, std) -> Estimate:
     std = np.array(std)
-    return Estimate(np.array(theta), lambda: Spread(std, std, 0.0))
+    return Estimate(np.array(theta), lambda: StandardErrors(std, std, 0.0))
 
 
 def blamed(theta, std, others=()) -> str:
@@ -94,14 +96,14 @@ def blamed(theta, std, others=()) -> str:
 
 def test_an_inertia_that_was_not_excited_is_not_blamed_on_signs():
     said = blamed([-0.07, 0.01, 0.37, 0.22], [0.25, 0.01, 0.01, 0.01])
-    assert "-0.07 ± 0.2 kg m^2 cannot be told from a positive one" in said
+    assert "-0.07 ± 0.2 kg m^2 may be positive, because the motion hardly excites it" in said
     assert "accelerating more: `davinci-forces excite arm.toml hand_roll`" in said
     assert "sign" not in said
 
 
 def test_an_effort_against_the_motion_is_blamed_on_a_sign():
     said = blamed([-0.45, 0.01, -0.37, -0.22], [0.01] * 4)
-    assert "and so is friction" in said
+    assert "and friction is negative, too" in said
     assert "correct the `sign`" in said
 
 
@@ -140,11 +142,12 @@ def test_the_report_says_what_is_wanting_and_what_to_record_next():
     def about(**changes):
         (found,) = made(arm.signal("hand_pitch"), Identifiability)
         told = replace(found, **{"together": (), "not_seen": (), "advice": "", **changes})
-        return list(wanting(SimpleNamespace(catalogue=Catalogue(lambda kind: [told])), "hand_pitch"))
+        return list(unidentified_parameters(SimpleNamespace(catalogue=Catalogue(lambda kind: [told])), "hand_pitch"))
 
     assert about() == []
-    (said,) = about(not_seen=("inertia is not seen: 0.1 ± 0.2",), advice="`davinci-forces excite a b` designs a motion")
-    assert said.text == "Inertia is not seen: 0.1 ± 0.2. `davinci-forces excite a b` designs a motion."
+    insignificant = "inertia is not significant: 0.1 ± 0.2"
+    (said,) = about(not_seen=(insignificant,), advice="`davinci-forces excite a b` designs a motion")
+    assert said.text == "Inertia is not significant: 0.1 ± 0.2. `davinci-forces excite a b` designs a motion."
 
 
 def test_effort_of_the_wrong_sign_is_said_once_for_all_estimators():
@@ -152,4 +155,4 @@ def test_effort_of_the_wrong_sign_is_said_once_for_all_estimators():
     said = [text for d in made(replace(signal, tau=-signal.tau), Diagnostic) for text in d.text]
     (wrong,) = [text for text in said if "not positive" in text]
     assert wrong.startswith("hand_roll: lse, wlse,")
-    assert "the effort pushes against the motion" in wrong
+    assert "the effort opposes the motion" in wrong

@@ -56,7 +56,7 @@ def test_columns_without_names_are_told_by_what_they_hold(tmp_path):
         expected |= {f"joint_{k + 1}.tau": f"column_{9 + k}"}
     assert held(tmp_path) == expected
     text = (tmp_path / "study.toml").read_text()
-    assert 'time = "column_0"  # rises throughout (125 Hz if it is in seconds)' in text
+    assert 'time = "column_0"  # increases throughout (125 Hz if it is in seconds)' in text
     assert text.count("CHECK: follows the velocities") == 4
 
 
@@ -85,7 +85,7 @@ def test_where_there_is_no_time_the_velocities_tell_the_rate(tmp_path, rate):
     new(file)
     [entry] = reading.read(tmp_path).logs
     assert entry.rate == rate
-    assert f"rate = {rate!r}, by which the velocities are those of the positions" in call("inspect", file)
+    assert f"rate = {rate!r}, at which the velocities match the derivatives of the positions" in call("inspect", file)
 
 
 def test_torques_that_are_proportional_tell_that_a_block_is_of_currents(tmp_path):
@@ -101,7 +101,7 @@ def test_a_joint_at_rest_stays_commented_out_with_the_reason(tmp_path):
     q[:, 2], dq[:, 2] = 0.7 + 1e-4 * np.sin(t), 0.0
     new(table(tmp_path / "run.csv", t, q, dq, effort(q, dq)))
     assert not any(quantity.startswith("joint_3.") for quantity in held(tmp_path))
-    assert '# "joint_3.q" = "column_3"  # the joint is at rest' in (tmp_path / "study.toml").read_text()
+    assert '# "joint_3.q" = "column_3"  # the joint does not move' in (tmp_path / "study.toml").read_text()
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ import pytest
 from davinci_forces.records import store
 from davinci_forces.runner import reporting
 from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, hash_of_text
-from davinci_forces.runner.ledger import OUTPUT, Entry, Folders, Ledger, index_of, sealed
+from davinci_forces.runner.ledger import OUTPUT, Entry, Folders, Ledger, index_of, seal
 from davinci_forces.runner.plan import Task
 from tests.test_robustness import analysed, finished, flat, raw, small  # noqa: F401 - fixtures
 from tests.test_runs import call, contents, processed, reports
@@ -72,7 +72,7 @@ def test_a_report_is_replaced_whole_or_by_the_next_run(tmp_path, monkeypatch, se
         return {name: f"{name} {edition}".encode() for name in names} | {"manifest.txt": edition.encode()}
 
     def write(files: dict[str, bytes]) -> bool:
-        monkeypatch.setattr(reporting, "written", lambda *_: files)
+        monkeypatch.setattr(reporting, "render", lambda *_: files)
         ledger = Ledger(folders)
         outcome = reporting.perform(ledger, task)
         ledger.write(Entry(task.step, task.name, vars(task.fingerprint), outcome.outputs, outcome.failed))
@@ -150,7 +150,7 @@ def plant(study: Path, entry: Entry, file: Path | None = None) -> None:
     """Put an entry in the ledger as another hand does, its seal right."""
     file = file or processed(study) / "tasks" / entry.stage / f"{entry.task}.json"
     file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_text(sealed(entry))
+    file.write_text(seal(entry))
 
 
 @pytest.mark.medium
@@ -251,8 +251,8 @@ def test_what_an_earlier_version_made_goes_and_the_rest_is_as_if_it_had_never_be
     notes = processed(study) / "smoothed" / "notes.txt"
     notes.write_text("of somebody")
     said = call("all", study)
-    assert "under names that an earlier version used" in said
-    assert "does not count" not in said
+    assert "which an earlier version made" in said
+    assert "is ignored" not in said
     assert notes.read_text() == "of somebody"
     notes.unlink()
     notes.parent.rmdir()

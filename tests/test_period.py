@@ -10,7 +10,7 @@ from scipy.signal import lfilter, sosfiltfilt
 from davinci_forces.errors import NotPeriodic
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.periods import period
-from davinci_forces.maths.periods.agreement import differing, stretch
+from davinci_forces.maths.periods.agreement import differing_periods, stretch
 from davinci_forces.maths.periods.repetition import repetition
 from davinci_forces.maths.periods.steps import REACH, steps
 from davinci_forces.records import Average, Diagnostic, Fit, Signal, Trajectory
@@ -218,7 +218,7 @@ def test_correlated_noise_is_no_transient(rho, periods):
     for seed in range(60):
         t = np.arange(1000 * periods) / RATE
         x = waves(t, 10.0) + 0.01 * coloured(np.random.default_rng(seed), len(t), rho)
-        flagged += bool(differing(t, [x], 10.0, RATE))
+        flagged += bool(differing_periods(t, [x], 10.0, RATE))
     assert flagged <= 2
 
 
@@ -260,7 +260,7 @@ def test_an_interval_of_the_period_needs_neither_every_sample_nor_every_line_of_
     T, t = 10.0, np.arange(100_003) / 50
     x = waves(t, T) + 0.01 * coloured(np.random.default_rng(0), len(t), rho)
     few = period.standard_error(t, [x], T, 3)
-    monkeypatch.setattr(period, "BESIDE", len(t))
+    monkeypatch.setattr(period, "LINES_BESIDE", len(t))
     monkeypatch.setattr("scipy.fft.prev_fast_len", lambda N, real: N)
     assert few == pytest.approx(period.standard_error(t, [x], T, 3), rel=0.01)
 

@@ -12,7 +12,7 @@ from davinci_forces.robots import dvrk_psm
 from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, schemas
 from davinci_forces.runner.graph import every_step
 from davinci_forces.runner.ledger import Entry, Folders, Ledger
-from davinci_forces.runner.places import about
+from davinci_forces.runner.places import log_and_joint
 from davinci_forces.runner.plan import Plan
 from davinci_forces.runner.signature import declaration
 from davinci_forces.study import LogEntry, Settings, Study
@@ -58,16 +58,16 @@ def plan(tmp_path) -> Plan:
     ],
 )
 def test_a_place_says_what_its_record_is_about(kind, place, log, joint):
-    assert about(kind, place) == (log, joint)
+    assert log_and_joint(kind, place) == (log, joint)
 
 
 def test_records_come_in_the_order_of_the_studys_logs_and_the_robots_joints(plan):
-    names = [place for _, place in plan.places().of((Track, Signal))]
+    names = [place for _, place in plan.places().find((Track, Signal))]
     assert names == [f"signal/{log}/{joint}.parquet" for log in LOGS for joint in (ROLL, PITCH)]
 
 
 def test_a_log_that_has_left_the_study_has_no_records(plan):
-    assert not [place for _, place in plan.places().of(tuple(KINDS.values())) if "gone" in place]
+    assert not [place for _, place in plan.places().find(tuple(KINDS.values())) if "gone" in place]
 
 
 def handed(plan: Plan, step: str) -> dict[str, list[str]]:

@@ -277,7 +277,7 @@ def test_the_lines_of_python_run_as_they_are_written(analysed, tmp_path, capsys)
     code = README.partition("```python\n")[2].partition("```")[0]
     exec(code.replace("raw/davinci-demo", str(tmp_path / "lab" / "raw" / "arm")), {})
     printed = capsys.readouterr().out
-    assert "nothing to do, every stage is current" in printed
+    assert "nothing to do, all stages are up to date" in printed
     assert "\nN m\n" in printed
     assert "kg m^2" in printed
 

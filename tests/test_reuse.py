@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 from davinci_forces.cli import app
 from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, hash_of_text
 from davinci_forces.runner.ledger import Entry, Folders, Ledger
-from davinci_forces.runner.plan import Task, reused
+from davinci_forces.runner.plan import Task, reuse
 from davinci_forces.stages import design
 
 SAME = Fingerprint({}, {"robot": "a"}, {"shape": [1, 2]}, {}, {"design.py": "b"}, "1")
@@ -34,7 +34,7 @@ def make(lab: Path, study: str, fingerprint: Fingerprint, failed: str = "", **fi
 def test_files_and_entry_of_the_same_task_are_copied_and_what_was_there_before_goes(tmp_path):
     there = make(tmp_path, "one", SAME, links="the links")
     here = make(tmp_path, "two", replace(SAME, version="0"), pose="an old pose")
-    assert reused(here, Task("design", "design", SAME)) == "one"
+    assert reuse(here, Task("design", "design", SAME)) == "one"
     assert here.folders.file(LINKS).read_text() == "the links"
     assert not here.folders.file(POSE).exists()
     assert here.entry("design", "design") == there.entry("design", "design")
@@ -56,14 +56,14 @@ def test_what_differs_or_failed_or_was_altered_is_not_copied(tmp_path, fingerpri
     if altered:
         there.folders.file(LINKS).write_text("other links")
     here = ledger(tmp_path, "two")
-    assert reused(here, Task("design", "design", SAME)) == ""
+    assert reuse(here, Task("design", "design", SAME)) == ""
     assert here.entry("design", "design") is None
 
 
 def test_a_task_that_reads_something_of_its_study_is_never_copied(tmp_path):
     fingerprint = replace(SAME, inputs={"raw/log.csv": "c"})
     make(tmp_path, "one", fingerprint, links="the links")
-    assert reused(ledger(tmp_path, "two"), Task("design", "design", fingerprint)) == ""
+    assert reuse(ledger(tmp_path, "two"), Task("design", "design", fingerprint)) == ""
 
 
 def test_a_second_study_of_a_robot_copies_its_design_and_says_so_in_one_line(tmp_path, monkeypatch):
@@ -79,7 +79,7 @@ def test_a_second_study_of_a_robot_copies_its_design_and_says_so_in_one_line(tmp
     assert "design: copied from one, which has the same robot and settings" in said[1]
     files = [sorted((tmp_path / "processed" / study).rglob("*.*")) for study in ("one", "two")]
     assert [f.read_bytes() for f in files[0] if f.is_file()] == [f.read_bytes() for f in files[1] if f.is_file()]
-    assert "1 of 1 current" in CliRunner().invoke(app, ["design", str(tmp_path / "raw" / "two")]).output
+    assert "1 of 1 up to date" in CliRunner().invoke(app, ["design", str(tmp_path / "raw" / "two")]).output
     forced = CliRunner().invoke(app, ["design", str(tmp_path / "raw" / "two"), "--force"]).output
     assert "copied" not in forced
 

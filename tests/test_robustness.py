@@ -22,11 +22,11 @@ from davinci_forces.errors import BadRequest
 from davinci_forces.records import Diagnostic, PeriodResidual, Recording, store
 from davinci_forces.robots import davinci
 from davinci_forces.runner import execution
-from davinci_forces.runner.fingerprints.code import PACKAGE, code, imported
+from davinci_forces.runner.fingerprints.code import PACKAGE, code, find_imports
 from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, canonical, hash_of
 from davinci_forces.runner.ledger import Folders
+from davinci_forces.runner.lock import hold_lock, parse_holder
 from davinci_forces.runner.lock import holder as holder_now
-from davinci_forces.runner.lock import locked, parsed
 from davinci_forces.runner.plan import Task
 from davinci_forces.runner.signature import declaration
 from davinci_forces.stages.recordings import resample
@@ -88,7 +88,7 @@ def test_no_import_of_a_module_is_overlooked(file):
     statements = (node for node in ast.walk(ast.parse(source)) if isinstance(node, ast.ImportFrom))
     ours = (s for s in statements if str(s.module).startswith("davinci_forces"))
     parsed = [(str(s.module), [n.name for n in s.names]) for s in ours]
-    assert sorted(imported(source)) == sorted(parsed)
+    assert sorted(find_imports(source)) == sorted(parsed)
 
 
 def test_records_that_a_stage_comes_to_in_turn_are_read_then_and_not_kept(finished):
@@ -225,10 +225,10 @@ import sys, time
 from pathlib import Path
 from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
 from davinci_forces.runner.ledger import Folders
-from davinci_forces.runner.lock import locked
+from davinci_forces.runner.lock import hold_lock
 from davinci_forces.runner.plan import Task
 from davinci_forces.runner.signature import declaration
-with locked(Path(sys.argv[1])):
+with hold_lock(Path(sys.argv[1])):
     print("held", flush=True)
     time.sleep(60)
 """
@@ -260,7 +260,7 @@ def test_a_second_run_on_a_study_is_refused_until_the_first_has_ended_however_it
 
 def test_a_lock_is_free_when_its_block_is_left_even_by_an_error(tmp_path):
     def work(inside):
-        with locked(tmp_path / "p"):
+        with hold_lock(tmp_path / "p"):
             inside()
 
     with pytest.raises(BadRequest, match="another run"):
@@ -270,7 +270,7 @@ def test_a_lock_is_free_when_its_block_is_left_even_by_an_error(tmp_path):
 
 def test_a_lock_file_that_nobody_holds_counts_for_nothing(tmp_path):
     (tmp_path / ".lock").write_text("of a run that was killed")
-    with locked(tmp_path):
+    with hold_lock(tmp_path):
         pass
 
 
@@ -278,11 +278,11 @@ AFTER = """
 import sys, time
 from pathlib import Path
 from davinci_forces.errors import BadRequest
-from davinci_forces.runner.lock import locked
+from davinci_forces.runner.lock import hold_lock
 folder, done = Path(sys.argv[-1]), 0
 while done < 40:
     try:
-        with locked(folder):
+        with hold_lock(folder):
             marker = folder / "inside"
             marker.touch(exist_ok=False)
             marker.unlink()
@@ -338,9 +338,9 @@ def test_without_flock_the_lock_of_a_living_run_is_refused_and_that_of_a_dead_on
     other = hold_without_flock(without_flock, tmp_path)
     try:
         [said] = os.listdir(tmp_path / ".lock")
-        taken = parsed(said).taken
+        taken = parse_holder(said).taken
         assert abs(datetime.now(UTC) - datetime.fromisoformat(f"{taken}+00:00")).total_seconds() < 600
-        with pytest.raises(BadRequest, match="another run is working on this study") as refused, locked(tmp_path):
+        with pytest.raises(BadRequest, match="another run is working on this study") as refused, hold_lock(tmp_path):
             pass
         assert f"process {other.pid} on {socket.gethostname()}" in str(refused.value)
         assert f"{taken[:19]} UTC" in str(refused.value)
@@ -348,7 +348,7 @@ def test_without_flock_the_lock_of_a_living_run_is_refused_and_that_of_a_dead_on
         other.kill()
         other.communicate()
     assert os.listdir(tmp_path / ".lock") == [said]
-    with locked(tmp_path), pytest.raises(BadRequest, match=f"process {os.getpid()} on"), locked(tmp_path):
+    with hold_lock(tmp_path), pytest.raises(BadRequest, match=f"process {os.getpid()} on"), hold_lock(tmp_path):
         pass
     assert not list(tmp_path.iterdir())
 
@@ -363,8 +363,8 @@ def left_by(folder, **what):
 
 def test_without_flock_a_later_process_of_the_same_number_is_told_from_the_one_that_ended(tmp_path, without_flock):
     left_by(tmp_path, start="00000000.1")
-    with locked(tmp_path):
-        assert [parsed(name).start for name in os.listdir(tmp_path / ".lock")] == [holder_now().start]
+    with hold_lock(tmp_path):
+        assert [parse_holder(name).start for name in os.listdir(tmp_path / ".lock")] == [holder_now().start]
 
 
 @pytest.mark.parametrize("host", ["elsewhere.0", f"{socket.gethostname()}.0"], ids=["host", "container"])
@@ -377,31 +377,31 @@ def test_without_flock_the_lock_of_another_host_is_never_taken(tmp_path, without
         file = tmp_path / ".lock"
         file.write_text(theirs.name)
     for _ in range(2):
-        with pytest.raises(BadRequest) as refused, locked(tmp_path):
+        with pytest.raises(BadRequest) as refused, hold_lock(tmp_path):
             pass
         told = f"process 4711 on {host[:-2]}, which took the lock at 2026-01-02 03:04:05 UTC"
         assert told in str(refused.value)
         assert str(refused.value).endswith(f"delete {file}")
     file.unlink()
-    with locked(tmp_path):
+    with hold_lock(tmp_path):
         pass
 
 
 @pytest.mark.parametrize("content", ["", "of a run that was killed", "4711\nlab\n", "host=&process=x&start=&taken="])
 def test_without_flock_what_names_nobody_holds_nothing(tmp_path, without_flock, content):
     (tmp_path / ".lock").write_text(content)
-    with locked(tmp_path):
+    with hold_lock(tmp_path):
         pass
     (tmp_path / ".lock").mkdir()  # of a run that was killed as it let go
-    with locked(tmp_path):
+    with hold_lock(tmp_path):
         pass
     assert not list(tmp_path.iterdir())
 
 
 def test_a_lock_says_who_holds_it_and_nothing_once_it_is_free(tmp_path):
-    with locked(tmp_path):
-        assert parsed((tmp_path / ".lock").read_text()).process == str(os.getpid())
-        with pytest.raises(BadRequest, match=f"process {os.getpid()} on {socket.gethostname()}"), locked(tmp_path):
+    with hold_lock(tmp_path):
+        assert parse_holder((tmp_path / ".lock").read_text()).process == str(os.getpid())
+        with pytest.raises(BadRequest, match=f"process {os.getpid()} on {socket.gethostname()}"), hold_lock(tmp_path):
             pass
     assert (tmp_path / ".lock").read_bytes() == b""
 
@@ -410,12 +410,12 @@ def test_a_lock_says_who_holds_it_and_nothing_once_it_is_free(tmp_path):
 def test_a_lock_that_is_a_link_or_a_pipe_has_nothing_written_and_nobody_wait(tmp_path):
     (tmp_path / "precious").write_text("content")
     (tmp_path / ".lock").symlink_to(tmp_path / "precious")
-    with pytest.raises(OSError, match="lock"), locked(tmp_path):
+    with pytest.raises(OSError, match="lock"), hold_lock(tmp_path):
         pass
     assert (tmp_path / "precious").read_text() == "content"
     (tmp_path / ".lock").unlink()
     os.mkfifo(tmp_path / ".lock")
-    with contextlib.suppress(OSError), locked(tmp_path):
+    with contextlib.suppress(OSError), hold_lock(tmp_path):
         pass
 
 
@@ -423,13 +423,13 @@ RACE = """
 import time
 from pathlib import Path
 from davinci_forces.errors import BadRequest
-from davinci_forces.runner.lock import locked
+from davinci_forces.runner.lock import hold_lock
 for line in sys.stdin:
     folder = Path(line.strip())
     while not (folder / "go").exists():
         pass
     try:
-        with locked(folder):
+        with hold_lock(folder):
             print("won", flush=True)
             while not (folder / "over").exists():
                 time.sleep(0.001)
@@ -499,7 +499,7 @@ def test_verify_names_a_deviation_or_a_unit_that_was_altered(finished, key, word
     results = json.loads(file.read_text())
     next(r for r in results if r["key"] == key)[word] = value
     file.write_text(json.dumps(results))
-    assert f"{key}: says {word} {value!r}, but its records give" in flat(call("verify", finished, code=1))
+    assert f"{key}: has {word} {value!r}, but its records give" in flat(call("verify", finished, code=1))
 
 
 def test_verify_names_results_that_are_gone_or_odd(finished):
@@ -509,10 +509,10 @@ def test_verify_names_results_that_are_gone_or_odd(finished):
     odd = [{**results[0], "source": source} for source in ("processed/fits/a.parquet#mse", 3)]
     file.write_text(json.dumps([*results, *odd, {}, {**results[0], "key": "fit.of.nothing"}]))
     said = flat(call("verify", finished, code=1))
-    assert f"{gone} is gone" in said
-    assert f"{results[0]['key']} stands there 3 times" in said
-    assert said.count("says source 'processed/fits/a.parquet#mse', but its records give") == 1
-    assert said.count("says source 3, but") == 1
+    assert f"{gone} is missing" in said
+    assert f"{results[0]['key']} appears 3 times" in said
+    assert said.count("has source 'processed/fits/a.parquet#mse', but its records give") == 1
+    assert said.count("has source 3, but") == 1
     assert "None comes from no record" in said
     assert "fit.of.nothing comes from no record" in said
 

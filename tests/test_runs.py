@@ -71,7 +71,7 @@ def processed(study: Path) -> Path:
 
 
 def test_a_report_of_long_records_whose_columns_are_read_when_asked_for_is_the_same(finished, monkeypatch):
-    monkeypatch.setattr(reporting, "KEPT", 0)
+    monkeypatch.setattr(reporting, "MAX_CACHED_ROWS", 0)
     before = contents(reports(finished))
     call("report", finished, "--force")
     assert contents(reports(finished)) == before
@@ -80,7 +80,7 @@ def test_a_report_of_long_records_whose_columns_are_read_when_asked_for_is_the_s
 def test_a_second_run_runs_no_stage_and_says_so(finished):
     before = contents(processed(finished)) | contents(reports(finished))
     said = call("all", finished)
-    assert "nothing to do, every stage is current" in said
+    assert "nothing to do, all stages are up to date" in said
     assert "it has not run" not in said
     assert contents(processed(finished)) | contents(reports(finished)) == before
 
@@ -102,7 +102,7 @@ def test_a_dry_run_says_what_would_run_and_why_and_changes_nothing(study, finish
     new = write_study(study.parent / "new")
     said = call("all", new, "--dry-run")
     assert "design: would run: it has not run yet" in said
-    assert "resample: waits for what ingest makes" in said
+    assert "resample: waits for the results of ingest" in said
     assert not processed(new).exists()
     assert "would run" not in call("all", finished, "--dry-run")
     log = next(study.glob("*.csv"))
@@ -160,7 +160,7 @@ def test_a_stage_runs_again_and_says_why(finished, change, reruns, keeps):
     stage, why = reruns
     assert any(line.startswith(f"{stage}:") and why in line for line in lines), lines
     if keeps:
-        assert any(line.startswith(f"{keeps}:") and line.endswith("current") for line in lines), lines
+        assert any(line.startswith(f"{keeps}:") and line.endswith("up to date") for line in lines), lines
 
 
 def test_a_changed_sample_runs_what_depends_on_it_and_nothing_else(finished):
@@ -170,7 +170,7 @@ def test_a_changed_sample_runs_what_depends_on_it_and_nothing_else(finished):
     file.write_text("\n".join(lines) + "\n")
     said = call("ingest", finished)
     assert "ingest: slide: raw/slide.csv changed" in said
-    assert "ingest: 3 of 4 current" in said
+    assert "ingest: 3 of 4 up to date" in said
 
 
 def test_an_altered_processed_file_is_made_again(finished):
@@ -206,7 +206,7 @@ def edit(file: Path, old: str, new: str) -> None:
 
 
 def test_editing_a_term_of_the_model_makes_the_fit_run_again_and_says_why(finished, package):
-    assert "fit: 5 of 5 current" in run_by(package, "fit", finished)
+    assert "fit: 5 of 5 up to date" in run_by(package, "fit", finished)
     edit(package / "maths" / "models" / "terms.py", 'b={"sign(dq)": 1.0}', 'b={"sign(dq)": 2.0}')
     said = run_by(package, "fit", finished)
     assert "the robot changed" in said
@@ -223,7 +223,7 @@ def test_a_reworded_meaning_runs_what_stores_it_and_what_reads_that(finished, pa
     said = run_by(package, "all", finished)
     for stage in ("design", "ingest", "resample", "average", "differentiate", "fit", "predict"):
         [line] = [line for line in said.splitlines() if line.startswith(f"{stage}: ")]
-        assert line.endswith(" current"), line
+        assert line.endswith(" up to date"), line
     assert re.search(r"^ekf: .* and 1 more: the declaration of Track changed$", said, re.M), said
     assert re.search(r"^whiteness: track/.*: processed/track/.*parquet changed$", said, re.M), said
     assert re.search(r"^report: the code of records/prediction.py changed", said, re.M), said
@@ -252,7 +252,7 @@ def test_an_index_that_is_no_more_what_the_entries_say_is_not_believed(finished)
     entry.write_bytes(good[1].replace(b'"failed": ""', b'"failed": "x"'))
     assert "average: roll: it has not run yet" in call("average", finished)
     index.write_bytes(good[0].replace(b"average", b"mistake"))
-    assert f"{index} is not what the entries beside it say" in " ".join(call("verify", finished, code=1).split())
+    assert f"{index} does not agree with the entries beside it" in " ".join(call("verify", finished, code=1).split())
     assert "nothing to do" in call("all", finished)
     assert (index.read_bytes(), entry.read_bytes()) == good
 
@@ -275,7 +275,7 @@ def test_the_report_is_written_again_when_what_it_shows_or_it_itself_changed(fin
     assert page.read_bytes() == good
     edit(finished / "study.toml", 'title = "A test"', 'title = "A trial"')
     assert "report: the study changed; raw/study.toml changed" in call("report", finished)
-    assert "report: 1 of 1 current" in call("report", finished)
+    assert "report: 1 of 1 up to date" in call("report", finished)
 
 
 def test_a_report_that_fails_says_so_costs_no_stage_and_is_tried_again(finished, monkeypatch):
@@ -324,7 +324,7 @@ def test_a_stage_of_a_fresh_study_runs_what_it_needs_and_nothing_else(study):
     assert ran(study) == {"ingest", "resample", "average", "differentiate", "fit"}
     assert "fit: it has not run yet" in said
     again = call("fit", study).splitlines()[1:]
-    assert again == ["fit: 5 of 5 current", f"{study}: nothing to do, every stage is current"]
+    assert again == ["fit: 5 of 5 up to date", f"{study}: nothing to do, all stages are up to date"]
 
 
 def test_a_group_of_a_fresh_study_runs_its_stages_and_what_they_need(study):
@@ -434,7 +434,7 @@ def test_verify_names_a_number_that_was_altered(finished):
             result["value"] += 1e-9
     file.write_text(json.dumps(results))
     said = " ".join(call("verify", finished, code=1).split())
-    assert "fit.hand_roll.independent.lse.inertia: says" in said
+    assert "fit.hand_roll.independent.lse.inertia: has" in said
 
 
 def test_verify_notices_files_that_are_gone_or_of_unknown_origin(finished):
@@ -444,7 +444,7 @@ def test_verify_notices_files_that_are_gone_or_of_unknown_origin(finished):
         processed(finished) / "track" / "roll" / "stray.parquet",
     )
     said = " ".join(call("verify", finished, code=1).split())
-    assert "independent.lse.parquet is gone" in said
+    assert "independent.lse.parquet is missing" in said
     assert "stray.parquet was made by no stage" in said
 
 
@@ -456,7 +456,7 @@ def test_all_takes_the_studies_of_raw_and_skips_those_without_logs(study, monkey
     (other / "study.toml").write_text((study / "study.toml").read_text())
     monkeypatch.setattr("davinci_forces.cli.ALL", ("ingest",))
     said = call("all")
-    assert "raw/elsewhere: skipped, its logs are not here (roll.csv ...)" in said
+    assert "raw/elsewhere: skipped, its logs are missing (roll.csv ...)" in said
     assert (tmp_path / "processed" / "arm" / "recording" / "roll" / "hand_roll.parquet").exists()
 
 

@@ -20,7 +20,7 @@ def test_all_passes_over_each_in_one_line_while_its_recordings_are_absent(tmp_pa
     said = call("all")
     assert len(said.splitlines()) == len(PUBLIC)
     for name in PUBLIC:
-        assert f"raw/{name}: skipped, its logs are not here" in said
+        assert f"raw/{name}: skipped, its logs are missing" in said
         assert "get them" in flat((ROOT / "raw" / name / "study.toml").read_text().replace("#", "")).lower()
 
 

@@ -117,14 +117,14 @@ def test_of_many_problems_the_first_are_said_and_the_others_counted(tmp_path):
     *said, last = str(caught.value).splitlines()
     assert len(said) == MOST_PROBLEMS
     assert "unknown key 'k0'" in said[2]
-    assert last.endswith(f"study.toml: {1002 - MOST_PROBLEMS} more problems; mend these first")
+    assert last.endswith(f"study.toml: {1002 - MOST_PROBLEMS} more problems; correct these first")
 
 
 def test_a_robot_of_thousands_of_joints_is_refused(tmp_path):
     joint = '[[joint]]\nname = "j{}"\nkind = "revolute"\nterms = ["inertia"]\n'
     link = '[[link]]\nname = "l{0}"\na = 0.1\nmoved_by = "j{0}"\nmass = 1.0\n'
     (tmp_path / "arm.toml").write_text("".join(each.format(i) for each in (joint, link) for i in range(4000)))
-    assert_refused_soon("arm.toml:801: it has 4000 [[joint]], and may have 200", "robot", str(tmp_path / "arm.toml"))
+    assert_refused_soon("arm.toml:801: it has 4000 [[joint]], more than the 200", "robot", str(tmp_path / "arm.toml"))
 
 
 def urdf_chain(joints: int, kind: str) -> str:
@@ -141,9 +141,9 @@ def urdf_chain(joints: int, kind: str) -> str:
     ("content", "says"),
     [
         (urdf_chain(3000, "continuous"), "arm.urdf:1002: it has more than 1000 links"),
-        (urdf_chain(201, "continuous"), "it has 201 joints that move, and may have 200"),
+        (urdf_chain(201, "continuous"), "it has 201 moving joints, more than the 200 allowed"),
         (urdf_chain(3000, "fixed"), "arm.urdf:1002: it has more than 1000 links"),
-        ("<robot>" + "<a>" * 500_000 + "</a>" * 500_000 + "</robot>", "more than 30 elements inside each other"),
+        ("<robot>" + "<a>" * 500_000 + "</a>" * 500_000 + "</robot>", "more than 30 nested elements"),
         ("<robot>" + "<a/>" * 900_000 + "</robot>", "arm.urdf:1: it has more than 30000 elements"),
         ("<robot " + " ".join(f'a{i}="1"' for i in range(300_000)) + "/>", "more than 30 attributes in an element"),
         (f'<robot><link name="{"x" * 3_900_000}"/></robot>', "arm.urdf:1: <link name='xxx"),
@@ -209,7 +209,7 @@ def test_a_chunk_unpacked_piece_by_piece_holds_the_same_samples(tmp_path, monkey
     from davinci_forces.logs.hdf5 import datasets
 
     monkeypatch.setattr(datasets, "CACHE", 100)
-    monkeypatch.setattr(datasets, "PIECE", 77)
+    monkeypatch.setattr(datasets, "UNPACK_BYTES", 77)
     values = np.random.default_rng(0).integers(0, 200, shape).astype(kind)
     chunks = tuple(length if length < 7000 else 3000 for length in shape)
     axis = int(np.argmax(shape))
@@ -218,7 +218,7 @@ def test_a_chunk_unpacked_piece_by_piece_holds_the_same_samples(tmp_path, monkey
         shuffled = file.create_dataset("y", data=values, chunks=chunks, compression="gzip", shuffle=True)
         assert isinstance(datasets._opened(file, plain.ref, axis), datasets.Unpacked)
         assert isinstance(datasets._opened(file, shuffled.ref, axis), h5py.Dataset)
-    log = datasets.opened(tmp_path / "log.h5", datasets.Options())
+    log = datasets.open_in_child(tmp_path / "log.h5", datasets.Options())
     for _ in range(2):  # from the start again, too
         blocks = list(log.blocks([channel.name for channel in log.channels]))
         columns = [np.concatenate([block[c.name] for block in blocks]) for c in log.channels]

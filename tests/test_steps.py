@@ -9,7 +9,7 @@ from typer.testing import CliRunner
 
 import davinci_forces
 from davinci_forces.cli import app
-from davinci_forces.runner.graph import every_step, needed
+from davinci_forces.runner.graph import every_step, required_steps
 from davinci_forces.runner.ledger import Entry, Ledger
 from davinci_forces.runner.runs import folders
 from davinci_forces.runner.signature import stage_of, steps
@@ -31,22 +31,22 @@ def test_a_stage_has_a_step_for_each_function_that_it_exports_in_their_order():
 
 
 def test_a_stage_needs_the_steps_that_make_what_it_reads_and_no_other():
-    assert needed(["fit"]) == FIT
-    ekf = needed(["ekf"])
+    assert required_steps(["fit"]) == FIT
+    ekf = required_steps(["ekf"])
     assert {"tune.gather", "calibrate", "calibrate.gather", "predict"} <= {*ekf}
     assert not {"design", "choose.apply", "assess", "benchmark", "whiteness"} & {*ekf}
     assert ekf == [step for step in every_step() if step in ekf]
 
 
 def test_a_group_needs_its_stages_whole_and_what_they_read():
-    model = needed(["model"])
+    model = required_steps(["model"])
     assert model == [*FIT, "choose", "choose.apply", "predict", "predict.apply"]
-    assert needed(["weigh"])[-2:] == ["weigh", "weigh.gather"]
+    assert required_steps(["weigh"])[-2:] == ["weigh", "weigh.gather"]
 
 
 def test_names_in_any_order_are_taken_in_that_of_the_stages_and_the_report_needs_everything():
-    assert needed(["ekf", "fit"]) == needed(["ekf"])
-    assert needed(["fit", "report"]) == [*every_step(), "report"]
+    assert required_steps(["ekf", "fit"]) == required_steps(["ekf"])
+    assert required_steps(["fit", "report"]) == [*every_step(), "report"]
 
 
 def test_a_step_waits_for_those_before_it_and_says_the_name_of_its_stage(finished, capsys):
@@ -59,7 +59,7 @@ def test_a_step_waits_for_those_before_it_and_says_the_name_of_its_stage(finishe
     assert said == [
         "tune: roll/hand_roll: it has not run yet",
         "tune: gather: it has not run yet",
-        "tune: 3 of 5 current",
+        "tune: 3 of 5 up to date",
     ]
 
 
@@ -67,9 +67,9 @@ def test_what_would_run_is_told_once_a_stage(finished):
     ledger = Ledger(folders(finished, None, None))
     ledger.place("tune", "check/hand_roll").unlink()  # which makes nothing, as it identifies nothing
     said = CliRunner().invoke(app, ["calibrate", str(finished), "--dry-run"]).output.splitlines()[1:]
-    assert said == ["tune: check/hand_roll: would run: it has not run yet", "calibrate: waits for what tune makes"]
+    assert said == ["tune: check/hand_roll: would run: it has not run yet", "calibrate: waits for the results of tune"]
     said = CliRunner().invoke(app, ["tune", str(finished), "--dry-run"]).output.splitlines()[1:]
-    assert said == ["tune: check/hand_roll: would run: it has not run yet", "tune: 4 of 5 current"]
+    assert said == ["tune: check/hand_roll: would run: it has not run yet", "tune: 4 of 5 up to date"]
 
 
 @pytest.mark.parametrize(
@@ -97,7 +97,7 @@ def test_what_was_made_under_the_name_of_a_stage_that_is_no_more_goes_and_is_mad
     ledger.place("tune.gather", "gather").unlink()
     assert json.loads(ledger.place("settle", "settle").read_text())["stage"] == "settle"
     assert davinci_forces.run(finished, "tune")
-    assert "removed 3 files of settle under names that an earlier version used" in capsys.readouterr().out
+    assert "removed 3 files of settle, which an earlier version made" in capsys.readouterr().out
     assert not ledger.folders.file(stray).exists()
     assert not ledger.place("settle", "settle").parent.exists()
     assert all(ledger.folders.file(name).exists() for name in entry.outputs)

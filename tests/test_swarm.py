@@ -51,7 +51,7 @@ def test_every_seed_finds_the_best_parameters_of_its_box(name, theta, known):
     """Where least squares are in the box, those; else those that bounds on the lumped parameters leave."""
     p = problem(name, theta, known=known)
     R, best = least(p)
-    box = p.known.box or pso.around(R, p)
+    box = p.known.box or pso.box_around(R, p)
     excess = [search(R, box, seed).squares / best - 1 for seed in range(SEEDS)]
     assert max(excess) < 1e-6
     assert min(excess) > -1e-9

@@ -27,7 +27,7 @@ def ledger_of(study: Path) -> Ledger:
 
 
 def report_id(study: Path) -> str:
-    return re.search(r"its ID is ([0-9a-f]{32})", flat(call("verify", study)))[1]
+    return re.search(r"the report ID is ([0-9a-f]{32})", flat(call("verify", study)))[1]
 
 
 def remove_raw(study):
@@ -100,17 +100,17 @@ def add_page(study):
 
 
 TAMPERINGS = {
-    remove_raw: "one.csv is gone",
+    remove_raw: "one.csv is missing",
     alter_raw: "one.csv was altered",
-    remove_record: "independent.lse.parquet is gone",
+    remove_record: "independent.lse.parquet is missing",
     add_record: "independent.other.parquet was made by no stage",
-    remove_results: "results.json is gone",
+    remove_results: "results.json is missing",
     remove_entry_of_the_report: "report: report: it is not in the ledger",
     remove_entry_of_a_stage: "fit: fit: it is not in the ledger",
-    add_entry: "ingest: the ledger has entries of what this study has no call for: another",
+    add_entry: "ingest: the ledger has entries of tasks that this study does not have: another",
     change_study_file: "lowpass = 17.0 became 12.0",
-    remove_page: "report.pdf is gone",
-    forge_page: "report.html is not what its records give",
+    remove_page: "report.pdf is missing",
+    forge_page: "report.html differs from what its records give",
     forge_results: "but its records give",
     add_page: "report (corrected).html was made by no stage",
 }
@@ -208,7 +208,7 @@ def test_verify_passes_files_of_the_system_and_those_in_raw_that_the_study_does_
         file.touch()
     said = flat(call("verify", finished))
     assert "are unchanged" in said
-    assert f"not compared, since they are no part of the results: {', '.join(sorted(map(str, others)))}" in said
+    assert f"not checked, since they are not part of the results: {', '.join(sorted(map(str, others)))}" in said
 
 
 def test_what_a_study_names_in_raw_is_not_said_to_be_left_out(tmp_path):
@@ -251,7 +251,7 @@ def forge_everything(study: Path) -> None:
 
 def test_a_printed_page_tells_a_report_that_was_forged_with_all_its_files(finished):  # noqa: F811
     printed = report_id(finished)
-    assert f"its ID is {printed}" in flat(call("verify", finished, "--id", printed))
+    assert f"the report ID is {printed}" in flat(call("verify", finished, "--id", printed))
     spaced = f"{printed[:16]} {printed[16:]}".upper()
     call("verify", finished, "--id", spaced)
     forge_everything(finished)
@@ -274,7 +274,7 @@ def temporary(tmp_path, monkeypatch) -> Path:
 def another_processor(monkeypatch):
     """Results were made here, and from now on this is another processor."""
     reporting.environment.cache_clear()
-    monkeypatch.setattr("davinci_forces.runner.processes.arithmetic.described", lambda: "BLAS of another kind")
+    monkeypatch.setattr("davinci_forces.runner.processes.arithmetic.description", lambda: "BLAS of another kind")
     yield
     reporting.environment.cache_clear()
 
@@ -295,7 +295,7 @@ def test_what_was_forged_with_all_its_hashes_does_not_come_from_raw(finished, te
     assert "are unchanged" in call("verify", finished)
     said = flat(call("verify", finished, "--again", "--jobs", 2, code=1))
     forged = processed(finished) / "fit" / "hand_roll" / "independent.lse.parquet"
-    assert re.search(rf"error: \d+ of \d+ files are not, byte for byte, what raw/ gives: {forged}, ", said)
+    assert re.search(rf"error: \d+ of \d+ files differ from those recomputed from raw/: {forged}, ", said)
     assert f"{reports(finished) / 'results.json'}" in said
     assert not [*temporary.iterdir()]
 
@@ -303,13 +303,13 @@ def test_what_was_forged_with_all_its_hashes_does_not_come_from_raw(finished, te
 @pytest.mark.medium
 def test_on_another_processor_numbers_are_compared(finished, temporary, another_processor):  # noqa: F811
     said = flat(call("verify", finished, "--again"))
-    compared = "recomputed from raw/: other processor or packages, not compared by bytes; of"
+    compared = "recomputed from raw/ with another processor or packages, so compared by number and not by byte: of"
     assert compared in said
-    assert "0 differ by more than 1e-9 of themselves; 0 differ by more than their standard deviation" in said
+    assert "0 differ by more than 1e-9 of their size; 0 differ by more than their standard deviation" in said
     forge_everything(finished)
     said = flat(call("verify", finished, "--again", code=1))
     assert compared in said
-    assert re.search(r"\d are not what raw/ gives \(fit.hand_roll.independent.lse.inertia, ", said)
+    assert re.search(r"\d do not agree with raw/ \(fit.hand_roll.independent.lse.inertia, ", said)
     assert not [*temporary.iterdir()]
 
 
@@ -365,12 +365,12 @@ def row(value: float, std: float | None = None, unit: str = "N") -> dict:
 )
 def test_what_is_said_of_a_number_that_another_processor_computes(key, stored, computed, said):
     words = {
-        "different": "differ by more than 1e-9 of themselves",
+        "different": "differ by more than 1e-9 of their size",
         "far": "differ by more than their standard deviation",
-        "searched": "differ, and are not judged, since a search or a count of samples gives them",
+        "searched": "differ without a limit, since they come from a search or a count of samples",
         "new": "are not in results.json",
-        "gone": "do not come from raw/",
-        "other": "are not what raw/ gives",
+        "gone": "are not computed from raw/",
+        "other": "do not agree with raw/",
     }
     assert [*recomputation.differences(key, stored, computed)] == [words[each] for each in said]
     before, now = ({key: each} if each else {} for each in (stored, computed))
@@ -389,7 +389,7 @@ def test_an_entry_knows_the_packages_and_the_processor_that_it_was_made_with(fin
     assert {entry.environment for entry in ledger.entries()} == {here}
     assert recomputation.has_same_environment(ledger.folders)
     others = ("importlib.metadata.version", "platform.python_version", "platform.machine")
-    for changed in (*others, "davinci_forces.runner.processes.arithmetic.described"):
+    for changed in (*others, "davinci_forces.runner.processes.arithmetic.description"):
         with monkeypatch.context() as patched:
             patched.setattr(changed, lambda *_: "another")
             reporting.environment.cache_clear()

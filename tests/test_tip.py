@@ -156,7 +156,7 @@ def test_what_is_kept_of_correlations_does_not_grow_with_the_study():
     [arm] = resolve.gather(few, robot)
     assert list(arm.source) == ["log-0", "log-1", "log-2"]
     [arm] = resolve.gather([replace(few[0], log=f"log-{i}") for i in range(100)], robot)
-    assert len(arm) == resolve.LOGS
+    assert len(arm) == resolve.MAX_LOGS_CORRELATION
     assert not list(resolve.gather([], robot))
 
 
@@ -165,7 +165,7 @@ def test_a_joint_at_rest_or_without_a_track_leaves_the_force_unknown_and_that_is
     made = run("davinci", [of[0], of[2]])
     assert set(made) == {Diagnostic}
     [text] = made[Diagnostic].text
-    assert "hand_pitch is not tracked" in text
+    assert "the external effort of hand_pitch is not known" in text
     assert "instrument_slide is at rest, where friction hides its effort" in text
     assert not run("davinci", of, role="validation", contact=())  # nothing touches it, so nothing is missed
     assert not run("davinci", tracks("davinci", noise(3)), role="weight", contact=())

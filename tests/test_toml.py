@@ -187,8 +187,8 @@ def test_each_accessor_gives_what_the_file_says():
         ("n = []", lambda t: t.tables("n", "it has no [[n]]"), "1: it has no [[n]]"),
         ("[[n]]\n\n[[n]]\nx = 1", lambda t: t.tables("n")[1].text("x"), "4: n 2: x must be text, not 1"),
         ("n = 1\nlenght = 2", lambda t: (t.number("n"), "length" in t, t.close()),
-         "2: unknown key 'lenght'; known are n, length; did you mean 'length'?"),
-        ("[a.b]\nx = 1", lambda t: t.table("a").table("b").close(), "2: a.b: unknown key 'x'; known are none"),
+         "2: unknown key 'lenght'; known keys are n, length; did you mean 'length'?"),
+        ("[a.b]\nx = 1", lambda t: t.table("a").table("b").close(), "2: a.b: unknown key 'x'; known keys are none"),
     ],
 )  # fmt: skip
 def test_what_is_wrong_with_a_value_is_said_with_its_line(text, ask, says):

@@ -9,9 +9,9 @@ from numpy.testing import assert_allclose, assert_array_equal
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators import estimator
 from davinci_forces.estimators.problem import Regression
-from davinci_forces.estimators.tls import Noise, smallest
+from davinci_forces.estimators.tls import Noise, fit_for_noise
 from davinci_forces.identification.regression import averaged_motion, joined, pose, row_covariance
-from davinci_forces.identification.scores import part
+from davinci_forces.identification.scores import select_logs
 from davinci_forces.maths.estimation.least_squares import triangle
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.model import ArmMotion
@@ -87,7 +87,7 @@ def test_with_noise_of_one_size_everywhere_it_is_the_textbook_s_smallest_singula
     rng = np.random.default_rng(0)
     Phi, tau = rng.normal(size=(60, 3)), rng.normal(size=60)
     R = triangle(Phi, tau, np.ones(60))
-    found = smallest(R, Noise(np.eye(3), 1.0 / R.scale**2), 1.0) / R.scale
+    found = fit_for_noise(R, Noise(np.eye(3), 1.0 / R.scale**2), 1.0) / R.scale
     *_, v = np.linalg.svd(np.column_stack([Phi, tau]))[2]
     assert_allclose(found, -v[:3] / v[3], rtol=1e-9)
 
@@ -97,8 +97,8 @@ def test_columns_without_noise_are_taken_out_first():
     rng = np.random.default_rng(1)
     Phi, tau = rng.normal(size=(60, 3)), rng.normal(size=60)
     R = triangle(Phi, tau, np.ones(60))
-    mixed = smallest(R, Noise(np.eye(3), np.array([0.0, 0.0, 1.0])), 1.0)
-    limit = smallest(R, Noise(np.eye(3), np.array([1e-10, 1e-10, 1.0])), 1.0)
+    mixed = fit_for_noise(R, Noise(np.eye(3), np.array([0.0, 0.0, 1.0])), 1.0)
+    limit = fit_for_noise(R, Noise(np.eye(3), np.array([1e-10, 1e-10, 1.0])), 1.0)
     assert_allclose(mixed, limit, rtol=1e-6)
     assert np.abs(mixed - R.theta * R.scale).max() > 0.01
 
@@ -114,7 +114,7 @@ def test_a_model_that_errs_beyond_noise_is_not_taken_for_noise_of_the_columns():
     R = triangle(Phi, wrong.tau, np.ones(K))
     variance, axes = np.linalg.eigh(C / np.outer(R.scale, R.scale))
     noise = Noise(axes, np.where(variance > 1e-12 * variance[-1], variance, 0.0))
-    textbook = smallest(R, noise, float(wrong.tau_var.sum())) / R.scale
+    textbook = fit_for_noise(R, noise, float(wrong.tau_var.sum())) / R.scale
     assert abs(textbook[0] - lse[0]) > 10 * abs(tls[0] - lse[0])
 
 
@@ -175,16 +175,16 @@ def test_what_is_known_of_the_columns_goes_with_the_logs():
     one, other = (pose(model, [trajectory(arm.signal(seed=seed, log=f"log-{seed}"))]) for seed in (0, 1))
     both = joined([one, other])
     assert_array_equal(both.Phi_cov, np.concatenate([one.Phi_cov, other.Phi_cov]))
-    assert_array_equal(part(both, [1]).Phi_cov, other.Phi_cov)
+    assert_array_equal(select_logs(both, [1]).Phi_cov, other.Phi_cov)
     assert joined([one, replace(other, Phi_cov=None)]).Phi_cov is None
-    assert part(replace(both, Phi_cov=None), [1]).Phi_cov is None
+    assert select_logs(replace(both, Phi_cov=None), [1]).Phi_cov is None
 
 
 # What is refused
 
 
 def test_motion_whose_noise_is_not_known_is_refused():
-    with pytest.raises(NotIdentifiable, match="how noisy the motion is shows where periods repeat"):
+    with pytest.raises(NotIdentifiable, match="the noise of the motion is not known without repeated periods"):
         estimator("tls")(replace(problem(1), Phi_cov=None))
 
 
@@ -192,7 +192,7 @@ def test_noise_that_buries_what_the_motion_shows_is_refused_by_name():
     p = problem(1)
     cov = np.zeros((1, 4, 4))
     cov[0, 2, 2] = np.mean(PHI[:, 2] ** 2)
-    with pytest.raises(NotIdentifiable, match="% of what the motion shows of") as refused:
+    with pytest.raises(NotIdentifiable, match="% of the excitation of") as refused:
         estimator("tls")(replace(p, Phi_cov=cov))
     assert [name for name in NAMES if name in str(refused.value)] == [NAMES[2]]
 
@@ -201,7 +201,7 @@ def test_a_log_that_does_not_repeat_has_no_total_least_squares_and_it_is_said():
     t = np.arange(3000) / 100.0
     q = 0.3 * np.sin(2.0 * t) + 0.2 * np.sin(2.0 * np.sqrt(2) * t + 1.0)
     made, text = said(fit, recording(q, np.gradient(q, 0.01)))
-    assert "hand_roll: tls is left out: how noisy the motion is shows where periods repeat" in text
+    assert "hand_roll: tls is left out: the noise of the motion is not known without repeated periods" in text
     assert {"lse", "consistent"} <= {r.estimator for r in made if isinstance(r, Fit)}
     averaged = list(fit.run([trajectory(arm.signal())], [], arm.ARM, lowpass=17.0))
     assert "tls" in {r.estimator for r in averaged if isinstance(r, Fit)}

@@ -7,7 +7,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.maths.contact.weighing import PARTS, Rows, Weighed, better, offset, unit_load, weighed, widening
-from davinci_forces.maths.periods.shift import circular, rolled, straight
+from davinci_forces.maths.periods.shift import circular, roll, straight
 from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Motion, Signal, Weight
 from davinci_forces.robots import dvrk_psm
 from davinci_forces.stages import weigh
@@ -81,10 +81,10 @@ def test_the_column_that_made_the_effort_explains_it_better():
 def test_a_period_is_found_wherever_the_other_recording_began():
     phase = np.arange(500) / 500
     q = np.stack([np.sin(2 * np.pi * phase), np.cos(4 * np.pi * phase + 0.3)], axis=1)
-    other = rolled(q, -123.4)
+    other = roll(q, -123.4)
     shift = circular(q, other)
     assert shift.samples % 500 == pytest.approx(123.4, abs=0.05)
-    assert_allclose(rolled(other, shift.samples), q, atol=1e-3)
+    assert_allclose(roll(other, shift.samples), q, atol=1e-3)
     assert shift.apart.max() < 1e-3
 
 
@@ -234,7 +234,7 @@ def test_what_the_joints_that_move_do_not_carry_is_said_and_not_weighed():
     logs = [tuple(part[2:] for part in log("heavy", "weight", 2, HUNG.position))]  # the slide alone
     weight, _, said = analysed(logs, Weighing("heavy", HUNG, ""))
     assert weight is None
-    assert any("heavy: no joint that moves carries what hangs on hand_pitch" in text for text in said)
+    assert any("heavy: no moving joint carries the mass on hand_pitch" in text for text in said)
 
 
 def in_current(*names):
@@ -248,21 +248,21 @@ def test_a_joint_whose_effort_is_a_current_weighs_nothing_and_the_others_do():
     weight, _, said = analysed(logs, Weighing("heavy", HUNG, ""), in_current("hand_roll"))
     assert (list(both.loaded), list(weight.loaded)) == (["hand_roll", "hand_pitch"], ["hand_pitch"])
     assert weight.mass == pytest.approx(both.mass_alone[1], rel=1e-9)
-    assert [text for text in said if "heavy: the effort of hand_roll is a current, which weighs nothing" in text]
+    assert [text for text in said if "heavy: the effort of hand_roll is a current, not a force" in text]
 
 
 def test_where_all_efforts_are_currents_nothing_is_weighed_and_the_remedy_is_said():
     logs = [log("heavy", "weight", 2, HUNG.position)]
     weight, _, said = analysed(logs, Weighing("heavy", HUNG, ""), in_current(*JOINTS))
     assert weight is None
-    assert any("their efforts are currents; nothing is weighed" in text for text in said)
+    assert any("their efforts are currents; no mass is estimated" in text for text in said)
 
 
 def test_a_robot_without_geometry_weighs_nothing_and_says_why():
     logs = [log("heavy", "weight", 2, HUNG.position)]
     weight, _, said = analysed(logs, Weighing("heavy", HUNG, ""), ARM)
     assert weight is None
-    assert "heavy: arm has no chain, so what a mass asks of its joints is not known; nothing is weighed" in said
+    assert "heavy: arm has no chain, so the joint effort of a mass is not known; no mass is estimated" in said
 
 
 def test_joints_count_by_how_well_their_models_do_in_free_motion():

@@ -22,7 +22,7 @@ from davinci_forces.filters.innovations.trials import (
     Subject,
 )
 from davinci_forces.filters.problem import Driven, NoiseModel
-from davinci_forces.maths.models.independent import combined, inertia_of
+from davinci_forces.maths.models.independent import bias_coefficients, inertia_of
 from davinci_forces.maths.signals import whiteness
 from davinci_forces.maths.signals.standstill import moving
 from tests import arm
@@ -156,7 +156,7 @@ def truth(seed=0, q_tau=NOISE.q_tau, coulomb=0.0, pushed=0.0):
     tau_ext[quarter] += pushed * noise(seed + 7, N // 4)
     w = 2.0
     t = np.arange(N) * T_S
-    tau = tau_ext + 3 * inertia_of(used, theta) * np.sin(w * t) + combined(used, theta)[0]
+    tau = tau_ext + 3 * inertia_of(used, theta) * np.sin(w * t) + bias_coefficients(used, theta)[0]
     tau = tau + coulomb * np.sign(-np.cos(w * t))
     clean = NOISE._replace(r_q=0.0, r_dq=0.0)
     return tau, simulate(used, theta, tau_ext, tau, clean, seed, x=(0.1, -3.0 / w), finer=8)
@@ -205,8 +205,8 @@ def test_a_walk_faster_than_the_data_ask_is_named_and_so_is_one_that_is_too_slow
     slow = search(subject(run, NOISE._replace(q_tau=NOISE.q_tau / 30)))
     assert without(fast)[0] == {WALK}
     assert without(slow)[0] == {WALK}
-    assert "a walk faster than the data ask" in verdict(fast)
-    assert "a walk slower than the data ask" in verdict(slow)
+    assert "a random walk faster than the data show" in verdict(fast)
+    assert "a random walk slower than the data show" in verdict(slow)
     assert finding(fast) == "mended"
 
 
@@ -232,7 +232,7 @@ def test_fewer_samples_are_no_cause():
     run = measured(v_dq=autoregressive(3, 0.12, NOISE.r_dq))
     some = np.arange(N) % 200 < 40
     passes = Passes(subject(run, far=some))
-    assert passes.trial(()).least < 0.01 < passes.trial((REVERSALS,)).least
+    assert passes.trial(()).lowest < 0.01 < passes.trial((REVERSALS,)).lowest
     assert not passes.fails_elsewhere((REVERSALS,))
     assert not any(REVERSALS in names for names in without(search(subject(run, far=some))))
 
@@ -241,10 +241,10 @@ def test_a_run_that_fails_by_chance_has_no_cause():
     """One in thirty does; of the first forty this one would pass without a window in which nothing happened."""
     run = measured(seed=27)
     passes = Passes(subject(run, free=TOUCHED))
-    assert passes.trial(()).least < 0.01 < passes.trial((CONTACT,)).least
+    assert passes.trial(()).lowest < 0.01 < passes.trial((CONTACT,)).lowest
     found = search(subject(run, free=TOUCHED))
     assert found.explaining == []
-    assert verdict(found).startswith("not white, but by little")
+    assert verdict(found).startswith("not white, but only slightly")
 
 
 def test_noise_of_another_size_is_named():
@@ -258,8 +258,8 @@ def test_coloured_measurement_noise_is_named_and_its_memory_found():
     run = measured(v_q=autoregressive(4, 0.7, NOISE.r_q), v_dq=autoregressive(5, 0.5, NOISE.r_dq))
     found = search(subject(run))
     assert without(found) == [{COLOUR}]
-    assert verdict(found) == "white but for coloured measurement noise"
-    told = coloured.likeliest(run, NOISE, walks=False, coloured=True)
+    assert verdict(found) == "white except for coloured measurement noise"
+    told = coloured.fit_noise(run, NOISE, walks=False, coloured=True)
     assert_allclose(told.phi, (0.7, 0.5), atol=0.1)
     assert_allclose((told.white.r_q, told.white.r_dq), (NOISE.r_q, NOISE.r_dq), rtol=0.1)
 
@@ -270,7 +270,7 @@ def test_a_wrong_model_is_named_where_another_would_do_and_not_where_the_other_i
     noises = NOISE._replace(q_tau=1e-4)
     named = search(subject(wrong, noises, **{"the true one": right}))
     assert {"the true one"} in without(named)
-    assert "the model (the true one would do)" in verdict(named)
+    assert "the model (the true one explains it)" in verdict(named)
     as_wrong = search(subject(wrong, noises, another=wrong))
     assert not any("another" in names for names in without(as_wrong))
 
@@ -280,7 +280,7 @@ def test_what_forward_euler_leaves_out_is_named_where_the_filter_steps_so():
     noises = NoiseModel(1e-5, NOISE.r_dq, 0.0, NOISE.q_dq, 1e-4)
     found = search(subject(run, noises)._replace(filter="ekf_euler"))
     assert {STEP} in without(found)
-    assert "what the filter's step leaves out" in verdict(found)
+    assert "the error of the filter's integration step" in verdict(found)
 
 
 FINE = 1e-4  # noise of a position, beside which the clock is what the filter's noise is tuned to
@@ -302,7 +302,7 @@ def test_the_other_joints_tell_an_uneven_clock_and_it_is_named():
     # What the others tell has their noise in it, so a little of the correlation stays.
     assert set(found.nearest().without) == {CLOCK}
     assert found.share(found.nearest()) > 0.95
-    assert "uneven times of the samples" in verdict(found)
+    assert "uneven sampling times" in verdict(found)
 
 
 def test_a_joint_has_no_say_in_its_own_delays():

@@ -17,7 +17,7 @@ import pytest
 from davinci_forces.runner.console import Console
 from davinci_forces.runner.execution import Outcome
 from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
-from davinci_forces.runner.graph import WHOLE, Graph, Part, every_step, needed
+from davinci_forces.runner.graph import ALL_LOGS, Graph, Part, every_step, required_steps
 from davinci_forces.runner.plan import Task
 from davinci_forces.runner.processes import workers
 from davinci_forces.runner.processes.workers import Crew, Others, pool
@@ -60,7 +60,7 @@ def outcomes(crew: Crew) -> list[Outcome]:
 @pytest.fixture
 def at_once(monkeypatch):
     """Others are started for the first task."""
-    monkeypatch.setattr(workers, "ALONE", -1.0)
+    monkeypatch.setattr(workers, "SECONDS_ALONE", -1.0)
 
 
 def test_tasks_run_here_while_there_is_little_to_do():
@@ -85,7 +85,7 @@ def test_a_worker_that_is_killed_is_replaced_and_its_task_runs_again(at_once, tm
         for i in range(12):
             crew.submit(partial(die_once, tmp_path / "mark"), task(str(i)))
         assert sorted(int(o.task.name) for o in outcomes(crew)) == list(range(12))
-        assert crew.breaks == 1
+        assert crew.restarts == 1
 
 
 def test_a_worker_that_is_killed_with_nothing_to_do_is_replaced(at_once):
@@ -157,7 +157,7 @@ def test_what_one_of_the_others_left_half_written_goes_with_the_run_though_nobod
 
 
 def test_others_are_prepared_as_soon_as_there_is_work_for_them_in_sight(monkeypatch):
-    monkeypatch.setattr(workers, "ALONE", 0.2)
+    monkeypatch.setattr(workers, "SECONDS_ALONE", 0.2)
     prepared: list[int] = []
     crew = Crew(Others(Recording, hands=2, prepare=lambda: prepared.append(crew.counts[0])))
     for i in range(40):
@@ -173,7 +173,7 @@ from pathlib import Path
 sys.path[:0] = [{root!r}]
 from davinci_forces.runner.processes import workers
 from tests.test_workers import {busy}, task
-workers.ALONE = -1.0
+workers.SECONDS_ALONE = -1.0
 if __name__ == "__main__":
     crew = workers.Crew(workers.Others(partial(workers.pool, 2)))
     for i in range(2):
@@ -238,16 +238,16 @@ def order(names) -> list[list[Part]]:
     while batch := graph.next():
         batches.append(batch)
         for part in batch:
-            graph.done(part)
+            graph.finish(part)
     return batches
 
 
 def test_every_part_of_a_run_begins_once_and_after_the_stages_before_it():
-    steps = needed(["report"])
+    steps = required_steps(["report"])
     batches = order(steps)
     begun = [part for batch in batches for part in batch]
     assert len(begun) == len(set(begun)) == len(Graph(steps, LOGS).parts)
-    assert begun[-1] == Part("report", WHOLE)
+    assert begun[-1] == Part("report", ALL_LOGS)
     named = [part.step for part in begun]
     assert named == sorted(named, key=steps.index)
 
@@ -256,16 +256,16 @@ def test_a_log_waits_for_what_is_made_of_it_and_a_stage_of_all_logs_for_all():
     graph = Graph(every_step(), LOGS)
     begun = [part for batch in iter(graph.next, []) for part in batch]
     assert {part.step for part in begun} == {"design", "ingest"}
-    graph.done(Part("ingest", "one"))
+    graph.finish(Part("ingest", "one"))
     assert graph.next() == [Part("resample", "one")]
     for stage in ("resample", "average", "differentiate"):
-        graph.done(Part(stage, "one"))
+        graph.finish(Part(stage, "one"))
     waiting = [part for batch in iter(graph.next, []) for part in batch]
     assert {part.log for part in waiting} <= {"one"}
     assert not {part.step for part in waiting} & {"fit", "choose", "predict", "tune"}
     for stage in ("ingest", "resample", "average", "differentiate"):
         for log in LOGS:
             if (stage, log) != ("ingest", "one") and log == "two":
-                graph.done(Part(stage, log))
-        graph.done(Part(stage, WHOLE))
+                graph.finish(Part(stage, log))
+        graph.finish(Part(stage, ALL_LOGS))
     assert {part.step for batch in iter(graph.next, []) for part in batch} >= {"fit", "choose"}

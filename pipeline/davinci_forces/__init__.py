@@ -1,4 +1,4 @@
-"""Contact forces of a da Vinci arm from its motor currents, offline: from raw logs to reports."""
+"""Estimate the contact forces of a da Vinci arm from its motor currents, offline: from raw logs to reports."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,11 +10,10 @@ __all__ = ["read", "results", "run"]
 
 
 def read(study: str | Path, record: str, **about: str) -> "pd.DataFrame":
-    """The records of one kind of an analysed study as one DataFrame: `read("raw/mine", "Track", joint="hand_roll")`.
+    """Read all records of one kind of a study into a DataFrame: `read("raw/mine", "Track", joint="hand_roll")`.
 
-    The scalars that tell records apart (log, joint, ...) are columns of their own.  `attrs["units"]` gives the unit of
-    each column; where it differs between joints, a dict by joint.  Keyword arguments keep records whose scalars have
-    these values.
+    The scalars that identify a record (log, joint, ...) become columns.  `attrs["units"]` has the unit of each column,
+    or a dict by joint where joints differ.  Keyword arguments select records by the values of their scalars.
 
     Raises
     ------
@@ -29,9 +28,9 @@ def read(study: str | Path, record: str, **about: str) -> "pd.DataFrame":
 
 
 def run(study: str | Path, *stages: str, force: bool = False, jobs: int = 1, quiet: bool = False) -> bool:
-    """Run stages, groups of them or the report, and what they need, or all where none is named; whether all went well.
+    """Run stages, groups or the report after the stages that they need; return whether all tasks succeeded.
 
-    What is current is skipped, as on the command line.  `jobs` is the number of processes.
+    Without names, everything runs.  Tasks that are up to date are skipped.  `jobs` is the number of processes.
 
     Raises
     ------
@@ -48,17 +47,16 @@ def run(study: str | Path, *stages: str, force: bool = False, jobs: int = 1, qui
     arithmetic.pin()
     if unknown := [name for name in stages if name not in (*ALL, *GROUPS)]:
         groups = ", ".join(name for name in GROUPS if name not in ALL)
-        said = f"there is no stage {unknown[0]!r}; there are {', '.join(ALL)}, and the groups {groups}"
-        raise BadRequest(said)
+        raise BadRequest(f"there is no stage {unknown[0]!r}; there are {', '.join(ALL)}, and the groups {groups}")
     from davinci_forces.runner import runs
 
     return runs.run(Path(study), stages or ALL, force=force, jobs=jobs, verbosity="quiet" if quiet else "normal")
 
 
 def results(study: str | Path) -> "pd.DataFrame":
-    """Every number of a study's report, by its key: `results("raw/mine").loc["period.roll", "value"]`.
+    """Read all numbers of a study's report by key: `results("raw/mine").loc["period.roll", "value"]`.
 
-    The columns are value, std (NaN where there is none), unit, and source, the record that holds the number.
+    The columns are value, std (NaN for numbers without one), unit, and source, the record of the number.
 
     Raises
     ------

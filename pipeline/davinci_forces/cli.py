@@ -1,4 +1,4 @@
-"""Contact forces of a da Vinci arm from its motor currents, without a force sensor: from logs to a report."""
+"""Estimate the contact forces of a da Vinci arm from its motor currents, without a force sensor."""
 
 import os
 import re
@@ -31,42 +31,42 @@ from davinci_forces.stages import GROUPS, module
 if TYPE_CHECKING:
     from davinci_forces.runner.console import Verbosity
 
-GRACE = 3.0  # [s] that a run which is stopped has to end by itself
-STAGE = "stage"  # what the command that those of stages and groups are copies of is called until then
-FIRST, OTHERS = "Start here", "Other commands"  # panels of the help, before those of the groups and after them
-BEGIN = ("all", "new", "inspect", "compare", REPORT)
+STOP_TIMEOUT = 3.0  # [s] until a stopped run is ended by force
+STAGE = "stage"  # the command that is copied for every stage and group
+FIRST_PANEL, LAST_PANEL = "Start here", "Other commands"  # of the help, around the panels of the groups
+FIRST_COMMANDS = ("all", "new", "inspect", "compare", REPORT)
 
 
 class Stages(TyperGroup):
-    """Commands in panels.  Those that run stages differ in name and help only: what they take is read once."""
+    """Commands in panels.  The commands of stages differ in name and help only, so they copy one command."""
 
     def __init__(self, *, commands: dict[str, Any], **attributes: Any) -> None:
         stage = commands.pop(STAGE)
-        commands[REPORT] = renamed(stage, REPORT, "davinci_forces.report.report", FIRST)
+        commands[REPORT] = copy_command(stage, REPORT, "davinci_forces.report.report", FIRST_PANEL)
         for group, stages in GROUPS.items():
             if group not in stages:
-                commands[group] = renamed(stage, group, f"davinci_forces.stages.{group}.__init__", group)
-            commands |= {name: renamed(stage, name, module(name), group) for name in stages}
-        names = [*BEGIN, *(name for name in commands if name not in COMMANDS), *COMMANDS]
+                commands[group] = copy_command(stage, group, f"davinci_forces.stages.{group}.__init__", group)
+            commands |= {name: copy_command(stage, name, module(name), group) for name in stages}
+        names = [*FIRST_COMMANDS, *(name for name in commands if name not in COMMANDS), *COMMANDS]
         super().__init__(commands={name: commands[name] for name in names}, **attributes)
 
 
-def renamed(command: TyperCommand, name: str, described: str, panel: str) -> TyperCommand:
-    """A command by another name, with the help of a module, in a panel."""
-    other = copy(command)
-    other.name, other.help, other.rich_help_panel = name, as_written(docstring(described)), panel
-    return other
+def copy_command(command: TyperCommand, name: str, module: str, panel: str) -> TyperCommand:
+    """Copy a command under another name, with the docstring of a module as its help, into a panel."""
+    copied = copy(command)
+    copied.name, copied.help, copied.rich_help_panel = name, escape_tags(read_docstring(module)), panel
+    return copied
 
 
-def docstring(module: str) -> str:
-    """What a module says of itself, which is what its file begins with; importing all would take seconds."""
+def read_docstring(module: str) -> str:
+    """Read the docstring of a module from its file, since importing all modules would take seconds."""
     file = Path(__file__).parent.joinpath(*module.split(".")[1:]).with_suffix(".py")
     return cleandoc(file.read_text(encoding="utf-8").split('"""', 2)[1])
 
 
-def as_written(words: str) -> str:
-    """Help that shows `raw/<study>`, which Markdown takes for a tag of HTML and leaves out."""
-    return re.sub(r"(`[^`]*`)|<", lambda match: match[1] or r"\<", words)
+def escape_tags(text: str) -> str:
+    """Escape `raw/<study>`, which Markdown takes for an HTML tag and leaves out."""
+    return re.sub(r"(`[^`]*`)|<", lambda match: match[1] or r"\<", text)
 
 
 app = typer.Typer(
@@ -78,28 +78,28 @@ app = typer.Typer(
 )
 
 StudyFolder = Annotated[Path, typer.Argument(help="Folder of a study: raw/<study>, which holds study.toml.")]
-Studies = Annotated[list[Path] | None, typer.Argument(help="Folders of studies; all in raw/ where none is named.")]
+Studies = Annotated[list[Path] | None, typer.Argument(help="Folders of studies; without any, all studies in raw/.")]
 Processed = Annotated[Path | None, typer.Option(help="Folder for processed files, instead of processed/ beside raw/.")]
 Reports = Annotated[Path | None, typer.Option(help="Folder for reports, instead of reports/ beside raw/.")]
-Force = Annotated[bool, typer.Option("--force", help="Run what is current, too.")]
-Jobs = Annotated[int, typer.Option(min=1, help="Processes to spread the work over.")]
+Force = Annotated[bool, typer.Option("--force", help="Run the named stages even if they are up to date.")]
+Jobs = Annotated[int, typer.Option(min=1, help="Number of processes to run tasks in.")]
 Cluster = Annotated[
-    str, typer.Option(metavar="ADDRESS", help="Scheduler of a Dask cluster to spread the work over: tcp://host:8786.")
+    str, typer.Option(metavar="ADDRESS", help="Run tasks on the Dask cluster of this scheduler: tcp://host:8786.")
 ]
-DryRun = Annotated[bool, typer.Option("--dry-run", help="Say what would run and why, and change nothing.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Say only what went wrong, or may have.")]
-Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Say of each task, too, when it is done and its time.")]
+DryRun = Annotated[bool, typer.Option("--dry-run", help="Print what would run and why, and change nothing.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print warnings and errors only.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Also print the time of each task as it ends.")]
 
 
 class ShownAsWritten(TyperCommand):
-    """A command whose help is shown as it was written."""
+    """A command whose help shows `<study>` as it is written."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
-        for described in (self, *self.params):
-            words = getattr(described, "help", None)
-            if words and self.rich_markup_mode == "markdown":
-                vars(described)["help"] = as_written(words)
+        for element in (self, *self.params):
+            text = getattr(element, "help", None)
+            if text and self.rich_markup_mode == "markdown":
+                vars(element)["help"] = escape_tags(text)
 
 
 def main() -> None:
@@ -112,7 +112,7 @@ def main() -> None:
         if hasattr(stream, "reconfigure"):  # names in logs need not fit the console's encoding
             stream.reconfigure(errors="replace")
     for number in (signal.SIGINT, signal.SIGTERM):
-        if signal.getsignal(number) != signal.SIG_IGN:  # as in the background of a script
+        if signal.getsignal(number) != signal.SIG_IGN:  # a script's background process ignores it
             signal.signal(number, stop)
     try:
         app()
@@ -122,57 +122,57 @@ def main() -> None:
 
 
 class Stopped(SystemExit):
-    """A signal asked for the end of the run."""
+    """A signal stopped the run."""
 
-    said = False
+    is_printed = False
 
     @classmethod
     def say(cls) -> None:
-        """Say so, once."""
-        if not cls.said:
-            cls.said = True
-            echo("stopped; run again to go on", err=True)
+        """Print the message, once."""
+        if not cls.is_printed:
+            cls.is_printed = True
+            echo("stopped; run again to continue", err=True)
 
 
 def stop(number: int, _: object) -> None:
-    """Raise `Stopped`, as often as it may be asked for; and end the process where that does not, or not in time."""
-    for each in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(each, signal.SIG_IGN)
-    sys.unraisablehook = lambda _: None  # where it was raised in vain, as in a destructor
-    threading.excepthook = lambda _: None  # of threads whose processes end
-    start_new_thread(leave, (128 + number,))  # one of `threading` waits for a lock that this thread may hold
+    """Raise `Stopped` once, and end the process if that has not ended it in time."""
+    for ignored in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(ignored, signal.SIG_IGN)
+    sys.unraisablehook = lambda _: None  # an exception raised in a destructor stops nothing
+    threading.excepthook = lambda _: None  # nor does one of a thread whose processes end
+    start_new_thread(leave, (128 + number,))  # a `threading.Thread` waits for a lock that this thread may hold
     raise Stopped(128 + number)
 
 
 def leave(code: int) -> None:
-    """End this process after a while, whatever it waits for."""
-    sleep(GRACE)
+    """End this process after `STOP_TIMEOUT`, whatever it waits for."""
+    sleep(STOP_TIMEOUT)
     Stopped.say()
     os._exit(code)
 
 
 @contextmanager
 def messages() -> Iterator[None]:
-    """Print what the pipeline raises on purpose, and what the machine refuses, as a message; leave with exit code 1."""
+    """Print expected errors, of the pipeline and of the system, without a traceback; exit with code 1."""
     try:
         yield
-    except BrokenPipeError:  # whoever read the output has gone, and needs no message
+    except BrokenPipeError:  # nobody reads the output any more
         raise
     except (PipelineError, OSError) as error:
         echo(f"error: {error}", fg="red", err=True)
         raise typer.Exit(1) from None
     except UnicodeEncodeError as error:
-        near = error.object[max(error.start - 40, 0) : error.end + 40]
-        echo(f"error: a name is not in UTF-8, near {near!r}; rename the file or the folder", fg="red", err=True)
+        excerpt = error.object[max(error.start - 40, 0) : error.end + 40]
+        echo(f"error: a name is not in UTF-8: {excerpt!r}; rename the file or the folder", fg="red", err=True)
         raise typer.Exit(1) from None
     except BrokenExecutor:
-        says = "a process of this run was ended from outside, perhaps for want of memory; run again with fewer --jobs"
-        echo(f"error: {says}: what was finished is kept", fg="red", err=True)
+        message = "a worker process was killed, perhaps because memory ran out; finished tasks are kept"
+        echo(f"error: {message}; run again with fewer --jobs", fg="red", err=True)
         raise typer.Exit(1) from None
 
 
-def guarded(run: Callable[..., Any]) -> Callable[..., Any]:
-    """A command that ends in a message where it cannot go on."""
+def print_errors(run: Callable[..., Any]) -> Callable[..., Any]:
+    """Wrap a command so that its errors are printed as messages."""
 
     @wraps(run)
     def command(*args: Any, **kwargs: Any) -> Any:
@@ -182,9 +182,9 @@ def guarded(run: Callable[..., Any]) -> Callable[..., Any]:
     return command
 
 
-def tell_version(asked: bool) -> None:
-    """Print the version, where it is asked for, and leave."""
-    if asked:
+def print_version(is_requested: bool) -> None:
+    """Print the version and exit, if the option is set."""
+    if is_requested:
         from importlib.metadata import version
 
         echo(f"davinci-forces {version('davinci-forces')}")
@@ -192,41 +192,41 @@ def tell_version(asked: bool) -> None:
 
 
 Version = Annotated[
-    bool, typer.Option("--version", callback=tell_version, is_eager=True, help="Print the version and leave.")
+    bool, typer.Option("--version", callback=print_version, is_eager=True, help="Print the version and exit.")
 ]
 
 
 @app.callback(help=__doc__)
 def options(version: Version = False) -> None:
-    """What holds for every command; the option does its work by itself."""
+    """Take the options of all commands; `print_version` does the work of the only one."""
 
 
 def verbosity(quiet: bool, verbose: bool) -> "Verbosity":
-    """How much a run says.
+    """Verbosity of a run.
 
     Raises
     ------
     typer.BadParameter
-        If it is to say both less and more.
+        If both options are set.
     """
     if quiet and verbose:
         raise typer.BadParameter("a run cannot be both --quiet and --verbose; leave one out")
     return "quiet" if quiet else "verbose" if verbose else "normal"
 
 
-def run_stages(study: Path, names: tuple[str, ...], *how: Any) -> bool:
-    """Run stages on one study; whether all went well.  Why they could not run at all is printed."""
+def run_stages(study: Path, names: tuple[str, ...], *options: Any) -> bool:
+    """Run stages on one study and return whether all tasks succeeded; errors are printed."""
     from davinci_forces.runner import runs
 
     try:
         with messages():
-            return runs.run(study, names, *how)
+            return runs.run(study, names, *options)
     except typer.Exit:
         return False
 
 
 @app.command(STAGE, cls=ShownAsWritten)
-@guarded
+@print_errors
 def run_named(
     context: typer.Context,
     study: StudyFolder,
@@ -239,17 +239,17 @@ def run_named(
     verbose: Verbose = False,
     dry_run: DryRun = False,
 ) -> None:
-    """Run the stage or group whose name the command has, and what it needs."""
+    """Run the stage or group that the command is named after, and the stages it needs."""
     from davinci_forces.runner import runs
 
-    says = verbosity(quiet, verbose)
+    level = verbosity(quiet, verbose)
     names = (str(context.command.name),)
-    if not run_stages(runs.one(study), names, processed, reports, force, jobs, says, dry_run, cluster):
+    if not run_stages(runs.single_study(study), names, processed, reports, force, jobs, level, dry_run, cluster):
         raise typer.Exit(1)
 
 
-@app.command("all", rich_help_panel=FIRST, cls=ShownAsWritten)
-@guarded
+@app.command("all", rich_help_panel=FIRST_PANEL, cls=ShownAsWritten)
+@print_errors
 def run_all(
     studies: Studies = None,
     processed: Processed = None,
@@ -261,17 +261,17 @@ def run_all(
     verbose: Verbose = False,
     dry_run: DryRun = False,
 ) -> None:
-    """Run every stage and the report, on the studies named or on all in raw/ whose logs are there."""
+    """Run all stages and write the report, for the named studies or for every study in raw/ that has its logs."""
     from davinci_forces.runner import runs
 
-    says = verbosity(quiet, verbose)
-    named = runs.studies(studies or [], says)
-    good = [run_stages(study, ALL, processed, reports, force, jobs, says, dry_run, cluster) for study in named]
-    if not all(good):
+    level = verbosity(quiet, verbose)
+    folders = runs.studies(studies or [], level)
+    successes = [run_stages(study, ALL, processed, reports, force, jobs, level, dry_run, cluster) for study in folders]
+    if not all(successes):
         raise typer.Exit(1)
 
 
-for other in COMMANDS:
-    code = import_module(f"davinci_forces.commands.{other}")
-    panel = FIRST if other in BEGIN else OTHERS
-    app.command(other, help=code.__doc__, rich_help_panel=panel, cls=ShownAsWritten)(guarded(code.run))
+for name in COMMANDS:
+    code = import_module(f"davinci_forces.commands.{name}")
+    panel = FIRST_PANEL if name in FIRST_COMMANDS else LAST_PANEL
+    app.command(name, help=code.__doc__, rich_help_panel=panel, cls=ShownAsWritten)(print_errors(code.run))

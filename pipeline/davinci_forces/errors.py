@@ -1,24 +1,24 @@
-"""Everything the pipeline raises on purpose.  The command line prints these without a traceback."""
+"""Exceptions that the pipeline raises on purpose.  The command line prints them without a traceback."""
 
 
 class PipelineError(Exception):
-    """The data, the study or the request is wrong; the message says where and what to do."""
+    """The data, the study or the request is wrong; the message says where, and what to do."""
 
 
 class BadStudy(PipelineError):
-    """A study file breaks its contract; every problem is listed, each with its place in the file."""
+    """A study file is wrong; the message lists all problems with their lines."""
 
 
 class BadRobot(PipelineError):
-    """A robot, joint or term does not exist, or a robot file is wrong."""
+    """A robot file is wrong, or a robot, joint or term does not exist."""
 
 
 class BadLog(PipelineError):
-    """A log cannot be read, or what it holds cannot be trusted; names the file and the place in it."""
+    """A log cannot be read, or its content is not plausible; the message names the file and the place in it."""
 
 
 class BadRecord(PipelineError):
-    """A record breaks its own contract: shapes, lengths, finite values."""
+    """A record has wrong shapes or lengths, or values that are not finite."""
 
 
 class NotPeriodic(PipelineError):
@@ -26,23 +26,23 @@ class NotPeriodic(PipelineError):
 
 
 class NotIdentifiable(PipelineError):
-    """The data do not determine the parameters that are asked of them."""
+    """The data do not determine the parameters of a model."""
 
 
 class MissingRecord(PipelineError):
-    """A record that a stage needs has not been made yet."""
+    """A record or a result that is needed has not been made yet."""
 
 
 class NotReproduced(PipelineError):
-    """A file or a number is not what its provenance says it should be."""
+    """A file or a number does not agree with its provenance."""
 
 
 class BadRequest(PipelineError):
-    """What was asked on the command line cannot be done."""
+    """A request on the command line cannot be carried out."""
 
 
 class NotAFile(PipelineError, OSError):
-    """A pipe, a device, a socket, a folder or an endless file stands where a file is read."""
+    """A path to be read is a pipe, a device, a socket, a folder or an endless file."""
 
     def __str__(self) -> str:
         return f"{self.filename}: {self.strerror}"

@@ -42,7 +42,7 @@ def test_a_million_rows_take_a_tenth_of_the_time_of_statsmodels(rows, name, caps
     import statsmodels.api as sm
 
     find, p = estimator(name), rows()
-    weights = p.periods / wlse.pooled(p.tau_var, p.periods)
+    weights = p.periods / wlse.pool_variance(p.tau_var, p.periods)
     thetas: list[np.ndarray] = []
     rivals: list[np.ndarray] = []
 
@@ -72,17 +72,17 @@ def test_standard_errors_cost_a_few_dozen_products_of_the_columns(rows, name, lo
     and 5 of a hundred.
     """
     find = estimator(name)
-    find(rows(logs)).spread  # noqa: B018  # compiles, or reads what was compiled
+    find(rows(logs)).standard_errors  # noqa: B018  # compiles, or reads what was compiled
     Phi, times = rows().Phi, []
     for _ in range(5):
         p, start = rows(logs), time.process_time()
-        spread = find(p).spread
+        errors = find(p).standard_errors
         middle = time.process_time()
         Phi.T @ Phi
         times.append((middle - start, time.process_time() - middle))
         # Uncorrelated noise of variance 1 on columns of variance 1: both kinds are 1 / sqrt(K).
-        assert_allclose(spread.classical, ROWS**-0.5, rtol=0.02)
-        assert_allclose(spread.stated, ROWS**-0.5, rtol=0.02)
+        assert_allclose(errors.classical, ROWS**-0.5, rtol=0.02)
+        assert_allclose(errors.stated, ROWS**-0.5, rtol=0.02)
     own, product = (min(column) for column in zip(*times, strict=True))
     with capsys.disabled():
         print(f"\n{name} with standard errors, {logs} logs: {own:.3f} s, {own / product:.0f} products Phi' Phi", end="")
@@ -96,7 +96,7 @@ def test_a_swarm_takes_a_fifteenth_of_the_time_of_pyswarms(name, capsys, monkeyp
     rival = pytest.importorskip("pyswarms.single", reason=reason)
     p = problem(name)
     R, box = triangle(p.Phi, p.tau, p.periods.astype(float)), p.known.box
-    monkeypatch.setattr(swarm, "MOST", 1000)
+    monkeypatch.setattr(swarm, "MAX_ITERATIONS", 1000)
     monkeypatch.setattr(swarm, "CHANGE", -1.0)  # so that it does not stop early
     manner = swarm.CONSTRICTED
     options = {"c1": manner.cognitive, "c2": manner.social, "w": manner.inertia[0]}

@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 from davinci_forces.filters import rts
 from davinci_forces.filters.ekf import track
 from davinci_forces.filters.problem import Driven, NoiseModel
-from davinci_forces.filters.stepping import FIRST, covariances
+from davinci_forces.filters.stepping import INITIAL_VARIANCE_RATIO, covariances
 from davinci_forces.maths.models.model import JointDynamics
 from davinci_forces.records import Track
 from davinci_forces.records.store import Writer
@@ -54,7 +54,7 @@ def track_in_cpp(loop, recording):
     short = np.array(joint.coefficients), np.array(NOISE)
     columns = (*short, joint.inertia, recording.q, recording.dq, drive, out)
     c, noise, inertia, y_q, y_dq, u, into = (x.ctypes.data_as(ctypes.c_void_p) for x in columns)
-    T_s, first_std, first = map(ctypes.c_double, (1e-3, 1.0, FIRST))
+    T_s, first_std, first = map(ctypes.c_double, (1e-3, 1.0, INITIAL_VARIANCE_RATIO))
     loop(c, inertia, y_q, y_dq, u, ctypes.c_long(N), T_s, noise, first_std, first, into)
     return out
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from davinci_forces.simulation.motion import simulated
+from davinci_forces.simulation.motion import simulate_log
 from davinci_forces.simulation.scenario.reading import load
 
 AT_LEAST = 50.0  # times faster than real time, with the wrist fixed
@@ -15,7 +15,7 @@ AT_LEAST = 50.0  # times faster than real time, with the wrist fixed
 @pytest.mark.parametrize("name", ["matched-roll-excitation", "realistic-roll-excitation"])
 def test_a_minute_of_closed_loop_is_simulated_fifty_times_faster_than_it_lasts(name, capsys):
     scenario, log = _problem(name)
-    simulated(scenario, replace(log, duration=0.1))  # compiles
+    simulate_log(scenario, replace(log, duration=0.1))  # compiles
     best = min(_seconds(*_problem(name)) for _ in range(5))
     with capsys.disabled():
         print(
@@ -32,7 +32,7 @@ def _problem(name):
 
 def _seconds(scenario, log) -> float:
     start = time.perf_counter()
-    run = simulated(scenario, log)
+    run = simulate_log(scenario, log)
     taken = time.perf_counter() - start
     assert len(run.t) == round(60.0 * scenario.rate)
     assert all(np.isfinite(motion.tau).all() and np.ptp(motion.q) > 0 for motion in run.motions.values())

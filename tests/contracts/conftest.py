@@ -45,7 +45,7 @@ class Lab:
     plan: Plan
 
     def records(self, kind: type[Record]) -> list[Record]:
-        places = [Path(place) for _, place in self.plan.places().of((kind,))]
+        places = [Path(place) for _, place in self.plan.places().find((kind,))]
         return [store.read(kind, self.folders.processed, place) for place in places]
 
 

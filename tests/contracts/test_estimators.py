@@ -189,7 +189,7 @@ def test_fewer_samples_than_it_takes_are_refused_with_both_numbers(estimate: Est
 
 @ESTIMATOR
 def test_an_effort_that_does_not_vary_is_refused(estimate: Estimator):
-    with pytest.raises(NotIdentifiable, match="the effort is the same throughout"):
+    with pytest.raises(NotIdentifiable, match="the effort is constant"):
         estimate(frozen(replace(problem(seed=1), tau=np.full(K, 0.3))))
 
 

@@ -15,7 +15,7 @@ from scipy.stats import chi2, multivariate_normal
 
 from davinci_forces.filters import FILTERS, kalman, title, tracker
 from davinci_forces.filters.problem import Driven, Filter, NoiseModel
-from davinci_forces.filters.stepping import FIRST
+from davinci_forces.filters.stepping import INITIAL_VARIANCE_RATIO
 from davinci_forces.maths.models.model import JointDynamics
 from davinci_forces.maths.models.terms import inertia, offset, stiffness, viscous
 from tests import arm
@@ -86,7 +86,7 @@ def batch(y: np.ndarray, tau: np.ndarray, noise: NoiseModel, name: str) -> tuple
     """
     N, joint = y.shape[1], swaying(y.shape[1])
     A, b = np.zeros((3 + 2 * N + 3 * (N - 1), 3 * N)), np.zeros(3 + 2 * N + 3 * (N - 1))
-    A[:3, :3] = np.diag([*(1 / np.array(noise[:2]) / np.sqrt(FIRST)), 1 / FIRST_STD])
+    A[:3, :3] = np.diag([*(1 / np.array(noise[:2]) / np.sqrt(INITIAL_VARIANCE_RATIO)), 1 / FIRST_STD])
     b[:2] = A[[0, 1], [0, 1]] * y[:, 0]
     weights, steps = 1 / np.array(noise[:2]), np.linalg.inv(np.linalg.cholesky(process(noise, name)))
     for k in range(N):
@@ -156,7 +156,7 @@ def test_the_filter_of_any_number_of_states_is_the_textbooks(n: int, order: int)
         model.P[3:, 3:], model.Q[3:, 3:] = 0.5 * np.eye(n - 3), 1e-3 * np.eye(n - 3)
     if n > 4:
         model = model._replace(in_q=(0, 3), in_dq=(1, 4), R=0.5 * model.R)
-    made, (expected, total) = kalman.filtered(run, model), textbook(y, tau, model)
+    made, (expected, total) = kalman.run_filter(run, model), textbook(y, tau, model)
     assert_allclose(made[2:6], expected, rtol=1e-6, atol=1e-9)
     assert kalman.log_likelihood(run, model, 0) == pytest.approx(total, rel=1e-8)
 

@@ -1,5 +1,6 @@
 """Every section of the report: of a study that has everything, of one that has nothing, and of any in between."""
 
+import re
 from dataclasses import replace
 from importlib import import_module
 
@@ -8,7 +9,19 @@ import pytest
 from davinci_forces.records import KINDS, Track
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.report.changes import Stated
-from davinci_forces.report.content import Document, Equation, Figure, Figure3D, Number, Section, Table, name_of, walk
+from davinci_forces.report.content import (
+    Bullets,
+    Document,
+    Equation,
+    Figure,
+    Figure3D,
+    Listing,
+    Number,
+    Section,
+    Table,
+    name_of,
+    walk,
+)
 from davinci_forces.report.content.layout import place
 from davinci_forces.report.context import Context
 from davinci_forces.report.results import Results, collect
@@ -103,6 +116,16 @@ def test_the_sections_together_are_a_document_whose_labels_differ_and_whose_refe
     for _, names in DOCUMENTS.values():
         sections = tuple(section for name in names if (section := written(name, full)))
         assert len(place(Document("A test", "arm", True, sections))) == len(names)
+
+
+@SECTION
+def test_nothing_but_the_references_names_the_thesis_in_a_user_s_study(name: str, full: Context):
+    """The ground truth of the thesis's simulations names their scenario; keys and labels name the default hand."""
+    section = written(name, full)
+    assert section is not None
+    shown = [block for block in walk(section) if not isinstance(block, Listing | Bullets | Section)]
+    assert not full.compares_with_thesis
+    assert not re.search(r"457\.24|(?<![.-])\bthesis\b(?!\.)|Fig 8\.9", " ".join(map(repr, shown)))
 
 
 def test_methods_tell_of_the_stages_that_ran_and_of_no_other(lab: Lab, catalogue: Catalogue):

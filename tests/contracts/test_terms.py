@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from davinci_forces.maths.models import kernels, terms
 from davinci_forces.maths.models.bias import bias as bias_of
-from davinci_forces.maths.models.independent import combined, inertia_of, regressor
+from davinci_forces.maths.models.independent import bias_coefficients, inertia_of, regressor
 from davinci_forces.maths.models.terms import TERMS, Term
 from davinci_forces.report.writers.typesetting import Formula, draw_formulas
 from davinci_forces.robots.robot import Kind
@@ -20,7 +20,7 @@ DQ = random.uniform(0.05, 1.2, 200) * random.choice([-1.0, 1.0], 200)  # away fr
 
 def bias(term, q, dq) -> np.ndarray:
     """b, b_q and b_dq (3, N), as the filter's loop has them."""
-    c = combined((term,), np.ones(1))
+    c = bias_coefficients((term,), np.ones(1))
     return np.array([kernels.bias(c, *x, 0.0) for x in zip(q.tolist(), dq.tolist(), strict=True)]).T
 
 
@@ -54,7 +54,7 @@ def test_arrays_and_scalars_give_the_same(term):
 
 def test_all_terms_together_are_one_model_in_the_regressor_and_in_the_loop():
     model, theta = tuple(TERMS.values()), random.uniform(0.5, 2.0, len(TERMS))
-    c = combined(model, theta)
+    c = bias_coefficients(model, theta)
     for q, dq in [(0.3, -0.2), (-0.4, 0.7), (0.1, 0.0)]:
         [phi] = regressor(model, np.array([q]), np.array([dq]), np.zeros(1))
         assert kernels.bias(c, q, dq, 0.0)[0] == pytest.approx(phi @ theta, rel=1e-14)

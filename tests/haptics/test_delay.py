@@ -6,8 +6,8 @@ from numpy.testing import assert_allclose
 
 from davinci_forces.errors import BadRequest
 from davinci_forces.haptics.maths.bimodal import THESIS, Hand
-from davinci_forces.haptics.maths.delay import damping_needed, delay_limit, discretised, sampled_limit
-from davinci_forces.haptics.maths.motion import FINE, flow, grows, late, leaving_limit
+from davinci_forces.haptics.maths.delay import damping_needed, delay_limit, delayed_hold, sampled_limit
+from davinci_forces.haptics.maths.motion import SAMPLES_PER_DELAY, flow, grows, leaving_limit, simulate_delayed
 
 PRESSED = 1.0  # [N]
 DELAYS = (0.005, 0.05, 0.3)
@@ -15,12 +15,12 @@ DELAYS = (0.005, 0.05, 0.3)
 
 def simulated(hand: Hand, k_t: float, delay: float, rate: float, push: float = PRESSED) -> bool:
     """Whether a motion of the hand grows, after its slowest swing has come sixty times."""
-    return grows(hand, late(hand, k_t, delay, rate, push, 60.0 * 2.0 * np.pi / hand.frequency))
+    return grows(hand, simulate_delayed(hand, k_t, delay, rate, push, 60.0 * 2.0 * np.pi / hand.frequency))
 
 
 def spectral_radius(hand: Hand, k_t: float, delay: float, rate: float) -> float:
     """The largest modulus of the roots of the sampled hand in contact: it is stable below 1."""
-    Phi, early, late, samples = discretised(hand, delay, rate)
+    Phi, early, late, samples = delayed_hold(hand, delay, rate)
     n = samples + 1  # forces that are remembered
     A = np.zeros((2 + n, 2 + n))
     A[:2, :2] = Phi
@@ -37,7 +37,7 @@ def spectral_radius(hand: Hand, k_t: float, delay: float, rate: float) -> float:
 @pytest.mark.parametrize("hand", [THESIS, Hand(1.0, 10.0, 300.0), Hand(0.5, 2.0, 50.0)])
 @pytest.mark.parametrize("delay", DELAYS)
 def test_a_pressed_hand_is_stable_below_the_limit_of_a_delay_and_not_beyond(hand, delay):
-    limit, rate = delay_limit(hand, delay), 4 * FINE / delay
+    limit, rate = delay_limit(hand, delay), 4 * SAMPLES_PER_DELAY / delay
     exact = delay - 0.5 / rate  # a held force is half a sample later
     assert [simulated(hand, share * limit, exact, rate) for share in (0.98, 1.02)] == [False, True]
 
@@ -81,7 +81,7 @@ def test_a_sample_is_the_hand_s_motion_under_the_force_before_and_then_the_new_o
         still = force / THESIS.k  # where the hand would rest
         at, dx = flow(THESIS, 0.0, (state[0] - still, state[1]), duration)
         state = at + still, dx
-    Phi, early, after, samples = discretised(THESIS, delay, rate)
+    Phi, early, after, samples = delayed_hold(THESIS, delay, rate)
     assert samples == round((delay - rest) * rate)
     assert_allclose(Phi @ x + early * new + after * before, state, rtol=1e-9)
 
@@ -91,7 +91,7 @@ def test_a_hand_that_nothing_presses_is_stable_for_stiffer_tissue():
         pressed = delay_limit(THESIS, delay)
         free = leaving_limit(THESIS, delay, pressed)
         assert free > 1.5 * pressed
-        rate = 4 * FINE / delay
+        rate = 4 * SAMPLES_PER_DELAY / delay
         exact = delay - 0.5 / rate
         assert [simulated(THESIS, share * free, exact, rate, 0.0) for share in (0.97, 1.03)] == [False, True]
 

@@ -72,7 +72,7 @@ def test_a_stated_stiffness_takes_the_place_of_the_measured_one():
 
 
 def test_what_slides_is_the_joint_as_it_was_fitted():
-    body, arm_from = haptic_limits.fitted(davinci.ROBOT, [fit()], davinci.ROBOT.joint("instrument_slide"))
+    body, arm_from = haptic_limits.moving_body(davinci.ROBOT, [fit()], davinci.ROBOT.joint("instrument_slide"))
     assert arm_from == "instrument_slide"
     assert_allclose([body.inertia, body.viscous, *body.coulomb], [2.0, 3.0, 4.5, 4.5])
     assert_allclose(body.gravity, -0.2 * 9.81)
@@ -80,8 +80,11 @@ def test_what_slides_is_the_joint_as_it_was_fitted():
 
 @pytest.mark.parametrize("fits", [[], [fit((-3.0, 1.0, 1.0, 1.0))]])
 def test_without_a_fit_that_can_be_it_is_the_thesis_s(fits):
-    assert haptic_limits.fitted(davinci.ROBOT, fits, davinci.ROBOT.joint("instrument_slide")) == (SLIDE, "the thesis")
-    assert haptic_limits.fitted(davinci.ROBOT, fits, None) == (SLIDE, "the thesis")
+    assert haptic_limits.moving_body(davinci.ROBOT, fits, davinci.ROBOT.joint("instrument_slide")) == (
+        SLIDE,
+        "the thesis",
+    )
+    assert haptic_limits.moving_body(davinci.ROBOT, fits, None) == (SLIDE, "the thesis")
 
 
 def test_the_filter_s_noise_is_the_joint_s(monkeypatch):

@@ -10,7 +10,7 @@ from davinci_forces.filters import ekf
 from davinci_forces.filters.problem import Driven
 from davinci_forces.haptics import loop as haptic
 from davinci_forces.haptics.maths.bimodal import THESIS, Hand
-from davinci_forces.haptics.maths.delay import delay_limit, harmonic, held, response_limit, sampled_limit
+from davinci_forces.haptics.maths.delay import delay_limit, harmonic, response_limit, sampled_limit, zero_order_hold
 from davinci_forces.haptics.maths.motion import switched
 from davinci_forces.haptics.maths.simulated_loop import Clocks, FeltTissue, Grip, simulate
 from davinci_forces.haptics.scenario import FIRM, SLIDE, AxisNoise, HapticScenario
@@ -27,7 +27,7 @@ SLOW = ((0.0, -0.02), (4.0, 0.04), (8.0, -0.02))
 def let_go(tick: float):
     """The hand let go 1 cm from a spring, its force continuous but for the ticks."""
     T = round(2.0 / tick)
-    clocks, grip = Clocks(tick, 1, 1, 0, 0), Grip(*held(THESIS, tick), NOBODY)
+    clocks, grip = Clocks(tick, 1, 1, 0, 0), Grip(*zero_order_hold(THESIS, tick), NOBODY)
     axis, tissue, noise = haptic._axis(IDEAL), FeltTissue(K, 0.0, 0.0), np.zeros((T, 3))
     return simulate(grip, IDEAL.device, axis, tissue, clocks, np.zeros(T), noise, (-0.01, 0.0), lambda r: r.force)
 
@@ -45,13 +45,13 @@ def test_with_an_ideal_arm_and_ever_smaller_ticks_the_hand_moves_as_the_bimodal_
 def test_the_filter_in_the_loop_is_the_one_that_tracks_logs(name):
     hand = dict(FULL.hands)[name]
     scenario = replace(FULL, plan=SLOW, device=FULL.device._replace(force=0.0 if name == "thesis" else 1.0))
-    run = haptic.felt(scenario, hand)
+    run = haptic.simulate_plan(scenario, hand)
     q, dq, tau, _ = run.readings.T
     nothing = np.zeros(len(q))
     joint = JointDynamics(np.full(len(q), SLIDE.inertia), haptic.coefficients(SLIDE), nothing)
     recorded = Driven(joint, q, dq, nothing, tau, 1.0 / scenario.rate, scenario.noise.tau)
-    assert run.made.max() > 5.0
-    assert_array_equal(run.made, ekf.track(recorded, haptic.assumed(scenario)).tau_ext)
+    assert run.estimates.max() > 5.0
+    assert_array_equal(run.estimates, ekf.track(recorded, haptic.filter_noise(scenario)).tau_ext)
 
 
 @pytest.mark.medium
@@ -91,7 +91,7 @@ def test_the_harmonic_of_a_sine_is_its_amplitude():
 
 
 def test_the_felt_peak_is_the_true_one_as_late_as_the_filter_and_the_link_are():
-    run = haptic.felt(replace(QUIET, plan=SLOW, friction=0.0), FIRM)
+    run = haptic.simulate_plan(replace(QUIET, plan=SLOW, friction=0.0), FIRM)
     assert run.true.max() > 8.0
     assert_allclose(run.felt.max(), run.true.max(), rtol=0.05)
     rises, falls = ([float(run.t[np.flatnonzero(f > 4.0)[k]]) for f in (run.true, run.felt)] for k in (0, -1))
@@ -100,7 +100,7 @@ def test_the_felt_peak_is_the_true_one_as_late_as_the_filter_and_the_link_are():
 
 
 def test_a_sensor_in_place_of_the_filter_is_felt_at_the_next_message():
-    run = haptic.felt(replace(QUIET, plan=SLOW, filtered=False), FIRM)
+    run = haptic.simulate_plan(replace(QUIET, plan=SLOW, filtered=False), FIRM)
     turn = round(1.0 / QUIET.rate / QUIET.tick)
     messages = run.true[::turn]
     assert_allclose(run.felt[::turn], messages, atol=1e-12)
@@ -120,7 +120,7 @@ def test_a_later_force_leaves_a_smaller_margin():
 def test_without_coulomb_friction_the_limit_by_simulation_and_by_response_agree():
     """The response taken at the limit, as an arm gives way to stiff tissue; between few frequencies."""
     smooth = SLIDE._replace(coulomb=(1e-9, 1e-9), static=(1e-9, 1e-9))
-    scenario = replace(FULL, body=smooth, known=smooth, friction=0.0, stiffness=1700.0)
+    scenario = replace(FULL, body=smooth, assumed_body=smooth, friction=0.0, stiffness=1700.0)
     margins = haptic.margins(scenario, FIRM, haptic.response(scenario))
     assert_allclose(margins.stiffness, margins.by_response, rtol=0.03)
 
@@ -142,20 +142,20 @@ def test_the_thesis_s_hand_is_thrown_out_of_reach_and_the_firm_one_is_not():
 
 def test_a_device_makes_no_more_force_than_it_can():
     weak = replace(FULL, device=FULL.device._replace(strongest=3.3), plan=SLOW)
-    run = haptic.felt(weak, FIRM)
+    run = haptic.simulate_plan(weak, FIRM)
     assert_allclose(run.felt.max(), 3.3)
     assert run.true.max() > 3.3
 
 
 def test_tissue_that_rubs_keeps_energy():
     def lost(friction: float) -> float:
-        run = haptic.felt(replace(QUIET, plan=SLOW, friction=friction, damping=0.0), FIRM)
+        run = haptic.simulate_plan(replace(QUIET, plan=SLOW, friction=friction, damping=0.0), FIRM)
         return float(np.sum(run.true * np.gradient(run.q)))
 
     assert lost(0.2) > 0.01 > abs(lost(0.0))
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_one_others():
-    once, again, other = (haptic.felt(replace(FULL, seed=seed, plan=SLOW), FIRM) for seed in (3, 3, 4))
+    once, again, other = (haptic.simulate_plan(replace(FULL, seed=seed, plan=SLOW), FIRM) for seed in (3, 3, 4))
     assert all(a.tobytes() == b.tobytes() for a, b in zip(once, again, strict=True))
     assert not np.array_equal(once.felt, other.felt)

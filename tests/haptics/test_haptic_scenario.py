@@ -64,24 +64,36 @@ def test_the_shipped_file_says_what_is_taken_where_none_says_another(tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("seed = 8", "sead = 8", (5, "unknown key 'sead'; known are")),
+        ("seed = 8", "sead = 8", (5, "unknown key 'sead'; known keys are")),
         ("mass = 1.0", "mass = 0", (19, "hand 1: mass must be finite and greater than 0, not 0")),
         ("damping = 40.0", "", (23, "hand 2: damping is missing")),
         ('name = "firm"', 'name = "thesis"', (24, "two hands have the name 'thesis'")),
         ('name = "firm"', 'name = "My hand"', (24, "hand 2: name must match [a-z0-9_-]+")),
         ("motion_scale = 1.0", "motion_scale = -1", (30, "device: motion_scale must be finite and greater than 0")),
-        ("rate = 100.0         #", "rate = 300.0 #", (37, "link: a period of 300 Hz must be whole ticks of 0.0005 s")),
+        (
+            "rate = 100.0         #",
+            "rate = 300.0 #",
+            (37, "link: the period at 300 Hz must be a whole number of ticks of 0.0005 s"),
+        ),
         ("force_delay = 0.0 ", "force_delay = 20 ", (39, "link: force_delay must be at most 5 s, not 20")),
-        ('"cascade" #', '"exactly" #', (42, "an arm that follows exactly has no effort to make a force of; write use")),
+        (
+            '"cascade" #',
+            '"exactly" #',
+            (42, "an arm that follows exactly has no effort to estimate a force from; write use"),
+        ),
         ("stops = [-0.13, 0.09]", "stops = [0.1, 0]", (45, "arm: stops must be lower and upper, not 0.1 and 0")),
-        ("tick = 5e-4 ", "tick = 5e-7 ", (43, "arm: 6e+07 ticks cannot be gone through; at most 2000000 can")),
+        ("tick = 5e-4 ", "tick = 5e-7 ", (43, "arm: 6e+07 ticks are too many to simulate; use at most 2000000")),
         ("inductance = 3e-4", "inductance = 0", (51, "arm.motor: inductance must be finite and")),
         ("position_p = 30.0", "position_p = 'x'", (57, "arm.control: position_p must be a number, not 'x'")),
         ("coulomb = [3.984, 3.984]   #", "coulomb = [-1, 1] #", (69, "arm.body: coulomb must be two numbers")),
         ("inertia = 2.0036", "inertia = 0", (66, "arm.body: inertia must be finite and greater than 0")),
         ('use = "ekf"', 'use = "kalman"', (77, "filter: use must be one of ekf, none, not 'kalman'")),
         ("stiffness = 457.24", "stiffness = -1", (82, "tissue: stiffness must be finite and greater than 0")),
-        ("friction = 0.05 ", "friction = 1.5 ", (84, "tissue: friction must be below 1, as tissue never pulls")),
+        (
+            "friction = 0.05 ",
+            "friction = 1.5 ",
+            (84, "tissue: friction must be below 1, not 1.5, because tissue never pulls"),
+        ),
         ("[0.0, -0.04], [1.0, 0.03]", "[0.0, -40], [1.0, 0.03]", (9, "it is in metres")),
         ("[0.0, -0.04], [1.0, 0.03]", "[1.0, -0.04], [1.0, 0.03]", (9, "the times of plan must increase")),
     ],
@@ -114,16 +126,18 @@ def test_what_is_left_open_is_filled_and_what_is_stated_is_kept(tmp_path):
     assert haptic.filled(stated).stiffness == 100.0
     assert haptic.filled(HapticScenario(), stiffness=333.0).stiffness == 333.0
     found = haptic.filled(stated, body)
-    assert (found.body, found.known) == (body, body)
+    assert (found.body, found.assumed_body) == (body, body)
     own = replace(stated, body=SLIDE)
-    assert haptic.filled(own, body).known == SLIDE  # what the filter knows is what slides, unless the file says another
+    assert (
+        haptic.filled(own, body).assumed_body == SLIDE
+    )  # the filter assumes the true body, unless the file says another
 
 
 def test_the_command_says_what_each_hand_feels_and_where_its_limits_are(tmp_path):
     text = said(written(tmp_path, SHORT))
     assert "simulated, against tissue of 100 N/m" in text
     assert "Hand 'still' of m = 1 kg, b_H = 40 N s/m and K_H = 500 N/m" in text
-    assert "settles against tissue up to" in text
+    assert "stable against tissue up to" in text
 
 
 def test_its_numbers_and_traces_are_for_machines_too(tmp_path):
@@ -140,14 +154,14 @@ def test_its_numbers_and_traces_are_for_machines_too(tmp_path):
 
 def test_an_unstable_hand_is_said_to_be_thrown_out_of_reach(tmp_path):
     wild = SHORT.replace("damping = 40.0", "damping = 0.1").replace("stiffness = 100.0", "stiffness = 1e5")
-    assert "unstable: it is thrown out of the device's reach after" in said(written(tmp_path, wild))
+    assert "unstable: the hand is thrown out of the device's reach after" in said(written(tmp_path, wild))
 
 
 def test_the_template_is_the_shipped_file_and_overwrites_none(tmp_path):
     target = tmp_path / "new.toml"
     assert "written; change its numbers" in said("--template", target)
     assert target.read_text(encoding="utf-8") == SHIPPED
-    assert "is there already" in said("--template", target, code=1)
+    assert "exists already" in said("--template", target, code=1)
 
 
 @pytest.fixture

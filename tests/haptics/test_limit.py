@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from davinci_forces.haptics.maths import bimodal
 from davinci_forces.haptics.maths.bimodal import THESIS, cqlf_limit, switching_limit
 from davinci_forces.haptics.maths.delay import delay_limit, sampled_limit
-from davinci_forces.haptics.maths.lmi import holds
+from davinci_forces.haptics.maths.lmi import cqlf_exists
 from davinci_forces.haptics.maths.motion import leaving_limit
 from davinci_forces.records import (
     Comparison,
@@ -63,7 +63,7 @@ def test_the_map_is_cut_by_the_exact_border(records):
 
 def test_what_is_shipped_of_the_thesis_s_hand_is_what_is_found_of_it():
     for k, proved in zip(bimodal.K_H.tolist(), bimodal.PROVED, strict=True):
-        assert holds(THESIS._replace(k=k), bimodal.K_T).tolist() == [i < proved for i in range(len(bimodal.K_T))]
+        assert cqlf_exists(THESIS._replace(k=k), bimodal.K_T).tolist() == [i < proved for i in range(len(bimodal.K_T))]
     held = [sampled_limit(THESIS, delay, bimodal.LINK_RATE) for delay in bimodal.DELAYS.tolist()]
     assert_allclose(bimodal.HELD, held, rtol=1e-9)
     simulated = bimodal.DELAYS[bimodal.SIMULATED].tolist()

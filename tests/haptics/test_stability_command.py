@@ -46,10 +46,10 @@ def test_people_are_told_what_each_limit_means_and_where_the_thesis_s_tissue_is(
     text = said("--delay", "0.05")
     assert "Lyapunov" in text
     assert "worst" in text
-    assert "457.24 N/m, is beyond both limits of arbitrary switching" in text
-    assert "it is beyond k_t_delay" in text
+    assert "457.24 N/m, is above both limits of arbitrary switching" in text
+    assert "it is above k_t_delay" in text
     assert "below all limits" in said("--k-h", "100000")
-    assert "so late, too" in said("--b-h", "100", "--delay", "0.01")
+    assert "with this delay it is stable, too" in said("--b-h", "100", "--delay", "0.01")
 
 
 @pytest.mark.parametrize(

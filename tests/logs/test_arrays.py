@@ -100,7 +100,7 @@ def test_complex_numbers_are_not_read_as_their_real_part():
 def test_of_many_parameters_some_are_shown_and_the_others_counted():
     log, _ = read(hdf5({"t": T, **{f"gain/{i}": float(i) for i in range(1000)}}), "log.h5")
     assert log.facts["gain/0"] == "0.0"
-    assert log.facts["..."] == "960 more that are no recordings"
+    assert log.facts["..."] == "960 more that are not recordings"
 
 
 def test_a_file_of_scalars_is_no_log():
@@ -158,7 +158,7 @@ def test_what_lies_in_another_file_is_left_out(tmp_path):
         hdf.create_virtual_dataset("virtual", layout)
     log, _ = read((tmp_path / "log.h5").read_bytes(), "log.h5")
     assert names(log) == ["t"]
-    assert log.warnings == ["dataset /virtual lies in another file, and is left out"]
+    assert log.warnings == ["dataset /virtual is stored in another file and is left out"]
 
 
 def test_a_dataset_that_claims_more_samples_than_its_file_can_hold_is_refused():

@@ -47,7 +47,7 @@ def test_sizes_before_arrays_are_not_taken_for_samples(dtype, order):
     content = sized(ROWS[:7], ROWS[7:8], ROWS[8:], dtype=dtype, order=order)
     log, samples = read(content, "log.bin", Options(dtype=dtype, columns=3))
     assert_array_equal(np.column_stack(list(samples.values())), ROWS)
-    assert log.facts["layout"] == "3 arrays with their sizes before them"
+    assert log.facts["layout"] == "3 arrays, each with its size before it"
 
 
 def test_an_array_that_is_cut_keeps_its_whole_rows():
@@ -58,7 +58,7 @@ def test_an_array_that_is_cut_keeps_its_whole_rows():
 
 
 def test_arrays_of_another_width_are_refused():
-    with pytest.raises(BadLog, match="begins at byte 176 that is not of 3 columns"):
+    with pytest.raises(BadLog, match="byte 176 begins an array without 3 columns"):
         read(sized(ROWS[:7], ROWS[7:].reshape(-1, 13)), "log.bin", Options(dtype="DBL", columns=3))
 
 
@@ -75,11 +75,11 @@ def test_without_a_type_the_message_says_what_to_write(name):
 
 
 def test_less_than_a_row_is_refused():
-    with pytest.raises(BadLog, match="its 8 bytes are less than a row of 3 numbers of 8 bytes"):
+    with pytest.raises(BadLog, match="its 8 bytes are fewer than one row of 3 numbers of 8 bytes"):
         read(bytes(8), "log.bin", Options(dtype="DBL", columns=3))
 
 
 @pytest.mark.parametrize(("name", "content"), [("log.tdm", b'<?xml version="1.0"?>'), ("log.tdx", bytes(100))])
 def test_a_tdm_file_says_how_to_make_tdms_of_it(name, content):
-    with pytest.raises(BadLog, match="save as TDMS"):
+    with pytest.raises(BadLog, match="save it as TDMS"):
         read(content, name)

@@ -124,7 +124,7 @@ def test_samples_before_and_after_another_unit_or_scale_are_not_mixed(word: str,
     with TdmsWriter(file) as writer:
         for value in values:
             writer.write_segment([ChannelObject("a", "q", np.arange(2.0), {word: value})])
-    with pytest.raises(BadLog, match="in a later file segment, so its samples are of two kinds"):
+    with pytest.raises(BadLog, match="in a later file segment, so its samples mean two things"):
         read(file.getvalue(), "log.tdms")
 
 
@@ -194,8 +194,8 @@ def test_the_times_of_a_timeline_do_not_depend_on_how_it_is_asked(
     timeline = Timeline()
     for write in writes:
         timeline.add(*write)
-    whole = timeline.at(0, timeline.rows)
-    assert_array_equal(whole, np.concatenate([timeline.at(row, 1) for row in range(timeline.rows)]))
+    whole = timeline.times(0, timeline.rows)
+    assert_array_equal(whole, np.concatenate([timeline.times(row, 1) for row in range(timeline.rows)]))
 
 
 def test_lvm_columns_of_x_that_differ_are_the_clocks_of_their_channels() -> None:

@@ -62,7 +62,7 @@ def test_repeated_rows_are_flagged_from_a_tenth_on(tmp_path: Path) -> None:
         path.write_text("t,q\n" + "".join(f"{a!r},{b!r}\n" for a, b in zip(t.tolist(), q.tolist(), strict=True)))
         found = json.loads(shown(path, "--json"))
         assert found["clock"]["duplicates"] == repeated
-        assert any("repeat the one before" in warning for warning in found["warnings"]) is flagged
+        assert any("repeat the previous row" in warning for warning in found["warnings"]) is flagged
 
 
 def test_a_jittery_clock_and_a_gap_are_flagged_and_an_even_one_is_not(tmp_path: Path) -> None:
@@ -70,8 +70,8 @@ def test_a_jittery_clock_and_a_gap_are_flagged_and_an_even_one_is_not(tmp_path: 
     even = np.arange(500) * 0.01
     jittery = even + rng.uniform(0, 0.005, 500)
     gapped = np.where(even > 2, even + 0.1, even)
-    longest = "the longest time between samples is 0.11 s"
-    for name, t, words in (("even", even, ""), ("jittery", jittery, "jittery"), ("gapped", gapped, longest)):
+    longest = "the longest gap between samples is 0.11 s"
+    for name, t, words in (("even", even, ""), ("jittery", jittery, "of jitter"), ("gapped", gapped, longest)):
         path = tmp_path / f"{name}.csv"
         path.write_text("t,q\n" + "".join(f"{a:.6f},{b}\n" for b, a in enumerate(t.tolist())))
         warnings = json.loads(shown(path, "--json"))["warnings"]
@@ -82,14 +82,14 @@ def test_a_log_without_a_clock_says_what_may_be_one(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("".join(f"{0.5 * i + 7},{(-1) ** i}\n" for i in range(20)))
     text = shown(path)
-    assert "say rate = ... [Hz] for this log in study.toml" in text
-    assert "or time = 'column_0', which rises throughout (2 Hz" in text
+    assert "add rate = ... [Hz] for this log in study.toml" in text
+    assert "or time = 'column_0', which increases throughout (2 Hz" in text
 
 
 def test_an_lvm_log_whose_x_restarts_says_how_to_go_on(tmp_path: Path) -> None:
     path = tmp_path / "log.lvm"
     path.write_bytes(lvm([Write({"a": [1.0, 2.0]}, x=[0.0, 0.01])] * 3, Style(several=False)))
-    assert "time 'X_Value' goes back 2 times and stands still 0 times, first in row 3" in shown(path)
+    assert "time 'X_Value' goes back 2 times and repeats 0 times, first in row 3" in shown(path)
 
 
 @given(st.lists(st.floats(-1e3, 1e3) | st.just(np.nan), min_size=20), st.lists(st.floats(0, 1), min_size=1))

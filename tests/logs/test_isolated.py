@@ -44,7 +44,7 @@ class Odd(Log):
         yield {"x": np.arange(3.0, 6.0)}
 
 
-def opened(path, options):
+def open_in_child(path, options):
     if path.read_text() == "refuse":
         raise BadLog(f"{path}: refused")
     return Odd(path, "odd", (Channel("x", "m", alias="y"),), facts={"pid": str(os.getpid())})
@@ -73,7 +73,7 @@ def test_a_child_is_kept_for_the_next_file(tmp_path):
 @pytest.mark.parametrize(
     ("what", "says"),
     [
-        pytest.param("crash", "reading it ends the process that does so (signal 11)", marks=POSIX),
+        pytest.param("crash", "reading it crashes the reader process (signal 11)", marks=POSIX),
         ("fault", "it cannot be read (KeyError: 'of a library'): it is damaged; record it again"),
         pytest.param("greedy", "reading it takes more than 448 MB of memory", marks=POSIX),
     ],
@@ -90,7 +90,7 @@ def test_what_goes_wrong_in_the_child_is_a_message_and_the_next_file_is_read(tmp
     ("what", "limit", "says"),
     [
         ("hang", "seconds", "reading it takes more than 1 s, so"),
-        pytest.param("compute", "cpu", "reading it takes more than 1 s of computing", marks=POSIX),
+        pytest.param("compute", "cpu", "reading it takes more than 1 s of CPU time", marks=POSIX),
     ],
 )
 def test_a_child_that_takes_too_long_is_ended(tmp_path, what, limit, says):

@@ -122,7 +122,7 @@ SENSES: dict[str, str | tuple[int, str]] = {
     "dup_names.lvm": (3, "read as 'Voltage_1'"),
     "nonmono_time.lvm": (3, "x goes back from 1 to 0.5 in row 3"),
     "thousands.lvm": ":24: '1.002,500000' in column 1",
-    "samples_wrong.lvm": (3, "the header says 500 samples, 3 rows follow"),
+    "samples_wrong.lvm": (3, "the header states 500 samples, but 3 rows follow"),
     "no_x_value_line.lvm": ":22: the column line.* is missing",
     "special_between.lvm": (3, ""),
     "nul_tail.lvm": (3, "4096 NUL bytes"),

@@ -90,7 +90,7 @@ def test_blocks_of_any_size_give_the_same_samples(monkeypatch: pytest.MonkeyPatc
         log, at_once = read(content)
         for size in (61, 1000, 7001):
             with monkeypatch.context() as patch:
-                patch.setattr(lvm_walk, "SMALL", size // 4)
+                patch.setattr(lvm_walk, "LINEWISE_BYTES", size // 4)
                 patch.setattr(lines.Lines.blocks, "__defaults__", (size,))
                 again, in_blocks = read(content)
             assert again.warnings == log.warnings
@@ -102,11 +102,11 @@ def test_blocks_of_any_size_give_the_same_samples(monkeypatch: pytest.MonkeyPatc
 def test_a_blank_line_in_a_block_of_rows_is_noticed(monkeypatch: pytest.MonkeyPatch) -> None:
     rows = [float(i) for i in range(400)]
     content = lvm([Write({"a": rows}, x=rows)], Style(several=False, end="\n"))
-    monkeypatch.setattr(lvm_walk, "SMALL", 64)
+    monkeypatch.setattr(lvm_walk, "LINEWISE_BYTES", 64)
     log, samples = read(content.replace(b"\n300,0\t", b"\n\n300,0\t"))
     assert_array_equal(samples["a"], rows)
     assert_array_equal(samples["write"], np.repeat([1, 2], [300, 100]))
-    assert log.warnings == ["line 324: rows go on after a blank line, without a header; they are read as before"]
+    assert log.warnings == ["line 324: rows continue after a blank line without a header; they are read as before"]
 
 
 def test_reading_again_tells_the_same_once(tmp_path: Path) -> None:
@@ -162,7 +162,7 @@ def test_a_log_without_x_has_the_clock_of_its_header() -> None:
 
 def test_an_interval_that_lost_its_digits_is_told_of() -> None:
     log, _ = read(lvm([Write({"a": [1.0, 2.0]}, step=0.000488)], Style(x_columns="No")))
-    assert "the interval of 0,000488 s is rounded, the clock may be wrong by 0.10%" in log.warnings[0]
+    assert "the sampling interval of 0,000488 s is rounded, so the clock may be wrong by 0.10%" in log.warnings[0]
     log, _ = read(lvm([Write({"a": [1.0, 2.0]}, step=0.001)], Style(x_columns="No")))
     assert not log.warnings
 
@@ -171,7 +171,7 @@ def test_what_recurs_is_told_of_a_few_times_and_counted() -> None:
     writes = [Write({"a": [1.0]}, x=[0.0], samples=2) for _ in range(20)]
     log, samples = read(lvm(writes))
     assert_array_equal(samples["write"], np.arange(1, 21))
-    assert log.warnings[-1] == "15 more times: line #: the header says # samples, # rows follow; these are read"
+    assert log.warnings[-1] == "15 more times: line #: the header states # samples, but # rows follow; these are read"
     assert len(log.warnings) == 6
 
 
@@ -207,7 +207,7 @@ def test_the_same_mark_for_cells_and_decimals_is_refused() -> None:
 
 def test_text_in_a_number_cell_is_named_with_its_place() -> None:
     content = lvm([Write({"a": [1.0, 2.5, 3.0]}, x=[0.0, 1.0, 2.0])]).replace(b"2,5", b"2,5V")
-    with pytest.raises(BadLog, match=r"log.lvm:24: '2,5V' in column 1 \(a\) is no number"):
+    with pytest.raises(BadLog, match=r"log.lvm:24: '2,5V' in column 1 \(a\) is not a number"):
         read(content)
 
 
@@ -249,7 +249,7 @@ def test_only_the_channels_asked_for_are_converted() -> None:
 @pytest.mark.parametrize("separator", [b"\xa7", b"7", b"-"])
 def test_a_separator_that_cannot_part_numbers_is_refused(separator: bytes) -> None:
     content = lvm([Write({"a": [1.0]}, x=[0.0])]).replace(b"Separator\tTab", b"Separator" + separator)
-    with pytest.raises(BadLog, match=r"the separator is .*, which cannot part numbers"):
+    with pytest.raises(BadLog, match=r"the separator is .*, which cannot separate numbers"):
         read(content)
 
 

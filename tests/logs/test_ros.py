@@ -105,9 +105,7 @@ def test_an_array_that_ends_halfway_is_named(tmp_path):
     messages = list(states())
     messages[40] = joint_state(T[40], NAMES, values(40), (), values(40))
     log = open_log(write(tmp_path / "log", messages))
-    with pytest.raises(
-        BadLog, match=r"message 40 of .* has 3 of position, 0 of velocity, 3 of effort, where the first"
-    ):
+    with pytest.raises(BadLog, match=r"message 40 of .* has 3 of position, 0 of velocity, 3 of effort, but the first"):
         column(log, "effort[0]")
 
 
@@ -121,7 +119,7 @@ def test_joints_without_names_keep_their_number_and_a_change_of_it_is_named(tmp_
 
 
 def test_names_that_do_not_match_their_values_are_refused(tmp_path):
-    with pytest.raises(BadLog, match=r"message 0 of /PSM1/measured_js names 3 joints and has 2 of position"):
+    with pytest.raises(BadLog, match=r"message 0 of /PSM1/measured_js names 3 joints but has 2 of position"):
         open_log(write(tmp_path / "log", [joint_state(0.0, NAMES, (1.0, 2.0))]))
 
 
@@ -132,7 +130,7 @@ def test_messages_of_other_joints_on_the_same_topic_are_left_out_and_remarked_on
     assert_array_equal(column(log, "position[outer_yaw]")[0], [values(i)[0] for i in range(60)])
     assert log.dropped == 60
     [remark] = log.warnings
-    assert "message 1 of /joint_states is of jaw" in remark
+    assert "message 1 of /joint_states is of other joints (jaw)" in remark
 
 
 def test_headers_without_a_time_leave_the_recorder_s_which_is_remarked_on(tmp_path):
@@ -144,15 +142,15 @@ def test_headers_without_a_time_leave_the_recorder_s_which_is_remarked_on(tmp_pa
 
 def test_a_bag_of_nothing_that_is_read_says_what_it_has(tmp_path):
     empty = write(tmp_path / "log", [])
-    with pytest.raises(BadLog, match=r"no message of a type that is read \(sensor_msgs/JointState.*topics are none"):
+    with pytest.raises(BadLog, match=r"no message of a supported type \(sensor_msgs/JointState.*topics are none"):
         open_log(empty)
 
 
 def test_a_folder_that_is_no_bag_and_a_description_without_its_folder_are_refused(tmp_path):
-    with pytest.raises(BadLog, match=r"a folder without metadata\.yaml"):
+    with pytest.raises(BadLog, match=r"this folder has no metadata\.yaml"):
         open_log(tmp_path)
     bag = write(tmp_path / "log", states())
-    with pytest.raises(BadLog, match=r"it describes a bag of ROS 2; name the folder"):
+    with pytest.raises(BadLog, match=r"this file describes a ROS 2 bag; name its folder"):
         open_log(bag / "metadata.yaml")
 
 
@@ -198,11 +196,11 @@ def test_signs_in_the_names_of_folders_and_files_mean_nothing(kind, tmp_path):
 @pytest.mark.medium
 def test_blocks_of_a_long_bag_are_bounded_and_whole(tmp_path):
     from davinci_forces.logs.log import Options
-    from davinci_forces.logs.ros.bag import ROWS, opened
+    from davinci_forces.logs.ros.bag import BLOCK_MESSAGES, open_in_child
 
-    count = 2 * ROWS + 5
+    count = 2 * BLOCK_MESSAGES + 5
     messages = (joint_state(0.001 * i, ["roll"], [i]) for i in range(count))
-    log = opened(write(Path(tmp_path) / "log", messages), Options())
+    log = open_in_child(write(Path(tmp_path) / "log", messages), Options())
     blocks = [block["/PSM1/measured_js/position[0]"] for block in log.blocks(["/PSM1/measured_js/position[0]"])]
-    assert max(map(len, blocks)) == ROWS
+    assert max(map(len, blocks)) == BLOCK_MESSAGES
     assert_array_equal(np.concatenate(blocks), np.arange(count))

@@ -134,8 +134,8 @@ def test_raw_numbers_are_what_the_study_says(tmp_path, dtype, as_):
 @pytest.mark.parametrize(
     ("more", "says"),
     [
-        ('dtype = "float64"', "dtype is of raw binary numbers, and needs columns"),
-        ("columns = 3", "columns is of raw binary numbers, and needs dtype"),
+        ('dtype = "float64"', "dtype needs columns; a file of raw binary numbers"),
+        ("columns = 3", "columns needs dtype; a file of raw binary numbers"),
         ('dtype = "i8"\ncolumns = 3', "dtype must be a type of number"),
         ('dtype = "DBL"\ncolumns = 0', "columns must be how many numbers a row has, or their names"),
         ('dtype = "DBL"\ncolumns = ["a", "a"]', "columns must be how many numbers a row has, or their names"),

@@ -126,8 +126,8 @@ def test_blocks_of_any_size_give_the_same_samples(
     contents = [segment(table, interleaved) + segment(table, interleaved, described=False) * 5]
     contents += [] if interleaved else [segment(table, chunks=chunks) * 4 for chunks in (2, 12)]
     for module, name, value in (
-        (tdms_walk, "BLOCK", block), (tdms_walk, "SMALL", block), (tdms_samples, "BLOCK", block),
-        (tdms_samples, "ROWS", 5), (asked, "ROWS", 7),
+        (tdms_walk, "BLOCK", block), (tdms_walk, "SMALL_SEGMENT", block), (tdms_samples, "BLOCK", block),
+        (tdms_samples, "PIECE_ROWS", 5), (asked, "BLOCK_ROWS", 7),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, value)
     holds(contents[0], joined([table] * 6))
@@ -266,7 +266,7 @@ def test_a_count_of_scales_that_was_damaged_is_refused_before_anything_is_made_o
         file = io.BytesIO()
         with TdmsWriter(file) as writer:
             writer.write_segment([ChannelObject("a", "raw", np.array([1, 2], dtype=np.int16), scale)])
-        with pytest.raises(BadLog, match=f"says that it has {count} scales and describes 1: the file is damaged"):
+        with pytest.raises(BadLog, match=f"claims {count} scales but describes 1: the file is damaged"):
             read(file.getvalue(), "log.tdms")
 
 
@@ -287,14 +287,14 @@ def test_channels_that_are_called_alike_are_remarked_on() -> None:
         writer.write_segment([ChannelObject("a/b", "c", np.array([1.0])), ChannelObject("a", "b/c", np.array([2.0]))])
     log, samples = read(file.getvalue(), "log.tdms")
     assert (samples["a/b/c"], samples["a/b/c_1"]) == ([1], [2])
-    assert log.warnings == ["a channel is called 'a/b/c' like another; it is read as 'a/b/c_1'"]
+    assert log.warnings == ["more than one channel is called 'a/b/c'; one of them is read as 'a/b/c_1'"]
 
 
 @pytest.mark.parametrize("chunk", [1, 7, 10**9])
 def test_values_of_daq_cards_are_read_as_npTDMS_reads_them_however_long_their_chunks(
     monkeypatch: pytest.MonkeyPatch, chunk: int
 ) -> None:
-    monkeypatch.setattr(tdms_samples, "ROWS", chunk)
+    monkeypatch.setattr(tdms_samples, "PIECE_ROWS", chunk)
     raw = {f"a/{i}": np.arange(i, 40 + i, dtype=np.int16) for i in range(3)}
     content = daqmx(raw, slope=0.5, chunks=4) * 3
     _, samples = read(content, "log.tdms")

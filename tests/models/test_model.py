@@ -15,7 +15,7 @@ from davinci_forces.maths.models import kernels, terms
 from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
-from davinci_forces.maths.models.memory import deflection, driven, efforts, pieces
+from davinci_forces.maths.models.memory import deflection, efforts, friction_state, pieces
 from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.records import Motion
 from davinci_forces.robots.davinci_chain import BODIES, CHAIN
@@ -83,7 +83,7 @@ def test_a_long_motion_piece_by_piece_is_the_whole_of_it(model, monkeypatch):
     Phi, known = model.regressor(motion)
     theta = np.random.default_rng(1).normal(size=(2, len(model.parameters)))
     which = np.arange(2000) % 2
-    monkeypatch.setattr("davinci_forces.maths.models.memory.SAMPLES", 300)
+    monkeypatch.setattr("davinci_forces.maths.models.memory.PIECE_SAMPLES", 300)
     every = list(pieces(model, motion, 7))
     assert [len(piece.motion.q) for piece in every] == [307, *[314] * 5, 207]
     for piece in every:
@@ -107,7 +107,7 @@ def test_rows_for_a_fit_are_low_passed_piece_by_piece_as_they_would_be_at_once(m
     ]
     log = observed(records, (), 4.0, 0)
     at_once = log.rows(coupled())
-    monkeypatch.setattr("davinci_forces.maths.models.memory.SAMPLES", 700)
+    monkeypatch.setattr("davinci_forces.maths.models.memory.PIECE_SAMPLES", 700)
     for piecewise, whole in zip(log.rows(coupled()), at_once, strict=True):
         assert_allclose(piecewise, whole, rtol=1e-9, atol=1e-12)
 
@@ -230,10 +230,10 @@ def test_a_term_of_an_unknown_function_or_without_its_displacement_is_refused():
 def test_a_smooth_sign_and_stribeck_s_peak_are_the_sign_far_from_and_near_standstill():
     motion = column(wandering(2000))
     dq = motion.dq[:, 0]
-    smooth, _ = driven(motion, 0, terms.smooth_sign(1e-3))
-    peak, _ = driven(motion, 0, terms.stribeck(1e-3))
+    smooth, _ = friction_state(motion, 0, terms.smooth_sign(1e-3))
+    peak, _ = friction_state(motion, 0, terms.stribeck(1e-3))
     fast = np.abs(dq) > 5e-3
     assert_allclose(smooth[fast], np.sign(dq[fast]), atol=1e-4)  # 1 - tanh(5)
     assert_allclose(peak[fast], 0.0, atol=1e-10)  # exp(-25)
-    assert_allclose(driven(motion, 0, terms.smooth_sign(1e3))[0], dq / 1e3, rtol=1e-5)
-    assert_allclose(driven(motion, 0, terms.stribeck(1e3))[0], np.sign(dq), rtol=1e-5)
+    assert_allclose(friction_state(motion, 0, terms.smooth_sign(1e3))[0], dq / 1e3, rtol=1e-5)
+    assert_allclose(friction_state(motion, 0, terms.stribeck(1e3))[0], np.sign(dq), rtol=1e-5)

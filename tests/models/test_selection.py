@@ -6,7 +6,7 @@ from numpy.testing import assert_allclose
 
 from davinci_forces.identification import unseen
 from davinci_forces.identification.candidates import Library
-from davinci_forces.identification.unseen import Refitted
+from davinci_forces.identification.unseen import RefitModel
 from davinci_forces.maths.selection import (
     BLOCKS,
     MOST,
@@ -61,7 +61,7 @@ def test_refits_that_several_logs_ask_for_are_made_once(monkeypatch):
     Phi = RNG.normal(size=(N, 1, p))
     cells = gathered(Phi, Phi @ np.ones(p), CELL, CELLS)
     library = Library(model, (), ((),), np.array([N]), cells, cells, np.empty(0))
-    made = Refitted(model, library, PLAIN, list(range(p)), 1)
+    made = RefitModel(model, library, PLAIN, list(range(p)), 1)
     solved = []
     monkeypatch.setattr(unseen, "solve", lambda *given: solved.append(given) or solve(*given))
     for out in (*np.eye(CELLS, dtype=bool), *np.eye(CELLS, dtype=bool)):

@@ -119,7 +119,7 @@ def test_studies_without_results_are_named_and_left_out(tmp_path):
     studies = lab(tmp_path, 3)
     (tmp_path / "reports" / "run-01" / "results.json").unlink()
     said = call("campaign", tmp_path / "raw" / "*")
-    assert f"{studies[1]}: left out, as it has no results; run `davinci-forces all {studies[1]}`" in said
+    assert f"{studies[1]}: left out, it has no results; run `davinci-forces all {studies[1]}`" in said
     assert "run-01" not in re.findall(r'href="(run-\d\d)/', page(tmp_path))
     assert "Left out, as they have no results" in page(tmp_path)
 
@@ -132,7 +132,7 @@ def test_a_campaign_of_nothing_or_of_what_cannot_be_read_says_so(tmp_path):
         summary.write_text(content)
         assert f"{summary} is not as the report wrote it" in call("campaign", *studies, code=1)
     summary.unlink()
-    assert f"{summary} is not there" in call("campaign", *studies, code=1)
+    assert f"{summary} does not exist" in call("campaign", *studies, code=1)
     shutil.rmtree(tmp_path / "reports")
     assert "no study has results" in call("campaign", *studies, code=1)
 

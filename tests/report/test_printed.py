@@ -31,7 +31,7 @@ def context(records, robot=davinci.ROBOT) -> Context:
             record, "origin", Origin("x.parquet", "", dict.fromkeys((f.name for f in fields(record)), ""))
         )
     catalogue = Catalogue(lambda kind: [record for record in records if isinstance(record, kind)])
-    study = SimpleNamespace(robot=robot, simulated=False, truth={})
+    study = SimpleNamespace(robot=robot, simulated=True, truth={"scenario": "davinci-demo"})
     return Context(catalogue, study, collect(catalogue), None)
 
 
@@ -77,6 +77,13 @@ def test_nothing_is_printed_beside_what_it_is_not_of(records, robot):
     assert list(printed_beside(context(records, robot), plain(records))) == []
 
 
+def test_nothing_of_the_thesis_is_beside_a_user_s_study(records):
+    about = context(records)
+    about.study.truth = {}
+    assert not about.compares_with_thesis
+    assert list(printed_beside(about, plain(records))) == []
+
+
 def test_estimators_are_drawn_over_the_averaged_effort_and_as_differences(records):
     (figure,) = estimators(context(records), plain(records))
     over, less = figure.panels
@@ -86,7 +93,7 @@ def test_estimators_are_drawn_over_the_averaged_effort_and_as_differences(record
     by_name = {r.estimator: r for r in records if isinstance(r, Residual)}
     shown = next(mark for mark in less.marks if mark.label == "WLSE")
     np.testing.assert_array_equal(shown.y, by_name["wlse"].tau_hat - by_name["lse"].tau_hat)
-    assert figure.caption.endswith("consistent and TLS are least squares' own.")
+    assert figure.caption.endswith("consistent and TLS are the same as least squares.")
 
 
 def test_an_estimator_that_differs_from_least_squares_is_drawn_and_one_that_does_not_is_named(records):
@@ -96,7 +103,7 @@ def test_an_estimator_that_differs_from_least_squares_is_drawn_and_one_that_does
     ]
     (figure,) = estimators(context(other), plain(other))
     assert "consistent" in {mark.label for mark in figure.panels[1].marks}
-    assert figure.caption.endswith("TLS is least squares' own.")
+    assert figure.caption.endswith("TLS is the same as least squares.")
 
 
 def test_a_search_is_drawn_as_it_fell_and_said_to_reach_what_it_reached(records):

@@ -110,7 +110,7 @@ def test_figures_drawn_by_several_processes_are_the_same_bytes_and_none_is_missi
 ) -> None:
     monkeypatch.setattr(together, "PROGRAM", program)
     monkeypatch.setattr(os, "cpu_count", lambda: 2)
-    figures = [zoomable(40 + i, f"z{i}") for i in range(2 * together.FEWEST)]
+    figures = [zoomable(40 + i, f"z{i}") for i in range(2 * together.MIN_FIGURES_PER_PROCESS)]
     together.draw_together(figures)
     assert [svg(figure) for figure in figures] == [draw_svg(figure) for figure in figures]
 

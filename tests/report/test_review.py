@@ -52,8 +52,8 @@ def test_a_rating_says_what_of_whom_and_of_which_numbers(tmp_path):
         ('verdict = "doubt"', 'verdict = "fine"', "review.toml:3: .*verdict must be one of accept, doubt, reject"),
         (f'results = "{HASH}"', 'results = "x"', "review.toml:4: .*results must be the SHA-256"),
         (f'results = "{HASH}"', "", "results is missing"),
-        ('figure = "zoom"', "", "say what is rated"),
-        ('figure = "zoom"', 'figure = "zoom"\nrun = "push"', "say what is rated"),
+        ('figure = "zoom"', "", "give what is rated"),
+        ('figure = "zoom"', 'figure = "zoom"\nrun = "push"', "give what is rated"),
         ('figure = "zoom"', 'figure = "zoom"\ncoment = "x"', "review.toml:3: .*unknown key 'coment'"),
         ("[[rating]]", "[[ratings]]", "unknown key 'ratings'"),
         ("[[rating]]", "[[rating]", "review.toml: "),
@@ -116,7 +116,7 @@ def test_the_next_report_shows_ratings_as_text_and_says_when_numbers_changed_sin
     assert "The numbers have changed since 1 rating of 2" in page
     assert "figure gone, no longer here" in page
     (finished / "review.toml").write_text("[[rating]]\n")
-    assert "say what is rated" in call("report", finished, code=1)
+    assert "give what is rated" in call("report", finished, code=1)
 
 
 @pytest.fixture(scope="module")

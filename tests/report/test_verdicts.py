@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from report_records import free_space, prediction
 
-from davinci_forces.report.verdicts import Trust, band, band_in_words, graded, thresholds
+from davinci_forces.report.verdicts import Trust, band, band_in_words, grade, thresholds, verdict_words
 
 
 def trust(error: float = 0.05, path: str = "another path", level: float = 0.3, sought: float | None = None) -> Trust:
@@ -32,7 +32,25 @@ def test_what_is_not_known_calls_for_caution():
     assert Trust("roll", None, None, None).level == "warn"
     assert Trust("roll", None, None, 1.0).level == "warn"
     assert replace(trust(), prediction=prediction(effort_rms=0.0)).level == "warn"
-    assert graded(float("nan"), 0.1, 0.2) == "warn"
+    assert grade(float("nan"), 0.1, 0.2) == "warn"
+
+
+@pytest.mark.parametrize("level", ["good", "warn", "bad"])
+@pytest.mark.parametrize("same_path", [False, True])
+@pytest.mark.parametrize("narrow", [False, True])
+def test_good_never_stands_beside_a_caveat(level, same_path, narrow):
+    words = verdict_words(level, same_path and level != "good", narrow)
+    assert ("Good" in words) == (level == "good" and not narrow)
+    assert ("same path" in words) == (same_path and level != "good")
+
+
+def test_a_joint_whose_band_is_too_narrow_is_not_called_good_and_keeps_its_level():
+    narrow = replace(trust(), space=free_space(coverage=0.5))
+    right = replace(trust(), space=free_space(coverage=0.95))
+    assert narrow.level == right.level == "good"
+    assert "narrow band" in narrow.words
+    assert "Good" not in narrow.words
+    assert "Good" in right.words
 
 
 @pytest.mark.parametrize(

@@ -18,14 +18,14 @@ def links(chain: Chain, q: np.ndarray) -> np.ndarray:
 
 
 def potential(chain: Chain, bodies: Bodies, q: np.ndarray) -> np.ndarray:
-    there, T = bodies.counted(q.shape[1]), links(chain, q)
+    there, T = bodies.with_coordinates(q.shape[1]), links(chain, q)
     heights = np.einsum("nli,li->nl", T[..., 2, :3], there.centres) + T[..., 2, 3]
     return G * heights @ there.masses
 
 
 def mass(chain: Chain, bodies: Bodies, q: np.ndarray) -> np.ndarray:
     """The sum of m J_v' J_v + J_w' I J_w, with the Jacobians of the centres."""
-    there, T, M = bodies.counted(q.shape[1]), links(chain, q), 0.0
+    there, T, M = bodies.with_coordinates(q.shape[1]), links(chain, q), 0.0
     for i, (link, offset) in enumerate(zip(chain.links, chain.of_links, strict=True)):
         centre = np.linalg.inv(offset) @ np.append(there.centres[i], 1.0)
         J_v, J_w = kinematics.jacobian(chain, q, link, centre[:3])

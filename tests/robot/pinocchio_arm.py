@@ -19,7 +19,7 @@ class Tree(NamedTuple):
 
 
 def tree(pin: Any, chain: Chain, bodies: Bodies, n: int) -> Tree:
-    chain, bodies = chain.reduced(n), bodies.counted(n)
+    chain, bodies = chain.with_coordinates(n), bodies.with_coordinates(n)
     model = pin.Model()
     place: list[tuple[int, Any]] = [(0, pin.SE3.Identity())]  # joint that carries each body, and the body in it
     E = []

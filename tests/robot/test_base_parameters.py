@@ -8,7 +8,7 @@ from davinci_forces.maths.mechanics.bodies import PARAMETERS, base_parameters
 from davinci_forces.robots import dvrk_psm
 from davinci_forces.robots.davinci_chain import BODIES, CHAIN
 
-PSM = dvrk_psm.CHAIN
+PSM = dvrk_psm.PSM_CHAIN
 ARMS = pytest.mark.parametrize(("chain", "n"), [(CHAIN, 3), (CHAIN, 6), (CHAIN, 7), (PSM, 3), (PSM, 6)])
 
 

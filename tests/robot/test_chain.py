@@ -6,7 +6,7 @@ import pytest
 from davinci_forces.maths.mechanics import kinematics
 from davinci_forces.maths.mechanics.chain import FIXED, TableRow, denavit_hartenberg, modified_denavit_hartenberg
 from davinci_forces.robots.davinci_chain import CHAIN as DAVINCI
-from davinci_forces.robots.dvrk_psm import CHAIN as PSM
+from davinci_forces.robots.dvrk_psm import PSM_CHAIN as PSM
 
 POSES = 100
 
@@ -120,7 +120,7 @@ def test_the_research_kit_s_counterweight_keeps_to_the_back_link():
 
 @pytest.mark.parametrize("N", [0, 3, 10, 25])
 def test_what_is_said_of_many_poses_so_many_at_a_time_is_what_is_said_of_all(N, monkeypatch):
-    monkeypatch.setattr(kinematics, "AT_ONCE", 10)
+    monkeypatch.setattr(kinematics, "POSES_AT_ONCE", 10)
     q, asked = np.random.default_rng(N).normal(size=(N, 3)), []
     found = kinematics.along(lambda some: asked.append(len(some)) or kinematics.tip(PSM, some), q)
     assert found.tolist() == kinematics.tip(PSM, q).tolist()

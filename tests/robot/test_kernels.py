@@ -81,7 +81,7 @@ def test_one_sample_is_no_exception(compiled):
 
 @SIZES
 def test_one_sample_s_mass_matrix_and_bias_come_out_of_compiled_code(n):
-    arm, rest = rigid_body.moving(CHAIN, BODIES, n), np.zeros(n)
+    arm, rest = rigid_body.moving_tree(CHAIN, BODIES, n), np.zeros(n)
     mass_and_bias = kernels.mass_and_bias
 
     @njit
@@ -98,7 +98,7 @@ def test_one_sample_s_mass_matrix_and_bias_come_out_of_compiled_code(n):
 
 @pytest.mark.parametrize(("n", "least"), [(3, 1.0), (6, 0.1)])
 def test_an_arm_that_falls_freely_keeps_its_energy(n, least):
-    arm, M, bias, rest = rigid_body.moving(CHAIN, BODIES, n), np.empty((n, n)), np.empty(n), np.zeros(n)
+    arm, M, bias, rest = rigid_body.moving_tree(CHAIN, BODIES, n), np.empty((n, n)), np.empty(n), np.zeros(n)
 
     def rates(_, x):
         kernels.mass_and_bias(arm, GRAVITY, x[:n].copy(), x[n:].copy(), rest, M, bias)
@@ -119,7 +119,7 @@ from davinci_forces.maths.mechanics import kernels, rigid_body
 from davinci_forces.robots.davinci_chain import BODIES, CHAIN
 rigid_body.COMPILE_FROM = 1
 q, dq, ddq = np.random.default_rng(0).uniform(-3, 3, (3, 1001, 6))
-M, bias, J, arm = np.empty((6, 6)), np.empty(6), np.empty((3, 6)), rigid_body.moving(CHAIN, BODIES, 6)
+M, bias, J, arm = np.empty((6, 6)), np.empty(6), np.empty((3, 6)), rigid_body.moving_tree(CHAIN, BODIES, 6)
 kernels.mass_and_bias(arm, 9.81, q[0], dq[0], ddq[0], M, bias)
 kernels.place_and_jacobian(arm, 8, (0.1, 0.2, 0.3), q[0], J)
 results = (
@@ -144,9 +144,9 @@ def test_every_processor_computes_the_same_bytes(tmp_path):
 
 def test_links_that_nothing_moves_become_part_of_those_that_carry_them():
     for n, links in ((3, 5), (6, 8), (7, 9)):
-        assert len(rigid_body.moving(CHAIN, BODIES, n).parent) == links
-    total = rigid_body.moving(CHAIN, BODIES, 3).rows[:, 12].sum()
-    assert total == pytest.approx(BODIES.counted(3).masses.sum())
+        assert len(rigid_body.moving_tree(CHAIN, BODIES, n).parent) == links
+    total = rigid_body.moving_tree(CHAIN, BODIES, 3).rows[:, 12].sum()
+    assert total == pytest.approx(BODIES.with_coordinates(3).masses.sum())
 
 
 def test_a_sample_that_is_not_a_number_spoils_no_other(compiled):

@@ -101,7 +101,7 @@ def branching(seed: int = 7) -> Chain:
 
 # A coordinate may turn one link and slide another: c and b of `branching` share the second one.
 OTHERS = {
-    "dvrk": (dvrk_psm.CHAIN, lagrangian.random_bodies(11)),
+    "dvrk": (dvrk_psm.PSM_CHAIN, lagrangian.random_bodies(11)),
     "placements": (branching(), lagrangian.random_bodies(7)),
 }
 

@@ -7,7 +7,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from davinci_forces.cli import guarded
+from davinci_forces.cli import print_errors
 from davinci_forces.commands import robot
 from davinci_forces.errors import BadRobot
 from davinci_forces.maths.mechanics import kinematics, rigid_body, tip_force
@@ -15,7 +15,7 @@ from davinci_forces.robots.davinci_chain import BODIES, CHAIN
 
 KEYS = ["frames", "tip", "jacobian_v", "jacobian_w", "mass", "coriolis", "gravity", "condition", "warnings", "joints"]
 app = typer.Typer()
-app.command()(guarded(robot.run))
+app.command()(print_errors(robot.run))
 
 
 def asked(*words):
@@ -94,7 +94,7 @@ def test_a_negative_first_value_is_a_value():
         (("--at", "0.1,0.2"), "--at has 2 values; the pose of davinci has 3, 6 or 7"),
         (("--at", "0.1,x,0"), "--at 0.1,x,0: value 2 is 'x', not a number"),
         (("--at", "0.1,nan,0"), "value 2 is nan, and must be finite"),
-        (("--at", "0,0,0", "--dq", "1,2,3,4"), "--dq has 4 values and the pose 3; give as many or fewer"),
+        (("--at", "0,0,0", "--dq", "1,2,3,4"), "--dq has 4 values and the pose 3; give at most 3"),
     ],
 )
 def test_bad_input_is_refused_with_its_place(words, says):
@@ -110,7 +110,7 @@ LINK = '[[link]]\nname = "l"\nmoved_by = "a"\nalpha = 1.5\nmass = 2.0\ncentre = 
 def test_a_robot_without_geometry_shows_its_joints_and_has_no_pose(tmp_path):
     file = tmp_path / "mine.toml"
     file.write_text(MINE)
-    assert "a   revolute, without an end; effort in N m: inertia + gravity, sine" in asked(str(file)).stdout
+    assert "a   revolute, unlimited; effort in N m: inertia + gravity, sine" in asked(str(file)).stdout
     found = document(str(file))["joints"]["a"]
     assert found["limits"] == {"q": [None, None], "dq": [None, None], "ddq": [None, None], "effort": None}
     for words in (("--at", "0.1"), ("--dq", "0.1")):
@@ -119,11 +119,11 @@ def test_a_robot_without_geometry_shows_its_joints_and_has_no_pose(tmp_path):
         assert "robot mine has no chain: its geometry is not known; leave --at and --dq out" in result.output
     result = asked(str(file), "--urdf")
     assert result.exit_code == 1
-    assert "robot mine has no chain: its geometry is not known, and a URDF is made of it" in result.output
+    assert "robot mine has no chain: its geometry is not known, and a URDF needs it" in result.output
 
 
 def test_a_robot_that_does_not_exist_is_refused():
-    with pytest.raises(BadRobot, match="no robot 'nonsuch'; there are davinci, dvrk_psm, or name a file"):
+    with pytest.raises(BadRobot, match="no robot 'nonsuch'; name one of davinci, dvrk_psm, or a file"):
         robot.run("nonsuch", None, None, False)
 
 

@@ -141,5 +141,5 @@ def test_another_tool_moves_the_tip_along_its_axis_and_nothing_else(length: floa
 
 
 def test_a_robot_whose_tool_is_not_known_takes_no_other():
-    with pytest.raises(BadRobot, match="robot davinci does not say which part of its chain is the tool"):
+    with pytest.raises(BadRobot, match="robot davinci has no known tool in its chain"):
         ARMS["davinci"].with_tool(0.4)

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 from davinci_forces import robots
 from davinci_forces.errors import BadRobot
 from davinci_forces.maths.mechanics import kinematics, rigid_body
-from davinci_forces.robots.dvrk_psm import CHAIN
+from davinci_forces.robots.dvrk_psm import PSM_CHAIN
 
 TWO = """
 name = "two"
@@ -82,7 +82,7 @@ def written(convention: str, chain) -> str:
 @pytest.mark.parametrize("name", robots.ROBOTS)
 def test_the_tables_of_the_shipped_robots_written_as_toml_give_their_chains(name, tmp_path):
     chain = robots.load(name, Path()).chain
-    convention = "modified" if chain is CHAIN else "classic"
+    convention = "modified" if chain is PSM_CHAIN else "classic"
     arm = load(tmp_path, written(convention, chain))
     q = np.random.default_rng(1).uniform(-1, 1, (20, chain.n))
     assert_allclose(kinematics.frames(arm.chain, q), kinematics.frames(chain, q), rtol=0, atol=0)
@@ -94,19 +94,19 @@ def test_the_tables_of_the_shipped_robots_written_as_toml_give_their_chains(name
     ("old", "new", "says"),
     [
         ('moved_by = "elbow"', 'moved_by = "elbo"', "arm.toml:22: link 2: moved_by must be one of shoulder, elbow"),
-        ('moved_by = "elbow"', "", "no [[link]] is moved_by 'elbow'; a chain has a link for every joint, so add it"),
-        ('moved_by = "elbow"', "", "link 2: nothing moves it, so it weighs with what carries it: give that its mass"),
+        ('moved_by = "elbow"', "", "no [[link]] has moved_by 'elbow'; a chain needs a link for every joint: add it"),
+        ('moved_by = "elbow"', "", "link 2: a link without moved_by has no mass; add it to the link"),
         ("mass = 1.0", "mass = -1.0", "link 2: mass must be finite and at least 0, not -1.0"),
         ("mass = 1.0", "", "link 2: mass is missing; it is a number of kg"),
-        ("0.0, 0.01]", "0.0, -0.01]", "link 2: no body has the inertia [0.0, 0.0, 0.0, 0.0, 0.0, -0.01]"),
+        ("0.0, 0.01]", "0.0, -0.01]", "link 2: inertia [0.0, 0.0, 0.0, 0.0, 0.0, -0.01] has a negative"),
         ("a = 0.5", 'on = "hand"', "link 2: on must be one of base, 0, upper, not 'hand'"),
         ("a = 0.5", "sign = 2", "link 2: sign must be 1 or -1, not 2"),
         ("a = 0.5", "b = 0.5", "link 2: unknown key 'b'"),
         ('name = "hand"', 'name = "upper"', "two links are named 'upper'"),
-        ('name = "hand"', 'name = "base"', "link 3: name 'base' is the base's; choose another"),
+        ('name = "hand"', 'name = "base"', "link 3: name 'base' is reserved for the base; choose another"),
         ('name = "two"', 'tip = "toe"', "tip must be one of upper, fore, hand, not 'toe'"),
         ('name = "two"', 'convention = "DH"', "convention must be one of modified, classic, not 'DH'"),
-        ('name = "two"', 'wrist = ["elbow"]', "wrist names what moves beyond the joints, each once"),
+        ('name = "two"', 'wrist = ["elbow"]', "wrist must name each coordinate beyond the joints once"),
     ],
 )
 def test_what_is_wrong_with_a_chain_is_said_with_its_line(tmp_path, old, new, says):

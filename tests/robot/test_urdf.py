@@ -245,36 +245,36 @@ def test_an_arm_of_forty_joints_is_read():
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ('type="prismatic"', 'type="planar"', "arm.urdf:15: <joint name='b'>: type is 'planar', and must be one of"),
-        ('<mass value="0.3"/>', '<mass value="-0.3"/>', "arm.urdf:3: <link name='sensor'> <mass>: a mass of -0.3 kg"),
+        ('type="prismatic"', 'type="planar"', "arm.urdf:15: <joint name='b'>: type is 'planar', but must be revolute"),
+        ('<mass value="0.3"/>', '<mass value="-0.3"/>', "arm.urdf:3: <link name='sensor'> <mass>: the mass is -0.3 kg"),
         ('<mass value="0.3"/>', "", "<link name='sensor'> <inertial>: its inertial has no mass; write <mass"),
-        ('ixx="0.03"', 'ixx="-0.03"', "arm.urdf:3: <link name='upper'> <inertia>: no body has this inertia, whose"),
+        ('ixx="0.03"', 'ixx="-0.03"', "arm.urdf:3: <link name='upper'> <inertia>: the smallest principal moment"),
         (
             'xyz="1 2 -0.5"',
             'xyz="0 0 0"',
-            "<joint name='Turn 1'> <axis>: xyz is 0 0 0, and an axis must point somewhere",
+            "<joint name='Turn 1'> <axis>: xyz is 0 0 0, but an axis needs a direction",
         ),
         ('xyz="1 2 -0.5"', 'xyz="1 2"', "xyz must be 3 finite numbers with spaces between them, not '1 2'"),
         ('xyz="1 2 -0.5"', 'xyz="1 nan 2"', "xyz must be 3 finite numbers with spaces between them, not '1 nan 2'"),
-        ('lower="-2"', 'lower="2"', "<joint name='Turn 1'> <limit>: lower is 2 and upper 2: a joint that moves"),
-        ('effort="40"', 'effort="-4"', "<joint name='Turn 1'> <limit>: effort is -4, and must be 0 or more"),
+        ('lower="-2"', 'lower="2"', "<joint name='Turn 1'> <limit>: lower is 2 and upper is 2, but lower must"),
+        ('effort="40"', 'effort="-4"', "<joint name='Turn 1'> <limit>: effort is -4, but must be 0 or more"),
         ('<parent link="fore"/>', '<parent link="for"/>', "<joint name='c'> <parent>: there is no <link name='for'>"),
         (
             '<child link="right"/>',
             '<child link="left"/>',
-            "joint 'c' carries link 'left' already; a loop has to be cut",
+            "link 'left' already has the parent joint 'c'; cut the loop",
         ),
         ('joint="c"', 'joint="z"', "<joint name='d'> <mimic>: there is no joint 'z'; correct the name"),
         ('joint="c"', 'joint="d"', "<joint name='d'> <mimic>: d mimics d: one of them must move by itself"),
-        ('joint="c"', 'joint="a"', "<joint name='d'> <mimic>: joint 'a' is fixed; name one that moves"),
-        ('multiplier="-1"', 'multiplier="0.5"', "multiplier is 0.5, and links that share a coordinate go by 1 or -1"),
-        ('name="Turn 1"', 'name="B"', "are both called 'b' in lower case, as files are named; rename one of them"),
+        ('joint="c"', 'joint="a"', "<joint name='d'> <mimic>: joint 'a' is fixed; name a joint that moves"),
+        ('multiplier="-1"', 'multiplier="0.5"', "multiplier is 0.5, but must be 1 or -1, as links"),
+        ('name="Turn 1"', 'name="B"', "are both 'b' in lower case, which files are named by; rename one of them"),
         ('name="Turn 1"', 'name="con"', "<joint name='con'>: 'con' is reserved on Windows"),
-        ('name="Turn 1"', 'name="a&quot;b"', "its name is 'a\"b', and must be letters, digits, spaces"),
-        ('<link name="base"/>', '<link name="base"/><link name="left"/>', "another of this name; rename one of them"),
-        ('<link name="base"/>', '<link name="base"/><link name="x"/>', "links 'base', 'x' are carried by nothing"),
-        ('<link name="base"/>', '<link name="base"/><xacro:macro name="x"/>', "a macro; run xacro first"),
-        ('<robot name="gripper">', '<sdf name="gripper">', "a URDF is one <robot name=...>"),
+        ('name="Turn 1"', 'name="a&quot;b"', "its name is 'a\"b', but may have only letters, digits, spaces"),
+        ('<link name="base"/>', '<link name="base"/><link name="left"/>', "has the same name; rename one of them"),
+        ('<link name="base"/>', '<link name="base"/><link name="x"/>', "links 'base', 'x' have no parent"),
+        ('<link name="base"/>', '<link name="base"/><xacro:macro name="x"/>', "a xacro macro; run xacro first"),
+        ('<robot name="gripper">', '<sdf name="gripper">', "a URDF must consist of one <robot name=...>"),
     ],
 )
 def test_what_is_wrong_with_a_file_is_said_with_its_element_its_line_and_a_remedy(old, new, says):
@@ -302,7 +302,7 @@ def test_every_problem_of_a_file_is_in_one_message(tmp_path):
     [
         (
             '<!DOCTYPE r [<!ENTITY a "aaaa"><!ENTITY b "&a;&a;">]><robot name="&b;"/>',
-            "arm.urdf:1: a robot's description",
+            "arm.urdf:1: a URDF",
         ),
         ('<!DOCTYPE r SYSTEM "file:///etc/passwd"><robot/>', "needs no document type; delete <!DOCTYPE ...>"),
         ("<robot>\n<link></robot>", "arm.urdf:2: not XML: mismatched tag"),
@@ -310,7 +310,7 @@ def test_every_problem_of_a_file_is_in_one_message(tmp_path):
         ("", "not XML: no element found"),
         ('<?xml version="1.0" encoding="klingon"?><robot/>', "not XML: "),
         ("<robot/>", "it has no <link>"),
-        ('<robot><link name="a"/></robot>', "no joint moves; one must be revolute, continuous, prismatic"),
+        ('<robot><link name="a"/></robot>', "no joint moves; at least one must be revolute or continuous or prismatic"),
     ],
 )
 def test_what_is_no_description_of_a_robot_is_refused(tmp_path, text, says):
@@ -321,8 +321,8 @@ def test_what_is_no_description_of_a_robot_is_refused(tmp_path, text, says):
 
 
 def test_a_file_of_many_megabytes_is_refused_unread(tmp_path):
-    (tmp_path / "arm.urdf").write_text(" " * (tables.LARGEST + 1))
-    with pytest.raises(BadRobot, match=r"arm\.urdf: it has 4\.0 MB, and a robot's description has at most 4"):
+    (tmp_path / "arm.urdf").write_text(" " * (tables.MAX_BYTES + 1))
+    with pytest.raises(BadRobot, match=r"arm\.urdf: it has 4\.0 MB, more than the 4 MB that are read"):
         robots.load("arm.urdf", tmp_path)
 
 
@@ -332,7 +332,7 @@ def test_a_file_that_is_not_there_is_said(tmp_path):
 
 
 def test_a_description_as_deep_as_it_is_long_is_refused():
-    with pytest.raises(BadRobot, match=r"arm\.urdf:1: it has more than 30 elements inside each other"):
+    with pytest.raises(BadRobot, match=r"arm\.urdf:1: it has more than 30 nested elements"):
         parsed("<robot>" + "<link>" * 50_000 + "</link>" * 50_000 + "</robot>")
 
 
@@ -360,4 +360,4 @@ def test_of_an_arm_of_more_than_three_joints_no_force_at_the_tip_is_made_up():
     arm = replace(DAVINCI, joints=robot(writing.text(DAVINCI)).joints)
     touched = LogEntry(name="touch", files=("a.csv",), role="contact", channels=())
     [said] = resolve.apply([], [], [], touched, arm)
-    assert "touch: no force at the tip: davinci has 7 joints, and a force at the tip is told by 3" in said.text[0]
+    assert "touch: no force at the tip: davinci has 7 joints, and it is computed only for arms of 3" in said.text[0]

@@ -12,10 +12,10 @@ from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.simulation.actuators import Regulator
 from davinci_forces.maths.simulation.closed_loop import JointConstraints, Timing, arm, simulate
 from davinci_forces.maths.simulation.surroundings import UP, Path, Surroundings
-from davinci_forces.simulation.motion import SimulatedRun, simulated, theta
+from davinci_forces.simulation.motion import SimulatedRun, simulate_log, theta
 from davinci_forces.simulation.scenario.reading import load
 from davinci_forces.simulation.scenario.scenario import BadScenario, Scenario, SimulatedLog
-from davinci_forces.simulation.study_folder import touched
+from davinci_forces.simulation.study_folder import contact_times
 
 G = 9.81
 SLIDE = "instrument_slide"
@@ -31,7 +31,7 @@ def log(name: str, **changes) -> SimulatedLog:
 
 
 def run(entry: SimulatedLog) -> SimulatedRun:
-    return simulated(scenario(), entry)
+    return simulate_log(scenario(), entry)
 
 
 def identified(entry: SimulatedLog, joint: str) -> tuple[np.ndarray, np.ndarray]:
@@ -84,7 +84,7 @@ def test_slow_contact_with_tissue_is_a_spring_from_the_surface_on():
     motion = found.motions[SLIDE]
     depth = motion.q - entry.tissue.surface
     speed = 0.02 / 4.0
-    assert touched(found)[0][0] == pytest.approx(2.0, abs=0.05)  # the loop follows 1 / 30 s late
+    assert contact_times(found)[0][0] == pytest.approx(2.0, abs=0.05)  # the loop follows 1 / 30 s late
     pressed = depth > 1e-4
     expected = 457.24 * depth + 5.0 * speed
     # the middle of a tick is where the force is taken; friction's grip makes the speed jump about a little
@@ -128,8 +128,8 @@ def test_gains_that_the_ticks_are_too_slow_for_are_refused():
     limits = what.motors._replace(current_limit=np.full(3, 1e300), voltage_limit=np.full(3, 1e300))
     nowhere = {name: replace(joint, stops=(-np.inf, np.inf)) for name, joint in scenario().joints.items()}
     unstable = replace(scenario(), arm=replace(what, control=wild, motors=limits), joints=nowhere)
-    with pytest.raises(BadScenario, match="log matched-roll-contact: the loop is unstable"):
-        simulated(unstable, log("matched-roll-contact", duration=5.0, lead=0.0, external={}))
+    with pytest.raises(BadScenario, match="log matched-roll-contact: the control loop is unstable"):
+        simulate_log(unstable, log("matched-roll-contact", duration=5.0, lead=0.0, external={}))
 
 
 def test_slow_motion_shows_friction_with_hysteresis_and_asymmetry():

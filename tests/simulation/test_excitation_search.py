@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from davinci_forces.maths.excitation.fourier import Fourier, motion, ranges
-from davinci_forces.maths.excitation.joint import delayed, extremes, fitted, from_standstill
+from davinci_forces.maths.excitation.joint import delay, extremes, from_standstill, scale_to_limits
 from davinci_forces.maths.excitation.search import descend, lowest
 
 LIMITS = ((-0.3, 0.5), (-1.0, 0.2), (-np.inf, 2.0))
@@ -45,7 +45,7 @@ def test_where_nothing_is_worth_anything_the_search_ends_without_a_warning():
 
 @given(numbers, st.floats(0.5, 20))
 def test_any_numbers_are_a_trajectory_within_the_limits(z, period):
-    x = fitted(np.array([z]), LIMITS, period)[0]
+    x = scale_to_limits(np.array([z]), LIMITS, period)[0]
     for (low, high), (lowest_, highest) in zip(LIMITS, ranges(Fourier.of(x, period)), strict=True):
         room = 1e-6 * max(abs(low) if np.isfinite(low) else 0.0, abs(high))
         assert low - room <= lowest_
@@ -57,7 +57,7 @@ def test_harmonics_of_size_one_touch_a_limit_and_the_mean_goes_through_the_slack
     c = np.array([[0.3, -0.2, 0.5, 0.1]])
     lowest_, highest = extremes(c, 7.0)
     size = max((highest[0] - lowest_[0]) / 0.8, lowest_[1] / -1.0, highest[1] / 0.2, highest[2] / 2.0)
-    x = fitted(np.column_stack([[mean], c / size]), LIMITS, 7.0)[0]
+    x = scale_to_limits(np.column_stack([[mean], c / size]), LIMITS, 7.0)[0]
     q, dq, ddq = ranges(Fourier.of(x, 7.0))
     used = max((q[1] - q[0]) / 0.8, dq[0] / -1.0, dq[1] / 0.2, ddq[1] / 2.0)
     assert used == pytest.approx(1, abs=2e-7)
@@ -79,7 +79,7 @@ def test_harmonics_stand_still_when_time_starts_but_for_the_phase_that_is_left()
     known, phase = from_standstill(z, 300)
     assert np.abs(known[:, 1::2].sum(axis=1)).max() < 1e-12
     assert phase == pytest.approx(np.pi / 300 * z[:, 5] ** 3)
-    for before, after, late in zip(known, delayed(known, phase), phase, strict=True):
+    for before, after, late in zip(known, delay(known, phase), phase, strict=True):
         t = np.linspace(0, 8, 50)
         moved = motion(Fourier.of(after, 8.0), t)
         for values, same in zip(moved, motion(Fourier.of(before, 8.0), t - late * 8 / (2 * np.pi)), strict=True):

@@ -31,7 +31,7 @@ def test_json_of_given_coefficients_has_objective_coefficients_ranges_and_condit
 
 
 def test_a_given_trajectory_that_breaks_a_limit_is_shown_to():
-    assert "LIMIT BROKEN: q goes from -0.6003 to 0.6008 rad, its limits are -0.6 and 0.6" in call(
+    assert "LIMIT EXCEEDED: q goes from -0.6003 to 0.6008 rad, its limits are -0.6 and 0.6" in call(
         "davinci", "hand_pitch", "--evaluate", PITCH
     )
 
@@ -159,7 +159,7 @@ def test_a_plot_is_the_same_bytes_twice(tmp_path, suffix):
         (["davinci", "all", "--evaluate", PITCH], "name it instead of `all`"),
         (["davinci", "hand_pitch", "--period", "-1"], "--period must be positive"),
         (["davinci", "hand_pitch", "--criterion", "volume"], "--criterion is one of determinant, condition"),
-        (["davinci", "hand_pitch", "--evaluate", PITCH, "--plot", "a.txt"], "a plot ends in"),
+        (["davinci", "hand_pitch", "--evaluate", PITCH, "--plot", "a.txt"], "the name of a plot must end in"),
         (["davinci", "hand_pitch", "--evaluate", PITCH, "--rate", "nan", "--csv", "a.csv"], "--rate must be positive"),
         (["davinci", "hand_pitch", "--evaluate", PITCH, "--csv", "no/a.csv"], "a.csv: No such file or directory"),
         (["davinci", "hand_pitch", "--evaluate", PITCH, "--plot", "no/a.svg"], "a.svg: No such file or directory"),

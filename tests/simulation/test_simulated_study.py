@@ -19,7 +19,7 @@ from davinci_forces.records import Average, Fit, Signal, Trajectory
 from davinci_forces.simulation import study_folder
 from davinci_forces.simulation.scenario.reading import load
 from davinci_forces.simulation.scenario.scenario import SensorNoise
-from davinci_forces.simulation.sensors import drift, generator, stepped
+from davinci_forces.simulation.sensors import drift, generator, quantise
 from davinci_forces.stages.model import fit
 from davinci_forces.stages.recordings import average, differentiate
 from davinci_forces.study import Study, reading
@@ -218,8 +218,8 @@ def test_a_simulation_that_fails_leaves_nothing_behind(tmp_path, monkeypatch):
 
 
 def test_a_converter_gives_whole_steps():
-    assert stepped(np.array([0.26, -0.24, 0.0]), 0.5) == pytest.approx([0.5, -0.0, 0.0])
-    assert stepped(np.array([0.26]), 0.0) == pytest.approx([0.26])
+    assert quantise(np.array([0.26, -0.24, 0.0]), 0.5) == pytest.approx([0.5, -0.0, 0.0])
+    assert quantise(np.array([0.26]), 0.0) == pytest.approx([0.26])
 
 
 def test_drift_has_its_deviation_and_its_correlation():

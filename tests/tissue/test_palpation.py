@@ -8,7 +8,7 @@ import pytest
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.maths.tissue.indentation import (
     NONE,
-    found,
+    find_contact,
     hinge,
     median_std,
     onset_std,
@@ -164,7 +164,7 @@ def test_models_are_judged_by_pushes_that_they_were_not_fitted_to():
 def test_noise_is_no_contact():
     """Of a hundred pushes of ten samples each that meet nothing; a hinge bends with some of the noise."""
     rng, depth = np.random.default_rng(0), np.linspace(0, 2e-3, 10)
-    states = [found(depth, rng.normal(size=10), np.ones(10, bool)).state for _ in range(100)]
+    states = [find_contact(depth, rng.normal(size=10), np.ones(10, bool)).state for _ in range(100)]
     assert states.count(NONE) >= 80
 
 

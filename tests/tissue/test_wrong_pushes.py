@@ -38,7 +38,7 @@ def test_a_depth_in_mm_that_is_taken_for_m_is_said():
     tissue, [said] = of(depth_scale=1e3)
     assert tissue.stiffness == pytest.approx(0.457, rel=0.02)
     assert "pushes are 11.9 m deep and meet 0.457 N/m: no tissue does so" in said
-    assert 'say unit = "mm"' in said
+    assert 'write unit = "mm"' in said
 
 
 def test_a_depth_in_m_that_is_taken_for_mm_is_said():

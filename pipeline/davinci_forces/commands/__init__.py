@@ -1,4 +1,4 @@
-"""What else the command line does: one module per command, exporting `run`, and its name in the list below."""
+"""Commands besides the stages: each module exports `run`, and its docstring is the help; `COMMANDS` lists them."""
 
 COMMANDS = (
     "new", "inspect", "verify", "simulate", "robot", "excite", "stability", "haptics", "compare", "campaign",

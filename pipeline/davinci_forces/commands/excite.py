@@ -1,4 +1,4 @@
-"""Design the trajectory that tells most about a joint, or judge one that is given."""
+"""Design an excitation trajectory that identifies a joint's parameters best, or evaluate a given one."""
 
 import json
 from pathlib import Path
@@ -15,31 +15,33 @@ if TYPE_CHECKING:
 
 def run(
     robot: Annotated[str, typer.Argument(help="A listed robot, or the path of a robot's .toml or .urdf file.")],
-    joint: Annotated[str, typer.Argument(help="A joint of it, or `all`, which then move together.")],
-    evaluate: Annotated[str | None, typer.Option(help="Judge these coefficients: a0,a1,b1,a2,b2,...")] = None,
-    period: Annotated[float | None, typer.Option(help="Period [s]; else 10, or 5 where all joints slide.")] = None,
-    harmonics: Annotated[int | None, typer.Option(min=1, help="Harmonics of the series; else the joint's.")] = None,
+    joint: Annotated[str, typer.Argument(help="A joint of the robot, or `all` to move all joints together.")],
+    evaluate: Annotated[str | None, typer.Option(help="Evaluate these coefficients: a0,a1,b1,a2,b2,...")] = None,
+    period: Annotated[
+        float | None, typer.Option(help="Period [s]; default 10, or 5 if all joints are prismatic.")
+    ] = None,
+    harmonics: Annotated[int | None, typer.Option(min=1, help="Number of harmonics; default: the joint's.")] = None,
     criterion: Annotated[
-        str, typer.Option(help="determinant: -log10 det(F'F); condition: log10 cond(F).")
+        str, typer.Option(help="What to minimise: `determinant`, -log10 det(F'F), or `condition`, log10 cond(F).")
     ] = "determinant",
-    q: Annotated[str | None, typer.Option(help="Limits of position, lower,upper, instead of the joint's.")] = None,
-    dq: Annotated[str | None, typer.Option(help="Limits of velocity.")] = None,
-    ddq: Annotated[str | None, typer.Option(help="Limits of acceleration.")] = None,
-    starts: Annotated[int, typer.Option(min=1, help="Starts of the search; half as many for an arm.")] = 24,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the starts.")] = 0,
-    samples: Annotated[int, typer.Option(min=2, help="K, the instants of a period that the criterion looks at.")] = 300,
-    rate: Annotated[float, typer.Option(help="Rate of the controller's table [Hz].")] = 100.0,
-    csv: Annotated[Path | None, typer.Option(help="Write its table for the controller: t, q, dq, ddq.")] = None,
+    q: Annotated[str | None, typer.Option(help="Position limits, lower,upper, instead of the joint's.")] = None,
+    dq: Annotated[str | None, typer.Option(help="Velocity limits, likewise.")] = None,
+    ddq: Annotated[str | None, typer.Option(help="Acceleration limits, likewise.")] = None,
+    starts: Annotated[int, typer.Option(min=1, help="Random starts of the search; half as many for `all`.")] = 24,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random starts.")] = 0,
+    samples: Annotated[int, typer.Option(min=2, help="Samples K per period at which the criterion is computed.")] = 300,
+    rate: Annotated[float, typer.Option(help="Sampling rate of the table [Hz].")] = 100.0,
+    csv: Annotated[Path | None, typer.Option(help="Write a table for the controller: t, q, dq, ddq.")] = None,
     run_in: Annotated[
-        bool, typer.Option(help="Begin the table at rest, before t = 0; else it is the period alone.")
+        bool, typer.Option(help="Let the table begin at rest, before t = 0, instead of with the period.")
     ] = True,
     plot: Annotated[Path | None, typer.Option(help="Draw the trajectory: .svg, .png or .pdf.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Minimise -log10 det(F'F) over a Fourier series whose limits hold at every instant.
+    """Minimise the criterion over Fourier series that keep the limits at every instant.
 
-    The best, the median and the worst of the starts tell whether the search is to be trusted: where they differ, more
-    starts may find more. All joints of an arm take minutes; each start is told of when it is done.
+    Where the best, the median and the worst start differ, more starts may find a better trajectory. All joints of an
+    arm take minutes; a line is printed after each start.
     """
     from davinci_forces.errors import BadRequest
     from davinci_forces.simulation.excitation import trajectory
@@ -72,8 +74,8 @@ def _document(robot: str, answered: "Answer") -> dict[str, Any]:
 def _totals(arm: "ArmExcitation") -> dict[str, Any]:
     from davinci_forces.simulation.excitation.trajectory import spread
 
-    own = {"objective": arm.objective, "condition": arm.condition, "base_parameters": arm.base_parameters}
-    return {**own, "starts": spread(arm.optima)}
+    numbers = {"objective": arm.objective, "condition": arm.condition, "base_parameters": arm.base_parameters}
+    return {**numbers, "starts": spread(arm.optima)}
 
 
 def _format_text(answered: "Answer") -> str:
@@ -96,11 +98,11 @@ def _lines(e: "ExcitationTrajectory") -> list[str]:
     for symbol, (low, high) in facts["ranges"].items():
         lower, upper = facts["limits"][symbol]
         lines += [f"  {symbol:3} from {low:.5f} to {high:.5f}, limits {lower:g} and {upper:g}"]
-    return lines + [f"  LIMIT BROKEN: {text}" for text in e.broken]
+    return lines + [f"  LIMIT EXCEEDED: {text}" for text in e.broken]
 
 
 def _spread(starts: dict[str, float | None]) -> str:
-    """How far the starts agree: a search that has found the best there is finds it more than once."""
+    """How well the starts agree: a search that reached the optimum reaches it from several starts."""
     optima = (
         f"{name} {starts[name]:.4f}" if starts[name] is not None else f"{name} none"
         for name in ("best", "median", "worst")

@@ -1,4 +1,4 @@
-"""Simulate a hand that feels tissue through the arm: what it feels, and how far it is from unstable."""
+"""Simulate haptic feedback from tissue through the arm: the forces that a hand feels, and its stability margins."""
 
 import json
 from pathlib import Path
@@ -16,35 +16,34 @@ Answer = dict[str, object]
 
 def run(
     scenario: Annotated[
-        Path | None, typer.Argument(help="The .toml file of a scenario; without one, the experiment of section 8.4.")
+        Path | None, typer.Argument(help="A scenario (.toml); without one, the experiment of thesis section 8.4.")
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
     csv: Annotated[
-        Path | None, typer.Option(help="A folder in which to write what each hand felt over time, <hand>.csv.")
+        Path | None, typer.Option(help="Folder for the motion and force of each hand over time, <hand>.csv.")
     ] = None,
     template: Annotated[
-        Path | None, typer.Option(help="Write the file of section 8.4 there, to be changed, and do nothing else.")
+        Path | None, typer.Option(help="Only write the scenario of thesis section 8.4 to this file, to be edited.")
     ] = None,
 ) -> None:
-    """The whole loop, simulated: hand, device, link, arm with its controller, friction and filter, and tissue."""
+    """Simulate the whole loop: hand, device, link, arm with its controller, friction and filter, and tissue."""
     if template is not None:
         _write_template(template)
         return
     from davinci_forces.haptics import loop as haptic
     from davinci_forces.haptics import scenario as haptics
 
-    whole = haptic.filled(haptics.read(scenario) if scenario else haptics.HapticScenario())
-    answer = _answer(whole, csv)
+    answer = _answer(haptic.filled(haptics.read(scenario) if scenario else haptics.HapticScenario()), csv)
     echo(json.dumps(answer, indent=2, allow_nan=False) if as_json else _format_text(answer))
 
 
 def _write_template(file: Path) -> None:
-    """The shipped scenario, as a file of the user's own.
+    """Write the shipped scenario to a new file.
 
     Raises
     ------
     BadRequest
-        If there is a file already.
+        If the file exists.
     """
     from importlib.resources import files
 
@@ -52,13 +51,13 @@ def _write_template(file: Path) -> None:
     from davinci_forces.files import write_bytes
 
     if file.exists():
-        raise BadRequest(f"{file} is there already; name another file, or move it away")
+        raise BadRequest(f"{file} exists already; name another file, or move it away")
     write_bytes(file, files("davinci_forces.haptics").joinpath("haptics.toml").read_bytes())
     echo(f"{file}: written; change its numbers, then run `davinci-forces haptics {file}`")
 
 
 def _answer(scenario: "HapticScenario", csv: Path | None) -> Answer:
-    """Everything that is said of a scenario; None is no limit."""
+    """Results of a scenario as JSON values; None stands for no limit."""
     from davinci_forces.haptics import loop as haptic
 
     response = haptic.response(scenario)
@@ -83,7 +82,7 @@ def _known(value: float) -> float | None:
 
 
 def _write_csv(file: Path, run: object) -> None:
-    """What one hand felt, a row a turn of the controller."""
+    """Write the motion and force of one hand, one row per step of the controller."""
     from davinci_forces.files import write_bytes
 
     fields = {"t [s]": "t", "plan [m]": "plan", "hand [m]": "x", "arm [m]": "q", "true [N]": "true", "felt [N]": "felt"}
@@ -93,9 +92,9 @@ def _write_csv(file: Path, run: object) -> None:
 
 
 def _format_text(answer: Answer) -> str:
-    """A paragraph a hand, for people."""
+    """The results as text, one paragraph per hand."""
     lines = [f"{answer['title']}, simulated, against tissue of {answer['tissue_stiffness']:.4g} N/m.", ""]
-    lines += ["The stiffness that is felt over the true one, and how late it is:"]
+    lines += ["Frequency, felt stiffness in % of the true one, and delay of the felt force:"]
     lines += [f"  {row['frequency']:5.2f} Hz {100 * row['share']:5.0f} %  {1e3 * row['late']:5.0f} ms"
               for row in answer["response"]]  # type: ignore[attr-defined]  # fmt: skip
     for name, hand in answer["hands"].items():  # type: ignore[attr-defined]
@@ -104,16 +103,16 @@ def _format_text(answer: Answer) -> str:
             f"Hand {name!r} of m = {hand['m']:g} kg, b_H = {hand['b_h']:g} N s/m and K_H = {hand['k_h']:g} N/m:",
         ]
         if hand["out_of_reach"] is not None:
-            lines += [f"  unstable: it is thrown out of the device's reach after {hand['out_of_reach']:.1f} s"]
+            lines += [f"  unstable: the hand is thrown out of the device's reach after {hand['out_of_reach']:.1f} s"]
         lines += [
-            f"  felt force at most {hand['felt_peak']:.3g} N where the true one is at most {hand['true_peak']:.3g} N, "
-            f"off by {hand['felt_error']:.2g} N (rms)",
-            f"  settles against tissue up to {_of(hand['k_t_settles'], 'N/m')}, by simulation; up to "
-            f"{_of(hand['k_t_response'], 'N/m')} by the response",
-            f"  bears {_of(hand['delay_margin'], 's')} more of delay",
+            f"  peak force: felt {hand['felt_peak']:.3g} N, true {hand['true_peak']:.3g} N; error of the felt force "
+            f"{hand['felt_error']:.2g} N (rms)",
+            f"  stable against tissue up to {_quantity(hand['k_t_settles'], 'N/m')} in simulation, up to "
+            f"{_quantity(hand['k_t_response'], 'N/m')} by the frequency response",
+            f"  delay margin: {_quantity(hand['delay_margin'], 's')}",
         ]
     return "\n".join(lines)
 
 
-def _of(value: float | None, unit: str) -> str:
+def _quantity(value: float | None, unit: str) -> str:
     return f"any [{unit}]" if value is None else f"{value:.3g} {unit}"

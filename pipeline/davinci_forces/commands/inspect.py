@@ -1,4 +1,4 @@
-"""Show what a log holds: channels, units, samples, clock, what is odd about it, and its first rows."""
+"""Show what a log holds: channels, units, samples, clock, warnings and first rows."""
 
 import json
 from collections.abc import Iterator
@@ -17,21 +17,23 @@ if TYPE_CHECKING:
     from davinci_forces.maths.signals.columns import Outline
 
 BARS = "▁▂▃▄▅▆▇█"
-MAX_SHARE = 0.1  # share of repeated rows, and of jitter in the sampling time, above which they are flagged
+MAX_REPEATED_OR_JITTER = 0.1  # share of rows, and of the sampling time, above which a warning is given
 
 
 def run(
     file: Annotated[Path, typer.Argument(help="A log, of any format that the README lists.")],
-    head: Annotated[int, typer.Option(min=0, help="Rows to show.")] = 5,
-    as_json: Annotated[bool, typer.Option("--json", help="Print it for a program to read.")] = False,
-    dtype: Annotated[str | None, typer.Option(help="Of raw binary numbers: float64, '<int16' ...")] = None,
-    columns: Annotated[str | None, typer.Option(help="Of a row of them: their number, or names, as in t,q,i.")] = None,
+    head: Annotated[int, typer.Option(min=0, help="Number of rows to show.")] = 5,
+    as_json: Annotated[bool, typer.Option("--json", help="Print the description as JSON.")] = False,
+    dtype: Annotated[str | None, typer.Option(help="Type of raw binary numbers: float64, '<int16' ...")] = None,
+    columns: Annotated[
+        str | None, typer.Option(help="Columns of raw binary numbers: how many, or names, as in t,q,i.")
+    ] = None,
 ) -> None:
-    """Show what a log holds: channels, units, samples, clock, warnings, first rows."""
+    """Print the description of a log, as text or JSON."""
     from davinci_forces.logs.log import Options
 
-    of = int(columns) if columns and columns.isdecimal() else tuple(columns.split(",")) if columns else None
-    description = describe(file, head, Options(dtype=dtype, columns=of))
+    layout = int(columns) if columns and columns.isdecimal() else tuple(columns.split(",")) if columns else None
+    description = describe(file, head, Options(dtype=dtype, columns=layout))
     if as_json:
         echo(json.dumps(description, indent=1, ensure_ascii=False, allow_nan=False))
     else:
@@ -42,7 +44,7 @@ def run(
 
 @dataclass
 class _Survey:
-    """What one pass over the channels of one clock found."""
+    """Statistics of the channels of one clock, from one pass over them."""
 
     statistics: "ClockStatistics"
     outlines: dict[str, "Outline"]
@@ -51,7 +53,7 @@ class _Survey:
 
 
 def describe(file: Path, head: int, options: "Options | None" = None) -> dict[str, Any]:
-    """Read a whole log, one clock after the other; what it holds, in plain values of which none is NaN.
+    """Read a whole log, clock by clock, and describe it as JSON values, without NaN.
 
     Raises
     ------
@@ -65,21 +67,22 @@ def describe(file: Path, head: int, options: "Options | None" = None) -> dict[st
     log = open_log(file, options or Options())
     names = [channel.name for channel in log.channels if channel.kind in ("number", "time")]
     source, warnings = named_time(log), list[str]()
-    found: dict[str, _Survey] = {}
+    surveys: dict[str, _Survey] = {}
     nulls, nans = dict[str, int](), dict[str, int]()
-    for own, together in sorted(log.by_clock(names).items(), key=lambda each: each[0] != "") or [("", names)]:
-        found[own] = _survey(log, own or source, together, head)
+    for clock, channels in sorted(log.by_clock(names).items(), key=lambda item: item[0] != "") or [("", names)]:
+        surveys[clock] = _survey(log, clock or source, channels, head)
         warnings += [warning for warning in log.warnings if warning not in warnings]
         nulls, nans = nulls | log.nulls, nans | log.nans
     log.nulls, log.nans = nulls, nans
-    first_clock = next(iter(found))  # the log's own, or the first where every channel has another
-    source, main = first_clock or source, found.pop(first_clock)
-    outlines = {name: outline for each in (main, *found.values()) for name, outline in each.outlines.items()}
-    first = {name: rows for each in (main, *found.values()) for name, rows in each.first.items()}
+    outlines = {name: outline for survey in surveys.values() for name, outline in survey.outlines.items()}
+    first = {name: rows for survey in surveys.values() for name, rows in survey.first.items()}
+    rows = max(survey.rows for survey in surveys.values())
+    first_clock = next(iter(surveys))  # the clock of the log, or the first if every channel has its own
+    source, main = first_clock or source, surveys.pop(first_clock)
     return {
-        "file": str(file), "format": log.format, "rows": max(each.rows for each in (main, *found.values())),
+        "file": str(file), "format": log.format, "rows": rows,
         "started": log.started, "zone": log.zone, "clock": _clock(log, source, main.statistics),
-        "clocks": [_clock(log, own, each.statistics) | {"channels": [*each.first]} for own, each in found.items()],
+        "clocks": [_clock(log, clock, s.statistics) | {"channels": [*s.first]} for clock, s in surveys.items()],
         "channels": [_channel(log, channel, outlines.get(channel.name)) for channel in log.channels],
         "facts": log.facts, "comments": log.comments, "dropped": log.dropped,
         "warnings": [*warnings, *_flags(log, source, main.statistics)],
@@ -87,22 +90,22 @@ def describe(file: Path, head: int, options: "Options | None" = None) -> dict[st
     }  # fmt: skip
 
 
-def _survey(log: "Log", source: str, together: list[str], head: int) -> _Survey:
-    """Read the channels of one clock, whose times `source` holds, if any does."""
+def _survey(log: "Log", source: str, names: list[str], head: int) -> _Survey:
+    """Read the channels of one clock; channel `source`, if any, holds its times."""
     import numpy as np
 
     from davinci_forces.maths.signals.clock import ClockStatistics
     from davinci_forces.maths.signals.columns import Outline
 
     kinds = {channel.name: channel.kind for channel in log.channels if not channel.derived}
-    measured = [name for name in together if kinds.get(name) == "number" and name != source]
-    survey = _Survey(ClockStatistics(), {name: Outline() for name in together}, {name: [] for name in together})
-    for block in log.blocks(together):
+    measured = [name for name in names if kinds.get(name) == "number" and name != source]
+    survey = _Survey(ClockStatistics(), {name: Outline() for name in names}, {name: [] for name in names})
+    for block in log.blocks(names):
         count = len(next(iter(block.values())))
         number = survey.rows + np.arange(count, dtype=float)  # counts samples where the log has no clock
         t = block.get(source, log.clock.start + number * log.clock.step if log.clock else number)
         survey.statistics.update(t, [block[name] for name in measured])
-        for name in together:
+        for name in names:
             survey.outlines[name].update(block[name])
             survey.first[name].extend(block[name][: max(0, head - survey.rows)].tolist())
         survey.rows += count
@@ -114,7 +117,7 @@ def _clock(log: "Log", source: str, clock: "ClockStatistics") -> dict[str, Any]:
         from davinci_forces.study.guessing import clock_hint
 
         hint = clock_hint(log.apart())
-        advice = "none: say rate = ... [Hz] for this log in study.toml" + (f", or {hint}" if hint else "")
+        advice = "none: add rate = ... [Hz] for this log in study.toml" + (f", or {hint}" if hint else "")
         return {"source": advice, "duplicates": clock.duplicates}
     return {
         "source": f"channel {source!r}" if source else "the log's own interval",
@@ -125,41 +128,41 @@ def _clock(log: "Log", source: str, clock: "ClockStatistics") -> dict[str, Any]:
 
 
 def _channel(log: "Log", channel: Any, outline: "Outline | None") -> dict[str, Any]:
-    about = {"name": channel.name, "unit": channel.unit, "kind": channel.kind, "derived": channel.derived}
-    about |= {"alias": channel.alias} if channel.alias else {}
+    labels = {"name": channel.name, "unit": channel.unit, "kind": channel.kind, "derived": channel.derived}
+    labels |= {"alias": channel.alias} if channel.alias else {}
     if outline is None:
-        return about
+        return labels
     values = {name: _plain(getattr(outline, name)) for name in ("samples", "least", "most", "mean")}
     counts = {"nulls": log.nulls.get(channel.name, 0), "nans": log.nans.get(channel.name, 0)}
-    return about | values | counts | {"course": [_plain(value) for value in outline.course.tolist()]}
+    return labels | values | counts | {"course": [_plain(value) for value in outline.course.tolist()]}
 
 
 def _flags(log: "Log", source: str, clock: "ClockStatistics") -> Iterator[str]:
-    """What makes a recording doubtful though every cell of it can be read."""
-    if clock.duplicates > MAX_SHARE * clock.samples:
+    """Warnings about a clock: repeated rows, times that do not increase, jitter and gaps."""
+    if clock.duplicates > MAX_REPEATED_OR_JITTER * clock.samples:
         share = clock.duplicates / clock.samples
-        yield f"{clock.duplicates} of {clock.samples} rows ({share:.0%}) repeat the one before in every channel"
+        yield f"{clock.duplicates} of {clock.samples} rows ({share:.0%}) repeat the previous row in every channel"
     if not source:
         return
     if clock.backward or clock.repeated:
         yield (
-            f"time {source!r} goes back {clock.backward} times and stands still {clock.repeated} times, first in row "
-            f"{clock.bad_row + 1}; name another time channel, or say rate = ... [Hz] for this log in study.toml"
+            f"time {source!r} goes back {clock.backward} times and repeats {clock.repeated} times, first in row "
+            f"{clock.bad_row + 1}; name another time channel, or add rate = ... [Hz] for this log in study.toml"
         )
-    elif clock.jitter * clock.rate > MAX_SHARE:
-        yield f"the clock is jittery: {clock.jitter * 1e3:.3g} ms around {1e3 / clock.rate:.3g} ms"
+    elif clock.jitter * clock.rate > MAX_REPEATED_OR_JITTER:
+        yield f"the clock has {clock.jitter * 1e3:.3g} ms of jitter (std) in intervals of {1e3 / clock.rate:.3g} ms"
     if clock.longest_gap * clock.rate > 2.5:
         gap = clock.longest_gap
-        yield f"the longest time between samples is {gap:.3g} s, {gap * clock.rate:.1f} samples"
+        yield f"the longest gap between samples is {gap:.3g} s, {gap * clock.rate:.1f} sampling intervals"
 
 
 def _plain(value: float) -> float | None:
-    """JSON knows neither NaN nor infinity."""
+    """The value, or None for NaN and infinity, which JSON does not have."""
     return value if abs(value) < float("inf") else None
 
 
 def lines(description: dict[str, Any]) -> Iterator[str]:
-    """The same for people."""
+    """The description as lines of text."""
     started = f", started {description['started']} ({description['zone']} time)" if description["started"] else ""
     yield f"{description['file']}: {description['format']}, {description['rows']} rows{started}"
     yield from (f"  {key}: {value}" for key, value in description["facts"].items())
@@ -168,10 +171,10 @@ def lines(description: dict[str, Any]) -> Iterator[str]:
     if "rate" in clock:
         yield f"  {clock['duration'] or 0:.6g} s at {clock['rate']:.6g} Hz, jitter {clock['jitter'] * 1e3:.3g} ms (std)"
         yield f"  longest gap {clock['longest_gap']:.3g} s; {clock['backward']} steps back, {clock['repeated']} of zero"
-    yield f"  {clock['duplicates']} rows repeat the one before"
-    for other in description["clocks"]:
-        whose = ", ".join(repr(name) for name in other["channels"][:6]) + (" ..." if len(other["channels"]) > 6 else "")
-        yield f"another clock: {other['source']}, {other['rate']:.6g} Hz, of {whose}"
+    yield f"  {clock['duplicates']} rows repeat the previous row"
+    for extra in description["clocks"]:
+        channels = ", ".join(map(repr, extra["channels"][:6])) + (" ..." if len(extra["channels"]) > 6 else "")
+        yield f"another clock: {extra['source']}, {extra['rate']:.6g} Hz, of {channels}"
     yield "channels:"
     yield from _table([_row(i, channel) for i, channel in enumerate(description["channels"])])
     if any(description["head"].values()):
@@ -191,7 +194,7 @@ def _row(number: int, channel: dict[str, Any]) -> list[str]:
         return [*name, channel["kind"]]
     missing = ", ".join(f"{channel[kind]} {kind}" for kind in ("nulls", "nans") if channel[kind])
     span = f"{_number(channel['least'])} .. {_number(channel['most'])}"
-    return [*name, span, sparkline(channel["course"]), missing or ("made by the reader" if channel["derived"] else "")]
+    return [*name, span, sparkline(channel["course"]), missing or ("added by the reader" if channel["derived"] else "")]
 
 
 def _number(value: float | None) -> str:
@@ -205,7 +208,7 @@ def _table(rows: list[list[str]]) -> Iterator[str]:
 
 
 def sparkline(course: list[float | None]) -> str:
-    """The course of a channel in one line of bars, low to high; a blank where it has no value."""
+    """Draw the values of a channel over time as a line of bars, low to high; a blank where there is no value."""
     values = [value for value in course if value is not None]
     if not values:
         return ""

@@ -1,4 +1,4 @@
-"""Write a commented study.toml for logs: what their channels are, and what they seem to hold."""
+"""Write a commented study.toml for logs, with a guess of what their channels measure."""
 
 from pathlib import Path
 from typing import Annotated
@@ -11,12 +11,12 @@ from davinci_forces.runner.console import echo
 def run(
     files: Annotated[list[Path], typer.Argument(help="Logs, in the folder of the study: raw/<study>/<log>.")],
     robot: Annotated[
-        str, typer.Option(help="The robot, or a .toml or .urdf file beside the study.", show_default="guessed")
+        str, typer.Option(help="A listed robot, or a .toml or .urdf file beside the study.", show_default="guessed")
     ] = "",
-    study: Annotated[Path | None, typer.Option(help="Folder of the study, where not that of the first log.")] = None,
-    show: Annotated[bool, typer.Option("--print", help="Print it instead of writing study.toml.")] = False,
+    study: Annotated[Path | None, typer.Option(help="Folder of the study, instead of that of the first log.")] = None,
+    show: Annotated[bool, typer.Option("--print", help="Print the text instead of writing study.toml.")] = False,
 ) -> None:
-    """Describe logs in a study.toml, which is never overwritten."""
+    """Describe logs in a study.toml; an existing file is never overwritten."""
     from davinci_forces.errors import BadRequest
     from davinci_forces.files import write_bytes
     from davinci_forces.study import template
@@ -28,7 +28,7 @@ def run(
         return
     target = folder / "study.toml"
     if target.exists():
-        raise BadRequest(f"{target} is there already; move it away, or print the new one with --print")
+        raise BadRequest(f"{target} exists already; move it away, or print the new one with --print")
     if draft.robot_file:
         write_bytes(folder / draft.robot_file, draft.robot_text.encode())
         echo(f"{folder / draft.robot_file}: written; check the kinds of its joints and their terms")

@@ -1,4 +1,4 @@
-"""Print a robot: its joints, and at one pose frames, tip, Jacobian, M, C dq and G; or the robot as URDF."""
+"""Print a robot's joints, and at one pose its frames, tip, Jacobian, M, C dq and G; or the robot as URDF."""
 
 import json
 import math
@@ -12,22 +12,24 @@ from davinci_forces.runner.console import echo
 if TYPE_CHECKING:
     from davinci_forces.robots.robot import Joint, Robot
 
-ROUNDING = 1e-14
-DEFAULT = 6  # coordinates of the pose where none is given: the arm with one jaw
+PRINTED_AS_ZERO = 1e-14  # [any unit] numbers up to this size are rounding errors
+MAX_DEFAULT_COORDINATES = 6  # of the zero pose of an arm with a wrist: the arm with one jaw
 
 
 def run(
     robot: Annotated[str, typer.Argument(help="A listed robot, or the path of a robot's .toml or .urdf file.")],
     at: Annotated[
-        str | None, typer.Option(help="Pose q1,q2,... in rad or m: of davinci 3, 6 or 7 values; what is missing is 0.")
+        str | None, typer.Option(help="Pose q1,q2,... in rad or m; for davinci 3, 6 or 7 values. Default: zeros.")
     ] = None,
-    dq: Annotated[str | None, typer.Option(help="Velocities, for C dq: as many values as --at or fewer.")] = None,
+    dq: Annotated[
+        str | None, typer.Option(help="Velocities for C dq, at most as many values as the pose; missing ones are 0.")
+    ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
     urdf: Annotated[bool, typer.Option("--urdf", help="Print the robot as URDF, for ROS and simulators.")] = False,
 ) -> None:
-    """The pose, the velocity Jacobian of the tip (7.21)-(7.24) and the terms of (4.38), with all joints in SI units.
+    """Print the pose, the velocity Jacobian of the tip (7.21)-(7.24) and the terms of (4.38), in SI units.
 
-    Of a robot whose geometry is not known, its joints.
+    For a robot without known geometry, print its joints only.
     """
     from davinci_forces.robots import load
 
@@ -38,13 +40,13 @@ def run(
         echo(writing.text(arm), nl=False)
         return
     n = arm.chain.n if arm.chain else 0
-    q = _values("--at", at) if at is not None else [0.0] * (min(DEFAULT, n) if arm.wrist else n)
+    q = _values("--at", at) if at is not None else [0.0] * (min(MAX_DEFAULT_COORDINATES, n) if arm.wrist else n)
     document = _document(arm, q, _values("--dq", dq) if dq is not None else [])
     echo(json.dumps(document, indent=2, allow_nan=False) if as_json else _format_text(arm, q, document))
 
 
 def _values(option: str, text: str) -> list[float]:
-    """Numbers separated by commas."""
+    """Read numbers separated by commas."""
     from davinci_forces.errors import BadRequest
     from davinci_forces.toml import unlikely
 
@@ -62,12 +64,12 @@ def _values(option: str, text: str) -> list[float]:
 
 
 def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]:
-    """Everything that is printed, as JSON's types.
+    """The printed quantities as JSON values.
 
     Raises
     ------
     BadRequest
-        If the robot has no chain, or q and dq have not the numbers of values that it can take.
+        If the robot has no chain, or the length of q or dq is wrong.
     """
     import numpy as np
 
@@ -84,7 +86,7 @@ def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]
         numbers = " or ".join(filter(None, (", ".join(map(str, counts[:-1])), str(counts[-1]))))
         raise BadRequest(f"--at has {len(q)} values; the pose of {robot.name} has {numbers}")
     if len(dq) > len(q):
-        raise BadRequest(f"--dq has {len(dq)} values and the pose {len(q)}; give as many or fewer")
+        raise BadRequest(f"--dq has {len(dq)} values and the pose {len(q)}; give at most {len(q)}")
     pose, rates = np.array(q), np.array(dq + [0.0] * (len(q) - len(dq)))
     T = kinematics.frames(chain, pose)
     J_v, J_w = kinematics.jacobian(chain, pose)
@@ -105,7 +107,7 @@ def _document(robot: "Robot", q: list[float], dq: list[float]) -> dict[str, Any]
 
 
 def _joints(robot: "Robot") -> dict[str, Any]:
-    """What is said of each joint: its kind, unit of effort, limits (null where there are none) and terms."""
+    """Kind, unit of effort, limits (null where there is none) and terms of each joint."""
     return {
         joint.name: {
             "kind": joint.kind.value,
@@ -124,7 +126,7 @@ def _joints(robot: "Robot") -> dict[str, Any]:
 
 
 def _dynamics(robot: "Robot", q: Any, dq: Any) -> dict[str, Any]:
-    """M, C dq and G, of a robot whose masses are known."""
+    """M, C dq and G, or None for a robot without known masses."""
     from davinci_forces.maths.mechanics import rigid_body
 
     if robot.chain is None or robot.bodies is None:
@@ -137,7 +139,7 @@ def _dynamics(robot: "Robot", q: Any, dq: Any) -> dict[str, Any]:
 
 
 def _outside(robot: "Robot", q: list[float]) -> list[str]:
-    """Which joints are beyond their limits: it is computed all the same."""
+    """Warn of joints outside their limits; the quantities are computed all the same."""
     warnings = []
     for joint, value in zip(robot.joints, q, strict=False):
         (low, high), unit = joint.limits.q, joint.unit("{position}")
@@ -147,24 +149,24 @@ def _outside(robot: "Robot", q: list[float]) -> list[str]:
 
 
 def _singular(chain: Any, q: list[float]) -> str:
-    """Why the pose has no condition number, and where such poses lie."""
+    """Explain why the pose has no condition number, and where such poses lie."""
     from davinci_forces.maths.mechanics.tip_force import ARM, SINGULAR, singular_slides
 
     kinds = [set(chain.slides[chain.coordinate == k].tolist()) for k in range(ARM)]
     of_a_slide = kinds == [{False}, {False}, {True}]
     slides = ", ".join(sorted({f"{slide:.4f}" for slide in singular_slides(chain, q[1])})) if of_a_slide else ""
-    where = f"; at this pitch that is so where the slide is at {slides} m" if slides else ""
+    where = f"; at this pitch, the slide positions {slides} m are singular" if slides else ""
     return (
-        f"singular: the condition number of J_v of the first {ARM} joints is above {SINGULAR:g}, so that they do not "
-        f"tell the force at the tip in one direction{where}"
+        f"singular: the condition number of J_v of the first {ARM} joints is above {SINGULAR:g}, so in one direction "
+        f"the force at the tip cannot be computed from their efforts{where}"
     )
 
 
 def _format_text(robot: "Robot", q: list[float], document: dict[str, Any]) -> str:
-    """The result for people: numbers in columns, everything in the base axes and SI units; rounding errors are 0."""
+    """The document as text, in base axes and SI units, rounding errors as 0."""
     lines = [robot.title, "", *_joint_lines(robot)]
     if "frames" not in document:
-        return "\n".join([*lines, "", "its geometry is not known: [[link]] in its file says it, or a URDF"])
+        return "\n".join([*lines, "", "its geometry is not known; add [[link]] to its file, or use a URDF"])
     lines += ["", f"at q = {_numbers(q)}"]
     lines += [f"warning: {text}" for text in document["warnings"]]
     width = max(map(len, ("frame", *document["frames"])))
@@ -182,7 +184,7 @@ def _format_text(robot: "Robot", q: list[float], document: dict[str, Any]) -> st
 
 
 def _joint_lines(robot: "Robot") -> list[str]:
-    """One line a joint: from where to where it moves, how fast, and what its effort is made of."""
+    """One line per joint: its range, speed, and the terms of its effort."""
     width = max(len(joint.name) for joint in robot.joints)
     lines = []
     for joint in robot.joints:
@@ -192,14 +194,14 @@ def _joint_lines(robot: "Robot") -> list[str]:
 
 
 def _moves(joint: "Joint") -> str:
-    """How a joint moves, as far as it is limited."""
-    (low, high), (_, fastest), most = joint.limits.q, joint.limits.dq, joint.limits.effort
+    """Kind and limits of a joint."""
+    (low, high), (_, max_speed), max_effort = joint.limits.q, joint.limits.dq, joint.limits.effort
     position = joint.unit("{position}")
-    words = [joint.kind.value, f"{low:g} to {high:g} {position}" if math.isfinite(high - low) else "without an end"]
-    words += [f"at most {fastest:g} {position}/s"] if math.isfinite(fastest) else []
-    words += [f"at most {most:g} {joint.unit('{effort}')}"] if math.isfinite(most) else []
+    words = [joint.kind.value, f"{low:g} to {high:g} {position}" if math.isfinite(high - low) else "unlimited"]
+    words += [f"at most {max_speed:g} {position}/s"] if math.isfinite(max_speed) else []
+    words += [f"at most {max_effort:g} {joint.unit('{effort}')}"] if math.isfinite(max_effort) else []
     return ", ".join(words)
 
 
 def _numbers(values: list[float]) -> str:
-    return " ".join(f"{value if abs(value) > ROUNDING else 0.0:12.6g}" for value in values)
+    return " ".join(f"{value if abs(value) > PRINTED_AS_ZERO else 0.0:12.6g}" for value in values)

@@ -1,4 +1,4 @@
-"""Simulate a study: logs as the laboratory would have recorded them, and their ground truth."""
+"""Simulate a study: logs as a laboratory would record them, and their ground truth."""
 
 from pathlib import Path
 from typing import Annotated
@@ -9,9 +9,9 @@ from davinci_forces.runner.console import echo
 
 
 def run(
-    scenario: Annotated[str, typer.Argument(help="A shipped scenario by its name, or the path of a .toml file.")],
-    out: Annotated[Path, typer.Argument(help="The folder of the study to be made.")],
-    force: Annotated[bool, typer.Option("--force", help="Replace a simulated study that is there already.")] = False,
+    scenario: Annotated[str, typer.Argument(help="Name of a shipped scenario, or path of a .toml file.")],
+    out: Annotated[Path, typer.Argument(help="Folder of the new study.")],
+    force: Annotated[bool, typer.Option("--force", help="Replace an existing simulated study.")] = False,
 ) -> None:
     """Simulate a scenario and write the study folder OUT: study.toml, the logs, and truth.toml."""
     from davinci_forces.errors import BadRequest

@@ -1,6 +1,7 @@
-"""Say how stiff a tissue may be before the hand that feels it through a haptic device is no longer stable.
+"""Compute how stiff tissue may be for a hand that feels it through a haptic device to stay stable.
 
-The hand is a mass on a spring and a damper, tissue a spring on one side of its surface, as in chapter 8 of the thesis.
+The hand is a mass on a spring and a damper. The tissue is a spring that acts below its surface only, as in chapter 8
+of the thesis.
 """
 
 import json
@@ -21,28 +22,28 @@ def run(
     b_h: Annotated[float, typer.Option(help="Damping b_H of the hand [N s/m].")] = 1.0,
     m: Annotated[float, typer.Option(help="Mass m of the hand and what it holds [kg].")] = 1.0,
     delay: Annotated[
-        float | None, typer.Option(help="How late the force comes [s]: the filter's lag and the link's.")
+        float | None, typer.Option(help="Delay of the felt force [s]: of the filter and of the link.")
     ] = None,
-    rate: Annotated[float | None, typer.Option(help="Rate [Hz] at which the force is made and held.")] = None,
+    rate: Annotated[float | None, typer.Option(help="Rate [Hz] at which the force is updated and held.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """The largest stiffness K_T of tissue [N/m] by each criterion: (8.10), arbitrary switching, delay and sampling."""
+    """Print the largest stable tissue stiffness K_T [N/m]: by (8.10), by arbitrary switching, by delay and sampling."""
     hand = _hand(k_h, b_h, m, delay, rate)
     limits = _limits(hand, delay, rate)
     if as_json:
-        asked = {"k_h": k_h, "b_h": b_h, "m": m, "delay": delay, "rate": rate}
-        echo(json.dumps(asked | limits, indent=2, allow_nan=False))
+        parameters = {"k_h": k_h, "b_h": b_h, "m": m, "delay": delay, "rate": rate}
+        echo(json.dumps(parameters | limits, indent=2, allow_nan=False))
     else:
         echo(_format_text(hand, limits, delay, rate))
 
 
 def _hand(k_h: float, b_h: float, m: float, delay: float | None, rate: float | None) -> "Hand":
-    """The hand that was asked for.
+    """The hand with these parameters, in SI units.
 
     Raises
     ------
     BadRequest
-        If a number cannot be one of a hand, of a delay or of a rate; every such number is named.
+        If a parameter is impossible; all such parameters are named.
     """
     from davinci_forces.errors import BadRequest
     from davinci_forces.haptics.maths.bimodal import Hand
@@ -56,9 +57,9 @@ def _hand(k_h: float, b_h: float, m: float, delay: float | None, rate: float | N
     ]
     if delay is not None and not 0.0 <= delay < float("inf"):
         wrong.append(f"--delay {delay:g}: must be 0 or a positive number [s]")
-    asked = (("--k-h", k_h, "stiffness"), ("--b-h", b_h, "damping"), ("--m", m, "mass"), ("--delay", delay, "time"),
-             ("--rate", rate, "rate"))  # fmt: skip
-    wrong = wrong or [f"{said}, not {x:g}" for option, x, kind in asked if (said := unlikely(option, x or 0.0, kind))]
+    options = (("--k-h", k_h, "stiffness"), ("--b-h", b_h, "damping"), ("--m", m, "mass"), ("--delay", delay, "time"),
+               ("--rate", rate, "rate"))  # fmt: skip
+    wrong = wrong or [f"{text}, not {x:g}" for option, x, kind in options if (text := unlikely(option, x or 0.0, kind))]
     if wrong:
         without = "; a hand without damping never comes to rest" if b_h == 0.0 else ""
         raise BadRequest("; ".join(wrong) + without)
@@ -66,7 +67,7 @@ def _hand(k_h: float, b_h: float, m: float, delay: float | None, rate: float | N
 
 
 def _limits(hand: "Hand", delay: float | None, rate: float | None) -> Limits:
-    """Every limit [N/m] that was asked for; None is no limit."""
+    """Limits of K_T [N/m] by each criterion; None stands for no limit."""
     from davinci_forces.haptics.maths import bimodal, lmi
     from davinci_forces.haptics.maths.delay import delay_limit, sampled_limit
 
@@ -84,29 +85,31 @@ def _limits(hand: "Hand", delay: float | None, rate: float | None) -> Limits:
 
 
 def _format_text(hand: "Hand", limits: Limits, delay: float | None, rate: float | None) -> str:
-    """A sentence a limit, for people."""
+    """The limits as text, one line each."""
     from davinci_forces.haptics.maths.bimodal import THESIS_TISSUE
     from davinci_forces.haptics.maths.delay import damping_needed
 
     lines = [
-        f"A hand of m = {hand.m:g} kg, b_H = {hand.b:g} N s/m and K_H = {hand.k:g} N/m, against tissue of K_T:",
-        f"  k_t_cqlf      {_newtons(limits['k_t_cqlf'])}  below it one quadratic Lyapunov function falls in both modes",
-        f"  k_t_lmi       {_newtons(limits['k_t_lmi'])}  the same by Clarabel, from the inequality (8.10)",
-        f"  k_t_switching {_newtons(limits['k_t_switching'])}  below it no switching makes it unstable, above it the "
-        "worst does",
-        "  without delay          any  as it really switches, at first contact: every K_T >= 0 is stable",
+        f"Limits of the tissue stiffness K_T for a hand of m = {hand.m:g} kg, b_H = {hand.b:g} N s/m and "
+        f"K_H = {hand.k:g} N/m:",
+        f"  k_t_cqlf      {_newtons(limits['k_t_cqlf'])}  below it, one quadratic Lyapunov function decreases in both "
+        "modes",
+        f"  k_t_lmi       {_newtons(limits['k_t_lmi'])}  the same, computed from the matrix inequality (8.10)",
+        f"  k_t_switching {_newtons(limits['k_t_switching'])}  below it, every switching is stable; above it, the "
+        "worst switching is not",
+        "  without delay          any  switching at contact only, as it really does: stable for every K_T >= 0",
     ]
     if "k_t_delay" in limits:
-        how = [f"{delay:g} s late"] if delay else []
+        how = [f"delayed by {delay:g} s"] if delay else []
         how += [f"held at {rate:g} Hz"] if rate is not None else []
         lines += [
-            f"  k_t_delay     {_newtons(limits['k_t_delay'])}  below it the hand that stays in contact is stable, the "
-            f"force {' and '.join(how) or 'not late at all'}"
+            f"  k_t_delay     {_newtons(limits['k_t_delay'])}  below it, a hand that stays in contact is stable, with "
+            f"the force {' and '.join(how) or 'not delayed'}"
         ]
-    lines += ["", f"The thesis's tissue, {THESIS_TISSUE:g} N/m, is {_against(limits, THESIS_TISSUE)}."]
+    lines += ["", f"The tissue of the thesis, {THESIS_TISSUE:g} N/m, is {_place(limits, THESIS_TISSUE)}."]
     if delay and (limits.get("k_t_delay") or THESIS_TISSUE) <= THESIS_TISSUE:
-        needed = damping_needed(hand, THESIS_TISSUE, delay + (0.5 / rate if rate else 0.0))
-        lines += [f"A hand damped by about {needed:.3g} N s/m would hold it."]
+        damping = damping_needed(hand, THESIS_TISSUE, delay + (0.5 / rate if rate else 0.0))
+        lines += [f"A hand with a damping of about {damping:.3g} N s/m would be stable."]
     return "\n".join(lines)
 
 
@@ -114,17 +117,17 @@ def _newtons(value: float | None) -> str:
     return f"{'any' if value is None else f'{value:.4g} N/m':>12}"
 
 
-def _against(limits: Limits, k_t: float) -> str:
-    """On which side of the limits a tissue is."""
-    proved, worst, late = (limits.get(name) for name in ("k_t_cqlf", "k_t_switching", "k_t_delay"))
-    if k_t < (proved or 0.0):
-        said = "below all limits without delay"
-    elif k_t < (worst or 0.0):
-        said = "beyond the Lyapunov function, but no switching makes it unstable"
+def _place(limits: Limits, k_t: float) -> str:
+    """Where a stiffness lies among the limits."""
+    cqlf, switching, delayed = (limits.get(name) for name in ("k_t_cqlf", "k_t_switching", "k_t_delay"))
+    if k_t < (cqlf or 0.0):
+        text = "below all limits without delay"
+    elif k_t < (switching or 0.0):
+        text = "above k_t_cqlf, but stable under every switching"
     else:
-        said = "beyond both limits of arbitrary switching, which does not happen: without delay it is stable"
+        text = "above both limits of arbitrary switching, which does not occur: without delay it is stable"
     if "k_t_delay" not in limits:
-        return said + "; say --delay or --rate for what does limit it"
-    if late is None or k_t < late:
-        return said + "; so late, too"
-    return said + "; so late, it is not: it is beyond k_t_delay"
+        return text + "; add --delay or --rate to compute the limit by delay"
+    if delayed is None or k_t < delayed:
+        return text + "; with this delay it is stable, too"
+    return text + "; with this delay it is unstable: it is above k_t_delay"

@@ -1,4 +1,4 @@
-"""How parameters are found: one module per estimator, exporting `estimate` and its title, `NAME`, and listed below."""
+"""Estimators of model parameters: one module each, exporting `estimate` and its title `NAME`, listed below."""
 
 from importlib import import_module
 
@@ -8,11 +8,11 @@ ESTIMATORS = ("lse", "wlse", "pso", "bounded", "prior", "huber", "iv", "tls", "c
 
 
 def estimator(name: str) -> Estimator:
-    """The estimator of that name."""
-    found: Estimator = import_module(f"davinci_forces.estimators.{name}").estimate
-    return found
+    """Return the estimator of that name."""
+    estimate: Estimator = import_module(f"davinci_forces.estimators.{name}").estimate
+    return estimate
 
 
 def title_of(name: str) -> str:
-    """The title of the estimator of that name, as `least squares`; the name itself where there is none."""
+    """Return the title of an estimator, as `least squares`; the name itself where there is none."""
     return str(import_module(f"davinci_forces.estimators.{name}").NAME) if name in ESTIMATORS else name

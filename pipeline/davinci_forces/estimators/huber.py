@@ -1,22 +1,22 @@
-"""Robust least squares: samples that lie far off pull with a bounded force.  (Huber, 1964)"""
+"""Robust least squares: samples far from the fit have a bounded influence.  (Huber, 1964)"""
 
 from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.estimators.problem import Estimate, Regression, Spread, factored, spread
+from davinci_forces.estimators.problem import Estimate, Regression, StandardErrors, factorise, standard_errors
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation.least_squares import Triangle
 
 NAME = "robust least squares"
-FAR = 1.345  # deviations of the residuals beyond which they are far: 95 % as efficient as least squares on normal noise
-TO_DEVIATION = 1.4826  # of normal residuals, from the median of their absolute values
-STEPS = 200
-SETTLED = 1e-12  # of the effort
+HUBER_K = 1.345  # deviations of the residuals: 95 % as efficient as least squares on normal noise
+MAD_TO_STD = 1.4826  # of normal residuals: from their median absolute value to their standard deviation
+MAX_STEPS_HUBER = 200
+TOLERANCE_HUBER = 1e-12  # of the effort
 
 
-class Settled(NamedTuple):
-    """Parameters, and how far off each sample lies from them, in deviations of the residuals."""
+class RobustFit(NamedTuple):
+    """Parameters, and the residuals over their standard deviation."""
 
     theta: Array  # (p,)
     off: Array  # (K,)
@@ -24,37 +24,37 @@ class Settled(NamedTuple):
 
 
 def estimate(problem: Regression) -> Estimate:
-    """theta with sum of psi(r_k / s) Phi_k = 0, psi(u) = u up to `FAR` and constant beyond, by weighted least squares.
+    """theta with sum of psi(r_k / s) Phi_k = 0, psi(u) = u up to `HUBER_K`, constant beyond; weighted least squares.
 
-    s is the deviation of the residuals by the median of their absolute values.  The standard errors are those of least
-    squares on residuals s psi(r / s) over the share of samples that lie near.  (Huber, 1981, (7.6.5))
+    s is the standard deviation of the residuals, from their median absolute value.  The standard errors are those of
+    least squares on residuals s psi(r / s), over the share of samples within `HUBER_K`.  (Huber, 1981, (7.6.5))
 
-    The parameters are those of statsmodels' RLM, which takes no weights, knows no standard errors of correlated
-    residuals and needs eight times as long for 600 000 rows.
+    The parameters are those of statsmodels' RLM, which has no weights and no standard errors for correlated residuals,
+    and needs eight times as long for 600 000 rows.
     """
     weight, R = problem.weight, problem.triangle
-    found = settled(problem, weight, R)
-    return Estimate(found.theta, lambda: robust_spread(problem, weight, R, found))
+    fit = fit_robustly(problem, weight, R)
+    return Estimate(fit.theta, lambda: robust_standard_errors(problem, weight, R, fit))
 
 
-def settled(problem: Regression, weight: Array, R: Triangle) -> Settled:
-    """Weighted least squares anew, until their fit stays where it is."""
+def fit_robustly(problem: Regression, weight: Array, R: Triangle) -> RobustFit:
+    """Repeat weighted least squares until the fitted effort changes less than `TOLERANCE_HUBER`."""
     theta, root = R.theta, np.sqrt(weight)
-    enough = SETTLED * np.sqrt(float(R.y @ R.y) + R.squares)
-    for _ in range(STEPS):
+    tolerance = TOLERANCE_HUBER * np.sqrt(float(R.y @ R.y) + R.squares)
+    for _ in range(MAX_STEPS_HUBER):
         residual = root * (problem.tau - problem.Phi @ theta)
-        deviation = TO_DEVIATION * float(np.median(np.abs(residual[weight > 0])))
-        off = residual / max(deviation, enough / np.sqrt(len(residual)))
-        moved = factored(problem, weight * np.minimum(1.0, FAR / np.maximum(np.abs(off), FAR))).theta
-        still = R.U @ ((moved - theta) * R.scale)
-        theta = moved
-        if still @ still <= enough**2:
+        deviation = MAD_TO_STD * float(np.median(np.abs(residual[weight > 0])))
+        off = residual / max(deviation, tolerance / np.sqrt(len(residual)))
+        share = np.minimum(1.0, HUBER_K / np.maximum(np.abs(off), HUBER_K))
+        before, theta = theta, factorise(problem, weight * share).theta
+        change = R.U @ ((theta - before) * R.scale)
+        if change @ change <= tolerance**2:
             break
-    return Settled(theta, off, deviation)
+    return RobustFit(theta, off, deviation)
 
 
-def robust_spread(problem: Regression, weight: Array, R: Triangle, found: Settled) -> Spread:
-    """The standard errors, by pseudo-residuals."""
-    near = float(np.mean(np.abs(found.off[weight > 0]) < FAR))
-    pseudo = found.deviation * np.clip(found.off, -FAR, FAR) / near
-    return spread(problem, weight, R, found.theta, pseudo)
+def robust_standard_errors(problem: Regression, weight: Array, R: Triangle, fit: RobustFit) -> StandardErrors:
+    """Compute the standard errors from pseudo-residuals."""
+    near = float(np.mean(np.abs(fit.off[weight > 0]) < HUBER_K))
+    pseudo = fit.deviation * np.clip(fit.off, -HUBER_K, HUBER_K) / near
+    return standard_errors(problem, weight, R, fit.theta, pseudo)

@@ -1,6 +1,6 @@
-"""Least squares: every averaged sample counts as much as the periods behind it."""
+"""Least squares: each averaged sample has the weight of its number of periods."""
 
-from davinci_forces.estimators.problem import Estimate, Regression, spread
+from davinci_forces.estimators.problem import Estimate, Regression, standard_errors
 
 NAME = "least squares"
 
@@ -8,8 +8,7 @@ NAME = "least squares"
 def estimate(problem: Regression) -> Estimate:
     """theta = (Phi' W Phi)^-1 Phi' W tau, W the number of periods, by QR of the weighted rows.  (6.46), (6.50)
 
-    The standard errors take their scale from the residuals, so a model that does not fit has wider ones, whatever the
-    noise.
+    The standard errors scale with the residuals, so those of a model that does not fit are larger than the noise's.
     """
     weight, R = problem.weight, problem.triangle
-    return Estimate(R.theta, lambda: spread(problem, weight, R, R.theta))
+    return Estimate(R.theta, lambda: standard_errors(problem, weight, R, R.theta))

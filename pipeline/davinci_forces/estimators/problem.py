@@ -1,4 +1,4 @@
-"""What every estimator is asked, and what it answers."""
+"""The input and the output of every estimator."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,20 +14,20 @@ from davinci_forces.maths.estimation.correlation import correlated
 from davinci_forces.maths.estimation.least_squares import Triangle, not_told_apart, triangle
 from davinci_forces.maths.models.physical import Box
 
-ROUNDING = 1e-13  # of the longest column, below which one is nothing but rounding
-ALIKE = 0.01  # of the square of what the columns tell least, from which on a parameter is named
-CONDITION = 1e10  # of scaled columns, above which rounding tells them apart as much as the motion does
+ROUNDING = 1e-13  # of the longest column, below which a column is only rounding
+MIN_PART_NAMED = 0.01  # share in the square of the least certain combination for a parameter to be named
+MAX_CONDITION = 1e10  # of scaled columns, above which rounding separates them as much as the motion does
 
 
 class Known(NamedTuple):
-    """What is known of p parameters before anything is measured."""
+    """Prior knowledge of p parameters."""
 
-    positive: Booleans | None = None  # (p,) whether physics knows that they are not negative
-    box: Box | None = None  # of the physical parameters that they are made of
+    positive: Booleans | None = None  # (p,) whether physics requires that they are not negative
+    box: Box | None = None  # of the physical parameters that they consist of
     guess: Array | None = None  # (p,)
 
     def signs(self, p: int) -> Booleans:
-        """Which of the parameters (p,) are known not to be negative."""
+        """Return which of the parameters (p,) are known not to be negative."""
         return np.zeros(p, np.bool_) if self.positive is None else self.positive
 
 
@@ -36,12 +36,12 @@ NOTHING = Known()
 
 @dataclass(frozen=True, eq=False)
 class Regression:
-    """Find theta with Phi theta close to tau: K samples, p parameters, one averaged period of each log in turn."""
+    """Fit Phi theta to tau: K samples, p parameters, one averaged period of each log in turn."""
 
     Phi: Array  # (K, p)
     tau: Array  # (K,)
     tau_var: Array  # (K,) variance of one period at each sample
-    periods: NDArray[np.int64]  # (K,) how many periods each sample is the mean of, M; 0 where none was recorded
+    periods: NDArray[np.int64]  # (K,) number of periods M behind each sample; 0 where none was recorded
     starts: tuple[int, ...]  # where each log begins
     names: tuple[str, ...]  # of the parameters
     known: Known = NOTHING
@@ -49,126 +49,126 @@ class Regression:
 
     @cached_property
     def weight(self) -> Array:
-        """By what each sample (K,) counts where all periods count the same."""
+        """The weight of each sample (K,) where all periods count the same."""
         return self.periods.astype(float)
 
     @cached_property
     def triangle(self) -> Triangle:
-        """What the samples say of the parameters where all periods count the same.  Raises what `factored` does."""
-        return factored(self, self.weight)
+        """The QR factors of the samples where all periods count the same.  Raises what `factorise` does."""
+        return factorise(self, self.weight)
 
 
-class Spread(NamedTuple):
-    """How far parameters may be off."""
+class StandardErrors(NamedTuple):
+    """Standard errors of parameters."""
 
-    classical: Array  # (p,) standard errors, residuals taken as uncorrelated and as large everywhere
-    stated: Array  # (p,) allowing for residuals that are neither
+    classical: Array  # (p,) standard errors for residuals that are uncorrelated and of equal variance
+    stated: Array  # (p,) for residuals that are neither
     lags: float  # the sum of the residuals' correlations over all lags but 0
 
 
 class Search(NamedTuple):
-    """A search for parameters, and how it went."""
+    """A search for parameters, and its course."""
 
-    walls: str  # what they did to particles
+    walls: str  # what happens to particles at the box
     seed: int
     particles: int
     searched: int  # parameters, n
     swarms: int
-    excess: float  # of the squared error over the least that the known signs allow, as a share of it
+    excess: float  # of the squared error over the smallest that the known signs allow, as a share of it
     history: Array  # (I,) mean squared error after each iteration
     theta: Array  # (p,)
 
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Parameters; standard errors and searches are computed when they are first asked for, which refits never do."""
+    """Parameters; standard errors and searches are computed at first use, because refits need neither."""
 
     theta: Array  # (p,)
-    judge: Callable[[], Spread]
-    look: Callable[[], tuple[Search, ...]] = tuple
+    compute_standard_errors: Callable[[], StandardErrors]
+    run_searches: Callable[[], tuple[Search, ...]] = tuple
 
     @cached_property
-    def spread(self) -> Spread:
-        """How far the parameters may be off."""
-        return self.judge()
+    def standard_errors(self) -> StandardErrors:
+        """The standard errors of the parameters."""
+        return self.compute_standard_errors()
 
     @property
     def searches(self) -> tuple[Search, ...]:
-        """How the parameters were searched for, and how others would have been."""
-        return self.look()
+        """The searches for the parameters, by every manner of search."""
+        return self.run_searches()
 
     @property
     def theta_std_classical(self) -> Array:
-        """Standard errors (p,) that take residuals as uncorrelated and as large everywhere."""
-        return self.spread.classical
+        """Standard errors (p,) for residuals that are uncorrelated and of equal variance."""
+        return self.standard_errors.classical
 
     @property
     def theta_std(self) -> Array:
-        """Standard errors (p,) that allow for residuals that are correlated, and larger here than there."""
-        return self.spread.stated
+        """Standard errors (p,) for residuals that are correlated and of varying variance."""
+        return self.standard_errors.stated
 
     @property
     def correlated_lags(self) -> int:
-        """Over how many lags residuals are correlated, each counting by its correlation."""
-        return round(self.spread.lags)
+        """The number of lags over which residuals are correlated, each weighted by its correlation."""
+        return round(self.standard_errors.lags)
 
 
 Estimator = Callable[[Regression], Estimate]
 
 
-def factored(problem: Regression, weight: Array) -> Triangle:
-    """What the rows, each counting by its weight (K,), 0 where there is nothing, say of the parameters.  (6.42)
+def factorise(problem: Regression, weight: Array) -> Triangle:
+    """Compute the QR factors of the weighted rows; weight (K,) is 0 where there is no sample.  (6.42)
 
     Raises
     ------
     NotIdentifiable
-        If a weight or a sample is not a number, the effort does not vary, there are no more samples than parameters, or
-        the columns of Phi are linearly dependent.
+        If a weight or a sample is not a number, or the effort does not vary.  If there are no more samples than
+        parameters, or the columns of Phi are linearly dependent.
     """
     K, p = int(np.count_nonzero(weight)), problem.Phi.shape[1]
     if p >= K:
         raise NotIdentifiable(f"{K} samples for {p} parameters: record more of the motion")
     if np.ptp(problem.tau) == 0:
-        raise NotIdentifiable("the effort is the same throughout: check its channel")
+        raise NotIdentifiable("the effort is constant: check its channel")
     R = triangle(problem.Phi, problem.tau, weight)
     if not np.isfinite(R.squares):
         columns = {"weight": np.where(weight >= 0, weight, np.nan), "effort": problem.tau, "motion": problem.Phi.sum(1)}
-        what, row = next((name, np.argmin(np.isfinite(x))) for name, x in columns.items() if not np.isfinite(x).all())
-        raise NotIdentifiable(
-            f"the {what} of sample {row + 1} of {len(problem.tau)} is not a number: check its channel"
-        )
-    still = [name for name, size in zip(problem.names, R.scale, strict=True) if size <= ROUNDING * R.scale.max()]
-    if still:
-        raise NotIdentifiable(f"nothing in the motion excites {', '.join(still)}")
-    if (condition := np.linalg.cond(R.U)) > CONDITION:
-        alike = ", ".join(problem.names[i] for i in not_told_apart(R.U, ALIKE))
-        raise NotIdentifiable(
-            f"the motion does not tell {alike} apart: condition number {condition:.1e} of scaled columns"
-        )
+        name, row = next((name, np.argmin(np.isfinite(x))) for name, x in columns.items() if not np.isfinite(x).all())
+        sample = f"sample {row + 1} of {len(problem.tau)}"
+        raise NotIdentifiable(f"the {name} of {sample} is not a number: check its channel")
+    unexcited = [name for name, size in zip(problem.names, R.scale, strict=True) if size <= ROUNDING * R.scale.max()]
+    if unexcited:
+        raise NotIdentifiable(f"the motion does not excite {', '.join(unexcited)}")
+    if (condition := np.linalg.cond(R.U)) > MAX_CONDITION:
+        alike = ", ".join(problem.names[i] for i in not_told_apart(R.U, MIN_PART_NAMED))
+        size = f"{condition:.1e} of scaled columns"
+        raise NotIdentifiable(f"the motion does not separate {alike}: condition number {size}")
     return R
 
 
-def spread_by(problem: Regression, weight: Array, theta: Array, Q: Array, D: Array) -> Spread:
-    """The standard errors of parameters theta = D Q' tau (p,), of orthonormal columns Q (K, p) and D (p, p)."""
+def standard_errors_by(problem: Regression, weight: Array, theta: Array, Q: Array, D: Array) -> StandardErrors:
+    """Compute the standard errors of theta = D Q' tau (p,), with orthonormal columns Q (K, p), and D (p, p)."""
     residual = np.sqrt(weight) * (problem.tau - problem.Phi @ theta)
     degrees = int((weight > 0).sum()) - len(theta)
     classical = np.sqrt(residual @ residual / degrees * (D**2).sum(axis=1))
-    found = correlated(Q, residual, problem.starts, D, degrees)
-    return Spread(classical, np.sqrt(found.variance), found.lags)
+    stated = correlated(Q, residual, problem.starts, D, degrees)
+    return StandardErrors(classical, np.sqrt(stated.variance), stated.lags)
 
 
-def spread(problem: Regression, weight: Array, R: Triangle, theta: Array, residual: Array | None = None) -> Spread:
-    """The standard errors of parameters that are those of least squares, or close to them.
+def standard_errors(
+    problem: Regression, weight: Array, R: Triangle, theta: Array, residual: Array | None = None
+) -> StandardErrors:
+    """Compute the standard errors of parameters of least squares, or close to them.
 
-    They come from the weighted residuals, or from others (K,) that stand in for them.
+    They come from the weighted residuals, or from a `residual` (K,) in place of them.
     """
     inverse = np.linalg.inv(R.U)
     root = np.sqrt(weight)
-    Q = ((inverse.T / R.scale) @ problem.Phi.T).T  # each column in one piece, as its transform wants it
+    Q = ((inverse.T / R.scale) @ problem.Phi.T).T  # columns contiguous, for their transform
     Q *= root[:, None]
     if residual is None:
         residual = root * (problem.tau - problem.Phi @ theta)
     degrees = int((weight > 0).sum()) - len(theta)
     classical = np.sqrt(residual @ residual / degrees * (inverse**2).sum(axis=1)) / R.scale
-    found = correlated(Q, residual, problem.starts, inverse / R.scale[:, None], degrees)
-    return Spread(classical, np.sqrt(found.variance), found.lags)
+    stated = correlated(Q, residual, problem.starts, inverse / R.scale[:, None], degrees)
+    return StandardErrors(classical, np.sqrt(stated.variance), stated.lags)

@@ -1,4 +1,4 @@
-"""How external effort is tracked: one module per filter, exporting `track` and `NAME`, listed below."""
+"""Filters that track the external effort: one module each, exporting `track` and `NAME`, listed below."""
 
 from collections.abc import Sequence
 from importlib import import_module
@@ -9,27 +9,27 @@ from davinci_forces.filters.problem import Driven, Filter, NoiseModel, Tracked
 
 FILTERS = ("ekf", "ekf_euler", "ekf_adaptive", "rts", "rate", "momentum", "direct")
 DEFAULT = "ekf"  # the others are compared with it
-DIVERGED = 50.0  # times what a consistent filter has of normalised innovations squared, on average
+MAX_NIS_RATIO = 50.0  # of the mean normalised innovation squared to 2, that of a consistent filter
 
 
 def tracker(name: str) -> Filter:
-    """The filter of that name."""
+    """Return the filter of that name."""
     track: Filter = import_module(f"davinci_forces.filters.{name}").track
     return track
 
 
 def title(name: str) -> str:
-    """What the filter of that name is called in a report."""
+    """Return the title of a filter in reports."""
     return str(import_module(f"davinci_forces.filters.{name}").NAME)
 
 
-def through(name: str, recordings: Sequence[Driven], noise: NoiseModel) -> Tracked:
-    """The pass of a filter over a recording with gaps: each starts it anew."""
+def through(name: str, parts: Sequence[Driven], noise: NoiseModel) -> Tracked:
+    """Run a filter over the parts of a recording between gaps; each part starts it anew."""
     track = tracker(name)
-    passes = [track(recording, noise) for recording in recordings]
+    passes = [track(part, noise) for part in parts]
     return Tracked(*(np.concatenate(columns) for columns in zip(*passes, strict=True)))
 
 
-def diverges(made: Tracked) -> bool:
-    """Whether a pass is nothing like what its filter assumes, so that nothing may be concluded from it."""
-    return not np.isfinite(made.tau_ext).all() or float(np.mean(made.nis)) > 2.0 * DIVERGED
+def diverges(tracked: Tracked) -> bool:
+    """Whether the innovations exceed what the filter assumes so far that its result is not usable."""
+    return not np.isfinite(tracked.tau_ext).all() or float(np.mean(tracked.nis)) > 2.0 * MAX_NIS_RATIO

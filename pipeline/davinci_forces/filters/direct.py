@@ -1,8 +1,6 @@
-"""The effort that the model leaves of every sample, with accelerations from measured motion.
+"""The measured effort less that of the model, sample by sample, at the measured motion q, dq and ddq.
 
-With the motion that is handed over, q, dq and ddq:
-
-    tau_ext = tau - M ddq - b(q, dq)                                                  (7.28)
+tau_ext = tau - M ddq - b(q, dq)                                                  (7.28)
 """
 
 import numpy as np
@@ -14,8 +12,8 @@ NAME = "Measured minus model"
 
 
 def track(recording: Driven, noise: NoiseModel) -> Tracked:
-    """As the motion that is handed over has it; its deviation is that of the noise of the effort."""
+    """Subtract the model's effort; the standard deviation is that of the effort's noise."""
     joint, q, dq, ddq, tau, T_s, _ = recording
     tau_ext = tau - joint.inertia * ddq - bias(joint.coefficients, q, dq, 0.0)[0] - joint.known
-    nothing = np.zeros(len(q))
-    return Tracked(q, dq, tau_ext, joint.inertia * noise.q_dq / T_s, nothing, nothing, nothing)
+    zeros = np.zeros(len(q))
+    return Tracked(q, dq, tau_ext, joint.inertia * noise.q_dq / T_s, zeros, zeros, zeros)

@@ -3,8 +3,8 @@
     f(x, u) = [dq, (u - b(q, dq) - tau_ext) / M, 0],    A = df/dx
     x[k+1] = x + T_s f + T_s^2 / 2 A f + w,    F = I + T_s A + T_s^2 / 2 A^2          (7.11)-(7.16), stepped further
 
-Forward Euler, as it is printed, leaves out half of T_s^2 times the acceleration, which is more than an encoder's noise
-(`ekf_euler`).  The process noise of the velocity comes of an acceleration that is constant over a sample.
+Forward Euler, as the source prints it (`ekf_euler`), omits T_s^2 / 2 times the acceleration, which exceeds an encoder's
+noise.  The process noise of the velocity is that of an acceleration that is constant over a sample.
 """
 
 from typing import Any
@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from davinci_forces.filters.problem import Driven, NoiseModel, Tracked
-from davinci_forces.filters.stepping import Belief, arguments, corrected, covariances, spread, transition
+from davinci_forces.filters.stepping import Belief, arguments, correct, covariances, predict, transition
 from davinci_forces.maths.compiled import cached
 from davinci_forces.maths.models.bias import Coefficients
 from davinci_forces.maths.signals.windows import SETTLE
@@ -29,9 +29,9 @@ def track(recording: Driven, noise: NoiseModel) -> Tracked:
 
 
 def log_likelihood(recording: Driven, noise: NoiseModel) -> float:
-    """Of the measurements (2 N), by the innovations: -1/2 sum of (i' S^-1 i + log det 2 pi S).
+    """Compute the log-likelihood of the measurements (2 N): -1/2 sum of (i' S^-1 i + log det 2 pi S).
 
-    The first second is left out, in which the filter forgets what it believed at first.
+    The first second is omitted, because the initial state still acts on it.
     """
     settle = min(round(SETTLE / recording.T_s), len(recording.q) // 2)
     return float(_likelihood(settle, *arguments(recording, noise)))
@@ -40,13 +40,13 @@ def log_likelihood(recording: Driven, noise: NoiseModel) -> float:
 def step(
     s: Belief, y: tuple[float, float], drive: float, M: float, c_b: Coefficients, T_s: float, noise: NoiseModel
 ) -> tuple[Belief, Belief]:
-    """One sample as it arrives: the belief after it, and the one that the next sample is to correct.
+    """Filter one sample as it arrives: return the corrected state, and its prediction for the next sample.
 
-    `s` is what the last step predicted, or `belief.first`; `y` are position and velocity, and `drive` is the effort
-    less what is known of others.  The same as `track`, number for number, when given the same drive and inertia M.
+    `s` is the last prediction, or `stepping.first`; `y` are position and velocity; `drive` is the effort less the known
+    effort of other joints.  The same as `track`, number for number, for the same drive and inertia M.
     """
-    now, after = _step(s, *y, drive, M, c_b, T_s, *covariances(noise, T_s))
-    return now, after
+    corrected, predicted = _step(s, *y, drive, M, c_b, T_s, *covariances(noise, T_s))
+    return corrected, predicted
 
 
 @cached
@@ -54,9 +54,9 @@ def _step(
     s: Any, y_q: float, y_dq: float, drive: float, M: float, c_b: Any, T_s: float, R_q: float, R_dq: float,
     Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float,
 ) -> Any:  # fmt: skip
-    now, _, _, _, _ = corrected(s, y_q, y_dq, R_q, R_dq)
-    q, dq, F, unsure = transition(now[0], now[1], now[2], now[6], drive, M, c_b, T_s, 0.5 * T_s * T_s)
-    return now, spread(now, q, dq, F, Q_qq, Q_qd, Q_dd + unsure, Q_tau)
+    now, _, _, _, _ = correct(s, y_q, y_dq, R_q, R_dq)
+    q, dq, F, friction_var = transition(now[0], now[1], now[2], now[6], drive, M, c_b, T_s, 0.5 * T_s * T_s)
+    return now, predict(now, q, dq, F, Q_qq, Q_qd, Q_dd + friction_var, Q_tau)
 
 
 @cached
@@ -65,13 +65,12 @@ def _pass(
     Q_qd: float, Q_dd: float, Q_tau: float, out_q: Any, out_dq: Any, out_tau: Any, out_std: Any, out_iq: Any,
     out_idq: Any, out_nis: Any,
 ) -> None:  # fmt: skip
-    """The loop."""
     for k in range(len(y_q)):
-        s, i_q, i_dq, nis, _ = corrected(s, y_q[k], y_dq[k], R_q, R_dq)
+        s, i_q, i_dq, nis, _ = correct(s, y_q[k], y_dq[k], R_q, R_dq)
         out_q[k], out_dq[k], out_tau[k], out_std[k] = s[0], s[1], s[2], s[8] ** 0.5
         out_iq[k], out_idq[k], out_nis[k] = i_q, i_dq, nis
-        q, dq, F, unsure = transition(s[0], s[1], s[2], s[6], drive[k], inertia[k], c_b, T_s, 0.5 * T_s * T_s)
-        s = spread(s, q, dq, F, Q_qq, Q_qd, Q_dd + unsure, Q_tau)
+        q, dq, F, friction_var = transition(s[0], s[1], s[2], s[6], drive[k], inertia[k], c_b, T_s, 0.5 * T_s * T_s)
+        s = predict(s, q, dq, F, Q_qq, Q_qd, Q_dd + friction_var, Q_tau)
 
 
 @cached
@@ -81,9 +80,9 @@ def _likelihood(
 ) -> float:  # fmt: skip
     total = 0.0
     for k in range(len(y_q)):
-        s, _, _, nis, det = corrected(s, y_q[k], y_dq[k], R_q, R_dq)
+        s, _, _, nis, det = correct(s, y_q[k], y_dq[k], R_q, R_dq)
         if k >= settle:
             total -= 0.5 * (nis + np.log(det)) + LOG_2_PI
-        q, dq, F, unsure = transition(s[0], s[1], s[2], s[6], drive[k], inertia[k], c_b, T_s, 0.5 * T_s * T_s)
-        s = spread(s, q, dq, F, Q_qq, Q_qd, Q_dd + unsure, Q_tau)
+        q, dq, F, friction_var = transition(s[0], s[1], s[2], s[6], drive[k], inertia[k], c_b, T_s, 0.5 * T_s * T_s)
+        s = predict(s, q, dq, F, Q_qq, Q_qd, Q_dd + friction_var, Q_tau)
     return total

@@ -1,10 +1,10 @@
-"""The extended Kalman filter as it is printed: forward Euler.
+"""The extended Kalman filter as the source prints it, with forward Euler steps.
 
     q[k+1]       = q + T_s dq + w_q
     dq[k+1]      = dq + T_s (tau - b(q, dq) - tau_ext) / M + w_dq
     tau_ext[k+1] = tau_ext + w_tau                                                        (7.11)-(7.16)
 
-What a step leaves out of position and velocity is process noise, by the root mean square of the recording.
+The error of a step in position and velocity counts as process noise, by its root mean square over the recording.
 """
 
 import numpy as np
@@ -19,7 +19,7 @@ def track(recording: Driven, noise: NoiseModel) -> Tracked:
     """Filter a recording: correct with y_k, then predict with tau_k.  (7.6), (7.7)"""
     T_s = recording.T_s
     jerk = np.gradient(recording.ddq, T_s) if len(recording.q) > 1 else np.zeros(1)
-    left_q, left_dq = (0.25 * T_s**4 * float(np.mean(x**2)) for x in (recording.ddq, jerk))
+    step_q_var, step_dq_var = (0.25 * T_s**4 * float(np.mean(x**2)) for x in (recording.ddq, jerk))
     model = kalman.states(recording, noise)._replace(order=1, doubts=False)
-    model.Q[:2, :2] = np.diag([noise.q_q**2 + left_q, noise.q_dq**2 + left_dq])
-    return Tracked(*kalman.filtered(recording, model))
+    model.Q[:2, :2] = np.diag([noise.q_q**2 + step_q_var, noise.q_dq**2 + step_dq_var])
+    return Tracked(*kalman.run_filter(recording, model))

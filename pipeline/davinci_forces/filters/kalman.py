@@ -3,7 +3,7 @@
     x = [q, dq, tau_ext, ...],    y = H x + v,    v ~ N(0, diag(R))                                              (7.6)
     x[k+1] = [f(q, dq, tau_ext), Phi x] + w,    w ~ N(0, Q)                                                      (7.7)
 
-f is the step of the joint's motion (`stepping`).  `ekf` is the same with three states, written out: it takes three
+f is the step of the joint's motion (`stepping`).  `ekf` is the same with three states, written out, which takes three
 quarters of the time.
 """
 
@@ -13,17 +13,17 @@ import numpy as np
 
 from davinci_forces.filters.ekf import LOG_2_PI
 from davinci_forces.filters.problem import Driven, NoiseModel
-from davinci_forces.filters.stepping import FIRST, columns, covariances, transition
+from davinci_forces.filters.stepping import INITIAL_VARIANCE_RATIO, columns, covariances, transition
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import cached
 
-LEAST, MOST = 0.1, 1e3  # of the variance of a measurement, between which it may follow the innovations
+MIN_NOISE_RATIO, MAX_NOISE_RATIO = 0.1, 1e3  # of an adapted measurement variance to the tuned one
 
 
 class States(NamedTuple):
-    """n states before the first sample, how they are measured, and how they move from one sample to the next.
+    """n initial states, their measurement model, and their motion from one sample to the next.
 
-    `Phi` is upper triangular; the filter fills in the rows of position and velocity.
+    `Phi` is upper triangular; the filter computes the rows of position and velocity.
     """
 
     x: tuple[float, ...]  # (n,)
@@ -34,29 +34,29 @@ class States(NamedTuple):
     in_q: tuple[int, ...] = (0,)  # the states whose sum is measured as position
     in_dq: tuple[int, ...] = (1,)  # the states whose sum is measured as velocity
     order: int = 2  # in T_s, of the step of the motion: 1 or 2
-    doubts: bool = True  # whether the sign of Coulomb friction is doubted where the velocity may be 0
-    forgets: float = 0.0  # share of the innovations' mean square forgotten over a sample, where R follows it; 0: never
+    doubts: bool = True  # whether the sign of Coulomb friction is uncertain where the velocity may be 0
+    forgets: float = 0.0  # share of the innovations' mean square forgotten a sample, where R adapts to it; 0: never
 
 
 def states(recording: Driven, noise: NoiseModel, n: int = 3) -> States:
-    """The states of `ekf`, and n - 3 others that are 0, stay as they are and are not measured."""
+    """Return the states of `ekf`, and n - 3 further states that are 0, constant and not measured."""
     R_q, R_dq, Q_qq, Q_qd, Q_dd, Q_tau = covariances(noise, recording.T_s)
     x, others = (float(recording.q[0]), float(recording.dq[0]), 0.0), [0.0] * (n - 3)
-    P = np.diag([FIRST * R_q, FIRST * R_dq, recording.first_std**2, *others])
+    P = np.diag([INITIAL_VARIANCE_RATIO * R_q, INITIAL_VARIANCE_RATIO * R_dq, recording.first_std**2, *others])
     Q = np.diag([Q_qq, Q_dd, Q_tau, *others])
     Q[0, 1] = Q[1, 0] = Q_qd
     return States((*x, *others), P, np.array([R_q, R_dq]), np.eye(n), Q)
 
 
-def filtered(recording: Driven, model: States) -> Array:
-    """The columns of `Tracked` (7, N): correct with y_k, then predict with tau_k.  (7.6), (7.7)"""
+def run_filter(recording: Driven, model: States) -> Array:
+    """Compute the columns of `Tracked` (7, N): correct with y_k, then predict with tau_k.  (7.6), (7.7)"""
     out = np.empty((7, len(recording.q)))
     _run(recording, model, len(recording.q), out)
     return out
 
 
 def log_likelihood(recording: Driven, model: States, settle: int) -> float:
-    """Of the measurements from sample `settle` on, by the innovations: -1/2 sum of (i' S^-1 i + log det 2 pi S)."""
+    """Compute the log-likelihood from sample `settle` on: -1/2 sum of (i' S^-1 i + log det 2 pi S)."""
     return _run(recording, model, settle, np.empty((7, len(recording.q))))
 
 
@@ -72,7 +72,7 @@ def _pass(
     settle: int, out: Any, start: Any, P: Any, in_q: Any, in_dq: Any, R_q: float, R_dq: float, F: Any, Q: Any, h: float,
     doubts: float, forgets: float, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float,
 ) -> float:  # fmt: skip
-    """The loop.  `start` is a tuple, whose length n the compiler knows: twice as fast."""
+    """Run the loop.  `start` is a tuple, whose length n the compiler knows: twice as fast."""
     n, first_q, first_dq, C_q, C_dq, total = len(start), R_q, R_dq, 0.0, 0.0, 0.0
     x, B, D, K, G = np.array(start), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, n))
     for k in range(len(y_q)):
@@ -89,11 +89,11 @@ def _pass(
         for i in in_dq:
             i_dq, s_dd = i_dq - x[i], s_dd + B[i, 1]
         if forgets > 0.0 and k > 0:
-            if k == 1:  # the first prediction knows the velocity
+            if k == 1:  # the first sample has set the velocity
                 C_q, C_dq = s_qq + R_q, s_dd + R_dq
             C_q, C_dq = C_q + forgets * (i_q * i_q - C_q), C_dq + forgets * (i_dq * i_dq - C_dq)
-            R_q = min(max(C_q - s_qq, LEAST * first_q), MOST * first_q)
-            R_dq = min(max(C_dq - s_dd, LEAST * first_dq), MOST * first_dq)
+            R_q = min(max(C_q - s_qq, MIN_NOISE_RATIO * first_q), MAX_NOISE_RATIO * first_q)
+            R_dq = min(max(C_dq - s_dd, MIN_NOISE_RATIO * first_dq), MAX_NOISE_RATIO * first_dq)
         s_qq, s_dd = s_qq + R_q, s_dd + R_dq
         det = s_qq * s_dd - s_qd * s_qd
         v_qq, v_qd, v_dd = s_dd / det, -s_qd / det, s_qq / det
@@ -112,10 +112,10 @@ def _pass(
         out[0, k], out[1, k], out[2, k], out[3, k] = x[0], x[1], x[2], P[2, 2] ** 0.5
         out[4, k], out[5, k], out[6, k] = i_q, i_dq, nis
         dq_var = doubts * P[1, 1]
-        x[0], x[1], top, unsure = transition(x[0], x[1], x[2], dq_var, drive[k], inertia[k], c_b, T_s, h)
+        x[0], x[1], top, friction_var = transition(x[0], x[1], x[2], dq_var, drive[k], inertia[k], c_b, T_s, h)
         for j in range(3):
             F[0, j], F[1, j] = top[j], top[3 + j]
-        for i in range(3, n):  # what moves the effort moves the velocity, to second order
+        for i in range(3, n):  # what changes the effort changes the velocity, to second order
             F[1, i] = -h / T_s / inertia[k] * F[2, i]
             x[1] += F[1, i] * x[i]
         for i in range(n):
@@ -136,5 +136,5 @@ def _pass(
                 for m in range(first, n):
                     p += F[i, m] * G[j, m]
                 P[i, j], P[j, i] = p, p
-        P[1, 1] += unsure
+        P[1, 1] += friction_var
     return total

@@ -1,10 +1,10 @@
-"""The observer of the generalised momentum (De Luca and Mattone 2003), the field's usual one.
+"""The observer of the generalised momentum (De Luca and Mattone 2003), the usual one of the field.
 
     p = M dq,    dp/dt = tau - b + dM/dt dq - tau_ext
     tau_ext^ = z - K p,    dz/dt = K (tau - b + dM/dt dq + K p - z)
 
-It sees the external effort through a first-order lag of 1 / K, and needs no acceleration.  K is that of a random walk
-of `q_tau` a sample seen through the noise of effort and velocity, so that filters are tuned alike.
+It returns the external effort through a first-order lag of 1 / K, without accelerations.  K is optimal for a random
+walk of `q_tau` a sample under the noise of effort and velocity, so all filters are tuned alike.
 """
 
 import numpy as np
@@ -17,7 +17,7 @@ NAME = "Momentum observer"
 
 
 def track(recording: Driven, noise: NoiseModel) -> Tracked:
-    """Exact over a sample of constant drive; its deviation is what noise of effort and velocity makes of it."""
+    """Run the observer, exact for a drive that is constant over a sample."""
     from scipy.signal import lfilter
 
     joint, q, dq, _, tau, T_s, first_std = recording
@@ -26,19 +26,19 @@ def track(recording: Driven, noise: NoiseModel) -> Tracked:
     p, turning = M * dq, (np.gradient(M, T_s) if len(M) > 1 else np.zeros(1)) * dq
     drive = tau - bias(joint.coefficients, q, dq, 0.0)[0] - joint.known + turning
     # z[k+1] = forgets z[k] + (1 - forgets) (drive[k] + K p[k]), from z[0] = K p[0]: no external effort at first.
-    driven, _ = lfilter([0.0, 1.0 - forgets], [1.0, -forgets], drive + K * p, zi=[K * p[0]])
-    return Tracked(q, dq, driven - K * p, deviation(M, K, forgets, T_s, noise, first_std), *np.zeros((3, len(q))))
+    z, _ = lfilter([0.0, 1.0 - forgets], [1.0, -forgets], drive + K * p, zi=[K * p[0]])
+    return Tracked(q, dq, z - K * p, deviation(M, K, forgets, T_s, noise, first_std), *np.zeros((3, len(q))))
 
 
 def gain(M: float, T_s: float, noise: NoiseModel) -> tuple[float, float]:
-    """K [1/s], and the share of itself that the observer keeps over a sample."""
+    """Compute K [1/s], and the factor by which the observer decays over a sample."""
     ratio = noise.q_tau * T_s / (M * float(np.hypot(noise.q_dq, noise.r_dq)))
     share = 0.5 * ratio * (np.sqrt(ratio**2 + 4.0) - ratio)
     return -float(np.log1p(-share)) / T_s, 1.0 - share
 
 
 def deviation(M: Array, K: float, forgets: float, T_s: float, noise: NoiseModel, first_std: float) -> Array:
-    """Noise of effort through the lag, that of velocity through what is left of it, and what was not known at first."""
-    through = (1.0 - forgets) / (1.0 + forgets)
-    settled = through * (M * noise.q_dq / T_s) ** 2 + (1.0 + through) * (K * M * noise.r_dq) ** 2
-    return np.asarray(np.sqrt(settled + (first_std * forgets ** np.arange(len(M))) ** 2))
+    """Compute the standard deviation (N,): lagged noise of effort and velocity, and initial uncertainty."""
+    ratio = (1.0 - forgets) / (1.0 + forgets)
+    noise_var = ratio * (M * noise.q_dq / T_s) ** 2 + (1.0 + ratio) * (K * M * noise.r_dq) ** 2
+    return np.asarray(np.sqrt(noise_var + (first_std * forgets ** np.arange(len(M))) ** 2))

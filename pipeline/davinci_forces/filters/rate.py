@@ -1,9 +1,9 @@
-"""A Kalman filter with the external effort and its rate as states: the rate walks, so that a ramp is followed.
+"""A Kalman filter with the external effort and its rate as states: the rate walks, so that the filter follows a ramp.
 
     d/dt tau_ext = rate,    rate[k+1] = rate[k] + w,    w ~ N(0, q_tau^2 / T_s^2)
 
-The motion is stepped as in `ekf`, with the sign of the velocity taken as known.  `q_tau` is what the rate gains over a
-sample, times the sample.
+The motion is stepped as in `ekf`, with the sign of the velocity taken as known.  `q_tau` is the standard deviation of
+the rate's change over a sample, times T_s.
 """
 
 import numpy as np
@@ -21,4 +21,4 @@ def track(recording: Driven, noise: NoiseModel) -> Tracked:
     model.P[3, 3] = recording.first_std**2
     model.Phi[2, 3] = T_s
     model.Q[2:, 2:] = noise.q_tau**2 / T_s**2 * np.array([[T_s**2 / 3.0, T_s / 2.0], [T_s / 2.0, 1.0]])
-    return Tracked(*kalman.filtered(recording, model))
+    return Tracked(*kalman.run_filter(recording, model))

@@ -1,9 +1,10 @@
-"""The smoother: every state from the whole recording, before and after it.
+"""The smoother: every state estimated from the whole recording, before and after it.
 
-The filter's pass forwards, then backwards the recursion of Bryson and Frazier (in the form of Bierman 1973), which is
-that of Rauch, Tung and Striebel without an inverse of P:
+The filter runs forwards, then the recursion of Bryson and Frazier backwards (in the form of Bierman 1973).  It equals
+that of Rauch, Tung and Striebel, without an inverse of P:
 
-    l~ = -H' S^-1 i + (I - K H)' l^,    L~ = H' S^-1 H + (I - K H)' L^ (I - K H)
+    l~ = -H' S^-1 i + (I - K H)' l^,    L~ = H' S^-1 H + (I - K H)' L^ (I - K H),
+
     x|N = x- - P- l~,    P|N = P- - P- L~ P-,    l^ = F' l~ and L^ = F' L~ F one sample earlier
 """
 
@@ -12,13 +13,13 @@ from typing import Any
 import numpy as np
 
 from davinci_forces.filters.problem import Driven, NoiseModel, Tracked
-from davinci_forces.filters.stepping import arguments, corrected, gains, spread, transition
+from davinci_forces.filters.stepping import arguments, correct, gains, predict, transition
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import cached
 
 NAME = "Smoother"
-LEFT = 1e-12  # of a variance, below which a difference from it is rounding
-STORED = 15  # of each sample: what was predicted, and the transition to the next
+MIN_VARIANCE_SHARE = 1e-12  # of the predicted variance: below it a smoothed one is rounding
+STORED = 15  # numbers of each sample: the prediction, and the transition to the next
 
 
 def track(recording: Driven, noise: NoiseModel) -> Tracked:
@@ -30,7 +31,7 @@ def track(recording: Driven, noise: NoiseModel) -> Tracked:
 
 
 def forwards(recording: Driven, noise: NoiseModel) -> tuple[Array, Array]:
-    """The filter's innovations and NIS (3, N), and of each sample (N, `STORED`) its prediction and F to the next."""
+    """Return the filter's innovations and NIS (3, N), and its predictions and F of each sample (N, `STORED`)."""
     out, stored = np.empty((3, len(recording.q))), np.empty((len(recording.q), STORED))
     _forwards(stored, *arguments(recording, noise), *out)
     return out, stored
@@ -44,12 +45,12 @@ def _forwards(
     for k in range(len(y_q)):
         for i in range(9):
             stored[k, i] = s[i]
-        s, i_q, i_dq, nis, _ = corrected(s, y_q[k], y_dq[k], R_q, R_dq)
+        s, i_q, i_dq, nis, _ = correct(s, y_q[k], y_dq[k], R_q, R_dq)
         out_iq[k], out_idq[k], out_nis[k] = i_q, i_dq, nis
-        q, dq, F, unsure = transition(s[0], s[1], s[2], s[6], drive[k], inertia[k], c_b, T_s, 0.5 * T_s * T_s)
+        q, dq, F, friction_var = transition(s[0], s[1], s[2], s[6], drive[k], inertia[k], c_b, T_s, 0.5 * T_s * T_s)
         for i in range(6):
             stored[k, 9 + i] = F[i]
-        s = spread(s, q, dq, F, Q_qq, Q_qd, Q_dd + unsure, Q_tau)
+        s = predict(s, q, dq, F, Q_qq, Q_qd, Q_dd + friction_var, Q_tau)
 
 
 @cached
@@ -77,8 +78,8 @@ def _backwards(
         out_q[k] = row[0] - a * l1 - b * l2 - c * l3
         out_dq[k] = row[1] - b * l1 - d * l2 - e * l3
         out_tau[k] = row[2] - c * l1 - e * l2 - f * l3
-        told = c * (c * L11 + 2 * (e * L12 + f * L13)) + e * (e * L22 + 2 * f * L23) + f * f * L33
-        out_std[k] = max(f - told, LEFT * f) ** 0.5
+        reduction = c * (c * L11 + 2 * (e * L12 + f * L13)) + e * (e * L22 + 2 * f * L23) + f * f * L33
+        out_std[k] = max(f - reduction, MIN_VARIANCE_SHARE * f) ** 0.5
         if k > 0:
             before = stored[k - 1]
             f11, f12, f13, f21, f22, f23 = before[9], before[10], before[11], before[12], before[13], before[14]

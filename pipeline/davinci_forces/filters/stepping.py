@@ -3,10 +3,10 @@
     f(x, u) = [dq, (u - b(q, dq) - tau_ext) / M, 0],    A = df/dx
     x[k+1] = x + T_s f + T_s^2 / 2 A f + w,    F = I + T_s A + T_s^2 / 2 A^2          (7.11)-(7.16), stepped further
 
-Where the velocity passes through 0, nobody knows the sign of Coulomb friction: it is c_f erf(dq / sqrt(2 P_dq)) on
-average, and c_f^2 (1 - erf^2) about that, which counts as noise of the drive.
+Where the velocity passes through 0, the sign of Coulomb friction is uncertain.  The friction's mean is then
+c_f erf(dq / sqrt(2 P_dq)), and its variance c_f^2 (1 - erf^2) counts as noise of the drive.
 
-What a filter believes of one joint, corrected by a measurement and carried to the next sample.
+A filter corrects its belief of one joint by a measurement, and predicts it for the next sample.
 
     x = [q, dq, tau_ext],    y = [q, dq] + v,    v ~ N(0, diag(r_q^2, r_dq^2))                      (7.6), (7.11)-(7.16)
 
@@ -24,26 +24,26 @@ from davinci_forces.maths.models.bias import COULOMB
 from davinci_forces.maths.models.kernels import bias
 
 TINY = 1e-300
-# The first position and velocity are as measured, and count for nothing beside what is measured: 10^6 times the
-# variance.  More than that would leave the smoother without digits.
-FIRST = 1e6
+# Of the first position and velocity to the measurement's variance: they then weigh nothing beside what is measured.
+# More than that would leave the smoother without digits.
+INITIAL_VARIANCE_RATIO = 1e6
 
 
 def arguments(recording: Driven, noise: NoiseModel) -> tuple[Any, ...]:
-    """A recording and its noise as the compiled passes take them."""
+    """Return a recording and its noise as the compiled passes take them."""
     before = first(float(recording.q[0]), float(recording.dq[0]), noise.r_q, noise.r_dq, recording.first_std)
     return (before, *columns(recording), *covariances(noise, recording.T_s))
 
 
 def columns(recording: Driven) -> tuple[Any, ...]:
-    """Position, velocity, drive and inertia (N,) of a recording, the coefficients of its bias, and T_s."""
+    """Return position, velocity, drive and inertia (N,) of a recording, the coefficients of its bias, and T_s."""
     joint = recording.joint
     samples = (recording.q, recording.dq, recording.tau - joint.known, joint.inertia)
     return (*(np.ascontiguousarray(x, float) for x in samples), joint.coefficients, recording.T_s)
 
 
 def covariances(noise: NoiseModel, T_s: float) -> tuple[float, float, float, float, float, float]:
-    """R of q and dq, and Q: of q, of q and dq together, of dq, and of the external effort."""
+    """Return R of q and dq, and Q: of q, the covariance of q and dq, of dq, and of the external effort."""
     r_q, r_dq, q_q, q_dq, q_tau = map(float, noise)
     return r_q**2, r_dq**2, q_q**2 + (0.5 * T_s * q_dq) ** 2, 0.5 * T_s * q_dq**2, q_dq**2, q_tau**2
 
@@ -52,18 +52,18 @@ def covariances(noise: NoiseModel, T_s: float) -> tuple[float, float, float, flo
 def transition(
     q: float, dq: float, tau_ext: float, dq_var: float, drive: float, M: float, c_b: Any, T_s: float, h: float
 ) -> Any:
-    """Position and velocity one sample later, F, and the variance that a doubtful sign adds to the velocity.
+    """Step position and velocity by a sample; return them, F, and the velocity variance of an uncertain friction sign.
 
-    h is T_s^2 / 2; with 0 it is forward Euler's step.
+    h is T_s^2 / 2; with 0 the step is forward Euler's.
     """
     b, b_q, b_dq = bias(c_b, q, dq, 0.0)
-    likely = math.erf(dq / math.sqrt(2.0 * dq_var + TINY))
-    b += c_b[COULOMB] * (likely - np.sign(dq))
-    unsure = (T_s * c_b[COULOMB] / M) ** 2 * (1.0 - likely * likely)
+    sign = math.erf(dq / math.sqrt(2.0 * dq_var + TINY))
+    b += c_b[COULOMB] * (sign - np.sign(dq))
+    friction_var = (T_s * c_b[COULOMB] / M) ** 2 * (1.0 - sign * sign)
     a_q, a_dq, a_tau = -b_q / M, -b_dq / M, -1.0 / M
     ddq, of_dq = (drive - b - tau_ext) / M, T_s + h * a_dq
     F = (1.0 + h * a_q, of_dq, h * a_tau, of_dq * a_q, 1.0 + of_dq * a_dq + h * a_q, of_dq * a_tau)
-    return q + T_s * dq + h * ddq, dq + T_s * ddq + h * (a_q * dq + a_dq * ddq), F, unsure
+    return q + T_s * dq + h * ddq, dq + T_s * ddq + h * (a_q * dq + a_dq * ddq), F, friction_var
 
 
 Belief = tuple[float, float, float, float, float, float, float, float, float]
@@ -71,13 +71,14 @@ Transition = tuple[float, float, float, float, float, float]  # F = [f11 f12 f13
 
 
 def first(q: float, dq: float, r_q: float, r_dq: float, first_std: float) -> Belief:
-    """Before the first sample, at its position and velocity; not the printed x = 0 and P = Q_0.  (7.6)"""
-    return q, dq, 0.0, FIRST * r_q * r_q, 0.0, 0.0, FIRST * r_dq * r_dq, 0.0, first_std * first_std
+    """Return the initial belief: at the first position and velocity, not the printed x = 0 and P = Q_0.  (7.6)"""
+    q_var, dq_var = INITIAL_VARIANCE_RATIO * r_q * r_q, INITIAL_VARIANCE_RATIO * r_dq * r_dq
+    return q, dq, 0.0, q_var, 0.0, 0.0, dq_var, 0.0, first_std * first_std
 
 
 @compiled
 def gains(s: Any, R_q: float, R_dq: float) -> Any:
-    """S^-1 (3 numbers) and K = P H' S^-1 (6, row by row), and det S."""
+    """Compute S^-1 (3 numbers), K = P H' S^-1 (6, row by row), and det S."""
     _, _, _, a, b, c, d, e, _ = s
     s_qq, s_dd = a + R_q, d + R_dq
     det = s_qq * s_dd - b * b
@@ -92,10 +93,10 @@ def gains(s: Any, R_q: float, R_dq: float) -> Any:
 
 
 @compiled
-def corrected(s: Any, y_q: float, y_dq: float, R_q: float, R_dq: float) -> Any:
-    """The belief after a measurement, the innovations, their normalised square and det S.  (7.6)
+def correct(s: Any, y_q: float, y_dq: float, R_q: float, R_dq: float) -> Any:
+    """Correct a belief by a measurement; return it, the innovations, their normalised square and det S.  (7.6)
 
-    Joseph form, P = (I - K H) P (I - K H)' + K R K', symmetric and positive for any gain.
+    Joseph form: P = (I - K H) P (I - K H)' + K R K', symmetric and positive for any gain.
     """
     x_q, x_dq, x_tau, a, b, c, d, e, f = s
     v_qq, v_qd, v_dd, k11, k12, k21, k22, k31, k32, det = gains(s, R_q, R_dq)
@@ -120,8 +121,8 @@ def corrected(s: Any, y_q: float, y_dq: float, R_q: float, R_dq: float) -> Any:
 
 
 @compiled
-def spread(s: Any, q: float, dq: float, F: Any, Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float) -> Any:
-    """The belief at the next sample: q and dq are there, P is F P F' + Q.  (7.7)"""
+def predict(s: Any, q: float, dq: float, F: Any, Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float) -> Any:
+    """Predict the belief at the next sample, of position q and velocity dq: P is F P F' + Q.  (7.7)"""
     _, _, tau_ext, a, b, c, d, e, f = s
     f11, f12, f13, f21, f22, f23 = F
     n11, n12, n13 = f11 * a + f12 * b + f13 * c, f11 * b + f12 * d + f13 * e, f11 * c + f12 * e + f13 * f

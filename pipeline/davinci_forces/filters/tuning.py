@@ -1,8 +1,8 @@
-"""The noise that the filter assumes of a joint, from recordings in which nothing touches it.
+"""Tune the noise of a joint's filter on recordings in which nothing touches the robot.
 
-The noise of position, velocity and drive is that of the greatest likelihood of the innovations (section 7.3); how much
-the external effort may walk is the least that shows a push, because where there is no effort the likelihood wants a
-filter that is deaf.
+The noise of position, velocity and drive maximises the likelihood of the innovations (section 7.3).  The random walk of
+the external effort is the slowest that follows a push.  By likelihood it would be 0 without external effort, and the
+filter would then follow none.
 """
 
 from collections.abc import Sequence
@@ -15,53 +15,53 @@ from davinci_forces.filters.response import slowest
 from davinci_forces.maths.arrays import Array
 
 ROUNDS = 4  # of likelihood and push in turn
-FARTHEST = np.log(1e3)  # that the likelihood may take a deviation from where it starts
-MOST = 20_000  # samples of each recording that the likelihood is of
+MAX_LOG_CHANGE = np.log(1e3)  # of a standard deviation, from where the search starts
+MAX_SAMPLES_TUNING = 20_000  # of each recording
 
 
 def tuned(recordings: Sequence[Driven], start: NoiseModel, inertia: float, viscous: float) -> NoiseModel:
-    """The noise of a joint, all recordings taken together; `start` is what is known of it without the filter.
+    """Tune the noise of a joint to all recordings together, from `start`, an estimate without the filter.
 
-    `inertia` is the largest along the recordings: with it the filter is slowest.
+    `inertia` is the largest along the recordings, with which the filter is slowest.
     """
     from scipy.optimize import minimize
 
     T_s = recordings[0].T_s
-    some = [recording.part(slice(MOST)) for recording in recordings]
-    noise, known = start, np.log([start.r_q, start.r_dq, start.q_dq])
-    away = np.zeros(len(known))
+    parts = [recording.part(slice(MAX_SAMPLES_TUNING)) for recording in recordings]
+    noise, center = start, np.log([start.r_q, start.r_dq, start.q_dq])
+    change = np.zeros(len(center))
     for _ in range(ROUNDS):
         noise = noise._replace(q_tau=slowest(ekf.track, inertia, viscous, T_s, noise))
         walk = noise.q_tau
 
-        def unlikely(away: Array, walk: float = walk) -> float:
-            if np.abs(away).max() > FARTHEST:
+        def cost(change: Array, walk: float = walk) -> float:
+            if np.abs(change).max() > MAX_LOG_CHANGE:
                 return np.inf
-            return -sum(ekf.log_likelihood(part, of(known + away, walk)) for part in some)
+            return -sum(ekf.log_likelihood(part, noise_of(center + change, walk)) for part in parts)
 
-        # Starting points at a distance: the likelihood of one alone may be flat.
-        simplex = away + np.vstack([np.zeros(3), 0.5 * np.eye(3)])
-        away = minimize(
-            unlikely, away, method="Nelder-Mead", options={"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-2}
+        # The first simplex is wide, because the likelihood may be flat near its start.
+        simplex = change + np.vstack([np.zeros(3), 0.5 * np.eye(3)])
+        change = minimize(
+            cost, change, method="Nelder-Mead", options={"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-2}
         ).x
-        noise = of(known + away, walk)
+        noise = noise_of(center + change, walk)
     return noise._replace(q_tau=slowest(ekf.track, inertia, viscous, T_s, noise))
 
 
-def of(logarithms: Array, q_tau: float) -> NoiseModel:
-    """The noise by the logarithms of its deviations."""
+def noise_of(logarithms: Array, q_tau: float) -> NoiseModel:
+    """Return the noise from the logarithms of its standard deviations r_q, r_dq and q_dq."""
     r_q, r_dq, q_dq = np.exp(logarithms).tolist()
     return NoiseModel(r_q, r_dq, 0.0, q_dq, q_tau)
 
 
 def likeliest_walk(recordings: Sequence[Driven], noise: NoiseModel) -> float:
-    """The walk of a sample that makes the innovations likeliest: where effort is present, as in section 7.3."""
+    """Find the `q_tau` of greatest likelihood, for recordings with external effort, as in section 7.3."""
     from scipy.optimize import minimize_scalar
 
-    def unlikely(logarithm: float) -> float:
+    def cost(logarithm: float) -> float:
         walk = noise._replace(q_tau=float(np.exp(logarithm)))
         return -sum(ekf.log_likelihood(part, walk) for part in recordings)
 
-    own = noise.q_tau or float(np.std(recordings[0].tau)) * recordings[0].T_s
-    found = minimize_scalar(unlikely, bounds=(np.log(own) - FARTHEST, np.log(own) + FARTHEST), method="bounded")
-    return float(np.exp(found.x))
+    start = np.log(noise.q_tau or float(np.std(recordings[0].tau)) * recordings[0].T_s)
+    best = minimize_scalar(cost, bounds=(start - MAX_LOG_CHANGE, start + MAX_LOG_CHANGE), method="bounded")
+    return float(np.exp(best.x))

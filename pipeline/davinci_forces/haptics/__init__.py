@@ -1,1 +1,1 @@
-"""The simulated hand that feels tissue through the arm."""
+"""Haptic feedback: a hand against tissue, simulated with device, link, arm and filter."""

@@ -1,6 +1,6 @@
-"""What is simulated of a hand that feels: hand, device, link, arm, filter, tissue and plan, read from a TOML file.
+"""Scenarios of haptic feedback: hand, device, link, arm, filter, tissue and plan, read from a TOML file.
 
-What the file leaves out is that of the experiment of section 8.4, and of body, noise and tissue that of the study.
+Defaults are those of the experiment of section 8.4; body, noise and tissue may come from a study instead.
 """
 
 import math
@@ -18,21 +18,21 @@ from davinci_forces.maths.simulation.actuators import Cascade, Device, Motors
 from davinci_forces.robots.from_toml import NAME
 from davinci_forces.toml import TomlTable
 
-LONGEST = 2_000_000  # ticks
-LATEST = 5.0  # [s] of a delay
+MAX_TICKS = 2_000_000  # of one simulation
+MAX_DELAY = 5.0  # [s] of positions or forces on the link
 
 
 class BadHaptics(PipelineError):
-    """A scenario of a hand that feels breaks its contract; every problem is listed, each with its place."""
+    """A haptic scenario is invalid; the message lists every problem with its place."""
 
 
 class Body(NamedTuple):
-    """What slides, and its friction."""
+    """The sliding body and its friction."""
 
     inertia: float  # [kg]
-    gravity: float  # [N] of the effort that holds it
+    gravity: float  # [N] effort that holds its weight
     viscous: float  # [N s/m]
-    coulomb: tuple[float, float]  # [N] up and down
+    coulomb: tuple[float, float]  # [N] upwards, downwards
     static: tuple[float, float]
     stribeck_velocity: float = 0.01  # [m/s]
     bristle_stiffness: float = 0.0  # [N/m]; 0 for none
@@ -40,22 +40,22 @@ class Body(NamedTuple):
 
 
 class AxisNoise(NamedTuple):
-    """Standard deviations of what is measured."""
+    """Standard deviations of the measurement noise."""
 
     q: float  # [m]
     dq: float  # [m/s]
     tau: float  # [N]
 
 
-# The instrument slide of the demonstration study, where neither a file nor a study says another: its links of Tables
-# 4.1 and 4.2 with the friction and the noise of Table 6.6.
+# The default is the instrument slide of the demonstration study: the links of Tables 4.1 and 4.2 with the friction and
+# the noise of Table 6.6.
 SLIDE = Body(2.0036, -2.04048, 3.2723, (3.984, 3.984), (3.984, 3.984))
 SLIDE_NOISE = AxisNoise(5e-7, 5e-4, 1.3454)
 MOTOR = Motors(*(np.array([x]) for x in (1340.0, 0.0438, 2.0, 3e-4, 5.0, 48.0, 9.587379924285257e-5)))
 LAW = Cascade(*(np.array([x]) for x in (30.0, 7.5, 0.0160, 4.02, 0.6, 2000.0, 4e-4)))
 DEVICE = Device(motion=1.0, force=1.0, strongest=math.inf, step=0.0)
-FIRM = Hand(1.0, 40.0, 500.0)  # an arm that is tensed
-# Section 8.4: fast in and out for 8 s, fast away from the tissue to 15 s, then slowly in.
+FIRM = Hand(1.0, 40.0, 500.0)  # a tensed arm
+# Section 8.4: fast in and out for 8 s, fast away from the tissue until 15 s, then slowly in.
 PLAN = (
     (0.0, -0.04), (1.0, 0.03), (2.0, -0.04), (3.0, 0.035), (4.0, -0.04), (5.0, 0.025), (6.0, -0.04), (7.0, 0.03),
     (8.0, -0.09), (8.7, -0.01), (9.4, -0.09), (10.1, -0.01), (10.8, -0.09), (11.5, -0.01), (12.2, -0.09),
@@ -65,35 +65,35 @@ PLAN = (
 
 @dataclass(frozen=True)
 class HapticScenario:
-    """A simulated experiment; None is for a study to say."""
+    """A simulated experiment; a study replaces the fields that are None."""
 
     title: str = "Section 8.4: in and out of tissue"
     seed: int = 8
     hands: tuple[tuple[str, Hand], ...] = (("thesis", THESIS), ("firm", FIRM))
     device: Device = DEVICE
-    reach: float = 0.15  # [m] of the device to either side, from the tissue's surface
+    reach: float = 0.15  # [m] of the device, to either side of the tissue's surface
     link_rate: float = 100.0  # [Hz], chapter 9
-    position_delay: float = 0.0  # [s] of the link, beside that of its rate
+    position_delay: float = 0.0  # [s] of the link, besides the wait for a message
     force_delay: float = 0.0
     tick: float = 5e-4  # [s] of the motor drivers
     rate: float = 100.0  # [Hz] of the controller, its sensors and the filter
-    exact: bool = False  # whether the arm is wherever it is told to be
+    exact: bool = False  # whether the arm follows its reference without error
     motor: Motors = MOTOR
     law: Cascade = LAW
     stops: tuple[float, float] = (-0.13, 0.09)  # [m] from the tissue's surface
     body: Body | None = None
     noise: AxisNoise | None = None
-    known: Body | None = None  # what the filter takes the body for
+    assumed_body: Body | None = None  # by the filter
     filtered: bool = True  # by the extended Kalman filter; else the true force is sent
-    q_tau: float = 0.0  # random walk of its external effort [N/s^0.5]; 0 is the slowest that shows a push
+    q_tau: float = 0.0  # random walk of the external effort [N/s^0.5]; 0 selects the slowest that shows a push
     stiffness: float | None = None  # [N/m]
     damping: float = 5.0  # [N s/m]
-    friction: float = 0.05  # along the tool, over the force that presses
-    plan: tuple[tuple[float, float], ...] = PLAN  # where the hand is that feels nothing: [s], [m] from the surface
+    friction: float = 0.05  # friction force along the tool over pressing force
+    plan: tuple[tuple[float, float], ...] = PLAN  # path without felt force: [s], [m] from the surface
 
     @property
     def duration(self) -> float:
-        """Of the plan [s]."""
+        """The duration of the plan [s]."""
         return self.plan[-1][0] - self.plan[0][0]
 
 
@@ -112,47 +112,47 @@ def read(file: Path) -> HapticScenario:
 
 
 def scenario_of(table: TomlTable) -> HapticScenario:
-    """The scenario that the whole of a file describes; its problems are noted."""
-    usual = HapticScenario()
+    """Build the scenario of a whole file, and note its problems."""
+    default = HapticScenario()
     link, arm, tissue = table.table("link"), table.table("arm"), table.table("tissue")
     device = table.table("device")
-    filtered, q_tau, known = _filter(table.table("filter"))
+    filtered, q_tau, assumed_body = _filter(table.table("filter"))
     scenario = HapticScenario(
-        title=table.text("title", usual.title),
-        seed=table.whole("seed", usual.seed),
-        hands=_hands(table) or usual.hands,
+        title=table.text("title", default.title),
+        seed=table.whole("seed", default.seed),
+        hands=_hands(table) or default.hands,
         device=_device(device),
-        reach=device.number("reach", usual.reach, above=0.0),
-        link_rate=link.number("rate", usual.link_rate, above=0.0),
+        reach=device.number("reach", default.reach, above=0.0),
+        link_rate=link.number("rate", default.link_rate, above=0.0),
         position_delay=_delay(link, "position_delay"),
         force_delay=_delay(link, "force_delay"),
-        tick=arm.number("tick", usual.tick, above=0.0),
-        rate=arm.number("rate", usual.rate, above=0.0),
+        tick=arm.number("tick", default.tick, above=0.0),
+        rate=arm.number("rate", default.rate, above=0.0),
         exact=arm.text("follows", "cascade", ("cascade", "exactly")) == "exactly",
-        motor=Motors(*_ones(arm.table("motor"), usual.motor)),
-        law=Cascade(*_ones(arm.table("control"), usual.law)),
-        stops=_stops(arm, usual.stops),
+        motor=Motors(*_joint_arrays(arm.table("motor"), default.motor)),
+        law=Cascade(*_joint_arrays(arm.table("control"), default.law)),
+        stops=_stops(arm, default.stops),
         body=_body(arm.table("body")) if "body" in arm else None,
         noise=_noise(arm.table("noise")) if "noise" in arm else None,
-        known=known,
+        assumed_body=assumed_body,
         filtered=filtered,
         q_tau=q_tau,
         stiffness=tissue.number("stiffness", above=0.0) if "stiffness" in tissue else None,
-        damping=tissue.number("damping", usual.damping, low=0.0),
-        friction=_below_one(tissue, "friction", usual.friction),
+        damping=tissue.number("damping", default.damping, low=0.0),
+        friction=_below_one(tissue, "friction", default.friction),
         plan=_plan(table),
     )
     for part in (device, link, arm, tissue, table):
         part.close()
     _check_clocks(link, arm, scenario)
     if scenario.exact and scenario.filtered:
-        said = 'an arm that follows exactly has no effort to make a force of; write use = "none" in [filter]'
-        arm.problem(said, "follows")
+        message = 'an arm that follows exactly has no effort to estimate a force from; write use = "none" in [filter]'
+        arm.problem(message, "follows")
     return scenario
 
 
 def _hands(table: TomlTable) -> tuple[tuple[str, Hand], ...]:
-    """Every [[hand]]."""
+    """Read every [[hand]]."""
     hands = []
     for entry in table.tables("hand"):
         name = entry.text("name")
@@ -176,24 +176,24 @@ def _device(table: TomlTable) -> Device:
 
 def _delay(table: TomlTable, key: str) -> float:
     delay = table.number(key, 0.0, low=0.0)
-    if delay > LATEST:
-        table.problem(f"{key} must be at most {LATEST:g} s, not {delay:g}; it is in seconds", key)
+    if delay > MAX_DELAY:
+        table.problem(f"{key} must be at most {MAX_DELAY:g} s, not {delay:g}; it is in seconds", key)
     return delay
 
 
-def _ones(table: TomlTable, usual: Motors | Cascade) -> list[np.ndarray]:
-    """The numbers of one joint; what a motor is made of must be positive, but its encoder's step."""
-    positive = isinstance(usual, Motors)
+def _joint_arrays(table: TomlTable, default: Motors | Cascade) -> list[np.ndarray]:
+    """Read the numbers of one joint; those of a motor must be positive, except its encoder step."""
+    positive = isinstance(default, Motors)
     columns = []
-    for key, value in zip(type(usual)._fields, usual, strict=True):
+    for key, value in zip(type(default)._fields, default, strict=True):
         above = 0.0 if positive and key != "encoder_step" else -math.inf
         columns.append(np.array([table.number(key, float(value[0]), low=0.0, above=above)]))
     table.close()
     return columns
 
 
-def _stops(table: TomlTable, usual: tuple[float, float]) -> tuple[float, float]:
-    low, high = table.numbers("stops", list(usual), count=2) or usual
+def _stops(table: TomlTable, default: tuple[float, float]) -> tuple[float, float]:
+    low, high = table.numbers("stops", list(default), count=2) or default
     if low >= high:
         table.problem(f"stops must be lower and upper, not {low:g} and {high:g}", "stops")
     return low, high
@@ -220,7 +220,7 @@ def _body(table: TomlTable) -> Body:
 def _pair(table: TomlTable, key: str, default: tuple[float, float] | None) -> tuple[float, float]:
     up, down = table.numbers(key, list(default) if default else None, count=2) or (1.0, 1.0)
     if min(up, down) < 0.0:
-        table.problem(f"{key} must be two numbers, up and down, that are not negative, not {[up, down]}", key)
+        table.problem(f"{key} must be two numbers that are not negative, up and down, but is {[up, down]}", key)
     return up, down
 
 
@@ -231,18 +231,18 @@ def _noise(table: TomlTable) -> AxisNoise:
 
 
 def _filter(table: TomlTable) -> tuple[bool, float, Body | None]:
-    """What makes a force of the readings: whether a filter does, its walk, and what it takes the body for."""
+    """Read whether a filter estimates the force, its random walk, and the body that it assumes."""
     filtered = table.text("use", "ekf", ("ekf", "none")) == "ekf"
     q_tau = table.number("q_tau", 0.0, low=0.0)
-    known = _body(table.table("body")) if "body" in table else None
+    assumed_body = _body(table.table("body")) if "body" in table else None
     table.close()
-    return filtered, q_tau, known
+    return filtered, q_tau, assumed_body
 
 
 def _below_one(table: TomlTable, key: str, default: float) -> float:
     value = table.number(key, default, low=0.0)
     if value >= 1.0:
-        table.problem(f"{key} must be below 1, as tissue never pulls, not {value:g}", key)
+        table.problem(f"{key} must be below 1, not {value:g}, because tissue never pulls", key)
     return value
 
 
@@ -256,12 +256,12 @@ def _plan(table: TomlTable) -> tuple[tuple[float, float], ...]:
 
 
 def _check_clocks(link: TomlTable, arm: TomlTable, scenario: HapticScenario) -> None:
-    """Note where the clocks do not fit each other, or there is too much to go through."""
+    """Note rates that are no whole number of ticks, and a simulation that is too long."""
     ticks = scenario.duration / scenario.tick
-    if ticks > LONGEST:
-        arm.problem(f"{ticks:.3g} ticks cannot be gone through; at most {LONGEST} can", "tick")
+    if ticks > MAX_TICKS:
+        arm.problem(f"{ticks:.3g} ticks are too many to simulate; use at most {MAX_TICKS}", "tick")
     for table, rate in ((link, scenario.link_rate), (arm, scenario.rate)):
         turn = 1.0 / rate / scenario.tick if rate * scenario.tick > 0.0 else math.nan
         if math.isfinite(turn) and (abs(turn - round(turn)) > 1e-6 or round(turn) < 1):
-            said = f"a period of {rate:g} Hz must be whole ticks of {scenario.tick:g} s, not {turn:g} of them"
-            table.problem(said, "rate")
+            message = f"the period at {rate:g} Hz must be a whole number of ticks of {scenario.tick:g} s, not {turn:g}"
+            table.problem(message, "rate")

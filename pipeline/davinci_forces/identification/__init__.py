@@ -1,1 +1,1 @@
-"""Which models describe the joints: candidates, their scores, and the choice among them."""
+"""Models of the joints: candidates, their scores, and the choice among them."""

@@ -1,4 +1,4 @@
-"""The models that there are to choose from, each with the normal equations of all logs, made once for all of them.
+"""All candidate models, with the normal equations of all logs, which the candidates of a library share.
 
 A library is a model with every friction that may be added; a candidate is some of its columns, and a ridge.
 """
@@ -19,42 +19,42 @@ from davinci_forces.robots.models import ARM, AddedFriction, Reach, coupled, fri
 from davinci_forces.robots.robot import Robot
 
 RIDGES = {"independent": (0.0, 1e-3), "coupled": (1e-4, 1e-3, 1e-2, 3e-2)}
-WEIGHED_BY = Ridge(1e-3, np.ones(1), np.empty((0, 0)))
-POSES = 50  # of each log, at which an inertia has to be positive definite
+WEIGHTS_RIDGE = Ridge(1e-3, np.ones(1), np.empty((0, 0)))
+POSES = 50  # of each log, at which the inertia has to be positive definite
 
 
 class Library(NamedTuple):
-    """A model with all friction there is, and the equations of its efforts."""
+    """A model with all candidate friction, and the equations of its efforts."""
 
     model: CoupledArm | IndependentJoint
     logs: tuple[Observed, ...]
     added: tuple[tuple[Term, ...], ...]  # of each effort
-    samples: Integers  # of each effort (m,), that the equations are made of
+    samples: Integers  # (m,) number behind the equations of each effort
     by_block: Equations
     by_period: Equations
     inertias: Array  # (S, m, m, p) with M = inertias theta, along the trajectories
 
     def columns(self, friction: AddedFriction, reaches: dict[str, Reach]) -> list[int]:
-        """The parameters of a candidate: the model's own, and those of one friction."""
+        """Return the indices of a candidate's parameters: those of the model, and those of one friction."""
         suffixes = [f" of {effort}" if len(self.model.efforts) > 1 else "" for effort in self.model.efforts]
-        own = zip(self.model.efforts, suffixes, self.added, strict=True)
-        numbers = {f"{t.name}{end}": (effort, t) for effort, end, terms in own for t in terms}
-        kept = []
+        efforts = zip(self.model.efforts, suffixes, self.added, strict=True)
+        added = {f"{t.name}{suffix}": (effort, t) for effort, suffix, terms in efforts for t in terms}
+        indices = []
         for i, parameter in enumerate(self.model.parameters):
-            effort, term = numbers.get(parameter.name, ("", None))
+            effort, term = added.get(parameter.name, ("", None))
             wanted = {(t.width, t.faded, t.displacement) for t in friction.terms(reaches[effort])} if term else set()
             if term is None or (term.width, term.faded, term.displacement) in wanted:
-                kept.append(i)
-        return kept
+                indices.append(i)
+        return indices
 
     @property
     def combination(self) -> Array:
-        """How inertial parameters enter the first of the model's; none of a joint by itself."""
+        """The combination of inertial parameters in the first of the model's; empty for a single joint."""
         return self.model.base.combination if isinstance(self.model, CoupledArm) else np.empty((0, 0))
 
 
 class Candidate(NamedTuple):
-    """A structure with a friction and a ridge: one model, or one a joint."""
+    """A structure with a friction and a ridge: one model, or one per joint."""
 
     structure: str
     shared: bool  # whether the joints share parameters
@@ -65,41 +65,46 @@ class Candidate(NamedTuple):
 
     @property
     def variant(self) -> str:
-        """The model by name, as fits are named."""
+        """The name of the model, as in fits."""
         return f"{self.structure}+{self.friction.variant}".removesuffix("+")
 
     @property
     def estimator(self) -> str:
-        """How its parameters are found."""
+        """The name of its estimator."""
         return "ridge" if self.strength else "lse"
 
     @property
     def name(self) -> str:
-        """What tells it from the others."""
+        """Unique name."""
         friction = f"+{self.friction}" if self.friction.variant else ""
-        how = ", joint by joint" if self.structure == "coupled" and not self.shared else ""
+        separate = ", joint by joint" if self.structure == "coupled" and not self.shared else ""
         ridge = f", ridge {self.strength:g}" if self.strength else ""
-        return f"{self.structure}{friction}{how}{ridge}"
+        return f"{self.structure}{friction}{separate}{ridge}"
 
     def ridges(self) -> Iterator[Ridge]:
-        """How the parameters of each library are found."""
+        """Return the ridge of each library."""
         for library, weights in zip(self.libraries, self.weights, strict=True):
             yield Ridge(self.strength, weights, library.combination)
 
     def size(self, reaches: dict[str, Reach]) -> int:
-        """How many parameters it has."""
+        """Return the number of parameters."""
         return sum(len(library.columns(self.friction, reaches)) for library in self.libraries)
 
-    def judged(self, schemes: Sequence[Booleans], reaches: dict[str, Reach], by_period: bool = False) -> Judged:
-        """Its errors on what is left out; raises LinAlgError where the rest does not tell its parameters apart."""
+    def cross_validate(
+        self, schemes: Sequence[Booleans], reaches: dict[str, Reach], by_period: bool = False
+    ) -> Judged | None:
+        """Compute its errors on data left out; None where the remaining data do not separate its parameters."""
         parts = []
         for library, ridge in zip(self.libraries, self.ridges(), strict=True):
             cells = library.by_period if by_period else library.by_block
-            parts.append(judged(cells.columns(library.columns(self.friction, reaches)), ridge, schemes))
+            try:
+                parts.append(judged(cells.columns(library.columns(self.friction, reaches)), ridge, schemes))
+            except np.linalg.LinAlgError:
+                return None
         return together(parts)
 
     def parameters(self, reaches: dict[str, Reach], out: Booleans | None = None) -> list[Array]:
-        """Theta of each library from all cells, or without some of them."""
+        """Fit theta of each library to all cells, or without some of them."""
         thetas = []
         for library, ridge in zip(self.libraries, self.ridges(), strict=True):
             cells = library.by_block.columns(library.columns(self.friction, reaches))
@@ -107,17 +112,17 @@ class Candidate(NamedTuple):
         return thetas
 
     def models(self, robot: Robot, reaches: dict[str, Reach]) -> list[Model]:
-        """The model of each library, of this friction alone."""
-        made: list[Model] = []
+        """Return the model of each library, with this friction only."""
+        models: list[Model] = []
         for library in self.libraries:
             efforts, group = library.model.efforts, library.model.group
             added = [self.friction.terms(reaches[effort]) for effort in efforts]
             if self.structure == "independent":
-                made.append(independent(robot.joint(group), added[0], self.friction.variant))
+                models.append(independent(robot.joint(group), added[0], self.friction.variant))
             else:
                 rows = [library.model.joints.index(effort) for effort in efforts]
-                made.append(coupled(robot, rows, added, self.friction.variant, group))
-        return made
+                models.append(coupled(robot, rows, added, self.friction.variant, group))
+        return models
 
     def is_physical(self, reaches: dict[str, Reach]) -> bool:
         """Whether the inertia is positive definite along the trajectories."""
@@ -136,45 +141,45 @@ def candidates(
     reaches: dict[str, Reach],
     count: int,
 ) -> list[Candidate]:
-    """Everything to choose from: `separate` are the logs of each joint by itself, `arm` those of all joints together,
-    of `count` logs.
+    """Return all candidate models of `count` logs.
+
+    `separate` are the logs of each joint by itself, `arm` those of all joints together.
     """
     added = {name: every_term(reach) for name, reach in reaches.items()}
-    alone = tuple(
+    independents = tuple(
         library(independent(robot.joint(name), added[name]), logs, (added[name],), count)
         for name, logs in separate.items()
     )
-    made = [*of("independent", False, alone, tuple(np.ones(1) for _ in alone))]
+    models = variants("independent", False, independents, [np.ones(1)] * len(independents))
     if not arm:
-        return made
+        return models
     rows = [i for i, joint in enumerate(robot.joints) if joint.name in separate]
-    each = {row: of_rows(robot, [row], arm, added, count) for row in rows}
-    variance = {row: residual_variance(part, reaches) for row, part in each.items()}
-    made += of("coupled", False, tuple(each.values()), tuple(np.ones(1) for _ in each))
+    libraries = [coupled_library(robot, [row], arm, added, count) for row in rows]
+    models += variants("coupled", False, tuple(libraries), [np.ones(1)] * len(libraries))
     if share_parameters(robot, rows):
-        weights = np.array([1.0 / variance[row] for row in rows])
-        made += of("coupled", True, (of_rows(robot, rows, arm, added, count),), (weights,))
-    return made
+        weights = np.array([1.0 / residual_variance(part, reaches) for part in libraries])
+        models += variants("coupled", True, (coupled_library(robot, rows, arm, added, count),), [weights])
+    return models
 
 
 def share_parameters(robot: Robot, rows: Sequence[int]) -> bool:
-    """Whether joints (indices) may have the parameters of links in common: not where a drive's gain is between."""
+    """Whether joints (indices) may share the parameters of links; a drive of unknown gain prevents it."""
     return len(rows) > 1 and not any(robot.joints[row].effort for row in rows)
 
 
-def of_rows(
+def coupled_library(
     robot: Robot, rows: Sequence[int], arm: tuple[Observed, ...], added: dict[str, tuple[Term, ...]], count: int
 ) -> Library:
-    """Joints (indices) of a coupled arm that share parameters."""
+    """Return the library of joints (indices) of a coupled arm that share parameters."""
     names = [robot.joints[row].name for row in rows]
     terms = tuple(added[name] for name in names)
     return library(coupled(robot, rows, terms, group=ARM if len(rows) > 1 else names[0]), arm, terms, count)
 
 
-def of(structure: str, shared: bool, libraries: tuple[Library, ...], weights: tuple[Array, ...]) -> list[Candidate]:
-    """Every friction and ridge of a structure."""
+def variants(structure: str, shared: bool, libraries: tuple[Library, ...], weights: Sequence[Array]) -> list[Candidate]:
+    """Return the candidates of a structure, with every friction and ridge."""
     return [
-        Candidate(structure, shared, friction, strength, libraries, weights)
+        Candidate(structure, shared, friction, strength, libraries, tuple(weights))
         for friction in frictions()
         for strength in RIDGES[structure]
     ]
@@ -183,13 +188,13 @@ def of(structure: str, shared: bool, libraries: tuple[Library, ...], weights: tu
 def library(
     model: CoupledArm | IndependentJoint, logs: tuple[Observed, ...], added: tuple[tuple[Term, ...], ...], count: int
 ) -> Library:
-    """A model with its equations."""
+    """Return a model with its equations."""
     poses = np.concatenate([log.motion.q[:: max(1, len(log.tau) // POSES)] for log in logs])
     return Library(model, logs, added, *equations(model, logs, count), model.inertia_columns(poses))
 
 
 def every_term(reach: Reach) -> tuple[Term, ...]:
-    """All friction that may be added to a joint, each once."""
+    """Return all friction that may be added to a joint, each term once."""
     terms = {(t.width, t.faded, t.displacement): t for friction in frictions() for t in friction.terms(reach)}
     slow = sorted(t.displacement for t in terms.values() if t.displacement)
     others = (t for t in terms.values() if not t.displacement)
@@ -197,15 +202,15 @@ def every_term(reach: Reach) -> tuple[Term, ...]:
 
 
 def residual_variance(part: Library, reaches: dict[str, Reach]) -> float:
-    """What a joint of a coupled arm leaves, by parameters of its own and without further friction."""
+    """Return the residual variance of a joint of a coupled arm, with its own parameters and no added friction."""
     cells = part.by_block.columns(part.columns(AddedFriction(""), reaches))
-    whole = cells.of(np.ones(len(cells.gram), np.bool_))
-    theta = solve(whole, WEIGHED_BY._replace(combination=part.combination))
-    return float(whole.errors(theta)[0, 0])
+    total = cells.of(np.ones(len(cells.gram), np.bool_))
+    theta = solve(total, WEIGHTS_RIDGE._replace(combination=part.combination))
+    return float(total.errors(theta)[0, 0])
 
 
 def reach_of(logs: Sequence[Observed], joint: str) -> Reach:
-    """How far and how fast a joint moves where it does not stand still, over all logs that move it."""
+    """Return the range and the speed of a joint's motion, over all logs that move it."""
     ranges, squares, count = [0.0], 0.0, 0
     for log in logs:
         i = [record.joint for record in log.records].index(joint)

@@ -1,4 +1,4 @@
-"""Choosing among candidates, and the parameters of those that are fitted."""
+"""The choice among candidates, and the parameters of those that are fitted."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -26,12 +26,12 @@ from davinci_forces.maths.selection import (
 from davinci_forces.robots.models import Reach
 from davinci_forces.robots.robot import Robot
 
-NOTHING = 1e-8  # of the effort's square, below which it costs nothing that the solver would tell
+NOTHING = 1e-8  # of the effort's square: a smaller excess is within the solver's accuracy
 
 
 @dataclass(frozen=True, eq=False)
 class Selection:
-    """Candidates with their scores, one of them chosen."""
+    """Candidates with their scores, the chosen one, the best one, and the reason of the choice."""
 
     candidates: tuple[Candidate, ...]
     physical: tuple[bool, ...]
@@ -45,7 +45,7 @@ class Selection:
 
 
 class BlockEstimate(NamedTuple):
-    """Parameters (p,) with their standard errors: residuals taken as uncorrelated, and from blocks left out."""
+    """Parameters (p,) with their standard errors: for uncorrelated residuals, and from blocks left out."""
 
     theta: Array
     theta_std_classical: Array
@@ -57,117 +57,107 @@ class BlockEstimate(NamedTuple):
 
 
 def selected(candidates: Sequence[Candidate], reaches: dict[str, Reach], count: int) -> Selection | None:
-    """Judge every candidate on the same groups, and choose one; None where none can be judged."""
-    schemes = possible(candidates, count)
-    judged = [(c, made) for c in candidates if (made := judge(c, schemes, reaches)) is not None] if schemes else []
-    if not judged:
+    """Cross-validate all candidates on the same groups, and choose one; None if none can be refitted."""
+    schemes = usable_schemes(candidates, count)
+    pairs = [(c, errors) for c in candidates if (errors := c.cross_validate(schemes, reaches))] if schemes else []
+    if not pairs:
         return None
-    kept, verdicts = (list(column) for column in zip(*judged, strict=True))
-    physical = [c.is_physical(reaches) for c in kept]
-    eligible = physical if any(physical) else [True] * len(kept)
-    sizes = [c.size(reaches) for c in kept]
-    chosen, best = preferred(verdicts, sizes, eligible)
+    models, results = (list(column) for column in zip(*pairs, strict=True))
+    physical = [c.is_physical(reaches) for c in models]
+    eligible = physical if any(physical) else [True] * len(models)
+    sizes = [c.size(reaches) for c in models]
+    chosen, best = preferred(results, sizes, eligible)
     return Selection(
-        candidates=tuple(kept),
+        candidates=tuple(models),
         physical=tuple(physical),
-        score=np.array([verdict.score for verdict in verdicts]),
-        score_std=np.array([standard_error(verdict) for verdict in verdicts]),
-        training=np.array([verdict.training.mean() for verdict in verdicts]),
-        over_periods=np.array([over_periods(c, reaches, count) for c in kept]),
-        chosen=kept[chosen],
-        best=kept[best],
-        why=reason(kept, verdicts, sizes, chosen, best),
+        score=np.array([result.score for result in results]),
+        score_std=np.array([standard_error(result) for result in results]),
+        training=np.array([result.training.mean() for result in results]),
+        over_periods=np.array([over_periods(c, reaches, count) for c in models]),
+        chosen=models[chosen],
+        best=models[best],
+        why=reason(models, results, sizes, chosen, best),
     )
 
 
-def judge(
-    candidate: Candidate, schemes: Sequence[Booleans], reaches: dict[str, Reach], by_period: bool = False
-) -> Judged | None:
-    """A candidate's errors on what is left out; None where the rest does not tell its parameters apart."""
-    try:
-        return candidate.judged(schemes, reaches, by_period)
-    except np.linalg.LinAlgError:
-        return None
-
-
-def possible(candidates: Sequence[Candidate], count: int) -> list[Booleans]:
-    """The schemes of leaving out in which something of every effort is left in each refit."""
+def usable_schemes(candidates: Sequence[Candidate], count: int) -> list[Booleans]:
+    """Return the schemes of leaving out in which each refit has data of every effort."""
     log, block = np.repeat(np.arange(count), BLOCKS), np.tile(np.arange(BLOCKS), count)
-    every = {id(library): library.by_block.squares for c in candidates for library in c.libraries}
-    squares = np.concatenate(list(every.values()), axis=1)
+    by_library = {id(library): library.by_block.squares for c in candidates for library in c.libraries}
+    squares = np.concatenate(list(by_library.values()), axis=1)
     return [groups for groups in left_out(log, block) if all(bool((squares[~g].sum(axis=0) > 0).all()) for g in groups)]
 
 
 def over_periods(candidate: Candidate, reaches: dict[str, Reach], count: int) -> float:
-    """The score on periods left out, which repeat the path of those that are kept; NaN where a path does not."""
+    """Return the score on periods left out, of the same path as the fitted ones; NaN where a path does not repeat."""
     number = np.tile(np.arange(MOST), count)
     squares = np.concatenate([library.by_period.squares for library in candidate.libraries], axis=1)
     groups = np.array([number == k for k in range(MOST) if squares[number == k].any()])
     if len(groups) < 2 or not all((squares[~group].sum(axis=0) > 0).all() for group in groups):
         return float("nan")
-    judged = judge(candidate, [groups], reaches, by_period=True)
-    return judged.score if judged else float("nan")
+    errors = candidate.cross_validate([groups], reaches, by_period=True)
+    return errors.score if errors else float("nan")
 
 
-def reason(candidates: Sequence[Candidate], verdicts: Sequence[Judged], sizes: Sequence[int], i: int, best: int) -> str:
-    """Why a candidate was chosen, in words, and whether a larger one only fitted better."""
-    own = f"{candidates[i].name} errs by {verdicts[i].score:.4f} of the effort where it was not fitted"
+def reason(candidates: Sequence[Candidate], results: Sequence[Judged], sizes: Sequence[int], i: int, best: int) -> str:
+    """State why a candidate was chosen, and whether one that fits better overfits."""
+    text = f"{candidates[i].name} has an out-of-sample error of {results[i].score:.4f} of the effort"
     if i == best:
-        said = f"{own}, less than any other"
+        text += ", less than any other"
     else:
-        behind = verdicts[i].score - verdicts[best].score
-        doubt = standard_error(verdicts[i], verdicts[best])
-        said = (
-            f"{own}; the best, {candidates[best].name}, by {behind:.4f} less, which with a standard error of "
-            f"{doubt:.4f} is not clearly better, and it has {sizes[best]} parameters for {sizes[i]}"
+        difference = results[i].score - results[best].score
+        text += (
+            f"; the best, {candidates[best].name}, errs by {difference:.4f} less, with a standard error of "
+            f"{standard_error(results[i], results[best]):.4f}: it is not clearly better, and has {sizes[best]} "
+            f"parameters instead of {sizes[i]}"
         )
-    training = [verdict.training.mean() for verdict in verdicts]
+    training = [result.training.mean() for result in results]
     closest = int(np.argmin(training))
-    if verdicts[closest].score > verdicts[i].score:
-        said += (
-            f"; {candidates[closest].name} fits better ({training[closest]:.4f} for {training[i]:.4f}) and predicts "
-            f"worse ({verdicts[closest].score:.4f}): it overfits"
+    if results[closest].score > results[i].score:
+        text += (
+            f"; {candidates[closest].name} fits better ({training[closest]:.4f} instead of {training[i]:.4f}) and "
+            f"predicts worse ({results[closest].score:.4f}): it overfits"
         )
-    return said
+    return text
 
 
 def parameters(
     candidate: Candidate, robot: Robot, reaches: dict[str, Reach], count: int
 ) -> Iterator[tuple[Model, Library, BlockEstimate]]:
-    """What a candidate's parameters are, one model at a time, from all data."""
+    """Fit a candidate's parameters to all data, one model at a time."""
     block = np.tile(np.arange(BLOCKS), count)
-    whole = candidate.parameters(reaches)
-    without = [candidate.parameters(reaches, block == b) for b in range(BLOCKS)]
-    each = zip(candidate.models(robot, reaches), candidate.libraries, candidate.ridges(), strict=True)
-    for i, (model, library, ridge) in enumerate(each):
-        theta, thetas = whole[i], np.array([part[i] for part in without])
+    fits = candidate.parameters(reaches)
+    refits = [candidate.parameters(reaches, block == b) for b in range(BLOCKS)]
+    models = zip(candidate.models(robot, reaches), candidate.libraries, candidate.ridges(), strict=True)
+    for i, (model, library, ridge) in enumerate(models):
+        theta, thetas = fits[i], np.array([refit[i] for refit in refits])
         cells = library.by_block.columns(library.columns(candidate.friction, reaches))
-        together = cells.of(np.ones(len(cells.gram), np.bool_))
-        errors, samples = together.errors(theta)[0], library.samples
+        total = cells.of(np.ones(len(cells.gram), np.bool_))
+        errors, samples = total.errors(theta)[0], library.samples
         jackknife = (BLOCKS - 1) / BLOCKS * ((thetas - thetas.mean(axis=0)) ** 2).sum(axis=0)
         estimate = BlockEstimate(
             theta=theta,
-            theta_std_classical=np.sqrt(np.diag(covariance(together, ridge, errors / samples))),
+            theta_std_classical=np.sqrt(np.diag(covariance(total, ridge, errors / samples))),
             theta_std=np.sqrt(jackknife),
             samples=int(samples.max()),
             mse=float((errors / samples).sum()),
-            r2=float(1.0 - errors.sum() / together.squares[0].sum()),
-            condition=float(np.sqrt(np.linalg.cond(scaled_equations(together, ridge)[0]))),
+            r2=float(1.0 - errors.sum() / total.squares[0].sum()),
+            condition=float(np.sqrt(np.linalg.cond(scaled_equations(total, ridge)[0]))),
         )
         yield model, library, estimate
 
 
-class Held(NamedTuple):
-    """Parameters that a mechanism can have, and what each effort's model errs by with them and without."""
+class ConsistentFit(NamedTuple):
+    """Parameters that a mechanism can have, and the error of each effort (m,) with them and with free ones."""
 
     estimate: BlockEstimate
     rmse: Array  # (m,)
     rmse_free: Array  # (m,)
-    excess: float  # of the criterion over its least, as a share of the effort's square
+    excess: float  # of the criterion over its minimum, as a share of the effort's square
 
 
-def held(model: Model, library: Library, equations: Equations, ridge: Ridge, free: BlockEstimate) -> Held:
-    """The parameters nearest to a candidate's that a mechanism can have, from the equations (of one cell) of all logs.
+def held(model: Model, library: Library, equations: Equations, ridge: Ridge, free: BlockEstimate) -> ConsistentFit:
+    """Fit the parameters nearest to a candidate's that a mechanism can have, to the equations (one cell) of all logs.
 
     The standard errors stay the candidate's, as those of the estimator `consistent` stay least squares'.
 
@@ -176,17 +166,17 @@ def held(model: Model, library: Library, equations: Equations, ridge: Ridge, fre
     NotIdentifiable
         If the conic program is not solved.
     """
-    made = nearest(factor(equations, ridge), model.mechanism)
-    errors, squares = equations.errors(made.theta)[0], float(equations.squares.sum())
+    fit = nearest(factor(equations, ridge), model.mechanism)
+    errors, squares = equations.errors(fit.theta)[0], float(equations.squares.sum())
     estimate = free._replace(
-        theta=made.theta, mse=float((errors / library.samples).sum()), r2=float(1.0 - errors.sum() / squares)
+        theta=fit.theta, mse=float((errors / library.samples).sum()), r2=float(1.0 - errors.sum() / squares)
     )
     rmse, rmse_free = (np.sqrt(x / library.samples) for x in (errors, equations.errors(free.theta)[0]))
-    return Held(estimate, rmse, rmse_free, made.excess)
+    return ConsistentFit(estimate, rmse, rmse_free, fit.excess)
 
 
 def factor(equations: Equations, ridge: Ridge) -> Triangle:
-    """A triangle that asks for the same parameters as a ridge: |U D theta - y|^2 but for a constant.
+    """Factor a ridge problem into |U D theta - y|^2 plus a constant, which has the same parameters.
 
     U' U = D^-1 (G + lambda P) D^-1, and U' y = D^-1 r
     """

@@ -1,4 +1,4 @@
-"""The model of each joint along a log: what a filter is to know of it, and the effort that a fit gives for it."""
+"""The model of each joint along a log, as a filter takes it, and the effort of a fit along it."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -15,36 +15,36 @@ from davinci_forces.records import Fit, JointModel, Motion, Prediction
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.robots.models import ARM
 
-# What a record calls the coefficients of the bias, in their order in `maths.models.bias`.
+# The fields of a record for the coefficients of the bias, in their order in `maths.models.bias`.
 BIAS = ("constant", "gravity_sine", "gravity_cosine", "spring", "viscous", "coulomb", "presliding")
-LEAST = 1e-3  # of the largest singular value: what a log tells less well stays as it was
+MIN_SINGULAR_SHARE = 1e-3  # of the largest singular value: less certain combinations are not refitted
 
 
 class Along:
-    """What fits say of the joints of one log; what the joints of an arm share is worked out once."""
+    """The models of fits along one log; what the joints of an arm share is computed once."""
 
     def __init__(self, identified: Identified, motions: Iterable[Motion | JointModel]) -> None:
         self.identified = identified
-        self._motions = {motion.joint: recorded_motion(motion) for motion in motions}  # whose other columns may go
+        self._motions = {motion.joint: recorded_motion(motion) for motion in motions}  # the other columns may be freed
         self._efforts: dict[tuple[str, ...], Array] = {}
         self._dynamics: dict[tuple[str, ...], tuple[JointDynamics, ...]] = {}
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """The joints that the log holds."""
+        """The joints in the log."""
         return tuple(self._motions)
 
     def held(self, joint: str) -> set[str]:
-        """The joints that the log holds on the clock of one of them."""
+        """Return the joints of the log that share the clock of one of them."""
         length = len(self._motions[joint].q)
-        return {other for other, motion in self._motions.items() if len(motion.q) == length}
+        return {name for name, motion in self._motions.items() if len(motion.q) == length}
 
     def motion(self, fit: Fit) -> ArmMotion:
-        """The motion that a fit's model takes, low-passed; the log has to hold its joints."""
+        """Return the low-passed motion of the joints of a fit's model, which the log has to hold."""
         return joined_motion([self._motions[name] for name in self.identified.model(fit).joints])
 
     def tau_hat(self, fit: Fit, joint: str) -> Array:
-        """The effort (N,) that a fit gives for a joint."""
+        """Compute the effort (N,) of a joint by a fit."""
         model = self.identified.model(fit)
         tau_hat = self._efforts.get(fit.key)
         if tau_hat is None:
@@ -54,7 +54,7 @@ class Along:
         return np.ascontiguousarray(tau_hat[:, model.efforts.index(joint)])
 
     def dynamics(self, fit: Fit, joint: str) -> JointDynamics:
-        """What a filter is to know of a joint by a fit.  (7.15), (7.16)"""
+        """Compute the dynamics of a joint by a fit, as a filter takes them.  (7.15), (7.16)"""
         model = self.identified.model(fit)
         dynamics = self._dynamics.get(fit.key) or model.joint_dynamics(fit.theta, self.motion(fit))
         if fit.group == ARM:
@@ -62,7 +62,7 @@ class Along:
         return dynamics[model.efforts.index(joint)]
 
     def by(self, fit: Fit, joint: str) -> dict[str, Any]:
-        """The fields of a JointModel that follow from a fit."""
+        """Return the fields of a JointModel that follow from a fit."""
         dynamics = self.dynamics(fit, joint)
         return {
             "model": fit.model, "estimator": fit.estimator, "inertia": dynamics.inertia, "tau_known": dynamics.known,
@@ -71,13 +71,13 @@ class Along:
         }  # fmt: skip
 
     def under(self, model: JointModel, fit: Fit) -> JointModel:
-        """A joint under another fit; refits that had not seen it there are none of."""
+        """Return a joint's model by another fit, without predictions of unseen data."""
         unknown: dict[str, Any] = {"scheme": "", "path_unseen": "", "tau_hat_unseen": np.full(len(model), np.nan)}
         return replace(model, **self.by(fit, model.joint), **unknown)
 
 
 def refits_of(predictions: Iterable[Prediction], used: dict[str, Fit], setting: str) -> dict[str, Prediction]:
-    """What refits that left data of a log out predict of each joint, in place of the fit that describes it."""
+    """Return the out-of-sample prediction of each joint that belongs to the fit in use."""
     refits: dict[str, Prediction] = {}
     for prediction in predictions:
         fit = used.get(prediction.joint)
@@ -88,22 +88,22 @@ def refits_of(predictions: Iterable[Prediction], used: dict[str, Fit], setting: 
 
 
 def at_samples(prediction: Prediction, motion: Motion) -> Array:
-    """The predicted effort (N,) at the samples of a recording; NaN at those that are not predicted."""
+    """Return the predicted effort (N,) at the samples of a recording; NaN at those that are not predicted."""
     half = 0.5 / motion.rate
     at = np.minimum(np.searchsorted(prediction.t, motion.t - half), len(prediction) - 1)
     return np.where(np.abs(prediction.t[at] - motion.t) < half, prediction.tau_hat[at], np.nan)
 
 
 def refitted(joint: JointModel, fit: Fit, along: Along, free: Booleans) -> Array:
-    """tau_hat (N,) of a fit corrected by least squares of what it leaves of a joint's log, over the free samples (N,).
+    """Correct tau_hat (N,) of a fit by least squares on its residual along a joint's log, over the free samples (N,).
 
     Phi (theta + D d),    d = arg min |tau - tau_hat - Phi D d|,    D scales each column of Phi to length 1
     """
     model = along.identified.model(fit)
     regressor = model.regressor(along.motion(fit))
-    told = free & regressor.known
+    valid = free & regressor.known
     Phi = regressor.Phi[:, model.efforts.index(joint.joint)]
-    length = np.linalg.norm(Phi[told], axis=0)
+    length = np.linalg.norm(Phi[valid], axis=0)
     scale = np.divide(1.0, length, out=np.zeros_like(length), where=length > 0)
-    d, *_ = np.linalg.lstsq(Phi[told] * scale, (joint.tau - joint.tau_hat)[told], rcond=LEAST)
+    d, *_ = np.linalg.lstsq(Phi[valid] * scale, (joint.tau - joint.tau_hat)[valid], rcond=MIN_SINGULAR_SHARE)
     return np.asarray(joint.tau_hat + Phi @ (scale * d))

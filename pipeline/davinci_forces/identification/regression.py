@@ -1,4 +1,4 @@
-"""Records as motions and regressions: averaged periods to be fitted, and recordings whose effort is to be predicted."""
+"""Records as motions and regressions: averaged periods for fits, and recordings for predictions."""
 
 from collections.abc import Sequence
 
@@ -7,8 +7,7 @@ import numpy as np
 from davinci_forces.estimators.problem import NOTHING, Known, Regression
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.independent import IndependentJoint
-from davinci_forces.maths.models.memory import efforts
-from davinci_forces.maths.models.model import ArmMotion, Model
+from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.maths.models.physical import ROUNDING, Box, lumping
 from davinci_forces.maths.periods.harmonics import kept_noise
 from davinci_forces.maths.signals.standstill import standing
@@ -17,9 +16,9 @@ from davinci_forces.robots.robot import Joint
 
 
 def pose(model: IndependentJoint, trajectories: Sequence[Trajectory], known: Known = NOTHING) -> Regression:
-    """The least squares problem of one joint: the averaged periods of all its logs, one after the other.  (6.37)
+    """Return the least squares problem of a joint: the averaged periods of all its logs, one after the other.  (6.37)
 
-    What stands still counts as if it had not been recorded: friction takes any value there.
+    Samples at standstill have weight 0, because friction is undetermined there.
     """
     lengths = [len(t) for t in trajectories]
     return Regression(
@@ -35,13 +34,13 @@ def pose(model: IndependentJoint, trajectories: Sequence[Trajectory], known: Kno
 
 
 def stands_still(t: Trajectory) -> Booleans:
-    """Where an averaged period (K,), which goes on as it began, stands still."""
+    """Return the samples (K,) of an averaged period at which the joint stands still; the period repeats."""
     q, dq = np.tile(t.q, 3), np.tile(t.dq, 3)
     return standing(q, dq, np.zeros(len(q), np.int64), len(t.q) / t.period)[len(t.q) : 2 * len(t.q)]
 
 
 def row_covariance(model: IndependentJoint, t: Trajectory) -> Array:
-    """The covariance (p, p) of the errors of a row of Phi, which noise of the averaged motion makes; its mean.
+    """Compute the mean covariance (p, p) of a row of Phi by the noise of the averaged motion.
 
     cov(Phi_k) = J_k cov(q, dq, ddq) J_k' / M,    J_k the derivatives of Phi by the motion.
     """
@@ -51,7 +50,7 @@ def row_covariance(model: IndependentJoint, t: Trajectory) -> Array:
 
 
 def joined(parts: Sequence[Regression]) -> Regression:
-    """The least squares problem of several parts together."""
+    """Return the least squares problem of several parts together."""
     ends = np.cumsum([0, *(len(p.tau) for p in parts[:-1])]).tolist()
     noises = [p.Phi_cov for p in parts if p.Phi_cov is not None]
     return Regression(
@@ -67,38 +66,33 @@ def joined(parts: Sequence[Regression]) -> Regression:
 
 
 def averaged_motion(trajectory: Trajectory) -> ArmMotion:
-    """One averaged period of a joint, which repeats."""
+    """Return the motion of one averaged period of a joint, which repeats."""
     q, dq, ddq = (x[:, None] for x in (trajectory.q, trajectory.dq, trajectory.ddq))
     return ArmMotion(q, dq, ddq, trajectory.period / len(q), np.zeros(len(q), np.int64), periodic=True)
 
 
 def recorded_motion(record: Motion | JointModel) -> ArmMotion:
-    """The low-passed motion of a joint of one recording."""
+    """Return the low-passed motion of a joint of one recording."""
     return ArmMotion(record.q[:, None], record.dq[:, None], record.ddq[:, None], 1.0 / record.rate, record.segment)
 
 
 def joined_motion(motions: Sequence[ArmMotion]) -> ArmMotion:
-    """The motion of several joints of one recording, in this order, which share a clock."""
+    """Join the motions of several joints of one recording, in this order, which share a clock."""
     if len(motions) == 1:
         return motions[0]
     q, dq, ddq = (np.concatenate(columns, axis=1) for columns in zip(*(m[:3] for m in motions), strict=True))
     return motions[0]._replace(q=q, dq=dq, ddq=ddq)
 
 
-def predicted(model: Model, theta: Array, motion: ArmMotion, effort: int = 0) -> Array:
-    """One of the model's efforts (N,) along a motion."""
-    return np.ascontiguousarray(efforts(model, theta, motion)[:, effort])
-
-
 def known_of(joint: Joint) -> Known:
-    """The signs that physics knows; where the robot has a table of it, what the parameters are made of, and a guess."""
+    """Return the signs that physics requires, and the box of physical parameters with a guess if the robot has one."""
     positive = np.array([term.positive for term in joint.terms])
     if joint.physical is None or joint.effort:  # a current does not say how much its motor pushes
         return Known(positive)
-    made = lumping(joint.physical, joint.gear_ratio, tuple(term.name for term in joint.terms))
-    if made is None:
+    lumped = lumping(joint.physical, joint.gear_ratio, tuple(term.name for term in joint.terms))
+    if lumped is None:
         return Known(positive)
     guess, lower, upper = np.array([(x.guess, x.lower, x.upper) for x in joint.physical.parameters]).T
-    theta = made.theta(guess)
-    # What masses leave of each other by rounding is no guess; taken for one, it would be believed to all its digits.
-    return Known(positive, Box(lower, upper, made), np.where(np.abs(theta) > ROUNDING, theta, 0.0))
+    theta = lumped.theta(guess)
+    # A difference of masses that is only rounding is no guess; as one, it would be trusted to all its digits.
+    return Known(positive, Box(lower, upper, lumped), np.where(np.abs(theta) > ROUNDING, theta, 0.0))

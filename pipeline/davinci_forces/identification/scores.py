@@ -1,4 +1,4 @@
-"""How well an effort was predicted, on one footing: raw, and with effort and prediction through the same low-pass."""
+"""Scores of predicted efforts: raw, and with effort and prediction through the same low-pass."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -12,47 +12,47 @@ from davinci_forces.maths.signals.smoothing import share_passed, smoothed, white
 from davinci_forces.maths.uncertainty.bootstrap import model_error
 from davinci_forces.records import Motion, Prediction
 
-FOLDS = 20  # at most: so many refits show how far a fit can be trusted, whatever the amount of data
-FIRST = 1111  # samples that the published rival's errors are over
+MAX_FOLDS = 20  # enough refits to show how far a fit can be trusted, whatever the amount of data
+SAMPLES_RIVAL = 1111  # behind the published rival's errors
 
 
 def folds(count: int) -> list[int]:
-    """The fold of each of so many logs or periods, in order: each is one of its own, or some in a row share one."""
-    number = min(count, FOLDS)
+    """Return the fold of each of `count` logs or periods, in order; above `MAX_FOLDS` neighbours share one."""
+    number = min(count, MAX_FOLDS)
     return [i * number // count for i in range(count)]
 
 
 def refits(problem: Regression, estimate: Estimator) -> Iterator[Array | NotIdentifiable]:
-    """The parameters (p,) without each fold of the logs in turn, or why there are none."""
+    """Fit the parameters (p,) without each fold of the logs in turn, or yield why that is not possible."""
     fold = folds(len(problem.starts))
     for out in range(fold[-1] + 1):
         try:
-            yield estimate(part(problem, [log for log, own in enumerate(fold) if own != out])).theta
+            yield estimate(select_logs(problem, [log for log, number in enumerate(fold) if number != out])).theta
         except NotIdentifiable as error:
             yield error
 
 
-def part(problem: Regression, logs: Sequence[int]) -> Regression:
-    """The problem of some of its logs, by their number."""
+def select_logs(problem: Regression, logs: Sequence[int]) -> Regression:
+    """Return the least squares problem of some of its logs, by their index."""
     ends = (*problem.starts[1:], len(problem.tau))
-    rows = [np.arange(problem.starts[i], ends[i]) for i in logs]
-    kept = np.concatenate(rows)
+    parts = [np.arange(problem.starts[i], ends[i]) for i in logs]
+    rows = np.concatenate(parts)
     return replace(
         problem,
-        Phi=problem.Phi[kept],
-        tau=problem.tau[kept],
-        tau_var=problem.tau_var[kept],
-        periods=problem.periods[kept],
-        starts=tuple(np.cumsum([0, *map(len, rows[:-1])]).tolist()),
+        Phi=problem.Phi[rows],
+        tau=problem.tau[rows],
+        tau_var=problem.tau_var[rows],
+        periods=problem.periods[rows],
+        starts=tuple(np.cumsum([0, *map(len, parts[:-1])]).tolist()),
         Phi_cov=None if problem.Phi_cov is None else problem.Phi_cov[list(logs)],
     )
 
 
 class Judge:
-    """What predictions of the effort of a recording are held against; what they share is worked out once.
+    """The effort of a recording, against which predictions are scored; what they share is computed once.
 
-    `free` (N,) are the samples that count: where nothing touched the robot.  `white` is the noise of the effort where
-    periods tell it; else it is what a low-pass takes out of the error, which holds a ripple of the drive as well.
+    `free` (N,) are the samples that count, at which nothing touches the robot.  `white` is the noise of the effort from
+    repeated periods.  Without it the noise is what a low-pass removes from the error, including ripple of the drive.
     """
 
     def __init__(self, motion: Motion, free: Booleans, lowpass: float, white: float | None = None) -> None:
@@ -65,11 +65,11 @@ class Judge:
         self.passed = share_passed(motion.rate, lowpass)
 
     def scored(self, model: str, name: str, role: str, scheme: str, path: str, tau_hat: Array) -> Prediction:
-        """A prediction (N,) with its scores."""
-        whole_error = self.motion.tau - tau_hat
-        slow = self._smoothed(whole_error)
-        noise = white_std(whole_error - slow, self.passed) if self.white is None else self.white
-        error, slow = whole_error[self.free], slow[self.free]
+        """Return a prediction (N,) with its scores."""
+        error = self.motion.tau - tau_hat
+        slow = self._smoothed(error)
+        noise = white_std(error - slow, self.passed) if self.white is None else self.white
+        error, slow = error[self.free], slow[self.free]
         unexplained = float(np.linalg.norm(error)) / self.spread
         rmse = float(np.sqrt(error @ error / len(error)))
         beyond_noise, beyond_noise_std = model_error(slow, noise * np.sqrt(self.passed))
@@ -90,7 +90,7 @@ class Judge:
             model_error_std=beyond_noise_std,
             effort_rms=float(np.sqrt(np.mean(self.smooth**2))),
             relative_error=relative(slow, self.smooth),
-            relative_error_1111=relative(slow[:FIRST], self.smooth[:FIRST]),
+            relative_error_1111=relative(slow[:SAMPLES_RIVAL], self.smooth[:SAMPLES_RIVAL]),
             t=self.motion.t,
             tau=self.motion.tau,
             tau_hat=tau_hat,
@@ -100,11 +100,11 @@ class Judge:
         return smoothed(x, self.motion.segment, self.motion.rate, self.lowpass)
 
 
-def some(motion: Motion, which: Booleans | slice) -> Motion:
-    """Some of the samples (N,) of a recording."""
+def select_samples(motion: Motion, which: Booleans | slice) -> Motion:
+    """Return some of the samples (N,) of a recording."""
     return replace(motion, **{name: getattr(motion, name)[which] for name in motion.columns()})
 
 
 def relative(error: Array, tau: Array) -> float:
-    """The norm of an error (N,) over that of the effort (N,)."""
+    """Return the norm of an error (N,) over that of the effort (N,)."""
     return float(np.linalg.norm(error) / (np.linalg.norm(tau) or 1.0))

@@ -1,4 +1,4 @@
-"""What identification logs say of a robot's joints, and which of their fits describes a joint under a setting."""
+"""The fits of a robot's joints, and the one that a setting names for a joint."""
 
 from collections.abc import Collection, Iterable
 
@@ -14,46 +14,47 @@ from davinci_forces.records.prediction import ANOTHER_PATH, CHOSEN, SAME_PATH
 from davinci_forces.robots.models import ARM, described
 from davinci_forces.robots.robot import Robot
 
-FALLBACK = "independent.lse"  # of joints that the chosen model does not describe
+FALLBACK = "independent.lse"  # for joints that the chosen model does not cover
 
 
 def follows(motion: Motion, paths: FittedPaths) -> bool:
-    """Whether the longest segment of a recording is like one of the paths."""
+    """Whether the longest segment of a recording follows one of the paths."""
     part = max(segments(motion.segment), key=lambda s: s.stop - s.start)
-    each = [np.flatnonzero(paths.source == log) for log in dict.fromkeys(paths.source)]
+    path_rows = [np.flatnonzero(paths.source == log) for log in dict.fromkeys(paths.source)]
     likenesses = [
-        likeness(motion.t[part], motion.q_measured[part], paths.q[rows], float(paths.period[rows[0]])) for rows in each
+        likeness(motion.t[part], motion.q_measured[part], paths.q[rows], float(paths.period[rows[0]]))
+        for rows in path_rows
     ]
     return max(likenesses) > LIKE
 
 
 class Identified:
-    """The fits of a robot's joints, refits without some logs, the choice among models, and the paths that were fitted.
+    """The fits of a robot's joints, refits without some logs, chosen models and fitted paths.
 
-    Of these records those that a stage has.
+    It takes the records of these that a stage has.
     """
 
     def __init__(self, robot: Robot, records: Iterable[Fit | CrossFit | Choice | FittedPaths]) -> None:
-        every = list(records)
+        records = list(records)
         self.robot, self._models = robot, dict[tuple[str, ...], Model]()
-        self.fits = [r for r in every if isinstance(r, Fit)]
-        self.cross_fits = [r for r in every if isinstance(r, CrossFit)]
-        self._choices = [r for r in every if isinstance(r, Choice)]
-        self._paths = {r.joint: r for r in every if isinstance(r, FittedPaths)}
+        self.fits = [r for r in records if isinstance(r, Fit)]
+        self.cross_fits = [r for r in records if isinstance(r, CrossFit)]
+        self._choices = [r for r in records if isinstance(r, Choice)]
+        self._paths = {r.joint: r for r in records if isinstance(r, FittedPaths)}
 
     def model(self, fit: Fit) -> Model:
-        """The model that a fit's parameters are of."""
+        """Return the model of a fit."""
         if fit.key not in self._models:
             scales, names = fit.scale.tolist(), [str(name) for name in fit.parameter]
             self._models[fit.key] = described(self.robot, fit.model, fit.group, names, scales)
         return self._models[fit.key]
 
     def describing(self, joint: str) -> list[Fit]:
-        """The fits that give the effort of a joint: its own, and those of the arm that it is a part of."""
+        """Return the fits of a joint's effort: its own, and those of its arm."""
         return [f for f in self.fits if f.group == joint or (f.group == ARM and joint in self.model(f).efforts)]
 
     def used(self, joint: str, setting: str) -> Fit | None:
-        """The fit that describes a joint under a setting; the chosen one's stand-in is `FALLBACK`."""
+        """Return the fit named by the setting `fit`, or `FALLBACK` where the chosen model does not cover the joint."""
         by_name = {f"{f.model}.{f.estimator}": f for f in self.describing(joint)}
         if setting != CHOSEN:
             return by_name.get(setting)
@@ -61,7 +62,7 @@ class Identified:
         return next((by_name[name] for name in (*names, FALLBACK) if name in by_name), None)
 
     def used_along(self, joint: str, setting: str, held: Collection[str]) -> tuple[Fit, str]:
-        """The fit of a joint under a setting, along a log that holds these joints, and why another stands in for it.
+        """Return the fit of a joint along a log that holds these joints, and why it replaces that of the setting.
 
         Raises
         ------
@@ -78,6 +79,6 @@ class Identified:
         return stand_in, f"{needs}, so {FALLBACK} is used; add their channels"
 
     def path(self, motion: Motion) -> str:
-        """Whether a recording follows a path that was fitted."""
+        """Return whether a recording follows a fitted path, as `SAME_PATH` or `ANOTHER_PATH`."""
         paths = self._paths.get(motion.joint)
         return SAME_PATH if paths is not None and follows(motion, paths) else ANOTHER_PATH

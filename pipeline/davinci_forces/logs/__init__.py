@@ -1,4 +1,4 @@
-"""How measurements come in: one module per log format, tried in this order."""
+"""Open measurement logs: one module per format, tried in the order of `FORMATS`."""
 
 from importlib import import_module
 from pathlib import Path
@@ -7,13 +7,13 @@ from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
 from davinci_forces.logs.log import Log, Options
 
-# Text last: it recognises whatever looks like columns of numbers, and raw binary whatever has that name before it.
+# Text last: it recognises anything that looks like columns of numbers. Raw binary goes by the file's suffix.
 FORMATS = ("tdms", "lvm", "tdm", "ros", "mat", "hdf5", "arrow", "binary", "text")
-BAG = "metadata.yaml"  # what a folder holds that is a log: a bag of ROS 2
+BAG = "metadata.yaml"  # in a folder that is a log: a ROS 2 bag
 
 
 def open_log(path: Path, options: Options = Options()) -> Log:  # noqa: B008 - frozen
-    """Open a log of whichever format recognises it.
+    """Open a log with the first format that recognises it.
 
     Raises
     ------
@@ -23,7 +23,7 @@ def open_log(path: Path, options: Options = Options()) -> Log:  # noqa: B008 - f
     if not path.exists():
         raise BadLog(f"{path}: there is no such file")
     if path.is_dir() and not (path / BAG).is_file():
-        raise BadLog(f"{path}: it is a folder without {BAG}, so it is no bag of ROS 2; name a file in it")
+        raise BadLog(f"{path}: this folder has no {BAG}, so it is not a ROS 2 bag; name a file in it")
     with open_file(path / BAG if path.is_dir() else path) as file:
         head = file.read(4096)
     if not head:

@@ -1,4 +1,4 @@
-"""Numbers out of rows of delimited cells, a block at a time, parsed by Arrow."""
+"""Parse numbers from rows of delimited cells, one block at a time, with Arrow."""
 
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -17,11 +17,11 @@ Number = TypeVar("Number", np.float64, np.int64)
 
 NUMBER = re.compile(rb"[+-]?((\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
 UNREADABLE = pa.ArrowInvalid
-PIECE = 1 << 20  # [bytes] that one thread of Arrow parses at a time
+PARSE_BYTES = 1 << 20  # [bytes] that one thread of Arrow parses at a time
 
 
 def numbers(column: pa.ChunkedArray) -> Array:
-    """A column of doubles (N,), NaN where it has no value."""
+    """Convert a column of doubles (N,), NaN where it has no value."""
     values = _values(column, np.float64)
     if column.null_count:
         values[absent(column)] = np.nan
@@ -29,12 +29,12 @@ def numbers(column: pa.ChunkedArray) -> Array:
 
 
 def integers(column: pa.ChunkedArray) -> Integers:
-    """A column of whole numbers of 64 bits (N,), any where it has no value."""
+    """Convert a column of 64-bit integers (N,), of any value where it has none."""
     return _values(column, np.int64)
 
 
 def absent(column: pa.ChunkedArray) -> Booleans:
-    """Where a column (N,) has no value."""
+    """Mask (N,) of the rows in which a column has no value."""
     return ~np.concatenate([_present(chunk) for chunk in column.chunks] or [np.empty(0, bool)])
 
 
@@ -45,7 +45,7 @@ def _values(column: pa.ChunkedArray, dtype: type[Number]) -> NDArray[Number]:
 
 
 def _present(chunk: pa.Array) -> Booleans:
-    """Where a chunk has a value: one bit each, that of the first is the lowest."""
+    """Mask of the rows in which a chunk has a value: one bit each, the lowest for the first."""
     bits = chunk.buffers()[0] if chunk.null_count else None
     if bits is None:
         return np.full(len(chunk), not chunk.null_count)
@@ -54,7 +54,7 @@ def _present(chunk: pa.Array) -> Booleans:
 
 
 class NotANumber(ValueError):
-    """The cell at (row, column), counted from 0, holds something else than a number."""
+    """The cell at (row, column), counted from 0, is not a number."""
 
     def __init__(self, row: int, column: int, cell: bytes) -> None:
         super().__init__(row, column, cell)
@@ -63,17 +63,17 @@ class NotANumber(ValueError):
 
 @dataclass(frozen=True)
 class Cells:
-    """Columns of numbers, NaN where a cell is empty; how many cells are; and the cells of a column of text."""
+    """Columns of numbers, NaN where a cell is empty; the counts of empty cells; and the cells of a column of text."""
 
     rows: int
     columns: dict[int, NDArray[np.float64]]
     nulls: dict[int, int]
     texts: list[bytes | None]
-    empty: dict[int, Booleans] = field(default_factory=dict)  # which cells are, of columns that have empty ones
+    empty: dict[int, Booleans] = field(default_factory=dict)  # masks of the columns with empty cells
 
 
 def marks(block: bytes, delimiter: bytes) -> bytes:
-    """The decimal marks among the bytes of a block: `.`, `,`, both or none."""
+    """Find the decimal marks in a block: `.`, `,`, both or none."""
     return bytes(mark for mark in b".," if mark != delimiter[0] and mark in block)
 
 
@@ -87,20 +87,20 @@ def parse(
     quoted: bool = False,
     times: Mapping[int, Callable[[pa.ChunkedArray], Array]] = MappingProxyType({}),
 ) -> Cells:
-    """Convert the `wanted` columns of rows of `width` cells to numbers; `text` is a column left as it stands.
+    """Convert the `wanted` columns of rows of `width` cells to numbers; column `text` is not converted.
 
-    `times` makes numbers of those of the wanted columns that are not written as such.
+    `times` converts those wanted columns that are not written as numbers.
 
     Raises
     ------
     UNREADABLE
-        If a row has another width, or a wanted cell is no number.
+        If a row has another width, or a wanted cell is not a number.
     """
     types = {f"{i}": pa.float64() for i in wanted} | ({f"{text}": pa.binary()} if text >= 0 else {})
     types |= {f"{i}": pa.string() for i in wanted if i in times}
     table = csv.read_csv(
         pa.py_buffer(block),
-        read_options=csv.ReadOptions(column_names=[f"{i}" for i in range(width)], block_size=PIECE),
+        read_options=csv.ReadOptions(column_names=[f"{i}" for i in range(width)], block_size=PARSE_BYTES),
         parse_options=csv.ParseOptions(delimiter=delimiter.decode(), quote_char='"' if quoted else False),
         convert_options=csv.ConvertOptions(
             column_types=types,
@@ -122,7 +122,7 @@ def parse(
 
 
 def parse_either(block: bytes, width: int, delimiter: bytes, wanted: Sequence[int], text: int = -1) -> Cells:
-    """The same with whichever decimal mark the cells have, be it both; a cell with two marks is no number."""
+    """Parse with the decimal mark that the cells have, or with both; a cell with two marks is not a number."""
     decimals = marks(block, delimiter)
     if len(decimals) == 2 and text < 0:
         block, decimals = block.replace(b",", b"."), b"."
@@ -130,12 +130,12 @@ def parse_either(block: bytes, width: int, delimiter: bytes, wanted: Sequence[in
 
 
 def parse_carefully(block: bytes, width: int, delimiter: bytes, wanted: Sequence[int]) -> Cells:
-    """The same, but it finds the cell that is no number, and forgives blanks around numbers.
+    """Parse like `parse_either`, allow blanks around numbers, and locate a cell that is not a number.
 
     Raises
     ------
     NotANumber
-        Where a wanted cell is none.
+        If a wanted cell is not a number.
     """
     try:
         return parse_either(block, width, delimiter, wanted)
@@ -148,12 +148,12 @@ def parse_carefully(block: bytes, width: int, delimiter: bytes, wanted: Sequence
 def check(
     rows: Sequence[Sequence[bytes]], wanted: Sequence[int], patterns: Sequence[re.Pattern[bytes]] | None = None
 ) -> None:
-    """Find a wanted cell that is no number, or not what the pattern of its column says.
+    """Check that wanted cells are numbers, or match the pattern of their column.
 
     Raises
     ------
     NotANumber
-        Where there is one.
+        At the first cell that does not.
     """
     for i, row in enumerate(rows):
         for column, pattern in zip(wanted, patterns or [NUMBER] * len(wanted), strict=True):

@@ -1,4 +1,4 @@
-"""Whole lines of a text log in blocks of bytes, whatever its encoding, line ends and damage at its end."""
+"""Read the complete lines of a text log in blocks of bytes, for any encoding, line end and damage at the end."""
 
 import codecs
 import re
@@ -13,22 +13,22 @@ import numpy as np
 from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
 
-SIZE = 4 << 20  # [bytes] of a block
-LONGEST = 64 << 20  # [bytes] of a line
+BLOCK_BYTES = 4 << 20  # [bytes] of a block
+MAX_LINE = 64 << 20  # [bytes] of a line
 GZIP = b"\x1f\x8b"
 CR, LF = 13, 10
 MARKS = {codecs.BOM_UTF8: "utf-8", codecs.BOM_UTF16_LE: "utf-16", codecs.BOM_UTF16_BE: "utf-16"}
 
 
 class Block(NamedTuple):
-    """Whole lines: the number of the first, counted from 1; their bytes; and how many they are."""
+    """Complete lines: the number of the first, counted from 1; their bytes; and their count."""
 
     first: int
     text: bytes
     lines: int
 
     def halves(self) -> "tuple[Block, Block]":
-        """The block in two, of about equal size; it must have two lines."""
+        """Split a block of at least two lines into two of about equal size."""
         middle = self.text.find(b"\n", len(self.text) // 2, len(self.text) - 1) + 1
         middle = middle or self.text.rfind(b"\n", 0, len(self.text) // 2) + 1
         upper = self.text[:middle]
@@ -38,7 +38,7 @@ class Block(NamedTuple):
 
 @dataclass
 class Lines:
-    """The lines of a text file, plain or gzipped.  `cut`, `padding` and `damage` are known when `blocks` is exhausted.
+    """The lines of a text file, plain or gzipped.  `cut`, `padding` and `damage` are known when `blocks` has ended.
 
     Every line of a block ends in LF or CRLF.  UTF-16 becomes UTF-8; every other encoding is left as it is, because
     numbers and delimiters are ASCII in all of them.
@@ -49,7 +49,7 @@ class Lines:
     cut: bytes = b""  # the last line, where the file ends within it
     cut_at: int = 0  # number of that line, counted from 1
     padding: int = 0  # NUL bytes at the end, as a power cut leaves them
-    damage: str = ""  # what kept a compressed file from being read to its end
+    damage: str = ""  # why a compressed file could not be read to its end
 
     def __post_init__(self) -> None:
         with open_file(self.path) as file:
@@ -63,13 +63,13 @@ class Lines:
             raise BadLog(f"{self.path}: there is no encoding {self.encoding!r}; correct it in study.toml") from None
 
     def head(self, size: int = 1 << 18) -> bytes:
-        """The first whole lines, about `size` bytes, or the only line where it has no end."""
+        """Return the first complete lines, about `size` bytes, or the only line if it has no end."""
         for block in self.blocks(size):
             return block.text
         return self.cut
 
-    def blocks(self, size: int = SIZE) -> Iterator[Block]:
-        """The blocks of the file, in order."""
+    def blocks(self, size: int = BLOCK_BYTES) -> Iterator[Block]:
+        """Read the blocks of the file, in order."""
         self.cut, self.padding, self.damage = b"", 0, ""
         remainder, line = b"", 1
         for piece in self._without_padding(self._decoded(self._bytes(size))):
@@ -79,8 +79,8 @@ class Lines:
                 end = _last_end(piece)
             block = _block(line, b"".join((remainder, memoryview(piece)[:end])) if end else b"")
             remainder = piece[end:]
-            if len(remainder) > LONGEST:
-                raise BadLog(f"{self.path}:{line}: a line of more than {LONGEST} bytes; this is not a log in text")
+            if len(remainder) > MAX_LINE:
+                raise BadLog(f"{self.path}:{line}: a line longer than {MAX_LINE} bytes; the file is not a text log")
             if block.text:
                 yield block
                 line += block.lines
@@ -96,14 +96,14 @@ class Lines:
             yield from self._unzipped(pieces, size) if self.zipped else pieces
 
     def _unzipped(self, pieces: Iterable[bytes], size: int) -> Iterator[bytes]:
-        """What a gzip file holds, as far as it is whole; `gzip.open` would lose the bytes before the damage."""
+        """Unzip a gzip file up to any damage; `gzip.open` would lose the bytes before the damage."""
         unpack = zlib.decompressobj(wbits=31)
         for piece in pieces:
             while piece:
                 try:
                     text = unpack.decompress(piece, size)
                 except zlib.error as error:
-                    self.damage = f"the compressed file is damaged ({error}); what comes before the damage was read"
+                    self.damage = f"the compressed file is damaged ({error}); the data before the damage was read"
                     return
                 if text:
                     yield text
@@ -113,7 +113,7 @@ class Lines:
                     unpack = zlib.decompressobj(wbits=31)
                     self._ended = not piece
         if not unpack.eof and not getattr(self, "_ended", False):
-            self.damage = "the compressed file ends before its data; what there is was read"
+            self.damage = "the compressed file is cut; the data before the cut was read"
 
     def _decoded(self, pieces: Iterable[bytes]) -> Iterator[bytes]:
         wide = "16" in self.read_as or "32" in self.read_as
@@ -139,13 +139,13 @@ class Lines:
 
 
 def _last_end(text: bytes) -> int:
-    """Where the last whole line ends, or 0.  A CR at the very end waits: its LF may be in the next piece."""
+    """End of the last complete line, or 0.  A CR at the very end waits: its LF may come in the next piece."""
     end = text.rfind(b"\n")
     return (end if end >= 0 else text.rfind(b"\r", 0, len(text) - 1)) + 1
 
 
 def _block(first: int, text: bytes) -> Block:
-    """The block of these lines: a lone CR ends a line, and so do several before one LF."""
+    """Make a block of these lines: a single CR ends a line, and so do several before one LF."""
     octets = np.frombuffer(text, np.uint8)
     returns, lines = int(np.count_nonzero(octets == CR)), int(np.count_nonzero(octets == LF))
     if returns not in (0, lines):
@@ -154,8 +154,8 @@ def _block(first: int, text: bytes) -> Block:
     return Block(first, text, lines)
 
 
-def decoded(text: bytes, encoding: str | None = None) -> str:
-    """Text of a log: UTF-8 where it is valid, else the code page of western Windows."""
+def decode(text: bytes, encoding: str | None = None) -> str:
+    """Decode text of a log: as UTF-8 if valid, else in the code page of western Windows."""
     for name in (encoding,) if encoding else ("utf-8", "cp1252", "latin-1"):
         try:
             return text.decode(name)

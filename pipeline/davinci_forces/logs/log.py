@@ -1,4 +1,4 @@
-"""What every log format is asked for, and what it answers.
+"""The interface of log formats: logs, channels and clocks.
 
 A format is a module of this folder that exports two functions:
 
@@ -7,11 +7,10 @@ A format is a module of this folder that exports two functions:
 
 `read` looks at headers only; the samples are read by iterating over `Log.blocks`.
 
-Channels may have clocks of their own: `Channel.time` names the channel of the same log that says when the samples of a
-channel were taken, in seconds from `Log.started`.  Where the file has none, the reader makes one (`derived`, of kind
-"time"), which is right from file segment to file segment and from write to write.  What has one uniform clock in common
-needs none: `Log.clock` says it.  Several clocks are read at the same time through `Log.apart`, a shallow copy, so that
-what a pass over a file needs is kept by `blocks` itself.
+A channel may have its own clock: `Channel.time` names the channel of the same log with its sample times, in seconds
+from `Log.started`.  Where the file has no such channel, the reader derives one (`derived`, of kind "time"), with
+the correct times of every file segment and write.  Channels on one uniform clock need none: `Log.clock` describes it.
+To read several clocks at once, use `Log.apart`, a shallow copy; `blocks` therefore keeps the state of its own pass.
 """
 
 import re
@@ -30,39 +29,39 @@ from numpy.typing import NDArray
 from davinci_forces.errors import BadLog
 
 Block = dict[str, NDArray[np.float64]]  # channel name -> samples; every array of a block has one length
-COUNTED = "samples"  # unit of a channel of times that only counts them
+COUNTED = "samples"  # unit of a time channel that only counts samples
 IN_BRACKETS = re.compile(r".*\S\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*")
-ROWS = 1 << 16  # of a block, or fewer
-CELLS = 1 << 20  # of a block of many channels
+BLOCK_ROWS = 1 << 16  # of a full block
+BLOCK_CELLS = 1 << 20  # of a full block of many channels
 
 
 @dataclass(frozen=True)
 class Options:
-    """What a study may say about how a file is to be read; None is found from the file."""
+    """How to read a file, as a study states it; None is detected from the file."""
 
     delimiter: str | None = None
     decimal: str | None = None  # "." or ","
     header: bool | None = None  # the first row holds names
     encoding: str | None = None
-    dtype: str | None = None  # of raw binary numbers: "float64", "<i2"; big-endian where it does not say
-    columns: int | tuple[str, ...] | None = None  # of a row of raw binary numbers: how many, or their names
+    dtype: str | None = None  # of raw binary numbers: "float64", "<i2"; big-endian by default
+    columns: int | tuple[str, ...] | None = None  # of a row of raw binary numbers: their count or names
 
 
 @dataclass(frozen=True)
 class Channel:
-    """One channel of a log: its name is unique within the log, and its unit is what the log says, or ""."""
+    """One channel of a log, with a name that is unique in the log; `unit` is as the log states it, or ""."""
 
     name: str
     unit: str = ""
-    kind: str = "number"  # or "text", "time" (what cannot be used as a quantity is still listed)
-    derived: bool = False  # made by the reader, not written in the log ("write", "elapsed")
-    time: str = ""  # the channel that says when its samples were taken; "" for the log's own: `Log.time`, else `.clock`
-    alias: str = ""  # another name that `find` knows it by: of a joint in place of its number, in another spelling
+    kind: str = "number"  # or "text", "time"; channels that are not quantities are listed, too
+    derived: bool = False  # computed by the reader, not in the file ("write", "elapsed")
+    time: str = ""  # the channel of its sample times; "" for the clock of the log: `Log.time`, else `Log.clock`
+    alias: str = ""  # another name that `find` accepts: a joint's name for its number, or another spelling
 
 
 @dataclass(frozen=True)
 class Clock:
-    """A clock that the format itself carries, for logs without a time channel: t = start + i * step [s]."""
+    """A uniform clock that the format states, for logs without a time channel: t = start + i * step [s]."""
 
     step: float
     start: float = 0.0
@@ -72,24 +71,24 @@ class Clock:
 class Log(ABC):
     """An opened log.
 
-    `warnings`, `facts`, `comments` and the counts grow while its blocks are read, and are whole when they are
-    exhausted.  Reading the blocks again starts them anew.
+    `warnings`, `facts`, `comments` and the counts grow while its blocks are read and are complete at their end.
+    Reading the blocks again resets them.
     """
 
     path: Path
     format: str  # the name of the module that reads it
     channels: tuple[Channel, ...]  # in the order of the file
     clock: Clock | None = None
-    time: str = ""  # the channel that is the log's own time axis, where the format has one
+    time: str = ""  # the channel of the log's time axis, where the format has one
     started: str = ""  # date and time of the first sample as the file gives it, ISO 8601; "" where it does not
     zone: str = ""  # "UTC", "local" or ""
-    facts: dict[str, str] = field(default_factory=dict)  # delimiter, encoding, operator ...: for people to read
+    facts: dict[str, str] = field(default_factory=dict)  # delimiter, encoding, operator ...: shown to the user
     warnings: list[str] = field(default_factory=list)  # one line each: the place in the file, and what was done
-    comments: list[str] = field(default_factory=list)  # what the operator wrote beside the samples, with its row
-    nulls: dict[str, int] = field(default_factory=dict)  # samples missing, of every channel that was read
-    nans: dict[str, int] = field(default_factory=dict)  # samples logged as NaN, of every channel that was read
-    dropped: int = 0  # rows that could not be used
-    cut: bool = False  # the file ends before what was begun, so that channels may end in missing samples
+    comments: list[str] = field(default_factory=list)  # what the operator wrote beside the samples, with the row
+    nulls: dict[str, int] = field(default_factory=dict)  # missing samples of every channel read
+    nans: dict[str, int] = field(default_factory=dict)  # samples logged as NaN of every channel read
+    dropped: int = 0  # unusable rows
+    cut: bool = False  # the file is truncated, so channels may end in missing samples
     _lookup: tuple[tuple[Channel, ...], dict[str, tuple[Channel, str]]] | None = field(
         default=None, init=False, repr=False
     )
@@ -99,22 +98,22 @@ class Log(ABC):
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, all of one clock, in consecutive blocks of bounded size.
 
-        Whoever wants channels of several clocks reads them one clock after the other, see `by_clock`.  Missing cells
-        and cells that hold NaN are both NaN in the block; they are counted apart in `nulls` and `nans`.
+        Channels on several clocks are read one clock after the other, see `by_clock`.  Missing cells and cells that
+        hold NaN are both NaN in the block; `nulls` and `nans` count them separately.
 
         Raises
         ------
         BadLog
-            Where the file is damaged in a way that cannot be read past; names the file, line and column.
+            If damage makes the rest of the file unreadable; names the file, line and column.
         """
 
     def find(self, name: str | int) -> Channel:
-        """The channel of a name, of the last part of a name where only one has it, or of a number counted from 0.
+        """Find a channel by its name, by the last part of its name if that is unique, or by its number from 0.
 
         Raises
         ------
         BadLog
-            If there is none, or more than one; lists the closest.
+            If there is none, or more than one; the message lists the closest.
         """
         if isinstance(name, int):
             return self._numbered(name)
@@ -132,7 +131,7 @@ class Log(ABC):
         raise BadLog(f"{self.path}: there is no channel {name!r} among its {len(names)}; {hint}")
 
     def times_called(self, name: str | int) -> list[Channel]:
-        """The channels that a study means by the name of its time: one, or one of that name in each group of channels.
+        """List the time channels that a study means by a name: one, or one of that name in each group of channels.
 
         Raises
         ------
@@ -148,13 +147,13 @@ class Log(ABC):
         return [*exact, *others] or [self.find(name)]
 
     def apart(self) -> "Log":
-        """The same log to be read at the same time as this one, with counts and warnings of its own."""
-        other = copy(self)
-        other.warnings, other.comments, other.facts = [*self.warnings], [*self.comments], {**self.facts}
-        return other
+        """Copy the log, to be read at the same time as this one, with separate counts and warnings."""
+        twin = copy(self)
+        twin.warnings, twin.comments, twin.facts = [*self.warnings], [*self.comments], {**self.facts}
+        return twin
 
     def by_clock(self, names: Sequence[str]) -> dict[str, list[str]]:
-        """The names by the clock of their channels: its time channel, or "" for the log's own."""
+        """Group names of channels by their clock: its time channel, or "" for the clock of the log."""
         grouped: dict[str, list[str]] = {}
         for name in names:
             full = name if name in self._looked_up else self.find(name).name
@@ -163,7 +162,7 @@ class Log(ABC):
 
     @property
     def _looked_up(self) -> dict[str, tuple[Channel, str]]:
-        """The channels and their clocks, by name; made anew where the channels are others."""
+        """The channels and their clocks, by name; computed again when `channels` is replaced."""
         if self._lookup is None or self._lookup[0] is not self.channels:
             clocks = {channel.time for channel in self.channels} - {""}
             by_name = {c.name: (c, c.name if c.name in clocks else c.time) for c in self.channels}
@@ -177,7 +176,7 @@ class Log(ABC):
         return written[number]
 
     def _start_anew(self, names: Sequence[str], kinds: Sequence[str] = ("number",)) -> None:
-        """Empty the counts before the blocks are read, and refuse channels that do not hold numbers."""
+        """Reset the counts before blocks are read, and refuse channels that do not hold numbers."""
         self.nulls, self.nans = dict.fromkeys(names, 0), dict.fromkeys(names, 0)
         self.dropped = 0
         self._at_open = self._at_open or (len(self.warnings), len(self.comments))
@@ -189,8 +188,8 @@ class Log(ABC):
         if len(clocks := self.by_clock(names)) > 1:
             raise BadLog(f"{self.path}: {', '.join(map(repr, names))} have {len(clocks)} clocks; read them one by one")
 
-    def tallied(self, block: Block, missing: Mapping[str, int] = MappingProxyType({})) -> Block:
-        """A block to be handed on, whose NaNs are counted: of each channel so many are missing, the others logged."""
+    def count_nans(self, block: Block, missing: Mapping[str, int] = MappingProxyType({})) -> Block:
+        """Count the NaNs of a block and return it: `missing` of each channel are missing, the others logged."""
         for name, values in block.items():
             self.nulls[name] += missing.get(name, 0)
             self.nans[name] += int(np.count_nonzero(np.isnan(values))) - missing.get(name, 0)
@@ -202,16 +201,16 @@ def _listed(channels: Sequence[Channel], joint: str = ", ") -> str:
 
 
 def unique(names: Sequence[str], taken: Iterable[str] = ()) -> tuple[str, ...]:
-    """The names with `_1`, `_2` ... after those that came before, and `column_<number>` for empty ones."""
-    seen: dict[str, None] = dict.fromkeys(taken)
+    """Make names unique: append `_1`, `_2` ... to repeated ones, and call empty ones `column_<number>`."""
+    used: dict[str, None] = dict.fromkeys(taken)
     for column, name in enumerate(names):
         name = name or f"column_{column}"
         free, number = name, 0
-        while free in seen:
+        while free in used:
             number += 1
             free = f"{name}_{number}"
-        seen[free] = None
-    return tuple(seen)[len(seen) - len(names) :]
+        used[free] = None
+    return tuple(used)[len(used) - len(names) :]
 
 
 def unit_in(name: str) -> str:
@@ -220,29 +219,29 @@ def unit_in(name: str) -> str:
     return unit.group(1) if unit else ""
 
 
-def renamed(written: Sequence[str], names: Sequence[str]) -> list[str]:
-    """What to say of channels that had to be renamed, because they are called like another."""
+def renaming_remarks(written: Sequence[str], names: Sequence[str]) -> list[str]:
+    """Describe the channels that had to be renamed because their name was taken."""
     return [
-        f"column {i} is called {own!r} like another; it is read as {name!r}"
-        for i, (own, name) in enumerate(zip(written, names, strict=True))
-        if own and own != name
+        f"more than one column is called {original!r}; column {i} is read as {name!r}"
+        for i, (original, name) in enumerate(zip(written, names, strict=True))
+        if original and original != name
     ]
 
 
-def ahead(blocks: Iterator[Block]) -> Iterator[Block]:
-    """The same samples in blocks of at least `ROWS` rows or `CELLS` cells, but for the last.
+def read_ahead(blocks: Iterator[Block]) -> Iterator[Block]:
+    """Merge blocks into blocks of at least `BLOCK_ROWS` rows or `BLOCK_CELLS` cells, but for the last.
 
-    Each is made while the one before is used: parsing and compressing both leave the interpreter free, so that reading
-    and storing a log share two processors.  A log of one block needs no second one, which takes longer to start.
+    The next block is read while the caller uses this one: parsing and compressing both release the interpreter, so
+    reading and storing a log share two processors.  One block alone is not worth the start of a thread.
     """
-    made = _gathered(blocks)
-    block = next(made, None)
+    gathered = _gathered(blocks)
+    block = next(gathered, None)
     if block and not _is_full(_rows(block), len(block)):
         yield block
     elif block:
         with ThreadPoolExecutor(max_workers=1) as reader:
             while block:
-                following = reader.submit(next, made, None)
+                following = reader.submit(next, gathered, None)
                 yield block
                 block = following.result()
 
@@ -265,7 +264,7 @@ def _rows(block: Block) -> int:
 
 
 def _is_full(rows: int, channels: int) -> bool:
-    return rows >= ROWS or rows * channels >= CELLS
+    return rows >= BLOCK_ROWS or rows * channels >= BLOCK_CELLS
 
 
 def _joined(blocks: Sequence[Block]) -> Block:

@@ -1,4 +1,4 @@
-"""TDM files of DIAdem, which are read as TDMS: how to make one of the other."""
+"""Refuse TDM files of DIAdem, and say how to convert them to TDMS."""
 
 from pathlib import Path
 
@@ -7,12 +7,12 @@ from davinci_forces.logs.log import Log, Options
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether the file is the description or the numbers of a TDM file."""
+    """Whether the file is the description (.tdm) or the numbers (.tdx) of a TDM file."""
     return path.suffix.lower() in (".tdm", ".tdx") or (head.lstrip().startswith(b"<?xml") and b"usi:tdm" in head)
 
 
 def read(path: Path, options: Options) -> Log:
-    """Say how to make a TDMS file of it.
+    """Refuse the file, and say how to convert it to TDMS.
 
     Raises
     ------
@@ -20,6 +20,6 @@ def read(path: Path, options: Options) -> Log:
         Always.
     """
     raise BadLog(
-        f"{path}: it is a TDM file (.tdm, with its numbers in a .tdx), which is not read: save as TDMS, by DIAdem or "
-        "by LabVIEW's Convert to TDMS, and name that file in study.toml"
+        f"{path}: TDM files (.tdm, with their numbers in a .tdx) are not read; save it as TDMS, with DIAdem or with "
+        "LabVIEW's Convert to TDMS, and name that file in study.toml"
     )

@@ -1,9 +1,9 @@
-"""When evenly sampled channels were sampled, as their writes or headers say, and which were sampled together."""
+"""Sample times of evenly sampled channels from their writes or headers, and the groups sampled together."""
 
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from decimal import Decimal
 
 import numpy as np
@@ -11,12 +11,13 @@ import numpy as np
 from davinci_forces.logs.log import Block
 from davinci_forces.maths.arrays import Array
 
-ROUNDING = 1.5e-6  # [s] two starts written in whole microseconds may be off by so much
-SKEW = 0.02  # of a sampling time: channels that stray less than this from each other were sampled together
+UNIX_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+ROUNDING = 1.5e-6  # [s] rounding of the difference of two starts written in whole microseconds
+SKEW = 0.02  # of a sampling time: channels whose times differ by less were sampled together
 
 
 def moment(zero: datetime, seconds: int, microseconds: int = 0) -> datetime | None:
-    """The moment so long after `zero`; None for one that no calendar holds."""
+    """The date and time so long after `zero`; None beyond the range of dates."""
     try:
         return zero + timedelta(seconds=seconds, microseconds=microseconds)
     except OverflowError:
@@ -25,7 +26,7 @@ def moment(zero: datetime, seconds: int, microseconds: int = 0) -> datetime | No
 
 @dataclass
 class Timeline:
-    """Stretches of samples: each begins at a row, at a time [s], and goes on by a sampling time [s]."""
+    """Uniform stretches of samples: the first row, start time [s] and sampling time [s] of each."""
 
     first: list[int] = field(default_factory=list)
     start: list[float] = field(default_factory=list)
@@ -33,7 +34,7 @@ class Timeline:
     rows: int = 0
 
     def add(self, rows: int, start: float | None, step: float) -> None:
-        """Samples that follow; they go on from those before where no `start` is said, or one that is next in turn."""
+        """Append samples; without a `start`, or with the time that is due, they continue those before."""
         due = self.due
         follows = bool(self.first) and (start is None or abs(start - due) <= ROUNDING)
         if not follows or step != self.step[-1]:
@@ -44,7 +45,7 @@ class Timeline:
 
     @property
     def due(self) -> float:
-        """When the next sample is due [s]; 0 before the first."""
+        """Time at which the next sample is due [s]; 0 before the first."""
         return self.start[-1] + (self.rows - self.first[-1]) * self.step[-1] if self.first else 0.0
 
     @property
@@ -52,32 +53,32 @@ class Timeline:
         """Whether all samples have one sampling time and no gap between them."""
         return len(self.first) == 1
 
-    def at(self, row: int, count: int) -> Array:
-        """The times (count,) [s] of the samples from a row on; the last stretch has no end."""
+    def times(self, row: int, count: int) -> Array:
+        """Compute the times (count,) [s] of the samples from a row on; the last stretch has no end."""
         begin, end = bisect_right(self.first, row) - 1, bisect_right(self.first, row + count - 1)
-        first, start, step = (np.array(each[begin:end]) for each in (self.first, self.start, self.step))
+        first, start, step = (np.array(column[begin:end]) for column in (self.first, self.start, self.step))
         rows = row + np.arange(count)
         if len(first) == 1:
             return np.asarray(start[0] + (rows - first[0]) * step[0])
-        of = np.searchsorted(first, rows, side="right") - 1
-        return np.asarray(start[of] + (rows - first[of]) * step[of])
+        stretch = np.searchsorted(first, rows, side="right") - 1
+        return np.asarray(start[stretch] + (rows - first[stretch]) * step[stretch])
 
-    def is_like(self, other: "Timeline") -> bool:
-        """Whether samples of both were taken together, though one may have more of them."""
-        if self.first != other.first:
+    def is_like(self, timeline: "Timeline") -> bool:
+        """Whether both were sampled together, though one may have more samples."""
+        if self.first != timeline.first:
             return False
-        # What tells most clocks apart, without arrays: by how much their first sampling times differ by the end.
-        apart, least = abs(self.step[0] - other.step[0]), min(abs(self.step[0]), abs(other.step[0]))
-        if apart * (self.first[1] if len(self.first) > 1 else max(self.rows, other.rows)) > SKEW * least:
+        # Most unequal clocks are found without arrays: by the drift between their first sampling times.
+        difference, least = abs(self.step[0] - timeline.step[0]), min(abs(self.step[0]), abs(timeline.step[0]))
+        if difference * (self.first[1] if len(self.first) > 1 else max(self.rows, timeline.rows)) > SKEW * least:
             return False
-        own, its = np.array([self.start, self.step]), np.array([other.start, other.step])
-        ends = np.array([*self.first[1:], max(self.rows, other.rows)])
-        strays = np.abs(own[0] - its[0]) + np.abs(own[1] - its[1]) * (ends - self.first)
-        return bool(np.all(strays <= SKEW * np.minimum(np.abs(own[1]), np.abs(its[1]))))
+        mine, theirs = np.array([self.start, self.step]), np.array([timeline.start, timeline.step])
+        ends = np.array([*self.first[1:], max(self.rows, timeline.rows)])
+        strays = np.abs(mine[0] - theirs[0]) + np.abs(mine[1] - theirs[1]) * (ends - self.first)
+        return bool(np.all(strays <= SKEW * np.minimum(np.abs(mine[1]), np.abs(theirs[1]))))
 
 
-def together(timelines: dict[str, Timeline]) -> list[list[str]]:
-    """Names of channels that were sampled together, in their order."""
+def group_by_clock(timelines: dict[str, Timeline]) -> list[list[str]]:
+    """Group the names of channels that were sampled together, in their order."""
     order = {name: i for i, name in enumerate(timelines)}
     ranked = sorted(timelines, key=lambda name: (*_rank(timelines[name]), order[name]))
     groups: list[list[str]] = []
@@ -89,40 +90,41 @@ def together(timelines: dict[str, Timeline]) -> list[list[str]]:
     return sorted((sorted(group, key=order.__getitem__) for group in groups), key=lambda group: order[group[0]])
 
 
-def _rank(one: Timeline) -> tuple[list[int], list[str], list[float]]:
-    """What brings timelines that are alike next to each other, without comparing all pairs."""
-    return one.first, [f"{step:.9g}" for step in one.step], one.start
+def _rank(timeline: Timeline) -> tuple[list[int], list[str], list[float]]:
+    """Sort key that puts similar timelines next to each other, without comparing all pairs."""
+    return timeline.first, [f"{step:.9g}" for step in timeline.step], timeline.start
 
 
 @dataclass(frozen=True)
 class Sampling:
-    """What a header says of when one channel was sampled: `start` [s] since the year 1 in local time."""
+    """The sampling of one channel as a header states it; `start` [s] counts from the year 1 in local time."""
 
     start: Decimal | None
     x0: float
     step: float
 
-    def is_like(self, other: "Sampling", x_is_written: bool) -> bool:
-        """Whether both were sampled together, as far as the header knows."""
-        if (self.start is None) != (other.start is None) or (self.step != other.step and not x_is_written):
+    def is_like(self, sampling: "Sampling", x_is_written: bool) -> bool:
+        """Whether both were sampled together, as far as the header tells."""
+        if (self.start is None) != (sampling.start is None) or (self.step != sampling.step and not x_is_written):
             return False
-        apart = float(self.start - other.start) if self.start is not None and other.start is not None else 0.0
+        start, its_start = self.start, sampling.start
+        difference = float(start - its_start) if start is not None and its_start is not None else 0.0
         if not x_is_written:
-            apart += self.x0 - other.x0
-        return abs(apart) <= max(SKEW * min(abs(self.step), abs(other.step)), ROUNDING)
+            difference += self.x0 - sampling.x0
+        return abs(difference) <= max(SKEW * min(abs(self.step), abs(sampling.step)), ROUNDING)
 
 
 @dataclass(frozen=True)
 class OwnClock:
-    """A clock of some channels that is not the log's first."""
+    """A clock of some channels other than the first clock of the log."""
 
     time: str  # the derived channel of its times
     channels: tuple[str, ...]  # in the order of the file
     x: str = ""  # the column of x, where one is written for them
 
 
-def refined(groups: Sequence[list[str]], sampled: dict[str, Sampling], x_is_written: bool) -> list[list[str]]:
-    """Groups of channels that were sampled together up to here, split where one more header tells them apart."""
+def refine_groups(groups: Sequence[list[str]], sampled: dict[str, Sampling], x_is_written: bool) -> list[list[str]]:
+    """Split groups of channels sampled together so far, where one more header shows different clocks."""
     split: list[list[str]] = []
     for group in groups:
         parts: list[list[str]] = []
@@ -135,9 +137,9 @@ def refined(groups: Sequence[list[str]], sampled: dict[str, Sampling], x_is_writ
 
 
 def _joined(groups: list[list[str]], name: str, sampled: dict[str, Sampling], x_is_written: bool) -> None:
-    """Put a channel into the first group that it may belong to; the header need not have all of them."""
+    """Put a channel into the first group that it may belong to; the header need not name all channels."""
     for group in groups:
-        its = next((sampled[other] for other in group if other in sampled), None)
+        its = next((sampled[member] for member in group if member in sampled), None)
         if its is None or name not in sampled or its.is_like(sampled[name], x_is_written):
             group.append(name)
             return
@@ -145,7 +147,7 @@ def _joined(groups: list[list[str]], name: str, sampled: dict[str, Sampling], x_
 
 
 def equal_columns(names: Sequence[str], blocks: Iterable[Block]) -> list[list[str]]:
-    """The columns that hold the same throughout, missing cells at the same places included."""
+    """Group columns with equal values throughout, and with the same cells missing."""
     groups = [[*names]]
     for block in blocks:
         split: list[list[str]] = []

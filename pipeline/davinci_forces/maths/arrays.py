@@ -1,4 +1,4 @@
-"""The arrays that everything is made of, named once; docstrings give their shapes and units."""
+"""Types of arrays; docstrings give their shapes and units."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -9,5 +9,5 @@ Booleans = NDArray[np.bool_]
 
 
 def evenly(N: int, most: int) -> Integers:
-    """The numbers of at most so many of N things, evenly spaced, the first and the last among them."""
+    """Indices of at most `most` of N samples, evenly spaced, including the first and the last."""
     return np.linspace(0, N - 1, min(N, most)).round().astype(np.int64)

@@ -1,7 +1,8 @@
-"""Compiling the loops that numpy cannot take over.  No fastmath: a result must not depend on the compiler's mood.
+"""Compile loops that numpy cannot express.  No fastmath: a result must not depend on the compiler's optimisations.
 
-Numba compiles a function anew when its own file changes, but not when what it inlines does.  The folder of compiled
-code is therefore named by a hash of all of it.  Whoever reads compiled code runs it, so only the user may write there.
+Numba recompiles a function when its own file changes, but not when a function that it inlines does.  The folder of
+compiled code is therefore named by a hash of all sources.  To load compiled code is to run it, so only the user may
+write there.
 """
 
 import atexit
@@ -22,7 +23,7 @@ from threading import Lock
 from typing import Any, TypeVar
 
 PACKAGE = Path(__file__).parents[1]
-SOURCES = ("maths", "filters", "haptics/maths")  # folders of all that compiled code depends on
+SOURCES = ("maths", "filters", "haptics/maths")  # folders that compiled code depends on
 NAME = re.compile("compiled-[0-9a-f]{32}")
 MAX_UNUSED = 30 * 86400.0  # [s]
 MIN_FOLDERS = 5  # kept however long they are unused
@@ -32,20 +33,20 @@ _setting = Lock()
 
 
 def compiled(function: F, **options: Any) -> F:
-    """The function, compiled when it is first called, anew in every process."""
+    """Compile a function at its first call, in every process again."""
     from numba import njit
 
-    made: F = njit(**options)(function)
-    return made
+    jitted: F = njit(**options)(function)
+    return jitted
 
 
-def inlined(function: F) -> F:
-    """The function as part of every compiled function that calls it."""
+def inline(function: F) -> F:
+    """Compile a function into every compiled function that calls it."""
     return compiled(function, inline="always")
 
 
 def cached(function: F) -> F:
-    """The function, compiled once an installation and kept on disk."""
+    """Compile a function once, and store the code on disk."""
     from numba import config
 
     with _setting:  # threads may import several modules at once
@@ -58,7 +59,7 @@ def cached(function: F) -> F:
 
 @cache
 def folder() -> Path:
-    """The folder of what numba makes of these sources; others that are unused for long are removed."""
+    """The folder of numba's code for these sources; folders of other sources are removed after `MAX_UNUSED`."""
     digest = sha256(f"{sys.version} {version('numba')} {version('llvmlite')}".encode())
     for file in sorted(file for room in SOURCES for file in PACKAGE.joinpath(room).rglob("*.py")):
         digest.update(f"\n{file.relative_to(PACKAGE).as_posix()} {sha256(file.read_bytes()).hexdigest()}".encode())
@@ -78,7 +79,7 @@ def folder() -> Path:
 def home() -> Path:
     """The folder of all compiled code: in NUMBA_CACHE_DIR where that is set, else in the user's cache folder.
 
-    Where there is none, or others could write to it, it is a temporary one, shared with processes that start later.
+    If there is none, or others could write to it, it is a temporary one, shared with processes that start later.
     """
     user, chosen = os.environ.get("HOME", ""), os.environ.get("NUMBA_CACHE_DIR")
     linux = os.environ.get("XDG_CACHE_HOME") or os.path.join(user, ".cache")
@@ -94,14 +95,14 @@ def home() -> Path:
 
 @cache
 def temporary() -> Path:
-    """A folder for this process and those that it starts from now on, removed when this process ends."""
+    """A folder for this process and those that it starts later, removed when this process ends."""
     place = os.environ["NUMBA_CACHE_DIR"] = tempfile.mkdtemp(prefix="davinci-forces-")
     atexit.register(shutil.rmtree, place, ignore_errors=True)
     return private(Path(place, "davinci-forces"))
 
 
 def private(place: Path, parents: bool = False) -> Path:
-    """The folder, made where there is none.
+    """Create the folder if needed, and check that only this user may write to it.
 
     Raises
     ------
@@ -117,8 +118,8 @@ def private(place: Path, parents: bool = False) -> Path:
 
 
 def remove_unused(place: Path) -> None:
-    """Remove folders that no process has chosen for `MAX_UNUSED`, but for the last `MIN_FOLDERS`."""
-    folders = (each for each in place.iterdir() if NAME.fullmatch(each.name) and not each.is_symlink())
-    for each in sorted(folders, key=lambda each: each.stat().st_mtime)[:-MIN_FOLDERS]:
-        if each.stat().st_mtime < time.time() - MAX_UNUSED:
-            shutil.rmtree(private(each), ignore_errors=True)
+    """Remove folders that no process has used for `MAX_UNUSED`, except for the last `MIN_FOLDERS`."""
+    folders = (path for path in place.iterdir() if NAME.fullmatch(path.name) and not path.is_symlink())
+    for path in sorted(folders, key=lambda path: path.stat().st_mtime)[:-MIN_FOLDERS]:
+        if path.stat().st_mtime < time.time() - MAX_UNUSED:
+            shutil.rmtree(private(path), ignore_errors=True)

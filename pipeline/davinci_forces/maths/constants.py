@@ -1,3 +1,3 @@
-"""Constants of nature, as the thesis takes them."""
+"""Constants of nature, with the values of the thesis."""
 
 GRAVITY = 9.81  # [m/s^2]; 9.82 does not reproduce the thesis's printed numbers

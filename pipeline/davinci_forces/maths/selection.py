@@ -1,20 +1,21 @@
-"""Choosing a model: least squares with parts of the path left out, and which of the candidates to trust.
+"""Cross-validation of models: least squares with parts of the path left out, and the choice among the candidates.
 
-Parts of a path are left out one at a time: what is predicted there has not been seen, nor anything near it.  Leaving a
-period out repeats the path in what is kept, and rewards every column; a block of path does not.
+Parts of a path are left out one at a time, so that neither a predicted sample nor its neighbours are in the fit.  With
+a period left out, the others repeat its path, which rewards every column; with a block of the path left out, they do
+not.
 
-Least squares is told how far to trust the data: a ridge on columns scaled to the same size.
+The fit is regularised by a ridge on columns scaled to the same size.
 
     theta = arg min sum_i w_i |tau_i - Phi_i theta|^2 + lambda theta' P theta
 
-Base parameters beta = K pi are the least of what they can be: their penalty is that of the smallest pi, each scaled by
-its column, so that it does not depend on which parameters lead the combinations:
+The penalty of base parameters beta = K pi is that of the smallest pi that gives them, each scaled by its column.  So it
+does not depend on which parameters lead the combinations:
 
     P = (K D^-1 K')^-1,    D = diag(K' G K)
 
-Normal equations by cells of the data, so that any part of them can be left out of a fit without going back to it.
+Normal equations are summed by cells of the data, so that any cells can be left out of a fit without their samples:
 
-G = sum Phi' Phi,    r = sum Phi' tau,    s = sum tau^2,    |tau - Phi theta|^2 = s - 2 r' theta + theta' G theta
+    G = sum Phi' Phi,    r = sum Phi' tau,    s = sum tau^2,    |tau - Phi theta|^2 = s - 2 r' theta + theta' G theta
 """
 
 from collections.abc import Sequence
@@ -24,81 +25,81 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 
-UNSEEN = 1e-12  # of the largest column's square, below which a column is nothing but rounding
-ROUNDING = 1e-12  # of the largest column, below which rounding is all that there is of one
+UNSEEN = 1e-12  # of the largest column's square: a smaller column is rounding only
+ROUNDING_OF_COLUMN = 1e-12  # of the largest column: a smaller column is rounding only
 DEPENDENT = 1e12  # condition of the equations of scaled columns, the square of the columns' own
 BLOCKS = 6  # of a period, or of a recording that does not repeat
-MOST = 20  # groups at most that are left out, one refit each
-CLEARLY = 1.0  # standard errors of the difference by which a candidate has to be worse
+MOST = 20  # groups at most that are left out, each with a fit of its own
+CLEARLY = 1.0  # standard errors of the difference, from which a candidate is clearly worse
 
 
 class Equations(NamedTuple):
-    """What least squares needs of m efforts in C cells."""
+    """Normal equations of m efforts in C cells."""
 
     gram: Array  # (C, m, p, p)
     right: Array  # (C, m, p)
     squares: Array  # (C, m)
 
     def without(self, cells: Booleans) -> "Equations":
-        """Those of all other cells (C,), as one."""
+        """Sum the equations of all cells but these (C,)."""
         return self.of(~cells)
 
     def of(self, cells: Booleans) -> "Equations":
-        """Those of some cells (C,), as one."""
+        """Sum the equations of these cells (C,)."""
         return Equations(*(part[cells].sum(axis=0, keepdims=True) for part in self))
 
     def errors(self, theta: Array) -> Array:
-        """|tau - Phi theta|^2 (C, m) of parameters (p,)."""
+        """Squared errors |tau - Phi theta|^2 (C, m) of parameters (p,)."""
         product = np.einsum("cmpq,p,q->cm", self.gram, theta, theta)
         return np.asarray(np.maximum(self.squares - 2.0 * self.right @ theta + product, 0.0))
 
     def columns(self, which: Sequence[int] | Integers) -> "Equations":
-        """Those of some of the parameters."""
+        """The equations of some of the parameters."""
         index = np.asarray(which, np.int64)
         return Equations(self.gram[:, :, index][..., index], self.right[..., index], self.squares)
 
 
 def gathered(Phi: Array, tau: Array, cell: Integers, cells: int) -> Equations:
-    """The equations of Phi (N, m, p) and tau (N, m), the rows of which are in cells (N,); rows in cell -1 are left out.
+    """Sum the equations of Phi (N, m, p) and tau (N, m) by the cell of each sample (N,); cell -1 is left out.
 
-    An effort counts nothing where it is NaN.
+    Efforts that are NaN are left out.
     """
     m, p = Phi.shape[1:]
-    made = Equations(np.zeros((cells, m, p, p)), np.zeros((cells, m, p)), np.zeros((cells, m)))
+    equations = Equations(np.zeros((cells, m, p, p)), np.zeros((cells, m, p)), np.zeros((cells, m)))
     for c in np.unique(cell[cell >= 0]).tolist():
         rows = cell == c
         for i in range(m):
-            told = rows & ~np.isnan(tau[:, i])
-            if told.any():
-                F, z = Phi[told, i], tau[told, i]
-                made.gram[c, i], made.right[c, i], made.squares[c, i] = F.T @ F, F.T @ z, z @ z
-    return made
+            valid = rows & ~np.isnan(tau[:, i])
+            if valid.any():
+                F, z = Phi[valid, i], tau[valid, i]
+                equations.gram[c, i], equations.right[c, i], equations.squares[c, i] = F.T @ F, F.T @ z, z @ z
+    return equations
 
 
 def side_by_side(parts: Sequence[Equations], places: Sequence[int], count: int) -> Equations:
-    """Equations of as many cells each as `count` such parts of as many cells, each in its place; other cells hold 0."""
-    made = Equations(*(np.zeros((count, *column.shape)) for column in parts[0]))
+    """Join equations of equally many cells as parts of `count` such blocks, each at its place; other blocks hold 0."""
+    joined = Equations(*(np.zeros((count, *column.shape)) for column in parts[0]))
     for place, part in zip(places, parts, strict=True):
-        for whole, column in zip(made, part, strict=True):
+        for whole, column in zip(joined, part, strict=True):
             whole[place] = column
-    return Equations(*(column.reshape(-1, *column.shape[2:]) for column in made))
+    return Equations(*(column.reshape(-1, *column.shape[2:]) for column in joined))
 
 
 class Ridge(NamedTuple):
-    """How parameters are found from normal equations."""
+    """Regularisation and weights of the normal equations."""
 
     strength: float  # lambda [-]
     weights: Array  # w (m,) of the efforts
-    combination: Array  # K (b, 10 L + ...) of the first b parameters; the others stand for themselves
+    combination: Array  # K (b, 10 L + ...) of the first b parameters; each other one is itself
 
 
 def solve(equations: Equations, ridge: Ridge) -> Array:
-    """Parameters (p,) from equations of one cell.
+    """Solve the equations of one cell for the parameters (p,).
 
     Raises
     ------
     LinAlgError
-        If the columns are linearly dependent and no ridge tells them apart.
+        If the columns are linearly dependent and there is no ridge.
     """
     scaled, size = scaled_equations(equations, ridge)
     return np.asarray(np.linalg.solve(scaled, ridge.weights @ equations.right[0] / size) / size)
@@ -108,9 +109,9 @@ def scaled_equations(equations: Equations, ridge: Ridge) -> tuple[Array, Array]:
     """G + lambda P (p, p) of columns scaled to unit length, and their lengths (p,); raises as `solve` does."""
     G = np.einsum("m,mpq->pq", ridge.weights, equations.gram[0])
     size = np.sqrt(np.diag(G))
-    # Scaled up, and told apart by a ridge, rounding would look like any other column.  Of an arm's base parameters some
-    # are never seen where a joint is held, and the others are none the worse for it.
-    least = 0.0 if len(ridge.combination) else ROUNDING * size.max()
+    # Scaled up, a column of rounding errors would look like any other column to the ridge.  Where a joint is held, some
+    # base parameters of an arm have no column at all, which does the others no harm.
+    least = 0.0 if len(ridge.combination) else ROUNDING_OF_COLUMN * size.max()
     if not (size > least).all():
         raise np.linalg.LinAlgError("a column is zero throughout")
     scaled = (G + ridge.strength * penalty(G, ridge.combination)) / size / size[:, None]
@@ -120,28 +121,28 @@ def scaled_equations(equations: Equations, ridge: Ridge) -> tuple[Array, Array]:
 
 
 def covariance(equations: Equations, ridge: Ridge, variances: Array) -> Array:
-    """The covariance (p, p) of the parameters where rows of each effort err by independent noise of a variance (m,)."""
+    """Covariance (p, p) of the parameters under independent noise of each effort, with a variance (m,)."""
     scaled, size = scaled_equations(equations, ridge)
     inverse = np.linalg.inv(scaled) / size / size[:, None]
     return np.asarray(inverse @ np.einsum("m,mpq->pq", ridge.weights**2 * variances, equations.gram[0]) @ inverse)
 
 
 def penalty(G: Array, combination: Array) -> Array:
-    """P (p, p): of each parameter its column's square, of base parameters that of the smallest they can be made of."""
+    """Penalty P (p, p): the square of each parameter's column; of base parameters that of the smallest pi."""
     P, b = np.diag(np.diag(G)), len(combination)
     if b:
         D = ((G[:b, :b] @ combination) * combination).sum(axis=0)
-        seen = UNSEEN * D.max() < D
-        K = combination[:, seen]
-        P[:b, :b] = np.linalg.inv((K / D[seen]) @ K.T)
+        shown = UNSEEN * D.max() < D
+        K = combination[:, shown]
+        P[:b, :b] = np.linalg.inv((K / D[shown]) @ K.T)
     return P
 
 
 def path_blocks(t: Array, period: float, moving: Booleans | None = None) -> Integers:
-    """The block of the path, 0 to 5, that each sample (N,) is in: the sixth of its period, or of the recording.
+    """The block of the path, 0 to 5, of each sample (N,) at times `t` [s]: a sixth of its period or of the recording.
 
-    `t` [s]; a `period` of 0 [s] is that of a recording that does not repeat, of which sixths of what is `moving` (N,)
-    are taken, all where it is left out.
+    A `period` of 0 [s] stands for a recording that does not repeat: its blocks are sixths of the time that it is
+    `moving` (N,), or of all its time without that.
     """
     since = t - t[0]
     if moving is not None and not moving.all() and not period:
@@ -151,14 +152,14 @@ def path_blocks(t: Array, period: float, moving: Booleans | None = None) -> Inte
 
 
 def repetitions(t: Array, period: float) -> Integers:
-    """The period, from 0, that each sample (N,) is in; the last one need not be whole."""
+    """The period of each sample (N,), counted from 0; the last one need not be whole."""
     return np.asarray(((t - t[0]) / period + 1e-9).astype(np.int64))
 
 
 def left_out(log: Integers, block: Integers) -> tuple[Booleans, ...]:
-    """Which cells (C,), each a block of one log, every group leaves out: schemes of groups (G, C).
+    """The cells (C,), each a block of one log, that every group leaves out: schemes of groups (G, C).
 
-    Sixths of the path, its halves, and where there are several, each log, together at most `MOST` groups.
+    The schemes leave out sixths of the path, its halves, and each of several logs: at most `MOST` groups together.
     """
     logs = np.unique(log)
     sixths = block == np.arange(BLOCKS)[:, None]
@@ -170,14 +171,14 @@ def left_out(log: Integers, block: Integers) -> tuple[Booleans, ...]:
 
 
 class Judged(NamedTuple):
-    """What a candidate is worth: squared errors over those of the effort, by scheme of leaving out."""
+    """Relative squared errors of a candidate on the data that its fits left out, by scheme."""
 
     unseen: tuple[Array, ...]  # of each scheme (G, m): squared error of each group, over the effort's in all of them
     training: Array  # (m,) relative error of the fit to all data
 
     @property
     def errors(self) -> Array:
-        """The relative error (m,) of each effort, the mean over schemes."""
+        """Relative error (m,) of each effort, the mean over schemes."""
         return np.asarray(np.mean([np.sqrt(shares.sum(axis=0)) for shares in self.unseen], axis=0))
 
     @property
@@ -187,12 +188,12 @@ class Judged(NamedTuple):
 
 
 def judged(equations: Equations, ridge: Ridge, schemes: Sequence[Booleans]) -> Judged:
-    """Leave each group (G, C) of cells out in turn, and predict it.
+    """Cross-validate a candidate: leave out each group (G, C) of cells in turn, and predict it.
 
     Raises
     ------
     LinAlgError
-        If what is left does not tell the parameters apart.
+        If the columns of the other cells are linearly dependent.
     """
     whole = equations.squares.sum(axis=0)
     unseen = []
@@ -205,29 +206,29 @@ def judged(equations: Equations, ridge: Ridge, schemes: Sequence[Booleans]) -> J
 
 
 def together(parts: Sequence[Judged]) -> Judged:
-    """One candidate that consists of fits to different efforts."""
+    """Combine the fits to different efforts into one candidate."""
     unseen = tuple(np.concatenate(shares, axis=1) for shares in zip(*(part.unseen for part in parts), strict=True))
     return Judged(unseen, np.concatenate([part.training for part in parts]))
 
 
-def standard_error(one: Judged, other: Judged | None = None) -> float:
-    """The standard error of a score, or of the difference of two, by leaving each group out of it in turn."""
+def standard_error(candidate: Judged, reference: Judged | None = None) -> float:
+    """Standard error of a score, or of the difference of two scores, by the jackknife over groups."""
     variances = []
-    for i, shares in enumerate(one.unseen):
-        values = [shares, *([other.unseen[i]] if other else [])]
+    for i, shares in enumerate(candidate.unseen):
+        values = [shares, *([reference.unseen[i]] if reference else [])]
         G = len(shares)
         scores = np.array([
             [np.sqrt(np.delete(x, g, axis=0).sum(axis=0) * G / (G - 1)).mean() for g in range(G)] for x in values
         ])  # fmt: skip
-        differences = scores[0] - scores[1] if other else scores[0]
+        differences = scores[0] - scores[1] if reference else scores[0]
         variances.append((G - 1) / G * float(((differences - differences.mean()) ** 2).sum()))
     return float(np.sqrt(np.mean(variances)))
 
 
 def preferred(candidates: Sequence[Judged], sizes: Sequence[int], eligible: Sequence[bool]) -> tuple[int, int]:
-    """The smallest candidate that is not clearly worse than the best, of several the better one; and the best.
+    """Indices of the chosen candidate and of the best: the chosen one is the smallest that is not clearly worse.
 
-    `sizes` are numbers of parameters.
+    Of several equally small candidates, the better one is chosen; `sizes` are numbers of parameters.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Units in which logs may give their quantities, and what they are in SI."""
+"""Units of the quantities in logs, and their size in SI."""
 
 import math
 
@@ -22,7 +22,7 @@ UNITS: dict[str, tuple[str, float]] = {
 UNITS |= {f"{u}/s": (f"{kind} rate", size) for u, (kind, size) in UNITS.items() if kind in ("angle", "length")}
 UNITS["rpm"] = ("angle rate", 2 * math.pi / 60)
 
-# what a quantity is taken to be in where neither the study nor the log says
+# the default units, where neither the study nor the log states one
 SI = {
     "angle": "rad", "length": "m", "angle rate": "rad/s", "length rate": "m/s", "time": "s", "current": "A",
     "force": "N", "torque": "N m", "count": "",
@@ -42,10 +42,10 @@ def canonical(unit: str) -> str:
 
 
 def measures(unit: str) -> str | None:
-    """What a unit measures, or None for a unit that is not listed."""
+    """The kind of quantity of a unit, or None for a unit that is not listed."""
     return UNITS.get(canonical(unit), (None, 0.0))[0]
 
 
 def size(unit: str) -> float:
-    """What one of this unit is in SI."""
+    """The size of a unit in SI."""
     return UNITS[canonical(unit)][1]

@@ -1,4 +1,4 @@
-"""The records that flow between stages, one module for each stage that makes them; see `record`."""
+"""The records that stages exchange, in modules by subject; see `record`."""
 
 from davinci_forces.records.forces import (
     Comparison,
@@ -89,5 +89,5 @@ KINDS: dict[str, type[Record]] = {
     )
 }  # fmt: skip
 
-# Folders of the kinds that earlier versions wrote, whose files are removed.  Whoever removes a kind adds its folder.
+# Folders of record kinds of earlier versions, whose files are removed.  Add the folder of each removed kind.
 FORMER_FOLDERS = ("intake", "logsummary", "noise", "note", "periodresidual", "smoothed", "tissue")

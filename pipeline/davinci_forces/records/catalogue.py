@@ -8,7 +8,7 @@ from davinci_forces.records import AnyRecord, Record
 
 @dataclass(frozen=True)
 class Provenance:
-    """Where a study's results come from: versions, and every file with its hash."""
+    """The origin of a study's results: versions, and every file with its hash."""
 
     name: str  # of the study
     version: str
@@ -16,22 +16,22 @@ class Provenance:
     raw: dict[str, str]
     processed: dict[str, str]
     failures: dict[str, str]
-    study: str = ""  # the study file, as it was read
+    study: str = ""  # text of the study file
 
 
 class Catalogue:
-    """The records of a study by kind, read when asked for."""
+    """The records of a study by kind, each kind read at its first use."""
 
     def __init__(self, read: Callable[[type[Record]], Sequence[Record]]) -> None:
         self._read = read
         self._records: dict[type[Record], list[Record]] = {}
 
     def all(self, kind: type[AnyRecord]) -> list[AnyRecord]:
-        """Every record of a kind, in the order of the study's logs and the robot's joints."""
+        """Return all records of a kind, in the order of the study's logs and the robot's joints."""
         if kind not in self._records:
             self._records[kind] = list(self._read(kind))
         return list(self._records[kind])  # type: ignore[arg-type]
 
     def about(self, kind: type[AnyRecord], **scalars: str) -> list[AnyRecord]:
-        """Records of a kind whose scalars have these values."""
+        """Return the records of a kind whose scalars have these values."""
         return [r for r in self.all(kind) if all(getattr(r, k) == v for k, v in scalars.items())]

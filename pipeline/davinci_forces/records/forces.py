@@ -1,4 +1,4 @@
-"""Records of the external effort on joints: what a filter assumes, what it tracks, and how far that may be off."""
+"""Records of the external effort on joints: the filter's noise, its estimates, and their errors."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from davinci_forces.records.record import Column, Counts, JointRecord, Labels, L
 
 @dataclass(frozen=True, eq=False)
 class Tuning(LogJointRecord):
-    """The noise of one joint in one identification log, as the likelihood of a filter's innovations has it."""
+    """The noise of one joint in one identification log, of maximum likelihood for the filter's innovations."""
 
     rate: float
     r_q: float
@@ -37,15 +37,15 @@ class FilterNoise(JointRecord):
     speed: float
 
     def published(self) -> Iterator[Published]:
-        """The noise, and the walk that shows a push at the rate of the identification logs."""
+        """The noise, and the random walk that shows a push at the rate of the identification logs."""
         yield from self.publish(f"tuning.{self.joint}", "r_q", "r_dq", "r_tau", "q_tau")
 
 
 @dataclass(frozen=True, eq=False)
 class FreeMotion(LogJointRecord):
-    """What a filter makes of one joint of a log in which nothing touches the robot, by a fit that has not seen it.
+    """The filter's external effort on one joint of a log of free motion, with a fit that did not use that log.
 
-    A row is a block of the log, a sixth of it, at one range of speeds.
+    A row is one sixth of the log, in one range of speeds.
     """
 
     path: str
@@ -61,9 +61,9 @@ class FreeMotion(LogJointRecord):
 
 @dataclass(frozen=True, eq=False)
 class ErrorBand(JointRecord):
-    """The errors of a joint's external effort in free motion that no fit had seen, of at most 20 logs, block by block.
+    """The errors of a joint's external effort in free motion outside the fit, block by block, of at most 20 logs.
 
-    A log's own band is made of the rows of the others.
+    The band of a log uses the rows of the other logs.
     """
 
     speed: float
@@ -85,10 +85,10 @@ class ErrorBand(JointRecord):
 
 @dataclass(frozen=True, eq=False)
 class Track(LogJointRecord):
-    """The external effort on one joint during one log, as a filter tracked it, and how far it may be off.
+    """The external effort on one joint during one log, as a filter tracked it, with its standard deviation.
 
-    Its standard deviation is the total: the filter's own, the model's error on free motion that no fit had seen, what
-    the filter lags behind, and the offset of the day, where `free` windows tell one.
+    The standard deviation combines four parts: the filter's own, the model's error in free motion outside the fit, the
+    filter's lag, and the offset of the day where the log has `free` windows.
     """
 
     model: str
@@ -127,7 +127,7 @@ class Track(LogJointRecord):
     nis: Column
 
     def published(self) -> Iterator[Published]:
-        """What the filter found outside contacts, the noise that it assumes, and what its deviation is made of."""
+        """The effort outside contacts, the noise that the filter assumes, and the parts of its standard deviation."""
         prefix = f"{self.filter}.{self.log}.{self.joint}"
         names = ("tau_ext_rms", "nis_mean", "r_q", "r_dq", "q_dq", "q_tau", "filter_part", "lag_part")
         yield from self.publish(prefix, *names)
@@ -136,7 +136,7 @@ class Track(LogJointRecord):
 
 @dataclass(frozen=True, eq=False)
 class FreeSpace(LogJointRecord):
-    """The external effort that one filter states on one joint of one log, where nothing touched the robot."""
+    """The external effort of one filter on one joint of one log, where nothing touched the robot."""
 
     filter: str
     role: str
@@ -161,7 +161,7 @@ class FreeSpace(LogJointRecord):
 
 @dataclass(frozen=True, eq=False)
 class Threshold(JointRecord):
-    """The detection level that contacts on a joint are judged by: that of its worst free space."""
+    """The detection level for contacts on a joint: that of the log with the worst free space."""
 
     KEY = ("joint", "filter")
 
@@ -180,10 +180,10 @@ class Threshold(JointRecord):
 
 @dataclass(frozen=True, eq=False)
 class Contact(LogJointRecord):
-    """The contacts of one log: what one joint exerted on its environment, against its detection level.
+    """The contacts of one joint in one log: its effort on the environment, and its detection level.
 
-    The windows that the study states come first, then what was found beside them.  A window in which nothing was found
-    begins and ends as it is stated.
+    The windows that the study states come first, then other detected contacts.  A window without a detected contact
+    keeps its stated start and end.
     """
 
     filter: str
@@ -218,9 +218,9 @@ class Contact(LogJointRecord):
 
 @dataclass(frozen=True, eq=False)
 class Comparison(LogJointRecord):
-    """One filter on one joint of a log: what it makes of free space, and of a push that was added in software.
+    """One filter on one joint of a log: its effort in free space, and its response to a push added in software.
 
-    Of the default filter the free space is said in FreeSpace.
+    The free space of the default filter is in FreeSpace.
     """
 
     KEY = ("log", "joint", "filter")
@@ -241,7 +241,7 @@ class Comparison(LogJointRecord):
     tau_ext: Column
 
     def published(self) -> Iterator[Published]:
-        """Its levels in free space, and how much of a push it shows, how late."""
+        """The levels in free space, and the share and the delay of a push."""
         prefix = f"{self.filter}.{self.log}.{self.joint}"
         if not self.default:
             yield from self.publish(prefix, "free_rms", "free_level", "detection_level", with_std=True)

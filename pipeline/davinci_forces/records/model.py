@@ -49,12 +49,12 @@ class Fit(Record):
             yield Published(f"{prefix}.{slug(parameter)}", "theta", std="theta_std", row=i)
             yield Published(f"{prefix}.{slug(parameter)}.std_classical", "theta_std_classical", row=i)
         yield from self.publish(prefix, "mse", "r2", "condition", "samples", "periods")
-        yield Published(f"{prefix}.hac_lags", "correlated_lags")  # the key that results.json had before the field
+        yield Published(f"{prefix}.hac_lags", "correlated_lags")  # results.json had this key before the field
 
 
 @dataclass(frozen=True, eq=False)
 class Guess(Record):
-    """What a joint's parameters were guessed to be before anything was measured, and how well that fits."""
+    """An initial guess of a joint's parameters, without measurements, and the error that it leaves."""
 
     KEY = ("group",)
     ROWS = "parameter"
@@ -74,7 +74,7 @@ class Guess(Record):
 
 @dataclass(frozen=True, eq=False)
 class CrossFit(Record):
-    """The parameters of a model, estimated without some of the identification logs, each left out once."""
+    """The parameters of a model from fits that leave out some identification logs, each log once."""
 
     KEY = ("group", "model", "estimator")
 
@@ -89,7 +89,7 @@ class CrossFit(Record):
 
 @dataclass(frozen=True, eq=False)
 class SwarmSearch(Record):
-    """How a swarm searched for the parameters of a model: the best it knew after each iteration."""
+    """A particle swarm search for the parameters of a model, with the lowest error after each iteration."""
 
     KEY = ("group", "model", "estimator", "walls")
 
@@ -107,13 +107,13 @@ class SwarmSearch(Record):
     best_mse: Column
 
     def published(self) -> Iterator[Published]:
-        """What it reached, and in how many iterations."""
+        """The error reached, and the number of iterations."""
         yield from self.publish(".".join(("search", *self.key)), "mse", "excess", "searched", "swarms", "iterations")
 
 
 @dataclass(frozen=True, eq=False)
 class Identifiability(Record):
-    """What the identification logs tell of a model's parameters: each beside each, and what follows in words."""
+    """The identifiability of a model's parameters: the correlation of each pair, and advice in words."""
 
     KEY = ("group", "model")
 
@@ -131,14 +131,14 @@ class Identifiability(Record):
         """The condition number, and the correlation of every pair of parameters, once."""
         yield Published(f"identifiability.{'.'.join(self.key)}.condition", "scaled_condition")
         names = list(dict.fromkeys(self.parameter))
-        for i, (one, other) in enumerate(zip(self.parameter, self.beside, strict=True)):
-            if names.index(one) < names.index(other):
-                yield Published(f"correlation.{'.'.join(self.key)}.{slug(one)}.{slug(other)}", "correlation", row=i)
+        for i, (a, b) in enumerate(zip(self.parameter, self.beside, strict=True)):
+            if names.index(a) < names.index(b):
+                yield Published(f"correlation.{'.'.join(self.key)}.{slug(a)}.{slug(b)}", "correlation", row=i)
 
 
 @dataclass(frozen=True, eq=False)
 class FittedPaths(JointRecord):
-    """The paths that were fitted on a joint, one period of each in turn; of many, those that differ most."""
+    """The fitted paths of a joint, one period of each after the other; of many, those that differ most."""
 
     source: Labels  # the log that follows the path
     period: Column
@@ -148,7 +148,7 @@ class FittedPaths(JointRecord):
 
 @dataclass(frozen=True, eq=False)
 class MeasurementNoise(JointRecord):
-    """The noise of a joint between periods, the root mean square over its identification logs."""
+    """The noise of a joint between periods: the root mean square over its identification logs."""
 
     sigma_q: float
     sigma_dq: float
@@ -157,7 +157,7 @@ class MeasurementNoise(JointRecord):
 
 @dataclass(frozen=True, eq=False)
 class Residual(LogJointRecord):
-    """The averaged effort of one identification log, and the effort that a fit gives for it."""
+    """The averaged effort of one identification log, and the effort of a fit for it."""
 
     KEY = ("log", "joint", "model", "estimator")
 
@@ -172,7 +172,7 @@ class Residual(LogJointRecord):
 
 @dataclass(frozen=True, eq=False)
 class Choice(Record):
-    """The model that describes a joint, or the arm, as cross-validation chose it from candidates."""
+    """The model of a joint, or of the arm, that cross-validation chose from candidates."""
 
     KEY = ("group",)
     UNKNOWN = ("over_periods",)
@@ -183,7 +183,7 @@ class Choice(Record):
     friction: str
     estimator: str
     chosen: str  # the candidate, by name
-    best: str  # the one of the least score
+    best: str  # the candidate with the lowest score
     why: str
     logs: Names
     candidate: Labels
@@ -205,9 +205,9 @@ class Choice(Record):
 
 @dataclass(frozen=True, eq=False)
 class FrictionMap(LogJointRecord):
-    """What a fit's other terms leave of the effort of one joint in one log, and its friction, over velocity.
+    """The effort of one joint in one log minus a fit's terms except friction, and the fit's friction, over velocity.
 
-    Each row is the mean over a range of velocity, of samples that gain speed or of those that lose it.
+    Each row is the mean over a range of velocity, separately for increasing and for decreasing speed.
     """
 
     KEY = ("log", "joint", "model", "estimator")

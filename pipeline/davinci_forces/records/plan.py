@@ -1,4 +1,4 @@
-"""Records of a robot before its logs: its chain, its controllers, and what excites it."""
+"""Records of a robot without its logs: its chain, its controllers, and its excitation."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ class Links(RobotRecord):
 
 @dataclass(frozen=True, eq=False)
 class Pose(RobotRecord):
-    """Where the frames of a robot's chain are at one configuration."""
+    """The positions of the frames of a robot's chain in one configuration."""
 
     KEY = ("robot", "pose")
 
@@ -46,7 +46,7 @@ class Pose(RobotRecord):
 
 @dataclass(frozen=True, eq=False)
 class Workspace(RobotRecord):
-    """Places that the tip can reach within the limits, and how well efforts tell the force there."""
+    """Reachable positions of the tip within the limits, with the condition number of its Jacobian."""
 
     x: Column
     y: Column
@@ -64,7 +64,7 @@ class Control(Record):
     joint: str
     start: float
     reference: float
-    settling_time: float  # NaN where it does not settle, or is not to move
+    settling_time: float  # NaN where the joint does not settle, or has no step
     overshoot: float
     error_10: float
     error_20: float
@@ -74,7 +74,7 @@ class Control(Record):
     dq: Column
 
     def published(self) -> Iterator[Published]:
-        """How the joint follows its reference."""
+        """The tracking of the reference."""
         names = ("start", "reference", "settling_time", "overshoot", "error_10", "error_20", "error_end")
         yield from self.publish(f"control.{self.controller}.{self.joint}", *names)
 
@@ -92,13 +92,13 @@ class Lyapunov(Record):
     V: Column
 
     def published(self) -> Iterator[Published]:
-        """Where it starts, and how far it rises."""
+        """The initial value, and the largest rise."""
         yield from self.publish(f"control.{self.controller}", "V_rise", "V_0")
 
 
 @dataclass(frozen=True, eq=False)
 class Excitation(JointRecord):
-    """One period of an excitation trajectory, published or designed, with what it is worth and what it exceeds."""
+    """One period of an excitation trajectory, published or designed, with its criteria and its excess over limits."""
 
     KEY = ("joint", "source")
 
@@ -116,7 +116,7 @@ class Excitation(JointRecord):
     ddq: Column
 
     def published(self) -> Iterator[Published]:
-        """What the trajectory is worth, what it exceeds, and its coefficients as Table 6.1 names them."""
+        """The criteria, the excess over limits, and the coefficients under the names of Table 6.1."""
         prefix = f"excitation.{self.joint}.{self.source}"
         names = ("period", "objective", "condition", "excess_q", "excess_dq", "excess_ddq")
         yield from self.publish(prefix, *names)

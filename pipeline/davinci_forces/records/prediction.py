@@ -1,4 +1,4 @@
-"""Records of what a fit says of a log: the effort that it predicts, and the joint as filters take it."""
+"""Records of a fit along a log: the predicted effort, and the joint model for filters."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -6,14 +6,14 @@ from dataclasses import dataclass
 from davinci_forces.records.record import Column, Counts, LogJointRecord, Published
 
 CHOSEN = "chosen"
-SAME_PATH, ANOTHER_PATH = "same path", "another path"  # as what was fitted
+SAME_PATH, ANOTHER_PATH = "same path", "another path"  # as fitted
 
 
 @dataclass(frozen=True, eq=False)
 class Prediction(LogJointRecord):
-    """The effort of a log that a fit has not seen, and the effort that the fit predicts for it.
+    """The effort of a log that was left out of a fit, and the effort that the fit predicts for it.
 
-    Of the chosen model, whatever it is, `model` is "chosen" and `estimator` names its fit.
+    For the chosen model, `model` is "chosen" and `estimator` names its fit.
     """
 
     KEY = ("log", "joint", "model", "estimator")
@@ -22,7 +22,7 @@ class Prediction(LogJointRecord):
     estimator: str
     role: str
     scheme: str  # "validation", "contact", "leave one log out", "leave 5 logs out", ...
-    path: str  # "another path" than what was fitted, or the "same path", on which the model's error repeats
+    path: str  # "another path" than the fitted ones, or the "same path", on which the model's error repeats
     rmse: float
     nrmse: float
     r2: float
@@ -39,7 +39,7 @@ class Prediction(LogJointRecord):
 
     @property
     def prefix(self) -> str:
-        """`predict.<log>.<joint>.<model>.<estimator>` or `.chosen`; `cv.` where the log itself was fitted."""
+        """`predict.<log>.<joint>.<model>.<estimator>` or `.chosen`; `cv.` for identification logs."""
         key = self.key[:-1] if self.model == CHOSEN else self.key
         return ".".join(("cv" if self.role == "identification" else "predict", *key))
 
@@ -52,12 +52,12 @@ class Prediction(LogJointRecord):
 
 @dataclass(frozen=True, eq=False)
 class JointModel(LogJointRecord):
-    """The model of one joint along one log, by the fit that the setting `fit` leads to:
+    """The model of one joint along one log, with the fit that the setting `fit` selects:
 
         inertia ddq + b(q, dq) + tau_known + tau_ext = tau                                              (7.15), (7.16)
 
-    `tau_hat_unseen` is the effort of an identification log by refits that have not seen the sample, and NaN where there
-    are none.  It is NaN throughout other logs, which no fit has seen.
+    `tau_hat_unseen` is the effort of an identification log from refits without the sample, or NaN where there are none.
+    It is NaN in all other logs, which no fit uses.
     """
 
     UNKNOWN = ("tau_hat_unseen",)
@@ -67,7 +67,7 @@ class JointModel(LogJointRecord):
     estimator: str
     stand_in: str
     path: str
-    scheme: str  # of what has not seen the samples; "" where nothing has
+    scheme: str  # of the refits without the samples; "" where there are none
     path_unseen: str
     rate: float
     at_rest: int

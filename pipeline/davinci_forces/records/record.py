@@ -1,9 +1,9 @@
-"""The records that flow between stages.
+"""The base classes of the records that stages exchange.
 
-A record is a few scalars that say what it is about, and columns of one length that say what was measured or
-estimated.  It checks itself once, when made, so a stage can trust what it is handed and `store` can write any of
-them the same way.  Every field is a symbol of `quantities`.  `KEY` names the scalars that tell one record of a
-kind from another: they are its place on disk.  `published` says which of its numbers results.json holds.
+A record has a few scalars, which describe its subject, and columns of one length, which hold measurements or
+estimates.  Its constructor checks it, so that stages can rely on it and `store` can write every kind in the same way.
+Every field is a symbol of `quantities`.  `KEY` names the scalars that identify a record among its kind and give its
+file name.  `published` lists the numbers of the record in results.json.
 """
 
 import re
@@ -26,7 +26,7 @@ COLUMN_DTYPES: dict[Any, Any] = {Column: np.float64, Counts: np.int64, Labels: n
 
 
 class Origin(NamedTuple):
-    """Where a record was read from: the file, its hash, and the units of its fields."""
+    """The origin of a record: its file, the hash of the file, and the units of its fields."""
 
     path: str
     sha256: str
@@ -34,7 +34,7 @@ class Origin(NamedTuple):
 
 
 class Published(NamedTuple):
-    """A number of a record that results.json holds: the field, or the row of a column, under a key."""
+    """A number of a record in results.json: a field, or a row of a column, under a key."""
 
     key: str
     field: str
@@ -43,70 +43,70 @@ class Published(NamedTuple):
 
 
 class Record:
-    """What all records share; never made itself."""
+    """The abstract base of all records."""
 
     KEY: ClassVar[Names]
-    UNKNOWN: ClassVar[Names] = ()  # columns in which NaN says that a number is not known
-    ROWS: ClassVar[str] = ""  # the column that names the rows, where rows have names
-    origin: ClassVar[Origin | None] = None  # set on the instances that `store` read
+    UNKNOWN: ClassVar[Names] = ()  # columns in which NaN means unknown
+    ROWS: ClassVar[str] = ""  # the column of row names, where rows have names
+    origin: ClassVar[Origin | None] = None  # set by `store` on the records that it reads
 
     @classmethod
     def folder(cls) -> str:
-        """The folder of its files, its name in lower case: `log_summary`."""
+        """Return the folder of the kind's files, its name in snake case: `log_summary`."""
         return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", cls.__name__).lower()
 
     @classmethod
     def columns(cls) -> Names:
-        """Names of the fields that are columns."""
+        """Return the names of the column fields."""
         return tuple(f.name for f in fields(cls) if f.type in COLUMN_DTYPES)  # type: ignore[arg-type]
 
     @classmethod
     def scalars(cls) -> Names:
-        """Names of the fields that are scalars."""
+        """Return the names of the scalar fields."""
         return tuple(f.name for f in fields(cls) if f.type not in COLUMN_DTYPES)  # type: ignore[arg-type]
 
     @classmethod
-    def later(cls, scalars: Mapping[str, Any], column: Callable[[str], NDArray[Any]]) -> Self:
-        """A record with these scalars, whose columns are read, by name, whenever they are asked for.
+    def lazy(cls, scalars: Mapping[str, Any], column: Callable[[str], NDArray[Any]]) -> Self:
+        """Return a record with these scalars that reads a column, by its name, at every access.
 
-        A column is checked each time; nothing checks that all are of one length.
+        Each access checks the column; nothing checks that all columns have one length.
         """
         record = object.__new__(cls)
         record.__dict__.update(scalars, _column=column)
         return record
 
-    if not TYPE_CHECKING:  # or a name that no record has would be found in no other way than by running
+    if not TYPE_CHECKING:  # so that type checkers still report names that no record has
 
         def __getattr__(self, name: str) -> Any:
-            """A column that is not held, which is asked for here only where there is no attribute of that name."""
+            """Read a column of a lazy record; Python calls this only where there is no such attribute."""
             if name not in self.columns() or "_column" not in self.__dict__:
                 raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
             return self._checked(name, self.__dict__["_column"](name))
 
     @property
     def key(self) -> Names:
-        """What tells this record from others of its kind."""
+        """The values of `KEY`, unique among the records of a kind."""
         return tuple(str(getattr(self, name)) for name in self.KEY)
 
     def published(self) -> Iterator[Published]:
-        """The numbers of this record that belong in results.json."""
+        """Yield the numbers of this record for results.json."""
         return iter(())
 
     def publish(self, prefix: str, *names: str, row: int | None = None, with_std: bool = False) -> Iterator[Published]:
-        """Scalars, or a row of columns, under `<prefix>.<name>`, with their standard errors or without."""
+        """Yield scalars, or a row of columns, under `<prefix>.<name>`, with or without their standard errors."""
         return (Published(f"{prefix}.{name}", name, f"{name}_std" if with_std else "", row) for name in names)
 
     def row_name(self, row: int) -> str:
-        """What a row is called where a number is traced back to it."""
+        """Return the name of a row, for tracing a number back to it."""
         return str(getattr(self, self.ROWS)[row]) if self.ROWS else str(row)
 
     def row_number(self, name: str) -> int:
-        """The row of that name.
+        """Return the row with a name.
 
         Raises
         ------
         ValueError
-            If there is none.
+            If no row has that name.
         """
         return [str(label) for label in getattr(self, self.ROWS)].index(name) if self.ROWS else int(name)
 
@@ -122,10 +122,10 @@ class Record:
             self._checked(name, getattr(self, name))
 
     def _checked(self, name: str, column: NDArray[Any]) -> NDArray[Any]:
-        """A column, once it is known that its numbers are finite."""
+        """Return the column if all its numbers are finite."""
         if column.dtype.kind == "f" and name not in self.UNKNOWN and not np.isfinite(column).all():
-            bad = np.flatnonzero(~np.isfinite(column))
-            raise BadRecord(f"{self}: {name} has {len(bad)} values that are not finite, the first at row {bad[0]}")
+            rows = np.flatnonzero(~np.isfinite(column))
+            raise BadRecord(f"{self}: {name} has {len(rows)} values that are not finite, the first at row {rows[0]}")
         return column
 
     def __str__(self) -> str:
@@ -176,13 +176,13 @@ class RobotRecord(Record):
 
 
 def slug(text: str) -> str:
-    """A name as it stands in a key: 'gravity, sine' is gravity_sine."""
+    """Convert a name for use in a key: 'gravity, sine' becomes gravity_sine."""
     return re.sub(r"[^a-z0-9]+", "_", text.lower()).strip("_")
 
 
 @dataclass(frozen=True, eq=False)
 class Diagnostic(Record):
-    """What a stage wants the reviewer to know: something left out, assumed, or wrong."""
+    """Messages of a stage to the reviewer: about omissions, assumptions and errors."""
 
     KEY = ("stage", "subject")
 
@@ -193,5 +193,5 @@ class Diagnostic(Record):
 
 
 def diagnostic(stage: str, subject: str, severity: str, *texts: str) -> Diagnostic:
-    """A diagnostic of one or more lines of one severity."""
+    """Build a diagnostic of one or more lines with one severity."""
     return Diagnostic(stage, subject, np.array([severity] * len(texts), object), np.array(texts, object))

@@ -1,4 +1,4 @@
-"""Records of what was measured: as it was read, on a uniform clock, and averaged over periods."""
+"""Records of measurements: as read, on a uniform clock, and averaged over periods."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from davinci_forces.records.record import Column, Counts, Labels, LogJointRecord
 
 @dataclass(frozen=True, eq=False)
 class LogSummary(LogRecord):
-    """How one log was read: what the reader noticed, and what each of its channels is used for."""
+    """The summary of reading one log: its clock and rows, and the use of each channel."""
 
     role: str
     format: str
@@ -33,14 +33,14 @@ class LogSummary(LogRecord):
     nans: Counts
 
     def published(self) -> Iterator[Published]:
-        """What the reader noticed of the clock and the rows."""
+        """The properties of the clock and the rows."""
         names = ("rows", "rate", "duration", "jitter", "longest_gap", "duplicates", "dropped")
         yield from self.publish(f"log.{self.log}", *names)
 
 
 @dataclass(frozen=True, eq=False)
 class Touch(LogRecord):
-    """What the channels of one log beyond its joints say of contact, as recorded; NaN without such a channel."""
+    """The contact channels of one log, besides those of joints, as recorded; NaN without such a channel."""
 
     UNKNOWN = ("t", "depth", "force", "force_x", "force_y", "force_z", "x", "y", "z")
 
@@ -60,7 +60,7 @@ class Touch(LogRecord):
 
 @dataclass(frozen=True, eq=False)
 class Recording(LogJointRecord):
-    """One joint during one log, as recorded: at the log's own clock, in joint units."""
+    """One joint during one log, as recorded: on the log's clock, in joint units."""
 
     role: str
     rate: float
@@ -90,10 +90,10 @@ class Signal(LogJointRecord):
 
 @dataclass(frozen=True, eq=False)
 class Motion(LogJointRecord):
-    """The motion of one joint during one log, low-passed without delay, beside what was measured of it.
+    """The motion of one joint during one log after a low-pass filter without delay, and the measured motion.
 
-    The noise is what the low-pass takes out.  Where the joint stands still, friction takes any value up to its Coulomb
-    level: nothing is fitted to its effort there.
+    The noise is what the filter removes.  Where the joint stands still, friction takes any value up to its Coulomb
+    level, so that no fit uses the effort there.
     """
 
     role: str
@@ -149,7 +149,7 @@ class Average(LogJointRecord):
 
 @dataclass(frozen=True, eq=False)
 class PeriodResidual(LogJointRecord):
-    """What averaging removed: each sample minus the mean of the periods at its phase."""
+    """The difference of each sample from the mean of the periods at its phase."""
 
     t: Column
     q_noise: Column
@@ -159,7 +159,7 @@ class PeriodResidual(LogJointRecord):
 
 @dataclass(frozen=True, eq=False)
 class Trajectory(LogJointRecord):
-    """One averaged period with its velocity and acceleration, free of noise, and how large that was."""
+    """One averaged period with its velocity and acceleration, without noise, and the level of that noise."""
 
     rate: float
     period: float
@@ -181,7 +181,7 @@ class Trajectory(LogJointRecord):
 
 @dataclass(frozen=True, eq=False)
 class Spectrum(LogJointRecord):
-    """Amplitude of each harmonic of an averaged period: the harmonics kept, and the rest taken as noise."""
+    """The amplitude of each harmonic of an averaged period: the harmonics kept, and those treated as noise."""
 
     harmonics: int
     frequency: Column

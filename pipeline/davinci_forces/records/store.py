@@ -1,8 +1,8 @@
 """Records on disk: one Parquet file per record.
 
-The columns are the record's own; its scalars are in the file's metadata, with the unit and meaning of every
-field and what the file was made from.  Nothing in a file changes from run to run, so the same raw data give the
-same bytes.  A file appears under its own name only when it is whole.
+The columns are those of the record.  The scalars are in the file's metadata, with the unit and meaning of every field
+and the sources of the file.  A file depends on nothing else, so that the same raw data give the same bytes.  It gets
+its name only when it is complete.
 """
 
 import json
@@ -26,20 +26,20 @@ from davinci_forces.records.quantities import QUANTITIES
 Unit = Callable[[str], str]
 
 ARROW: dict[Any, pa.DataType] = {Column: pa.float64(), Counts: pa.int64(), Labels: pa.string()}
-ROWS = 1 << 24  # at most in a row group: a recording in one of them is read without a copy
+MAX_ROWS_OF_GROUP = 1 << 24  # a recording in one row group is read without a copy
 
 
 def path(kind: type[Record], key: Names) -> Path:
-    """Where a record is, below its study's folder: `track/<log>/<joint>.parquet`."""
+    """Return the place of a record below its study's folder: `track/<log>/<joint>.parquet`."""
     first, name = key[0], ".".join(key[1:])
     folder = Path(kind.folder())
     return folder / first / f"{name}.parquet" if name else folder / f"{first}.parquet"
 
 
 class Writer:
-    """Writes the records of one task.  Records of one kind and key that follow each other are one file.
+    """Writes the records of one task.  Consecutive records of one kind and key share a file.
 
-    Use as a context: the files get their names when the block is left without an error, and vanish otherwise.
+    Use as a context: the files get their names when the block ends without an error; otherwise they are removed.
     """
 
     def __init__(self, folder: Path, unit: Callable[[Record], Unit], made_from: dict[str, Any]) -> None:
@@ -53,14 +53,14 @@ class Writer:
         return self
 
     def write(self, record: Record) -> Path:
-        """Append a record's rows to its file; its scalars count as those of the last part written."""
+        """Append a record's rows to its file; the scalars of the last part apply to the whole file."""
         place = path(type(record), record.key)
         if place not in self._open:
             target = self.folder / place
             target.parent.mkdir(parents=True, exist_ok=True)
             described = schema(type(record), self.unit(record))
             self._open[place] = pq.ParquetWriter(self._unnamed(target), described, **_encoding(described))
-        self._open[place].write_table(_table(record, self._open[place].schema), ROWS)
+        self._open[place].write_table(_table(record, self._open[place].schema), MAX_ROWS_OF_GROUP)
         self._described[place] = self._metadata(record)
         return place
 
@@ -76,11 +76,11 @@ class Writer:
             self._remove_partial()
 
     def _remove_partial(self) -> None:
-        """Remove what has not got its name; on a disk that is full, a file cannot even be closed."""
+        """Remove unfinished files; on a full disk, a file cannot even be closed."""
         for place, file in self._open.items():
             with suppress(OSError):
                 file.close()
-            file.is_open = False  # or it would be closed again, aloud, when it is collected
+            file.is_open = False  # otherwise the garbage collector closes it again and prints an error
             self._unnamed(self.folder / place).unlink(missing_ok=True)
 
     def _metadata(self, record: Record) -> dict[str, str]:
@@ -100,7 +100,7 @@ class Writer:
 
 
 def schema(kind: type[Record], unit: Unit) -> pa.Schema:
-    """The columns of a record, each with its meaning and unit."""
+    """Return the columns of a record, each with its meaning and unit."""
     return _schema(kind, tuple(unit(QUANTITIES[f.name].unit) for f in _stored(kind)))  # type: ignore[arg-type]  # a class is hashable
 
 
@@ -117,16 +117,16 @@ def _stored(kind: Any) -> list[Field[Any]]:
 
 
 def read(kind: type[AnyRecord], folder: Path, place: Path, sha256: str = "", longest: int | None = None) -> AnyRecord:
-    """Read a record back, with its origin; a file whose hash is known already is not hashed again.
+    """Read a record with its origin; `sha256`, where given, saves hashing the file.
 
-    The columns of one of more than `longest` rows are read whenever they are asked for, and not kept.
+    A record of more than `longest` rows reads each column at every access and keeps none.
 
     Raises
     ------
     MissingRecord
-        If the file is not there.
+        If the file does not exist.
     BadRecord
-        If it is not a record of this kind, as this version writes it; of a long one, whenever a column is not.
+        If it is not a record of this kind and version; for a long one, also at the access of a column.
     """
     whole = folder / place
     with _opened(kind, whole) as file:
@@ -141,60 +141,59 @@ def read(kind: type[AnyRecord], folder: Path, place: Path, sha256: str = "", lon
             table = file.read()
             record = kind(**{name: _values(table[name]) for name in kind.columns()}, **scalars)
         else:
-            record = kind.later(scalars, partial(_column_of, kind, whole))
+            record = kind.lazy(scalars, partial(_column_of, kind, whole))
     object.__setattr__(record, "origin", Origin(place.as_posix(), sha256 or digest(whole), units))
     return record
 
 
 @contextmanager
 def _opened(kind: type[Record], whole: Path) -> Iterator[pq.ParquetFile]:
-    """The file of a record; of whatever cannot be read in it, it is said that it is not a record of this kind."""
+    """Open the file of a record, and raise BadRecord for anything in it that cannot be read."""
     try:
-        require_file(whole)  # as a library in C would wait for a pipe
+        require_file(whole)  # Arrow would wait for a pipe forever
         with pq.ParquetFile(whole) as file:
             yield file
     except FileNotFoundError:
-        raise MissingRecord(f"{whole} is not there; run the stage that writes {kind.__name__} records first") from None
+        raise MissingRecord(
+            f"{whole} does not exist; run the stage that writes {kind.__name__} records first"
+        ) from None
     except (pa.ArrowException, PipelineError, LookupError, TypeError, ValueError, OSError, MemoryError) as error:
-        raise BadRecord(
-            f"{whole}: not a {kind.__name__} as this version writes it ({error}); run with --force"
-        ) from error
+        raise BadRecord(f"{whole}: not a {kind.__name__} record of this version ({error}); run with --force") from error
 
 
 def _column_of(kind: type[Record], whole: Path, name: str) -> np.ndarray[Any, Any]:
-    """One column of the record in a file."""
+    """Read one column of the record in a file."""
     with _opened(kind, whole) as file:
         return _values(file.read([name])[name])
 
 
 def release() -> None:
-    """Give back what Arrow keeps of the memory in which records were read and written."""
+    """Release the memory that Arrow retains after reading and writing records."""
     pa.default_memory_pool().release_unused()
 
 
 def leftovers(folder: Path) -> Iterator[Path]:
-    """Files that an interrupted run left half written.
+    """Yield the incomplete files of an interrupted run.
 
     Raises
     ------
     BadRequest
-        If a folder in it is a link, which would have what is written there written elsewhere.
+        If a folder in it is a link, through which a run would write elsewhere.
     """
-    for home, folders, files in os.walk(folder):  # which takes a third of the time of rglob
+    for home, folders, files in os.walk(folder):  # takes a third of the time of rglob
         for name in folders:
             if os.path.islink(link := os.path.join(home, name)):
-                leads = os.readlink(link)
                 raise BadRequest(
-                    f"{link} is a link to {leads}, and what a run makes is not written through links: remove it, or "
-                    "put all results elsewhere with --processed and --reports"
+                    f"{link} is a link to {os.readlink(link)}, and a run writes no results through links; remove it, "
+                    "or choose other folders with --processed and --reports"
                 )
         yield from (Path(home, file) for file in files if file.endswith(PARTIAL))
 
 
 def _encoding(described: pa.Schema) -> dict[str, Any]:
-    """Floats byte by byte and compressed, which is smaller and faster than dictionaries of them.
+    """Return the encoding: floats byte by byte and compressed, smaller and faster than in dictionaries.
 
-    LZ4 takes half the time of Zstandard and 2 % more room: bytes of a float are either noise, or nearly all alike.
+    LZ4 takes half the time of Zstandard and 2 % more space, as bytes of a float are either noise or nearly all equal.
     """
     floats = [f.name for f in described if pa.types.is_floating(f.type)]
     return {
@@ -211,9 +210,9 @@ def _table(record: Record, described: pa.Schema) -> pa.Table:
 
 
 def _column(values: np.ndarray[Any, Any], kind: pa.DataType) -> pa.Array:
-    """A column as Arrow has it, of the same memory where it holds numbers.
+    """Convert a column to Arrow, without a copy of numbers.
 
-    `pa.array` would load pandas to ask whether these are of it, which takes longer than storing a short log.
+    `pa.array` would import pandas to check for its types, which takes longer than storing a short log.
     """
     if kind != pa.string():
         return pa.Array.from_buffers(kind, len(values), [None, pa.py_buffer(np.ascontiguousarray(values))])
@@ -223,7 +222,7 @@ def _column(values: np.ndarray[Any, Any], kind: pa.DataType) -> pa.Array:
 
 
 def _values(column: pa.ChunkedArray) -> np.ndarray[Any, Any]:
-    """What `_column` stored."""
+    """Convert a column of `_column` back."""
     if column.type == pa.string():
         return np.array(column.to_pylist(), object)
     dtype = np.dtype(str(column.type))

@@ -8,7 +8,7 @@ from davinci_forces.records.record import Column, Counts, Labels, LogRecord, Pub
 
 @dataclass(frozen=True, eq=False)
 class JointCorrelation(LogRecord):
-    """How the external efforts of the joints that carry the tip go together in one log, where nothing touches it."""
+    """The correlation of the external efforts of the joints that carry the tip, in one log of free motion."""
 
     tested: int
     rho_12: float
@@ -18,9 +18,9 @@ class JointCorrelation(LogRecord):
 
 @dataclass(frozen=True, eq=False)
 class ArmCorrelation(RobotRecord):
-    """How the external efforts of the joints that carry the tip go together in free space, of at most 20 logs.
+    """The correlation of the external efforts of the joints that carry the tip, in free space, of at most 20 logs.
 
-    What is taken of a log is made of the rows of the others.
+    The correlation for a log uses the rows of the other logs.
     """
 
     source: Labels
@@ -33,7 +33,7 @@ class ArmCorrelation(RobotRecord):
 class TipForce(LogRecord):
     """The force that the tip exerts on its environment during one log, in base axes, with its covariance.
 
-    It is that of the external efforts without delay, where nothing but the tip is touched; NaN at singular poses.
+    It follows from the external efforts without delay, for contact at the tip alone; NaN at singular poses.
     """
 
     UNKNOWN = ("f_x", "f_y", "f_z", "c_xx", "c_yy", "c_zz", "c_xy", "c_xz", "c_yz")
@@ -73,7 +73,7 @@ class TipForce(LogRecord):
     near_singular: Counts
 
     def published(self) -> Iterator[Published]:
-        """How large it looks in free space, and how well the poses of the log tell it."""
+        """The apparent force in free space, and the conditioning of the log's poses."""
         for key, name in (("free_rms", "force_rms"), ("free_level", "force_level"),
                           ("detection_level", "force_detection"), ("coverage", "force_coverage")):  # fmt: skip
             yield Published(f"tip.{self.log}.{key}", name, std=f"{name}_std")
@@ -85,7 +85,7 @@ class TipForce(LogRecord):
 class TipContact(LogRecord):
     """The force at the tip in each contact of one log, at the time at which it is largest.
 
-    The windows that the study states come first, then what was found beside them on any joint.
+    The windows that the study states come first, then other contacts detected on any joint.
     """
 
     filter: str
@@ -127,7 +127,7 @@ class TipContact(LogRecord):
 
 @dataclass(frozen=True, eq=False)
 class TipBudget(LogRecord):
-    """What each joint's error comes to at the tip, at the median pose of one log's free space."""
+    """The contribution of each joint's error to the tip force, at the median pose of one log's free space."""
 
     ROWS = "of_joint"
 
@@ -152,10 +152,10 @@ class TipBudget(LogRecord):
 
 @dataclass(frozen=True, eq=False)
 class SensorForce(LogRecord):
-    """The force that was estimated in one log beside what a force sensor showed, and how far apart they are.
+    """The estimated force in one log, the force of a sensor, and their difference.
 
     `axis` is x, y or z of the base, `vector` for all three together, `size` where the sensor shows only that, or the
-    joint that slides along the sensor's axis.  Of a vector the columns are the sizes of both forces.
+    prismatic joint along the sensor's axis.  For a vector, the columns are the magnitudes of both forces.
     """
 
     KEY = ("log", "axis")

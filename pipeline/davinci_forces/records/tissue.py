@@ -1,11 +1,11 @@
-"""Records of pushes into tissue, and of a hand that feels it."""
+"""Records of pushes into tissue, and of haptic feedback."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
 
 from davinci_forces.records.record import Column, Counts, Labels, LogRecord, Published, Record, RobotRecord, slug
 
-EACH = 20  # pushes of a log, up to which every one of them is in results.json
+MAX_LISTED_PUSHES = 20  # of a log: up to this number, results.json has each push
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,7 +28,7 @@ class Push(LogRecord):
     t: Column
     depth: Column
     force: Column
-    fitted: Column  # by the model that was chosen; NaN where nothing is touched
+    fitted: Column  # by the chosen model; NaN outside contact
     x: Column
     y: Column
     z: Column
@@ -38,7 +38,7 @@ class Push(LogRecord):
 
 @dataclass(frozen=True, eq=False)
 class Stiffness(LogRecord):
-    """How stiff the tissue of one log is: the pushes, one a row, and their median."""
+    """The stiffness of the tissue of one log: the pushes, one a row, and their median."""
 
     ROWS = "push"
     UNKNOWN = (
@@ -46,8 +46,8 @@ class Stiffness(LogRecord):
         "x", "y", "z",
     )  # fmt: skip
 
-    source: str  # what the force was measured by
-    swings: int  # pushes that were looked at
+    source: str  # source of the force
+    swings: int  # pushes examined
     stiffness: float
     stiffness_std: float
     stiffness_std_model: float
@@ -71,19 +71,19 @@ class Stiffness(LogRecord):
     z: Column
 
     def published(self) -> Iterator[Published]:
-        """The median over the pushes that count, its quartiles, how many they are; and each push where they are few."""
+        """The median and quartiles over the pushes that count, their number, and each push if there are few."""
         prefix = f"tissue.{self.log}"
         yield from self.publish(prefix, "stiffness", with_std=True)
         yield from self.publish(prefix, "stiffness_q1", "stiffness_q3", "pushes")
-        for i in range(len(self) if len(self) <= EACH else 0):
-            own = f"{prefix}.{self.push[i]}"
-            yield from self.publish(own, "k_t", "onset_depth", row=i, with_std=True)
-            yield from self.publish(own, "r2", "k_t_loading", "k_t_unloading", "lost", "lost_share", "onset", row=i)
+        for i in range(len(self) if len(self) <= MAX_LISTED_PUSHES else 0):
+            key = f"{prefix}.{self.push[i]}"
+            yield from self.publish(key, "k_t", "onset_depth", row=i, with_std=True)
+            yield from self.publish(key, "r2", "k_t_loading", "k_t_unloading", "lost", "lost_share", "onset", row=i)
 
 
 @dataclass(frozen=True, eq=False)
 class TissueModel(LogRecord):
-    """Which model of tissue predicts the pushes of one log best that it has not seen."""
+    """The models of tissue for one log, and the one with the best prediction of left-out pushes."""
 
     ROWS = "law"
 
@@ -98,7 +98,7 @@ class TissueModel(LogRecord):
     exponent: Column
 
     def published(self) -> Iterator[Published]:
-        """What each model comes to."""
+        """The error and the properties of each model."""
         for i, name in enumerate(self.law):
             prefix = f"tissue.{self.log}.{slug(str(name))}"
             yield from self.publish(prefix, "error", row=i, with_std=True)
@@ -107,7 +107,7 @@ class TissueModel(LogRecord):
 
 @dataclass(frozen=True, eq=False)
 class StabilityMap(RobotRecord):
-    """Where a common quadratic Lyapunov function was found, over stiffnesses of hand and tissue.  Fig 8.9"""
+    """The map of common quadratic Lyapunov functions found, over stiffnesses of hand and tissue.  Fig 8.9"""
 
     hand_mass: float
     hand_damping: float
@@ -118,7 +118,7 @@ class StabilityMap(RobotRecord):
 
 @dataclass(frozen=True, eq=False)
 class StabilityLimit(RobotRecord):
-    """The stiffest tissue over the stiffness of the hand, without delay."""
+    """The largest stable tissue stiffness over the stiffness of the hand, without delay."""
 
     hand_mass: float
     hand_damping: float
@@ -129,7 +129,7 @@ class StabilityLimit(RobotRecord):
 
 @dataclass(frozen=True, eq=False)
 class DelayLimit(RobotRecord):
-    """The stiffest tissue of one hand over how late the force comes."""
+    """The largest stable tissue stiffness for one hand, over the delay of the force."""
 
     UNKNOWN = ("k_t_leaving",)
 
@@ -152,7 +152,7 @@ class DelayLimit(RobotRecord):
 
 @dataclass(frozen=True, eq=False)
 class TissueLimit(LogRecord):
-    """The tissue of one log beside the limits of that hand."""
+    """The tissue of one log, compared with the limits of that hand."""
 
     stiffness: float
     k_h_needed: float
@@ -162,13 +162,13 @@ class TissueLimit(LogRecord):
     damping_needed: float
 
     def published(self) -> Iterator[Published]:
-        """What the tissue asks of the hand, by the Lyapunov function and by the filter's lag."""
+        """The hand that the tissue requires, by the Lyapunov function and by the filter's lag."""
         yield from self.publish(f"stability.{self.log}", "k_h_needed", "force_lag", "k_t_lag", "damping_needed")
 
 
 @dataclass(frozen=True, eq=False)
 class HapticMotion(RobotRecord):
-    """How a hand moves against tissue beyond the limits of arbitrary switching, by a law.  Fig 8.8, 8.10"""
+    """The motion of a hand against tissue beyond the limit of arbitrary switching, by a law.  Fig 8.8, 8.10"""
 
     KEY = ("robot", "switching")
 
@@ -182,7 +182,7 @@ class HapticMotion(RobotRecord):
 
 @dataclass(frozen=True, eq=False)
 class HapticResponse(RobotRecord):
-    """What lies between a hand in the tissue and the force that it feels, over the frequency of its motion."""
+    """The response of the felt force to the motion of a hand in the tissue, over frequency."""
 
     arm_from: str
     tissue_stiffness: float
@@ -195,14 +195,14 @@ class HapticResponse(RobotRecord):
     felt_late: Column
 
     def published(self) -> Iterator[Published]:
-        """The tissue as it is and as it is felt."""
+        """The true and the felt stiffness of the tissue."""
         names = ("tissue_stiffness", "at_frequency", "rendered_stiffness", "transparency", "felt_delay")
         yield from self.publish("haptics", *names)
 
 
 @dataclass(frozen=True, eq=False)
 class HapticRun(Record):
-    """One hand going in and out of the tissue, what it feels, and how far it is from unstable.  Fig 8.12"""
+    """One hand that moves in and out of the tissue, its felt force, and its stability margins.  Fig 8.12"""
 
     KEY = ("hand",)
 

@@ -1,4 +1,4 @@
-"""Records of masses that hang on the arm."""
+"""Records of masses on the arm."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,9 +8,9 @@ from davinci_forces.records.record import Column, Labels, LogJointRecord, LogRec
 
 @dataclass(frozen=True, eq=False)
 class Load(LogJointRecord):
-    """What a kilogram, hung as in a weight log, asks of one joint along a log's path, and the external effort there.
+    """The effort of one joint per kilogram of a weight log's mass, along a log's path, and the external effort there.
 
-    Where the log's motion repeats, rows are one period, averaged; both efforts are low-passed alike, without delay.
+    Where the log's motion repeats, rows are one averaged period.  Both efforts have the same low-pass, without delay.
     """
 
     KEY = ("log", "joint", "weight")
@@ -30,7 +30,7 @@ class Load(LogJointRecord):
 
 @dataclass(frozen=True, eq=False)
 class Weight(LogRecord):
-    """The mass that hangs on the arm in one log, from the external effort of the joints that it loads."""
+    """The mass on the arm in one log, from the external effort of the joints that it loads."""
 
     ROWS = "loaded"
 
@@ -58,7 +58,7 @@ class Weight(LogRecord):
     free_error: Column
 
     def published(self) -> Iterator[Published]:
-        """The mass by the side as stated and by the other one, the scale, and what the tare looks like."""
+        """The mass on the stated side and on the opposite one, the scale, and the mass of the tare."""
         for key, field in (("mass", "mass"), ("mass_mirrored", "mass_mirrored"), ("scale", "mass_scale")):
             yield Published(f"weight.{self.log}.{key}", field, std=f"{field}_std")
         yield from self.publish(f"weight.{self.log}", "tare_mass", with_std=True)
@@ -70,7 +70,7 @@ class Weight(LogRecord):
 
 @dataclass(frozen=True, eq=False)
 class FreeWeight(LogRecord):
-    """The mass that seems to hang on the arm in a log of free motion, where nothing does."""
+    """The apparent mass on the arm in a log of free motion, where it should be 0."""
 
     KEY = ("log", "weight")
 

@@ -1,4 +1,4 @@
-"""Records of signals that should be white, and of why they are not."""
+"""Records of signals that should be white, and of the reasons why they are not."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -8,7 +8,7 @@ from davinci_forces.records.record import Column, Counts, Labels, LogJointRecord
 
 @dataclass(frozen=True, eq=False)
 class Whiteness(LogJointRecord):
-    """Whether a signal that should be white is: its autocorrelation and the tests of it."""
+    """The whiteness of a signal: its autocorrelation and its tests."""
 
     KEY = ("log", "joint", "signal")
 
@@ -36,7 +36,7 @@ class Whiteness(LogJointRecord):
     cumulated: Column
 
     def published(self) -> Iterator[Published]:
-        """The tests, of innovations among the filter's own numbers."""
+        """The tests; those of innovations are among the filter's numbers."""
         if not self.signal.startswith("innovation_"):
             names = ("acf1", "ljung_box_p", "jarque_bera_p", "skewness", "kurtosis", "white")
             yield from self.publish(f"whiteness.{self.log}.{self.joint}.{self.signal}", *names)
@@ -49,7 +49,7 @@ class Whiteness(LogJointRecord):
 
 @dataclass(frozen=True, eq=False)
 class Innovation(LogJointRecord):
-    """One innovation of the default filter: its size beside the stated one, and what it has to do with the motion."""
+    """One innovation of the default filter: its size over the stated one, and its correlation with the motion."""
 
     KEY = ("log", "joint", "signal")
 
@@ -66,13 +66,13 @@ class Innovation(LogJointRecord):
     with_sign: Column
 
     def published(self) -> Iterator[Published]:
-        """Its normalised square, by itself."""
+        """The normalised square of this innovation alone."""
         yield Published(f"ekf.{self.log}.{self.joint}.nis_{self.signal.removeprefix('innovation_')}", "nis_own")
 
 
 @dataclass(frozen=True, eq=False)
 class Explanation(LogJointRecord):
-    """Why the innovations of the default filter are not white; its rows are what was left out or mended, and tested.
+    """The reason why the innovations of the default filter are not white; a row tests one omission or correction.
 
     `finding` is white, left out, mended, or unexplained.
     """
@@ -90,6 +90,6 @@ class Explanation(LogJointRecord):
     walk: Column
 
     def published(self) -> Iterator[Published]:
-        """By how much the times of samples are off, where other joints can tell."""
+        """The error of the sample times, where other joints determine it."""
         if self.clock_std > 0.0:
             yield from self.publish(f"ekf.{self.log}.{self.joint}", "clock_std")

@@ -15,26 +15,27 @@ HEADER = ("joint", "verdict", "model error", "of effort", "R2", "at most", "dete
 
 
 def answer(context: Context) -> str:
-    """The trust table and the three things to look at first, in plain text."""
+    """The table of verdicts and the three things to look at first, in plain text."""
     trusts = [trust(context, joint) for joint in fitted_joints(context)]
-    tissue = [f"tissue {plain(verdict(context, each).text)}" for each in context.catalogue.all(Stiffness)]
+    stiffness = context.catalogue.all(Stiffness)
+    tissue = [f"tissue {plain(verdict(context, log).text)}" for log in stiffness]
     if not trusts:
-        said = "no joint could be identified: there is no usable identification log, so no effort was tracked"
-        return "\n".join([said, *tissue]) + "\n"
+        message = "no joint could be identified: there is no usable identification log, so no effort was tracked"
+        return "\n".join([message, *tissue]) + "\n"
     rows = [[plain(str(cell)) for cell in trust_row(context, trusted, False)] for trusted in trusts]
     looks = [f"{i}. {plain(text)}" for i, text in enumerate(first_looks_in_order(context, trusts), 1)]
-    lines = [*aligned([HEADER, *rows]), *(["look at these first:", *looks] if looks else []), *tissue]
+    lines = [*align([HEADER, *rows]), *(["look at these first:", *looks] if looks else []), *tissue]
     return "\n".join(lines) + "\n"
 
 
 def plain(text: str) -> str:
-    """Marked text without its marks; where it leads to is in the report."""
+    """Remove the marks and references of a marked text."""
     spans = (span.text for span in parse(re.sub(r" See \[@[^]]*\]\.", "", text)) if span.kind != "reference")
     return "".join(spans)
 
 
-def aligned(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Rows as lines, each column as wide as its longest cell."""
+def align(rows: Sequence[Sequence[str]]) -> list[str]:
+    """Write rows as lines, each column as wide as its longest cell."""
     widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
     return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
 
@@ -63,5 +64,5 @@ def _joint(context: Context, joint: str) -> dict[str, Any]:
         "detection_level": f"{free}.detection_level",
         "coverage": f"{free}.coverage",
     }
-    known = {name: key if key in context.results else None for name, key in keys.items()}
-    return {"joint": joint, "verdict": trusted.level, "same_path": trusted.same_path, **known}
+    result_keys = {name: key if key in context.results else None for name, key in keys.items()}
+    return {"joint": joint, "verdict": trusted.level, "same_path": trusted.same_path, **result_keys}

@@ -15,6 +15,7 @@ from davinci_forces.study import Study
 from davinci_forces.study.review import Rating
 
 PLAIN = "independent.lse"  # the fit that every other one is compared with
+THESIS_SCENARIOS = ("davinci-demo", "davinci-thesis")  # simulations of the thesis's experiments
 ACRONYMS = ("lse", "wlse", "pso", "iv", "tls")  # of estimators
 
 
@@ -29,6 +30,11 @@ class Context:
     ratings: tuple[Rating, ...] = ()  # what reviewers said, where the study holds it
     labels: frozenset[str] = frozenset()  # of what stands before a section in its document
     baseline: Mapping[str, Stated] | None = None  # the numbers of an earlier report, where the study names one
+
+    @property
+    def compares_with_thesis(self) -> bool:
+        """Whether results stand beside those of the thesis: in its two simulations, not in a user's study."""
+        return self.study.truth.get("scenario") in THESIS_SCENARIOS
 
     def number(self, key: str, digits: int = 4, **looks: Any) -> Number | str:
         """The result of that key as a cell, or a dash where there is none; `looks` are fields of a Number."""

@@ -1,4 +1,4 @@
-"""When a number is good, when it calls for caution, and when it is a problem: every threshold of the report."""
+"""All thresholds of the report: from where on a number is good, calls for caution or is a problem."""
 
 import math
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ WORDS: dict[Level, str] = {  # the mark and its word stay on one line
 
 @dataclass(frozen=True)
 class Trust:
-    """What is known of how far the external effort of one joint can be trusted: its worst unseen run."""
+    """How far the external effort of one joint can be trusted, by its worst run that was not fitted."""
 
     joint: str
     prediction: Prediction | None
@@ -37,35 +37,52 @@ class Trust:
 
     @property
     def fineness(self) -> float:
-        """Detection level over the effort that is sought, NaN where none is stated."""
+        """Detection level over the effort sought, NaN where none is stated."""
         return self.space.detection_level / self.sought if self.space is not None and self.sought else math.nan
 
     @property
     def same_path(self) -> bool:
-        """Whether it was judged on the path that was fitted, where the model's error repeats."""
+        """Whether the run repeats the path that was fitted, where the model's error repeats."""
         return self.prediction is not None and self.prediction.path == "same path"
 
     @property
     def level(self) -> Level:
-        """By the effort that is sought where one is stated, else by the model error; never good on the same path."""
-        by = graded(self.fineness, DETECTED, DETECTABLE) if self.sought else graded(self.share, GOOD, CAUTION)
+        """The verdict by the effort sought if one is stated, else by the model error; never good on the same path."""
+        by = grade(self.fineness, DETECTED, DETECTABLE) if self.sought else grade(self.share, GOOD, CAUTION)
         return "warn" if by == "good" and self.same_path else by
 
+    @property
+    def narrow(self) -> bool:
+        """Whether the 95 % band covers too few samples of free space."""
+        return self.space is not None and band(self.space.coverage) == "bad"
 
-def graded(share: float, good: float, caution: float) -> Level:
-    """Good, caution or problem; what is not known calls for caution."""
+    @property
+    def words(self) -> str:
+        """The verdict as it is printed."""
+        return verdict_words(self.level, self.same_path, self.narrow)
+
+
+def verdict_words(level: Level, same_path: bool, narrow: bool) -> str:
+    """A verdict with what limits it; a band that is too narrow denies "Good", so that word is not printed beside it."""
+    if level == "good" and narrow:
+        return "●\N{NO-BREAK SPACE}Small error, narrow band"
+    return WORDS[level] + (", same path" if same_path else "")
+
+
+def grade(share: float, good: float, caution: float) -> Level:
+    """Grade a share as good, caution or problem; NaN calls for caution."""
     if math.isnan(share):
         return "warn"
     return "good" if share <= good else "warn" if share <= caution else "bad"
 
 
 def band(coverage: float) -> Level:
-    """Whether a 95 % band that covers this share of free-space samples is right; too wide is only cautious."""
+    """Grade a 95 % band by the share of free-space samples that it covers; too wide is no problem."""
     return "bad" if coverage < COVERED[0] else "info" if coverage > COVERED[1] else "good"
 
 
 def band_in_words(coverage: float) -> str:
-    """The same in words."""
+    """Whether a 95 % band that covers this share of free-space samples is too narrow, right or too wide."""
     return {"bad": "too narrow", "info": "too wide", "good": "right"}[band(coverage)]
 
 
@@ -75,11 +92,11 @@ def percent(share: float) -> str:
 
 
 def thresholds() -> tuple[tuple[Cell, ...], ...]:
-    """What is judged, by what, and from where on: the rows of the table under methods."""
+    """The rows of the table of thresholds: quantity, measure, and the bounds of good, caution and problem."""
     return (
         ("External effort of a joint, where `effort` is stated", "detection level over the effort sought",
          f"at most {percent(DETECTED)}", f"at most {percent(DETECTABLE)}", "beyond"),
-        ("External effort of a joint, elsewhere", "model error over the root mean square of the effort",
+        ("External effort of a joint, without `effort`", "model error over the root mean square of the effort",
          f"at most {percent(GOOD)}, on a path that was not fitted", f"at most {percent(CAUTION)}, or the same path",
          "beyond"),
         ("95 % band of the external effort", "share of free-space samples that it covers",
@@ -91,6 +108,6 @@ def thresholds() -> tuple[tuple[Cell, ...], ...]:
         ("Pose of the tip", "condition number of its Jacobian", "–", f"above {NEAR_SINGULAR:g}: near singular", "–"),
         ("Parameter of a simulated study", "standard errors from the truth", f"at most {WITHIN:g}", "–", "beyond"),
         ("White noise", "probability of a larger Ljung-Box statistic over 20 lags", "above 1 %", "–", "–"),
-        ("Innovations of the filter", "that of position and velocity, and those of their cumulative periodograms",
+        ("Innovations of the filter", "this probability and that of the cumulative periodogram, both signals",
          "each above 1 %, of the whole run or outside contact and reversals", "with or without a tested cause", "–"),
     )  # fmt: skip

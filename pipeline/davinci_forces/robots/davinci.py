@@ -8,7 +8,7 @@ from dataclasses import replace
 from math import pi
 
 from davinci_forces.maths.models.terms import coulomb, gravity_cos, gravity_sin, inertia, lifted_mass, viscous
-from davinci_forces.robots.davinci_chain import BODIES, CHAIN, PITCH_PARTS, ROLL_PARTS, SLIDE_PARTS, WRIST
+from davinci_forces.robots.davinci_chain import BODIES, CHAIN, PITCH_PARTS, ROLL_PARTS, SLIDE_PARTS, WRIST_COORDINATES
 from davinci_forces.robots.robot import ControlStudy, Joint, Kind, Limits, Printed, PrintedColumn, Robot
 
 HAND = Limits(q=(-0.6, 0.6), dq=(-1.2, 1.2), ddq=(-1.2, 1.2))  # Table 6.2
@@ -82,7 +82,7 @@ SLIDE_PRINTED = Printed(
 K_P = (500.0, 500.0, 500.0, 10.0, 10.0, 1.0)
 K_D = (50.0, 50.0, 40.0, 2.0, 0.2, 0.02)
 K_I = (50.0, 50.0, 40.0, 2.0, 1.0, 0.1)
-NONE = (0.0,) * 6
+ZERO = (0.0,) * 6
 # Tables 5.2 and 5.3, which start the slide at 0.2 m, beyond its limit of Table 6.2, which the simulation does not have.
 POSE = (-pi / 8, pi / 8, 0.2, -pi / 4, -pi / 4, -pi / 4)
 # The thesis does not state the friction of its simulation; this is that of the initial guesses of Tables 6.4-6.6.
@@ -91,17 +91,17 @@ LIGHT = "gravity compensated with 0.9 of the masses"
 CONTROL = (
     ControlStudy(
         "pd-to-zero", "PD with gravity compensation, from the pose to zero",
-        POSE, NONE, K_P, K_D, NONE, VISCOUS, known_masses=1.0, duration=3.0,
+        POSE, ZERO, K_P, K_D, ZERO, VISCOUS, known_masses=1.0, duration=3.0,
     ),
     ControlStudy(
         "pd-to-pose", "PD with gravity compensation, from zero to the pose",
-        NONE, POSE, K_P, K_D, NONE, VISCOUS, known_masses=1.0, duration=3.0,
+        ZERO, POSE, K_P, K_D, ZERO, VISCOUS, known_masses=1.0, duration=3.0,
     ),
     ControlStudy(
-        "pd-light", f"PD, {LIGHT}", NONE, POSE, K_P, K_D, NONE, VISCOUS, known_masses=0.9, duration=60.0,
+        "pd-light", f"PD, {LIGHT}", ZERO, POSE, K_P, K_D, ZERO, VISCOUS, known_masses=0.9, duration=60.0,
     ),
     ControlStudy(
-        "pid-light", f"PID, {LIGHT}", NONE, POSE, K_P, K_D, K_I, VISCOUS, known_masses=0.9, duration=60.0,
+        "pid-light", f"PID, {LIGHT}", ZERO, POSE, K_P, K_D, K_I, VISCOUS, known_masses=0.9, duration=60.0,
     ),
 )  # fmt: skip
 
@@ -115,6 +115,6 @@ ROBOT = Robot(
     ),
     chain=CHAIN,
     bodies=BODIES,
-    wrist=WRIST,
+    wrist=WRIST_COORDINATES,
     control=CONTROL,
 )

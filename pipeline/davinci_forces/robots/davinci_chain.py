@@ -50,7 +50,7 @@ CYLINDERS = (
 )
 HOLDER = CHAIN.links.index("5")
 GUESSED_LC5 = 0.2  # [m] with which the initial guesses of Tables 6.4-6.6 were computed; Table 4.1 prints 0.3
-WRIST = ("instrument_roll", "instrument_pitch", "instrument_yaw", "grip")
+WRIST_COORDINATES = ("instrument_roll", "instrument_pitch", "instrument_yaw", "grip")
 # Gear ratios of Table 6.3; friction of the initial guesses of Tables 6.4-6.6, which say nothing of the wrist; the
 # motors' inertia is neglected (4.29).
 DRIVES = Drives(
@@ -67,7 +67,7 @@ BOX = {
     Quality.VISCOUS: (0.0, 20.0),
     Quality.COULOMB: (0.0, 20.0),
 }
-AXES = {"x": X, "y": Y, "z": Z}
+AXIS_INDEX = {"x": X, "y": Y, "z": Z}
 
 
 def bodies(lc5: float = -CYLINDERS[HOLDER][5]) -> Bodies:
@@ -114,23 +114,23 @@ def masses(*links: str) -> tuple[Physical, ...]:
 
 
 def centres(*links: str) -> tuple[Physical, ...]:
-    """How far centres of mass are from the origins of the links' frames, along the axis that they lie on."""
-    found = []
+    """Distances of centres of mass from the origins of the links' frames, along the axis that they lie on."""
+    parameters = []
     for link in links:
         centre = GUESSED.centres[CHAIN.links.index(link)]
         axis = int(np.abs(centre).argmax())
-        found.append(Physical(f"lc{link}", Quality.CENTRE, float(-centre[axis]), *BOX[Quality.CENTRE], link, axis))
-    return tuple(found)
+        parameters.append(Physical(f"lc{link}", Quality.CENTRE, float(-centre[axis]), *BOX[Quality.CENTRE], link, axis))
+    return tuple(parameters)
 
 
 def moments(*named: str) -> tuple[Physical, ...]:
     """Moments of inertia, by axis and link."""
-    found = []
+    parameters = []
     for name in named:
-        axis, link = AXES[name[0]], name[1:]
+        axis, link = AXIS_INDEX[name[0]], name[1:]
         guess = float(GUESSED.inertias[CHAIN.links.index(link), axis, axis])
-        found.append(Physical(f"I{name}", Quality.MOMENT, guess, *BOX[Quality.MOMENT], link, axis))
-    return tuple(found)
+        parameters.append(Physical(f"I{name}", Quality.MOMENT, guess, *BOX[Quality.MOMENT], link, axis))
+    return tuple(parameters)
 
 
 def table(joint: int, *parameters: tuple[Physical, ...]) -> PhysicalTable:

@@ -22,22 +22,22 @@ CARRIAGE = 0.04009  # [m] of the carriage from the end link's axis
 REACH = 0.4318  # [m] from the remote centre to the carriage at q3 = 0, along the tool
 TOOL, WRIST = 0.4162, 0.0091  # [m] of the tool's shaft, and from the wrist's pitch to its yaw
 
-ROLL, PITCH, SLIDE, TOOL_ROLL, WRIST_PITCH, WRIST_YAW = range(6)
+Q_ROLL, Q_PITCH, Q_SLIDE, Q_TOOL_ROLL, Q_WRIST_PITCH, Q_WRIST_YAW = range(6)
 
-CHAIN = modified_denavit_hartenberg(
+PSM_CHAIN = modified_denavit_hartenberg(
     [
-        TableRow("yaw", "0", pi / 2, 0.0, 0.0, pi / 2, ROLL),  # turns about -y
-        TableRow("back_link", "yaw", -pi / 2, 0.0, 0.0, -pi / 2, PITCH),  # turns about -x
+        TableRow("yaw", "0", pi / 2, 0.0, 0.0, pi / 2, Q_ROLL),  # turns about -y
+        TableRow("back_link", "yaw", -pi / 2, 0.0, 0.0, -pi / 2, Q_PITCH),  # turns about -x
         TableRow("back_link_corner", "back_link", 0.0, L3, 0.0, pi / 2),
-        TableRow("lower_bar", "back_link_corner", 0.0, H1, 0.0, pi / 2, PITCH, sign=-1),
-        TableRow("upper_bar", "back_link_corner", 0.0, H1 + H2, 0.0, pi / 2, PITCH, sign=-1),
-        TableRow("end_link", "lower_bar", 0.0, L2, 0.0, 0.0, PITCH),
-        TableRow("front_link", "lower_bar", 0.0, L1, 0.0, pi, PITCH),
-        TableRow("carriage", "end_link", -pi / 2, CARRIAGE, H1 - REACH, 0.0, SLIDE, slides=True),
-        TableRow("counterweight", "back_link", -pi / 2, L3, 0.0, 0.0, SLIDE, slides=True),
-        TableRow("tool_roll", "carriage", 0.0, 0.0, TOOL, 0.0, TOOL_ROLL),
-        TableRow("wrist_pitch", "tool_roll", pi / 2, 0.0, 0.0, pi / 2, WRIST_PITCH),
-        TableRow("wrist_yaw", "wrist_pitch", -pi / 2, WRIST, 0.0, pi / 2, WRIST_YAW),
+        TableRow("lower_bar", "back_link_corner", 0.0, H1, 0.0, pi / 2, Q_PITCH, sign=-1),
+        TableRow("upper_bar", "back_link_corner", 0.0, H1 + H2, 0.0, pi / 2, Q_PITCH, sign=-1),
+        TableRow("end_link", "lower_bar", 0.0, L2, 0.0, 0.0, Q_PITCH),
+        TableRow("front_link", "lower_bar", 0.0, L1, 0.0, pi, Q_PITCH),
+        TableRow("carriage", "end_link", -pi / 2, CARRIAGE, H1 - REACH, 0.0, Q_SLIDE, slides=True),
+        TableRow("counterweight", "back_link", -pi / 2, L3, 0.0, 0.0, Q_SLIDE, slides=True),
+        TableRow("tool_roll", "carriage", 0.0, 0.0, TOOL, 0.0, Q_TOOL_ROLL),
+        TableRow("wrist_pitch", "tool_roll", pi / 2, 0.0, 0.0, pi / 2, Q_WRIST_PITCH),
+        TableRow("wrist_yaw", "wrist_pitch", -pi / 2, WRIST, 0.0, pi / 2, Q_WRIST_YAW),
     ],
     tip="wrist_yaw",
 )
@@ -54,7 +54,7 @@ ROBOT = Robot(
         )
         for joint in davinci.ROBOT.joints
     ),
-    chain=CHAIN,
+    chain=PSM_CHAIN,
     wrist=("instrument_roll", "instrument_pitch", "instrument_yaw"),
     tool=Tool("tool_roll", TOOL),
 )

@@ -1,4 +1,4 @@
-"""A robot that a laboratory describes in a TOML file of its own, and changes to a listed one.
+"""Read a robot from a laboratory's TOML file, and changes to a listed robot.
 
 name = "my_arm"
 title = "Our arm"
@@ -12,20 +12,20 @@ torque_constant = 0.05                  # [N m/A]; or, where it is not known, ef
 harmonics = 5                           # of the excitation
 limits = { q = [-1.0, 1.0], dq = [-2.0, 2.0], ddq = [-5.0, 5.0] }    # and effort = 10.0, which is not exceeded
 
-Where its geometry is known, [[link]] say it: Denavit and Hartenberg's parameters of each, and what it weighs.
+Where its geometry is known, each [[link]] has its Denavit-Hartenberg parameters and its mass.
 
 convention = "modified"                # or "classic"
-tip = "hand"                           # where its frame is; the last link where nothing is said
-wrist = ["grip"]                       # what moves links beyond the joints, and has no effort of its own
+tip = "hand"                           # the link whose frame is the tip; by default the last link
+wrist = ["grip"]                       # coordinates beyond the joints, which move links but have no effort
 
 [[link]]
 name = "upper_arm"
-on = "base"                            # what carries it: the base, or a link before this one
+on = "base"                            # the link that carries it: the base, or a link before this one
 alpha = 0.0                            # [rad]
 a = 0.0                                # [m]
 d = 0.3                                # [m] at q = 0
 theta = 0.0                            # [rad] at q = 0
-moved_by = "shoulder"                  # a joint or a wrist's; without it the frame is fixed to what carries it
+moved_by = "shoulder"                  # a joint or wrist coordinate; without it the frame is fixed to its carrier
 sign = 1                               # -1 where it moves against its joint
 mass = 1.2                             # [kg]; with centre [m] and inertia [kg m^2] about it, in the link's own axes
 centre = [0.0, 0.0, 0.1]
@@ -54,45 +54,42 @@ from davinci_forces.maths.mechanics.chain import (
     modified_denavit_hartenberg,
 )
 from davinci_forces.maths.models.terms import TERMS, Term
-from davinci_forces.robots.robot import ANYWHERE, MOST_JOINTS, Joint, Kind, Limits, Robot
-from davinci_forces.toml import TomlTable, is_number, shown
+from davinci_forces.robots.robot import ANYWHERE, MOST_JOINTS, UNLIMITED, Joint, Kind, Limits, Robot
+from davinci_forces.toml import TomlTable, excerpt, is_number
 from davinci_forces.toml.file import TomlFile
 
 NAME = re.compile(r"[a-z0-9_-]+")
 # Names that Windows keeps for devices, whatever comes after a dot: records are files named by log and joint.
 RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(10))}
-UNLIMITED = Limits(ANYWHERE, ANYWHERE, ANYWHERE)
-KINDS = tuple(kind.value for kind in Kind)
+KIND_NAMES = tuple(kind.value for kind in Kind)
 CONVENTIONS = {"modified": modified_denavit_hartenberg, "classic": denavit_hartenberg}
-BASES = ("base", BASE)  # what the frame that carries the first link is called
-WEIGHT = ("mass", "centre", "inertia")
+BASE_NAMES = ("base", BASE)  # names of the frame that carries the first link
+WEIGHT_KEYS = ("mass", "centre", "inertia")
 
 
-def described(file: Path) -> tuple[Robot | None, TomlFile]:
-    """A robot, None where it cannot be told which joints it has, and the problems of its file; raises BadRobot where
-    that is not TOML.
-    """
+def read_with_problems(file: Path) -> tuple[Robot | None, TomlFile]:
+    """Read a robot, None where its joints are unknown, and its file's problems; raises BadRobot if it is not TOML."""
     table = toml.read(file, BadRobot, "there is no such robot file")
     return robot_of(table, file.stem), table.file
 
 
 def robot_of(table: TomlTable, stem: str) -> Robot | None:
-    """A robot, its problems noted; None where it cannot be told which joints it has."""
+    """Build a robot from its table, with problems noted; None where its joints are unknown."""
     name = table.text("name", stem)
     title = table.text("title", name)
     entries = table.tables("joint", "it has no [[joint]]", most=MOST_JOINTS)
     joints = [_joint(entry) for entry in entries]
     table.unique("joint", "name", ((i, joint.name) for i, joint in enumerate(joints) if joint), "two joints are named")
-    known = tuple(joint for joint in joints if joint)
-    chain = carried(table, known)
+    valid_joints = tuple(joint for joint in joints if joint)
+    chain = read_chain(table, valid_joints)
     table.close()
-    return Robot(name, title, known, *chain) if known and len(known) == len(joints) else None
+    return Robot(name, title, valid_joints, *chain) if valid_joints and len(valid_joints) == len(joints) else None
 
 
 def wrong_name(name: str) -> str:
-    """What is wrong with the name of a log or a joint, which names files; "" where nothing is."""
+    """The problem of the name of a log or a joint, which names files; "" if it is valid."""
     if not NAME.fullmatch(name):
-        return f"{shown(name)} must match [a-z0-9_-]+"
+        return f"{excerpt(name)} may have only lower-case letters, digits, _ and -"
     return f"{name!r} is reserved on Windows; choose another" if name in RESERVED else ""
 
 
@@ -103,16 +100,16 @@ def _joint(table: TomlTable) -> Joint | None:
     if wrong and isinstance(table.values.get("name"), str):
         table.problem(f"name {wrong}", "name")
     table.place += "" if wrong else f" ({name})"
-    kind = table.text("kind", choices=KINDS)
-    blank = Joint(name, name.replace("_", " ").capitalize(), Kind(kind or KINDS[0]), (), UNLIMITED)
+    kind = table.text("kind", choices=KIND_NAMES)
+    blank = Joint(name, name.replace("_", " ").capitalize(), Kind(kind or KIND_NAMES[0]), (), UNLIMITED)
     joint = change(blank, table)
     if "terms" not in table:
-        table.problem(f"terms lists the terms of its model, of {', '.join(map(repr, TERMS))}")
+        table.problem(f"terms is missing; it lists the terms of the joint's model, of {', '.join(map(repr, TERMS))}")
     return None if wrong or not kind else joint
 
 
 def change(joint: Joint, table: TomlTable) -> Joint:
-    """A joint with those of its properties changed that a table names; what is wrong is noted."""
+    """Change the properties of a joint that a table gives; problems are noted."""
     changed = replace(
         joint,
         title=table.text("title", joint.title),
@@ -137,7 +134,7 @@ def change(joint: Joint, table: TomlTable) -> Joint:
 def _terms(table: TomlTable) -> tuple[Term, ...]:
     names = table.texts("terms", None, TERMS)
     if len(set(names)) < len(names):
-        table.problem(f"terms must name no term twice, not {shown(list(names))}", "terms")
+        table.problem(f"terms must name no term twice, not {excerpt(list(names))}", "terms")
     return tuple(TERMS[name] for name in names)
 
 
@@ -155,7 +152,7 @@ def _limits(table: TomlTable) -> Limits:
     changed = Limits(q, dq, ddq)
     if "effort" in limits:
         changed = replace(
-            changed, effort=limits.number("effort", above=0.0, words="the most effort of its drive", kind="force")
+            changed, effort=limits.number("effort", above=0.0, words="the largest effort of the drive", kind="force")
         )
     limits.close()
     return changed
@@ -165,8 +162,8 @@ def _are_bounds(pair: list[Any]) -> bool:
     return len(pair) == 2 and all(is_number(x) or x in ANYWHERE for x in pair) and pair[0] < pair[1]
 
 
-class Carried(NamedTuple):
-    """The chain of a robot, what its links weigh where the file says so, and its coordinates beyond the joints."""
+class Geometry(NamedTuple):
+    """The chain of a robot, the bodies of its links where known, and its coordinates beyond the joints."""
 
     chain: Chain | None = None
     bodies: Bodies | None = None
@@ -179,60 +176,60 @@ class _Weight(NamedTuple):
     inertia: tuple[float, ...]
 
 
-def carried(table: TomlTable, joints: Sequence[Joint]) -> Carried:
-    """The chain that a robot's file describes, what is wrong with it noted; nothing where it has no [[link]]."""
+def read_chain(table: TomlTable, joints: Sequence[Joint]) -> Geometry:
+    """Read the chain that a robot's file describes, with problems noted; empty where it has no [[link]]."""
     entries = table.tables("link", most=MOST_JOINTS)
     if not entries:
-        return Carried()
+        return Geometry()
     convention = table.text("convention", "modified", tuple(CONVENTIONS))
     wrist = tuple(table.take("wrist", [], (list,), "a list of names", lambda names: all(type(x) is str for x in names)))
     kinds = {joint.name: joint.kind for joint in joints}
-    known, rows, weights = [*kinds, *wrist], list[TableRow](), list[_Weight | None]()
+    coordinates, rows, weights = [*kinds, *wrist], list[TableRow](), list[_Weight | None]()
     for entry in entries:
-        rows.append(_row(entry, [*BASES, *(row.name for row in rows)], known, kinds))
+        rows.append(_row(entry, [*BASE_NAMES, *(row.name for row in rows)], coordinates, kinds))
         weights.append(_weight(entry, rows[-1]))
         entry.close()
     table.unique("link", "name", enumerate(row.name for row in rows), "two links are named")
     tip = table.text("tip", rows[-1].name, tuple(row.name for row in rows))
-    unmoved = [name for k, name in enumerate(known) if k not in {row.coordinate for row in rows}]
+    unmoved = [name for k, name in enumerate(coordinates) if k not in {row.coordinate for row in rows}]
     if unmoved:
-        said = f"no [[link]] is moved_by {', '.join(map(repr, unmoved))}"
-        table.problem(f"{said}; a chain has a link for every joint, so add it, or leave all [[link]] out", "link")
-    if len(set(known)) < len(known):
-        table.problem("wrist names what moves beyond the joints, each once", "wrist")
+        missing = f"no [[link]] has moved_by {', '.join(map(repr, unmoved))}"
+        table.problem(f"{missing}; a chain needs a link for every joint: add it, or leave all [[link]] out", "link")
+    if len(set(coordinates)) < len(coordinates):
+        table.problem("wrist must name each coordinate beyond the joints once", "wrist")
     if table.file.problems():
-        return Carried()
+        return Geometry()
     chain = CONVENTIONS[convention](rows, tip)
     moving = [weight for row, weight in zip(rows, weights, strict=True) if row.coordinate != FIXED]
-    return Carried(chain, _bodies(moving, chain) if any(moving) else None, wrist)
+    return Geometry(chain, _bodies(moving, chain) if any(moving) else None, wrist)
 
 
-def _row(table: TomlTable, carriers: list[str], known: list[str], kinds: dict[str, Kind]) -> TableRow:
+def _row(table: TomlTable, carriers: list[str], coordinates: list[str], kinds: dict[str, Kind]) -> TableRow:
     """One row of the table; a coordinate of the wrist turns its links."""
     name = table.text("name")
-    if name in BASES:
-        table.problem(f"name {name!r} is the base's; choose another", "name")
+    if name in BASE_NAMES:
+        table.problem(f"name {name!r} is reserved for the base; choose another", "name")
     on = table.text("on", carriers[-1], carriers)
     alpha, a, d, theta = (table.number(key, 0.0) for key in ("alpha", "a", "d", "theta"))
-    moved_by = table.text("moved_by", "", known) if "moved_by" in table else ""
+    moved_by = table.text("moved_by", "", coordinates) if "moved_by" in table else ""
     sign = table.take("sign", 1, (int,), "1 or -1", lambda x: x in (1, -1))
-    coordinate = known.index(moved_by) if moved_by else FIXED
+    coordinate = coordinates.index(moved_by) if moved_by else FIXED
     slides = kinds.get(moved_by) is Kind.PRISMATIC
-    return TableRow(name, BASE if on in BASES else on, alpha, a, d, theta, coordinate, sign, slides)
+    return TableRow(name, BASE if on in BASE_NAMES else on, alpha, a, d, theta, coordinate, sign, slides)
 
 
 def _weight(table: TomlTable, row: TableRow) -> _Weight | None:
-    """What a link weighs; None where the file does not say."""
-    asked = [key in table for key in WEIGHT]  # of all of them, which makes them known
-    if not any(asked):
+    """The mass, centre and inertia of a link; None where the file does not give them."""
+    stated = [key in table for key in WEIGHT_KEYS]  # a list, as asking for a key makes it a known one
+    if not any(stated):
         return None
     if row.coordinate == FIXED:
-        table.problem("nothing moves it, so it weighs with what carries it: give that its mass", "mass")
+        table.problem("a link without moved_by has no mass; add it to the link that carries this one", "mass")
     mass = table.number("mass", low=0.0, words="a number of kg")
     centre = table.numbers("centre", [0.0] * 3, 3)
     inertia = table.numbers("inertia", [0.0] * 6, 6, "[Ixx, Ixy, Ixz, Iyy, Iyz, Izz]")
     if len(inertia) == 6 and np.linalg.eigvalsh(_tensor(inertia))[0] < 0:
-        table.problem(f"no body has the inertia {shown(list(inertia))}: a principal moment is negative", "inertia")
+        table.problem(f"inertia {excerpt(list(inertia))} has a negative principal moment, which no body has", "inertia")
     return _Weight(mass, centre, inertia)
 
 
@@ -242,11 +239,11 @@ def _tensor(inertia: Sequence[float]) -> Array:
 
 
 def _bodies(weights: Sequence[_Weight | None], chain: Chain) -> Bodies:
-    """The bodies of the links that move, in the frames that the dynamics take; what is not said weighs nothing."""
-    each = [weight or _Weight(0.0, (0.0,) * 3, (0.0,) * 6) for weight in weights]
+    """The bodies of the moving links, in the frames of the dynamics; unstated ones have no mass."""
+    stated = [weight or _Weight(0.0, (0.0,) * 3, (0.0,) * 6) for weight in weights]
     return Bodies(
-        np.array([weight.mass for weight in each]),
-        np.array([weight.centre for weight in each]),
-        np.array([_tensor(weight.inertia) for weight in each]),
-        np.zeros(len(each), np.int64),
+        np.array([weight.mass for weight in stated]),
+        np.array([weight.centre for weight in stated]),
+        np.array([_tensor(weight.inertia) for weight in stated]),
+        np.zeros(len(stated), np.int64),
     ).within(chain.of_links)

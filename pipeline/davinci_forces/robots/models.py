@@ -1,4 +1,4 @@
-"""The models of a robot: what describes which of its joints, with units filled in.
+"""The models of a robot's joints, with units filled in.
 
 A variant is a structure, `independent` or `coupled`, and the friction that is added to it: `coupled+dahl`.
 """
@@ -19,8 +19,8 @@ ARM = "arm"  # the group of a model of several joints
 
 WIDTH = 0.1  # of a smooth sign, in root mean square velocities
 FADED = 0.3  # of Stribeck's peak, likewise
-# Displacements of Dahl's states, as shares of the range of the motion.  Real arms of two laboratories ask for something
-# between 0.2 and 1 %; what suits the arm at hand is for cross-validation to say.
+# Displacements of Dahl's states, as shares of the range of the motion.  Real arms of two laboratories need between 0.2
+# and 1 %; cross-validation chooses among these.
 DISPLACEMENTS = {
     "dahl": ((0.002,), (0.005,), (0.01,), (0.02,)),
     "dahl2": ((0.002, 0.02), (0.005, 0.02)),
@@ -29,7 +29,7 @@ DISPLACEMENTS = {
 
 
 class Reach(NamedTuple):
-    """How far and how fast a joint moves, in its units: what the scales of its friction are shares of."""
+    """How far and how fast a joint moves, in its units; the scales of its friction are shares of these."""
 
     displacement: float
     velocity: float
@@ -42,7 +42,7 @@ class AddedFriction(NamedTuple):
     shares: tuple[float, ...] = ()
 
     def terms(self, reach: Reach) -> tuple[Term, ...]:
-        """Its terms for a joint that moves so."""
+        """Its terms for a joint with this range of motion."""
         if self.variant == "smooth":
             return (smooth_sign(rounded(WIDTH * reach.velocity)),)
         if self.variant == "stribeck":
@@ -51,23 +51,23 @@ class AddedFriction(NamedTuple):
         return tuple(presliding(scale, number) for number, scale in enumerate(scales, start=1))
 
     def __str__(self) -> str:
-        said = ", ".join(f"{100 * share:g} %" for share in self.shares)
-        return f"{self.variant} ({said})" if said else self.variant
+        percentages = ", ".join(f"{100 * share:g} %" for share in self.shares)
+        return f"{self.variant} ({percentages})" if percentages else self.variant
 
 
 def frictions() -> tuple[AddedFriction, ...]:
-    """Every friction that there is to choose from."""
+    """All frictions that cross-validation chooses from."""
     alone = tuple(AddedFriction(variant) for variant in FRICTIONS if variant not in DISPLACEMENTS)
-    return (*alone, *(AddedFriction(variant, shares) for variant, every in DISPLACEMENTS.items() for shares in every))
+    return (*alone, *(AddedFriction(variant, shares) for variant, sets in DISPLACEMENTS.items() for shares in sets))
 
 
 def rounded(scale: float) -> float:
-    """Three digits, which is more than a scale matters."""
+    """Round a scale to three digits, more than its effect needs."""
     return float(f"{scale:.3g}")
 
 
 def independent(joint: Joint, added: Sequence[Term] = (), variant: str = "") -> IndependentJoint:
-    """The model of a joint that is taken to move by itself, with friction added to its own terms.  Section 6.1"""
+    """Model a joint as moving independently, with friction added to its own terms.  Section 6.1"""
     terms = (*joint.terms, *added)
     name = f"independent+{variant}".removesuffix("+")
     return IndependentJoint(joint.name, terms, tuple(joint.unit(term.unit) for term in terms), name)
@@ -76,7 +76,7 @@ def independent(joint: Joint, added: Sequence[Term] = (), variant: str = "") -> 
 def coupled(
     robot: Robot, rows: Sequence[int], added: Sequence[Sequence[Term]], variant: str = "", group: str = ARM
 ) -> CoupledArm:
-    """The model of joints (indices) that move together, each with viscous, Coulomb and added friction.
+    """Model joints (indices) that move together, each with viscous, Coulomb and added friction.
 
     Raises
     ------
@@ -94,7 +94,7 @@ def coupled(
 
 
 def described(robot: Robot, name: str, group: str, parameters: Sequence[str], scales: Sequence[float]) -> Model:
-    """The model that parameters are of, by its name, group, and the names and scales of the parameters."""
+    """Rebuild a model from its name, its group, and the names and scales of its parameters."""
     structure, _, variant = name.partition("+")
     by_name = dict(zip(parameters, scales, strict=True))
     if structure == "independent":

@@ -1,4 +1,4 @@
-"""What a robot is: its joints, each with its motor, its model and its limits, and the chain that carries them."""
+"""A robot as data: its joints, each with its motor, its model and its limits, and its kinematic chain."""
 
 import math
 import re
@@ -13,12 +13,12 @@ from davinci_forces.maths.models.physical import PhysicalTable
 from davinci_forces.maths.models.terms import Term
 
 ANYWHERE = (-math.inf, math.inf)
-MOST_JOINTS = 200  # that move, or what takes their squares takes minutes; a humanoid with both hands has 80
+MOST_JOINTS = 200  # moving ones: more would take minutes, by their square; a humanoid with both hands has 80
 MOST_LINKS = 1000  # of a URDF, with frames that are fixed: sensors, tools, screws
 
 
 class Kind(Enum):
-    """What a joint does, and so the units of everything about it."""
+    """The kind of a joint, which sets the units of its quantities."""
 
     REVOLUTE = "revolute"
     PRISMATIC = "prismatic"
@@ -26,8 +26,8 @@ class Kind(Enum):
     def unit(self, template: str, measured: str = "") -> str:
         """Fill in a unit of `quantities` or of a term: '{position}/s' is 'rad/s' for a revolute joint.
 
-        Where effort is `measured` in A, what multiplies a motion is in A over the motion's unit, and parameters of
-        links are as many times too large or small as the effort is.
+        Where effort is `measured` in A, parameters that multiply a motion are in A over the motion's unit.  Parameters
+        of links then have the unknown factor of the effort.
         """
         position, effort, inertia = ("rad", "N m", "kg m^2") if self is Kind.REVOLUTE else ("m", "N", "kg")
         units = {"position": position, "effort": effort, "inertia": inertia, "mass_moment": "kg m", "gain": ""}
@@ -45,11 +45,14 @@ class Limits:
     q: tuple[float, float]
     dq: tuple[float, float]
     ddq: tuple[float, float]
-    effort: float = math.inf  # the most that its drive gives at the joint, either way
+    effort: float = math.inf  # the largest that its drive gives at the joint, in either direction
+
+
+UNLIMITED = Limits(ANYWHERE, ANYWHERE, ANYWHERE)
 
 
 class PrintedColumn(NamedTuple):
-    """What a publication prints of one way to find a joint's parameters: the estimator, or "" for first guesses."""
+    """A joint's parameters as a publication prints them for one estimator; "" for initial guesses."""
 
     estimator: str
     theta: tuple[float, ...]  # in the order of the joint's terms
@@ -79,9 +82,9 @@ class Joint:
     harmonics: int = 2  # N_f of the excitation
     # Published excitation trajectories by name: period, a0, a1, b1, a2, b2, ...
     published: tuple[tuple[str, tuple[float, ...]], ...] = ()
-    # How fast the external effort may wander: the intensity of its random walk, a standard deviation per square root
-    # of a second [effort/s^0.5].  A choice, not a measurement; the report says so.
-    q_tau: float = 0.0  # random walk of the external effort [effort/s^0.5]; 0 is the slowest that shows a push
+    # Intensity of the external effort's random walk, a standard deviation per square root of a second
+    # [effort/s^0.5]; 0 is the slowest that shows a push.  A choice, not a measurement; the report says so.
+    q_tau: float = 0.0
     physical: PhysicalTable | None = None  # what the parameters of its terms are made of, where that is known
     printed: Printed | None = None  # parameters that were published for it
 
@@ -143,7 +146,7 @@ class Robot:
             If it is not known which part of its chain the tool is.
         """
         if self.tool is None or self.chain is None:
-            raise BadRobot(f"robot {self.name} does not say which part of its chain is the tool; leave its length out")
+            raise BadRobot(f"robot {self.name} has no known tool in its chain; leave the length of the tool out")
         chain = self.chain.lengthened(self.tool.link, length - self.tool.length)
         return replace(self, chain=chain, tool=replace(self.tool, length=length))
 

@@ -1,6 +1,6 @@
-"""What runs again, and why: planning a study's tasks, running them, and remembering what each was made from."""
+"""Plan the tasks of a study, run those that are not up to date, and record what each result was made from."""
 
 from davinci_forces.report import REPORT
 from davinci_forces.stages import STAGES
 
-ALL = (*STAGES, REPORT)  # everything that a run may do, in order
+ALL = (*STAGES, REPORT)  # in the order of a run

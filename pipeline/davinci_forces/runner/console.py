@@ -1,4 +1,4 @@
-"""How a run speaks: lines for a log, on a terminal a bar as well, and at its end the answer, times and files."""
+"""Output of a run: lines, on a terminal a progress bar as well, and at the end the answer, times and files."""
 
 import atexit
 import sys
@@ -19,20 +19,20 @@ Verbosity = Literal["quiet", "normal", "verbose"]
 
 @dataclass
 class Console:
-    """How a run speaks: a line at a time, and how far it is."""
+    """Functions that print the lines, the warnings and the progress of a run."""
 
-    say: Callable[..., None]  # a line, and how it looks
+    say: Callable[..., None]  # a line and its style
     warn: Callable[[str], None]
     progress: Callable[[str, int, int], None] = lambda stage, done, total: None
 
 
 def console(verbosity: Verbosity) -> Console:
-    """Lines for a log; on a terminal, a bar as well.  Warnings are never left out."""
+    """Console of a verbosity.  Warnings are always printed; only a terminal gets the progress bar."""
     bar = Bar() if verbosity == "normal" and sys.stderr.isatty() else None
 
-    def say(line: str, **looks: Any) -> None:
+    def say(line: str, **style: Any) -> None:
         if verbosity != "quiet":
-            echo(line, **looks)
+            echo(line, **style)
 
     def warn(line: str) -> None:
         echo(line, err=True, fg="yellow")
@@ -41,13 +41,13 @@ def console(verbosity: Verbosity) -> Console:
 
 
 class Bar:
-    """How far a stage is, on the last line of a terminal; gone when the stage is done."""
+    """Progress bar of a stage on the last line of a terminal, removed when the stage is done."""
 
     def __init__(self) -> None:
         self._progress: Progress | None = None
 
     def show(self, stage: str, done: int, total: int) -> None:
-        """Draw the bar of a stage, and take it away with its last task."""
+        """Draw the bar of a stage, and remove it with its last task."""
         if self._progress is None:
             self._progress = self._new(stage, total)
         self._progress.update(self._progress.task_ids[0], completed=done)
@@ -64,19 +64,19 @@ class Bar:
         progress = Progress(*columns, console=Terminal(stderr=True), transient=True)
         progress.add_task(stage, total=total)
         progress.start()
-        atexit.register(progress.stop)  # which gives the cursor back where a run is stopped
+        atexit.register(progress.stop)  # restores the cursor if the run is stopped
         return progress
 
 
 def durations(seconds: dict[str, float]) -> str:
-    """How long each stage took, those of under a tenth of a second left out."""
-    long = [f"{name} {took:.1f} s" for name, took in seconds.items() if took >= 0.1]
+    """Total time of a run and of each stage that took at least 0.1 s."""
+    long = [f"{name} {duration:.1f} s" for name, duration in seconds.items() if duration >= 0.1]
     return f"took {sum(seconds.values()):.1f} s" + (f": {', '.join(long)}" if long else "")
 
 
-def echo(text: str, err: bool = False, **looks: Any) -> None:
-    """Print a text as this terminal can show it: what it would obey written out, and letters where it has no marks."""
+def echo(text: str, err: bool = False, **style: Any) -> None:
+    """Print a text, its control characters written out and `?` for what the terminal's encoding lacks."""
     text, encoding = visible(text, "\n\t"), (sys.stderr if err else sys.stdout).encoding or "utf-8"
     with suppress(LookupError):
         text = text.encode(encoding, "replace").decode(encoding)
-    typer.secho(text, err=err, **looks)
+    typer.secho(text, err=err, **style)

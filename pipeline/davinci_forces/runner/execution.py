@@ -1,4 +1,4 @@
-"""Running one task: read its records, call its function, write what it makes.  In this process or in another."""
+"""Run one task, in this process or another: read its records, call its function, write its outputs."""
 
 import errno
 import os
@@ -27,7 +27,7 @@ from davinci_forces.study import LogEntry
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a task made, or why it could not, and its messages for the console."""
+    """The outputs of a task or the reason why it failed, and its messages for the console."""
 
     task: Task
     outputs: dict[str, str]  # file -> sha256
@@ -37,12 +37,12 @@ class Outcome:
 
 
 def perform(folders: Folders, task: Task, mark: Path | None = None) -> Outcome:
-    """Run one task.  Whatever goes wrong is its outcome, so that it costs no other task.
+    """Run one task.  An error becomes its outcome, so that the other tasks go on.
 
     Raises
     ------
     Exception
-        If not even a diagnostic of what went wrong can be written, or the run has ended, whose mark is then gone: the
+        If the diagnostic of the error cannot be written, or the file `mark` is gone.  Then the run has ended, and the
         next one may have removed what this task was writing.
     """
     messages: list[str] = []
@@ -52,78 +52,77 @@ def perform(folders: Folders, task: Task, mark: Path | None = None) -> Outcome:
             for record in function_of(task.step)(**arguments(folders, task)):
                 writer.write(record)
                 messages += _messages(record)
-                del record  # before the stage makes the next
+                del record  # frees its memory before the stage makes the next
         return Outcome(task, _made(writer), messages=tuple(messages), seconds=perf_counter() - start)
     except Exception as error:
         if mark and not mark.exists():
             raise
-        said = said_of(error)
-        failed = without_folders(said, folders)
+        message = error_message(error)
+        failed = without_folders(message, folders)
         with _writer(folders, task) as writer:
             writer.write(diagnostic(stage_of(task.step), file_name(task.subject), "error", failed))
-        return Outcome(task, _made(writer), failed, (f"error: {said}",), perf_counter() - start)
+        return Outcome(task, _made(writer), failed, (f"error: {message}",), perf_counter() - start)
     finally:
         store.release()
 
 
-def said_of(error: Exception) -> str:
-    """What went wrong in a task.  A fault of ours must not cost the other logs, so it is said like any other."""
+def error_message(error: Exception) -> str:
+    """The message of an error; an unexpected one is named as a bug, with its place in the code."""
     if isinstance(error, OSError) and error.errno == errno.ENAMETOOLONG:
-        return f"{error}; what is about a log is stored under its name: give it a shorter one in study.toml"
+        return f"{error}; files are named after their log: give the log a shorter name in study.toml"
     if isinstance(error, PipelineError | OSError):
         return str(error)
-    # Where it happened is all that a report of it needs.
     frame = traceback.extract_tb(error.__traceback__)[-1]
-    fault = f"{type(error).__name__}: {error} ({Path(frame.filename).name}:{frame.lineno} in {frame.name})"
-    return f"{fault}: a fault of davinci-forces, not of the data; please report it"
+    bug = f"{type(error).__name__}: {error} ({Path(frame.filename).name}:{frame.lineno} in {frame.name})"
+    return f"{bug}: a bug of davinci-forces, not an error in the data; please report it"
 
 
 def without_folders(message: str, folders: Folders) -> str:
-    """A message without the folders of this machine, as what is kept of it has to be the same on every one."""
+    """The message without the folders of this machine, so that records of it are the same everywhere."""
     for folder in (folders.processed, folders.reports, folders.raw):
         message = message.replace(f"{folder}{os.sep}", "")
     return message
 
 
 def arguments(folders: Folders, task: Task) -> dict[str, Any]:
-    """Everything that a task's function is called with."""
+    """The keyword arguments of a task's function."""
     asks = declaration(task.step)
-    handed: dict[str, Any] = dict(task.settings)
+    values: dict[str, Any] = dict(task.settings)
     for parameter, located in task.records.items():
         if parameter in asks.in_turn:
-            handed[parameter] = InTurn(folders, task, located)
+            values[parameter] = InTurn(folders, task, located)
             continue
-        records = [_record(folders, task, each) for each in located]
-        alone = parameter in asks.each or parameter in asks.optional
-        handed[parameter] = next(iter(records), None) if alone else records
+        records = [_record(folders, task, place) for place in located]
+        is_single = parameter in asks.each or parameter in asks.optional
+        values[parameter] = next(iter(records), None) if is_single else records
     for parameter, value in task.given.items():
-        handed[parameter] = _log(folders, value) if asks.given[parameter] == "log" else value
-    return handed
+        values[parameter] = _log(folders, value) if asks.given[parameter] == "log" else value
+    return values
 
 
 @dataclass(frozen=True)
 class InTurn(Collection[Record]):
-    """Records that are read whenever they are come to, and not kept: all of a long log would take much memory."""
+    """Records that are read one by one and not kept, since all of a long log would take much memory."""
 
     folders: Folders
     task: Task
     located: tuple[Located, ...]
 
     def __iter__(self) -> Iterator[Record]:
-        return (_record(self.folders, self.task, each) for each in self.located)
+        return (_record(self.folders, self.task, place) for place in self.located)
 
     def __len__(self) -> int:
         return len(self.located)
 
     def __contains__(self, record: object) -> bool:
-        return any(record is each for each in self)
+        return any(record is member for member in self)
 
 
 def _record(folders: Folders, task: Task, located: Located) -> Record:
     kind, place = located
     sha256 = task.fingerprint.inputs[f"processed/{place}"]
-    # What is about a joint is read by the tasks of all its logs, and is small.
-    read = _read if is_about_log(KINDS[kind]) else _kept
+    # The records of a joint are small, and the tasks of all its logs read them.
+    read = _read if is_about_log(KINDS[kind]) else _read_cached
     return read(kind, folders.processed, place, sha256)
 
 
@@ -131,7 +130,7 @@ def _read(kind: str, folder: Path, place: str, sha256: str) -> Record:
     return store.read(KINDS[kind], folder, Path(place), sha256)
 
 
-_kept = lru_cache(maxsize=256)(_read)
+_read_cached = lru_cache(maxsize=256)(_read)
 
 
 @contextmanager

@@ -1,5 +1,5 @@
-"""What waits for what: the calls of a step about one log need what was made of that log, and only a step that reads
-all logs waits for all of them.
+"""The order of a run: a call about one log waits for the results of that log only, and a step that reads all logs
+waits for all of them.
 """
 
 from collections.abc import Iterable, Sequence
@@ -13,18 +13,21 @@ from davinci_forces.runner.places import is_about_log
 from davinci_forces.runner.signature import Declaration, declaration, stage_of, steps
 from davinci_forces.stages import GROUPS, STAGES
 
-WHOLE = ""  # in place of a log: all that a step has to do
+ALL_LOGS = ""  # the log of a part that is about all logs
 
 
 class Part(NamedTuple):
-    """What a step has to do about one log; or the whole of it, which where it goes log by log is when all are done."""
+    """The calls of a step about one log.
+
+    The part of `ALL_LOGS` is the whole step; where a step goes log by log, it only marks that all logs are done.
+    """
 
     step: str
     log: str
 
 
 class Graph:
-    """The parts of a run in the order in which they may begin: of those that are ready, the earliest step first."""
+    """The parts of a run, given out as soon as they are ready, the earliest step first."""
 
     def __init__(self, names: Sequence[str], logs: Sequence[str]) -> None:
         self.parts = [part for name in names for part in _parts(name, logs)]
@@ -33,22 +36,22 @@ class Graph:
         self._followers: dict[Part, list[Part]] = {}
         self._ready: list[tuple[int, Part]] = []
         for part in self.parts:
-            awaited = [other for other in dict.fromkeys(_awaited(part, names, logs)) if other in self._rank]
-            self._waits[part] = len(awaited)
-            for other in awaited:
-                self._followers.setdefault(other, []).append(part)
-            if not awaited:
+            sources = [source for source in dict.fromkeys(_sources(part, names, logs)) if source in self._rank]
+            self._waits[part] = len(sources)
+            for source in sources:
+                self._followers.setdefault(source, []).append(part)
+            if not sources:
                 heappush(self._ready, (self._rank[part], part))
 
     def next(self) -> list[Part]:
-        """The parts of one step that may begin and have not; none where all have, or wait for one that is not done."""
+        """Take the ready parts of one step; none if all have begun or wait for others."""
         batch: list[Part] = []
         while self._ready and (not batch or self._ready[0][1].step == batch[0].step):
             batch.append(heappop(self._ready)[1])
         return batch
 
-    def done(self, part: Part) -> None:
-        """Let what waited for a part begin."""
+    def finish(self, part: Part) -> None:
+        """Mark a part as done, which makes the parts that waited for it alone ready."""
         for follower in self._followers.get(part, ()):
             self._waits[follower] -= 1
             if not self._waits[follower]:
@@ -56,14 +59,14 @@ class Graph:
 
 
 def stages_of(names: Iterable[str]) -> set[str]:
-    """The stages that names stand for, of which some are those of groups; the report stands for itself."""
+    """The stages of these names: a group stands for its stages, any other name for itself."""
     return {stage for name in names for stage in GROUPS.get(name, (name,))}
 
 
-def needed(names: Iterable[str]) -> list[str]:
-    """The steps of these stages and groups and, before them, those that make what they read, in their order."""
+def required_steps(names: Iterable[str]) -> list[str]:
+    """The steps of these stages and groups, and of those that make what they read, in the order of a run."""
     named = stages_of(names)
-    everything = REPORT in named  # which it reads
+    everything = REPORT in named  # it reads the records of all stages
     last = max((i for i, stage in enumerate(STAGES) if everything or stage in named), default=-1)
     read: set[type] = set()
     wanted = [REPORT] * everything
@@ -77,7 +80,7 @@ def needed(names: Iterable[str]) -> list[str]:
 
 @cache
 def every_step(last: int = len(STAGES) - 1) -> tuple[str, ...]:
-    """The steps of all stages, or of those up to one by its number, in their order."""
+    """The steps of all stages, or of those up to the stage of a number, in order."""
     return tuple(step for stage in STAGES[: last + 1] for step in steps(stage))
 
 
@@ -89,21 +92,21 @@ def goes_by_log(asks: Declaration) -> bool:
 
 def _parts(step: str, logs: Sequence[str]) -> list[Part]:
     by_log = step != REPORT and goes_by_log(declaration(step))
-    return [*(Part(step, log) for log in logs if by_log), Part(step, WHOLE)]
+    return [*(Part(step, log) for log in logs if by_log), Part(step, ALL_LOGS)]
 
 
-def _awaited(part: Part, names: Iterable[str], logs: Sequence[str]) -> list[Part]:
-    """The parts that make what this one reads, as far as one of these steps makes it at all."""
+def _sources(part: Part, names: Iterable[str], logs: Sequence[str]) -> list[Part]:
+    """The parts that make what this one reads."""
     if part.step == REPORT:
-        return [Part(name, WHOLE) for name in names if name != REPORT]
-    if part.log == WHOLE and goes_by_log(declaration(part.step)):
+        return [Part(name, ALL_LOGS) for name in names if name != REPORT]
+    if part.log == ALL_LOGS and goes_by_log(declaration(part.step)):
         return [Part(part.step, log) for log in logs]
-    return [Part(name, part.log if own else WHOLE) for name, own in _makers(part.step)]
+    return [Part(name, part.log if same_log else ALL_LOGS) for name, same_log in _makers(part.step)]
 
 
 @cache
 def _makers(step: str) -> tuple[tuple[str, bool], ...]:
-    """The steps that make what this one reads, each with whether what they made of a log is enough for that log."""
+    """The steps that make what this one reads, and whether a part of it reads their records of its own log only."""
     asks = declaration(step)
     earlier = takewhile(lambda name: name != step, every_step(STAGES.index(stage_of(step))))
     return tuple(

@@ -1,7 +1,8 @@
-"""One run at a time on a study: two would take each other's half written files away.
+"""A lock that lets one run at a time work on a study: two would remove each other's half-written files.
 
-The system locks the file `.lock` where the file system can.  Elsewhere `.lock` is a folder of one file, whose name
-says who runs: no folder replaces one that holds a file, and one run alone can rename the file of a run that has ended.
+Where the file system can lock files, the system locks the file `.lock`.  Elsewhere `.lock` is a folder of one file,
+whose name says who holds it.  No folder replaces one that holds a file, and only one run can rename the file of a run
+that has ended.
 """
 
 import os
@@ -21,11 +22,11 @@ from uuid import uuid4
 
 from davinci_forces.errors import BadRequest
 
-NAME = ".lock"  # the file stays when a run has ended: what counts is whether a process holds it
+NAME = ".lock"  # the file stays after a run; only a process that holds it counts
 BUSY, REMEDY = "another run is working on this study", "wait until it has ended, or stop it"
-MAX_TRIES = 100  # to take a lock that others take and release meanwhile
-FLAGS = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)  # a pipe must not wait
-OFFSET = 1 << 30  # [bytes] of what Windows locks, so that others can read what is before
+MAX_TRIES = 100  # to take a lock while others take and release it
+OPEN_FLAGS = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)  # never wait
+LOCKED_BYTE = 1 << 30  # that Windows locks, so that others can read the bytes before it
 
 
 @dataclass(frozen=True)
@@ -34,54 +35,53 @@ class Holder:
 
     host: str
     process: str
-    start: str  # of the process, which tells it from a later one of the same number
+    start: str  # of the process, since its number may be used again
     taken: str
 
     @property
     def name(self) -> str:
-        """The name of a file that says all of this."""
+        """The fields as the name of a file."""
         return urlencode(vars(self))
 
     def require_end(self, folder: Path, file: Path) -> None:
-        """Raise `BadRequest` unless the process that holds the lock of a folder by a file is known to have ended."""
-        says = f"process {self.process} on {self.host.rpartition('.')[0]}, which took the lock at {self.taken[:19]} UTC"
+        """Raise `BadRequest` unless this process, which holds the lock of a folder by a file, has certainly ended."""
+        text = f"process {self.process} on {self.host.rpartition('.')[0]}, which took the lock at {self.taken[:19]} UTC"
         if self.host != this_host():
             raise BadRequest(
-                f"{folder}: a run of another host or container has this lock: {says}; whether it has ended "
-                f"cannot be seen from here: make sure that it has, then delete {file}"
+                f"{folder}: a run on another host or in a container holds the lock: {text}; this host cannot see "
+                f"whether it has ended: make sure that it has, then delete {file}"
             )
         start = start_of(int(self.process))
         if start is not None and (start == self.start or "" in (start, self.start)):
-            raise BadRequest(f"{folder}: {BUSY}: {says}; {REMEDY}")
+            raise BadRequest(f"{folder}: {BUSY}: {text}; {REMEDY}")
 
 
 def holder() -> Holder:
-    """This process, from now on."""
+    """This process, as the holder of a lock from now on."""
     taken = datetime.now(UTC).replace(tzinfo=None).isoformat(" ", "microseconds")
     return Holder(this_host(), str(os.getpid()), start_of(os.getpid()) or "", taken)
 
 
-def parsed(name: str) -> Holder | None:
-    """The holder that a name is of, if it is of one."""
-    try:
+def parse_holder(name: str) -> Holder | None:
+    """The holder of a name, or None if the name is not one of a holder."""
+    with suppress(TypeError, ValueError):
         holder = Holder(**dict(parse_qsl(name, keep_blank_values=True)))
         int(holder.process)
-    except (TypeError, ValueError):
-        return None
-    return holder
+        return holder
+    return None
 
 
 @cache
 def this_host() -> str:
-    """The name of this host, and what tells it and its containers apart, and from others of that name."""
+    """The name of this host with a hash that differs between hosts of this name, and between its containers."""
     marks = []
-    with suppress(OSError):  # another system than Linux
+    with suppress(OSError):  # a system other than Linux
         marks = [os.readlink("/proc/self/ns/pid"), Path("/etc/machine-id").read_text(encoding="utf-8")]
     return f"{socket.gethostname()[:64]}.{sha256(''.join(marks).encode()).hexdigest()[:12]}"
 
 
 def start_of(process: int) -> str | None:
-    """When a process began, as no other of its number did; empty if the system does not say, `None` if it has ended."""
+    """The start time of a process; empty if the system does not tell it, `None` if the process has ended."""
     if sys.platform == "win32":
         return _start_on_windows(process)
     try:
@@ -94,7 +94,7 @@ def start_of(process: int) -> str | None:
         return None if state in "ZX" else f"{boot[:8]}.{fields[18]}"
     except (ProcessLookupError, OverflowError):
         return None
-    except OSError:  # it is of another user, and hidden
+    except OSError:  # the process of another user may be hidden
         return ""
 
 
@@ -114,15 +114,15 @@ def _start_on_windows(process: int) -> str | None:
 
 
 @contextmanager
-def locked(folder: Path) -> Iterator[bool]:
-    """Hold the lock of a processed folder.  That of a process that ended, however it ended, counts for nothing.
+def hold_lock(folder: Path) -> Iterator[bool]:
+    """Hold the lock of a processed folder, and yield whether it is held: a read-only folder needs none.
 
-    A folder that cannot be written to needs no lock, and gets none: whether it is held is what the context gives.
+    The lock of a process that has ended does not count.
 
     Raises
     ------
     BadRequest
-        If another process holds it, or one of another host may do so.
+        If another process holds the lock, or one on another host may hold it.
     """
     if folder.is_dir() and not os.access(folder, os.W_OK):
         yield False
@@ -143,15 +143,15 @@ def locked(folder: Path) -> Iterator[bool]:
             os.close(descriptor)
         else:
             (file / me.name).unlink(missing_ok=True)
-            with suppress(OSError):  # another run's folder has taken the place of this empty one
+            with suppress(OSError):  # another run may have replaced this empty folder
                 file.rmdir()
 
 
 def _lock_by_system(file: Path, me: Holder) -> int | None:
-    """Have the system lock a file, and write into it who holds it; `None` where the file system has no locks."""
+    """Lock a file by the system, and write its holder into it; `None` if the file system has no locks."""
     try:
-        descriptor = os.open(file, FLAGS, 0o666)
-    except (IsADirectoryError, PermissionError) as error:  # which Windows says of a folder
+        descriptor = os.open(file, OPEN_FLAGS, 0o666)
+    except (IsADirectoryError, PermissionError) as error:  # the latter for a folder on Windows
         if isinstance(error, PermissionError) and not file.is_dir():
             raise
         return None
@@ -159,7 +159,7 @@ def _lock_by_system(file: Path, me: Holder) -> int | None:
         if sys.platform == "win32":
             import msvcrt
 
-            os.lseek(descriptor, OFFSET, os.SEEK_SET)
+            os.lseek(descriptor, LOCKED_BYTE, os.SEEK_SET)
             msvcrt.locking(descriptor, msvcrt.LK_NBLCK, 1)
             os.lseek(descriptor, 0, os.SEEK_SET)
         else:
@@ -167,15 +167,14 @@ def _lock_by_system(file: Path, me: Holder) -> int | None:
 
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
     except OSError as error:
-        is_held = isinstance(error, BlockingIOError | PermissionError)
         os.lseek(descriptor, 0, os.SEEK_SET)
-        other = parsed(os.read(descriptor, 1000).decode("utf-8", "replace"))
+        earlier = parse_holder(os.read(descriptor, 1000).decode("utf-8", "replace"))
         os.close(descriptor)
-        if other:
-            other.require_end(file.parent, file)
-        if is_held:
+        if earlier:
+            earlier.require_end(file.parent, file)
+        if isinstance(error, BlockingIOError | PermissionError):
             raise BadRequest(f"{file.parent}: {BUSY}; {REMEDY}") from None
-        with suppress(OSError):  # another run has put a folder here
+        with suppress(OSError):  # another run may have put a folder here
             file.unlink()
         return None
     with suppress(OSError):  # a full disk
@@ -185,14 +184,13 @@ def _lock_by_system(file: Path, me: Holder) -> int | None:
 
 
 def _lock_by_name(file: Path, me: Holder) -> bool:
-    """Hold a lock by a folder of this name, and a file in it whose name says who does; whether no other was faster."""
-    try:
+    """Lock by a folder with one file, named after its holder; return whether no other process was faster."""
+    names: list[str] = []
+    with suppress(OSError):
         names = sorted(os.listdir(file))
-    except OSError:
-        names = []
     for name in names:
-        if name != me.name and (other := parsed(name)):
-            other.require_end(file.parent, file / name)
+        if name != me.name and (earlier := parse_holder(name)):
+            earlier.require_end(file.parent, file / name)
     folder = file.with_name(f"{NAME}-{uuid4().hex}")
     try:
         if names:

@@ -1,4 +1,4 @@
-"""Where the records of a study are: an index of their files by kind, and by the log and joint that they are about."""
+"""An index of a study's record files by kind, log and joint."""
 
 from collections.abc import Iterable, Iterator
 
@@ -7,13 +7,13 @@ from davinci_forces.runner.ledger import Entry
 from davinci_forces.runner.signature import Kinds
 from davinci_forces.study import Study
 
-Located = tuple[str, str]  # kind of record, file below the processed folder: a Path costs ten times what a name does
+Located = tuple[str, str]  # kind of record, file below the processed folder; a Path would take ten times as long
 ANY = ""  # log, joint or role
 ORDER = {kind: i for i, kind in enumerate(KINDS.values())}
 
 
 class Places:
-    """The files that stages made, in the order of the study's logs and the robot's joints."""
+    """The record files of a study, in the order of its logs and of the robot's joints."""
 
     def __init__(self, study: Study, entries: Iterable[Entry]) -> None:
         self._logs = {entry.name: i for i, entry in enumerate(study.logs)}
@@ -21,38 +21,37 @@ class Places:
         self._joints = {joint.name: i for i, joint in enumerate(study.robot.joints)}
         self._kinds = {kind.folder(): kind for kind in KINDS.values()}
         self._names: dict[str, dict[str, dict[str, str]]] = {}  # by folder and log, with the joint
-        self._all: dict[str, dict[str, list[Located]]] = {}  # by kind and joint, what is about every log, in order
+        self._all: dict[str, dict[str, list[Located]]] = {}  # by kind and joint, the files of all logs, in order
         for entry in entries:
             self.add(entry.outputs)
 
     def add(self, outputs: Iterable[str]) -> None:
-        """Know of files that a task made."""
-        for kind, path, log, joint in self._about(outputs):
+        """Add the outputs of a task."""
+        for kind, path, log, joint in self._changed_records(outputs):
             self._names.setdefault(kind.folder(), {}).setdefault(log, {})[path] = joint
 
     def remove(self, outputs: Iterable[str]) -> None:
-        """Know no more of files that a task made."""
-        for kind, path, log, _ in self._about(outputs):
+        """Remove the outputs of a task."""
+        for kind, path, log, _ in self._changed_records(outputs):
             self._names.get(kind.folder(), {}).get(log, {}).pop(path, None)
 
-    def _about(self, outputs: Iterable[str]) -> Iterator[tuple[type[Record], str, str, str]]:
-        """The records among a task's files that are about a log of the study, or about none.
-
-        What is kept of their kinds in order is no more.
+    def _changed_records(self, outputs: Iterable[str]) -> Iterator[tuple[type[Record], str, str, str]]:
+        """The records among a task's outputs, without those of logs that left the study; the order of their kinds
+        is computed again.
         """
         for name in outputs:
             root, _, path = name.partition("/")
             kind = self._kinds.get(path.partition("/")[0]) if root == "processed" else None
             if kind:
-                log, joint = about(kind, path)
+                log, joint = log_and_joint(kind, path)
                 if log == ANY or log in self._logs:
                     self._all.pop(kind.__name__, None)
                     yield kind, path, log, joint
 
-    def of(self, kinds: Kinds, log: str = ANY, joint: str = ANY, role: str = ANY) -> tuple[Located, ...]:
-        """Files of these kinds about a log and a joint; a kind that is about no log or joint is about every one.
+    def find(self, kinds: Kinds, log: str = ANY, joint: str = ANY, role: str = ANY) -> tuple[Located, ...]:
+        """Files of these kinds about a log, a joint and logs of a role.
 
-        Where a role is given, those of the logs of that role.
+        A kind that is about no log, or no joint, is about every one.
         """
         located: tuple[Located, ...] = ()
         for kind in sorted(kinds, key=ORDER.__getitem__) if len(kinds) > 1 else kinds:
@@ -62,10 +61,10 @@ class Places:
             )
         if role == ANY:
             return located
-        return tuple((kind, path) for kind, path in located if self._roles.get(about(KINDS[kind], path)[0]) == role)
+        return tuple((k, path) for k, path in located if self._roles.get(log_and_joint(KINDS[k], path)[0]) == role)
 
     def _of_all(self, kind: type[Record], joint: str) -> list[Located]:
-        """The files of a kind about a joint, of every log; many calls ask for them."""
+        """The files of a kind about a joint, of all logs; sorted once, since many calls read them."""
         by_joint = self._all.setdefault(kind.__name__, {})
         if joint not in by_joint:
             by_joint[joint] = self._sorted(kind, list(self._names.get(kind.folder(), ())), joint)
@@ -82,10 +81,10 @@ class Places:
         return [(kind.__name__, path) for *_, path in ranked]
 
 
-def about(kind: type[Record], name: str) -> tuple[str, str]:
-    """The log and the joint that a file is about: `track/<log>/<joint>.parquet`; "" where it is about none."""
-    first, *others = name.removesuffix(".parquet").split("/")[1:]
-    key = dict(zip(kind.KEY, (first, *(part for other in others for part in other.split("."))), strict=False))
+def log_and_joint(kind: type[Record], name: str) -> tuple[str, str]:
+    """The log and the joint of a file, as in `track/<log>/<joint>.parquet`; "" for none."""
+    first, *folders = name.removesuffix(".parquet").split("/")[1:]
+    key = dict(zip(kind.KEY, (first, *(part for folder in folders for part in folder.split("."))), strict=False))
     return key.get("log", ANY), key.get("joint", key.get("group", ANY))
 
 
@@ -95,5 +94,5 @@ def is_about_log(kind: type[Record]) -> bool:
 
 
 def is_about_joint(kind: type[Record]) -> bool:
-    """Whether every record of a kind is about one joint, or about the joint that a model is of."""
+    """Whether every record of a kind is about one joint, or about the group that a model describes."""
     return "joint" in kind.KEY or "group" in kind.KEY

@@ -1,4 +1,4 @@
-"""The last reader of a run: the report, of every record that there is."""
+"""Write the report of a study from all its records, as the last task of a run."""
 
 import hashlib
 import importlib.metadata
@@ -12,7 +12,7 @@ from davinci_forces.files import digest, read_bytes, text_of, write_together
 from davinci_forces.records import KINDS, Record, store
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.report import REPORT
-from davinci_forces.runner.execution import Outcome, said_of, without_folders
+from davinci_forces.runner.execution import Outcome, error_message, without_folders
 from davinci_forces.runner.fingerprints.code import code
 from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, hash_of
 from davinci_forces.runner.ledger import Ledger
@@ -23,14 +23,14 @@ from davinci_forces.runner.results import stated
 from davinci_forces.study import Study, review
 from davinci_forces.study.review import Rating
 
-KEPT = 1 << 16  # rows of a record at most, to be held while the report is made
+MAX_CACHED_ROWS = 1 << 16  # of a record that is held in memory while the report is made
 PACKAGES = "numpy", "scipy", "pandas", "pyarrow", "statsmodels", "numba", "clarabel", "matplotlib", "typst", "npTDMS"
 
 
 def task(plan: Plan) -> Task:
-    """What there is to report on one study, and all that the report depends on."""
+    """The task of the report on one study, with all that the report depends on."""
     study, ledger = plan.study, plan.ledger
-    located = plan.places().of(tuple(KINDS.values()))
+    located = plan.places().find(tuple(KINDS.values()))
     inputs = [f"processed/{place}" for _, place in located] + [f"raw/{file}" for file in study_files(study)]
     fingerprint = Fingerprint(
         inputs={name: ledger.digest(name) for name in sorted(inputs)},
@@ -44,31 +44,31 @@ def task(plan: Plan) -> Task:
 
 
 def perform(ledger: Ledger, task: Task) -> Outcome:
-    """Write the report, all of it or nothing; what went wrong is its outcome, and the pages that were there stay."""
+    """Write all files of the report or none.  An error becomes the outcome, and earlier pages stay."""
     start = perf_counter()
     try:
-        files = written(ledger, task)
+        files = render(ledger, task)
         write_together({ledger.folders.reports / name: content for name, content in files.items()})
-        made = {f"reports/{name}": hashlib.sha256(content).hexdigest() for name, content in files.items()}
-        return Outcome(task, made, seconds=perf_counter() - start)
+        outputs = {f"reports/{name}": hashlib.sha256(content).hexdigest() for name, content in files.items()}
+        return Outcome(task, outputs, seconds=perf_counter() - start)
     except Exception as error:
-        said, before = said_of(error), ledger.entry(task.step, task.name)
-        older = before.outputs if before else {}
-        messages = [f"error: {said}"]
-        if any(map(ledger.digest, older)):
+        message, before = error_message(error), ledger.entry(task.step, task.name)
+        earlier = before.outputs if before else {}
+        messages = [f"error: {message}"]
+        if any(map(ledger.digest, earlier)):
             messages.append(f"the pages in {ledger.folders.reports} are those of an earlier run")
-        return Outcome(task, older, without_folders(said, ledger.folders), tuple(messages))
+        return Outcome(task, earlier, without_folders(message, ledger.folders), tuple(messages))
 
 
-def written(ledger: Ledger, task: Task) -> dict[str, bytes]:
-    """The files of the report, by name.
+def render(ledger: Ledger, task: Task) -> dict[str, bytes]:
+    """The content of the report's files, by name.
 
     Raises
     ------
     BadRecord
         If a record cannot be read.
     """
-    from davinci_forces.report.report import write  # what it draws with takes longer to import than most runs take
+    from davinci_forces.report.report import write  # importing its plotting library takes longer than most runs
 
     study, located = task.given["study"], task.records["records"]
     baseline = stated.read(study.folder / study.baseline) if study.baseline else None
@@ -76,33 +76,34 @@ def written(ledger: Ledger, task: Task) -> dict[str, bytes]:
 
 
 def ratings(study: Study) -> tuple[Rating, ...]:
-    """What reviewers said of the study's report, where its folder holds that."""
+    """The reviewers' ratings of the study's report, if its folder holds any."""
     file = study.folder / review.FILE
     return review.read(file) if file.exists() else ()
 
 
 def review_given(study: Study) -> dict[str, str]:
-    """What a page depends on besides what its ID is made of: a review is shown, and no input."""
+    """The hash of the review: the page depends on it, the report ID does not."""
     file = study.folder / review.FILE
     return {"review": digest(file)} if file.is_file() else {}
 
 
 def catalogue(ledger: Ledger, located: tuple[Located, ...]) -> Catalogue:
-    """The records at these places, each read when it is asked for."""
+    """A catalogue of the records at these places, each read when it is used."""
 
     def read(kind: type[Record]) -> list[Record]:
         places = [place for name, place in located if name == kind.__name__]
         digests = [ledger.digest(f"processed/{place}") for place in places]
         processed = ledger.folders.processed
-        return [store.read(kind, processed, Path(place), sha, KEPT) for place, sha in zip(places, digests, strict=True)]
+        located_digests = zip(places, digests, strict=True)
+        return [store.read(kind, processed, Path(place), sha, MAX_CACHED_ROWS) for place, sha in located_digests]
 
     return Catalogue(read)
 
 
 def provenance(study: Study, ledger: Ledger, located: tuple[Located, ...]) -> Provenance:
-    """Versions, every file with its hash, and what failed."""
-    named = (*study_files(study), *(file for entry in study.logs for file in entry.files))
-    files = [name.removeprefix("raw/") for file in named for name in ledger.folders.inside(f"raw/{file}")]
+    """Versions, the hash of every file, and the tasks that failed."""
+    listed = (*study_files(study), *(file for entry in study.logs for file in entry.files))
+    files = [name.removeprefix("raw/") for file in listed for name in ledger.folders.expand(f"raw/{file}")]
     raw = {f"raw/{study.name}/{file}": ledger.digest(f"raw/{file}") for file in files}
     processed = {place: ledger.digest(f"processed/{place}") for _, place in located}
     failed = [entry for entry in ledger.entries() if entry.failed and entry.stage != REPORT]
@@ -112,13 +113,13 @@ def provenance(study: Study, ledger: Ledger, located: tuple[Located, ...]) -> Pr
 
 
 def versions() -> dict[str, str]:
-    """The packages that results and pages are made with, and how this process reckons."""
-    return {p: importlib.metadata.version(p) for p in PACKAGES} | {"arithmetic": arithmetic.described()}
+    """Versions of the packages that results and pages are made with, and the arithmetic of this process."""
+    return {p: importlib.metadata.version(p) for p in PACKAGES} | {"arithmetic": arithmetic.description()}
 
 
 @cache
 def environment() -> str:
-    """The hash of what the bytes of a run depend on besides code and data: packages, and the kind of processor."""
+    """The hash of the packages and the kind of processor, on which the bytes of results depend, too."""
     machine = platform.python_version(), platform.system(), platform.machine(), arithmetic.instructions()
     return hash_of((versions(), *machine))[:16]
 

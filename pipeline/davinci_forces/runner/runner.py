@@ -1,4 +1,4 @@
-"""Runs stages on a study: what is current is skipped, and each other task runs as soon as what it reads is there."""
+"""Run stages on a study: skip tasks that are up to date, and run each other task as soon as its inputs are there."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -13,10 +13,10 @@ from davinci_forces.report import REPORT
 from davinci_forces.runner import reporting
 from davinci_forces.runner.console import Console
 from davinci_forces.runner.execution import Outcome, perform
-from davinci_forces.runner.graph import WHOLE, Graph, Part, every_step, goes_by_log, needed, stages_of
+from davinci_forces.runner.graph import ALL_LOGS, Graph, Part, every_step, goes_by_log, required_steps, stages_of
 from davinci_forces.runner.ledger import Entry, Folders, Ledger, file_name
-from davinci_forces.runner.lock import locked
-from davinci_forces.runner.plan import Plan, Task, log_of, reused
+from davinci_forces.runner.lock import hold_lock
+from davinci_forces.runner.plan import Plan, Task, log_of, reuse
 from davinci_forces.runner.processes.workers import Crew, Others
 from davinci_forces.runner.signature import declaration, stage_of
 from davinci_forces.study import Study
@@ -24,56 +24,56 @@ from davinci_forces.study import Study
 
 @dataclass
 class Progress:
-    """How far a step is."""
+    """Progress of a step."""
 
-    awaited: int = 0  # parts that are not planned yet
+    unplanned: int = 0  # parts
     tasks: int = 0
-    current: int = 0
-    reasons: dict[str, list[str]] = field(default_factory=dict)  # tasks by why they run, until that is said
+    current: int = 0  # tasks that are up to date
+    reasons: dict[str, list[str]] = field(default_factory=dict)  # reason to run -> tasks, until it is printed
 
 
 @dataclass
 class Runner:
-    """Runs stages of one study; tasks are handed to `others`, and without them run in this process."""
+    """Runs stages of one study, in this process or in `others`."""
 
     study: Study
     folders: Folders
     console: Console
     force: bool = False
     others: Others | None = None
-    perform: Callable[[Folders, Task], Outcome] | None = None  # how they do it
+    perform: Callable[[Folders, Task], Outcome] | None = None  # runs a task in a worker of a cluster
 
     def __post_init__(self) -> None:
         self.ledger = Ledger(self.folders)
         self.failures = 0
         self.ran = 0
-        self.seconds: dict[str, float] = {}  # that the tasks of each stage took together
+        self.seconds: dict[str, float] = {}  # total time of the tasks, by stage
         self.writable = True
 
     @cached_property
     def plan(self) -> Plan:
-        """What there is to do, read once the study is locked."""
+        """The plan of the study, made once the study is locked."""
         return Plan(self.study, self.ledger)
 
     def run(self, names: Iterable[str]) -> bool:
-        """Run these stages and groups, or the report, and before them what they need; whether every task succeeded.
+        """Run these stages, groups or the report after the stages that they need; return whether all tasks succeeded.
 
         Raises
         ------
         PipelineError
             If another run is working on the study.
         """
-        steps = self._needed(names)
+        steps = self._steps(names)
         self.seconds = dict.fromkeys(map(stage_of, steps), 0.0)
         with (
-            locked(self.folders.processed) as self.writable,
-            self._tidied(),
+            hold_lock(self.folders.processed) as self.writable,
+            self._clean_up(),
             closing(Crew(self.others)) as self._crew,
         ):
             if self.writable:
                 self._remove_leftovers()
                 for file, reason in self.ledger.void().items():
-                    self.console.warn(f"{file} does not count, and nothing it names is removed: {reason}")
+                    self.console.warn(f"{file} is ignored, and the files it names are kept: {reason}")
                 self._remove_obsolete(steps)
             self._run(Graph(steps, [entry.name for entry in self.study.logs]))
             if self.writable:
@@ -81,9 +81,9 @@ class Runner:
         return self.failures == 0
 
     def preview(self, names: Iterable[str]) -> Iterator[str]:
-        """What a run of these stages would do and why, as far as that is known before it: it changes nothing."""
+        """List what a run of these stages would do and why, as far as that is known before it; change nothing."""
         before = ""
-        for stage, steps in groupby(self._needed(names), stage_of):
+        for stage, steps in groupby(self._steps(names), stage_of):
             tasks = [task for step in steps for task in self._tasks(step)]
             by_reason: dict[str, list[str]] = {}
             for task in tasks:
@@ -91,66 +91,66 @@ class Runner:
                     by_reason.setdefault(_brief(reasons), []).append(task.name)
             yield from (f"{_listed(stage, due)}: would run: {reason}" for reason, due in by_reason.items())
             if before and not by_reason:
-                yield f"{stage}: waits for what {before} makes"
+                yield f"{stage}: waits for the results of {before}"
             elif stage in self._named and len(tasks) > (due := sum(map(len, by_reason.values()))):
-                yield f"{stage}: {len(tasks) - due} of {len(tasks)} current"
+                yield f"{stage}: {len(tasks) - due} of {len(tasks)} up to date"
             before = stage if by_reason else before
 
-    def _needed(self, names: Iterable[str]) -> list[str]:
-        """The steps that a run of these names takes; of stages that are not named, only what is not current is told."""
+    def _steps(self, names: Iterable[str]) -> list[str]:
+        """The steps that a run of these names takes; the named stages print also how much is up to date."""
         self._named = stages_of(names)
-        return needed(self._named)
+        return required_steps(self._named)
 
-    def _tasks(self, step: str, log: str = WHOLE) -> list[Task]:
+    def _tasks(self, step: str, log: str = ALL_LOGS) -> list[Task]:
         return [reporting.task(self.plan)] if step == REPORT else list(self.plan.tasks(declaration(step), log))
 
     @contextmanager
-    def _tidied(self) -> Iterator[None]:
-        """Remove what is left half written where a run is stopped, and by others that may have been ended unseen."""
-        tidy = self.perform is None  # workers of a cluster go on with what they are at
+    def _clean_up(self) -> Iterator[None]:
+        """Remove half-written files after a run that was stopped, or that had other processes."""
+        needs_removal = self.perform is None  # workers of a cluster go on writing
         try:
             yield
-            tidy = self.others is not None
+            needs_removal = self.others is not None  # one may have been killed unnoticed
         finally:
-            if tidy and self.writable:
+            if needs_removal and self.writable:
                 self._remove_leftovers()
 
     def _remove_leftovers(self) -> None:
-        """Remove what an interrupted run, or a process that was ended, left half written."""
+        """Remove half-written files of an interrupted run or a killed process."""
         for leftover in [*store.leftovers(self.folders.processed), *store.leftovers(self.folders.reports)]:
             leftover.unlink(missing_ok=True)
 
     def _remove_obsolete(self, steps: Sequence[str]) -> None:
-        """Remove what an earlier version made under the names of steps and records that there are no more, and what
-        these steps made of logs that have left the study.
+        """Remove the outputs of steps and kinds of record that no longer exist, and those that these steps made from
+        logs that have left the study.
         """
         folders = {"", *(kind.folder() for kind in KINDS.values())}
-        known = {*every_step(), REPORT}
+        all_steps = {*every_step(), REPORT}
         obsolete = [
             entry
             for entry in self.ledger.entries()
-            if entry.stage not in known or not {_folder(name) for name in entry.outputs} <= folders
+            if entry.stage not in all_steps or not {_folder(name) for name in entry.outputs} <= folders
         ]
         for entry in obsolete:
             self.ledger.remove(entry)
         if obsolete:
             stages = ", ".join(dict.fromkeys(stage_of(entry.stage) for entry in obsolete))
             files = sum(len(entry.outputs) for entry in obsolete)
-            self.console.say(f"removed {files} files of {stages} under names that an earlier version used")
-        logs = {entry.name for entry in self.study.logs} | {WHOLE}
+            self.console.say(f"removed {files} files of {stages}, which an earlier version made")
+        logs = {entry.name for entry in self.study.logs} | {ALL_LOGS}
         for entry in list(self.ledger.entries()):
             if entry.stage in steps and _part(entry.stage, entry.task).log not in logs:
                 self.ledger.remove(entry)
 
     def _run(self, graph: Graph) -> None:
-        """Plan what may begin, run it, and let begin what waited for it, until nothing is left."""
+        """Plan the parts that are ready and run their tasks, until all parts are done."""
         self._before: dict[Part, list[Entry]] = {}
         for entry in self.ledger.entries():
             self._before.setdefault(_part(entry.stage, entry.task), []).append(entry)
         self._progress = {part.step: Progress() for part in graph.parts}
         self._open = Counter(map(stage_of, self._progress))  # steps of each stage that are not done
         for part in graph.parts:
-            self._progress[part.step].awaited += _plans(part)
+            self._progress[part.step].unplanned += _has_tasks(part)
         self._due: dict[Part, int] = {}  # tasks that are not done
         while True:
             for batch in iter(graph.next, []):
@@ -159,18 +159,18 @@ class Runner:
                 return
             for outcome in self._crew.outcomes():
                 self._record(outcome)
-                self._done(graph, _part(outcome.task.step, outcome.task.name))
+                self._count_done(graph, _part(outcome.task.step, outcome.task.name))
 
     def _begin(self, graph: Graph, batch: Sequence[Part]) -> None:
-        """Plan parts of a step, and take on what of them is not current."""
+        """Plan parts of a step, and submit their tasks that are not up to date."""
         step = batch[0].step
-        due = {part: self._plan_part(part) if _plans(part) else [] for part in batch}
+        due = {part: self._plan_part(part) if _has_tasks(part) else [] for part in batch}
         progress = self._progress[step]
-        if not progress.awaited:  # all that it does is known
-            for reason, tasks_of in progress.reasons.items():
-                self.console.say(f"{_listed(stage_of(step), tasks_of)}: {reason}")
+        if not progress.unplanned:
+            for reason, names in progress.reasons.items():
+                self.console.say(f"{_listed(stage_of(step), names)}: {reason}")
             progress.reasons.clear()
-        how = (
+        function = (
             partial(reporting.perform, self.ledger)
             if step == REPORT
             else partial(self.perform or perform, self.folders)
@@ -178,31 +178,31 @@ class Runner:
         for part, tasks in due.items():
             self._due[part] = len(tasks) + 1
             for task in tasks:
-                self._crew.submit(how, task)
-            self._done(graph, part)
+                self._crew.submit(function, task)
+            self._count_done(graph, part)
 
-    def _done(self, graph: Graph, part: Part) -> None:
-        """Count what of a part is done; with the last of it, let begin what waited for it."""
+    def _count_done(self, graph: Graph, part: Part) -> None:
+        """Count a task of a part as done, and with the last one the part."""
         self._due[part] -= 1
         if not self._due[part]:
-            graph.done(part)
-            if part.log == WHOLE:
+            graph.finish(part)
+            if part.log == ALL_LOGS:
                 self._conclude(stage_of(part.step))
 
     def _conclude(self, stage: str) -> None:
-        """Say what there was nothing to do for, where a stage that was named is done with its last step."""
+        """Print how many tasks of a named stage were up to date, once its last step is done."""
         self._open[stage] -= 1
         if self._open[stage] or stage not in self._named:
             return
-        of_steps = [progress for step, progress in self._progress.items() if stage_of(step) == stage]
-        current, tasks = (sum(getattr(each, what) for each in of_steps) for what in ("current", "tasks"))
+        steps = [progress for step, progress in self._progress.items() if stage_of(step) == stage]
+        current, tasks = sum(step.current for step in steps), sum(step.tasks for step in steps)
         if current:
-            self.console.say(f"{stage}: {current} of {tasks} current")
+            self.console.say(f"{stage}: {current} of {tasks} up to date")
         if not tasks:
-            self.console.say(f"{stage}: the study holds nothing for it")
+            self.console.say(f"{stage}: the study has no data for it")
 
     def _plan_part(self, part: Part) -> list[Task]:
-        """The tasks of a part that have to run; what was made by those that are no more is removed."""
+        """The tasks of a part that have to run; outputs of its former tasks are removed."""
         progress, tasks = self._progress[part.step], self._tasks(*part)
         planned = {file_name(task.name) for task in tasks}
         for entry in self._before.get(part, ()):
@@ -216,30 +216,30 @@ class Runner:
                     f"{self.folders.processed} cannot be written to, and {stage_of(task.step)} has to run: "
                     f"{_brief(reasons)}; allow writing, or name other folders with --processed and --reports"
                 )
-            if reasons and not self._forced(task) and (other := reused(self.ledger, task)):
-                self.console.say(f"{stage_of(part.step)}: copied from {other}, which has the same robot and settings")
+            if reasons and not self._is_forced(task) and (source := reuse(self.ledger, task)):
+                self.console.say(f"{stage_of(part.step)}: copied from {source}, which has the same robot and settings")
                 self.ran += 1
             elif reasons:
                 due.append(task)
                 progress.reasons.setdefault(_brief(reasons), []).append(task.name)
             else:
                 progress.current += 1
-        progress.awaited -= 1
+        progress.unplanned -= 1
         progress.tasks += len(tasks)
         return due
 
     def _reasons(self, task: Task) -> list[str]:
-        """Why a task has to run; nothing when it is current."""
-        if self._forced(task):
+        """Reasons to run a task; none if it is up to date."""
+        if self._is_forced(task):
             return ["--force"]
         return self.ledger.reasons(self.ledger.entry(task.step, task.name), task.fingerprint)
 
-    def _forced(self, task: Task) -> bool:
-        """Whether a task runs though it may be current: one of the stages that were named."""
+    def _is_forced(self, task: Task) -> bool:
+        """Whether a task runs even if it is up to date: with --force, those of the named stages do."""
         return self.force and stage_of(task.step) in self._named
 
     def _record(self, outcome: Outcome) -> None:
-        """Remember what a task made."""
+        """Record the outcome of a task in the ledger, and print its messages."""
         task, stage = outcome.task, stage_of(outcome.task.step)
         fingerprint, environment = dict(vars(task.fingerprint)), reporting.environment()
         self.ledger.write(Entry(task.step, task.name, fingerprint, outcome.outputs, outcome.failed, environment))
@@ -251,18 +251,18 @@ class Runner:
         self.console.progress(stage, *self._crew.counts)
 
 
-def _plans(part: Part) -> bool:
-    """Whether a part has tasks: the whole of a step that goes log by log is only when all of them are done."""
-    return part.log != WHOLE or part.step == REPORT or not goes_by_log(declaration(part.step))
+def _has_tasks(part: Part) -> bool:
+    """Whether a part has tasks; that of all logs has none if its step goes log by log."""
+    return part.log != ALL_LOGS or part.step == REPORT or not goes_by_log(declaration(part.step))
 
 
 def _part(step: str, task: str) -> Part:
-    """The part of its step that a task of this name belongs to."""
-    return Part(step, WHOLE if step == REPORT else log_of(declaration(step), task))
+    """The part of a step that the task of this name belongs to."""
+    return Part(step, ALL_LOGS if step == REPORT else log_of(declaration(step), task))
 
 
 def _folder(name: str) -> str:
-    """The folder of records that a file is in; "" for one that is not a record."""
+    """The folder of a record's file; "" for any other file."""
     root, _, place = name.partition("/")
     return place.partition("/")[0] if root == "processed" else ""
 
@@ -272,7 +272,7 @@ def _brief(reasons: list[str]) -> str:
 
 
 def _listed(stage: str, tasks: list[str]) -> str:
-    """A stage and its tasks; one that is called once is not named twice."""
+    """A stage with the first names of its tasks; a task named like its stage is not repeated."""
     if tasks == [stage]:
         return stage
     return f"{stage}: " + ", ".join(tasks[:3]) + (f" and {len(tasks) - 3} more" if len(tasks) > 3 else "")

@@ -1,4 +1,4 @@
-"""Runs of the stages on studies: where their folders are, which of them can run, and how a run speaks."""
+"""Run the stages on studies: find their folders and logs, run, and print what came out."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -18,41 +18,41 @@ from davinci_forces.study import Study, reading
 
 
 def folders(study: Path, processed: Path | None, reports: Path | None) -> Folders:
-    """The folders of a study: processed/ and reports/ are beside the folder that holds it."""
+    """The folders of a study; by default, processed/ and reports/ are beside the folder that holds the study."""
     home = study.resolve().parent.parent
     name = study.resolve().name
     return Folders(study, (processed or home / "processed") / name, (reports or home / "reports") / name)
 
 
-def studies(named: Sequence[Path], verbosity: Verbosity = "normal") -> Iterator[Path]:
-    """The studies named, patterns expanded, or every one in raw/ whose logs are there.
+def studies(names: Sequence[Path], verbosity: Verbosity = "normal") -> Iterator[Path]:
+    """The folders of the named studies, patterns expanded; without names, of all studies in raw/ that have logs.
 
     Raises
     ------
     BadStudy
-        If none is named and raw/ holds none, or a pattern matches none.
+        If there is no name and no study in raw/, or a pattern matches no folder.
     """
-    if named:
-        yield from (folder for name in named for folder in matching(name))
+    if names:
+        yield from (folder for name in names for folder in expand_pattern(name))
         return
-    found = sorted(file.parent for file in Path("raw").glob("*/study.toml"))
-    if not found:
-        raise BadStudy("raw/ holds no study; `davinci-forces new` writes one from a log")
-    for folder in found:
+    folders = sorted(file.parent for file in Path("raw").glob("*/study.toml"))
+    if not folders:
+        raise BadStudy("raw/ holds no study; write one with `davinci-forces new raw/<study>/<log>`")
+    for folder in folders:
         try:
             study = reading.read(folder)
-        except BadStudy:  # its run says what is wrong with it
+        except BadStudy:  # its run prints the error
             yield folder
             continue
         absent = study.absent()
         if len(absent) < study.files:
             yield folder
         elif verbosity != "quiet":
-            echo(f"{folder}: skipped, its logs are not here ({absent[0]} ...); study.toml says where to get them")
+            echo(f"{folder}: skipped, its logs are missing ({absent[0]} ...); study.toml says where to get them")
 
 
-def matching(name: Path) -> list[Path]:
-    """The folders that a name with * or ? stands for, as not every shell expands it; any other name is one folder.
+def expand_pattern(name: Path) -> list[Path]:
+    """The folders that a name with * or ? matches, as not every shell expands it; any other name is one folder.
 
     Raises
     ------
@@ -63,27 +63,27 @@ def matching(name: Path) -> list[Path]:
         return [name]
     folders = [Path(match) for match in sorted(glob(str(name))) if Path(match).is_dir()]
     if not folders:
-        raise BadStudy(f"{name}: no folder has a name like this; a study is a folder that holds study.toml")
+        raise BadStudy(f"{name}: no folder matches; a study is a folder that holds study.toml")
     return folders
 
 
-def one(name: Path) -> Path:
-    """The one study that a name stands for.
+def single_study(name: Path) -> Path:
+    """The folder of the one study that a name or pattern matches.
 
     Raises
     ------
     BadStudy
-        If a pattern stands for none, or for several.
+        If a pattern matches no folder, or several.
     """
-    folders = matching(name)
+    folders = expand_pattern(name)
     if len(folders) > 1:
         names = ", ".join(map(str, folders))
-        raise BadStudy(f"{name} stands for {len(folders)} studies, {names}: name one of them; `all` takes several")
+        raise BadStudy(f"{name} matches {len(folders)} studies, {names}: name one of them; `all` takes several")
     return folders[0]
 
 
 def results_of(name: Path, reports: Path | None = None) -> Path:
-    """The results.json that is meant: by its own name, by its report's folder, or by its study.
+    """The results.json of this name, or that of the report folder or study of this name.
 
     Raises
     ------
@@ -94,26 +94,26 @@ def results_of(name: Path, reports: Path | None = None) -> Path:
     """
     if name.exists() and not name.is_dir():
         return name
-    folder = one(name)
+    folder = single_study(name)
     if (folder / "study.toml").is_file():
         file = folders(folder, None, reports).reports / "results.json"
         if not file.is_file():
-            raise MissingRecord(f"{file} is not there; run `davinci-forces all {folder}`")
+            raise MissingRecord(f"{file} does not exist; run `davinci-forces all {folder}`")
         return file
     if (folder / "results.json").is_file():
         return folder / "results.json"
     if folder.is_dir():
         raise BadRequest(f"{folder} holds neither study.toml nor results.json; name a study or a results.json")
-    raise BadRequest(f"{name} is not there; name a study, as raw/<study>, or a results.json")
+    raise BadRequest(f"{name} does not exist; name a study, as raw/<study>, or a results.json")
 
 
 def load(folder: Path) -> Study:
-    """Read a study, and warn of outdated settings and of missing files; logs without files will fail, and no other.
+    """Read a study, and warn of outdated settings and missing files; the logs of missing files will fail.
 
     Raises
     ------
     BadStudy
-        With every problem at once; that no file at all is there is one.
+        With all problems at once, or if all files are missing.
     """
     study = reading.read(folder)
     absent = study.absent()
@@ -136,38 +136,38 @@ def run(
     dry_run: bool = False,
     cluster: str = "",
 ) -> bool:
-    """Run stages on one study, and what they need; say what was done, or only what would be; whether all succeeded."""
+    """Run stages on one study after those that they need, or preview the run; return whether all tasks succeeded."""
     study = load(folder)
-    speaks = console(verbosity)
-    kind = Narrator if verbosity == "verbose" else Runner
+    terminal = console(verbosity)
+    kind = VerboseRunner if verbosity == "verbose" else Runner
     places = folders(folder.resolve() if cluster else folder, processed, reports)
-    runner = kind(study, places, speaks, force, Others(partial(pool, jobs), jobs, prepare) if jobs > 1 else None)
-    speaks.say(f"{folder}: {study.title}{' (SIMULATED)' if study.simulated else ''}", bold=True)
+    runner = kind(study, places, terminal, force, Others(partial(pool, jobs), jobs, prepare) if jobs > 1 else None)
+    terminal.say(f"{folder}: {study.title}{' (SIMULATED)' if study.simulated else ''}", bold=True)
     if dry_run:
         for line in runner.preview(names):
-            speaks.say(line)
+            terminal.say(line)
         return True
-    good = run_on_cluster(runner, names, cluster) if cluster else runner.run(names)
+    succeeded = run_on_cluster(runner, names, cluster) if cluster else runner.run(names)
     if not runner.ran:
-        speaks.say(f"{folder}: nothing to do, every stage is current")
+        terminal.say(f"{folder}: nothing to do, all stages are up to date")
     if REPORT in names:
-        conclude(runner, folder)
-    if not good:
+        print_results(runner, folder)
+    if not succeeded:
         echo(f"{folder}: {runner.failures} of {runner.ran} tasks failed", fg="red", err=True)
-    return good
+    return succeeded
 
 
 def run_on_cluster(runner: Runner, names: Sequence[str], address: str) -> bool:
-    """Run stages with the workers of a Dask cluster; raises as `connected` does, and as any run."""
-    from davinci_forces.runner.processes.cluster import connected, perform_there
+    """Run stages with the workers of a Dask cluster; raises as `connect` does, and as any run."""
+    from davinci_forces.runner.processes.cluster import connect, perform_there
 
-    with connected(address, runner.folders) as (executor, hands, terms):
+    with connect(address, runner.folders) as (executor, hands, terms):
         runner.others, runner.perform = Others(lambda: executor, hands), partial(perform_there, terms)
         return runner.run(names)
 
 
-def conclude(runner: Runner, folder: Path) -> None:
-    """Say what came out: the answer, how long it took, and where it is; of a report that failed, only the time."""
+def print_results(runner: Runner, folder: Path) -> None:
+    """Print the answer of the report, the times and the report's files; after a failed report only the times."""
     report = runner.ledger.entry(REPORT, REPORT)
     files = report.outputs if report and not report.failed else {}
     if "reports/summary.txt" in files:
@@ -179,8 +179,8 @@ def conclude(runner: Runner, folder: Path) -> None:
             runner.console.say(f"{folder}: see {runner.folders.reports / file}")
 
 
-class Narrator(Runner):
-    """A runner that says of every task, too, when it is done, and how long it took."""
+class VerboseRunner(Runner):
+    """A runner that also prints the time of each task as it ends."""
 
     def _record(self, outcome: Outcome) -> None:
         self.console.say(f"{stage_of(outcome.task.step)}: {outcome.task.name}: took {outcome.seconds:.2f} s")

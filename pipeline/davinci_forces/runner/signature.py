@@ -1,4 +1,4 @@
-"""What the steps of a stage ask for and promise, read from the signatures of the functions that it exports."""
+"""Read from the signatures of a stage's functions what its steps take and make."""
 
 import re
 import types
@@ -28,16 +28,16 @@ SETTINGS = tuple(f.name for f in fields(Settings))
 
 @dataclass(frozen=True)
 class Declaration:
-    """What a step reads, by parameter, and what it makes."""
+    """What a step reads, by parameter, and the kinds of record that it makes."""
 
     name: str  # of the step
     each: dict[str, Kinds]  # called once for each record of these kinds
     per_log: dict[str, Kinds]  # called once a log, with all its records of these kinds
-    in_turn: set[str]  # those of these parameters whose records are read when the stage comes to them
+    in_turn: set[str]  # those of these parameters whose records are read one by one
     optional: dict[str, Kinds]  # the record about the same, or None
     every: dict[str, Kinds]  # all records about the same
     given: dict[str, str]  # parameter -> "log", "entry", "joint", "robot", "weighings" or "haptics"
-    roles: dict[str, str]  # parameter -> role of the logs whose records it holds, where not of all
+    roles: dict[str, str]  # parameter -> role of the logs whose records it takes, if not of all logs
     settings: tuple[str, ...]
     makes: Kinds
 
@@ -52,7 +52,7 @@ class Declaration:
 def steps(stage: str) -> tuple[str, ...]:
     """The steps of a stage, one for each function that it exports: "tune" for `run`, "tune.gather", "tune.apply".
 
-    They are read from the text of its module: to import all stages takes longer than to read a log.
+    They are read from the text of its module, since importing all stages takes longer than reading a log.
     """
     spec = find_spec(module(stage))
     exported = set(FUNCTION.findall(Path(str(spec and spec.origin)).read_text(encoding="utf-8")))
@@ -60,7 +60,7 @@ def steps(stage: str) -> tuple[str, ...]:
 
 
 def stage_of(step: str) -> str:
-    """The stage that a step belongs to; the report is one of its own."""
+    """The stage of a step; the report is its own stage."""
     return step.partition(".")[0]
 
 
@@ -100,11 +100,10 @@ def declaration(step: str) -> Declaration:
 
 
 def _settings(step: str, function: Any) -> tuple[str, ...]:
-    asked = [p.name for p in signature(function).parameters.values() if p.kind is Parameter.KEYWORD_ONLY]
-    unknown = sorted(set(asked) - set(SETTINGS))
-    if unknown:
-        raise TypeError(f"{step} asks for settings that do not exist: {', '.join(unknown)}")
-    return tuple(asked)
+    names = [p.name for p in signature(function).parameters.values() if p.kind is Parameter.KEYWORD_ONLY]
+    if unknown := sorted(set(names) - set(SETTINGS)):
+        raise TypeError(f"{step} takes settings that do not exist: {', '.join(unknown)}")
+    return tuple(names)
 
 
 def _inner(hint: Any) -> Any:

@@ -1,1 +1,1 @@
-"""Simulated studies: a scenario in, logs as the sensors would have recorded them out, with the ground truth."""
+"""Simulated studies: from a scenario, logs as sensors would record them, and the ground truth."""

@@ -1,4 +1,4 @@
-"""What truly happens in a recording: its motion and efforts, and the parameters that its joint models truly have."""
+"""The true motion and efforts of a simulated recording, and the true parameters of its joint models."""
 
 from dataclasses import dataclass
 from typing import cast
@@ -16,36 +16,36 @@ from davinci_forces.maths.simulation.closed_loop import JointConstraints, Timing
 from davinci_forces.maths.simulation.surroundings import UP, Surroundings
 from davinci_forces.simulation.scenario.scenario import BadScenario, Scenario, SimulatedArm, SimulatedLog
 
-EXACT = 1e-9  # size up to which a parameter that a model lacks counts as 0, in SI
-DIGITS = 12  # of a true parameter that follows from the links: rounding differs from machine to machine beyond
+NEGLIGIBLE = 1e-9  # in SI: a parameter that a model lacks counts as 0 below it
+SIGNIFICANT_DIGITS = 12  # of true parameters from the links; further digits depend on the machine
 
 
 @dataclass(frozen=True)
 class SimulatedMotion:
-    """What truly happened at one joint, at the recorder's instants; every array is (N,)."""
+    """The true motion of one joint at the recorder's instants; every array is (N,)."""
 
     q: Array
     dq: Array
-    tau: Array  # what the motor gave
-    tau_ext: Array  # what the joint exerted on its surroundings
+    tau: Array  # effort of the motor
+    tau_ext: Array  # effort of the joint on its surroundings
 
 
 @dataclass(frozen=True)
 class SimulatedRun:
-    """What truly happened in one recording: its clock (N,) [s], its joints, and the tip where it is known."""
+    """The true motion of one recording: its clock (N,) [s], its joints, and the tip where it is known."""
 
     t: Array
     motions: dict[str, SimulatedMotion]
     force: Array | None = None  # (N, 3) [N] of the tip on its surroundings, base frame
 
 
-def simulated(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
-    """One recording: of the whole arm in closed loop, or joint by joint; raises as `_in_closed_loop` does."""
+def simulate_log(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
+    """Simulate one recording: the whole arm in closed loop, or joint by joint; raises as `_in_closed_loop` does."""
     return _in_closed_loop(scenario, log) if scenario.arm else _prescribed(scenario, log)
 
 
 def _prescribed(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
-    """Joints that follow their trajectories exactly: the independent joint models, run backwards.  Section 6.1"""
+    """Compute the efforts of joints that follow their trajectories exactly, by inverse dynamics.  Section 6.1"""
     t = np.arange(round(log.duration * scenario.rate)) / scenario.rate
     return SimulatedRun(t, {name: _joint_motion(scenario, log, name, t) for name in log.joints})
 
@@ -56,18 +56,18 @@ def _joint_motion(scenario: Scenario, log: SimulatedLog, name: str, t: Array) ->
         q, dq, ddq = motion(move, t)
     else:
         q, dq, ddq = log.position(name, t), np.zeros_like(t), np.zeros_like(t)
-    tau_ext = sum((push.at(t) for push in log.external.get(name, ())), np.zeros_like(t))
+    tau_ext = sum((push.effort_at(t) for push in log.external.get(name, ())), np.zeros_like(t))
     tau = regressor(simulated.joint.terms, q, dq, ddq) @ np.array(simulated.theta) + tau_ext
     return SimulatedMotion(q, dq, tau, tau_ext)
 
 
 def _in_closed_loop(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
-    """The whole arm, from rest at the first position asked for; the lead is run and not recorded.
+    """Simulate the whole arm, from rest at its first reference; the lead is simulated but not recorded.
 
     Raises
     ------
     BadScenario
-        If the motion grows beyond all bounds, as it does under gains that the ticks are too slow for.
+        If the motion diverges, as it does with gains that are too high for the tick.
     """
     simulated_arm, robot = cast(SimulatedArm, scenario.arm), scenario.robot
     chain, bodies = _geometry(scenario)
@@ -82,15 +82,15 @@ def _in_closed_loop(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
     plant = arm(chain, bodies, simulated_arm.motors.gear_ratio**2 * simulated_arm.rotors)
     clock = Timing(simulated_arm.tick, ticks)
     instants = np.arange(len(t) * ticks, dtype=np.float64) * simulated_arm.tick - log.lead
-    around = _around(log, chain, names, instants)
-    simulated = simulate(
-        plant, body, simulated_arm.motors, simulated_arm.control, clock, reference, around, reference[0]
+    surroundings = _surroundings(log, chain, names, instants)
+    result = simulate(
+        plant, body, simulated_arm.motors, simulated_arm.control, clock, reference, surroundings, reference[0]
     )
-    if not all(np.isfinite(values).all() for values in simulated):
+    if not all(np.isfinite(values).all() for values in result):
         raise BadScenario(
-            f"{scenario.name}: log {log.name}: the loop is unstable; lower its gains, or shorten arm.tick"
+            f"{scenario.name}: log {log.name}: the control loop is unstable; lower its gains, or shorten arm.tick"
         )
-    q, dq, tau, tau_ext, force = (values[skipped:] for values in simulated)
+    q, dq, tau, tau_ext, force = (values[skipped:] for values in result)
     motions = {
         name: SimulatedMotion(*(np.ascontiguousarray(values[:, i]) for values in (q, dq, tau, tau_ext)))
         for i, name in enumerate(names)
@@ -102,14 +102,14 @@ def _geometry(scenario: Scenario) -> tuple[Chain, Bodies]:
     return cast(Chain, scenario.robot.chain), cast(Bodies, scenario.robot.bodies)
 
 
-def _around(log: SimulatedLog, chain: Chain, names: list[str], t: Array) -> Surroundings:
-    """What the arm touches at the ticks t (T,) [s]."""
+def _surroundings(log: SimulatedLog, chain: Chain, names: list[str], t: Array) -> Surroundings:
+    """Collect the efforts and forces on the arm at the ticks t (T,) [s], the mass, and the tissue."""
     efforts, forces = np.zeros((len(t), len(names))), np.zeros((len(t), 3))
     for i, name in enumerate(names):
         for push in log.external.get(name, ()):
-            efforts[:, i] += push.at(t)
+            efforts[:, i] += push.effort_at(t)
     for push in log.tip:
-        forces += np.outer(push.at(t), np.array(push.direction))
+        forces += np.outer(push.effort_at(t), np.array(push.direction))
     surface, tissue = np.zeros(3), log.tissue
     if tissue:
         q = [tissue.surface if name in log.moves else log.held.get(name, 0.0) for name in names]
@@ -120,8 +120,8 @@ def _around(log: SimulatedLog, chain: Chain, names: list[str], t: Array) -> Surr
     )
 
 
-def hung_at(scenario: Scenario) -> Array:
-    """Where the tip is at q = 0 from the remote centre (3,) [m], base axes: where a mass is hung."""
+def mass_position(scenario: Scenario) -> Array:
+    """The position of a mass on the tip at q = 0, from the remote centre (3,) [m], base axes."""
     chain, _ = _geometry(scenario)
     return np.asarray(kinematics.tip(chain, np.zeros(len(scenario.robot.joints))) - kinematics.remote_centre(chain))
 
@@ -129,8 +129,8 @@ def hung_at(scenario: Scenario) -> Array:
 def theta(scenario: Scenario, family: str) -> dict[str, Array]:
     """The parameters of each joint's model while the other joints stay at zero, where the model is exact.
 
-    Friction is as the scenario states it; inertia and gravity follow from the links, to `DIGITS` digits, so that they
-    are the same on every machine.  A joint whose friction has more to it than viscous and Coulomb friction has none.
+    Friction is that of the scenario.  Inertia and gravity follow from the links; `SIGNIFICANT_DIGITS` make them the
+    same on every machine.  Joints whose friction is more than viscous and Coulomb friction are omitted.
     """
     simulated_arm = cast(SimulatedArm, scenario.arm)
     friction = simulated_arm.families[family].friction
@@ -143,7 +143,7 @@ def theta(scenario: Scenario, family: str) -> dict[str, Array]:
             continue
         values = reduced_parameters(chain, bodies, i, len(scenario.robot.joints), drives)
         names = [term.name for term in joint.terms]
-        if all(abs(value) < EXACT for name, value in values.items() if name not in names):
+        if all(abs(value) < NEGLIGIBLE for name, value in values.items() if name not in names):
             theta = [values.get(name, 0.0) for name in names]
-            parameters[joint.name] = np.array([float(f"{value:.{DIGITS}g}") for value in theta])
+            parameters[joint.name] = np.array([float(f"{value:.{SIGNIFICANT_DIGITS}g}") for value in theta])
     return parameters

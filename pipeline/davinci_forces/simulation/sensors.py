@@ -1,6 +1,6 @@
-"""What the sensors record of a motion: motor angles, motor speeds and currents, in steps and with noise.
+"""Sensor signals of a motion: motor angles, motor speeds and currents, quantised and with noise.
 
-It is written as files that LabVIEW would have written, TDMS and LVM, whose headers say that they are simulated.
+The files are TDMS and LVM as LabVIEW writes them; their headers say that the data are simulated.
 """
 
 from collections.abc import Sequence
@@ -17,12 +17,12 @@ from davinci_forces.simulation.motion import SimulatedMotion
 from davinci_forces.simulation.scenario.scenario import ForceSensor, SensorNoise, SimulatedJoint
 
 GROUP = "Motors"
-SAYS = "SIMULATED data, not a recording of a robot"
+DESCRIPTION = "SIMULATED data, not a recording of a robot"
 
 
 @dataclass(frozen=True)
 class SimulatedChannel:
-    """One recorded channel, and the quantity of the study that it feeds."""
+    """One recorded channel, and the quantity of the study that it provides."""
 
     quantity: str  # "time", "hand_roll.i", ...
     name: str
@@ -38,39 +38,39 @@ def record(
     current_unit: str,
     random: np.random.Generator,
 ) -> list[SimulatedChannel]:
-    """The motor angle (6.28), the motor speed and the motor current (6.29) of one joint."""
+    """Record the motor angle (6.28), the motor speed and the motor current (6.29) of one joint."""
     joint, N = simulated.joint, len(motion.q)
     angle, speed = (true + random.normal(0.0, sigma, N) for true, sigma in ((motion.q, noise.q), (motion.dq, noise.dq)))
     effort = motion.tau + random.normal(0.0, noise.tau, N) + drift(noise, rate, N, random)
-    current = stepped(effort / (joint.gear_ratio * joint.torque_constant), simulated.current_step)
+    current = quantise(effort / (joint.gear_ratio * joint.torque_constant), simulated.current_step)
     size = 1e3 if current_unit == "mA" else 1.0
     return [
         SimulatedChannel(f"{joint.name}.theta_m", f"{simulated.label} motor angle", "rad",
-                stepped(joint.gear_ratio * angle, simulated.encoder_step)),
+                quantise(joint.gear_ratio * angle, simulated.encoder_step)),
         SimulatedChannel(f"{joint.name}.dtheta_m", f"{simulated.label} motor speed", "rad/s", joint.gear_ratio * speed),
         SimulatedChannel(f"{joint.name}.i", f"{simulated.label} current", current_unit, size * current),
     ]  # fmt: skip
 
 
 def record_force(sensor: ForceSensor, t: Array, force: Array, random: np.random.Generator) -> list[SimulatedChannel]:
-    """What a sensor shows of the force (N, 3) of the tip at the times t (N,), base axes: late, and with noise."""
-    late = np.stack([np.interp(t - sensor.lag, t, along) for along in force.T], axis=-1)
-    shown = late + random.normal(0.0, sensor.noise, force.shape)
-    return [SimulatedChannel(f"force_{a}", f"Force {a}", "N", shown[:, i].copy()) for i, a in enumerate("xyz")]
+    """Record the force (N, 3) of the tip at the times t (N,), base axes, with the delay and the noise of a sensor."""
+    delayed = np.stack([np.interp(t - sensor.lag, t, along) for along in force.T], axis=-1)
+    measured = delayed + random.normal(0.0, sensor.noise, force.shape)
+    return [SimulatedChannel(f"force_{a}", f"Force {a}", "N", measured[:, i].copy()) for i, a in enumerate("xyz")]
 
 
 def generator(seed: int, log: str, joint: str) -> np.random.Generator:
-    """The source of the noise of one joint in one log; it depends on nothing else, so logs may come and go."""
+    """The random generator for the noise of one joint in one log, which is independent of all other logs."""
     return np.random.default_rng([seed, *f"{log}/{joint}".encode()])
 
 
-def stepped(values: Array, step: float) -> Array:
-    """Values as a converter gives them: whole numbers of its step.  A step of 0 leaves them as they are."""
+def quantise(values: Array, step: float) -> Array:
+    """Round values to whole steps of a converter; a step of 0 leaves them unchanged."""
     return step * np.round(values / step) if step else values
 
 
 def drift(noise: SensorNoise, rate: float, samples: int, random: np.random.Generator) -> Array:
-    """Coloured noise (N,): a first-order autoregressive process, stationary from its first sample."""
+    """Draw coloured noise (N,): a first-order autoregressive process, stationary from its first sample."""
     pole = np.exp(-1 / (rate * noise.correlation))
     steps = random.normal(0.0, noise.drift * np.sqrt(1 - pole**2), samples)
     first = [pole * random.normal(0.0, noise.drift)]
@@ -78,15 +78,15 @@ def drift(noise: SensorNoise, rate: float, samples: int, random: np.random.Gener
 
 
 def write(path: Path, channels: Sequence[SimulatedChannel], rate: float, started: str) -> None:
-    """Write the channels in the format that the file's name asks for.
+    """Write the channels in the format of the file's suffix.
 
-    A channel whose quantity is `time` is the first column or channel; without one the file's header says the step.
+    A channel whose quantity is `time` is the first column or channel; without one, the header states the step.
     """
     {".tdms": tdms, ".lvm": lvm}[path.suffix](path, channels, rate, started)
 
 
-def named(path: Path, channel: SimulatedChannel) -> str:
-    """The name by which a reader finds a channel in the file."""
+def channel_name(path: Path, channel: SimulatedChannel) -> str:
+    """The name of a channel in the file, for readers."""
     if path.suffix == ".tdms":
         return f"{GROUP}/{channel.name}"
     return "X_Value" if channel.quantity == "time" else channel.name
@@ -95,7 +95,7 @@ def named(path: Path, channel: SimulatedChannel) -> str:
 def tdms(path: Path, channels: Sequence[SimulatedChannel], rate: float, started: str) -> None:
     """Write a TDMS file of one group."""
     step = {} if channels[0].quantity == "time" else {"wf_start_offset": 0.0, "wf_increment": 1 / rate}
-    root = RootObject({"name": path.stem, "description": SAYS, "started": started})
+    root = RootObject({"name": path.stem, "description": DESCRIPTION, "started": started})
     objects = [
         ChannelObject(GROUP, c.name, np.ascontiguousarray(c.samples), {"unit_string": c.unit, **step}) for c in channels
     ]
@@ -121,7 +121,7 @@ def _lvm_header(started: str, timed: bool) -> list[str]:
     entries = {
         "Writer_Version": "2", "Reader_Version": "2", "Separator": "Tab", "Decimal_Separator": ".",
         "Multi_Headings": "No", "X_Columns": "One" if timed else "No", "Time_Pref": "Relative",
-        "Operator": "simulation", "Description": SAYS, "Date": date, "Time": time, "***End_of_Header***": "",
+        "Operator": "simulation", "Description": DESCRIPTION, "Date": date, "Time": time, "***End_of_Header***": "",
     }  # fmt: skip
     return ["LabVIEW Measurement\t", *(f"{key}\t{value}" for key, value in entries.items()), "\t"]
 

@@ -1,4 +1,4 @@
-"""A simulated study on disk: every log, study.toml and truth.toml, put in place when all of it is there."""
+"""Simulated studies on disk: their logs, study.toml and truth.toml, moved into place when all are written."""
 
 import json
 import shutil
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from davinci_forces.errors import BadRequest
 from davinci_forces.maths.excitation.fourier import Fourier
 from davinci_forces.simulation import sensors
-from davinci_forces.simulation.motion import SimulatedRun, hung_at, simulated, theta
+from davinci_forces.simulation.motion import SimulatedRun, mass_position, simulate_log, theta
 from davinci_forces.simulation.scenario.scenario import Scenario, SensorNoise, SimulatedLog, SimulatedPush
 from davinci_forces.simulation.sensors import SimulatedChannel, generator, record, record_force
 
@@ -20,12 +20,12 @@ TRUTH = "truth.toml"
 
 
 def write(scenario: Scenario, folder: Path, force: bool, say: Callable[[str], None]) -> None:
-    """Simulate every log and put the study in place when it is whole; `say` is told of each log.
+    """Simulate every log, and move the study into place when it is complete; `say` reports each log.
 
     Raises
     ------
     BadRequest
-        If the folder holds something, unless `force` is given and what it holds is a simulated study.
+        If the folder is not empty, unless it holds a simulated study and `force` is set.
     """
     check(folder, force)
     folder.parent.mkdir(parents=True, exist_ok=True)
@@ -43,7 +43,7 @@ def write(scenario: Scenario, folder: Path, force: bool, say: Callable[[str], No
 
 
 def check(folder: Path, force: bool) -> None:
-    """Refuse to replace what should not be lost."""
+    """Refuse to replace a folder, except a simulated study with `force`."""
     if folder.exists() and not folder.is_dir():
         raise BadRequest(f"{folder} is a file; name a folder that does not exist yet")
     if not folder.is_dir() or not any(folder.iterdir()):
@@ -51,20 +51,20 @@ def check(folder: Path, force: bool) -> None:
     if not force:
         raise BadRequest(f"{folder} is not empty; name another folder, or replace it with --force")
     if not (folder / TRUTH).is_file():
-        raise BadRequest(f"{folder} has no {TRUTH}, so it is not a simulated study: it is left alone, --force or not")
+        raise BadRequest(f"{folder} has no {TRUTH}, so it is not a simulated study; --force does not replace it")
 
 
 def _log(scenario: Scenario, log: SimulatedLog, folder: Path, say: Callable[[str], None]) -> tuple[str, str]:
-    run = simulated(scenario, log)
-    channels, path = recorded(scenario, log, run), folder / log.file
+    run = simulate_log(scenario, log)
+    channels, path = record_channels(scenario, log, run), folder / log.file
     sensors.write(path, channels, scenario.rate, scenario.started)
     size = path.stat().st_size / 1e6
     say(f"{log.name}: {len(run.t)} samples of {', '.join(log.joints)} -> {log.file}, {size:.2f} MB")
     return study_entry(scenario, log, path, channels), truth_entry(log, run)
 
 
-def recorded(scenario: Scenario, log: SimulatedLog, run: SimulatedRun) -> list[SimulatedChannel]:
-    """The channels of one log, with the noise of its seed."""
+def record_channels(scenario: Scenario, log: SimulatedLog, run: SimulatedRun) -> list[SimulatedChannel]:
+    """Record the channels of one log, with the noise of the scenario's seed."""
     channels = [SimulatedChannel("time", "Time", "s", run.t)] if log.clock == "channel" else []
     for name, motion in run.motions.items():
         random = generator(scenario.seed, log.name, name)
@@ -80,7 +80,7 @@ def _text(file: Path, text: str) -> None:
 
 
 def study_text(scenario: Scenario, entries: Sequence[str]) -> str:
-    """The whole of study.toml."""
+    """The text of study.toml."""
     head = f"title = {toml(scenario.title)}\nrobot = {toml(scenario.robot.name)}\nsimulated = true\n"
     return "# Written by `davinci-forces simulate`: simulated data.\n" + "\n".join([head, *entries])
 
@@ -96,12 +96,12 @@ def study_entry(scenario: Scenario, log: SimulatedLog, path: Path, channels: Seq
     if log.windows:
         lines.append(f"contact = {toml([list(window) for window in log.windows])}")
     if log.role == "weight":
-        place = [round(float(x), 4) for x in hung_at(scenario)]
+        place = [round(float(x), 4) for x in mass_position(scenario)]
         joint = toml(scenario.robot.joints[-1].name)
         lines.append(f"weight = {{ mass = {toml(log.mass)}, moves_with = {joint}, position = {toml(place)} }}")
     lines.append("[log.channels]")
     for channel in channels:
-        name = toml(sensors.named(path, channel))
+        name = toml(sensors.channel_name(path, channel))
         if channel.quantity == "time":
             lines.append(f"time = {name}")
         else:
@@ -110,12 +110,12 @@ def study_entry(scenario: Scenario, log: SimulatedLog, path: Path, channels: Seq
 
 
 def toml(value: object) -> str:
-    """A text, a number, true or false, or a list of them; TOML writes them as JSON does."""
+    """Write a text, a number, a truth value or a list of them as TOML does, which is as in JSON."""
     return json.dumps(value, ensure_ascii=False)
 
 
 def truth_text(scenario: Scenario, entries: Sequence[str]) -> str:
-    """The whole of truth.toml: parameters and noise of each joint, by family where there are any, then the logs."""
+    """The text of truth.toml: parameters and noise of each joint, by family where there are any, then the logs."""
     lines = ["# What is true of the simulated recordings of this study.", "simulated = true"]
     lines += [f"scenario = {toml(scenario.name)}", f"seed = {scenario.seed}"]
     if scenario.arm is None:
@@ -131,14 +131,14 @@ def truth_text(scenario: Scenario, entries: Sequence[str]) -> str:
 
 
 def truth_entry(log: SimulatedLog, run: SimulatedRun) -> str:
-    """The [[log]] of one recording in truth.toml: what was pushed when, what hung there, when anything was touched."""
+    """The [[log]] of one recording in truth.toml: its pushes, its mass, and its times of contact."""
     lines = ["[[log]]", f"name = {toml(log.name)}", f"role = {toml(log.role)}"]
     lines += [f"{key} = {toml(value)}" for key, value in (("family", log.family), ("mass", log.mass)) if value]
     if log.sensor:
         lines.append(f"sensor = {{ noise = {toml(log.sensor.noise)}, lag = {toml(log.sensor.lag)} }}")
     if log.tissue:
         lines += [f"stiffness = {toml(log.tissue.stiffness)}", f"surface = {toml(log.tissue.surface)}"]
-        lines.append(f"touched = {toml(touched(run))}")
+        lines.append(f"touched = {toml(contact_times(run))}")
     for joint, pushes in log.external.items():
         for push in pushes:
             lines += ["", "[[log.push]]", f"joint = {toml(joint)}", *_push(push)]
@@ -147,8 +147,8 @@ def truth_entry(log: SimulatedLog, run: SimulatedRun) -> str:
     return "\n".join(lines) + "\n"
 
 
-def touched(run: SimulatedRun) -> list[list[float]]:
-    """When the tip touched something: [onset, end] of each time [s], to a sample."""
+def contact_times(run: SimulatedRun) -> list[list[float]]:
+    """The contacts of the tip: [onset, end] of each [s], to one sample."""
     if run.force is None:
         return []
     contact = np.concatenate([[False], np.linalg.norm(run.force, axis=1) > 0, [False]])

@@ -1,4 +1,4 @@
-"""Design what is to be recorded: the robot's chain, its controllers and its excitation, in simulation."""
+"""Simulate the robot before anything is recorded: its chain, its controllers and its excitation trajectories."""
 
 from collections.abc import Iterator
 from itertools import product
@@ -16,14 +16,14 @@ from davinci_forces.maths.simulation.actuators import Regulator
 from davinci_forces.records import Column, Control, Excitation, Links, Lyapunov, Pose, Workspace
 from davinci_forces.robots.robot import ControlStudy, Joint, Robot
 
-STARTS = 8  # of the excitation's optimiser; `davinci-forces excite` takes its time
-GRID = 11  # places along each joint's range
-ARM = 3  # coordinates at most that carry the tip, and whose ranges are gone through
-SETTLED = 0.02  # of the step, within which a joint counts as settled
+STARTS = 8  # of the excitation's optimiser; `davinci-forces excite` uses more
+GRID_POINTS = 11  # along each joint's range
+MAX_GRID_JOINTS = 3  # that carry the tip
+SETTLING_BAND = 0.02  # of the step
 
 
 def run(robot: Robot) -> Iterator[Links | Pose | Workspace | Control | Lyapunov | Excitation]:
-    """What is known of a robot before its logs; of one without a geometry, the excitation of its joints only."""
+    """Compute geometry, simulated control and excitation of a robot; without a geometry, only the excitation."""
     if robot.chain is not None:
         yield from geometry(robot, robot.chain)
         if robot.bodies is not None:
@@ -33,13 +33,13 @@ def run(robot: Robot) -> Iterator[Links | Pose | Workspace | Control | Lyapunov 
 
 
 def geometry(robot: Robot, chain: Chain) -> Iterator[Links | Pose | Workspace]:
-    """The chain, where its frames are, and where its tip can go.  Tables 3.1, 4.2, Fig 3.5"""
-    n = min(ARM, len(robot.joints))
+    """The chain, the positions of its frames, and the workspace of its tip.  Tables 3.1, 4.2, Fig 3.5"""
+    n = min(MAX_GRID_JOINTS, len(robot.joints))
     limits = np.array([joint.limits.q for joint in robot.joints[:n]])
     limited = bool(np.isfinite(limits).all())
     condition, names = np.array([]), np.array(chain.names, object)
     if limited:
-        grid = np.array(list(product(*(np.linspace(low, high, GRID) for low, high in limits.tolist()))))
+        grid = np.array(list(product(*(np.linspace(low, high, GRID_POINTS) for low, high in limits.tolist()))))
         condition = tip_force.condition(jacobian(chain, grid)[0])
     yield links(robot, chain, float(condition.max()) if limited else float("nan"))
     poses = {"zero": np.zeros(n)} | ({"low": limits[:, 0], "high": limits[:, 1]} if limited else {})
@@ -52,29 +52,29 @@ def geometry(robot: Robot, chain: Chain) -> Iterator[Links | Pose | Workspace]:
 
 
 def links(robot: Robot, chain: Chain, worst_condition: float) -> Links:
-    """The frames with their Denavit-Hartenberg parameters, and the masses of their links; NaN is not known."""
+    """The frames with their Denavit-Hartenberg parameters, and the masses of their links; NaN where unknown."""
     names = np.array(chain.names, object)
-    known = np.full(len(chain.links), np.nan) if robot.bodies is None else robot.bodies.masses
-    masses = dict(zip(chain.links, known.tolist(), strict=True))
+    link_masses = np.full(len(chain.links), np.nan) if robot.bodies is None else robot.bodies.masses
+    masses = dict(zip(chain.links, link_masses.tolist(), strict=True))
     return Links(
         robot=robot.name,
         worst_condition=worst_condition,
         link=names[1:],
         parent=names[chain.before][1:],
-        **table(chain),
+        **dh_parameters(chain),
         moved_by=chain.moved_by[1:] + 1,
         mass=np.array([masses.get(name, 0.0) for name in chain.names[1:]]),
     )
 
 
-def table(chain: Chain) -> dict[str, Column]:
-    """The parameters of the frames after the base as a table has given them, NaN where none has."""
+def dh_parameters(chain: Chain) -> dict[str, Column]:
+    """The parameters of the frames after the base from the robot's table; NaN without a table."""
     rows = np.array([row[2:6] for row in chain.table] or [(np.nan,) * 4] * (len(chain.names) - 1))
     return dict(zip(("alpha", "a", "d", "offset"), rows.T, strict=True))
 
 
 def control(robot: Robot, chain: Chain, bodies: Bodies) -> Iterator[Control | Lyapunov]:
-    """The robot's control studies, with friction that is viscous only.  Section 5.2, Fig 5.2-5.6"""
+    """Simulate the robot's control studies with viscous friction.  Section 5.2, Fig 5.2-5.6"""
     from davinci_forces.maths.simulation.closed_loop import arm
     from davinci_forces.maths.simulation.continuous import regulate
 
@@ -87,24 +87,24 @@ def control(robot: Robot, chain: Chain, bodies: Bodies) -> Iterator[Control | Ly
         plant, belief = (arm(chain, bodies.scaled(share), rotors) for share in (1.0, study.known_masses))
         run = regulate(plant, belief, law, viscous, start, target, study.duration)
         for i, name in enumerate(robot.coordinates[: len(start)]):
-            yield watched(study, name, run.t, run.q[:, i], run.dq[:, i], start[i], target[i])
+            yield control_record(study, name, run.t, run.q[:, i], run.dq[:, i], start[i], target[i])
         rise = max(float(np.diff(run.V).max()), 0.0)
         yield Lyapunov(study.name, rise, float(run.V[0]), run.t, run.V)
 
 
-def watched(
+def control_record(
     study: ControlStudy, joint: str, t: Column, q: Column, dq: Column, start: float, reference: float
 ) -> Control:
-    """One joint of a study: how far it overshoots, when it settles, and its errors as time goes on."""
-    from scipy.interpolate import CubicHermiteSpline  # which every run would load, as it asks what each stage makes
+    """Overshoot, settling time and errors of one joint of a control study."""
+    from scipy.interpolate import CubicHermiteSpline  # here, because every run imports this module
 
     between = CubicHermiteSpline(t, q, dq)  # the solver's steps grow to seconds as the errors die out
     step = reference - start
     overshoot = settling_time = float("nan")
     if step:
         overshoot = max(float(((q - reference) / step).max()), 0.0)
-        if abs(q[-1] - reference) <= SETTLED * abs(step):
-            edges = (reference + side * SETTLED * step for side in (-1, 1))
+        if abs(q[-1] - reference) <= SETTLING_BAND * abs(step):
+            edges = (reference + side * SETTLING_BAND * step for side in (-1, 1))
             settling_time = max(float(when) for edge in edges for when in between.solve(edge, extrapolate=False))
     later = [float(reference - between(when)) if when <= t[-1] else float("nan") for when in (10.0, 20.0)]
     return Control(
@@ -124,13 +124,13 @@ def watched(
 
 
 def excitations(joint: Joint) -> Iterator[Excitation]:
-    """What has been published for a joint, and what the optimiser finds within its limits.  (6.27), Table 6.1"""
+    """The published excitations of a joint, and the optimal one within its limits.  (6.27), Table 6.1"""
     for source, (period, *x) in joint.published:
-        yield described(joint, source, Fourier.of(np.array(x), period))
+        yield excitation_record(joint, source, Fourier.of(np.array(x), period))
     if joint.published and all(np.isfinite(pair).all() for pair in limits_of(joint)):
         period = joint.published[0][1][0]
         problem = ExcitationProblem(joint.terms, limits_of(joint), period, 2, "determinant")
-        yield described(joint, "found", design(problem, STARTS, 0).series)
+        yield excitation_record(joint, "found", design(problem, STARTS, 0).series)
 
 
 def limits_of(joint: Joint) -> tuple[tuple[float, float], tuple[float, float], tuple[float, float]]:
@@ -138,13 +138,13 @@ def limits_of(joint: Joint) -> tuple[tuple[float, float], tuple[float, float], t
     return joint.limits.q, joint.limits.dq, joint.limits.ddq
 
 
-def described(joint: Joint, source: str, series: Fourier) -> Excitation:
-    """A trajectory with its objective, its condition and by how much it leaves the limits."""
+def excitation_record(joint: Joint, source: str, series: Fourier) -> Excitation:
+    """A trajectory with its objective, its condition number and its excess over the limits."""
     F = fourier.observation(joint.terms, series)
     t = np.linspace(0.0, series.period, 401)
     q, dq, ddq = fourier.motion(series, t)
     ranges = zip(fourier.ranges(series), limits_of(joint), strict=True)
-    excess = [float(max(low - found[0], found[1] - high, 0.0)) for found, (low, high) in ranges]
+    excess = [float(max(low - least, largest - high, 0.0)) for (least, largest), (low, high) in ranges]
     return Excitation(
         joint=joint.name,
         source=source,

@@ -1,4 +1,4 @@
-"""Weigh what hangs on the arm: mass and scale from the external effort of the joints that carry it."""
+"""Estimate the mass on the arm from the joint efforts of a weight log, and its ratio to the stated mass."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
@@ -30,14 +30,14 @@ from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Mot
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import HungMass, LogEntry, Weighing, Weighings
 
-FREE = ("identification", "validation")  # roles of logs in which nothing touches the arm
-PER_CUTOFF = 6.0  # rows kept per period of the low-pass's cutoff
-CARRIES = 1e-6  # effort of a kilogram, below which a joint does not carry it
-FEWEST = 2 * PARTS  # rows of a path that tell anything
-TOGETHER = 0.1  # of the range of motion, by how much a tare may be off the path
+FREE_ROLES = ("identification", "validation")  # of logs in which nothing touches the arm
+ROWS_PER_CUTOFF_PERIOD = 6.0  # of the low-pass
+MIN_LOAD = 1e-6  # effort per kilogram, below which a joint does not carry the mass
+MIN_ROWS = 2 * PARTS  # of a path
+MAX_TARE_DISTANCE = 0.1  # between the paths of a log and its tare, over the standard deviation of the position
 PHASES = 1000  # of a period, at which two paths are compared
-SAME_PERIOD = 0.01  # of a period, by how much a tare's may differ
-TELLS = 2.0  # standard errors by which one side of a link has to explain the effort better
+MAX_PERIOD_DIFFERENCE = 0.01  # between a log and its tare, over the period
+MIN_SIDE_DIFFERENCE = 2.0  # standard errors by which one side of a link has to explain the effort better
 
 
 def run(
@@ -49,56 +49,56 @@ def run(
     *,
     lowpass: float,
 ) -> Iterator[Load | Diagnostic]:
-    """One Load per joint that moves and weight: a weight log's own one, and all of them in free motion.
+    """Compute the joint effort per kilogram of each mass, along its weight log and along free motion.
 
-    The effort is measured minus modelled, not the filter's: neither its lag nor its random walk bias the mass.
-    Joints that the log does not hold are taken to be at 0.  A current weighs nothing, so joints whose effort is in A
-    are left out.
+    One Load per weight and moving joint.  Its effort is measured minus modelled effort, not that of the filter, whose
+    lag and random walk would bias the mass.  Joints that the log does not hold are taken to be at 0.  Joints whose
+    effort is in A are left out, because a current is not a force.
     """
-    hung = [w for w in weighings.each if entry.role in FREE or w.log == entry.name]
-    if hung and robot.chain is None:
-        said = f"{entry.name}: {robot.name} has no chain, so what a mass asks of its joints is not known"
-        yield diagnostic("weigh", entry.name, "note", f"{said}; nothing is weighed")
+    relevant = [w for w in weighings.each if entry.role in FREE_ROLES or w.log == entry.name]
+    if relevant and robot.chain is None:
+        message = f"{entry.name}: {robot.name} has no chain, so the joint effort of a mass is not known"
+        yield diagnostic("weigh", entry.name, "note", f"{message}; no mass is estimated")
         return
     moving = [model for model in models if not model.at_rest and len(model) == len(motions[0])]
     loaded = [model for model in moving if not robot.joint(model.joint).effort]
-    if entry.role not in FREE and len(loaded) < len(moving):
-        which = ", ".join(model.joint for model in moving if model not in loaded)
-        said = f"{entry.name}: the effort of {which} is a current, which weighs nothing, and is left out"
-        yield diagnostic("weigh", entry.name, "note", f"{said}; state torque_constant where it is known")
-    if not hung or not loaded or robot.chain is None:
+    if entry.role not in FREE_ROLES and len(loaded) < len(moving):
+        names = ", ".join(model.joint for model in moving if model not in loaded)
+        message = f"{entry.name}: the effort of {names} is a current, not a force, and is left out"
+        yield diagnostic("weigh", entry.name, "note", f"{message}; state torque_constant where it is known")
+    if not relevant or not loaded or robot.chain is None:
         return
     motion = whole_motion(motions, robot)
     period = period_of([m for m in motions if m.joint in {model.joint for model in loaded}], robot)
-    efforts = {model.joint: external(model, model.tau_hat, lowpass) for model in loaded}
+    efforts = {model.joint: external_effort(model, model.tau_hat, lowpass) for model in loaded}
     unseen = efforts
     if entry.role == "identification":
-        unseen = {model.joint: external(model, model.tau_hat_unseen, lowpass) for model in loaded}
-    for weighing in hung:
-        sides = asked(robot.chain, robot, weighing.weight, motion)
+        unseen = {model.joint: external_effort(model, model.tau_hat_unseen, lowpass) for model in loaded}
+    for weighing in relevant:
+        sides = loads_per_kilogram(robot.chain, robot, weighing.weight, motion)
         for model in loaded:
             column = [joint.name for joint in robot.joints].index(model.joint)
             first = float(model.t[0]) - 0.5 / model.rate  # a sample is in the middle of its time
             length = period or float(model.t[-1]) + 0.5 / model.rate - first
-            count = max(int(length * min(model.rate, PER_CUTOFF * lowpass) * (1 + 1e-9)), 1)
+            count = max(int(length * min(model.rate, ROWS_PER_CUTOFF_PERIOD * lowpass) * (1 + 1e-9)), 1)
             loads = [smoothed(side[:, column], motions[0].segment, model.rate, lowpass) for side in sides]
             columns = {
-                "q": along(model.t, motion[0][:, column], first, length, count),
-                "load": along(model.t, loads[0], first, length, count),
-                "load_mirrored": along(model.t, loads[1], first, length, count),
-                "tau_ext": along(*efforts[model.joint], first, length, count),
-                "tau_ext_unseen": along(*unseen[model.joint], first, length, count),
+                "q": path_means(model.t, motion[0][:, column], first, length, count),
+                "load": path_means(model.t, loads[0], first, length, count),
+                "load_mirrored": path_means(model.t, loads[1], first, length, count),
+                "tau_ext": path_means(*efforts[model.joint], first, length, count),
+                "tau_ext_unseen": path_means(*unseen[model.joint], first, length, count),
             }
-            kept = np.isfinite(columns["q"])
+            reached = np.isfinite(columns["q"])
             yield Load(
                 log=model.log, joint=model.joint, weight=weighing.log, role=model.role, rate=count / length,
-                period=period, t=((np.arange(count) + 0.5) / count * length)[kept],
-                **{name: values[kept] for name, values in columns.items()},
+                period=period, t=((np.arange(count) + 0.5) / count * length)[reached],
+                **{name: values[reached] for name, values in columns.items()},
             )  # fmt: skip
 
 
 def whole_motion(motions: Sequence[Motion], robot: Robot) -> tuple[Array, Array, Array]:
-    """Position, velocity and acceleration (N, n) of all joints of the robot; 0 of those that the log does not hold."""
+    """Position, velocity and acceleration (N, n) of all joints; 0 for joints that the log does not hold."""
     q, dq, ddq = np.zeros((3, len(motions[0]), len(robot.joints)))
     names = [joint.name for joint in robot.joints]
     for motion in motions:
@@ -109,7 +109,7 @@ def whole_motion(motions: Sequence[Motion], robot: Robot) -> tuple[Array, Array,
 
 
 def period_of(motions: Sequence[Motion], robot: Robot) -> float:
-    """The period [s] of joints that move together; 0 where they do not repeat."""
+    """Common period [s] of the joints; 0 where they do not repeat."""
     part = max(segments(motions[0].segment), key=lambda part: part.stop - part.start)
     positions = [motion.q_measured[part] for motion in motions]
     lag = guess(positions)
@@ -119,28 +119,29 @@ def period_of(motions: Sequence[Motion], robot: Robot) -> float:
     return refine(motions[0].t[part], positions, lag / motions[0].rate, orders)
 
 
-def external(model: JointModel, tau_hat: Array, lowpass: float) -> tuple[Array, Array]:
-    """The times (K,), and the low-passed effort (K,) that a prediction leaves, where there is one."""
-    kept = np.isfinite(tau_hat)
-    left = (model.tau - tau_hat)[kept]
-    return model.t[kept], smoothed(left, model.segment[kept], model.rate, lowpass) if kept.any() else left
+def external_effort(model: JointModel, tau_hat: Array, lowpass: float) -> tuple[Array, Array]:
+    """Times (K,) at which the effort is predicted, and the low-passed difference to the measured effort (K,)."""
+    predicted = np.isfinite(tau_hat)
+    tau_ext = (model.tau - tau_hat)[predicted]
+    if predicted.any():
+        tau_ext = smoothed(tau_ext, model.segment[predicted], model.rate, lowpass)
+    return model.t[predicted], tau_ext
 
 
-def asked(chain: Chain, robot: Robot, weight: HungMass, motion: tuple[Array, Array, Array]) -> tuple[Array, Array]:
-    """What a kilogram asks of the joints (N, n) where the study has it, and on the other side of its link."""
-    link = carrier(chain, robot, weight.moves_with)
-    own, other = (unit_load(chain, link, at, *motion) for at in (weight.position, mirrored(weight.position)))
-    return own, other
-
-
-def carrier(chain: Chain, robot: Robot, moves_with: str) -> str:
-    """The link that carries a weight: the one of that name, or the one that moves with the joint of that name."""
+def loads_per_kilogram(
+    chain: Chain, robot: Robot, weight: HungMass, motion: tuple[Array, Array, Array]
+) -> tuple[Array, Array]:
+    """Joint effort of a kilogram (N, n) at the stated position, and at its mirror position on the link."""
     names = [joint.name for joint in robot.joints]
-    return moved_with(chain, names.index(moves_with)) if moves_with in names else moves_with
+    link = weight.moves_with  # a link, or a joint, with which a link moves
+    if link in names:
+        link = moved_with(chain, names.index(link))
+    stated, opposite = (unit_load(chain, link, at, *motion) for at in (weight.position, mirrored(weight.position)))
+    return stated, opposite
 
 
-def along(t: Array, x: Array, first: float, length: float, count: int) -> Array:
-    """The mean of a signal (N,) in so many parts of the path (count,), NaN in those that it does not reach."""
+def path_means(t: Array, x: Array, first: float, length: float, count: int) -> Array:
+    """Mean of a signal (N,) in each of `count` parts of the path; NaN in parts that it does not reach."""
     part = ((t - first) / length % 1.0 * count).astype(np.int64) % count
     samples = np.bincount(part, minlength=count)
     sums = np.bincount(part, x, count)
@@ -148,58 +149,58 @@ def along(t: Array, x: Array, first: float, length: float, count: int) -> Array:
 
 
 def gather(loads: Iterable[Load], robot: Robot, weighings: Weighings) -> Iterator[Weight | FreeWeight | Diagnostic]:
-    """One Weight per weight log, and one FreeWeight per log of free motion, in which nothing hangs.  Section 7.5
+    """Estimate one Weight per weight log, and one FreeWeight per log of free motion, without a mass.  Section 7.5
 
-    A current weighs nothing, so joints whose effort is in A are left out.
+    Joints whose effort is in A are left out, because a current is not a force.
     """
-    every = defaultdict(list)
+    by_weight = defaultdict(list)
     for load in loads:
-        if len(load) >= FEWEST and np.abs(load.load).max() > CARRIES and not robot.joint(load.joint).effort:
-            every[load.weight, load.log].append(load)
+        if len(load) >= MIN_ROWS and np.abs(load.load).max() > MIN_LOAD and not robot.joint(load.joint).effort:
+            by_weight[load.weight, load.log].append(load)
     units = {joint.name: joint.unit("{effort}") for joint in robot.joints}
     for weighing in weighings.each:
-        own = every[weighing.log, weighing.log]
-        logs = {log: ls for (weight, log), ls in every.items() if weight == weighing.log and log != weighing.log}
-        if not own:
-            said = f"{weighing.log}: no joint that moves carries what hangs on {weighing.weight.moves_with}"
+        weight_loads = by_weight[weighing.log, weighing.log]
+        logs = {log: ls for (weight, log), ls in by_weight.items() if weight == weighing.log and log != weighing.log}
+        if not weight_loads:
+            message = f"{weighing.log}: no moving joint carries the mass on {weighing.weight.moves_with}"
             yield diagnostic(
                 "weigh", f"{weighing.log}.mass", "warning",
-                f"{said}, or none of them has a fit, or their efforts are currents; nothing is weighed: move a joint "
-                "that the mass loads, and state torque_constant where it is known",
+                f"{message}, or none of them has a fit, or their efforts are currents; no mass is estimated: move a "
+                "joint that the mass loads, and state torque_constant where it is known",
             )  # fmt: skip
             continue
-        tare, wrong = tared(own, logs.get(weighing.tare, [])) if weighing.tare else ([], "")
-        if wrong:
-            said = f"{weighing.log}: its tare {weighing.tare} {wrong}; nothing is subtracted"
-            yield diagnostic("weigh", f"{weighing.log}.mass", "warning", f"{said}: record the tare along the same path")
-        yield from of_log(weighing, own, tare, logs, units)
+        tare, fault = subtract_tare(weight_loads, logs.get(weighing.tare, [])) if weighing.tare else ([], "")
+        if fault:
+            message = f"{weighing.log}: its tare {weighing.tare} {fault}, and is not subtracted"
+            yield diagnostic("weigh", f"{weighing.log}.mass", "warning", f"{message}; record it along the same path")
+        yield from estimate_mass(weighing, weight_loads, tare, logs, units)
 
 
-class Free(NamedTuple):
-    """What free motion says of the errors of a mass."""
+class FreeMotionErrors(NamedTuple):
+    """Errors of a mass, as free motion shows them."""
 
-    sigma: dict[str, float]  # the model's error by joint
-    fit_std: float  # [kg] of what all masses by this fit share
+    sigma: dict[str, float]  # error of the model, by joint
+    fit_std: float  # [kg] of the error that all masses by this fit share
     widening: float
     masses: dict[str, Weighed]  # by log
     roles: dict[str, str]
 
 
-def of_log(
-    weighing: Weighing, own: Sequence[Load], tare: Sequence[Load], logs: dict[str, list[Load]], units: dict[str, str]
+def estimate_mass(
+    weighing: Weighing, loads: Sequence[Load], tare: Sequence[Load], logs: dict[str, list[Load]], units: dict[str, str]
 ) -> Iterator[Weight | FreeWeight]:
-    """The Weight of one log, and what its load would seem to weigh in logs of free motion."""
-    free = of_free_motion(own, logs)
-    kept = tare or own
-    sides = [rows_of(kept, free.sigma, column) for column in ("load", "load_mirrored")]
+    """Estimate the mass of one weight log, by its loads without the `tare`, and the mass in logs of free motion."""
+    free = free_motion_errors(loads, logs)
+    loads = tare or loads
+    sides = [rows_of(loads, free.sigma, column) for column in ("load", "load_mirrored")]
     fit_std = 0.0 if tare else free.fit_std
-    (mass, run_std), (other, other_std) = (weighed(rows) for rows in sides)
-    std, mirrored_std = (free.widening * float(np.hypot(part, fit_std)) for part in (run_std, other_std))
-    tells = better(*sides)
+    (mass, run_std), (mass_mirrored, mirrored_run_std) = (weighed(rows) for rows in sides)
+    std, mirrored_std = (free.widening * float(np.hypot(part, fit_std)) for part in (run_std, mirrored_run_std))
+    advantage = better(*sides)
     stated = float("nan") if weighing.weight.mass is None else weighing.weight.mass
-    of_tare = free.masses.get(weighing.tare, Weighed(float("nan"), float("nan"))) if tare else None
-    alone = [weighed([row]) for row in sides[0]]
-    left = [float(np.sqrt(np.mean(residual(row, mass) ** 2))) for row in sides[0]]
+    tare_mass = free.masses.get(weighing.tare, Weighed(float("nan"), float("nan"))) if tare else None
+    by_joint = [weighed([row]) for row in sides[0]]
+    residual_rms = [float(np.sqrt(np.mean(residual(row, mass) ** 2))) for row in sides[0]]
     yield Weight(
         log=weighing.log,
         moves_with=weighing.weight.moves_with,
@@ -210,113 +211,117 @@ def of_log(
         run_std=run_std,
         fit_std=fit_std,
         widening=free.widening,
-        mass_mirrored=other,
+        mass_mirrored=mass_mirrored,
         mass_mirrored_std=mirrored_std,
-        side="as stated" if tells > TELLS else "the other one" if tells < -TELLS else "not told",
+        side=side_of(advantage),
         mass_scale=mass / stated,
         mass_scale_std=std / stated,
-        tare_mass=of_tare.mass if of_tare else float("nan"),
-        tare_mass_std=total(of_tare, free) if of_tare else float("nan"),
-        loaded=np.array([load.joint for load in kept], object),
-        unit=np.array([units[load.joint] for load in kept], object),
-        mass_alone=np.array([w.mass for w in alone]),
-        mass_alone_std=np.array([w.std for w in alone]),
+        tare_mass=tare_mass.mass if tare_mass else float("nan"),
+        tare_mass_std=total_std(tare_mass, free) if tare_mass else float("nan"),
+        loaded=np.array([load.joint for load in loads], object),
+        unit=np.array([units[load.joint] for load in loads], object),
+        mass_alone=np.array([m.mass for m in by_joint]),
+        mass_alone_std=np.array([m.std for m in by_joint]),
         joint_offset=np.array([offset(row, mass) for row in sides[0]]),
-        left_rms=np.array(left),
-        free_error=np.array([free.sigma[load.joint] for load in kept]),
+        left_rms=np.array(residual_rms),
+        free_error=np.array([free.sigma[load.joint] for load in loads]),
     )
-    for log, seems in free.masses.items():
-        yield FreeWeight(log, weighing.log, free.roles[log], seems.mass, total(seems, free))
+    for log, free_mass in free.masses.items():
+        yield FreeWeight(log, weighing.log, free.roles[log], free_mass.mass, total_std(free_mass, free))
 
 
-def total(of_run: Weighed, free: Free) -> float:
-    """The standard error of a mass: of its run and of the fit, widened as free motion asks for."""
-    return free.widening * float(np.hypot(of_run.std, free.fit_std))
+def side_of(advantage: float) -> str:
+    """Side of the link on which the mass is, by how much better the stated side explains the effort."""
+    if advantage > MIN_SIDE_DIFFERENCE:
+        return "as stated"
+    return "the other one" if advantage < -MIN_SIDE_DIFFERENCE else "not told"
 
 
-def of_free_motion(own: Sequence[Load], logs: dict[str, list[Load]]) -> Free:
-    """The errors of a load's mass as free motion shows them that the fit has not seen.
+def total_std(mass: Weighed, free: FreeMotionErrors) -> float:
+    """Standard error of a mass: of its run and of the fit, widened by the factor from free motion."""
+    return free.widening * float(np.hypot(mass.std, free.fit_std))
 
-    What the fit errs by is that of all logs that it was made of, where refits had not seen them; how much the masses
-    of other logs exceed their errors widens every one.
+
+def free_motion_errors(weight_loads: Sequence[Load], logs: dict[str, list[Load]]) -> FreeMotionErrors:
+    """Compute the errors of a mass from free motion that the fit has not seen.
+
+    The error of the fit is the mass that its identification logs seem to have, by refits that had not seen them.  The
+    masses of other logs of free motion over their errors give the factor that widens all errors.
     """
-    joints = {load.joint for load in own}
+    joints = {load.joint for load in weight_loads}
     unseen = {
-        log: [seen for load in ls if load.joint in joints and (seen := where_unseen(load))] for log, ls in logs.items()
+        log: [part for load in ls if load.joint in joints and (part := unseen_part(load))] for log, ls in logs.items()
     }
     unseen = {log: ls for log, ls in unseen.items() if ls}
     by_joint: dict[str, list[Rows]] = defaultdict(list)
     for load in (load for ls in unseen.values() for load in ls):
         by_joint[load.joint] += rows_of([load], {}, "load")
     sigma = {joint: model_errors(rows) for joint, rows in by_joint.items()}
-    for load in own:  # of a joint that no free motion tells of, by what its own mass leaves
+    for load in weight_loads:  # a joint without free motion gets the residual of its weight log
         [row] = rows_of([load], {}, "load")
         sigma.setdefault(load.joint, float(np.std(residual(row, weighed([row]).mass))))
     roles = {log: ls[0].role for log, ls in unseen.items()}
     rows = {log: rows_of(ls, sigma, "load") for log, ls in unseen.items()}
-    masses = {log: weighed(of_log) for log, of_log in rows.items()}
-    fitted = [row for log, of_log in rows.items() if roles[log] == "identification" for row in of_log]
-    of_fit = weighed(fitted) if fitted else Weighed(0.0, 0.0)
-    fit_std = max(abs(of_fit.mass), of_fit.std)
-    others = [mass for log, mass in masses.items() if roles[log] != "identification"]
-    return Free(sigma, fit_std, widening(others, fit_std), masses, roles)
+    masses = {log: weighed(log_rows) for log, log_rows in rows.items()}
+    fitted = [row for log, log_rows in rows.items() if roles[log] == "identification" for row in log_rows]
+    fit_mass = weighed(fitted) if fitted else Weighed(0.0, 0.0)
+    fit_std = max(abs(fit_mass.mass), fit_mass.std)
+    validation = [mass for log, mass in masses.items() if roles[log] != "identification"]
+    return FreeMotionErrors(sigma, fit_std, widening(validation, fit_std), masses, roles)
 
 
-def where_unseen(load: Load) -> Load | None:
-    """A load with the effort that its fit has not seen; None where there is none."""
-    kept = np.isfinite(load.tau_ext_unseen)
-    if kept.sum() < FEWEST:
+def unseen_part(load: Load) -> Load | None:
+    """Rows of a load whose effort the fit has not seen, with that effort; None where they are too few."""
+    unseen = np.isfinite(load.tau_ext_unseen)
+    if unseen.sum() < MIN_ROWS:
         return None
-    columns = {name: getattr(load, name)[kept] for name in load.columns()}
+    columns = {name: getattr(load, name)[unseen] for name in load.columns()}
     return replace(load, **{**columns, "tau_ext": columns["tau_ext_unseen"]})
 
 
 def rows_of(loads: Sequence[Load], sigma: dict[str, float], column: str) -> list[Rows]:
-    """What the joints of a log say of the mass, each weighted by its model's error."""
+    """Rows of the regression for the mass, one entry per joint of a log, weighted by the error of its model."""
     return [
         Rows(getattr(load, column), load.tau_ext, np.arange(len(load)) * PARTS // len(load), sigma.get(load.joint, 1.0))
         for load in loads
     ]
 
 
-def tared(own: Sequence[Load], tare: Sequence[Load]) -> tuple[list[Load], str]:
-    """The loads of a log without the effort of its tare at the same places of the path; or what is wrong with it."""
+def subtract_tare(loads: Sequence[Load], tare: Sequence[Load]) -> tuple[list[Load], str]:
+    """Subtract the effort of the tare at the same places of the path; where that is not possible, say why."""
     by_joint = {load.joint: load for load in tare}
-    missing = [load.joint for load in own if load.joint not in by_joint]
+    missing = [load.joint for load in loads if load.joint not in by_joint]
     if missing:
         return [], f"does not move {' and '.join(missing)}"
-    pairs = [(load, by_joint[load.joint]) for load in own]
-    (first, its), *_ = pairs
-    if abs(first.period - its.period) > SAME_PERIOD * first.period:
-        return [], f"repeats every {its.period:.4g} s and not every {first.period:.4g} s (0: not at all)"
-    q, other_q = (np.stack([evenly(load) for load in loads], axis=1) for loads in zip(*pairs, strict=True))
-    shift = circular(q, other_q) if first.period else straight(q, other_q)
-    if shift.apart.max() > TOGETHER:
-        worst = own[int(shift.apart.argmax())].joint
-        share = f"{shift.apart.max():.2g} of the standard deviation of {worst}"
-        return [], f"is not on the same path: at best it is off by {share}, and may be by {TOGETHER:g}"
-    return [subtracted(load, other, shift.samples) for load, other in pairs], ""
+    pairs = [(load, by_joint[load.joint]) for load in loads]
+    period, tare_period = pairs[0][0].period, pairs[0][1].period
+    if abs(period - tare_period) > MAX_PERIOD_DIFFERENCE * period:
+        return [], f"repeats every {tare_period:.4g} s and not every {period:.4g} s (0: not at all)"
+    q, q_tare = (np.stack([even_positions(load) for load in column], axis=1) for column in zip(*pairs, strict=True))
+    shift = circular(q, q_tare) if period else straight(q, q_tare)
+    if shift.apart.max() > MAX_TARE_DISTANCE:
+        worst = loads[int(shift.apart.argmax())].joint
+        distance = f"{shift.apart.max():.2g} of the standard deviation of {worst}"
+        return [], f"is not on the same path: at best it is off by {distance}, above {MAX_TARE_DISTANCE:g}"
+    return [subtract_joint_tare(*pair, shift.samples) for pair in pairs], ""
 
 
-def evenly(load: Load) -> Array:
-    """Where a joint is: so many times a period, or as often as its rate says."""
+def even_positions(load: Load) -> Array:
+    """Position of a joint at `PHASES` phases of a period, or at its rate where it does not repeat."""
     if load.period:
         phase = (np.arange(PHASES) + 0.5) / PHASES
         return np.asarray(np.interp(phase, load.t / load.period, load.q, period=1.0))
     return np.asarray(np.interp(np.arange(load.t[0], load.t[-1], 1.0 / load.rate), load.t, load.q))
 
 
-def subtracted(load: Load, tare: Load, samples: float) -> Load:
-    """A load without the effort of its tare, which is so many samples later; where the tare is there, too."""
+def subtract_joint_tare(load: Load, tare: Load, samples: float) -> Load:
+    """Subtract the effort of a joint's tare, which is `samples` later, on the part of the path that both cover."""
     if load.period:
         phase = load.t / load.period + samples / PHASES
-        return less(load, np.interp(phase, tare.t / tare.period, tare.tau_ext, period=1.0))
+        tare_effort = np.interp(phase, tare.t / tare.period, tare.tau_ext, period=1.0)
+        return replace(load, tau_ext=load.tau_ext - tare_effort)
     t = load.t - load.t[0] + tare.t[0] + samples / load.rate
-    there = (t >= tare.t[0]) & (t <= tare.t[-1])
-    kept = replace(load, **{name: getattr(load, name)[there] for name in load.columns()})
-    return less(kept, np.interp(t[there], tare.t, tare.tau_ext))
-
-
-def less(load: Load, tau_ext: Array) -> Load:
-    """A load with so much less external effort."""
-    return replace(load, tau_ext=load.tau_ext - tau_ext)
+    shared = (t >= tare.t[0]) & (t <= tare.t[-1])
+    columns = {name: getattr(load, name)[shared] for name in load.columns()}
+    columns["tau_ext"] = columns["tau_ext"] - np.interp(t[shared], tare.t, tare.tau_ext)
+    return replace(load, **columns)

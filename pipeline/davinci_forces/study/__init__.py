@@ -1,4 +1,4 @@
-"""What was recorded, and how it is to be analysed: study.toml as data, and the reading of it."""
+"""A study as data: what was recorded and how it is analysed, as study.toml gives it."""
 
 import math
 from dataclasses import dataclass, field
@@ -21,7 +21,7 @@ class Settings:
     harmonics: int = 0  # of the excitation; 0 takes the robot's
     fit: str = "chosen"  # the Fit that the filter runs with
     q_tau: float = 0.0  # random walk of the external effort [effort/s^0.5]; 0 is the slowest that shows a push
-    effort: dict[str, float] = field(default_factory=dict)  # what the user wants to see on each joint [effort]
+    effort: dict[str, float] = field(default_factory=dict)  # external effort to be detected on each joint [effort]
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,7 @@ class Source:
 
     @property
     def joint(self) -> str:
-        """The joint that the quantity is of, or "" for one of the whole log."""
+        """The joint of the quantity, or "" for a quantity of the whole log."""
         return self.quantity.rpartition(".")[0]
 
     @property
@@ -49,7 +49,7 @@ class Source:
 
 @dataclass(frozen=True)
 class HungMass:
-    """A mass hung on the arm, at a point fixed to a link.  Section 7.5"""
+    """A mass attached to the arm, at a point fixed to a link.  Section 7.5"""
 
     moves_with: str  # a joint, for the link that turns about the remote centre with it, or a link
     position: tuple[float, float, float]  # [m] from the remote centre, in the link's axes that at q = 0 are the base's
@@ -58,7 +58,7 @@ class HungMass:
 
 @dataclass(frozen=True)
 class Weighing:
-    """A weight log as every log is asked about it."""
+    """A weight log: its mass, and the log that is subtracted from it."""
 
     log: str
     weight: HungMass
@@ -67,7 +67,7 @@ class Weighing:
 
 @dataclass(frozen=True)
 class Weighings:
-    """All weight logs of a study that say where the mass hangs."""
+    """All weight logs of a study that give the position of the mass."""
 
     each: tuple[Weighing, ...]
 
@@ -98,7 +98,7 @@ class LogEntry:
 
     @property
     def tells_free_space(self) -> bool:
-        """Whether it is known when nothing touched the robot."""
+        """Whether the log has samples that are known to be free of contact."""
         return self.role in ("identification", "validation") or (self.role == "contact" and bool(self.contact))
 
     @property
@@ -108,7 +108,7 @@ class LogEntry:
 
     @property
     def needs_clock(self) -> bool:
-        """Whether its samples say nothing without the time between them; pushes of depth and force do."""
+        """Whether its analysis needs times; pushes of depth and force do not."""
         return self.role != "tissue" or bool(self.joints)
 
 
@@ -122,9 +122,9 @@ class Study:
     simulated: bool
     settings: Settings
     logs: tuple[LogEntry, ...]
-    changed: dict[str, Any] = field(default_factory=dict)  # what the study says of the robot, for the report
+    changed: dict[str, Any] = field(default_factory=dict)  # properties of the robot that the study changes
     truth: dict[str, Any] = field(default_factory=dict)  # ground truth of a simulated study: its truth.toml
-    haptics: HapticScenario = field(default_factory=HapticScenario)  # what is simulated of a hand that feels the tissue
+    haptics: HapticScenario = field(default_factory=HapticScenario)  # the simulated hand that feels the tissue
     baseline: str = ""  # the results.json in the study's folder that the report is compared with, if there is one
     robot_file: str = ""  # the .toml or .urdf in the study's folder that describes the robot, if there is one
     lines: dict[str, int] = field(default_factory=dict, compare=False)  # of study.toml, by the file of a log they name
@@ -148,9 +148,9 @@ class Study:
 
     @property
     def files(self) -> int:
-        """How many files its logs are in."""
+        """The number of files of its logs."""
         return sum(len(entry.files) for entry in self.logs)
 
     def absent(self) -> tuple[str, ...]:
-        """Files of logs that are not there."""
+        """Files of logs that do not exist."""
         return tuple(file for entry in self.logs for file in entry.files if not (self.folder / file).exists())

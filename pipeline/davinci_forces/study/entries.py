@@ -1,4 +1,4 @@
-"""Reading the [[log]] tables of a study file."""
+"""Read the [[log]] tables of a study file."""
 
 import os
 from collections.abc import Sequence
@@ -11,39 +11,39 @@ from davinci_forces.robots import Robot
 from davinci_forces.robots.from_toml import wrong_name
 from davinci_forces.study import WHOLE, HungMass, LogEntry
 from davinci_forces.study.channels import Channels
-from davinci_forces.toml import TomlTable, shown
+from davinci_forces.toml import TomlTable, excerpt
 from davinci_forces.toml.lines import MOST_LISTED
 
-MAY_BE_0 = ("skip", "harmonics", "q_tau")
+ZERO_ALLOWED = ("skip", "harmonics", "q_tau")
 ROLES = ("identification", "validation", "contact", "weight", "tissue", "friction")
 TARES = ("validation", "identification")  # roles of logs in which nothing touches the arm
-MOST_NAMED = 100  # logs that a problem lists
-FARTHEST = 3.0  # [m] from the remote centre, beyond which a position is more likely in another unit
-WINDOWS = "a list of [start, end] in seconds, from 0 on"
+MAX_LISTED = 100  # logs that a problem lists
+MAX_POSITION = 3.0  # [m] from the remote centre, beyond which a position is more likely in another unit
+WINDOWS = "a list of [start, end] in seconds, with 0 <= start < end"
 SEVERAL = ("files", "join")  # keys of several files: parts in order, or side by side
 ALL = "all"  # of a tissue log: every sample is one of contact
 
 
 def optional(table: TomlTable, key: str) -> float | None:
-    """A number that may be missing."""
-    return checked(table, key, table.number(key)) if key in table else None
+    """Read a positive number that may be missing."""
+    return check_positive(table, key, table.number(key)) if key in table else None
 
 
-def checked(table: TomlTable, key: str, value: float) -> float:
-    """A number as it is, noted where it is negative, or 0 and may not be that."""
-    if value < 0 or (value == 0 and key not in MAY_BE_0 and key in table.values):
-        table.problem(f"{key} must be positive, not {shown(value)}", key)
+def check_positive(table: TomlTable, key: str, value: float) -> float:
+    """Return a number unchanged; note it if it is negative, or if it is 0 where that is not allowed."""
+    if value < 0 or (value == 0 and key not in ZERO_ALLOWED and key in table.values):
+        table.problem(f"{key} must be positive, not {excerpt(value)}", key)
     return value
 
 
 def entries_of(study: TomlTable, robot: Robot | None) -> tuple[LogEntry, ...]:
-    """Every [[log]]; `robot` is None where the study names none that is known."""
+    """Read every [[log]]; `robot` is None where the study's robot is unknown."""
     tables = study.tables("log", "it has no [[log]] table, so there is nothing to analyse", most=MOST_LISTED)
     logs = tuple(_entry(study, i, table, robot) for i, table in enumerate(tables))
     study.unique("log", "name", enumerate(log.name for log in logs), "two logs are named")
-    named = {log.name: log for log in logs}
+    by_name = {log.name: log for log in logs}
     for i, log in enumerate(logs):
-        if log.tare and (wrong := _wrong_tare(log, named)):
+        if log.tare and (wrong := _wrong_tare(log, by_name)):
             study.problem(f"log {log.name!r}: {wrong}", "log", i, "tare")
     return logs
 
@@ -58,8 +58,8 @@ def lines_of_files(study: TomlTable, logs: Sequence[LogEntry]) -> dict[str, int]
     return lines
 
 
-def inside(file: str) -> bool:
-    """Whether a path stays in the study as it is written; a link that somebody put there may point anywhere."""
+def is_inside(file: str) -> bool:
+    """Whether a path as written stays in the study; a link in the study may point anywhere."""
     path = Path(file)
     return not path.anchor and Path(os.path.normpath(file)).parts[:1] != ("..",)
 
@@ -101,20 +101,20 @@ def _name(study: TomlTable, index: int, table: TomlTable) -> str:
 
 
 def _files(table: TomlTable) -> tuple[str, ...]:
-    given = [key for key in ("file", *SEVERAL) if key in table]
-    if len(given) != 1:
-        table.problem('say either file = "...", or files = ["..."] for parts in order, or join = ["..."] side by side')
+    keys = [key for key in ("file", *SEVERAL) if key in table]
+    if len(keys) != 1:
+        table.problem('give one of file = "...", files = ["..."] (parts in order) or join = ["..."] (side by side)')
         return ()
-    [key] = given
+    [key] = keys
     if key in SEVERAL:
-        words = "a list of names of files"
+        words = "a list of file names"
         named = table.take(key, [], (list,), words, lambda files: files and all(map(_is_name, files)))
     else:
-        named = [table.take("file", "", (str,), "the name of a file", _is_name)]
+        named = [table.take("file", "", (str,), "a file name", _is_name)]
     for i, file in enumerate(named):
-        if not inside(file):
+        if not is_inside(file):
             table.problem(f"{file!r} lies outside the study's folder", key, i)
-    return tuple(file for file in named if file and inside(file))
+    return tuple(file for file in named if file and is_inside(file))
 
 
 def _is_name(value: object) -> bool:
@@ -122,34 +122,34 @@ def _is_name(value: object) -> bool:
 
 
 def _end(table: TomlTable) -> float | None:
-    """Where the log ends; noted where that is before what is skipped ends."""
+    """Read where the log ends; note it if that is not after the skipped start."""
     until = optional(table, "until")
     skip = table.values.get("skip", 0.0)
     if until is not None and isinstance(skip, int | float) and 0 < until <= skip:
-        problem = f"until = {until:g} leaves nothing after skip = {skip:g}; both count in seconds from the log's first"
-        table.problem(f"{problem} sample", "until")
+        end = f"until = {until:g} s leaves no samples after skip = {skip:g} s"
+        table.problem(f"{end}; both count from the log's first sample", "until")
     return until
 
 
 def _delimiter(table: TomlTable) -> str | None:
     if table.values.get("delimiter") == "":
-        table.problem("delimiter must not be empty; leave it out, and it is found from the file", "delimiter")
+        table.problem("delimiter must not be empty; without it, it is detected from the file", "delimiter")
     return table.text("delimiter") if "delimiter" in table else None
 
 
 def _binary(table: TomlTable) -> dict[str, Any]:
-    """What raw binary numbers are, which such a file does not say itself."""
-    for key, other in (("dtype", "columns"), ("columns", "dtype")):
-        if key in table and other not in table:
-            table.problem(f"{key} is of raw binary numbers, and needs {other}; they say {EXAMPLE}", key)
-    said: dict[str, Any] = {}
+    """Read the type and columns of raw binary numbers, which such a file does not state."""
+    for key, partner in (("dtype", "columns"), ("columns", "dtype")):
+        if key in table and partner not in table:
+            table.problem(f"{key} needs {partner}; a file of raw binary numbers takes {EXAMPLE}", key)
+    fields: dict[str, Any] = {}
     if "dtype" in table:
         words = 'a type of number as "float64", "DBL" or "<int16", where < stands for little-endian'
-        said["dtype"] = table.take("dtype", None, (str,), words, lambda word: dtype_of(word) is not None)
+        fields["dtype"] = table.take("dtype", None, (str,), words, lambda word: dtype_of(word) is not None)
     if "columns" in table:
         columns = table.take("columns", None, (int, list), "how many numbers a row has, or their names", _are_columns)
-        said["columns"] = tuple(columns) if isinstance(columns, list) else columns
-    return said
+        fields["columns"] = tuple(columns) if isinstance(columns, list) else columns
+    return fields
 
 
 def _are_columns(value: object) -> bool:
@@ -161,7 +161,7 @@ def _are_columns(value: object) -> bool:
 def _windows(table: TomlTable, key: str) -> tuple[tuple[float, float], ...]:
     if key == "contact" and key in table and table.values[key] == ALL:
         if table.values.get("role") != "tissue":
-            table.problem(f'contact = "{ALL}" is for logs of role tissue; say the windows, {WINDOWS}', key)
+            table.problem(f'contact = "{ALL}" is only for logs of role tissue; give {WINDOWS}', key)
         return WHOLE
     windows = table.pairs(key, WINDOWS, [])
     for i, (start, end) in enumerate(windows):
@@ -170,31 +170,31 @@ def _windows(table: TomlTable, key: str) -> tuple[tuple[float, float], ...]:
     return windows
 
 
-def _wrong_tare(log: LogEntry, named: dict[str, LogEntry]) -> str:
-    """What is wrong with a log's tare, or ""."""
+def _wrong_tare(log: LogEntry, by_name: dict[str, LogEntry]) -> str:
+    """The problem of a log's tare, or ""."""
     if log.role != "weight":
-        return f"tare = {log.tare!r} is for logs of role weight, and this one's is {log.role}"
-    tare = named.get(log.tare)
+        return f"tare = {log.tare!r} is only for logs of role weight, but this log has role {log.role}"
+    tare = by_name.get(log.tare)
     if tare is None:
-        return f"tare = {log.tare!r} is not a log of this study; it has {', '.join(islice(named, MOST_NAMED))}"
+        return f"tare = {log.tare!r} is not a log of this study; its logs are {', '.join(islice(by_name, MAX_LISTED))}"
     if tare.role not in TARES:
-        role = f"its tare {log.tare!r} has the role {tare.role}"
-        return f"{role}; a tare is free motion along the same path, of role {' or '.join(TARES)}"
+        role = f"its tare {log.tare!r} has role {tare.role}"
+        return f"{role}; a tare must be free motion along the same path, with role {' or '.join(TARES)}"
     return ""
 
 
 def _weight(table: TomlTable, robot: Robot | None) -> HungMass | None:
     if "weight" not in table:
         if table.values.get("role") == "weight":
-            table.problem("a weight log says weight = { moves_with = ..., position = ... }, and mass = ... where known")
+            table.problem("a weight log needs weight = { moves_with = ..., position = ... }, with mass = ... if known")
         return None
     weight = table.table("weight")
     mass = weight.number("mass", above=0.0, words="a number of kg") if "mass" in weight else None
     links = robot.chain.links if robot and robot.chain else ()
     moves_with = weight.text("moves_with", choices=[*(joint.name for joint in robot.joints), *links] if robot else ())
     position = weight.numbers("position", count=3, words="[x, y, z] in metres")
-    if position and max(map(abs, position)) > FARTHEST:
-        said = f"position must lie within {FARTHEST:g} m of the remote centre, not {list(position)}; it is in metres"
-        weight.problem(said, "position")
+    if position and max(map(abs, position)) > MAX_POSITION:
+        far = f"position must lie within {MAX_POSITION:g} m of the remote centre, not {list(position)}; it is in metres"
+        weight.problem(far, "position")
     weight.close()
     return HungMass(moves_with, (position[0], position[1], position[2]), mass) if position else None

@@ -1,4 +1,4 @@
-"""Reading `raw/<study>/study.toml`, and saying everything that is wrong with it at once, each with its line."""
+"""Read `raw/<study>/study.toml`, and report all its problems at once, each with its line."""
 
 import math
 from dataclasses import Field, fields, replace
@@ -12,34 +12,33 @@ from davinci_forces.haptics import scenario as haptics
 from davinci_forces.robots import Robot, from_toml
 from davinci_forces.robots.models import VARIANTS
 from davinci_forces.study import HapticScenario, Settings, Study
-from davinci_forces.study.entries import checked, entries_of, inside, lines_of_files
+from davinci_forces.study.entries import check_positive, entries_of, is_inside, lines_of_files
 from davinci_forces.toml import TomlTable
 
 # Variants by the estimators that they can be chosen with: a coupled arm needs a ridge.
-BEYOND = tuple(
+VARIANT_FITS = tuple(
     f"{variant}.{how}" for variant in VARIANTS for how in ("lse", "ridge", "consistent")
     if how == "ridge" or variant.startswith("independent+") or (how == "consistent" and variant != "independent")
 )  # fmt: skip
-CHOICES = {"fit": ("chosen", *(f"independent.{estimator}" for estimator in ESTIMATORS), *BEYOND)}
+CHOICES = {"fit": ("chosen", *(f"independent.{estimator}" for estimator in ESTIMATORS), *VARIANT_FITS)}
 TRUTH = "truth.toml"  # the ground truth of a simulated study, where its folder has it
-OUTDATED = ("derivative",)  # settings without effect that earlier versions had
+OUTDATED_SETTINGS = ("derivative",)  # settings without effect that earlier versions had
 
 
 def read(folder: Path) -> Study:
-    """Read and validate `folder/study.toml`.  Whether the logs are there is asked by `Study.absent`.
+    """Read and validate `folder/study.toml`; `Study.absent` lists logs that do not exist.
 
     Raises
     ------
     BadStudy
-        With every problem that the file has, and those of the robot's file, one a line; and then with every log that
-        is not there.
+        With every problem of the file and of the robot's file, one a line, and then every log that does not exist.
     """
     missing = "there is no such file; `davinci-forces new` writes one from a log"
     return study_of(toml.read(folder / "study.toml", BadStudy, missing), folder)
 
 
 def study_of(table: TomlTable, folder: Path) -> Study:
-    """The study that the whole of a study.toml describes; raises as `read` does."""
+    """Build the study that a whole study.toml describes; raises as `read` does."""
     name = folder.resolve().name
     if name.partition(".")[0].lower() in from_toml.RESERVED:
         table.problem(f"the study's folder is called {name!r}, which is reserved on Windows; rename it")
@@ -60,20 +59,20 @@ def study_of(table: TomlTable, folder: Path) -> Study:
                 table.file.note(line, f"file {file!r} is not in {folder}")
     table.file.refuse(BadStudy)
     assert robot is not None
-    own = table.values["robot"] if table.values["robot"].endswith(robots.FILES) else ""
+    robot_file = table.values["robot"] if table.values["robot"].endswith(robots.FILES) else ""
     truth = toml.read(folder / TRUTH, BadStudy).values if simulated and (folder / TRUTH).exists() else {}
     changed = overrides.values | ({"tool": table.values["tool"]} if "tool" in table else {})
     return Study(
-        folder, title, robot, simulated, settings, logs, changed, truth, scenario, baseline, own, lines, remarks
+        folder, title, robot, simulated, settings, logs, changed, truth, scenario, baseline, robot_file, lines, remarks
     )
 
 
 def _baseline(table: TomlTable, folder: Path) -> str:
-    """The file of an earlier report's numbers, "" where none is named."""
+    """The results.json of an earlier report, or ""."""
     if "baseline" not in table:
         return ""
     name = table.text("baseline")
-    if not name or not inside(name):
+    if not name or not is_inside(name):
         table.problem(f"baseline {name!r} lies outside the study; copy that results.json beside study.toml", "baseline")
     elif not (folder / name).is_file():
         table.problem(f"file {name!r} is not in {folder}; copy a results.json there as {name}", "baseline")
@@ -81,17 +80,17 @@ def _baseline(table: TomlTable, folder: Path) -> str:
 
 
 def _robot(table: TomlTable, folder: Path) -> Robot | None:
-    """The robot, or None where it cannot be told which joints it has."""
+    """The robot, or None where its joints are unknown."""
     name = table.take(
         "robot", None, (str,), f"one of {', '.join(robots.ROBOTS)}, or a file, {' or '.join(robots.FILES)}"
     )
     if name is None:
         return None
-    if not inside(name):
+    if not is_inside(name):
         table.problem(f"robot {name!r} lies outside the study", "robot")
         return None
     try:
-        robot, file = robots.described(name, folder)
+        robot, file = robots.read_with_problems(name, folder)
     except BadRobot as error:
         table.problem(str(error), "robot")
         return None
@@ -102,16 +101,16 @@ def _robot(table: TomlTable, folder: Path) -> Robot | None:
 def _haptics(table: TomlTable, folder: Path) -> HapticScenario:
     """The scenario beside the study, its problems noted with the study's own."""
     name = table.take("haptics", None, (str,), "a .toml file beside the study, as `davinci-forces haptics` takes it")
-    if name is None or not inside(name):
+    if name is None or not is_inside(name):
         table.problem("haptics must name a file inside the study", "haptics")
         return HapticScenario()
     try:
-        described = toml.read(folder / name, BadStudy)
+        scenario_table = toml.read(folder / name, BadStudy)
     except BadStudy as error:
         table.problem(str(error), "haptics")
         return HapticScenario()
-    table.file.named.append(described.file)
-    return haptics.scenario_of(described)
+    table.file.named.append(scenario_table.file)
+    return haptics.scenario_of(scenario_table)
 
 
 def _overridden(robot: Robot, overrides: TomlTable) -> Robot:
@@ -125,9 +124,9 @@ def _overridden(robot: Robot, overrides: TomlTable) -> Robot:
 
 
 def _with_tool(robot: Robot | None, table: TomlTable) -> Robot | None:
-    """The robot with the tool that a study says it had."""
+    """The robot with the tool length that the study gives."""
     tool = table.table("tool")
-    length = checked(tool, "length", tool.number("length", words="a number of metres", kind="tool"))
+    length = check_positive(tool, "length", tool.number("length", words="a number of metres", kind="tool"))
     tool.close()
     try:
         return robot.with_tool(length) if robot and math.isfinite(length) else robot
@@ -139,9 +138,9 @@ def _with_tool(robot: Robot | None, table: TomlTable) -> Robot | None:
 def _remarks(settings: TomlTable) -> tuple[str, ...]:
     """One warning, with its line, for each outdated setting that the file gives."""
     return tuple(
-        f"{settings.file.name}:{settings.file.line((*settings.path, name))}: the setting {name!r} has no effect any "
-        "more; remove it"
-        for name in OUTDATED
+        f"{settings.file.name}:{settings.file.line((*settings.path, name))}: the setting {name!r} no longer has an "
+        "effect; remove it"
+        for name in OUTDATED_SETTINGS
         if name in settings.values
     )
 
@@ -149,18 +148,20 @@ def _remarks(settings: TomlTable) -> tuple[str, ...]:
 def _settings(table: TomlTable, robot: Robot | None) -> Settings:
     values = {field.name: _setting(table, field) for field in fields(Settings) if field.name != "effort"}
     efforts = table.table("effort")
-    table.close(OUTDATED)
-    return Settings(**values, effort=_sought(efforts, robot))
+    table.close(OUTDATED_SETTINGS)
+    return Settings(**values, effort=_wanted_effort(efforts, robot))
 
 
-def _sought(efforts: TomlTable, robot: Robot | None) -> dict[str, float]:
-    """The effort that the user wants to see on each joint."""
-    known = [joint.name for joint in robot.joints] if robot else list(efforts.values)
+def _wanted_effort(efforts: TomlTable, robot: Robot | None) -> dict[str, float]:
+    """The external effort to be detected on each joint."""
+    names = [joint.name for joint in robot.joints] if robot else list(efforts.values)
     for name in efforts.values:
-        if name not in known:
-            efforts.problem(f"{robot.name if robot else ''} has no joint {name!r}; it has {', '.join(known)}", name)
+        if name not in names:
+            efforts.problem(f"{robot.name if robot else ''} has no joint {name!r}; it has {', '.join(names)}", name)
     return {
-        name: checked(efforts, name, efforts.number(name, kind="effort")) for name in efforts.values if name in known
+        name: check_positive(efforts, name, efforts.number(name, kind="effort"))
+        for name in efforts.values
+        if name in names
     }
 
 
@@ -170,4 +171,4 @@ def _setting(table: TomlTable, field: Field[Any]) -> Any:
     if field.type is str:
         return table.text(name, default, CHOICES[name])
     value = table.whole(name, default, -math.inf) if field.type is int else table.number(name, default)
-    return checked(table, name, value)
+    return check_positive(table, name, value)

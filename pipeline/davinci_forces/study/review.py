@@ -1,4 +1,4 @@
-"""What reviewers said of a report: `raw/<study>/review.toml`, as the report's page exports it."""
+"""Reviewers' ratings of a report: `raw/<study>/review.toml`, as the report's page exports it."""
 
 import re
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ SUBJECTS = ("figure", "run")  # what is rated: a figure by its label, or a log b
 
 @dataclass(frozen=True)
 class Rating:
-    """What one reviewer said of a figure or a run, and the sha256 of the results.json that he saw."""
+    """One reviewer's rating of a figure or a run, and the SHA-256 of the results.json that he saw."""
 
     subject: str  # of SUBJECTS
     name: str
@@ -28,7 +28,7 @@ class Rating:
 
 
 def read(file: Path) -> tuple[Rating, ...]:
-    """Every rating of a file, in its order.
+    """Read the ratings of a file, in its order.
 
     Raises
     ------
@@ -45,7 +45,7 @@ def read(file: Path) -> tuple[Rating, ...]:
 def _rating(table: TomlTable) -> Rating:
     subjects = [subject for subject in SUBJECTS if subject in table]
     if len(subjects) != 1:
-        table.problem('say what is rated, by either figure = "<its label>" or run = "<its log>"')
+        table.problem('give what is rated, as either figure = "<its label>" or run = "<its log>"')
     subject = subjects[0] if subjects else SUBJECTS[0]
     rating = Rating(
         subject,

@@ -1,9 +1,9 @@
-"""What people write down: tables of a TOML file, read key by key, and everything wrong with them said at once.
+"""Read the TOML files that people write, key by key, and report all problems at once, each with file and line.
 
-Study, robot and scenario are read with it; every problem has its file and its line.
+Study, robot and scenario are read with it.
 """
 
 from davinci_forces.toml.ranges import unlikely
-from davinci_forces.toml.table import TomlTable, is_number, parse, read, shown
+from davinci_forces.toml.table import TomlTable, excerpt, is_number, parse, read
 
-__all__ = ["TomlTable", "is_number", "parse", "read", "shown", "unlikely"]
+__all__ = ["TomlTable", "excerpt", "is_number", "parse", "read", "unlikely"]

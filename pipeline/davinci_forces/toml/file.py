@@ -1,12 +1,12 @@
-"""What is wrong with a TOML file, and with the files that it names, each with its line."""
+"""The problems of a TOML file, and of the files that it names, each with its line."""
 
 from collections.abc import Mapping
 
 from davinci_forces.errors import PipelineError
 from davinci_forces.toml.lines import KeyPath
 
-MOST_PROBLEMS = 200  # of a file that are kept: who has mended so many reads it again
-LONGEST = 2_000  # characters of one
+MOST_PROBLEMS = 200  # of a file that are kept: after correcting so many, one reads it again
+MAX_PROBLEM_LENGTH = 2_000  # characters
 
 
 class TomlFile:
@@ -16,10 +16,10 @@ class TomlFile:
         self.name, self.lines = name, lines
         self.noted: set[tuple[int, str]] = set()
         self.left_out = 0  # problems beyond the most that are kept
-        self.named: list[TomlFile] = []  # whose problems are said together with its own
+        self.named: list[TomlFile] = []  # files whose problems are reported with its own
 
     def line(self, path: KeyPath) -> int:
-        """The line of a key; of what would hold it, where it is missing."""
+        """The line of a key, or of the table that lacks it."""
         while path and path not in self.lines:
             path = path[:-1]
         return self.lines.get(path, 1)
@@ -29,7 +29,7 @@ class TomlFile:
         if self.is_full:
             self.left_out += 1
         else:
-            self.noted.add((line, text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."))
+            self.noted.add((line, text if len(text) <= MAX_PROBLEM_LENGTH else f"{text[:MAX_PROBLEM_LENGTH]} ..."))
 
     @property
     def is_full(self) -> bool:
@@ -38,9 +38,9 @@ class TomlFile:
 
     def problems(self) -> list[str]:
         """Every problem, in the order of the file, with its file and line."""
-        own = [f"{self.name}:{line}: {text}" for line, text in sorted(self.noted)]
-        own += [f"{self.name}: {self.left_out} more problems; mend these first"] if self.left_out else []
-        return own + [problem for file in self.named for problem in file.problems()]
+        texts = [f"{self.name}:{line}: {text}" for line, text in sorted(self.noted)]
+        texts += [f"{self.name}: {self.left_out} more problems; correct these first"] if self.left_out else []
+        return texts + [problem for file in self.named for problem in file.problems()]
 
     def refuse(self, kind: type[PipelineError]) -> None:
         """Raise every problem, one a line, as an error of that kind; nothing where there is none."""

@@ -7,27 +7,27 @@ from functools import cache
 
 KeyPath = tuple[str | int, ...]  # keys from the top of the file, and numbers in lists from 0
 
-# One that is not closed ends with its line or the text, so that no scan of any text goes back over it.
+# An unclosed string ends with its line or the text, so that no scan goes back over it.
 QUOTED = r""""(?:[^"\\\n]++|\\.)*+"?|'[^'\n]*+'?"""
 LONG = r'''"""(?:[^"\\]++|\\.|"(?!""))*+"{0,5}|\'\'\'(?:[^']++|'(?!''))*+'{0,5}'''
 DATE = r"\d{4}-\d\d-\d\d \d[^][{}=,#\s]*"  # with a space before the time
 TOKEN = re.compile(rf"""({LONG}|{QUOTED}|{DATE}|[^][{{}}=,#\s"']+|[][{{}}=,])|#[^\n]*""", re.DOTALL)
 PART = re.compile(rf"""({QUOTED})|[^."']+""", re.DOTALL)
 
-# What a file may have of each.  The largest study, ten thousand logs with all their channels, has 650 000 words and
-# marks, two brackets around a key of two names, and no word of 1000 characters outside quotes.
+# Limits of a file.  The largest study, ten thousand logs with all their channels, has 650 000 words and marks, two
+# brackets around a key of two names, and no word of 1000 characters outside quotes.
 MOST_WORDS = 800_000
 MOST_LISTED = 10_000
-DEEPEST = 16
-LONGEST_WORD = 10_000
-NOTHING = (0, "")  # where no word or mark is left
+MAX_DEPTH = 16
+MAX_WORD_LENGTH = 10_000
+NOTHING = (0, "")  # after the last word or mark
 COST_OF_NAME = 4  # words: what tomllib keeps of a name that a dot follows takes as much memory
 
 
 def excess(text: str) -> str:
-    """What any text has too much of for tomllib, and its line; "" where it has not.  One scan, which ends there.
+    """Find in one scan which limit of tomllib a text exceeds, and in which line; "" where none.
 
-    tomllib takes the square of the names of a key in time, 500 bytes for a name, 100 for a digit.
+    tomllib takes time by the square of the names of a key, 500 bytes for a name, and 100 for a digit.
     """
     line, words, listed, deep, names, length = 1, 0, 0, 0, 0, 0
     around, before, is_value = list[int](), "", False  # names and brackets that each open bracket stands in
@@ -46,14 +46,14 @@ def excess(text: str) -> str:
             words, names = words + COST_OF_NAME * dots, names + 1 + dots
         length = len(word) if word[0] not in "\"'" else 0
         before, is_value = word, word == "="
-        if words > MOST_WORDS or listed > MOST_LISTED or deep + names > DEEPEST or length > LONGEST_WORD:
+        if words > MOST_WORDS or listed > MOST_LISTED or deep + names > MAX_DEPTH or length > MAX_WORD_LENGTH:
             break
-    found = (
+    counts = (
         (words, MOST_WORDS, "names, values and marks"), (listed, MOST_LISTED, "[[tables]]"),
-        (deep + names, DEEPEST, "names and brackets inside each other"),
-        (length, LONGEST_WORD, "characters in one name or number"),
+        (deep + names, MAX_DEPTH, "names and brackets inside each other"),
+        (length, MAX_WORD_LENGTH, "characters in one name or number"),
     )  # fmt: skip
-    return next((f"{line}: it has more than {most} {what}" for number, most, what in found if number > most), "")
+    return next((f"{line}: it has more than {most} {what}" for number, most, what in counts if number > most), "")
 
 
 def lines_of(text: str) -> dict[KeyPath, int]:
@@ -86,37 +86,37 @@ class _Scanner:
     def scan(self) -> dict[KeyPath, int]:
         table: KeyPath = ()
         while self.next is not NOTHING:
-            if self.skipped("["):
+            if self.skip_mark("["):
                 table = self.header()
             else:
                 self.pair(table)
         return self.lines
 
-    def skipped(self, mark: str) -> bool:
-        """Whether a mark is next, which is then taken."""
-        return self.next[1] == mark and bool(self.taken())
+    def skip_mark(self, mark: str) -> bool:
+        """Take a mark if it is next; whether it was."""
+        return self.next[1] == mark and bool(self.take())
 
-    def taken(self) -> tuple[int, str]:
-        """The next word or mark, which is left behind."""
-        taken, self.next = self.next, next(self.left, NOTHING)
-        return taken
+    def take(self) -> tuple[int, str]:
+        """Take the next word or mark."""
+        token, self.next = self.next, next(self.left, NOTHING)
+        return token
 
     def header(self) -> KeyPath:
         """[table] or [[list]], from its second character on."""
-        is_list = self.skipped("[")
+        is_list = self.skip_mark("[")
         line, parts = self.key("]")
         path: KeyPath = ()
         for part in parts:
-            path = (*self.inside(path), part)
+            path = (*self.latest(path), part)
             self.lines.setdefault(path, line)
         if is_list:
-            self.skipped("]")
+            self.skip_mark("]")
             self.last[path] = self.last.get(path, -1) + 1
-            path = self.inside(path)
+            path = self.latest(path)
         self.lines[path] = line
         return path
 
-    def inside(self, path: KeyPath) -> KeyPath:
+    def latest(self, path: KeyPath) -> KeyPath:
         return (*path, self.last[path]) if path in self.last else path
 
     def pair(self, path: KeyPath) -> None:
@@ -130,20 +130,20 @@ class _Scanner:
     def key(self, end: str) -> tuple[int, list[str]]:
         """The parts of a dotted key, and its line."""
         line, words = self.next[0], ""
-        while not self.skipped(end):
-            words += self.taken()[1]
+        while not self.skip_mark(end):
+            words += self.take()[1]
         return line, [_unquoted(part[0]) if part[1] else part[0] for part in PART.finditer(words)]
 
     def value(self, path: KeyPath) -> None:
         """One word; or a list, whose elements have lines of their own, or an inline table, whose pairs do."""
-        _, word = self.taken()
+        _, word = self.take()
         end = {"[": "]", "{": "}"}.get(word)
         number = 0
-        while end and not self.skipped(end):
+        while end and not self.skip_mark(end):
             if word == "{":
                 self.pair(path)
             else:
                 self.lines[*path, number] = self.next[0]
                 self.value((*path, number))
                 number += 1
-            self.skipped(",")
+            self.skip_mark(",")

@@ -1,9 +1,9 @@
-"""Between which sizes the numbers lie that people write down: wide enough for micro-robots and for excavators.
+"""Likely sizes of the numbers in TOML files: wide enough for micro-robots and for excavators.
 
-Beyond them a slip of the pen or of the unit is the likelier reason, and what is computed of them overflows.
+Beyond them, a typing error or a wrong unit is more likely, and results computed from them overflow.
 """
 
-# Sizes other than 0, least and greatest, and the unit, by kind.  What may be rounded off to almost 0 is a trace.
+# Smallest and largest size other than 0, and the unit, by kind.  A trace may be rounding next to 0.
 KINDS = {
     "number": (1e-30, 1e30, ""), "trace": (1e-100, 1e30, ""), "count": (1, 1e6, ""), "seed": (1, 1e40, ""),
     "harmonics": (0, 100, ""), "period": (1e-6, 1e6, "s"), "until": (1e-3, 1e6, "s"), "time": (1e-9, 1e6, "s"),
@@ -31,7 +31,7 @@ KIND_OF = {key: kind for kind, keys in KEYS.items() for key in keys.split()}
 
 
 def unlikely(key: str, value: float, kind: str = "") -> str:
-    """What is wrong with the size of a number, "" where nothing is; `kind` says of what, where its key does not."""
+    """The problem of the size of a number, "" if it is likely; `kind` names its quantity where the key does not."""
     least, most, unit = KINDS[kind or KIND_OF.get(key, key if key in KINDS else "number")]
     if not value or least <= abs(value) <= most:
         return ""

@@ -1,4 +1,4 @@
-"""A table of a TOML file, read key by key; what is wrong is noted with its place and line, not raised one by one."""
+"""A table of a TOML file, read key by key; problems are noted with place and line, not raised one by one."""
 
 import math
 import sys
@@ -15,7 +15,7 @@ from davinci_forces.toml.file import TomlFile
 from davinci_forces.toml.lines import KeyPath, excess, lines_of
 from davinci_forces.toml.ranges import unlikely
 
-LONGEST_NAME = 100  # characters of an unknown key that are compared with those of the known
+MAX_NAME_LENGTH = 100  # characters of an unknown key that are compared with known keys
 
 
 def is_number(value: Any) -> bool:
@@ -28,8 +28,8 @@ def are_numbers(value: Any, count: int | None = None) -> bool:
     return isinstance(value, list) and all(map(is_number, value)) and count in (None, len(value))
 
 
-def shown(value: Any) -> str:
-    """A value as a problem shows it, cut where it is long."""
+def excerpt(value: Any) -> str:
+    """A value as text for a message, cut where it is long."""
     try:
         text = repr(value)
     except ValueError:  # more digits than Python writes
@@ -40,21 +40,21 @@ def shown(value: Any) -> str:
 class TomlTable:
     """One table.  The keys that were asked for are the known ones; `close` reports the others.
 
-    What is missing or wrong is noted, and the reading goes on with the default, or with NaN, "", () or an empty table.
+    A missing or wrong value is noted, and replaced by the default, or by NaN, "", () or an empty table.
     """
 
     def __init__(self, values: Any, file: TomlFile, path: KeyPath = (), place: str = "") -> None:
         self.file, self.path, self.place, self.asked = file, path, place, dict[str, None]()
         self.values: dict[str, Any] = values if isinstance(values, dict) else {}
         if not isinstance(values, dict):
-            self.problem(f"must be a table, not {shown(values)}")
+            self.problem(f"must be a table, not {excerpt(values)}")
 
     def __contains__(self, key: str) -> bool:
         self.asked[key] = None
         return key in self.values
 
     def problem(self, text: str, *keys: str | int) -> None:
-        """Note something wrong with this table, or with what is at these keys below it."""
+        """Note a problem of this table, or of the value at these keys below it."""
         self.file.note(self.file.line((*self.path, *keys)), f"{self.place}: {text}" if self.place else text)
 
     def number(
@@ -78,17 +78,17 @@ class TomlTable:
         return float(value) if self.likely(key, (value,), kind) else math.nan
 
     def likely(self, key: str, values: Iterable[float], kind: str = "") -> bool:
-        """Whether numbers that the table gives have likely sizes; the first that has not is noted."""
-        wrong = next(((said, x) for x in values if key in self.values and (said := unlikely(key, x, kind))), None)
+        """Whether numbers that the table gives have likely sizes; the first unlikely one is noted."""
+        wrong = next(((text, x) for x in values if key in self.values and (text := unlikely(key, x, kind))), None)
         if wrong:
-            self.problem(f"{wrong[0]}, not {shown(wrong[1])}", key)
+            self.problem(f"{wrong[0]}, not {excerpt(wrong[1])}", key)
         return not wrong
 
     def whole(self, key: str, default: int | None = None, low: float = 0) -> int:
         """A whole number, at least `low`."""
         value = self.take(key, default, (int,), "a whole number")
         if value is not None and value < low:
-            self.problem(f"{key} must be at least {low}, not {shown(value)}", key)
+            self.problem(f"{key} must be at least {low}, not {excerpt(value)}", key)
         return 0 if value is None or not self.likely(key, (value,)) else int(value)
 
     def text(self, key: str, default: str | None = None, choices: Collection[str] = ()) -> str:
@@ -115,7 +115,7 @@ class TomlTable:
         """A list of pairs of finite numbers, of at least so many."""
         value = self.take(key, default, (list,), words, lambda value: all(are_numbers(pair, 2) for pair in value))
         if value is not None and len(value) < least:
-            self.problem(f"{key} must be {words}, not {shown(value)}", key)
+            self.problem(f"{key} must be {words}, not {excerpt(value)}", key)
         pairs = tuple((float(a), float(b)) for a, b in value or ())
         return pairs if self.likely(key, chain.from_iterable(pairs)) else ()
 
@@ -135,21 +135,21 @@ class TomlTable:
         return [(key, self.table(key)) for key in self.values]
 
     def tables(self, key: str, none: str = "", most: int = 1000) -> list["TomlTable"]:
-        """The tables of a list, such as [[log]]; that there are none is a problem where `none` says which.
+        """The tables of a list, such as [[log]]; if there are none, `none` is the problem to note, or "".
 
-        Of more than `most`, which is a problem, too, those beyond are left out.
+        More than `most` are a problem, too, and those beyond are left out.
         """
         words = f"a list of tables: write [[{key}]]"
         entries = self.take(key, [], (list,), words, lambda value: all(isinstance(entry, dict) for entry in value))
         if none and self.values.get(key, []) == []:
             self.problem(none, key)
         if len(entries) > most:
-            self.problem(f"it has {len(entries)} [[{key}]], and may have {most}; make several files of it", key, most)
+            self.problem(f"it has {len(entries)} [[{key}]], more than the {most} allowed; split the file", key, most)
         place, entries = self._within(key), entries[:most]
         return [TomlTable(e, self.file, (*self.path, key, i), f"{place} {i + 1}") for i, e in enumerate(entries)]
 
     def unique(self, key: str, name: str, values: Iterable[tuple[int, str]], says: str) -> None:
-        """Note which tables of a list call themselves by a `name` that an earlier one has; `values` are by number."""
+        """Note the tables of a list whose `name` an earlier one has; `values` are by number."""
         taken = set[str]()
         for number, value in values:
             if value in taken:
@@ -173,26 +173,26 @@ class TomlTable:
         fits = type(value) is not int or float not in kinds or is_number(value)
         if type(value) in kinds and fits and good(value):
             return value
-        self.problem(f"{key} must be {words}, not {shown(value)}", key)
+        self.problem(f"{key} must be {words}, not {excerpt(value)}", key)
         return default
 
     def close(self, outdated: Collection[str] = ()) -> None:
-        """Report the keys that nothing asked for, outdated ones apart, and what they may have been meant to be."""
+        """Report the keys that nothing asked for, except outdated ones, with the likely spelling."""
         for key in (key for key in self.values if key not in self.asked and key not in outdated):
-            near_ones = [] if self.file.is_full else get_close_matches(key[:LONGEST_NAME], self.asked, 1, 0.5)
+            near_ones = [] if self.file.is_full else get_close_matches(key[:MAX_NAME_LENGTH], self.asked, 1, 0.5)
             meant = "".join(f"; did you mean {near!r}?" for near in near_ones)
-            self.problem(f"unknown key {key!r}; known are {', '.join(self.asked) or 'none'}{meant}", key)
+            self.problem(f"unknown key {key!r}; known keys are {', '.join(self.asked) or 'none'}{meant}", key)
 
     def _within(self, key: str) -> str:
         return f"{self.place}.{key}" if self.place else key
 
 
-LARGEST = 4_000_000  # bytes: ten thousand logs with all their channels; what is larger was written by mistake
-BEYOND = f"and what people write down has at most {LARGEST / 1e6:.0f}: is it a log? Of a study this large, make several"
+MAX_BYTES = 4_000_000  # bytes: ten thousand logs with all their channels; a larger file is a mistake
+TOO_LARGE = f"more than the {MAX_BYTES / 1e6:.0f} MB that are read. Is it a log? Split a study this large into several"
 
 
 def read(file: Path, kind: type[PipelineError], missing: str = "there is no such file") -> TomlTable:
-    """The whole of a file.  What it says is checked by who asks the table for it.
+    """Read the whole of a file; its values are checked when they are taken from the table.
 
     Raises
     ------
@@ -200,7 +200,7 @@ def read(file: Path, kind: type[PipelineError], missing: str = "there is no such
         Of that kind, if the file cannot be read or is not TOML.
     """
     try:
-        text = text_of(read_bytes(file, LARGEST, BEYOND), "utf-8-sig")
+        text = text_of(read_bytes(file, MAX_BYTES, TOO_LARGE), "utf-8-sig")
     except FileNotFoundError:
         raise kind(f"{file}: {missing}") from None
     except OSError as error:
@@ -211,9 +211,9 @@ def read(file: Path, kind: type[PipelineError], missing: str = "there is no such
 
 
 def parse(text: str, name: str, kind: type[PipelineError]) -> TomlTable:
-    """The whole of a text of TOML, called `name` in problems; raises as `read` does."""
+    """Parse a text of TOML, called `name` in problems; raises as `read` does."""
     if wrong := excess(text):
-        raise kind(f"{name}:{wrong}: of a study this large, make several; of numbers this many, a log")
+        raise kind(f"{name}:{wrong}; split a study this large into several, and put long lists of numbers into a log")
     try:
         values, lines = tomllib.loads(text), lines_of(text)
     except (ValueError, RecursionError) as error:  # of TOML, and of numbers and nesting beyond Python's limits

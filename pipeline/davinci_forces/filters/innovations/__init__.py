@@ -1,1 +1,1 @@
-"""Why innovations are not white: each cause is taken away by itself, and the filter run again without it."""
+"""Explain why innovations are not white: remove each possible cause, and run the filter again without it."""

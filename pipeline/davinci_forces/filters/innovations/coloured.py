@@ -1,9 +1,9 @@
-"""The default filter with measurement noise that has a memory: two more states.
+"""The default filter with coloured measurement noise: two more states.
 
     x = [q, dq, tau_ext, v_q, v_dq],    y = [q + v_q, dq + v_dq],    v[k+1] = phi v[k] + (1 - phi^2)^0.5 r e[k]
 
-Without memory, phi = 0, its innovations are those of `ekf`.  It serves to tell whether coloured noise is why these are
-not white; for tracking, the noise that is white has fewer states and says the same of what is slow.
+With phi = 0 its innovations are those of `ekf`.  It tests whether coloured noise is why these are not white.  For
+tracking, white noise needs fewer states and gives the same slow external effort.
 """
 
 from typing import NamedTuple
@@ -12,37 +12,37 @@ import numpy as np
 
 from davinci_forces.filters import ekf, kalman
 from davinci_forces.filters.problem import Driven, NoiseModel
+from davinci_forces.filters.tuning import MAX_LOG_CHANGE
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals.windows import SETTLE
 
-MOST = 2000  # samples that the likelihood is of
+MAX_SAMPLES_COLOURED = 2000  # of the likelihood
 TRIALS = 60  # of the likelihood, a parameter
-FARTHEST = np.log(1e3)  # that a deviation may be taken from where it starts
-SLOWEST = 4.0  # atanh of the largest phi, .9993
+MAX_ATANH_PHI = 4.0  # phi = .9993
 UNCOLOURED = (0.0, 0.0)
 
 
 class Noise(NamedTuple):
-    """What is assumed of a joint: deviations, and the correlation of the measurement noise from sample to sample."""
+    """The noise of a joint, and the correlation of its measurement noise from sample to sample."""
 
     white: NoiseModel
     phi: tuple[float, float]  # of position and velocity
 
 
 def innovations(recording: Driven, noise: Noise) -> tuple[Array, Array]:
-    """Of position and velocity (N,)."""
-    _, _, _, _, i_q, i_dq, _ = kalman.filtered(recording, states(recording, noise))
+    """Compute the innovations of position and velocity (N,)."""
+    _, _, _, _, i_q, i_dq, _ = kalman.run_filter(recording, states(recording, noise))
     return i_q, i_dq
 
 
 def log_likelihood(recording: Driven, noise: Noise) -> float:
-    """Of the measurements, as that of `ekf`."""
+    """Compute the log-likelihood of the measurements, as that of `ekf`."""
     settle = min(round(SETTLE / recording.T_s), len(recording.q) // 2)
     return kalman.log_likelihood(recording, states(recording, noise), settle)
 
 
 def states(recording: Driven, noise: Noise) -> kalman.States:
-    """Those of `ekf` and the noise of each measurement, which is measured with it and forgotten by phi."""
+    """Return the states of `ekf` and the noise of each measurement, which decays by phi."""
     model = kalman.states(recording, noise.white, 5)
     for i, (r, phi) in enumerate(zip(noise.white[:2], noise.phi, strict=True)):
         v = (3 + i, 3 + i)
@@ -50,31 +50,32 @@ def states(recording: Driven, noise: Noise) -> kalman.States:
     return model._replace(R=np.zeros(2), in_q=(0, 3), in_dq=(1, 4))
 
 
-def likeliest(recording: Driven, start: NoiseModel, walks: bool, coloured: bool) -> Noise:
-    """The noise of the greatest likelihood of one recording: the deviations of q, dq and of the drive, that of the
-    walk where it `walks` freely, and phi where it is `coloured`.
+def fit_noise(recording: Driven, start: NoiseModel, walks: bool, coloured: bool) -> Noise:
+    """Fit the noise of one recording by maximum likelihood: the standard deviations of q, dq and the drive.
+
+    That of the random walk is fitted if it `walks` freely, and phi if it is `coloured`.
     """
     from scipy.optimize import minimize
 
-    some = recording.part(slice(MOST))
+    part = recording.part(slice(MAX_SAMPLES_COLOURED))
     names = ("r_q", "r_dq", "q_dq", "q_tau")[: 4 if walks else 3]
-    known = np.log([getattr(start, name) for name in names])
+    center = np.log([getattr(start, name) for name in names])
 
     def noise_at(x: Array) -> Noise:
-        sizes = dict(zip(names, np.exp(known + x[: len(names)]).tolist(), strict=True))
+        sizes = dict(zip(names, np.exp(center + x[: len(names)]).tolist(), strict=True))
         return Noise(start._replace(**sizes), tuple(np.tanh(x[len(names) :]).tolist()) if coloured else UNCOLOURED)
 
-    def unlikely(x: Array) -> float:
-        if np.abs(x[: len(names)]).max() > FARTHEST or (coloured and np.abs(x[len(names) :]).max() > SLOWEST):
+    def cost(x: Array) -> float:
+        if np.abs(x[: len(names)]).max() > MAX_LOG_CHANGE or np.abs(x[len(names) :]).max(initial=0.0) > MAX_ATANH_PHI:
             return np.inf
         noise = noise_at(x)
-        return -(log_likelihood(some, noise) if coloured else ekf.log_likelihood(some, noise.white))
+        return -(log_likelihood(part, noise) if coloured else ekf.log_likelihood(part, noise.white))
 
-    # Starting points at a distance: the likelihood of one alone may be flat.
+    # The first simplex is wide, because the likelihood may be flat near its start.
     size = len(names) + 2 * coloured
     simplex = np.vstack([np.zeros(size), np.diag([0.5] * len(names) + [1.0] * 2 * coloured)])
-    found = minimize(
-        unlikely, np.zeros(size), method="Nelder-Mead",
+    best = minimize(
+        cost, np.zeros(size), method="Nelder-Mead",
         options={"initial_simplex": simplex, "maxfev": TRIALS * size, "xatol": 1e-2, "fatol": 0.1},
     )  # fmt: skip
-    return noise_at(found.x)
+    return noise_at(best.x)

@@ -1,9 +1,9 @@
-"""Why a filter's innovations are not white, told by taking one cause after the other away.
+"""Search for the causes of innovations that are not white, by removing one after the other.
 
-A cause is named only where the innovations pass every test without it.  As few causes as possible are taken away at
-once, and where several would do, each is named.  Two things could make a test pass that is no cause: chance, so the
-smallest probability has to grow by `CLEARLY`; and that fewer samples are left to tell by, so as many samples at other
-times, with what was left out among them, must still fail.
+A cause is named only if the innovations pass every test without it.  As few causes as possible are removed at once; if
+several removals suffice, each is named.  A test may also pass by chance, so the smallest probability has to grow by
+`MIN_GROWTH`.  It may pass because it has fewer samples, so as many samples at other times must still fail, with the
+removed ones among them.
 """
 
 from collections.abc import Iterator
@@ -14,71 +14,71 @@ from davinci_forces.filters.innovations.trials import (
     CLOCK,
     COLOUR,
     CONTACT,
+    FINER_STEPS,
     LEVEL,
     REVERSALS,
     SIZES,
     STEP,
-    STEPS,
     WALK,
     Passes,
     Subject,
     Trial,
 )
 
-CLEARLY = 100.0  # times, that the smallest probability has to grow by where a cause is taken away
-MOST = 50_000  # samples that the causes are looked for in
-FEWEST = 200  # samples, fewer than which are left of a run tell nothing
-NEAR = 0.95  # of the most that is explained
-TOGETHER = 3  # causes that are taken away at once, at most
+MIN_GROWTH = 100.0  # of the smallest probability where a cause is removed
+MAX_SAMPLES_SEARCH = 50_000
+MIN_SAMPLES_TRIAL = 200  # of a run whose tests count
+NEARLY_BEST = 0.95  # of the largest share of the correlation that a trial explains
+MAX_CAUSES = 3  # removed at once
 WHITE, LEFT_OUT, MENDED, UNEXPLAINED = "white", "left out", "mended", "unexplained"
-LEAVING = (CONTACT, REVERSALS)
-SAID = {
+OMITTED = (CONTACT, REVERSALS)
+CAUSES = {
     SIZES: "noise of another size than assumed",
     COLOUR: "coloured measurement noise",
-    CLOCK: "uneven times of the samples, as the other joints tell them",
-    STEP: "what the filter's step leaves out",
+    CLOCK: "uneven sampling times, as the other joints show",
+    STEP: "the error of the filter's integration step",
 }
-NOTHING = "not white: no tested cause explains it"
-BY_LITTLE = "not white, but by little, as one of many runs is by chance"
-MOST_OF_IT = 0.5  # of the correlation, below which a cause is not worth its name
+NO_CAUSE = "not white: no tested cause explains it"
+BY_CHANCE = "not white, but only slightly, as happens by chance in one of many runs"
+MIN_SHARE_NAMED = 0.5  # of the correlation that a cause has to explain to be named
 
 
 class CauseSearch(NamedTuple):
-    """Every trial, the first of them with nothing taken away, and those that explain."""
+    """All trials, the first of which removes no cause, and those that explain the correlation."""
 
     trials: list[Trial]
     explaining: list[Trial]
 
     def share(self, trial: Trial) -> float:
-        """How much of the correlation is gone in a trial."""
-        whole = self.trials[0].excess
-        return 1.0 - trial.excess / whole if whole > 0.0 else 0.0
+        """Return the share of the correlation that a trial removes."""
+        excess = self.trials[0].excess
+        return 1.0 - trial.excess / excess if excess > 0.0 else 0.0
 
     def nearest(self) -> Trial:
-        """Of those that come near to explaining the most, the one that takes least away."""
-        told = [trial for trial in self.trials if trial.tested >= FEWEST] or self.trials[:1]
-        most = max(map(self.share, told))
-        return next(trial for trial in told if self.share(trial) >= NEAR * most)
+        """Return the trial of fewest causes among those that explain nearly the largest share."""
+        trials = [trial for trial in self.trials if trial.tested >= MIN_SAMPLES_TRIAL] or self.trials[:1]
+        largest = max(map(self.share, trials))
+        return next(trial for trial in trials if self.share(trial) >= NEARLY_BEST * largest)
 
 
 def search(subject: Subject) -> CauseSearch:
-    """The fewest causes without which the innovations are white."""
+    """Find the fewest causes without which the innovations are white."""
     first = next(iter(subject.models.values()))
-    if len(first.q) > MOST:
-        subject = beginning(subject)
+    if len(first.q) > MAX_SAMPLES_SEARCH:
+        subject = shorten(subject)
     passes = Passes(subject)
     trials = [passes.trial(())]
-    there = list(causes(subject))
-    for size in range(1, TOGETHER + 1):
-        if trials[0].white or trials[0].tested < FEWEST:
+    possible_causes = list(causes(subject))
+    for size in range(1, MAX_CAUSES + 1):
+        if trials[0].white or trials[0].tested < MIN_SAMPLES_TRIAL:
             break
         explaining: list[Trial] = []
-        for without in combinations(there, size):
-            if not possible(without, subject, explaining):
+        for without in combinations(possible_causes, size):
+            if not may_combine(without, subject, explaining):
                 continue
             trial = passes.trial(without)
             trials.append(trial)
-            enough = trial.tested >= FEWEST and trial.least > CLEARLY * trials[0].least
+            enough = trial.tested >= MIN_SAMPLES_TRIAL and trial.lowest > MIN_GROWTH * trials[0].lowest
             if trial.white and enough and passes.fails_elsewhere(without):
                 explaining.append(trial)
         if explaining:
@@ -87,23 +87,25 @@ def search(subject: Subject) -> CauseSearch:
 
 
 def causes(subject: Subject) -> Iterator[str]:
-    """What can be taken away of a run."""
+    """List the causes that can be removed from a run."""
     if not subject.free.all():
         yield CONTACT
     if not subject.moving.all():
         yield REVERSALS
-    if subject.filter in STEPS:
+    if subject.filter in FINER_STEPS:
         yield STEP
     yield from (WALK, SIZES)
     yield from list(subject.models)[1:]
     yield COLOUR
 
 
-def possible(without: tuple[str, ...], subject: Subject, explaining: list[Trial]) -> bool:
-    """Whether these go together: one model at a time; sizes are part of colour and of the clock, which are not tried
-    where sizes alone will do; no colour for another model; and of three, two are samples that are left out.
+def may_combine(without: tuple[str, ...], subject: Subject, explaining: list[Trial]) -> bool:
+    """Whether these causes may be removed together.
+
+    They hold one model at a time, and no colour for another model.  Sizes are part of colour and of the clock, which
+    are not tried where sizes suffice.  Of three causes, two omit samples.
     """
-    if len(without) == TOGETHER and not {CONTACT, REVERSALS} <= {*without}:
+    if len(without) == MAX_CAUSES and not {CONTACT, REVERSALS} <= {*without}:
         return False
     others = {*list(subject.models)[1:]} & {*without}
     if len(others) > 1 or len({SIZES, COLOUR} & {*without}) > 1 or {SIZES, CLOCK} <= {*without}:
@@ -114,52 +116,52 @@ def possible(without: tuple[str, ...], subject: Subject, explaining: list[Trial]
     return others <= {CLOCK} and all(simpler != {*trial.without} for trial in explaining)
 
 
-def beginning(subject: Subject) -> Subject:
-    """Its first samples."""
-    few = slice(MOST)
-    models = {name: driven.part(few) for name, driven in subject.models.items()}
-    return subject._replace(models=models, free=subject.free[few], moving=subject.moving[few])
+def shorten(subject: Subject) -> Subject:
+    """Return the first samples of a run."""
+    first = slice(MAX_SAMPLES_SEARCH)
+    models = {name: recording.part(first) for name, recording in subject.models.items()}
+    return subject._replace(models=models, free=subject.free[first], moving=subject.moving[first])
 
 
 def finding(search: CauseSearch) -> str:
-    """White, white where something is left out, explained by something that can be mended, or unexplained."""
+    """Classify the result: white, white where samples are left out, explained by a cause, or unexplained."""
     if search.trials[0].white:
         return WHITE
     if not search.explaining:
         return UNEXPLAINED
-    return LEFT_OUT if any({*trial.without} <= {*LEAVING} for trial in search.explaining) else MENDED
+    return LEFT_OUT if any({*trial.without} <= {*OMITTED} for trial in search.explaining) else MENDED
 
 
 def verdict(search: CauseSearch) -> str:
-    """The same in words; where several would explain it, all of them."""
+    """Return the result in words, with all explanations."""
     if search.trials[0].white:
         return "white"
-    return "; or ".join(explained(trial) for trial in search.explaining) or unexplained(search)
+    return "; or ".join(map(describe_trial, search.explaining)) or describe_unexplained(search)
 
 
-def explained(trial: Trial) -> str:
-    """What one trial shows: 'white outside contact', 'white but for coloured measurement noise'."""
-    left = [name for name in LEAVING if name in trial.without]
-    where = f" outside {' and '.join(left)}" if left else ""
-    mended = [cause(name, trial.walk) for name in trial.without if name not in LEAVING]
-    return f"white{where}" + (f" but for {' and '.join(mended)}" if mended else "")
+def describe_trial(trial: Trial) -> str:
+    """Describe an explaining trial: 'white outside contact', 'white except for coloured measurement noise'."""
+    omitted = [name for name in OMITTED if name in trial.without]
+    where = f" outside {' and '.join(omitted)}" if omitted else ""
+    corrected = [cause(name, trial.walk) for name in trial.without if name not in OMITTED]
+    return f"white{where}" + (f" except for {' and '.join(corrected)}" if corrected else "")
 
 
-def unexplained(search: CauseSearch) -> str:
-    """That nothing explains it, and what explains most of it."""
-    if search.trials[0].least > LEVEL / CLEARLY:
-        return BY_LITTLE
+def describe_unexplained(search: CauseSearch) -> str:
+    """Describe a search without explanation, by the causes of most of the correlation."""
+    if search.trials[0].lowest > LEVEL / MIN_GROWTH:
+        return BY_CHANCE
     nearest = search.nearest()
     share = search.share(nearest)
-    if share < MOST_OF_IT:
-        return NOTHING
-    names = " and ".join(name if name in LEAVING else cause(name, nearest.walk) for name in nearest.without)
-    said = f"{min(100 * share, 99):.0f} % of the correlation is explained by {names}, the rest by nothing tested"
-    return f"not white: {said}"
+    if share < MIN_SHARE_NAMED:
+        return NO_CAUSE
+    names = " and ".join(name if name in OMITTED else cause(name, nearest.walk) for name in nearest.without)
+    percent = f"{min(100 * share, 99):.0f} %"
+    return f"not white: {percent} of the correlation is explained by {names}, the remainder by no tested cause"
 
 
 def cause(name: str, walk: float) -> str:
-    """One cause that was mended."""
+    """Describe a cause that was corrected."""
     if name == WALK:
-        return f"a walk {'faster' if walk < 1.0 else 'slower'} than the data ask"
-    return SAID.get(name) or f"the model ({name} would do)"
+        return f"a random walk {'faster' if walk < 1.0 else 'slower'} than the data show"
+    return CAUSES.get(name) or f"the model ({name} explains it)"

@@ -1,4 +1,4 @@
-"""What a filter's innovations look like with some causes of colour taken away: left out of the run, or mended."""
+"""Test a filter's innovations with some causes of correlation removed: samples omitted, or errors corrected."""
 
 from collections.abc import Mapping
 from typing import NamedTuple
@@ -13,59 +13,59 @@ from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals.whiteness import tests
 from davinci_forces.maths.signals.windows import SETTLE, runs, settled
 
-LEVEL = 0.01  # below this probability a test rejects white noise
+LEVEL = 0.01  # probability below which a test rejects white noise
 LAGS = 20  # of the Ljung-Box statistic
 ELSEWHERE = 8  # other times at which as many samples are tested
 
-CONTACT, REVERSALS = "contact", "reversals"  # left out
-STEP, WALK, SIZES, CLOCK, COLOUR = "step", "walk", "sizes", "clock", "colour"  # mended; so is each other model
-STEPS = {"ekf_euler": DEFAULT}  # a filter, and the one that leaves less out of a step
+CONTACT, REVERSALS = "contact", "reversals"  # their samples are omitted
+STEP, WALK, SIZES, CLOCK, COLOUR = "step", "walk", "sizes", "clock", "colour"  # corrected; so is each other model
+FINER_STEPS = {"ekf_euler": DEFAULT}  # a filter, and the one of smaller step errors
 
 
 class Subject(NamedTuple):
-    """A joint's run without a gap, as the filter takes it under each model, the one in use first; (N,) samples.
+    """A joint's run without a gap under each model, the one in use first; (N,) samples.
 
-    With the times of its samples mended it counts as another model, `CLOCK`.
+    With its sampling times corrected it counts as another model, `CLOCK`.
     """
 
     models: Mapping[str, Driven]
     noise: NoiseModel
     free: Booleans  # whether nothing touches the robot
-    moving: Booleans  # whether it is far from any reversal
+    moving: Booleans  # whether the joint is far from any reversal
     filter: str = DEFAULT
 
 
 class Trial(NamedTuple):
-    """The tests of the innovations with some causes taken away."""
+    """The tests of the innovations with some causes removed."""
 
     without: tuple[str, ...]
     tested: int
     ljung_box: tuple[float, float]  # probabilities, of q and dq
     periodogram: tuple[float, float]
     excess: float  # the sum of squared autocorrelations beyond that of white noise, of q and dq together
-    walk: float  # over the one in use
+    walk: float  # `q_tau` over the one in use
 
     @property
-    def least(self) -> float:
-        """The smallest probability."""
+    def lowest(self) -> float:
+        """Return the smallest probability."""
         return min(*self.ljung_box, *self.periodogram)
 
     @property
     def white(self) -> bool:
         """Whether every test passes."""
-        return self.least > LEVEL
+        return self.lowest > LEVEL
 
 
 class Passes:
-    """The passes of filters over a subject; what was found likeliest is kept for other trials."""
+    """The filter passes over a run; fitted noise is kept for further trials."""
 
     def __init__(self, subject: Subject) -> None:
         self.subject = subject
         self._noises: dict[tuple[str, ...], coloured.Noise] = {}
 
     def trial(self, without: tuple[str, ...]) -> Trial:
-        """The tests without these causes."""
-        pieces_q, pieces_dq = self.pieces(without, self.free(without), self.moving(without))
+        """Test the innovations without these causes."""
+        pieces_q, pieces_dq = self.pieces(without, self.filtered_samples(without), self.tested_samples(without))
         (box_q, wave_q), (box_dq, wave_dq) = tests(pieces_q, LAGS), tests(pieces_dq, LAGS)
         tested = sum(map(len, pieces_q))
         excess = max(box_q.statistic + box_dq.statistic - 2.0 * LAGS, 0.0) / max(tested, 1)
@@ -74,8 +74,8 @@ class Passes:
         return Trial(without, tested, probabilities, (wave_q, wave_dq), excess, walk)
 
     def fails_elsewhere(self, without: tuple[str, ...]) -> bool:
-        """Whether as many samples at most other times fail, where samples were left out."""
-        free, moving = self.free(without), self.moving(without)
+        """Whether as many samples at most other times fail, where samples are omitted."""
+        free, moving = self.filtered_samples(without), self.tested_samples(without)
         if free.all() and moving.all():
             return True
         failed = 0
@@ -85,24 +85,24 @@ class Passes:
             failed += any(min(box.probability, wave) <= LEVEL for box, wave in (tests(x, LAGS) for x in pieces))
         return failed > ELSEWHERE // 2
 
-    def free(self, without: tuple[str, ...]) -> Booleans:
-        """The samples that the filter goes through."""
+    def filtered_samples(self, without: tuple[str, ...]) -> Booleans:
+        """Return the samples (N,) that the filter runs over."""
         return self.subject.free if CONTACT in without else np.ones_like(self.subject.free)
 
-    def moving(self, without: tuple[str, ...]) -> Booleans:
-        """The samples of these that are tested."""
+    def tested_samples(self, without: tuple[str, ...]) -> Booleans:
+        """Return the samples (N,) whose innovations are tested."""
         return self.subject.moving if REVERSALS in without else np.ones_like(self.subject.moving)
 
-    def driven(self, without: tuple[str, ...]) -> Driven:
-        """The run under the model that is not a cause."""
+    def run_under_model(self, without: tuple[str, ...]) -> Driven:
+        """Return the run under the model that replaces a removed one, or that in use."""
         names = list(self.subject.models)
         return self.subject.models[next((name for name in names[1:] if name in without), names[0])]
 
     def pieces(self, without: tuple[str, ...], free: Booleans, moving: Booleans) -> tuple[list[Array], list[Array]]:
-        """The innovations of position and velocity, settled, run by run."""
+        """Return the settled innovations of position and velocity, run by run."""
         pieces_q, pieces_dq = [], []
         for run in self.runs(free):
-            part = self.driven(without).part(run)
+            part = self.run_under_model(without).part(run)
             i_q, i_dq = self.innovations(without, part)
             for piece in runs(settled(np.asarray(np.arange(len(i_q)) * part.T_s, np.float64)) & moving[run]):
                 if piece.stop - piece.start > LAGS:
@@ -111,35 +111,35 @@ class Passes:
         return pieces_q, pieces_dq
 
     def runs(self, free: Booleans) -> list[slice]:
-        """Runs that are long enough for the filter to settle in."""
+        """Return the runs that are long enough for the filter to settle, or else the longest."""
         T_s = next(iter(self.subject.models.values())).T_s
-        found = [run for run in runs(free) if (run.stop - run.start) * T_s > 6.0 * SETTLE]
-        return found or [max(runs(free), key=lambda run: run.stop - run.start, default=slice(0, 0))]
+        long = [run for run in runs(free) if (run.stop - run.start) * T_s > 6.0 * SETTLE]
+        return long or [max(runs(free), key=lambda run: run.stop - run.start, default=slice(0, 0))]
 
     def innovations(self, without: tuple[str, ...], part: Driven) -> tuple[Array, Array]:
-        """Of one run."""
+        """Compute the innovations of one run."""
         noise = self.noise(without)
         if COLOUR in without:
             return coloured.innovations(part, noise)
-        name = STEPS[self.subject.filter] if STEP in without else self.subject.filter
-        made = tracker(name)(part, noise.white)
-        return made.innovation_q, made.innovation_dq
+        name = FINER_STEPS[self.subject.filter] if STEP in without else self.subject.filter
+        tracked = tracker(name)(part, noise.white)
+        return tracked.innovation_q, tracked.innovation_dq
 
     def noise(self, without: tuple[str, ...]) -> coloured.Noise:
-        """What is assumed: the noise in use, or what is likeliest of it where that is what is mended."""
+        """Return the noise in use, or that of greatest likelihood where it is a removed cause."""
         key = tuple(name for name in without if name != REVERSALS)
         if not {WALK, SIZES, CLOCK, COLOUR} & {*key}:
             return coloured.Noise(self.subject.noise, coloured.UNCOLOURED)
         if key not in self._noises:
-            self._noises[key] = self._likeliest(key)
+            self._noises[key] = self._fit_noise(key)
         return self._noises[key]
 
-    def _likeliest(self, without: tuple[str, ...]) -> coloured.Noise:
-        used, driven = self.subject.noise, self.driven(without)
-        parts = [driven.part(run) for run in self.runs(self.free(without))]
+    def _fit_noise(self, without: tuple[str, ...]) -> coloured.Noise:
+        noise, recording = self.subject.noise, self.run_under_model(without)
+        parts = [recording.part(run) for run in self.runs(self.filtered_samples(without))]
         if WALK in without:
-            used = used._replace(q_tau=likeliest_walk(parts, used))
+            noise = noise._replace(q_tau=likeliest_walk(parts, noise))
         if not {SIZES, CLOCK, COLOUR} & {*without}:
-            return coloured.Noise(used, coloured.UNCOLOURED)
+            return coloured.Noise(noise, coloured.UNCOLOURED)
         longest = max(parts, key=lambda part: len(part.q))
-        return coloured.likeliest(longest, used, WALK in without, COLOUR in without)
+        return coloured.fit_noise(longest, noise, WALK in without, COLOUR in without)

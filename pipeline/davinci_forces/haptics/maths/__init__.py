@@ -1,1 +1,1 @@
-"""The hand that feels: a human arm and a haptic device against tissue, and for which tissues that is stable."""
+"""Stability of a human arm with a haptic device against tissue, and its simulation."""

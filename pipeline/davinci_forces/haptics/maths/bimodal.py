@@ -1,24 +1,24 @@
-"""The bimodal haptic model: hand and haptic device as one mass on a spring and a damper, and tissue on one side only.
+"""The bimodal haptic model: hand and haptic device are one mass on a spring and a damper, with tissue on one side.
 
     m ddx = -K_H x - b dx - K_T x  in contact, x >= 0;  without the last term away from it.  (8.2)-(8.7)
 
-What the thesis asks of it is one quadratic function V = x' P x that falls in both modes.  That says that no switching
-between them, however fast and wherever, makes it unstable.  The real one switches where x = 0 only, and there
+The thesis requires one quadratic function V = x' P x that decreases in both modes.  The model is then stable under
+arbitrary switching between them.  The real system switches at x = 0 only, where
 
     V = m dx^2/2 + K_H x^2/2 + K_T max(x, 0)^2/2,  dV/dt = -b dx^2,
 
-so that without delay it is stable for every K_T >= 0.
+so that it is stable without delay for every K_T >= 0.
 
-The stiffest tissue under arbitrary switching, exactly, is where the worst switching law just closes on itself.  The two
-modes differ in the force K_T x only, which pushes back.  The worst law leaves it out while the hand moves away, and
-puts it in while it comes back, so that it switches on both axes of the phase plane, and alike in both halves.
-With omega^2 = K/m and the damping ratio zeta, a mode takes a speed v to the displacement X, and X to the speed v':
+Under arbitrary switching, the limit of K_T is where the trajectory of the worst switching law just closes.  The two
+modes differ in the force K_T x only, which pushes back.  The worst law omits that force while the hand moves away, and
+applies it while the hand returns.  It therefore switches on both axes of the phase plane, symmetrically.  With
+omega^2 = K/m and damping ratio zeta, a mode takes a speed v to the displacement X, and X to the speed v':
 
     X  = v/omega   exp(-g(zeta)),        g = zeta/s  arccos(zeta)
     v' = X omega   exp(-h(zeta)),        h = zeta/s  (pi - arccos(zeta)),     s = sqrt(1 - zeta^2)
 
-Half a turn of the worst law multiplies the speed by omega_1/omega_2 exp(-g(zeta_2) - h(zeta_1)), and K_T is the limit
-where that is 1: below it every switching law dies out, above it one does not.  For planar systems that is exact.
+Half a turn of the worst law multiplies the speed by omega_1/omega_2 exp(-g(zeta_2) - h(zeta_1)).  The limit is the K_T
+where that factor is 1: below it every switching law decays, above it one grows.  For planar systems that is exact.
 """
 
 import math
@@ -29,19 +29,19 @@ import numpy as np
 from davinci_forces.maths.arrays import Array
 
 THESIS_TISSUE = 457.24  # [N/m], section 8.2
-NEAR = 1e-6  # of a damping ratio to 1, where the series takes over
-# What takes seconds to find of the thesis's hand and is the same in every study, as numbers, which tests find again.
+SERIES_RANGE = 1e-6  # distance of a damping ratio from 1 within which the series is used
+# Results for the thesis's hand that take seconds to compute and are the same in every study; tests recompute them.
 SOFTEST, STIFFEST = 1.0, 1e5  # [N/m] hands
 K_H, K_T = np.geomspace(SOFTEST, STIFFEST, 30), np.geomspace(0.5, 2e3, 30)  # [N/m] hands and tissues of the map
 DELAYS = np.geomspace(1e-3, 0.5, 55)  # [s]
-SIMULATED = slice(18, None, 9)  # of the delays, at which the hand that leaves the tissue is simulated
+SIMULATED = slice(18, None, 9)  # of the delays: those for which a hand that leaves the tissue is simulated
 LINK_RATE = 100.0  # [Hz] of messages, chapter 9
-# Of each hand of the map, the tissues, from the softest on, for which `lmi.holds`.
+# For each hand of the map, the number of tissues, from the softest on, for which `lmi.cqlf_exists`.
 PROVED = (
     7, 7, 8, 8, 9, 9, 10, 11, 11, 12, 13, 13, 14, 14, 15, 16, 17, 17, 18, 19, 19, 20, 21, 21, 22, 23, 23, 24, 25,
     25,
 )  # fmt: skip
-# [N/m] `delay.sampled_limit` of each delay at that rate.
+# [N/m] `delay.sampled_limit` of each delay at LINK_RATE.
 HELD = (
     167.09132452095844, 163.76653710101584, 160.19105826948277, 156.36177491875574, 152.27869772527805,
     147.94540170726037, 143.3694072223424, 138.56247043556272, 133.54075245898127, 128.32483943775333,
@@ -62,7 +62,7 @@ LEAVING = (
 
 
 class Hand(NamedTuple):
-    """The human arm that holds a haptic device; all of it positive."""
+    """The human arm that holds a haptic device; all values are positive."""
 
     m: float  # [kg]
     b: float  # [N s/m]
@@ -78,7 +78,7 @@ class Hand(NamedTuple):
         return self.b / (2.0 * float(np.sqrt(self.m * (self.k + k_t))))
 
 
-THESIS = Hand(1.0, 1.0, 100.0)  # m and b of section 8.3; it states no K_H, and 100 N/m is an arm held loosely
+THESIS = Hand(1.0, 1.0, 100.0)  # m and b of section 8.3; it states no K_H, and 100 N/m is a relaxed arm
 
 
 def mode(hand: Hand, k_t: float) -> Array:
@@ -87,7 +87,7 @@ def mode(hand: Hand, k_t: float) -> Array:
 
 
 def cqlf_limit(hand: Hand) -> float:
-    """The K_T [N/m] below which a common quadratic Lyapunov function exists, and not from there on.
+    """The K_T [N/m] below which, and only below which, a common quadratic Lyapunov function exists.
 
     K_T < b^2/m + 2 b sqrt(K_H/m): for two modes that differ by a matrix of rank one, such a function exists where the
     product A_1 A_2 has no negative real eigenvalue.
@@ -96,13 +96,13 @@ def cqlf_limit(hand: Hand) -> float:
 
 
 def energy(hand: Hand, k_t: float, x: Array, dx: Array) -> Array:
-    """V [J] of the model as it really switches, which falls wherever it moves; x [m], dx [m/s]."""
+    """V [J] of the model that switches at x = 0, which decreases during motion; x [m], dx [m/s]."""
     return 0.5 * (hand.m * dx**2 + hand.k * x**2 + k_t * np.maximum(x, 0.0) ** 2)
 
 
 def switching_limit(hand: Hand) -> float:
-    """The K_T [N/m] at which the worst switching law neither grows nor dies out."""
-    from scipy.optimize import brentq  # here, so that who reads a hand from a file loads no solver
+    """The K_T [N/m] at which the worst switching law neither grows nor decays."""
+    from scipy.optimize import brentq  # here, so that reading a hand from a file loads no solver
 
     high = cqlf_limit(hand)  # below which no law grows
     while log_growth(hand, high) < 0.0:
@@ -111,22 +111,22 @@ def switching_limit(hand: Hand) -> float:
 
 
 def log_growth(hand: Hand, k_t: float) -> float:
-    """The logarithm of what half a turn of the worst law multiplies a speed by; -inf where it never turns."""
+    """The logarithm of the factor of a speed over half a turn of the worst law; -inf where it never turns."""
     soft, stiff = hand.damping_ratio(), hand.damping_ratio(k_t)
     if stiff >= 1.0:
         return -math.inf
-    return 0.5 * math.log1p(k_t / hand.k) - away(soft) - back(stiff)
+    return 0.5 * math.log1p(k_t / hand.k) - log_loss_away(soft) - log_loss_back(stiff)
 
 
-def away(zeta: float) -> float:
-    """g: what damping takes of the speed, as a logarithm, on the way from the axis to the turning point."""
-    if abs(1.0 - zeta) < NEAR:
+def log_loss_away(zeta: float) -> float:
+    """g: the logarithmic loss of speed to damping, on the way from the axis to the turning point."""
+    if abs(1.0 - zeta) < SERIES_RANGE:
         return 1.0 + (zeta - 1.0) * 2.0 / 3.0
     if zeta < 1.0:
         return zeta / math.sqrt(1.0 - zeta**2) * math.acos(zeta)
     return zeta / math.sqrt(zeta**2 - 1.0) * math.acosh(zeta)
 
 
-def back(zeta: float) -> float:
-    """h: the same on the way back, for zeta < 1; beyond, the axis is never reached."""
+def log_loss_back(zeta: float) -> float:
+    """h: the logarithmic loss on the way back, for zeta < 1; otherwise the axis is never reached."""
     return zeta / math.sqrt(1.0 - zeta**2) * (math.pi - math.acos(zeta))

@@ -3,8 +3,8 @@
     largest t:  P >= t I,  -(A_i' P + P A_i) >= t beta I for both modes,  trace P = 1
 
 A function exists where t > 0.  With P = [[p, r], [r, 1 - p]] there are three unknowns (p, r, t).  Time and position are
-scaled first by the mean stiffness of both modes, which changes no answer, so that a mode is [[0, 1], [-k, -beta]] with
-numbers near 1 for any hand.
+scaled by the mean stiffness of both modes, which changes no result.  A mode is then [[0, 1], [-k, -beta]] with numbers
+near 1 for any hand.
 """
 
 import numpy as np
@@ -14,31 +14,31 @@ from davinci_forces.haptics.maths.bimodal import Hand
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.estimation import conic
 
-EXISTS = 1e-7  # t beyond what the solver's tolerance leaves
+EXISTS = 1e-7  # t above the solver's tolerance
 TOLERANCE = 1e-9
-ROOT_2 = float(np.sqrt(2.0))  # of the off-diagonal entry, as the solver takes a symmetric matrix
-HALVINGS = 24
-# Where the entries of the columns p, r and t stand: rows 0-2 are P, 3-5 and 6-8 the two modes.
-ROWS = np.array([0, 2, 4, 5, 7, 8, 1, 3, 4, 5, 6, 7, 8, 0, 2, 3, 5, 6, 8])
-STARTS = np.array([0, 6, 13, 19])
+ROOT_2 = float(np.sqrt(2.0))  # factor of the off-diagonal entry in the solver's form of a symmetric matrix
+LMI_HALVINGS = 24
+# Sparse rows of the columns p, r and t: rows 0-2 are P, 3-5 and 6-8 the two modes.
+ENTRY_ROWS = np.array([0, 2, 4, 5, 7, 8, 1, 3, 4, 5, 6, 7, 8, 0, 2, 3, 5, 6, 8])
+COLUMN_STARTS = np.array([0, 6, 13, 19])
 
 
-def holds(hand: Hand, k_t: Array) -> Booleans:
-    """Whether a common quadratic Lyapunov function exists for each stiffness k_t (N,) [N/m]."""
+def cqlf_exists(hand: Hand, k_t: Array) -> Booleans:
+    """Test for each stiffness k_t (N,) [N/m] whether a common quadratic Lyapunov function exists."""
     import clarabel
 
     settings, cones = conic.settings(TOLERANCE), [clarabel.PSDTriangleConeT(2)] * 3
-    cost, nothing = np.array([0.0, 0.0, -1.0]), csc_array((3, 3))
-    found = []
+    cost, quadratic = np.array([0.0, 0.0, -1.0]), csc_array((3, 3))
+    exists = []
     for k in np.asarray(k_t, float).tolist():
         A, bound = inequality(hand, k)
-        answer = clarabel.DefaultSolver(nothing, cost, A, bound, cones, settings).solve()
-        found.append(answer.x[2] > EXISTS)
-    return np.array(found, bool)
+        answer = clarabel.DefaultSolver(quadratic, cost, A, bound, cones, settings).solve()
+        exists.append(answer.x[2] > EXISTS)
+    return np.array(exists, bool)
 
 
 def inequality(hand: Hand, k_t: float) -> tuple[csc_array, Array]:
-    """The matrix (9, 3) and the bound (9,) of bound - A (p, r, t)' in three cones of positive semidefinite matrices."""
+    """A (9, 3) and bound (9,), with bound - A (p, r, t)' in three cones of positive semidefinite matrices."""
     mean = hand.k + 0.5 * k_t
     beta = hand.b / float(np.sqrt(hand.m * mean))
     stiff, soft = (hand.k + k_t) / mean, hand.k / mean
@@ -51,13 +51,13 @@ def inequality(hand: Hand, k_t: float) -> tuple[csc_array, Array]:
         r += [-2.0 * k / beta, -ROOT_2, 2.0 / beta]
         t += [1.0, 1.0]
         bound += [0.0, ROOT_2 * k / beta, 2.0]
-    return csc_array((np.array(p + r + t), ROWS, STARTS), shape=(9, 3)), np.array(bound)
+    return csc_array((np.array(p + r + t), ENTRY_ROWS, COLUMN_STARTS), shape=(9, 3)), np.array(bound)
 
 
 def lmi_limit(hand: Hand, high: float) -> float:
-    """The largest K_T [N/m] below `high` for which the solver finds a function, by halving."""
+    """The largest K_T [N/m] below `high` for which the solver finds a function, by bisection."""
     low = 0.0
-    for _ in range(HALVINGS):
+    for _ in range(LMI_HALVINGS):
         middle = 0.5 * (low + high)
-        low, high = (middle, high) if holds(hand, np.array([middle]))[0] else (low, middle)
+        low, high = (middle, high) if cqlf_exists(hand, np.array([middle]))[0] else (low, middle)
     return low

@@ -1,17 +1,17 @@
-"""A hand that feels the tissue through an arm: haptic device, link, controller, friction and tissue in one loop.
+"""The haptic loop: hand, haptic device, link, arm with controller and friction, and tissue.
 
-Time goes in ticks of the motor drivers.  At every message of the link the device reads where the hand is, and sends it;
-the arm receives it later, and at every turn its controller follows the latest one it has.  At the same turn its
-sensors are read, and whoever simulates makes a force of them; at every message of the link the latest force is sent
-back, and the device holds it until the next one is there.  Between ticks the hand moves exactly,
+Time advances in ticks of the motor drivers.  At every message of the link the device sends the position of the hand; it
+reaches the arm after a delay.  Once in a period the controller follows the latest position received, the sensors
+are read, and a function estimates a force from them.  At every message of the link the latest force is sent back, and
+the device holds it until the next one arrives.  Between ticks the hand moves exactly,
 
     m ddx = F_H - K_H x - b dx - F,                                                                 (8.2), (8.5)
 
-with the force F that is held, and the arm by one implicit step.  Tissue begins where the arm is at 0, and pushes back
+with the held force F, and the arm by one implicit step.  Tissue begins at the arm's position 0 and pushes back with
 
     f = max(K_T x + D dx, 0) (1 + mu dx / sqrt(dx^2 + w^2)),                                        (8.1)
 
-with mu its friction along the tool.
+where mu is its friction along the tool.
 """
 
 from collections.abc import Callable
@@ -25,19 +25,19 @@ from davinci_forces.maths.simulation.actuators import Cascade, Device, Loops, Mo
 from davinci_forces.maths.simulation.control import drive, follow, read
 from davinci_forces.maths.simulation.step import Friction, State, at_rest, middle, step
 
-RUBBING = 1e-3  # w [m/s], below which the tissue's friction gives way
+FRICTION_VELOCITY = 1e-3  # w [m/s], below which the tissue's friction falls to 0 smoothly
 
 
 class Grip(NamedTuple):
-    """How the hand moves over a tick, x+ = Phi x + Gamma (F_H - F), or where it is put at the ticks, (T + 1, 2)."""
+    """The motion of the hand over a tick, x+ = Phi x + Gamma (F_H - F), or a prescribed path over ticks (T + 1, 2)."""
 
     Phi: Array  # (2, 2)
     Gamma: Array  # (2,) [m/N], [m/(s N)]
-    put: Array  # (0, 2) where it moves by itself
+    path: Array  # (0, 2) where the hand moves by itself
 
 
 class FeltTissue(NamedTuple):
-    """What the tip of the arm touches beyond 0."""
+    """The tissue at positions of the arm above 0."""
 
     stiffness: float  # K_T [N/m]
     damping: float  # D [N s/m]
@@ -45,7 +45,7 @@ class FeltTissue(NamedTuple):
 
 
 class Axis(NamedTuple):
-    """The joint that slides, alone: motor, controller, body and friction; every array is of one joint."""
+    """The prismatic joint alone: motor, controller, body and friction; every array is of one joint."""
 
     inertia: Array  # (1, 1) [kg]
     gravity: Array  # (1,) [N]
@@ -53,54 +53,54 @@ class Axis(NamedTuple):
     motors: Motors
     law: Cascade
     stops: tuple[Array, Array]  # (1,) each [m], from the tissue's surface
-    exact: bool  # whether it is, rather, wherever it was last told to be
+    exact: bool  # whether it follows its reference without error instead
 
 
 class Clocks(NamedTuple):
-    """Everything in ticks, but the tick [s]."""
+    """The tick [s], and periods and delays in ticks."""
 
     tick: float
-    turn: int  # of the controller and its sensors
-    message: int  # of the link
-    out: int  # how late a position is
-    back: int  # how late a force is
+    turn: int  # period of the controller and its sensors
+    message: int  # period of the link
+    out: int  # delay of a position
+    back: int  # delay of a force
 
 
 class SensorReading(NamedTuple):
-    """What the sensors say at a turn of the controller."""
+    """The sensor values at a period of the controller."""
 
     q: float  # [m]
     dq: float  # [m/s]
     tau: float  # [N]
-    force: float  # [N] that the tissue truly takes, which no sensor of the arm says
+    force: float  # [N] true force on the tissue, which no sensor of the arm measures
 
 
-class Felt(NamedTuple):
-    """What happened: (T,) at the ticks, and (K, 4) readings and (K,) forces made of them at the controller's turns."""
+class LoopRun(NamedTuple):
+    """A simulated run: (T,) at the ticks; readings (K, 4) and estimated forces (K,) at the controller's periods."""
 
     t: Array
     x: Array  # the hand
     dx: Array
     q: Array  # the arm, from the tissue's surface
-    true: Array  # [N] what the arm exerts on the tissue
-    felt: Array  # [N] what pushes the hand back
+    true: Array  # [N] force of the arm on the tissue
+    felt: Array  # [N] force of the device on the hand
     readings: Array
-    made: Array
+    estimates: Array  # [N]
 
 
 class _Loop(NamedTuple):
-    """All that changes, in few arrays: what is handed to compiled code takes its time, turn by turn."""
+    """The changing state, in few arrays, because each argument of compiled code takes time at every call."""
 
     hand: Array  # (2,)
     state: Array  # (4, 1), a `State`
     loops: Array  # (8, 1), `Loops`
-    last: Array  # (3, 1): effort and angle of the motor, and the force that was made last
-    said: Array  # (messages, 2) position and velocity of the hand, as sent
-    forces: Array  # (messages,) as sent
+    last: Array  # (3, 1): effort and angle of the motor, and the last estimated force
+    sent_motion: Array  # (messages, 2) position and velocity of the hand
+    sent_forces: Array  # (messages,) [N]
 
 
-class _Fixed(NamedTuple):
-    """The axis, likewise."""
+class _Plant(NamedTuple):
+    """The constants of the axis, in few arrays likewise."""
 
     motors: Array  # (7, 1)
     law: Array  # (7, 1)
@@ -111,12 +111,12 @@ class _Fixed(NamedTuple):
 
 def simulate(
     grip: Grip, device: Device, axis: Axis, tissue: FeltTissue, clocks: Clocks, push: Array, noise: Array,
-    start: tuple[float, float], make: Callable[[SensorReading], float],
-) -> Felt:  # fmt: skip
-    """The loop over as many ticks as there is `push`, F_H (T,) [N], from a hand at `start` and an arm at rest there.
+    start: tuple[float, float], estimate: Callable[[SensorReading], float],
+) -> LoopRun:  # fmt: skip
+    """Simulate the loop over the ticks of `push`, F_H (T,) [N], from a hand at `start` and an arm at rest there.
 
-    `noise` (K, 3) is what the sensors add to position, velocity and effort, and `make` the force [N] that is made of
-    their readings, one turn of the controller after the other.
+    `noise` (K, 3) is the noise of position, velocity and effort.  `estimate` returns the force [N] for the readings of
+    each period of the controller, in order.
     """
     T, turns = len(push), len(noise)
     messages = -(-T // clocks.message) + 1
@@ -124,29 +124,29 @@ def simulate(
     read(axis.motors, state[0], loops[Loops._fields.index("angle")])
     loop = _Loop(np.array(start), state, loops, np.zeros((3, 1)), np.zeros((messages, 2)), np.zeros(messages))
     body = np.array([axis.inertia[0], axis.gravity, *axis.stops])
-    fixed = _Fixed(np.array(axis.motors), np.array(axis.law), np.array(axis.friction), body, axis.exact)
-    readings, made, ticks = np.zeros((turns, 4)), np.zeros(turns), np.zeros((T, 5))
+    plant = _Plant(np.array(axis.motors), np.array(axis.law), np.array(axis.friction), body, axis.exact)
+    readings, estimates, ticks = np.zeros((turns, 4)), np.zeros(turns), np.zeros((T, 5))
     for k in range(turns):
-        _sense(device, fixed, tissue, clocks, noise, loop, k, readings)
-        made[k] = loop.last[2, 0] = make(SensorReading(*readings[k].tolist()))
-        _move(grip, device, fixed, tissue, clocks, push, loop, k, ticks)
+        _sense(device, plant, tissue, clocks, noise, loop, k, readings)
+        estimates[k] = loop.last[2, 0] = estimate(SensorReading(*readings[k].tolist()))
+        _run_ticks(grip, device, plant, tissue, clocks, push, loop, k, ticks)
     x, dx, q, true, felt = ticks.T
-    return Felt(clocks.tick * np.arange(T, dtype=float), x, dx, q, true, felt, readings, made)
+    return LoopRun(clocks.tick * np.arange(T, dtype=float), x, dx, q, true, felt, readings, estimates)
 
 
 @compiled
-def pressed(tissue: Any, x: float, dx: float) -> float:
+def tissue_force(tissue: Any, x: float, dx: float) -> float:
     """The force [N] on the tissue."""
     if x <= 0.0:
         return 0.0
     force = max(tissue.stiffness * x + tissue.damping * dx, 0.0)
-    return float(force * (1.0 + tissue.friction * dx / np.sqrt(dx * dx + RUBBING * RUBBING)))
+    return float(force * (1.0 + tissue.friction * dx / np.sqrt(dx * dx + FRICTION_VELOCITY * FRICTION_VELOCITY)))
 
 
 @compiled
-def _parts(fixed: Any, loop: Any) -> Any:
-    """Motors, law, friction, loops and state, row by row."""
-    m, c, f, i, s = fixed.motors, fixed.law, fixed.friction, loop.loops, loop.state
+def _parts(plant: Any, loop: Any) -> Any:
+    """Motors, law, friction, loops and state as named tuples of rows."""
+    m, c, f, i, s = plant.motors, plant.law, plant.friction, loop.loops, loop.state
     return (
         Motors(m[0], m[1], m[2], m[3], m[4], m[5], m[6]),
         Cascade(c[0], c[1], c[2], c[3], c[4], c[5], c[6]),
@@ -157,77 +157,77 @@ def _parts(fixed: Any, loop: Any) -> Any:
 
 
 @cached
-def _sense(device: Any, fixed: Any, tissue: Any, clocks: Any, noise: Any, loop: Any, k: int, readings: Any) -> None:
-    """A turn of the controller begins: it follows what it was told, and the sensors are read."""
+def _sense(device: Any, plant: Any, tissue: Any, clocks: Any, noise: Any, loop: Any, k: int, readings: Any) -> None:
+    """Begin a period of the controller: follow the latest reference, and read the sensors."""
     now, h = k * clocks.turn, clocks.tick
     if now % clocks.message == 0:
-        _say(device, loop, now // clocks.message)
-    wanted = device.motion * loop.said[max(now - clocks.out, 0) // clocks.message]
-    motors, law, _, loops, state = _parts(fixed, loop)
+        _send_motion(device, loop, now // clocks.message)
+    reference = device.motion * loop.sent_motion[max(now - clocks.out, 0) // clocks.message]
+    motors, law, _, loops, state = _parts(plant, loop)
     tau, angle = loop.last[0], loop.last[1]
-    if fixed.exact:
-        state.q[0], state.dq[0] = wanted[0], wanted[1]
+    if plant.exact:
+        state.q[0], state.dq[0] = reference[0], reference[1]
     else:
         read(motors, state.q, angle)
-        follow(motors, law, loops, wanted[:1], angle, h * clocks.turn)
+        follow(motors, law, loops, reference[:1], angle, h * clocks.turn)
         drive(motors, law, loops, angle, state.dq, 1.0 / clocks.turn, h, tau)
-    turned, resolved = motors.gear_ratio[0] * (state.q[0] + noise[k, 0]), motors.encoder_step[0]
-    if resolved > 0.0:
-        turned = resolved * np.round(turned / resolved)
-    readings[k, 0] = turned / motors.gear_ratio[0]
+    motor_angle, resolution = motors.gear_ratio[0] * (state.q[0] + noise[k, 0]), motors.encoder_step[0]
+    if resolution > 0.0:
+        motor_angle = resolution * np.round(motor_angle / resolution)
+    readings[k, 0] = motor_angle / motors.gear_ratio[0]
     readings[k, 1] = state.dq[0] + noise[k, 1]
     readings[k, 2] = tau[0] + noise[k, 2]
-    readings[k, 3] = pressed(tissue, state.q[0], state.dq[0])
+    readings[k, 3] = tissue_force(tissue, state.q[0], state.dq[0])
 
 
 @compiled
-def _say(device: Any, loop: Any, message: int) -> None:
-    """The device reads where the hand is."""
+def _send_motion(device: Any, loop: Any, message: int) -> None:
+    """Send the position and velocity of the hand, as the device measures them."""
     x = loop.hand[0]
-    loop.said[message, 0] = device.step * np.round(x / device.step) if device.step > 0.0 else x
-    loop.said[message, 1] = loop.hand[1]
+    loop.sent_motion[message, 0] = device.step * np.round(x / device.step) if device.step > 0.0 else x
+    loop.sent_motion[message, 1] = loop.hand[1]
 
 
 @cached
-def _move(
-    grip: Any, device: Any, fixed: Any, tissue: Any, clocks: Any, push: Any, loop: Any, k: int, ticks: Any
+def _run_ticks(
+    grip: Any, device: Any, plant: Any, tissue: Any, clocks: Any, push: Any, loop: Any, k: int, ticks: Any
 ) -> None:
-    """The ticks of one turn of the controller, hand and arm side by side."""
-    motors, law, rubbing, loops, state = _parts(fixed, loop)
+    """Advance hand and arm by the ticks of one period of the controller."""
+    motors, law, friction, loops, state = _parts(plant, loop)
     tau, angle, h = loop.last[0], loop.last[1], clocks.tick
     for tick in range(min(clocks.turn, len(push) - k * clocks.turn)):
         now = k * clocks.turn + tick
         if now % clocks.message == 0:
             if tick > 0:
-                _say(device, loop, now // clocks.message)
-            loop.forces[now // clocks.message] = loop.last[2, 0]
-        if tick > 0 and not fixed.exact:
+                _send_motion(device, loop, now // clocks.message)
+            loop.sent_forces[now // clocks.message] = loop.last[2, 0]
+        if tick > 0 and not plant.exact:
             read(motors, state.q, angle)
             drive(motors, law, loops, angle, state.dq, (tick + 1) / clocks.turn, h, tau)
-        force = device.force * loop.forces[(now - clocks.back) // clocks.message] if now >= clocks.back else 0.0
+        force = device.force * loop.sent_forces[(now - clocks.back) // clocks.message] if now >= clocks.back else 0.0
         force = min(max(force, -device.strongest), device.strongest)
-        true = pressed(tissue, state.q[0], state.dq[0])
+        true = tissue_force(tissue, state.q[0], state.dq[0])
         ticks[now, 0], ticks[now, 1], ticks[now, 2] = loop.hand[0], loop.hand[1], state.q[0]
         ticks[now, 3], ticks[now, 4] = true, force
-        if not fixed.exact:
-            _slide(fixed.body, rubbing, tissue, tau, state, h)
-        _hold(grip, loop.hand, push[now] - force, now)
+        if not plant.exact:
+            _move_arm(plant.body, friction, tissue, tau, state, h)
+        _move_hand(grip, loop.hand, push[now] - force, now)
 
 
 @compiled
-def _slide(body: Any, rubbing: Any, tissue: Any, tau: Any, state: Any, h: float) -> None:
-    """One step of the arm."""
+def _move_arm(body: Any, friction: Any, tissue: Any, tau: Any, state: Any, h: float) -> None:
+    """Advance the arm by one tick."""
     at, velocity, free = np.empty(1), np.empty(1), np.empty(1)
     middle(state, h, at, velocity)
-    free[0] = tau[0] - pressed(tissue, at[0], velocity[0])
-    step(body[:1], body[1], free, rubbing, body[2], body[3], state, np.ones(1, np.bool_), h)
+    free[0] = tau[0] - tissue_force(tissue, at[0], velocity[0])
+    step(body[:1], body[1], free, friction, body[2], body[3], state, np.ones(1, np.bool_), h)
 
 
 @compiled
-def _hold(grip: Any, hand: Any, net: float, now: int) -> None:
-    """One step of the hand, under a force that is constant."""
-    if len(grip.put):
-        hand[0], hand[1] = grip.put[now + 1, 0], grip.put[now + 1, 1]
+def _move_hand(grip: Any, hand: Any, net: float, now: int) -> None:
+    """Advance the hand by one tick, under a constant force."""
+    if len(grip.path):
+        hand[0], hand[1] = grip.path[now + 1, 0], grip.path[now + 1, 1]
         return
     x, dx = hand[0], hand[1]
     for i in range(2):

@@ -1,8 +1,7 @@
-"""The columns of a Parquet or Feather file, read by pyarrow in batches."""
+"""Read the columns of a Parquet or Feather file in batches, with pyarrow."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -14,20 +13,19 @@ from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
 from davinci_forces.logs.cells import absent, integers, numbers
 from davinci_forces.logs.log import Block, Channel, Log, Options, unique
-from davinci_forces.logs.timeline import moment
+from davinci_forces.logs.timeline import UNIX_EPOCH, moment
 from davinci_forces.maths.arrays import Array
 
-ROWS = 1 << 14  # of a batch
+BATCH_ROWS = 1 << 14  # of a batch
 BUFFER = 1 << 18  # [bytes] of a column of Parquet that are read at a time
-MAPPED = 64 << 20  # [bytes] of a batch of a Feather file, beyond which it is not read into memory
-UNITS = (b"unit", b"units")
+MAPPED = 64 << 20  # [bytes] of a batch of a Feather file, above which it is mapped instead of read into memory
+UNIT_KEYS = (b"unit", b"units")
 PER_SECOND = {"s": 1, "ms": 10**3, "us": 10**6, "ns": 10**9}
-EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 Batches = Callable[[Sequence[str]], Iterator[pa.RecordBatch]]
 
 
-def opened(path: Path, options: Options) -> Log:
+def open_in_child(path: Path, options: Options) -> Log:
     """Open the file.
 
     Raises
@@ -37,7 +35,7 @@ def opened(path: Path, options: Options) -> Log:
     """
     schema, batches = _file(path)
     if not schema.names or len(set(schema.names)) < len(schema.names):
-        raise BadLog(f"{path}: its columns are {', '.join(schema.names) or 'none'}; each needs a name of its own")
+        raise BadLog(f"{path}: its columns are {', '.join(schema.names) or 'none'}; each needs a unique name")
     names = zip(unique(schema.names), schema, strict=True)
     channels = tuple(Channel(name, _unit(column), _kind(column.type)) for name, column in names)
     log = ArrowLog(path, "arrow", channels, batches=batches)
@@ -50,16 +48,16 @@ def _file(path: Path) -> tuple[pa.Schema, Batches]:
     with open_file(path) as file:
         head = file.read(4)
     if head == b"PAR1":
-        opened = parquet.ParquetFile(path, pre_buffer=False, buffer_size=BUFFER)  # or all of a row group is held
-        return opened.schema_arrow, lambda names: opened.iter_batches(ROWS, columns=list(names), use_threads=False)
+        table = parquet.ParquetFile(path, pre_buffer=False, buffer_size=BUFFER)  # else a whole row group is held
+        return table.schema_arrow, lambda names: table.iter_batches(BATCH_ROWS, columns=list(names), use_threads=False)
     if head == b"FEA1":
-        table = feather.read_table(path, use_threads=False)
-        return table.schema, lambda names: iter(table.select(names).to_batches(ROWS))
+        rows = feather.read_table(path, use_threads=False)
+        return rows.schema, lambda names: iter(rows.select(names).to_batches(BATCH_ROWS))
     return ipc.open_file(str(path)).schema, lambda names: _records(path, names)
 
 
 def _records(path: Path, names: Sequence[str]) -> Iterator[pa.RecordBatch]:
-    """Its batches, of these columns alone; what is mapped counts as memory, so that only large batches are."""
+    """Read the batches of these columns alone; only large batches are mapped, because mapped bytes count as memory."""
     whole = ipc.open_file(str(path))
     mapped = path.stat().st_size > MAPPED * whole.num_record_batches
     columns = ipc.IpcReadOptions(included_fields=[whole.schema.names.index(name) for name in names], use_threads=False)
@@ -67,21 +65,21 @@ def _records(path: Path, names: Sequence[str]) -> Iterator[pa.RecordBatch]:
     for i in range(file.num_record_batches):
         batch = file.get_batch(i).select(names)
         batch.validate(full=True)
-        for first in range(0, batch.num_rows, ROWS):
-            yield batch.slice(first, ROWS)
+        for first in range(0, batch.num_rows, BATCH_ROWS):
+            yield batch.slice(first, BATCH_ROWS)
 
 
 def _unit(column: pa.Field) -> str:
     if pa.types.is_timestamp(column.type) or pa.types.is_duration(column.type):
         return "s"
     metadata = column.metadata or {}
-    return next((metadata[key].decode("utf-8", "replace") for key in UNITS if metadata.get(key)), "")
+    return next((metadata[key].decode("utf-8", "replace") for key in UNIT_KEYS if metadata.get(key)), "")
 
 
 def _kind(what: pa.DataType) -> str:
     if pa.types.is_timestamp(what):
         return "time"
-    # A dictionary is a column of labels, whatever the labels are.
+    # A dictionary column holds labels, even if the labels are numbers.
     of = pa.types
     tests = (of.is_integer, of.is_floating, of.is_boolean, of.is_decimal, of.is_duration)
     numeric = any(test(what) for test in tests)
@@ -90,11 +88,11 @@ def _kind(what: pa.DataType) -> str:
 
 @dataclass
 class ArrowLog(Log):
-    """An opened table.  Samples of a column of time stamps are seconds from the whole one at which the log started."""
+    """An opened table.  Time stamps become seconds from the whole second in which the log started."""
 
     batches: Batches = field(default=lambda names: iter(()))
     columns: dict[str, str] = field(default_factory=dict)  # by channel
-    origin: int = 0  # [s] since 1970, of time stamps
+    origin: int = 0  # [s] since 1970; the zero of time stamps
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, as `Log.blocks` says."""
@@ -103,11 +101,11 @@ class ArrowLog(Log):
             columns = {name: batch.column(self.columns[name]) for name in names}
             block = {name: _numbers(column, self.origin) for name, column in columns.items()}
             if batch.num_rows:
-                yield self.tallied(block, {name: column.null_count for name, column in columns.items()})
+                yield self.count_nans(block, {name: column.null_count for name, column in columns.items()})
 
 
 def _numbers(column: pa.Array, origin: int) -> Array:
-    """The values of a column, NaN where there is none."""
+    """Convert a column to numbers, NaN where it has no value."""
     what = column.type
     if pa.types.is_timestamp(what) or pa.types.is_duration(what):
         per_second = PER_SECOND[what.unit]
@@ -118,15 +116,15 @@ def _numbers(column: pa.Array, origin: int) -> Array:
 
 
 def _describe_time(log: ArrowLog) -> None:
-    """The first column of time stamps is the clock, and the first second in it is when the log started."""
+    """Make the first column of time stamps the clock, and its first whole second the start of the log."""
     log.time = next((channel.name for channel in log.channels if channel.kind == "time"), "")
     if not log.time:
         return
     for batch in log.batches([log.columns[log.time]]):
-        known = pc.drop_null(batch.column(0))
-        if len(known):
-            log.origin = known[0].cast(pa.int64()).as_py() // PER_SECOND[known.type.unit]
-            began = moment(EPOCH, log.origin)
+        stamps = pc.drop_null(batch.column(0))
+        if len(stamps):
+            log.origin = stamps[0].cast(pa.int64()).as_py() // PER_SECOND[stamps.type.unit]
+            began = moment(UNIX_EPOCH, log.origin)
             log.started = began.replace(tzinfo=None).isoformat() if began else ""
-            log.zone = "UTC" if known.type.tz else "local"
+            log.zone = "UTC" if stamps.type.tz else "local"
             return

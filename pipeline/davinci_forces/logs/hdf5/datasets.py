@@ -1,4 +1,4 @@
-"""The datasets of an HDF5 file as arrays, read by h5py."""
+"""Read the datasets of an HDF5 file as arrays, with h5py."""
 
 import math
 import zlib
@@ -11,18 +11,17 @@ import h5py
 import numpy as np
 
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.arrays import ArrayLog, Named, matlab_object, take_in
+from davinci_forces.logs.arrays import MAX_DEPTH, ArrayLog, NamedArray, matlab_object, take_in
 from davinci_forces.logs.log import Log, Options
 
-UNITS = ("units", "unit", "Units", "Unit")
-CACHE = 64 << 20  # [bytes] of the chunks of a dataset that are kept unpacked, at most
-PIECE = 1 << 16  # [bytes] of a packed chunk that are unpacked at once
-SLOTS = 521  # that chunks share by their number, as HDF5 has it
-MOST_REFERENCES = 1000
-DEEPEST = 20
+UNIT_ATTRIBUTES = ("units", "unit", "Units", "Unit")
+CACHE = 64 << 20  # [bytes] of unpacked chunks kept per dataset, at most
+UNPACK_BYTES = 1 << 16  # [bytes] of a packed chunk unpacked at once
+SLOTS = 521  # of HDF5's chunk cache, HDF5's default
+MAX_REFERENCES = 1000
 
 
-def opened(path: Path, options: Options) -> Log:
+def open_in_child(path: Path, options: Options) -> Log:
     """Open the file.
 
     Raises
@@ -39,25 +38,25 @@ def opened(path: Path, options: Options) -> Log:
     return log
 
 
-def arrays_of(file: h5py.File, log: Log) -> Iterator[Named]:
-    """Every dataset that groups lead to, in the order of their names; those in other files are left out."""
+def arrays_of(file: h5py.File, log: Log) -> Iterator[NamedArray]:
+    """List all datasets in the groups, in the order of names; datasets in other files are left out."""
     names: list[bytes] = []
 
     def visit(name: bytes, about: Any) -> None:
-        # What MATLAB refers to stands in /#refs#, and is followed from elsewhere.
+        # What MATLAB refers to is stored in /#refs#, and is read where it is referred to.
         if about.type == h5py.h5o.TYPE_DATASET and not name.startswith(b"#"):
             names.append(name)
 
-    h5py.h5o.visit(file.id, visit, info=True)  # which visits no link to another file
+    h5py.h5o.visit(file.id, visit, info=True)  # follows no link to another file
     for dataset in (file[name] for name in names):
         if dataset.is_virtual or dataset.external:
-            log.warnings.append(f"dataset {dataset.name} lies in another file, and is left out")
+            log.warnings.append(f"dataset {dataset.name} is stored in another file and is left out")
             continue
-        yield from _arrays(file, dataset, dataset.name.strip("/"), DEEPEST, log)
+        yield from _arrays(file, dataset, dataset.name.strip("/"), MAX_DEPTH, log)
 
 
-def _arrays(file: h5py.File, node: Any, name: str, deep: int, log: Log) -> Iterator[Named]:
-    """The arrays of a dataset, or of what it refers to."""
+def _arrays(file: h5py.File, node: Any, name: str, deep: int, log: Log) -> Iterator[NamedArray]:
+    """List the arrays of a dataset and of the datasets that it refers to."""
     if isinstance(node, h5py.Group):
         for key in node if deep else ():
             yield from _arrays(file, node[key], f"{name}/{key}", deep - 1, log)
@@ -69,7 +68,7 @@ def _arrays(file: h5py.File, node: Any, name: str, deep: int, log: Log) -> Itera
         log.facts[name] = "".join(map(chr, node[()].T.ravel()[:200].tolist()))
     elif h5py.check_ref_dtype(node.dtype) is h5py.Reference:
         pattern = "{}{{{}}}" if _matlab_class(node) == "cell" else "{}({})"
-        for number, reference in enumerate(node[()].T.ravel()[:MOST_REFERENCES] if deep else (), start=1):
+        for number, reference in enumerate(node[()].T.ravel()[:MAX_REFERENCES] if deep else (), start=1):
             if reference:
                 yield from _arrays(file, file[reference], pattern.format(name, number), deep - 1, log)
     elif node.dtype.kind in "SO" and node.size == 1:
@@ -77,14 +76,15 @@ def _arrays(file: h5py.File, node: Any, name: str, deep: int, log: Log) -> Itera
     elif node.dtype.names:
         for part in node.dtype.names:
             if not node.dtype[part].shape:
-                yield Named(f"{name}/{part}", Stored(file, node.ref, node.shape, node.dtype[part], part), unit_of(node))
+                column = Stored(file, node.ref, node.shape, node.dtype[part], part)
+                yield NamedArray(f"{name}/{part}", column, unit_of(node))
     else:
-        yield Named(name, Stored(file, node.ref, node.shape, node.dtype), unit_of(node))
+        yield NamedArray(name, Stored(file, node.ref, node.shape, node.dtype), unit_of(node))
 
 
 def unit_of(dataset: h5py.Dataset) -> str:
-    """The unit that an attribute gives, or ""."""
-    return next((text for name in UNITS if (text := _text(dataset.attrs.get(name)))), "")
+    """Return the unit stated by an attribute, or ""."""
+    return next((text for name in UNIT_ATTRIBUTES if (text := _text(dataset.attrs.get(name)))), "")
 
 
 def _matlab_class(node: Any) -> str:
@@ -99,7 +99,7 @@ def _text(value: Any) -> str:
 
 @dataclass(frozen=True)
 class Stored:
-    """A dataset, or a field of its records, that is open while it is read: thousands of open ones fill the memory."""
+    """A dataset, or a field of its records, open only while it is read: thousands of open ones fill the memory."""
 
     file: h5py.File
     reference: h5py.Reference
@@ -109,8 +109,8 @@ class Stored:
     opened: list[Any] = field(default_factory=list)
 
     def __getitem__(self, part: tuple[Any, ...]) -> Any:
-        """A part of it; that with the last samples closes it."""
-        axis = next((axis for axis, one in enumerate(part) if isinstance(one, slice) and one.stop is not None), -1)
+        """Read a part of it; reading the last samples closes it."""
+        axis = next((axis for axis, cut in enumerate(part) if isinstance(cut, slice) and cut.stop is not None), -1)
         if not self.opened:
             self.opened.append(_opened(self.file, self.reference, axis))
         values = self.opened[0][(self.of_record, *part) if self.of_record else part]
@@ -120,27 +120,27 @@ class Stored:
 
 
 def _opened(file: h5py.File, reference: h5py.Reference, axis: int) -> Any:
-    """A dataset with room for those of its chunks that hold the same samples; or one that is unpacked in order.
+    """Open a dataset with a cache for the chunks that hold the same samples, or one that is unpacked in order.
 
-    So a chunk is unpacked once, and not for every slice of it, but for a large one that is shuffled, too: to keep it
-    while the next one is unpacked takes more memory than there is.
+    Each chunk is then unpacked once instead of once per slice.  Large shuffled chunks are the exception: keeping one
+    while the next is unpacked takes too much memory.
     """
     node = file[reference]
     if node.chunks is None or not node.size or axis < 0:
         return node
     chunks = [-(-length // chunk) for length, chunk in zip(node.shape, node.chunks, strict=True)]
-    one = math.prod(node.chunks) * node.dtype.itemsize
-    if one > CACHE and node.id.get_num_chunks() == chunks[axis] == math.prod(chunks) and _is_plain(node, axis):
+    chunk_bytes = math.prod(node.chunks) * node.dtype.itemsize
+    if chunk_bytes > CACHE and node.id.get_num_chunks() == chunks[axis] == math.prod(chunks) and _is_plain(node, axis):
         return Unpacked(node, axis)
-    room = min(math.prod(chunks) // chunks[axis] * one, CACHE)
-    del node  # as long as a dataset is open, it keeps the room that it was opened with
+    room = min(math.prod(chunks) // chunks[axis] * chunk_bytes, CACHE)
+    del node  # an open dataset keeps the cache that it was opened with
     access = h5py.h5p.create(h5py.h5p.DATASET_ACCESS)
-    access.set_chunk_cache(SLOTS, room, 1.0)  # those that were read to their end make room first
+    access.set_chunk_cache(SLOTS, room, 1.0)  # chunks read to their end are evicted first
     return h5py.Dataset(h5py.h5r.dereference(reference, file.id, access))
 
 
 def _is_plain(node: h5py.Dataset, axis: int) -> bool:
-    """Whether its chunks are numbers packed by gzip alone, sample after sample along an axis."""
+    """Whether its chunks are numbers, packed by gzip alone, sample after sample along an axis."""
     filters, stored = node.id.get_create_plist(), node.id.get_type()
     is_gzip = filters.get_nfilters() == 1 and filters.get_filter(0)[0] == h5py.h5z.FILTER_DEFLATE
     in_order = max(node.chunks[:axis], default=1) == 1 and node.chunks[axis + 1 :] == node.shape[axis + 1 :]
@@ -148,7 +148,7 @@ def _is_plain(node: h5py.Dataset, axis: int) -> bool:
 
 
 class Unpacked:
-    """A dataset whose chunks are too large to be kept, unpacked piece by piece as its samples are asked for."""
+    """A dataset whose chunks are too large to be kept, unpacked piece by piece as its samples are read."""
 
     def __init__(self, dataset: h5py.Dataset, axis: int) -> None:
         self.dataset, self.axis = dataset, axis
@@ -157,24 +157,25 @@ class Unpacked:
 
     def start(self) -> None:
         """Go back to the first sample."""
-        self.at, self.waiting, self.pieces = 0, bytearray(), self.unpacked()
+        self.at, self.waiting, self.pieces = 0, bytearray(), self.unpack()
 
-    def unpacked(self) -> Iterator[bytes]:
-        """The samples of each chunk, piece by piece."""
+    def unpack(self) -> Iterator[bytes]:
+        """Unpack the samples of each chunk, piece by piece."""
         length, step = self.dataset.shape[self.axis], self.dataset.chunks[self.axis]
         for first in range(0, length, step):
             place = tuple(first if axis == self.axis else 0 for axis in range(self.dataset.ndim))
             unfiltered, packed = self.dataset.id.read_direct_chunk(place)
-            stream, left = zlib.decompressobj(), min(step, length - first) * self.width
-            for at in range(0, len(packed), PIECE):
-                piece = packed[at : at + PIECE] if unfiltered else stream.decompress(packed[at : at + PIECE])
-                yield piece[:left]
-                left -= len(piece[:left])
-            if left:
+            stream, remaining = zlib.decompressobj(), min(step, length - first) * self.width
+            for at in range(0, len(packed), UNPACK_BYTES):
+                piece = packed[at : at + UNPACK_BYTES]
+                piece = piece if unfiltered else stream.decompress(piece)
+                yield piece[:remaining]
+                remaining -= len(piece[:remaining])
+            if remaining:
                 raise OSError(f"a chunk of {self.dataset.name} ends early")
 
     def __getitem__(self, part: tuple[Any, ...]) -> Any:
-        """A part of it; what is before the samples that were read last is unpacked anew."""
+        """Read a part of it; samples before those read last are unpacked again."""
         first, last, _ = part[self.axis].indices(self.dataset.shape[self.axis])
         if first * self.width < self.at:
             self.start()
@@ -185,4 +186,4 @@ class Unpacked:
         del self.waiting[:end]
         self.at += end
         values = values.reshape([1] * self.axis + [last - first, *self.dataset.shape[self.axis + 1 :]])
-        return values[tuple(slice(None) if axis == self.axis else one for axis, one in enumerate(part))]
+        return values[tuple(slice(None) if axis == self.axis else cut for axis, cut in enumerate(part))]

@@ -1,7 +1,7 @@
-"""Logs that are read by libraries in C, in a process of their own with limits of time and memory.
+"""Read logs with C libraries in a child process, with limits of time and memory.
 
-A damaged file can take such a library down, keep it busy for ever, or have it ask for more memory than there is.  It
-then costs a child process, and is a `BadLog` like any other.
+A damaged file can crash such a library, keep it busy for ever, or make it request more memory than there is.  Then only
+the child process is lost, and the file is a `BadLog` like any other.
 """
 
 from collections.abc import Iterator, Sequence
@@ -12,35 +12,35 @@ from typing import Any
 
 from davinci_forces.errors import BadLog
 from davinci_forces.files import require_file
-from davinci_forces.logs.isolated.process import Ended, Message, child
-from davinci_forces.logs.log import Block, Channel, Clock, Log, Options, ahead
+from davinci_forces.logs.isolated.process import ChildEnded, Message, child
+from davinci_forces.logs.log import Block, Channel, Clock, Log, Options, read_ahead
 from davinci_forces.maths.arrays import Array
 
-SECONDS = 60.0  # that a file may take without a block, or of computing in all; and more for every so many bytes of it
-BYTES_PER_SECOND = 5e6  # without a block: an index may be long
-BYTES_PER_CPU_SECOND = 2e5  # in all: a tenth of what short messages of a bag take
-MEMORY = 448 << 20  # [bytes] that a child may have, and so many times the size of the file, but no more than most
-TIMES_ITS_SIZE = 4
-MOST_MEMORY = 4 << 30
+SECONDS = 60.0  # until a file yields a block, and of CPU time in all; more for large files, by the rates below
+BYTES_PER_SECOND = 5e6  # until a block: an index may be long
+BYTES_PER_CPU_SECOND = 2e5  # in all: a tenth of the rate for short messages of a bag
+MEMORY = 448 << 20  # [bytes] of a child; plus `MEMORY_PER_BYTE` of the file, up to `MAX_MEMORY`
+MEMORY_PER_BYTE = 4
+MAX_MEMORY = 4 << 30
 REMEDY = "it is damaged; record it again, or take it out of study.toml"
-MOST_PACKED = 2000  # times its size that the samples of a file may be; what packs best packs to a thousandth
-BESIDE = 1 << 16  # [bytes] so that small files of headers may hold a little
+MAX_COMPRESSION = 2000  # size of the samples over that of the file, at most; the best compression reaches 1000
+HEADER_BYTES = 1 << 16  # [bytes] added to the size, so that small files may hold a few samples
 
 
 def require(path: Path, package: str, extra: str) -> None:
-    """Say how to install what a format is read by.
+    """Require the package that reads a format, and say how to install it.
 
     Raises
     ------
     BadLog
-        If it is not installed.
+        If the package is not installed.
     """
     if find_spec(package) is None:
-        raise BadLog(f"{path}: {package} reads it and is not installed; run: pip install davinci-forces[{extra}]")
+        raise BadLog(f"{path}: {package}, which reads it, is not installed; run: pip install davinci-forces[{extra}]")
 
 
 def start(path: Path, options: Options, reader: str) -> Log:
-    """Open a log in a child; `reader` is a module that exports `opened(path, options) -> Log`.
+    """Open a log in a child process; `reader` is a module that exports `open_in_child(path, options) -> Log`.
 
     Raises
     ------
@@ -49,30 +49,30 @@ def start(path: Path, options: Options, reader: str) -> Log:
     """
     request = _request(path, options, reader)
     for message, _ in _answers(path, request):
-        said = message["log"]
-    channels = tuple(Channel(**channel) for channel in said.pop("channels"))
-    clock = Clock(**clock) if (clock := said.pop("clock")) else None
-    return IsolatedLog(path, channels=channels, clock=clock, request=request, **said)
+        state = message["log"]
+    channels = tuple(Channel(**channel) for channel in state.pop("channels"))
+    clock = Clock(**clock) if (clock := state.pop("clock")) else None
+    return IsolatedLog(path, channels=channels, clock=clock, request=request, **state)
 
 
 @dataclass
 class IsolatedLog(Log):
-    """A log that a child reads."""
+    """A log that a child process reads."""
 
     request: Message = field(default_factory=dict)
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, as `Log.blocks` says."""
         self._start_anew(names, kinds=("number", "time"))
-        yield from ahead(self._blocks(list(names)))
+        yield from read_ahead(self._blocks(list(names)))
 
     def _blocks(self, names: list[str]) -> Iterator[Block]:
-        left = (self.request["size"] + BESIDE) * MOST_PACKED
+        budget = (self.request["size"] + HEADER_BYTES) * MAX_COMPRESSION
         for message, columns in _answers(self.path, self.request | {"names": names}):
             self.nulls |= message["nulls"]
             self.nans |= message["nans"]
-            left -= sum(column.nbytes for column in columns)
-            if left < 0:
+            budget -= sum(column.nbytes for column in columns)
+            if budget < 0:
                 raise BadLog(
                     f"{self.path}: its {self.request['size']} bytes claim more samples than they can hold: {REMEDY}"
                 )
@@ -82,7 +82,7 @@ class IsolatedLog(Log):
                 self._take(end)
 
     def _take(self, end: Message) -> None:
-        """What the child noticed; channels of another clock may be read at the same time, by another child."""
+        """Add the child's warnings and counts; another child may read channels of another clock at the same time."""
         self.warnings += [warning for warning in end["warnings"] if warning not in self.warnings]
         self.comments += [comment for comment in end["comments"] if comment not in self.comments]
         self.facts |= end["facts"]
@@ -100,12 +100,12 @@ def _request(path: Path, options: Options, reader: str) -> Message:
         "size": size,
         "seconds": SECONDS + size / BYTES_PER_SECOND,
         "cpu": SECONDS + size / BYTES_PER_CPU_SECOND,
-        "memory": min(MEMORY + TIMES_ITS_SIZE * size, MOST_MEMORY),
+        "memory": min(MEMORY + MEMORY_PER_BYTE * size, MAX_MEMORY),
     }
 
 
 def _size(path: Path) -> int:
-    """The bytes of a log, of a folder those of the files right in it; each is one, as libraries do not ask."""
+    """Sum the bytes of a log, or of the files right in its folder, and refuse what is not a file; libraries do not."""
     files = [file for file in path.iterdir() if not file.is_dir()] if path.is_dir() else [path]
     for file in files:
         require_file(file)
@@ -118,11 +118,11 @@ def _answers(path: Path, request: Message) -> Iterator[tuple[dict[str, Any], lis
         with child() as reading:
             for message, columns in reading.answers(request):
                 if "bad" in message:
-                    # Read to its end, so that the child is kept; a generator that is closed would end it.
+                    # Read to the end, so that the child can be used again; closing the generator would end it.
                     problem = _problem(path, request, message)
                     continue
                 yield message, columns
-    except Ended as why:
+    except ChildEnded as why:
         raise BadLog(f"{path}: reading it {why}, so it is not read: {REMEDY}") from None
     if problem:
         raise BadLog(problem)
@@ -133,7 +133,7 @@ def _problem(path: Path, request: Message, message: Message) -> str:
         most = request["memory"] >> 20
         return (
             f"{path}: reading it takes more than {most} MB of memory; it is damaged, or holds much in one piece: save "
-            "it in a format that is read in pieces, as MATLAB's -v7.3"
+            "it in a format that is read piece by piece, such as MATLAB's -v7.3"
         )
-    said = str(message["bad"]).replace(request["path"], str(path))
-    return f"{path}: it cannot be read ({said}): {REMEDY}" if message.get("fault") else said
+    text = str(message["bad"]).replace(request["path"], str(path))
+    return f"{path}: it cannot be read ({text}): {REMEDY}" if message.get("fault") else text

@@ -1,4 +1,4 @@
-"""The child process: opens logs and reads their blocks for its parent, within limits that the system holds it to."""
+"""The child process: opens logs and reads their blocks for its parent, within limits that the system enforces."""
 
 import os
 import signal
@@ -16,13 +16,13 @@ from davinci_forces.logs.log import Log, Options
 from davinci_forces.maths.arrays import Array
 
 Answer = tuple[Message, list[Array]]
-TOLD_AT_THE_END = ("facts", "warnings", "comments", "dropped", "cut")
+FINAL_FIELDS = ("facts", "warnings", "comments", "dropped", "cut")
 
 
 def serve() -> None:
-    """Answer requests until the parent is gone."""
+    """Answer requests until the parent has ended."""
     answers = os.fdopen(os.dup(1), "wb")
-    os.dup2(2, 1)  # what a library prints must not get between the answers
+    os.dup2(2, 1)  # what a library prints must not mix with the answers
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent ends it
     child = Child()
     with suppress(EOFError, BrokenPipeError):
@@ -31,7 +31,7 @@ def serve() -> None:
 
 
 def _answer(child: "Child", request: Message, answers: IO[bytes]) -> None:
-    """Answer one request; whatever goes wrong in a library is an answer, too."""
+    """Answer one request; errors in a library are answers, too."""
     _limit(request["memory"], request["cpu"])
     try:
         for message, columns in child.answers(request):
@@ -49,18 +49,18 @@ def _answer(child: "Child", request: Message, answers: IO[bytes]) -> None:
 
 
 class Child:
-    """What is known between two requests: the log that was opened last."""
+    """State between two requests: the log that was opened last."""
 
     def __init__(self) -> None:
         self.key: Any = None
         self.log: Log | None = None
 
     def forget(self) -> None:
-        """Let go of the log."""
+        """Release the log."""
         self.key = self.log = None
 
     def answers(self, request: Message) -> Iterator[Answer]:
-        """What an open log is, or its blocks."""
+        """Yield the description of an opened log, or its blocks."""
         log = self._opened(request)
         names = request["names"]
         if names is None:
@@ -68,7 +68,7 @@ class Child:
             return
         for block in log.blocks(names):
             yield {"nulls": log.nulls, "nans": log.nans, "more": True}, [block[name] for name in names]
-        yield {"end": {name: getattr(log, name) for name in TOLD_AT_THE_END}, "nulls": log.nulls, "nans": log.nans}, []
+        yield {"end": {name: getattr(log, name) for name in FINAL_FIELDS}, "nulls": log.nulls, "nans": log.nans}, []
 
     def _opened(self, request: Message) -> Log:
         path = Path(request["path"])
@@ -76,23 +76,20 @@ class Child:
         key = (request["reader"], path, request["options"], about.st_mtime_ns, about.st_size)
         if self.log is None or self.key != key:
             self.forget()
-            self.log = import_module(request["reader"]).opened(path, Options(**_tupled(request["options"])))
+            options: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in request["options"].items()}
+            self.log = import_module(request["reader"]).open_in_child(path, Options(**options))
             self.key = key
         return self.log
 
 
-def _tupled(options: dict[str, Any]) -> dict[str, Any]:
-    return {name: tuple(value) if isinstance(value, list) else value for name, value in options.items()}
-
-
 def _described(log: Log) -> dict[str, Any]:
-    said = {name: getattr(log, name) for name in ("format", "time", "started", "zone", *TOLD_AT_THE_END)}
+    fields = {name: getattr(log, name) for name in ("format", "time", "started", "zone", *FINAL_FIELDS)}
     clock = asdict(log.clock) if log.clock else None
-    return {**said, "clock": clock, "channels": [asdict(channel) for channel in log.channels]}
+    return {**fields, "clock": clock, "channels": [asdict(channel) for channel in log.channels]}
 
 
 def _limit(memory: int, seconds: float) -> None:
-    """Have the system refuse more memory [bytes], and end the process after so much more CPU time [s]."""
+    """Limit the memory [bytes] and the further CPU time [s] of this process, enforced by the system."""
     if sys.platform == "win32":
         return
     import resource

@@ -1,4 +1,4 @@
-"""The parent's side: children that are kept for the next log, and ended when they are late or their parent ends."""
+"""Child processes, from the parent's side: kept for the next log, ended when late or when the parent ends."""
 
 import atexit
 import ctypes
@@ -19,20 +19,20 @@ from davinci_forces.maths.arrays import Array
 
 Message = dict[str, Any]
 
-KEPT = 2  # children that wait for a next log: starting one takes longer than reading a small file
+MAX_WAITING = 2  # children kept for the next log: starting one takes longer than reading a small file
 START = (
     "import sys; sys.path[:] = {path!r}; from davinci_forces.logs.isolated.process import end_with_parent; "
     "end_with_parent(); from davinci_forces.logs.isolated.child import serve; serve()"
 )
-OUT_OF_TIME = 24  # the signal SIGXCPU, which Windows does not know
+OUT_OF_TIME = 24  # the signal SIGXCPU, which Windows does not have
 PACKAGES = Path(__file__).parents[3]
-# One thread each, and Arrow's memory from the system: what libraries reserve beforehand counts as used.
-SPARING = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "ARROW_DEFAULT_MEMORY_POOL": "system"}
+# One thread each, and Arrow's memory from the system: memory that libraries reserve in advance counts as used.
+CHILD_ENVIRONMENT = {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1", "ARROW_DEFAULT_MEMORY_POOL": "system"}
 PR_SET_PDEATHSIG = 1  # of Linux's prctl(2): the signal that a process gets when the thread that started it ends
 
 
 def send(stream: IO[bytes], message: Message, columns: Sequence[Array] = ()) -> None:
-    """Write a message, and columns of one length."""
+    """Write a message and columns of equal length."""
     rows = len(columns[0]) if columns else 0
     stream.write(json.dumps(message | {"shape": [len(columns), rows]}).encode() + b"\n")
     for column in columns:
@@ -46,7 +46,7 @@ def receive(stream: IO[bytes]) -> tuple[Message, list[Array]]:
     Raises
     ------
     EOFError
-        If the other side is gone.
+        If the other process has ended.
     """
     line = stream.readline()
     if not line.endswith(b"\n"):
@@ -63,8 +63,8 @@ def _column(stream: IO[bytes], rows: int) -> Array:
     return np.frombuffer(content, np.float64)
 
 
-class Ended(Exception):
-    """A child is gone, with words for why."""
+class ChildEnded(Exception):
+    """A child has ended; the message says why."""
 
 
 class Child:
@@ -77,16 +77,16 @@ class Child:
         with uninterrupted():
             self.process = subprocess.Popen(
                 [sys.executable, "-S", "-c", START.format(path=path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
-                stderr=subprocess.DEVNULL, env=os.environ | SPARING,
+                stderr=subprocess.DEVNULL, env=os.environ | CHILD_ENVIRONMENT,
             )  # fmt: skip
 
     def answers(self, request: Message) -> Iterator[tuple[Message, list[Array]]]:
-        """Ask, and hand on what comes back, piece by piece.
+        """Send a request and yield the answers, piece by piece.
 
         Raises
         ------
-        Ended
-            If the child is gone, or had to be ended because a piece took longer than the request allows.
+        ChildEnded
+            If the child has ended, or was ended because an answer took longer than the request allows.
         """
         assert self.process.stdin
         assert self.process.stdout
@@ -99,7 +99,7 @@ class Child:
                 more = message.pop("more", False)
                 yield message, columns
         except (EOFError, OSError) as error:
-            raise Ended(self._why(request)) from error
+            raise ChildEnded(self._why(request)) from error
 
     @contextmanager
     def _within(self, seconds: float) -> Iterator[None]:
@@ -120,11 +120,11 @@ class Child:
         if self.late:
             return f"takes more than {request['seconds']:.0f} s"
         if code == -OUT_OF_TIME:
-            return f"takes more than {request['cpu']:.0f} s of computing"
-        return f"ends the process that does so ({f'signal {-code}' if code < 0 else f'code {code}'})"
+            return f"takes more than {request['cpu']:.0f} s of CPU time"
+        return f"crashes the reader process ({f'signal {-code}' if code < 0 else f'code {code}'})"
 
     def close(self) -> None:
-        """End the process, if it is ours: one that was forked off knows children that are not."""
+        """End the process if this process started it: after a fork, the parent's children are listed here, too."""
         if self.owner != os.getpid():
             self.process.returncode = 0
             return
@@ -140,14 +140,14 @@ _waiting: list[Child] = []
 
 @contextmanager
 def child() -> Iterator[Child]:
-    """A child for one request; it is kept for the next one where it answered all of this one."""
+    """Provide a child for one request, and keep it for the next one if it answered completely."""
     taken = _taken()
     whole = False
     try:
         yield taken
         whole = True
     finally:
-        if whole and len(_waiting) < KEPT:
+        if whole and len(_waiting) < MAX_WAITING:
             _waiting.append(taken)
         else:
             taken.close()
@@ -166,14 +166,14 @@ def _taken() -> Child:
 
 @atexit.register
 def close_all() -> None:
-    """End the children that wait."""
+    """End the waiting children."""
     while _waiting:
         _waiting.pop().close()
 
 
 @contextmanager
 def uninterrupted() -> Iterator[None]:
-    """Start processes that Ctrl-C passes over, which a terminal sends to all: their parent ends them."""
+    """Start processes that ignore Ctrl-C, which a terminal sends to all: their parent ends them."""
     if sys.platform == "win32":
         yield
         return
@@ -185,10 +185,10 @@ def uninterrupted() -> Iterator[None]:
 
 
 def end_with_parent() -> None:
-    """Have the system end this process with the one that started it, which only Linux can.
+    """Have the system end this process when its parent ends; only Linux can.
 
-    Unlike a thread that waits for the end of the other process, this needs no turn of the interpreter, for which a
-    thread waits as long as others compile or import.
+    A thread that waits for the end of the parent would need the interpreter, which other threads hold while they
+    compile or import.
     """
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)

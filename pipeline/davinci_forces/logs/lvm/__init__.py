@@ -1,4 +1,4 @@
-"""LabVIEW measurement files (LVM), the text that LabVIEW writes with headers."""
+"""LabVIEW measurement files (LVM): text with headers."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -6,18 +6,18 @@ from pathlib import Path
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.lines import MARKS, Lines
-from davinci_forces.logs.log import Block, Channel, Clock, Log, Options, ahead, unique
+from davinci_forces.logs.log import Block, Channel, Clock, Log, Options, read_ahead, unique
 from davinci_forces.logs.lvm.header import FOR_PEOPLE, MAGIC, BadHeader, Layout, X
 from davinci_forces.logs.lvm.rows import Reading
 from davinci_forces.logs.lvm.walk import Run, Walk
 from davinci_forces.logs.timeline import OwnClock, equal_columns
 
-ROUNDING = 0.5e-6  # [s] LabVIEW writes six decimals
-NOTICED = 1e-4
+STEP_ROUNDING = 0.5e-6  # [s] LabVIEW writes six decimals
+MIN_CLOCK_ERROR = 1e-4  # relative, from which on it is reported
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether the file begins with LabVIEW's magic words."""
+    """Whether the file begins with the words `LabVIEW Measurement`."""
     for mark, encoding in MARKS.items():
         if head.startswith(mark):
             head = head[: len(head) // 4 * 4].decode(encoding, "ignore").lstrip("\ufeff").encode()
@@ -25,12 +25,12 @@ def recognises(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, options: Options) -> Log:
-    """Open the file: its headers, wherever they stand, say what the log holds.
+    """Open the file, and find all headers in it.
 
     Raises
     ------
     BadLog
-        If a header is missing, is not ended, or contradicts itself.
+        If a header is missing, has no end, or contradicts itself.
     """
     lines, walk = Lines(path, options.encoding), Walk(options.encoding, lambda _: None)
     try:
@@ -45,37 +45,38 @@ def read(path: Path, options: Options) -> Log:
 
 def _opened(path: Path, options: Options, walk: Walk) -> "LvmLog":
     layouts = list(walk.met.values())
-    one = layouts[0]
+    first = layouts[0]
     units: dict[str, str] = {}
-    for each in layouts:
-        units |= {name: unit for name, unit in zip(each.names, each.units, strict=True) if name and not units.get(name)}
-    extra = range(one.width, max(walk.wide, default=0))
+    for layout in layouts:
+        pairs = zip(layout.names, layout.units, strict=True)
+        units |= {name: unit for name, unit in pairs if name and not units.get(name)}
+    extra = range(first.width, max(walk.wide, default=0))
     written = [Channel(name, unit) for name, unit in units.items()] + [Channel(f"column_{i}") for i in extra]
     names = [channel.name for channel in written]
-    has_x = any(each.file.x_columns != "No" for each in layouts)
-    dated = walk.file_segments > 1 and one.start is not None
+    has_x = any(layout.file.x_columns != "No" for layout in layouts)
+    dated = walk.file_segments > 1 and first.start is not None
     derived = unique(("write", "elapsed"), names)[: 1 + dated]
-    clock = None if has_x or dated or one.step is None else Clock(one.step, one.x0)
-    warnings = [_rounded(one)] if clock and _rounded(one) else []
-    made = (Channel(name, "s" * (i == 1), derived=True) for i, name in enumerate(derived))
+    clock = None if has_x or dated or first.step is None else Clock(first.step, first.x0)
+    warnings = [_rounded(first)] if clock and _rounded(first) else []
+    new = (Channel(name, "s" * (i == 1), derived=True) for i, name in enumerate(derived))
     log = LvmLog(
-        path, "lvm", channels=(*written, *made), clock=clock, time=derived[1] if dated else X if has_x else "",
-        started=one.started, zone="local" if one.started else "", facts=_facts(one, walk), warnings=warnings,
+        path, "lvm", channels=(*written, *new), clock=clock, time=derived[1] if dated else X if has_x else "",
+        started=first.started, zone="local" if first.started else "", facts=_facts(first, walk), warnings=warnings,
         options=options,
     )  # fmt: skip
     log.clocks = _own_clocks(log, walk, layouts)
-    of = {name: own.time for own in log.clocks for name in (*own.channels, own.x)}
-    times = (Channel(own.time, "s", "time", derived=True, time=own.time) for own in log.clocks)
-    log.channels = (*(replace(c, time=of.get(c.name, "")) for c in log.channels), *times)
+    time_of = {name: c.time for c in log.clocks for name in (*c.channels, c.x)}
+    times = (Channel(c.time, "s", "time", derived=True, time=c.time) for c in log.clocks)
+    log.channels = (*(replace(c, time=time_of.get(c.name, "")) for c in log.channels), *times)
     return log
 
 
 def _own_clocks(log: "LvmLog", walk: Walk, layouts: Sequence[Layout]) -> tuple[OwnClock, ...]:
-    """The clocks of channels that were not sampled with the first."""
+    """Find the clocks of channels that were not sampled with the first channel."""
     x_of = {
-        name: each.names[i - 1]
-        for each in layouts if each.file.x_columns == "Multi"
-        for i, name in enumerate(each.names) if i % 2
+        name: layout.names[i - 1]
+        for layout in layouts if layout.file.x_columns == "Multi"
+        for i, name in enumerate(layout.names) if i % 2
     }  # fmt: skip
     groups = walk.groups
     if len(columns := [*dict.fromkeys(x_of.values())]) > 1:
@@ -88,49 +89,49 @@ def _own_clocks(log: "LvmLog", walk: Walk, layouts: Sequence[Layout]) -> tuple[O
                 parts.setdefault((i, number.get(x_of.get(name, ""), -1)), []).append(name)
         groups = [*parts.values()]
     taken = [channel.name for channel in log.channels]
-    others = [group for group in groups if layouts[0].measured not in group]
+    others = [group for group in groups if layouts[0].first_channel not in group]
     times = unique([f"time of {group[0]}" for group in others], taken)
     return tuple(
         OwnClock(time, tuple(group), x_of.get(group[0], "")) for time, group in zip(times, others, strict=True)
     )
 
 
-def _rounded(one: Layout) -> str:
-    """What to say of a sampling interval that lost digits when it was written: 1/2048 s becomes 0.000488."""
-    step, fixed = one.step or 0.0, "E" not in one.step_written.upper()
+def _rounded(layout: Layout) -> str:
+    """Warn of a sampling interval that lost digits when it was written, as 1/2048 s becomes 0.000488; else ""."""
+    step, fixed = layout.step or 0.0, "E" not in layout.step_written.upper()
     whole_rate = step > 0 and abs(1 / step - round(1 / step)) < 1e-6 / step
-    if not fixed or whole_rate or step <= 0 or ROUNDING / step < NOTICED:
+    if not fixed or whole_rate or step <= 0 or STEP_ROUNDING / step < MIN_CLOCK_ERROR:
         return ""
     return (
-        f"line {one.line}: the interval of {one.step_written} s is rounded, the clock may be wrong by "
-        f"{ROUNDING / step:.2%}; say rate = ... [Hz] for this log in study.toml"
+        f"line {layout.line}: the sampling interval of {layout.step_written} s is rounded, so the clock may be "
+        f"wrong by {STEP_ROUNDING / step:.2%}; set rate = ... [Hz] for this log in study.toml"
     )
 
 
-def _facts(one: Layout, walk: Walk) -> dict[str, str]:
-    tags = {tag: one.file.tags[tag] for tag in FOR_PEOPLE if one.file.tags.get(tag)}
-    delimiter = {b"\t": "tab", b",": "comma", b";": "semicolon"}.get(one.file.separator, one.file.separator.decode())
-    return tags | {"delimiter": delimiter, "X_Columns": one.file.x_columns, "segments": str(walk.file_segments)}
+def _facts(layout: Layout, walk: Walk) -> dict[str, str]:
+    tags = {tag: layout.file.tags[tag] for tag in FOR_PEOPLE if layout.file.tags.get(tag)}
+    separator = layout.file.separator
+    delimiter = {b"\t": "tab", b",": "comma", b";": "semicolon"}.get(separator, separator.decode())
+    return tags | {"delimiter": delimiter, "X_Columns": layout.file.x_columns, "segments": str(walk.file_segments)}
 
 
 @dataclass
 class LvmLog(Log):
     """An opened LVM file.
 
-    Besides the channels of the file it has `write`, which counts from 1 the writes that the rows came in, as far as
-    they can be told apart (a new header, a blank line, an x that goes back or stands still); and, where several
-    file segments have a date, `elapsed`: the time since the start of the first, from the start of the row's own file
-    segment and its x.
+    It has two derived channels.  `write` numbers, from 1, the write of each row: a new write begins at a new header, at
+    a blank line, or where x does not increase.  `elapsed` exists if several file segments have a date.  It is the time
+    since the start of the first one: the start of the row's file segment plus x.
     """
 
     options: Options = field(default_factory=Options)
-    clocks: tuple[OwnClock, ...] = ()  # of channels that were not sampled with the first
+    clocks: tuple[OwnClock, ...] = ()  # of channels that were not sampled with the first channel
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, as `Log.blocks` says.
 
-        Where channels have clocks of their own, rows that hold nothing of theirs are none.
+        If channels have several clocks, rows without a sample on this clock are skipped.
         """
         self._start_anew(names, kinds=("number", "time"))
         [clock] = self.by_clock(names) or [""]
-        yield from ahead(Reading(self, self.options.encoding, tuple(names), self.clocks, clock).blocks())
+        yield from read_ahead(Reading(self, self.options.encoding, tuple(names), self.clocks, clock).blocks())

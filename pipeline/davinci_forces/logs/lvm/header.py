@@ -1,4 +1,4 @@
-"""The two headers of a LabVIEW measurement file: of the file, and of each file segment in it."""
+"""Parse the two headers of a LabVIEW measurement file: of the file, and of each file segment."""
 
 import re
 from collections.abc import Sequence
@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 from decimal import Decimal
 
-from davinci_forces.logs.lines import decoded
+from davinci_forces.logs.lines import decode
 from davinci_forces.logs.log import unique
 from davinci_forces.logs.timeline import Sampling
 
@@ -14,32 +14,32 @@ MAGIC = b"LabVIEW Measurement"
 END = b"***End_of_Header***"
 X = "X_Value"
 SEPARATOR = re.compile(rb"Separator(.)(.*)", re.DOTALL)
-DATE = re.compile(r"(\d{4})/(\d\d?)/(\d\d?)")
-TIME = re.compile(r"(\d\d?):(\d\d):(\d\d)(?:[.,](\d+))?")
+DATE_CELL = re.compile(r"(\d{4})/(\d\d?)/(\d\d?)")
+TIME_CELL = re.compile(r"(\d\d?):(\d\d):(\d\d)(?:[.,](\d+))?")
 FOR_PEOPLE = ("Operator", "Project", "Description", "Writer_Version", "Time_Pref")
 
 
 class BadHeader(ValueError):
-    """A header that cannot be read past; says what is wrong without the place."""
+    """A header that makes the file unreadable; the message omits the place."""
 
 
 @dataclass(frozen=True)
 class FileHeader:
-    """What stands at the head of a file, and again wherever a later session appended to it."""
+    """The header of a file; it is repeated where a later session appended to the file."""
 
     separator: bytes = b"\t"
     decimal: str = ""
     x_columns: str = "One"  # "No", "One" or "Multi"
-    several: bool = False  # every write is a file segment with a header of its own
+    several: bool = False  # every write is a file segment with a header
     tags: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Layout:
-    """What the cells of a file segment's rows are.  Column 0 is x, or empty where the rows have none."""
+    """The columns of the rows of a file segment.  Column 0 is x, or empty without an x."""
 
     file: FileHeader
-    names: tuple[str, ...]  # of every column of a row, unique; "" for one that holds nothing
+    names: tuple[str, ...]  # of every column of a row, unique; "" for an empty one
     units: tuple[str, ...]  # of every column
     line: int  # of the column line
     samples: int | None = None  # per channel, as the header says
@@ -49,37 +49,37 @@ class Layout:
     step: float | None = None
     step_written: str = ""
     sampled: tuple[Sampling | None, ...] = ()  # of every column that is measured
-    remarks: tuple[str, ...] = ()  # what is wrong with the header, and what was done
+    remarks: tuple[str, ...] = ()  # what is wrong in the header, and what was done
     notes: str = ""
 
     @property
     def width(self) -> int:
-        """Cells of a row without a comment."""
+        """Number of cells of a row without a comment."""
         return len(self.names)
 
     @property
-    def measured(self) -> str:
+    def first_channel(self) -> str:
         """The first channel, whose x stands in column 0; "" where there is none."""
         return next(iter(self.sampling), "")
 
     @property
     def first_sampling(self) -> Sampling:
-        """What the header says of when the first channel was sampled."""
-        return self.sampling.get(self.measured) or Sampling(self.start, self.x0, self.step or 0.0)
+        """The sampling of the first channel as the header states it."""
+        return self.sampling.get(self.first_channel) or Sampling(self.start, self.x0, self.step or 0.0)
 
     @property
     def sampling(self) -> dict[str, Sampling]:
-        """What the header says of when each channel was sampled."""
-        return {name: one for name, one in zip(self.names, self.sampled, strict=True) if one}
+        """The sampling of each channel as the header states it."""
+        return {name: sampling for name, sampling in zip(self.names, self.sampled, strict=True) if sampling}
 
-    def is_like(self, other: "Layout") -> bool:
-        """Whether rows of both have the same columns."""
-        own, its = self.file, other.file
-        return (self.names, own.separator, own.x_columns) == (other.names, its.separator, its.x_columns)
+    def is_like(self, layout: "Layout") -> bool:
+        """Whether the rows of both have the same columns."""
+        mine, theirs = self.file, layout.file
+        return (self.names, mine.separator, mine.x_columns) == (layout.names, theirs.separator, theirs.x_columns)
 
 
 def file_header(lines: Sequence[bytes], encoding: str | None) -> FileHeader:
-    """Parse the lines from the magic one up to the end of the header.
+    """Parse the header of a file, from its first line.
 
     Raises
     ------
@@ -89,9 +89,9 @@ def file_header(lines: Sequence[bytes], encoding: str | None) -> FileHeader:
     separator = _separator(lines)
     if not separator.isascii() or separator.isalnum() or separator in b"+-*":
         raise BadHeader(
-            f"the separator is {decoded(separator, encoding)!r}, which cannot part numbers; export with tabs"
+            f"the separator is {decode(separator, encoding)!r}, which cannot separate numbers; export with tabs"
         )
-    cells = [decoded(line, encoding).split(separator.decode()) for line in lines[1:]]
+    cells = [decode(line, encoding).split(separator.decode()) for line in lines[1:]]
     tags = {row[0].strip(): row[1].strip() for row in cells if len(row) > 1 and row[0].strip() not in ("", "Separator")}
     decimal = tags.get("Decimal_Separator", "")
     if not decimal and any(line.startswith(b"Decimal_Separator" + separator * 2) for line in lines):
@@ -106,16 +106,16 @@ def file_header(lines: Sequence[bytes], encoding: str | None) -> FileHeader:
 
 
 def layout(lines: Sequence[bytes], columns: bytes, file: FileHeader, line: int, encoding: str | None) -> Layout:
-    """What a file segment's header and its column line say.
+    """Parse the header of a file segment and its column line.
 
     Raises
     ------
     BadHeader
-        If the column line is missing, or x is a frequency.
+        If the column line is missing, or x is not time.
     """
     separator = file.separator.decode()
     tags = _tags(lines, separator, encoding)
-    names, remarks = _names(decoded(columns, encoding).split(separator), file, line)
+    names, remarks = _names(decode(columns, encoding).split(separator), file, line)
     measured = [i for i in range(len(names)) if names[i] and not _is_x(i, file)]
     _check(tags, len(measured), line, remarks)
     units = [""] * len(names)
@@ -136,42 +136,42 @@ def layout(lines: Sequence[bytes], columns: bytes, file: FileHeader, line: int, 
     )  # fmt: skip
 
 
-def dated(like: Layout, lines: Sequence[bytes], line: int, encoding: str | None) -> Layout:
-    """The layout of a file segment whose header differs in its date only."""
+def with_date(like: Layout, lines: Sequence[bytes], line: int, encoding: str | None) -> Layout:
+    """Derive the layout of a file segment whose header differs only in its date."""
     tags = _tags([text for text in lines if text[:4] in (b"Date", b"Time")], like.file.separator.decode(), encoding)
     start, started = _started(tags, like.file)
     starts = _starts(tags, len(like.names), start)
-    sampled = (one and replace(one, start=its) for one, its in zip(like.sampled, starts, strict=True))
+    sampled = (s and replace(s, start=column_start) for s, column_start in zip(like.sampled, starts, strict=True))
     return replace(like, line=line, start=start, started=started, sampled=tuple(sampled))
 
 
 def _sampled(
     tags: dict[str, list[str]], measured: Sequence[int], columns: int, start: Decimal | None, file: FileHeader
 ) -> tuple[Sampling | None, ...]:
-    """By column, what is said of it; a cell that is missing says what the first one does."""
+    """Parse the sampling of each column; a missing cell has the value of the first one."""
     starts = _starts(tags, columns, start)
     x0, step = ([_cell(tags, tag, i) or _first(tags, tag) for i in range(columns)] for tag in ("X0", "Delta_X"))
-    sampled = (i for i in measured if _cell(tags, "Samples", i) != "0")  # else nobody knows what they say
-    said = {i: Sampling(starts[i], _number(x0[i]) or 0.0, _number(step[i]) or 0.0) for i in sampled}
-    return tuple(said.get(i) for i in range(columns))
+    sampled = (i for i in measured if _cell(tags, "Samples", i) != "0")  # without samples the other cells mean nothing
+    samplings = {i: Sampling(starts[i], _number(x0[i]) or 0.0, _number(step[i]) or 0.0) for i in sampled}
+    return tuple(samplings.get(i) for i in range(columns))
 
 
 def _starts(tags: dict[str, list[str]], columns: int, start: Decimal | None) -> list[Decimal | None]:
     dates, times = tags.get("Date", []), tags.get("Time", [])
     if len({*dates} - {""}) <= 1 and len({*times} - {""}) <= 1:
         return [start] * columns
-    own = (_start(_cell(tags, "Date", i), _cell(tags, "Time", i))[0] for i in range(columns))
-    return [start if one is None else one for one in own]
+    column_starts = (_start(_cell(tags, "Date", i), _cell(tags, "Time", i))[0] for i in range(columns))
+    return [start if column_start is None else column_start for column_start in column_starts]
 
 
 def _cell(tags: dict[str, list[str]], tag: str, column: int) -> str:
-    """What a header says under a tag of one column of a row."""
+    """Return the cell of a tag for one column of a row, or ""."""
     cells = tags.get(tag, [])
     return cells[column - 1] if 0 < column <= len(cells) else ""
 
 
 def _tags(lines: Sequence[bytes], separator: str, encoding: str | None) -> dict[str, list[str]]:
-    rows = [decoded(text, encoding).split(separator) for text in lines]
+    rows = [decode(text, encoding).split(separator) for text in lines]
     return {row[0].strip(): [cell.strip() for cell in row[1:]] for row in rows if row[0].strip()}
 
 
@@ -180,10 +180,10 @@ def _started(tags: dict[str, list[str]], file: FileHeader) -> tuple[Decimal | No
     return (start, started) if started else _start(file.tags.get("Date", ""), file.tags.get("Time", ""))
 
 
-def unescaped(comment: bytes, encoding: str | None) -> str:
-    r"""A comment as it was typed: LabVIEW writes `\\` for a backslash and `\0A` for a control character."""
-    one = re.compile(r"\\(\\|[0-9A-Fa-f]{2})")
-    return one.sub(lambda m: "\\" if m[1] == "\\" else chr(int(m[1], 16)), decoded(comment, encoding)).strip()
+def unescape(comment: bytes, encoding: str | None) -> str:
+    r"""Restore a comment as it was typed: LabVIEW writes `\\` for a backslash and `\0A` for a control character."""
+    escape = re.compile(r"\\(\\|[0-9A-Fa-f]{2})")
+    return escape.sub(lambda m: "\\" if m[1] == "\\" else chr(int(m[1], 16)), decode(comment, encoding)).strip()
 
 
 def _separator(lines: Sequence[bytes]) -> bytes:
@@ -198,7 +198,7 @@ def _is_x(column: int, file: FileHeader) -> bool:
 
 
 def _names(cells: list[str], file: FileHeader, line: int) -> tuple[list[str], list[str]]:
-    """Names of the columns of a row, and remarks on those that had to be changed."""
+    """Parse the names of the columns of a row; returns remarks on changed names, too."""
     cells = [cell.strip() for cell in cells]
     while cells and not cells[-1]:
         cells.pop()
@@ -206,25 +206,25 @@ def _names(cells: list[str], file: FileHeader, line: int) -> tuple[list[str], li
         cells.pop()
     if not cells or (cells[0] != X and any(_number(cell) is not None for cell in cells)):
         raise BadHeader(f"the column line, which names the channels and begins with {X}, is missing")
-    made = list(unique([X if _is_x(i, file) else cell for i, cell in enumerate(cells)]))
+    names = list(unique([X if _is_x(i, file) else cell for i, cell in enumerate(cells)]))
     remarks = [
-        f"line {line}: channel {i} is called {cell!r} like another, or not at all; it is read as {name!r}"
-        for i, (cell, name) in enumerate(zip(cells, made, strict=True))
+        f"line {line}: channel {i} has no name, or that of another ({cell!r}); it is read as {name!r}"
+        for i, (cell, name) in enumerate(zip(cells, names, strict=True))
         if name != cell and not _is_x(i, file)
     ]
     if file.x_columns == "No":
-        made[0] = ""
-    return made, remarks
+        names[0] = ""
+    return names, remarks
 
 
 def _check(tags: dict[str, list[str]], channels: int, line: int, remarks: list[str]) -> None:
     dimension = _first(tags, "X_Dimension") or "Time"
     if dimension != "Time":
-        raise BadHeader(f"the x axis is {dimension}, not time: this is no recording over time; choose another file")
+        raise BadHeader(f"the x axis is {dimension}, not time; this is not a recording over time: choose another file")
     stated = _first(tags, "Channels")
     if stated.isdecimal() and int(stated) != channels:
         remarks.append(
-            f"line {line}: the header says {stated} channels, the column line names {channels}, which are read"
+            f"line {line}: the header states {stated} channels, but the column line names {channels}; those are read"
         )
 
 
@@ -240,8 +240,8 @@ def _number(cell: str) -> float | None:
 
 
 def _start(date: str, time: str) -> tuple[Decimal | None, str]:
-    """Seconds, exact to the last written digit, and the same in ISO 8601 without a zone."""
-    day, clock = DATE.fullmatch(date), TIME.fullmatch(time)
+    """Parse a start to seconds since the year 1, exact to the last written digit, and to ISO 8601 without a zone."""
+    day, clock = DATE_CELL.fullmatch(date), TIME_CELL.fullmatch(time)
     if not day or not clock:
         return None, ""
     try:

@@ -1,4 +1,4 @@
-"""One pass over the rows of a LabVIEW measurement file: numbers, the numbers of the writes, and what is odd."""
+"""Read the rows of a LabVIEW measurement file in one pass: samples, numbers of the writes, and warnings."""
 
 import re
 from collections import Counter
@@ -9,30 +9,30 @@ from numpy.typing import NDArray
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.cells import UNREADABLE, Cells, NotANumber, marks, parse_carefully, parse_either
-from davinci_forces.logs.lines import Lines, decoded
+from davinci_forces.logs.lines import Lines, decode
 from davinci_forces.logs.log import Block, Log
-from davinci_forces.logs.lvm.header import BadHeader, Layout, X, unescaped
+from davinci_forces.logs.lvm.header import BadHeader, Layout, X, unescape
 from davinci_forces.logs.lvm.walk import WRITTEN, Run, Walk
 from davinci_forces.logs.text.stamps import REMARK, clocks_may_change
 from davinci_forces.logs.timeline import OwnClock, Sampling
 from davinci_forces.maths.arrays import Array, Booleans
 
-DATED = 1e9  # [s] an x beyond this counts from 1904, not from the start of the file segment
-MOST_COMMENTS = 1000
-MOST = 5  # of a kind that are told one by one
-NUMBERS = re.compile(r"\d+")
+MIN_ABSOLUTE_X = 1e9  # [s] an x above this counts from 1904, not from the start of the file segment
+MAX_COMMENTS = 1000
+MAX_REMARKS_OF_A_KIND = 5  # that differ in numbers only; the others are counted
+DIGITS = re.compile(r"\d+")
 
 
 class Reading:
-    """A pass over the file; what it notices goes into the log."""
+    """A pass over the file; its warnings and counts go into the log."""
 
     def __init__(
         self, log: Log, encoding: str | None, names: tuple[str, ...], clocks: Sequence[OwnClock] = (), clock: str = ""
     ) -> None:
         self.log, self.names, self.encoding = log, names, encoding
         self.derived = [channel.name for channel in log.channels if channel.derived and channel.kind != "time"]
-        self.own = next((own for own in clocks if own.time == clock), None)
-        others = {name for own in clocks for name in (*own.channels, own.x)}
+        self.own = next((c for c in clocks if c.time == clock), None)
+        others = {name for c in clocks for name in (*c.channels, c.x)}
         written = [c.name for c in log.channels if not c.derived and not c.name.startswith(X)]
         first = tuple(name for name in written if name not in others) if others else ()
         self.together = (*self.own.channels, self.own.x) if self.own else first  # one of them has a sample in a row
@@ -51,7 +51,7 @@ class Reading:
         Raises
         ------
         BadLog
-            At a cell that is no number, or a header that cannot be read past.
+            At a cell that is not a number, or a header that makes the file unreadable.
         """
         try:
             for block in self.lines.blocks():
@@ -63,7 +63,7 @@ class Reading:
         self._close()
 
     def _at_once(self, run: Run, lines: int) -> Cells | None:
-        """The cells of a run, or None where it is not whole: the tag of a header, in column 0, is no number."""
+        """Parse the cells of a run, or return None if it is no run: a header's tag in column 0 is not a number."""
         separator, text = run.layout.file.separator, run.width - 1 if run.commented else -1
         if run.commented and len(marks(run.block, separator)) > 1:
             return None
@@ -82,11 +82,11 @@ class Reading:
         try:
             return parse_carefully(run.block, run.width, run.layout.file.separator, self._columns(run))
         except NotANumber as bad:
-            text = decoded(bad.cell)
+            text = decode(bad.cell)
             shown = repr(text if len(text) <= 40 else f"{text[:37]}...")
             raise BadLog(
                 f"{self.log.path}:{run.line(bad.row)}: {shown} in column {bad.column} ({run.name(bad.column) or 'x'}) "
-                "is no number; correct the cell, or take the row out of the log"
+                "is not a number; correct the cell, or take the row out of the log"
             ) from None
 
     def _wanted(self, run: Run) -> dict[int, str]:
@@ -100,16 +100,16 @@ class Reading:
         return sorted({0, *self._wanted(run), *self._columns_of(run, self.together)})
 
     def _block(self, run: Run, cells: Cells) -> Block:
-        """The samples of a run, under the names of their channels."""
+        """Return the samples of a run by the names of their channels."""
         block: Block = {name: cells.columns[i] for i, name in self._wanted(run).items()}
         empty = {name: cells.empty[i] for i, name in self._wanted(run).items() if i in cells.empty}
         x = cells.columns[0] if run.layout.file.x_columns != "No" else None
         self.first = self.first or run.layout
         before = self.rows_in_segment if run.layout is self.file_segment else 0
-        elapsed = self._since_start(run, x, cells.rows, before, self.first.measured)
-        made = (self._writes(run, x, cells.rows), elapsed)
+        elapsed = self._since_start(run, x, cells.rows, before, self.first.first_channel)
+        derived = (self._writes(run, x, cells.rows), elapsed)
         self._look_at(run, cells.rows)
-        for name, values in zip(self.derived, made, strict=False):
+        for name, values in zip(self.derived, derived, strict=False):
             if name in self.names:
                 block[name] = values
         if self.own and self.own.time in self.names:
@@ -122,10 +122,10 @@ class Reading:
             block = {name: values[held] for name, values in block.items()}
             empty = {name: which[held] for name, which in empty.items()}
         nulls = {name: int(np.count_nonzero(which)) for name, which in empty.items()}
-        return self.log.tallied({name: block[name] for name in self.names}, nulls)
+        return self.log.count_nans({name: block[name] for name in self.names}, nulls)
 
     def _held(self, run: Run, cells: Cells) -> Booleans | None:
-        """Rows that hold a sample of the channels of this clock; None where all do."""
+        """Mask of the rows with a sample on this clock; None if all have one."""
         columns = self._columns_of(run, self.together)
         if not self.together or not all(i in cells.empty for i in columns):
             return None
@@ -134,26 +134,26 @@ class Reading:
             none &= cells.empty[i]
         return ~none
 
-    def _own_times(self, own: OwnClock, run: Run, cells: Cells, before: int) -> Array:
-        """Times of the channels that were not sampled with the first, since the start of the log [s]."""
-        column = next(iter(self._columns_of(run, [own.x])), None) if own.x else None
+    def _own_times(self, clock: OwnClock, run: Run, cells: Cells, before: int) -> Array:
+        """Compute the times [s] since the start of the log of channels on another clock than the first."""
+        column = next(iter(self._columns_of(run, [clock.x])), None) if clock.x else None
         x = None if column is None else cells.columns[column]
-        return self._since_start(run, x, cells.rows, before, own.channels[0])
+        return self._since_start(run, x, cells.rows, before, clock.channels[0])
 
     def _look_at(self, run: Run, rows: int) -> None:
-        """File segments, comments and decimal marks of a run."""
+        """Check the file segments, comments and decimal marks of a run."""
         ends = [*(row for row, _ in run.file_segments[1:]), rows]
         for (first, layout), end in zip(run.file_segments, ends, strict=True):
             if layout is not self.file_segment:
                 self._begin_segment(layout)
             self.rows_in_segment += end - first
-        for line, cell in run.comments[: MOST_COMMENTS - len(self.log.comments)]:
-            self.log.comments.append(f"line {line}: {unescaped(cell, self.encoding)}")
-        stated, written = run.layout.file.decimal, decoded(marks(run.block, run.layout.file.separator))
+        for line, cell in run.comments[: MAX_COMMENTS - len(self.log.comments)]:
+            self.log.comments.append(f"line {line}: {unescape(cell, self.encoding)}")
+        stated, written = run.layout.file.decimal, decode(marks(run.block, run.layout.file.separator))
         if not self.marked and not run.commented and (len(written) > 1 or (stated and written and written != stated)):
             self.marked = True
             self.say(
-                f"line {run.first}: the header's decimal mark is {stated or 'not given'!r}, cells have "
+                f"line {run.first}: the header's decimal mark is {stated or 'not given'!r}, but cells use "
                 f"{' and '.join(map(repr, written))}; each cell is read with its own"
             )
 
@@ -165,12 +165,12 @@ class Reading:
         self.file_segment, self.rows_in_segment = layout, 0
         assert self.first is not None
         if absent := sorted(set(self.first.names) - set(layout.names)):
-            self.say(f"line {layout.line}: from here on there is no {', '.join(absent)}: nulls")
+            self.say(f"line {layout.line}: from here on without {', '.join(absent)}, read as nulls")
         if layout.notes:
             self.say(f"line {layout.line}: the header notes: {layout.notes}")
 
     def _writes(self, run: Run, x: Array | None, rows: int) -> Array:
-        """Number of the write that each row came in: a new one begins where x does not go on."""
+        """Number the write of each row: a new write begins where x does not increase."""
         begins = np.zeros(rows, dtype=bool)
         if x is not None and rows:
             before = np.concatenate(([self.last_x], x[:-1]))
@@ -191,77 +191,78 @@ class Reading:
         self.back += len(rows)
 
     def _since_start(self, run: Run, x: Array | None, rows: int, before: int, channel: str) -> Array:
-        """Time since the start of the first file segment [s] by what the headers say of a channel.
+        """Compute the time [s] since the start of the first file segment, from the headers of a channel.
 
-        `before` rows of the run's first file segment came already.
+        `before` rows of the run's first file segment precede the run.
         """
         firsts = np.array([row for row, _ in run.file_segments])
         counts = np.diff(firsts, append=rows)
-        said = [layout.sampling.get(channel) or layout.first_sampling for _, layout in run.file_segments]
-        starts = [self._seconds_from_first(one) for one in said]
+        samplings = [layout.sampling.get(channel) or layout.first_sampling for _, layout in run.file_segments]
+        starts = [self._seconds_from_first(sampling) for sampling in samplings]
         if x is None:
-            x0, step = [one.x0 for one in said], [one.step for one in said]
+            x0, step = [sampling.x0 for sampling in samplings], [sampling.step for sampling in samplings]
             number = np.arange(rows) - np.repeat(firsts, counts)
             number[: counts[0]] += before
             x = np.repeat(x0, counts) + np.repeat(step, counts) * number
-        return np.where(np.abs(x) > DATED, x, x + np.repeat(starts, counts))
+        return np.where(np.abs(x) > MIN_ABSOLUTE_X, x, x + np.repeat(starts, counts))
 
-    def _seconds_from_first(self, one: Sampling) -> float:
-        """From the start of the log to that of a file segment [s]; NaN where one has no date."""
+    def _seconds_from_first(self, sampling: Sampling) -> float:
+        """Time from the start of the log to that of a file segment [s]; NaN if one has no date."""
         assert self.first is not None
-        return float(one.start - self.first.start) if one.start is not None and self.first.start is not None else np.nan
+        start, zero = sampling.start, self.first.start
+        return float(start - zero) if start is not None and zero is not None else np.nan
 
     def _check_samples(self) -> None:
-        """A header counts the samples of its write; without several headers, of the first write only."""
+        """Check the header's count of samples: of its write, or with a single header of the first write only."""
         if self.file_segment is None or self.file_segment.samples is None:
             return
         line, stated, rows = self.file_segment.line, self.file_segment.samples, self.rows_in_segment
         if rows < stated or (rows > stated and self.file_segment.file.several):
-            self.say(f"line {line}: the header says {stated} samples, {rows} rows follow; these are read")
+            self.say(f"line {line}: the header states {stated} samples, but {rows} rows follow; these are read")
 
     def _close(self) -> None:
-        """What is known only at the end of the file."""
+        """Add the warnings that are only known at the end of the file."""
         self._check_samples()
         walk, lines, say = self.walk, self.lines, self.say
         if self.rows and walk.layout is not self.file_segment:
-            say(f"line {walk.line}: the file ends behind the header of a file segment, which holds no rows")
+            say(f"line {walk.line}: the file ends after the header of a file segment, which holds no rows")
         if not self.rows:
-            say("the file holds headers and no rows: the recorder stopped before its first write")
+            say("the file holds headers but no rows: the recorder stopped before its first write")
         if self.back:
             again = f" (the first of {self.back} times)" if self.back > 1 else ""
             say(f"{self.went_back}{again}; the rows are kept, and the channel {self.derived[0]!r} numbers the writes")
         if walk.narrow:
-            say(f"line {walk.first_narrow}: the first of {walk.narrow} rows with too few cells, filled with nulls")
+            say(f"line {walk.first_narrow}: the first of {walk.narrow} rows with too few cells; missing ones are nulls")
         for cells, line in sorted(walk.wide.items()):
-            say(f"line {line}: rows of {cells} cells begin, more than the header names; see column_<number>")
+            say(f"line {line}: the first row of {cells} cells, more than the header names; see column_<number>")
         if lines.cut and self.walk.state == "row":
             self.log.dropped += 1
             say(f"line {lines.cut_at}: the file ends within this row, which is dropped")
         elif lines.cut:
             say(f"line {lines.cut_at}: the file ends within this line, which is not used")
         if lines.padding:
-            say(f"{lines.padding} NUL bytes at the end of the file, as a power cut leaves them, are not read")
+            say(f"{lines.padding} NUL bytes at the end of the file, typical of a power cut, are not read")
         if lines.damage:
             say(lines.damage)
         say.close()
 
 
 class Remarks:
-    """Adds to a list of warnings; those that differ in their numbers only are counted after the first few."""
+    """Collects warnings; after the first few that differ only in their numbers, the others are counted."""
 
     def __init__(self, warnings: list[str]) -> None:
         self.warnings = warnings
         self.kinds: Counter[str] = Counter()
 
     def __call__(self, remark: str) -> None:
-        """Remark on something."""
-        kind = NUMBERS.sub("#", remark)
+        """Add a warning."""
+        kind = DIGITS.sub("#", remark)
         self.kinds[kind] += 1
-        if self.kinds[kind] <= MOST:
+        if self.kinds[kind] <= MAX_REMARKS_OF_A_KIND:
             self.warnings.append(remark)
 
     def close(self) -> None:
-        """Say how many were not told."""
+        """Add how many warnings were not listed."""
         for kind, count in self.kinds.items():
-            if count > MOST:
-                self.warnings.append(f"{count - MOST} more times: {kind}")
+            if count > MAX_REMARKS_OF_A_KIND:
+                self.warnings.append(f"{count - MAX_REMARKS_OF_A_KIND} more times: {kind}")

@@ -1,7 +1,7 @@
-"""The lines of a LabVIEW measurement file, told apart: headers are parsed, rows are handed on in runs of one layout.
+"""Separate headers and rows of a LabVIEW measurement file: headers are parsed, rows form runs of one layout.
 
-A block whose rows all have the width of the layout is handed on as it is.  Any other block is taken line by line:
-comments are taken out of the rows, and rows are filled up to one width.
+A block whose rows all have the width of the layout is passed on as it is.  Any other block is read line by line:
+comments are removed from the rows, and rows are filled up to one width.
 """
 
 import re
@@ -13,12 +13,12 @@ import numpy as np
 
 from davinci_forces.logs.cells import NUMBER
 from davinci_forces.logs.lines import Block
-from davinci_forces.logs.lvm.header import END, MAGIC, BadHeader, FileHeader, Layout, X, dated, file_header, layout
-from davinci_forces.logs.timeline import refined
+from davinci_forces.logs.lvm.header import END, MAGIC, BadHeader, FileHeader, Layout, X, file_header, layout, with_date
+from davinci_forces.logs.timeline import refine_groups
 
 WRITTEN = re.compile(rb"-?\d+[.,]\d+(E[+-]?\d+)?|NaN|-?Inf")  # as LabVIEW writes a number: always with a fraction
-SMALL = 1 << 16  # [bytes] of a block that is taken line by line
-LONGEST_HEADER = 10_000  # lines
+LINEWISE_BYTES = 1 << 16  # [bytes] of a block that is read line by line
+MAX_HEADER_LINES = 10_000  # lines
 BEGINS_NUMBER = b"0123456789-+.,"
 TAGS = frozenset(
     b"Channels Samples Date Time X_Dimension X_Unit_Label Y_Dimension Y_Unit_Label X0 Delta_X Notes Test_Name "
@@ -34,24 +34,24 @@ class Run:
     width: int
     first: int  # line of its first row
     block: bytes = b""
-    commented: bool = False  # the last cell of every row is for a comment
+    commented: bool = False  # the last cell of every row may hold a comment
     lines: list[int] | None = None  # line of each row, where they are not consecutive
-    begins: list[int] = field(default_factory=list)  # rows at which a write begins, by what stands before them
+    begins: list[int] = field(default_factory=list)  # rows at which a write begins, by the lines before them
     comments: list[tuple[int, bytes]] = field(default_factory=list)  # with their lines
     file_segments: list[tuple[int, Layout]] = field(default_factory=list)  # the row that each begins at
 
     def line(self, row: int) -> int:
-        """The line that a row stands on."""
+        """Return the line of a row."""
         return self.lines[row] if self.lines is not None else self.first + row
 
     def name(self, column: int) -> str:
-        """The channel of a column; beyond the layout's, one of its number."""
+        """Return the channel of a column, or `column_<number>` for a column that the layout lacks."""
         return self.layout.names[column] if column < self.layout.width else f"column_{column}"
 
     def looks_whole(self, lines: int) -> bool | None:
-        """Whether the count of separators is that of so many rows, and no header ends in the block; None for no."""
+        """Whether the separators are those of so many rows and no header ends in the block; None if not."""
         separators = int(np.count_nonzero(np.frombuffer(self.block, np.uint8) == ord(self.layout.file.separator)))
-        headed = b"*" in self.block and END in self.block  # one letter is found far faster than a word
+        headed = b"*" in self.block and END in self.block  # one character is found far faster than a word
         return (separators == lines * (self.width - 1) and not headed) or None
 
 
@@ -60,7 +60,7 @@ Taken = TypeVar("Taken")
 
 @dataclass
 class Walk:
-    """Where in a file we are, and what was odd about its lines.  `say` is told of oddities as they come."""
+    """State of a pass over a file, and the problems of its lines; `say` is called with each warning."""
 
     encoding: str | None
     say: Callable[[str], None]
@@ -72,34 +72,34 @@ class Walk:
     file_segments: int = 0
     narrow: int = 0  # rows with too few cells
     first_narrow: int = 0  # line of the first of them
-    wide: dict[int, int] = field(default_factory=dict)  # cells of a row, where too many -> line of the first such row
+    wide: dict[int, int] = field(default_factory=dict)  # number of cells, if too many -> line of the first such row
     state: str = "before"
     _header: list[bytes] = field(default_factory=list)
     _begins: bool = True  # the next row begins a write
     _width: int = 0  # of the row before
-    _rowless: bool = False  # no row came yet since the last header
+    _rowless: bool = False  # no row since the last header
     _run: Run | None = None
     _rows: list[bytes] = field(default_factory=list)
     _done: list[Run] = field(default_factory=list)
     _like: tuple[bytes, ...] = ()  # the header of the file segment before, but for its date
 
     def runs(self, block: Block, take: Callable[[Run, int], Taken | None]) -> Iterator[tuple[Run, Taken | None]]:
-        """The runs of rows in a block of whole lines.
+        """Split a block of complete lines into runs of rows.
 
-        `take` is given what may be a run, and its number of lines, and returns None where it is not.  What it does not
-        take is halved, until only the lines around what is odd are taken one by one.
+        `take` is called with a possible run and its number of lines, and returns None if it is no run.  Such a block is
+        halved, until only the lines around the problem are read one by one.
 
         Raises
         ------
         BadHeader
-            If a header cannot be read past; `line` says where.
+            If a header makes the file unreadable; `line` says where.
         """
         run = self._whole(block)
         if run and (taken := take(run, block.lines)) is not None:
             self._begins, self._width, self._rowless = False, run.layout.width, False
             self.line = block.first + block.lines - 1
             yield run, taken
-        elif len(block.text) > SMALL and block.lines > 1:
+        elif len(block.text) > LINEWISE_BYTES and block.lines > 1:
             for half in block.halves():
                 yield from self.runs(half, take)
         else:
@@ -107,7 +107,7 @@ class Walk:
                 yield run, None
 
     def _whole(self, block: Block) -> Run | None:
-        """The block as one run, if its first line is a row with or without a comment."""
+        """Make the block one run, if its first line is a row with or without a comment."""
         if self.state != "row" or self.layout is None:
             return None
         first = block.text[: block.text.find(b"\n")]
@@ -129,12 +129,12 @@ class Walk:
             yield self._done.pop()
 
     def finish(self) -> None:
-        """The file has ended.
+        """Check that the file did not end within a header.
 
         Raises
         ------
         BadHeader
-            If it ended before any column line.
+            If the file ended before any column line.
         """
         if self.state == "row" or (self.state == "between" and self.layout):
             return
@@ -164,7 +164,7 @@ class Walk:
         if self._is_header(line, first):
             return self._headed(line, first)
         if self.layout and (not first or NUMBER.fullmatch(first)):
-            self.say(f"line {self.line}: rows go on after a blank line, without a header; they are read as before")
+            self.say(f"line {self.line}: rows continue after a blank line without a header; they are read as before")
             self._begins = True
             return self._row(line)
         return self._segment(line)
@@ -184,7 +184,7 @@ class Walk:
         self._header, self._begins, self._width, self._rowless = [], True, self.layout.width, True
         sampled = self.layout.sampling
         if self.layout.names not in self.met or len({*sampled.values()}) > 1:
-            self.groups = refined(self.groups, sampled, self.file.x_columns == "Multi")
+            self.groups = refine_groups(self.groups, sampled, self.file.x_columns == "Multi")
         self.met.setdefault(self.layout.names, self.layout)
         self.file_segments += 1
         for remark in self.layout.remarks:
@@ -192,11 +192,11 @@ class Walk:
         return "row"
 
     def _parsed(self, columns: bytes) -> Layout:
-        """The layout that the header says; parsed anew only where more than its date differs from the one before."""
+        """Return the layout of the header; it is parsed only if more than the date differs from the header before."""
         like = (columns, *(line for line in self._header if not line.startswith((b"Date", b"Time"))))
         before, self._like = self._like, like
         if self.layout and like == before and self.layout.file is self.file and not self.layout.remarks:
-            return dated(self.layout, self._header, self.line, self.encoding)
+            return with_date(self.layout, self._header, self.line, self.encoding)
         return layout(self._header, columns, self.file, self.line, self.encoding)
 
     def _row(self, line: bytes) -> str:
@@ -215,11 +215,11 @@ class Walk:
         return first in TAGS or first == X.encode() or line.startswith((MAGIC, b"***"))
 
     def _headed(self, line: bytes, first: bytes) -> str:
-        """The state in which the line after this one, which begins a header, is read."""
+        """Begin a header at this line, and return the state for the next line."""
         self._header = []
         if line.startswith(MAGIC):
             if self.layout:
-                self.say(f"line {self.line}: the file header stands here again: another session was appended")
+                self.say(f"line {self.line}: the file header is repeated: another session was appended")
             return self._before(line)
         if line.startswith(b"***Start_Special***"):
             return "special"
@@ -227,8 +227,8 @@ class Walk:
 
     def _collected(self, line: bytes, state: str) -> str:
         self._header.append(line)
-        if len(self._header) > LONGEST_HEADER:
-            raise BadHeader(f"no line {END.decode()} ends the header within {LONGEST_HEADER} lines")
+        if len(self._header) > MAX_HEADER_LINES:
+            raise BadHeader(f"no line {END.decode()} ends the header within {MAX_HEADER_LINES} lines")
         return state
 
     def _take(self, line: bytes, separator: bytes, layout: Layout) -> None:
@@ -250,7 +250,7 @@ class Walk:
         self._begins, self._width, self._rowless = False, cells, False
 
     def _fitted(self, line: bytes, cells: int, separator: bytes, layout: Layout, run: Run) -> tuple[bytes, int]:
-        """A row whose width is not the layout's, without trailing empty cells and its comment."""
+        """Remove trailing empty cells and the comment from a row whose width is not the layout's."""
         while cells > layout.width and line.endswith(separator):
             line, cells = line[: -len(separator)], cells - 1
         row, _, last = line.rpartition(separator)
@@ -265,7 +265,7 @@ class Walk:
         return line, cells
 
     def _comment_of_row_before(self, separator: bytes, run: Run) -> None:
-        """Where a write has a channel fewer, the comment of its first row stands under the last channel's name."""
+        """Move a comment out of the last channel: it stands there in the first row of a write with a channel fewer."""
         if not self._rows or not run.lines:
             return
         row, _, last = self._rows[-1].rpartition(separator)

@@ -1,4 +1,4 @@
-"""MATLAB's files: vectors, matrices and structs of them, of versions 4 to 7.2 and of 7.3, which is HDF5."""
+"""MATLAB files of versions 4 to 7.2, and of 7.3, which is HDF5: vectors, matrices and structs of them."""
 
 from pathlib import Path
 
@@ -8,12 +8,12 @@ from davinci_forces.logs.log import Log, Options
 
 
 def recognises(path: Path, head: bytes) -> bool:
-    """Whether the file says so, or is named so and is no text."""
+    """Whether the file begins with MATLAB's header, or has the suffix .mat and is not text."""
     return head.startswith(b"MATLAB ") or (path.suffix.lower() == ".mat" and b"\0" in head[:20])
 
 
 def read(path: Path, options: Options) -> Log:
-    """Open the file: list its variables.
+    """Open the file and list its variables.
 
     Raises
     ------

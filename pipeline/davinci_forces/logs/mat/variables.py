@@ -1,4 +1,4 @@
-"""The variables of a MATLAB file as arrays, read by scipy, or by h5py where it is of version 7.3."""
+"""Read the variables of a MATLAB file as arrays, with scipy, or with h5py for version 7.3."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
@@ -11,15 +11,14 @@ from scipy.io.matlab import MatlabFunction, MatlabOpaque
 
 from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
-from davinci_forces.logs.arrays import ArrayLog, Named, matlab_object, take_in
+from davinci_forces.logs.arrays import MAX_DEPTH, ArrayLog, NamedArray, matlab_object, take_in
 from davinci_forces.logs.log import Log, Options
 
-NUMBERS = {"double", "single", "logical", *(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))}
-DEEPEST = 20
-MOST_ELEMENTS = 1000  # of a struct array or a cell array
+NUMBER_CLASSES = {"double", "single", "logical", *(f"{sign}int{n}" for sign in ("", "u") for n in (8, 16, 32, 64))}
+MAX_ELEMENTS = 1000  # of a struct array or a cell array
 
 
-def opened(path: Path, options: Options) -> Log:
+def open_in_child(path: Path, options: Options) -> Log:
     """Open the file.
 
     Raises
@@ -30,18 +29,18 @@ def opened(path: Path, options: Options) -> Log:
     log = ArrayLog(path, "mat", ())
     with open_file(path) as file:
         head = file.read(128)
-    said = head[:116].split(b"\0")[0].decode("ascii", "replace").strip() if head.startswith(b"MATLAB") else ""
-    if said:
-        log.facts["header"] = said
-    arrays = list(_of_hdf5(path, log) if said.startswith("MATLAB 7.3") else _of_matlab(path, log))
-    take_in(log, timed(arrays, log.facts))
+    header = head[:116].split(b"\0")[0].decode("ascii", "replace").strip() if head.startswith(b"MATLAB") else ""
+    if header:
+        log.facts["header"] = header
+    arrays = list(_of_hdf5(path, log) if header.startswith("MATLAB 7.3") else _of_matlab(path, log))
+    take_in(log, with_clocks(arrays, log.facts))
     if not log.channels:
         names = ", ".join(array.name for array in arrays) or "nothing that is read"
         raise BadLog(f"{path}: it holds no variable of samples; it has {names}")
     return log
 
 
-def _of_hdf5(path: Path, log: Log) -> Iterator[Named]:
+def _of_hdf5(path: Path, log: Log) -> Iterator[NamedArray]:
     import h5py
 
     from davinci_forces.logs.hdf5.datasets import arrays_of
@@ -49,18 +48,18 @@ def _of_hdf5(path: Path, log: Log) -> Iterator[Named]:
     yield from arrays_of(h5py.File(path, "r", locking=False), log)
 
 
-def _of_matlab(path: Path, log: Log) -> Iterator[Named]:
+def _of_matlab(path: Path, log: Log) -> Iterator[NamedArray]:
     for name, shape, kind in whosmat(path, appendmat=False):
-        if kind in NUMBERS:
-            yield Named(name, Variable(path, name, shape))
+        if kind in NUMBER_CLASSES:
+            yield NamedArray(name, Variable(path, name, shape))
         else:
             value = loadmat(path, appendmat=False, variable_names=[name]).get(name)
-            yield from _arrays(name, value, DEEPEST, log)
+            yield from _arrays(name, value, MAX_DEPTH, log)
 
 
 @dataclass
 class Variable:
-    """A variable of numbers, which is read whole when a part of it is asked for, and then kept."""
+    """A variable of numbers, read completely at the first access and then kept."""
 
     path: Path
     name: str
@@ -69,11 +68,11 @@ class Variable:
 
     @property
     def dtype(self) -> np.dtype[Any]:
-        """Of its elements; only the values tell complex ones."""
+        """Type of its elements; complex ones are only known from the values."""
         return np.dtype(np.float64)
 
     def __getitem__(self, part: Any) -> Any:
-        """A part of it."""
+        """Read a part of it."""
         if not self.kept:
             self.kept.append(loadmat(self.path, appendmat=False, variable_names=[self.name])[self.name])
         values = self.kept[0]
@@ -83,35 +82,35 @@ class Variable:
         return values[part]
 
 
-def _arrays(name: str, value: Any, deep: int, log: Log) -> Iterator[Named]:
-    """The arrays of a struct or a cell, by their names in MATLAB."""
+def _arrays(name: str, value: Any, deep: int, log: Log) -> Iterator[NamedArray]:
+    """List the arrays of a struct or a cell, by their names in MATLAB."""
     if isinstance(value, MatlabOpaque | MatlabFunction) or not isinstance(value, np.ndarray):
         log.warnings.append(matlab_object(name))
     elif value.dtype.kind in "US":
         log.facts[name] = "".join(map(str, value.ravel()[:1]))[:200]
     elif value.dtype.names or value.dtype.kind == "O":
         cell, many = not value.dtype.names, value.size > 1
-        for number, element in enumerate(value.ravel(order="F")[:MOST_ELEMENTS] if deep else (), start=1):
+        for number, element in enumerate(value.ravel(order="F")[:MAX_ELEMENTS] if deep else (), start=1):
             called = f"{name}{{{number}}}" if cell else f"{name}({number})" if many else name
             fields = {called: element} if cell else {f"{called}/{key}": element[key] for key in value.dtype.names or ()}
             for key, inner in fields.items():
                 yield from _arrays(key, inner, deep - 1, log)
     elif value.size:
-        yield Named(name, value)
+        yield NamedArray(name, value)
 
 
-# How structs that MATLAB makes of a timeseries, and Simulink of what it logs, call their times and their values.
+# Names of times and values in structs that MATLAB makes of a timeseries, and Simulink of its logs.
 TIMED = (("/Time", ("/Data",)), ("/time", ("/signals/", "/signals(")))
 
 
-def timed(arrays: Sequence[Named], facts: dict[str, str]) -> list[Named]:
-    """The arrays, with the times of a timeseries or a log of Simulink as the clock of its values."""
+def with_clocks(arrays: Sequence[NamedArray], facts: dict[str, str]) -> list[NamedArray]:
+    """Make the times of a timeseries or of a Simulink log the clock of its values."""
     clock: dict[str, str] = {}
     for array in arrays:
         for ending, followed in TIMED:
             stem = array.name.removesuffix(ending)
             if stem != array.name and facts.get(f"{stem}/TimeInfo/Units", "seconds") == "seconds":
-                values = tuple(stem + each for each in followed)
+                values = tuple(stem + suffix for suffix in followed)
                 same = (a.name for a in arrays if a.name.startswith(values) and a.rows == array.rows)
                 clock |= dict.fromkeys(same, array.name)
     units = {a.name: facts.get(f"{a.name.removesuffix('/Data')}/DataInfo/Units", "") for a in arrays}

@@ -1,8 +1,8 @@
-"""A bag as a log: its topics as channels, with a clock each."""
+"""Read a bag as a log: the values of its topics as channels, with one clock per topic."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from datetime import UTC, datetime, timedelta
+from datetime import timedelta
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -12,10 +12,11 @@ import numpy as np
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.log import Block, Channel, Log, Options, unique
 from davinci_forces.logs.ros.storage import Bag
+from davinci_forces.logs.timeline import UNIX_EPOCH
 
 JOINTS = "sensor_msgs/msg/JointState"
-STATES = ("position", "velocity", "effort")  # of a joint, in SI: rad or m by the joint, which the message does not say
-# Messages with a header and vectors: what holds them, and their names with their units.
+STATES = ("position", "velocity", "effort")  # of a joint, in SI: rad or m, which the message does not say
+# Messages with a header and vectors: the field that holds them, their names and units.
 VECTORS = {
     "geometry_msgs/msg/WrenchStamped": ("wrench", {"force": "N", "torque": "N m"}),
     "geometry_msgs/msg/TwistStamped": ("twist", {"linear": "m/s", "angular": "rad/s"}),
@@ -23,18 +24,17 @@ VECTORS = {
     "geometry_msgs/msg/TransformStamped": ("transform", {"translation": "m", "rotation": ""}),
 }
 KNOWN = (JOINTS, *VECTORS)
-ROWS = 1 << 13  # messages of a block
-EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+BLOCK_MESSAGES = 1 << 13  # messages of a block
 
 
 class Unlike(ValueError):
-    """A message that is not like the first of its topic, with words for how."""
+    """A message that differs from the first of its topic; the text says how."""
 
 
 class Vectors:
     """Vectors and quaternions; `columns` are their components: "force.x"."""
 
-    names: Sequence[str] = ()  # of joints, which these have none of
+    names: Sequence[str] = ()  # of joints; vectors have none
 
     def __init__(self, kind: str, message: Any) -> None:
         self.holder, units = VECTORS[kind]
@@ -46,7 +46,7 @@ class Vectors:
         return getattr(message, self.holder)
 
     def numbers(self, message: Any) -> Sequence[float]:
-        """The components of one message."""
+        """Return the components of one message."""
         held = self._held(message)
         return [getattr(getattr(held, name), axis) for name, axis in self.paths]
 
@@ -58,17 +58,17 @@ class Joints:
         self.names: list[str] = list(first.name)
         self.counts = [len(getattr(first, state)) for state in STATES]
         if self.names and any(count not in (0, len(self.names)) for count in self.counts):
-            raise Unlike(f"names {len(self.names)} joints and has {self._counted(self.counts)}")
-        known = unique(self.names)
+            raise Unlike(f"names {len(self.names)} joints but has {self._counted(self.counts)}")
+        names = unique(self.names)
         self.columns = tuple(
-            Channel(f"{state}[{i}]", alias=f"{state}[{known[i]}]" if self.names else "")
+            Channel(f"{state}[{i}]", alias=f"{state}[{names[i]}]" if self.names else "")
             for state, count in zip(STATES, self.counts, strict=True)
             for i in range(count)
         )
         self.orders: dict[tuple[str, ...], list[int] | None] = {tuple(self.names): None}
 
     def numbers(self, message: Any) -> Sequence[float] | None:
-        """The states of one message, by name where its joints come in another order; None where it has none of them."""
+        """Return the states of one message in the order of the first one; None if it has none of the joints."""
         arrays = [getattr(message, state) for state in STATES]
         names = tuple(message.name)
         if names not in self.orders:
@@ -79,17 +79,17 @@ class Joints:
         for had, array in zip(self.counts, arrays, strict=True):
             if len(array) != (had and len(names)) and (names or len(array) != had):
                 counts = self._counted([len(array) for array in arrays])
-                raise Unlike(f"has {counts}, where the first one has {self._counted(self.counts)}")
+                raise Unlike(f"has {counts}, but the first message has {self._counted(self.counts)}")
         if order is None:
             return list(chain.from_iterable(arrays))
         return [array[i] for array in arrays if len(array) for i in order]
 
     def _order(self, names: tuple[str, ...]) -> list[int]:
-        """Where the joints of the first message are in another one."""
+        """Return the positions of the first message's joints in another message."""
         if missing := [name for name in self.names if name not in names]:
-            raise Unlike(f"lacks {', '.join(missing)}, which the first one has")
+            raise Unlike(f"lacks {', '.join(missing)}, which the first message has")
         if not self.names or len(set(self.names)) < len(self.names):
-            raise Unlike(f"is of {', '.join(names) or 'joints without names'}, where the first one is not")
+            raise Unlike(f"is of {', '.join(names) or 'joints without names'}, but the first message is not")
         return [names.index(name) for name in self.names]
 
     def _counted(self, counts: Sequence[int]) -> str:
@@ -103,39 +103,39 @@ class Topic:
     name: str  # "/PSM1/measured_js"
     connections: list[Any]
     layout: Vectors | Joints
-    stamped: bool  # whether headers say when, else only the recorder does
+    stamped: bool  # whether headers have time stamps; else only the recorder's times exist
     first: int  # [ns] since 1970
 
     @property
-    def stamp(self) -> str:
-        """The channel of the times that headers give."""
+    def stamp_channel(self) -> str:
+        """The channel of the time stamps in the headers."""
         return f"{self.name}/stamp"
 
     @property
-    def received(self) -> str:
-        """The channel of the times at which the recorder had the messages."""
+    def receipt_channel(self) -> str:
+        """The channel of the times at which the recorder received the messages."""
         return f"{self.name}/received"
 
     def channels(self, alone: bool) -> list[Channel]:
-        """Its clocks and its numbers; of the only topic of a bag they are by the log's own clock."""
-        times = [self.stamp, self.received]
+        """List its clocks and values; if it is the only topic, they are on the clock of the log."""
+        times = [self.stamp_channel, self.receipt_channel]
         clock = times[not self.stamped]
-        of = "" if alone else clock
+        time = "" if alone else clock
         clocks = [Channel(name, "s", "time", time="" if alone or name == clock else clock) for name in times]
         numbers = [
-            Channel(f"{self.name}/{c.name}", c.unit, time=of, alias=c.alias and f"{self.name}/{c.alias}")
+            Channel(f"{self.name}/{c.name}", c.unit, time=time, alias=c.alias and f"{self.name}/{c.alias}")
             for c in self.layout.columns
         ]
         return clocks + numbers
 
 
-def opened(path: Path, options: Options) -> Log:
+def open_in_child(path: Path, options: Options) -> Log:
     """Open the bag.
 
     Raises
     ------
     BadLog
-        If none of its topics is of a type that is read.
+        If none of its topics has a supported type.
     """
     bag = Bag(path)
     log = BagLog(path, "ros", (), zone="UTC", bag=bag)
@@ -143,28 +143,28 @@ def opened(path: Path, options: Options) -> Log:
     if not log.topics:
         there = ", ".join(f"{c.topic} ({_short(c.msgtype)})" for c in bag.connections[:12]) or "none"
         raise BadLog(
-            f"{path}: the bag has no message of a type that is read ({', '.join(map(_short, KNOWN))}); its topics are "
+            f"{path}: the bag has no message of a supported type ({', '.join(map(_short, KNOWN))}); its topics are "
             f"{there}"
         )
-    microseconds = min(topic.first for topic in log.topics) // 1000  # as fine as dates are written
+    microseconds = min(topic.first for topic in log.topics) // 1000  # the resolution of dates
     log.origin = microseconds * 1000
-    log.started = (EPOCH + timedelta(microseconds=microseconds)).replace(tzinfo=None).isoformat()
+    log.started = (UNIX_EPOCH + timedelta(microseconds=microseconds)).replace(tzinfo=None).isoformat()
     alone = len(log.topics) == 1
     log.channels = tuple(channel for topic in log.topics for channel in topic.channels(alone))
     if alone:
         [topic] = log.topics
-        log.time = topic.stamp if topic.stamped else topic.received
+        log.time = topic.stamp_channel if topic.stamped else topic.receipt_channel
     return log
 
 
 def _topics(log: Log, bag: Bag) -> list[Topic]:
-    """The topics that are read, by name; what the bag holds besides is a fact."""
+    """List the supported topics by name; other topics become a fact."""
     by_name: dict[tuple[str, str], list[Any]] = {}
     for connection in bag.connections:
         by_name.setdefault((f"/{connection.topic.strip('/')}", connection.msgtype), []).append(connection)
     topics: list[Topic] = []
     others: list[str] = []
-    for (name, kind), connections in sorted(by_name.items(), key=lambda each: each[0]):
+    for (name, kind), connections in sorted(by_name.items(), key=lambda item: item[0]):
         first = next(bag.messages(connections), None) if kind in KNOWN else None
         if first is None or any(topic.name == name for topic in topics):
             others.append(f"{name} ({_short(kind)})")
@@ -182,7 +182,7 @@ def _topic(log: Log, name: str, kind: str, connections: list[Any], received: int
         raise BadLog(f"{log.path}: message 0 of {name} {how}") from None
     stamped = _stamp(message) != 0
     if not stamped:
-        log.warnings.append(f"the headers of {name} carry no time: its clock is when the recorder had the messages")
+        log.warnings.append(f"the headers of {name} carry no time; its clock is when its messages were recorded")
     joints = ", ".join(layout.names)
     count = sum(connection.msgcount for connection in connections)
     log.facts[name] = f"{_short(kind)}, {count} messages" + (f", joints {joints}" if joints else "")
@@ -194,13 +194,13 @@ def _short(kind: str) -> str:
 
 
 def _stamp(message: Any) -> int:
-    """When a message was made [ns] since 1970."""
+    """Time stamp of a message [ns] since 1970."""
     return int(message.header.stamp.sec) * 10**9 + int(message.header.stamp.nanosec)
 
 
 @dataclass
 class BagLog(Log):
-    """An opened bag.  Times count from the first of all topics."""
+    """An opened bag.  Times count from the first message of all topics."""
 
     bag: Bag | None = None
     topics: list[Topic] = field(default_factory=list)
@@ -212,13 +212,13 @@ class BagLog(Log):
         if not names:
             return
         topic, columns = next(
-            (t, c) for t in self.topics if names[0] in (c := [each.name for each in t.channels(True)])
+            (t, c) for t in self.topics if names[0] in (c := [channel.name for channel in t.channels(True)])
         )
         where = [columns.index(name) for name in names]
         rows: list[list[float]] = []
         for row in self._rows(topic):
             rows.append(row)
-            if len(rows) == ROWS:
+            if len(rows) == BLOCK_MESSAGES:
                 yield self._block(names, where, rows)
                 rows = []
         if rows:
@@ -230,16 +230,16 @@ class BagLog(Log):
             try:
                 numbers = topic.layout.numbers(message)
             except Unlike as how:
-                raise BadLog(f"{self.path}: message {number} of {topic.name} {how}; record such joints apart") from None
+                raise BadLog(f"{self.path}: message {number} of {topic.name} {how}; record these separately") from None
             if numbers is None:
                 self.dropped += 1
                 if self.dropped == 1:
-                    others = f"message {number} of {topic.name} is of {', '.join(message.name)}"
-                    self.warnings.append(f"{others}, as may be others: such messages are left out; record them apart")
+                    others = f"message {number} of {topic.name} is of other joints ({', '.join(message.name)})"
+                    self.warnings.append(f"{others}; such messages are left out: record them on a separate topic")
                 continue
             yield [(_stamp(message) - self.origin) / 1e9, (received - self.origin) / 1e9, *numbers]
 
     def _block(self, names: Sequence[str], where: Sequence[int], rows: list[list[float]]) -> Block:
         table = np.array(rows, np.float64)
         columns = zip(names, where, strict=True)
-        return self.tallied({name: np.ascontiguousarray(table[:, column]) for name, column in columns})
+        return self.count_nans({name: np.ascontiguousarray(table[:, column]) for name, column in columns})

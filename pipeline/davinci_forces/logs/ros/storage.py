@@ -1,4 +1,4 @@
-"""The messages of a bag, of either ROS and in whichever storage, read by rosbags."""
+"""Read the messages of a bag of ROS 1 or 2, from any storage, with rosbags."""
 
 from collections.abc import Iterator, Sequence
 from functools import lru_cache
@@ -17,13 +17,13 @@ from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
 
 RULE = "=" * 80 + "\n"  # between definitions in IDL
-LITERAL = "/:"  # what of a path an address of SQLite may hold as it is
-PAGES = slice(28, 32)  # of a database's header: how many it has, and before that how large they are
-PAGE = slice(16, 18)
+LITERAL = "/:"  # characters of a path that an SQLite address may hold unquoted
+PAGES = slice(28, 32)  # bytes of a database's header with the number of pages
+PAGE = slice(16, 18)  # and with the size of a page
 
 
 class Database(Sqlite3Reader):  # type: ignore[misc]  # rosbags is not there for everybody who checks types
-    """A storage of SQLite, whose address rosbags makes of its path; `#` and `?` of a name would end it."""
+    """An SQLite storage with a quoted path: rosbags makes an address of it, which `#` or `?` in a name would end."""
 
     def __init__(self, path: Path) -> None:
         super().__init__(Path(quote(path.as_posix(), safe=LITERAL)))
@@ -52,11 +52,11 @@ class Bag:
 
     @property
     def connections(self) -> Sequence[Any]:
-        """Its topics with their types; in ROS 1 each publisher of one has its own."""
+        """Its topics with their types; in ROS 1 one connection per publisher."""
         return self.storage.connections  # type: ignore[no-any-return]
 
     def messages(self, connections: Sequence[Any]) -> Iterator[tuple[int, Any]]:
-        """When the recorder had each message [ns] since 1970, and the message."""
+        """Yield the time at which each message was received [ns] since 1970, and the message."""
         for connection, received, content in self.storage.messages(connections):
             types = _types(connection.msgdef, connection.msgtype, self.ros1)
             read = types.deserialize_ros1 if self.ros1 else types.deserialize_cdr
@@ -77,22 +77,22 @@ def _storage(path: Path, head: bytes) -> Any:
 
 
 def _require_pages(path: Path) -> None:
-    """Refuse a database without its last pages, which SQLite takes for zeros, or for an index that it does not need.
+    """Refuse a truncated database; SQLite would take the missing pages for zeros, or for an index it does not need.
 
     Raises
     ------
     BadLog
-        If it is cut.
+        If it lacks pages.
     """
     head = _head(path)
     page, pages = int.from_bytes(head[PAGE]), int.from_bytes(head[PAGES])
     if head.startswith(b"SQLite") and path.stat().st_size < (page if page > 1 else 1 << 16) * pages:
-        raise BadLog(f"{path}: this bag cannot be read (it ends before its {pages} pages do); record it again")
+        raise BadLog(f"{path}: this bag cannot be read (it lacks some of its {pages} pages); record it again")
 
 
-@lru_cache(maxsize=64)  # bags of one robot define the same, and reading definitions takes longer than a small bag
+@lru_cache(maxsize=64)  # bags of one robot share definitions, and parsing them takes longer than reading a small bag
 def _types(definition: Any, kind: str, ros1: bool) -> Any:
-    """The types that a message is made of: as the bag defines them, else as ROS does."""
+    """Return the types in a message, as the bag defines them, else as ROS does."""
     if definition.format == MessageDefinitionFormat.NONE:
         return get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.LATEST)
     types = get_typestore(Stores.EMPTY)
@@ -104,4 +104,4 @@ def _defined(definition: Any, kind: str) -> dict[str, Any]:
     if definition.format == MessageDefinitionFormat.MSG:
         return dict(get_types_from_msg(definition.data, kind))
     parts = definition.data.split(RULE)[1:] if definition.data.startswith(f"{RULE}IDL: ") else [f"\n{definition.data}"]
-    return {name: each for part in parts for name, each in get_types_from_idl(part.split("\n", 1)[1]).items()}
+    return {name: fields for part in parts for name, fields in get_types_from_idl(part.split("\n", 1)[1]).items()}

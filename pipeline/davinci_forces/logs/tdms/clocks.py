@@ -1,4 +1,4 @@
-"""Which channels of a TDMS file share a clock: that of their group's time stamps, or of their waveforms."""
+"""Find which channels of a TDMS file share a clock: their group's time stamps, or equal waveform properties."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -9,12 +9,12 @@ from typing import Any, NamedTuple
 from davinci_forces.logs.log import Channel, Clock, unique
 from davinci_forces.logs.tdms.metadata import EPOCH
 from davinci_forces.logs.tdms.walk import Region
-from davinci_forces.logs.timeline import Timeline, together
+from davinci_forces.logs.timeline import Timeline, group_by_clock
 
 
 @dataclass(frozen=True)
 class Sampled:
-    """A channel as its clock is looked for."""
+    """What the search for clocks needs to know of a channel."""
 
     group: str
     samples: int
@@ -24,71 +24,72 @@ class Sampled:
 
 @dataclass(frozen=True)
 class ClocksFound:
-    """The channels with their clocks, and what the log says of its own."""
+    """The channels with their clocks, and the clock of the log."""
 
     channels: tuple[Channel, ...]
     clock: Clock | None = None
     time: str = ""
-    made: dict[str, Timeline] = field(default_factory=dict)  # the derived channels of times
+    made: dict[str, Timeline] = field(default_factory=dict)  # the derived time channels
 
 
 def clocks_of(channels: Sequence[Channel], sampled: Mapping[str, Sampled], ends_anywhere: bool) -> ClocksFound:
-    """Find the clock of every channel; `ends_anywhere` says that the file was cut, so that lengths say nothing.
+    """Find the clock of every channel; `ends_anywhere` marks a truncated file, in which lengths prove nothing.
 
-    The first clock is the log's own, unless there are channels without any: those must not be taken to have it.
+    The first clock becomes that of the log, unless some channels have no clock: they would wrongly inherit it.
     """
-    of = _shared(channels, sampled, ends_anywhere)
-    clocks = list(dict.fromkeys(of.values()))
+    clock_of = _shared(channels, sampled, ends_anywhere)
+    clocks = list(dict.fromkeys(clock_of.values()))
     if not any(clocks):
         return ClocksFound(tuple(channels))
-    own = clocks[0] if "" not in clocks else None
+    main = clocks[0] if "" not in clocks else None
     named = dict(zip(clocks, _names(clocks, channels, sampled), strict=True))
-    longest = _longest(of, sampled)
-    made = {named[c]: longest[c] for c in clocks if c and not sampled[c].is_stamps}
-    told = tuple(replace(c, time="" if of[c.name] in (own, "") else named[of[c.name]]) for c in channels)
-    if own and named[own] in made and made[named[own]].is_uniform:
-        timeline = made.pop(named[own])
-        return ClocksFound(_with(told, made), Clock(timeline.step[0], timeline.start[0]), "", made)
-    return ClocksFound(_with(told, made, own=named[own] if own else ""), None, named[own] if own else "", made)
+    longest = _longest(clock_of, sampled)
+    derived = {named[c]: longest[c] for c in clocks if c and not sampled[c].is_stamps}
+    timed = tuple(replace(c, time="" if clock_of[c.name] in (main, "") else named[clock_of[c.name]]) for c in channels)
+    if main and named[main] in derived and derived[named[main]].is_uniform:
+        timeline = derived.pop(named[main])
+        return ClocksFound(_with(timed, derived), Clock(timeline.step[0], timeline.start[0]), "", derived)
+    time = named[main] if main else ""
+    return ClocksFound(_with(timed, derived, time), None, time, derived)
 
 
-def _with(channels: tuple[Channel, ...], made: Mapping[str, Timeline], own: str = "") -> tuple[Channel, ...]:
-    times = (Channel(name, "s", "time", derived=True, time="" if name == own else name) for name in made)
+def _with(channels: tuple[Channel, ...], derived: Mapping[str, Timeline], main: str = "") -> tuple[Channel, ...]:
+    times = (Channel(name, "s", "time", derived=True, time="" if name == main else name) for name in derived)
     return (*channels, *times)
 
 
 def _shared(channels: Sequence[Channel], sampled: Mapping[str, Sampled], ends_anywhere: bool) -> dict[str, str]:
-    """By channel, the first channel that has its clock; "" where nothing tells of it."""
+    """Map each channel to the first channel on its clock; "" if its clock is unknown."""
     stamps: dict[str, str] = {}
-    for name, one in sampled.items():
-        if one.is_stamps:
-            stamps.setdefault(one.group, name)
-    waves = {name: one.timeline for name, one in sampled.items() if one.timeline and one.group not in stamps}
-    of = {name: group[0] for group in together(waves) for name in group}
-    of |= {name: stamps[one.group] for name, one in sampled.items() if one.group in stamps}
-    known = {name: of[name] for name in sampled if name in of}
+    for name, s in sampled.items():
+        if s.is_stamps:
+            stamps.setdefault(s.group, name)
+    waves = {name: s.timeline for name, s in sampled.items() if s.timeline and s.group not in stamps}
+    clock_of = {name: group[0] for group in group_by_clock(waves) for name in group}
+    clock_of |= {name: stamps[s.group] for name, s in sampled.items() if s.group in stamps}
+    clocked = {name: clock_of[name] for name in sampled if name in clock_of}
     for channel in channels:
-        if channel.name not in of:
-            one = sampled[channel.name]
-            fits = [n for n in known if ends_anywhere or sampled[n].samples == one.samples or not one.samples]
-            near = [n for n in fits if sampled[n].group == one.group]
-            of[channel.name] = known[(near or fits)[0]] if fits else ""
-    return of
+        if channel.name not in clock_of:
+            s = sampled[channel.name]
+            fits = [n for n in clocked if ends_anywhere or sampled[n].samples == s.samples or not s.samples]
+            near = [n for n in fits if sampled[n].group == s.group]
+            clock_of[channel.name] = clocked[(near or fits)[0]] if fits else ""
+    return clock_of
 
 
 def _names(clocks: Sequence[str], channels: Sequence[Channel], sampled: Mapping[str, Sampled]) -> list[str]:
-    """The channel of each clock: its time stamps, else one to be made, which no channel is called like."""
-    made = ["" if not c or sampled[c].is_stamps else f"time of {c}" for c in clocks]
+    """Name the time channel of each clock: its time stamps, else a derived one with an unused name."""
+    names = ["" if not c or sampled[c].is_stamps else f"time of {c}" for c in clocks]
     if len(clocks) == 1:
-        made = ["time" if name else "" for name in made]
-    free = iter(unique([name for name in made if name], [channel.name for channel in channels]))
-    return [next(free) if name else clock for name, clock in zip(made, clocks, strict=True)]
+        names = ["time" if name else "" for name in names]
+    free = iter(unique([name for name in names if name], [channel.name for channel in channels]))
+    return [next(free) if name else clock for name, clock in zip(names, clocks, strict=True)]
 
 
-def _longest(of: Mapping[str, str], sampled: Mapping[str, Sampled]) -> dict[str, Timeline]:
-    """The longest timeline of each clock."""
+def _longest(clock_of: Mapping[str, str], sampled: Mapping[str, Sampled]) -> dict[str, Timeline]:
+    """Return the longest timeline of each clock."""
     longest: dict[str, Timeline] = {}
-    for name, clock in of.items():
+    for name, clock in clock_of.items():
         timeline = sampled[name].timeline
         if timeline and (clock not in longest or timeline.rows > longest[clock].rows):
             longest[clock] = timeline
@@ -96,21 +97,21 @@ def _longest(of: Mapping[str, str], sampled: Mapping[str, Sampled]) -> dict[str,
 
 
 class Words(NamedTuple):
-    """What a file segment says of a channel's clock."""
+    """Waveform properties of a channel in a file segment."""
 
     step: float  # [s] wf_increment
-    offset: float  # [s] wf_start_offset: of the first sample from the start
+    offset: float  # [s] wf_start_offset: from the start to the first sample
     start: datetime | None  # wf_start_time, in UTC
 
 
 @dataclass
 class Waveforms:
-    """The samples of each channel, and what was said of their clock when they were written."""
+    """The numbers of samples of each channel, with the waveform properties at the time of writing."""
 
     writes: dict[str, list[tuple[int, Words | None]]] = field(default_factory=dict)
 
     def add(self, region: Region, properties: Mapping[str, Mapping[str, Any]]) -> None:
-        """Take in a region, and the properties as they stand there."""
+        """Add a region with the properties that hold there."""
         for path, count in region.counts.items():
             writes = self.writes.setdefault(path, [])
             words = _words(properties.get(path, {}))
@@ -120,22 +121,22 @@ class Waveforms:
                 writes.append((count * region.records, words))
 
     @property
-    def started(self) -> datetime | None:
-        """When the first channel started that says so."""
-        every = (words.start for writes in self.writes.values() for _, words in writes if words and words.start)
-        return next(every, None)
+    def first_start(self) -> datetime | None:
+        """Start of the first channel that states one."""
+        starts = (words.start for writes in self.writes.values() for _, words in writes if words and words.start)
+        return next(starts, None)
 
     def timelines(self, zero: datetime | None, properties: Mapping[str, Mapping[str, Any]]) -> dict[str, Timeline]:
-        """By path, counted from `zero`; channels that nothing is said of have none.
+        """Compute the timelines by path, counted from `zero`; untimed channels are omitted.
 
-        Properties may be written behind all samples; those before any was written have the first ones.
+        Properties may be written after samples; samples before any properties take the first ones.
         """
-        made = {}
+        timelines = {}
         for path, writes in self.writes.items():
             first = next((words for _, words in writes if words), None) or _words(properties.get(path, {}))
             if first:
-                made[path] = _timeline([(rows, words or first) for rows, words in writes], zero)
-        return made
+                timelines[path] = _timeline([(rows, words or first) for rows, words in writes], zero)
+        return timelines
 
 
 def _words(properties: Mapping[str, Any]) -> Words | None:
@@ -143,17 +144,17 @@ def _words(properties: Mapping[str, Any]) -> Words | None:
     if not isinstance(step, int | float) or not isfinite(step) or step <= 0:
         return None
     offset = offset if isinstance(offset, int | float) and isfinite(offset) else 0.0
-    # LabVIEW writes the year 1904 where nobody said when.
-    known = isinstance(start, datetime) and start != EPOCH
-    return Words(float(step), float(offset), start if known else None)
+    # LabVIEW writes the year 1904 for an unknown start.
+    is_stated = isinstance(start, datetime) and start != EPOCH
+    return Words(float(step), float(offset), start if is_stated else None)
 
 
 def _timeline(writes: list[tuple[int, Words]], zero: datetime | None) -> Timeline:
-    made, last = Timeline(), None
+    timeline, last = Timeline(), None
     for rows, words in writes:
-        # The same start with another interval goes on from where the samples are.
+        # The same start with another interval continues from the samples before.
         goes_on = last is not None and (last.start, last.offset) == (words.start, words.offset)
         since = (words.start - zero).total_seconds() if words.start and zero else 0.0
-        made.add(rows, None if goes_on else since + words.offset, words.step)
+        timeline.add(rows, None if goes_on else since + words.offset, words.step)
         last = words
-    return made
+    return timeline

@@ -1,6 +1,6 @@
-"""The metadata of a TDMS file segment: which objects it holds, how their samples lie in it, and their properties.
+"""Parse the metadata of a TDMS file segment: its objects, the layout of their samples, and their properties.
 
-Layout as National Instruments publishes it ("TDMS File Format Internal Structure").
+Source: National Instruments ("TDMS File Format Internal Structure").
 """
 
 import struct
@@ -13,55 +13,55 @@ import numpy as np
 from davinci_forces.logs.timeline import moment
 
 NO_DATA, AS_BEFORE = 0xFFFFFFFF, 0
-DAQMX, DIGITAL = 0x1269, 0x126A  # raw data of a DAQ card that still has to be scaled
+DAQMX, DIGITAL = 0x1269, 0x126A  # unscaled raw data of a DAQ card
 STRING, BOOLEAN, TIME, DAQMX_RAW = 0x20, 0x21, 0x44, 0xFFFFFFFF
-NUMBERS = {
+NUMBER_CODES = {
     1: "i1", 2: "i2", 3: "i4", 4: "i8", 5: "u1", 6: "u2", 7: "u4", 8: "u8", 9: "f4", 10: "f8",
     0x19: "f4", 0x1A: "f8", BOOLEAN: "u1",
 }  # fmt: skip
 COMPLEX = (0x08000C, 0x10000D)
-SIZES = {0x1B: 16, TIME: 16, COMPLEX[0]: 8, COMPLEX[1]: 16}  # [bytes] of what is no text
-SIZES |= {kind: np.dtype(code).itemsize for kind, code in NUMBERS.items()}
-OCTETS = {"I": 4, "Q": 8, "q": 8}  # [bytes] of the numbers of which metadata are made
+SIZES = {0x1B: 16, TIME: 16, COMPLEX[0]: 8, COMPLEX[1]: 16}  # [bytes] of one value, except text
+SIZES |= {kind: np.dtype(code).itemsize for kind, code in NUMBER_CODES.items()}
+OCTETS = {"I": 4, "Q": 8, "q": 8}  # [bytes] of the numbers in metadata
 EPOCH = datetime(1904, 1, 1, tzinfo=UTC)
 
 
 class Damaged(ValueError):
-    """The bytes are no TDMS metadata."""
+    """The bytes are not TDMS metadata."""
 
 
 @dataclass(frozen=True)
 class Samples:
-    """How the samples of one channel lie in one chunk of a file segment."""
+    """Layout of the samples of one channel in one chunk of a file segment."""
 
     kind: int  # NI's number of the data type
     count: int  # in a chunk
-    octets: int  # of them all
+    octets: int  # of all samples
     widths: tuple[int, ...] = ()  # DAQmx: bytes of a row in each of the card's buffers, which the channels share
 
 
 @dataclass
 class Objects:
-    """What the metadata said up to here, file segment after file segment."""
+    """Accumulated metadata of the file segments read so far."""
 
-    latest: dict[str, Samples] = field(default_factory=dict)  # by path: what was stated last
+    latest: dict[str, Samples] = field(default_factory=dict)  # by path: the last layout
     active: dict[str, Samples] = field(default_factory=dict)  # channels with data in this file segment, in order
-    properties: dict[str, dict[str, Any]] = field(default_factory=dict)  # what was stated last
-    revised: dict[str, dict[str, Any]] = field(default_factory=dict)  # what was first, of those that were changed
+    properties: dict[str, dict[str, Any]] = field(default_factory=dict)  # by path: the last values
+    revised: dict[str, dict[str, Any]] = field(default_factory=dict)  # by path: the first values of changed ones
 
     def update(self, metadata: bytes, order: str, renew: bool) -> None:
-        """Take in the metadata of one file segment.
+        """Add the metadata of one file segment.
 
         Raises
         ------
         Damaged
-            Where it is cut, or makes no sense.
+            If it is truncated, or cannot be parsed.
         """
         take = _Cursor(metadata, order)
         try:
             self._update(take, renew)
         except (struct.error, IndexError, UnicodeDecodeError, KeyError, OverflowError) as error:
-            raise Damaged(f"its metadata makes no sense after {take.at} bytes ({error})") from None
+            raise Damaged(f"its metadata cannot be parsed after {take.at} bytes ({error})") from None
 
     def _update(self, take: "_Cursor", renew: bool) -> None:
         self.active = {} if renew else dict(self.active)
@@ -85,7 +85,7 @@ class Objects:
 
 
 class _Cursor:
-    """Reads values off bytes."""
+    """Reads consecutive values from bytes."""
 
     def __init__(self, data: bytes, order: str) -> None:
         self.data, self.order, self.at = data, order, 0
@@ -97,7 +97,7 @@ class _Cursor:
 
     def bytes(self, length: int) -> bytes:
         if self.at + length > len(self.data):
-            raise IndexError(f"{length} bytes are asked for, {len(self.data) - self.at} are left")
+            raise IndexError(f"{length} bytes are needed, but {len(self.data) - self.at} are left")
         self.at += length
         return self.data[self.at - length : self.at]
 
@@ -109,18 +109,18 @@ class _Cursor:
             return raw.decode("cp1252")
 
     def value(self, kind: int) -> Any:
-        """A property."""
+        """Read a property."""
         if kind == STRING:
             return self.text()
         if kind == TIME:
             return self.moment()
-        if kind in NUMBERS:
-            code = np.dtype(self.order + NUMBERS[kind])
+        if kind in NUMBER_CODES:
+            code = np.dtype(self.order + NUMBER_CODES[kind])
             return np.frombuffer(self.bytes(code.itemsize), code)[0].item()
         return self.bytes(SIZES[kind])
 
     def moment(self) -> datetime | None:
-        """A time stamp; None for one that no calendar holds."""
+        """Read a time stamp; None beyond the range of dates."""
         parts = ("Q", "q") if self.order == "<" else ("q", "Q")
         first, second = self.number(parts[0]), self.number(parts[1])
         fraction, seconds = (first, second) if self.order == "<" else (second, first)
@@ -129,7 +129,7 @@ class _Cursor:
     def samples(self) -> Samples:
         kind, dimension, count = self.number("I"), self.number("I"), self.number("Q")
         if dimension != 1:
-            raise IndexError(f"an array of {dimension} dimensions; TDMS 2.0 has only one")
+            raise IndexError(f"an array of {dimension} dimensions; TDMS 2.0 allows only one")
         if kind == STRING:
             return Samples(kind, count, self.number("Q"))
         return Samples(kind, count, count * SIZES[kind])
@@ -137,7 +137,7 @@ class _Cursor:
     def daqmx(self, header: int) -> Samples:
         _, dimension, count = self.number("I"), self.number("I"), self.number("Q")
         if dimension != 1:
-            raise IndexError(f"an array of {dimension} dimensions; TDMS 2.0 has only one")
+            raise IndexError(f"an array of {dimension} dimensions; TDMS 2.0 allows only one")
         for _ in range(self.number("I")):
             self.bytes(20 if header == DAQMX else 17)
         widths = tuple(self.number("I") for _ in range(self.number("I")))
@@ -145,5 +145,5 @@ class _Cursor:
 
 
 def names(path: str) -> tuple[str, ...]:
-    """The group and the channel of an object's path: `/'Motors'/'Roll''s current'` -> `Motors`, `Roll's current`."""
+    """Split an object's path into group and channel: `/'Motors'/'Roll''s current'` -> `Motors`, `Roll's current`."""
     return tuple(part.replace("''", "'") for part in path[2:-1].split("'/'")) if len(path) > 1 else ()

@@ -1,10 +1,9 @@
-"""Where the samples of a TDMS file lie, so that any channel is read without another, and these as numbers.
+"""Index the samples of a TDMS file, so that any channel is read without the others, as numbers.
 
-They come in pieces of bounded size, and channels of different lengths side by side.
+They are read in pieces of bounded size; channels of different lengths are read side by side.
 
-npTDMS reads channels that need more than their bytes: raw values of DAQ cards, and scales that the file describes.  It
-is always given the open file, never its path: it would trust an index file of whatever age and state in the same
-folder.
+npTDMS reads channels that need a scale: raw values of DAQ cards, and scales described in the file.  It always gets the
+open file, never its path: it would trust an index file in the same folder, however old or damaged.
 """
 
 import io
@@ -22,13 +21,13 @@ from davinci_forces.logs.log import Block
 from davinci_forces.logs.tdms.metadata import names
 from davinci_forces.logs.tdms.walk import BLOCK, Column, Region
 
-ROWS = 1 << 17  # of a piece
-VALUES = 1 << 20  # of a block
-FAR = 1 << 16  # [bytes] between what is wanted of two records, which cost more to read than to pass over
+PIECE_ROWS = 1 << 17  # of a piece
+BLOCK_VALUES = 1 << 20  # of a block
+MIN_SKIP = 1 << 16  # [bytes] between the wanted parts of two records, from which on skipping is faster than reading
 COUNT = "NI_Number_Of_Scales"
 NUMBERED = re.compile(r"NI_Scale\[(\d{1,6})\]_")
-MOST = 1000  # scales of a channel
-# What npTDMS knows; it would return values of any other scale unscaled.
+MAX_SCALES = 1000  # scales of a channel
+# The scales that npTDMS applies; it would return values of any other scale unscaled.
 SCALES = frozenset(
     ["Polynomial", "Linear", "RTD", "Strain", "Table", "Thermistor", "Thermocouple", "Add", "Subtract", "AdvancedAPI"]
 )
@@ -36,7 +35,7 @@ SCALES = frozenset(
 
 @dataclass(frozen=True)
 class Records:
-    """What records of one kind hold: where the samples of each channel lie, and how many there are."""
+    """Layout of the records of one kind: position and number of the samples of each channel."""
 
     columns: dict[str, Column]
     counts: dict[str, int]
@@ -44,16 +43,16 @@ class Records:
 
 @dataclass
 class Index:
-    """The regions of a file.  A region is four numbers, so that millions of them fit."""
+    """The regions of a file, four numbers each, so that millions of them fit in memory."""
 
     kinds: list[Records] = field(default_factory=list)
-    _holding: dict[str, list[int]] = field(default_factory=dict)  # by path: the kinds that hold samples of it
-    _by_kind: list[NDArray[np.intp]] = field(default_factory=list)  # numbers of regions, once all are there
+    _holding: dict[str, list[int]] = field(default_factory=dict)  # by path: the kinds with samples of it
+    _by_kind: list[NDArray[np.intp]] = field(default_factory=list)  # numbers of regions, once all are added
     _numbers: dict[tuple[object, ...], int] = field(default_factory=dict)  # of the kinds
     _regions: tuple["array[int]", ...] = field(default_factory=lambda: tuple(array("q") for _ in range(4)))
 
     def add(self, region: Region) -> None:
-        """Take in a region."""
+        """Add a region."""
         self._by_kind = []
         last = self.kinds[self._regions[3][-1]] if self.kinds else None
         if last and last.columns == region.columns and last.counts == region.counts:
@@ -68,8 +67,8 @@ class Index:
         for numbers, value in zip(self._regions, (region.position, region.records, region.stride, kind), strict=True):
             numbers.append(value)
 
-    def together(self, paths: Sequence[str]) -> list[list[str]]:
-        """The channels that can be read in one go: those with as many samples as each other in every record."""
+    def groups(self, paths: Sequence[str]) -> list[list[str]]:
+        """Group channels with equal numbers of samples in every record, which can be read in one pass."""
         groups: dict[tuple[tuple[int, int], ...], list[str]] = {}
         for path in paths:
             counts = ((kind, self.kinds[kind].counts[path]) for kind in self._holding.get(path, ()))
@@ -77,14 +76,14 @@ class Index:
         return list(groups.values())
 
     def regions(self, path: str) -> Iterator[Region]:
-        """The regions that hold samples of a channel, in order."""
+        """Yield the regions with samples of a channel, in order."""
         position, records, stride, _ = self._regions
         for i in self._places(path) if path in self._holding else ():
-            of = self.kinds[self._regions[3][i]]
-            yield Region(position[i], records[i], stride[i], of.columns, of.counts)
+            kind = self.kinds[self._regions[3][i]]
+            yield Region(position[i], records[i], stride[i], kind.columns, kind.counts)
 
     def _places(self, path: str) -> list[int]:
-        """Numbers of the regions that hold samples of a channel, in order."""
+        """List the numbers of the regions with samples of a channel, in order."""
         if not self._by_kind and self.kinds:
             kind = np.frombuffer(self._regions[3], np.int64)
             order = np.argsort(kind, kind="stable")
@@ -94,19 +93,19 @@ class Index:
         return places
 
     def largest_chunk(self, paths: Sequence[str]) -> int:
-        """Most samples of any of these channels in one record."""
+        """Return the largest number of samples of any of these channels in one record."""
         return max((self.kinds[kind].counts[p] for p in paths for kind in self._holding.get(p, ())), default=0)
 
 
 def rows_of(channels: int) -> int:
-    """Rows of a block of so many channels."""
-    return min(ROWS, VALUES // max(channels, 1) + 1)
+    """Number of rows of a block of so many channels."""
+    return min(PIECE_ROWS, BLOCK_VALUES // max(channels, 1) + 1)
 
 
 def pieces(file: BinaryIO, regions: Iterator[Region], paths: Sequence[str], origin: int) -> Iterator[Block]:
-    """The samples of channels that always come together, as many of each in every piece.
+    """Read the samples of channels of one group, equally many of each in every piece.
 
-    `origin` is the second since 1904 that time stamps are counted from.
+    `origin` is the zero of time stamps, in seconds since 1904.
     """
     for region in regions:
         columns = {path: region.columns[path] for path in paths if path in region.columns}
@@ -119,15 +118,15 @@ def pieces(file: BinaryIO, regions: Iterator[Region], paths: Sequence[str], orig
 
 
 def _records(file: BinaryIO, region: Region, columns: dict[str, Column]) -> Iterator[dict[str, NDArray[Any]]]:
-    """Many whole records at a time."""
+    """Read many complete records at a time."""
     widest = max(column.count for column in columns.values())
-    many = max(1, min(BLOCK // region.stride, ROWS // max(widest, 1)))
+    many = max(1, min(BLOCK // region.stride, PIECE_ROWS // max(widest, 1)))
     begin = min(column.offset for column in columns.values())
     needed = max(
         column.offset + (column.count - 1) * column.step + column.dtype.itemsize for column in columns.values()
     )
     span = needed - begin
-    apart = region.stride - span > FAR
+    apart = region.stride - span > MIN_SKIP
     for first in range(0, region.records, many):
         records, start = min(many, region.records - first), region.position + first * region.stride + begin
         if apart:
@@ -151,7 +150,7 @@ def _view(raw: bytes, records: int, stride: int, column: Column, begin: int) -> 
 
 
 def _slices(file: BinaryIO, region: Region, columns: dict[str, Column]) -> Iterator[dict[str, NDArray[Any]]]:
-    """Records that are too large to be read whole: a slice of every channel at a time."""
+    """Read records too large for memory: a slice of every channel at a time."""
     most, rows = max(column.count for column in columns.values()), rows_of(len(columns))
     for record in range(region.records):
         start = region.position + record * region.stride
@@ -169,11 +168,11 @@ def _slice(file: BinaryIO, start: int, column: Column, first: int, rows: int) ->
 def _numbers(samples: NDArray[Any], origin: int) -> NDArray[np.float64]:
     if samples.dtype.names:
         samples = (samples["seconds"] - origin) + samples["fraction"] / 2.0**64
-    return samples.astype(np.float64).reshape(-1)  # a copy, so that the rest of what was read is let go
+    return samples.astype(np.float64).reshape(-1)  # a copy, so that the bytes read can be freed
 
 
 class Queue:
-    """The samples of some channels that came and are not handed on yet."""
+    """Samples of some channels that were read and not yet passed on."""
 
     def __init__(self, source: Iterator[Block], paths: Sequence[str]) -> None:
         self.source, self.paths = source, paths
@@ -181,7 +180,7 @@ class Queue:
         self.length, self.ended = 0, False
 
     def fill(self, rows: int) -> None:
-        """Read until there is a block's worth, or the end."""
+        """Read until there are enough rows, or the source ends."""
         while self.length < rows and not self.ended:
             part = next(self.source, None)
             if part is None:
@@ -191,7 +190,7 @@ class Queue:
                 self.length += len(part[self.paths[0]])
 
     def take(self, rows: int) -> tuple[Block, int]:
-        """The next rows, filled up with NaN behind the end, and how many are filled up."""
+        """Return the next rows, filled up with NaN after the end, and the number of filled rows."""
         lacking = max(0, rows - self.length)
         whole = {path: np.concatenate([part[path] for part in self.parts] or [np.empty(0)]) for path in self.paths}
         self.parts = [{path: samples[rows:] for path, samples in whole.items()}] if self.length > rows else []
@@ -200,8 +199,8 @@ class Queue:
         return {p: np.concatenate((s[:rows], fill)) if lacking else s[:rows] for p, s in whole.items()}, lacking
 
 
-def side_by_side(queues: Sequence[Queue], most: int = ROWS) -> Iterator[tuple[Block, dict[str, int]]]:
-    """Blocks of all channels, of about `most` rows, and how many samples each lacks, until the longest ends."""
+def side_by_side(queues: Sequence[Queue], most: int = PIECE_ROWS) -> Iterator[tuple[Block, dict[str, int]]]:
+    """Yield blocks of all channels, of about `most` rows, with the missing samples of each, until the longest ends."""
     while True:
         for queue in queues:
             queue.fill(most)
@@ -219,18 +218,18 @@ def side_by_side(queues: Sequence[Queue], most: int = ROWS) -> Iterator[tuple[Bl
 
 
 class Part(io.RawIOBase):
-    """The first `size` bytes of a file, for a reader that must not see the damage behind them."""
+    """The first `size` bytes of a file, for a reader that must not see the damage after them."""
 
     def __init__(self, file: BinaryIO, size: int) -> None:
         self.file, self.size, self.at = file, size, 0
 
     def seek(self, offset: int, whence: int = io.SEEK_SET) -> int:
-        """Go to a byte, as files do."""
+        """Set the position, as files do."""
         self.at = offset + {io.SEEK_SET: 0, io.SEEK_CUR: self.at, io.SEEK_END: self.size}[whence]
         return self.at
 
     def tell(self) -> int:
-        """The byte that is read next."""
+        """Return the position."""
         return self.at
 
     def readinto(self, buffer: Any) -> int:
@@ -244,50 +243,50 @@ class Part(io.RawIOBase):
 
 
 def is_scaled(properties: dict[str, Any]) -> bool:
-    """Whether the values are still to be scaled as the properties say."""
+    """Whether the values still have to be scaled by the properties."""
     return properties.get("NI_Scaling_Status", "unscaled") != "scaled" and (
         properties.get(COUNT, 0) not in (0, "0") or any(name.endswith("_Scale_Type") for name in properties)
     )
 
 
 def problem(properties: dict[str, Any]) -> str:
-    """Why the scales cannot be applied, or ""; a count that was damaged would have npTDMS look for billions."""
+    """Return why the scales cannot be applied, or ""; with a damaged count npTDMS would look for billions."""
     kinds = {str(value) for name, value in properties.items() if name.endswith("_Scale_Type")}
     if unknown := sorted(kinds - SCALES):
         return f"has a scale of unknown kind: {', '.join(unknown)}"
     numbers = [int(match[1]) for name in properties if (match := NUMBERED.match(name))]
     count, most = properties.get(COUNT, 0), max([0, *numbers]) + 1
-    if not isinstance(count, int) or not 0 <= count <= min(most, MOST):
-        return f"says that it has {count!r} scales and describes {len(kinds)}: the file is damaged; record it again"
+    if not isinstance(count, int) or not 0 <= count <= min(most, MAX_SCALES):
+        return f"claims {count!r} scales but describes {len(kinds)}: the file is damaged; record it again"
     return ""
 
 
-def applied(read: Iterator[Block], scales: Mapping[str, dict[str, Any]]) -> Iterator[Block]:
-    """The samples with those of some channels scaled as their properties say.
+def apply_scales(read: Iterator[Block], scales: Mapping[str, dict[str, Any]]) -> Iterator[Block]:
+    """Scale the samples of some channels by their properties.
 
-    npTDMS would read all of a chunk for every piece of it, which takes as long as their product.
+    npTDMS would read the whole chunk for every piece of it: time grows with the square of the chunk.
     """
     from nptdms.base_segment import RawChannelDataChunk
     from nptdms.scaling import get_scaling
 
-    of = {path: scaling for path, said in scales.items() if (scaling := get_scaling(said, {}, {}))}
+    scalings = {path: scaling for path, properties in scales.items() if (scaling := get_scaling(properties, {}, {}))}
     for piece in read:
-        raw = {path: RawChannelDataChunk.channel_data(piece[path]) for path in of}
-        yield piece | {path: np.asarray(each.scale(raw[path]), np.float64) for path, each in of.items()}
+        raw = {path: RawChannelDataChunk.channel_data(piece[path]) for path in scalings}
+        yield piece | {path: np.asarray(scaling.scale(raw[path]), np.float64) for path, scaling in scalings.items()}
 
 
 def scaled_pieces(file: BinaryIO, size: int, paths: Sequence[str], chunk: int) -> Iterator[Block]:
-    """The scaled samples of channels that always come together; `chunk` is how many of each do."""
+    """Read the scaled samples of channels of one group; `chunk` is the number of each in one chunk."""
     from nptdms import TdmsFile
     from nptdms.log import log_manager
 
-    log_manager.set_level(logging.ERROR)  # what is amiss with the file we have said already
+    log_manager.set_level(logging.ERROR)  # problems of the file are reported already
     with TdmsFile.open(Part(file, size)) as opened:
-        of = {path: names(path) for path in paths}
-        if chunk <= ROWS:
-            for each in opened.data_chunks():
-                yield {path: np.asarray(each[g][c][:], dtype=np.float64) for path, (g, c) in of.items()}
+        name_of = {path: names(path) for path in paths}
+        if chunk <= PIECE_ROWS:
+            for part in opened.data_chunks():
+                yield {path: np.asarray(part[g][c][:], dtype=np.float64) for path, (g, c) in name_of.items()}
             return
-        channels = {path: opened[group][channel] for path, (group, channel) in of.items()}
-        for first in range(0, len(channels[paths[0]]), ROWS):
-            yield {path: np.asarray(c[first : first + ROWS], dtype=np.float64) for path, c in channels.items()}
+        channels = {path: opened[group][channel] for path, (group, channel) in name_of.items()}
+        for first in range(0, len(channels[paths[0]]), PIECE_ROWS):
+            yield {path: np.asarray(c[first : first + PIECE_ROWS], dtype=np.float64) for path, c in channels.items()}

@@ -1,7 +1,7 @@
-"""The file segments of a TDMS file, from lead-in to lead-in, as regions of equal records.
+"""Walk the file segments of a TDMS file, and describe them as regions of equal records.
 
-A control loop that writes one sample per call leaves millions of file segments or chunks behind.  Those that are alike
-are found by comparing whole blocks of the file, and become one region, so that no loop runs over them.
+A control loop that writes one sample per call leaves millions of file segments or chunks.  Equal ones are found by
+comparing whole blocks of the file and become one region, so that no loop runs over them.
 """
 
 import struct
@@ -11,20 +11,20 @@ from typing import Any, BinaryIO
 
 import numpy as np
 
-from davinci_forces.logs.tdms.metadata import DAQMX_RAW, NUMBERS, SIZES, STRING, TIME, Damaged, Objects, Samples
+from davinci_forces.logs.tdms.metadata import DAQMX_RAW, NUMBER_CODES, SIZES, STRING, TIME, Damaged, Objects, Samples
 
 TAG = b"TDSm"
 LEAD_IN = 28  # [bytes]
-METADATA, NEW_LIST, RAW, INTERLEAVED, BIG_ENDIAN, DAQMX = 2, 4, 8, 32, 64, 128
+HAS_METADATA, HAS_NEW_LIST, HAS_RAW, IS_INTERLEAVED, IS_BIG_ENDIAN, HAS_DAQMX = 2, 4, 8, 32, 64, 128
 VERSIONS = [struct.pack(order + "I", version) for order in "<>" for version in (4712, 4713)]
-UNKNOWN = 2**64 - 1  # as the length of a file segment that LabVIEW did not live to finish
-SMALL = 1 << 14  # [bytes] of a file segment
+UNKNOWN = 2**64 - 1  # length of a file segment that LabVIEW did not finish
+SMALL_SEGMENT = 1 << 14  # [bytes] of a file segment that is compared in blocks
 BLOCK = 8 << 20
 
 
 @dataclass(frozen=True)
 class Column:
-    """Where the samples of a channel lie in a record."""
+    """Position of the samples of a channel in a record."""
 
     dtype: np.dtype[Any]
     offset: int  # of the first
@@ -34,18 +34,18 @@ class Column:
 
 @dataclass(frozen=True)
 class Region:
-    """Records of equal size in a row."""
+    """Consecutive records of equal size."""
 
     position: int  # of the first
     records: int
     stride: int  # from one record to the next
-    columns: dict[str, Column]  # by path; channels whose samples are not plain are left out
+    columns: dict[str, Column]  # by path, without channels whose samples are not plain numbers
     counts: dict[str, int]  # samples of every channel in one record
 
 
 @dataclass
 class Walk:
-    """A pass over the file segments of a file of `size` bytes.  `say` is told, once, why it ended early."""
+    """A pass over the file segments of a file of `size` bytes; `say` gets the reason if it ends early."""
 
     file: BinaryIO
     size: int
@@ -57,14 +57,14 @@ class Walk:
     cut: bool = False  # a file segment lacks some of its samples
 
     def regions(self) -> Iterator[Region]:
-        """The regions of the file, in order."""
+        """Yield the regions of the file, in order."""
         at = 0
         while at < self.size:
             lead = self._read(at, LEAD_IN)
             if not lead.startswith(TAG) or len(lead) < LEAD_IN:
                 return self._stop(at, lead)
             toc = int.from_bytes(lead[4:8], "little")
-            order = ">" if toc & BIG_ENDIAN else "<"
+            order = ">" if toc & IS_BIG_ENDIAN else "<"
             length, raw = struct.unpack(order + "QQ", lead[12:])
             data, end = at + LEAD_IN + raw, at + LEAD_IN + length
             whole = length != UNKNOWN and end <= self.size
@@ -74,14 +74,14 @@ class Walk:
                 end = self._cut(at, data, length)
             metadata = self._read(at + LEAD_IN, raw)
             try:
-                if toc & METADATA:
-                    self.objects.update(metadata, order, bool(toc & NEW_LIST))
+                if toc & HAS_METADATA:
+                    self.objects.update(metadata, order, bool(toc & HAS_NEW_LIST))
                 more = self._alike(lead + metadata, end, LEAD_IN + length) if whole else 0
                 yield from self._within(toc, order, data, end, more, LEAD_IN + length, whole)
             except Damaged as problem:
                 self.say(
-                    f"byte {at}: the file segment that begins here is damaged: {problem}; it is not read, nor what "
-                    "follows"
+                    f"byte {at}: the file segment that begins here is damaged: {problem}; neither it nor the data "
+                    "after it is read"
                 )
                 return None
             self.file_segments += 1 + more
@@ -93,19 +93,19 @@ class Walk:
         return self.file.read(length)
 
     def _stop(self, at: int, lead: bytes) -> None:
-        """Say why the walk ends here."""
-        left = self.size - at
+        """Warn why the walk ends here."""
+        size = self.size - at
         if not lead.strip(b"\0"):
-            self.say(f"byte {at}: {left} NUL bytes follow, as a power cut leaves them; they are not read")
+            self.say(f"byte {at}: {size} NUL bytes follow, typical of a power cut; they are not read")
         elif TAG.startswith(lead[:4]):
             self.say(
-                f"byte {at}: the file is cut within the head of a file segment; its last {left} bytes are not read"
+                f"byte {at}: the file is cut within the head of a file segment; its last {size} bytes are not read"
             )
         else:
-            self.say(f"byte {at}: no file segment begins here, the file is damaged; its last {left} bytes are not read")
+            self.say(f"byte {at}: no file segment begins here: the file is damaged; the last {size} bytes are not read")
 
     def _cut(self, at: int, data: int, length: int) -> int:
-        """The end of a file segment whose length is unknown or too large: the next one, or the end of the file."""
+        """Find the end of a file segment of unknown or too large length: the next one, or the end of the file."""
         self.cut = True
         end = self._next_tag(data)
         where = "the end of the file" if end == self.size else f"the next file segment, at byte {end}"
@@ -122,7 +122,7 @@ class Walk:
         return end
 
     def _next_tag(self, at: int) -> int:
-        """Where the next lead-in stands, or the end of the file."""
+        """Find the position of the next lead-in, or the end of the file."""
         while at < self.size:
             block = self._read(at, BLOCK)
             tag = block.find(TAG)
@@ -134,9 +134,9 @@ class Walk:
         return self.size
 
     def _alike(self, head: bytes, at: int, stride: int) -> int:
-        """How many of the file segments that follow have the same lead-in and metadata.
+        """Count the following file segments with the same lead-in and metadata.
 
-        Ever more of them are looked at in one go, so that a file of which no two are alike is not read many times.
+        The number compared at once grows, so that a file of unequal file segments is not read many times.
         """
         alike, window = 0, stride
         while True:
@@ -148,8 +148,8 @@ class Walk:
             window = max(min(2 * window, BLOCK), stride)
 
     def _same(self, head: bytes, at: int, stride: int, many: int) -> int:
-        """How many of the next file segments begin like this: compared at once where small, else one by one."""
-        if stride > SMALL:
+        """Count the next file segments that begin like this: compared at once if small, else one by one."""
+        if stride > SMALL_SEGMENT:
             return next((i for i in range(many) if self._read(at + i * stride, len(head)) != head), many)
         block = np.frombuffer(self._read(at, many * stride), np.uint8).reshape(many, stride)
         differ = np.flatnonzero((block[:, : len(head)] != np.frombuffer(head, np.uint8)).any(axis=1))
@@ -158,15 +158,15 @@ class Walk:
     def _within(
         self, toc: int, order: str, data: int, end: int, more: int, stride: int, whole: bool
     ) -> Iterator[Region]:
-        """The regions of a file segment and of the `more` like it that follow, `stride` bytes apart."""
+        """Yield the regions of a file segment and of the `more` equal ones after it, `stride` bytes apart."""
         active = self.objects.active
-        if not toc & RAW or not active:
+        if not toc & HAS_RAW or not active:
             return
-        interleaved = bool(toc & INTERLEAVED) and DAQMX_RAW not in {samples.kind for samples in active.values()}
+        interleaved = bool(toc & IS_INTERLEAVED) and DAQMX_RAW not in {samples.kind for samples in active.values()}
         self.layouts |= {"interleaved" if interleaved else "contiguous"} | ({"big-endian"} if order == ">" else set())
         regions = list(_regions(active, order, interleaved, data, end - data, whole))
-        if more and len(regions) == 1 and stride <= BLOCK and (one := _joined(regions[0], 1 + more, stride)):
-            yield one
+        if more and len(regions) == 1 and stride <= BLOCK and (joined := _joined(regions[0], 1 + more, stride)):
+            yield joined
             return
         for i in range(1 + more):
             for region in regions:
@@ -176,22 +176,22 @@ class Walk:
 def _regions(
     active: dict[str, Samples], order: str, interleaved: bool, data: int, length: int, whole: bool
 ) -> Iterator[Region]:
-    """The regions of the raw data of one file segment."""
+    """Yield the regions of the raw data of one file segment."""
     if interleaved:
         yield from _interleaved(active, order, data, length)
         return
     size = _chunk_size(active)
-    chunks, left = divmod(length, size) if size else (0, 0)
+    chunks, remainder = divmod(length, size) if size else (0, 0)
     counts = {path: samples.count for path, samples in active.items()}
     if chunks:
         yield Region(data, chunks, size, _contiguous(active, counts, order), counts)
-    if left:
-        counts = _left_over(active, left, size, whole)
-        yield Region(data + chunks * size, 1, left, _contiguous(active, counts, order), counts)
+    if remainder:
+        counts = _left_over(active, remainder, size, whole)
+        yield Region(data + chunks * size, 1, remainder, _contiguous(active, counts, order), counts)
 
 
 def _interleaved(active: dict[str, Samples], order: str, data: int, length: int) -> Iterator[Region]:
-    """One record per row; a row that is cut is no record."""
+    """Yield interleaved data, one record per row, without an incomplete last row."""
     sizes = {path: SIZES.get(samples.kind, 0) for path, samples in active.items()}
     row = sum(sizes.values())
     if len({samples.count for samples in active.values()}) > 1 or not all(sizes.values()):
@@ -207,7 +207,7 @@ def _interleaved(active: dict[str, Samples], order: str, data: int, length: int)
 
 
 def _contiguous(active: dict[str, Samples], counts: dict[str, int], order: str) -> dict[str, Column]:
-    """One channel after the other."""
+    """Locate the channels of a chunk, which lie one after the other."""
     columns, offset = {}, 0
     for path, samples in active.items():
         count = counts[path]
@@ -217,26 +217,26 @@ def _contiguous(active: dict[str, Samples], counts: dict[str, int], order: str) 
     return columns
 
 
-def _left_over(active: dict[str, Samples], left: int, size: int, whole: bool) -> dict[str, int]:
-    """Samples in the last chunk of a file segment, of `left` bytes, where it is shorter than the others.
+def _left_over(active: dict[str, Samples], remaining: int, size: int, whole: bool) -> dict[str, int]:
+    """Count the samples in the shorter last chunk of a file segment, of `remaining` bytes.
 
-    A recorder that ended in good order shares these out over the channels; a file that was cut holds the first
-    channels whole and nothing of the last ones.
+    A recorder that ended normally divides these over all channels; a truncated file holds the first channels
+    completely and nothing of the last ones.
     """
     kinds = {samples.kind for samples in active.values()}
     if STRING in kinds:
         return dict.fromkeys(active, 0)
     if whole or DAQMX_RAW in kinds:
-        return {path: samples.count * left // size for path, samples in active.items()}
+        return {path: samples.count * remaining // size for path, samples in active.items()}
     counts = {}
     for path, samples in active.items():
-        counts[path] = min(samples.count, left // SIZES.get(samples.kind, 0))
-        left = max(left - samples.octets, 0)
+        counts[path] = min(samples.count, remaining // SIZES.get(samples.kind, 0))
+        remaining = max(remaining - samples.octets, 0)
     return counts
 
 
 def _joined(region: Region, file_segments: int, stride: int) -> Region | None:
-    """The region of equal file segments, one record for each, where each channel's samples are evenly spaced."""
+    """Join equal file segments into a region, one record each, if each channel's samples are evenly spaced."""
     if region.records > 1 and any(column.count > 1 for column in region.columns.values()):
         return None
     columns = region.columns
@@ -252,8 +252,8 @@ def _chunk_size(active: dict[str, Samples]) -> int:
 
 
 def _dtype(kind: int, order: str) -> np.dtype[Any] | None:
-    """The samples as numpy reads them; None for those that are neither numbers nor times."""
+    """Return the numpy type of samples; None if they are neither numbers nor times."""
     if kind == TIME:
         parts = [("fraction", order + "u8"), ("seconds", order + "i8")]
         return np.dtype(parts if order == "<" else parts[::-1])
-    return np.dtype(order + NUMBERS[kind]) if kind in NUMBERS else None
+    return np.dtype(order + NUMBER_CODES[kind]) if kind in NUMBER_CODES else None

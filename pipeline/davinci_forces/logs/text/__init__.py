@@ -1,4 +1,4 @@
-"""Columns of numbers in text, with or without a header, in whatever delimiter and decimal mark."""
+"""Columns of numbers in text, with or without a header, with any delimiter and decimal mark."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -8,15 +8,14 @@ from pathlib import Path
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.cells import UNREADABLE, Cells, NotANumber, check, parse
-from davinci_forces.logs.lines import GZIP, Lines, decoded
-from davinci_forces.logs.log import Block, Channel, Log, Options, ahead
-from davinci_forces.logs.text.dialect import NAMES, Dialect, Unclear, find, split
+from davinci_forces.logs.lines import GZIP, Lines, decode
+from davinci_forces.logs.log import Block, Channel, Log, Options, read_ahead
+from davinci_forces.logs.text.dialect import NAMES, Dialect, Unclear, find_dialect, split_cells
 from davinci_forces.logs.text.stamps import REMARK, Unwrapped, clocks_may_change
 
-VALUE = rb"[+-]?((\d+MARK?\d*|MARK\d+)([eE][+-]?\d+)?|nan|inf|infinity)"
-NUMBERS = {
-    ".": re.compile(VALUE.replace(b"MARK", rb"\."), re.IGNORECASE),
-    ",": re.compile(VALUE.replace(b"MARK", b","), re.IGNORECASE),
+VALUE_BYTES = rb"[+-]?((\d+MARK?\d*|MARK\d+)([eE][+-]?\d+)?|nan|inf|infinity)"
+NUMBER_PATTERNS_BYTES = {
+    mark.decode(): re.compile(VALUE_BYTES.replace(b"MARK", re.escape(mark)), re.IGNORECASE) for mark in (b".", b",")
 }
 
 
@@ -27,17 +26,17 @@ def recognises(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, options: Options) -> Log:
-    """Open the file: its first lines say how it is written.
+    """Open the file, and find its format from the first lines.
 
     Raises
     ------
     BadLog
-        If it can be read in more than one way, or in none; says which key of study.toml settles it.
+        If the format is ambiguous or unknown; the message names the key of study.toml to set.
     """
     lines = Lines(path, options.encoding)
-    head = decoded(lines.head(), lines.encoding if not lines.mark else None).split("\n")
+    head = decode(lines.head(), lines.encoding if not lines.mark else None).split("\n")
     try:
-        dialect = find([line.rstrip("\r") for line in head], options)
+        dialect = find_dialect([line.rstrip("\r") for line in head], options)
     except Unclear as problem:
         raise BadLog(f"{path}: {problem}") from None
     channels = tuple(
@@ -51,9 +50,9 @@ def read(path: Path, options: Options) -> Log:
     shown = channels[: len(channels) - dialect.trailing]
     comments = list(dialect.preamble)
     time = next((channel.name for channel in shown if channel.kind == "time"), "")
-    dated = next((stamps for stamps in dialect.stamps.values() if stamps.dated), None)
+    dated = next((stamps for stamps in dialect.stamps.values() if stamps.has_date), None)
     return TextLog(
-        path, "text", shown, time=time, started=dated.started if dated else "",
+        path, "text", shown, time=time, started=dated.first_moment if dated else "",
         zone=("UTC" if dated.zoned else "local") if dated else "", facts=facts, comments=comments, dialect=dialect,
         encoding=options.encoding, warnings=list(dialect.remarks),
     )  # fmt: skip
@@ -61,7 +60,7 @@ def read(path: Path, options: Options) -> Log:
 
 @dataclass
 class TextLog(Log):
-    """An opened text of columns."""
+    """An opened text log."""
 
     dialect: Dialect | None = None
     encoding: str | None = None
@@ -70,7 +69,7 @@ class TextLog(Log):
         """Read the samples of these channels, as `Log.blocks` says."""
         self._start_anew(names, kinds=("number", "time"))
         assert self.dialect is not None
-        yield from ahead(_Reading(self, self.dialect, tuple(names)).blocks())
+        yield from read_ahead(_Reading(self, self.dialect, tuple(names)).blocks())
 
 
 class _Reading:
@@ -79,20 +78,20 @@ class _Reading:
     def __init__(self, log: TextLog, dialect: Dialect, names: tuple[str, ...]) -> None:
         self.log, self.dialect, self.names = log, dialect, names
         self.columns = {name: dialect.names.index(name) for name in names}
-        behind = [len(dialect.names) - 1] if dialect.trailing else []  # must stay empty
+        behind = [len(dialect.names) - 1] if dialect.trailing else []  # a column that must stay empty
         self.wanted = sorted({*self.columns.values(), *behind})
         self.rows = self.narrow = self.first_narrow = 0
         self.times = {i: stamps.seconds for i, stamps in dialect.stamps.items() if i in self.wanted}
-        self.latest = 0.0  # [s] of a column that says the day
-        self.days = {i: Unwrapped() for i in self.times if not dialect.stamps[i].dated}
+        self.latest = 0.0  # [s] of columns with dates
+        self.days = {i: Unwrapped() for i in self.times if not dialect.stamps[i].has_date}
 
     def blocks(self) -> Iterator[Block]:
-        """The blocks of samples.
+        """Read the blocks of samples.
 
         Raises
         ------
         BadLog
-            At a cell that is no number, or a row with more cells than columns.
+            At a cell that is not a number, or a row with more cells than columns.
         """
         lines = Lines(self.log.path, self.log.encoding)
         skip = self.dialect.header
@@ -112,10 +111,10 @@ class _Reading:
         for i, unwrapped in self.days.items():
             cells.columns[i] = unwrapped(cells.columns[i])
         nulls = {name: cells.nulls[i] for name, i in self.columns.items()}
-        return self.log.tallied({name: cells.columns[i] for name, i in self.columns.items()}, nulls)
+        return self.log.count_nans({name: cells.columns[i] for name, i in self.columns.items()}, nulls)
 
     def _at_once(self, block: bytes) -> Cells | None:
-        """The cells of a block whose rows are all as they should be, else None."""
+        """Parse a block whose rows are all regular, else return None."""
         dialect = self.dialect
         if dialect.delimiter == " ":
             return None
@@ -127,11 +126,11 @@ class _Reading:
         return None if dialect.trailing and cells.nulls[width - 1] < cells.rows else cells
 
     def _row_by_row(self, first: int, block: bytes) -> Cells:
-        """The same for any other block: only the wanted cells are kept, and a cell that is no number is found."""
+        """Parse any other block: keep only the wanted cells, and locate a cell that is not a number."""
         rows, lines = [], []
         for line, row in enumerate(block.split(b"\n"), start=first):
             if row.strip():
-                texts = self._fitted(line, split(decoded(row, "latin-1"), self.dialect.delimiter))
+                texts = self._fitted(line, split_cells(decode(row, "latin-1"), self.dialect.delimiter))
                 rows.append([texts[i].encode("latin-1") for i in self.wanted])
                 lines.append(line)
         try:
@@ -146,28 +145,24 @@ class _Reading:
             )
         except UNREADABLE as bad:
             raise BadLog(
-                f"{self.log.path}:{lines[0]}: from this line on there is a time that no calendar holds ({bad}); "
+                f"{self.log.path}:{lines[0]}: from this line on there is a time that is not a valid date ({bad}); "
                 "correct the cell, or take the row out of the log"
             ) from None
-        return Cells(
-            rows=cells.rows,
-            columns={self.wanted[i]: column for i, column in cells.columns.items()},
-            nulls={self.wanted[i]: count for i, count in cells.nulls.items()},
-            texts=[],
-        )
+        columns = {self.wanted[i]: column for i, column in cells.columns.items()}
+        return Cells(cells.rows, columns, {self.wanted[i]: count for i, count in cells.nulls.items()}, texts=[])
 
     def _pattern(self, column: int) -> re.Pattern[bytes]:
-        """What a cell of a column has to look like."""
+        """Return the pattern of the cells of a column."""
         if column in self.times:
             return re.compile(self.dialect.stamps[column].pattern.pattern.encode())
-        return NUMBERS[self.dialect.decimal]
+        return NUMBER_PATTERNS_BYTES[self.dialect.decimal]
 
     def _fitted(self, line: int, cells: list[str]) -> list[str]:
-        """The cells of a row, as many as there are columns."""
+        """Fill up the cells of a row to the number of columns."""
         width = len(self.dialect.names)
         if any(cells[width:]):
             raise BadLog(
-                f"{self.log.path}:{line}: the row has {len(cells)} cells, where there are {width} columns; correct the "
+                f"{self.log.path}:{line}: the row has {len(cells)} cells, but the log has {width} columns; correct the "
                 "row, or set `delimiter` and `decimal` for this log in study.toml"
             )
         if len(cells) < width - self.dialect.trailing:
@@ -175,28 +170,28 @@ class _Reading:
         return cells + [""] * (width - len(cells))
 
     def _no_number(self, line: int, column: int, cell: bytes) -> str:
-        what, remedy = "time like those before it", "take the row out of the log"
+        what, remedy = "time in the format of the rows before", "take the row out of the log"
         if column not in self.times:
             what = f"number with the decimal mark {self.dialect.decimal!r}"
             remedy = "set `decimal` for this log in study.toml"
-        where = f"{decoded(cell, self.log.encoding)[:40]!r} in column {column} ({self.dialect.names[column]})"
-        return f"{self.log.path}:{line}: {where} is no {what}; correct the cell, or {remedy}"
+        where = f"{decode(cell, self.log.encoding)[:40]!r} in column {column} ({self.dialect.names[column]})"
+        return f"{self.log.path}:{line}: {where} is not a {what}; correct the cell, or {remedy}"
 
     def _close(self, lines: Lines) -> None:
-        """What is known only at the end of the file."""
+        """Add the warnings that are only known at the end of the file."""
         say = self.log.warnings.append
         if self.narrow:
-            say(f"line {self.first_narrow}: the first of {self.narrow} rows with too few cells, filled with nulls")
+            say(f"line {self.first_narrow}: the first of {self.narrow} rows with too few cells; missing ones are nulls")
         if lines.cut.strip():
             self.log.dropped += 1
             say(f"line {lines.cut_at}: the file ends within this row, which is dropped")
         if not self.rows:
-            say("the file holds no whole row")
+            say("the file holds no complete row")
         if self.latest and self.log.zone == "local":
             ended = datetime.fromisoformat(self.log.started) + timedelta(seconds=self.latest)
             if clocks_may_change(self.log.started, ended.isoformat()):
                 say(f"the log began at {self.log.started} and ended at {ended.isoformat()}: {REMARK}")
         if lines.padding:
-            say(f"{lines.padding} NUL bytes at the end of the file, as a power cut leaves them, are not read")
+            say(f"{lines.padding} NUL bytes at the end of the file, typical of a power cut, are not read")
         if lines.damage:
             say(lines.damage)

@@ -1,4 +1,4 @@
-"""Times of day and dates in the cells of a text: ISO 8601 or HH:MM:SS, turned into seconds."""
+"""Convert dates and times of day in the cells of a text log to seconds: ISO 8601 or HH:MM:SS."""
 
 import re
 from collections.abc import Sequence
@@ -19,43 +19,43 @@ MOMENT = re.compile(rf"{DATE}[T ]\d\d:\d\d(?::\d\d(?:[.,]\d+)?)?(?P<zone>{ZONE})
 TIME_OF_DAY = re.compile(CLOCK, re.ASCII)
 DAY_ALONE = re.compile(DATE, re.ASCII)
 DAY = 86400.0  # [s]
-MONTHS = (3, 4, 9, 10, 11)  # in which some country's clocks change, on a Sunday night
-HOURS = (1, 2, 3)  # at which they do, by local time
+MONTHS = (3, 4, 9, 10, 11)  # in which clocks change in some country, on a Sunday night
+HOURS = (1, 2, 3)  # of these changes, in local time
 REMARK = (
-    "times are local and on either side of a Sunday night in which clocks may have been put forward or back; if they "
-    "were, the times after it are wrong by an hour: record in UTC, or give what comes after as a log of its own"
+    "times are local, and between them lies a Sunday night on which clocks may have been put forward or back; if they "
+    "were, the times after it are wrong by an hour: record in UTC, or give the data after it as a separate log"
 )
 
 
 @dataclass(frozen=True)
 class Stamps:
-    """How the cells of a column of times are written, and where their seconds are counted from."""
+    """The format of a column of times, and the zero of its seconds."""
 
     pattern: re.Pattern[str]
     zoned: bool = False
-    zero: int = 0  # [ns] since 1970 of the first cell; of times of day it is midnight
+    zero: int = 0  # [ns] since 1970 of the first cell; midnight for times of day
 
     @property
-    def dated(self) -> bool:
-        """Whether the cells say the day, too."""
+    def has_date(self) -> bool:
+        """Whether the cells have a date."""
         return self.pattern is MOMENT
 
     @property
-    def started(self) -> str:
-        """The first moment in ISO 8601, in UTC where the cells say their zone; "" for times of day."""
+    def first_moment(self) -> str:
+        """The first date and time in ISO 8601, in UTC if the cells state a zone; "" for times of day."""
         moment = datetime(1970, 1, 1) + timedelta(microseconds=self.zero // 1000)
-        return moment.isoformat() if self.dated else ""
+        return moment.isoformat() if self.has_date else ""
 
     def seconds(self, cells: "pa.ChunkedArray") -> Array:
-        """Seconds since zero (N,), NaN where a cell is empty.
+        """Convert cells to seconds since zero (N,), NaN where a cell is empty.
 
         Raises
         ------
         pa.ArrowInvalid
-            At a cell that is no such time.
+            At a cell of another format.
         """
         text = pc.replace_substring(pc.utf8_trim_whitespace(cells), ",", ".")
-        if self.dated:
+        if self.has_date:
             text = pc.replace_substring(pc.replace_substring_regex(text, r"\s+([Z+-])", r"\1"), "/", "-")
         else:
             text = pc.replace_substring_regex(text, r"^(\d\d?:)", r"1970-01-01 0\1")
@@ -66,7 +66,7 @@ class Stamps:
 
 
 def stamps_of(cells: Sequence[str]) -> Stamps | None:
-    """How a column of text tells times, if most of its cells do: one that does not is then an error with its line."""
+    """Find the time format of a text column, if most cells have one; any other cell is later an error with its line."""
     filled = [cell for cell in cells if cell]
     for pattern in (MOMENT, TIME_OF_DAY):
         matches = [match for match in map(pattern.fullmatch, filled) if match]
@@ -77,13 +77,13 @@ def stamps_of(cells: Sequence[str]) -> Stamps | None:
 
 
 def tells_time(cell: str) -> bool:
-    """Whether a cell is a moment, a time of day or a date."""
-    return cell[:1].isdecimal() and any(each.fullmatch(cell) for each in (MOMENT, TIME_OF_DAY, DAY_ALONE))
+    """Whether a cell is a date, a time of day or both."""
+    return cell[:1].isdecimal() and any(pattern.fullmatch(cell) for pattern in (MOMENT, TIME_OF_DAY, DAY_ALONE))
 
 
-def begun(stamps: Stamps, cells: Sequence[str]) -> Stamps | None:
-    """The same, counted from the first cell that says a day; None where no calendar holds it."""
-    if not stamps.dated:
+def from_first_cell(stamps: Stamps, cells: Sequence[str]) -> Stamps | None:
+    """Set the zero of dated stamps to the first dated cell; None if it is not a valid date."""
+    if not stamps.has_date:
         return stamps
     first = next(cell for cell in cells if stamps.pattern.fullmatch(cell))
     try:
@@ -94,26 +94,26 @@ def begun(stamps: Stamps, cells: Sequence[str]) -> Stamps | None:
 
 
 class Unwrapped:
-    """Times of day that go on past midnight."""
+    """Continues times of day past midnight."""
 
     def __init__(self) -> None:
         self.last, self.days = np.nan, 0
 
     def __call__(self, t: Array) -> Array:
-        """The next times (N,) [s], a day later from where they fall by more than half of one."""
-        known = np.flatnonzero(np.isfinite(t))
-        if not len(known):
+        """Add a day to the next times (N,) [s] after each fall of more than half a day."""
+        present = np.flatnonzero(np.isfinite(t))
+        if not len(present):
             return t
-        falls = np.diff(t[known], prepend=t[known[0]] if np.isnan(self.last) else self.last) < -DAY / 2
+        falls = np.diff(t[present], prepend=t[present[0]] if np.isnan(self.last) else self.last) < -DAY / 2
         days = self.days + np.cumsum(falls)
-        self.last, self.days = float(t[known[-1]]), int(days[-1])
+        self.last, self.days = float(t[present[-1]]), int(days[-1])
         later = t.copy()
-        later[known] += DAY * days
+        later[present] += DAY * days
         return later
 
 
 def clocks_may_change(before: str, after: str) -> bool:
-    """Whether clocks may have changed between two moments, in ISO 8601 without a zone."""
+    """Whether clocks may have changed between two local times, in ISO 8601 without a zone."""
     first, last = datetime.fromisoformat(before), datetime.fromisoformat(after)
     sunday = (first - timedelta(days=(first.weekday() + 1) % 7)).replace(hour=0, minute=0, second=0, microsecond=0)
     while sunday <= last:

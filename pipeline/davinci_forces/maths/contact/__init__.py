@@ -1,1 +1,1 @@
-"""What an external effort says of contacts: how large it is where nothing touches the robot, and within windows."""
+"""Contacts in an external effort: detection, forces against a force sensor, and the mass of a load."""

@@ -1,19 +1,18 @@
-"""Where contacts begin and end, found in an external effort without delay, at a stated rate of false alarms.
+"""Detect contacts in an external effort without delay, at a stated rate of false alarms, and summarise them.
 
-A contact is where the effort stays above the alarm level.  That is what free motion crosses once in ten minutes by
-Rice's formula for a normal process, or the most that it was ever seen to reach, whichever is more:
+A contact lasts while the effort exceeds the alarm level.  By Rice's formula for a normal process, free motion crosses
+that level once in ten minutes; the level is at least the largest effort of free motion:
 
     level = rms sqrt(2 ln(v_0 / false alarms a second)),    v_0 upward crossings of zero a second         (Rice 1944)
 
-A flank is taken to be a ramp that the smoother has widened, and left in its middle; it makes a step T_s long:
+A flank is modelled as a ramp of duration T that the smoother widens about its middle; a step becomes T_s long:
 
     onset = t(half the peak) - T/2,    T^2 = T_seen^2 - T_s^2,    T_seen = 2 (t(3/4 of the peak) - t(1/4))
 
-What happened within a window of contact: peak, mean and impulse of the external effort, and how far to trust them.
-
-The standard errors are what the same numbers come to where nothing touches the robot, model error included: of a peak
-the root mean square of the largest samples of windows of the same length, of a mean that of means over such windows.  A
-peak may be off by what the effort's own deviation is near it, too, which knows how far a filter lags behind.
+A window of contact is summarised by peak, mean and impulse of the external effort, with standard errors.  These are the
+values of the same statistics without contact, model error included: of a peak the root mean square of the largest
+samples of windows of the same length, of a mean that of means over such windows.  The standard deviation of the effort
+near a peak, which includes the lag of a filter, is added to that of the peak.
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,8 +25,8 @@ from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals.windows import runs
 
 FALSE_ALARMS = 1.0 / 600.0  # [1/s]
-TOGETHER = 0.25  # [s] apart at most, two crossings of one sign are one contact
-NEAR = 0.2  # [s] of a peak, within which a filter's lag passes through its largest
+MAX_GAP_CONTACT = 0.25  # [s] between two crossings of one sign that count as one contact
+PEAK_REACH = 0.2  # [s] around a peak that include the largest error by a filter's lag
 
 
 class Quiet(NamedTuple):
@@ -39,7 +38,7 @@ class Quiet(NamedTuple):
 
 
 class Event(NamedTuple):
-    """A contact that was found: where it begins and ends [s], and how far that may be off."""
+    """A detected contact: its onset and release [s], with standard errors."""
 
     onset: float
     onset_std: float
@@ -48,7 +47,7 @@ class Event(NamedTuple):
 
 
 def quiet(tau_ext: Array, free: Booleans, rate: float) -> Quiet:
-    """How an effort (N,) at `rate` [Hz] behaves where it is free (N,)."""
+    """Statistics of an effort (N,) at `rate` [Hz] at its `free` samples (N,)."""
     x, follows = tau_ext[free], np.diff(np.flatnonzero(free)) == 1
     upwards = (x[:-1] < 0.0) & (x[1:] >= 0.0) & follows
     rms = float(np.sqrt(np.mean(x**2)))
@@ -56,15 +55,15 @@ def quiet(tau_ext: Array, free: Booleans, rate: float) -> Quiet:
 
 
 def alarm_level(spaces: Sequence[Quiet]) -> float:
-    """The effort that all these free motions cross no more than once in ten minutes."""
+    """The effort that each of these free motions crosses at most once in ten minutes."""
     often = (max(s.crossings / FALSE_ALARMS, 1.0) for s in spaces)
     return max(max(s.largest, s.rms * float(np.sqrt(2.0 * np.log(n)))) for s, n in zip(spaces, often, strict=True))
 
 
 def events(t: Array, tau_ext: Array, std: Array, level: float, rise: float) -> Iterator[Event]:
-    """The contacts in a smoothed external effort (N,) with its standard deviation (N,), over times (N,) [s].
+    """Yield the contacts in a smoothed external effort (N,) with its standard deviation (N,), at times (N,) [s].
 
-    `rise` [s] is how long the smoother makes a step.
+    `rise` [s] is the duration T_s that the smoother gives a step.
     """
     for start, stop in sign_runs(t, np.where(np.abs(tau_ext) > level, np.sign(tau_ext), 0.0)):
         size = tau_ext * np.sign(tau_ext[start])
@@ -74,12 +73,12 @@ def events(t: Array, tau_ext: Array, std: Array, level: float, rise: float) -> I
 
 
 def sign_runs(t: Array, side: Array) -> Iterator[tuple[int, int]]:
-    """Runs of one sign (N,), as start and stop, those of the same sign that nearly touch taken together."""
+    """Yield start and stop of the runs of one sign (N,); runs of the same sign with a short gap are merged."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0.0], side, [0.0]])))
     signed = [(int(a), int(b)) for a, b in pairwise(edges) if side[a] != 0.0]
     merged: list[tuple[int, int]] = []
     for a, b in signed:
-        if merged and t[a] - t[merged[-1][1] - 1] <= TOGETHER and side[a] == side[merged[-1][0]]:
+        if merged and t[a] - t[merged[-1][1] - 1] <= MAX_GAP_CONTACT and side[a] == side[merged[-1][0]]:
             merged[-1] = (merged[-1][0], b)
         else:
             merged.append((a, b))
@@ -87,24 +86,24 @@ def sign_runs(t: Array, side: Array) -> Iterator[tuple[int, int]]:
 
 
 def edge(t: Array, size: Array, std: Array, start: int, stop: int, inwards: int, rise: float) -> tuple[float, float]:
-    """Where a contact, above the level from `start` to `stop`, begins (inwards 1) or ends (-1), and its error."""
+    """Onset (inwards 1) or release (-1) of a contact above the level from `start` to `stop`, and its standard error."""
     k, peak = (start if inwards > 0 else stop - 1), float(size[start:stop].max())
-    middle = reached(t, size, k, inwards, 0.5 * peak)
-    upper, lower = reached(t, size, k, inwards, 0.75 * peak), left(t, size, k, inwards, 0.25 * peak)
-    seen = max(2.0 * abs(upper - lower), float(t[1] - t[0]))
-    true = float(np.sqrt(max(seen**2 - rise**2, 0.0)))
-    return middle - 0.5 * inwards * true, float(std[k]) * seen / peak
+    middle = inner_crossing(t, size, k, inwards, 0.5 * peak)
+    upper, lower = inner_crossing(t, size, k, inwards, 0.75 * peak), outer_crossing(t, size, k, inwards, 0.25 * peak)
+    apparent = max(2.0 * abs(upper - lower), float(t[1] - t[0]))
+    duration = float(np.sqrt(max(apparent**2 - rise**2, 0.0)))
+    return middle - 0.5 * inwards * duration, float(std[k]) * apparent / peak
 
 
-def reached(t: Array, size: Array, k: int, inwards: int, level: float) -> float:
-    """The time at which a size, followed inwards from sample k on, first reaches a level."""
+def inner_crossing(t: Array, size: Array, k: int, inwards: int, level: float) -> float:
+    """Time at which a size, followed inwards from sample k, first reaches a level."""
     while size[k] < level:
         k += inwards
-    return left(t, size, k, inwards, level)
+    return outer_crossing(t, size, k, inwards, level)
 
 
-def left(t: Array, size: Array, k: int, inwards: int, level: float) -> float:
-    """The time at which a size, followed outwards from sample k on, is no more above a level, between two samples."""
+def outer_crossing(t: Array, size: Array, k: int, inwards: int, level: float) -> float:
+    """Time at which a size, followed outwards from sample k, falls below a level, interpolated between samples."""
     while 0 <= k - inwards < len(t) and size[k - inwards] >= level:
         k -= inwards
     out = k - inwards
@@ -136,27 +135,27 @@ def summarise(t: Array, tau_ext: Array, std: Array, window: tuple[float, float],
     duration, mean = end - start, float(inside.mean())
     mean_std = mean_size(tau_ext, free, len(inside))
     k = int(np.searchsorted(t, start)) + int(np.argmax(np.abs(inside)))
-    own = float(std[np.abs(t - t[k]) <= NEAR].max())
-    peak_std = float(np.hypot(own, largest_size(tau_ext, free, len(inside))))
+    std_near_peak = float(std[np.abs(t - t[k]) <= PEAK_REACH].max())
+    peak_std = float(np.hypot(std_near_peak, largest_size(tau_ext, free, len(inside))))
     return Summary(float(tau_ext[k]), peak_std, mean, mean_std, mean * duration, mean_std * duration)
 
 
 def mean_size(tau_ext: Array, free: Booleans, length: int) -> float:
     """Root mean square of means over `length` samples in free space.
 
-    Where no run of free samples is as long as that, of the longest means that there are; NaN where there are none.
+    If no run of free samples is that long, means are over the longest run; NaN without free samples.
     """
     return _size([_moving_means(run, length) for run, length in _runs(tau_ext, free, length)])
 
 
 def largest_size(tau_ext: Array, free: Booleans, length: int) -> float:
-    """Root mean square of the largest samples of windows of `length` samples in free space, one after the other."""
+    """Root mean square of the largest samples of consecutive windows of `length` samples in free space."""
     windows = (np.array_split(run, max(len(run) // length, 1)) for run, length in _runs(tau_ext, free, length))
     return _size([np.array([np.abs(window).max() for window in of_run]) for of_run in windows])
 
 
 def _runs(tau_ext: Array, free: Booleans, length: int) -> list[tuple[Array, int]]:
-    """The runs of free samples that are as long as that, or the longest where none is, with that length."""
+    """The runs of at least `length` free samples, or else the longest ones, with the length that was used."""
     parts = [tau_ext[run] for run in runs(free)]
     length = min(length, max(map(len, parts), default=0))
     return [(part, length) for part in parts if len(part) >= length > 0]

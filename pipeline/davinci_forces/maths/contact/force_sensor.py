@@ -1,10 +1,13 @@
-"""How far an estimated force is from that of a force sensor, and how much later the sensor shows it.
+"""Errors of an estimated force against a force sensor, and the lag of the sensor.
 
-e = f_hat - f_s,    relative error = sum_i rms(e_i) / sum_i (max f_s,i - min f_s,i)
+    e = f_hat - f_s,    relative error = sum_i rms(e_i) / sum_i (max f_s,i - min f_s,i)
 
-over the components i, which is how Yang et al. (2024, arXiv:2405.07453) state theirs.  The lag is where the correlation
-c(d) = sum f_hat(t) f_s(t + d) / sqrt(sum f_hat(t)^2 sum f_s(t + d)^2) of both, less their means, is largest.  Standard
-errors are by block bootstrap.
+over the components i, as Yang et al. (2024, arXiv:2405.07453) define it.  The lag d maximises the correlation of both
+forces, less their means:
+
+    c(d) = sum f_hat(t) f_s(t + d) / sqrt(sum f_hat(t)^2 sum f_s(t + d)^2)
+
+Standard errors are by block bootstrap.
 """
 
 from typing import NamedTuple
@@ -16,31 +19,31 @@ from davinci_forces.maths.mechanics.tip_force import CHI_SQUARED_95
 from davinci_forces.maths.uncertainty.bootstrap import blocks, standard_error
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 
-STEPS = 25  # of a lag to either side, at most
-STEP = 0.01  # [s] between lags that are tried, at least: smooth forces tell the rest by a parabola
-NEAR = 10  # lags to either side of the largest correlation that tell where it is
-ALIKE = 0.5  # correlation below which both do not show one force, and no lag is told
+MAX_LAG_STEPS = 25  # lags that are tried to either side
+MIN_LAG_STEP = 0.01  # [s] between them: a parabola interpolates the correlation of smooth forces
+MAX_PEAK_NEIGHBOURS = 10  # lags to either side of the largest correlation that the parabola is fitted to
+MIN_CORRELATION = 0.5  # below which the two signals do not show one force, so there is no lag
 
 
 class ForceErrors(NamedTuple):
-    """The errors of an estimated force, or of one component: in its unit, as a share of the range, in time."""
+    """Errors of an estimated force, or of one component, in its unit and relative to the range."""
 
     rmse: float
     rmse_std: float
     bias: float  # of a vector, the size of its mean error
     bias_std: float
     largest: float
-    span: float  # of what the sensor shows, the mean over components
+    span: float  # range of the sensor's force, the mean over components
     relative: float
     relative_std: float
-    coverage: float  # share of samples whose 95 % band holds what the sensor shows
+    coverage: float  # share of samples whose 95 % band contains the sensor's force
     coverage_std: float
 
 
 def at(t: Array, clock: Array, f: Array, reach: float) -> Array:
-    """What a sensor (M, k) on its clock (M,) shows at times (N,): on a line between samples, NaN where none are near.
+    """Interpolate a sensor (M, k) on its clock (M,) linearly at times (N,); NaN outside and in gaps.
 
-    `reach` [s] is how far apart samples may be for that.
+    Samples more than `reach` [s] apart have a gap between them.
     """
     after = np.clip(np.searchsorted(clock, t), 1, len(clock) - 1)
     gap = (clock[after] - clock[after - 1] > reach) & (t != clock[after])
@@ -51,7 +54,7 @@ def at(t: Array, clock: Array, f: Array, reach: float) -> Array:
 
 
 def errors(estimated: Array, C: Array, measured: Array) -> ForceErrors:
-    """The errors of a force (N, k) with covariance (N, k, k), against what a sensor shows (N, k)."""
+    """Errors of a force (N, k) with covariance (N, k, k), against that of a sensor (N, k)."""
     e, k = estimated - measured, measured.shape[1]
     spans = np.ptp(measured, axis=0)
     limit = {1: NORMAL_95**2, 3: CHI_SQUARED_95}[k]
@@ -72,45 +75,45 @@ def errors(estimated: Array, C: Array, measured: Array) -> ForceErrors:
 
 
 class Lag(NamedTuple):
-    """How much later one of two forces comes [s], NaN where they are not alike."""
+    """Delay [s] of one force behind another, NaN where they do not correlate."""
 
     value: float
     std: float
 
 
 def lag(t: Array, estimated: Array, clock: Array, measured: Array, rate: float, judged: Booleans) -> Lag:
-    """How much later a sensor (M, k) on its clock (M,) shows the force that is estimated (N, k) at times (N,).
+    """Delay of a sensor (M, k) on its clock (M,) behind the estimated force (N, k) at times (N,).
 
-    `judged` (N,) says which samples tell; `rate` [Hz] is that of the estimate.
+    `judged` (N,) selects samples; `rate` [Hz] is that of the estimate.
     """
-    step = np.ceil(STEP * rate - 1e-9) / rate
-    lags = step * np.arange(-STEPS, STEPS + 1)
+    step = np.ceil(MIN_LAG_STEP * rate - 1e-9) / rate
+    lags = step * np.arange(-MAX_LAG_STEPS, MAX_LAG_STEPS + 1)
     f, parts = estimated[judged] - estimated[judged].mean(0), blocks(int(judged.sum()))
     mean, products = measured.mean(0), np.zeros((len(parts), len(lags), 3))
     for j, late in enumerate(lags.tolist()):
         shown = at(t[judged] + late, clock, measured, 3.0 / rate) - mean
-        known = np.isfinite(shown).all(1)
-        sums = [np.where(known, np.einsum("ni,ni->n", a, b), 0.0) for a, b in ((f, shown), (f, f), (shown, shown))]
+        comparable = np.isfinite(shown).all(1)
+        sums = [np.where(comparable, np.einsum("ni,ni->n", a, b), 0.0) for a, b in ((f, shown), (f, f), (shown, shown))]
         products[:, j] = [[float(total[part].sum()) for total in sums] for part in parts]
 
     def peak(of: list[Array]) -> float:
-        both, own, its = np.sum(of, axis=0).T
-        return _vertex(both / np.sqrt(np.maximum(own * its, 1e-300)), step)
+        both, f_power, shown_power = np.sum(of, axis=0).T
+        return _vertex(both / np.sqrt(np.maximum(f_power * shown_power, 1e-300)), step)
 
-    found = list(products)
-    return Lag(peak(found), standard_error(peak, found))
+    samples = list(products)
+    return Lag(peak(samples), standard_error(peak, samples))
 
 
 def _vertex(c: Array, step: float) -> float:
-    """The lag of the largest correlation: where the parabola through it and its neighbours to both sides turns.
+    """Lag of the largest correlation: the vertex of a parabola fitted to it and its neighbours on both sides.
 
-    Noise makes the largest of nearly equal correlations any of them; as many neighbours as belong to the same peak, up
-    to `NEAR`, tell better.  The parabola is put about its own vertex until it stays there.
+    Noise decides which of nearly equal correlations is the largest.  The fit therefore includes the neighbours of the
+    same peak, up to `MAX_PEAK_NEIGHBOURS`, and is repeated around its vertex until that stays in place.
     """
     i = int(c.argmax())
     for _ in range(len(c)):
         near = reach(c, i)
-        if c[i] < ALIKE or near < 1:
+        if c[i] < MIN_CORRELATION or near < 1:
             return float("nan")
         k = np.arange(-near, near + 1)
         curvature, slope, _ = np.polyfit(k, c[i + k], 2).tolist()
@@ -120,12 +123,12 @@ def _vertex(c: Array, step: float) -> float:
         if abs(between) <= 1.0:
             break
         i = int(np.clip(i + np.sign(between), 0, len(c) - 1))
-    return float(step * (i - STEPS + between))
+    return float(step * (i - MAX_LAG_STEPS + between))
 
 
 def reach(c: Array, i: int) -> int:
-    """How many lags to both sides of lag i still belong to its peak; 0 where it is none."""
-    near = min(NEAR, i, len(c) - 1 - i)
+    """Number of lags on both sides of lag i that belong to its peak; 0 if it is no peak."""
+    near = min(MAX_PEAK_NEIGHBOURS, i, len(c) - 1 - i)
     below = [k for k in range(1, near + 1) if min(c[i - k], c[i + k]) < 0.5 * c[i]]
     return below[0] - 1 if below else near
 

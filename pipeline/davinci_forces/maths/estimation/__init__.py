@@ -1,1 +1,1 @@
-"""Parameters from data: least squares, how far to trust them, and the search of a swarm."""
+"""Estimate parameters from data: least squares, their uncertainty, and particle swarms."""

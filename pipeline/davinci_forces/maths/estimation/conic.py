@@ -1,11 +1,10 @@
-"""Least squares among the parameters that a mechanism can have, as a conic program, which Clarabel solves.
+"""Least squares over the physically possible parameters of a mechanism, as a conic program solved by Clarabel.
 
     theta = arg min |U D theta - y|^2,    theta = A x,    J_l(x) >= 0 of every link,    x_i >= 0 where physics knows it
 
 Sousa and Cortesao, Inertia tensor properties in robot dynamics identification: a linear matrix inequality approach,
-2019.  Of the x that make the same theta the lightest is taken, so that there is one: the traces of J have a price.
-Where the data ask for first moments without inertia, masses grow large, for the moment of an endless mass needs none;
-a solver that runs after them is called back by a higher price.
+2019.  Many x give the same theta: a small price on the traces of J selects the lightest.  Where the data demand first
+moments without inertia, masses grow without limit; a higher price stops the solver.
 """
 
 from typing import Any, NamedTuple
@@ -24,16 +23,16 @@ ENTRIES = [(i, j) for j in range(4) for i in range(j + 1)]  # of the triangle of
 SECOND = [k for k, (_, j) in enumerate(ENTRIES) if j < 3]  # of them, those that are second moments of the mass
 FIRST = [k for k, (i, j) in enumerate(ENTRIES) if i < j == 3]
 DIAGONAL = [k for k, (i, j) in enumerate(ENTRIES) if i == j]
-NEGLIGIBLE = 1e-10  # of the longest column, below which the effort does not show what it multiplies
+NEGLIGIBLE_COLUMN = 1e-10  # of the longest column: a parameter of a shorter one has no effect on the effort
 PRICES = (1e-10, 1e-9, 1e-8, 1e-7)  # of the traces of J, where the square of the whole effort is 1
-AT_BOUND = 1e-8  # of the effort, below which a bound that holds is met exactly
-TOLERANCE = 1e-12  # asked of the solver
-STEP = 0.9  # share of the way to the edge of a cone that it goes at a time: nearer by, rounding stops it early
-GAP = 1e-8  # of the same squares, by which the best may be missed
+AT_BOUND = 1e-8  # of the effort: a value nearer to its bound is set to the bound
+TOLERANCE = 1e-12  # of the solver
+MAX_STEP_FRACTION = 0.9  # of the way to the edge of a cone in one step: nearer to it, rounding stops the solver early
+MAX_GAP_SOLVER = 1e-8  # duality gap, as a share of the effort's square
 
 
 def settings(tolerance: float) -> Any:
-    """Of Clarabel: no words, one thread, nothing removed beforehand, and gaps and residuals of at most `tolerance`."""
+    """Settings of Clarabel: silent, one thread, no presolve, and gaps and residuals of at most `tolerance`."""
     import clarabel
 
     chosen = clarabel.DefaultSettings()
@@ -45,68 +44,70 @@ def settings(tolerance: float) -> Any:
 
 
 class Made(NamedTuple):
-    """Parameters that a mechanism can have, one that has them, and what that costs."""
+    """Physically possible parameters, a mechanism that has them, and their excess over least squares."""
 
     theta: Array  # (p,)
     x: Array  # (n,)
-    excess: float  # of the squares over the least, as a share of the effort's own
-    gap: float  # by which the solver may miss the best, likewise
+    excess: float  # of the squares over the least, as a share of the effort's square
+    gap: float  # bound of the distance to the optimum, likewise
 
 
 class Cones(NamedTuple):
-    """The program in unknowns z, each scaled by what the effort shows of it: x = B z."""
+    """The program in unknowns z, each scaled by its effect on the effort: x = B z."""
 
     scale: csc_array  # B (n, n)
-    seen: Integers  # the unknowns that the effort shows at all, links first
-    links: int  # that it shows
-    positive: Integers  # of those seen, numbers without a link that are not negative
+    seen: Integers  # the unknowns with an effect on the effort, links first
+    links: int  # with an effect
+    positive: Integers  # of those with an effect, the ones outside links that are not negative
 
 
 def nearest(R: Triangle, mechanism: Mechanism) -> Made:
-    """The best parameters that a mechanism can have; those of least squares, to the bit, where signs are all there is.
+    """Find the best physically possible parameters.
+
+    Of a mechanism without bodies, these are exactly those of least squares if their signs are possible.
 
     Raises
     ------
     NotIdentifiable
-        If the solver does not get there.
+        If the solver does not converge.
     """
     if not mechanism.has_bodies and (R.theta[mechanism.positive] >= 0).all():
         return Made(R.theta, R.theta, 0.0, 0.0)
     F, size = (R.U * R.scale) @ mechanism.matrix, float(np.sqrt(R.y @ R.y + R.squares))
-    cones = scaled(F, mechanism)
-    z, gap = solved(csc_array(F @ cones.scale)[:, cones.seen], R.y / size, cones)
+    cones = scale_unknowns(F, mechanism)
+    z, gap = solve(csc_array(F @ cones.scale)[:, cones.seen], R.y / size, cones)
     x = np.asarray(cones.scale[:, cones.seen] @ z * size)
     theta = np.asarray(mechanism.matrix @ x)
     return Made(theta, x, float(R.excess(theta)) / size**2, gap)
 
 
-def scaled(F: Array, mechanism: Mechanism) -> Cones:
-    """Unknowns whose columns of F (p, n) are about of unit length.
+def scale_unknowns(F: Array, mechanism: Mechanism) -> Cones:
+    """Scale the unknowns so that their columns of F (p, n) have about unit length.
 
     Scaling the axes of a link and its mass, J = T Z T', T = diag(s, s, s, t), leaves its cone as it is.
     """
     L, n = mechanism.links, F.shape[1]
     to_ten, B = parameters_of_entries(), np.zeros((n, n))
     longest = float(np.linalg.norm(F, axis=0).max())
-    seen = list[int]()
+    shown = list[int]()
     for link in range(L):
-        own = slice(TEN * link, TEN * (link + 1))
-        columns = F[:, own] @ to_ten
-        if (size := np.linalg.norm(columns, axis=0)).max() > NEGLIGIBLE * longest:
-            B[own, own] = to_ten * scales_of_entries(size, NEGLIGIBLE * longest)
-            seen += range(own.start, own.stop)
-    rest = np.arange(TEN * L, n)
-    size = np.linalg.norm(F[:, rest], axis=0)
-    rest, size = rest[size > NEGLIGIBLE * longest], size[size > NEGLIGIBLE * longest]
-    B[rest, rest] = 1.0 / size
-    which = np.array([*seen, *rest.tolist()])
-    links = len(seen) // TEN
+        span = slice(TEN * link, TEN * (link + 1))
+        columns = F[:, span] @ to_ten
+        if (size := np.linalg.norm(columns, axis=0)).max() > NEGLIGIBLE_COLUMN * longest:
+            B[span, span] = to_ten * scales_of_entries(size, NEGLIGIBLE_COLUMN * longest)
+            shown += range(span.start, span.stop)
+    others = np.arange(TEN * L, n)
+    size = np.linalg.norm(F[:, others], axis=0)
+    others, size = others[size > NEGLIGIBLE_COLUMN * longest], size[size > NEGLIGIBLE_COLUMN * longest]
+    B[others, others] = 1.0 / size
+    which = np.array([*shown, *others.tolist()])
+    links = len(shown) // TEN
     held = np.flatnonzero(mechanism.positive[which] & (np.arange(len(which)) >= TEN * links))
     return Cones(csc_array(B), which, links, held)
 
 
 def parameters_of_entries() -> Array:
-    """The inertial parameters (10, 10) of each entry of J, as the solver takes a symmetric matrix."""
+    """Inertial parameters (10, 10) of each entry of J, in the solver's form of a symmetric matrix."""
     J = np.zeros((TEN, 4, 4))
     for k, (i, j) in enumerate(ENTRIES):
         J[k, i, j] = J[k, j, i] = 1.0 if i == j else np.sqrt(0.5)
@@ -114,7 +115,7 @@ def parameters_of_entries() -> Array:
 
 
 def scales_of_entries(size: Array, least: float) -> Array:
-    """T J T' by entry (10,), given how long their columns (10,) are: what is not seen follows from what is."""
+    """Scales of T J T' by entry (10,) from the lengths of their columns (10,); short columns use the others'."""
     second, first, mass = (float(size[which].max()) for which in (SECOND, FIRST, [TEN - 1]))
     if max(second, mass) <= least:
         second = mass = first
@@ -126,27 +127,27 @@ def scales_of_entries(size: Array, least: float) -> Array:
     return np.array([T[i] * T[j] for i, j in ENTRIES])
 
 
-def solved(F: csc_array, y: Array, cones: Cones) -> tuple[Array, float]:
-    """z of the least |F z - y|^2 in its cones, at the lowest price at which the solver gets there, and the gap left.
+def solve(F: csc_array, y: Array, cones: Cones) -> tuple[Array, float]:
+    """Minimise |F z - y|^2 in the cones, at the lowest price at which the solver converges; return z and the gap.
 
     Raises
     ------
     NotIdentifiable
-        If it does at none.
+        If it converges at no price.
     """
     for price in PRICES:
-        z, gap, said = at_price(F, y, cones, price)
-        if gap <= GAP:
+        z, gap, status = solve_at_price(F, y, cones, price)
+        if gap <= MAX_GAP_SOLVER:
             return z, gap
     raise NotIdentifiable(
-        f"the conic program was not solved ({said}): its answer may miss the best by {gap:.1e} of the effort's square"
+        f"the conic program was not solved ({status}): it may miss the optimum by {gap:.1e} of the effort's square"
     )
 
 
-def at_price(F: csc_array, y: Array, cones: Cones, price: float) -> tuple[Array, float, str]:
-    """z of the least |F z - y|^2 + price of the traces, by how much it may miss that, and what the solver says.
+def solve_at_price(F: csc_array, y: Array, cones: Cones, price: float) -> tuple[Array, float, str]:
+    """Minimise |F z - y|^2 + price of the traces in the cones; return z, the gap, and the solver's status.
 
-    The residual r = F z - y is an unknown of its own, so that no product of F with itself is made.
+    The residual r = F z - y is an unknown of its own, so that F is not multiplied with itself.
     """
     import clarabel
 
@@ -160,17 +161,17 @@ def at_price(F: csc_array, y: Array, cones: Cones, price: float) -> tuple[Array,
     kinds: list[Any] = [clarabel.ZeroConeT(p), *[clarabel.PSDTriangleConeT(4)] * cones.links]
     kinds += [clarabel.NonnegativeConeT(len(cones.positive))] if len(cones.positive) else []
     bound = np.r_[y, np.zeros(len(held))]
-    answer = clarabel.DefaultSolver(squares, cost, rows, bound, kinds, careful()).solve()
+    answer = clarabel.DefaultSolver(squares, cost, rows, bound, kinds, careful_settings()).solve()
     z = np.array(answer.x)[:n]
-    z[held] = np.array(answer.s)[p:]  # which lies in the cones, and not just beside them
-    own, multiplier = z[cones.positive], np.array(answer.z)[p + TEN * cones.links :]
-    z[cones.positive] = np.where((own < AT_BOUND) & (own < multiplier), 0.0, own)  # of the two one is 0
+    z[held] = np.array(answer.s)[p:]  # the slack lies exactly in the cones
+    values, multiplier = z[cones.positive], np.array(answer.z)[p + TEN * cones.links :]
+    z[cones.positive] = np.where((values < AT_BOUND) & (values < multiplier), 0.0, values)  # of the two one is 0
     gap = float(((F @ z - y) ** 2).sum() + cost[:n] @ z) - float(answer.obj_val_dual)  # no z is below the dual's value
     return z, gap if np.isfinite(gap) else np.inf, f"{answer.status} after {answer.iterations} steps"
 
 
-def careful() -> Any:
-    """The solver's settings, with small steps."""
+def careful_settings() -> Any:
+    """Settings of the solver with smaller steps."""
     cautious = settings(TOLERANCE)
-    cautious.max_step_fraction = STEP
+    cautious.max_step_fraction = MAX_STEP_FRACTION
     return cautious

@@ -1,17 +1,17 @@
-"""How far parameters of least squares may be off where residuals are correlated.
+"""The variance of least-squares parameters where residuals are correlated.
 
     r = (1 - Q Q') e,    cov(e) = sigma^2 Omega,    cov(Q' e) = sigma^2 Q' Omega Q
 
-Omega is that of a first-order autoregression and white noise on a period, which repeats: a model's error is slow, the
-noise of averaged samples is not, and one correlation for both would be that of the faster.  On a period Omega is a
-matter of frequencies,
+Omega is that of a first-order autoregression plus white noise on a repeated period.  A model's error is slow and the
+noise of averaged samples is not, so one correlation for both would be that of the faster.  On a period Omega is
+diagonal in frequency,
 
     S(w) = (1 - a) (1 - rho^2) / (1 + rho^2 - 2 rho cos w) + a,    rho = exp(-1/T)
 
-so every candidate of T and a costs a product of small matrices.  Each counts by its restricted likelihood, that of what
-is left when p columns have been fitted: the residuals' own correlation is biased by those.  (Patterson and Thompson,
-1971; Harville, 1974.)  The covariance is the mean over candidates, because one correlation, taken as known, covers too
-little where a period holds only a dozen correlation times.
+so every candidate of T and a costs a product of small matrices.  Its weight is its restricted likelihood, which allows
+for the p fitted columns; they bias the residuals' own correlation.  (Patterson and Thompson, 1971; Harville, 1974.)
+The covariance is the mean over candidates: a single correlation gives too little coverage where a period has only a
+dozen correlation times.
 """
 
 from itertools import pairwise
@@ -23,11 +23,11 @@ from numpy.typing import NDArray
 from davinci_forces.maths.arrays import Array
 
 TIMES = 24  # correlation times T, besides none, evenly spaced in their logarithm
-SHORTEST = 0.3  # [samples]
-LONGEST = 0.25  # of the longest log
+SHORTEST_TIME = 0.3  # [samples]
+LONGEST_TIME = 0.25  # of the longest log
 WHITE = np.array([0.0, 0.03, 0.1, 0.3, 0.6])  # shares a of white noise in the variance
-SINGLE, BANDS = 64, 120  # frequencies that stand alone, and bands of those beyond
-ROWS = 8192  # at a time: few enough to stay in the processor's cache
+SINGLE, BANDS = 64, 120  # lowest frequencies, one band each, and bands of all higher ones
+CACHED_ROWS = 8192  # rows at a time, which fit into the processor's cache
 SMALLEST = np.finfo(float).tiny
 
 
@@ -35,7 +35,7 @@ Spectra = list[tuple[NDArray[np.complex128], int]]  # of each log: F (p + 1, K /
 
 
 class Bands(NamedTuple):
-    """What the logs hold in B bands of frequency."""
+    """The spectra of the logs in B bands of frequency."""
 
     frequency: Array  # (B,) [rad/sample]
     number: Array  # (B,) of frequencies in the band
@@ -45,22 +45,22 @@ class Bands(NamedTuple):
 
 
 class Correlated(NamedTuple):
-    """The variance of parameters, and over how many lags the residuals that it comes from are correlated."""
+    """The variance of parameters, and the number of lags over which the residuals are correlated."""
 
     variance: Array  # (p,)
     lags: float
 
 
 def correlated(Q: Array, residual: Array, starts: tuple[int, ...], D: Array, degrees: int) -> Correlated:
-    """The variance of D y for y = Q' tau, given orthonormal columns Q (K, p), D (p, p) and the residuals (K,).
+    """Variance of D y for y = Q' tau, from orthonormal columns Q (K, p), D (p, p) and the residuals (K,).
 
-    Each log is a period that begins where `starts` says; `degrees` are K - p.  Where residuals are larger in one part
-    of the period than in another, so is what parameters that depend on this part may err by.
+    Each log is a period that begins at its entry of `starts`; `degrees` are K - p.  Larger residuals in one part of the
+    period increase the variance of the parameters that depend on this part.
     """
-    spectra = transformed(Q, residual, starts)
-    bands = banded(spectra)
+    spectra = transform_logs(Q, residual, starts)
+    bands = band_spectra(spectra)
     S, lags = candidates(bands.frequency, max(K for _, K in spectra))
-    share, scale = weighed(bands, S, degrees)
+    share, scale = weigh_candidates(bands, S, degrees)
     mean = (share * scale) @ S
     covariance = np.einsum("b,bij->ij", mean, bands.basis)
     variance = np.einsum("ki,ij,kj->k", D, covariance, D)
@@ -68,11 +68,11 @@ def correlated(Q: Array, residual: Array, starts: tuple[int, ...], D: Array, deg
     return Correlated(variance * factor, float(share @ lags))
 
 
-def transformed(Q: Array, residual: Array, starts: tuple[int, ...]) -> Spectra:
-    """The Fourier transforms of each log's part of columns (K, p) and residuals (K,)."""
+def transform_logs(Q: Array, residual: Array, starts: tuple[int, ...]) -> Spectra:
+    """Fourier-transform each log's part of columns (K, p) and residuals (K,)."""
     lengths = np.diff([*starts, len(Q)])
     ends = np.cumsum(lengths // 2 + 1)
-    memory = np.empty((Q.shape[1] + 1, ends[-1]), complex)  # at once, which costs a third of asking log by log
+    memory = np.empty((Q.shape[1] + 1, ends[-1]), complex)  # one allocation takes a third of the time of one per log
     spectra = []
     for first, K, F in zip(starts, lengths.tolist(), np.split(memory, ends[:-1], axis=1), strict=True):
         np.fft.rfft(Q[first : first + K].T, norm="ortho", out=F[:-1])
@@ -81,8 +81,8 @@ def transformed(Q: Array, residual: Array, starts: tuple[int, ...]) -> Spectra:
     return spectra
 
 
-def banded(spectra: Spectra) -> Bands:
-    """The columns' and the residuals' spectra, in bands that widen with frequency; logs of one length share theirs."""
+def band_spectra(spectra: Spectra) -> Bands:
+    """Sum the spectra of columns and residuals in bands that widen with frequency; logs of equal length share them."""
     parts = []
     for K in dict.fromkeys(K for _, K in spectra):
         logs, n = [F for F, samples in spectra if samples == K], K // 2 + 1
@@ -103,15 +103,15 @@ def banded(spectra: Spectra) -> Bands:
 
 
 def candidates(frequency: Array, K: int) -> tuple[Array, Array]:
-    """S (G, B) of every correlation time and share of white noise; and their correlations (G,), summed over lags."""
-    times = np.concatenate([[1e-3], np.geomspace(SHORTEST, max(LONGEST * K, 1.0), TIMES)])
+    """Spectra S (G, B) of all correlation times and shares of white noise, and their sums of correlations (G,)."""
+    times = np.concatenate([[1e-3], np.geomspace(SHORTEST_TIME, max(LONGEST_TIME * K, 1.0), TIMES)])
     rho, a = (x.ravel() for x in np.meshgrid(np.exp(-1.0 / times), WHITE, indexing="ij"))
     slow = (1 - rho**2)[:, None] / (1 + rho[:, None] ** 2 - 2 * rho[:, None] * np.cos(frequency))
     return (1 - a)[:, None] * slow + a[:, None], (1 - a) * 2 * rho / (1 - rho)
 
 
-def weighed(bands: Bands, S: Array, degrees: int) -> tuple[Array, Array]:
-    """The share (G,) that each candidate has by its restricted likelihood, and its estimate of sigma^2 (G,)."""
+def weigh_candidates(bands: Bands, S: Array, degrees: int) -> tuple[Array, Array]:
+    """Weight (G,) of each candidate by its restricted likelihood, and its estimate of sigma^2 (G,)."""
     G, p = len(S), bands.cross.shape[1]
     normal = (1 / S @ bands.basis.reshape(-1, p * p)).reshape(G, p, p)
     moved = np.linalg.solve(normal, (1 / S @ bands.cross)[:, :, None])[:, :, 0]
@@ -124,7 +124,7 @@ def weighed(bands: Bands, S: Array, degrees: int) -> tuple[Array, Array]:
 
 
 def unevenness(spectra: Spectra, D: Array, S: Array, frequency: Array) -> Array:
-    """By how much the variances (p,) of D y differ from those of innovations that are as large everywhere.
+    """Factors (p,) of the variances of D y against those of innovations of constant variance.
 
     With u = Omega^(-1/2) e the innovations and h the rows of D Q' Omega^(1/2), D Q' e = sum of h_k u_k: its variance is
     the sum of h_k^2 u_k^2, and would be that of h_k^2 times the mean of u^2.  (White, 1980)
@@ -137,8 +137,8 @@ def unevenness(spectra: Spectra, D: Array, S: Array, frequency: Array) -> Array:
         numbers[:-1] *= both
         numbers[-1] /= both
         columns = np.fft.irfft(F, K, norm="ortho")
-        for first in range(0, K, ROWS):
-            some = columns[:, first : first + ROWS]
+        for first in range(0, K, CACHED_ROWS):
+            some = columns[:, first : first + CACHED_ROWS]
             u2, h2 = some[-1] ** 2, (D @ some[:-1]) ** 2
             sums += np.stack([h2 @ u2, h2.sum(axis=1), np.full(len(D), u2.sum())])
     samples = sum(K for _, K in spectra)

@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.maths.compiled import cached, inlined
+from davinci_forces.maths.compiled import cached, inline
 
-ROWS = 512  # at a time: few enough that all their columns stay in the processor's nearest cache
+BLOCK_ROWS = 512  # rows at a time, whose columns all fit into the processor's nearest cache
 
 
-@inlined
+@inline
 def dot(x: Any, y: Any, n: int) -> float:
-    """x' y over the first n; four sums at once, none of which waits for another."""
+    """Product x' y over the first n entries, in four independent sums that the processor computes in parallel."""
     a = b = c = d = 0.0
     whole = n - n % 4
     for i in range(0, whole, 4):
@@ -35,9 +35,9 @@ def triangularise(Phi: Any, tau: Any, weight: Any, R: Any) -> None:
     """
     K, p = Phi.shape
     R[:] = 0.0
-    A = np.empty((p + 1, ROWS))  # a block's columns
-    for start in range(0, K, ROWS):
-        n = min(ROWS, K - start)
+    A = np.empty((p + 1, BLOCK_ROWS))  # a block's columns
+    for start in range(0, K, BLOCK_ROWS):
+        n = min(BLOCK_ROWS, K - start)
         for i in range(n):
             root = np.sqrt(weight[start + i])
             for j in range(p):
@@ -59,9 +59,9 @@ def triangularise(Phi: Any, tau: Any, weight: Any, R: Any) -> None:
             R[k, k] = -size if first > 0 else size
 
 
-@inlined
-def beyond(x: Any, factors: Any, C: Any, y: Any, monomials: Any) -> float:
-    """|C m(x) - y|^2, of n parameters x (n + 1,), the last of which is 1; `monomials` (T,) is overwritten."""
+@inline
+def residual_squares(x: Any, factors: Any, C: Any, y: Any, monomials: Any) -> float:
+    """Squared error |C m(x) - y|^2 of n parameters x (n + 1,), the last of which is 1; overwrites `monomials` (T,)."""
     for t in range(len(factors)):
         monomials[t] = x[factors[t, 0]] * x[factors[t, 1]] * x[factors[t, 2]]
     total = 0.0
@@ -73,26 +73,13 @@ def beyond(x: Any, factors: Any, C: Any, y: Any, monomials: Any) -> float:
 
 @cached
 def fly(
-    x: Any,
-    v: Any,
-    best: Any,
-    costs: Any,
-    lower: Any,
-    upper: Any,
-    factors: Any,
-    C: Any,
-    y: Any,
-    r: Any,
-    w: Any,
-    cognitive: float,
-    social: float,
-    reflects: bool,
-    history: Any,
-) -> None:
+    x: Any, v: Any, best: Any, costs: Any, lower: Any, upper: Any, factors: Any, C: Any, y: Any, r: Any, w: Any,
+    cognitive: float, social: float, reflects: bool, history: Any,
+) -> None:  # fmt: skip
     """Move particles x (S, n + 1) by velocities v (S, n), once for each r (I, S, n, 2) in [0, 1) and weight w (I,).
 
-    `best` (S, n + 1) and `costs` (S,) are what each particle has found; the least of them after each move is written to
-    `history` (I,).
+    `best` (S, n + 1) and `costs` (S,) are the best place and cost of each particle; the least cost after each move goes
+    to `history` (I,).
     """
     S, n = v.shape
     monomials = np.empty(len(factors))
@@ -109,7 +96,7 @@ def fly(
                         x[s, i] = 2.0 * wall - x[s, i]
                         v[s, i] = -v[s, i]
                     x[s, i] = min(max(x[s, i], lower[i]), upper[i])
-            cost = beyond(x[s], factors, C, y, monomials)
+            cost = residual_squares(x[s], factors, C, y, monomials)
             if cost < costs[s]:
                 costs[s] = cost
                 best[s] = x[s]

@@ -1,8 +1,8 @@
-"""The search of a swarm of particles in a box.  Section 6.5
+"""Particle swarm optimisation in a box.  Section 6.5
 
     V = w V + C_1 r_1 (P_best - p) + C_2 r_2 (G_best - p),    p = p + V              (6.51), (6.52)
 
-What a swarm reaches is decided by its walls and weights: particles that are clipped to a wall stay on it.
+The optimum that a swarm reaches depends on its walls and weights: particles that are clipped to a wall stay on it.
 """
 
 from typing import NamedTuple
@@ -13,15 +13,15 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation.least_squares import Triangle
 from davinci_forces.maths.models.physical import Box
 
-PARTICLES, MOST, PATIENCE = 24, 3000, 150  # particles, iterations, and those without a change: section 6.5.1
-CHANGE = 1e-9  # of the squared error: what is less is none
-BLOCK = 50  # iterations that random numbers are drawn for at once
+PARTICLES, MAX_ITERATIONS, PATIENCE = 24, 3000, 150  # PATIENCE: iterations without a change; section 6.5.1
+CHANGE = 1e-9  # of the squared error: a smaller change counts as none
+ITERATIONS_DRAWN = 50  # iterations whose random numbers are drawn together
 SWARMS = 4  # at most, until two agree
 AGREE = 1e-7  # of the squared error
 
 
 class Manner(NamedTuple):
-    """How a swarm moves."""
+    """Weights and walls of a swarm."""
 
     name: str  # for its walls
     inertia: tuple[float, float]  # w at first, and after `falls` iterations
@@ -38,44 +38,44 @@ THESIS = Manner("clipping", (0.9, 0.4), 1500, 2.0, 2.0, False)
 
 
 class Found(NamedTuple):
-    """What a swarm found."""
+    """The optimum of a swarm."""
 
     x: Array  # (n,)
     theta: Array  # (p,)
     squares: float  # |W^(1/2) (tau - Phi theta)|^2
     history: Array  # (I,) the least squares after each iteration
-    swarms: int  # that were asked before two agreed
+    swarms: int  # that ran until two agreed
 
 
 def search(R: Triangle, box: Box, seed: int, manner: Manner = CONSTRICTED) -> Found:
-    """The best of several swarms, which stop when two have found squares that agree; the same seed finds the same."""
+    """Run swarms until the squares of two agree, and return the best; the same seed gives the same result."""
     best = swarm(R, box, np.random.default_rng([seed, 0]), manner)
     for number in range(1, SWARMS):
-        other = swarm(R, box, np.random.default_rng([seed, number]), manner)
-        agree = abs(other.squares - best.squares) <= AGREE * best.squares
-        best = min(best, other, key=lambda found: found.squares)._replace(swarms=number + 1)
+        result = swarm(R, box, np.random.default_rng([seed, number]), manner)
+        agree = abs(result.squares - best.squares) <= AGREE * best.squares
+        best = min(best, result, key=lambda run: run.squares)._replace(swarms=number + 1)
         if agree:
             break
     return best
 
 
 def swarm(R: Triangle, box: Box, random: np.random.Generator, manner: Manner) -> Found:
-    """One swarm from random places of the box, until its best has not changed for a while."""
+    """Run one swarm from random places of the box until its best has not changed for `PATIENCE` iterations."""
     from davinci_forces.maths.estimation import kernels
 
     n, C = len(box.lower), np.ascontiguousarray((R.U * R.scale) @ box.lumping.coefficients)
     x = np.ones((PARTICLES, n + 1))
     x[:, :n] = random.uniform(box.lower, box.upper, (PARTICLES, n))
     v, best, costs = np.zeros((PARTICLES, n)), x.copy(), R.excess(box.lumping.theta(x[:, :n]))
-    history = np.full(MOST, np.inf)
+    history = np.full(MAX_ITERATIONS, np.inf)
     first, last = manner.inertia
-    for start in range(0, MOST, BLOCK):
-        w = first + (last - first) * np.minimum(np.arange(start, start + BLOCK) / manner.falls, 1.0)
-        r = random.random((BLOCK, PARTICLES, n, 2))
+    for start in range(0, MAX_ITERATIONS, ITERATIONS_DRAWN):
+        w = first + (last - first) * np.minimum(np.arange(start, start + ITERATIONS_DRAWN) / manner.falls, 1.0)
+        r = random.random((ITERATIONS_DRAWN, PARTICLES, n, 2))
         bounds = (box.lower, box.upper, box.lumping.factors, C, R.y)
-        into = history[start : start + BLOCK]
+        into = history[start : start + ITERATIONS_DRAWN]
         kernels.fly(x, v, best, costs, *bounds, r, w, manner.cognitive, manner.social, manner.reflects, into)
-        done = start + BLOCK
+        done = start + ITERATIONS_DRAWN
         if done > PATIENCE and history[done - 1 - PATIENCE] - into[-1] <= CHANGE * (R.squares + into[-1]):
             break
     leader = best[int(costs.argmin()), :n]

@@ -1,8 +1,8 @@
-"""Trajectories of all joints at once: those that tell most about the arm as one, links, rotors and friction together.
+"""Design the most informative trajectories of all joints together: for links, rotors and friction of the arm.
 
     tau = Y(q, dq, ddq) pi + diag(ddq) J_m + diag(dq) v + diag(sign(dq)) c                            (6.3), (A.16)
 
-The columns that no motion tells apart are left out, so the criterion is that of the arm's base parameters.
+Dependent columns are left out, so the criterion is that of the arm's base parameters.
 """
 
 from collections.abc import Sequence
@@ -16,24 +16,23 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.excitation.fourier import CRITERIA, Fourier, basis, instants
 from davinci_forces.maths.excitation.joint import (
     ExcitationProblem,
-    delayed,
-    fitted,
+    delay,
     from_standstill,
     impossible,
-    within,
+    scale_to_limits,
+    shrink_into_limits,
 )
 from davinci_forces.maths.excitation.search import Tell, lowest, nothing
-from davinci_forces.maths.mechanics.bodies import base_parameters
+from davinci_forces.maths.mechanics.bodies import RANDOM_SAMPLES, base_parameters
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.rigid_body import compiled_regressor
 
-RICH = 200  # random samples that show which columns depend on others
-AT_ONCE = 8  # trajectories, whose regressors fit into a processor's cache
+TRAJECTORIES_AT_ONCE = 8  # whose regressors fit into a processor's cache
 
 
 @dataclass(frozen=True)
 class ArmExcitationProblem:
-    """The first joints of an arm, to be excited together; all of them share period, samples and criterion."""
+    """The excitation of the first joints of an arm together; all of them share period, samples and criterion."""
 
     chain: Chain
     joints: tuple[ExcitationProblem, ...]
@@ -41,55 +40,55 @@ class ArmExcitationProblem:
 
 
 class ArmDesign(NamedTuple):
-    """The designed trajectory of each joint, and the lowest criterion that each start has come to (starts,)."""
+    """The designed trajectory of each joint, and the lowest criterion of each start (starts,)."""
 
     series: list[Fourier]
     optima: Array
 
 
 def arm_problem(chain: Chain, joints: Sequence[ExcitationProblem]) -> ArmExcitationProblem:
-    """The problem, with the base parameters of the arm."""
-    q, dq, ddq = np.random.default_rng(0).uniform(-1, 1, (3, RICH, len(joints)))
+    """The excitation problem of these joints, with the base parameters of the arm."""
+    q, dq, ddq = np.random.default_rng(0).uniform(-1, 1, (3, RANDOM_SAMPLES, len(joints)))
     all_columns = np.arange(10 * len(chain.parent) + 3 * len(joints))
     return ArmExcitationProblem(chain, tuple(joints), base_parameters(_columns(chain, q, dq, ddq, all_columns)).columns)
 
 
 def arm_observation(problem: ArmExcitationProblem, series: Sequence[Fourier]) -> Array:
     """F (K n, p) of the base parameters over one period, the joints of a sample below each other.  (6.19)"""
-    return np.asarray(_observations(problem, [one.x[None] for one in series])[0])
+    return np.asarray(_observations(problem, [joint_series.x[None] for joint_series in series])[0])
 
 
 def design_together(problem: ArmExcitationProblem, starts: int, seed: int, tell: Tell = nothing) -> ArmDesign:
-    """The best of several optima, each of a population of its own.
+    """Design the best of several optima, each of its own population.
 
     Raises
     ------
     ValueError
-        If a joint's limits cannot be kept, or if no trajectory tells its terms apart.
+        If a joint's limits cannot be kept, or if the regressor of every trajectory is rank deficient.
     """
     if reason := next(filter(None, (impossible(joint.limits) for joint in problem.joints)), ""):
         raise ValueError(reason)
     criterion = CRITERIA[problem.joints[0].criterion]
 
     def objective(z: Array) -> Array:
-        chunks = (z[i : i + AT_ONCE] for i in range(0, len(z), AT_ONCE))
+        chunks = (z[i : i + TRAJECTORIES_AT_ONCE] for i in range(0, len(z), TRAJECTORIES_AT_ONCE))
         return np.concatenate([criterion(_observations(problem, _trajectories(problem, chunk))) for chunk in chunks])
 
     best = lowest(objective, sum(1 + 2 * joint.harmonics for joint in problem.joints), starts, seed, tell)
     if not np.isfinite(best.values).any():
-        raise ValueError("no trajectory of these harmonics tells the base parameters of the arm apart")
+        raise ValueError("no trajectory of these harmonics identifies all base parameters of the arm")
     parts = zip(problem.joints, _trajectories(problem, best.z[None]), strict=True)
-    return ArmDesign([within(joint, Fourier.of(x[0], joint.period)) for joint, x in parts], best.values)
+    return ArmDesign([shrink_into_limits(joint, Fourier.of(x[0], joint.period)) for joint, x in parts], best.values)
 
 
 def _trajectories(problem: ArmExcitationProblem, z: Array) -> list[Array]:
     """Coefficients (S, 1 + 2 N_f) of each joint within its limits; the first one stands still when time starts."""
     first = problem.joints[0]
     ends = np.cumsum([1 + 2 * joint.harmonics for joint in problem.joints])
-    own, *others = np.split(z, ends[:-1], axis=1)
-    own, phase = from_standstill(own, first.samples)
-    parts = zip(problem.joints, (own, *others), strict=True)
-    return [fitted(delayed(part, phase), joint.limits, first.period) for joint, part in parts]
+    lead, *others = np.split(z, ends[:-1], axis=1)
+    lead, phase = from_standstill(lead, first.samples)
+    parts = zip(problem.joints, (lead, *others), strict=True)
+    return [scale_to_limits(delay(part, phase), joint.limits, first.period) for joint, part in parts]
 
 
 def _observations(problem: ArmExcitationProblem, x: Sequence[Array]) -> Array:

@@ -1,12 +1,11 @@
-"""Trajectories as finite Fourier series: their motion, exact ranges and run-in, and how well they excite a joint.
+"""Trajectories as finite Fourier series: their motion, exact ranges, run-in, and criteria of their excitation.
 
 The coefficients of a series are also written as one vector x = (a0, a1, b1, a2, b2, ...), in which position, velocity
 and acceleration are linear.  Section 6.3
 
-The criteria say how well a regressor F (..., K, p), one or many, tells its parameters apart; what is infinite has no
-full rank.
+The criteria measure how well regressors F (..., K, p) determine their parameters; they are infinite without full rank.
 
-From standing still the way into a trajectory is along itself, slow at first:
+A trajectory is entered from a standstill along its own path, slowly at first:
 
     q(sigma(t)),    dq sigma',    ddq sigma'^2 + dq sigma'',    sigma' = 10 u^3 - 15 u^4 + 6 u^5,    u = 1 + t / T
 
@@ -25,12 +24,12 @@ from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.terms import Term
 
 Range = tuple[float, float]
-SAMPLES = 300  # K, of one period without its end point: what reproduces Table 6.1
-# Numbers of a matrix that is made a triangle at once: for more, the library starts threads, which thousands of times a
-# second cost more than they save, and on a busy machine 20 times as much.
-BLOCK = 8000
-FINE = 4000  # instants of a run-in at which the limits are asked for
-ROOM = 1e-5  # of a limit, for what may be between them
+PERIOD_SAMPLES = 300  # K, of one period without its end point: what reproduces Table 6.1
+# Entries of a matrix that is factored at once: for more, the library starts threads.  Thousands of times a second,
+# they cost more than they save, and on a busy machine 20 times as much.
+MAX_TRIANGLE_ENTRIES = 8000
+RUN_IN_INSTANTS = 4000  # instants of a run-in at which the limits are checked
+LIMIT_MARGIN = 1e-5  # of a limit, for extremes between two instants
 
 
 @dataclass(frozen=True)
@@ -66,7 +65,7 @@ def motion(series: Fourier, t: Array) -> tuple[Array, Array, Array]:
     return q @ series.x, dq @ series.x, ddq @ series.x
 
 
-def instants(period: float, samples: int = SAMPLES) -> Array:
+def instants(period: float, samples: int = PERIOD_SAMPLES) -> Array:
     """The times (K,) [s] at which one period is sampled; its end, which is its start, is left out."""
     return np.arange(samples, dtype=np.float64) * (period / samples)
 
@@ -76,14 +75,14 @@ def turning_points(series: Fourier) -> tuple[Array, Array, Array]:
 
     The derivative of a trigonometric polynomial is, times z^N with z = exp(i omega t), a polynomial in z whose roots
     on the unit circle are the extrema.  The angles of *all* roots are given, so that a double root which rounding
-    has pushed off the circle is not lost; the others do no harm, since the series passes through them as well.
+    has moved off the circle is not lost; the others do no harm, since the series passes through them as well.
     """
     k = np.arange(1, len(series.a) + 1)
     velocity = np.array(series.a) - 1j * np.array(series.b)  # a_k cos + b_k sin = Re(velocity_k z^k)
     times = []
     for derivative in (velocity, 1j * k * velocity, -(k**2) * velocity):
         size = np.abs(derivative)
-        derivative = np.where(size > 1e-14 * size.max(), derivative, 0.0)  # what rounding hides anyway spoils the roots
+        derivative = np.where(size > 1e-14 * size.max(), derivative, 0.0)  # rounding errors would spoil the roots
         roots = np.roots(np.concatenate([derivative[::-1], [0.0], derivative.conj()]))
         angles = np.concatenate([[0.0], np.angle(roots) % (2 * np.pi)])
         times.append(angles * (series.period / (2 * np.pi)))
@@ -97,7 +96,7 @@ def ranges(series: Fourier) -> tuple[Range, Range, Range]:
     return q, dq, ddq
 
 
-def observation(terms: Sequence[Term], series: Fourier, samples: int = SAMPLES) -> Array:
+def observation(terms: Sequence[Term], series: Fourier, samples: int = PERIOD_SAMPLES) -> Array:
     """F (K, p): the regressor at K instants of one period.  (6.19)"""
     return regressor(terms, *motion(series, instants(series.period, samples)))
 
@@ -125,7 +124,7 @@ def condition(F: Array) -> Array:
 def triangle(F: Array) -> Array:
     """R (..., p, p) of F = Q R, from the R of blocks of samples where there are many."""
     samples, parameters = F.shape[-2:]
-    rows = max(2 * parameters, BLOCK // parameters)
+    rows = max(2 * parameters, MAX_TRIANGLE_ENTRIES // parameters)
     if samples <= rows:
         return np.asarray(np.linalg.qr(F, mode="r"))
     blocks = [np.linalg.qr(F[..., i : i + rows, :], mode="r") for i in range(0, samples, rows)]
@@ -155,15 +154,15 @@ def run_in(series: Fourier, t: Array, duration: float) -> tuple[Array, Array, Ar
 def shortest(series: Sequence[Fourier], accelerations: Sequence[Range], durations: Array) -> float | None:
     """The first of these durations [s] in which the run-in of every series keeps its limits of acceleration, or None.
 
-    A series that leaves the limits by itself may use in its run-in what it uses anyway.
+    A series that exceeds the limits itself may reach the same accelerations in its run-in.
     """
     bounds = []
-    for one, (low, high) in zip(series, accelerations, strict=True):
-        lowest, highest = ranges(one)[2]
-        bounds.append((min(low * (1 - ROOM), lowest), max(high * (1 - ROOM), highest)))
+    for joint_series, (low, high) in zip(series, accelerations, strict=True):
+        lowest, highest = ranges(joint_series)[2]
+        bounds.append((min(low * (1 - LIMIT_MARGIN), lowest), max(high * (1 - LIMIT_MARGIN), highest)))
     for duration in durations.tolist():
-        t = np.linspace(-duration, 0.0, FINE)
-        used = [run_in(one, t, duration)[2] for one in series]
+        t = np.linspace(-duration, 0.0, RUN_IN_INSTANTS)
+        used = [run_in(joint_series, t, duration)[2] for joint_series in series]
         if all(low <= ddq.min() and ddq.max() <= high for ddq, (low, high) in zip(used, bounds, strict=True)):
             return float(duration)
     return None

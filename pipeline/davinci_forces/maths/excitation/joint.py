@@ -1,11 +1,10 @@
-"""The trajectory that tells most about a joint, within limits that hold at every instant.  Section 6.3.2
+"""Design the most informative trajectory of a joint, within limits that hold at every instant.  Section 6.3.2
 
-The search goes over any numbers, which are made trajectories within the limits, so that it is free of them.  The
-numbers z (..., 1 + 2 N_f) are those of a series x = (a0, a1, b1, ...), but for two of them: z[0] places the mean in the
-slack that the harmonics leave.  And since time may start anywhere, it starts at a standstill, where the a_k add up to
-zero, so a_N is known and its place is free for how far that standstill is from an instant of the criterion's.  Friction
-jumps there, and with it the criterion: the best trajectories come to rest within millionths of a sample of such an
-instant.
+The search is unconstrained: any numbers z (..., 1 + 2 N_f) are mapped to trajectories within the limits.  They are the
+coefficients of a series x = (a0, a1, b1, ...), but for two of them.  z[0] places the mean in the slack that the
+harmonics leave.  Time may start anywhere, so it starts at a standstill, where the a_k add up to zero.  That determines
+a_N, whose place in z holds the distance of the standstill from an instant of the criterion.  Friction jumps there, and
+with it the criterion: the best trajectories come to rest within millionths of a sample of such an instant.
 """
 
 from collections.abc import Sequence
@@ -17,34 +16,34 @@ import numpy as np
 from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.excitation.fourier import CRITERIA, SAMPLES, Fourier, Range, basis, instants, ranges
+from davinci_forces.maths.excitation.fourier import CRITERIA, PERIOD_SAMPLES, Fourier, Range, basis, instants, ranges
 from davinci_forces.maths.excitation.search import Tell, lowest, nothing
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.terms import Term
 
-MARGIN = 1e-9  # of the limits, so that they also hold for numbers rounded on paper
-GRID = 96  # instants a harmonic at which an extreme is looked for, and found to 1e-7 of it
+MARGIN = 1e-9  # of the limits, so that they also hold for printed numbers
+GRID = 96  # instants a harmonic of the search for extremes, which are found to 1e-7
 
 
 @dataclass(frozen=True)
 class ExcitationProblem:
-    """One joint to be excited: its model, and the lower and upper limits of position, velocity and acceleration."""
+    """The excitation of one joint: its model, and lower and upper limits of position, velocity and acceleration."""
 
     terms: Sequence[Term]
     limits: tuple[Range, Range, Range]
     period: float
     harmonics: int
     criterion: str = "determinant"
-    samples: int = SAMPLES
+    samples: int = PERIOD_SAMPLES
 
     @property
     def centre(self) -> Array:
-        """The coefficients of standing still in the middle of the positions, which is within every limit."""
+        """Coefficients of a standstill in the middle of the positions, which is within every limit."""
         return np.array([sum(self.limits[0]) / 2, *[0.0] * (2 * self.harmonics)])
 
 
 class Design(NamedTuple):
-    """A designed trajectory, and the lowest criterion that each start of the search has come to (starts,)."""
+    """A designed trajectory, and the lowest criterion of each start of the search (starts,)."""
 
     series: Fourier
     optima: Array
@@ -67,12 +66,12 @@ def impossible(limits: tuple[Range, Range, Range]) -> str:
 
 
 def design(problem: ExcitationProblem, starts: int, seed: int, tell: Tell = nothing) -> Design:
-    """The best of several optima, each of a population of its own.  (6.27)
+    """Design the best of several optima, each of its own population.  (6.27)
 
     Raises
     ------
     ValueError
-        If the limits cannot be kept, or if no trajectory tells the terms apart.
+        If the limits cannot be kept, or if the regressor of every trajectory is rank deficient.
     """
     if reason := impossible(problem.limits):
         raise ValueError(reason)
@@ -85,20 +84,20 @@ def design(problem: ExcitationProblem, starts: int, seed: int, tell: Tell = noth
     best = lowest(objective, 1 + 2 * problem.harmonics, starts, seed, tell)
     if not np.isfinite(best.values).any():
         names = ", ".join(term.name for term in problem.terms)
-        raise ValueError(f"no trajectory of {problem.harmonics} harmonics tells the terms {names} apart")
+        raise ValueError(f"no trajectory of {problem.harmonics} harmonics identifies all of the terms {names}")
     x = trajectories(problem, best.z[None])[0]
-    return Design(within(problem, Fourier.of(x, problem.period)), best.values)
+    return Design(shrink_into_limits(problem, Fourier.of(x, problem.period)), best.values)
 
 
 def trajectories(problem: ExcitationProblem, z: Array) -> Array:
-    """Coefficients x (S, 1 + 2 N_f) within the limits, of any numbers z (S, 1 + 2 N_f)."""
-    return fitted(delayed(*from_standstill(z, problem.samples)), problem.limits, problem.period)
+    """Map any numbers z (S, 1 + 2 N_f) to coefficients x (S, 1 + 2 N_f) within the limits."""
+    return scale_to_limits(delay(*from_standstill(z, problem.samples)), problem.limits, problem.period)
 
 
-def within(problem: ExcitationProblem, series: Fourier) -> Fourier:
-    """The series shrunk towards standing still until every limit holds at every instant.
+def shrink_into_limits(problem: ExcitationProblem, series: Fourier) -> Fourier:
+    """Shrink the series towards a standstill until every limit holds at every instant.
 
-    The trajectories within the limits are a convex set, so the exact extrema of the series say by how much.
+    The trajectories within the limits are a convex set, so the factor follows from the exact extrema of the series.
     """
     scale = 1.0
     for (low, high), (low_x, high_x), middle in zip(
@@ -114,8 +113,8 @@ def within(problem: ExcitationProblem, series: Fourier) -> Fourier:
 Indices = NDArray[np.intp]
 
 
-def fitted(z: Array, limits: tuple[Range, Range, Range], period: float) -> Array:
-    """Coefficients x (S, 1 + 2 N_f) of series that keep the limits, to about 1e-7 of them.
+def scale_to_limits(z: Array, limits: tuple[Range, Range, Range], period: float) -> Array:
+    """Scale series to coefficients x (S, 1 + 2 N_f) that keep the limits, to about 1e-7 of them.
 
     Harmonics c of size n, where 1 touches a limit, become 2 c / (1 + n^2): of all sizes up to 1, and flat at 1.
     """
@@ -131,18 +130,18 @@ def fitted(z: Array, limits: tuple[Range, Range, Range], period: float) -> Array
 
 
 def from_standstill(z: Array, samples: int) -> tuple[Array, Array]:
-    """z (S, 1 + 2 N_f) with all harmonics, which stand still at 0; and the phase (S,) [rad] by which to move them.
+    """Complete z (S, 1 + 2 N_f) by the harmonic that makes it stand still at 0; and the phase (S,) [rad] of its delay.
 
-    The cube makes phases that are small, against that between two of `samples` instants, as likely as larger ones.
+    The cube favours phases that are small against that between two of `samples` instants.
     """
     free = z[:, -2]
-    known = z.copy()
-    known[:, -2] = -z[:, 1:-2:2].sum(axis=1)
-    return known, np.pi / samples * free**3
+    complete = z.copy()
+    complete[:, -2] = -z[:, 1:-2:2].sum(axis=1)
+    return complete, np.pi / samples * free**3
 
 
-def delayed(z: Array, phase: Array) -> Array:
-    """z (S, 1 + 2 N_f) as of series that are later by this phase (S,) [rad] of the period."""
+def delay(z: Array, phase: Array) -> Array:
+    """Delay series z (S, 1 + 2 N_f) by this phase (S,) [rad] of the period."""
     k = np.arange(1, z.shape[1] // 2 + 1)
     velocity = (z[:, 1::2] - 1j * z[:, 2::2]) * np.exp(-1j * k * phase[:, None])  # a cos + b sin = Re(velocity e^i)
     moved = z.copy()
@@ -153,8 +152,8 @@ def delayed(z: Array, phase: Array) -> Array:
 def extremes(c: Array, period: float) -> tuple[Array, Array]:
     """The lowest and highest position, velocity and acceleration (3, S) of harmonics c (S, 2 N_f) about a mean of 0.
 
-    Where the series turns on a grid, the parabola through the turn and its neighbours says when it is extreme, to the
-    second order of a step, and so how far, to the fourth.
+    At each extreme on a grid, a parabola through it and its neighbours gives the time to the second order of a step.
+    The value there is accurate to the fourth order.
     """
     harmonics = c.shape[1] // 2
     grid = c @ _grid(period, harmonics)

@@ -1,6 +1,6 @@
-"""Finding the lowest value of a function of a few numbers that has kinks and jumps, and so no use for derivatives.
+"""Minimise a function of a few numbers with kinks and jumps, without derivatives.
 
-Differential evolution: where a population lies tells the directions and sizes of the steps that are worth trying.
+Differential evolution takes the directions and sizes of its steps from the spread of a population.
 R. Storn and K. Price, Differential evolution, Journal of Global Optimization 11, 1997 (best/1/bin).
 """
 
@@ -13,9 +13,9 @@ from davinci_forces.maths.arrays import Array
 
 POPULATION = 5  # candidates a dimension
 GENERATIONS = 24  # a dimension
-COLLAPSED = 1e-6  # of the objective: a population that agrees so far is spread anew
+COLLAPSED = 1e-6  # range of the objective, below which a population is spread anew
 SPREAD = (1e-6, 0.1)  # sizes of the steps by which it is, small ones as likely as large ones
-STEPS = (0.5, 1.0)  # of a difference between two candidates
+STEP_FACTORS = (0.5, 1.0)  # of a difference between two candidates
 CROSSING = 0.9  # share of the numbers that a step changes
 
 Objective = Callable[[Array], Array]  # of many candidates (S, d) at once (S,)
@@ -23,7 +23,7 @@ Tell = Callable[[int, int, float], None]  # the number of a start, from 1, of ho
 
 
 class Optimum(NamedTuple):
-    """The best candidate (d,) of several starts, and the lowest value that each of them has come to (starts,)."""
+    """The best candidate (d,) of several starts, and the lowest value of each of them (starts,)."""
 
     z: Array
     values: Array
@@ -34,7 +34,7 @@ def nothing(start: int, starts: int, value: float) -> None:
 
 
 def lowest(objective: Objective, d: int, starts: int, seed: int, tell: Tell = nothing) -> Optimum:
-    """The best of several starts; the first ones are the same however many there are."""
+    """Minimise from several starts; the first ones are the same for any number of starts."""
     optima = []
     for start in range(starts):
         optima.append(descend(objective, d, np.random.default_rng([seed, start])))
@@ -44,9 +44,9 @@ def lowest(objective: Objective, d: int, starts: int, seed: int, tell: Tell = no
 
 
 def descend(objective: Objective, d: int, random: np.random.Generator) -> tuple[Array, float]:
-    """The best candidate (d,) of one population, and its value.
+    """Evolve one population; return its best candidate (d,) and the value.
 
-    A population that has collapsed is spread about its best, so that it also finds what lies beyond a jump nearby.
+    A collapsed population is spread about its best candidate, so that it also finds minima beyond a jump nearby.
     """
     z = random.normal(size=(POPULATION * d, d))
     value = objective(z)
@@ -63,8 +63,8 @@ def descend(objective: Objective, d: int, random: np.random.Generator) -> tuple[
 
 def _steps(z: Array, best: Array, random: np.random.Generator) -> Array:
     """A candidate (n, d) for each of the population."""
-    one, other = random.integers(len(z), size=(2, len(z)))
-    moved = best + random.uniform(*STEPS) * (z[one] - z[other])
+    a, b = random.integers(len(z), size=(2, len(z)))
+    moved = best + random.uniform(*STEP_FACTORS) * (z[a] - z[b])
     return np.where(random.uniform(size=z.shape) < CROSSING, moved, z)
 
 

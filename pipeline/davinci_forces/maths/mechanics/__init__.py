@@ -1,1 +1,1 @@
-"""The arm as rigid bodies: kinematics, dynamics, and what the drives add."""
+"""The arm as rigid bodies: kinematics, dynamics and drives."""

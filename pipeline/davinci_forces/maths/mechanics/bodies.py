@@ -1,10 +1,10 @@
-"""What the links of an arm weigh, and where; and what motors and gears add to it: reflected inertia and friction.
+"""Masses and inertias of an arm's links, reflected inertia and friction of its drives, and its base parameters.
 
     eta tau_m = (eta^2 J_m + M) ddq + V + G + F + tau_ext,    F = v dq + c sign(dq)          (4.26), (4.28), (A.16)
 
-Everything is a coordinate's own: drives do not couple.  Shapes: (n,) for a property, (..., n) for a motion.
+Drives do not couple the coordinates.  Shapes: (n,) for a property, (..., n) for a motion.
 
-Which combinations of all inertial parameters an arm's motion can tell:
+The base parameters are the combinations of all inertial parameters that an arm's motion can identify:
 
     tau = Y(q, dq, ddq) pi,    Y P = Y_b [1 K],    beta = pi_b + K pi_d                                      (6.3)
 
@@ -24,9 +24,10 @@ from davinci_forces.maths.arrays import Array
 # about the origin of the link's frame (not its centre of mass), in which the dynamics are linear.
 PARAMETERS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 _UPPER = np.triu_indices(3)
-# Of a column's own size, what has to be left of it when the columns taken before are subtracted: rounding leaves 1e-15
-# times the condition number of those, and the least that is left of a true one of the arms here is 1e-3.
-NEGLIGIBLE = 1e-9
+# Share of a column's size that must remain after its projection on the columns before: rounding leaves 1e-15 times the
+# condition number of those, and an independent column of the arms here at least 1e-3.
+NEGLIGIBLE_RESIDUAL = 1e-9
+RANDOM_SAMPLES = 200  # random poses, velocities and accelerations, which show all base parameters of an arm
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,17 +44,17 @@ class Bodies:
     inertias: Array
     counts_from: NDArray[np.int64]
 
-    def counted(self, n: int) -> "Bodies":
-        """The bodies of the model with n coordinates: those that are not part of it weigh nothing."""
+    def with_coordinates(self, n: int) -> "Bodies":
+        """The bodies of the model with n coordinates; others get mass 0."""
         there = self.counts_from <= n
         return replace(self, masses=self.masses * there, inertias=self.inertias * there[:, None, None])
 
     def scaled(self, factor: float) -> "Bodies":
-        """The same bodies of another density, as a compensator that knows the masses badly has them.  Section 5.2"""
+        """The same bodies with another density, as in a compensator with wrong masses.  Section 5.2"""
         return replace(self, masses=self.masses * factor, inertias=self.inertias * factor)
 
     def within(self, T: Array) -> "Bodies":
-        """The same bodies in other frames, in which those they are given in are at T (L, 4, 4) [m]."""
+        """The same bodies in other frames, relative to which their present frames are at T (L, 4, 4) [m]."""
         R = T[:, :3, :3]
         centres = np.einsum("lij,lj->li", R, self.centres) + T[:, :3, 3]
         return replace(self, centres=centres, inertias=R @ self.inertias @ R.swapaxes(1, 2))
@@ -66,16 +67,16 @@ class Bodies:
 
     def parameters(self, n: int) -> Array:
         """The inertial parameters (10 L,) of the model with n coordinates, ten a link in the order of PARAMETERS."""
-        there = self.counted(n)
+        there = self.with_coordinates(n)
         inertia = there.about_frames()[:, *_UPPER]
         moments = there.masses[:, None] * there.centres
         return np.concatenate([there.masses[:, None], moments, inertia], axis=1).ravel()
 
 
-def weighing(parameters: Array) -> Bodies:
-    """The bodies that have inertial parameters (L, 10): the inverse of `Bodies.parameters`, counted with any n.
+def as_bodies(parameters: Array) -> Bodies:
+    """The bodies with inertial parameters (L, 10), the inverse of `Bodies.parameters`; part of the model for any n.
 
-    The centre of what weighs nothing is at the origin.
+    The centre of a body without mass is at the origin.
     """
     masses = parameters[:, 0]
     centres = np.divide(parameters[:, 1:4], masses[:, None], out=np.zeros((len(masses), 3)), where=masses[:, None] > 0)
@@ -117,9 +118,9 @@ def of_pseudo_inertias(J: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Drives:
-    """One drive a coordinate (n,): everything at the joint's side except the motor's own inertia.
+    """One drive a coordinate (n,): all quantities at the joint, except the motor's own inertia.
 
-    `viscous` and `coulomb` are those of joint and motor together, as the joint feels them.  (A.11)
+    `viscous` and `coulomb` are those of joint and motor together, at the joint.  (A.11)
     """
 
     gear_ratio: Array  # eta [-], or [rad/m] for a prismatic joint
@@ -139,7 +140,7 @@ class Drives:
 
 
 class BaseParameters(NamedTuple):
-    """What the motion can tell of the inertial parameters: beta = K pi, p combinations of the 10 L."""
+    """The identifiable inertial parameters: beta = K pi, p combinations of the 10 L."""
 
     columns: NDArray[np.int64]  # (p,) of Y, which span all the others: tau = Y[:, columns] beta
     combination: Array  # K (p, 10 L): how all parameters enter each
@@ -149,26 +150,26 @@ class BaseParameters(NamedTuple):
 def base_parameters(Y: Array) -> BaseParameters:
     """Reduce the regressor (..., 10 L) of a motion to independent columns.
 
-    They are taken in the order of Y, from the base outwards, each that does not depend on those before it: the same
-    ones whatever the motion, as in the grouping by hand (Khalil and Kleinfinger 1987).  The motion must be rich (random
-    poses, velocities and accelerations will do): what it does not show is left out.
+    Columns are chosen in the order of Y, from the base outwards, if they do not depend on those before.  So they are
+    the same for any motion, as in the grouping by hand (Khalil and Kleinfinger 1987).  The motion must be rich, such as
+    random poses, velocities and accelerations: parameters that it does not show are left out.
     """
     from scipy.linalg import qr, solve_triangular  # which every command would load
 
     (R,) = qr(Y.reshape(-1, Y.shape[-1]), mode="r")  # it has the dependences of Y's columns, in as many rows
     scale = np.linalg.norm(R, axis=0)
-    seen = np.flatnonzero(scale > NEGLIGIBLE * scale.max())
-    unit = R[:, seen] / scale[seen]
+    shown = np.flatnonzero(scale > NEGLIGIBLE_RESIDUAL * scale.max())
+    unit = R[:, shown] / scale[shown]
     Q = np.empty((len(unit), 0))
     taken = list[int]()
     for column, x in enumerate(unit.T):
-        left = x - Q @ (Q.T @ x)
-        left -= Q @ (Q.T @ left)  # once more, for what the first has left by rounding
-        if (size := np.linalg.norm(left)) > NEGLIGIBLE:
-            Q = np.column_stack([Q, left / size])
+        residual = x - Q @ (Q.T @ x)
+        residual -= Q @ (Q.T @ residual)  # once more, against the rounding of the first
+        if (size := np.linalg.norm(residual)) > NEGLIGIBLE_RESIDUAL:
+            Q = np.column_stack([Q, residual / size])
             taken.append(column)
     triangle = np.triu(Q.T @ unit[:, taken])
     K = np.zeros((len(taken), len(scale)))
-    K[:, seen] = solve_triangular(triangle, Q.T @ unit) * scale[seen] / scale[seen[taken]][:, None]
-    K[:, seen[taken]] = np.eye(len(taken))
-    return BaseParameters(seen[taken], K, float(np.linalg.cond(triangle)))
+    K[:, shown] = solve_triangular(triangle, Q.T @ unit) * scale[shown] / scale[shown[taken]][:, None]
+    K[:, shown[taken]] = np.eye(len(taken))
+    return BaseParameters(shown[taken], K, float(np.linalg.cond(triangle)))

@@ -1,12 +1,12 @@
-"""What carries and what moves each link of an arm: a chain that may branch, and whose links may share a coordinate.
+"""The kinematic tree of an arm: a chain that may branch, and whose links may share a coordinate.
 
 Every link has a frame at its joint, whose z is the axis: the link's pose in its carrier's is its placement times Rz(q),
-or Tz(q).  One coordinate may move several links (a parallelogram's), and several links may hang on one (two jaws).
+or Tz(q).  One coordinate may move several links (a parallelogram's), and one link may carry several (two jaws).
 Further frames, by name, are fixed to links.  Bodies are numbered from the base, which is 0: link i is body i + 1.
 Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 4.
 
-A chain is described by the placements themselves, or by a table of Denavit and Hartenberg's parameters.  With what its
-links weigh it is the tree that the recursions take.
+A chain is described by the placements themselves, or by a table of Denavit and Hartenberg's parameters.  Together with
+the inertial parameters of its links it makes the tree for the recursions.
 """
 
 from collections.abc import Sequence
@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias, pseudo_inertias
 
-FIXED = -1  # the coordinate of what nothing moves
+FIXED = -1  # the coordinate of links that do not move
 BASE = "0"
 
 
 class TableRow(NamedTuple):
-    """One frame of a table of Denavit and Hartenberg's parameters; what nothing moves is fixed to its carrier."""
+    """One frame of a table of Denavit and Hartenberg's parameters; without a coordinate, it is fixed to its carrier."""
 
     name: str
     before: str  # frame that carries it
@@ -54,7 +54,7 @@ class Chain:
     n: int  # coordinates
     table: tuple[TableRow, ...] = ()  # of the frames after the base, where the chain was described by one
 
-    def reduced(self, n: int) -> "Chain":
+    def with_coordinates(self, n: int) -> "Chain":
         """The same arm with all coordinates after the first n at rest at 0.
 
         Raises
@@ -71,7 +71,7 @@ class Chain:
     def lengthened(self, link: str, by: float) -> "Chain":
         """The same arm with a link, and all that it carries, further out along its own axis [m].
 
-        A table says so in the d of that row, where the row has the link's axis: in modified parameters.
+        In a table of modified parameters, whose rows have the links' axes, d of that row changes.
         """
         i, placement = self.links.index(link), self.placement.copy()
         placement[i, :3, 3] += by * placement[i, :3, 2]
@@ -86,7 +86,7 @@ class Chain:
 
     @property
     def of_links(self) -> Array:
-        """The frames that bear the links' names, in the links' own (L, 4, 4) [m]: where a table has its links."""
+        """The frames with the links' names, relative to the links' own (L, 4, 4) [m]: the frames of a table."""
         return np.asarray(self.offset[[self.names.index(link) for link in self.links]])
 
 
@@ -111,7 +111,7 @@ def modified_denavit_hartenberg(table: Sequence[TableRow], tip: str) -> Chain:
 
 
 def _described(table: Sequence[TableRow], tip: str, around: list[tuple[Array, Array]]) -> Chain:
-    """The chain of a table, with what lies before and after the motion of each row."""
+    """The chain of a table, with the transforms before and after the motion of each row."""
     names, body, offset, before = [BASE], [0], [np.eye(4)], [0]
     parent, placement, moving = list[int](), list[Array](), list[TableRow]()
     for row, (first, last) in zip(table, around, strict=True):
@@ -169,10 +169,10 @@ class Tree(NamedTuple):
 def tree_of(chain: Chain, parameters: Array) -> Tree:
     """The tree of a chain whose links have these inertial parameters (L, 10)."""
     L, at = len(chain.parent), chain.placement
-    own = chain.coordinate[:, None] == np.arange(chain.n)
+    drives = chain.coordinate[:, None] == np.arange(chain.n)
     moves, carried = np.zeros((L + 1, chain.n), np.bool_), np.append(0.0, parameters[:, 0])
     for i in range(L):
-        moves[i + 1] = moves[chain.parent[i]] | own[i]
+        moves[i + 1] = moves[chain.parent[i]] | drives[i]
     for i in reversed(range(L)):
         carried[chain.parent[i]] += carried[i + 1]
     still = chain.coordinate == FIXED
@@ -181,16 +181,16 @@ def tree_of(chain: Chain, parameters: Array) -> Tree:
     return Tree(chain.n, chain.parent, coordinate, chain.slides | still, moves[1:], carried[1:], rows)
 
 
-def folded(chain: Chain, parameters: Array) -> tuple[Chain, Array]:
-    """The chain without links that do not move: they, and their inertial parameters (L, 10), join their carriers'."""
-    pseudo, body, within, kept = pseudo_inertias(parameters), [0], [np.eye(4)], list[int]()
+def fold_fixed_links(chain: Chain, parameters: Array) -> tuple[Chain, Array]:
+    """Merge links that do not move, and their inertial parameters (L, 10), into their carriers."""
+    pseudo, body, within, movable = pseudo_inertias(parameters), [0], [np.eye(4)], list[int]()
     placement, merged = chain.placement.copy(), list[Array]()
     for i, carrier in enumerate(chain.parent):
         placement[i] = within[carrier] @ chain.placement[i]
         if chain.coordinate[i] != FIXED:
-            kept.append(i)
+            movable.append(i)
             merged.append(pseudo[i])
-            body.append(len(kept))
+            body.append(len(movable))
             within.append(np.eye(4))
         else:
             body.append(body[carrier])
@@ -198,8 +198,8 @@ def folded(chain: Chain, parameters: Array) -> tuple[Chain, Array]:
             if body[carrier]:
                 merged[body[carrier] - 1] = merged[body[carrier] - 1] + placement[i] @ pseudo[i] @ placement[i].T
     fewer = replace(
-        chain, links=tuple(chain.links[i] for i in kept), parent=np.array(body)[chain.parent[kept]],
-        placement=placement[kept], slides=chain.slides[kept], coordinate=chain.coordinate[kept],
+        chain, links=tuple(chain.links[i] for i in movable), parent=np.array(body)[chain.parent[movable]],
+        placement=placement[movable], slides=chain.slides[movable], coordinate=chain.coordinate[movable],
         body=np.array(body)[chain.body], offset=np.array(within)[chain.body] @ chain.offset,
     )  # fmt: skip
     return fewer, of_pseudo_inertias(np.array(merged))

@@ -1,8 +1,8 @@
 """The recursions compiled: for one sample, as a simulator's step needs it, and for many, LANES of them at a time.
 
-The innermost loops run over samples, LANES of them and one after the other in memory, so that the compiler lets the
-processor compute with several at once.  Import this module only where it is used: compiling it, or reading it back from
-the cache on disk, takes longer than thousands of samples of numpy.
+The innermost loops run over LANES samples that are adjacent in memory, so that the compiler can use vector
+instructions.  Import this module only where it is used: compiling it, or reading it back from the cache on disk, takes
+longer than thousands of samples of numpy.
 """
 
 from collections.abc import Callable
@@ -66,10 +66,10 @@ def place_and_jacobian(tree: Any, body: Any, point: Any, q: Any, J: Any) -> Any:
         else:
             J[0, k] -= y
             J[1, k] += x
-            point = link.turned_back(angle, point)
+            point = link.from_link_axes(angle, point)
         point = link.plus(link.times(row, point), link.place(row))
         for o in range(tree.n):
-            J[0, o], J[1, o], J[2, o] = link.times(row, link.turned_back(angle, (J[0, o], J[1, o], J[2, o])))
+            J[0, o], J[1, o], J[2, o] = link.times(row, link.from_link_axes(angle, (J[0, o], J[1, o], J[2, o])))
         body = tree.parent[i]
     return point
 

@@ -1,4 +1,4 @@
-"""Where every frame of an arm is, and how it moves.
+"""Poses and Jacobians of the frames of an arm.
 
 Shapes: `q` is (..., n) in rad or m, with any leading axes; n below the chain's own leaves the later coordinates at 0.
 """
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.mechanics.chain import FIXED, Chain
 
-AT_ONCE = 1 << 14  # poses
+POSES_AT_ONCE = 1 << 14
 
 
 def frames(chain: Chain, q: ArrayLike) -> Array:
@@ -21,7 +21,7 @@ def frames(chain: Chain, q: ArrayLike) -> Array:
 
 def _bodies(chain: Chain, q: Array) -> Array:
     """The pose of every body in the base frame (..., L + 1, 4, 4), the base first."""
-    chain = chain.reduced(q.shape[-1])
+    chain = chain.with_coordinates(q.shape[-1])
     moved = np.where(chain.coordinate == FIXED, 0.0, q[..., chain.coordinate])
     c, s = (np.where(chain.slides, still, of(moved))[..., None] for still, of in ((1.0, np.cos), (0.0, np.sin)))
     x, y, z, place = np.moveaxis(chain.placement, -1, 0)
@@ -35,7 +35,7 @@ def _bodies(chain: Chain, q: Array) -> Array:
 
 
 def tip(chain: Chain, q: ArrayLike) -> Array:
-    """Where the tip is: the origin of frame 9L of the da Vinci (..., 3) [m]."""
+    """Position of the tip (..., 3) [m], the origin of frame 9L of the da Vinci."""
     index = chain.names.index(chain.tip)
     carrier = _bodies(chain, np.asarray(q, float))[..., chain.body[index], :, :]
     return np.asarray((carrier @ chain.offset[index])[..., :3, 3])
@@ -67,12 +67,12 @@ def _jacobian(chain: Chain, T: Array, n: int, body: int, at: Array) -> tuple[Arr
 
 
 def along(of: Callable[[Array], Array], q: Array) -> Array:
-    """What a function says of poses (N, n), so many at a time: all bodies' poses at all samples may take gigabytes."""
-    return np.concatenate([of(q[i : i + AT_ONCE]) for i in range(0, max(len(q), 1), AT_ONCE)])
+    """Evaluate a function of poses (N, n) in chunks: all bodies' poses at all samples may take gigabytes."""
+    return np.concatenate([of(q[i : i + POSES_AT_ONCE]) for i in range(0, max(len(q), 1), POSES_AT_ONCE)])
 
 
 def to_base(chain: Chain, body: int) -> Iterator[int]:
-    """A body and those that carry it, without the base."""
+    """Yield a body and those that carry it, without the base."""
     while body > 0:
         yield body
         body = int(chain.parent[body - 1])
@@ -81,8 +81,8 @@ def to_base(chain: Chain, body: int) -> Iterator[int]:
 def remote_centre(chain: Chain) -> Array:
     """The point (3,) [m] about which the first two coordinates turn whatever carries the instrument.
 
-    It is the point of the last link towards the tip that they move, which neither of them moves at q = 0; that it stays
-    where it is for all q is a property of the parallelogram.  Section 2.2
+    It is the point of the last link towards the tip that they move, which neither of them moves at q = 0.  The
+    parallelogram keeps it in place for all q.  Section 2.2
     """
     tip_body = int(chain.body[chain.names.index(chain.tip)])
     body = next(body for body in to_base(chain, tip_body) if chain.coordinate[body - 1] == 1)

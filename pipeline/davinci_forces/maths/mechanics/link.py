@@ -45,7 +45,7 @@ def place(row: Row) -> Vector:
     return row[9], row[10], row[11]
 
 
-def into(row: Row, x: Vector) -> Vector:
+def to_joint_axes(row: Row, x: Vector) -> Vector:
     """A vector in the carrier's axes, in those of the joint at q = 0."""
     return (
         row[0] * x[0] + row[3] * x[1] + row[6] * x[2],
@@ -54,45 +54,45 @@ def into(row: Row, x: Vector) -> Vector:
     )
 
 
-def turned(turn: Turn, x: Vector) -> Vector:
+def to_link_axes(turn: Turn, x: Vector) -> Vector:
     """A vector in the axes of a joint at q = 0, in those of the link."""
     return turn[0] * x[0] + turn[1] * x[1], turn[0] * x[1] - turn[1] * x[0], x[2]
 
 
-def turned_back(turn: Turn, x: Vector) -> Vector:
+def from_link_axes(turn: Turn, x: Vector) -> Vector:
     """A vector in a link's axes, in those of its joint at q = 0."""
     return turn[0] * x[0] - turn[1] * x[1], turn[1] * x[0] + turn[0] * x[1], x[2]
 
 
 def rates(w: Vector, e: Vector) -> tuple[Number, ...]:
-    """[e]x + [w]x [w]x by rows: what turns a point's place into its acceleration."""
+    """[e]x + [w]x [w]x by rows: the matrix from a point's place to its acceleration."""
     xy, xz, yz, xx, yy, zz = w[0] * w[1], w[0] * w[2], w[1] * w[2], w[0] * w[0], w[1] * w[1], w[2] * w[2]
     return -yy - zz, xy - e[2], xz + e[1], xy + e[2], -xx - zz, yz - e[0], xz - e[1], yz + e[0], -xx - yy
 
 
-def moved(row: Row, slides: bool, turn: Turn, q: Number, dq: Number, ddq: Number, motion: Motion) -> Motion:
+def link_motion(row: Row, slides: bool, turn: Turn, q: Number, dq: Number, ddq: Number, motion: Motion) -> Motion:
     """The motion of a link from that of its carrier."""
     w, e, a = motion
-    a = into(row, plus(a, times(rates(w, e), place(row))))
-    w, e = into(row, w), into(row, e)
+    a = to_joint_axes(row, plus(a, times(rates(w, e), place(row))))
+    w, e = to_joint_axes(row, w), to_joint_axes(row, e)
     if slides:
         x = a[0] + q * (w[0] * w[2] + e[1]) + 2.0 * dq * w[1]
         y = a[1] + q * (w[1] * w[2] - e[0]) - 2.0 * dq * w[0]
         return w, e, (x, y, a[2] - q * (w[0] * w[0] + w[1] * w[1]) + ddq)
     e = e[0] + w[1] * dq, e[1] - w[0] * dq, e[2] + ddq
-    return turned(turn, (w[0], w[1], w[2] + dq)), turned(turn, e), turned(turn, a)
+    return to_link_axes(turn, (w[0], w[1], w[2] + dq)), to_link_axes(turn, e), to_link_axes(turn, a)
 
 
-def moved_velocity(row: Row, slides: bool, turn: Turn, q: Number, dq: Number, velocity: Velocity) -> Velocity:
+def link_velocity(row: Row, slides: bool, turn: Turn, q: Number, dq: Number, velocity: Velocity) -> Velocity:
     """The velocity of a link from that of its carrier."""
-    w, v = into(row, velocity[0]), into(row, plus(velocity[1], cross(velocity[0], place(row))))
+    w, v = to_joint_axes(row, velocity[0]), to_joint_axes(row, plus(velocity[1], cross(velocity[0], place(row))))
     if slides:
         return w, (v[0] + w[1] * q, v[1] - w[0] * q, v[2] + dq)
-    return turned(turn, (w[0], w[1], w[2] + dq)), turned(turn, v)
+    return to_link_axes(turn, (w[0], w[1], w[2] + dq)), to_link_axes(turn, v)
 
 
 def wrench_of(row: Row, motion: Motion) -> Wrench:
-    """What gives a link this motion: f = m a + (e x + w x w x) h, n = h x a + I e + w x I w.  (4.9)"""
+    """The wrench that gives a link this motion: f = m a + (e x + w x w x) h, n = h x a + I e + w x I w.  (4.9)"""
     w, e, a = motion
     h = row[13], row[14], row[15]
     inertia = row[16], row[17], row[18], row[17], row[19], row[20], row[18], row[20], row[21]
@@ -101,19 +101,19 @@ def wrench_of(row: Row, motion: Motion) -> Wrench:
     return f, plus(cross(h, a), plus(times(inertia, e), cross(w, times(inertia, w))))
 
 
-def carried(row: Row, slides: bool, turn: Turn, q: Number, wrench: Wrench) -> Wrench:
-    """A wrench on a link, as its carrier feels it at its own origin."""
+def carrier_wrench(row: Row, slides: bool, turn: Turn, q: Number, wrench: Wrench) -> Wrench:
+    """A wrench on a link, at the origin and in the axes of its carrier."""
     f, n = wrench
     if slides:
         n = n[0] - q * f[1], n[1] + q * f[0], n[2]
     else:
-        f, n = turned_back(turn, f), turned_back(turn, n)
+        f, n = from_link_axes(turn, f), from_link_axes(turn, n)
     f, n = times(row, f), times(row, n)
     return f, plus(n, cross(place(row), f))
 
 
 def unit_wrench(slides: bool, m: float, inertia: Inertia) -> Wrench:
-    """What gives a body of mass m one unit of its joint's acceleration."""
+    """The wrench that gives a body of mass m one unit of its joint's acceleration."""
     h, (_, _, xz), (_, yz, zz) = inertia
     zero = 0.0 * zz
     if slides:
@@ -127,7 +127,7 @@ def turned_inertia(turn: Turn, inertia: Inertia) -> Inertia:
     cc, cs, ss, both = c * c, c * s, s * s, 2.0 * c * s * xy
     mixed = cs * (xx - yy) + (cc - ss) * xy
     upper, lower = (cc * xx - both + ss * yy, mixed, c * xz - s * yz), (ss * xx + both + cc * yy, s * xz + c * yz, zz)
-    return turned_back(turn, h), upper, lower
+    return from_link_axes(turn, h), upper, lower
 
 
 def shifted_inertia(m: float, r: Vector, inertia: Inertia) -> Inertia:

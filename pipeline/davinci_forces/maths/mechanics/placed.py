@@ -12,14 +12,14 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.mechanics.bodies import PARAMETERS, Bodies, of_pseudo_inertias, pseudo_inertias, weighing
+from davinci_forces.maths.mechanics.bodies import PARAMETERS, Bodies, as_bodies, of_pseudo_inertias, pseudo_inertias
 from davinci_forces.maths.mechanics.chain import FIXED, Chain
 
 Z = np.array([0.0, 0.0, 1.0])
 
 
 class PlacedLink(NamedTuple):
-    """One frame on an earlier one, and the link's inertial parameters in it; what nothing moves is fixed there."""
+    """One frame on an earlier one, and the link's inertial parameters in it; fixed there without a coordinate."""
 
     name: str
     before: int  # frame that carries it: 0 is the base, and link i has frame i + 1
@@ -33,13 +33,11 @@ class PlacedLink(NamedTuple):
 
 
 def assembled(base: str, links: Sequence[PlacedLink], tip: str) -> tuple[Chain, Bodies]:
-    """The chain of such links, and its bodies: what is fixed to a link weighs with it, and what is fixed to the base
-    weighs nothing.
-    """
+    """The chain of such links, and its bodies: those fixed to a link add to it, those on the base are left out."""
     body, offset, moving = [0], [np.eye(4)], list[PlacedLink]()
     parent, placement, pseudo = list[int](), list[Array](), list[Array]()
-    own = pseudo_inertias(np.array([link.parameters for link in links]).reshape(-1, len(PARAMETERS)))
-    for link, J in zip(links, own, strict=True):
+    inertias = pseudo_inertias(np.array([link.parameters for link in links]).reshape(-1, len(PARAMETERS)))
+    for link, J in zip(links, inertias, strict=True):
         at = offset[link.before] @ link.placement @ _moved(link)
         if link.coordinate == FIXED:
             body.append(body[link.before])
@@ -61,7 +59,7 @@ def assembled(base: str, links: Sequence[PlacedLink], tip: str) -> tuple[Chain, 
         before=np.array([0, *(link.before for link in links)]), tip=tip,
         n=max(link.coordinate for link in moving) + 1,
     )  # fmt: skip
-    return chain, weighing(of_pseudo_inertias(np.array(pseudo)))
+    return chain, as_bodies(of_pseudo_inertias(np.array(pseudo)))
 
 
 def transform(xyz: Sequence[float], rpy: Sequence[float]) -> Array:
@@ -81,9 +79,9 @@ def transform(xyz: Sequence[float], rpy: Sequence[float]) -> Array:
 
 
 def roll_pitch_yaw(R: Array) -> tuple[float, float, float]:
-    """The angles of `transform` that make a rotation (3, 3): however it is turned, they make it to rounding.
+    """The angles of `transform` for a rotation (3, 3), exact to rounding for any rotation.
 
-    Where the pitch is a quarter turn, yaw is what it is taken to be, and the roll is told without it.
+    At a pitch of a quarter turn, only roll and yaw together are determined: yaw is chosen, and roll follows.
     """
     yaw = float(np.arctan2(R[1, 0], R[0, 0]))
     c, s = np.cos(yaw), np.sin(yaw)
@@ -93,7 +91,7 @@ def roll_pitch_yaw(R: Array) -> tuple[float, float, float]:
 
 
 def _moved(link: PlacedLink) -> Array:
-    """What a link's bias does to its frame (4, 4)."""
+    """The displacement of a link's frame (4, 4) by its bias."""
     T = np.eye(4)
     if link.slides:
         T[:3, 3] = link.bias * link.axis

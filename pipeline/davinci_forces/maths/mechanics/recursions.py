@@ -51,7 +51,7 @@ def motions(tree: Tree, gravity: float, joints: Any, work: Any, samples: Samples
         for s in samples:
             motion = vector(carrier, 0, s), vector(carrier, 3, s), vector(carrier, 6, s)
             turn = joint[0, s], joint[1, s]
-            w, e, a = link.moved(row, slides, turn, joint[2, s], joint[3, s], joint[4, s], motion)
+            w, e, a = link.link_motion(row, slides, turn, joint[2, s], joint[3, s], joint[4, s], motion)
             put(body, 0, s, w)
             put(body, 3, s, e)
             put(body, 6, s, a)
@@ -77,7 +77,7 @@ def inverse_dynamics(tree: Tree, gravity: float, joints: Any, work: Any, tau: An
         add(tau[tree.coordinate[i]], body[9:], slides, samples)
         for s in samples:
             wrench = vector(body, 9, s), vector(body, 12, s)
-            f, n = link.carried(row, slides, (joint[0, s], joint[1, s]), joint[2, s], wrench)
+            f, n = link.carrier_wrench(row, slides, (joint[0, s], joint[1, s]), joint[2, s], wrench)
             put(carrier, 9, s, plus(vector(carrier, 9, s), f))
             put(carrier, 12, s, plus(vector(carrier, 12, s), n))
 
@@ -121,7 +121,7 @@ def mass_matrix(tree: Tree, joints: Any, work: Any, M: Any, samples: Samples) ->
             row, slides, joint = tree.rows[j], tree.slides[j], joints[tree.coordinate[j]]
             for s in samples:
                 push = vector(wrench, 0, s), vector(wrench, 3, s)
-                f, n = link.carried(row, slides, (joint[0, s], joint[1, s]), joint[2, s], push)
+                f, n = link.carrier_wrench(row, slides, (joint[0, s], joint[1, s]), joint[2, s], push)
                 put(wrench, 0, s, f)
                 put(wrench, 3, s, n)
             j = tree.parent[j] - 1
@@ -145,7 +145,7 @@ def regressor(tree: Tree, gravity: float, joints: Any, work: Any, Y: Any, sample
                 carrier, body, columns = work[first + tree.parent[i]], work[first + i + 1], Y[k, i]
                 for s in samples:
                     turn, before = (joint[0, s], joint[1, s]), (vector(carrier, 0, s), vector(carrier, 3, s))
-                    J = link.moved_velocity(row, slides, turn, joint[2, s], unit, before)
+                    J = link.link_velocity(row, slides, turn, joint[2, s], unit, before)
                     put(body, 0, s, J[0])
                     put(body, 3, s, J[1])
                     wea = vector(motion, 0, s), vector(motion, 3, s), vector(motion, 6, s)

@@ -13,7 +13,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.constants import GRAVITY
 from davinci_forces.maths.mechanics import recursions
 from davinci_forces.maths.mechanics.bodies import Bodies, Drives
-from davinci_forces.maths.mechanics.chain import Chain, Tree, folded, tree_of
+from davinci_forces.maths.mechanics.chain import Chain, Tree, fold_fixed_links, tree_of
 
 ALL = (slice(None),)  # samples at once
 COMPILE_FROM = 20_000  # samples; fewer are done before the kernels are loaded
@@ -22,7 +22,7 @@ COMPILE_FROM = 20_000  # samples; fewer are done before the kernels are loaded
 def mass_matrix(chain: Chain, bodies: Bodies, q: ArrayLike, drives: Drives | None = None) -> Array:
     """M (..., n, n), symmetric positive definite; with the rotors' inertia where drives are given.  (4.28), (4.38)"""
     q = np.asarray(q, float)
-    n, tree = q.shape[-1], moving(chain, bodies, q.shape[-1])
+    n, tree = q.shape[-1], moving_tree(chain, bodies, q.shape[-1])
     if _many(q):
         from davinci_forces.maths.mechanics.kernels import mass_matrices
 
@@ -45,15 +45,15 @@ def gravity(chain: Chain, bodies: Bodies, q: ArrayLike) -> Array:
 def coriolis(chain: Chain, bodies: Bodies, q: ArrayLike, dq: ArrayLike) -> Array:
     """C dq (..., n): centrifugal and Coriolis efforts.  (4.38)"""
     q, dq = np.broadcast_arrays(np.asarray(q, float), np.asarray(dq, float))
-    return _newton_euler(moving(chain, bodies, q.shape[-1]), 0.0, q, dq, np.zeros_like(q))
+    return _newton_euler(moving_tree(chain, bodies, q.shape[-1]), 0.0, q, dq, np.zeros_like(q))
 
 
 def inverse_dynamics(
     chain: Chain, bodies: Bodies, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike, drives: Drives | None = None
 ) -> Array:
-    """The effort tau (..., n) of this motion with nothing touching the arm.  (4.27), (4.28), (7.27)"""
+    """The effort tau (..., n) of this motion without contact.  (4.27), (4.28), (7.27)"""
     q, dq, ddq = np.broadcast_arrays(*(np.asarray(x, float) for x in (q, dq, ddq)))
-    tau = _newton_euler(moving(chain, bodies, q.shape[-1]), GRAVITY, q, dq, ddq)
+    tau = _newton_euler(moving_tree(chain, bodies, q.shape[-1]), GRAVITY, q, dq, ddq)
     return tau if drives is None else np.asarray(tau + drives.inertia * ddq + drives.friction(dq))
 
 
@@ -64,26 +64,26 @@ def regressor(chain: Chain, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Arra
         return compiled_regressor(chain, q, dq, ddq)
     n, L = q.shape[-1], len(chain.parent)
     N = q.size // n
-    tree = tree_of(chain.reduced(n), np.zeros((L, 10)))
+    tree = tree_of(chain.with_coordinates(n), np.zeros((L, 10)))
     work, Y = np.zeros(((n + 1) * (L + 1), 9, N)), np.zeros((n, L, 10, N))
     recursions.regressor(tree.lists(), GRAVITY, _joints(q, dq, ddq), work, Y, ALL)
     return np.moveaxis(Y, -1, 0).reshape(*q.shape, 10 * L)
 
 
 def compiled_regressor(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
-    """Y (..., n, 10 L) of `regressor` by the kernels however few the samples, for those who ask often."""
+    """Y (..., n, 10 L) of `regressor`, by the kernels for any number of samples, for repeated calls."""
     from davinci_forces.maths.mechanics.kernels import regressors
 
     n, L = q.shape[-1], len(chain.parent)
     Y = np.empty((*q.shape, 10 * L))
-    tree = tree_of(chain.reduced(n), np.zeros((L, 10)))
+    tree = tree_of(chain.with_coordinates(n), np.zeros((L, 10)))
     regressors(tree, GRAVITY, _rows(q), _rows(dq), _rows(ddq), Y.reshape(-1, n, L, 10))
     return Y
 
 
-def moving(chain: Chain, bodies: Bodies, n: int) -> Tree:
+def moving_tree(chain: Chain, bodies: Bodies, n: int) -> Tree:
     """The arm with its first n coordinates, and only the links that they move."""
-    return tree_of(*folded(chain.reduced(n), bodies.parameters(n).reshape(-1, 10)))
+    return tree_of(*fold_fixed_links(chain.with_coordinates(n), bodies.parameters(n).reshape(-1, 10)))
 
 
 def _newton_euler(tree: Tree, g: float, q: Array, dq: Array, ddq: Array) -> Array:

@@ -1,4 +1,4 @@
-"""The force at the tip that explains external efforts at the joints, how far it may be off, and where it is told well.
+"""The force at the tip from external efforts at the joints, its covariance, and the poses that determine it.
 
 tau_ext = J' w                                                                     (7.17), (7.18), (7.25)
 w = J^-T tau_ext,    C_w = J^-T C_tau J^-1                                         (7.26)
@@ -6,12 +6,12 @@ w = J^-T tau_ext,    C_w = J^-T C_tau J^-1                                      
 J is J_v of the first three joints, and w the force [N]; or J_v above J_omega of six, and w the wrench: the force [N]
 and the moment [N m].  Shapes: k is 3 or 6, and any leading axes come before it.
 
-How the errors of several joints go together: what other logs say of it, as far as they agree.
+The correlation of the errors of several joints is shared by logs as far as they agree:
 
 R = (1 - s) I + s mean(R_i),    s = max(0, 1 - var / mean_of_squares)
 
-of the correlations of n logs, var being the variance of their mean that the spread between logs gives it.  Logs that
-disagree leave no correlation, and a single one does, for nothing tells whether it would repeat.
+with the correlations R_i of n logs, and var the variance of their mean by the spread between logs.  Logs that disagree
+give no correlation.  Nor does a single one, since nothing shows whether it would repeat.
 """
 
 import numpy as np
@@ -24,8 +24,8 @@ from davinci_forces.maths.mechanics.kinematics import jacobian
 # Above this condition number a pose counts as singular: the first three joints leave one direction of the force
 # undetermined in practice.  It is 0.1 mm from an exact singularity; in the box of Table 6.2 it reaches 60.
 SINGULAR = 1e4
-# Above this one a force is marked: one direction of it is a hundred times less well told than another, as where the
-# lever of a joint at the tip is about a centimetre.  The box of Table 6.2 stays below.
+# Above this one a force is marked: the error of one direction is a hundred times that of another, as where the lever of
+# a joint at the tip is about a centimetre.  The box of Table 6.2 stays below.
 NEAR_SINGULAR = 1e2
 DOUBLE = 1e-6  # [m] imaginary part that rounding, at its square root, gives to a double root
 ARM = 3  # coordinates of the reduced Jacobian
@@ -33,7 +33,7 @@ CHI_SQUARED_95 = 7.814727903251179  # what 95 % of squared lengths of normal vec
 
 
 def condition(J_v: ArrayLike) -> Array:
-    """The condition number (...) of J_v (..., 3, n): how much a force can be blurred more than another.
+    """Condition number (...) of J_v (..., 3, n): the largest ratio of the errors of two directions of the force.
 
     It mixes metres per radian and metres per metre, as the Jacobian itself does.
     """
@@ -44,13 +44,13 @@ def condition(J_v: ArrayLike) -> Array:
 
 
 def is_singular(chain: Chain, q: ArrayLike) -> NDArray[np.bool_]:
-    """Whether the first three joints cannot tell the force at the tip, at q (..., n).  (7.26)"""
+    """Whether the first three joints do not determine the force at the tip, at q (..., n).  (7.26)"""
     J_v, _ = jacobian(chain, q)
     return np.asarray(condition(J_v[..., :ARM]) > SINGULAR)
 
 
 def singular_slides(chain: Chain, q_pitch: float) -> Array:
-    """Where the slide makes J_v of the first three joints singular at this pitch, ascending (0, 1 or 2,) [m].
+    """Slides at which J_v of the first three joints is singular at this pitch, ascending (0, 1 or 2,) [m].
 
     det J_v is a polynomial of the second degree in q3, and the roll does not change it: two levers, that of the roll
     about its axis and that of the pitch about the remote centre, each grow linearly with the slide.
@@ -64,17 +64,17 @@ def singular_slides(chain: Chain, q_pitch: float) -> Array:
 
 
 def from_efforts(J: ArrayLike, tau_ext: ArrayLike, C_tau: ArrayLike) -> tuple[Array, Array]:
-    """The force or wrench (..., k) that efforts (..., k) with covariance (..., k, k) come from, and its covariance.
+    """Compute the force or wrench (..., k) of efforts (..., k) with covariance (..., k, k), and its covariance.
 
-    Both are NaN at poses that count as singular, where the efforts leave one direction of it open.  (7.26)
+    Both are NaN at singular poses, where the efforts do not determine one direction.  (7.26)
     """
     J, tau_ext = np.asarray(J, float), np.asarray(tau_ext, float)
     C_tau = np.broadcast_to(np.asarray(C_tau, float), J.shape)
     w, C_w = np.full(tau_ext.shape, np.nan), np.full(J.shape, np.nan)
-    known = condition(J) <= SINGULAR
-    inverse = np.linalg.inv(np.swapaxes(J[known], -1, -2))  # J^-T
-    w[known] = np.einsum("...ij,...j->...i", inverse, tau_ext[known])
-    C_w[known] = inverse @ C_tau[known] @ np.swapaxes(inverse, -1, -2)
+    regular = condition(J) <= SINGULAR
+    inverse = np.linalg.inv(np.swapaxes(J[regular], -1, -2))  # J^-T
+    w[regular] = np.einsum("...ij,...j->...i", inverse, tau_ext[regular])
+    C_w[regular] = inverse @ C_tau[regular] @ np.swapaxes(inverse, -1, -2)
     return w, C_w
 
 
@@ -85,8 +85,9 @@ def covariance(std: ArrayLike, correlation: ArrayLike) -> Array:
 
 
 def sigma_ellipsoid(C: ArrayLike) -> tuple[Array, Array]:
-    """The half-axes (..., 3) of the sigma ellipsoid of a covariance (..., 3, 3), the longest first, and their
-    directions (..., 3, 3), one a row.
+    """Half-axes (..., 3) of the sigma ellipsoid of a covariance (..., 3, 3), and their directions (..., 3, 3) in rows.
+
+    The longest comes first.
     """
     values, vectors = np.linalg.eigh(np.asarray(C, float))
     sigma = np.sqrt(np.maximum(values[..., ::-1], 0.0))
@@ -96,7 +97,7 @@ def sigma_ellipsoid(C: ArrayLike) -> tuple[Array, Array]:
 
 
 def reach_95(f: ArrayLike, C: ArrayLike) -> Array:
-    """How far (...,) the 95 % ellipsoid of a covariance (..., 3, 3) reaches in the direction of a force (..., 3).
+    """Radius (...,) of the 95 % ellipsoid of a covariance (..., 3, 3) in the direction of a force (..., 3).
 
     |f| is no more than that where 0 lies in the 95 % ellipsoid about f.
     """
@@ -109,7 +110,7 @@ def reach_95(f: ArrayLike, C: ArrayLike) -> Array:
 
 
 def lever(J: ArrayLike) -> Array:
-    """The force [N] that one unit of each effort (..., k) stands for at the tip: the lengths of the columns of J^-T."""
+    """Force [N] at the tip of one unit of each effort (..., k): the lengths of the columns of J^-T."""
     return np.asarray(np.linalg.norm(np.linalg.inv(np.swapaxes(np.asarray(J, float), -1, -2))[..., :3, :], axis=-2))
 
 

@@ -1,1 +1,1 @@
-"""Models that are linear in their parameters, as identification and filtering take them."""
+"""Models that are linear in their parameters, for identification and filtering."""

@@ -1,4 +1,4 @@
-"""The bias of one joint, written once: it runs on arrays of samples as it stands, and compiled, sample by sample.
+"""The bias of one joint, in functions that run on arrays of samples and, compiled, sample by sample.
 
     b(q, dq) = c_1 + c_s sin q + c_c cos q + c_q q + c_v dq + c_f sign(dq) + c_z z                     (7.15), (7.16)
 
@@ -29,6 +29,6 @@ def bias(c: Coefficients, q: Any, dq: Any, z: Any) -> tuple[Any, Any, Any]:
 
 
 def deflect(z: Any, dq: Any, T_s: float, x_0: float) -> Any:
-    """The deflection z, -1 to 1, one sampling time T_s [s] later; `x_0` is the displacement it takes to turn over."""
+    """The deflection z, -1 to 1, one sampling time T_s [s] later; it reverses within the displacement `x_0`."""
     side = np.sign(dq)
     return side - (side - z) * np.exp(-np.abs(dq) * T_s / x_0)

@@ -1,4 +1,4 @@
-"""The model of a joint that moves by itself, or is taken to: a sum of terms.  Section 6.1"""
+"""The model of a joint that moves independently of the others: a sum of terms.  Section 6.1"""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -7,7 +7,7 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.models.bias import Coefficients, bias
-from davinci_forces.maths.models.memory import driven
+from davinci_forces.maths.models.memory import friction_state
 from davinci_forces.maths.models.model import ArmMotion, JointDynamics, Mechanism, Parameter, Regressor, of_signs
 from davinci_forces.maths.models.terms import Term
 
@@ -38,41 +38,41 @@ class IndependentJoint:
 
     @property
     def efforts(self) -> tuple[str, ...]:
-        """The joint's own."""
+        """The same joint."""
         return self.joints
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """One a term."""
+        """One parameter a term."""
         pairs = zip(self.terms, self.units, strict=True)
         return tuple(Parameter(term.name, term.typst, unit, term.positive, term.scale) for term, unit in pairs)
 
     @property
     def displacements(self) -> set[tuple[int, float]]:
-        """Those of its terms."""
+        """The displacements of its terms."""
         return {(0, term.displacement) for term in self.terms if term.displacement}
 
     @property
     def mechanism(self) -> Mechanism:
-        """Of a joint without bodies signs are known."""
+        """The parameters themselves: without bodies, only signs are constrained."""
         return of_signs(np.array([term.positive for term in self.terms]))
 
     def regressor(self, motion: ArmMotion) -> Regressor:
         """Phi (N, 1, p).  (6.9), (6.12), (6.14)"""
         q, dq, ddq = (x[:, 0] for x in motion[:3])
-        known, Phi = np.ones(len(q), np.bool_), np.zeros((len(q), 1, len(self.terms)))
+        valid, Phi = np.ones(len(q), np.bool_), np.zeros((len(q), 1, len(self.terms)))
         for i, term in enumerate(self.terms):
             z: Array | float = 0.0
             if term.scale:
-                z, started = driven(motion, 0, term)
-                known &= started
+                z, started = friction_state(motion, 0, term)
+                valid &= started
             add(term, q, dq, ddq, z, Phi[:, 0, i])
-        return Regressor(Phi, known)
+        return Regressor(Phi, valid)
 
     def sensitivity(self, motion: ArmMotion) -> Array:
-        """By how much the regressor moves with the motion: its derivatives by q, dq and ddq, (N, 3, p).
+        """Derivatives (N, 3, p) of the regressor by q, dq and ddq.
 
-        The jump of sign(dq) has none, and what remembers the motion is taken as it stands.
+        The jump of sign(dq) counts as zero, and states of friction as constant.
         """
         q, dq = motion.q[:, 0], motion.dq[:, 0]
         columns = []
@@ -86,7 +86,7 @@ class IndependentJoint:
         return np.full((len(q), 1, 1), inertia_of(self.terms, theta))
 
     def inertia_columns(self, q: Array) -> Array:
-        """What the parameters (p,) make of M at q (N, 1), (N, 1, 1, p)."""
+        """Derivatives (N, 1, 1, p) of M at q (N, 1) by the parameters."""
         return np.tile(np.array([term.a for term in self.terms]), (len(q), 1, 1, 1))
 
     def bias(self, theta: Array, motion: ArmMotion) -> Array:
@@ -95,11 +95,11 @@ class IndependentJoint:
         return np.asarray(self.regressor(still).Phi @ theta)
 
     def joint_dynamics(self, theta: Array, motion: ArmMotion) -> tuple[JointDynamics]:
-        """The terms of the joint's own state as coefficients, those that measured motion drives as known effort."""
-        c = combined(self.terms, theta)
+        """Terms of the joint's own state as coefficients, and states of friction as known effort."""
+        c = bias_coefficients(self.terms, theta)
         of_z = [theta_i * bool(term.scale) for theta_i, term in zip(theta, self.terms, strict=True)]
-        known = self.bias(np.array(of_z), motion)[:, 0] if any(of_z) else np.zeros(len(motion.q))
-        return (JointDynamics(np.full(len(motion.q), inertia_of(self.terms, theta)), c, known),)
+        known_effort = self.bias(np.array(of_z), motion)[:, 0] if any(of_z) else np.zeros(len(motion.q))
+        return (JointDynamics(np.full(len(motion.q), inertia_of(self.terms, theta)), c, known_effort),)
 
 
 def regressor(terms: Sequence[Term], q: Array, dq: Array, ddq: Array) -> Array:
@@ -119,12 +119,12 @@ def add(term: Term, q: Array, dq: Array, ddq: Array, z: Array | float, phi: Arra
 
 
 def inertia_of(terms: Sequence[Term], theta: Array) -> float:
-    """What multiplies the acceleration: M, constant for a joint that moves alone.  (6.5)"""
+    """The inertia M, the factor of the acceleration, which is constant for a joint that moves alone.  (6.5)"""
     return float(sum(p * term.a for p, term in zip(theta, terms, strict=True)))
 
 
-def combined(terms: Sequence[Term], theta: Array) -> Coefficients:
-    """The coefficients of b = sum_i theta_i b_i, for `bias`; terms of z are left out."""
+def bias_coefficients(terms: Sequence[Term], theta: Array) -> Coefficients:
+    """Coefficients of b = sum_i theta_i b_i, for `bias`, without terms of z."""
     rows = np.array([term.coefficients if not term.scale else np.zeros(7) for term in terms])
-    one, sine, cosine, linear, viscous, coulomb, presliding = (np.asarray(theta) @ rows).tolist()
-    return one, sine, cosine, linear, viscous, coulomb, presliding
+    constant, sine, cosine, linear, viscous, coulomb, presliding = (np.asarray(theta) @ rows).tolist()
+    return constant, sine, cosine, linear, viscous, coulomb, presliding

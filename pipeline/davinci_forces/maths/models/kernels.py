@@ -1,15 +1,15 @@
-"""What compiled loops use of a model: the bias and the deflection of one sample, and the deflection along a motion.
+"""Compiled parts of a model: the bias and the deflection of one sample, and the deflection along a motion.
 
 Import this module only where a loop runs: compiling it, or reading it back from the cache on disk, takes a moment.
 """
 
 from typing import Any
 
-from davinci_forces.maths.compiled import cached, inlined
+from davinci_forces.maths.compiled import cached, inline
 from davinci_forces.maths.models import bias as derivation
 
-bias = inlined(derivation.bias)
-deflect = inlined(derivation.deflect)
+bias = inline(derivation.bias)
+deflect = inline(derivation.deflect)
 
 
 @cached

@@ -2,18 +2,18 @@
 
     tau = Phi(q, dq, ddq) theta,        tau = M(q) ddq + b(q, dq) + tau_ext                            (6.8), (7.8)
 
-Identification asks for Phi, prediction for Phi theta; a filter tracks each joint by itself and asks what it is to know
-of it.  Shapes: N samples, n joints, m efforts, p parameters.
+Identification uses Phi, prediction Phi theta, and a filter, which tracks each joint by itself, `JointDynamics`.
+Shapes: N samples, n joints, m efforts, p parameters.
 
-No mechanism has negative mass, inertia or friction, of which parameters are made:
+Parameters are combinations of masses, inertias and friction, none of which is negative:
 
-    theta = A x,    J_l(x) >= 0 of every link,    x_i >= 0 where physics knows it
+    theta = A x,    J_l(x) >= 0 of every link,    x_i >= 0 where physics knows the sign
 
-x are the inertial parameters of links, ten each, and whatever else a model has.  A link can exist where its
-pseudo-inertia J_l is positive semidefinite: its mass is then spread over space and nowhere negative, and triangle
-inequalities hold.  Traversaro, Brossette, Escande and Nori, Identification of fully physical consistent inertial
-parameters using optimization on manifolds, 2016; Wensing, Kim and Slotine, 2018; of base parameters Sousa and Cortesao,
-Physical feasibility of robot base inertial parameter identification: a linear matrix inequality approach, 2014.
+x are the inertial parameters of links, ten each, and all others of a model.  A link is possible if its pseudo-inertia
+J_l is positive semidefinite: then its mass density is nowhere negative, and the triangle inequalities hold.
+Traversaro, Brossette, Escande and Nori, Identification of fully physical consistent inertial parameters using
+optimization on manifolds, 2016; Wensing, Kim and Slotine, 2018; of base parameters Sousa and Cortesao, Physical
+feasibility of robot base inertial parameter identification: a linear matrix inequality approach, 2014.
 """
 
 from collections.abc import Collection, Mapping
@@ -26,20 +26,20 @@ from davinci_forces.maths.models.bias import Coefficients
 
 
 class Mechanism(NamedTuple):
-    """What p parameters are made of: n numbers of links, drives, cables and friction."""
+    """How p parameters depend on n numbers of links, drives, cables and friction."""
 
     matrix: Array  # A (p, n)
     links: int  # L, of which the first 10 L of x are the inertial parameters, in the order of `bodies.PARAMETERS`
-    positive: Booleans  # (n,) what else is not negative
+    positive: Booleans  # (n,) the other numbers that are not negative
 
     @property
     def has_bodies(self) -> bool:
-        """Whether there is more to know of it than the signs of its parameters."""
+        """Whether links constrain the parameters, besides signs."""
         return self.links > 0
 
 
 def of_signs(positive: Booleans) -> Mechanism:
-    """Parameters that are made of nothing but themselves, some of which (p,) are not negative."""
+    """A mechanism without links: parameters of their own, some of which (p,) are not negative."""
     return Mechanism(np.eye(len(positive)), 0, positive)
 
 
@@ -47,7 +47,7 @@ class Parameter(NamedTuple):
     """One parameter of a model."""
 
     name: str
-    typst: str  # what it multiplies, in Typst's maths
+    typst: str  # its column, in Typst's maths
     unit: str
     positive: bool  # whether physics knows its sign
     scale: float = 0.0  # the displacement or velocity that its column depends on, in the joint's units; 0 for none
@@ -62,7 +62,7 @@ class ArmMotion(NamedTuple):
     T_s: float  # [s]
     segment: Integers  # (N,) a new number after each gap
     periodic: bool = False  # whether each segment is one period, which repeats
-    memory: Mapping[tuple[int, float], tuple[Array, Booleans]] = {}  # deflections that are known already, see `driven`
+    memory: Mapping[tuple[int, float], tuple[Array, Booleans]] = {}  # deflections computed before: `friction_state`
 
 
 class Regressor(NamedTuple):
@@ -73,7 +73,7 @@ class Regressor(NamedTuple):
 
 
 class JointDynamics(NamedTuple):
-    """What a filter is to know of one joint along a motion: inertia ddq + b(c; q, dq) + known + tau_ext = tau."""
+    """Dynamics of one joint along a motion, for a filter: inertia ddq + b(c; q, dq) + known + tau_ext = tau."""
 
     inertia: Array  # (N,)
     coefficients: Coefficients  # c, of what depends on the joint's own state
@@ -90,7 +90,7 @@ class Model(Protocol):
 
     @property
     def group(self) -> str:
-        """What it describes: a joint by name, or "arm"."""
+        """Its subject: a joint by name, or "arm"."""
         ...
 
     @property
@@ -110,12 +110,12 @@ class Model(Protocol):
 
     @property
     def displacements(self) -> Collection[tuple[int, float]]:
-        """The joint and the displacement of every deflection that it depends on."""
+        """Joint and displacement of every deflection in the model."""
         ...
 
     @property
     def mechanism(self) -> Mechanism:
-        """What its parameters are made of, and what of it no mechanism has."""
+        """The physical numbers behind its parameters, and their constraints."""
         ...
 
     def regressor(self, motion: ArmMotion) -> Regressor:
@@ -127,9 +127,9 @@ class Model(Protocol):
         ...
 
     def bias(self, theta: Array, motion: ArmMotion) -> Array:
-        """The effort (N, m) of this motion without what accelerates it.  (4.38)"""
+        """The effort (N, m) of this motion at zero acceleration.  (4.38)"""
         ...
 
     def joint_dynamics(self, theta: Array, motion: ArmMotion) -> tuple[JointDynamics, ...]:
-        """Each joint whose effort it gives, as a filter takes it.  (7.15), (7.16)"""
+        """Dynamics for a filter of each joint whose effort it gives.  (7.15), (7.16)"""
         ...

@@ -1,9 +1,9 @@
-"""What the parameters of a joint's model are made of: masses, their centres, moments of inertia, the motor.
+"""The physical parameters behind those of a joint's model: masses, their centres, moments of inertia, the motor.
 
     theta = C m(x),    m(x) monomials such as m_3, m_3 l_c3, m_3 l_c3^2             (6.7), (6.10), (6.13)
 
-A joint's few parameters do not tell the many physical ones apart; they are what a search in a box moves.
-C, which the equations write out by hand, is derived from the chain, in which the joint moves alone.
+A joint's few parameters do not determine the many physical ones, which a search in a box varies.  C is derived from the
+chain, in which only this joint moves.
 """
 
 from dataclasses import dataclass
@@ -20,13 +20,13 @@ from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.rigid_body import gravity, mass_matrix
 from davinci_forces.maths.models import terms
 
-REACH = np.linspace(-0.6, 0.6, 7)  # [rad] or [m]: three poses determine the coefficients, the rest confirm them
-AGREEMENT = 1e-9
+POSES = np.linspace(-0.6, 0.6, 7)  # [rad] or [m]: three poses determine the coefficients, the others confirm them
+AGREEMENT = 1e-9  # relative deviation from the form of the model
 ROUNDING = 1e-12  # below which a parameter does not enter
 
 
 class Quality(Enum):
-    """What a physical parameter is."""
+    """The kind of a physical parameter."""
 
     MASS = "mass"
     CENTRE = "distance of the centre of mass"
@@ -37,20 +37,20 @@ class Quality(Enum):
 
 
 class Physical(NamedTuple):
-    """One physical parameter, what it is guessed to be, and the box that it is searched in."""
+    """One physical parameter, its guess, and the bounds of its search."""
 
     name: str
     quality: Quality
     guess: float
     lower: float
     upper: float
-    link: str = ""  # which it is of, unless it is the motor's
+    link: str = ""  # that it belongs to, unless it is the motor's
     axis: int = 0  # of the link's frame in the table of the chain, of a moment or a centre, which lies on its far side
 
 
 @dataclass(frozen=True, eq=False)
 class PhysicalTable:
-    """The physical parameters of one joint, and the chain that says how they enter."""
+    """The physical parameters of one joint, and the chain that determines how they enter."""
 
     chain: Chain
     joint: int  # counted from 0
@@ -59,7 +59,7 @@ class PhysicalTable:
 
 
 class Lumping(NamedTuple):
-    """How n physical parameters make p: theta = C m(x)."""
+    """The p parameters as functions of n physical ones: theta = C m(x)."""
 
     factors: Integers  # (T, 3): the parameters whose product a monomial is; n stands for 1
     coefficients: Array  # C (p, T)
@@ -71,7 +71,7 @@ class Lumping(NamedTuple):
 
 
 class Box(NamedTuple):
-    """What is searched: n parameters between bounds, which make the p of the model."""
+    """A search space: n parameters between bounds, which determine the p of the model."""
 
     lower: Array  # (n,)
     upper: Array  # (n,)
@@ -79,7 +79,7 @@ class Box(NamedTuple):
 
 
 def each_for_itself(n: int) -> Lumping:
-    """Parameters that are searched as they are: theta = x."""
+    """The lumping of parameters that are searched themselves: theta = x."""
     return Lumping(np.column_stack([np.arange(n), np.full((n, 2), n)]), np.eye(n))
 
 
@@ -97,62 +97,61 @@ def reduced_parameters(
     ValueError
         If the joint's inertia or gravity is not of this form.
     """
-    q = np.zeros((len(REACH), n))
-    q[:, joint] = REACH
+    q = np.zeros((len(POSES), n))
+    q[:, joint] = POSES
     M = mass_matrix(chain, bodies, q)[:, joint, joint]
     G = gravity(chain, bodies, q)[:, joint] / GRAVITY
     slides = bool(chain.slides[chain.coordinate == joint].all())
-    columns = [-np.ones_like(REACH)] if slides else [np.sin(REACH), np.cos(REACH)]
+    columns = [-np.ones_like(POSES)] if slides else [np.sin(POSES), np.cos(POSES)]
     theta = np.linalg.lstsq(np.column_stack(columns), G, rcond=None)[0]
     if np.ptp(M) > AGREEMENT * M.max() or np.abs(np.column_stack(columns) @ theta - G).max() > AGREEMENT * M.max():
         raise ValueError(f"joint {joint} moving alone is not of the form of (6.8), (6.11) or (6.13)")
     rotor = 0.0 if drives is None else float(drives.inertia[joint])
     if slides:
-        found = {terms.lifted_mass.name: float(theta[0]), terms.inertia.name: float(M[0] - theta[0]) + rotor}
+        values = {terms.lifted_mass.name: float(theta[0]), terms.inertia.name: float(M[0] - theta[0]) + rotor}
     else:
         gravities = {terms.gravity_sin.name: float(theta[0]), terms.gravity_cos.name: float(theta[1])}
-        found = {terms.inertia.name: float(M[0]) + rotor, **gravities}
+        values = {terms.inertia.name: float(M[0]) + rotor, **gravities}
     if drives is not None:
-        found |= {terms.viscous.name: float(drives.viscous[joint]), terms.coulomb.name: float(drives.coulomb[joint])}
-    return found
+        values |= {terms.viscous.name: float(drives.viscous[joint]), terms.coulomb.name: float(drives.coulomb[joint])}
+    return values
 
 
 @cache
 def lumping(table: PhysicalTable, gear_ratio: float, names: tuple[str, ...]) -> Lumping | None:
-    """How a joint's physical parameters make those of its model, derived from the chain.
+    """Derive from the chain how a joint's physical parameters determine those of its model.
 
-    None where the table does not make the parameters that are named, and no others.  Kept for each table, as every
-    task asks for it again.
+    None if they do not determine exactly the parameters `names`.  Cached, since every task needs it again.
     """
-    one, place = len(table.parameters), {(x.quality, x.link): i for i, x in enumerate(table.parameters)}
-    made = list[tuple[tuple[int, int, int], dict[str, float]]]()
+    unit, place = len(table.parameters), {(x.quality, x.link): i for i, x in enumerate(table.parameters)}
+    monomials = list[tuple[tuple[int, int, int], dict[str, float]]]()
     for i, x in enumerate(table.parameters):
         match x.quality:
             case Quality.MASS:
-                centre = place.get((Quality.CENTRE, x.link), one)
-                axis = table.parameters[centre].axis if centre < one else 0
-                back, at, ahead = (alone(table, x.link, mass=1.0, centre=-c, axis=axis) for c in (-1.0, 0.0, 1.0))
-                made.append(((i, one, one), at))
-                if centre < one:
-                    made.append(((i, centre, one), {k: (ahead[k] - back[k]) / 2 for k in at}))
-                    made.append(((i, centre, centre), {k: (ahead[k] + back[k]) / 2 - at[k] for k in at}))
+                centre = place.get((Quality.CENTRE, x.link), unit)
+                axis = table.parameters[centre].axis if centre < unit else 0
+                back, at, ahead = (of_link(table, x.link, mass=1.0, centre=-c, axis=axis) for c in (-1.0, 0.0, 1.0))
+                monomials.append(((i, unit, unit), at))
+                if centre < unit:
+                    monomials.append(((i, centre, unit), {k: (ahead[k] - back[k]) / 2 for k in at}))
+                    monomials.append(((i, centre, centre), {k: (ahead[k] + back[k]) / 2 - at[k] for k in at}))
             case Quality.MOMENT:
-                made.append(((i, one, one), alone(table, x.link, moment=1.0, axis=x.axis)))
+                monomials.append(((i, unit, unit), of_link(table, x.link, moment=1.0, axis=x.axis)))
             case Quality.ROTOR:
-                made.append(((i, one, one), {terms.inertia.name: gear_ratio**2}))
+                monomials.append(((i, unit, unit), {terms.inertia.name: gear_ratio**2}))
             case Quality.VISCOUS | Quality.COULOMB:
-                made.append(((i, one, one), {x.quality.value: 1.0}))
-    entering = {name for _, part in made for name, value in part.items() if abs(value) > ROUNDING}
+                monomials.append(((i, unit, unit), {x.quality.value: 1.0}))
+    entering = {name for _, part in monomials for name, value in part.items() if abs(value) > ROUNDING}
     if entering != set(names):
         return None
-    coefficients = np.array([[part.get(name, 0.0) for _, part in made] for name in names])
-    return Lumping(np.array([factors for factors, _ in made]), coefficients)
+    coefficients = np.array([[part.get(name, 0.0) for _, part in monomials] for name in names])
+    return Lumping(np.array([factors for factors, _ in monomials]), coefficients)
 
 
-def alone(
+def of_link(
     table: PhysicalTable, link: str, mass: float = 0.0, centre: float = 0.0, moment: float = 0.0, axis: int = 0
 ) -> dict[str, float]:
-    """The parameters of a joint that carries one link, and nothing else."""
+    """Parameters of a joint that carries a single link."""
     chain = table.chain
     L, which = len(chain.links), chain.links.index(link)
     masses, centres, inertias = np.zeros(L), np.zeros((L, 3)), np.zeros((L, 3, 3))

@@ -1,10 +1,10 @@
-"""The terms that a joint model is made of.
+"""The terms of a joint model.
 
 A joint model is linear in its parameters (6.8), and each of its terms is linear in acceleration:
 
     tau = sum_i theta_i phi_i,        phi_i = a_i ddq + b_i(q, dq)
 
-so one tuple of terms gives the regressor for identification, and the inertia, the bias and its derivatives for the
+So one tuple of terms gives the regressor for identification, and the inertia, the bias and its derivatives for the
 filter.  b_i is a combination of the functions of `bias`.
 """
 
@@ -22,7 +22,7 @@ class Term:
     `unit` is that of the parameter, with {inertia}, {mass_moment}, {effort} and {position} left to the joint; `typst`
     is phi in Typst's maths, for equations; a `positive` parameter is one whose sign physics knows. A term of z says
     what z is by one of three, in the joint's units: the `displacement` of a deflection, the `width` [velocity] of a
-    smooth sign, or the velocity at which Stribeck's peak has `faded`; see `driven`.
+    smooth sign, or the velocity at which Stribeck's peak has `faded`; see `friction_state`.
     """
 
     name: str
@@ -39,8 +39,8 @@ class Term:
         if unknown := sorted(set(self.b) - set(COEFFICIENTS)):
             raise ValueError(f"term {self.name!r}: no functions {unknown}; there are {', '.join(COEFFICIENTS)}")
         if sum(scale > 0 for scale in (self.displacement, self.width, self.faded)) != int("z" in self.b):
-            said = "a term of z, and no other, has one displacement, width or velocity greater than 0"
-            raise ValueError(f"term {self.name!r}: {said}")
+            message = "a term of z needs one displacement, width or velocity above 0, and other terms have none"
+            raise ValueError(f"term {self.name!r}: {message}")
 
     @property
     def scale(self) -> float:
@@ -50,8 +50,8 @@ class Term:
     @property
     def coefficients(self) -> Coefficients:
         """The coefficients of b, for `bias`."""
-        one, sine, cosine, linear, viscous, coulomb, presliding = (self.b.get(name, 0.0) for name in COEFFICIENTS)
-        return one, sine, cosine, linear, viscous, coulomb, presliding
+        constant, sine, cosine, linear, viscous, coulomb, presliding = (self.b.get(name, 0.0) for name in COEFFICIENTS)
+        return constant, sine, cosine, linear, viscous, coulomb, presliding
 
 
 inertia = Term("inertia", "dot.double(q)", "{inertia}", a=1.0, positive=True)
@@ -65,17 +65,17 @@ stiffness = Term("stiffness", "q", "{effort}/{position}", b={"q": 1.0})
 
 
 def presliding(displacement: float, number: int = 1) -> Term:
-    """Friction of bristles that turn over within a displacement, in the joint's units; several are numbered from 1."""
+    """Friction of bristles that reverse within a displacement, in the joint's units; several are numbered from 1."""
     return Term(f"presliding friction {number}", f"z_{number}", "{effort}", b={"z": 1.0}, displacement=displacement)
 
 
 def smooth_sign(width: float) -> Term:
-    """Friction that turns over within velocities of +- `width`, in the joint's units."""
+    """Friction that reverses within velocities of +- `width`, in the joint's units."""
     return Term("smooth friction", 'tanh(dot(q) \\/ dot(q)_"w")', "{effort}", b={"z": 1.0}, width=width)
 
 
 def stribeck(faded: float) -> Term:
-    """What friction is more near standstill; the velocity, in the joint's units, takes e-fold of it away."""
+    """Additional friction near standstill, which decays e-fold at the velocity `faded`, in the joint's units."""
     phi = 'op("sign")(dot(q)) e^(-(dot(q) \\/ dot(q)_"s")^2)'
     return Term("Stribeck friction", phi, "{effort}", b={"z": 1.0}, faded=faded)
 

@@ -1,4 +1,4 @@
-"""Which of the periods of a recording differ from the others by more than their noise."""
+"""Find the periods of a recording that differ from the others by more than their noise."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -10,17 +10,17 @@ from davinci_forces.maths.periods.averaging import Phases, end, nearest, phases,
 from davinci_forces.maths.periods.harmonics import Harmonics
 from davinci_forces.maths.periods.period import refine, standard_error
 
-ODD = 2.0  # times what noise explains: a period that differs by less is left in, as it costs more to lose it
-NEGLIGIBLE = 1e-4  # of a signal's standard deviation: a smaller difference is that of an encoder's steps
-CHANCE = 1e-3  # that a period differs by as much though nothing but noise differs
-STRAYS = 4.0  # times what the harmonics leave where the motion repeats: a sample further away strays from it
-LEAST = 0.01  # of the motion's standard deviation: a sample nearer than that does not stray
+MIN_ODD_RATIO = 2.0  # times what noise explains: to lose a period costs more than a smaller difference
+NEGLIGIBLE_DIFFERENCE = 1e-4  # of a signal's standard deviation: encoder steps make smaller differences
+ODD_PROBABILITY = 1e-3  # of so large a difference by noise alone, below which a period differs
+STRAY_FACTOR = 4.0  # times the residual of the harmonics where the motion repeats: samples further away stray
+MIN_STRAY = 0.01  # of the motion's standard deviation: a nearer sample does not stray
 IN_A_ROW = 3  # samples that stray before the motion is over: one by itself is a glitch
 UNSURE = 0.02  # of a period, by which a phase may be uncertain beyond a gap
 
 
 class Difference(NamedTuple):
-    """How far one period of a signal is from the mean of the others."""
+    """Difference of one period of a signal from the mean of the others."""
 
     signal: int
     period: int  # counted from 0
@@ -30,31 +30,25 @@ class Difference(NamedTuple):
 
     @property
     def inside(self) -> bool:
-        """Whether periods on either side agree with each other."""
+        """Whether there are periods on both sides, which agree with each other."""
         return 0 < self.period < self.periods - 1
 
 
 def alike(
-    t: Array,
-    positions: Sequence[Array],
-    signals: Sequence[Array],
-    span: slice,
-    length: float,
-    rate: float,
-    orders: int,
+    t: Array, positions: Sequence[Array], signals: Sequence[Array], span: slice, length: float, rate: float, orders: int
 ) -> tuple[slice, float, list[Difference]]:
-    """The stretch without the first and last periods that differ from the others, its period, and what differed.
+    """Leave out the first and last periods that differ from the others; return stretch, period and differences.
 
-    What does not fill a period is left out at the start rather than at the end, before a period is; of the periods
-    never more than half, as they could be the ones that are right.  `t` (N,) and `length` [s]; `positions`, whose
-    harmonics give the period, and `signals`, which are compared, (N,) each.
+    An incomplete period is left out at the start rather than at the end, before a whole one is.  Of the periods at most
+    half are left out, since those could be the right ones.  `t` (N,) and `length` [s]; `positions`, whose harmonics
+    give the period, and `signals`, which are compared, (N,) each.
     """
     left_out: list[Difference] = []
     fewest = (whole_periods(t[span], length, rate) + 1) // 2
     while True:
         M = whole_periods(t[span], length, rate)
         used = slice(span.start, end(t, span, length, rate))
-        odd = differing(t[used], [x[used] for x in signals], length, rate)
+        odd = differing_periods(t[used], [x[used] for x in signals], length, rate)
         at_the_edges = sorted((d for d in odd if not d.inside), key=lambda d: -d.ratio)
         if not at_the_edges or fewest >= M:
             return span, length, left_out + sorted(odd, key=lambda d: -d.ratio)[:1]
@@ -64,7 +58,7 @@ def alike(
 
 
 def _without(t: Array, span: slice, odd: Difference, M: int, length: float, rate: float) -> slice:
-    """A stretch of M whole periods without the first or the last of them, or without what does not fill one."""
+    """Shorten a stretch of M whole periods by the first or the last one, or by an incomplete one at the start."""
     if odd.period > 0:
         return slice(span.start, end(t, span, length, rate, M - 1))
     late, next_one = t[span.stop - 1] + 0.5 / rate - M * length, t[span.start] + length - 0.5 / rate
@@ -73,17 +67,17 @@ def _without(t: Array, span: slice, odd: Difference, M: int, length: float, rate
 
 
 def alternation(t: Array, signals: Sequence[Array], length: float, rate: float, among: Sequence[int]) -> int:
-    """How many periods make the one after which all signals (N,) repeat: the first of `among` that does, or 1.
+    """The number k, the first of `among`, for which signals (N,) repeat only after k of these periods, or 1.
 
-    A motion may all but repeat within its period.  Its periods then agree with every k-th other but not with those
-    between; they are compared by groups, in an analysis of variance.
+    A motion may nearly repeat within its period.  Then every k-th period agrees, and those between them do not; the
+    groups are compared by an analysis of variance.
     """
     phased, number = Phases(t, length, phases(length, rate)), numbers(t, length)
-    left = [phased.carried(x)[1] for x in signals if among]
+    residuals = [phased.move_to_phases(x)[1] for x in signals if among]
     for k in among:
         place = number % k * phased.K + phased.bins
         counts = np.bincount(place, minlength=k * phased.K).reshape(k, -1)
-        if any(_alternates(x, residual, place, counts) for x, residual in zip(signals, left, strict=True)):
+        if any(_alternates(x, residual, place, counts) for x, residual in zip(signals, residuals, strict=True)):
             return k
     return 1
 
@@ -93,56 +87,56 @@ def _alternates(x: Array, residual: Array, place: Integers, counts: Integers) ->
     sums = _sums(place, residual, counts)
     means = sums / np.maximum(counts, 1)
     mean = sums.sum(axis=0) / np.maximum(counts.sum(axis=0), 1)
-    between, own = float(np.sum(counts * (means - mean) ** 2)), counts[1:].size
-    left, degrees = float(residual @ residual - np.sum(sums * means)), len(x) - int((counts > 0).sum())
-    F = between / own / max(left / max(degrees, 1), 1e-300)
-    if F <= ODD**2 or np.sqrt(between / len(x)) <= NEGLIGIBLE * x.std():
+    between, freedom = float(np.sum(counts * (means - mean) ** 2)), counts[1:].size
+    within, degrees = float(residual @ residual - np.sum(sums * means)), len(x) - int((counts > 0).sum())
+    F = between / freedom / max(within / max(degrees, 1), 1e-300)
+    if F <= MIN_ODD_RATIO**2 or np.sqrt(between / len(x)) <= NEGLIGIBLE_DIFFERENCE * x.std():
         return False
-    return is_unlikely(F, _lag_one(residual - means.ravel()[place]), own, degrees)
+    return is_unlikely(F, _lag_one(residual - means.ravel()[place]), freedom, degrees)
 
 
 def numbers(t: Array, length: float) -> Integers:
-    """The period in which each time (N,) is, counted from that of the first."""
+    """Number of the period of each time (N,), 0 for the first time."""
     turns: Array = (t - t[0]) / length + 1e-9
     return turns.astype(np.int64)
 
 
 def _sums(place: Integers, x: Array, counts: Integers) -> Array:
-    """The sums of samples (N,) by their place in a table like that of their counts."""
+    """Sum samples (N,) by their place in a table of the shape of their counts."""
     return np.asarray(np.bincount(place, x, counts.size).reshape(counts.shape), dtype=np.float64)
 
 
 def _lag_one(noise: Array) -> float:
-    """The correlation of each sample with the next, along the last axis."""
+    """Correlation of each sample with the next, along the last axis."""
     return float(np.sum(noise[..., 1:] * noise[..., :-1]) / max(float(np.sum(noise**2)), 1e-300))
 
 
-def is_unlikely(F: float, rho: float, own: float, others: float) -> bool:
-    """Whether noise of a correlation from sample to sample rarely makes one variance so many times another.
+def is_unlikely(F: float, rho: float, degrees: float, degrees_others: float) -> bool:
+    """Whether noise with correlation `rho` from sample to sample rarely gives so large a ratio F of two variances.
 
-    Squares of first-order noise are correlated by rho^2, so that few of them say as much as independent ones.
+    Squares of first-order noise are correlated by rho^2, so they count as fewer independent ones.
     """
     from scipy.special import fdtrc
 
     worth = (1 - rho**2) / (1 + rho**2)
-    return bool(fdtrc(max(worth * own, 1.0), max(worth * others, 1.0), F) < CHANCE)
+    return bool(fdtrc(max(worth * degrees, 1.0), max(worth * degrees_others, 1.0), F) < ODD_PROBABILITY)
 
 
-def differing(t: Array, signals: Sequence[Array], length: float, rate: float) -> list[Difference]:
-    """The periods of signals (N,) that differ from the others.
+def differing_periods(t: Array, signals: Sequence[Array], length: float, rate: float) -> list[Difference]:
+    """Find the periods of signals (N,) that differ from the others; none of fewer than three periods.
 
-    A period is compared with the mean of the others at each phase, as an analysis of variance would: the mean square of
-    the difference over the variance between the others.  Noise that is correlated leaves few degrees of freedom behind
-    either, so their number is taken from the others' own correlation.  Of two periods nobody can tell which is odd.
+    A period is compared with the mean of the others at each phase, as in an analysis of variance: the mean square of
+    the difference over the variance between the others.  Correlated noise reduces the degrees of freedom of both, so
+    their number follows from the correlation of the others.
     """
-    periods = _Periods.of(t, length, rate)
+    periods = _Periods.from_times(t, length, rate)
     if len(periods.numbers) < 3:
         return []
     return [difference for i, x in enumerate(signals) for difference in periods.odd(x, i)]
 
 
 class _Periods(NamedTuple):
-    """Where samples (N,) fall in a table of M periods by K phases: what all signals of a log share."""
+    """The places of samples (N,) in a table of M periods by K phases, which all signals of a log share."""
 
     phased: Phases
     numbers: Integers  # (M,) of the periods, those that hold no samples left out
@@ -150,12 +144,12 @@ class _Periods(NamedTuple):
     place: Integers  # (N,) of each sample in the table
     counts: Integers  # (M, K)
     totals: Integers  # (K,) of the counts
-    weight: Array  # (M, K) of the square of what a period's sum is off the mean; 0 where it or the others have none
+    weight: Array  # (M, K) of the squared deviation of a period's sum; 0 where it or the others have no samples
     compared: Integers  # (M,) phases at which a period and the others have samples
     degrees: Integers  # (M,) of freedom behind the variance of the others
 
     @classmethod
-    def of(cls, t: Array, length: float, rate: float) -> "_Periods":
+    def from_times(cls, t: Array, length: float, rate: float) -> "_Periods":
         phased, number = Phases(t, length, phases(length, rate)), numbers(t, length)
         first = np.concatenate([[0], np.flatnonzero(np.diff(number)) + 1])
         M, K = len(first), phased.K
@@ -171,26 +165,26 @@ class _Periods(NamedTuple):
 
     def odd(self, x: Array, signal: int) -> list[Difference]:
         """The periods in which a signal (N,) differs from the others."""
-        _, residual = self.phased.carried(x)
+        _, residual = self.phased.move_to_phases(x)
         sums = _sums(self.place, residual, self.counts)
         mean = sums.sum(axis=0) / np.maximum(self.totals, 1)
         off = sums - self.counts * mean
         explained = np.einsum("mk,mk,mk->m", off, off, self.weight)
-        # What is left without a period: all squares, less those within it and those it is apart from the others by.
+        # Squares between the other periods: all squares, less those within this period and those of its difference.
         squares = np.add.reduceat(residual * residual, self.first)
-        own = squares - np.einsum("mk,mk->m", sums, sums / np.maximum(self.counts, 1))
+        within = squares - np.einsum("mk,mk->m", sums, sums / np.maximum(self.counts, 1))
         between = squares.sum() - mean @ sums.sum(axis=0)
-        noise = np.maximum(between - explained - own, 0.0) / self.degrees
+        noise = np.maximum(between - explained - within, 0.0) / self.degrees
         apart = explained / np.maximum(self.compared, 1)
         ratio, rms = np.sqrt(apart / np.maximum(noise, 1e-300)), np.sqrt(np.maximum(apart - noise, 0.0))
         return [
             Difference(signal, int(self.numbers[m]), int(self.numbers[-1]) + 1, float(rms[m]), float(ratio[m]))
-            for m in np.flatnonzero(ratio > ODD).tolist()
-            if rms[m] > NEGLIGIBLE * x.std() and self._is_unlikely(m, float(ratio[m]), sums)
+            for m in np.flatnonzero(ratio > MIN_ODD_RATIO).tolist()
+            if rms[m] > NEGLIGIBLE_DIFFERENCE * x.std() and self._is_unlikely(m, float(ratio[m]), sums)
         ]
 
     def _is_unlikely(self, m: int, ratio: float, sums: Array) -> bool:
-        """Whether noise as correlated as that of the other periods rarely makes one differ so; `sums` (M, K)."""
+        """Whether noise correlated like that of the other periods rarely gives such a difference; `sums` (M, K)."""
         others = np.arange(len(sums)) != m
         counts, sums = self.counts[others], sums[others]
         mean = sums.sum(axis=0) / np.maximum(counts.sum(axis=0), 1)
@@ -199,11 +193,11 @@ class _Periods(NamedTuple):
 
 
 def stretch(t: Array, signals: Sequence[Array], length: float, core: slice, harmonics: int) -> tuple[slice, float]:
-    """The longest run of samples around `core` that repeat with one period, and that period [s].
+    """Extend `core` to the longest run of samples that repeats with one period, and refine that period [s].
 
-    The harmonics of what is known to repeat say where the next samples should be, up to as many again on either side;
-    from those that are there the period is known better.  `t` (N,) [s], with or without gaps; `signals` (N,) each;
-    `length` [s] good enough for the few periods of `core`.
+    The harmonics of the stretch so far predict up to as many samples again on either side.  Those that agree are added,
+    and the period is fitted again.  `t` (N,) [s], with or without gaps; `signals` (N,) each; `length` [s] precise
+    enough for the few periods of `core`.
     """
     length = refine(t[core], [x[core] for x in signals], length, harmonics)
     while (wide := _certain(t, signals, length, core, harmonics)) != core:
@@ -223,7 +217,7 @@ def _certain(t: Array, signals: Sequence[Array], length: float, core: slice, har
     reach = core.stop - core.start
     wide = slice(max(core.start - reach, 0), min(core.stop + reach, len(t)))
     steps = np.diff(t[wide])
-    # A period is known to within itself, so that no shorter gap can matter.
+    # The error of a period is less than the period, so no shorter gap can matter.
     if not np.any(steps > UNSURE * length):
         return wide
     std = standard_error(t[core], [x[core] for x in signals], length, harmonics)
@@ -233,27 +227,27 @@ def _certain(t: Array, signals: Sequence[Array], length: float, core: slice, har
 
 
 def _strays(t: Array, signals: Sequence[Array], length: float, core: slice, wide: slice, harmonics: int) -> Booleans:
-    """Whether any signal is where the mean period of `core` does not lead us to expect it, at each sample of `wide`."""
+    """Whether any signal differs from its mean period in `core` by more than its scatter, at each sample of `wide`."""
     omega, since = 2 * np.pi / length, t[wide] - t[core.start]
     inside = slice(core.start - wide.start, core.stop - wide.start)
     N, rate = core.stop - core.start, (core.stop - core.start - 1) / (t[core.stop - 1] - t[core.start])
     K = phases(length, rate)
     bins = nearest(since, length, K)
-    known, whole = (Harmonics(times, omega, harmonics) for times in (since[inside], since))
+    core_fit, wide_fit = (Harmonics(times, omega, harmonics) for times in (since[inside], since))
     counts = np.maximum(np.bincount(bins[inside], minlength=K), 1)
     strays = np.zeros(len(since), dtype=bool)
     for x in signals:
-        residual = whole.evaluate(known.project(x[core]))
+        residual = wide_fit.evaluate(core_fit.project(x[core]))
         np.subtract(x[wide], residual, out=residual)
         residual -= (np.bincount(bins[inside], residual[inside], K) / counts)[bins]
-        # The mean of M periods follows their noise, and misses that of others by more.
+        # The mean of M periods contains their noise, so samples of other periods differ from it by more.
         expected = np.sqrt(residual[inside] @ residual[inside] / max(N - K, 1) * (1 + K / N))
-        strays |= np.abs(residual) > max(STRAYS * expected, LEAST * x[core].std())
+        strays |= np.abs(residual) > max(STRAY_FACTOR * expected, MIN_STRAY * x[core].std())
     return strays
 
 
 def _ahead(strays: Booleans) -> int:
-    """How many samples there are before the first that begins a run of those that stray."""
+    """Number of samples before the first run of samples that stray."""
     counts = np.convolve(strays, np.ones(IN_A_ROW, dtype=int), mode="valid") if len(strays) >= IN_A_ROW else strays
     runs = np.flatnonzero(counts >= IN_A_ROW)
     return int(runs[0]) if len(runs) else len(strays)

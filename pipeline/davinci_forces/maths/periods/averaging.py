@@ -1,4 +1,4 @@
-"""Averaging the repeated periods of a recording, whatever the ratio of its period to its sampling time."""
+"""Average the repeated periods of a recording, whatever the ratio of its period to its sampling time."""
 
 from collections.abc import Iterator
 from functools import cached_property
@@ -15,7 +15,7 @@ ON_PHASE = 1e-6  # of the time between phases, by which a sample on one may be o
 
 
 class Folded(NamedTuple):
-    """One period on K evenly spaced phases, and what averaging removed from every sample used."""
+    """One mean period on K evenly spaced phases, and the noise of every sample."""
 
     mean: Array  # (K,)
     var: Array  # (K,) variance of one period, not of the mean
@@ -24,27 +24,27 @@ class Folded(NamedTuple):
 
 
 def phases(period: float, rate: float) -> int:
-    """How many phases a period is divided into, K: as many as it holds whole samples, so that none stays empty."""
+    """Number of phases K of a period: that of its whole samples, so that no phase stays empty."""
     return int(np.floor(period * rate * (1 + 1e-6)))
 
 
 def whole_periods(t: Array, period: float, rate: float) -> int:
-    """How many whole periods the samples cover, M; the last may lack less than half a sample: its end is uncertain."""
+    """Number of whole periods M of the samples; the last may lack up to half a sample, since its end is uncertain."""
     return int(np.floor(((t[-1] - t[0]) * rate + 1.5) / (period * rate)))
 
 
 def end(t: Array, span: slice, period: float, rate: float, M: int | None = None) -> int:
-    """The sample after the last of the first M periods of a stretch; of all the whole ones that it covers."""
+    """Index after the last sample of the first M periods of a stretch, or of all its whole periods."""
     M = whole_periods(t[span], period, rate) if M is None else M
     after = span.start + np.searchsorted(t[span] - t[span.start], M * period - 0.5 / rate)
     return int(after)
 
 
 class Phases:
-    """The K phases of a period, and where samples (N,) at times (N,) fall among them: what all signals of a log share.
+    """The K phases of a period, and the places of samples at times (N,) among them, which all signals of a log share.
 
-    A sample rarely falls on a phase exactly.  A smooth harmonic fit carries it from where it was taken to the phase,
-    and only what the fit leaves is compared and averaged.
+    A sample rarely falls on a phase exactly.  A smooth harmonic fit moves it to the phase: only the residual of the fit
+    is compared and averaged.
     """
 
     def __init__(self, t: Array, period: float, K: int) -> None:
@@ -52,43 +52,43 @@ class Phases:
 
     @cached_property
     def on_them(self) -> bool:
-        """Whether each sample falls on the phase after that of the one before it."""
+        """Whether each sample falls on the phase after that of the previous sample."""
         return len(self.t) >= self.K and on_phases(self.t, self.period, self.K)
 
     @cached_property
     def bins(self) -> Integers:
-        """The phase that is nearest to each sample, (N,)."""
+        """The phase nearest to each sample, (N,)."""
         return nearest(self.t - self.t[0], self.period, self.K)
 
     @cached_property
     def counts(self) -> NDArray[np.int64]:
-        """How many samples are nearest to each phase, (K,)."""
+        """Number of samples nearest to each phase, (K,)."""
         return np.bincount(self.bins, minlength=self.K)
 
     @cached_property
     def _smooth(self) -> tuple[Harmonics, Harmonics]:
-        """The harmonics that describe a signal, at its samples and at the phases."""
+        """The harmonics of the smooth fit, at the samples and at the phases."""
         omega, harmonics = 2 * np.pi / self.period, min(SMOOTH, self.K // 4)
         times = self.t - self.t[0], np.arange(self.K) / self.K * self.period
         of_samples, of_phases = (Harmonics(since, omega, harmonics) for since in times)
         return of_samples, of_phases
 
-    def carried(self, x: Array) -> tuple[Array, Array]:
-        """The smooth fit of samples (N,) at the phases (K,), and what it leaves of each sample (N,)."""
+    def move_to_phases(self, x: Array) -> tuple[Array, Array]:
+        """Fit samples (N,) smoothly: the fit at the phases (K,), and the residual of each sample (N,)."""
         of_samples, of_phases = self._smooth
-        c, residual = of_samples.left(x)
+        c, residual = of_samples.fit(x)
         return of_phases.evaluate(c), residual
 
     def fold(self, x: Array) -> Folded:
         """Average the samples (N,) at each phase, from the first sample on.
 
-        For a period of a whole number of samples this is plain averaging, the noise stays as white as it was, and a
-        jump of friction does not ring as it would under interpolation.  A phase that no sample falls on takes the fit
-        and a count of 0.  (6.30), (6.31)
+        For a period of a whole number of samples this is plain averaging.  White noise stays white, and a jump of
+        friction does not ring as it would under interpolation.  A phase without samples gets the fit and a count of 0.
+        (6.30), (6.31)
         """
         if self.on_them:
-            return stacked(x, self.K)
-        smooth, noise = self.carried(x)
+            return average_rows(x, self.K)
+        smooth, noise = self.move_to_phases(x)
         mean = np.bincount(self.bins, noise, self.K) / np.maximum(self.counts, 1)
         noise -= mean[self.bins]
         var = np.bincount(self.bins, noise * noise, self.K) / np.maximum(self.counts - 1, 1)
@@ -96,7 +96,7 @@ class Phases:
 
 
 def nearest(since: Array, period: float, K: int) -> Integers:
-    """The nearest of K phases of a period to each time (N,) since its first."""
+    """The nearest of the K phases of a period to each time (N,) since the first."""
     turns = since / period
     turns -= np.floor(turns)
     turns *= K
@@ -106,35 +106,35 @@ def nearest(since: Array, period: float, K: int) -> Integers:
 
 
 def on_phases(t: Array, period: float, K: int) -> bool:
-    """Whether each sample falls on the phase after that of the one before it."""
+    """Whether each sample falls on the phase after that of the previous sample."""
     return are_apart(t, period / K, ON_PHASE)
 
 
-def stacked(x: Array, K: int) -> Folded:
-    """The average of samples each of which falls on the next phase, which needs no fit.  `x` is (N,)."""
-    M, rest = divmod(len(x), K)
+def average_rows(x: Array, K: int) -> Folded:
+    """Average samples (N,) each of which falls on the next phase, which needs no fit."""
+    M, remainder = divmod(len(x), K)
     whole = M * K
     counts = np.full(K, M)
-    counts[:rest] += 1
+    counts[:remainder] += 1
     total = x[:whole].reshape(M, K).sum(axis=0)
-    total[:rest] += x[whole:]
+    total[:remainder] += x[whole:]
     mean = total / np.maximum(counts, 1)
     noise = np.empty_like(x)
     periods = noise[:whole].reshape(M, K)
     np.subtract(x[:whole].reshape(M, K), mean, out=periods)
-    np.subtract(x[whole:], mean[:rest], out=noise[whole:])
+    np.subtract(x[whole:], mean[:remainder], out=noise[whole:])
     squares = np.einsum("mk,mk->k", periods, periods)
-    squares[:rest] += noise[whole:] ** 2
+    squares[:remainder] += noise[whole:] ** 2
     return Folded(mean, squares / np.maximum(counts - 1, 1), counts, noise)
 
 
 def left_out(t: Array, x: Array, period: float, K: int, groups: Integers) -> Iterator[Folded]:
-    """The average without each group of samples in turn, `groups` (N,) numbered from 0; `noise` stays empty.
+    """Average without each group of samples in turn, `groups` (N,) numbered from 0; `noise` stays empty.
 
-    The smooth fit is that of all samples: it only carries each to the nearest phase.
+    The smooth fit is that of all samples, since it only moves each to the nearest phase.
     """
     phased = Phases(t, period, K)
-    smooth, residual = phased.carried(x)
+    smooth, residual = phased.move_to_phases(x)
     size = int(groups.max()) + 1
     place = groups * K + phased.bins
     powers = (np.ones_like(residual), residual, residual * residual)

@@ -1,4 +1,4 @@
-"""Signals as a mean and a few harmonics: projecting on them, evaluating and differentiating them.
+"""Signals as a mean and a few harmonics: projection, evaluation and differentiation.
 
 Coefficients are (2 H + 1,): mean, then cosine and sine of harmonics 1 to H, at multiples of omega.
 """
@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array
 
-BLOCK = 1 << 15  # samples whose basis is held at a time
+MAX_BASIS_SAMPLES = 1 << 15  # samples whose basis is held at a time
 EVEN = 256  # evenly spaced samples in a block
-UNEVEN = 1e-7  # of the time between samples, by which they may be off it
+UNEVEN = 1e-7  # of the time between samples: largest deviation of an even clock
 
 
 def basis(t: Array, omega: float, harmonics: int) -> Array:
@@ -30,10 +30,10 @@ def basis(t: Array, omega: float, harmonics: int) -> Array:
 
 
 class Harmonics:
-    """The mean and the first harmonics of omega at times (N,): what depends on these alone serves all signals.
+    """The mean and the first harmonics of omega at times (N,), computed once for all signals.
 
-    Evenly sampled blocks differ by a turn of each harmonic only: one basis serves all, which takes a tenth of the time.
-    What they leave, and all of an uneven clock, is taken a block at a time, which keeps the memory bounded.
+    Evenly sampled blocks differ only by a rotation of each harmonic, so one basis serves all in a tenth of the time.
+    The samples after them, and all of an uneven clock, are processed block by block, which limits the memory.
     """
 
     def __init__(self, t: Array, omega: float, harmonics: int) -> None:
@@ -44,9 +44,9 @@ class Harmonics:
         self._rest = t[self._even :].copy() if step else t  # no view, which would keep all times of a long log
 
     def project(self, x: Array) -> Array:
-        """The coefficients closest to samples (N,) in the least squares sense.
+        """Fit the coefficients to samples (N,) by least squares.
 
-        The harmonics are all but orthogonal over whole periods, so their normal equations are well conditioned.
+        The harmonics are nearly orthogonal over whole periods, so their normal equations are well conditioned.
         """
         return np.asarray(np.linalg.solve(self._gram, self._products(x)), dtype=np.float64)
 
@@ -60,8 +60,8 @@ class Harmonics:
             signal[part] = F @ c
         return signal
 
-    def left(self, x: Array) -> tuple[Array, Array]:
-        """The coefficients closest to samples (N,), and what they leave of them (N,)."""
+    def fit(self, x: Array) -> tuple[Array, Array]:
+        """Fit the coefficients to samples (N,); return them and the residuals (N,)."""
         c = self.project(x)
         signal = self.evaluate(c)
         return c, np.subtract(x, signal, out=signal)
@@ -73,7 +73,7 @@ class Harmonics:
 
     @cached_property
     def _turns(self) -> NDArray[np.complex128]:
-        """How far each harmonic has turned where each of B blocks starts, (B, H)."""
+        """Rotation (B, H) of each harmonic at the start of each of B blocks."""
         return _pairs(np.ascontiguousarray(basis(self._starts, self.omega, self.harmonics)))
 
     def _products(self, x: Array) -> Array:
@@ -90,7 +90,7 @@ class Harmonics:
     def _gram(self) -> Array:
         """The products (2 H + 1, 2 H + 1) of the basis with itself.
 
-        cos jx cos kx = (cos (j - k)x + cos (j + k)x) / 2, and so on: sums of twice as many harmonics tell them all.
+        cos jx cos kx = (cos (j - k)x + cos (j + k)x) / 2, and so on: the sums of twice as many harmonics give them all.
         """
         H = self.harmonics
         sums = self._sums(2 * H)
@@ -107,7 +107,7 @@ class Harmonics:
         return gram
 
     def _sums(self, harmonics: int) -> Array:
-        """The basis of so many harmonics, summed over all times: (2 H + 1,)."""
+        """Sum the basis of so many harmonics over all times: (2 H + 1,)."""
         sums: Array = basis(self._starts, self.omega, harmonics).sum(axis=0)
         within = basis(self._within, self.omega, harmonics).sum(axis=0)
         sums[0] *= within[0]
@@ -117,14 +117,14 @@ class Harmonics:
         return sums
 
     def _blocks(self, harmonics: int) -> Iterator[tuple[slice, Array]]:
-        """Blocks of the samples that no other block serves, each with its basis (n, 2 H + 1)."""
-        for start in range(self._even, self._size, BLOCK):
-            part = slice(start, min(start + BLOCK, self._size))
+        """Yield blocks of the samples outside the even blocks, each with its basis (n, 2 H + 1)."""
+        for start in range(self._even, self._size, MAX_BASIS_SAMPLES):
+            part = slice(start, min(start + MAX_BASIS_SAMPLES, self._size))
             yield part, basis(self._rest[start - self._even : part.stop - self._even], self.omega, harmonics)
 
 
 def project(t: Array, x: Array, omega: float, harmonics: int) -> Array:
-    """The coefficients closest to the samples (N,) in the least squares sense."""
+    """Fit the coefficients to samples (N,) by least squares."""
     return Harmonics(t, omega, harmonics).project(x)
 
 
@@ -139,7 +139,7 @@ def _pairs(parts: Array) -> NDArray[np.complex128]:
 
 
 def even_step(t: Array) -> float:
-    """The time between samples (N,); 0 where it is not the same between all, or they are too few for it to matter."""
+    """Time between samples (N,); 0 for an uneven clock, or where the samples are too few for it to matter."""
     if len(t) < EVEN:
         return 0.0
     step = float(t[-1] - t[0]) / (len(t) - 1)
@@ -147,10 +147,10 @@ def even_step(t: Array) -> float:
 
 
 def are_apart(t: Array, step: float, within: float) -> bool:
-    """Whether samples (N,) are so far apart, none of them off by more than a share of it from where it is due."""
-    due = t[0] + np.arange(BLOCK) * step
-    for start in range(0, len(t), BLOCK):
-        block = t[start : start + BLOCK]
+    """Whether samples (N,) are one `step` apart, none off its place by more than a share `within` of the step."""
+    due = t[0] + np.arange(MAX_BASIS_SAMPLES) * step
+    for start in range(0, len(t), MAX_BASIS_SAMPLES):
+        block = t[start : start + MAX_BASIS_SAMPLES]
         late = block - due[: len(block)]
         if max(late.max() - start * step, start * step - late.min()) > within * step:
             return False
@@ -173,12 +173,12 @@ def amplitudes(x: Array) -> Array:
 
 
 def kept_noise(sigma: float, K: int, harmonics: int, omega: float) -> Array:
-    """What the kept harmonics leave of white noise in K samples of a period: covariance (3, 3) of x, dx and ddx.
+    """Covariance (3, 3) of x, dx and ddx from white noise in K samples of a period, after the projection on harmonics.
 
-    Each harmonic keeps 2 sigma^2 / K and the mean half of that; a derivative is a quarter of a turn ahead, so that only
-    x and ddx go together.
+    Each harmonic keeps 2 sigma^2 / K of the noise, and the mean half of that.  A derivative is a quarter turn ahead, so
+    that only x and ddx correlate.
     """
     rate = omega * np.arange(1, harmonics + 1)
-    own = sigma**2 / K * (1.0 + 2.0 * harmonics)
+    variance = sigma**2 / K * (1.0 + 2.0 * harmonics)
     of_dx, of_ddx = (2.0 * sigma**2 / K * float((rate**order).sum()) for order in (2, 4))
-    return np.array([[own, 0.0, -of_dx], [0.0, of_dx, 0.0], [-of_dx, 0.0, of_ddx]])
+    return np.array([[variance, 0.0, -of_dx], [0.0, of_dx, 0.0], [-of_dx, 0.0, of_ddx]])

@@ -1,4 +1,4 @@
-"""Finding where in a recording its motion repeats, and after how long, from the recording itself."""
+"""Find where in a recording its motion repeats, and after how long."""
 
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -7,18 +7,18 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array
 
-POINTS = 1024  # that a search is made on, each the mean of neighbouring samples
-SHORTEST = 4  # points in a period
+POINTS = 1024  # of a search, each the mean of neighbouring samples
+MIN_PERIOD_POINTS = 4  # points in a period
 DIP = 0.02  # a span repeats where its halves differ by less than this share of twice its variance
-MOVES = 0.01  # share of the recording's variance below which a span is at rest
-AS_GOOD = 2.0  # times the smallest difference: a lag this good is a period, too
-AS_CLEAN = 20.0  # times the smallest difference, and at least `CLEAN`: where a stretch that repeats ends
-CLEAN = 2e-3
-ROUNDED = 1e-5  # difference that is left of a lag between two points
-FINE = 200  # parts of a lag, between which its difference is taken as a parabola
-FEW = 4.2  # periods that are searched for a shorter one
-AS_LONG = 0.8  # of the longest stretch: one this long counts as long as it
-ENOUGH = 0.25  # of a recording: a shorter stretch may repeat by chance
+MIN_SPAN_VARIANCE = 0.01  # share of the recording's variance below which a span is at rest
+MAX_RATIO_PERIOD = 2.0  # to the smallest difference: a lag below it is a period, too
+# A stretch that repeats ends where the difference exceeds so many times its smallest value, but at least this bound.
+MAX_RATIO_STRETCH, MIN_BOUND_STRETCH = 20.0, 2e-3
+ROUNDED = 1e-5  # difference that a lag between two points leaves
+LAG_PARTS = 200  # parts of a lag, between which its difference is taken as a parabola
+PERIODS_SEARCHED = 4.2  # periods in which a shorter one is sought
+MIN_LENGTH_RATIO = 0.8  # to the longest stretch: a stretch of this length counts as equally long
+MIN_STRETCH_SHARE = 0.25  # of a recording: a shorter stretch may repeat by chance
 
 
 class Repetition(NamedTuple):
@@ -31,30 +31,30 @@ class Repetition(NamedTuple):
 
 
 class Lag(NamedTuple):
-    """How much the halves of every span of two lags differ, as a share of twice its variance (n - 2 lag + 1,)."""
+    """Difference of the halves of every span of two lags, as a share of twice its variance (n - 2 lag + 1,)."""
 
     lag: int
     difference: Array
 
 
 def repetition(signals: Sequence[Array]) -> Repetition | None:
-    """The longest stretch of a recording in which all signals repeat together, or None where they do not.
+    """Find the longest stretch of a recording in which all signals repeat together, or None.
 
-    `signals` are (N,) each, without gaps, weighted alike.  Every lag is tried everywhere, on few points; then on a few
-    periods of what was found, in case they hold shorter ones.  Where the recording holds so many periods that the means
-    of neighbours level them, its parts are searched.  The cost is a few passes over the recording.
+    `signals` are (N,) each, without gaps, equally weighted.  Every lag is tried everywhere, on few points; then on a
+    few periods of the match, which may contain shorter ones.  Where a recording has so many periods that the means of
+    neighbours cancel them, its parts are searched.  The cost is a few passes over the recording.
     """
     N = len(signals[0])
     x = np.array([(s - s.mean()) / s.std() for s in signals if s.std() > 0]).reshape(-1, N)
     for start, stop in _parts(N):
-        found = _searched(x[:, start:stop]) if len(x) else None
-        if found is not None:
-            return _resolved(x, Repetition(found.lag, found.start + start, found.stop + start, found.core + start))
+        match = _searched(x[:, start:stop]) if len(x) else None
+        if match is not None:
+            return _resolved(x, Repetition(match.lag, match.start + start, match.stop + start, match.core + start))
     return None
 
 
 def _parts(N: int) -> Iterator[tuple[int, int]]:
-    """The whole, then its middle, beginning and end by halves of halves, down to where no means are taken."""
+    """Yield the whole, then middle, beginning and end of half its length, a quarter and so on, down to `POINTS`."""
     yield 0, N
     size = N // 2
     while size >= POINTS:
@@ -63,22 +63,22 @@ def _parts(N: int) -> Iterator[tuple[int, int]]:
         size //= 2
 
 
-def _resolved(x: Array, found: Repetition) -> Repetition:
-    """The same stretch with the shortest lag that holds throughout its two best periods."""
-    lag, size = found.lag, round(FEW * found.lag)
-    middle, best = round(found.core + found.lag), x[:, found.core : found.core + 2 * round(found.lag) + 1]
+def _resolved(x: Array, match: Repetition) -> Repetition:
+    """Replace the lag of a stretch by the shortest one that holds throughout its two best periods."""
+    lag, size = match.lag, round(PERIODS_SEARCHED * match.lag)
+    middle, best = round(match.core + match.lag), x[:, match.core : match.core + 2 * round(match.lag) + 1]
     while True:
-        start = max(min(middle - size // 2, found.stop - size), found.start)
-        closer = _searched(x[:, start : min(start + size, found.stop)])
+        start = max(min(middle - size // 2, match.stop - size), match.start)
+        closer = _searched(x[:, start : min(start + size, match.stop)])
         if closer is not None and closer.lag < 0.75 * lag:
             lag = _shortest([round(closer.lag), round(lag)], best)
         if size <= POINTS:
-            return found._replace(lag=lag)
-        size = min(size // 4, round(FEW * lag))
+            return match._replace(lag=lag)
+        size = min(size // 4, round(PERIODS_SEARCHED * lag))
 
 
 def _searched(x: Array) -> Repetition | None:
-    """The longest stretch that repeats, on means of neighbouring samples; `x` (J, N)."""
+    """Find the longest stretch of signals `x` (J, N) that repeats, on means of neighbouring samples."""
     factor = -(-x.shape[1] // POINTS)
     n = x.shape[1] // factor
     points = x[:, : n * factor].reshape(len(x), n, factor).mean(axis=2)
@@ -87,12 +87,13 @@ def _searched(x: Array) -> Repetition | None:
     best = min(lows.values(), default=np.inf)
     if best > DIP:
         return None
-    good = [lag for lag, value in lows.items() if value <= AS_GOOD * best + ROUNDED]
-    runs = {lag: _longest(lags[lag], min(max(AS_CLEAN * lows[lag], 4 * _least(lags[lag]), CLEAN), DIP)) for lag in good}
+    good = [lag for lag, value in lows.items() if value <= MAX_RATIO_PERIOD * best + ROUNDED]
+    bounds = {lag: max(MAX_RATIO_STRETCH * lows[lag], 4 * _least(lags[lag]), MIN_BOUND_STRETCH) for lag in good}
+    runs = {lag: _longest(lags[lag], min(bound, DIP)) for lag, bound in bounds.items()}
     longest = max(stop - start for start, stop in runs.values())
-    if longest < ENOUGH * n:
+    if longest < MIN_STRETCH_SHARE * n:
         return None
-    lag, (start, stop) = next((lag, run) for lag, run in runs.items() if run[1] - run[0] >= AS_LONG * longest)
+    lag, (start, stop) = next((lag, run) for lag, run in runs.items() if run[1] - run[0] >= MIN_LENGTH_RATIO * longest)
     core = start + int(lags[lag].difference[start : stop - 2 * lag + 1].argmin())
     exact = _shortest([low for low in lows if low <= lag], points[:, core : core + 2 * lag])
     end = x.shape[1] if stop == n else stop * factor
@@ -100,39 +101,39 @@ def _searched(x: Array) -> Repetition | None:
 
 
 def _shortest(lags: list[int], x: Array) -> float:
-    """The shortest of the lags after which two periods (J, n) of the last of them repeat about as well as after it."""
-    steps = [max(1, lag // FINE) for lag in lags]
+    """The shortest lag after which `x` (J, n), two periods of the last lag, repeats about as well as after that one."""
+    steps = [max(1, lag // LAG_PARTS) for lag in lags]
     least = [_vertex(*(_apart(x, lag + d) for d in (-step, 0, step))) for lag, step in zip(lags, steps, strict=True)]
     for lag, step, (shift, value) in zip(lags, steps, least, strict=True):
-        if value <= AS_GOOD * least[-1][1] + ROUNDED:
+        if value <= MAX_RATIO_PERIOD * least[-1][1] + ROUNDED:
             return lag + step * shift
     raise AssertionError("the last lag is as good as itself")
 
 
 def _apart(x: Array, lag: int) -> float:
-    """How much the signals (J, n) differ after a lag throughout, as a share of twice their variance."""
+    """Mean squared difference of the signals (J, n) after a lag, as a share of twice their variance."""
     return float(((x[:, lag:] - x[:, :-lag]) ** 2).mean() / (2 * x.var(axis=1).mean()))
 
 
-def _vertex(left: float, middle: float, right: float) -> tuple[float, float]:
-    """The lowest point of the parabola through three neighbours: how far from the middle one, and how low.
+def _vertex(before: float, middle: float, after: float) -> tuple[float, float]:
+    """Lowest point of the parabola through three neighbours: its place relative to the middle one, and its value.
 
-    No further than the neighbours: beyond them it is noise that says where.
+    It lies no further than the neighbours: beyond them noise would determine it.
     """
-    curvature = left - 2 * middle + right
+    curvature = before - 2 * middle + after
     if not 0 < curvature < np.inf:
         return 0.0, middle
-    shift = float(np.clip(0.5 * (left - right) / curvature, -1.0, 1.0))
-    return shift, max(middle + 0.5 * shift * (right - left + curvature * shift), 0.0)
+    shift = float(np.clip(0.5 * (before - after) / curvature, -1.0, 1.0))
+    return shift, max(middle + 0.5 * shift * (after - before + curvature * shift), 0.0)
 
 
 def _lags(x: Array) -> Iterator[Lag]:
-    """How much the signals (J, n) differ after each lag, the shortest lag first."""
+    """Yield the differences of the signals (J, n) after each lag, the shortest lag first."""
     n = x.shape[1]
-    moves = MOVES * float(x.var(axis=1).sum())
+    moves = MIN_SPAN_VARIANCE * float(x.var(axis=1).sum())
     first, second = (np.concatenate([np.zeros((len(x), 1)), np.cumsum(p, axis=1)], axis=1) for p in (x, x * x))
     squares = second.sum(axis=0)
-    for lag in range(SHORTEST, n // 2 + 1):
+    for lag in range(MIN_PERIOD_POINTS, n // 2 + 1):
         span = 2 * lag
         apart = ((x[:, lag:] - x[:, :-lag]) ** 2).sum(axis=0)
         sums = np.concatenate([[0.0], np.cumsum(apart)])
@@ -143,7 +144,7 @@ def _lags(x: Array) -> Iterator[Lag]:
 
 
 def _longest(lag: Lag, most: float) -> tuple[int, int]:
-    """The longest run of spans that differ by no more: from the first point of it to the end of the last span."""
+    """The longest run of spans that differ by at most `most`: from its first point to the end of its last span."""
     edges = np.flatnonzero(np.diff(np.concatenate([[0], (lag.difference <= most).view(np.int8), [0]])))
     if not len(edges):
         return 0, 0
@@ -161,7 +162,7 @@ def _is_low(lags: dict[int, Lag], lag: int) -> bool:
 
 
 def _lowest(lags: dict[int, Lag], lag: int) -> float:
-    """How little the halves of any span differ at the lowest point around a lag, which is between two points."""
+    """Least difference of the halves of any span around a lag, interpolated between points."""
     if lag - 1 not in lags or lag + 1 not in lags:
         return _least(lags[lag])
     return _vertex(*(_least(lags[near]) for near in (lag - 1, lag, lag + 1)))[1]

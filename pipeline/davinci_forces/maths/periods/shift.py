@@ -1,4 +1,4 @@
-"""Bringing two recordings of one path together, whenever each of them began."""
+"""Align two recordings of one path in time."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -7,71 +7,71 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array
 
-LEAST = 0.8  # of the shorter of two recordings that do not repeat, which has to lie within the other
+MIN_OVERLAP = 0.8  # share of the shorter recording, of two that do not repeat, that must lie within the other
 SAME_PATH = 0.95  # likeness above which two recordings follow the same path
 
 
 class Shift(NamedTuple):
-    """How much later than one recording another is where it is, and how far apart they then are."""
+    """Delay of one recording against another, and the difference that remains."""
 
     samples: float
     apart: Array  # (J,) root mean square of the difference over the standard deviation
 
 
-def circular(q: Array, other: Array) -> Shift:
-    """The shift of a repeated period (K, J) against another of as many samples, which puts them closest together."""
+def circular(q: Array, reference: Array) -> Shift:
+    """Shift of a repeated period (K, J) against another of as many samples that brings them closest together."""
     spread = np.maximum(q.std(axis=0), 1e-300)
-    spectra = np.conj(np.fft.rfft(q / spread, axis=0)) * np.fft.rfft(other / spread, axis=0)
+    spectra = np.conj(np.fft.rfft(q / spread, axis=0)) * np.fft.rfft(reference / spread, axis=0)
     products = np.fft.irfft(spectra.sum(axis=1), len(q))
     best = int(products.argmax())
     samples = best + _vertex(*(float(products[(best + d) % len(q)]) for d in (-1, 0, 1)))
-    return Shift(samples, _apart(q, rolled(other, samples), spread))
+    return Shift(samples, _apart(q, roll(reference, samples), spread))
 
 
-def rolled(x: Array, samples: float) -> Array:
-    """A repeated period (K, ...) so many samples later, between samples on the straight line."""
+def roll(x: Array, samples: float) -> Array:
+    """Shift a repeated period (K, ...) by so many samples, with linear interpolation."""
     whole = int(np.floor(samples))
     share = samples - whole
     return np.asarray((1.0 - share) * np.roll(x, -whole, axis=0) + share * np.roll(x, -whole - 1, axis=0))
 
 
-def straight(q: Array, other: Array) -> Shift:
-    """The shift in whole samples of a recording (N, J) against another (N', J) that puts them closest together.
+def straight(q: Array, reference: Array) -> Shift:
+    """Shift in whole samples of a recording (N, J) against another (N', J) that brings them closest together.
 
-    They overlap by `LEAST` of the shorter one.
+    They overlap by `MIN_OVERLAP` of the shorter one.
     """
     spread = np.maximum(q.std(axis=0), 1e-300)
-    a, b = q / spread, other / spread
+    a, b = q / spread, reference / spread
     N, M = len(a), len(b)
     size = 1 << (N + M - 1).bit_length()
     products = np.fft.irfft((np.conj(np.fft.rfft(a, size, axis=0)) * np.fft.rfft(b, size, axis=0)).sum(axis=1), size)
     lags = np.arange(-N + 1, M)
     start, stop = np.maximum(0, -lags), np.minimum(N, M - lags)  # of the rows of a that have a partner
     squares_a, squares_b = (np.concatenate([[0.0], np.cumsum((x**2).sum(axis=1))]) for x in (a, b))
-    own = squares_a[stop] - squares_a[start]
-    its = squares_b[stop + lags] - squares_b[start + lags]
+    power_a = squares_a[stop] - squares_a[start]
+    power_b = squares_b[stop + lags] - squares_b[start + lags]
     shared = stop - start
-    difference = (own + its - 2.0 * products[lags % size]) / shared
-    lag = int(lags[np.where(shared >= LEAST * min(N, M), difference, np.inf).argmin()])
+    difference = (power_a + power_b - 2.0 * products[lags % size]) / shared
+    lag = int(lags[np.where(shared >= MIN_OVERLAP * min(N, M), difference, np.inf).argmin()])
     first, last = max(0, -lag), min(N, M - lag)
-    return Shift(float(lag), _apart(q[first:last], other[first + lag : last + lag], spread))
+    return Shift(float(lag), _apart(q[first:last], reference[first + lag : last + lag], spread))
 
 
-def _apart(q: Array, other: Array, spread: Array) -> Array:
-    return np.asarray(np.sqrt(np.mean((q - other) ** 2, axis=0)) / spread)
+def _apart(q: Array, reference: Array, spread: Array) -> Array:
+    return np.asarray(np.sqrt(np.mean((q - reference) ** 2, axis=0)) / spread)
 
 
-def _vertex(left: float, middle: float, right: float) -> float:
-    """Where the parabola through three neighbours turns, from the middle one."""
-    curvature = 2.0 * middle - left - right
-    return float(np.clip(0.5 * (right - left) / curvature, -0.5, 0.5)) if curvature > 0 else 0.0
+def _vertex(before: float, middle: float, after: float) -> float:
+    """Place of the vertex of the parabola through three neighbours, relative to the middle one."""
+    curvature = 2.0 * middle - before - after
+    return float(np.clip(0.5 * (after - before) / curvature, -0.5, 0.5)) if curvature > 0 else 0.0
 
 
 def likeness(t: Array, q: Array, period: Array, length: float) -> float:
-    """The largest correlation between a position (N,) and a repeated period (K,) of `length` [s], whatever their phase.
+    """Largest correlation between a position (N,) and a repeated period (K,) of `length` [s] over all phases.
 
-    1 for the same path, which may start anywhere in the period; `t` (N,) [s].  Of a recording of a period or more,
-    whole periods are compared.
+    It is 1 for the same path, which may start anywhere in the period; `t` (N,) [s].  A recording of a period or more is
+    compared by its whole periods.
     """
     K, whole = len(period), int((t[-1] - t[0]) / length + 1e-9)
     if whole:
@@ -85,16 +85,16 @@ def likeness(t: Array, q: Array, period: Array, length: float) -> float:
 
 
 def most_different(periods: Sequence[tuple[Array, Array, float]], most: int) -> tuple[list[int], float]:
-    """Which periods (t (K,) [s], q (K,), length [s]) stand for all, and the least likeness of any to these.
+    """Choose at most `most` periods (t (K,) [s], q (K,), length [s]) to represent all; and the least likeness to them.
 
-    The first does, and then, as long as they are not `most`, the one that is least like any of them.
+    The first is chosen, and then each time the one that is least like all chosen ones.
     """
     chosen, nearest = [0], np.full(len(periods), -1.0)
     while True:
         _, q, length = periods[chosen[-1]]
-        nearest = np.maximum(nearest, [likeness(t, other, q, length) for t, other, _ in periods])
+        nearest = np.maximum(nearest, [likeness(t, q_i, q, length) for t, q_i, _ in periods])
         nearest[chosen] = 1.0
         if len(chosen) == min(most, len(periods)):
             return sorted(chosen), float(nearest.min())
-        rest = np.setdiff1d(np.arange(len(periods)), chosen)
-        chosen.append(int(rest[np.argmin(nearest[rest])]))
+        candidates = np.setdiff1d(np.arange(len(periods)), chosen)
+        chosen.append(int(candidates[np.argmin(nearest[candidates])]))

@@ -1,4 +1,4 @@
-"""What the times of a log say about its recorder, gathered block by block."""
+"""Statistics of a log's clock, computed block by block, and interpolation between its samples."""
 
 import math
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ GAP = 2.5  # sampling times between two samples that count as an interruption
 
 @dataclass
 class ClockStatistics:
-    """Running facts about a clock and the rows that go with it.  Times in seconds; rows are counted from 0."""
+    """Running statistics of a clock and of the rows of its log.  Times in seconds; rows are counted from 0."""
 
     samples: int = 0
     first: float = math.nan
@@ -29,7 +29,7 @@ class ClockStatistics:
     _last_row: list[float] = field(default_factory=list)
 
     def update(self, t: Array, channels: Sequence[Array] = ()) -> None:
-        """Take in the next block: times (N,) and, to find repeated rows, the samples (N,) of every channel."""
+        """Add the next block: times (N,) and, to find repeated rows, the samples (N,) of every channel."""
         if not len(t):
             return
         if self.samples == 0:
@@ -71,16 +71,17 @@ class ClockStatistics:
 
     @property
     def jitter(self) -> float:
-        """Standard deviation of the time between samples [s]; 0 where it is the rounding of the times themselves."""
+        """Standard deviation of the time between samples [s]; 0 where rounding of the times explains it."""
         std = math.sqrt(self._squares / (self.samples - 2)) if self.samples > 2 else 0.0
         return std if std > 1e-9 * abs(self._mean) else 0.0
 
 
 def cubic(t: Array, x: Array, gap: float, at: Array) -> tuple[Array, Booleans, Booleans]:
-    """Signals `x` (N, C) sampled at times `t` (N,) at the times `at` (K,); where that is exact, and where in between.
+    """Interpolate signals `x` (N, C), sampled at times `t` (N,), at the times `at` (K,); and where that is valid.
 
-    Between two samples no further apart than `gap` [s] goes the cubic that has their values and the slopes of the
-    parabolas through their neighbours.  What is returned elsewhere means nothing.  (Catmull and Rom 1974)
+    Returns the values, whether a time is that of a sample, and whether it lies between two samples no further apart
+    than `gap` [s].  Between them runs the cubic with their values and the slopes of the parabolas through their
+    neighbours.  Elsewhere values have no meaning.  (Catmull and Rom 1974)
     """
     before: Integers = np.searchsorted(t, at, side="right") - 1
     if not len(t):
@@ -103,9 +104,9 @@ def cubic(t: Array, x: Array, gap: float, at: Array) -> tuple[Array, Booleans, B
 
 
 def _slopes(x: Array, h: Array, gap: float) -> Array:
-    """Slopes (N, C) of the parabolas through each sample and its neighbours; of the chord, where a gap hides one.
+    """Slopes (N, C) of the parabolas through each sample and its neighbours; of the chord beside a gap.
 
-    A parabola's slope is that of its two chords, each weighted by the other's step.
+    A parabola's slope is the mean of its two chords' slopes, each weighted by the other's step.
     """
     chords = np.diff(x, axis=0) / h[:, None]
     near = h <= gap
@@ -118,9 +119,9 @@ def _slopes(x: Array, h: Array, gap: float) -> Array:
 
 
 def means(t: Array, x: Array, many: int, gap: float) -> tuple[Array, Array, int]:
-    """Every `many` consecutive times (N,) and samples (N, C) averaged into one, none across a gap.
+    """Average every `many` consecutive times (N,) and samples (N, C) into one, none across a gap.
 
-    Also says how many at the end were too few, and wait for what follows.
+    Also returns how many samples at the end were too few for a mean.
     """
     cuts = np.flatnonzero(np.diff(t) > gap) + 1
     begins, ends = np.array([0, *cuts]), np.array([*cuts, len(t)])

@@ -1,4 +1,4 @@
-"""Telling columns without names by what they hold: a time, positions, velocities, and what comes after them."""
+"""Recognise columns without names by their values: a time, positions, velocities, currents and torques."""
 
 import math
 from collections.abc import Sequence
@@ -9,57 +9,57 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array
 
-SMOOTHED = 9  # samples over which a difference is averaged before it is set against a velocity
-FOLLOWS = 0.9  # correlation from which a column is the velocity of another
-MOVES = 0.02  # of the widest column's range, from which a joint moves
-STILL = 0.005  # [rad or m] range of an arm that stands still
+SMOOTHED = 9  # samples over which differences are averaged before the comparison with a velocity
+MIN_COSINE = 0.9  # between proportional columns
+MIN_RANGE_SHARE = 0.02  # of the widest column's range, from which on a joint moves
+MIN_RANGE_MOVING = 0.005  # [rad or m] below which an arm stands still
 ROUND = (1.0, 1.25, 2.0, 2.5, 4.0, 5.0, 8.0, 10.0)  # times a power of ten: rates that recorders are set to
-NEAR = 0.01  # relative, by how much a rate that velocities tell may miss a round one
-SEVERAL = 2.0  # times a current, from which what is proportional to it is a torque
+ROUND_RATE_TOLERANCE = 0.01  # relative, of a rate from velocities to a round one
+MIN_RATIO_TORQUE = 2.0  # to a current, from which on a proportional column is a torque
 NOISY = 300  # parts of a recording, over one of which a velocity is averaged
 SHORT = 100  # parts of a recording, over one of which a velocity may be held
-LEVEL = 0.1  # relative change within which it is
-RESTS = 0.02  # of the highest speed, below which a joint rests
-STEADY = 0.28  # share of the moving samples from which it is held: ramps and returns lie between levels
+MAX_CHANGE_LEVEL = 0.1  # relative change of a velocity that is held
+MIN_SPEED_SHARE = 0.02  # of the highest speed, below which a joint rests
+MIN_STEADY_SHARE = 0.28  # of the moving samples with a held velocity: ramps and returns lie between levels
 
 
 class Blocks(NamedTuple):
-    """Columns in blocks of n: positions first, then their velocities."""
+    """Columns in blocks of n joints: positions first, then their velocities."""
 
     n: int
-    rate: float  # samples a second by which the velocities are those of the positions; 1 where times were given
+    rate: float  # samples a second for which the velocities fit the positions; 1 where times were given
     moving: tuple[int, ...]  # joints, counted from 0
     correlation: float  # the least of a joint that moves
 
 
 def rising(columns: Sequence[Array]) -> int | None:
     """The first column (N,) that increases from every sample to the next, as a time does."""
-    found = (i for i, column in enumerate(columns) if len(column) > 2 and bool(np.all(np.diff(column) > 0)))
-    return next(found, None)
+    indices = (i for i, column in enumerate(columns) if len(column) > 2 and bool(np.all(np.diff(column) > 0)))
+    return next(indices, None)
 
 
 def moving(positions: Sequence[Array]) -> tuple[int, ...]:
-    """Which positions (N,) move: by a share of what the widest does, and beyond the noise of an arm at rest."""
+    """The positions (N,) that move: by a share of the widest range, and beyond the noise of an arm at rest."""
     ranges = [float(np.ptp(q)) for q in positions]
-    return tuple(i for i, width in enumerate(ranges) if width >= max(MOVES * max(ranges), STILL))
+    return tuple(i for i, width in enumerate(ranges) if width >= max(MIN_RANGE_SHARE * max(ranges), MIN_RANGE_MOVING))
 
 
 def blocks(columns: Sequence[Array], t: Array | None = None) -> Blocks | None:
-    """How many joints there are, by the velocities being the derivatives of the positions; None where none are.
+    """Find the number of joints n for which the second n columns are the derivatives of the first n, or None.
 
     `columns` (N,) each, of n positions, n velocities and more; `t` (N,) [s] where there is a time.
     """
     for n in range(len(columns) // 3, 0, -1):
         moves = moving(columns[:n])
         pairs = [derivative(columns[i], columns[n + i], t) for i in moves]
-        if pairs and min(correlation for correlation, _ in pairs) >= FOLLOWS:
+        if pairs and min(correlation for correlation, _ in pairs) >= MIN_COSINE:
             best = max(pairs)
             return Blocks(n, best[1], moves, min(correlation for correlation, _ in pairs))
     return None
 
 
 def derivative(q: Array, dq: Array, t: Array | None = None) -> tuple[float, float]:
-    """The correlation of a velocity (N,) with the differences of a position (N,), and samples a second by their slope.
+    """Correlation of a velocity (N,) with the differences of a position (N,), and samples a second by their slope.
 
     Both are averaged over a few samples; the slope is the geometric mean of the two regressions, as both have errors.
     """
@@ -67,7 +67,7 @@ def derivative(q: Array, dq: Array, t: Array | None = None) -> tuple[float, floa
     mean = np.ones(SMOOTHED) / SMOOTHED
     if len(steps) < 2 * SMOOTHED:
         return 0.0, 0.0
-    x, y = (np.convolve(each, mean, "valid") for each in (steps, 0.5 * (dq[1:] + dq[:-1])))
+    x, y = (np.convolve(column, mean, "valid") for column in (steps, 0.5 * (dq[1:] + dq[:-1])))
     x, y = x - x.mean(), y - y.mean()
     if not (x @ x > 0 and y @ y > 0):
         return 0.0, 0.0
@@ -75,61 +75,62 @@ def derivative(q: Array, dq: Array, t: Array | None = None) -> tuple[float, floa
 
 
 def round_rate(rate: float) -> float:
-    """The round rate that a rate is near, else the rate itself to four digits."""
+    """Round a rate to the nearest usual rate if that is near, else to four digits."""
     power = 10.0 ** np.floor(np.log10(rate))
-    nearest = min((factor * power for factor in ROUND), key=lambda each: abs(each - rate))
-    return float(nearest if abs(nearest - rate) <= NEAR * rate else f"{rate:.4g}")
+    nearest = min((factor * power for factor in ROUND), key=lambda candidate: abs(candidate - rate))
+    return float(nearest if abs(nearest - rate) <= ROUND_RATE_TOLERANCE * rate else f"{rate:.4g}")
 
 
 def is_current(measured: Sequence[Array], others: Sequence[Sequence[Array]], moves: Sequence[int]) -> bool:
-    """Whether a block of columns is of currents, as torques of some other block are proportional to it, or to its like.
+    """Whether a block of columns holds currents: another block, of torques, is proportional to it or to a similar one.
 
-    `measured` (N,) each; `others`, blocks of as many columns; `moves`, the columns by which blocks are alike.
+    `measured` (N,) each; `others`, blocks of as many columns; `moves`, the columns by which blocks are compared.
     """
-    alike = [measured, *(other for other in others if all(_alike(measured[i], other[i]) for i in moves))]
-    return any(_is_larger(one, other) for one in alike for other in others)
+    alike = [measured, *(block for block in others if all(_alike(measured[i], block[i]) for i in moves))]
+    return any(_is_larger(currents, block) for currents in alike for block in others)
 
 
-def _is_larger(one: Sequence[Array], other: Sequence[Array]) -> bool:
-    """Whether columns of a block are several times those of another that they are proportional to."""
-    pairs = [_proportion(x, y) for x, y in zip(one, other, strict=True)]
-    return sum(cosine > FOLLOWS and factor > SEVERAL for cosine, factor in pairs) >= min(2, len(pairs))
+def _is_larger(currents: Sequence[Array], block: Sequence[Array]) -> bool:
+    """Whether the columns of a block are proportional to these currents and several times as large."""
+    pairs = [_proportion(x, y) for x, y in zip(currents, block, strict=True)]
+    larger = [cosine > MIN_COSINE and factor > MIN_RATIO_TORQUE for cosine, factor in pairs]
+    return sum(larger) >= min(2, len(pairs))
 
 
 def _alike(x: Array, y: Array) -> bool:
     cosine, factor = _proportion(x, y)
-    return cosine > FOLLOWS and 1 / SEVERAL < factor < SEVERAL
+    return cosine > MIN_COSINE and 1 / MIN_RATIO_TORQUE < factor < MIN_RATIO_TORQUE
 
 
 def _proportion(x: Array, y: Array) -> tuple[float, float]:
-    """The cosine between two columns (N,), and how many times the second is as large; 0 where one holds nothing."""
+    """Cosine between two columns (N,), and the ratio of the second's size to the first's; 0 if one is zero."""
     sizes = float(np.linalg.norm(x)), float(np.linalg.norm(y))
     return (float(x @ y) / (sizes[0] * sizes[1]), sizes[1] / sizes[0]) if all(sizes) else (0.0, 0.0)
 
 
 def is_steady(velocity: Array) -> bool:
-    """Whether a velocity (N,) is held at level after level, as in runs that tell of friction.
+    """Whether a velocity (N,) is held at one level after another, as in recordings for friction.
 
     Neighbouring samples are averaged, so that noise does not hide a level.
     """
-    return steadiness(velocity) >= STEADY
+    return steadiness(velocity) >= MIN_STEADY_SHARE
 
 
 def steadiness(velocity: Array) -> float:
-    """The share of the moving samples of a velocity (N,) from which it hardly changes within a short while."""
+    """Share of the moving samples of a velocity (N,) after which it hardly changes for a short time."""
     N = len(velocity)
     width, lag = max(N // NOISY, 1), max(N // SHORT, 1)
     v = np.convolve(velocity, np.ones(width) / width, "valid")
     if len(v) <= 2 * lag or not v.any():
         return 0.0
     size = np.abs(v[lag:])
-    moves = size > RESTS * size.max()
-    return float((np.abs(v[lag:] - v[:-lag]) < LEVEL * size)[moves].mean()) if moves.any() else 0.0
+    moves = size > MIN_SPEED_SHARE * size.max()
+    return float((np.abs(v[lag:] - v[:-lag]) < MAX_CHANGE_LEVEL * size)[moves].mean()) if moves.any() else 0.0
 
 
 @dataclass
 class Outline:
-    """Extremes, mean, and the means of at most `2 * width` bins of equal length, of what is finite."""
+    """Extremes, mean, and the means of at most `2 * width` bins of equal length, of the finite samples."""
 
     width: int = 32
     samples: int = 0
@@ -141,7 +142,7 @@ class Outline:
     _counts: Array = field(default_factory=lambda: np.zeros(0))  # of the finite samples in them
 
     def update(self, values: Array) -> None:
-        """Take in the next block (N,)."""
+        """Add the next block (N,)."""
         good = np.isfinite(values)
         if good.any():
             self.least = min(self.least, float(values[good].min()))
@@ -157,7 +158,7 @@ class Outline:
         self.samples = end
 
     def _halve(self) -> None:
-        """Bins of twice the length."""
+        """Double the length of the bins."""
         pairs = (self._sums, self._counts)
         self._sums, self._counts = (np.add.reduceat(p, np.arange(0, len(p), 2)) if len(p) else p for p in pairs)
         self.bin_size *= 2

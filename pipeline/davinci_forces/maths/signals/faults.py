@@ -1,7 +1,7 @@
-"""What a recording shows of sensors that failed: positions that stood still, and effort at its stop.
+"""Sensor faults in a recording: stuck positions and saturated efforts.
 
-A sensor that is stuck repeats one value exactly, and leaves it by a jump no motion makes.  An effort that is saturated
-stays exactly at its largest value, of either sign.
+A stuck sensor repeats one value exactly, and then jumps by more than any motion does.  A saturated effort stays exactly
+at its largest value, of either sign.
 """
 
 from typing import NamedTuple
@@ -11,14 +11,14 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals.windows import runs
 
-STUCK = 0.25  # [s] of one value, before a jump that is called one
-JUMP = 5.0  # times the largest usual step between samples
-USUAL = 0.999  # of all steps
-SATURATED = 5  # samples in a row at the largest value
+MIN_TIME_STUCK = 0.25  # [s] of one value before a jump
+MIN_JUMP_RATIO = 5.0  # times the largest usual step between samples
+USUAL_STEP_QUANTILE = 0.999  # of all steps: the largest that motion makes
+MIN_SAMPLES_SATURATED = 5  # samples in a row at the largest value
 
 
 class Stuck(NamedTuple):
-    """When a value did not change [s], and by how much it jumped then."""
+    """The time in which a value did not change [s], and the jump that ended it."""
 
     start: float
     end: float
@@ -26,28 +26,29 @@ class Stuck(NamedTuple):
 
 
 def stuck(t: Array, x: Array) -> list[Stuck]:
-    """Where a signal (N,) at times (N,) [s] repeats a value and then jumps, which no rest of a joint ends in."""
+    """Find where a signal (N,) at times (N,) [s] repeats a value and then jumps, unlike a joint that was at rest."""
     step = np.abs(np.diff(x))
-    still = [(a, b) for a, b in repeated(step == 0.0) if t[b] - t[a] >= STUCK and b < len(step)]
+    still = [(a, b) for a, b in repeated_runs(step == 0.0) if t[b] - t[a] >= MIN_TIME_STUCK and b < len(step)]
     moving = step[step > 0.0] if still else step[:0]
     if not len(moving):
         return []
-    usual = float(np.quantile(moving, USUAL)) if len(moving) > 1 else np.inf
-    # The jumps themselves must not set what is usual.
-    usual = min(usual, float(np.median(moving)) * JUMP)
-    return [Stuck(float(t[a]), float(t[b]), float(x[b + 1] - x[b])) for a, b in still if step[b] > JUMP * usual]
+    usual = float(np.quantile(moving, USUAL_STEP_QUANTILE)) if len(moving) > 1 else np.inf
+    # The jumps themselves must not raise the usual step.
+    usual = min(usual, float(np.median(moving)) * MIN_JUMP_RATIO)
+    jumping = [(a, b) for a, b in still if step[b] > MIN_JUMP_RATIO * usual]
+    return [Stuck(float(t[a]), float(t[b]), float(x[b + 1] - x[b])) for a, b in jumping]
 
 
 def saturated(x: Array) -> int:
-    """How many samples of a signal (N,) lie in rows of several exactly at its largest or its least value."""
+    """Count the samples of a signal (N,) in runs of several exactly at its largest or its least value."""
     return sum(
         b - a + 1
         for level in (x.max(), x.min())
-        for a, b in repeated((x[:-1] == level) & (x[1:] == level))
-        if b - a + 1 >= SATURATED and level != 0.0
+        for a, b in repeated_runs((x[:-1] == level) & (x[1:] == level))
+        if b - a + 1 >= MIN_SAMPLES_SATURATED and level != 0.0
     )
 
 
-def repeated(same: Booleans) -> list[tuple[int, int]]:
-    """The first and last sample of each run in which each sample is the `same` (N-1,) as the next."""
+def repeated_runs(same: Booleans) -> list[tuple[int, int]]:
+    """First and last sample of each run in which each sample is the `same` (N-1,) as the next."""
     return [(run.start, run.stop) for run in runs(same)]

@@ -8,15 +8,15 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array, Integers
 
-ORDER = 4  # of the Butterworth filter, run forwards and backwards
+FILTER_ORDER = 4  # of the Butterworth filter, run forwards and backwards
 NORMAL_MAD = 0.6744897501960817  # median of |x| of a standard normal variable
 
 
 def lowpass(x: Array, rate: float, cutoff: float) -> Array:
     """Low-pass a signal (N,), or columns (N, ...), without delay.
 
-    `cutoff` [Hz] is where the two passes together have halved the power twice.  One at or above 0.4 of the sampling
-    rate leaves the signal as it is.
+    At `cutoff` [Hz] each of the two passes halves the power.  A cutoff at or above 0.4 of the sampling rate leaves the
+    signal as it is.
     """
     if cutoff >= 0.4 * rate or len(x) < 2:
         return x
@@ -28,7 +28,7 @@ def lowpass(x: Array, rate: float, cutoff: float) -> Array:
 
 @cache
 def reach(rate: float, cutoff: float) -> int:
-    """Samples after which what `lowpass` has seen is less than rounding."""
+    """Number of samples after which the response of `lowpass` has decayed to rounding."""
     if cutoff >= 0.4 * rate:
         return 0
     from scipy.signal import sos2zpk
@@ -39,7 +39,7 @@ def reach(rate: float, cutoff: float) -> int:
 
 @cache
 def share_passed(rate: float, cutoff: float) -> float:
-    """The share of the power of white noise that `lowpass` lets through."""
+    """Share of the power of white noise that `lowpass` passes."""
     if cutoff >= 0.4 * rate:
         return 1.0
     from scipy.signal import sosfreqz
@@ -52,17 +52,17 @@ def share_passed(rate: float, cutoff: float) -> float:
 def _sections(rate: float, cutoff: float) -> Array:
     from scipy.signal import butter
 
-    return np.asarray(butter(ORDER, cutoff, fs=rate, output="sos"))
+    return np.asarray(butter(FILTER_ORDER, cutoff, fs=rate, output="sos"))
 
 
 def measured_motion(
     q: Array, dq: Array | None, segment: Integers, rate: float, cutoff: float, lag: float = 0.0
 ) -> tuple[Array, Array, Array]:
-    """Position, velocity and acceleration (N,) each of a motion that need not repeat, every segment by itself.
+    """Low-pass position, velocity and acceleration (N,) of a motion that need not repeat, each segment by itself.
 
-    They are low-passed, from a logged velocity where there is one; differences are central, at the ends one-sided.
-    `lag` [s] is how much later the effort is measured: each sample has the motion so long before it, those at the start
-    of a segment its first.
+    The velocity is the logged one where there is one; differences are central, at the ends one-sided.  The effort is
+    measured `lag` [s] later than the motion, so each sample gets the motion of that time before it.  At the start of a
+    segment that is the segment's first.
     """
     parts = [_motion(q[part], None if dq is None else dq[part], rate, cutoff, lag) for part in segments(segment)]
     position, velocity, acceleration = (np.concatenate(columns) for columns in zip(*parts, strict=True))
@@ -79,7 +79,7 @@ def _motion(q: Array, dq: Array | None, rate: float, cutoff: float, lag: float) 
 
 
 def _before(x: Array, samples: float) -> Array:
-    """A low-passed signal (N,) so many samples before, by a cubic spline; at either end as it begins or ends."""
+    """Delay a low-passed signal (N,) by so many samples, with a cubic spline; its ends are held."""
     if samples == 0.0:
         return x
     from scipy.interpolate import make_interp_spline
@@ -89,7 +89,7 @@ def _before(x: Array, samples: float) -> Array:
 
 
 def segments(segment: Integers) -> Iterator[slice]:
-    """The runs of samples of one number (N,), in order: such as the segments of a signal, without a gap."""
+    """Yield the runs of equal numbers (N,) in order, such as the segments of a signal between gaps."""
     if len(segment) == 0:
         return
     edges = [0, *(np.flatnonzero(np.diff(segment)) + 1).tolist(), len(segment)]
@@ -98,19 +98,19 @@ def segments(segment: Integers) -> Iterator[slice]:
 
 
 def noise_std(residual: Array, segment: Integers, rate: float, cutoff: float) -> float:
-    """Standard deviation of the white noise in a residual (N,), from what a low-pass at `cutoff` [Hz] takes out of it.
+    """Standard deviation of the white noise in a residual (N,), from what a low-pass at `cutoff` [Hz] removes.
 
-    The model's error is slower than that but for jumps where the motion turns, so the median is taken, which a few
-    jumps do not move.  0 where the sampling rate leaves the low-pass nothing to take out.
+    The model's error is slower than that but for jumps at reversals, which hardly move the median.  0 where the
+    low-pass removes nothing at this sampling rate.
     """
     return white_std(residual - smoothed(residual, segment, rate, cutoff), share_passed(rate, cutoff))
 
 
 def white_std(removed: Array, passed: float) -> float:
-    """Standard deviation of white noise, from what a low-pass that lets a share of its power through took out (N,)."""
+    """Standard deviation of white noise, from the part (N,) removed by a low-pass that passes a share of its power."""
     return float(np.median(np.abs(removed)) / NORMAL_MAD / np.sqrt(1.0 - passed)) if passed < 1.0 else 0.0
 
 
 def smoothed(x: Array, segment: Integers, rate: float, cutoff: float) -> Array:
-    """The low-pass of each segment of a signal (N,), or of columns (N, ...)."""
+    """Low-pass each segment of a signal (N,), or of columns (N, ...)."""
     return np.concatenate([lowpass(x[part], rate, cutoff) for part in segments(segment)])

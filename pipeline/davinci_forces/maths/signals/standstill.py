@@ -1,15 +1,15 @@
-"""Where a joint stands still: friction takes any value up to its Coulomb level there, and no model has its effort."""
+"""Samples at which a joint stands still: friction takes any value up to its Coulomb level, which no model predicts."""
 
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.signals.smoothing import segments
 
-HOLD = 1.0  # [s] in which a joint that stands still goes nowhere: longer than a motion takes to turn
-STILL = 0.01  # of how far it goes in that time on average
-STILL_AT_MOST = 0.05  # where noise makes it seem to move; the slowest turns of an excitation cover twice that
-NOISE = 6.0  # standard deviations that noise makes a position range over
-# [s] around a reversal that are left out: by then a filter that shows pushes has forgotten it.
+HOLD = 1.0  # [s] of a standstill at least: longer than a motion takes to reverse
+STILL = 0.01  # of the mean travel in that time, below which a joint stands still
+STILL_AT_MOST = 0.05  # the same with noise; the slowest reversals of an excitation travel twice that
+NOISE = 6.0  # standard deviations of noise that the range of a resting position spans
+# [s] around a reversal that are left out: after that its effect on a filter has decayed.
 BEFORE, AFTER = 0.05, 0.25
 SLOW = 0.05  # of the root mean square of the velocity, below which friction may stick
 
@@ -17,8 +17,8 @@ SLOW = 0.05  # of the root mean square of the velocity, below which friction may
 def standing(q: Array, dq: Array, segment: Integers, rate: float, q_std: float = 0.0, spread: int = 0) -> Booleans:
     """Whether a joint stands still at each sample (N,) of its motion, sampled at `rate` [Hz].
 
-    It does throughout every window of `HOLD` in which its position, with noise of `q_std`, ranges over next to nothing,
-    and for `spread` samples before and after, which is as far as a low-pass carries its effort.
+    It stands still throughout every window of `HOLD` in which its position, with noise of `q_std`, hardly changes.  The
+    `spread` samples before and after count too: a low-pass carries its effort that far.
     """
     usual = float(np.sqrt(np.mean(dq**2))) * HOLD if len(dq) else 0.0
     least = min(max(STILL * usual, NOISE * q_std), STILL_AT_MOST * usual)
@@ -28,7 +28,7 @@ def standing(q: Array, dq: Array, segment: Integers, rate: float, q_std: float =
 
 
 def _standing(q: Array, window: int, spread: int, least: float) -> Booleans:
-    """The same of one segment (N,): windows that range over less than `least`, widened by `spread` samples."""
+    """Standstill of one segment (N,): windows whose range is below `least`, widened by `spread` samples."""
     from scipy.ndimage import maximum_filter1d, minimum_filter1d
 
     N = len(q)
@@ -43,7 +43,7 @@ def _standing(q: Array, window: int, spread: int, least: float) -> Booleans:
 
 
 def moving(dq: Array, T_s: float) -> Booleans:
-    """Whether each sample of a velocity (N,), low-passed without delay, is far from any reversal and no standstill."""
+    """Whether each sample of a velocity (N,), low-passed without delay, is far from reversals and standstills."""
     size = float(np.sqrt(np.mean(dq**2)))
     standing = np.abs(dq) <= SLOW * size
     standing[1:] |= np.sign(dq[1:]) != np.sign(dq[:-1])

@@ -1,4 +1,4 @@
-"""A signal over velocity, in both directions, and while it gains speed and while it loses speed."""
+"""A signal over velocity, in both directions, separately for samples that gain and that lose speed."""
 
 from typing import NamedTuple
 
@@ -7,7 +7,7 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, Booleans
 
 RANGES = 20  # of equal width, in each direction
-FEWEST = 5  # samples in a range that is shown
+MIN_SAMPLES_RANGE = 5  # in a range of the map
 
 
 class VelocityMap(NamedTuple):
@@ -20,17 +20,17 @@ class VelocityMap(NamedTuple):
 
 
 def over_velocity(dq: Array, ddq: Array, signals: Array) -> VelocityMap:
-    """Means of signals (N, c) over ranges of the velocity dq (N,), by whether dq ddq is positive."""
+    """Average signals (N, c) over ranges of the velocity dq (N,), separately by the sign of dq ddq."""
     edges = float(np.abs(dq).max() or 1.0) * np.linspace(-1.0, 1.0, 2 * RANGES + 1)
     place = np.clip(np.digitize(dq, edges) - 1, 0, 2 * RANGES - 1)
     gaining = dq * ddq > 0
-    made = []
+    rows = []
     for number in range(2 * RANGES):
         for gains in (True, False):
-            own = (place == number) & (gaining == gains)
-            if np.count_nonzero(own) >= FEWEST:
-                made.append((dq[own].mean(), gains, signals[own].mean(axis=0), signals[own].std(axis=0)))
-    if not made:
+            inside = (place == number) & (gaining == gains)
+            if np.count_nonzero(inside) >= MIN_SAMPLES_RANGE:
+                rows.append((dq[inside].mean(), gains, signals[inside].mean(axis=0), signals[inside].std(axis=0)))
+    if not rows:
         return VelocityMap(np.empty(0), np.empty(0, np.bool_), *(np.empty((0, signals.shape[1])) for _ in range(2)))
-    columns = (np.array(column) for column in zip(*made, strict=True))
+    columns = (np.array(column) for column in zip(*rows, strict=True))
     return VelocityMap(*columns)

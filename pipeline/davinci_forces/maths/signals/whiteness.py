@@ -1,10 +1,11 @@
-"""Whether a signal is white noise: its autocorrelation and its cumulative periodogram, over one or more pieces of it.
+"""Tests for white noise: the autocorrelation and the cumulative periodogram of a signal in one or more pieces.
 
     r_k = sum x_t x_(t+k) / sum x_t^2,    Q = n (n + 2) sum_k r_k^2 / n_k ~ chi^2                  Ljung and Box (1978)
+
     C_j = sum_(i <= j) I_i / sum_i I_i,   D = sup |C - j / q| ~ Kolmogorov and Smirnov, q - 1 steps      Bartlett (1955)
 
-n_k pairs of samples are k apart within a piece; the ordinates I of all pieces are taken in the order of their
-frequencies, because of white noise each of them is exponentially distributed with the same mean.
+n_k pairs of samples are k apart within a piece.  The ordinates I of all pieces are sorted by frequency: for white noise
+each is exponentially distributed with the same mean.
 """
 
 from collections.abc import Sequence
@@ -14,8 +15,8 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array
 
-NORMAL_95, NORMAL_99 = 1.96, 2.576  # deviations that as much of the normal distribution is within
-FEWEST = 20  # samples, below which nothing can be said
+NORMAL_95, NORMAL_99 = 1.96, 2.576  # standard deviations within which 95 and 99 % of a normal distribution lie
+FEWEST = 20  # samples that the tests need
 
 
 class LjungBox(NamedTuple):
@@ -26,7 +27,7 @@ class LjungBox(NamedTuple):
 
 
 class Cumulative(NamedTuple):
-    """A cumulative periodogram, with how far it strays from a straight line."""
+    """A cumulative periodogram, and its largest distance from a straight line."""
 
     frequency: Array  # (q,) cycles a sample
     share: Array  # (q,) of the power up to each frequency
@@ -35,13 +36,13 @@ class Cumulative(NamedTuple):
 
 
 def centred(pieces: Sequence[Array]) -> list[Array]:
-    """The pieces less their common mean."""
+    """Subtract the common mean from the pieces."""
     mean = sum(float(x.sum()) for x in pieces) / sum(len(x) for x in pieces)
     return [x - mean for x in pieces]
 
 
 def autocorrelation(pieces: Sequence[Array], lags: int) -> Array:
-    """r (lags + 1,) of centred pieces; a pair of samples counts where both are in one piece."""
+    """Autocorrelation r (lags + 1,) of centred pieces, over pairs of samples within one piece."""
     from statsmodels.tsa.stattools import acovf
 
     apart = np.full(lags, np.nan)  # so that no lag reaches from one piece into another
@@ -65,7 +66,7 @@ def ljung_box(pieces: Sequence[Array], r: Array, lags: int) -> LjungBox:
 
 
 def cumulative_periodogram(pieces: Sequence[Array]) -> Cumulative:
-    """Of centred pieces, by the ordinates between frequency 0 and half a cycle a sample, both left out."""
+    """Cumulative periodogram of centred pieces, between the frequencies 0 and 1/2 cycle a sample, both left out."""
     from scipy.fft import rfft
     from scipy.stats import kstwo
 
@@ -89,16 +90,16 @@ def _ordinates(X: Array, length: int) -> tuple[Array, Array]:
 
 
 def distance_of(probability: float, ordinates: int) -> float:
-    """Half the width of the band that a cumulative periodogram of white noise leaves with that probability."""
+    """Half width of the band that a cumulative periodogram of white noise leaves with this probability."""
     from scipy.stats import kstwo
 
     return float(kstwo.isf(probability, max(ordinates - 1, 1)))
 
 
 def tests(pieces: Sequence[Array], lags: int) -> tuple[LjungBox, float]:
-    """Ljung and Box's, and the probability of a cumulative periodogram that strays farther.
+    """Ljung and Box's test, and the probability of a larger distance of the cumulative periodogram.
 
-    Both probabilities are 0 where nothing can be said.
+    Both probabilities are 0 for too few or constant samples.
     """
     n = sum(len(x) for x in pieces)
     if n < FEWEST or max(map(len, pieces)) < 5 or all(np.ptp(x) == 0 for x in pieces):
@@ -123,7 +124,7 @@ def shape(x: Array) -> tuple[float, float, float]:
 
 
 def mean_square_band(N: int) -> tuple[float, float]:
-    """Where the mean square of N samples of white noise of variance 1 is in 95 of 100 cases: chi^2(N) / N."""
+    """95 % interval of the mean square of N samples of white noise of variance 1: chi^2(N) / N."""
     from scipy.special import chdtri
 
     return float(chdtri(N, 0.975) / N), float(chdtri(N, 0.025) / N)

@@ -1,4 +1,4 @@
-"""Which samples of a recording are evaluated."""
+"""Choose the samples of a recording that are evaluated."""
 
 from collections.abc import Sequence
 
@@ -24,16 +24,17 @@ def settled(t: Array) -> Booleans:
 
 
 def free_space(t: Array, windows: Sequence[tuple[float, float]], rate: float) -> Booleans:
-    """Whether nothing touches the robot at each time (N,), and no filter is still settling: at the start, after each
-    gap, and after each window; `rate` [Hz].
+    """Whether nothing touches the robot at each time (N,) and the filter's transient is over; `rate` [Hz].
+
+    There is a transient at the start, after each gap and after each window.
     """
-    after = [(start, end + SETTLE) for start, end in windows]
-    calm = np.concatenate([settled(t[part]) for part in unbroken(t, 1.5 / rate)])
-    return np.asarray(outside(t, after) & calm)
+    widened = [(start, end + SETTLE) for start, end in windows]
+    steady = np.concatenate([settled(t[part]) for part in unbroken(t, 1.5 / rate)])
+    return np.asarray(outside(t, widened) & steady)
 
 
 def runs(which: Booleans) -> list[slice]:
-    """The runs of samples (N,) that count."""
+    """The runs of true samples (N,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], which, [False]]))).reshape(-1, 2)
     return [slice(start, stop) for start, stop in edges.tolist()]
 
@@ -44,5 +45,5 @@ def longest_run(t: Array, rate: float) -> slice:
 
 
 def unbroken(t: Array, gap: float) -> list[slice]:
-    """The runs of samples whose times (N,) are no more than `gap` [s] apart."""
+    """Split the times (N,) into runs that are no more than `gap` [s] apart."""
     return list(segments(np.cumsum(np.diff(t, prepend=t[:1]) > gap)))

@@ -15,7 +15,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import compiled
 from davinci_forces.maths.constants import GRAVITY
 from davinci_forces.maths.mechanics.bodies import Bodies
-from davinci_forces.maths.mechanics.chain import Chain, Tree, folded, tree_of
+from davinci_forces.maths.mechanics.chain import Chain, Tree, fold_fixed_links, tree_of
 from davinci_forces.maths.mechanics.kernels import mass_and_bias, place_and_jacobian
 from davinci_forces.maths.simulation.actuators import Cascade, Loops, Motors, Regulator
 from davinci_forces.maths.simulation.control import drive, follow, pi, read
@@ -113,10 +113,10 @@ def _regulator(
         dynamics(data, angle / motors.gear_ratio, still, M, G)
         for j in range(n):
             error = reference[k, j] - angle[j] / motors.gear_ratio[j]
-            known = law.gravity * G[j] - law.derivative[j] * (angle[j] - before[j]) / (turn * motors.gear_ratio[j])
+            damping = law.derivative[j] * (angle[j] - before[j]) / (turn * motors.gear_ratio[j])
             limit = motors.gear_ratio[j] * motors.torque_constant[j] * motors.current_limit[j]
             output, integral[j] = pi(error, law.proportional[j], law.integral[j], integral[j], turn, limit)
-            tau[j], before[j] = min(max(output + known, -limit), limit), angle[j]
+            tau[j], before[j] = min(max(output + (law.gravity * G[j] - damping), -limit), limit), angle[j]
         for tick in range(timing.ticks):
             _tick(dynamics, tip, data, body, around, state, tau, timing.tick, k, tick, timing.ticks, out)
 
@@ -190,7 +190,7 @@ class PlantData(NamedTuple):
 def arm(chain: Chain, bodies: Bodies, rotors: Array) -> Plant:
     """The arm with as many joints as there are `rotors` (n,), eta^2 J_m; later coordinates stay at rest at 0."""
     n = len(rotors)
-    chain, parameters = folded(chain.reduced(n), bodies.parameters(n).reshape(-1, 10))
+    chain, parameters = fold_fixed_links(chain.with_coordinates(n), bodies.parameters(n).reshape(-1, 10))
     frame = chain.names.index(chain.tip)
     x, y, z = chain.offset[frame, :3, 3].tolist()
     data = PlantData(

@@ -1,4 +1,4 @@
-"""The studies of chapter 5: controllers without a clock, friction that is viscous only, an implicit adaptive solver.
+"""The studies of chapter 5: continuous controllers, viscous friction only, an implicit adaptive solver.
 
 The wrist's inertias are so small for its gains that an explicit solver would need steps of microseconds.
 """
@@ -29,20 +29,19 @@ class Regulated(NamedTuple):
 
 
 def regulate(
-    plant: Plant, known: Plant, law: Regulator, viscous: Array, q: Array, target: Array, duration: float
+    plant: Plant, model: Plant, law: Regulator, viscous: Array, q: Array, target: Array, duration: float
 ) -> Regulated:
     """Drive the arm from rest at q (n,) to `target` (n,) under PD or PID with gravity compensation.
 
-    Both are an `arm`'s, `known` as the compensator knows it; `viscous` (n,) is the friction.  The samples are the
-    solver's own steps, so that V is compared where it was computed and not where it was interpolated.  (5.8),
-    (5.9), (5.17)
+    `plant` and `model` are plants of an `arm`, `model` that of the compensator; `viscous` (n,) is the friction.  The
+    samples are the solver's own steps, so that V is computed there and not interpolated.  (5.8), (5.9), (5.17)
     """
     n = len(q)
     M, tau, b = np.empty((n, n)), np.empty(n), np.empty(n)
 
     def slope(_: float, state: Array) -> Array:
         rate = np.empty(3 * n)
-        _slope(plant.data, known.data, law, target, viscous, np.ascontiguousarray(state), M, tau, b, rate)
+        _slope(plant.data, model.data, law, target, viscous, np.ascontiguousarray(state), M, tau, b, rate)
         return rate
 
     start = np.concatenate([q, np.zeros(2 * n)])
@@ -52,18 +51,18 @@ def regulate(
     q_t, dq_t = solution.y[:n].T, solution.y[n : 2 * n].T
     V, efforts = np.empty(len(q_t)), np.empty(q_t.shape)
     for k, state in enumerate(solution.y.T):
-        _forces(plant.data, known.data, law, target, np.ascontiguousarray(state), M, tau, b)
+        _forces(plant.data, model.data, law, target, np.ascontiguousarray(state), M, tau, b)
         V[k] = lyapunov(M, dq_t[k], law.proportional, target - q_t[k])
         efforts[k] = tau
     return Regulated(solution.t, q_t, dq_t, efforts, V)
 
 
 @cached
-def _forces(body: Any, known: Any, law: Any, target: Any, state: Any, M: Any, tau: Any, b: Any) -> None:
+def _forces(body: Any, model: Any, law: Any, target: Any, state: Any, M: Any, tau: Any, b: Any) -> None:
     """Fill inertia, the controller's effort and bias at a state, (3 n,): position, velocity, integral of the error."""
     n = len(target)
     q, dq = state[:n], state[n : 2 * n]
-    arms.dynamics(known, q, known.rest, M, b)  # b is the known arm's gravity
+    arms.dynamics(model, q, model.rest, M, b)  # b is the known arm's gravity
     error = target - q
     tau[:] = law.proportional * error - law.derivative * dq + law.gravity * b + law.integral * state[2 * n :]  # (5.17)
     arms.dynamics(body, q, dq, M, b)
@@ -71,11 +70,11 @@ def _forces(body: Any, known: Any, law: Any, target: Any, state: Any, M: Any, ta
 
 @cached
 def _slope(
-    body: Any, known: Any, law: Any, target: Any, viscous: Any, state: Any, M: Any, tau: Any, b: Any, rate: Any
+    body: Any, model: Any, law: Any, target: Any, viscous: Any, state: Any, M: Any, tau: Any, b: Any, rate: Any
 ) -> None:
     """Fill the derivative of a state.  (4.28)"""
     n = len(target)
-    _forces(body, known, law, target, state, M, tau, b)
+    _forces(body, model, law, target, state, M, tau, b)
     dq = state[n : 2 * n]
     rate[:n] = dq
     rate[n : 2 * n] = np.linalg.solve(M, tau - b - viscous * dq)

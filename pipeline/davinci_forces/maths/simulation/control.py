@@ -14,7 +14,7 @@ from davinci_forces.maths.simulation.actuators import Motors
 
 @compiled
 def pi(error: float, p: float, i: float, integral: float, h: float, limit: float) -> tuple[float, float]:
-    """One step of a PI loop: its output, at most the limit, and its integral, which stops growing at the limit."""
+    """Advance a PI loop by a step: its output, clipped at the limit, and its integral, which stops growing there."""
     output = p * error + integral + i * h * error
     if output > limit:
         return limit, min(integral, max(limit - p * error, 0.0))
@@ -27,13 +27,13 @@ def pi(error: float, p: float, i: float, integral: float, h: float, limit: float
 def current_after(motors: Motors, j: int, current: float, voltage: float, speed: float, h: float) -> float:
     """The current after h [s] of a constant voltage at a constant motor speed [rad/s]: (A.5), solved exactly."""
     decay = np.exp(-h * motors.resistance[j] / motors.inductance[j])
-    settled = (voltage - motors.torque_constant[j] * speed) / motors.resistance[j]
-    return float(settled + (current - settled) * decay)
+    final = (voltage - motors.torque_constant[j] * speed) / motors.resistance[j]
+    return float(final + (current - final) * decay)
 
 
 @compiled
 def follow(motors: Any, law: Any, loops: Any, reference: Any, angle: Any, turn: float) -> None:
-    """The position loop: what velocity the drivers are asked for, once every turn [s] of the controller."""
+    """Advance the position loop: the velocity reference of the drivers, once every turn [s] of the controller."""
     for j in range(len(angle)):
         error, loops.last[j] = motors.gear_ratio[j] * reference[j] - angle[j], loops.wanted[j]
         loops.wanted[j], loops.position_i[j] = pi(
@@ -43,20 +43,20 @@ def follow(motors: Any, law: Any, loops: Any, reference: Any, angle: Any, turn: 
 
 @compiled
 def drive(motors: Any, law: Any, loops: Any, angle: Any, dq: Any, part: float, h: float, tau: Any) -> None:
-    """The velocity and current loops for one tick of h [s]: fill the efforts at the joints tau (n,).
+    """Advance the velocity and current loops by one tick of h [s], and fill the efforts at the joints tau (n,).
 
-    The drivers ramp to a new velocity over one turn of the controller, of which `part` is over: steps would kick the
-    current just when the recorder looks, and look like inertia.
+    The drivers ramp to a new velocity over one turn of the controller, of which `part` is over.  Steps would disturb
+    the current at the moment of recording, like inertia.
     """
     for j in range(len(angle)):
         gain = h / (law.velocity_filter[j] + h)
         loops.speed[j] += gain * ((angle[j] - loops.angle[j]) / h - loops.speed[j])
         loops.angle[j] = angle[j]
         error = loops.last[j] + (loops.wanted[j] - loops.last[j]) * part - loops.speed[j]
-        asked, loops.velocity_i[j] = pi(
+        wanted_current, loops.velocity_i[j] = pi(
             error, law.velocity_p[j], law.velocity_i[j], loops.velocity_i[j], h, motors.current_limit[j]
         )
-        error = asked - loops.current[j]
+        error = wanted_current - loops.current[j]
         voltage, loops.current_i[j] = pi(
             error, law.current_p[j], law.current_i[j], loops.current_i[j], h, motors.voltage_limit[j]
         )
@@ -75,5 +75,5 @@ def read(motors: Any, q: Any, angle: Any) -> None:
 
 
 def lyapunov(M: Array, dq: Array, proportional: Array, error: Array) -> float:
-    """V = dq^T M dq / 2 + e^T K_p e / 2, which PD with gravity compensation never lets rise.  (5.9)"""
+    """V = dq^T M dq / 2 + e^T K_p e / 2, which never rises under PD with gravity compensation.  (5.9)"""
     return float(dq @ M @ dq / 2 + error @ (proportional * error) / 2)

@@ -1,19 +1,22 @@
-"""One step of a robot with friction and hard stops: implicit in what is stiff, exact about what sticks.
+"""One step of a robot with friction and hard stops: implicit in stiff terms, with exact sticking.
 
     M(q) ddq + b(q, dq) + v dq + friction + tau_ext = tau                                          (4.40), (A.16)
 
-The step is the midpoint rule, implicit in friction, with the bias at where the middle of the step is foreseen to be:
-Moreau and Jean's scheme for systems with dry friction, of second order where nothing sticks; bristles, taken at the
-end of the step so that they may be stiff, are of first order (`bristle`).  The velocity at its end minimises
-dq^T A dq / 2 - r^T dq + h sum_i g_i |dq_i|, which is strictly convex, so a joint that friction holds comes out with a
-velocity of exactly zero.  Jean, Computer Methods in Applied Mechanics and Engineering 177 (1999) 235-257.
+The step is the midpoint rule, implicit in friction, with the bias at the predicted middle of the step.  This is Moreau
+and Jean's scheme for systems with dry friction, of second order where nothing sticks.  Bristles are evaluated at the
+end of the step so that they may be stiff, and are of first order (`bristle`).  The velocity at its end minimises
+
+    dq^T A dq / 2 - r^T dq + h sum_i g_i |dq_i|
+
+which is strictly convex, so a joint that friction holds has a velocity of exactly zero.  Jean, Computer Methods in
+Applied Mechanics and Engineering 177 (1999) 235-257.
 
 Friction is viscous, Coulomb that differs by direction, Stribeck's rise near rest, and presliding:
 
     f = g(dq) sign(dq) + v dq,        g(dq) = c + (s - c) exp(-(dq / w)^2)
 
-with c the Coulomb and s the static level of the direction moved in, and w the Stribeck velocity.  Where a joint has
-bristles it does not stick: it gives way elastically before it slides (LuGre), which is what makes friction lag.
+with c the Coulomb and s the static level of the direction of motion, and w the Stribeck velocity.  A joint with
+bristles does not stick: it deflects elastically before it slides (LuGre), which makes friction lag.
 Section 6.7; Canudas de Wit, Olsson, Astrom and Lischinsky, IEEE Trans. Automatic Control 40 (1995) 419-425.
 """
 
@@ -24,8 +27,8 @@ import numpy as np
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import compiled
 
-SWEEPS = 100
-ENOUGH = 1e-13  # relative change of a sweep
+MAX_SWEEPS = 100
+SWEEP_TOLERANCE = 1e-13  # relative change of a sweep
 
 
 class Friction(NamedTuple):
@@ -43,7 +46,7 @@ class Friction(NamedTuple):
 
 @compiled
 def level(friction: Friction, i: int, v: float) -> float:
-    """What friction without its viscous part comes to when joint i slides at v, or would start to move that way."""
+    """Friction, without its viscous part, of joint i when it slides at v, or starts to move in that direction."""
     up = v >= 0.0
     c = friction.coulomb_up[i] if up else friction.coulomb_down[i]
     s = friction.static_up[i] if up else friction.static_down[i]
@@ -54,9 +57,10 @@ def level(friction: Friction, i: int, v: float) -> float:
 def bristle(friction: Friction, i: int, v: float, z: float, h: float) -> tuple[float, float, float]:
     """The bristles' effort at the end of a step of h [s], constant + slope dq, and the decay of their deflection.
 
-    dz/dt = dq - sigma_0 |dq| z / g, f = sigma_0 z + sigma_1 dz/dt, taken implicitly in dq and z at the end of the
-    step and with |dq| from its start, so that it is stable however stiff the bristles are.  The deflection at the end
-    is (z + h dq) / decay.
+        dz/dt = dq - sigma_0 |dq| z / g,    f = sigma_0 z + sigma_1 dz/dt
+
+    dq and z are implicit, at the end of the step, and |dq| is from its start, which is stable for any stiffness.  The
+    deflection at the end is (z + h dq) / decay.
     """
     stiffness, damping = friction.bristle_stiffness[i], friction.bristle_damping[i]
     decay = 1.0 + h * stiffness * abs(v) / level(friction, i, v)
@@ -81,7 +85,7 @@ def at_rest(q: Array) -> State:
 
 @compiled
 def middle(state: Any, h: float, q: Any, dq: Any) -> None:
-    """Fill position and velocity (n,) in the middle of the coming step, as far as they are known."""
+    """Fill the predicted position and velocity (n,) in the middle of the coming step."""
     for i in range(len(q)):
         q[i] = state.q[i] + h / 2 * state.dq[i]
         dq[i] = state.dq[i] + (state.dq[i] - state.before[i]) / 2
@@ -94,8 +98,8 @@ def step(
     """Advance the state by h [s] under constant efforts.
 
     `M` (n, n) and `b` (n,) are inertia and bias at the middle of the step, `tau` (n,) is the effort less the external
-    one.  Joints that are not `moving` (n,) stay at rest.  A joint that would pass `lower` or `upper` is put there and
-    loses its velocity, as Simulink's second-order integrator does (section 4.5).
+    one.  Joints that are not `moving` (n,) stay at rest.  A joint that would pass `lower` or `upper` is set to it at
+    zero velocity, as by Simulink's second-order integrator (section 4.5).
     """
     q, dq, z, before = state
     n = len(q)
@@ -128,7 +132,7 @@ def step(
 
 @compiled
 def _rub(friction: Any, dq: Any, z: Any, h: float, A: Any, r: Any, up: Any, down: Any, decay: Any) -> None:
-    """Add friction: what is smooth to A and r, and what sticks as the impulses up and down that it can hold."""
+    """Add smooth friction to A and r, and fill the impulses up and down that sticking friction can hold."""
     for i in range(len(dq)):
         A[i, i] += h / 2 * friction.viscous[i]
         r[i] -= h / 2 * friction.viscous[i] * dq[i]
@@ -148,7 +152,7 @@ def _velocity(A: Any, r: Any, up: Any, down: Any, free: Any, v: Any) -> None:
     for i in range(n):
         if not free[i]:
             v[i] = 0.0
-    for _ in range(SWEEPS):
+    for _ in range(MAX_SWEEPS):
         change, size = 0.0, 0.0
         for i in range(n):
             if free[i]:
@@ -158,5 +162,5 @@ def _velocity(A: Any, r: Any, up: Any, down: Any, free: Any, v: Any) -> None:
                 new = (max(s - up[i], 0.0) + min(s + down[i], 0.0)) / A[i, i]
                 change, size = max(change, abs(new - v[i])), max(size, abs(new))
                 v[i] = new
-        if change <= ENOUGH * size:
+        if change <= SWEEP_TOLERANCE * size:
             break

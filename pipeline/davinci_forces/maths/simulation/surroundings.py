@@ -1,4 +1,4 @@
-"""What touches a simulated robot: efforts at its joints, forces on its tip, a weight, tissue; and where it is to be.
+"""The surroundings of a simulated robot: efforts at its joints, forces on its tip, a mass, tissue; and its path.
 
 Efforts and forces are those that the robot exerts on its surroundings (7.8).
 """
@@ -16,11 +16,11 @@ UP = np.array([0.0, 0.0, 1.0])
 
 
 class Surroundings(NamedTuple):
-    """What the robot touches, T ticks long."""
+    """External efforts and forces, mass and tissue, for T ticks."""
 
     efforts: Array  # (T, n) at the joints
     forces: Array  # (T, 3) of the tip, base frame [N]
-    mass: float  # [kg] hung on the tip; 0 for none
+    mass: float  # [kg] at the tip; 0 for none
     stiffness: float  # [N/m] of the tissue; 0 for none
     damping: float  # [N s/m] of the tissue while it is pressed
     surface: Array  # a point (3,) of the tissue's surface [m]
@@ -34,7 +34,7 @@ def triangle(t: Array, start: float, end: float, peak: float) -> Array:
 
 
 def pulse(t: Array, start: float, end: float, peak: float) -> Array:
-    """An effort that is there from start to end, and nowhere else."""
+    """An effort that is constant from start to end, and zero elsewhere."""
     return peak * ((t >= start) & (t < end)).astype(np.float64)
 
 
@@ -43,9 +43,9 @@ SHAPES = {"triangle": triangle, "pulse": pulse}
 
 @compiled
 def on_tip(around: Any, tick: int, x: Any, velocity: Any, force: Any) -> None:
-    """Fill the force (3,) [N] of the tip at x (3,) [m] on what it touches: the one given for this tick, and tissue.
+    """Fill the force (3,) [N] of the tip at x (3,) [m] on its surroundings: that of this tick, and that of tissue.
 
-    Tissue is a spring with a damper that pushes and never pulls.  (8.1)
+    Tissue is a spring with a damper, which pushes and never pulls.  (8.1)
     """
     depth, sinking = 0.0, 0.0
     for k in range(3):
@@ -60,7 +60,7 @@ def on_tip(around: Any, tick: int, x: Any, velocity: Any, force: Any) -> None:
 
 @compiled
 def weigh(tip: Any, data: Any, q: Any, dq: Any, J: Any, drift: Any) -> None:
-    """Fill the Jacobian (3, n) of the tip, and dJ/dt dq + g up (3,) [m/s^2]: what a mass hung there feels, less J ddq.
+    """Fill the Jacobian (3, n) of the tip, and dJ/dt dq + g up (3,) [m/s^2]: the load of a mass there, less J ddq.
 
     The robot exerts m (a + g up) on the mass, with a = J ddq + dJ/dt dq.  Section 7.5
     """
@@ -75,7 +75,7 @@ def weigh(tip: Any, data: Any, q: Any, dq: Any, J: Any, drift: Any) -> None:
 
 @dataclass(frozen=True)
 class Path:
-    """Positions to be at at given times, at constant speed or easing in and out between them."""
+    """Positions at given times, with constant speed or cosine ramps between them."""
 
     points: tuple[tuple[float, float], ...]  # time [s], position
     ease: bool

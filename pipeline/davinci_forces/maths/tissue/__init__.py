@@ -1,1 +1,1 @@
-"""What pushes into tissue tell of it."""
+"""Stiffness, damping and contact of tissue from pushes into it."""

@@ -1,9 +1,8 @@
-"""What a log of pushes says of the tissue: each push with its contact, its lines and its loop.
+"""The pushes of a log into tissue: of each its contact, its straight lines and its hysteresis loop.
 
-A push is depths and forces along the way that it goes.  Where the log says no depth but where the tip is, a push goes
-along the force that it meets, or where that is one number only, from where it is least to where it is most.  Forces and
-depths are taken with the sign that makes depths grow into the tissue, both alike: the slope of one over the other stays
-what the log says.
+A push is depths and forces along its direction.  Where the log has the position of the tip instead of a depth, the
+direction is that of the force.  Where the force is one number only, it is from the least force to the largest.  Both
+signs are flipped together so that depths grow into the tissue: the slope of force over depth stays that of the log.
 """
 
 from collections.abc import Iterator, Sequence
@@ -15,23 +14,23 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.signals.smoothing import lowpass, segments
 from davinci_forces.maths.tissue import indentation
-from davinci_forces.maths.tissue.indentation import NONE, TOO_EARLY, WHOLE, Indentation, StraightLine
+from davinci_forces.maths.tissue.indentation import NONE, TOO_EARLY, Indentation, StraightLine
 
-RISES = 0.15  # of the range of what swings: a peak that stands out by less is none
-AT_REST = 0.1  # of a usual speed
-FEWEST = 4  # samples that say anything
-ONE_SIDED = 2.0  # by how much further a force has to go to one side of its median to be pushing there
-USUAL = 0.95  # quantile of the speeds of a push that stands for its usual one
-DEEPEST = 0.3  # [m] beyond which a slip of the unit is the likelier reason
-SOFTEST, STIFFEST = 1.0, 1e5  # [N/m]
-COUNTS = 0.9  # R2 of a straight line
-NAMED = 5
+MIN_PROMINENCE = 0.15  # of a peak, as a share of the signal's range
+MAX_REST_SPEED = 0.1  # of the usual speed, below which a joint is at rest
+MIN_SAMPLES_SIGN = 4  # that determine the sign of depth or force
+MIN_RATIO_SIDES = 2.0  # of a force's excursions to both sides of its median, from which on the larger side is pushing
+USUAL_SPEED_QUANTILE = 0.95  # of the speeds of a push
+MAX_DEPTH = 0.3  # [m] beyond which the unit is likely wrong
+MIN_STIFFNESS, MAX_STIFFNESS = 1.0, 1e5  # [N/m]
+MIN_R2 = 0.9  # of a straight line through a push
+MAX_NAMED = 5  # pushes that a remark names
 
 
-def between_troughs(x: Array, rises: float = RISES) -> list[slice]:
-    """Each swing of a signal (N,) up and down again, from the lowest sample before its peak to the lowest after it.
+def between_troughs(x: Array, rises: float = MIN_PROMINENCE) -> list[slice]:
+    """Split a signal (N,) into swings, each from the lowest sample before a peak to the lowest after it.
 
-    A peak is one that stands out by at least `rises` of the signal's range, but for the extreme 1 % of its samples; one
+    The prominence of a peak is at least `rises` of the signal's range, without the extreme 1 % of its samples.  A peak
     at an end of the signal counts.
     """
     from scipy.signal import find_peaks
@@ -46,7 +45,7 @@ def between_troughs(x: Array, rises: float = RISES) -> list[slice]:
 
 
 class Probing(NamedTuple):
-    """What a log of N samples says of pushes."""
+    """The samples (N,) of a log of pushes."""
 
     t: Array  # (N,) [s]; NaN without a clock
     push: Integers  # (N,) number of the push; one number throughout where they are not counted
@@ -58,70 +57,70 @@ class Probing(NamedTuple):
 
     @property
     def size(self) -> Array:
-        """How large the force is (N,): signed where it is one number."""
+        """Magnitude of the force (N,), signed where it is one number."""
         return self.force[:, 0] if self.force.shape[1] == 1 else np.asarray(np.linalg.norm(self.force, axis=1))
 
 
-def known(given: Probing) -> Probing:
-    """The samples at which both depth and force are known."""
-    whole = np.isfinite(given.depth).all(axis=1) & np.isfinite(given.force).all(axis=1)
-    return given if whole.all() else Probing._make(column[whole] for column in given)
+def known(probing: Probing) -> Probing:
+    """Keep the samples at which both depth and force are finite."""
+    whole = np.isfinite(probing.depth).all(axis=1) & np.isfinite(probing.force).all(axis=1)
+    return probing if whole.all() else Probing._make(column[whole] for column in probing)
 
 
 def moves(speed: Array, usual: float, reach: int) -> Booleans:
-    """Whether the force is known at each sample (N,): a joint at rest meets any effort that friction can hold.
+    """Whether the force is known at each sample (N,): at rest, friction hides any effort that it can hold.
 
-    It is at rest where it is slower than a tenth of its `usual` speed, and for the `reach` samples that a low-pass
-    spreads that to either side.
+    A joint is at rest below a tenth of its `usual` speed, and for `reach` samples before and after, by which a low-pass
+    spreads the rest.
     """
     from scipy.ndimage import maximum_filter1d
 
-    rest = np.abs(speed) < AT_REST * usual
-    return np.asarray(~maximum_filter1d(rest, 2 * reach + 1))
+    at_rest = np.abs(speed) < MAX_REST_SPEED * usual
+    return np.asarray(~maximum_filter1d(at_rest, 2 * reach + 1))
 
 
-def turned(given: Probing) -> Probing:
-    """The same with depths that grow into the tissue, where the log says them.
+def orient_into_tissue(probing: Probing) -> Probing:
+    """Choose the sign of depth and force so that the depths of the log grow into the tissue.
 
-    Where it says where the tip is, a single force is taken with the sign that its larger excursions have.
+    Of a log with positions of the tip, a single force gets the sign of its larger excursions.
     """
-    counts = ~(np.abs(given.speed) < AT_REST * np.median(np.abs(given.speed)))
-    if given.force.shape[1] > 1 or counts.sum() < FEWEST:
-        return given
-    depth, force = given.depth[counts], given.force[counts, 0]
+    counts = ~(np.abs(probing.speed) < MAX_REST_SPEED * np.median(np.abs(probing.speed)))
+    if probing.force.shape[1] > 1 or counts.sum() < MIN_SAMPLES_SIGN:
+        return probing
+    depth, force = probing.depth[counts], probing.force[counts, 0]
     if depth.shape[1] > 1:
         low, middle, high = np.quantile(force, [0.01, 0.5, 0.99])
-        return given._replace(force=-given.force) if middle - low > ONE_SIDED * (high - middle) else given
+        return probing._replace(force=-probing.force) if middle - low > MIN_RATIO_SIDES * (high - middle) else probing
     sign = indentation.into_tissue(depth[:, 0], force)
-    return given._replace(depth=sign * given.depth, force=sign * given.force)
+    return probing._replace(depth=sign * probing.depth, force=sign * probing.force)
 
 
-def parts(given: Probing, windows: Sequence[tuple[float, float]]) -> list[slice]:
-    """The pushes: those of the windows [s] where there are any, those that are counted, or those that are found."""
+def parts(probing: Probing, windows: Sequence[tuple[float, float]]) -> list[slice]:
+    """Split a log into pushes: by the windows [s] if there are any, by the push numbers, or by the swings of depth."""
     if windows:
-        bounds = [np.searchsorted(given.t, (start, np.nextafter(end, np.inf))) for start, end in sorted(windows)]
+        bounds = [np.searchsorted(probing.t, (start, np.nextafter(end, np.inf))) for start, end in sorted(windows)]
         return [slice(int(a), int(b)) for a, b in bounds if b > a]
-    if np.any(given.push != given.push[0]):
-        return list(segments(given.push))
-    return between_troughs(given.depth[:, 0] if given.depth.shape[1] == 1 else given.size)
+    if np.any(probing.push != probing.push[0]):
+        return list(segments(probing.push))
+    return between_troughs(probing.depth[:, 0] if probing.depth.shape[1] == 1 else probing.size)
 
 
-def ways(given: Probing, pushes: Sequence[slice]) -> list[tuple[Array, Array]]:
-    """Depth [m] and force [N] of each push along the way that it goes, (n,) each.
+def ways(probing: Probing, pushes: Sequence[slice]) -> list[tuple[Array, Array]]:
+    """Depth [m] and force [N] of each push along its direction, (n,) each.
 
-    Whether a sensor gives the force on the tissue or that on the tool, the pushes of a log tell together.
+    All pushes of a log together decide whether a sensor gives the force on the tissue or that on the tool.
     """
-    gone = [_along(given, part) for part in pushes]
-    if given.depth.shape[1] == 1 or given.force.shape[1] == 1:
-        return gone
-    rises = np.sum([np.sign(np.sum((d - d.mean()) * (f - f.mean()))) for d, f in gone])
-    return gone if rises >= 0 else [(-d, f) for d, f in gone]
+    tracks = [_along(probing, part) for part in pushes]
+    if probing.depth.shape[1] == 1 or probing.force.shape[1] == 1:
+        return tracks
+    rises = np.sum([np.sign(np.sum((d - d.mean()) * (f - f.mean()))) for d, f in tracks])
+    return tracks if rises >= 0 else [(-d, f) for d, f in tracks]
 
 
-def _along(given: Probing, part: slice) -> tuple[Array, Array]:
-    depth, force = given.depth[part], given.force[part]
+def _along(probing: Probing, part: slice) -> tuple[Array, Array]:
+    depth, force = probing.depth[part], probing.force[part]
     if force.shape[1] > 1:
-        size = given.size[part]
+        size = probing.size[part]
         way = _unit((size - size.min()) @ force)
         return (depth - depth[0]) @ -way if depth.shape[1] > 1 else depth[:, 0], force @ way
     if depth.shape[1] > 1:
@@ -152,16 +151,15 @@ class Pushed(NamedTuple):
 
     @property
     def below(self) -> Array:
-        """Depth below first contact (n,) [m], or below the least that is pressed where first contact is not known."""
+        """Depth below first contact (n,) [m], or below the least depth in contact where first contact is not known."""
         onset = self.contact.onset
         return self.depth - (onset if np.isfinite(onset) else self.depth[self.contact.inside].min())
 
     @property
     def lost(self) -> tuple[float, float]:
-        """Energy [J] that is kept between first contact and last, and its share of the work of loading; NaN of a push
-        that does not come back.
+        """Energy [J] dissipated between first and last contact, and its share of the work of loading.
 
-        The loop is closed where it ends, along the force there.
+        The loop is closed along the force at its end.  NaN for a push without unloading.
         """
         inside, loading = self.contact.inside, self.contact.loading
         if not np.isfinite(self.k_unloading):
@@ -172,67 +170,67 @@ class Pushed(NamedTuple):
 
 
 def palpated(
-    given: Probing, windows: Sequence[tuple[float, float]], everything: bool, rate: float, cutoff: float
+    probing: Probing, windows: Sequence[tuple[float, float]], everything: bool, rate: float, cutoff: float
 ) -> list[Pushed]:
-    """Every push of a log, with its contact found, or stated by windows [s], or by `everything` being contact.
+    """Evaluate every push of a log, with its contact detected, stated by windows [s], or all of it with `everything`.
 
-    `rate` [Hz] is that of the samples, 0 without a clock; rates of depth are low-passed at `cutoff` [Hz].
+    `rate` [Hz] is the sampling rate, 0 without a clock; rates of depth are low-passed at `cutoff` [Hz].
     """
-    given = given if everything or windows else turned(given)
-    pushes = parts(given, windows)
+    probing = probing if everything or windows else orient_into_tissue(probing)
+    pushes = parts(probing, windows)
     reach = int(np.ceil(rate / (2 * cutoff)))
-    numbers = _numbers(given, pushes)
+    numbers = _numbers(probing, pushes)
     return [
-        _pushed(given, part, number, way, bool(everything or windows), rate, cutoff, reach)
-        for part, number, way in zip(pushes, numbers, ways(given, pushes), strict=True)
+        _pushed(probing, part, number, way, bool(everything or windows), rate, cutoff, reach)
+        for part, number, way in zip(pushes, numbers, ways(probing, pushes), strict=True)
     ]
 
 
-def _numbers(given: Probing, pushes: Sequence[slice]) -> list[int]:
-    """The numbers that a log gives its pushes, or from 1 on where it gives none, or one to several."""
-    numbers = [int(given.push[part][0]) for part in pushes]
+def _numbers(probing: Probing, pushes: Sequence[slice]) -> list[int]:
+    """The numbers of the pushes in the log, or 1, 2, ... where it has none or repeats one."""
+    numbers = [int(probing.push[part][0]) for part in pushes]
     return numbers if len(set(numbers)) == len(numbers) > 1 else list(range(1, len(pushes) + 1))
 
 
 def _pushed(
-    given: Probing, part: slice, number: int, way: tuple[Array, Array], stated: bool, rate: float, cutoff: float,
+    probing: Probing, part: slice, number: int, way: tuple[Array, Array], stated: bool, rate: float, cutoff: float,
     reach: int,
 ) -> Pushed:  # fmt: skip
-    (depth, force), speed = way, given.speed[part]
-    counted = moves(speed, float(np.quantile(np.abs(speed), USUAL)), reach)
-    contact = indentation.all_of(depth, counted, WHOLE) if stated else indentation.found(depth, force, counted)
-    d_rate = (
-        np.gradient(lowpass(depth, rate, cutoff), given.t[part]) if rate and len(depth) > 1 else np.zeros(len(depth))
-    )
+    (depth, force), speed = way, probing.speed[part]
+    counted = moves(speed, float(np.quantile(np.abs(speed), USUAL_SPEED_QUANTILE)), reach)
+    contact = indentation.all_of(depth, counted) if stated else indentation.find_contact(depth, force, counted)
+    d_rate = np.zeros(len(depth))
+    if rate and len(depth) > 1:
+        d_rate = np.gradient(lowpass(depth, rate, cutoff), probing.t[part])
     inside, loading = contact.inside, contact.loading
-    line = indentation.straight(depth[inside], force[inside]) if contact.touched else None
-    common = float(np.sqrt(np.mean(given.std[part][inside] ** 2))) if line else 0.0
+    line = indentation.straight(depth[inside], force[inside]) if contact.has_contact else None
+    common = float(np.sqrt(np.mean(probing.std[part][inside] ** 2))) if line else 0.0
     error = indentation.slope_error(depth[inside], common) if line else 0.0
-    if line and line.k:  # a force that is wrong by this bends as much deeper, or less deep
+    if line and line.k:  # an error of the force moves the onset by that error over the stiffness
         contact = contact._replace(onset_std=float(np.hypot(contact.onset_std, common / abs(line.k))))
     loaded, unloaded = (indentation.slope(depth[i], force[i]) for i in (inside & loading, inside & ~loading))
-    place = given.place[part]
-    return Pushed(number, given.t[part], depth, force, d_rate, place, contact, line, loaded, unloaded, error)
+    place = probing.place[part]
+    return Pushed(number, probing.t[part], depth, force, d_rate, place, contact, line, loaded, unloaded, error)
 
 
 def remarks(pushes: Sequence[Pushed]) -> Iterator[str]:
-    """What a reviewer should know of the pushes of one log, each remark once."""
+    """Diagnostics of the pushes of one log, each once."""
     touched = [(push, push.line) for push in pushes if push.line is not None]
     yield from _contact(pushes, touched)
     if not touched:
         return
     yield from _units(touched)
-    falling = [(push, line.k) for push, line in touched if line.k < 0 and line.r2 > COUNTS]
+    falling = [(push, line.k) for push, line in touched if line.k < 0 and line.r2 > MIN_R2]
     if falling:
         which, worst = _which([push for push, _ in falling], pushes), min(k for _, k in falling)
         yield (
-            f"{which}: the force falls as the depth grows, by up to {-worst:.4g} N/m, as no "
-            "tissue has it; write sign = -1 for the channel of the depth or for that of the force"
+            f"{which}: the force falls as the depth grows, by up to {-worst:.4g} N/m, which no tissue does; "
+            "write sign = -1 for the channel of the depth or of the force"
         )
-    if not (best := max(line.r2 for _, line in touched)) > COUNTS:
+    if not (best := max(line.r2 for _, line in touched)) > MIN_R2:
         yield (
-            f"no push counts: a straight line explains at most {best:.0%} of the force of one, and {COUNTS:.0%} are "
-            "needed; push slower or deeper, or look for what else the force holds"
+            f"no push counts: a straight line explains at most {best:.0%} of its force, and {MIN_R2:.0%} are needed; "
+            "push slower or deeper, or check what else the force contains"
         )
 
 
@@ -241,39 +239,40 @@ def _contact(pushes: Sequence[Pushed], touched: Sequence[tuple[Pushed, StraightL
     if not touched:
         largest = max(float(np.ptp(push.force)) for push in pushes)
         yield (
-            f"no contact is found in {_count(len(pushes))}: the force changes by {largest:.3g} N at most, and not as "
-            'the depth does; check both channels, or state contact = [[start, end]] or contact = "all"'
+            f"no contact is found in {_count(len(pushes))}: the force changes by {largest:.3g} N at most and does not "
+            'follow the depth; check both channels, or state contact = [[start, end]] or contact = "all"'
         )
     elif free and not any(push.contact.onset == push.contact.onset for push, _ in touched):
         yield f"{_which(free, pushes)} of {_count(len(pushes))} without contact"
     early = [push for push, _ in touched if push.contact.state == TOO_EARLY]
     if early:
         yield (
-            f"{_which(early, pushes)}: contact from the first sample, so where it begins is not known and all of it is "
-            'taken as contact; begin before contact, or say contact = "all"'
+            f"{_which(early, pushes)}: contact from the first sample, so where it begins is not known and every sample "
+            'counts as contact; begin before contact, or state contact = "all"'
         )
 
 
 def _units(touched: Sequence[tuple[Pushed, StraightLine]]) -> Iterator[str]:
     deep = float(np.median([np.ptp(push.depth[push.contact.inside]) for push, _ in touched]))
     k = float(np.median([abs(line.k) for _, line in touched]))
-    if deep > DEEPEST or k < SOFTEST:
+    if deep > MAX_DEPTH or k < MIN_STIFFNESS:
         yield (
-            f"pushes are {deep:.3g} m deep and meet {k:.3g} N/m: no tissue does so, and the depth is likelier to be in "
-            'mm than in m; say unit = "mm" for its channel, or look at the unit of the force'
+            f"pushes are {deep:.3g} m deep and meet {k:.3g} N/m: no tissue does so, so the depth is probably in mm, "
+            'not in m; write unit = "mm" for its channel, or check the unit of the force'
         )
-    elif k > STIFFEST:
+    elif k > MAX_STIFFNESS:
         yield (
-            f"pushes are {1e3 * deep:.3g} mm deep and meet {k:.3g} N/m: no tissue does so, and the depth is likelier "
-            "to be in m than in mm; correct the unit of its channel, or look at that of the force"
+            f"pushes are {1e3 * deep:.3g} mm deep and meet {k:.3g} N/m: no tissue does so, so the depth is probably in "
+            "m, not in mm; correct the unit of its channel, or check that of the force"
         )
 
 
 def _which(some: Sequence[Pushed], pushes: Sequence[Pushed]) -> str:
     if len(some) == len(pushes) > 1:
         return f"all {_count(len(pushes))}"
-    named = ", ".join(str(push.number) for push in some[:NAMED])
-    return f"push{'es' if len(some) > 1 else ''} {named}{f' and {len(some) - NAMED} more' if len(some) > NAMED else ''}"
+    names = ", ".join(str(push.number) for push in some[:MAX_NAMED])
+    more = f" and {len(some) - MAX_NAMED} more" if len(some) > MAX_NAMED else ""
+    return f"push{'es' if len(some) > 1 else ''} {names}{more}"
 
 
 def _count(number: int) -> str:

@@ -1,13 +1,16 @@
-"""Models of tissue: what force it meets a depth and a velocity with, and which of them predicts pushes it has not seen.
+"""Models of tissue: its force by depth and velocity, and which model predicts pushes that it was not fitted to best.
 
     spring          f = c + k x                                          (8.1)
-    Kelvin-Voigt    f = c + k x + b v
-    Hunt-Crossley   f = c + k x^n + b x^n v      Hunt and Crossley, Coefficient of restitution interpreted as damping in
-                                                 vibroimpact, Journal of Applied Mechanics 42 (1975)
 
-x is the depth below first contact and v its rate.  Each push has a c of its own, the force that it begins with.  For a
-given exponent n all are linear, so a push is known by the small matrices that its samples give, and leaving one out is
-a difference of sums.
+    Kelvin-Voigt    f = c + k x + b v
+
+    Hunt-Crossley   f = c + k x^n + b x^n v
+
+x is the depth below first contact and v its rate.  Each push has its own offset c.  For a given exponent n all models
+are linear: a push contributes small matrices of products, and leaving it out is a difference of sums.
+
+Hunt and Crossley, Coefficient of restitution interpreted as damping in vibroimpact, Journal of Applied Mechanics 42
+(1975).
 """
 
 from collections.abc import Sequence
@@ -23,7 +26,7 @@ FOLDS = 20
 
 
 class ForceLaw(NamedTuple):
-    """The structure of a model: which of the columns x^n, v and x^n v it has, and whether the exponent is free."""
+    """Structure of a model: which of the columns x^n, v and x^n v it has, and whether the exponent is free."""
 
     name: str
     columns: tuple[int, ...]
@@ -31,12 +34,12 @@ class ForceLaw(NamedTuple):
 
     @property
     def parameters(self) -> int:
-        """How many parameters all pushes share."""
+        """Number of parameters that all pushes share."""
         return len(self.columns) + self.free
 
     @property
     def damped(self) -> bool:
-        """Whether the velocity counts."""
+        """Whether the force depends on velocity."""
         return len(self.columns) > 1
 
 
@@ -49,7 +52,7 @@ LAWS = (
 
 
 class Moments(NamedTuple):
-    """What P pushes say for E exponents: products of the columns and the force, less their means."""
+    """Products of the columns and the force of P pushes, less their means, for E exponents."""
 
     A: Array  # (P, E, 3, 3)
     b: Array  # (P, E, 3)
@@ -57,7 +60,7 @@ class Moments(NamedTuple):
 
 
 class FittedLaw(NamedTuple):
-    """How well a model predicts pushes that it has not seen, and what it is when fitted to all of them."""
+    """A model fitted to all pushes, and its errors on pushes that were left out of a fit."""
 
     law: ForceLaw
     errors: Array  # (folds,) squares of the errors on pushes left out
@@ -68,7 +71,7 @@ class FittedLaw(NamedTuple):
 
 
 def moments(pushes: Sequence[tuple[Array, Array, Array]]) -> Moments:
-    """The moments of pushes, each the depth below first contact [m], its rate [m/s] and the force [N], (N,)."""
+    """Compute the moments of pushes, each of depth below first contact [m], its rate [m/s] and force [N], (N,)."""
     A, b, squares = [], [], []
     for x, v, f in pushes:
         columns, away = _columns(x, v, EXPONENTS), f - f.mean()
@@ -79,28 +82,28 @@ def moments(pushes: Sequence[tuple[Array, Array, Array]]) -> Moments:
     return Moments(np.array(A), np.array(b), np.array(squares))
 
 
-def judged(given: Moments, law: ForceLaw) -> FittedLaw:
-    """A model by cross-validation over pushes: by leaving out one at a time, or a twentieth of them."""
-    parts = blocks(len(given.squares), FOLDS)
-    A, b, _ = (column.sum(axis=0) for column in given)
+def judged(data: Moments, law: ForceLaw) -> FittedLaw:
+    """Fit and cross-validate a model: leave out one push at a time, or a twentieth of them."""
+    parts = blocks(len(data.squares), FOLDS)
+    A, b, _ = (column.sum(axis=0) for column in data)
     errors, sizes = np.zeros(len(parts)), np.zeros(len(parts))
     for i, part in enumerate(parts):
-        A_out, b_out, sizes[i] = (column[part].sum(axis=0) for column in given)
-        theta, e = fitted(A - A_out, b - b_out, law)
+        A_out, b_out, sizes[i] = (column[part].sum(axis=0) for column in data)
+        theta, e = fit_parameters(A - A_out, b - b_out, law)
         errors[i] = sizes[i] - 2 * theta @ b_out[e] + theta @ A_out[e] @ theta
-    theta, e = fitted(A, b, law)
+    theta, e = fit_parameters(A, b, law)
     pairs = list(zip(errors.tolist(), sizes.tolist(), strict=True))
     return FittedLaw(law, errors, _relative(pairs), standard_error(_relative, pairs), theta, float(EXPONENTS[e]))
 
 
-def fitted(A: Array, b: Array, law: ForceLaw) -> tuple[Array, int]:
-    """The parameters (3,) of least squares of moments (E, 3, 3) and (E, 3), and which exponent leaves least."""
-    own = list(law.columns)
+def fit_parameters(A: Array, b: Array, law: ForceLaw) -> tuple[Array, int]:
+    """Least-squares parameters (3,) of moments (E, 3, 3) and (E, 3), and the index of the best exponent."""
+    which = list(law.columns)
     exponents = range(len(EXPONENTS) if law.free else 1)
-    thetas = [np.linalg.lstsq(A[e][np.ix_(own, own)], b[e, own], rcond=1e-12)[0] for e in exponents]
-    best = int(np.argmax([theta @ b[e, own] for e, theta in enumerate(thetas)]))
+    thetas = [np.linalg.lstsq(A[e][np.ix_(which, which)], b[e, which], rcond=1e-12)[0] for e in exponents]
+    best = int(np.argmax([theta @ b[e, which] for e, theta in enumerate(thetas)]))
     theta = np.zeros(3)
-    theta[own] = thetas[best]
+    theta[which] = thetas[best]
     return theta, best
 
 
@@ -122,7 +125,7 @@ def _columns(x: Array, v: Array, exponents: Array) -> Array:
 
 
 def chosen(candidates: Sequence[FittedLaw]) -> tuple[FittedLaw, str]:
-    """The model of the fewest parameters that predicts pushes left out no worse than chance; and why."""
+    """The model of the fewest parameters that predicts omitted pushes not clearly worse than the best, and why."""
     best = min(candidates, key=lambda c: c.score)
     for candidate in sorted(candidates, key=lambda c: (c.law.parameters, c.score)):
         worse = (candidate.errors - best.errors).tolist()

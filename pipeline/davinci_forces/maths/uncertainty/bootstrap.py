@@ -1,10 +1,11 @@
-"""Standard errors where there is no formula: by drawing blocks of samples that are longer than what correlates.
+"""Standard errors by resampling, for statistics without a formula.
 
-Kuensch, The jackknife and the bootstrap for general stationary observations, Annals of Statistics 17 (1989).
+The block bootstrap draws blocks of samples that are longer than their correlation.  Kuensch, The jackknife and the
+bootstrap for general stationary observations, Annals of Statistics 17 (1989).
 
-Standard errors where there is no formula: by leaving out one of the units, logs or blocks, that do not correlate.
+The jackknife leaves out one uncorrelated unit, a log or a block, at a time:
 
-s^2 = (n - 1) / n  sum_i (theta_(i) - mean theta_(.))^2
+    s^2 = (n - 1) / n  sum_i (theta_(i) - mean theta_(.))^2
 
 Efron, The jackknife, the bootstrap and other resampling plans (1982), Eq (3.4).
 """
@@ -17,24 +18,22 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 
-BLOCKS = 20
+BOOTSTRAP_BLOCKS = 20
 DRAWS = 200
 
 Block = TypeVar("Block")
 
 
-def blocks(N: int, count: int = BLOCKS) -> list[slice]:
-    """N samples as so many blocks of about one length; fewer where there are not that many samples."""
+def blocks(N: int, count: int = BOOTSTRAP_BLOCKS) -> list[slice]:
+    """Split N samples into `count` blocks of about equal length; fewer where there are fewer samples."""
     edges = np.linspace(0, N, min(count, max(N, 1)) + 1).round().astype(int).tolist()
     return [slice(start, stop) for start, stop in pairwise(edges) if stop > start]
 
 
 def standard_error(statistic: Callable[[list[Block]], float], parts: Sequence[Block], seed: int = 0) -> float:
-    """The standard deviation of a statistic of blocks over draws of as many blocks, with replacement.
+    """Bootstrap the standard error of a statistic of blocks, by drawing as many blocks with replacement.
 
-    A block is whatever the statistic takes: samples, or what is already known of them.
-
-    NaN for a single block, of which nothing can be drawn.
+    A block is whatever the statistic takes: samples, or sums over them.  NaN for a single block.
     """
     if len(parts) < 2:
         return float("nan")
@@ -42,29 +41,29 @@ def standard_error(statistic: Callable[[list[Block]], float], parts: Sequence[Bl
 
 
 def error_of_mean(values: Sequence[float] | Array, seed: int = 0) -> float:
-    """The same of the mean of numbers (n,), one a block."""
+    """Bootstrap the standard error of the mean of numbers (n,), one a block."""
     if len(values) < 2:
         return float("nan")
     return _spread(np.asarray(values)[_draws(len(values), seed)].mean(axis=1), len(values))
 
 
 def error_of_pooled_mean(x: Array, seed: int = 0, of: Callable[[Array], Array] = np.asarray) -> float:
-    """The same of the mean of samples (N,), in blocks of about one length, or of a function of that mean."""
+    """Bootstrap the standard error of the mean of samples (N,), in blocks, or of a function of that mean."""
     parts = blocks(len(x))
     if len(parts) < 2:
         return float("nan")
     draws = _draws(len(parts), seed)
-    sums, samples = (np.array(each)[draws].sum(axis=1) for each in ([x[p].sum() for p in parts], _lengths(parts)))
+    sums, samples = (np.array(values)[draws].sum(axis=1) for values in ([x[p].sum() for p in parts], _lengths(parts)))
     return _spread(of(sums / samples), len(parts))
 
 
 def error_of_quantile(x: Array, share: float, seed: int = 0) -> float:
-    """The same of a quantile of samples (N,), which are sorted once for all draws."""
+    """Bootstrap the standard error of a quantile of samples (N,), which are sorted once for all draws."""
     parts = blocks(len(x))
     if len(parts) < 2:
         return float("nan")
     order = np.argsort(x)
-    before = np.zeros((len(x), len(parts)), np.int64)  # how many samples of each block are up to each one, sorted
+    before = np.zeros((len(x), len(parts)), np.int64)  # samples of each block up to each sorted sample
     before[np.arange(len(x)), np.repeat(np.arange(len(parts)), _lengths(parts))[order]] = 1
     np.cumsum(before, axis=0, out=before)
     draws = _draws(len(parts), seed)
@@ -75,9 +74,9 @@ def error_of_quantile(x: Array, share: float, seed: int = 0) -> float:
 
 
 def _reached(before: Integers, times: Integers, place: Array) -> Integers:
-    """The first sample (DRAWS,) of N up to which a draw holds more than so many (DRAWS,), by bisection of all at once.
+    """Index (DRAWS,) of the first of N samples up to which each draw has more than `place` (DRAWS,), by bisection.
 
-    `before` (N, n) counts the samples of blocks, which draws take so many times (DRAWS, n).
+    `before` (N, n) counts the samples of each block, and `times` (DRAWS, n) how often a draw takes it.
     """
     low, high = np.zeros(len(times), np.int64), np.full(len(times), len(before) - 1)
     while (low < high).any():
@@ -92,7 +91,7 @@ def _lengths(parts: Sequence[slice]) -> list[int]:
 
 
 def _draws(n: int, seed: int) -> Integers:
-    """Which of n blocks each draw takes, (DRAWS, n)."""
+    """Numbers (DRAWS, n) of the blocks, of n, that each draw takes."""
     return np.random.default_rng(seed).integers(0, n, (DRAWS, n))
 
 
@@ -104,28 +103,28 @@ def _spread(drawn: Array, n: int) -> float:
 def model_error(slow: Array, noise: float) -> tuple[float, float]:
     """Root mean square of a low-passed residual (N,) beyond the noise in it, and its standard error.
 
-    `noise` is the standard deviation of the noise that passes the low-pass.  The standard error is that of the mean
-    square over blocks, carried over to its root.
+    `noise` is the standard deviation of the noise that passes the low-pass.  The standard error follows from that of
+    the mean square over blocks.
     """
     squares = slow**2
     excess = float(np.mean(squares)) - noise**2
     error = float(np.sqrt(max(excess, 0.0)))
     spread = error_of_mean([float(squares[part].mean()) for part in blocks(len(slow))])
-    # d sqrt(x) = dx / (2 sqrt(x)), which says nothing near 0: there the root of the spread is the bound.
+    # d sqrt(x) = dx / (2 sqrt(x)) diverges at 0: there the root of the spread is the bound.
     return error, min(spread / (2.0 * error), float(np.sqrt(spread))) if error > 0 else float(np.sqrt(spread))
 
 
 def jackknife_std(statistic: Callable[[Booleans], Array], units: Integers) -> Array:
-    """The standard error (p,) of a statistic (p,) of the samples that are kept (N,), which are of these units (N,).
+    """Jackknife the standard error (p,) of a statistic (p,) of a mask of samples (N,), by their `units` (N,).
 
-    NaN for a single unit, of which nothing can be left out.
+    NaN for a single unit.
     """
     numbers = np.unique(units)
     return of_left_out(np.array([statistic(units != n) for n in numbers] if len(numbers) > 1 else [[np.nan]]))
 
 
 def of_left_out(left_out: Array) -> Array:
-    """The same of a statistic (n, p) without each of n units."""
+    """Standard error (p,) from the values (n, p) of a statistic without each of n units."""
     n = len(left_out)
     if n < 2:
         return np.full(left_out.shape[1], np.nan)

@@ -1,4 +1,4 @@
-"""What an effort is off on the day of a log: its mean where nothing touches the robot, and whether that drifts."""
+"""The offset of an effort on the day of a log: its mean without contact, and whether it drifts."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -9,11 +9,11 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals.windows import outside
 from davinci_forces.maths.uncertainty.bootstrap import blocks, error_of_mean
 
-BEYOND = 2.0  # standard errors of a difference, from which on it is a drift
+MIN_DRIFT_ERRORS = 2.0  # standard errors of a difference that count as a drift
 
 
 class DayOffset(NamedTuple):
-    """An offset with its standard error, and by how much its samples' second half differs from the first."""
+    """An offset with its standard error, and the difference of the second half of the samples from the first."""
 
     value: float
     std: float
@@ -22,16 +22,16 @@ class DayOffset(NamedTuple):
 
     @property
     def drifts(self) -> bool:
-        """Whether the two halves differ by more than their standard errors explain."""
-        return abs(self.drift) > BEYOND * self.drift_std
+        """Whether the halves differ by more than `MIN_DRIFT_ERRORS` standard errors."""
+        return abs(self.drift) > MIN_DRIFT_ERRORS * self.drift_std
 
 
-def day_offset(t: Array, left: Array, windows: Sequence[tuple[float, float]]) -> DayOffset:
-    """The mean of the effort (N,) that a model leaves, in windows [s] in which nothing touches the robot.
+def day_offset(t: Array, residual: Array, windows: Sequence[tuple[float, float]]) -> DayOffset:
+    """Average the residual effort (N,) of a model in windows [s] in which nothing touches the robot.
 
-    Without windows, or samples in them, nothing is known: an offset of 0 without error.
+    Without windows, or with fewer than two samples in them, the offset is 0 with error 0.
     """
-    inside = left[~outside(t, windows)]
+    inside = residual[~outside(t, windows)]
     if len(inside) < 2:
         return DayOffset(0.0, 0.0, 0.0, 0.0)
     halves = np.array_split(inside, 2)

@@ -1,7 +1,7 @@
-"""Every symbol that the pipeline stores or plots, once: what it means and what it is measured in.
+"""All symbols that the pipeline stores or plots: the meaning and the unit of each.
 
-A revolute joint turns in rad and pushes in N m; a prismatic one slides in m and pushes in N.  Units are
-therefore written with {position} and {effort}, and a joint fills them in.
+A revolute joint has positions in rad and efforts in N m; a prismatic joint has positions in m and efforts in N.
+Units are therefore written with {position} and {effort}, which each joint replaces by its own.
 """
 
 from davinci_forces.records.quantities.arm import ARM

@@ -23,41 +23,42 @@ from davinci_forces.report.content import (
 from davinci_forces.report.content.marks import AnyMark
 from davinci_forces.report.context import count, title
 from davinci_forces.report.results import format_unit
-from davinci_forces.report.verdicts import WORDS
+from davinci_forces.report.verdicts import band, verdict_words
 from davinci_forces.report.writers import render_all
 
 
-def page(studies: Sequence[Campaigned], left_out: Sequence[str], told: Findings) -> dict[str, bytes]:
+def page(studies: Sequence[Campaigned], left_out: Sequence[str], findings: Findings) -> dict[str, bytes]:
     """campaign.html and campaign.pdf of studies in their order; `left_out` names those that have no results."""
     sections = (
-        Section("The campaign", "campaign", tuple(overview(studies, left_out, told))),
-        *(joint_section(joint, studies, told) for joint in joints_of(studies)),
+        Section("The campaign", "campaign", tuple(overview(studies, left_out, findings))),
+        *(joint_section(joint, studies, findings) for joint in joints_of(studies)),
     )
     simulated = any(study.simulated for study in studies)
     heading = "1 study" if len(studies) == 1 else f"{len(studies)} studies"
     return render_all((Document("Campaign", heading, simulated, sections, "", "campaign", links=()),))
 
 
-def overview(studies: Sequence[Campaigned], left_out: Sequence[str], told: Findings) -> Iterator[Block]:
-    """What there is, what drifts, and one row a study."""
-    dates = f", recorded from {studies[0].started[:10]} to {studies[-1].started[:10]}" if told.by_date else ""
-    undated = " Their logs do not all say when they were recorded, so they are in the order in which they are named."
-    order = "" if told.by_date else undated
+def overview(studies: Sequence[Campaigned], left_out: Sequence[str], findings: Findings) -> Iterator[Block]:
+    """The prose, the findings, and a table with one row a study."""
+    dates = f", recorded from {studies[0].started[:10]} to {studies[-1].started[:10]}" if findings.by_date else ""
+    undated = " Some logs state no date of recording, so studies are in the order in which they are named."
+    order = "" if findings.by_date else undated
     yield Prose(
-        f"{count(len(studies), 'report')}{dates}, each row linked to its own.{order} Parameters are those of each "
-        "joint by itself, by least squares. A number drifts where a weighted line through it has a slope beyond its "
-        "standard error, varies where its studies scatter about one mean by more than their errors, and a study "
-        "stands out where it is far from the mean of the others; errors of a line are widened where values scatter. "
-        f"Of all {told.tests} tests together, the chance that any tells falsely is {100 * told.chance:.0f} %."
+        f"This page compares {count(len(studies), 'report')}{dates}; each row links to its report.{order} Parameters "
+        "are least-squares estimates of each joint by itself. A number drifts if a weighted line through it has "
+        "a slope beyond the standard error of the slope, which is widened where values scatter. A number varies if its "
+        "values scatter about one mean by more than their errors. A study stands out if it is far from the mean of the "
+        f"others. The chance of a false alarm in all {findings.tests} tests together is {100 * findings.chance:.0f} %."
     )
     if left_out:
         names = ", ".join(f"`{literal(name)}`" for name in left_out)
-        yield Verdict("info", f"Left out, as they have no results: {names}. `davinci-forces all` makes them.")
-    said = tuple(finding(one, told) for one in told.every if place(one) in told.slopes or place(one) in told.varying)
-    said += tuple(text for one in told.every for text in outliers_in_words(one, told))
-    if said:
+        yield Verdict("info", f"Left out, as they have no results: {names}. Run `davinci-forces all` on them.")
+    changes = (series for series in findings.every if place(series) in {*findings.slopes, *findings.varying})
+    messages = tuple(change_in_words(series, findings) for series in changes)
+    messages += tuple(text for series in findings.every for text in outliers_in_words(series, findings))
+    if messages:
         yield Verdict("warn", "**Beyond standard errors:**")
-        yield Bullets(said)
+        yield Bullets(messages)
     else:
         yield Verdict("good", "No number drifts, varies or stands out beyond its standard errors.")
     joints = joints_of(studies)
@@ -66,21 +67,21 @@ def overview(studies: Sequence[Campaigned], left_out: Sequence[str], told: Findi
     yield Table("The verdict of every joint in every study.", header, rows, "campaign-studies", "l" * len(header))
 
 
-def finding(one: Series, told: Findings) -> str:
-    """What a series does, in words."""
-    name = f"**{title(one.joint)}, {literal(words(one.name))}**"
-    if line := told.slopes.get(place(one)):
-        slope = Number(line.value, f"{format_unit(one.unit)} a {told.unit}".strip(), line.std)
-        return f"{name} drifts by {literal(str(slope))} over {len(one.value)} studies."
+def change_in_words(series: Series, findings: Findings) -> str:
+    """How a number drifts or varies, in words."""
+    name = f"**{title(series.joint)}, {literal(words(series.name))}**"
+    if line := findings.slopes.get(place(series)):
+        slope = Number(line.value, f"{format_unit(series.unit)} a {findings.unit}".strip(), line.std)
+        return f"{name} drifts by {literal(str(slope))} over {len(series.value)} studies."
     return f"{name} varies by more than its standard errors, without a trend."
 
 
-def outliers_in_words(one: Series, told: Findings) -> Iterator[str]:
+def outliers_in_words(series: Series, findings: Findings) -> Iterator[str]:
     """Studies that stand out."""
-    for i in told.stand_out(one):
-        shown = Number(float(one.value[i]), format_unit(one.unit), float(one.std[i]))
-        where = f"{title(one.joint)}, {literal(words(one.name))}"
-        yield f"{one.studies[i].link} stands out: **{where}** is {literal(str(shown))}."
+    for i in findings.stand_out(series):
+        shown = Number(float(series.value[i]), format_unit(series.unit), float(series.std[i]))
+        where = f"{title(series.joint)}, {literal(words(series.name))}"
+        yield f"{series.studies[i].link} stands out: **{where}** is {literal(str(shown))}."
 
 
 def date(study: Campaigned) -> str:
@@ -90,22 +91,26 @@ def date(study: Campaigned) -> str:
 
 def word(study: Campaigned, joint: str) -> str:
     """The verdict of one joint."""
-    judged = study.joints.get(joint)
-    return WORDS[judged.verdict] + (", same path" if judged.same_path else "") if judged else "–"
+    verdict = study.joints.get(joint)
+    if verdict is None:
+        return "–"
+    coverage = study.numbers.get(verdict.keys.get("coverage") or "")
+    narrow = coverage is not None and coverage.number is not None and band(coverage.number) == "bad"
+    return verdict_words(verdict.verdict, verdict.same_path, narrow)
 
 
-def joint_section(joint: str, studies: Sequence[Campaigned], told: Findings) -> Section:
+def joint_section(joint: str, studies: Sequence[Campaigned], findings: Findings) -> Section:
     """The numbers of one joint, drawn and listed."""
-    own = [one for one in told.every if one.joint == joint]
-    names = list(dict.fromkeys(one.name for one in own))
-    odd = sorted({one.name for one in own if told.tell(one)})
-    spoken = f"beyond errors: {', '.join(odd)}" if odd else "none changes beyond its errors"
-    drawn = [one for one in own if len(one.studies) > 1]  # a single one is no course over time
+    of_joint = [series for series in findings.every if series.joint == joint]
+    names = list(dict.fromkeys(series.name for series in of_joint))
+    changed = sorted({series.name for series in of_joint if findings.tell(series)})
+    changes = f"beyond errors: {', '.join(changed)}" if changed else "none changes beyond its errors"
+    drawn = [series for series in of_joint if len(series.studies) > 1]  # one study is no course over time
     figure = Figure(
-        f"{title(joint)}: its parameters and how far it is to be trusted, with standard errors, study by study; "
-        "studies that stand out are named.",
-        f"{title(joint)}: {count(len(names), 'number')} over {len(studies)} studies; {spoken}.",
-        tuple(panel(one, told) for one in drawn),
+        f"{title(joint)}: its parameters and the measures of trust, with standard errors, study by study. Studies that "
+        "stand out are named.",
+        f"{title(joint)}: {count(len(names), 'number')} over {len(studies)} studies; {changes}.",
+        tuple(panel(series, findings) for series in drawn),
         f"campaign-{joint}",
         columns=2,
         height=34,
@@ -113,17 +118,22 @@ def joint_section(joint: str, studies: Sequence[Campaigned], told: Findings) -> 
     floors = [name for name in names if name in FLOORS.values()]
     parameters = [name for name in names if name not in floors]
     tables = (
-        table(joint, "parameters", "parameters", parameters, own, studies),
-        table(joint, "how far to trust it", "floors", floors, own, studies),
+        table(joint, "parameters", "parameters", parameters, of_joint, studies),
+        table(joint, "measures of trust", "floors", floors, of_joint, studies),
     )
     return Section(title(joint), f"joint-{joint}", (*([figure] if drawn else []), *tables))
 
 
 def table(
-    joint: str, said: str, label: str, names: Sequence[str], own: Sequence[Series], studies: Sequence[Campaigned]
+    joint: str,
+    content: str,
+    label: str,
+    names: Sequence[str],
+    of_joint: Sequence[Series],
+    studies: Sequence[Campaigned],
 ) -> Table:
     """Some numbers of a joint, one row a study."""
-    keys = {(one.name, study.name): key for one in own for study, key in zip(one.studies, one.keys, strict=True)}
+    keys = {(s.name, study.name): key for s in of_joint for study, key in zip(s.studies, s.keys, strict=True)}
     verdict = label == "floors"
     rows = tuple(
         (
@@ -138,7 +148,7 @@ def table(
     heads = [words(name)[:1].upper() + words(name)[1:] for name in names]
     header = ("Recorded", "Study", *(["Verdict"] if verdict else []), *map(literal, heads))
     align = ("lll" if verdict else "ll") + "r" * len(names)
-    return Table(f"{title(joint)}: {said}, in every study.", header, rows, f"campaign-{joint}-{label}", align)
+    return Table(f"{title(joint)}: {content}, in every study.", header, rows, f"campaign-{joint}-{label}", align)
 
 
 def words(name: str) -> str:
@@ -154,17 +164,17 @@ def cell(study: Campaigned, key: str | None) -> Cell:
     return Number(stated.number, format_unit(stated.unit), stated.std, key, 3)
 
 
-def panel(one: Series, told: Findings) -> Panel:
+def panel(series: Series, findings: Findings) -> Panel:
     """One number over time."""
-    t, out = told.times(one), list(told.stand_out(one))
+    t, out = findings.times(series), list(findings.stand_out(series))
     inside = [i for i in range(len(t)) if i not in out]
-    std = np.nan_to_num(one.std)
-    marks: list[AnyMark] = [Points(t[inside], one.value[inside], "", "blue", std[inside])] if inside else []
+    std = np.nan_to_num(series.std)
+    marks: list[AnyMark] = [Points(t[inside], series.value[inside], "", "blue", std[inside])] if inside else []
     if out:
-        names = tuple(one.studies[i].name for i in out)
-        marks.append(Points(t[out], one.value[out], "", "vermillion", std[out], names))
-    unit = format_unit(one.unit)
-    x_label = "time [days from the first]" if told.by_date else "study"
-    name = words(one.name)
-    x_range = None if told.by_date else (min(told.time.values()) - 0.5, max(told.time.values()) + 0.5)
+        names = tuple(series.studies[i].name for i in out)
+        marks.append(Points(t[out], series.value[out], "", "vermillion", std[out], names))
+    unit = format_unit(series.unit)
+    x_label = "time [days from the first]" if findings.by_date else "study"
+    name = words(series.name)
+    x_range = None if findings.by_date else (min(findings.time.values()) - 0.5, max(findings.time.values()) + 0.5)
     return Panel(name, x_label, f"{name} [{unit}]" if unit else name, tuple(marks), x_range)

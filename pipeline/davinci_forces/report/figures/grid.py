@@ -18,7 +18,7 @@ TICK = 2.6  # [mm] from an axis to its numbers, and from these to its label
 RIGHT = 4.0  # [mm] beside the axes, where half of the last number may be
 NUMBERS = 3.4  # [mm] that a line of the numbers of an axis is high
 ROW_ABOVE = 2 * LINE + 1.5  # [mm] of a heading of one line of title and one of legend
-LEAST = 15.0  # [mm] that axes are high at least
+MIN_AXES_HEIGHT = 15.0  # [mm]
 
 
 def arrange(canvas: "Canvas", figure: Figure) -> None:
@@ -27,7 +27,7 @@ def arrange(canvas: "Canvas", figure: Figure) -> None:
     width = WIDTH / columns
     rows = [canvas.axes[i : i + columns] for i in range(0, len(canvas.axes), columns)]
     for axes, panel in zip(canvas.axes, figure.panels, strict=True):  # which may change the numbers beside the axes
-        make_room_for_names(axes, panel, max(figure.height - ROW_ABOVE - _room_below(axes), LEAST))
+        make_room_for_names(axes, panel, max(figure.height - ROW_ABOVE - _room_below(axes), MIN_AXES_HEIGHT))
     numbers = max(_letters(axes.yaxis) for axes in canvas.axes) * DIGIT
     left = TICK + numbers + max(_lines(axes.get_ylabel()) for axes in canvas.axes) * LINE + 1
     wide = width - left - RIGHT
@@ -38,7 +38,7 @@ def arrange(canvas: "Canvas", figure: Figure) -> None:
     below = [max(_room_below(axes) for axes in row) for row in rows]
     # What a figure asks for holds its words, of headings two lines.
     asked = figure.height * len(rows) + sum(max(room - ROW_ABOVE, 0) for room in rooms)
-    high = max((asked - sum(rooms) - sum(below)) / len(rows), LEAST)
+    high = max((asked - sum(rooms) - sum(below)) / len(rows), MIN_AXES_HEIGHT)
     total = sum(rooms) + sum(below) + high * len(rows)
     canvas.set_size_inches(WIDTH / INCH, total / INCH)
     bottom = total

@@ -13,8 +13,8 @@ from davinci_forces.logs.isolated.process import uninterrupted
 from davinci_forces.report.content import Figure, Figure3D
 from davinci_forces.report.figures.svg import draw_svg, drawn
 
-FEWEST = 8  # figures that are worth another process, which takes as long to begin
-MOST = 4  # processes, this one among them
+MIN_FIGURES_PER_PROCESS = 8  # figures that are worth another process, which takes as long to begin
+MAX_PROCESSES = 4  # processes, this one among them
 PROGRAM = (
     "from davinci_forces.logs.isolated.process import end_with_parent; end_with_parent(); "
     "from davinci_forces.report.figures.together import serve; serve()"
@@ -24,7 +24,7 @@ PROGRAM = (
 def draw_together(figures: Iterable[Figure | Figure3D]) -> None:
     """Draw the figures that are not drawn yet; the same bytes come out wherever one is drawn."""
     left = sorted((figure for figure in figures if figure not in drawn), key=_cost)
-    processes = min(MOST, os.cpu_count() or 1, max(len(left) // FEWEST, 1))
+    processes = min(MAX_PROCESSES, os.cpu_count() or 1, max(len(left) // MIN_FIGURES_PER_PROCESS, 1))
     shares = [left[i::processes] for i in range(processes)]
     asked = [(share, _ask(share)) for share in shares[1:]]
     _draw(shares[0])

@@ -1,4 +1,4 @@
-"""What changed since an earlier report of the same study, or of another, that the study names as its baseline."""
+"""Changes since the baseline: an earlier report that the study names, of itself or of another study."""
 
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -8,7 +8,7 @@ from davinci_forces.report.context import Context, count
 from davinci_forces.report.results import format_unit
 from davinci_forces.report.sections.parts import listed
 
-MOST = 300  # rows of a table; `davinci-forces compare` has them all
+MAX_ROWS = 300  # of a table; `davinci-forces compare` has them all
 
 
 def section(context: Context) -> Section | None:
@@ -21,29 +21,29 @@ def section(context: Context) -> Section | None:
     )
 
 
-def blocks(context: Context, before: Mapping[str, Stated], found: Sequence[Change]) -> Iterator[Block]:
-    """What there is to say."""
-    changed = sorted((each for each in found if each.before and each.after), key=weight, reverse=True)
-    came, went = [c.key for c in found if not c.before], [c.key for c in found if not c.after]
+def blocks(context: Context, before: Mapping[str, Stated], differences: Sequence[Change]) -> Iterator[Block]:
+    """The section's content."""
+    changed = sorted((c for c in differences if c.before and c.after), key=weight, reverse=True)
+    came, went = [c.key for c in differences if not c.before], [c.key for c in differences if not c.after]
     shared = sum(key in context.results for key in before)
     yield Prose(
-        f"Of the {count(shared, 'number')} that this report shares with its baseline, "
-        f"`{literal(context.study.baseline)}`, {len(changed)} changed; {len(came)} came and {len(went)} went. A number "
-        "has changed where it differs by more than two standard errors of the difference, $sqrt(s_a^2 + s_b^2)$; where "
-        "neither states one, by more than $10^(-9)$ of it. Of recordings that share nothing, one number in twenty that "
-        "has a standard error changes by chance."
+        f"This report shares {count(shared, 'number')} with its baseline, `{literal(context.study.baseline)}`. "
+        f"{len(changed)} of them changed. New numbers: {len(came)}; missing: {len(went)}. A number has "
+        "changed if it differs by more than two standard errors of the difference, $sqrt(s_a^2 + s_b^2)$, or without "
+        "standard errors by more than $10^(-9)$ of it. Between independent recordings, one number in twenty that has a "
+        "standard error changes by chance."
     )
     if changed:
         yield from table(context, changed)
-    for keys, what, anchor in ((came, "came", "baseline-came"), (went, "went", "baseline-went")):
+    for keys, what, anchor in ((came, "new", "baseline-came"), (went, "missing", "baseline-went")):
         if keys:
-            more = [f"and {len(keys) - MOST} more"] if len(keys) > MOST else []
-            listed = Listing("\n".join([*keys[:MOST], *more]))
-            yield OnScreen(f"{count(len(keys), 'key')} that {what}", anchor, (listed,))
+            more = [f"and {len(keys) - MAX_ROWS} more"] if len(keys) > MAX_ROWS else []
+            listed = Listing("\n".join([*keys[:MAX_ROWS], *more]))
+            yield OnScreen(f"{count(len(keys), what + ' key')}", anchor, (listed,))
 
 
 def weight(change: Change) -> float:
-    """How far a change stands out: its standard errors, or without any, more than all that have them."""
+    """A change in standard errors; without any, it comes before all that have them."""
     return abs(change.z) if change.z is not None else float("inf")
 
 
@@ -51,11 +51,15 @@ def table(context: Context, changed: Sequence[Change]) -> Iterator[Block]:
     """The changes, the largest first; on screen where they are many."""
     rows = tuple(
         (literal(c.key), before_text(c), context.number(c.key), "–" if c.z is None else f"{c.z:+.1f}")
-        for c in changed[:MOST]
+        for c in changed[:MAX_ROWS]
     )
-    said = f"The {MOST} largest of {len(changed)} changes" if len(changed) > MOST else count(len(changed), "change")
+    changes = (
+        f"The {MAX_ROWS} largest of {len(changed)} changes"
+        if len(changed) > MAX_ROWS
+        else count(len(changed), "change")
+    )
     whole = Table(
-        f"{said} since the baseline, the largest first: a, b, and their difference over its standard error.",
+        f"{changes} since the baseline, the largest first: a, b, and their difference over its standard error.",
         ("Number", "a, the baseline", "b, now", "Standard errors"), rows, "baseline-changes", "lrrr",
     )  # fmt: skip
     yield from listed(whole, "Changes since the baseline")

@@ -1,4 +1,4 @@
-"""Which model was chosen for the arm, from among what, and whether data that nobody fitted agree."""
+"""The choice of the arm's model among all candidates, and its error on data that no fit had seen."""
 
 from collections.abc import Iterator
 
@@ -23,8 +23,8 @@ from davinci_forces.report.content import (
 from davinci_forces.report.context import Context, fit_name, title
 from davinci_forces.report.sections.parts import MEASURES, listed
 
-SHOWN = 9  # runs at most in the PDF
-SAME = 1e-9  # relative errors closer than this are one
+MAX_RUNS_ON_PAPER = 9
+ERROR_TOLERANCE = 1e-9  # relative errors closer than this are equal
 
 
 def section(context: Context) -> Section | None:
@@ -36,27 +36,27 @@ def section(context: Context) -> Section | None:
 def blocks(context: Context, choice: Choice) -> Iterator[Block]:
     """The section's content."""
     yield Prose(
-        "Candidates are a structure, each joint by itself or coupled through the arm's links, with friction added to "
-        "it, and a ridge. Each is refitted without a sixth of the path, without half of it, and without each log where "
-        "there are several, and judged by the relative error where it was not fitted: measured motion, effort and "
-        "prediction through one low-pass, the mean over joints, where they do not stand still. One candidate is taken "
-        "for the whole arm, the smallest that is not clearly worse than the best and whose inertia is positive "
-        f"definite along the trajectories. {MEASURES}"
+        "A candidate model is a structure (each joint by itself, or coupled through the arm's links), a friction "
+        "model, and a ridge, which keeps poorly determined parameters small. Each candidate is refitted without a "
+        "sixth of the path, without half of it, and without each log where there are several. Its score is the "
+        "relative error on what was left out: the mean over joints that move, with motion, effort and prediction "
+        "through one low-pass. The whole arm gets the smallest candidate that is not clearly worse than the best, and "
+        f"whose inertia is positive definite along the trajectories. {MEASURES}"
     )
     yield Verdict("info", f"**Chosen: {literal(choice.chosen)}.** {literal(choice.why)}.")
-    yield table(context, choice, leading(choice), "The best candidate of each variant.", "choice-table")
+    yield table(context, choice, best_rows(choice), "The best candidate of each variant.", "choice-table")
     yield figure(choice)
-    every = np.argsort(choice.score, kind="stable").tolist()
+    order = np.argsort(choice.score, kind="stable").tolist()
     yield OnScreen(
         "Every candidate", "all-candidates",
-        (table(context, choice, every, "Every candidate, the best first.", "candidates-table"),),
+        (table(context, choice, order, "Every candidate, the best first.", "candidates-table"),),
     )  # fmt: skip
-    yield from overfitting(choice)
+    yield from overfitting_note(choice)
     yield from unseen(context)
     yield from parameters(context)
 
 
-def leading(choice: Choice) -> list[int]:
+def best_rows(choice: Choice) -> list[int]:
     """The rows of the best candidate of each variant, and of the chosen one."""
     best: dict[str, int] = {}
     for i in np.argsort(choice.score, kind="stable").tolist():
@@ -69,10 +69,8 @@ def leading(choice: Choice) -> list[int]:
 def table(context: Context, choice: Choice, rows: list[int], caption: str, label: str) -> Table:
     """Scores of candidates."""
     header = ("Candidate", "Parameters", "Path blocks left out", "Where fitted", "Periods left out", "Physical")
-    said = (
-        f"{caption} Relative errors: on blocks of path left out (raw samples), where fitted, and on periods left out."
-    )
-    return Table(said, header, tuple(row(context, choice, i) for i in rows), label, "lrrrrl")
+    caption += " Relative errors: on blocks of path left out (raw samples), where fitted, and on periods left out."
+    return Table(caption, header, tuple(row(context, choice, i) for i in rows), label, "lrrrrl")
 
 
 def row(context: Context, choice: Choice, i: int) -> tuple[Cell, ...]:
@@ -85,17 +83,18 @@ def row(context: Context, choice: Choice, i: int) -> tuple[Cell, ...]:
 
 
 def figure(choice: Choice) -> Figure:
-    """Errors against size: what was fitted always gains from more parameters, what was not does not."""
+    """Error over number of parameters: it always falls on fitted data, not on data that were left out."""
     size, chosen = choice.parameters.astype(float), choice.row_number(choice.chosen)
     marks = (
         Points(size, choice.training, "where fitted", "sky"),
         Points(size, choice.score, "blocks of path left out", "vermillion"),
         Points(size[[chosen]], choice.score[[chosen]], "chosen", "black", y_std=choice.score_std[[chosen]]),
     )
-    known = np.isfinite(choice.over_periods)
-    repeated = (Points(size[known], choice.over_periods[known], "periods left out", "green"),) if known.any() else ()
+    finite = np.isfinite(choice.over_periods)
+    repeated = (Points(size[finite], choice.over_periods[finite], "periods left out", "green"),) if finite.any() else ()
     return Figure(
-        "Relative error of every candidate against its size, where it was fitted and where it was not.",
+        "Relative error of every candidate over its number of parameters, on fitted data and on data that were left "
+        "out.",
         "Relative error over number of parameters: falling where fitted, not always where data were left out.",
         (Panel("Candidates", "parameters", "relative error", (*marks, *repeated)),),
         label="choice-figure",
@@ -103,20 +102,23 @@ def figure(choice: Choice) -> Figure:
     )
 
 
-def overfitting(choice: Choice) -> Iterator[Verdict]:
+def overfitting_note(choice: Choice) -> Iterator[Verdict]:
     """Whether the candidate that fits best predicts worse than the chosen one."""
     closest, chosen = int(np.argmin(choice.training)), choice.row_number(choice.chosen)
-    if choice.score[closest] > choice.score[chosen] + SAME and choice.training[closest] < choice.training[chosen]:
+    if (
+        choice.score[closest] > choice.score[chosen] + ERROR_TOLERANCE
+        and choice.training[closest] < choice.training[chosen]
+    ):
         yield Verdict(
             "info",
-            f"{literal(str(choice.candidate[closest]))} fits best and overfits: its error is "
-            f"{choice.training[closest]:.3f} where it was fitted and {choice.score[closest]:.3f} where it was not; the "
-            f"chosen one's are {choice.training[chosen]:.3f} and {choice.score[chosen]:.3f}.",
+            f"{literal(str(choice.candidate[closest]))} fits best but overfits: its error is "
+            f"{choice.training[closest]:.3f} on fitted data and {choice.score[closest]:.3f} on data left out. The "
+            f"chosen candidate has {choice.training[chosen]:.3f} and {choice.score[chosen]:.3f}.",
         )
 
 
 def unseen(context: Context) -> Iterator[Block]:
-    """The chosen model beside each joint by itself, on logs that nobody fitted."""
+    """The chosen model beside each joint by itself, on logs that were not fitted."""
     predictions = [p for p in context.catalogue.about(Prediction, model=CHOSEN) if p.role != "identification"]
     if not predictions:
         return
@@ -131,8 +133,8 @@ def unseen(context: Context) -> Iterator[Block]:
         for p in predictions
     )
     header = ("Log", "Joint", "Path", "Chosen", "Joint by itself")
-    table = Table("Relative error on logs that no parameter was fitted to.", header, rows, "choice-unseen", "lllrr")
-    yield from listed(table, "The chosen model beside each joint by itself, run by run", SHOWN)
+    table = Table("Relative error on logs that were not fitted.", header, rows, "choice-unseen", "lllrr")
+    yield from listed(table, "The chosen model beside each joint by itself, run by run", MAX_RUNS_ON_PAPER)
 
 
 def parameters(context: Context) -> Iterator[Block]:

@@ -1,4 +1,4 @@
-"""Every contact: what the robot exerted, with its error, against the detection level; and what is not analysed."""
+"""Every contact with its effort and error, against the detection level; and recordings that are not analysed."""
 
 from collections.abc import Iterator
 
@@ -13,8 +13,8 @@ from davinci_forces.study import LogEntry
 
 def section(context: Context) -> Section | None:
     """All windows of contact, and what was recorded without being analysed."""
-    found = tuple(blocks(context))
-    return Section("Contacts", "contacts", found) if found else None
+    content = tuple(blocks(context))
+    return Section("Contacts", "contacts", content) if content else None
 
 
 def blocks(context: Context) -> Iterator[Block]:
@@ -22,19 +22,20 @@ def blocks(context: Context) -> Iterator[Block]:
     contacts = context.catalogue.all(Contact)
     if contacts:
         yield Prose(
-            "Each contact on each joint that moved in it, in the windows that the study states and wherever else the "
-            "smoothed external effort is above the alarm level, which free motion crosses at most once in ten minutes: "
-            "when it began and ended, the largest external effort, its mean and its impulse (effort times time). Their "
-            "standard errors are what the same quantities come to over windows of the same length in free space; of a "
-            "peak, its own deviation, too. A peak counts as told from free space where it is above the joint's "
-            "detection level, which 99 % of the samples of its worst free run stay below."
+            "A contact is measured on each joint that moved in it. Its window is one that the study states, or one "
+            "where the smoothed external effort exceeds the alarm level. Free motion crosses the alarm level at most "
+            "once in ten minutes. Each contact has an onset, a release, a peak (the largest external effort), a mean "
+            "and an impulse (effort times time). The standard errors are the spread of the same quantities over "
+            "windows of the same length in free space; that of a peak includes its own standard deviation. A contact "
+            "is detected if its peak exceeds the joint's detection level: the level that 99 % of the samples of its "
+            "worst free run stay below."
         )
         yield peaks(contacts)
         yield from listed(
             Table(
-                "Contacts, log by log; told says whether the peak is above the detection level, and where no window of "
-                "the study says so that a contact was found.",
-                ("Log", "Joint", "Onset", "Release", "Peak", "Mean", "Impulse", "Told"),
+                "Contacts, log by log. Detected: whether the peak exceeds the detection level; “peak only” where it "
+                "does, yet not the alarm level; “found, not stated” for a contact outside the study's windows.",
+                ("Log", "Joint", "Onset", "Release", "Peak", "Mean", "Impulse", "Detected"),
                 tuple(row for contact in contacts for row in rows(context, contact)),
                 "contact-table",
                 "llrrrrrl",
@@ -43,7 +44,7 @@ def blocks(context: Context) -> Iterator[Block]:
     unused = tuple((literal(name), joint, why) for name, joint, why in not_analysed(context))
     if unused:
         yield Table(
-            "Recorded, and not analysed for contact.",
+            "Logs that were recorded, but not analysed for contact.",
             ("Log", "Joint", "Why, and what would change it"),
             unused,
             "not-analysed",
@@ -55,11 +56,11 @@ def rows(context: Context, contact: Contact) -> Iterator[tuple[Cell, ...]]:
     for i, above in enumerate(contact.above, 1):
         key = f"contact.{contact.log}.{contact.joint}.{i}"
         numbers = context.numbers(key, ("onset", "release", "peak", "mean", "impulse"))
-        yield (literal(contact.log), title(contact.joint), *numbers, told(contact, i - 1, bool(above)))
+        yield (literal(contact.log), title(contact.joint), *numbers, detection(contact, i - 1, bool(above)))
 
 
-def told(contact: Contact, i: int, above: bool) -> str:
-    """Whether a contact stands out, and what of it is not as the study has it."""
+def detection(contact: Contact, i: int, above: bool) -> str:
+    """Whether a contact is detected, or was found outside the windows that the study states."""
     if not contact.stated[i]:
         return "found, not stated"
     return ("yes" if contact.found[i] else "peak only") if above else "no"
@@ -71,8 +72,8 @@ def peaks(contacts: list[Contact]) -> Figure:
     missed = sum(int((contact.above == 0).sum()) for contact in contacts)
     total = sum(len(contact) for contact in contacts)
     caption = (
-        "The peak of every window with its standard error; in the grey band, below the detection level, it cannot be "
-        "told from free space. Windows are in the order of [@contact-table]."
+        "The peak of every window with its standard error. Peaks in the grey band, below the detection level, cannot "
+        "be distinguished from free space. Windows are in the order of [@contact-table]."
     )
     alt = f"Peaks of {count(total, 'window')}, joint by joint; {missed} lie below the detection level."
     panels = tuple(peak_panel([c for c in contacts if c.joint == joint], i == 0) for i, joint in enumerate(joints))
@@ -91,7 +92,7 @@ def peak_panel(contacts: list[Contact], named: bool) -> Panel:
 
 
 def not_analysed(context: Context) -> Iterator[tuple[str, str, str]]:
-    """Log, joint and reason of what was recorded and tells nothing of contact here."""
+    """Log, joints and reason of every recording without a measured contact."""
     measured = {(contact.log, contact.joint) for contact in context.catalogue.all(Contact)}
     weighed = {weight.log for weight in context.catalogue.all(Weight)}
     tracked = {(track.log, track.joint): track for track in context.catalogue.all(Track)}
@@ -111,14 +112,14 @@ def not_analysed(context: Context) -> Iterator[tuple[str, str, str]]:
 def reason(entry: LogEntry, track: Track | None) -> str:
     """Why a joint of a log has no contact measured."""
     if entry.role == "friction":
-        return "a log of friction is charted, joint by joint, and not tracked"
+        return "a friction log gives friction maps; its external effort is not tracked"
     if track is None:
         return "no fit of the joint to compare with: record an identification log of it"
     if track.at_rest:
         return (
-            "at rest: friction takes any value up to its Coulomb level, so effort up to that level cannot be told from "
-            "it; move the joint"
+            "at rest, where friction takes any value up to its Coulomb level and hides efforts up to that level; move "
+            "the joint"
         )
     if entry.role != "contact":
-        return f"a log of role “{entry.role}” is tracked, and its windows are not measured"
+        return f"a log of role “{entry.role}” is tracked, but its windows are not measured"
     return "no contact was found above the alarm level; write `contact = [[start, end]]` where there was one"

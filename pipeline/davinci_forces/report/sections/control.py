@@ -1,4 +1,4 @@
-"""The simulated control studies: PD with gravity compensation, and PID where the masses are not known exactly."""
+"""Simulated control studies: PD with gravity compensation, and PID where the masses are not known exactly."""
 
 from collections.abc import Iterator
 
@@ -7,7 +7,7 @@ from davinci_forces.report.content import Block, Cell, Figure, HLine, Line, Pane
 from davinci_forces.report.context import Context, label, title
 from davinci_forces.robots.robot import ControlStudy
 
-SHOWN = 0.5  # of a study's time, in which it settles
+SHARE_DRAWN = 0.5  # of a study's time, in which it settles
 
 
 def section(context: Context) -> Section | None:
@@ -20,13 +20,13 @@ def section(context: Context) -> Section | None:
 def blocks(context: Context, studies: list[ControlStudy]) -> Iterator[Block]:
     """The section's content.  Fig 5.2-5.6"""
     exact = [study for study in studies if study.known_masses == 1.0]
-    light = [study for study in studies if study.known_masses != 1.0]
+    light, thesis = [study for study in studies if study.known_masses != 1.0], context.compares_with_thesis
     yield Prose(
-        "Simulated: the full rigid-body model of the arm under controllers with gravity compensation, as in the "
-        "thesis's chapter 5 (gains of Tables 5.1 and 5.4 for the da Vinci). The thesis does not state the friction of "
-        f"its simulation; here it is viscous only, {viscous_friction(context, studies[0])}. With exact gravity "
-        "compensation PD settles at its reference, and the Lyapunov function "
-        "$V = 1/2 dot(q)^T M dot(q) + 1/2 tilde(q)^T K_p tilde(q)$ never rises."
+        "These are simulations of the full rigid-body model of the arm, under controllers with gravity compensation"
+        + (", as in the thesis's chapter 5 (gains of Tables 5.1 and 5.4)" if thesis else "")
+        + f". Friction{', which the thesis does not state,' * thesis} is viscous only, "
+        f"{viscous_friction(context, studies[0])}. With exact gravity compensation PD settles at its reference, and "
+        "the Lyapunov function $V = 1/2 dot(q)^T M dot(q) + 1/2 tilde(q)^T K_p tilde(q)$ never rises."
     )
     for study in exact:
         rise, start = (context.results.get(f"control.{study.name}.{name}") for name in ("V_rise", "V_0"))
@@ -35,12 +35,12 @@ def blocks(context: Context, studies: list[ControlStudy]) -> Iterator[Block]:
             yield Verdict("good" if rise.value == 0 else "bad", verdict)
         yield response(context, study)
     if exact:
-        yield settling(context, exact)
+        yield settling_table(context, exact)
     if light:
         yield Prose(
-            "A compensator that does not know all of the masses leaves PD with an offset. Integral action removes it, "
-            "but with the gains of Table 5.4 slowly: its slow pole keeps the error **larger** than PD's offset for "
-            "some twenty seconds. The thesis calls the response faster, which this simulation does not confirm."
+            "If the compensator does not know all of the masses, PD is left with an offset. Integral action removes "
+            "it, but slowly: its slow pole keeps the error **larger** than PD's offset for some twenty seconds."
+            + (" The thesis calls the response faster, which this simulation does not confirm." if thesis else "")
         )
         yield errors(context, light)
 
@@ -54,7 +54,7 @@ def viscous_friction(context: Context, study: ControlStudy) -> str:
 
 def response(context: Context, study: ControlStudy) -> Figure:
     """Positions, velocities and the Lyapunov function of a study."""
-    until = SHOWN * study.duration
+    until = SHARE_DRAWN * study.duration
     runs = runs_of(context, study)
     names = [joint.name for joint in context.study.robot.joints]
     q = tuple(Line(run.t[run.t < until], run.q[run.t < until], title(run.joint)) for run in runs)
@@ -77,7 +77,7 @@ def response(context: Context, study: ControlStudy) -> Figure:
     )
 
 
-def settling(context: Context, studies: list[ControlStudy]) -> Table:
+def settling_table(context: Context, studies: list[ControlStudy]) -> Table:
     """How fast each joint settles, and how far it overshoots."""
     names = ("settling_time", "overshoot", "error_end")
     return Table(
@@ -89,7 +89,7 @@ def settling(context: Context, studies: list[ControlStudy]) -> Table:
 
 
 def errors(context: Context, studies: list[ControlStudy]) -> Table:
-    """What each controller is off by as time goes on, where the masses are known badly."""
+    """The error of each controller over time, where the masses are not known exactly."""
     share, duration = studies[0].known_masses, studies[0].duration
     return Table(
         f"Position error when gravity is compensated with {share:g} of the masses, after 10, 20 and {duration:g} s.",

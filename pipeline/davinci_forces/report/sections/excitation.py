@@ -1,4 +1,4 @@
-"""Excitation trajectories: those that were published, and those designed here within the joints' limits."""
+"""Excitation trajectories: published ones, and those designed here within the joints' limits."""
 
 from collections.abc import Iterator
 
@@ -6,7 +6,7 @@ from davinci_forces.records import Excitation
 from davinci_forces.report.content import Block, Figure, HLine, Line, Panel, Prose, Section, Table, Verdict, literal
 from davinci_forces.report.context import Context, label, title
 
-SOURCES = {"table-6.1": "Table 6.1", "table-6.1-corrected": "Table 6.1, misprint corrected", "found": "designed here"}
+SOURCES = {"table-6.1": "published", "table-6.1-corrected": "published, corrected", "found": "designed here"}
 
 
 def section(context: Context) -> Section | None:
@@ -18,10 +18,11 @@ def section(context: Context) -> Section | None:
 def blocks(context: Context, excitations: list[Excitation]) -> Iterator[Block]:
     """The section's content.  Fig 6.5, Table 6.1"""
     yield Prose(
-        "A trajectory tells the parameters apart the better, the smaller $-log_10 det(F^T F)$ over 300 samples of a "
-        "period. Position, velocity and acceleration have to keep their limits at every instant: the extremes are "
-        "computed, not sampled. Those designed here are the best of several searches, which know no limits: the "
-        "harmonics are scaled until they touch one, and the mean lies anywhere in the slack that they leave."
+        "The smaller the objective $-log_10 det(F^T F)$ over 300 samples of a period, the better a trajectory "
+        "separates the parameters. Position, velocity and acceleration must keep their limits at every instant, so the "
+        "extremes are computed, not sampled. Trajectories designed here are the best of several searches without "
+        "limits: the harmonics are scaled until they touch one, and the mean may lie anywhere in the remaining room."
+        + (" The published ones are those of the thesis's Table 6.1." if context.compares_with_thesis else "")
     )
     yield Table(
         "Objective and condition of published trajectories and of those designed here, and how far each exceeds its "
@@ -42,9 +43,7 @@ def blocks(context: Context, excitations: list[Excitation]) -> Iterator[Block]:
     for e in excitations:
         if max(e.excess_q, e.excess_dq, e.excess_ddq) > 0:
             excess = context.results[f"excitation.{e.joint}.{e.source}.excess_q"].number(2)
-            yield Verdict(
-                "warn", f"**{title(e.joint)}**, {source_label(e)}: breaks the thesis's own position limits by {excess}."
-            )
+            yield Verdict("warn", f"**{title(e.joint)}**, {source_label(e)}: exceeds its position limits by {excess}.")
     yield coefficients(context, excitations)
     for joint in dict.fromkeys(e.joint for e in excitations):
         yield figure(context, [e for e in excitations if e.joint == joint])

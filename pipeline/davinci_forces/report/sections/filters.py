@@ -1,6 +1,4 @@
-"""How the external effort is found: what the filter assumes, what its deviation is made of, and what other filters make
-of the same run.
-"""
+"""The filter: its assumed noise, the parts of its standard deviation, and a comparison with other filters."""
 
 from collections.abc import Iterator
 
@@ -11,7 +9,7 @@ from davinci_forces.records import Comparison, FilterNoise, Track
 from davinci_forces.report.content import Block, Cell, Figure, Line, OnScreen, Panel, Prose, Section, Table, literal
 from davinci_forces.report.context import Context, label, title
 
-SHOWN = 8.0  # [s] of a run, in which filters can be told apart
+SECONDS_DRAWN = 8.0  # [s] of a run, few enough to see differences of filters
 DRAWN = {
     "direct": ("grey", "dotted"),
     "momentum": ("green", "dashdot"),
@@ -22,8 +20,8 @@ DRAWN = {
 
 def section(context: Context) -> Section | None:
     """Tuning, budget and comparison, where anything was tracked."""
-    found = tuple(blocks(context))
-    return Section("The filter", "filters", found) if found else None
+    content = tuple(blocks(context))
+    return Section("The filter", "filters", content) if content else None
 
 
 def blocks(context: Context) -> Iterator[Block]:
@@ -32,25 +30,26 @@ def blocks(context: Context) -> Iterator[Block]:
     if not noises:
         return
     yield Prose(
-        "The noise that the filter assumes of position, velocity and effort is that of the greatest likelihood of its "
-        "innovations in identification logs, where nothing touches the robot. How fast the external effort may walk "
-        "is not asked of such data, which would make the filter deaf: it is the slowest walk with which a push, a "
-        "half-sine of 1 s, shows 90 % of its peak at most 0.1 s late ([@filter-tuning])."
+        "The filter assumes noise of position, velocity and effort. Its size maximises the likelihood of the "
+        "innovations (each measurement minus its prediction) in identification logs, where nothing touches the robot. "
+        "The external effort is a random walk. Such logs cannot tell how fast it may change: a filter tuned to them "
+        "would miss pushes. So the walk is the slowest with which a push, a half-sine of 1 s, shows 90 % of its peak "
+        "at most 0.1 s late ([@filter-tuning])."
     )
     yield tuning(context, noises)
     worst = [track for noise in noises for track in worst_track(context, noise.joint)]
     if worst:
         yield Prose(
-            "The stated standard deviation of the external effort is the total of independent parts "
-            "([@error-budget]): what the filter says of noise and walk; the model's error, from free motion that no "
-            "fit had seen and of other logs than the one that is judged; what the filter lags behind, by what it "
-            "would miss of the smoothed effort; and the offset of the day, where free windows tell one."
+            "The stated standard deviation of the external effort combines independent parts ([@error-budget]). The "
+            "filter's part comes from noise and random walk. The model's part is its error in free motion of other "
+            "logs that no fit had seen. The lag's part is what the filter misses of the smoothed effort. The offset "
+            "of the day is added where free windows determine one."
         )
         yield budget(context, worst)
-    compared = [c for track in worst for c in context.catalogue.about(Comparison, log=track.log, joint=track.joint)]
-    if compared:
-        yield comparison(context, compared)
-        yield OnScreen("Filters beside each other over time", "filters-over-time", (overlaid(compared),))
+    comparisons = [c for track in worst for c in context.catalogue.about(Comparison, log=track.log, joint=track.joint)]
+    if comparisons:
+        yield comparison(context, comparisons)
+        yield OnScreen("Filters beside each other over time", "filters-over-time", (overlay(comparisons),))
 
 
 def worst_track(context: Context, joint: str) -> Iterator[Track]:
@@ -60,7 +59,7 @@ def worst_track(context: Context, joint: str) -> Iterator[Track]:
 
 
 def tuning(context: Context, noises: list[FilterNoise]) -> Table:
-    """What was tuned, and on what."""
+    """The tuned noise of each joint, and the logs that it was tuned on."""
     rows: tuple[tuple[Cell, ...], ...] = tuple(
         (
             title(noise.joint),
@@ -69,21 +68,21 @@ def tuning(context: Context, noises: list[FilterNoise]) -> Table:
         )
         for noise in noises
     )
-    caption = "What the filter assumes (standard deviations of a sample; the walk per root of a second)."
+    caption = "Noise that the filter assumes (standard deviations of a sample; the walk per square root of a second)."
     return Table(
         caption, ("Joint", "Position", "Velocity", "Effort", "Walk", "Tuned on"), rows, "filter-tuning", "lrrrrl"
     )
 
 
 def budget(context: Context, tracks: list[Track]) -> Table:
-    """What the deviation of each joint's worst free run is made of, beside what that run shows."""
+    """The parts of the standard deviation of each joint's worst free run, beside the RMS and coverage of that run."""
     names = ("filter_part", "model_part", "lag_part", "free_rms", "coverage")
     rows: tuple[tuple[Cell, ...], ...] = tuple(
         (title(t.joint), literal(t.log), *context.numbers(f"ekf.{t.log}.{t.joint}", names, 2)) for t in tracks
     )
-    header = ("Joint", "Worst free run", "Filter", "Model", "Lag", "RMS found", "Covered by 95 % band")
+    header = ("Joint", "Worst free run", "Filter", "Model", "Lag", "RMS", "Covered by 95 % band")
     return Table(
-        "Parts of the standard deviation (root mean squares), and what was found.",
+        "Parts of the standard deviation (root mean squares), beside the RMS and the coverage of the run.",
         header,
         rows,
         "error-budget",
@@ -95,8 +94,8 @@ def comparison(context: Context, compared: list[Comparison]) -> Table:
     """Every filter on the worst free run of each joint."""
     rows = tuple(compared_row(context, c) for c in compared)
     caption = (
-        "Filters compared on the worst free run of each joint, each with the slowest walk that shows a push: what is "
-        "left of free motion, and a push added to the recorded effort in software."
+        "Filters compared on the worst free run of each joint, each with the slowest walk that shows a push: their "
+        "external effort in free motion, and their response to a push that is added to the recorded effort in software."
     )
     return Table(
         caption,
@@ -120,14 +119,14 @@ def name_of(label: str) -> str:
     return filters.title(name) if name in filters.FILTERS else "The same, own terms only"
 
 
-def overlaid(compared: list[Comparison]) -> Figure:
+def overlay(compared: list[Comparison]) -> Figure:
     """Some filters in the middle of the same run, joint by joint."""
     joints = list(dict.fromkeys(c.joint for c in compared))
     panels = tuple(panel([c for c in compared if c.joint == joint], i == 0) for i, joint in enumerate(joints))
     return Figure(
-        "External effort of free motion by four filters, which should be 0: the smoother has no delay, and the model's "
-        "error is in all of them.",
-        f"External effort by four filters over {SHOWN:g} s of the worst free run of {len(joints)} joints.",
+        "External effort in free motion by four filters. It should be 0; the rest is the model's error, which all of "
+        "them share. The smoother has no delay.",
+        f"External effort by four filters over {SECONDS_DRAWN:g} s of the worst free run of {len(joints)} joints.",
         panels,
         "filters-figure",
         columns=1,
@@ -138,9 +137,9 @@ def overlaid(compared: list[Comparison]) -> Figure:
 def panel(compared: list[Comparison], named: bool) -> Panel:
     """One joint."""
     by_name = {c.filter: c for c in compared}
-    some = [by_name[name] for name in DRAWN if name in by_name]
-    middle = float(np.mean(some[0].t))
-    near = np.abs(some[0].t - middle) <= 0.5 * SHOWN
-    lines = tuple(Line(c.t[near], c.tau_ext[near], name_of(c.filter) if named else "", *DRAWN[c.filter]) for c in some)  # type: ignore[arg-type]
-    heading = f"{title(some[0].joint)} in {some[0].log}"
-    return Panel(heading, "time [s]", label(some[0], "tau_ext", "external effort"), lines)
+    drawn = [by_name[name] for name in DRAWN if name in by_name]
+    middle = float(np.mean(drawn[0].t))
+    near = np.abs(drawn[0].t - middle) <= 0.5 * SECONDS_DRAWN
+    lines = tuple(Line(c.t[near], c.tau_ext[near], name_of(c.filter) if named else "", *DRAWN[c.filter]) for c in drawn)  # type: ignore[arg-type]
+    heading = f"{title(drawn[0].joint)} in {drawn[0].log}"
+    return Panel(heading, "time [s]", label(drawn[0], "tau_ext", "external effort"), lines)

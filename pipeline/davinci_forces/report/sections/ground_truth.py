@@ -1,4 +1,4 @@
-"""Comparison of a simulated study with its ground truth, which nothing but the report ever sees."""
+"""Comparison of a simulated study with its ground truth, which only the report reads."""
 
 from collections.abc import Iterator
 from typing import Any
@@ -38,9 +38,9 @@ def section(context: Context) -> Section | None:
 def blocks(context: Context) -> Iterator[Block]:
     """The section's content."""
     yield Prose(
-        "This study is simulated, so the ground truth is known. It is stored with the logs, no stage reads it, and "
-        "this section compares with it: parameters where the simulated friction is what the model says, and external "
-        "efforts everywhere."
+        "This study is simulated, so the ground truth is known. It is stored with the logs, but no stage of the "
+        "analysis reads it. This section compares external efforts with it, and parameters where the simulated "
+        "friction is that of the model."
     )
     yield from of_friction(context)
     for joint, path, theta in true_parameters(context):
@@ -67,10 +67,10 @@ def of_friction(context: Context) -> Iterator[Block]:
         return
     yield Prose(
         f"**What friction does to a fit.** Parameters are identified from the recordings {literal(', '.join(fitted))}, "
-        "whose friction differs by direction, rises near rest and gives way before it slides. The true parameters "
-        f"below are those of the recordings {literal(', '.join(matched))}, which differ in nothing but friction: there "
-        "it is what the models say. So what an estimate is off by is what such friction does to it, and the standard "
-        "errors are as wide as they are because the residual repeats in every period."
+        "whose friction differs by direction, rises near rest and yields elastically before it slides. The true "
+        f"parameters below are those of the recordings {literal(', '.join(matched))}, which differ in friction only: "
+        "theirs is that of the models. So the error of an estimate is the effect of such friction. The standard errors "
+        "are wide because the residual repeats in every period."
     )
     yield errors_by_family(context, family)
 
@@ -129,7 +129,7 @@ def effort_figure(track: Track, pushes: list[Push]) -> Figure:
     name = run_name(track.log, track.joint)
     marks = (Line(track.t, track.tau_ext, "filter", "vermillion"), Line(t, effort, "true", "black"))
     return Figure(
-        f"{name}: external effort tracked by the filter, and true external effort.",
+        f"{name}: external effort by the filter, and the true one.",
         f"External effort over time for {name}, tracked and true.",
         (Panel("External effort", "time [s]", label(track, "tau_ext", "external effort"), marks),),
         height=42,
@@ -147,19 +147,21 @@ def true_effort(pushes: list[Push], end: float) -> tuple[Any, Any]:
 
 
 def tip_forces(context: Context) -> Iterator[Block]:
-    """The force at the tip, found and true; nothing of a study in which nothing pushed the tip."""
+    """The force at the tip, estimated and true; nothing where no push of a simulation is at the tip."""
     pushed = {log["name"]: pushes for log in context.study.truth.get("log", []) if (pushes := at_the_tip(log))}
-    found = [(contact, pushed[contact.log]) for contact in context.catalogue.all(TipContact) if contact.log in pushed]
+    contacts = [
+        (contact, pushed[contact.log]) for contact in context.catalogue.all(TipContact) if contact.log in pushed
+    ]
     pairs = [
         (contact, i, push)
-        for contact, pushes in found for i in range(len(contact)) for push in pushes if meet(contact, i, push)
+        for contact, pushes in contacts for i in range(len(contact)) for push in pushes if meet(contact, i, push)
     ]  # fmt: skip
     if pairs:
-        yield compared(context, pairs)
-        yield judged([size for pair in pairs for size in off(*pair)])
+        yield comparison(context, pairs)
+        yield verdict([size for pair in pairs for size in errors_in_deviations(*pair)])
     forces = [force for force in context.catalogue.all(TipForce) if force.log in pushed]
     figures = [force_figure(force, pushed[force.log]) for force in forces]
-    yield from first_on_paper(figures, "Force at the tip, found and true, in other logs", "more-tip-truth")
+    yield from first_on_paper(figures, "Force at the tip, estimated and true, in other logs", "more-tip-truth")
 
 
 def at_the_tip(log: dict[str, Any]) -> list[Push]:
@@ -177,48 +179,53 @@ def force_of(push: Push) -> list[float]:
     return [push["peak"] * part for part in push["direction"]]
 
 
-def off(contact: TipContact, i: int, push: Push) -> list[float]:
-    """By how many of its standard deviations each component is off."""
+def errors_in_deviations(contact: TipContact, i: int, push: Push) -> list[float]:
+    """The error of each component in standard deviations."""
     names = zip(COMPONENTS, force_of(push), strict=True)
     return [abs(float(getattr(contact, f)[i]) - true) / float(getattr(contact, f"{f}_std")[i]) for f, true in names]
 
 
-def compared(context: Context, pairs: list[tuple[TipContact, int, Push]]) -> Table:
+def comparison(context: Context, pairs: list[tuple[TipContact, int, Push]]) -> Table:
     """One row a push."""
     rows: list[tuple[Cell, ...]] = []
     for contact, i, push in pairs:
         true = (f"{x:.3g}".replace("-", MINUS) for x in force_of(push))
         numbers = context.numbers(f"tip.{contact.log}.{i + 1}", COMPONENTS)
-        rows.append((literal(contact.log), str(i + 1), *true, *numbers, f"{max(off(contact, i, push)):.1f}"))
+        rows.append(
+            (literal(contact.log), str(i + 1), *true, *numbers, f"{max(errors_in_deviations(contact, i, push)):.1f}")
+        )
     return Table(
-        "The force at the tip where it is largest in each contact [N], true and found, and by how many of its standard "
-        "deviations the worst component is off. The true one is the largest of the push, at its own time.",
-        ("Log", "Contact", *(f"true ${f}$" for f in COMPONENTS), *(f"${f}$" for f in COMPONENTS), "Off"),
+        "The largest force at the tip in each contact [N], true and estimated, and the error of the worst component in "
+        "standard deviations. The true force is the largest of the push, at its own time.",
+        ("Log", "Contact", *(f"true ${f}$" for f in COMPONENTS), *(f"${f}$" for f in COMPONENTS), "Error"),
         tuple(rows),
         "tip-truth",
         "llrrrrrrr",
     )
 
 
-def judged(errors: list[float]) -> Verdict:
-    """Whether the stated deviations are what the errors are."""
+def verdict(errors: list[float]) -> Verdict:
+    """Whether the errors agree with the stated standard deviations."""
     inside = sum(error <= NORMAL_95 for error in errors)
-    said = f"{inside} of {count(len(errors), 'component')} lie within their 95 % interval"
     level: Level = "good" if max(errors) < WITHIN else "bad"
-    return Verdict(level, f"**Force at the tip**: {said}; the worst is {max(errors):.1f} standard deviations off.")
+    return Verdict(
+        level,
+        f"**Force at the tip**: the worst of {count(len(errors), 'component')} is {max(errors):.1f} standard "
+        f"deviations from the truth, where {WITHIN:g} are allowed; {inside} lie within their 95 % interval.",
+    )
 
 
 def force_figure(force: TipForce, pushes: list[Push]) -> Figure:
-    """The components of the force, found and true."""
+    """The components of the force, estimated and true."""
     panels = []
     for k, name in enumerate(COMPONENTS):
         along = [push | {"peak": force_of(push)[k]} for push in pushes]
         t, true = true_effort(along, float(force.t[-1]))
-        marks = (Line(force.t, getattr(force, name), "found", "vermillion"), Line(t, true, "true", "black"))
+        marks = (Line(force.t, getattr(force, name), "estimated", "vermillion"), Line(t, true, "true", "black"))
         panels.append(Panel(f"Along {name[-1]}0", "time [s]", label(force, name, "force"), marks))
     return Figure(
-        f"{literal(force.log)}: force at the tip, found and true.",
-        f"Components of the force at the tip over time in {literal(force.log)}, found and true.",
+        f"{literal(force.log)}: force at the tip, estimated and true.",
+        f"Components of the force at the tip over time in {literal(force.log)}, estimated and true.",
         tuple(panels),
         columns=3,
         height=42,

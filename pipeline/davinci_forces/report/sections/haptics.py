@@ -1,4 +1,4 @@
-"""A simulated hand that feels the tissue through the arm: what it feels over time, how truly, and its margins."""
+"""A simulated hand with haptic feedback from the tissue: forces over time, their fidelity, and stability margins."""
 
 from collections.abc import Iterator
 
@@ -26,11 +26,11 @@ from davinci_forces.report.content.marks import AnyMark
 from davinci_forces.report.context import Context, title
 
 MM, MS = 1e3, 1e3
-SHOWN = 300  # samples of a run that are drawn
+SAMPLES_DRAWN = 300  # of a run
 
 
 def section(context: Context) -> Section | None:
-    """The haptic loop, where one was simulated."""
+    """The haptic loop; None where none was simulated."""
     runs = context.catalogue.all(HapticRun)
     return Section("Haptic loop, simulated", "haptics", tuple(blocks(context, runs))) if runs else None
 
@@ -40,68 +40,76 @@ def blocks(context: Context, runs: list[HapticRun]) -> Iterator[Block]:
     yield from (verdict(context, run) for run in runs)
     responses = context.catalogue.all(HapticResponse)
     yield OnScreen(
-        "The haptic loop, simulated: what each hand feels, how true it is, and its margins",
+        "The haptic loop, simulated: the force that each hand feels, its error, and its stability margins",
         "haptic-loop",
         (
-            Prose(told(context, responses)),
-            *(traces(run) for run in runs),
-            *(response(one) for one in responses),
+            Prose(experiment(context, responses)),
+            *(traces(context, run) for run in runs),
+            *(response_figure(response) for response in responses),
             margins(context, runs),
         ),
     )
 
 
 def verdict(context: Context, run: HapticRun) -> Verdict:
-    """Whether a hand is stable against the tissue, and where its limit is."""
-    key, name = f"haptics.{run.hand}", f"**Simulated**, hand “{literal(run.hand)}”"
+    """Whether a hand is stable against the tissue, and the stiffest tissue against which it is."""
+    key, name = f"haptics.{run.hand}", f"**Simulated**, hand “{hand_name(context, run)}”"
     limit, margin = context.numbers(key, ("k_t_settles", "stiffness_margin"), 2)
     where = f"it settles against tissue up to {limit}, {margin} times the measured one"
     if not run.k_t_settles > 0.0:
         where = "no limit of the tissue's stiffness was found"
     if run.out_of_reach:
-        return Verdict("warn", f"{name}: **unstable**, thrown out of the device's reach at {run.t[-1]:.1f} s; {where}.")
+        return Verdict("warn", f"{name}: **unstable**, leaves the reach of the device at {run.t[-1]:.1f} s; {where}.")
     stable = run.delay_margin != 0.0  # NaN where no delay was found that it does not bear
     off = context.number(f"{key}.felt_error", 2)
-    said = "stable" if stable else "goes in and out within reach, but is **unstable** when it stays in the tissue"
-    return Verdict("good" if stable else "warn", f"{name}: {said}; {where}; what it feels is off by {off} (rms).")
+    motion = "stable" if stable else "goes in and out within reach, but is **unstable** when it stays in the tissue"
+    return Verdict("good" if stable else "warn", f"{name}: {motion}; {where}. The felt force errs by {off} (rms).")
 
 
-def told(context: Context, responses: list[HapticResponse]) -> str:
-    """What was simulated."""
-    said = (
-        "**Simulated**, not recorded: the experiment of the thesis's section 8.4. A hand, mass on spring and damper "
-        "(8.2), holds the haptic device; its position crosses the link to the arm, whose cascaded controllers follow "
-        "it against friction and tissue; of the arm's position, velocity and current the extended Kalman filter makes "
-        "a force, one sample at a time, as it does in all logs; and that crosses the link back and is held by the "
-        "device until the next message."
+def experiment(context: Context, responses: list[HapticResponse]) -> str:
+    """Describe the simulated experiment."""
+    thesis = context.compares_with_thesis
+    text = (
+        f"This is **simulated**, not recorded{': the experiment of the thesis’s section 8.4' if thesis else ''}. A "
+        "hand (a mass on a spring and a damper) holds the haptic device. A link sends its position to the arm, whose "
+        "cascaded controllers follow it against friction and tissue. The extended Kalman filter estimates the force "
+        "from the arm's position, velocity and current, one sample at a time, as in all logs. The link sends this "
+        "force back, and the device holds it until the next message."
     )
     if not responses:
-        return said
-    one = responses[0]
-    arm = {"the thesis": "as in the thesis", "the scenario": "of the scenario"}.get(
-        one.arm_from, f"as the fit of the {title(one.arm_from).lower()} has it, which the filter knows, too"
-    )
+        return text
+    response = responses[0]
+    arm = {
+        "the thesis": "that of the thesis" if thesis else "an assumed one",
+        "the scenario": "that of the scenario",
+    }.get(response.arm_from, f"that of the fit of the {title(response.arm_from).lower()}, which the filter uses, too")
     names = ("tissue_stiffness", "rendered_stiffness", "at_frequency", "felt_delay")
     true, felt, frequency, late = context.numbers("haptics", names)
     return (
-        f"{said}\n\nWhat slides is {arm}: the model's error on the real arm comes on top. Tissue of {true} feels like "
-        f"{felt} to a hand that moves at {frequency}, {late} late. A hand in contact that no longer settles swings "
-        "ever further, or without end, when it lets go of a quarter of its push. The limit by simulation knows the "
-        "arm's friction, which makes the felt force hunt near rest; the one by response takes the loop as linear. Both "
-        "count the damping of the tissue, which limits of delay alone leave out. Your own numbers: `davinci-forces "
+        f"{text}\n\nThe model of the slide is {arm}; the model's error on the real arm is not included. To a hand that "
+        f"moves at {frequency}, tissue of {true} feels like {felt}, with a delay of {late}. A hand settles if its "
+        "oscillation dies out after it releases a quarter of its push. The limit by simulation includes the arm's "
+        "friction, which makes the felt force hunt near rest. The limit by response takes the loop as linear. Both "
+        "include the damping of the tissue; limits by delay alone leave it out. Try your own numbers: `davinci-forces "
         "haptics --help`."
     )
 
 
-def traces(run: HapticRun) -> Figure:
+def hand_name(context: Context, run: HapticRun) -> str:
+    """The name of a hand; the default one is the thesis's, but only its simulations say so."""
+    return "default" if run.hand == "thesis" and not context.compares_with_thesis else literal(run.hand)
+
+
+def traces(context: Context, run: HapticRun) -> Figure:
     """Fig 8.12 of one hand: positions above, forces below, contact shaded."""
-    few = slice(None, None, max(len(run) // SHOWN, 1))
+    few = slice(None, None, max(len(run) // SAMPLES_DRAWN, 1))
     t = run.t[few]
     shaded = tuple(spans(run))
     ends = " The run ends where the hand leaves the device's reach." if run.out_of_reach else ""
     return Figure(
-        f"Simulated, hand “{literal(run.hand)}” in and out of the tissue, contact shaded: where it would be if it felt "
-        f"nothing, where it is and where the arm is, from the tissue's surface; and the true and the felt force.{ends}",
+        f"Simulated, hand “{hand_name(context, run)}” in and out of the tissue, contact shaded. Positions from the "
+        "surface of the tissue: the plan (without force feedback), the hand and the arm. Forces: the true and the felt "
+        f"one.{ends}",
         f"Positions of hand and arm over {run.t[-1] - run.t[0]:.0f} s, and below them a true force of at most "
         f"{run.true_peak:.2g} N and a felt one of at most {run.felt_peak:.2g} N.",
         (
@@ -141,23 +149,21 @@ def spans(run: HapticRun) -> Iterator[AnyMark]:
         yield VSpan(float(run.t[start]), float(run.t[min(end, len(run) - 1)]), "" if i else "contact")
 
 
-def response(one: HapticResponse) -> Figure:
-    """How much of the tissue is felt, and how late."""
+def response_figure(response: HapticResponse) -> Figure:
+    """The share of the tissue's stiffness that a hand feels, and the delay, over frequency."""
 
-    def panel(name: str, unit: str, y: Array, *others: AnyMark) -> Panel:
-        at = VLine(one.at_frequency)
-        return Panel(
-            name, "frequency [Hz]", unit, (Line(one.frequency, y, "", "blue", "solid"), at, *others), x_log=True
-        )
+    def panel(name: str, unit: str, y: Array, *marks: AnyMark) -> Panel:
+        line, at = Line(response.frequency, y, "", "blue", "solid"), VLine(response.at_frequency)
+        return Panel(name, "frequency [Hz]", unit, (line, at, *marks), x_log=True)
 
     return Figure(
-        "Simulated: the stiffness that a hand feels over the one that there is, by the frequency of its motion in the "
-        "tissue; and how late.",
-        f"Two curves over frequency: the felt share of the stiffness, {one.felt_share.min():.2f} to "
-        f"{one.felt_share.max():.2f}, and its delay, at most {MS * one.felt_late.max():.0f} ms.",
+        "Simulated: the felt stiffness over the true one, and the delay of the felt force, over the frequency of the "
+        "hand's motion in the tissue.",
+        f"Two curves over frequency: the felt share of the stiffness, {response.felt_share.min():.2f} to "
+        f"{response.felt_share.max():.2f}, and its delay, at most {MS * response.felt_late.max():.0f} ms.",
         (
-            panel("Felt stiffness over true", "share", one.felt_share, HLine(1.0)),
-            panel("How late it is felt", "delay [ms]", MS * one.felt_late),
+            panel("Felt stiffness over true", "share", response.felt_share, HLine(1.0)),
+            panel("Delay of the felt force", "delay [ms]", MS * response.felt_late),
         ),
         "haptic-response",
         columns=2,
@@ -171,14 +177,14 @@ def margins(context: Context, runs: list[HapticRun]) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for run in runs:
         cells = context.numbers(f"haptics.{run.hand}", (*names, "delay_margin"))
-        rows.append((literal(run.hand), *cells))
+        rows.append((hand_name(context, run), *cells))
     header = (
-        "Hand", "Mass", "$b_H$", "$K_H$", "True peak", "Felt peak", "Settles up to", "By response", "Delay it bears",
+        "Hand", "Mass", "$b_H$", "$K_H$", "True peak", "Felt peak", "Settles up to", "By response", "Delay margin",
     )  # fmt: skip
     return Table(
         "Simulated hands: peaks of the true and the felt force; the stiffest tissue that each settles against, by "
-        "simulation and by the response of the loop; and how much later still the force may come, 0 where it is late "
-        "enough to be unstable. A dash is where no limit was found.",
+        "simulation and by the response of the loop; and the delay that may be added before the hand is unstable (0: "
+        "it is unstable already). A dash marks that no limit was found.",
         header,
         tuple(rows),
         "haptic-margins",

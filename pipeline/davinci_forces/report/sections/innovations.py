@@ -1,4 +1,4 @@
-"""Whether the filter's innovations are white, and by what they are when not."""
+"""Tests whether the filter's innovations are white, and the causes where they are not."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -43,14 +43,14 @@ def blocks(context: Context, explained: list[Explanation]) -> Iterator[Block]:
     """The section's content."""
     assumed = " ([@filter-assumptions])" if context.catalogue.all(Track) else ""
     yield Prose(
-        "An innovation is what a measurement adds to what the filter had predicted. Innovations are white where model "
-        "and noise are what the filter takes them for. Each run is tested whole, but for its first second, by the "
-        "autocorrelation and the cumulative periodogram of both innovations ([@thresholds]). Where it fails, one cause "
-        "after the other is taken away, as few at once as will do: contact and reversals are left out; the walk, "
-        "the size of the noise, its colour, the times of the samples and the model are replaced by what this very log "
-        "makes likeliest. A cause is named only where all tests pass without it, with a hundred times the "
-        "probability, and where as many samples at other times still fail. The filter's walk is chosen to show "
-        f"pushes{assumed}, which free motion does not ask for: that alone colours its innovations a little.\n\n"
+        "An innovation is a measurement minus its prediction by the filter. Innovations are white (uncorrelated over "
+        "time) if model and noise are as the filter assumes. Each run is tested whole, except for its first second, by "
+        "the autocorrelation and the cumulative periodogram (power summed over frequency) of both innovations "
+        "([@thresholds]). If a run fails, possible causes are removed one after the other, as few at once as suffice. "
+        "Contact and reversals are left out. The walk, the size of the noise, its colour, the times of the samples and "
+        "the model are replaced by the likeliest for this log. A cause is named only if all tests pass without it with "
+        "a hundred times the probability, and if as many samples at other times still fail. The filter's walk is "
+        f"chosen to show pushes{assumed}; free motion does not need it, so it colours the innovations a little.\n\n"
         + summary(explained)
     )
     yield from listed(verdicts(context, explained))
@@ -73,12 +73,12 @@ def blocks(context: Context, explained: list[Explanation]) -> Iterator[Block]:
 def summary(explained: list[Explanation]) -> str:
     """How many runs are white, and how many are explained."""
     counts = Counter(e.finding for e in explained)
-    said = [
+    findings = [
         f"{counts[finding]} {'is' if counts[finding] == 1 else 'are'} {words}"
         for finding, words in FINDINGS.items()
         if counts[finding]
     ]
-    return f"Of {count(len(explained), 'run')} of moving joints, {', '.join(said)}."
+    return f"Of {count(len(explained), 'run')} of moving joints, {', '.join(findings)}."
 
 
 def is_worst(context: Context, e: Explanation) -> bool:
@@ -99,10 +99,10 @@ def verdicts(context: Context, explained: list[Explanation]) -> Table:
         for e in explained
     )
     band = max((i.nis_high - 1.0 for i in context.catalogue.all(Innovation)), default=0.0)
-    within = f"; of white ones it is within {band:.2f} of 1 in 95 of 100 runs" if band else ""
+    within = f" White innovations are within {band:.2f} of 1 in 95 of 100 runs." if band else ""
     return Table(
-        "Are the innovations white, and by what not? NIS: the mean square of each innovation over its stated variance, "
-        f"which is 1 where that is right{within}.",
+        "Are the innovations white, and if not, why? NIS (normalised innovation squared): the mean square of each "
+        f"innovation over its stated variance, which is 1 if that variance is right.{within}",
         ("Log", "Joint", "NIS of $q$", "NIS of $dot(q)$", "Verdict"),
         rows,
         "innovation-verdicts",
@@ -115,9 +115,10 @@ def tests(context: Context, explained: list[Explanation]) -> Table:
     rows = tuple((literal(e.log), title(e.joint), *statistics(context, f"ekf.{e.log}.{e.joint}")) for e in explained)
     header = ("Log", "Joint", "NIS", "ACF(1) of $q$", "of $dot(q)$", "Ljung-Box, $q$", "$dot(q)$")
     return Table(
-        "The filter's innovations: normalised innovation squared of both (expected: 2), first autocorrelations, "
-        "the probabilities of a larger Ljung-Box statistic and of a cumulative periodogram that strays farther, if "
-        "they were white; and by how much the times of samples are off, where other joints of the log can tell.",
+        "The filter's innovations: normalised innovation squared (NIS) of both together (expected: 2) and first "
+        "autocorrelations (ACF). The probabilities are those of a larger Ljung-Box statistic, and of a cumulative "
+        "periodogram farther from the line, if the innovations were white. Times: the error of the sample times, where "
+        "other joints of the log show it.",
         (*header, "Periodogram, $q$", "$dot(q)$", "Times"),
         rows,
         "innovation-table",
@@ -136,7 +137,7 @@ def statistics(context: Context, prefix: str) -> tuple[Cell, ...]:
 
 
 def trials(e: Explanation) -> Table:
-    """What was taken away of a run, and what the tests then said; the most telling first."""
+    """The results of the tests without each cause, the largest probability first."""
     least = least_probability(e)
     order = [0, *sorted(range(1, len(e)), key=lambda i: -least[i])]
     rows = tuple(
@@ -144,14 +145,14 @@ def trials(e: Explanation) -> Table:
             literal(str(e.without[i])),
             str(e.left[i]),
             f"{e.walk[i]:.3g}",
-            printed(least[i]),
+            probability_text(least[i]),
             "●" if e.explains[i] else "",
         )
         for i in order
     )
     return Table(
-        f"{title(e.joint)} in {literal(e.log)}: what was left out or mended, the samples left to test, the walk over "
-        "the one in use, and the smallest probability of all tests; ● explains.",
+        f"{title(e.joint)} in {literal(e.log)}: the cause that was removed, the samples left to test, the walk over "
+        "the one in use, and the smallest probability of all tests. A ● marks causes that explain the run.",
         ("Without", "Samples", "Walk", "Smallest $p$", "Explains"),
         rows,
         f"trials-{e.log}-{e.joint}",
@@ -164,8 +165,8 @@ def least_probability(e: Explanation) -> Column:
     return np.asarray(np.min([e.ljung_box_p_q, e.ljung_box_p_dq, e.periodogram_p_q, e.periodogram_p_dq], axis=0))
 
 
-def printed(probability: float) -> str:
-    """A probability of a trial."""
+def probability_text(probability: float) -> str:
+    """A probability as it is printed."""
     return f"{probability:.2g}" if probability >= 0.001 else "< 0.001"
 
 
@@ -183,13 +184,13 @@ def figure(context: Context, e: Explanation, whole: bool) -> Figure:
             for field, of in SIGNALS
             if field in white
         ),
-        tuple(cumulated(white[field], of) for field, of in more if field in white),
+        tuple(periodogram(white[field], of) for field, of in more if field in white),
         tuple(with_motion(moved[field], of) for field, of in more if field in moved),
     ]
     firsts = " and ".join(f"{w.acf1:.2f}" for field, _ in SIGNALS if (w := white.get(field)))
     return Figure(
         f"{name}, the worst free run of this joint: innovations, their autocorrelation and cumulative periodogram with "
-        "what 95 % (grey) and 99 % (blue) of white noise stay within, and their correlation with the motion before."
+        "the bands of 95 % (grey) and 99 % (blue) of white noise, and their correlation with the motion before."
         if whole
         else f"{name}: autocorrelation of the innovations.",
         f"{name}: the innovations have first autocorrelations of {firsts or 'unknown size'}; verdict: {e.verdict}.",
@@ -201,13 +202,13 @@ def figure(context: Context, e: Explanation, whole: bool) -> Figure:
 
 
 def over_time(t: Track, field: str, of: str) -> Panel:
-    """An innovation over time, settled."""
+    """An innovation over time, once the filter has converged."""
     late = t.t - t.t[0] >= 1.0 if t.t[-1] - t.t[0] > 5 else t.t >= t.t[0]
     marks = (Line(t.t[late], getattr(t, field)[late], "", "blue"),)
     return Panel(f"{of.capitalize()} innovation", "time [s]", label(t, field, "innovation"), marks)
 
 
-def cumulated(w: Whiteness, of: str) -> Panel:
+def periodogram(w: Whiteness, of: str) -> Panel:
     """A cumulative periodogram less the straight line of white noise, with its bands."""
     marks: tuple[AnyMark, ...] = (
         HBand(-w.periodogram_band_99, w.periodogram_band_99, "", "sky"),

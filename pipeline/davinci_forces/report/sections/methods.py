@@ -1,4 +1,4 @@
-"""How the numbers were made, with the equations."""
+"""The methods behind the numbers, with their equations."""
 
 from collections.abc import Iterator
 
@@ -51,7 +51,7 @@ METHODS: tuple[tuple[type[Record], tuple[Block, ...]], ...] = (
     (LogSummary, (
         Prose(
             "**From the motor to the joint.** Logs of the motor side are carried to the joint through the gear ratio "
-            "$eta$ and the torque constant $K_m$; logs of the joint side are used as they are.{in_current}"
+            "$eta$ and the torque constant $K_m$; logs of the joint side are used unchanged.{in_current}"
         ),
         Equation(
             "q = theta_m / eta, quad tau = eta K_m i",
@@ -61,9 +61,9 @@ METHODS: tuple[tuple[type[Record], tuple[Block, ...]], ...] = (
     )),
     (Average, (
         Prose(
-            "**Periods.** The period is the shortest lag after which all moving joints repeat, refined until the "
-            "harmonics of the excitation fit the positions best. A sample rarely falls on a phase of the averaged "
-            "period exactly: a smooth harmonic fit carries it there, and what the fit leaves is averaged over the "
+            "**Periods.** The period is the shortest lag after which all moving joints repeat their motion. It is "
+            "refined until the harmonics of the excitation fit the positions best. Samples rarely fall on the phases "
+            "of the averaged period. A smooth harmonic fit moves them there, and its residual is averaged over the "
             "$N_p$ periods. The variance between periods is that of one period; the mean's is smaller by $N_p$."
         ),
         Equation(
@@ -75,8 +75,8 @@ METHODS: tuple[tuple[type[Record], tuple[Block, ...]], ...] = (
     )),
     (Trajectory, (
         Prose(
-            "**Differentiation.** Only the harmonics of the excitation are kept of the averaged position, by "
-            "projection on the harmonics, and differentiated exactly."
+            "**Differentiation.** The averaged position is projected on the harmonics of the excitation, which are "
+            "differentiated exactly."
         ),
         Equation(
             "cal(F)[(dif^n overline(q)) / (dif t^n)] = (j omega)^n Q(omega)",
@@ -93,10 +93,10 @@ METHODS: tuple[tuple[type[Record], tuple[Block, ...]], ...] = (
     (Fit, (
         Prose(
             "**Identification.** The model of each joint is linear in its parameters. Least squares gives every "
-            "averaged sample the same weight; weighted least squares gives it the inverse of its variance, pooled over "
+            "averaged sample the same weight. Weighted least squares gives it the inverse of its variance, pooled over "
             "neighbouring samples because the variance between few periods is itself uncertain. Both are solved by "
-            "orthogonal factorisation, never by the normal equations. Consistent parameters are the nearest that some "
-            "mechanism has."
+            "orthogonal factorisation, never by the normal equations. Consistent parameters are the nearest that are "
+            "physically possible."
         ),
         Equation(
             "hat(theta) = arg min_theta norm(W^(1/2) (tau - Phi(q, dot(q), dot.double(q)) theta))^2",
@@ -104,14 +104,14 @@ METHODS: tuple[tuple[type[Record], tuple[Block, ...]], ...] = (
             "parameters",
             "estimation",
         ),
-        Prose('The weights are $W = "diag"(N_p \\/ sigma_tau^2)$; below four periods they are left out.'),
+        Prose('The weights are $W = "diag"(N_p \\/ sigma_tau^2)$. Below four periods they are not used.'),
     )),
     (Track, (
         Prose(
-            "**Filtering.** The state holds position, velocity and external effort, the last as a random walk. Each "
-            "sample is first corrected with its measurement and then carried to the next; the covariance is corrected "
-            "in Joseph's form. The external effort is what the robot exerts on its environment: a mass hung on a "
-            "vertical slide gives a negative one."
+            "**Filtering.** The state holds position, velocity and external effort, the last as a random walk. At each "
+            "sample the state is corrected with the measurement, and then predicted to the next sample. The covariance "
+            "is corrected in Joseph's form. The external effort is what the robot exerts on its environment: a mass on "
+            "a vertical slide gives a negative one."
         ),
         Equation(
             'f(x, tau) = [dot(q), M^(-1) (tau - V - F - G - tau_"ext"), 0]^T, quad A = (partial f) / (partial x), quad '
@@ -131,18 +131,18 @@ METHODS: tuple[tuple[type[Record], tuple[Block, ...]], ...] = (
             "correction",
         ),
         Prose(
-            "The measured effort drives the model, so its noise is process noise, as of an acceleration that is "
-            "constant over a sample. Where the velocity passes through zero, Coulomb friction is what it is on "
-            "average, and the doubt about its sign counts as noise. Contacts are found where the smoothed effort "
-            "(Bierman, 1973) is above what free motion crosses once in ten minutes (Rice, 1944)."
+            "The measured effort is the input of the model, so its noise is process noise, as of an acceleration that "
+            "is constant over a sample. Where the velocity passes through zero, Coulomb friction takes its average, "
+            "and the uncertainty of its sign counts as noise. A contact is found where the smoothed effort (Bierman, "
+            "1973) exceeds the level that free motion crosses once in ten minutes (Rice, 1944)."
         ),
     )),
     (Whiteness, (
         Prose(
-            "**Whiteness** is judged by the autocorrelation, its 95 % band $1.96 \\/ sqrt(N)$, and the Ljung-Box "
-            "statistic over 20 lags; a signal is called white when its probability exceeds 1 %. Innovations have to "
-            "pass by their cumulative periodograms, too, whose distance from a straight line is that of Kolmogorov and "
-            "Smirnov (Bartlett, 1955)."
+            "**Whiteness** is tested by the autocorrelation, its 95 % band $1.96 \\/ sqrt(N)$, and the Ljung-Box "
+            "statistic over 20 lags. A signal is called white if its probability exceeds 1 %. The cumulative "
+            "periodograms of innovations must pass, too, by their Kolmogorov-Smirnov distance from a straight line "
+            "(Bartlett, 1955)."
         ),
     )),
 )  # fmt: skip
@@ -153,17 +153,17 @@ def section(context: Context) -> Section:
     symbols = Table(
         "Symbols.", ("Symbol", "Is", "Unit"), tuple((s, m, u or "–") for s, m, u in SYMBOLS), "symbols", "lll"
     )
-    judged = Table(
-        "Every threshold that a verdict of this report rests on.",
-        ("Judged", "By", "Good", "Caution", "Problem"), thresholds(), "thresholds", "lllll",
+    limits = Table(
+        "The thresholds of all verdicts of this report.",
+        ("Quantity", "Measure", "Good", "Caution", "Problem"), thresholds(), "thresholds", "lllll",
     )  # fmt: skip
     paragraph = Section("A paragraph for a paper", "paragraph", (Listing(paragraph_for_paper(context)),))
     references = Section("References", "references", (Bullets(REFERENCES),))
-    return Section("Methods", "methods", (*blocks(context), judged, symbols, paragraph, references))
+    return Section("Methods", "methods", (*blocks(context), limits, symbols, paragraph, references))
 
 
 def paragraph_for_paper(context: Context) -> str:
-    """What was done, with this study's numbers, to be pasted."""
+    """A paragraph on the method with this study's numbers, to be pasted."""
     settings, robot = context.study.settings, context.study.robot
     fits = context.own_fits()
     joints = ", ".join(dict.fromkeys(fit.group.replace("_", " ") for fit in fits)) or "no joint"
@@ -187,12 +187,14 @@ def in_current(context: Context) -> str:
     joints = [joint.title.lower() for joint in context.study.robot.joints if joint.effort]
     if not joints:
         return ""
-    said = f" Of the {', '.join(joints)} no torque constant is known: effort is the motor's current, in A,"
-    return f"{said} and so are external effort and levels."
+    return (
+        f" No torque constant of the {', '.join(joints)} is known. Their effort is the motor's current in A, and so "
+        "are their external effort and levels."
+    )
 
 
 def blocks(context: Context) -> Iterator[Block]:
-    """What each stage did that made records, in their order."""
+    """The method of each stage that made records, in the order of the stages."""
     settings = context.study.settings
     words = {"lowpass": f"{settings.lowpass:g}", "in_current": in_current(context)}
     for kind, method in METHODS:

@@ -27,8 +27,8 @@ from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.parts import autocorrelation, run_name
 
 SIGNALS = {"q_noise": "position", "dq_noise": "velocity", "tau_noise": "effort"}
-OUTLIER = 3.0  # times the median period's noise, from which on a period is named
-BARS = 24  # periods at most that are drawn one by one
+MIN_OUTLIER = 3.0  # times the median period's noise
+MAX_BARS = 24  # periods drawn one by one
 
 
 def section(context: Context) -> Section | None:
@@ -40,9 +40,9 @@ def section(context: Context) -> Section | None:
 def blocks(context: Context, averages: list[Average]) -> Iterator[Block]:
     """The section's content."""
     yield Prose(
-        "Every identification log repeats one period. Its periods are averaged, and what differs between them is "
-        "taken as noise, slow differences of the path included. The period itself is "
-        "estimated from the longest stretch in which the joints' motion repeats; the remarks say what is left out."
+        "Every identification log repeats one period. Its periods are averaged. Differences between periods are taken "
+        "as noise, even slow differences of the path. The period is estimated from the longest stretch in which the "
+        "joints' motion repeats; remarks name the samples that are left out."
     )
     rows = tuple(
         (
@@ -77,9 +77,9 @@ def tests(context: Context, averages: list[Average]) -> Table:
         for signal, meaning in SIGNALS.items()
     )
     return Table(
-        "Is the noise white and normal? First autocorrelation, and the probabilities of a larger Ljung-Box and "
-        "Jarque-Bera statistic if it were; below 0.01 it is not. Noise of motion that is not white is what a real "
-        "encoder, its derivative and a jittering clock leave; the filter takes it as white.",
+        "Is the noise white (uncorrelated over time) and normal? First autocorrelation (ACF), and the probabilities of "
+        "a larger Ljung-Box and Jarque-Bera statistic if it were. Below 0.01 it is not. Real encoders, their "
+        "derivative and a jittering clock give noise that is not white; the filter takes it as white.",
         header,
         rows,
         "noise-tests",
@@ -101,14 +101,14 @@ def outliers(context: Context, average: Average) -> Iterator[Verdict]:
     for residual in context.catalogue.about(PeriodResidual, log=average.log, joint=average.joint):
         for signal, meaning in SIGNALS.items():
             rms = by_period(residual, average, getattr(residual, signal))
-            loud = [i for i, value in enumerate(rms, 1) if len(rms) > 2 and value > OUTLIER * np.median(rms)]
-            if loud:
-                times = ", ".join(f"{rms[i - 1] / np.median(rms):.1f}" for i in loud[:5])
+            noisy = [i for i, value in enumerate(rms, 1) if len(rms) > 2 and value > MIN_OUTLIER * np.median(rms)]
+            if noisy:
+                times = ", ".join(f"{rms[i - 1] / np.median(rms):.1f}" for i in noisy[:5])
                 name = f"**{run_name(average.log, average.joint)}**"
-                which = f"period{'' if len(loud) == 1 else 's'} {', '.join(map(str, loud[:5]))} of {len(rms)}"
-                said = f"{name}: {meaning} noise of {which} is {times} times that of the median period"
-                settle = "; the arm may still have been settling: see `skip`." if loud[0] == 1 else "."
-                yield Verdict("warn", said + settle)
+                which = f"period{'' if len(noisy) == 1 else 's'} {', '.join(map(str, noisy[:5]))} of {len(rms)}"
+                message = f"{name}: {meaning} noise of {which} is {times} times that of the median period."
+                start = " The arm may not yet have settled: set `skip`." if noisy[0] == 1 else ""
+                yield Verdict("warn", message + start)
 
 
 def by_period(residual: PeriodResidual, average: Average, noise: Column) -> Column:
@@ -138,9 +138,9 @@ def average_figures(context: Context, average: Average) -> Iterator[Block]:
         height=42,
     )
     yield Figure(
-        f"{name}: what averaging removed. Noise period by period, over that of the median period; histogram of the "
-        "effort noise with the normal density of the same standard deviation; normal probability plot of the position "
-        "noise; autocorrelation of the velocity noise with the 95 % band of white noise.",
+        f"{name}: the noise that averaging removed. Noise of each period over that of the median period; histogram of "
+        "the effort noise with the normal density of the same standard deviation; normal probability plot of the "
+        "position noise; autocorrelation of the velocity noise with the 95 % band of white noise.",
         f"{name}: the noise of each period, and its distribution and autocorrelation.",
         tuple(noise_panels(period_residuals[0], average, whiteness)),
         columns=2,
@@ -162,9 +162,9 @@ def one_period(average: Average, signal: Signal) -> Panel:
 def spectrum(s: Spectrum) -> Panel:
     """The spectrum of the position, and the harmonics that are kept of it.  Fig 6.8"""
     shown = slice(0, min(len(s.amplitude), max(4 * s.harmonics, 20)))
-    kept = np.arange(len(s.amplitude)) <= s.harmonics
+    harmonic = np.arange(len(s.amplitude)) <= s.harmonics
     f, a = s.frequency[shown], np.maximum(s.amplitude[shown], 1e-12)
-    k = kept[shown]
+    k = harmonic[shown]
     marks = (Points(f[k], a[k], "kept", "blue"), Points(f[~k], a[~k], "taken as noise", "grey"))
     return Panel("Spectrum of the position", "frequency [Hz]", label(s, "amplitude", "amplitude"), marks, y_log=True)
 
@@ -191,7 +191,7 @@ def noise_panels(residual: PeriodResidual, average: Average, whiteness: dict[str
 
     Fig 6.7, 6.10, 6.11
     """
-    periods = min(average.periods, BARS)
+    periods = min(average.periods, MAX_BARS)
     names = tuple(str(i) for i in range(1, periods + 1))
     bars = []
     for signal, meaning in SIGNALS.items():

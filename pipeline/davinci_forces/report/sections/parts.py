@@ -1,5 +1,6 @@
-"""What several sections share: what is on paper and what on screen, marks of a run, and words."""
+"""Parts that several sections share: tables on paper or on screen, marks of a run, and words."""
 
+import re
 from collections.abc import Iterator, Sequence
 
 from davinci_forces.records import Prediction, Residual, Track, Whiteness
@@ -15,15 +16,15 @@ LEFT_OUT = {
     "leave a segment out": "a segment",
 }
 MEASURES = (
-    "With periods left out, or logs, the error says how well a model describes the motion that it was made of: a "
-    "period repeats the path of the others, so every parameter gains. With path blocks left out, on raw samples, it "
-    "says what to expect on a path that is new; that is larger, and what a model is chosen by."
+    "With periods or logs left out, the error tells how well a model describes the motion that it was fitted to: each "
+    "period repeats the path of the others, so every parameter helps. With path blocks left out, on raw samples, it "
+    "tells what to expect on a new path. That error is larger, and the model is chosen by it."
 )
 
 
 def listed(table: Table, name: str = "", most: int = PAPER) -> Iterator[Block]:
-    """A table as it is, or on screen where it has more rows than paper has room for, under a name or its caption."""
-    name = name or table.caption.partition(";")[0].rstrip(".")
+    """A table on paper, or on screen if it has more rows than `most`, under a name or the start of its caption."""
+    name = name or re.split(r"[;:.?](?: |$)", table.caption)[0]
     yield OnScreen(name, f"all-{table.label}", (table,)) if len(table.rows) > most else table
 
 

@@ -1,4 +1,4 @@
-"""How well the fits predict effort that they have not seen."""
+"""Errors of the fits on efforts that they were not fitted to."""
 
 from collections.abc import Iterator
 
@@ -18,17 +18,17 @@ def section(context: Context) -> Section | None:
 def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     """The section's content."""
     yield Prose(
-        "A fit is judged on data that it has not seen: validation logs, contact logs outside their contact windows, "
-        "and identification logs predicted from refits that leave the log out, with its neighbours where a joint has "
-        "more than 20, or, where it has only one, each of its periods in turn. On the path that was fitted the model's "
-        "error repeats, so such a score flatters. "
-        '$R^2$ is of the raw effort, and noise alone keeps it below its ceiling $1 - sigma^2 \\/ "var"(tau)$; the '
-        "model error is what differs beyond noise. Where a joint of an identification log stands still, friction takes "
-        "any value, and it is not judged; other logs are judged throughout."
+        "A fit is tested on data that it was not fitted to: validation logs, contact logs outside their contact "
+        "windows, and identification logs. These are predicted by refits that leave the log out, together with its "
+        "neighbours where a joint has more than 20. Where a joint has one log only, each of its periods is left out in "
+        "turn. On the path that was fitted the model's error repeats, so scores there are too good. "
+        '$R^2$ is of the raw effort; noise alone keeps it below its ceiling $1 - sigma^2 \\/ "var"(tau)$. The model '
+        "error is the difference beyond noise. Samples of identification logs at which the joint stands still are left "
+        "out, as friction can then take any value; other logs are tested throughout."
     )
     used = [p for p in predictions if f"{p.model}.{p.estimator}" == context.used_fit(p.joint)]
     header = ("Log", "Joint", "Left out", "Path", "Model error", "Of effort", "$R^2$", "Ceiling")
-    caption = "Prediction of unseen effort by the fit that the filter runs with, one row a run."
+    caption = "Prediction of unseen effort by the fit that the filter uses, one row a run."
     yield from listed(Table(caption, header, tuple(row(context, p) for p in used), "prediction-table", "llllrrrr"))
     yield from estimators(context, predictions)
     yield OnScreen("Every score of every fit in every run", "all-scores", (every_score(context, predictions),))
@@ -61,7 +61,7 @@ def every_score(context: Context, predictions: list[Prediction]) -> Table:
         for p in predictions
     )
     header = ("Log", "Joint", "Fit", "RMSE", "RMSE over range", "$R^2$", "Ceiling", "Model error", "Relative error")
-    caption = "Scores of raw effort, and the relative error, which compares low-passed efforts."
+    caption = "Scores of the raw effort, and the relative error of the low-passed effort."
     return Table(caption, header, rows, "scores-table", "lllrrrrrr")
 
 
@@ -72,7 +72,7 @@ def estimators(context: Context, predictions: list[Prediction]) -> Iterator[Tabl
     if len(fits) < 2:
         return
     errors = {fit: [worst(context, predictions, joint, *fit) for joint in joints] for fit in fits}
-    rows = tuple((fit_name(*fit), *found) for fit, found in errors.items() if any(cell != "–" for cell in found))
+    rows = tuple((fit_name(*fit), *cells) for fit, cells in errors.items() if any(cell != "–" for cell in cells))
     caption = "Every fit compared: its model error in the worst unseen run of each joint."
     yield Table(caption, ("Fit", *map(title, joints)), rows, "estimators-table", "l" + "r" * len(joints))
 

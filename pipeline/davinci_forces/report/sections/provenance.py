@@ -14,7 +14,7 @@ PER_LINE = 4  # settings
 
 
 def section(context: Context) -> Section:
-    """Everything needed to tell whether a report is of these files and this code."""
+    """Everything needed to check whether a report comes from these files and this code."""
     return Section("Provenance", "provenance", tuple(blocks(context)))
 
 
@@ -23,10 +23,10 @@ def blocks(context: Context) -> Iterator[Block]:
     provenance, study = context.provenance, context.study
     yield Prose(
         f"Made by davinci-forces {provenance.version}. The report ID on page one is the first half of the SHA-256 of "
-        "`manifest.txt`, which lists raw files, study file, processed files and numbers, each with its own; two "
-        "reports of one ID say the same. `davinci-forces verify --id` shows whether files and pages are those of an "
-        "ID. Every number of the tables is in `results.json` under a key of its own, with the processed file and field "
-        "that it stands in."
+        "`manifest.txt`. This lists raw files, study file, processed files and numbers, each with its own SHA-256. Two "
+        "reports with the same ID have the same content. `davinci-forces verify --id` checks whether files and pages "
+        "are those of an ID. Every number of the tables is in `results.json` under its own key, with the processed "
+        "file and the field that it comes from."
     )
     raw = tuple((literal(file), f"`{sha[:16]}`") for file, sha in provenance.raw.items())
     caption = "Raw files, with the first 16 digits of their SHA-256."
@@ -40,9 +40,9 @@ def blocks(context: Context) -> Iterator[Block]:
         yield Prose("Changes of the robot:")
         yield Listing("\n".join(f"{k}: {v}" for k, v in study.changed.items()))
     number = len(provenance.processed)
-    yield Prose(f"{number} processed files stand behind this report; their hashes are in `manifest.txt`.")
+    yield Prose(f"This report is made from {number} processed files; their hashes are in `manifest.txt`.")
     if number:
-        yield OnScreen("What was made, and what there was nothing to make of", "made", (made(provenance),))
+        yield OnScreen("Records that were made, and those without input", "made", (record_counts(provenance),))
     if summaries := context.catalogue.all(LogSummary):
         tables = (start_times(summaries), channels(summaries))
         yield OnScreen("Files, dates and channels of every log", "channels", tables)
@@ -50,11 +50,11 @@ def blocks(context: Context) -> Iterator[Block]:
         yield OnScreen("The study file", "study-file", (Listing(provenance.study),))
 
 
-def made(provenance: Provenance) -> Table:
-    """How many files there are of each kind of record; of what was skipped, none."""
+def record_counts(provenance: Provenance) -> Table:
+    """The number of files of each kind of record."""
     folders = Counter(folder for place in provenance.processed for folder in place.split("/")[:-1])
     rows = tuple(
-        (name, str(folders[kind.folder()]) if folders[kind.folder()] else "skipped: nothing to make it of")
+        (name, str(folders[kind.folder()]) if folders[kind.folder()] else "skipped: no input for it")
         for name, kind in KINDS.items()
     )
     return Table("Records, and how many files of each were made.", ("Record", "Files"), rows)

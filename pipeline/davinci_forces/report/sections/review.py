@@ -1,4 +1,4 @@
-"""What reviewers said of figures and runs, and whether the numbers are still those that they saw."""
+"""Ratings of figures and runs by reviewers, and whether the numbers have changed since."""
 
 from collections.abc import Iterator
 from hashlib import sha256
@@ -21,14 +21,14 @@ def blocks(context: Context) -> Iterator[Block]:
     now = sha256(context.results.json()).hexdigest()
     old = [rating for rating in context.ratings if rating.results != now]
     yield Prose(
-        "Reviewers rated figures and runs of this report, or of an earlier one, on its page; `review.toml` beside "
-        "study.toml holds what they said. Ratings are no part of the report's ID."
+        "Reviewers rated figures and runs on the page of this report, or of an earlier one. Their ratings are stored "
+        "in `review.toml` beside study.toml, and are no part of the report's ID."
     )
     if old:
         yield Verdict(
             "warn",
             f"The numbers have changed since {count(len(old), 'rating')} of {len(context.ratings)}: "
-            "`results.json` is not the one that was rated. Look again at what these are of.",
+            "`results.json` is not the one that was rated. Look again at the figures and runs of these ratings.",
         )
     else:
         yield Verdict("info", "All ratings are of the numbers that this report shows.")

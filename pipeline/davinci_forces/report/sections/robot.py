@@ -1,4 +1,4 @@
-"""The robot that the analysis assumes: its chain, its links, and where its tip can go."""
+"""The robot that the analysis assumes: its kinematic chain, its links, and the workspace of its tip."""
 
 from collections.abc import Iterator
 
@@ -17,11 +17,10 @@ def blocks(context: Context, links: Links) -> Iterator[Block]:
     """The section's content.  Tables 3.1, 4.2, Fig 3.5"""
     worst = context.results["robot.worst_condition"].number(3)
     yield Prose(
-        f"The {literal(context.study.robot.title)} as a Denavit-Hartenberg chain. The parallelogram's links share the "
-        "coordinate of the pitch, so that the tool pivots about a remote centre that nothing holds. Forces at the tip "
-        "follow from efforts at the joints through the Jacobian; its condition number reaches "
-        f"{worst} within the joints' limits, and is what the uncertainty of an effort can be multiplied by on its way "
-        "to a force."
+        f"The {literal(context.study.robot.title)} is modelled as a Denavit-Hartenberg chain. The parallelogram's "
+        "links share the coordinate of the pitch, so the tool pivots about a remote centre without a bearing there. "
+        "Forces at the tip follow from efforts at the joints through the Jacobian. Its condition number reaches "
+        f"{worst} within the joints' limits: by so much it can multiply the relative error of an effort."
     )
     rows = tuple(
         (

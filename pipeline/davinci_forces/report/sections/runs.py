@@ -1,4 +1,4 @@
-"""Every run: how it was recorded, what the filter tracked in it, and its traces."""
+"""Every run: its recording, its external effort tracked by the filter, and its traces."""
 
 from collections.abc import Iterator
 
@@ -29,11 +29,14 @@ LEVELS = ("free_rms", "detection_level")
 
 def section(context: Context) -> Section | None:
     """What was recorded, a table over all tracks, the worst run of each joint, and every run on demand."""
-    content = (*recorded(context, context.catalogue.all(LogSummary)), *tracked(context, context.catalogue.all(Track)))
+    content = (
+        *recording_blocks(context, context.catalogue.all(LogSummary)),
+        *track_blocks(context, context.catalogue.all(Track)),
+    )
     return Section("Runs", "runs", content) if content else None
 
 
-def tracked(context: Context, tracks: list[Track]) -> Iterator[Block]:
+def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:
     """The external effort of all runs, the worst of each joint drawn, the others on demand."""
     if not tracks:
         return
@@ -55,19 +58,18 @@ def tracked(context: Context, tracks: list[Track]) -> Iterator[Block]:
 
 
 def intro(context: Context, tracks: list[Track]) -> Iterator[Prose]:
-    """What the filter does, and which joints it cannot say much about."""
-    explained = context.catalogue.all(Explanation)
-    tuned = ", tuned as [@filter-tuning] says" if context.catalogue.all(FilterNoise) else ""
-    told = " Whether both fit the data is told by its innovations ([@innovations])." if explained else ""
+    """Describe the filter, and name the joints at rest."""
+    tuned = ", tuned as in [@filter-tuning]" if context.catalogue.all(FilterNoise) else ""
+    tested = " Its innovations test whether it fits the data ([@innovations])."
     yield Prose(
-        f"An extended Kalman filter follows position, velocity and external effort of each joint by itself{tuned}."
-        + told
+        f"An extended Kalman filter estimates position, velocity and external effort of each joint by itself{tuned}."
+        + (tested if context.catalogue.all(Explanation) else "")
     )
     at_rest = [run_name(t.log, t.joint) for t in tracks if t.at_rest]
     if at_rest:
         yield Prose(
-            f"Joints at rest are in the tables only ({', '.join(at_rest)}): at standstill friction takes any value up "
-            "to its Coulomb level, and external effort up to that level cannot be told from it."
+            f"Joints at rest are in the tables only ({', '.join(at_rest)}). At standstill friction takes any value up "
+            "to its Coulomb level, and hides external efforts up to that level."
         )
 
 
@@ -85,23 +87,24 @@ def scores(context: Context, tracks: list[Track]) -> Table:
             literal(t.log),
             title(t.joint),
             *context.numbers(f"{t.filter}.{t.log}.{t.joint}", LEVELS, 2),
-            *covered(context, t),
+            *coverage(context, t),
         )
         for t in tracks
     )
     header = ("Log", "Joint", "RMS", "Detection level", "Covered", "Band")
     caption = (
-        "External effort where nothing touches the robot: its root mean square, the level that 99 % of samples stay "
-        "below, and the share that the 95 % band covers. Where contact is not known, nothing is said."
+        "External effort in free space, where nothing touches the robot: its root mean square (RMS), the level that "
+        "99 % of samples stay below, and the share of samples in the 95 % band. A dash marks runs whose contacts are "
+        "not known."
     )
     return Table(caption, header, rows, "free-space-table", "llrrrl")
 
 
-def covered(context: Context, t: Track) -> tuple[Cell, Cell]:
-    """Coverage of a run's band, and what it means."""
+def coverage(context: Context, t: Track) -> tuple[Cell, Cell]:
+    """The coverage of a run's band, and whether that is right."""
     spaces = context.catalogue.about(FreeSpace, log=t.log, joint=t.joint, filter=t.filter)
-    said = band_in_words(spaces[0].coverage) if spaces else "–"
-    return context.number(f"{t.filter}.{t.log}.{t.joint}.coverage", 2), said
+    words = band_in_words(spaces[0].coverage) if spaces else "–"
+    return context.number(f"{t.filter}.{t.log}.{t.joint}.coverage", 2), words
 
 
 def assumptions(context: Context, tracks: list[Track]) -> Table:
@@ -109,9 +112,9 @@ def assumptions(context: Context, tracks: list[Track]) -> Table:
     names = ("r_q", "r_dq", "q_dq", "q_tau")
     rows = tuple((literal(t.log), title(t.joint), *context.numbers(f"ekf.{t.log}.{t.joint}", names)) for t in tracks)
     return Table(
-        "Noise that the filter assumes (standard deviations): of the measured position and velocity, and of what the "
-        "noise of the effort adds to the velocity in a sample, by the likelihood of the innovations of identification "
-        "logs; and of the random walk of the external effort, the slowest that shows a push.",
+        "Noise that the filter assumes (standard deviations): of the measured position and velocity, of the velocity "
+        "per sample due to effort noise, and of the random walk of the external effort. The first three maximise the "
+        "likelihood of the innovations of identification logs; the walk is the slowest that shows a push.",
         ("Log", "Joint", "Position", "Velocity", "Process, $dot(q)$", "Random walk"),
         rows,
         "filter-noise",
@@ -123,12 +126,12 @@ def trace(context: Context, t: Track, why: str) -> Figure:
     """One run over time.  Fig 7.6-7.11"""
     name, windows = run_name(t.log, t.joint), contact_spans(context, t.log, "stated contact")
     sigma = 2 * t.tau_ext_std
-    # The first samples know nothing yet: their band would set the scale of the whole plot.
+    # The filter has not converged in the first samples: their band would set the scale of the whole plot.
     shown = slice(min(int(0.25 * t.rate), len(t) // 10), None)
     largest = float(abs(t.tau_ext[shown]).max()) if len(t.tau_ext[shown]) else 0.0
     return Figure(
-        f"{name}{f', {why}' if why else ''}: position; effort measured and modelled; external effort tracked by the "
-        "filter with two of its standard deviations, and measured minus modelled effort.",
+        f"{name}{f', {why}' if why else ''}: position; measured and modelled effort; external effort by the filter, "
+        "with a band of two standard deviations, and measured minus modelled effort.",
         f"{name}: the tracked external effort reaches {context.size(t, 'tau_ext', largest)}.",
         (
             Panel("Trajectory", "time [s]", label(t, "q", "position"), (*windows, Line(t.t, t.q, "", "blue"))),
@@ -149,30 +152,31 @@ def trace(context: Context, t: Track, why: str) -> Figure:
     )  # fmt: skip
 
 
-def recorded(context: Context, summaries: list[LogSummary]) -> Iterator[Block]:
-    """One table over all logs, and what the readers and the first stages remarked."""
+def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[Block]:
+    """One table over all logs, and the remarks of the readers and of the first stages."""
     if not summaries:
         return
     yield from listed(overview(context, summaries))
-    remarked = {summary.log: texts for summary in summaries if (texts := remarks(summary))}
-    if clean := len(summaries) - len(remarked):
-        which = f"{clean} of {count(len(summaries), 'log')} were" if remarked else "Every log was"
-        yield Verdict("good", f"{which} read without a remark.")
-    yield from (Verdict("warn", f"**{literal(log)}**: {literal('; '.join(texts))}.") for log, texts in remarked.items())
-    methods = sorted({(s.method, s.velocity) for s in context.catalogue.all(Signal)})
-    if methods:
-        yield Prose("How the recordings were put on a uniform clock, and where their velocities come from:")
-        yield Bullets(
-            tuple(f"clock: {method}; velocity: {velocity_source(velocity, context)}" for method, velocity in methods)
-        )
     remarks_of_stages = [
         literal(text)
         for diagnostic in context.catalogue.all(Diagnostic)
         if diagnostic.stage in ("ingest", "resample", "average")
         for text in diagnostic.text
     ]
+    remarked = {summary.log: texts for summary in summaries if (texts := remarks(summary))}
+    if clean := len(summaries) - len(remarked):
+        which = f"{clean} of {count(len(summaries), 'log')} were" if remarked else "Every log was"
+        # Remarks of the stages follow: "Good" would stand beside what may deny it.
+        yield Verdict("info" if remarks_of_stages else "good", f"{which} read without a warning.")
+    yield from (Verdict("warn", f"**{literal(log)}**: {literal('; '.join(texts))}.") for log, texts in remarked.items())
+    methods = sorted({(s.method, s.velocity) for s in context.catalogue.all(Signal)})
+    if methods:
+        yield Prose("Sources of the uniform clock and of the velocities of the recordings:")
+        yield Bullets(
+            tuple(f"clock: {method}; velocity: {velocity_source(velocity, context)}" for method, velocity in methods)
+        )
     if remarks_of_stages:
-        yield Prose("Remarks of the readers and of the first stages:")
+        yield Prose("Remarks of the file readers and of the stages `ingest`, `resample` and `average`:")
         yield Bullets(tuple(remarks_of_stages))
 
 
@@ -204,7 +208,7 @@ def overview(context: Context, summaries: list[LogSummary]) -> Table:
 
 
 def remarks(summary: LogSummary) -> list[str]:
-    """What keeps a log from being trusted without a second look."""
+    """The warnings about a log."""
     texts = list(summary.warnings)
     if summary.dropped:
         texts.append(f"{summary.dropped} rows could not be used")

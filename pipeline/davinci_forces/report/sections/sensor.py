@@ -1,4 +1,4 @@
-"""The estimated force beside that of a force sensor, in logs that have one: how far apart and how late."""
+"""The estimated force compared with that of a force sensor, in logs that have one: error and lag."""
 
 from collections.abc import Iterator, Sequence
 
@@ -21,52 +21,55 @@ from davinci_forces.report.context import Context, label, title
 from davinci_forces.report.sections.parts import listed
 from davinci_forces.report.verdicts import NORMAL_95, band_in_words
 
-ANCHOR = 0.0307  # root mean square error over range of a neural network on the dVRK, Yang et al. (2024)
-WHOLE = "vector"
+PUBLISHED_ERROR = 0.0307  # root mean square error over range of a neural network on the dVRK, Yang et al. (2024)
+VECTOR = "vector"  # the axis that stands for all three
 
 
 def section(context: Context) -> Section | None:
     """A table of all logs with a sensor, beside the best that is published for this arm, and both forces over time."""
-    every = context.catalogue.all(SensorForce)
-    return Section("Against a force sensor", "sensor", tuple(blocks(context, every))) if every else None
+    forces = context.catalogue.all(SensorForce)
+    return Section("Against a force sensor", "sensor", tuple(blocks(context, forces))) if forces else None
 
 
-def blocks(context: Context, every: Sequence[SensorForce]) -> Iterator[Block]:
+def blocks(context: Context, forces: Sequence[SensorForce]) -> Iterator[Block]:
     """The section's content."""
     yield Prose(
-        "A sensor measured the force in these logs; nothing was fitted to it. The error is the estimated force less "
-        "what the sensor shows at that instant, over the whole log but the filter's first second and poses near a "
-        "singularity. The lag is how much later the sensor shows a force than it is estimated, by their "
-        "correlation; it is part of the error. Coverage is the share of samples whose 95 % band holds what the sensor "
-        "shows, its noise included.\n\nAs a yardstick: a neural network on the da Vinci Research Kit came to "
-        f"{100 * ANCHOR:.2f} % of range, the root mean square error averaged over axes by the range averaged over axes "
-        "(Yang et al. 2024, arXiv:2405.07453), which is how the row **vector** states it here."
+        "A sensor measured the force in these logs; nothing was fitted to it. The error is the estimated force minus "
+        "the sensor's at the same instant. The filter's first second and poses near a singularity are left out. The "
+        "lag is the delay of the sensor behind the estimate, by their correlation; it is part of the error. Coverage "
+        "is the share of samples at which the 95 % band, with the sensor's noise, contains the sensor's force.\n\nFor "
+        f"comparison: a neural network on the da Vinci Research Kit had an error of {100 * PUBLISHED_ERROR:.2f} % of "
+        "range (Yang et al. 2024, arXiv:2405.07453). That is the root mean square error, averaged over axes, over the "
+        "range averaged over axes; the row **vector** states the same here."
     )
-    yield from listed(table(context, every))
-    first, *others = dict.fromkeys(one.log for one in every)
-    yield figure([one for one in every if one.log == first])
+    yield from listed(table(context, forces))
+    first, *others = dict.fromkeys(force.log for force in forces)
+    yield figure([force for force in forces if force.log == first])
     for log in others:
         yield OnScreen(
-            f"Both forces in {literal(log)}", f"sensor-{log}", (figure([one for one in every if one.log == log]),)
+            f"Both forces in {literal(log)}",
+            f"sensor-{log}",
+            (figure([force for force in forces if force.log == log]),),
         )
 
 
-def table(context: Context, every: Sequence[SensorForce]) -> Table:
-    """The errors of every log and axis; the yardstick last."""
+def table(context: Context, forces: Sequence[SensorForce]) -> Table:
+    """The errors of every log and axis; the published error last."""
     names = ("rmse", "bias", "largest", "range", "relative_error", "lag", "coverage")
     rows: list[tuple[Cell, ...]] = [
         (
-            literal(one.log),
-            axis_name(one.axis),
-            *context.numbers(f"sensor.{one.log}.{one.axis}", names),
-            band_in_words(one.sensor_coverage),
+            literal(force.log),
+            axis_name(force.axis),
+            *context.numbers(f"sensor.{force.log}.{force.axis}", names),
+            band_in_words(force.sensor_coverage),
         )
-        for one in every
+        for force in forces
     ]
-    rows.append(("Yang et al. 2024", "three axes", "–", "–", "–", "–", f"{ANCHOR}", "–", "–", "–"))
+    rows.append(("Yang et al. 2024", "three axes", "–", "–", "–", "–", f"{PUBLISHED_ERROR}", "–", "–", "–"))
     return Table(
-        "The estimated force less that of the sensor: root mean square, mean, and largest; the range of what the "
-        "sensor shows, and the first as a share of it; lag of the sensor; share of samples within the 95 % band.",
+        "The estimated force minus the sensor's: root mean square (RMSE), mean (bias) and largest difference; the "
+        "range of the sensor's force, and the RMSE as a share of it; the lag of the sensor; the share of samples "
+        "within the 95 % band.",
         ("Log", "Axis", "RMSE", "Bias", "Largest", "Range", "Of range", "Lag", "Coverage", "Band"),
         tuple(rows),
         "sensor-errors",
@@ -79,29 +82,29 @@ def axis_name(axis: str) -> str:
     return f"${axis}_0$" if axis in ("x", "y", "z") else title(axis).lower()
 
 
-def figure(own: Sequence[SensorForce]) -> Figure:
+def figure(forces: Sequence[SensorForce]) -> Figure:
     """Both forces of one log over time, axis by axis."""
-    log = literal(own[0].log)
-    shown = [one for one in own if one.axis != WHOLE] or [*own]
-    largest = max(one.force_error_max for one in shown)
+    log = literal(forces[0].log)
+    shown = [force for force in forces if force.axis != VECTOR] or [*forces]
+    largest = max(force.force_error_max for force in shown)
     return Figure(
-        f"{log}: the force by the sensor, and as it is estimated with its 95 % band.",
+        f"{log}: the force by the sensor, and the estimated force with its 95 % band.",
         f"The estimated force in {log} over that of the sensor; they are at most {largest:.2g} N apart along an axis.",
-        tuple(panel(one, i == 0) for i, one in enumerate(shown)),
-        f"sensor-time-{own[0].log}",
+        tuple(panel(force, i == 0) for i, force in enumerate(shown)),
+        f"sensor-time-{forces[0].log}",
         zoomable=True,
         height=32,
     )
 
 
-def panel(one: SensorForce, named: bool) -> Panel:
+def panel(force: SensorForce, named: bool) -> Panel:
     """One axis."""
-    known = one.estimated_force_std * NORMAL_95
-    lower, upper = one.estimated_force - known, one.estimated_force + known
+    half = force.estimated_force_std * NORMAL_95
+    lower, upper = force.estimated_force - half, force.estimated_force + half
     marks: tuple[AnyMark, ...] = (
-        Band(one.t, lower, upper, "95 % band" if named else "", "sky"),
-        Line(one.t, one.measured_force, "sensor" if named else "", "black"),
-        Line(one.t, one.estimated_force, "estimate" if named else "", "vermillion"),
+        Band(force.t, lower, upper, "95 % band" if named else "", "sky"),
+        Line(force.t, force.measured_force, "sensor" if named else "", "black"),
+        Line(force.t, force.estimated_force, "estimate" if named else "", "vermillion"),
     )
-    what = {"x": "Along x0", "y": "Along y0", "z": "Along z0"}.get(one.axis, title(one.axis))
-    return Panel(what, "time [s]", label(one, "measured_force", "force"), marks)
+    what = {"x": "Along x0", "y": "Along y0", "z": "Along z0"}.get(force.axis, title(force.axis))
+    return Panel(what, "time [s]", label(force, "measured_force", "force"), marks)

@@ -29,9 +29,7 @@ from davinci_forces.report.verdicts import (
     DETECTABLE,
     DETECTED,
     GOOD,
-    WORDS,
     Trust,
-    band,
     band_in_words,
     percent,
 )
@@ -50,7 +48,7 @@ def blocks(context: Context) -> Iterator[Block]:
         return
     trusts = [trust(context, joint) for joint in fitted_joints(context)]
     contacts = context.catalogue.all(Contact)
-    yield Prose(opening(context, trusts, contacts))
+    yield Prose(opening_paragraph(context, trusts, contacts))
     panels = [panel for trusted in trusts for panel in effort_panel(context, trusted)]
     if panels:
         yield Figure(
@@ -75,28 +73,30 @@ def nothing_identified(context: Context) -> Verdict:
 
 
 def thresholds_in_words(trusts: list[Trust]) -> str:
-    """From where on the verdicts of the table are what they are."""
+    """State in words the thresholds of the table's verdicts."""
     by_error = (
-        f"error at most {percent(GOOD)} of the effort's root mean square on another path (caution: at most "
-        f"{percent(CAUTION)}, or the same path)"
+        f"the model error is at most {percent(GOOD)} of the effort (root mean square), on a path that was not fitted "
+        f"(caution: at most {percent(CAUTION)}, or a fitted path)"
     )
-    by_level = "detection level at most a third of the effort sought (caution: up to it; set as `effort` in study.toml)"
-    asked = [trust.sought is not None for trust in trusts]
-    rule = by_level if all(asked) else f"{by_level}, else {by_error}" if any(asked) else by_error
+    by_level = (
+        "the detection level is at most a third of `effort` in study.toml, the effort sought (caution: up to all of it)"
+    )
+    stated = [trust.sought is not None for trust in trusts]
+    rule = by_level if all(stated) else f"{by_level}; without `effort`, {by_error}" if any(stated) else by_error
     return (
-        f"Of each joint, the worst run not fitted. Good: {rule}. A band is right at {percent(COVERED[0])} to "
-        f"{percent(COVERED[1])}. See [@thresholds]."
+        f"Each row is of the joint's worst run that was not fitted. Good: {rule}. A band is right if it covers "
+        f"{percent(COVERED[0])} to {percent(COVERED[1])}. See [@thresholds]."
     )
 
 
 def caption(contacts: list[Contact]) -> str:
     """What the figure shows."""
-    level = "the grey band holds 95 % of samples where nothing touches the robot"
+    level = "The grey band holds 95 % of the samples in free space, where nothing touches the robot."
     if not contacts:
-        return f"External effort on each joint in its worst run that was not fitted; {level}."
+        return f"External effort on each joint in its worst run that was not fitted. {level}"
     return (
-        "External effort on each joint, in the contact log on which its model errs most, with the windows of contact "
-        f"shaded and the peak in each; {level}."
+        "External effort on each joint, in its contact log with the largest model error. Contact windows are shaded, "
+        f"and their peaks marked. {level}"
     )
 
 
@@ -120,39 +120,40 @@ def trust(context: Context, joint: str) -> Trust:
     )
 
 
-def opening(context: Context, trusts: list[Trust], contacts: list[Contact]) -> str:
+def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Contact]) -> str:
     """One paragraph: what was estimated, and which contacts stand out."""
     kind = "simulated " if context.study.simulated else ""
     runs = len({track.log for track in context.catalogue.all(Track)})
     windows = sum(len(contact) for contact in contacts)
     above = sum(int(contact.above.sum()) for contact in contacts)
     text = (
-        f"External effort, torque [N m] at joints that turn and force [N] at joints that slide, was estimated on "
-        f"{count(len(trusts), 'joint')} in {count(runs, kind + 'run')} of the {literal(context.study.robot.title)} "
-        "from motor currents and joint positions, without a force sensor. It is what the robot exerts on its "
-        "environment. "
+        "External effort is what the robot exerts on its environment: torque [N m] at joints that turn, force [N] at "
+        f"joints that slide. It was estimated on {count(len(trusts), 'joint')} in {count(runs, kind + 'run')} of the "
+        f"{literal(context.study.robot.title)}, from motor currents and joint positions, without a force sensor. "
     )
     if not windows:
         return text + "The study states no contact windows, so no contact is measured."
     return text + (
-        f"**{above} of {count(windows, 'window')} of contact, counted joint by joint, stand out from free space.** "
-        "Efforts below the detection level cannot be told from the model's error."
+        f"**{above} of {count(windows, 'contact window')}, counted joint by joint, exceed the detection level.** "
+        "Smaller efforts cannot be distinguished from the model's error."
     )
 
 
 def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
     """The external effort of a joint in its most doubtful contact log, or where there is none, in its worst run."""
-    own = context.catalogue.about(Contact, joint=trusted.joint)
+    contacts = context.catalogue.about(Contact, joint=trusted.joint)
     errors = {p.log: p.model_error for p in context.catalogue.about(Prediction, joint=trusted.joint)}
-    logs = sorted((c.log for c in own if len(joints_touched(context, c)) == 1), key=lambda log: errors.get(log, 0.0))
-    logs = logs or [c.log for c in own] or ([trusted.space.log] if trusted.space is not None else [])
+    logs = sorted(
+        (c.log for c in contacts if len(joints_touched(context, c)) == 1), key=lambda log: errors.get(log, 0.0)
+    )
+    logs = logs or [c.log for c in contacts] or ([trusted.space.log] if trusted.space is not None else [])
     for track in context.catalogue.about(Track, joint=trusted.joint, log=logs[-1]) if logs else []:
         spans = [VSpan(start, end, "", "sky") for start, end in context.study.log(track.log).contact]
         levels = [trusted.space.free_level] if trusted.space is not None else []
         level = [HBand(-size, size, "free space: 95 % of samples") for size in levels]
-        calm = track.t - track.t[0] >= 1.0
-        line = Line(track.t[calm], track.tau_ext[calm], "external effort", "vermillion")
-        peaks = [named_peaks(track, c) for c in own if c.log == track.log]
+        converged = track.t - track.t[0] >= 1.0
+        line = Line(track.t[converged], track.tau_ext[converged], "external effort", "vermillion")
+        peaks = [named_peaks(track, c) for c in contacts if c.log == track.log]
         heading = f"{title(track.joint)}, {track.log}"
         effort = label(track, "tau_ext", "effort")
         yield Panel(heading, "time [s]", effort, (*spans, *level, line, *peaks))
@@ -167,7 +168,7 @@ def in_column(panels: list[Panel]) -> Iterator[Panel]:
 
 def joints_touched(context: Context, contact: Contact) -> list[Contact]:
     """The joints with contact windows in the same log."""
-    return [other for other in context.catalogue.about(Contact, log=contact.log) if other.above.any()]
+    return [contact for contact in context.catalogue.about(Contact, log=contact.log) if contact.above.any()]
 
 
 def named_peaks(track: Track, contact: Contact) -> Points:
@@ -190,8 +191,8 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
     sought = ("Sought",) if any(trust.sought for trust in trusts) else ()
     header = ("Joint", "Verdict", "Model error", "Of effort", "$R^2$", "At most", "Detection level", *sought, "Covered")
     return Table(
-        "How far to trust it: the model's error beyond noise, $R^2$ and the most that noise leaves of it, the level "
-        "that 99 % of free-space samples stay below, and how many of them the 95 % band covers.",
+        "How far to trust the estimates. Model error: beyond noise. At most: the limit that noise sets to $R^2$. "
+        "Detection level: 99 % of free-space samples stay below it. Covered: the share of them in the 95 % band.",
         header,
         tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts),
         label="trust-table",
@@ -202,7 +203,7 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
 def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell, ...]:
     """The numbers of one joint, with the runs that they are of."""
     p, space = trusted.prediction, trusted.space
-    row: list[Cell] = [title(trusted.joint), WORDS[trusted.level] + (", same path" if trusted.same_path else "")]
+    row: list[Cell] = [title(trusted.joint), trusted.words]
     if p is None:
         row += ["–"] * 4
     else:
@@ -226,12 +227,12 @@ def first_looks(context: Context, trusts: list[Trust]) -> Iterator[Block]:
 
 
 def first_looks_in_order(context: Context, trusts: list[Trust]) -> tuple[str, ...]:
-    """The same as marked texts."""
+    """The three things to look at first, as marked texts, worst first."""
     return tuple(text for _, text in sorted(looks_at(context, trusts), key=lambda look: -look[0])[:3])
 
 
 def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:
-    """What deserves a look, with how much: 1 is where caution begins."""
+    """Yield every caveat with its weight; 1 is where caution begins."""
     for trusted in trusts:
         yield from looks_at_model(context, trusted)
         yield from looks_at_band(context, trusted)
@@ -242,43 +243,44 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
 
 
 def looks_at_paths(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str]]:
-    """The joints that were judged on the path that was fitted, together."""
+    """Yield one caveat for all joints that were tested only on the path that was fitted."""
     same = [trusted for trusted in trusts if trusted.same_path]
     if same:
         logs = dict.fromkeys(literal(trusted.prediction.log) for trusted in same if trusted.prediction is not None)
         names, which = ", ".join(title(trusted.joint) for trusted in same), ", ".join(logs)
-        repeats = f"judged on the path that was fitted ({which}), where the model's error repeats; "
-        remedy = f"record a validation log on another path.{see(context, Prediction, 'prediction')}"
+        repeats = f"tested only on the path that was fitted ({which}), where the model's error repeats. "
+        remedy = f"Record a validation log on another path.{see(context, Prediction, 'prediction')}"
         yield 4.0, f"**{names}**: {repeats}{remedy}"
 
 
 def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
-    """How far the model errs."""
+    """Yield a caveat where the model error calls for caution."""
     p, name, see_runs = trusted.prediction, title(trusted.joint), see(context, Prediction, "prediction")
     if p is not None and trusted.share > GOOD:
         error = context.results[f"{p.prefix}.model_error"].number(2)
-        errs = f"the model errs by {error}, {percent(trusted.share)} of the effort."
-        yield trusted.share / GOOD, f"**{name}, {literal(p.log)}**: {errs}{see_runs}"
+        text = f"the model error is {error}, {percent(trusted.share)} of the effort."
+        by_level = " The verdict goes by the detection level." if trusted.level == "good" else ""
+        yield trusted.share / GOOD, f"**{name}, {literal(p.log)}**: {text}{by_level}{see_runs}"
 
 
 def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
-    """Whether the effort that is sought can be seen, and whether the band covers."""
+    """Yield caveats where the detection level hides the effort sought, or the 95 % band is too narrow."""
     space, name, see_runs = trusted.space, title(trusted.joint), see(context, Track, "runs")
     if space is None:
         return
     if trusted.sought and trusted.fineness > DETECTED:
         level, sought = (context.size(space, "detection_level", x) for x in (space.detection_level, trusted.sought))
         hides = "hides efforts of" if trusted.fineness > DETECTABLE else "is more than a third of"
-        told = f"the detection level of {level} {hides} {sought}, which the study seeks."
-        yield 3 * trusted.fineness, f"**{name}, {literal(space.log)}**: {told}{see_runs}"
-    if band(space.coverage) == "bad":
-        narrow = f"the 95 % band is too narrow, it covers {percent(space.coverage)} of free-space samples; "
-        judge = f"judge contacts by the detection level.{see_runs}"
+        text = f"the detection level of {level} {hides} {sought}, which the study seeks."
+        yield 3 * trusted.fineness, f"**{name}, {literal(space.log)}**: {text}{see_runs}"
+    if trusted.narrow:
+        narrow = f"the 95 % band is too narrow: it covers {percent(space.coverage)} of free-space samples. "
+        judge = f"Judge contacts by the detection level.{see_runs}"
         yield 1.0 + 10 * (COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {narrow}{judge}"
 
 
 def see(context: Context, kind: type[Record], anchor: str) -> str:
-    """Where more is said, if it is: a section is there only if there are records for it."""
+    """A reference to a section, or "" where no record of that kind exists and so the section is missing."""
     return f" See [@{anchor}]." if context.catalogue.all(kind) else ""
 
 
@@ -289,6 +291,6 @@ def warning_texts(diagnostic: Diagnostic) -> Iterator[str]:
 
 
 def failures(context: Context) -> Iterator[Block]:
-    """What could not be done at all."""
+    """One verdict for every task that failed."""
     for task, failed in context.provenance.failures.items():
         yield Verdict("bad", f"**{literal(task)}** failed, and what depends on it is missing: {literal(failed)}")

@@ -34,7 +34,7 @@ from davinci_forces.report.verdicts import NEAR_SINGULAR, NORMAL_95, band, perce
 
 AXES = {"x": "x0", "y": "y0, the roll axis", "z": "z0, up"}
 PATH_POINTS = 600  # of the path in space
-SETTLE = 1.0  # [s] that the range of the force is not taken from
+CONVERGENCE = 1.0  # [s] of the filter, left out of the range of the force
 SPACING = 0.2  # [s] between the vectors that are drawn in a contact
 REACH = 0.5  # of the path's extent, that the largest force is long
 
@@ -48,10 +48,10 @@ def section(context: Context) -> Section | None:
 def blocks(context: Context, forces: list[TipForce]) -> Iterator[Block]:
     """The section's content."""
     yield Prose(
-        "A force $f$ at the tip makes the external efforts of the joints that carry it what they are, and follows from "
-        "them where all of these joints move. It is what the robot exerts on its environment, in base axes, where "
-        "nothing but the tip is touched; the wrist is taken to be straight. Efforts are taken without delay, by the "
-        "smoother, and their covariance $C_tau$ holds the total standard deviations of the joints."
+        "The force $f$ at the tip is what the robot exerts on its environment, in base axes. It follows from the "
+        "external efforts of the joints that carry it, at times when all of these joints move. Two assumptions are "
+        "made: nothing but the tip is touched, and the wrist is straight. The efforts are those of the smoother, which "
+        "has no delay. Their covariance $C_tau$ holds the total standard deviations of the joints."
     )
     yield Equation(
         'f = bold(J)_v^(-T) tau_"ext", quad C_f = bold(J)_v^(-T) C_tau bold(J)_v^(-1)',
@@ -66,7 +66,7 @@ def blocks(context: Context, forces: list[TipForce]) -> Iterator[Block]:
     yield level_table(context, forces)
     yield from narrow(forces)
     budgets = {budget.log: budget for budget in context.catalogue.all(TipBudget)}
-    first, *others = sorted(forces, key=lambda force: telling(force, contacts), reverse=True)
+    first, *others = sorted(forces, key=lambda force: priority(force, contacts), reverse=True)
     yield from log_blocks(first, contacts.get(first.log), budgets.get(first.log))
     for force in others:
         inside = tuple(log_blocks(force, contacts.get(force.log), budgets.get(force.log)))
@@ -76,26 +76,24 @@ def blocks(context: Context, forces: list[TipForce]) -> Iterator[Block]:
         yield OnScreen("Logs of contact without a force at the tip", "tip-left-out", (Bullets(tuple(left_out)),))
 
 
-def telling(force: TipForce, contacts: dict[str, TipContact]) -> tuple[bool, bool, float]:
-    """What a log is shown first by: whether the tip was touched, whether no parameter was fitted to it, and how large
-    its force looks in free space.
-    """
+def priority(force: TipForce, contacts: dict[str, TipContact]) -> tuple[bool, bool, float]:
+    """The order of logs: with contact first, then those not fitted, then by the detection level of the force."""
     level = force.force_detection if np.isfinite(force.force_detection) else 0.0
     return force.log in contacts, force.role != "identification", level
 
 
 def correlations(forces: Sequence[TipForce]) -> str:
-    """What is taken of how the joints' errors go together."""
-    known = [force for force in forces if force.correlation_from]
-    if not known:
+    """State the correlation that is assumed of the joints' errors."""
+    correlated = [force for force in forces if force.correlation_from]
+    if not correlated:
         return (
-            "The joints' errors are taken to be independent: there are not two other logs whose free motion agrees on "
-            "how they go together."
+            "The joints' errors are taken as independent. There are no two other logs whose free motion agrees on "
+            "their correlation."
         )
-    sizes = [max(abs(f.rho_12), abs(f.rho_13), abs(f.rho_23)) for f in known]
+    sizes = [max(abs(f.rho_12), abs(f.rho_13), abs(f.rho_23)) for f in correlated]
     return (
-        "How the joints' errors go together is taken from the free motion of other logs, as far as these agree; "
-        f"correlations reach {max(sizes):.2f}."
+        "The correlation of the joints' errors is estimated from the free motion of other logs, as far as these "
+        f"agree. It reaches {max(sizes):.2f}."
     )
 
 
@@ -103,10 +101,10 @@ def contact_table(context: Context, contacts: Sequence[TipContact]) -> Table:
     """The largest force of every contact, component by component."""
     rows = tuple(row for contact in contacts for row in contact_rows(context, contact))
     return Table(
-        "The force at the tip where it is largest in each contact, with its standard deviation; the force's size, and "
-        "in which direction it is known least, by how much. Windows that the study does not state were found on a "
-        "joint. Near a singular pose the force is marked.",
-        ("Log", "Window", "$f_x$", "$f_y$", "$f_z$", "$abs(f)$", "Least known", "along"),
+        "The largest force at the tip in each contact, with standard deviations. Least certain: the standard deviation "
+        "along the direction in which it is largest. “Found” marks windows that the study does not state; “near "
+        "singular” marks poses in which the force is uncertain.",
+        ("Log", "Window", "$f_x$", "$f_y$", "$f_z$", "$abs(f)$", "Least certain", "along"),
         rows,
         "tip-contacts",
         "llrrrrrl",
@@ -118,19 +116,19 @@ def contact_rows(context: Context, contact: TipContact) -> Iterator[tuple[Cell, 
     for i in range(len(contact)):
         prefix = f"tip.{contact.log}.{i + 1}"
         numbers = [context.number(f"{prefix}.{name}", 3) for name in ("f_x", "f_y", "f_z", "peak")]
-        weak = ", ".join(signed(x[i], 1) for x in (contact.weak_x, contact.weak_y, contact.weak_z))
+        weak = ", ".join(signed_text(x[i], 1) for x in (contact.weak_x, contact.weak_y, contact.weak_z))
         window = f"{contact.onset[i]:.4g} to {contact.release[i]:.4g} s"
         remark = ("" if contact.stated[i] else ", found") + (", near singular" if contact.near_singular[i] else "")
         yield (literal(contact.log), window + remark, *numbers, context.number(f"{prefix}.sigma_1", 2), f"({weak})")
 
 
-def signed(value: float, decimals: int) -> str:
+def signed_text(value: float, decimals: int) -> str:
     """A number with a sign as it is printed, and none where it is zero."""
     return f"{round(value, decimals) + 0.0:.{decimals}f}".replace("-", MINUS)
 
 
 def level_table(context: Context, forces: Sequence[TipForce]) -> Table:
-    """How large the force looks where nothing is touched, and how well the poses tell it."""
+    """The force that is estimated in free space, and the condition of the poses."""
     rows = tuple(
         (
             literal(force.log),
@@ -143,11 +141,12 @@ def level_table(context: Context, forces: Sequence[TipForce]) -> Table:
         for force in forces
     )
     return Table(
-        "The size of the force at the tip where nothing touches the robot: root mean square, the levels that 95 % and "
-        "99 % of samples stay below, and the share of samples whose 95 % ellipsoid holds no force. A force below the "
-        "detection level cannot be told from free space. The condition number of the Jacobian, its median, says how "
-        f"much better the force is told in one direction than in another; above {NEAR_SINGULAR:g}, as where the tip is "
-        "within about a centimetre of the remote centre, a sample is near singular and not judged.",
+        "The size of the estimated force at the tip in free space, where the true force is zero: root mean square "
+        "(RMS), and the levels that 95 % and 99 % of samples stay below. Smaller forces than the detection level "
+        "cannot be distinguished from free space. Coverage: the share of samples whose 95 % ellipsoid contains zero. "
+        "The condition number of the Jacobian (median) compares the certainty of the force between directions. Samples "
+        f"above {NEAR_SINGULAR:g} are near singular and not counted; the tip is then within about a centimetre of the "
+        "remote centre.",
         ("Log", "Role", "RMS", "95 %", "Detection level", "Coverage", "Condition", "Near singular"),
         rows,
         "tip-levels",
@@ -161,8 +160,9 @@ def narrow(forces: Sequence[TipForce]) -> Iterator[Verdict]:
         if band(force.force_coverage) == "bad":
             yield Verdict(
                 "bad",
-                f"**{literal(force.log)}**: the band of the force covers {percent(force.force_coverage)} of samples "
-                "in free space, so it is too narrow: trust the detection level rather than the standard deviations.",
+                f"**{literal(force.log)}**: the 95 % band of the force is too narrow: it covers "
+                f"{percent(force.force_coverage)} of samples in free space. Trust the detection level rather than the "
+                "standard deviations.",
             )
 
 
@@ -172,7 +172,7 @@ def log_blocks(force: TipForce, contact: TipContact | None, budget: TipBudget | 
     yield Figure(
         f"{name}: force at the tip with its 95 % band, and the condition number of the Jacobian."
         f"{' Windows of contact are shaded.' if contact is not None else ''}",
-        f"Components of the force at the tip over time in {name}, and how well its poses tell it.",
+        f"Components of the force at the tip over time in {name}, and the condition number of its poses.",
         (*(component_panel(force, axis, contact) for axis in AXES), condition_panel(force)),
         f"tip-time-{force.log}",
         zoomable=True,
@@ -182,7 +182,7 @@ def log_blocks(force: TipForce, contact: TipContact | None, budget: TipBudget | 
         yield in_space(force, contact)
     if budget is not None:
         figure = budget_figure(force, budget)
-        yield OnScreen("What each joint's error comes to at the tip", f"tip-parts-{force.log}", (figure,))
+        yield OnScreen("Error at the tip due to each joint", f"tip-parts-{force.log}", (figure,))
 
 
 def component_panel(force: TipForce, axis: str, contact: TipContact | None) -> Panel:
@@ -199,8 +199,8 @@ def component_panel(force: TipForce, axis: str, contact: TipContact | None) -> P
 
 
 def reach(force: TipForce, lower: Column, upper: Column) -> tuple[float, float] | None:
-    """What a band reaches over once the filter has settled: at its start it knows nothing, and would hide all else."""
-    values = np.concatenate([edge[force.t >= force.t[0] + SETTLE] for edge in (lower, upper)])
+    """The range of a band once the filter has converged; its wide start would hide everything else."""
+    values = np.concatenate([edge[force.t >= force.t[0] + CONVERGENCE] for edge in (lower, upper)])
     values = values[np.isfinite(values)]
     if not len(values) or np.ptp(values) == 0.0:
         return None
@@ -209,7 +209,7 @@ def reach(force: TipForce, lower: Column, upper: Column) -> tuple[float, float] 
 
 
 def condition_panel(force: TipForce) -> Panel:
-    """How well the poses tell the force."""
+    """The condition number of the Jacobian over time."""
     near = bool(force.near_singular.any())
     marks: tuple[AnyMark, ...] = (Line(force.t, np.minimum(force.condition, 1e6), "", "black"),)
     if near:
@@ -223,7 +223,7 @@ def in_space(force: TipForce, contact: TipContact) -> Figure3D:
     extent = float(np.ptp(path, axis=0).max())
     per_newton = REACH * extent / float(contact.f_peak.max())
     few = np.unique(np.linspace(0, len(path) - 1, PATH_POINTS).round().astype(int))
-    at, f = sampled(force, contact)
+    at, f = contact_samples(force, contact)
     here, largest = (np.column_stack([getattr(contact, n) for n in names]) for names in (("x", "y", "z"), F))
     weak = np.column_stack([contact.weak_x, contact.weak_y, contact.weak_z]) * NORMAL_95 * contact.sigma_1[:, None]
     ends = here + per_newton * largest
@@ -238,8 +238,8 @@ def in_space(force: TipForce, contact: TipContact) -> Figure3D:
     )
     return Figure3D(
         f"{literal(force.log)}: the path of the tip, and the force that it exerts in each contact, numbered as in "
-        f"[@tip-contacts]; 1 N is {1e3 * per_newton:.2g} mm long. A black line at its end is the 95 % interval in the "
-        "direction in which the force is known least.",
+        f"[@tip-contacts]; 1 N is {1e3 * per_newton:.2g} mm long. The black line at its end is the 95 % interval along "
+        "the least certain direction.",
         f"The path of the tip in space in {literal(force.log)}, with the force in each contact as a line from it.",
         marks,
         f"tip-space-{force.log}",
@@ -250,7 +250,7 @@ def in_space(force: TipForce, contact: TipContact) -> Figure3D:
 F = ("f_x", "f_y", "f_z")
 
 
-def sampled(force: TipForce, contact: TipContact) -> tuple[Column, Column]:
+def contact_samples(force: TipForce, contact: TipContact) -> tuple[Column, Column]:
     """Samples within contacts, a fifth of a second apart, and the forces there."""
     f = np.column_stack([getattr(force, name) for name in F])
     times = [np.arange(start, end, SPACING) for start, end in windows(contact)]
@@ -275,14 +275,14 @@ def windows(contact: TipContact) -> list[tuple[float, float]]:
 
 
 def budget_figure(force: TipForce, budget: TipBudget) -> Figure:
-    """What each joint's error comes to at the tip."""
+    """The error of the force at the tip due to each joint."""
     names = tuple(title(joint) for joint in budget.of_joint)
     parts = (("filter_force", "sensor noise and filter"), ("model_force", "model"), ("lag_force", "lag of the filter"))
-    bars = tuple(Bars(names, getattr(budget, part), said) for part, said in parts)
+    bars = tuple(Bars(names, getattr(budget, part), source) for part, source in parts)
     total = ", ".join(f"{name} {size:.2g} N" for name, size in zip(names, budget.total_force, strict=True))
     return Figure(
-        f"{literal(force.log)}: what the errors of each joint's external effort come to at the tip, at the median "
-        f"pose, as standard deviations; in all {total}.",
+        f"{literal(force.log)}: error of the force at the tip due to the error of each joint's external effort, at the "
+        f"median pose, as standard deviations; in total {total}.",
         f"Bars of the error that each joint adds to the force at the tip in {literal(force.log)}: {total}.",
         (Panel("Error at the tip", "", label(budget, "filter_force", "force"), bars),),
         f"tip-budget-{force.log}",

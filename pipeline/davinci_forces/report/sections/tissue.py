@@ -1,4 +1,4 @@
-"""How stiff the tissue is: force against depth, what a straight line leaves, the loop, and the map of a surface."""
+"""Stiffness of tissue: force against depth, residual of a straight line, hysteresis loop, and map of a surface."""
 
 from collections.abc import Iterator, Sequence
 
@@ -27,14 +27,13 @@ from davinci_forces.report.content import (
 from davinci_forces.report.content.marks import AnyMark, Colour
 from davinci_forces.report.context import Context, title
 from davinci_forces.report.sections.parts import THESIS_TISSUE
-from davinci_forces.report.verdicts import NORMAL_95, STIFF, STIFFER, graded
+from davinci_forces.report.verdicts import NORMAL_95, STIFF, STIFFER, grade
 
-THESIS_ROBOT = "davinci"
-SHOWN = 1  # figures of force, and maps; the others are on screen
-TOGETHER = 8  # pushes in one panel
-SAMPLES = 60  # of a push in a panel of several
-MANY = 20  # pushes, beyond which their spread says more than one loop
-EVEN = 1e-3  # [m] between places, below which there is no map
+FIGURES_ON_PAPER = 1  # of force, and of maps; the others are on screen
+PUSHES_PER_PANEL = 8
+SAMPLES_PER_PUSH = 60  # in a panel of several pushes
+MAX_PUSHES_LISTED = 20  # of a log; with more, their spread says more than one loop
+MIN_SPACING_MAP = 1e-3  # [m] between places, below which there is no map
 CLASSES: tuple[Colour, ...] = ("blue", "sky", "orange", "vermillion")
 MM = 1e3
 
@@ -49,21 +48,21 @@ def blocks(context: Context, tissues: list[Stiffness]) -> Iterator[Block]:
     """The section's content."""
     yield from (verdict(context, tissue) for tissue in tissues)
     yield Prose(
-        "The stiffness of a push is the slope of an ordinary straight line, with an intercept, through its contact, "
-        "which begins and ends where the force bends; of a log, the median over pushes of which the line explains 90 %."
-        " The error allows for correlated residuals, for tissue that differs from place to place, and for the error of "
-        "a joint's model, in whatever way along the depth it moves the slope most. A joint's force is its effort less "
-        "the model's, low-passed without delay, as the filter's would come late; at rest, where friction takes any "
-        "value, it does not count."
+        "The stiffness of a push is the slope of a straight line, fitted by least squares to force over depth during "
+        "contact. Contact begins and ends where the force bends. A push counts if the line explains 90 % of its force; "
+        "the stiffness of a log is the median of these pushes. The error allows for correlated residuals, for tissue "
+        "that differs from place to place, and for the worst effect of the joint model's error on the slope. The force "
+        "of a joint is its measured effort minus the model's, low-passed without delay; the filter's would come late. "
+        "Samples at rest do not count, because friction can then take any value."
     )
     yield comparison(context, tissues)
     forces = [figure for tissue in tissues for figure in force_figures(context, tissue)]
-    maps = [surface_map(tissue) for tissue in tissues if spread(tissue) > EVEN]
-    yield from (*forces[:SHOWN], *maps[:SHOWN])
+    maps = [surface_map(tissue) for tissue in tissues if spread(tissue) > MIN_SPACING_MAP]
+    yield from (*forces[:FIGURES_ON_PAPER], *maps[:FIGURES_ON_PAPER])
     models = context.catalogue.all(TissueModel)
     details: tuple[Block, ...] = (
-        *forces[SHOWN:],
-        *maps[SHOWN:],
+        *forces[FIGURES_ON_PAPER:],
+        *maps[FIGURES_ON_PAPER:],
         *each_push(context, tissues),
         *model_tables(context, models),
     )
@@ -72,39 +71,36 @@ def blocks(context: Context, tissues: list[Stiffness]) -> Iterator[Block]:
 
 
 def verdict(context: Context, tissue: Stiffness) -> Verdict:
-    """How well one log tells the stiffness."""
+    """Grade the stiffness of one log by its standard error."""
     name = f"**{literal(tissue.log)}**"
     if not tissue.pushes:
-        return Verdict("bad", f"{name}: a straight line explains 90 % of the force in none of {pushes(len(tissue))}.")
-    level = graded(tissue.stiffness_std / tissue.stiffness, STIFF, STIFFER) if tissue.stiffness > 0 else "bad"
+        return Verdict("bad", f"{name}: in none of {pushes(len(tissue))} a straight line explains 90 % of the force.")
+    level = grade(tissue.stiffness_std / tissue.stiffness, STIFF, STIFFER) if tissue.stiffness > 0 else "bad"
     stiffness = context.results[f"tissue.{tissue.log}.stiffness"].number()
-    model = f"; {chosen(context, tissue.log)}" if chosen(context, tissue.log) else ""
-    text = f"{name}: {stiffness}, {tissue.pushes} of {pushes(len(tissue))}{model}{true_words(context, tissue)}."
-    return Verdict("warn" if level == "good" and tissue.pushes == 1 else level, text)
-
-
-def true_words(context: Context, tissue: Stiffness) -> str:
-    """Whether the interval of 95 % holds what is true of a simulated log."""
-    value = true_stiffness(context, tissue.log)
-    if value is None:
-        return ""
-    held = abs(tissue.stiffness - value) <= NORMAL_95 * tissue.stiffness_std
-    return f"; {'holds' if held else 'does **not** hold'} the true {value:g} N/m"
+    law = chosen_law(context, tissue.log)
+    text = f"{name}: {stiffness} from {tissue.pushes} of {pushes(len(tissue))}{f'; best model: {law}' if law else ''}"
+    true = true_stiffness(context, tissue.log)
+    missed = true is not None and abs(tissue.stiffness - true) > NORMAL_95 * tissue.stiffness_std
+    if true is not None:
+        text += f"; the 95 % interval {'misses' if missed else 'contains'} the true {true:g} N/m"
+    if level == "good" and (missed or tissue.pushes == 1):
+        level = "info" if missed and tissue.pushes > 1 else "warn"  # a good precision is not called good if it misses
+    return Verdict(level, f"{text}.")
 
 
 def true_stiffness(context: Context, log: str) -> float | None:
-    """The stiffness that a simulation put in."""
+    """The stiffness [N/m] of the tissue of a simulated log, None of a recorded one."""
     entries = [entry for entry in context.study.truth.get("log", []) if entry.get("name") == log]
     return float(entries[0]["stiffness"]) if entries and "stiffness" in entries[0] else None
 
 
-def chosen(context: Context, log: str) -> str:
-    """The model that predicts the pushes of a log, or "" where none could be chosen."""
+def chosen_law(context: Context, log: str) -> str:
+    """The model that predicts the pushes of a log best, or "" where none could be chosen."""
     return next((model.chosen for model in context.catalogue.about(TissueModel, log=log)), "")
 
 
 def comparison(context: Context, tissues: Sequence[Stiffness]) -> Table:
-    """One row a log, and what the thesis states of the same robot."""
+    """One row a log; in simulations of the thesis's experiments, also the stiffness that the thesis states."""
     rows: list[tuple[Cell, ...]] = [
         (
             literal(tissue.log),
@@ -117,11 +113,12 @@ def comparison(context: Context, tissues: Sequence[Stiffness]) -> Table:
         )
         for tissue in tissues
     ]
-    if context.study.robot.name == THESIS_ROBOT:
+    if context.compares_with_thesis:
         rows.append(("thesis, section 8.2", "Instrument slide", f"{THESIS_TISSUE}", "–", "–", "1", "1 of 1"))
     header = ("Log", "Force of", "Stiffness", "Quartile 1", "Quartile 3", "Count", "In contact")
     return Table(
-        "Stiffness of the tissue; how many pushes count, and in how many of those looked at there is contact.",
+        "Stiffness of the tissue, its quartiles over pushes, the number of pushes that count, and the number of pushes "
+        "with contact.",
         header,
         tuple(rows),
         "tissue-table",
@@ -131,11 +128,13 @@ def comparison(context: Context, tissues: Sequence[Stiffness]) -> Table:
 
 def force_figures(context: Context, tissue: Stiffness) -> Iterator[Figure]:
     """Force against depth of one log, where its pushes are at hand."""
-    own = {push.push: push for push in context.catalogue.about(Push, log=tissue.log)}
-    typical = own.get(int(tissue.push[nearest(tissue)]))
+    pushes = {push.push: push for push in context.catalogue.about(Push, log=tissue.log)}
+    typical = pushes.get(int(tissue.push[nearest(tissue)]))
     if typical is not None:
-        few = evenly(len(tissue), TOGETHER)
-        yield force_figure(tissue, [own[number] for number in tissue.push[few].tolist() if number in own], typical)
+        few = evenly(len(tissue), PUSHES_PER_PANEL)
+        yield force_figure(
+            tissue, [pushes[number] for number in tissue.push[few].tolist() if number in pushes], typical
+        )
 
 
 def nearest(tissue: Stiffness) -> int:
@@ -148,11 +147,12 @@ def nearest(tissue: Stiffness) -> int:
 def force_figure(tissue: Stiffness, pushes: Sequence[Push], typical: Push) -> Figure:
     """Pushes with the typical line and its interval, what the line leaves, and the loop or the spread."""
     name = literal(tissue.log)
-    last = spread_panel(tissue) if len(tissue) > MANY else loop_panel(typical)
-    third = "how the stiffness of pushes is spread" if len(tissue) > MANY else "its loop, on the way in and out"
+    many = len(tissue) > MAX_PUSHES_LISTED
+    last = spread_panel(tissue) if many else loop_panel(typical)
+    third = "the distribution of the stiffness of pushes" if many else "its loop on the way in and out"
     return Figure(
-        f"{name}: force against depth of contact, with the line of push {typical.push}, which is nearest to the "
-        f"stiffness of the log, and its 95 % interval; what the line leaves; and {third}.",
+        f"{name}: force against depth of contact, with the line of push {typical.push} and its 95 % interval; the "
+        f"residual of the line; and {third}. This push is the nearest to the stiffness of the log.",
         f"Force over depth in {name}, with a line of slope {typical.k_t:.4g} N/m that explains {typical.r2:.0%}.",
         (line_panel(pushes, typical), residual_panel(typical), last),
         f"tissue-{tissue.log}",
@@ -166,7 +166,7 @@ def line_panel(pushes: Sequence[Push], typical: Push) -> Panel:
     marks: list[AnyMark] = []
     for push in pushes:
         contact = np.flatnonzero(push.inside)
-        few = contact[:: max(len(contact) // SAMPLES, 1)]
+        few = contact[:: max(len(contact) // SAMPLES_PER_PUSH, 1)]
         marks.append(Points(MM * push.depth[few], push.force[few], "contact" if push is pushes[0] else "", "sky"))
     depth = typical.depth[typical.inside == 1]
     x = np.linspace(depth.min(), depth.max(), 50)
@@ -177,15 +177,15 @@ def line_panel(pushes: Sequence[Push], typical: Push) -> Panel:
 
 
 def residual_panel(push: Push) -> Panel:
-    """What the straight line of one push leaves."""
+    """The residual of the straight line of one push."""
     inside, loading = push.inside == 1, push.loading == 1
-    left = push.force - push.intercept - push.k_t * push.depth
-    marks: tuple[AnyMark, ...] = (HLine(0.0), *in_and_out(MM * push.depth, left, inside, loading))
+    residual = push.force - push.intercept - push.k_t * push.depth
+    marks: tuple[AnyMark, ...] = (HLine(0.0), *in_and_out(MM * push.depth, residual, inside, loading))
     return Panel("Residual", "depth [mm]", "force [N]", marks)
 
 
 def loop_panel(push: Push) -> Panel:
-    """The loop of one push, with what the chosen model gives."""
+    """The loop of one push, with the force of the chosen model."""
     inside, loading = push.inside == 1, push.loading == 1
     model = Line(MM * push.depth, push.fitted, "model", "black", "solid")
     marks: tuple[AnyMark, ...] = (*in_and_out(MM * push.depth, push.force, inside, loading), model)
@@ -200,7 +200,7 @@ def in_and_out(x: Column, y: Column, inside: Booleans, loading: Booleans) -> tup
 
 
 def spread_panel(tissue: Stiffness) -> Panel:
-    """How the stiffness of the pushes that count is spread, with its quartiles."""
+    """A histogram of the stiffness of the pushes that count, with its quartiles."""
     counts, edges = np.histogram(tissue.k_t[tissue.counted == 1], bins=40)
     quartiles = VSpan(tissue.stiffness_q1, tissue.stiffness_q3, "quartiles")
     return Panel("Stiffness of pushes", "stiffness [N/m]", "pushes", (quartiles, Histogram(edges, counts, "", "blue")))
@@ -243,12 +243,12 @@ def each_push(context: Context, tissues: Sequence[Stiffness]) -> Iterator[Table]
     for tissue in tissues:
         prefix = f"tissue.{tissue.log}"
         rows = tuple((str(push), *context.numbers(f"{prefix}.{push}", names)) for push in tissue.push.tolist())
-        if len(rows) <= MANY:
+        if len(rows) <= MAX_PUSHES_LISTED:
             yield Table(f"{literal(tissue.log)}: every push.", header, rows, f"pushes-{tissue.log}", "lrrrrrrr")
 
 
 def model_tables(context: Context, models: Sequence[TissueModel]) -> Iterator[Table]:
-    """What models of the tissue come to on pushes that they have not seen."""
+    """The errors of the models of the tissue on pushes that were left out of the fit."""
     header = ("Log", "Model", "Error on pushes left out", "Stiffness", "Damping", "Exponent", "")
     rows = []
     for model in models:
@@ -257,7 +257,7 @@ def model_tables(context: Context, models: Sequence[TissueModel]) -> Iterator[Ta
             numbers = context.numbers(prefix, ("error", "tangent", "damping", "exponent"))
             rows.append((literal(model.log), name, *numbers, "chosen" if name == model.chosen else ""))
     if rows:
-        caption = "Models of the tissue; stiffness and damping are at half the usual depth below first contact."
+        caption = "Models of the tissue. Stiffness and damping are at half the usual depth below first contact."
         yield Table(caption, header, tuple(rows), "tissue-models", "llrrrrl")
 
 

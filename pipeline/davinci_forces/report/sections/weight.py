@@ -1,4 +1,4 @@
-"""What hangs on the arm: its mass, the scale of the efforts, and what free motion would seem to weigh.  Section 7.5"""
+"""The mass on the arm: its estimate, the scale of the efforts, and the apparent mass in free motion.  Section 7.5"""
 
 import math
 from collections.abc import Iterator
@@ -27,25 +27,25 @@ def section(context: Context) -> Section | None:
     weights = context.catalogue.all(Weight)
     if not weights:
         return None
-    found: list[Block] = [intro(), summary(context, weights)]
-    found += (verdict(context, weight) for weight in weights)
-    found += of_log(context, weights[0])
+    content: list[Block] = [intro(), summary(context, weights)]
+    content += (verdict(context, weight) for weight in weights)
+    content += log_blocks(context, weights[0])
     if weights[1:]:
-        others = tuple(block for weight in weights[1:] for block in of_log(context, weight))
-        found.append(OnScreen("The other runs with a mass", "other-masses", others))
-    return Section("Hung masses", "weight", tuple(found))
+        others = tuple(block for weight in weights[1:] for block in log_blocks(context, weight))
+        content.append(OnScreen("The other runs with a mass", "other-masses", others))
+    return Section("Hung masses", "weight", tuple(content))
 
 
 def intro() -> Prose:
-    """How a mass is found, and what its error is made of."""
+    """Explain the estimate of a mass and its standard error."""
     return Prose(
-        "A mass that hangs on a link asks the joints for its gravity and its inertia, which follow from the robot's "
-        "chain. The external effort (measured minus modelled, low-passed without delay, not the filter's) of all "
-        "joints that move and carry the mass is regressed on what a kilogram would ask for, each joint weighted by the "
-        "inverse of its model's squared error along free motion. A joint has an offset of the day where that can be "
-        "told from the load. The standard error is that of six parts of the path, one left out at a time, together "
-        "with that of the fit; both are widened where masses that other free motion seems to carry, and that should "
-        "be 0, exceed theirs."
+        "A mass on a link adds its gravity and its inertia to the effort of the joints, as computed from the robot's "
+        "chain. The mass follows by regression: the external effort of all joints that move and carry it, over the "
+        "effort that one kilogram would need. This external effort is measured minus modelled, low-passed without "
+        "delay. Each joint is weighted by the inverse of its model's squared error in free motion. A joint also has an "
+        "offset of the day, where the data can separate it from the load. The standard error combines that of the fit "
+        "with that of leaving out one of six parts of the path at a time. It is widened where logs without a mass "
+        "appear to carry more than their standard errors allow."
     )
 
 
@@ -62,9 +62,9 @@ def summary(context: Context, weights: list[Weight]) -> Table:
         for weight in weights
     )
     return Table(
-        "Masses with their standard errors: as the position is stated, and on the other side of the link. The side "
-        "that explains the efforts better is named where it does so by two standard errors. The scale is the mass over "
-        "the stated one.",
+        "Masses with their standard errors, at the stated position and on the other side of the link. The better side "
+        "is named if the difference is two standard errors or more. The scale is the estimated mass over the stated "
+        "one.",
         ("Log", "Moves with", "Stated", "Mass", "Other side", "Scale", "Side"),
         rows,
         "weight-table",
@@ -72,62 +72,62 @@ def summary(context: Context, weights: list[Weight]) -> Table:
     )
 
 
-def of_log(context: Context, weight: Weight) -> Iterator[Block]:
-    """What is said of one log."""
+def log_blocks(context: Context, weight: Weight) -> Iterator[Block]:
+    """The content about one log."""
     if weight.tare:
         yield disagreement(context, weight)
-    if loads := carrying(context, weight):
+    if loads := loads_of(context, weight):
         yield figure(weight, loads)
     yield by_joint(context, weight)
     free = context.catalogue.about(FreeWeight, weight=weight.log)
     if free:
-        yield OnScreen("What free motion seems to weigh", f"free-{weight.log}", (free_motion(context, weight, free),))
+        yield OnScreen("Apparent mass in free motion", f"free-{weight.log}", (free_motion(context, weight, free),))
 
 
 def verdict(context: Context, weight: Weight) -> Verdict:
-    """Whether the mass is the one that is stated, and what follows for the efforts."""
+    """Whether the estimated mass agrees with the stated one, and what follows for the scale of the efforts."""
     mass = context.number(f"weight.{weight.log}.mass", 3)
-    name = f"**{literal(weight.log)}**: the efforts weigh {mass}"
+    name = f"**{literal(weight.log)}**: the mass by the efforts is {mass}"
     if weight.side == "the other one":
-        return Verdict("warn", f"{name}; on the other side of its link it explains them better: check its position.")
+        return Verdict("warn", f"{name}. The other side of its link explains the efforts better: check its position.")
     if math.isnan(weight.stated_mass):
-        return Verdict("info", f"{name}; the study states no mass, so the scale of the efforts is not known.")
+        return Verdict("info", f"{name}. The study states no mass, so the scale of the efforts is not known.")
     within = abs(weight.mass - weight.stated_mass) <= NORMAL_95 * weight.mass_std
     stated, scale = Number(weight.stated_mass, "kg"), context.number(f"weight.{weight.log}.scale", 3)
     if within:
-        return Verdict("good", f"{name}, and {stated} hang there: the scale, {scale}, cannot be told from 1.")
+        return Verdict("good", f"{name}, and {stated} is stated. The scale, {scale}, agrees with 1.")
     return Verdict(
-        "warn", f"{name}, and {stated} hang there: efforts are {scale} times too large; check gear and motor."
+        "warn", f"{name}, but {stated} is stated. Efforts are {scale} times too large: check gear and motor."
     )
 
 
 def disagreement(context: Context, weight: Weight) -> Prose:
-    """By how much the tare disagrees with the fit's own free motion."""
-    seems = context.number(f"weight.{weight.log}.tare_mass", 2)
+    """State the apparent mass of the tare by the fit alone."""
+    apparent = context.number(f"weight.{weight.log}.tare_mass", 2)
     return Prose(
-        f"The run {literal(weight.tare)} along the same path is subtracted. By the fit alone it would seem to carry "
-        f"{seems}: by so much the tare disagrees with the free motion that was fitted, and by so much the mass differs "
-        "from the one without the tare. What the fit errs by repeats along the path and falls out, so it is not in the "
-        "standard error; what changed between the two runs is in the mass."
+        f"The run {literal(weight.tare)} without the mass (tare), along the same path, is subtracted. By the fit alone "
+        f"the tare appears to carry {apparent}, and by so much the mass differs from the one without the tare. The "
+        "error of the fit repeats along the path and cancels, so the standard error does not include it. A change "
+        "between the two runs remains in the mass."
     )
 
 
-def carrying(context: Context, weight: Weight) -> list[Load]:
+def loads_of(context: Context, weight: Weight) -> list[Load]:
     """What the joints carry along the path of a log."""
     loads = context.catalogue.about(Load, log=weight.log, weight=weight.log)
     return [load for load in loads if load.joint in weight.loaded]
 
 
 def figure(weight: Weight, loads: list[Load]) -> Figure:
-    """The external effort of each joint beside what the mass asks of it.  Fig 7.12"""
+    """The external effort of each joint beside the effort of the mass.  Fig 7.12"""
     mass = weight.mass if math.isnan(weight.stated_mass) else weight.stated_mass
-    by = "found" if math.isnan(weight.stated_mass) else "stated"
+    by = "estimated" if math.isnan(weight.stated_mass) else "stated"
     offsets = dict(zip(weight.loaded, weight.joint_offset, strict=True))
     name, subtracted = literal(weight.log), ", before the tare is subtracted" if weight.tare else ""
     once = "over one period, averaged" if loads[0].period else "over the run"
     return Figure(
-        f"{name}: external effort of each joint that carries the mass {once}{subtracted}, and what the {by} mass asks "
-        "for, with the joint's offset of the day.",
+        f"{name}: external effort of each joint that carries the mass {once}{subtracted}, and the effort of the {by} "
+        "mass, with the joint's offset of the day.",
         f"{name}: the external effort of {', '.join(title(load.joint) for load in loads)} follows the load of "
         f"{Number(mass, 'kg')}.",
         tuple(
@@ -146,14 +146,14 @@ def figure(weight: Weight, loads: list[Load]) -> Figure:
 
 
 def by_joint(context: Context, weight: Weight) -> Table:
-    """What each joint says of the mass."""
+    """The mass by each joint alone."""
     names = ("mass", "joint_offset", "left_rms", "free_error")
     rows = tuple((title(joint), *context.numbers(f"weight.{weight.log}.{joint}", names)) for joint in weight.loaded)
     return Table(
-        f"{literal(weight.log)}, joint by joint: the mass by that joint alone, with the standard error that parts of "
-        "the path tell; its offset of the day; and the root mean square of what mass and offset leave, beside what the "
-        "model leaves of free motion. Where the former is larger, more than the mass has changed.",
-        ("Joint", "Mass alone", "Offset", "Left", "Free motion"),
+        f"{literal(weight.log)}, joint by joint: the mass by that joint alone, with the standard error from parts of "
+        "the path; its offset of the day; and the root mean square of the residual, beside that of the model in free "
+        "motion. Where the residual is larger, more than the mass has changed.",
+        ("Joint", "Mass alone", "Offset", "Residual", "Free motion"),
         rows,
         f"weight-joints-{weight.log}",
         "lrrrr",
@@ -161,14 +161,15 @@ def by_joint(context: Context, weight: Weight) -> Table:
 
 
 def free_motion(context: Context, weight: Weight, free: list[FreeWeight]) -> Table:
-    """What free motion would seem to weigh."""
+    """The apparent mass in free motion, one row a log."""
     rows: tuple[tuple[Cell, ...], ...] = tuple(
         (literal(of.log), literal(of.role), context.number(f"weight.{weight.log}.free.{of.log}", 2)) for of in free
     )
     widening = context.number(f"weight.{weight.log}.widening", 3)
     return Table(
-        f"What seems to hang in free motion where {literal(weight.log)} has its mass: it should be 0. Fitted logs "
-        f"count by refits that had not seen them; by the others, standard errors are widened {widening} times.",
+        f"Apparent mass in free motion at the position of the mass of {literal(weight.log)}: it should be 0. Fitted "
+        "logs are predicted by refits that leave them out. Because of the other logs, standard errors are widened "
+        f"{widening} times.",
         ("Log", "Role", "Mass"),
         rows,
         f"weight-free-{weight.log}",

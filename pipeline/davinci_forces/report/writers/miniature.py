@@ -17,7 +17,7 @@ from davinci_forces.report.figures.palette import COLOURS, DARK, SURROUNDINGS, a
 
 WIDTH, LEFT, LINE, LETTER = 640, 64, 15, 6.2  # [px] of a figure, left of axes, of a line of words, of a letter of them
 LETTERS = 60  # of a title or a label
-FEWEST = 12  # points of a line
+MIN_LINE_POINTS = 12
 DASHES = {"dashed": "4 2", "dotted": "1 2", "dashdot": "5 2 1 2"}
 Box = tuple[float, float, float, float]
 
@@ -38,7 +38,7 @@ LARGER = Scale(110, 2400, legend=True)  # the picture of a trace that is on scre
 def miniature(figure: Figure, scale: Scale = SMALL) -> str:
     """The SVG of a figure."""
     curves = [mark for panel in figure.panels for mark in _curves(panel)]
-    points = max(FEWEST, scale.points // max(len(curves), 1))
+    points = max(MIN_LINE_POINTS, scale.points // max(len(curves), 1))
     across = _ends([mark.x for mark in curves]) if figure.zoomable else None
     top, panels = 0, ""
     for panel in figure.panels:

@@ -1,7 +1,7 @@
-"""What the elements of a URDF say, as numbers and names; what is wrong is noted with its line.
+"""Read the elements of a URDF as numbers and names; problems are noted with their lines.
 
-The file is XML, read as elements that know their lines.  A document type is refused: a description of a robot needs
-none, and entities that expand a thousandfold, or that name other files, come with one.
+The file is XML, read as elements that know their lines.  A document type is refused: a URDF needs none, and it could
+define entities that expand a thousandfold or that name other files.
 """
 
 import math
@@ -21,20 +21,20 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias, pseudo_inertias
 from davinci_forces.maths.mechanics.placed import transform
 from davinci_forces.robots.robot import MOST_LINKS
-from davinci_forces.toml import shown
+from davinci_forces.toml import excerpt
 from davinci_forces.toml.file import TomlFile
 from davinci_forces.toml.ranges import unlikely
 
-LARGEST = 4_000_000  # bytes; what people describe has some thousands of lines, and shapes are in files of their own
-BEYOND = f"and a robot's description has at most {LARGEST / 1e6:.0f}: keep shapes in files of their own"
-DEEPEST = 30  # elements inside each other; what simulators add goes ten deep
-MOST_ELEMENTS = 30_000  # 30 for each of the most links, with what they look like and what they touch with
+MAX_BYTES = 4_000_000  # bytes; a description has some thousands of lines, and shapes are in separate files
+TOO_LARGE = f"more than the {MAX_BYTES / 1e6:.0f} MB that are read; keep shapes in separate files"
+MAX_DEPTH = 30  # nested elements; those that simulators add are nested ten deep
+MOST_ELEMENTS = 30_000  # 30 for each of the most links, with their visual and collision shapes
 MOST_ATTRIBUTES = 30
 NAME = re.compile(r"[\w ./:+-]{1,100}")  # of links and joints, as files, equations and messages can show them
 MOVING = ("revolute", "continuous", "prismatic")
-UNLIMITED = 1e9  # [N m, N or their rates] what a file says that knows no limit; URDF has no word for it
+NO_LIMIT = 1e9  # [N m, N or their rates] stands for no limit, for which URDF has no word
 ROUNDING = 1e-9  # of an inertia's eigenvalues, as a share of the largest, that printed digits may leave below 0
-TIP = "tip"  # what a file that we write calls the frame at the tip
+TIP = "tip"  # name of the frame at the tip in files that we write
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
@@ -47,13 +47,13 @@ class Element:
     line: int
     inner: list["Element"] = field(default_factory=list)
 
-    def all(self, tag: str) -> list["Element"]:
+    def children(self, tag: str) -> list["Element"]:
         """The elements in it that have this tag."""
         return [element for element in self.inner if element.tag == tag]
 
-    def first(self, tag: str) -> "Element | None":
+    def child(self, tag: str) -> "Element | None":
         """The first of them, or None."""
-        return next(iter(self.all(tag)), None)
+        return next(iter(self.children(tag)), None)
 
 
 def read(file: Path) -> Element:
@@ -65,7 +65,7 @@ def read(file: Path) -> Element:
         If the file cannot be read, is not XML, or has a document type.
     """
     try:
-        text = read_bytes(file, LARGEST, BEYOND)
+        text = read_bytes(file, MAX_BYTES, TOO_LARGE)
     except FileNotFoundError:
         raise BadRobot(f"{file}: there is no such robot file") from None
     except OSError as error:
@@ -83,13 +83,13 @@ def parse(text: bytes, name: str) -> Element:
     def start(tag: str, attributes: dict[str, str]) -> None:
         counts.update(("element", tag) if len(open_elements) == 2 else ("element",))
         for what, number, most in (
-            ("elements inside each other", len(open_elements), DEEPEST), ("elements", counts["element"], MOST_ELEMENTS),
+            ("nested elements", len(open_elements), MAX_DEPTH), ("elements", counts["element"], MOST_ELEMENTS),
             ("joints", counts["joint"], MOST_LINKS), ("links", counts["link"], MOST_LINKS),
             ("attributes in an element", len(attributes), MOST_ATTRIBUTES),
         ):  # fmt: skip
             if number > most:
-                said = f"it has more than {most} {what}, and a robot has fewer"
-                raise BadRobot(f"{name}:{parser.CurrentLineNumber}: {said}; describe an arm of it in a file of its own")
+                excess = f"it has more than {most} {what}"
+                raise BadRobot(f"{name}:{parser.CurrentLineNumber}: {excess}; describe one arm of the robot only")
         element = Element(tag, attributes, parser.CurrentLineNumber)
         open_elements[-1].inner.append(element)
         open_elements.append(element)
@@ -98,17 +98,17 @@ def parse(text: bytes, name: str) -> Element:
         open_elements.pop()
 
     def document_type(*_: object) -> None:
-        said = "a robot's description needs no document type; delete <!DOCTYPE ...> and what it defines"
-        raise BadRobot(f"{name}:{parser.CurrentLineNumber}: {said}")
+        remedy = "a URDF needs no document type; delete <!DOCTYPE ...> and what it defines"
+        raise BadRobot(f"{name}:{parser.CurrentLineNumber}: {remedy}")
 
     parser.StartElementHandler, parser.EndElementHandler = start, end
     parser.StartDoctypeDeclHandler = document_type
     try:
         parser.Parse(text, True)
     except expat.ExpatError as error:
-        said = f"not XML: {expat.ErrorString(error.code)}, at column {error.offset + 1}"
+        wrong = f"not XML: {expat.ErrorString(error.code)}, at column {error.offset + 1}"
         hint = "; run xacro first, and name the .urdf that it writes" if b"xacro:" in text else ""
-        raise BadRobot(f"{name}:{error.lineno}: {said}{hint}") from None
+        raise BadRobot(f"{name}:{error.lineno}: {wrong}{hint}") from None
     except (ValueError, LookupError) as error:  # of an encoding that Python does not know
         raise BadRobot(f"{name}: not XML: {error}; save it as UTF-8") from None
     return outermost.inner[0]
@@ -133,12 +133,12 @@ class UrdfJoint(NamedTuple):
 
 
 class Notes:
-    """What is said of one element: problems with its line, and what it is called."""
+    """Notes the problems of one element, with its line and its name."""
 
     def __init__(self, file: TomlFile, element: Element) -> None:
         self.file, self.element = file, element
         named = element.attributes.get("name")
-        self.called = f"<{element.tag} name={shown(named)}>" if named is not None else f"<{element.tag}>"
+        self.called = f"<{element.tag} name={excerpt(named)}>" if named is not None else f"<{element.tag}>"
 
     def problem(self, text: str, at: Element | None = None) -> None:
         """Note something wrong with the element, or with one in it."""
@@ -151,7 +151,7 @@ class Notes:
         if not value:
             self.problem(f"{says} is missing", element)
         elif not NAME.fullmatch(value):
-            self.problem(f"{says} is {shown(value)}, and must be letters, digits, spaces and _./:+- only", element)
+            self.problem(f"{says} is {excerpt(value)}, but may have only letters, digits, spaces and _./:+-", element)
         return value
 
     def numbers(self, element: Element | None, key: str, default: Sequence[float]) -> list[float]:
@@ -165,14 +165,14 @@ class Notes:
             values = []
         if len(values) != len(default) or not all(map(math.isfinite, values)):
             how = "a finite number" if len(default) == 1 else f"{len(default)} finite numbers with spaces between them"
-            self.problem(f"{key} must be {how}, not {shown(text)}", element)
+            self.problem(f"{key} must be {how}, not {excerpt(text)}", element)
             return list(default)
         limits = element.tag == "limit"  # of which the largest are none
         likely = (
-            unlikely(key, x, "force" if key == "effort" else "") for x in values if abs(x) < UNLIMITED or not limits
+            unlikely(key, x, "force" if key == "effort" else "") for x in values if abs(x) < NO_LIMIT or not limits
         )
         if wrong := next(filter(None, likely), ""):
-            self.problem(f"{wrong}, not {shown(text)}", element)
+            self.problem(f"{wrong}, not {excerpt(text)}", element)
             return list(default)
         return values
 
@@ -186,69 +186,69 @@ class Notes:
         return transform(xyz, rpy)
 
 
-def inertial(link: Element, file: TomlFile) -> Array | None:
+def inertial_parameters(link: Element, file: TomlFile) -> Array | None:
     """The inertial parameters (10,) of a link in its frame; None where it states none."""
-    stated = link.first("inertial")
+    stated = link.child("inertial")
     if stated is None:
         return None
-    notes, mass = Notes(file, link), stated.first("mass")
+    notes, mass = Notes(file, link), stated.child("mass")
     m = notes.number(mass, "value", 0.0)
     if mass is None or "value" not in mass.attributes:
         notes.problem('its inertial has no mass; write <mass value="..."/> [kg], or leave the inertial out', stated)
     if m < 0:
-        notes.problem(f"a mass of {m:g} kg; it must be 0 or more", mass)
-    tensor = stated.first("inertia")
+        notes.problem(f"the mass is {m:g} kg, but must be 0 or more", mass)
+    tensor = stated.child("inertia")
     xx, xy, xz, yy, yz, zz = (notes.number(tensor, key, 0.0) for key in TENSOR)
     values = np.linalg.eigvalsh([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     if values[0] < -ROUNDING * abs(values).max():
-        said = f"no body has this inertia, whose smallest principal moment is {values[0]:.3g} kg m^2"
-        notes.problem(f"{said}: correct its signs, or leave the inertial out", tensor)
+        wrong = f"the smallest principal moment of inertia is {values[0]:.3g} kg m^2, but must be 0 or more"
+        notes.problem(f"{wrong}; correct its signs, or leave the inertial out", tensor)
     about_centre = np.array([[0.0, 0.0, 0.0, 0.0, xx, xy, xz, yy, yz, zz]])
-    at, J = notes.pose(stated.first("origin")), pseudo_inertias(about_centre)[0]
+    at, J = notes.pose(stated.child("origin")), pseudo_inertias(about_centre)[0]
     J[3, 3] = m
     return np.asarray(of_pseudo_inertias((at @ J @ at.T)[None])[0])
 
 
-def joint(element: Element, file: TomlFile) -> UrdfJoint:
-    """A joint; one of an unknown type is taken to be fixed, so that the links beyond it hang on something."""
+def read_joint(element: Element, file: TomlFile) -> UrdfJoint:
+    """Read a joint; one of an unknown type is taken as fixed, so that the links beyond it stay connected."""
     notes, kind = Notes(file, element), element.attributes.get("type", "")
     name = notes.name(element, "name", "its name")
-    parent = notes.name(element.first("parent"), "link", 'its <parent link="..."/>')
-    child = notes.name(element.first("child"), "link", 'its <child link="..."/>')
+    parent_link = notes.name(element.child("parent"), "link", 'its <parent link="..."/>')
+    child_link = notes.name(element.child("child"), "link", 'its <child link="..."/>')
     if kind not in (*MOVING, "fixed"):
-        remedy = "describe it by several of them" if kind in ("floating", "planar") else "correct it"
-        notes.problem(f"type is {shown(kind)}, and must be one of {', '.join(MOVING)} or fixed; {remedy}")
+        remedy = "replace it by several of these" if kind in ("floating", "planar") else "correct it"
+        notes.problem(f"type is {excerpt(kind)}, but must be {', '.join(MOVING)} or fixed; {remedy}")
         kind = "fixed"
-    axis = np.array(notes.numbers(element.first("axis"), "xyz", [1.0, 0.0, 0.0]))
+    axis = np.array(notes.numbers(element.child("axis"), "xyz", [1.0, 0.0, 0.0]))
     length = float(np.linalg.norm(axis))
     if not length:
-        notes.problem("xyz is 0 0 0, and an axis must point somewhere", element.first("axis"))
-    mimic = element.first("mimic")
-    bounds = _bounds(notes, element.first("limit"), kind)
+        notes.problem("xyz is 0 0 0, but an axis needs a direction", element.child("axis"))
+    mimic = element.child("mimic")
+    bounds = _bounds(notes, element.child("limit"), kind)
     return UrdfJoint(
-        name=name, kind=kind, parent=parent, child=child, placement=notes.pose(element.first("origin")),
-        axis=axis / (length or 1.0), position=bounds, velocity=_most(notes, element.first("limit"), "velocity"),
-        effort=_most(notes, element.first("limit"), "effort"),
+        name=name, kind=kind, parent=parent_link, child=child_link, placement=notes.pose(element.child("origin")),
+        axis=axis / (length or 1.0), position=bounds, velocity=_most(notes, element.child("limit"), "velocity"),
+        effort=_most(notes, element.child("limit"), "effort"),
         mimic=notes.name(mimic, "joint", "the joint that it mimics") if mimic else "",
         multiplier=notes.number(mimic, "multiplier", 1.0), bias=notes.number(mimic, "offset", 0.0), line=element.line,
     )  # fmt: skip
 
 
 def _bounds(notes: Notes, limit: Element | None, kind: str) -> tuple[float, float]:
-    """The range of a joint's position; without one where it turns on and on, or states neither end."""
+    """The range of a joint's position; infinite where it turns without end, or states neither bound."""
     stated = limit is not None and {"lower", "upper"} & limit.attributes.keys()
     if kind not in ("revolute", "prismatic") or not stated:
         return -math.inf, math.inf
     low, high = (notes.number(limit, key, 0.0) for key in ("lower", "upper"))
     if low >= high:
-        said = f"lower is {low:g} and upper {high:g}: a joint that moves has a lower below its upper"
-        notes.problem(f'{said}; correct them, or write type="fixed" where it does not move', limit)
-    return low if low > -UNLIMITED else -math.inf, high if high < UNLIMITED else math.inf
+        wrong = f"lower is {low:g} and upper is {high:g}, but lower must be less than upper"
+        notes.problem(f'{wrong}; correct them, or write type="fixed" if the joint does not move', limit)
+    return low if low > -NO_LIMIT else -math.inf, high if high < NO_LIMIT else math.inf
 
 
 def _most(notes: Notes, limit: Element | None, key: str) -> float:
-    """A limit of velocity or effort; 0 is what many files say where it is not known."""
+    """A limit of velocity or effort; many files give 0 where it is not known."""
     most = notes.number(limit, key, 0.0)
     if most < 0:
-        notes.problem(f"{key} is {most:g}, and must be 0 or more", limit)
-    return most if 0 < most < UNLIMITED else math.inf
+        notes.problem(f"{key} is {most:g}, but must be 0 or more", limit)
+    return most if 0 < most < NO_LIMIT else math.inf

@@ -1,9 +1,8 @@
-"""A robot as URDF: its chain, what its links weigh, and the limits of its joints.
+"""Write a robot as URDF: its chain, the masses of its links, and the limits of its joints.
 
-A link's frame is at its joint: the one that bears the link's name where that is so, else the one with z along the axis,
-as the dynamics take it.  Other frames that the chain names are links without mass, fixed where they are.  A coordinate
-that moves several links moves the first, which the others mimic.  URDF has no word for acceleration, for where a joint
-without limits ends, or for a drive.
+A link's frame is at its joint: the frame of the link's name where that is on the axis, else the one with z along the
+axis, as the dynamics take it.  Other frames of the chain are fixed links without mass.  A coordinate that moves several
+links moves the first, which the others mimic.  URDF cannot express limits of acceleration, missing limits or drives.
 """
 
 from collections.abc import Iterator
@@ -17,16 +16,15 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.mechanics.bodies import Bodies
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.placed import roll_pitch_yaw
-from davinci_forces.robots.robot import ANYWHERE, Kind, Limits, Robot
-from davinci_forces.robots.urdf.tables import TENSOR, TIP, UNLIMITED
+from davinci_forces.robots.robot import UNLIMITED, Kind, Limits, Robot
+from davinci_forces.robots.urdf.tables import NO_LIMIT, TENSOR, TIP
 
 UPPER = np.triu_indices(3)
-UNKNOWN = Limits(ANYWHERE, ANYWHERE, ANYWHERE)
-SAME = 1e-15  # by which rounding moves a frame that is a link's own
+FRAME_TOLERANCE = 1e-15  # by which rounding moves a frame that coincides with its link's
 
 
 def text(robot: Robot) -> str:
-    """The whole of its file.
+    """Write the text of its URDF.
 
     Raises
     ------
@@ -34,9 +32,9 @@ def text(robot: Robot) -> str:
         If the robot has no chain.
     """
     if robot.chain is None:
-        raise BadRobot(f"robot {robot.name} has no chain: its geometry is not known, and a URDF is made of it")
+        raise BadRobot(f"robot {robot.name} has no chain: its geometry is not known, and a URDF needs it")
     title = robot.title.replace("--", "- -").rstrip("-")  # which a comment may not hold
-    weightless = "" if robot.bodies else "; what its links weigh is not known"
+    weightless = "" if robot.bodies else "; the masses of its links are not known"
     lines = [
         '<?xml version="1.0" encoding="utf-8"?>',
         f"<!-- {title}, in m, rad and kg, z up{weightless} -->",
@@ -49,7 +47,7 @@ def text(robot: Robot) -> str:
 
 
 class _Turned(NamedTuple):
-    """A robot whose links have frames as URDF has them: on their axes, which may point anywhere."""
+    """A robot whose links have frames as in URDF: on their joint axes, in any orientation."""
 
     robot: Robot
     links: tuple[str, ...]  # by body, the base first (L + 1,)
@@ -60,13 +58,13 @@ class _Turned(NamedTuple):
 
 
 def _turned(robot: Robot, chain: Chain) -> _Turned:
-    """The robot with those of its links' frames turned that bear the links' names and are on their axes."""
-    own = chain.of_links.copy()
-    own[own[:, :3, 3].any(axis=1)] = np.eye(4)  # beside the axis, or further along
-    by_body = np.concatenate([np.eye(4)[None], own])
+    """Express the robot in the links' frames of the chain's names, where these are on the joint axes."""
+    frames = chain.of_links.copy()
+    frames[frames[:, :3, 3].any(axis=1)] = np.eye(4)  # beside the axis, or further along
+    by_body = np.concatenate([np.eye(4)[None], frames])
     back = np.linalg.inv(by_body)
     return _Turned(
-        robot, (chain.names[0], *chain.links), back[chain.parent] @ chain.placement @ own, back[1:, :3, 2],
+        robot, (chain.names[0], *chain.links), back[chain.parent] @ chain.placement @ frames, back[1:, :3, 2],
         robot.bodies.within(back[1:]) if robot.bodies else None, back[chain.body] @ chain.offset,
     )  # fmt: skip
 
@@ -80,7 +78,7 @@ def _body(turned: _Turned, chain: Chain) -> Iterator[str]:
         moved.add(coordinate)
     taken = set(turned.links)
     for name, body, offset in [*zip(chain.names, chain.body.tolist(), turned.offset, strict=True)][1:]:
-        if name not in taken or not np.allclose(offset, np.eye(4), rtol=0, atol=SAME):
+        if name not in taken or not np.allclose(offset, np.eye(4), rtol=0, atol=FRAME_TOLERANCE):
             yield from _fixed(_unused(name, taken), turned.links[body], offset)
     if TIP not in taken:  # a file says by this name which of its frames is the tip
         at = chain.names.index(chain.tip)
@@ -108,7 +106,7 @@ def _joint(turned: _Turned, chain: Chain, i: int, mimics: bool) -> Iterator[str]
     robot, k = turned.robot, int(chain.coordinate[i])
     carrier, child = turned.links[chain.parent[i]], turned.links[i + 1]
     coordinate = robot.coordinates[k]
-    limits = robot.joints[k].limits if k < len(robot.joints) else UNKNOWN
+    limits = robot.joints[k].limits if k < len(robot.joints) else UNLIMITED
     bounded = bool(np.isfinite(limits.q).all())
     kind = Kind.PRISMATIC.value if chain.slides[i] else Kind.REVOLUTE.value if bounded else "continuous"
     name = f"{coordinate} of {child}" if mimics else coordinate
@@ -122,8 +120,8 @@ def _joint(turned: _Turned, chain: Chain, i: int, mimics: bool) -> Iterator[str]
 
 
 def _limits(limits: Limits, ends: bool) -> str:
-    low, high = (min(max(end, -UNLIMITED), UNLIMITED) for end in limits.q)
-    velocity, effort = min(limits.dq[1], -limits.dq[0], UNLIMITED), min(limits.effort, UNLIMITED)
+    low, high = (min(max(end, -NO_LIMIT), NO_LIMIT) for end in limits.q)
+    velocity, effort = min(limits.dq[1], -limits.dq[0], NO_LIMIT), min(limits.effort, NO_LIMIT)
     between = f'lower="{_number(low)}" upper="{_number(high)}" ' if ends else ""
     return f'{between}velocity="{_number(velocity)}" effort="{_number(effort)}"'
 

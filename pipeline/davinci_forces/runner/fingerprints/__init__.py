@@ -1,1 +1,1 @@
-"""All that the outputs of a task depend on, by hash: values, code, and the declarations of records."""
+"""Hashes of all that the outputs of a task depend on: values, code, and the declarations of records."""

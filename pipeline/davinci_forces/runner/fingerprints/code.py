@@ -1,4 +1,4 @@
-"""The code that a result depends on: modules with everything of the pipeline that they import, by hash."""
+"""Hashes of the code that a result depends on: modules and everything of the pipeline that they import."""
 
 import re
 from collections.abc import Iterable, Iterator
@@ -14,17 +14,17 @@ COMMENT = re.compile(r"#.*")
 
 @cache
 def code(*modules: str, without: str = "") -> dict[str, str]:
-    """The hash of modules and of everything of the pipeline that they import, directly or not.
+    """The hashes of modules and of everything of the pipeline that they import, directly or not.
 
-    What lies in the package `without` counts only where it is one of the modules.
+    Modules in the package `without` are left out, unless they are named.
     """
     files: dict[Path, None] = {}
     for module in modules:
         _collect(_files(module), files)
     named = {file for module in modules for file in _files(module)}
     left_out = PACKAGE.joinpath(*without.split(".")[1:]) if without else None
-    kept = (file for file in sorted(files) if file in named or left_out not in file.parents)
-    return {file.relative_to(PACKAGE).as_posix(): _hash_of(file) for file in kept}
+    hashed = (file for file in sorted(files) if file in named or left_out not in file.parents)
+    return {file.relative_to(PACKAGE).as_posix(): _hash_of(file) for file in hashed}
 
 
 def _collect(sources: Iterable[Path], files: dict[Path, None]) -> None:
@@ -39,26 +39,26 @@ def _collect(sources: Iterable[Path], files: dict[Path, None]) -> None:
 @cache
 def _imports(file: Path) -> tuple[str, ...]:
     modules = []
-    for module, names in imported(file.read_text(encoding="utf-8")):
+    for module, names in find_imports(file.read_text(encoding="utf-8")):
         for name in names:
             deeper = f"{module}.{name}"
             modules.append(deeper if _files(deeper) else module)
     return tuple(modules)
 
 
-def imported(source: str) -> Iterator[tuple[str, list[str]]]:
-    """What a module imports from the pipeline: each module, and the names from it.
+def find_imports(source: str) -> Iterator[tuple[str, list[str]]]:
+    """Find what a source imports from the pipeline: each module, and the names from it.
 
-    Statements are found by how they begin: to parse all of a stage's modules would take longer than many a run.
+    A regular expression finds the statements, since parsing all of a stage's modules would take longer than many runs.
     """
-    for module, said in IMPORT.findall(source):
-        names = COMMENT.sub("", said).strip("() \n").split(",")
+    for module, text in IMPORT.findall(source):
+        names = COMMENT.sub("", text).strip("() \n").split(",")
         yield module, [name.split()[0] for name in names if name.strip()]
 
 
 @cache
 def _files(module: str) -> list[Path]:
-    """The file of a module; of a package its `__init__`, or all files where that imports its modules by name."""
+    """The file of a module; for a package its `__init__`, or all its files if that imports modules by name."""
     place = PACKAGE.joinpath(*module.split(".")[1:])
     if place.with_suffix(".py").is_file():
         return [place.with_suffix(".py")]

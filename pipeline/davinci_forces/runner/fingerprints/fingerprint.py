@@ -1,4 +1,4 @@
-"""All that the outputs of a task depend on, and in words what of it changed."""
+"""The fingerprint of a task: all that its outputs depend on, and in words what changed."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
@@ -16,7 +16,7 @@ from davinci_forces.records.quantities import QUANTITIES
 from davinci_forces.runner.signature import declaration
 
 PLAIN = (str, float, int, bool, type(None))
-REASONS = {  # part of a fingerprint -> what is said of what changed in it
+REASONS = {  # part of a fingerprint -> reason to run
     "given": "the {} changed",
     "schemas": "the declaration of {} changed",
     "code": "the code of {} changed",
@@ -30,19 +30,19 @@ def hash_of_text(text: str) -> str:
 
 
 def hash_of(value: Any) -> str:
-    """The sha256 of a value by all that it holds: arrays by their bytes, of which `repr` shows a few digits."""
+    """The sha256 of all that a value holds; arrays count by their bytes, since `repr` rounds."""
     return hash_of_text(canonical(value))
 
 
 def canonical(value: Any) -> str:
-    """A text that two values share only if they hold the same.
+    """A text that is the same for two values only if they hold the same.
 
     Raises
     ------
     TypeError
-        If the value holds something of which that cannot be said.
+        If the value holds a type without such a text.
     """
-    if type(value) in PLAIN:  # most of what anything holds
+    if type(value) in PLAIN:  # the most frequent case
         return repr(value)
     if is_dataclass(value) and not isinstance(value, type):
         items = (f"{f.name}={canonical(getattr(value, f.name))}" for f in fields(value))
@@ -69,7 +69,7 @@ class Fingerprint:
     """Everything that the outputs of a task depend on."""
 
     inputs: dict[str, str]  # file -> sha256
-    given: dict[str, str]  # what the stage was given besides records -> sha256
+    given: dict[str, str]  # argument of the stage besides records -> sha256
     settings: dict[str, Any]
     schemas: dict[str, str]  # kind of record read or made -> sha256 of its declaration
     code: dict[str, str]  # module -> sha256
@@ -77,7 +77,7 @@ class Fingerprint:
 
 
 def differences(then: dict[str, Any], now: Fingerprint) -> list[str]:
-    """What changed between the fingerprint of an entry and that of now, in words."""
+    """What changed from the fingerprint of an entry to the present one, in words."""
     if then == vars(now):
         return []
     changed = []
@@ -99,18 +99,18 @@ def schemas(step: str) -> dict[str, str]:
     return hashes | {kind.__name__: _hash(kind, _as_written) for kind in asks.makes}
 
 
-def _hash(kind: type[Record], described: Callable[[str, Any], tuple[str, ...]]) -> str:
-    declared = [described(f.name, f.type) for f in fields(kind)]  # type: ignore[arg-type]
-    return hash_of((kind.__name__, kind.KEY, kind.UNKNOWN, declared))
+def _hash(kind: type[Record], describe: Callable[[str, Any], tuple[str, ...]]) -> str:
+    columns = [describe(f.name, f.type) for f in fields(kind)]  # type: ignore[arg-type]
+    return hash_of((kind.__name__, kind.KEY, kind.UNKNOWN, columns))
 
 
 def _as_read(name: str, type_: Any) -> tuple[str, ...]:
-    """What a reader relies on of a field: its name, type and unit."""
+    """What a reader of a field depends on: its name, type and unit."""
     stored = str(np.dtype(COLUMN_DTYPES[type_])) if type_ in COLUMN_DTYPES else str(type_)
     return name, stored, QUANTITIES[name].unit
 
 
 def _as_written(name: str, type_: Any) -> tuple[str, ...]:
-    """All that a file holds of a field: the meaning of a column, too."""
+    """What the writer of a field depends on: also the meaning of a column, which is in the file."""
     meaning = (QUANTITIES[name].meaning,) if type_ in COLUMN_DTYPES else ()
     return *_as_read(name, type_), *meaning

@@ -1,1 +1,1 @@
-"""Where tasks run: in other processes of this machine, or of a cluster, which reckon as this one does."""
+"""Processes that run tasks, on this machine or a cluster, with the same floating-point arithmetic."""

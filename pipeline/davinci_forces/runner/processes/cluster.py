@@ -1,4 +1,4 @@
-"""Workers of a Dask cluster: they see the same folders under the same paths, and hold the same code, or are refused."""
+"""Run tasks on workers of a Dask cluster that see the same folders under the same paths and have the same code."""
 
 import logging
 import socket
@@ -21,14 +21,15 @@ from davinci_forces.runner.ledger import Folders
 from davinci_forces.runner.plan import Task
 from davinci_forces.runner.processes import arithmetic
 
-PACKAGES = ("numpy", "scipy", "numba", "pyarrow", "statsmodels", "clarabel")  # that results are made with
-LOGGERS = ("distributed", "distributed.client", "tornado.application", "asyncio")  # of tracebacks of a lost connection
-PATIENCE = 10.0  # [s] that a shared file system may take to show a file to others
+RESULT_PACKAGES = ("numpy", "scipy", "numba", "pyarrow", "statsmodels", "clarabel")
+# They print tracebacks when a connection is lost.
+CONNECTION_LOGGERS = ("distributed", "distributed.client", "tornado.application", "asyncio")
+CONNECT_TIMEOUT = 10.0  # [s] for a scheduler to answer, and for a shared file system to show a new file
 
 
 @dataclass(frozen=True)
 class Terms:
-    """What a worker has to find to be handed tasks of a study."""
+    """What a worker needs to have to run tasks of a study."""
 
     mark: str  # a file in the processed folder
     code: str
@@ -37,11 +38,11 @@ class Terms:
 
 @cache
 def own_terms(mark: str = "") -> Terms:
-    """What this process has."""
+    """The terms that this process meets."""
     code = {file.relative_to(PACKAGE).as_posix(): digest(file) for file in sorted(PACKAGE.rglob("*.py"))}
-    versions = {"Python": python_version(), "arithmetic": arithmetic.described()}
+    versions = {"Python": python_version(), "arithmetic": arithmetic.description()}
     versions["instructions"] = arithmetic.instructions()
-    for name in PACKAGES:
+    for name in RESULT_PACKAGES:
         try:
             versions[name] = version(name)
         except PackageNotFoundError:
@@ -55,46 +56,44 @@ def perform_there(terms: Terms, folders: Folders, task: Task) -> Outcome:
     Raises
     ------
     BadRequest
-        If this worker does not see the study's folders, or its code or libraries are others.
+        If this worker does not see the study's folders, or has other code or libraries.
     """
-    require(terms, folders)
+    require_terms(terms, folders)
     return perform(folders, task, folders.processed / terms.mark)
 
 
 @cache
-def require(terms: Terms, folders: Folders) -> None:
-    """Refuse to work on what this process sees or does otherwise than the one that asked; raises as `perform_there`."""
-    here, own = f"the worker on {socket.gethostname()}", own_terms(terms.mark)
+def require_terms(terms: Terms, folders: Folders) -> None:
+    """Check that this process meets the terms; raises as `perform_there`."""
+    here, actual = f"the worker on {socket.gethostname()}", own_terms(terms.mark)
     waited = 0.0
     while not (folders.processed / terms.mark).exists():
-        if waited >= PATIENCE:
+        if waited >= CONNECT_TIMEOUT:
             raise BadRequest(
                 f"{here} does not see {folders.processed}; a cluster needs the same folders under the same paths on "
                 "every machine: name ones that are shared with --processed and --reports"
             )
         sleep(0.5)
         waited += 0.5
-    if own.code != terms.code:
+    if actual.code != terms.code:
+        raise BadRequest(f"{here} has another version of davinci-forces; install the same one there and restart it")
+    if others := sorted({*actual.versions} - {*terms.versions}):
+        expected = dict(terms.versions)
+        versions = ", ".join(f"{name} {version} instead of {expected[name]}" for name, version in others)
+        settings = " ".join(f"{name}={value}" for name, value in arithmetic.blas_variables().items())
         raise BadRequest(
-            f"{here} holds another version of davinci-forces; install the same one there and start it anew"
-        )
-    if others := sorted({*own.versions} - {*terms.versions}):
-        wanted = dict(terms.versions)
-        said = ", ".join(f"{name} {has} instead of {wanted[name]}" for name, has in others)
-        settings = " ".join(f"{name}={value}" for name, value in arithmetic.wanted().items())
-        raise BadRequest(
-            f"{here} has {said}; numbers would differ: start it in the same environment, with {settings} set"
+            f"{here} has {versions}; numbers would differ: start it in the same environment, with {settings} set"
         )
 
 
 @contextmanager
-def connected(address: str, folders: Folders) -> Iterator[tuple[Executor, int, Terms]]:
-    """The workers of a cluster as an executor, how many tasks they run at once, and on what terms they are handed them.
+def connect(address: str, folders: Folders) -> Iterator[tuple[Executor, int, Terms]]:
+    """Connect to a cluster; yield its executor, how many tasks it runs at once, and the terms for its workers.
 
     Raises
     ------
     BadRequest
-        If there is no scheduler at the address or it ends, workers end again and again, or Dask is not installed.
+        If no scheduler is at the address or it ends, workers are killed repeatedly, or Dask is not installed.
     """
     try:
         from distributed import Client, KilledWorker, Security
@@ -106,25 +105,25 @@ def connected(address: str, folders: Folders) -> Iterator[tuple[Executor, int, T
         if address.startswith("tls:") and not Security().get_connection_args("client")["ssl_context"]:
             names = "ca-file, client.cert and client.key"
             raise BadRequest(f"{address} needs certificates: set distributed.comm.tls.{names} in Dask's configuration")
-        client = Client(address, timeout=PATIENCE, set_as_default=False)
+        client = Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
     except (OSError, RuntimeError, ValueError) as error:
         raise BadRequest(f"no scheduler of a Dask cluster answers at {address}: {error}") from None
     terms = own_terms(f".run-{uuid4().hex[:12]}")
     mark = folders.processed / terms.mark
     folders.processed.mkdir(parents=True, exist_ok=True)
     mark.touch()
-    levels = {logger: logger.level for logger in map(logging.getLogger, LOGGERS)}
+    levels = {logger: logger.level for logger in map(logging.getLogger, CONNECTION_LOGGERS)}
     for logger in levels:
         logger.setLevel(logging.CRITICAL)
     try:
         yield client.get_executor(pure=False), max(sum(client.nthreads().values()), 1), terms
     except KilledWorker as error:
-        raise BadRequest(f"workers of the cluster ended again and again, perhaps for want of memory: {error}") from None
+        raise BadRequest(f"workers were killed repeatedly, perhaps because memory ran out: {error}") from None
     except Exception:
         if client.status == "running":
             raise
-        says = f"the scheduler at {address} is gone; what was finished is kept: run again"
-        raise BadRequest(says) from None
+        message = f"the scheduler at {address} does not answer any more; finished tasks are kept: run again"
+        raise BadRequest(message) from None
     finally:
         mark.unlink(missing_ok=True)
         client.close()

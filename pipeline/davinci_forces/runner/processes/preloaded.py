@@ -1,4 +1,4 @@
-"""What a worker has imported before it is handed a task; importing this is what it takes."""
+"""Import all that a worker needs before its first task."""
 
 from davinci_forces.logs.isolated import process
 

@@ -1,1 +1,1 @@
-"""What a finished study states: its numbers as data frames, and those of many studies beside each other."""
+"""Results of finished studies: as data frames, and those of many studies on one page."""

@@ -1,4 +1,4 @@
-"""The reports of many studies, as a campaign shows them, and where its page goes."""
+"""Read the reports of many studies, and write the page of a campaign."""
 
 import json
 import os
@@ -30,39 +30,41 @@ from davinci_forces.report.verdicts import WORDS
 from davinci_forces.runner import runs
 from davinci_forces.runner.results import stated
 
-CHANCE = 0.05  # of any false alarm on the whole page
+FALSE_ALARM_PROBABILITY = 0.05  # of the whole page
 
 
 def write(studies: Sequence[Path], reports: Path | None, out: Path | None) -> tuple[list[Path], list[str]]:
-    """Write the page of these studies; its files, and the studies that have no results and are left out.
+    """Write the page of these studies; return its files, and the studies that are left out without results.
 
     Raises
     ------
+    MissingRecord
+        If no study has results, or one has no summary.json.
     BadRequest
-        If no study has results, two have one name, or what one has cannot be read.
+        If two studies have the same name, or the results of one cannot be read.
     """
     folders = [runs.folders(study, None, reports).reports for study in studies]
-    there = [folder for folder in folders if (folder / "results.json").is_file()]
-    left_out = [str(s) for s, folder in zip(studies, folders, strict=True) if folder not in there]
-    if not there:
+    finished = [folder for folder in folders if (folder / "results.json").is_file()]
+    left_out = [str(s) for s, folder in zip(studies, folders, strict=True) if folder not in finished]
+    if not finished:
         names = ", ".join(left_out) or "none was named"
         raise MissingRecord(f"no study has results ({names}); run `davinci-forces all` on them first")
-    if len({folder.name for folder in there}) < len(there):
-        raise BadRequest(f"two studies are called alike: {', '.join(map(str, there))}; a campaign tells them by name")
-    place = out or there[0].parent
-    every = [campaigned(folder, place) for folder in there]
-    by_date = all(study.when is not None for study in every)
-    ordered = sorted(every, key=lambda study: study.started) if by_date else every
-    series = [one for joint in joints_of(ordered) for one in series_of(ordered, joint)]
+    if len({folder.name for folder in finished}) < len(finished):
+        raise BadRequest(f"two studies have the same name: {', '.join(map(str, finished))}; rename one of the folders")
+    place = out or finished[0].parent
+    summaries = [read_study(folder, place) for folder in finished]
+    by_date = all(study.when is not None for study in summaries)
+    ordered = sorted(summaries, key=lambda study: study.started) if by_date else summaries
+    series = [row for joint in joints_of(ordered) for row in series_of(ordered, joint)]
     files = page(ordered, left_out, findings(series, ordered, by_date))
     for name, content in files.items():
         write_bytes(place / name, content)
     return [place / name for name in files], left_out
 
 
-def campaigned(folder: Path, place: Path) -> Campaigned:
-    """One study, by the files of its report; `place` is the folder of the page that leads there."""
-    numbers, about = stated.read(folder / "results.json"), digest(folder / "summary.json")
+def read_study(folder: Path, place: Path) -> Campaigned:
+    """Read a study from the files of its report; `place` is the folder of the page that links to it."""
+    numbers, about = stated.read(folder / "results.json"), read_summary(folder / "summary.json")
     joints = {
         str(joint["joint"]): JointVerdict(
             joint["verdict"],
@@ -72,69 +74,72 @@ def campaigned(folder: Path, place: Path) -> Campaigned:
         for joint in about["joints"]
     }
     return Campaigned(
-        folder.name, leads_to(folder / "report.html", place), about["robot"], bool(about["simulated"]),
+        folder.name, link_to(folder / "report.html", place), about["robot"], bool(about["simulated"]),
         about["started"], joints, numbers,
     )  # fmt: skip
 
 
-def leads_to(file: Path, place: Path) -> str:
-    """The address of a file from a page in a folder."""
+def link_to(file: Path, place: Path) -> str:
+    """The link to a file from a page in a folder."""
     try:
         return quote(Path(os.path.relpath(file.resolve(), place.resolve())).as_posix())
     except ValueError:  # on another drive of Windows
         return quote(file.resolve().as_posix())
 
 
-def digest(file: Path) -> dict[str, Any]:
-    """The content of a summary.json.
+def read_summary(file: Path) -> dict[str, Any]:
+    """Read a summary.json.
 
     Raises
     ------
+    MissingRecord
+        If it does not exist.
     BadRequest
-        If it is not there or not as a report wrote it.
+        If it is not as a report wrote it.
     """
-    again = "`davinci-forces report` makes it anew"
+    again = "`davinci-forces report` writes it again"
     try:
         content = json.loads(read_bytes(file))
         texts = [content[name] for name in ("title", "robot", "started")]
         odd = [joint["joint"] for joint in content["joints"] if joint["verdict"] not in WORDS]
         if odd or not all(isinstance(text, str) for text in texts):
-            raise ValueError(f"verdicts of {odd}" if odd else "a text is none")
+            raise ValueError(f"verdicts of {odd}" if odd else "a text is missing")
     except FileNotFoundError:
-        raise MissingRecord(f"{file} is not there, as an earlier version made that report; {again}") from None
+        raise MissingRecord(f"{file} does not exist, since an earlier version wrote the report; {again}") from None
     except (OSError, ValueError, TypeError, LookupError) as error:
         raise BadRequest(f"{file} is not as the report wrote it ({error!r}); {again}") from None
     return dict(content)
 
 
-Test = tuple[str, Place, int]  # what is asked, of which series, and of which of its studies
+Test = tuple[str, Place, int]  # kind of test, its series, and the number of the study in it
 
 
-def findings(every: Sequence[Series], studies: Sequence[Campaigned], by_date: bool) -> Findings:
-    """What the series tell beyond their standard errors, of those that state them."""
+def findings(series: Sequence[Series], studies: Sequence[Campaigned], by_date: bool) -> Findings:
+    """Drifts, variations and outliers of the series beyond their standard errors, where all have one."""
     time = times(studies, by_date)
     slopes: dict[Place, Slope] = {}
     tests: dict[Test, float] = {}
-    for one in every:
-        if len(one.value) < 2 or not (np.isfinite(one.value).all() and np.isfinite(one.std).all()):
+    for row in series:
+        if len(row.value) < 2 or not (np.isfinite(row.value).all() and np.isfinite(row.std).all()):
             continue
-        line = trend(np.array([time[study.name] for study in one.studies]), one.value, one.std)
+        line = trend(np.array([time[study.name] for study in row.studies]), row.value, row.std)
         if line is not None:
-            slopes[place(one)] = Slope(line.slope, line.std)
-            tests["drift", place(one), 0] = line.p
-        tests["scatter", place(one), 0] = scatter(one.value, one.std)
-        tests |= {("outlier", place(one), i): p for i, p in enumerate(stands_out(one.value, one.std).tolist())}
-    told = [test for test, tells in zip(tests, holm([*tests.values()], CHANCE).tolist(), strict=True) if tells]
-    drifting, varying = ({where for what, where, _ in told if what == wanted} for wanted in ("drift", "scatter"))
-    odd = {where: tuple(i for w, at, i in told if w == "outlier" and at == where) for _, where, _ in told}
+            slopes[place(row)] = Slope(line.slope, line.std)
+            tests["drift", place(row), 0] = line.p
+        tests["scatter", place(row), 0] = scatter(row.value, row.std)
+        tests |= {("outlier", place(row), i): p for i, p in enumerate(stands_out(row.value, row.std).tolist())}
+    rejections = holm([*tests.values()], FALSE_ALARM_PROBABILITY).tolist()
+    significant = [test for test, rejected in zip(tests, rejections, strict=True) if rejected]
+    drifting, varying = ({where for kind, where, _ in significant if kind == k} for k in ("drift", "scatter"))
+    odd = {where: tuple(i for k, at, i in significant if k == "outlier" and at == where) for _, where, _ in significant}
     return Findings(
-        tuple(every), by_date, time, {where: slopes[where] for where in drifting}, frozenset(varying), odd, len(tests),
-        CHANCE,
+        tuple(series), by_date, time, {where: slopes[where] for where in drifting}, frozenset(varying), odd,
+        len(tests), FALSE_ALARM_PROBABILITY,
     )  # fmt: skip
 
 
 def times(studies: Sequence[Campaigned], by_date: bool) -> dict[str, float]:
-    """When each study was [days from the first], or which one it is in order."""
+    """The date of each study [days from the first], or its number in order."""
     first = studies[0].when if studies else None
     return {
         study.name: (study.when - first).total_seconds() / DAY

@@ -1,4 +1,4 @@
-"""Records and results as pandas DataFrames, for people who go on from where the pipeline ends."""
+"""Records and results as pandas DataFrames, for further analysis."""
 
 import json
 from pathlib import Path
@@ -14,7 +14,7 @@ from davinci_forces.runner.runs import folders
 
 
 def read(study: Path, kind: str, about: dict[str, str]) -> pd.DataFrame:
-    """All records of a kind, one below the other; see `davinci_forces.read`."""
+    """All records of a kind in one DataFrame; see `davinci_forces.read`."""
     if kind not in KINDS:
         raise BadRequest(f"there is no record {kind!r}; there are {', '.join(KINDS)}")
     unknown = set(about) - set(KINDS[kind].scalars())
@@ -38,22 +38,22 @@ def read(study: Path, kind: str, about: dict[str, str]) -> pd.DataFrame:
 
 
 def results(study: Path) -> pd.DataFrame:
-    """Every number of a study's results.json; see `davinci_forces.results`."""
+    """All numbers of a study's results.json; see `davinci_forces.results`."""
     file = folders(study, None, None).reports / "results.json"
     names = ["key", "value", "std", "unit", "source"]
     try:
         rows = [[result[name] for name in names] for result in json.loads(read_bytes(file))]
     except FileNotFoundError:
-        raise MissingRecord(f"{file} is not there; run `davinci-forces all {study}`") from None
+        raise MissingRecord(f"{file} does not exist; run `davinci-forces all {study}`") from None
     except (ValueError, TypeError, LookupError) as error:
-        again = f"`davinci-forces report {study}` makes it anew"
+        again = f"`davinci-forces report {study}` writes it again"
         raise MissingRecord(f"{file} is not as the report wrote it ({error!r}); {again}") from None
     frame = pd.DataFrame(rows, columns=names).set_index("key")
     return frame.astype({"value": float, "std": float})
 
 
 def as_frame(record: Record) -> pd.DataFrame:
-    """One record, its key and single scalars repeated on every row."""
+    """A record as a DataFrame, its key and single scalars repeated in every row."""
     scalars = {name: getattr(record, name) for name in record.scalars()}
     repeated = {name: value for name, value in scalars.items() if not isinstance(value, tuple)}
     columns = {name: getattr(record, name) for name in record.columns()}
@@ -62,7 +62,7 @@ def as_frame(record: Record) -> pd.DataFrame:
 
 
 def units(records: list[Any]) -> dict[str, str | dict[str, str]]:
-    """The unit of each field; by joint where joints differ."""
+    """The unit of each field, or its units by joint if they differ."""
     units_by_joint: dict[str, dict[str, str]] = {}
     for record in records:
         for name, unit in record.origin.units.items():

@@ -1,4 +1,4 @@
-"""What a results.json states, of whichever study and version it is: the numbers in it by key."""
+"""Read the numbers of a results.json of any study and version."""
 
 import json
 import math
@@ -11,12 +11,12 @@ from davinci_forces.report.changes import Stated, Value
 
 
 def read(file: Path) -> dict[str, Stated]:
-    """Every number of a results.json by its key, in the file's order.
+    """Read all numbers of a results.json by key, in the order of the file.
 
     Raises
     ------
     BadRequest
-        If the file cannot be read, or is not a results.json; the first number that is wrong is named.
+        If the file cannot be read or is not a results.json; names the first wrong number.
     """
     try:
         rows = json.loads(read_bytes(file))
@@ -30,12 +30,12 @@ def read(file: Path) -> dict[str, Stated]:
     for i, row in enumerate(rows, 1):
         key, problem = _problem(row)
         if key in numbers:
-            problem = "the key is there twice"
+            problem = "the key appears twice"
         if problem:
             raise BadRequest(f"{file}: number {i}{f' ({key})' if key else ''}: {problem}")
         std = row.get("std")
-        known = std is not None and not math.isnan(std)
-        numbers[key] = Stated(row["value"], float(std) if known else None, row.get("unit") or "")
+        has_std = std is not None and not math.isnan(std)
+        numbers[key] = Stated(row["value"], float(std) if has_std else None, row.get("unit") or "")
     return numbers
 
 
@@ -48,5 +48,5 @@ def _problem(row: Any) -> tuple[str, str]:
         return key, f"its value is {row.get('value')!r}, not a number"
     std, unit = row.get("std"), row.get("unit", "")
     if std is not None and (isinstance(std, bool) or not isinstance(std, int | float) or std < 0):
-        return key, f"its std is {std!r}, neither null nor a number from 0 on"
+        return key, f"its std is {std!r}, neither null nor a number of at least 0"
     return key, "" if unit is None or isinstance(unit, str) else f"its unit is {unit!r}, not text"

@@ -1,1 +1,1 @@
-"""Excitation experiments as a command line asks for them: trajectories, tables and plots."""
+"""Excitation experiments for a command line: trajectories, tables and plots."""

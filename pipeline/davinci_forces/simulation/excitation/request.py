@@ -1,4 +1,4 @@
-"""What is asked of an excitation, as options of a command line, and the trajectories that answer it."""
+"""Requests for excitation trajectories, as the options of a command state them, and their answers."""
 
 import math
 from dataclasses import dataclass, replace
@@ -18,17 +18,17 @@ from davinci_forces.simulation.excitation.trajectory import (
     PERIODS,
     ExcitationTrajectory,
     coefficient_names,
-    designed,
+    design_excitation,
     problem_of,
 )
 from davinci_forces.toml import unlikely
 
-STARTS_OF_ARM = 2  # starts of one joint for one of the arm, which takes longer
+STARTS_OF_ARM = 2  # starts for one joint per start for the arm, which takes longer
 
 
 @dataclass(frozen=True)
 class Request:
-    """What is asked for; None is left to the joint."""
+    """The options of a request; None takes the value of the joint."""
 
     robot: str
     joint: str  # or "all"
@@ -39,11 +39,11 @@ class Request:
     limits: tuple[str | None, str | None, str | None]  # of position, velocity and acceleration: "lower,upper"
     starts: int
     seed: int
-    samples: int  # K, instants of a period that the criterion looks at
+    samples: int  # K, instants of a period in the criterion
 
 
 class ArmExcitation(NamedTuple):
-    """What all joints together tell about the arm, and the criterion that each start of the search has come to."""
+    """The excitation of the arm by all joints together, and the criterion that each start of the search reached."""
 
     objective: float
     condition: float
@@ -52,73 +52,73 @@ class ArmExcitation(NamedTuple):
 
 
 class Answer(NamedTuple):
-    """A trajectory for each joint asked for; of all joints together, what they are worth where the links are known."""
+    """A trajectory for each requested joint, and the excitation of the arm where its links are known."""
 
     trajectories: list[ExcitationTrajectory]
     arm: ArmExcitation | None = None
 
 
 def answer(request: Request, tell: Tell = nothing) -> Answer:
-    """A trajectory for each joint asked for: designed, or the given one; `tell` hears of each start for an arm.
+    """Design or evaluate a trajectory for each requested joint; `tell` reports each start for an arm.
 
-    Joints that move together share a period.  Where the arm's links are known, their trajectories are the best ones for
-    the arm as a whole; else the joints' models are independent, and the best for all of them is the best of each.
+    Joints that move together share a period.  Where the arm's links are known, the trajectories are optimal for the
+    whole arm.  Otherwise the joints' models are independent, and each trajectory is optimal for its own joint.
 
     Raises
     ------
     BadRequest, BadRobot
-        If the request makes no sense or cannot be met.
+        If the request is invalid or cannot be met.
     """
-    named = Path(request.robot)  # a listed robot, or a .toml file
-    robot = robots.load(named.name, named.parent) if named.suffix == ".toml" else robots.load(request.robot, Path())
-    together = request.joint == "all"
-    joints = robot.joints if together else (robot.joint(request.joint),)
+    file = Path(request.robot)  # a listed robot, or a .toml file
+    robot = robots.load(file.name, file.parent) if file.suffix == ".toml" else robots.load(request.robot, Path())
+    all_joints = request.joint == "all"
+    joints = robot.joints if all_joints else (robot.joint(request.joint),)
     if request.criterion not in CRITERIA:
         raise BadRequest(f"--criterion is one of {', '.join(CRITERIA)}, not {request.criterion!r}")
     if request.period is not None and not (math.isfinite(request.period) and request.period > 0):
         raise BadRequest(f"--period must be positive, not {request.period:g}")
-    if wrong := unlikely("--period", request.period or 0.0, "period"):
-        raise BadRequest(f"{wrong}, not {request.period:g}")
-    if together and request.evaluate:
-        raise BadRequest("--evaluate judges one joint; name it instead of `all`")
+    if problem := unlikely("--period", request.period or 0.0, "period"):
+        raise BadRequest(f"{problem}, not {request.period:g}")
+    if all_joints and request.evaluate:
+        raise BadRequest("--evaluate takes one joint; name it instead of `all`")
     period = request.period or max(PERIODS[joint.kind] for joint in joints)
     problems = [_problem(request, joint, period) for joint in joints]
-    if together and robot.chain is not None:
+    if all_joints and robot.chain is not None:
         return _of_arm(request, robot, arm_problem(robot.chain, problems), tell)
-    return Answer([_excitation(request, *each) for each in zip(joints, problems, strict=True)])
+    return Answer([_excitation(request, *pair) for pair in zip(joints, problems, strict=True)])
 
 
 def _of_arm(request: Request, robot: Robot, problem: ArmExcitationProblem, tell: Tell) -> Answer:
     try:
-        found = design_together(problem, max(1, request.starts // STARTS_OF_ARM), request.seed, tell)
+        design = design_together(problem, max(1, request.starts // STARTS_OF_ARM), request.seed, tell)
     except ValueError as error:
         raise BadRequest(f"{robot.name}: {error}") from None
-    F = arm_observation(problem, found.series)
-    parts = zip(robot.joints, problem.joints, found.series, strict=True)
+    F = arm_observation(problem, design.series)
+    parts = zip(robot.joints, problem.joints, design.series, strict=True)
     return Answer(
         [ExcitationTrajectory(*part) for part in parts],
         ArmExcitation(
-            float(CRITERIA[request.criterion](F)), float(10 ** condition(F)), F.shape[-1], tuple(found.optima.tolist())
+            float(CRITERIA[request.criterion](F)), float(10 ** condition(F)), F.shape[-1], tuple(design.optima.tolist())
         ),
     )
 
 
 def _problem(request: Request, joint: Joint, period: float) -> ExcitationProblem:
     problem = problem_of(joint, period, request.harmonics, request.criterion, request.samples)
-    given = zip(("--q", "--dq", "--ddq"), request.limits, problem.limits, strict=True)
-    q, dq, ddq = (_limits(option, text) if text else own for option, text, own in given)
+    options = zip(("--q", "--dq", "--ddq"), request.limits, problem.limits, strict=True)
+    q, dq, ddq = (_limits(option, text) if text else limits for option, text, limits in options)
     return replace(problem, limits=(q, dq, ddq))
 
 
 def _excitation(request: Request, joint: Joint, problem: ExcitationProblem) -> ExcitationTrajectory:
     if request.evaluate is None:
-        return designed(joint, problem, request.starts, request.seed)
+        return design_excitation(joint, problem, request.starts, request.seed)
     x = _numbers("--evaluate", request.evaluate)
     if len(x) < 3 or len(x) % 2 == 0:
-        named = ",".join(coefficient_names(2))
-        raise BadRequest(f"--evaluate takes {named} or as many pairs as there are harmonics, not {len(x)} numbers")
-    given = replace(problem, harmonics=(len(x) - 1) // 2)
-    return ExcitationTrajectory(joint, given, Fourier.of(np.array(x), problem.period))
+        names = ",".join(coefficient_names(2))
+        raise BadRequest(f"--evaluate takes {names}, or a0 and a pair for each harmonic, not {len(x)} numbers")
+    problem = replace(problem, harmonics=(len(x) - 1) // 2)
+    return ExcitationTrajectory(joint, problem, Fourier.of(np.array(x), problem.period))
 
 
 def _limits(option: str, text: str) -> Range:
@@ -132,9 +132,9 @@ def _numbers(option: str, text: str) -> list[float]:
     try:
         values = [float(part) for part in text.split(",")]
     except ValueError:
-        raise BadRequest(f"{option} takes numbers with commas between them, not {text!r}") from None
+        raise BadRequest(f"{option} takes numbers separated by commas, not {text!r}") from None
     if not all(map(math.isfinite, values)):
         raise BadRequest(f"{option} takes finite numbers, not {text!r}")
-    if wrong := next(filter(None, (unlikely(option, x, "motion") for x in values)), ""):
-        raise BadRequest(f"{wrong}, not {text!r}")
+    if problem := next(filter(None, (unlikely(option, x, "motion") for x in values)), ""):
+        raise BadRequest(f"{problem}, not {text!r}")
     return values

@@ -1,4 +1,4 @@
-"""An excitation trajectory: its properties and plot for people, for controllers its table, from standing still on."""
+"""Excitation trajectories: their properties, their plot, and their table for controllers, which starts from rest."""
 
 import io
 import math
@@ -18,17 +18,17 @@ from davinci_forces.toml import unlikely
 
 PERIODS = {Kind.REVOLUTE: 10.0, Kind.PRISMATIC: 5.0}  # [s] of Table 6.1
 PLOTS = (".svg", ".png", ".pdf")
-RUN_INS = 31  # lengths of the run-in that are tried, from a quarter of a period to a whole one
+RUN_INS = 31  # candidate lengths of the run-in, from a quarter of a period to one period
 
 
 @dataclass(frozen=True)
 class ExcitationTrajectory:
-    """A trajectory of one joint, and the problem that it solves or is judged by."""
+    """A trajectory of one joint, and the problem that it solves or is evaluated for."""
 
     joint: Joint
     problem: ExcitationProblem
     series: fourier.Fourier
-    optima: tuple[float, ...] = ()  # the criterion that each start of a search for it has come to
+    optima: tuple[float, ...] = ()  # the criterion that each start of the search reached
 
     @property
     def objective(self) -> float:
@@ -42,7 +42,7 @@ class ExcitationTrajectory:
 
     @property
     def broken(self) -> list[str]:
-        """The limits that the trajectory does not keep, one a line."""
+        """The limits that the trajectory exceeds, one a line."""
         names = zip(
             ("q", "dq", "ddq"), ("", "/s", "/s^2"), fourier.ranges(self.series), self.problem.limits, strict=True
         )
@@ -54,7 +54,7 @@ class ExcitationTrajectory:
         ]
 
     def facts(self) -> dict[str, Any]:
-        """All of its properties, in JSON's types."""
+        """All properties, in JSON's types."""
         x, names = self.series.x.tolist(), coefficient_names(len(self.series.a))
         symbols = ("q", "dq", "ddq")
         return {
@@ -76,14 +76,14 @@ class ExcitationTrajectory:
 
 
 def spread(optima: Sequence[float]) -> dict[str, float | int | None]:
-    """How far the starts of a search agree: their number, and the best, the median and the worst optimum."""
+    """The agreement of a search's starts: their number, and the best, median and worst optimum."""
     ordered = [finite(value) for value in sorted(optima)]
     best, median, worst = ordered[0], ordered[(len(ordered) - 1) // 2], ordered[-1]
     return {"number": len(optima), "best": best, "median": median, "worst": worst}
 
 
 def finite(value: float) -> float | None:
-    """The number, or JSON's null where it is infinite because the trajectory does not tell the terms apart."""
+    """The number, or JSON's null where it is infinite because the trajectory does not separate the terms."""
     return value if math.isfinite(value) else None
 
 
@@ -95,37 +95,37 @@ def coefficient_names(harmonics: int) -> list[str]:
 def problem_of(
     joint: Joint, period: float | None, harmonics: int | None, criterion: str, samples: int
 ) -> ExcitationProblem:
-    """What the excitation of a joint is asked for, with its own limits."""
+    """Build the excitation problem of a joint, with the joint's own limits."""
     limits = (joint.limits.q, joint.limits.dq, joint.limits.ddq)
     period = period or PERIODS[joint.kind]
     return ExcitationProblem(joint.terms, limits, period, harmonics or joint.harmonics, criterion, samples)
 
 
-def designed(joint: Joint, problem: ExcitationProblem, starts: int, seed: int) -> ExcitationTrajectory:
-    """The best trajectory found.
+def design_excitation(joint: Joint, problem: ExcitationProblem, starts: int, seed: int) -> ExcitationTrajectory:
+    """Find the best trajectory of a joint.
 
     Raises
     ------
     BadRequest
-        If the limits of the joint cannot be kept, or no trajectory tells its parameters apart.
+        If the limits of the joint cannot be kept, or no trajectory separates its parameters.
     """
     try:
-        found = design(problem, starts, seed)
-        return ExcitationTrajectory(joint, problem, found.series, tuple(found.optima.tolist()))
+        result = design(problem, starts, seed)
+        return ExcitationTrajectory(joint, problem, result.series, tuple(result.optima.tolist()))
     except ValueError as error:
         raise BadRequest(f"{joint.name}: {error}") from None
 
 
 def plot(excitations: Sequence[ExcitationTrajectory], path: Path) -> None:
-    """Position, velocity and acceleration over one period, between their limits.  Fig 6.5
+    """Plot position, velocity and acceleration over one period, with their limits.  Fig 6.5
 
     Raises
     ------
     BadRequest
-        If the file's name does not end in a format that can be drawn.
+        If the file's name does not end in one of PLOTS.
     """
     if path.suffix not in PLOTS:
-        raise BadRequest(f"{path}: a plot ends in {', '.join(PLOTS)}")
+        raise BadRequest(f"{path}: the name of a plot must end in {', '.join(PLOTS)}")
     import matplotlib as mpl
     from matplotlib.figure import Figure
 
@@ -154,9 +154,9 @@ def _draw(axes: Any, excitation: ExcitationTrajectory) -> None:
 
 
 def table(excitations: Sequence[ExcitationTrajectory], rate: float, from_rest: bool = True) -> str:
-    """The run-in from rest and one period at the controller's rate [Hz]: t, q, dq, ddq, with SI units.
+    """Write the run-in from rest and one period at the controller's rate [Hz]: t, q, dq, ddq, with SI units.
 
-    The period starts at t = 0, so that the run-in has negative times; without `from_rest` it is left out.
+    The period starts at t = 0, so that the run-in has negative times; without `from_rest` there is no run-in.
 
     Raises
     ------
@@ -178,12 +178,12 @@ def _samples(excitations: Sequence[ExcitationTrajectory], rate: float) -> int:
     """The samples of one period."""
     if not (math.isfinite(rate) and rate > 0):
         raise BadRequest(f"--rate must be positive, not {rate:g}")
-    if wrong := unlikely("--rate", rate, "rate"):
-        raise BadRequest(f"{wrong}, not {rate:g}")
+    if problem := unlikely("--rate", rate, "rate"):
+        raise BadRequest(f"{problem}, not {rate:g}")
     period = excitations[0].series.period
     samples = round(period * rate)
     if any(e.series.period != period for e in excitations):
-        raise BadRequest("joints that move together need one period; say which with --period")
+        raise BadRequest("joints that move together need the same period; set it with --period")
     if abs(period * rate - samples) > 1e-9 * samples or samples < 1:
         raise BadRequest(
             f"a period of {period:g} s is {period * rate:g} samples at {rate:g} Hz; choose a period or a rate that "
@@ -199,12 +199,12 @@ def _run_in_samples(excitations: Sequence[ExcitationTrajectory], samples: int, r
     if duration := fourier.shortest([e.series for e in excitations], accelerations, durations):
         return round(duration * rate)
     raise BadRequest(
-        "no run-in of up to a period keeps the limits of acceleration; write the period alone, with --no-run-in, and "
-        "lead into it by other means"
+        "no run-in of at most one period keeps the acceleration limits; write the period alone, with --no-run-in, and "
+        "move to its start by other means"
     )
 
 
 def _with_run_in(series: fourier.Fourier, t: Array, before: int) -> Array:
-    """Position, velocity and acceleration (3, K) at t, the first `before` of which are of the run-in."""
+    """Position, velocity and acceleration (3, K) at t; the first `before` samples are the run-in."""
     moving = np.array(fourier.motion(series, t[before:]))
     return np.hstack([fourier.run_in(series, t[:before], -t[0]), moving]) if before else moving

@@ -1,1 +1,1 @@
-"""What is simulated and recorded: a scenario as data, and the reading of its TOML."""
+"""Scenarios of simulated studies: their data, and the reading of their TOML."""

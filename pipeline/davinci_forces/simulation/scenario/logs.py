@@ -1,4 +1,4 @@
-"""The [[log]] tables of a scenario: what each recording is of."""
+"""Reading of the [[log]] tables of a scenario."""
 
 import math
 from collections.abc import Sequence
@@ -19,7 +19,7 @@ FORMATS = (".tdms", ".lvm")
 
 
 def logs_of(table: TomlTable, joints: dict[str, SimulatedJoint], families: Sequence[str]) -> tuple[SimulatedLog, ...]:
-    """Read every [[log]]; one that several families record is listed once for each, named after the family."""
+    """Read every [[log]]; one that several families record appears once for each, under a name with the family."""
     entries = table.tables("log", "it has no [[log]], so nothing would be recorded")
     logs = [(i, log) for i, entry in enumerate(entries) for log in _log(entry, joints, families)]
     for field in ("name", "file"):
@@ -51,15 +51,15 @@ def _log(table: TomlTable, joints: dict[str, SimulatedJoint], families: Sequence
 def _check_joints(
     table: TomlTable, joints: dict[str, SimulatedJoint], moving: set[str], still: set[str], pushed: set[str]
 ) -> None:
-    for said, keys in (("moves", moving), ("held", still), ("external", pushed)):
+    for entry, keys in (("moves", moving), ("held", still), ("external", pushed)):
         for key in keys - set(joints):
-            table.problem(f"there is no [joint.{key}]; there are {', '.join(joints)}", said, key)
+            table.problem(f"there is no [joint.{key}]; there are {', '.join(joints)}", entry, key)
     for key in moving & still:
         table.problem(f"{key} both moves and is held", "held", key)
     for key in pushed - moving - still:
-        table.problem(f"{key} touches something but is not recorded; let it move or hold it", "external", key)
+        table.problem(f"{key} has a contact but is not recorded; name it in moves or in held", "external", key)
     if not moving:
-        table.problem("no joint moves; it needs a table moves")
+        table.problem("no joint moves; add a table moves")
 
 
 def _of_joints(table: TomlTable, log: SimulatedLog) -> list[SimulatedLog]:
@@ -73,28 +73,28 @@ def _of_joints(table: TomlTable, log: SimulatedLog) -> list[SimulatedLog]:
 def _of_arm(
     table: TomlTable, log: SimulatedLog, joints: dict[str, SimulatedJoint], families: Sequence[str]
 ) -> list[SimulatedLog]:
-    """What only the whole arm can do, and the log as each of its families gives it."""
+    """Read the entries for the whole arm, and return one log for each family."""
     lead, skip = table.number("lead", 0.0, low=0.0), table.number("skip", 0.0, low=0.0)
     if skip >= log.duration:
         table.problem(f"skip = {skip:g} s leaves nothing of {log.duration:g} s", "skip")
     for name, joint in joints.items():
         start, (low, high) = float(log.position(name, np.array([-lead]))[0]), joint.stops
         if start < low or start > high:
-            said = {**dict.fromkeys(log.held, "held"), **dict.fromkeys(log.moves, "moves")}
-            keys = (said[name], name) if name in said else ()
+            tables = {**dict.fromkeys(log.held, "held"), **dict.fromkeys(log.moves, "moves")}
+            keys = (tables[name], name) if name in tables else ()
             table.problem(f"{name} starts at {start:g}, beyond its stops {low:g} and {high:g}", *keys)
     mass = table.number("mass", 0.0, low=0.0)
     tip = tuple(_push(entry, log.duration, True) for entry in table.tables("tip"))
     tissue = _tissue(table.table("tissue")) if "tissue" in table else None
     sensor = _sensor(table.table("sensor")) if "sensor" in table else None
-    wanted = table.texts("families", list(families), families)
+    recorded_families = table.texts("families", list(families), families)
     roles_table = table.table("role_in")
     roles = {family: roles_table.text(family, log.role, ROLES) for family in families}
     roles_table.close()
     shared = replace(log, lead=lead, skip=skip, mass=mass, tip=tip, tissue=tissue, sensor=sensor)
     return [
         replace(shared, name=f"{name}-{log.name}", file=f"{name}_{log.file}", family=name, role=roles[name])
-        for name in wanted
+        for name in recorded_families
     ]
 
 
@@ -129,7 +129,7 @@ def _push(table: TomlTable, duration: float, at_tip: bool) -> SimulatedPush:
     if end <= start:
         table.problem(f"end must be after start = {start:g}, not {end:g}", "end")
     if end > duration and not math.isnan(duration):
-        table.problem(f"end = {end:g} s is after the recording's {duration:g} s", "end")
+        table.problem(f"end = {end:g} s is after the end of the recording at {duration:g} s", "end")
     table.close()
     return SimulatedPush(shape, start, end, peak, direction)
 

@@ -1,4 +1,4 @@
-"""Reading a scenario from TOML, and saying everything that is wrong with it at once, each with its line."""
+"""Reading of scenarios from TOML, which reports all problems at once, each with its line."""
 
 import math
 import re
@@ -24,10 +24,10 @@ from davinci_forces.simulation.scenario.scenario import (
 )
 from davinci_forces.toml import TomlTable
 
-LONGEST = 10_000_000  # samples of a log
+MAX_SAMPLES = 10_000_000  # samples of a log
 
 
-def shipped() -> tuple[str, ...]:
+def shipped_scenarios() -> tuple[str, ...]:
     """The names of the scenarios that come with the package."""
     names = (entry.name for entry in files("davinci_forces.simulation").joinpath("shipped").iterdir())
     return tuple(sorted(name.removesuffix(".toml") for name in names if name.endswith(".toml")))
@@ -39,40 +39,37 @@ def load(scenario: str) -> Scenario:
     Raises
     ------
     BadScenario
-        If there is none, or with every problem that it has, one a line.
+        If it does not exist, or with all its problems, one a line.
     """
-    if scenario in shipped():
+    if scenario in shipped_scenarios():
         text = files("davinci_forces.simulation").joinpath("shipped", f"{scenario}.toml").read_text(encoding="utf-8")
         table = toml.parse(text, scenario, BadScenario)
     elif File(scenario).exists():
         table = toml.read(File(scenario), BadScenario)
     else:
-        raise BadScenario(f"there is no scenario {scenario!r}; there are {', '.join(shipped())}, or name a .toml file")
-    made = _scenario(File(scenario).stem, table)
+        raise BadScenario(f"no scenario {scenario!r}; name one of {', '.join(shipped_scenarios())}, or a .toml file")
+    result = _scenario(File(scenario).stem, table)
     table.file.refuse(BadScenario)
-    return made
+    return result
 
 
 def _scenario(name: str, table: TomlTable) -> Scenario:
     robot = _robot(table)
-    whole = "arm" in table
-    joints = {key: _joint(robot, key, entry, whole) for key, entry in table.table("joint").each()}
+    whole_arm = "arm" in table
+    joints = {key: _joint(robot, key, entry, whole_arm) for key, entry in table.table("joint").each()}
     if not joints:
         table.problem("it has no [joint.<name>] table, so nothing can move")
-    arm = arm_of(table, robot, joints) if whole else None
+    arm = arm_of(table, robot, joints) if whole_arm else None
     rate = table.number("rate", above=0.0)
-    turn = 1 / rate / arm.tick if arm else 1.0  # in ticks; NaN where a problem is noted already
+    turn = 1 / rate / arm.tick if arm else 1.0  # in ticks; NaN where a problem is already noted
     if math.isfinite(turn) and abs(turn - round(turn)) > 1e-6:
-        table.problem(
-            f"a turn of the controller at {rate:g} Hz must be whole ticks, not {turn:g} of them", "arm", "tick"
-        )
+        message = f"the controller's period at {rate:g} Hz must be a whole number of ticks, not {turn:g}"
+        table.problem(message, "arm", "tick")
     logs = logs_of(table, joints, tuple(arm.families) if arm else ())
     for log in logs:
         samples = (log.lead + log.duration) * rate
-        if math.isfinite(samples) and not 2 <= samples <= LONGEST:
-            table.problem(
-                f"log {log.name}: {samples:.3g} samples cannot be recorded; it must be 2 to {LONGEST}", "rate"
-            )
+        if math.isfinite(samples) and not 2 <= samples <= MAX_SAMPLES:
+            table.problem(f"log {log.name} has {samples:.3g} samples; it must have 2 to {MAX_SAMPLES}", "rate")
     title, seed, started = table.text("title", name), table.whole("seed"), table.text("started")
     if started and not re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d", started):
         table.problem(f"started must be a date and time such as '2016-05-02T09:00:00', not {started!r}", "started")
@@ -82,17 +79,19 @@ def _scenario(name: str, table: TomlTable) -> Scenario:
 
 def _robot(table: TomlTable) -> Robot:
     name = table.text("robot", choices=robots.ROBOTS)
-    return robots.load(name if name in robots.ROBOTS else "davinci", File())  # noted as a problem; read on with one
+    return robots.load(
+        name if name in robots.ROBOTS else "davinci", File()
+    )  # the problem is noted; read on with another robot
 
 
-def _joint(robot: Robot, name: str, table: TomlTable, whole: bool) -> SimulatedJoint:
+def _joint(robot: Robot, name: str, table: TomlTable, whole_arm: bool) -> SimulatedJoint:
     try:
         joint = robot.joint(name)
     except BadRobot as error:
         table.problem(str(error))
         joint = robot.joints[0]
     noise, theta = SensorNoise(), tuple[float, ...]()
-    if not whole:
+    if not whole_arm:
         noise = noise_of(table)
         values = table.table("theta")
         theta = tuple(values.number(term.name) for term in joint.terms)
@@ -109,7 +108,7 @@ def _joint(robot: Robot, name: str, table: TomlTable, whole: bool) -> SimulatedJ
 def arm_of(table: TomlTable, robot: Robot, joints: dict[str, SimulatedJoint]) -> SimulatedArm:
     """Read [arm], [arm.control] and the families.  Every list has one number for each joint."""
     if robot.chain is None or robot.bodies is None:
-        table.problem(f"the geometry and masses of {robot.name} are not known, so there is no arm to simulate", "arm")
+        table.problem(f"{robot.name} has no geometry or no masses, so the whole arm cannot be simulated", "arm")
     if list(joints) != [joint.name for joint in robot.joints]:
         table.problem(
             f"the whole arm needs [joint.<name>] of {', '.join(j.name for j in robot.joints)}, in that order", "joint"
@@ -127,12 +126,12 @@ def arm_of(table: TomlTable, robot: Robot, joints: dict[str, SimulatedJoint]) ->
     arm.close()
     families = {name: _family(entry, robot) for name, entry in table.table("family").each()}
     if not families:
-        table.problem("it has no [family.<name>], which says what friction and noise the arm has")
+        table.problem("it has no [family.<name>], which states the friction and noise of the arm")
     return SimulatedArm(tick, rotors, motors, control, families)
 
 
 def _control(table: TomlTable, n: int) -> Cascade | Regulator:
-    """The law that `law` names: the laboratory's cascade, or the PID with gravity compensation of chapter 5."""
+    """Read the control law: the laboratory's cascade, or the PID with gravity compensation of chapter 5."""
     law: Cascade | Regulator
     if table.text("law", "cascade", ("cascade", "pid")) == "pid":
         proportional, derivative, integral = (
@@ -170,7 +169,7 @@ def _friction(table: TomlTable) -> tuple[float, ...]:
     static = table.numbers("static", list(coulomb), count=2) or coulomb
     for key, values in (("coulomb", coulomb), ("static", static)):
         if min(values) < 0:
-            table.problem(f"{key} must be two positive numbers, up and down, not {list(values)}", key)
+            table.problem(f"{key} must be two numbers that are not negative, up and down, but is {list(values)}", key)
     stiffness = table.number("bristle_stiffness", 0.0, low=0.0)
     if stiffness > 0 and min(coulomb) <= 0:
         table.problem("bristles need Coulomb friction greater than 0", "coulomb")
@@ -180,7 +179,7 @@ def _friction(table: TomlTable) -> tuple[float, ...]:
 
 
 def noise_of(table: TomlTable) -> SensorNoise:
-    """The noise of one joint."""
+    """Read the noise of one joint."""
     values = table.table("noise")
     noise = SensorNoise(
         **{key: values.number(key, 0.0, low=0.0) for key in ("q", "dq", "tau", "drift")},

@@ -1,4 +1,4 @@
-"""A scenario: what is simulated and recorded."""
+"""Scenarios: what is simulated and recorded."""
 
 from dataclasses import dataclass, field
 
@@ -14,23 +14,23 @@ from davinci_forces.robots.robot import Joint, Robot
 
 
 class BadScenario(PipelineError):
-    """A scenario breaks its contract; every problem is listed, each with its place."""
+    """A scenario is invalid; the message lists every problem with its place."""
 
 
 @dataclass(frozen=True)
 class SensorNoise:
-    """Standard deviations of noise, in the joint's units: white, and of the effort a slow drift as well."""
+    """Standard deviations of white noise, in the joint's units, and of a slow drift of the effort."""
 
     q: float = 0.0
     dq: float = 0.0
     tau: float = 0.0
-    drift: float = 0.0  # of the effort, correlated over
-    correlation: float = 1.0  # [s]
+    drift: float = 0.0  # of the effort
+    correlation: float = 1.0  # [s] correlation time of the drift
 
 
 @dataclass(frozen=True)
 class ForceSensor:
-    """A sensor of the force at the tip: the standard deviation of its noise [N], and how late it is [s]."""
+    """A sensor of the force at the tip: the standard deviation of its noise [N], and its delay [s]."""
 
     noise: float
     lag: float
@@ -46,14 +46,14 @@ class SimulatedPush:
     peak: float  # [effort], or [N]
     direction: tuple[float, float, float] | None = None  # of a force of the tip, base frame, of length 1
 
-    def at(self, t: Array) -> Array:
+    def effort_at(self, t: Array) -> Array:
         """The push at the times t (N,) [s]."""
         return np.asarray(SHAPES[self.shape](t, self.start, self.end, self.peak))
 
 
 @dataclass(frozen=True)
 class Tissue:
-    """A spring with a damper below the height at which the tip is when the slide is at `surface`.  (8.1)"""
+    """A spring with a damper, below the height of the tip when the slide is at `surface`.  (8.1)"""
 
     surface: float  # [m] of the slide
     stiffness: float  # [N/m]
@@ -62,20 +62,20 @@ class Tissue:
 
 @dataclass(frozen=True)
 class SimulatedJoint:
-    """What a joint truly is, and how well its motion and its current are seen."""
+    """A joint with its true parameters, and the resolution and noise of its sensors."""
 
     joint: Joint
-    label: str  # how the laboratory names the joint's channels
+    label: str  # the joint's name in the laboratory's channels
     encoder_step: float  # [rad] at the motor
     current_step: float  # [A]
-    stops: tuple[float, float]  # where it cannot go beyond
+    stops: tuple[float, float]  # lower and upper
     noise: SensorNoise = field(default_factory=SensorNoise)
-    theta: tuple[float, ...] = ()  # of the joint's terms, where it follows its model exactly
+    theta: tuple[float, ...] = ()  # of the joint's terms, where the joint follows its model exactly
 
 
 @dataclass(frozen=True)
 class Family:
-    """One way in which the arm behaves: its friction, and its noise by joint."""
+    """One behaviour of the arm: its friction, and its noise by joint."""
 
     friction: Friction
     noise: dict[str, SensorNoise]
@@ -83,7 +83,7 @@ class Family:
 
 @dataclass(frozen=True)
 class SimulatedArm:
-    """What drives the arm in closed loop."""
+    """The motors and controllers of the arm in closed loop."""
 
     tick: float  # [s] of the motor drivers
     rotors: Array  # J_m (n,) [kg m^2]
@@ -94,7 +94,7 @@ class SimulatedArm:
 
 @dataclass(frozen=True)
 class SimulatedLog:
-    """One recording: which joints move and how, which are at rest and where, and what they touch."""
+    """One recording: the moving joints with their motions, the resting ones with their positions, and all contacts."""
 
     name: str
     file: str
@@ -104,12 +104,12 @@ class SimulatedLog:
     held: dict[str, float]
     external: dict[str, tuple[SimulatedPush, ...]]
     current_unit: str
-    clock: str  # "channel", or "header" where the file itself says the step
+    clock: str  # "channel", or "header" where the header of the file states the step
     family: str = ""
-    lead: float = 0.0  # [s] that the robot runs before the recording starts
+    lead: float = 0.0  # [s] of motion before the recording starts
     skip: float = 0.0  # [s] at the start that the study leaves out
     tip: tuple[SimulatedPush, ...] = ()
-    mass: float = 0.0  # [kg] hung on the tip
+    mass: float = 0.0  # [kg] on the tip
     tissue: Tissue | None = None
     sensor: ForceSensor | None = None  # of the force at the tip
 
@@ -120,12 +120,12 @@ class SimulatedLog:
 
     @property
     def windows(self) -> list[tuple[float, float]]:
-        """When something pushes [s], in order."""
-        pushes = [push for each in self.external.values() for push in each]
+        """The time windows of all pushes [s], in order."""
+        pushes = [push for joint_pushes in self.external.values() for push in joint_pushes]
         return sorted({(push.start, push.end) for push in [*pushes, *self.tip]})
 
     def position(self, joint: str, t: Array) -> Array:
-        """Where a joint is asked to be at the times t (N,) [s]; one that is not mentioned stays at zero."""
+        """The reference position of a joint at the times t (N,) [s]; zero for joints that are not mentioned."""
         move = self.moves.get(joint)
         if move is None:
             return np.full_like(t, self.held.get(joint, 0.0))
@@ -134,14 +134,14 @@ class SimulatedLog:
 
 @dataclass(frozen=True)
 class Scenario:
-    """A study to be simulated: joint by joint from their models, or the whole arm in closed loop."""
+    """A simulated study: of joints that follow their models, or of the whole arm in closed loop."""
 
     name: str
     title: str
     robot: Robot
     seed: int
     rate: float  # [Hz] of the controller and the recorder
-    started: str  # the date that the recordings carry, ISO 8601
+    started: str  # date and time of the recordings, ISO 8601
     joints: dict[str, SimulatedJoint]
     logs: tuple[SimulatedLog, ...]
     arm: SimulatedArm | None = None

@@ -1,1 +1,1 @@
-"""External effort on every joint, with its error: the filter, what it rests on, and what it shows of contacts."""
+"""Estimate the external effort on every joint, with its error, and measure every contact."""

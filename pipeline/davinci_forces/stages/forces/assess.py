@@ -1,4 +1,4 @@
-"""Assess the external effort where nothing touches the robot: its levels, and above which contacts stand out."""
+"""Compute the level of the external effort in free space, and the level above which a contact is detected."""
 
 from collections.abc import Iterable, Iterator
 
@@ -10,20 +10,21 @@ from davinci_forces.maths.uncertainty.error_band import levels
 from davinci_forces.records import FreeSpace, Threshold, Track
 from davinci_forces.study import LogEntry
 
-FORESEEN = 0.5  # [s] before a contact, in which the smoother sees it coming
-FEWEST = 100  # samples of free space, below which nothing is said of its level
+MARGIN_BEFORE_CONTACT = 0.5  # [s] in which the smoother already shows the contact
+MIN_SAMPLES_LEVEL = 100  # of free space
 
 
 def run(track: Track, entry: LogEntry) -> Iterator[FreeSpace]:
-    """The levels of one joint in one log; none of a joint at rest, or where it is not known when it was touched.
+    """Compute the levels of one moving joint in one log in which the times of contact are known.
 
-    At rest, friction takes any value up to its Coulomb level, so a small external effort says nothing.
+    Joints at rest are left out: friction takes any value up to its Coulomb level, which hides a small external effort.
     """
     free = free_space(track.t, entry.contact, track.rate)
-    if track.at_rest or not entry.tells_free_space or int(free.sum()) < FEWEST:
+    if track.at_rest or not entry.tells_free_space or int(free.sum()) < MIN_SAMPLES_LEVEL:
         return
-    calm = free_space(track.t, [(start - FORESEEN, end) for start, end in entry.contact], track.rate)
-    smooth = quiet(track.tau_ext_smooth, calm if calm.any() else free, track.rate)
+    windows = [(start - MARGIN_BEFORE_CONTACT, end) for start, end in entry.contact]
+    free_smooth = free_space(track.t, windows, track.rate)
+    smooth = quiet(track.tau_ext_smooth, free_smooth if free_smooth.any() else free, track.rate)
     space = levels(track.tau_ext[free], track.tau_ext_std[free])
     yield FreeSpace(
         log=track.log,
@@ -46,20 +47,20 @@ def run(track: Track, entry: LogEntry) -> Iterator[FreeSpace]:
 
 
 def gather(spaces: Iterable[FreeSpace]) -> Iterator[Threshold]:
-    """One Threshold per joint and filter of which there is any free space: the highest level of any log."""
-    every: dict[tuple[str, str], list[FreeSpace]] = {}
+    """Take the highest level of all logs, one Threshold per joint and filter with any free space."""
+    by_joint: dict[tuple[str, str], list[FreeSpace]] = {}
     for space in spaces:
-        every.setdefault((space.joint, space.filter), []).append(space)
-    for (joint, name), own in every.items():
-        judging = [space for space in own if space.role != "identification"] or own  # that no parameter was fitted to
-        judge = max(judging, key=lambda space: space.detection_level)
-        alarms, loudest = max(((alarm(space), space) for space in judging), key=lambda pair: pair[0])
+        by_joint.setdefault((space.joint, space.filter), []).append(space)
+    for (joint, name), joint_spaces in by_joint.items():
+        unfitted = [space for space in joint_spaces if space.role != "identification"] or joint_spaces
+        worst = max(unfitted, key=lambda space: space.detection_level)
+        level, source = max(((alarm_level_of(space), space) for space in unfitted), key=lambda pair: pair[0])
         yield Threshold(
-            joint, name, judge.detection_level, judge.detection_level_std, alarms,
-            alarms * loudest.free_rms_std / loudest.free_rms if loudest.free_rms else 0.0, judge.log,
+            joint, name, worst.detection_level, worst.detection_level_std, level,
+            level * source.free_rms_std / source.free_rms if source.free_rms else 0.0, worst.log,
         )  # fmt: skip
 
 
-def alarm(space: FreeSpace) -> float:
-    """The effort that this free motion crosses no more than once in ten minutes; it scales with the motion's size."""
+def alarm_level_of(space: FreeSpace) -> float:
+    """Alarm level: the effort that free motion exceeds at most once in ten minutes; it grows with its rms."""
     return alarm_level([Quiet(space.smooth_rms, space.smooth_max, space.crossings)])

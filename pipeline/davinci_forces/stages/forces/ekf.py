@@ -1,4 +1,4 @@
-"""Track the external effort on every joint of every log with an extended Kalman filter."""
+"""Estimate the external effort on every joint of every log with an extended Kalman filter."""
 
 from collections.abc import Iterator
 
@@ -26,39 +26,39 @@ def run(
     *,
     q_tau: float,
 ) -> Iterator[Track | Diagnostic]:
-    """The filter's pass over a joint of a log.
+    """Filter one joint of a log.
 
-    What the fit says of other joints and of friction's memory, the filter knows from the measured motion.  (7.6)-(7.16)
+    The effect of other joints and of the friction's memory enters by the measured motion.  (7.6)-(7.16)
     """
     if noise is not None:
-        yield from tracked(model, assumed(noise, joint, 1.0 / model.rate, q_tau), band, entry)
+        yield from track_effort(model, assumed(noise, joint, 1.0 / model.rate, q_tau), band, entry)
         return
-    said = "no identification log tells the noise that the filter assumes, so its external effort is not tracked"
-    yield diagnostic("ekf", f"{model.log}.{model.joint}", "note", f"{model.log}/{model.joint}: {said}")
+    message = "no identification log gives the noise of the filter, so its external effort is not estimated"
+    yield diagnostic("ekf", f"{model.log}.{model.joint}", "note", f"{model.log}/{model.joint}: {message}")
 
 
-def tracked(
+def track_effort(
     model: JointModel, noise: NoiseModel, band: ErrorBand | None, entry: LogEntry
 ) -> Iterator[Track | Diagnostic]:
-    """The Track of one joint of a log."""
+    """Estimate the external effort of one joint of a log, with its error."""
     parts = driven(model)
-    made = through(DEFAULT, parts, noise)
-    if diverges(made):
-        yield diverged(model, float(np.mean(made.nis)))
-        if not np.isfinite(made.tau_ext).all():
+    estimate = through(DEFAULT, parts, noise)
+    if diverges(estimate):
+        yield divergence_warning(model, float(np.mean(estimate.nis)))
+        if not np.isfinite(estimate.tau_ext).all():
             return
     smooth, late = lag(parts, noise)
     smooth_rise = rise(rts.track, parts[0], noise)
     offset = day_offset(model.t, model.tau - model.tau_hat, entry.free)
     if offset.drifts:
-        yield drifting(model, offset)
-    beyond = ModelVariance(np.zeros(len(model)), np.zeros(len(model)), "")
+        yield drift_warning(model, offset)
+    model_error = ModelVariance(np.zeros(len(model)), np.zeros(len(model)), "")
     if band is not None:
-        beyond = model_variance(band, model.log, model.path, model.dq_measured, bool(entry.free))
-    total = made.tau_ext_std**2 + beyond.variance + late**2 + offset.std**2
-    calm = np.concatenate([settled(model.t[part]) for part in segments(model.segment)])
+        model_error = model_variance(band, model.log, model.path, model.dq_measured, bool(entry.free))
+    total = estimate.tau_ext_std**2 + model_error.variance + late**2 + offset.std**2
+    converged = np.concatenate([settled(model.t[part]) for part in segments(model.segment)])
     free = free_space(model.t, entry.contact, model.rate)
-    model_part = float(np.sqrt(np.mean(beyond.variance)))
+    model_part = float(np.sqrt(np.mean(model_error.variance)))
     yield Track(
         log=model.log,
         joint=model.joint,
@@ -69,55 +69,55 @@ def tracked(
         path=model.path,
         at_rest=model.at_rest,
         rate=model.rate,
-        tau_ext_rms=rms((made.tau_ext - offset.value)[free]),
-        nis_mean=float(np.mean(made.nis[calm])),
+        tau_ext_rms=rms((estimate.tau_ext - offset.value)[free]),
+        nis_mean=float(np.mean(estimate.nis[converged])),
         r_q=noise.r_q,
         r_dq=noise.r_dq,
         q_dq=noise.q_dq,
         q_tau=noise.q_tau * model.rate**0.5,
         day_offset=offset.value,
         day_offset_std=offset.std,
-        filter_part=rms(made.tau_ext_std[calm]),
+        filter_part=rms(estimate.tau_ext_std[converged]),
         model_part=model_part,
-        model_part_std=float(np.sqrt(model_part**2 + np.mean(beyond.std))) - model_part,
-        lag_part=rms(late[calm]),
+        model_part_std=float(np.sqrt(model_part**2 + np.mean(model_error.std))) - model_part,
+        lag_part=rms(late[converged]),
         smooth_rise=smooth_rise,
-        band_from=beyond.told_by,
+        band_from=model_error.told_by,
         t=model.t,
-        q=made.q,
-        dq=made.dq,
+        q=estimate.q,
+        dq=estimate.dq,
         tau=model.tau,
         tau_hat=model.tau_hat,
-        tau_ext=made.tau_ext - offset.value,
+        tau_ext=estimate.tau_ext - offset.value,
         tau_ext_std=np.sqrt(total),
-        tau_ext_std_filter=made.tau_ext_std,
+        tau_ext_std_filter=estimate.tau_ext_std,
         tau_ext_smooth=smooth - offset.value,
         tau_ext_direct=model.tau - model.tau_hat - offset.value,
-        innovation_q=made.innovation_q,
-        innovation_dq=made.innovation_dq,
-        nis=made.nis,
+        innovation_q=estimate.innovation_q,
+        innovation_dq=estimate.innovation_dq,
+        nis=estimate.nis,
     )
 
 
 def rms(x: Array) -> float:
-    """Root mean square, NaN of nothing."""
+    """Root mean square; NaN of an empty array."""
     return float(np.sqrt(np.mean(x**2))) if len(x) else float("nan")
 
 
-def diverged(model: JointModel, nis: float) -> Diagnostic:
-    """A filter whose innovations are nothing like what it assumes."""
-    said = (
-        f"{model.log}/{model.joint}: the filter's innovations are {np.sqrt(nis / 2.0):.3g} times what it assumes: "
-        "the measured motion does not follow from the effort; check the units, signs and clock of its channels, and "
-        "whether a sensor was stuck"
+def divergence_warning(model: JointModel, nis: float) -> Diagnostic:
+    """Warn of innovations that are much larger than the filter assumes."""
+    message = (
+        f"{model.log}/{model.joint}: the filter's innovations are {np.sqrt(nis / 2.0):.3g} times as large as it "
+        "assumes, so the measured motion does not follow from the effort; check the units, signs and clock of its "
+        "channels, and whether a sensor was stuck"
     )
-    return diagnostic("ekf", f"{model.log}.{model.joint}", "warning", said)
+    return diagnostic("ekf", f"{model.log}.{model.joint}", "warning", message)
 
 
-def drifting(model: JointModel, offset: DayOffset) -> Diagnostic:
-    """An offset that is not the same in all that is said to be free."""
-    said = (
+def drift_warning(model: JointModel, offset: DayOffset) -> Diagnostic:
+    """Warn of an offset that changes between the free windows."""
+    message = (
         f"{model.log}/{model.joint}: the offset drifts within the free windows by {offset.drift:.3g}, with a "
         f"standard error of {offset.drift_std:.2g}; shorten the log, or state a free window nearer to the contact"
     )
-    return diagnostic("ekf", f"{model.log}.{model.joint}", "warning", said)
+    return diagnostic("ekf", f"{model.log}.{model.joint}", "warning", message)

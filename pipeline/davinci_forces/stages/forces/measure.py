@@ -1,4 +1,4 @@
-"""Measure every contact: where it begins and ends, peak, mean and impulse, against the level of free space."""
+"""Measure every contact: onset, release, peak, mean and impulse, compared with the level of free space."""
 
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -12,53 +12,53 @@ from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
 Window = tuple[float, float]
-BESIDE = 0.5  # [s] of a window that a contact may begin before it, or end after it
+WINDOW_MARGIN = 0.5  # [s] by which a contact may begin before its window, or end after it
 
 
 def run(
     track: Track, thresholds: Iterable[Threshold], fits: Iterable[Fit], entry: LogEntry, robot: Robot
 ) -> Iterator[Contact | Diagnostic]:
-    """The contacts of one joint that moves: in windows that the study states, and what else is above the alarm level.
+    """Measure the contacts of one moving joint: in windows that the study states, and others above the alarm level.
 
-    Of logs that are said to be free, or about contact; of a weight or of tissue that is touched all along, none.
+    Logs of a weight or of tissue are left out, because the arm is loaded all along.
     """
-    own = [t for t in thresholds if (t.joint, t.filter) == (track.joint, track.filter)]
     if entry.role not in ("contact", "validation", "identification"):
         return
     if track.at_rest:
         if entry.role == "contact":
-            yield hidden(track, fits, robot)
+            yield stiction_note(track, fits, robot)
         return
-    if not own:
+    threshold = next((t for t in thresholds if (t.joint, t.filter) == (track.joint, track.filter)), None)
+    if threshold is None:
         return
-    calm = settled(track.t)
-    found = [
+    converged = settled(track.t)
+    detected = [
         event
-        for event in events(track.t, track.tau_ext_smooth, track.tau_ext_std, own[0].alarm_level, track.smooth_rise)
-        if calm[np.searchsorted(track.t, event.onset).clip(0, len(calm) - 1)]
+        for event in events(track.t, track.tau_ext_smooth, track.tau_ext_std, threshold.alarm_level, track.smooth_rise)
+        if converged[np.searchsorted(track.t, event.onset).clip(0, len(converged) - 1)]
     ]
-    placed = list(placing(sorted(entry.contact), found))
+    placed = list(match_windows(sorted(entry.contact), detected))
     if placed:
-        yield from contacts(track, own[0], placed, entry)
+        yield from contacts(track, threshold, placed)
 
 
-def placing(windows: Sequence[Window], found: Sequence[Event]) -> Iterator[tuple[Window, Event | None, bool]]:
-    """Each stated window with the contact that was found in it, then the contacts that no window states."""
-    beside = set(found)
+def match_windows(windows: Sequence[Window], detected: Sequence[Event]) -> Iterator[tuple[Window, Event | None, bool]]:
+    """Pair each stated window with the contact that was detected in it; then yield the contacts without a window."""
+    unstated = set(detected)
     for start, end in windows:
-        inside = [e for e in found if e.onset >= start - BESIDE and e.release <= end + BESIDE]
-        beside -= set(inside)
+        inside = [e for e in detected if e.onset >= start - WINDOW_MARGIN and e.release <= end + WINDOW_MARGIN]
+        unstated -= set(inside)
         first, last = (inside[0], inside[-1]) if inside else (None, None)
         event = Event(*first[:2], *last[2:]) if first and last else None
         yield (start, end), event, True
-    touching = [(start - BESIDE, end + BESIDE) for start, end in windows]
-    for event in found:
-        if event in beside and not any(event.onset < end and event.release > start for start, end in touching):
+    widened = [(start - WINDOW_MARGIN, end + WINDOW_MARGIN) for start, end in windows]
+    for event in detected:
+        if event in unstated and not any(event.onset < end and event.release > start for start, end in widened):
             yield (event.onset, event.release), event, False
 
 
 def contacts(
-    track: Track, threshold: Threshold, placed: Sequence[tuple[Window, Event | None, bool]], entry: LogEntry
+    track: Track, threshold: Threshold, placed: Sequence[tuple[Window, Event | None, bool]]
 ) -> Iterator[Contact]:
     """The Contact of one joint of a log, if any sample lies in any of its contacts."""
     windows = [window for window, _, _ in placed]
@@ -67,9 +67,9 @@ def contacts(
     for window, event, stated in placed:
         summary = summarise(track.t, track.tau_ext, track.tau_ext_std, window, free)
         if summary is not None:
-            event, found = event or Event(window[0], 0.0, window[1], 0.0), event is not None
-            spread = float(np.hypot(event.onset_std, event.release_std))
-            rows.append((int(stated), int(found), *event, event.release - event.onset, spread, *summary))
+            onset, onset_std, release, release_std = times = event or Event(window[0], 0.0, window[1], 0.0)
+            duration = (release - onset, float(np.hypot(onset_std, release_std)))
+            rows.append((int(stated), int(event is not None), *times, *duration, *summary))
     if not rows:
         return
     names = (
@@ -89,8 +89,8 @@ def contacts(
     )
 
 
-def hidden(track: Track, fits: Iterable[Fit], robot: Robot) -> Diagnostic:
-    """Up to which effort a contact on a joint at rest cannot be told from stiction."""
+def stiction_note(track: Track, fits: Iterable[Fit], robot: Robot) -> Diagnostic:
+    """Note the effort up to which stiction hides a contact on a joint at rest."""
     name = f"{track.log}/{track.joint}"
     levels = [
         abs(float(theta))
@@ -101,5 +101,5 @@ def hidden(track: Track, fits: Iterable[Fit], robot: Robot) -> Diagnostic:
     ]
     unit = robot.joint(track.joint).kind.unit("{effort}")
     up_to = f"about {levels[0]:.2g} {unit}, its Coulomb friction, " if levels else "its stiction "
-    said = f"{name}: the joint is at rest, where contact of up to {up_to}cannot be told from friction; move the joint"
-    return diagnostic("measure", f"{track.log}.{track.joint}", "note", said)
+    message = f"{name}: the joint is at rest, so a contact of up to {up_to}cannot be told from friction"
+    return diagnostic("measure", f"{track.log}.{track.joint}", "note", f"{message}; move the joint")

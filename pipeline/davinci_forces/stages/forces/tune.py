@@ -1,4 +1,4 @@
-"""Tune the filter's noise to identification logs, by the likelihood of its innovations, and settle it for all logs."""
+"""Tune the filter noise of every joint by the likelihood of the innovations, and take the median over its logs."""
 
 from collections.abc import Iterable, Iterator
 
@@ -10,21 +10,21 @@ from davinci_forces.filters.tuning import tuned
 from davinci_forces.maths.signals.smoothing import noise_std
 from davinci_forces.records import FilterNoise, JointModel, MeasurementNoise, Tuning
 
-USUAL = ("rate", "r_q", "r_dq", "r_tau", "q_tau", "viscous", "speed")  # of which the median of all logs is taken
-FINEST = 1e-9  # of a range: a noiseless log would leave innovations without a covariance to be judged by
+POOLED = ("rate", "r_q", "r_dq", "r_tau", "q_tau", "viscous", "speed")  # by the median over all logs
+MIN_NOISE = 1e-9  # over the range of a signal: without noise, innovations have no covariance
 
 
 def run(model: JointModel, noise: MeasurementNoise | None, *, lowpass: float) -> Iterator[Tuning]:
-    """The Tuning of a joint that moves in an identification log, in which nothing touches the robot.  Section 7.3"""
+    """Tune the filter to a moving joint in an identification log, where nothing touches the robot.  Section 7.3"""
     if model.role == "identification" and not model.at_rest and noise is not None:
-        yield tuning(model, start(model, noise, lowpass))
+        yield tuning(model, initial_noise(model, noise, lowpass))
 
 
 def tuning(model: JointModel, before: NoiseModel) -> Tuning:
-    """The noise of one joint of a log, and how much more likely it makes what was measured than where it began."""
+    """Maximise the likelihood of one joint of a log over the noise; the gain is over the noise `before`."""
     parts, T_s, inertia = driven(model), 1.0 / model.rate, float(model.inertia.max())
     noise = tuned(parts, before, inertia, model.viscous)
-    began, ended = (
+    initial, final = (
         sum(ekf.log_likelihood(part, n) for part in parts) for n in (before._replace(q_tau=noise.q_tau), noise)
     )
     return Tuning(
@@ -38,14 +38,15 @@ def tuning(model: JointModel, before: NoiseModel) -> Tuning:
         inertia=inertia,
         viscous=model.viscous,
         speed=float(np.sqrt(np.mean(model.dq_measured**2))),
-        likelihood_gain=ended - began,
+        likelihood_gain=final - initial,
         tested=len(model),
     )
 
 
-def start(model: JointModel, between: MeasurementNoise, lowpass: float) -> NoiseModel:
-    """What a low-pass takes out of each signal, so that what is slow, and no noise, does not count; the noise between
-    periods where the sampling rate leaves it nothing to take out.  Section 6.3.3
+def initial_noise(model: JointModel, between: MeasurementNoise, lowpass: float) -> NoiseModel:
+    """Estimate the noise of each signal by what a low-pass removes, so that slow errors do not count.
+
+    Where the sampling rate leaves nothing above the low-pass, it is the noise `between` periods.  Section 6.3.3
     """
     pairs = (
         (model.q_measured, between.sigma_q),
@@ -53,17 +54,20 @@ def start(model: JointModel, between: MeasurementNoise, lowpass: float) -> Noise
         (model.tau - model.tau_hat, between.sigma_tau),
     )
     sizes = [
-        max(noise_std(x, model.segment, model.rate, lowpass) or slow, FINEST * float(np.ptp(x)), 1e-12)
+        max(noise_std(x, model.segment, model.rate, lowpass) or slow, MIN_NOISE * float(np.ptp(x)), 1e-12)
         for x, slow in pairs
     ]
     return NoiseModel(sizes[0], sizes[1], 0.0, sizes[2] / model.rate / float(model.inertia.mean()), 0.0)
 
 
 def gather(tunings: Iterable[Tuning]) -> Iterator[FilterNoise]:
-    """One FilterNoise per joint; the inertia is the largest, with which the filter is slowest."""
-    every: dict[str, list[Tuning]] = {}
+    """Pool the filter noise of each joint: the median over its identification logs.
+
+    The inertia is the largest, with which the filter is slowest.
+    """
+    by_joint: dict[str, list[Tuning]] = {}
     for tuning in tunings:
-        every.setdefault(tuning.joint, []).append(tuning)
-    for joint, own in every.items():
-        usual = {name: float(np.median([getattr(t, name) for t in own])) for name in USUAL}
-        yield FilterNoise(joint=joint, logs=tuple(t.log for t in own), inertia=max(t.inertia for t in own), **usual)
+        by_joint.setdefault(tuning.joint, []).append(tuning)
+    for joint, ts in by_joint.items():
+        medians = {name: float(np.median([getattr(t, name) for t in ts])) for name in POOLED}
+        yield FilterNoise(joint=joint, logs=tuple(t.log for t in ts), inertia=max(t.inertia for t in ts), **medians)

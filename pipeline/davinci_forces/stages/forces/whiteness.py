@@ -1,4 +1,4 @@
-"""Test whether what averaging, fit and filter leave is white noise, and explain why innovations are not."""
+"""Test whether the residuals of averaging, fit and filter are white noise, and explain why innovations are not."""
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 
@@ -32,34 +32,34 @@ from davinci_forces.records import (
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
-LAGS = 100  # of the correlations that are shown
+LAGS = 100  # of the correlations in the report
 TESTED_LAGS = 20  # of the Ljung-Box statistic
-LEVEL = 0.01  # below this probability a signal is called not white
-UNSTATED = "; when it is touched is not stated, so contact could not be left out"
+MIN_PROBABILITY = 0.01  # of a white signal
+UNKNOWN_CONTACT = "; the study states no contact windows, so contact could not be left out"
 THIS_LOG = "parameters of this log itself"
 
 
 def run(subject: PeriodResidual | Residual | Track) -> Iterator[Whiteness]:
-    """What averaging removed, the effort that a fit leaves of a period, and a filter's innovations over its run."""
+    """Test the residuals of averaging, the residual effort of a fit, or the innovations of a filter."""
     if isinstance(subject, PeriodResidual):
         signals = {name: getattr(subject, name) for name in ("q_noise", "dq_noise", "tau_noise")}
     elif isinstance(subject, Residual):
         signals = {f"tau.{subject.model}.{subject.estimator}": subject.tau - subject.tau_hat}
     else:
         # Correlations across a gap mean nothing, and after one the filter starts anew.
-        run_ = longest_run(subject.t, subject.rate)
-        kept = settled(subject.t[run_])
-        signals = {name: getattr(subject, name)[run_][kept] for name in ("innovation_q", "innovation_dq")}
-    found = {name: statistics(x) for name, x in signals.items()}
-    together = int(all(result["white"] and float(result["periodogram_p"]) > LEVEL for result in found.values()))  # type: ignore[arg-type]
-    for name, result in found.items():
-        yield Whiteness(log=subject.log, joint=subject.joint, signal=name, all_white=together, **result)  # type: ignore[arg-type]
+        part = longest_run(subject.t, subject.rate)
+        converged = settled(subject.t[part])
+        signals = {name: getattr(subject, name)[part][converged] for name in ("innovation_q", "innovation_dq")}
+    results = {name: statistics(x) for name, x in signals.items()}
+    all_white = int(all(r["white"] and float(r["periodogram_p"]) > MIN_PROBABILITY for r in results.values()))  # type: ignore[arg-type]
+    for name, result in results.items():
+        yield Whiteness(log=subject.log, joint=subject.joint, signal=name, all_white=all_white, **result)  # type: ignore[arg-type]
 
 
 def statistics(x: Column) -> dict[str, object]:
     """Autocorrelation, Ljung-Box, cumulative periodogram and Jarque-Bera of one signal.
 
-    A signal without variance has nothing to test and is not called white.
+    A signal without variance cannot be tested, and counts as not white.
     """
     N = len(x)
     lags, tested_lags = min(LAGS, N // 4), min(TESTED_LAGS, N // 5)
@@ -91,7 +91,7 @@ def statistics(x: Column) -> dict[str, object]:
         "jarque_bera_p": normal if N >= whiteness.FEWEST else 0.0,
         "skewness": skewness,
         "kurtosis": kurtosis,
-        "white": int(box.probability > LEVEL),
+        "white": int(box.probability > MIN_PROBABILITY),
         "lag": np.arange(lags + 1),
         "acf": correlation,
         "cycles": cycles,
@@ -109,66 +109,62 @@ def apply(
     *,
     q_tau: float,
 ) -> Iterator[Innovation | Explanation]:
-    """Of each joint that is tracked and moves: its innovations over the longest run, and why they are not white.
+    """Compute the innovations of each moving joint over the longest run, and explain why they are not white.
 
     A cause is named only where the innovations pass every test without it.  Section 7.4
     """
-    assumes, modelled = {noise.joint: noise for noise in noises}, {model.joint for model in models}
+    noise_of, modelled = {noise.joint: noise for noise in noises}, {model.joint for model in models}
     along = Along(Identified(robot, fits), [*models, *(m for m in motions if m.joint not in modelled)])
-    moving_models = [model for model in models if not model.at_rest and model.joint in assumes]
-    every_noise = [
-        assumed(assumes[model.joint], robot.joint(model.joint), 1.0 / model.rate, q_tau) for model in moving_models
-    ]
-    every_innovation = [
-        innovations(longest(model), noise) for model, noise in zip(moving_models, every_noise, strict=True)
-    ]
-    late = delays([motion_of(model)[0] for model in moving_models], [made.q for made in every_innovation])
-    for model, noise, made, delay in zip(moving_models, every_noise, every_innovation, late, strict=True):
+    models = [model for model in models if not model.at_rest and model.joint in noise_of]
+    filter_noises = [assumed(noise_of[m.joint], robot.joint(m.joint), 1.0 / m.rate, q_tau) for m in models]
+    results = [innovations(longest_part(m), noise) for m, noise in zip(models, filter_noises, strict=True)]
+    clock_delays = delays([velocities(m)[0] for m in models], [result.q for result in results])
+    for model, noise, result, delay in zip(models, filter_noises, results, clock_delays, strict=True):
         part = longest_run(model.t, model.rate)
-        motion, free = motion_of(model), outside(model.t, entry.contact)
-        yield from described(model, made, motion)
-        trials = dict(others(model, along, free))
+        motion, free = velocities(model), outside(model.t, entry.contact)
+        yield from innovation_records(model, result, motion)
+        trials = dict(alternatives(model, along, free))
         if delay.any():
-            trials[CLOCK] = mended(longest(model), *motion, delay)
+            trials[CLOCK] = mended(longest_part(model), *motion, delay)
         subject = Subject(trials, noise, free[part], moving(motion[0], 1.0 / model.rate))
         yield explanation(model, search(subject), entry, float(np.std(delay)))
 
 
-def motion_of(model: JointModel) -> tuple[Array, Array]:
-    """Velocity and acceleration over the longest run, without noise."""
+def velocities(model: JointModel) -> tuple[Array, Array]:
+    """Low-passed velocity and acceleration over the longest run."""
     part = longest_run(model.t, model.rate)
     return model.dq[part], model.ddq[part]
 
 
-def longest(model: JointModel, tau_hat: Array | None = None) -> Driven:
-    """The longest run of a joint's recording; `tau_hat` (N,) by another fit, where that is taken off."""
+def longest_part(model: JointModel, tau_hat: Array | None = None) -> Driven:
+    """The longest run of a joint's recording; `tau_hat` (N,) is the effort by another fit."""
     return max(driven(model, tau_hat), key=lambda part: len(part.q))
 
 
-def others(model: JointModel, along: Along, free: Booleans) -> Iterator[tuple[str, Driven]]:
-    """The joint under the model in use; with parameters of this log itself; and under another structure of its own."""
+def alternatives(model: JointModel, along: Along, free: Booleans) -> Iterator[tuple[str, Driven]]:
+    """The joint under the model in use, with parameters fitted to this log, and under another structure."""
     identified, joint = along.identified, model.joint
     fit = identified.used(joint, f"{model.model}.{model.estimator}")
-    yield "", longest(model)
+    yield "", longest_part(model)
     if fit is not None:
-        yield THIS_LOG, longest(model, refitted(model, fit, along, free))
-    structures = [other for other in identified.fits if other.group == joint and other.model != model.model]
-    possible = [other for other in structures if set(along.joints) >= set(identified.model(other).joints)]
-    for other in possible[:1]:  # of those whose joints the log holds
-        under = along.under(model, other)
+        yield THIS_LOG, longest_part(model, refitted(model, fit, along, free))
+    structures = [f for f in identified.fits if f.group == joint and f.model != model.model]
+    possible = [f for f in structures if set(along.joints) >= set(identified.model(f).joints)]
+    for alternative in possible[:1]:  # of those whose joints the log holds
+        under = along.under(model, alternative)
         if under.inertia.min() > 0:
-            yield other.model, longest(under)
+            yield alternative.model, longest_part(under)
 
 
-def described(model: JointModel, made: Innovations, motion: tuple[Array, Array]) -> Iterator[Innovation]:
-    """The size of both innovations, and their correlation with the motion before."""
-    kept = settled(np.arange(len(made.q)) / model.rate)
-    dq, ddq = (x[kept] for x in motion)
-    N = int(kept.sum())
+def innovation_records(model: JointModel, result: Innovations, motion: tuple[Array, Array]) -> Iterator[Innovation]:
+    """The normalised square of both innovations, and their correlation with the motion before."""
+    converged = settled(np.arange(len(result.q)) / model.rate)
+    dq, ddq = (x[converged] for x in motion)
+    N = int(converged.sum())
     lags = min(LAGS, N // 4)
     low, high = mean_square_band(N)
-    for name, x, std in (("innovation_q", made.q, made.q_std), ("innovation_dq", made.dq, made.dq_std)):
-        normalised = (x / std)[kept]
+    for name, x, std in (("innovation_q", result.q, result.q_std), ("innovation_dq", result.dq, result.dq_std)):
+        normalised = (x / std)[converged]
         with_dq, with_ddq, with_sign = (cross_correlation(normalised, u, lags) for u in (dq, ddq, np.sign(dq)))
         yield Innovation(
             log=model.log, joint=model.joint, signal=name, tested=N, band=NORMAL_95 / N**0.5,
@@ -177,18 +173,18 @@ def described(model: JointModel, made: Innovations, motion: tuple[Array, Array])
         )  # fmt: skip
 
 
-def explanation(model: JointModel, found: CauseSearch, entry: LogEntry, clock_std: float) -> Explanation:
-    """What a search found, trial by trial."""
-    trials, touched = found.trials, entry.role in ("contact", "tissue") and not entry.contact
-    unstated = UNSTATED if touched and not (trials[0].white or found.explaining) else ""
+def explanation(model: JointModel, causes: CauseSearch, entry: LogEntry, clock_std: float) -> Explanation:
+    """The result of a search for the causes, trial by trial."""
+    trials, touched = causes.trials, entry.role in ("contact", "tissue") and not entry.contact
+    caveat = UNKNOWN_CONTACT if touched and not (trials[0].white or causes.explaining) else ""
     return Explanation(
         log=model.log,
         joint=model.joint,
-        finding=finding(found),
-        verdict=verdict(found) + unstated,
+        finding=finding(causes),
+        verdict=verdict(causes) + caveat,
         clock_std=clock_std,
         without=np.array([" + ".join(t.without) or "nothing" for t in trials], object),
-        explains=np.array([t in found.explaining for t in trials], np.int64),
+        explains=np.array([t in causes.explaining for t in trials], np.int64),
         left=np.array([t.tested for t in trials]),
         ljung_box_p_q=np.array([t.ljung_box[0] for t in trials]),
         ljung_box_p_dq=np.array([t.ljung_box[1] for t in trials]),

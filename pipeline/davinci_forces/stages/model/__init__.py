@@ -1,1 +1,1 @@
-"""What every joint needs to move: parameters, the model that the arm is taken to have, and how well it predicts."""
+"""Identify the model of every joint and of the whole arm, and score how well it predicts the effort."""

@@ -1,4 +1,4 @@
-"""Choose a model of the arm by leaving out blocks of path, fit it to all identification logs and chart its friction."""
+"""Choose the model of the arm by leaving out blocks of path, fit it to all logs, and map friction over velocity."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
@@ -20,8 +20,8 @@ from davinci_forces.records import Average, Choice, Diagnostic, Fit, FrictionMap
 from davinci_forces.robots.models import Reach
 from davinci_forces.robots.robot import Robot
 
-CHARTED_ROLES = ("identification", "friction")
-CHARTED_ESTIMATORS = ("lse", "ridge")  # the plain ones
+MAPPED_ROLES = ("identification", "friction")
+MAPPED_ESTIMATORS = ("lse", "ridge")  # without constraints
 
 
 def run(
@@ -32,53 +32,55 @@ def run(
     fit: str,
     lowpass: float,
 ) -> Iterator[Choice | Fit | Prediction | Diagnostic]:
-    """One model for the whole arm: its parameters, and its predictions of what each refit had not seen.
+    """Choose one model for the whole arm, estimate its parameters, and predict what each refit had not seen.
 
-    Where a log moves several joints, and the robot has a chain, the joints that move are described together; joints
-    that move in other logs only keep their own terms.  A fit that the settings name is made, too.
+    Where a log moves several joints, and the robot has a chain, one model describes these joints together; joints
+    that move only in other logs keep their own terms.  The fit that the settings name is made, too.
     """
-    logs = by_log(motions, averages, robot, lowpass)
-    separate, arm = to_describe(logs, robot)
+    logs = logs_of(motions, averages, robot, lowpass)
+    separate, arm = modelled_logs(logs, robot)
     if not separate:
         return
-    reaches = {name: reach_of(own, name) for name, own in separate.items()}
-    every = candidates(robot, separate, arm, reaches, len(logs))
-    selection = selected(every, reaches, len(logs))
+    reaches = {name: reach_of(joint_logs, name) for name, joint_logs in separate.items()}
+    selection = selected(candidates(robot, separate, arm, reaches, len(logs)), reaches, len(logs))
     if selection is None:
-        said = "no model could be chosen: no candidate can be fitted with a part of the path left out"
-        yield diagnostic("choose", "arm", "warning", f"{said}; record more of the path, or more periods")
+        message = "no model could be chosen: no candidate can be fitted with a part of the path left out"
+        yield diagnostic("choose", "arm", "warning", f"{message}; record more of the path, or more periods")
         return
     yield from choice(selection, reaches, logs)
     if not any(selection.physical):
-        said = "no candidate's inertia is positive definite along the paths, so the choice goes by scores alone"
-        yield diagnostic("choose", "arm", "warning", f"{said}; what fit says of each joint's inertia tells why")
-    worth = {f"{c.variant}.{c.estimator}": c for c in (*leading(selection), *named(selection, fit), selection.chosen)}
-    by_variant = {c.variant: name for name, c in worth.items()}
-    for name, candidate in worth.items():
+        message = "no candidate has a positive definite inertia along the paths, so the scores alone decide"
+        yield diagnostic("choose", "arm", "warning", f"{message}; the remarks of stage fit on each inertia say why")
+    shown = (*best_of_structures(selection), *best_of_setting(selection, fit), selection.chosen)
+    by_name = {f"{c.variant}.{c.estimator}": c for c in shown}
+    by_variant = {c.variant: name for name, c in by_name.items()}
+    for name, candidate in by_name.items():
         if name != "independent.lse":
-            found = list(parameters(candidate, robot, reaches, len(logs)))
-            yield from (fitted(candidate, candidate.estimator, *part) for part in found)
+            estimates = list(parameters(candidate, robot, reaches, len(logs)))
+            yield from (fit_record(candidate, candidate.estimator, *part) for part in estimates)
             if candidate.variant != "independent" and by_variant[candidate.variant] == name:
-                yield from possible(candidate, found, robot, reaches)
-    for candidate in worth.values():
+                yield from consistent_fits(candidate, estimates, robot, reaches)
+    for candidate in by_name.values():
         yield from predictions(candidate, candidate is selection.chosen, logs, robot, reaches)
 
 
-def by_log(motions: Iterable[Motion], averages: Iterable[Average], robot: Robot, lowpass: float) -> list[Observed]:
-    """The joints of each log, in the robot's order; of several clocks, the first joint's is kept."""
-    joints, every = [joint.name for joint in robot.joints], list(averages)
+def logs_of(motions: Iterable[Motion], averages: Iterable[Average], robot: Robot, lowpass: float) -> list[Observed]:
+    """The joints of each log, in the robot's order; of several clocks, only joints on that of the first."""
+    joints, periods = [joint.name for joint in robot.joints], list(averages)
     records: dict[str, list[Motion]] = defaultdict(list)
     for record in motions:
         records[record.log].append(record)
     logs: list[Observed] = []
-    for own in records.values():
-        ordered = sorted(own, key=lambda record: joints.index(record.joint))
-        logs.append(observed([r for r in ordered if len(r) == len(ordered[0])], every, lowpass, len(logs)))
+    for log_records in records.values():
+        ordered = sorted(log_records, key=lambda record: joints.index(record.joint))
+        logs.append(observed([r for r in ordered if len(r) == len(ordered[0])], periods, lowpass, len(logs)))
     return logs
 
 
-def to_describe(logs: Sequence[Observed], robot: Robot) -> tuple[dict[str, tuple[Observed, ...]], tuple[Observed, ...]]:
-    """The logs of each joint that is to be described, by itself; and those of all joints, where some move together."""
+def modelled_logs(
+    logs: Sequence[Observed], robot: Robot
+) -> tuple[dict[str, tuple[Observed, ...]], tuple[Observed, ...]]:
+    """The logs of each moving joint by itself, and those that hold all joints, where some move together."""
     whole = tuple(log for log in logs if len(log.records) == len(robot.joints) and log.moving.any())
     arm = whole if robot.chain is not None and any(log.moving.sum() > 1 for log in whole) else ()
     separate: dict[str, list[Observed]] = defaultdict(list)
@@ -91,7 +93,7 @@ def to_describe(logs: Sequence[Observed], robot: Robot) -> tuple[dict[str, tuple
 
 
 def choice(selection: Selection, reaches: dict[str, Reach], logs: Sequence[Observed]) -> Iterator[Choice]:
-    """What was chosen, and from among what; one a group that the chosen model describes by itself."""
+    """One Choice per group of the chosen model, with all candidates and their scores."""
     chosen = selection.chosen
     for library in chosen.libraries:
         yield Choice(
@@ -114,55 +116,54 @@ def choice(selection: Selection, reaches: dict[str, Reach], logs: Sequence[Obser
         )
 
 
-def leading(selection: Selection) -> list[Candidate]:
-    """The best candidate of each structure with something added to the joints' own terms, to compare with."""
+def best_of_structures(selection: Selection) -> list[Candidate]:
+    """The best candidate of each structure that adds to the joints' own terms, for comparison."""
     scores = dict(zip((c.name for c in selection.candidates), selection.score.tolist(), strict=True))
     more = [c for c in selection.candidates if c.variant != "independent"]
     structures = dict.fromkeys(c.structure for c in more)
     return [min((c for c in more if c.structure == s), key=lambda c: scores[c.name]) for s in structures]
 
 
-def named(selection: Selection, fit: str) -> list[Candidate]:
-    """The best candidate of the variant and estimator that the settings name, where they name one.
+def best_of_setting(selection: Selection, fit: str) -> list[Candidate]:
+    """The best candidate of the variant and estimator that the setting `fit` names, where it names one.
 
-    What a mechanism can have is found from the best of its variant, however that is estimated.
+    Consistent parameters follow from the best candidate of their variant, whatever its estimator.
     """
     variant, _, estimator = fit.rpartition(".")
-    wanted = [i for i, c in enumerate(selection.candidates) if c.variant == variant]
-    own = [i for i in wanted if estimator in (selection.candidates[i].estimator, "consistent")]
-    return [selection.candidates[min(own, key=lambda i: float(selection.score[i]))]] if own else []
+    pairs = zip(selection.score.tolist(), selection.candidates, strict=True)
+    matching = [(score, c) for score, c in pairs if c.variant == variant and estimator in (c.estimator, "consistent")]
+    return [min(matching, key=lambda pair: pair[0])[1]] if matching else []
 
 
-def possible(
+def consistent_fits(
     candidate: Candidate,
-    found: Sequence[tuple[Model, Library, BlockEstimate]],
+    estimates: Sequence[tuple[Model, Library, BlockEstimate]],
     robot: Robot,
     reaches: dict[str, Reach],
 ) -> Iterator[Fit | Diagnostic]:
-    """A candidate's parameters held to what some mechanism has, and what that costs of how well they fit."""
+    """Constrain the parameters of a candidate to those that some mechanism has, and state how much worse they fit."""
     name = f"{candidate.variant}.{candidate.estimator}"
-    for (model, library, free), ridge in zip(found, candidate.ridges(), strict=True):
+    for (model, library, free), ridge in zip(estimates, candidate.ridges(), strict=True):
         cells = library.by_block.columns(library.columns(candidate.friction, reaches))
         try:
-            made = held(model, library, cells.of(np.ones(len(cells.gram), np.bool_)), ridge, free)
+            consistent = held(model, library, cells.of(np.ones(len(cells.gram), np.bool_)), ridge, free)
         except NotIdentifiable as error:
-            said = f"{model.group}: {candidate.variant}.consistent is left out: {error}"
-            yield diagnostic("choose", model.group, "warning", said)
+            message = f"{model.group}: {candidate.variant}.consistent is left out: {error}"
+            yield diagnostic("choose", model.group, "warning", message)
             continue
-        yield fitted(candidate, "consistent", model, library, made.estimate)
-        if made.excess > NOTHING:
+        yield fit_record(candidate, "consistent", model, library, consistent.estimate)
+        if consistent.excess > NOTHING:
             units = [robot.joint(effort).unit("{effort}") for effort in model.efforts]
-            each = zip(model.efforts, made.rmse, made.rmse_free, units, strict=True)
-            costs = ", ".join(f"{rmse:.3g} for {before:.3g} {unit} of {joint}" for joint, rmse, before, unit in each)
-            said = (
-                f"{model.group}: no mechanism has the parameters of {name}; those that one can have (consistent) leave"
-            )
-            yield diagnostic("choose", model.group, "note", f"{said} {costs} where fitted, root mean square")
+            errors = zip(model.efforts, consistent.rmse, consistent.rmse_free, units, strict=True)
+            costs = ", ".join(f"{rmse:.3g} instead of {before:.3g} {unit} of {j}" for j, rmse, before, unit in errors)
+            message = f"{model.group}: no mechanism has the parameters of {name}"
+            follows = f"those of consistent leave an effort of {costs} where fitted, root mean square"
+            yield diagnostic("choose", model.group, "note", f"{message}; {follows}")
 
 
-def fitted(candidate: Candidate, estimator: str, model: Model, library: Library, estimate: BlockEstimate) -> Fit:
-    """Parameters of a candidate, from all logs."""
-    about = model.parameters
+def fit_record(candidate: Candidate, estimator: str, model: Model, library: Library, estimate: BlockEstimate) -> Fit:
+    """The Fit of a candidate to all logs."""
+    defined = model.parameters
     return Fit(
         group=model.group,
         model=candidate.variant,
@@ -170,45 +171,45 @@ def fitted(candidate: Candidate, estimator: str, model: Model, library: Library,
         logs=tuple(log.records[0].log for log in library.logs),
         periods=0,
         correlated_lags=0,
-        parameter=np.array([parameter.name for parameter in about], object),
-        phi=np.array([parameter.typst for parameter in about], object),
-        unit=np.array([parameter.unit for parameter in about], object),
-        scale=np.array([parameter.scale for parameter in about]),
-        positive=np.array([parameter.positive for parameter in about], float),
+        parameter=np.array([parameter.name for parameter in defined], object),
+        phi=np.array([parameter.typst for parameter in defined], object),
+        unit=np.array([parameter.unit for parameter in defined], object),
+        scale=np.array([parameter.scale for parameter in defined]),
+        positive=np.array([parameter.positive for parameter in defined], float),
         **estimate._asdict(),
     )
 
 
 def apply(motion: Motion, fits: Iterable[Fit], robot: Robot, *, lowpass: float) -> Iterator[FrictionMap]:
-    """One FrictionMap per log that tells of friction, joint and model of the joint by itself.
+    """Map friction over velocity, one FrictionMap per log, moving joint and model of the joint by itself.
 
-    Of a coupled arm the rest of the effort depends on other joints, which a log of one does not hold.
+    Coupled models are left out: their effort depends on other joints, which a log of one joint does not hold.
     """
-    if motion.role not in CHARTED_ROLES or motion.at_rest:
+    if motion.role not in MAPPED_ROLES or motion.at_rest:
         return
     identified = Identified(robot, fits)
     for fit in identified.describing(motion.joint):
-        if fit.estimator in CHARTED_ESTIMATORS and fit.model.startswith("independent"):
-            yield charted(motion, fit, identified, lowpass)
+        if fit.estimator in MAPPED_ESTIMATORS and fit.model.startswith("independent"):
+            yield friction_map(motion, fit, identified, lowpass)
 
 
-def charted(motion: Motion, fit: Fit, identified: Identified, lowpass: float) -> FrictionMap:
+def friction_map(motion: Motion, fit: Fit, identified: Identified, lowpass: float) -> FrictionMap:
     """tau - Phi_other theta_other, and Phi_friction theta_friction, as means over ranges of velocity."""
-    Phi, known = identified.model(fit).regressor(recorded_motion(motion))
-    friction = np.array(["friction" in str(name) for name in fit.parameter])
-    left = smoothed(motion.tau, motion.segment, motion.rate, lowpass) - Phi[:, 0] @ np.where(friction, 0.0, fit.theta)
-    modelled = Phi[:, 0] @ np.where(friction, fit.theta, 0.0)
-    dq, ddq = motion.dq[known], motion.ddq[known]
-    found = over_velocity(dq, ddq, np.column_stack([left, modelled])[known])
+    Phi, valid = identified.model(fit).regressor(recorded_motion(motion))
+    is_friction = np.array(["friction" in str(name) for name in fit.parameter])
+    tau, theta = smoothed(motion.tau, motion.segment, motion.rate, lowpass), fit.theta
+    measured = tau - Phi[:, 0] @ np.where(is_friction, 0.0, theta)
+    modelled = Phi[:, 0] @ np.where(is_friction, theta, 0.0)
+    means = over_velocity(motion.dq[valid], motion.ddq[valid], np.column_stack([measured, modelled])[valid])
     return FrictionMap(
         log=motion.log,
         joint=motion.joint,
         model=fit.model,
         estimator=fit.estimator,
         role=motion.role,
-        dq=found.dq,
-        gaining=found.gaining.astype(int),
-        tau_friction=found.mean[:, 0],
-        tau_friction_std=found.std[:, 0],
-        tau_friction_hat=found.mean[:, 1],
+        dq=means.dq,
+        gaining=means.gaining.astype(int),
+        tau_friction=means.mean[:, 0],
+        tau_friction_std=means.std[:, 0],
+        tau_friction_hat=means.mean[:, 1],
     )

@@ -1,4 +1,4 @@
-"""Fit the parameters of every joint to all identification logs together, and without some, with every estimator."""
+"""Estimate the parameters of every joint from all identification logs, and from parts of them, by every estimator."""
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import Annotated, NamedTuple
@@ -23,7 +23,7 @@ from davinci_forces.identification.observations import observed, pose_samples
 from davinci_forces.identification.regression import joined, known_of, pose
 from davinci_forces.identification.scores import folds, refits
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.estimation.least_squares import Told, told
+from davinci_forces.maths.estimation.least_squares import told
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.periods.shift import SAME_PATH, most_different
 from davinci_forces.records import (
@@ -46,16 +46,16 @@ from davinci_forces.robots.models import independent
 from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.study import LogEntry
 
-PATHS = 20  # at most, that a recording is compared with
+MAX_PATHS = 20  # that a recording is compared with
 
 
 class Part(NamedTuple):
-    """What one log tells of a joint: an averaged period, or low-passed samples of a motion that does not repeat."""
+    """Data of one joint from one log: an averaged period, or low-passed samples of a motion that does not repeat."""
 
     log: str
     rate: float
     periods: int
-    period: float  # [s], or the duration of what does not repeat
+    period: float  # [s], or the duration of a motion that does not repeat
     noise: tuple[float, float, float]  # standard deviations of q, dq and tau
     t: Column
     q: Column
@@ -72,7 +72,7 @@ def run(
 ) -> Iterator[
     Fit | CrossFit | FittedPaths | Guess | Identifiability | MeasurementNoise | Residual | SwarmSearch | Diagnostic
 ]:
-    """One Fit per joint and estimator; an estimator that cannot be used says why, and the rest goes on.
+    """Estimate one Fit per joint and estimator; a diagnostic says why an estimator cannot be used.
 
     A joint of several logs has a CrossFit, too, by which each of its logs can be predicted from others.
     """
@@ -84,11 +84,11 @@ def run(
             unaveraged += [motion] if moving[-1] not in repeating else []
     for joint in robot.joints:
         model, prior = independent(joint), known_of(joint)
-        parts = [repeated(model, t, prior) for t in averaged if t.joint == joint.name]
-        parts += [unrepeated(model, motion, lowpass, prior) for motion in unaveraged if motion.joint == joint.name]
+        parts = [periodic_part(model, t, prior) for t in averaged if t.joint == joint.name]
+        parts += [sampled_part(model, motion, lowpass, prior) for motion in unaveraged if motion.joint == joint.name]
         if parts:
             others = moving_with(joint.name, [part.log for part in parts], moving)
-            yield from of_joint(model, parts, robot, joint, others)
+            yield from fit_joint(model, parts, robot, joint, others)
 
 
 def apply(
@@ -100,7 +100,7 @@ def apply(
     *,
     lowpass: float,
 ) -> Iterator[Prediction | Diagnostic]:
-    """One Prediction per estimator and joint of an identification log, by refits without some of it."""
+    """Predict the effort of an identification log by refits without parts of it, per estimator and joint."""
     if entry.role != "identification":
         return
     periods, refits = {t.joint: t for t in trajectories}, list(cross_fits)
@@ -110,12 +110,12 @@ def apply(
             yield from left_out(motion, periods.get(motion.joint), others, robot.joint(motion.joint), lowpass)
 
 
-def of_joint(
+def fit_joint(
     model: IndependentJoint, parts: Sequence[Part], robot: Robot, joint: Joint, others: Sequence[str]
 ) -> Iterator[
     Fit | CrossFit | FittedPaths | Guess | Identifiability | MeasurementNoise | Residual | SwarmSearch | Diagnostic
 ]:
-    """The fits of one joint, what they leave, and what its logs have in common; `others` move in them, too."""
+    """Fit one joint by every estimator, with residuals, identifiability and noise; `others` move in its logs, too."""
     regression = joined([part.regression for part in parts])
     estimates: dict[str, Estimate] = {}
     for name in ESTIMATORS:
@@ -125,11 +125,11 @@ def of_joint(
             yield diagnostic("fit", model.group, "warning", f"{model.group}: {name} is left out: {error}")
             continue
         estimates[name] = estimate
-        yield summarised(parts, model, name, regression, estimate)
+        yield fit_record(parts, model, name, regression, estimate)
         yield from residuals(parts, model, name, estimate)
         yield from (swarm_search(model, name, search) for search in estimate.searches)
     yield from identifiability(model, parts, regression, estimates, robot, joint, others)
-    yield from held_back(model.group, regression, estimates, joint.unit("{effort}"))
+    yield from cost_of_consistency(model.group, regression, estimates, joint.unit("{effort}"))
     if len(parts) > 1:
         for name in ESTIMATORS:
             yield from cross_fits([part.log for part in parts], model, name, regression)
@@ -147,97 +147,91 @@ def identifiability(
     joint: Joint,
     others: Sequence[str],
 ) -> Iterator[Identifiability | Diagnostic]:
-    """What the logs of a joint tell of its parameters, and whose inertia is not positive, and why."""
+    """Assess how well the logs determine the parameters, and explain an inertia that is not positive."""
     plain = estimates.get("lse")
     if plain is None:
         return
-    seen = told(regression.triangle)
+    excitation = told(regression.triangle)
     names = [parameter.name for parameter in model.parameters]
-    wanting = (*together(names, seen), *not_seen(regression, plain))
-    yield summary_of(model, names, seen, regression, plain, advice(robot, joint, wanting))
+    pairs, insignificant = together(names, excitation), not_seen(regression, plain)
+    yield Identifiability(
+        group=model.group,
+        model=model.name,
+        scaled_condition=excitation.condition,
+        together=tuple(pairs),
+        not_seen=tuple(insignificant),
+        advice=advice(robot, joint, (*pairs, *insignificant)),
+        parameter=np.repeat(np.array(names, object), len(names)),
+        beside=np.tile(np.array(names, object), len(names)),
+        correlation=flat(excitation),
+    )
     wrong = [name for name, estimate in estimates.items() if not has_positive_inertia(model, estimate.theta, parts)]
     if wrong:
-        least = plain if "lse" in wrong else estimates[wrong[0]]
-        verb = "finds" if len(wrong) == 1 else "find"
-        why = inertia_at_fault(robot, joint, least, seen, others)
-        said = f"{model.group}: {listed(wrong)} {verb} an inertia that is not positive: {why}"
-        yield diagnostic("fit", model.group, "warning", said)
-    if said := hardly_described(joint, explained(regression, plain), others):
-        yield diagnostic("fit", model.group, "warning", f"{model.group}: {said}")
+        estimate = plain if "lse" in wrong else estimates[wrong[0]]
+        verb = "estimates" if len(wrong) == 1 else "estimate"
+        why = inertia_at_fault(robot, joint, estimate, excitation, others)
+        message = f"{model.group}: {listed(wrong)} {verb} an inertia that is not positive: {why}"
+        yield diagnostic("fit", model.group, "warning", message)
+    if message := hardly_described(joint, r_squared(regression, plain), others):
+        yield diagnostic("fit", model.group, "warning", f"{model.group}: {message}")
 
 
-def held_back(group: str, regression: Regression, estimates: dict[str, Estimate], unit: str) -> Iterator[Diagnostic]:
-    """What it costs that parameters are those of some mechanism, where least squares' are not."""
+def cost_of_consistency(
+    group: str, regression: Regression, estimates: dict[str, Estimate], unit: str
+) -> Iterator[Diagnostic]:
+    """State how much worse physically consistent parameters fit, where those of least squares are not consistent."""
     if "lse" not in estimates or "consistent" not in estimates:
         return
     signs = regression.known.signs(len(regression.names))
-    wrong = [name for name, x, known in zip(regression.names, estimates["lse"].theta, signs, strict=True)
-             if known and x < 0]  # fmt: skip
+    wrong = [name for name, x, is_signed in zip(regression.names, estimates["lse"].theta, signs, strict=True)
+             if is_signed and x < 0]  # fmt: skip
     if wrong:
         rmse, before = (
             np.sqrt(np.mean((regression.tau - regression.Phi @ estimates[name].theta) ** 2))
             for name in ("consistent", "lse")
         )
-        said = f"{group}: no mechanism has a negative {listed(wrong)}, as lse finds; parameters that one can have"
-        cost = f"leave {rmse:.3g} for {before:.3g} {unit} of the effort, root mean square"
-        yield diagnostic("fit", group, "note", f"{said} (consistent) {cost}")
+        message = f"{group}: lse estimates a negative {listed(wrong)}, which no mechanism has"
+        cost = f"{rmse:.3g} {unit} root mean square instead of {before:.3g} {unit}"
+        yield diagnostic("fit", group, "note", f"{message}; consistent has none, and leaves an effort of {cost}")
 
 
-def summary_of(
-    model: IndependentJoint, names: Sequence[str], seen: Told, regression: Regression, plain: Estimate, next_motion: str
-) -> Identifiability:
-    """The correlations of a joint's parameters, and what follows from them."""
-    p = len(names)
-    return Identifiability(
-        group=model.group,
-        model=model.name,
-        scaled_condition=seen.condition,
-        together=tuple(together(names, seen)),
-        not_seen=tuple(not_seen(regression, plain)),
-        advice=next_motion,
-        parameter=np.repeat(np.array(names, object), p),
-        beside=np.tile(np.array(names, object), p),
-        correlation=flat(seen),
-    )
-
-
-def left(regression: Regression, estimate: Estimate) -> Array:
-    """What a fit leaves of the effort that it was made from."""
+def fit_residual(regression: Regression, estimate: Estimate) -> Array:
+    """Residual effort of a fit on its own data."""
     return np.asarray((regression.tau - regression.Phi @ estimate.theta)[regression.periods > 0])
 
 
-def explained(regression: Regression, estimate: Estimate) -> float:
-    """The share of the effort's variance that a fit explains, R2."""
-    tau, residual = regression.tau[regression.periods > 0], left(regression, estimate)
+def r_squared(regression: Regression, estimate: Estimate) -> float:
+    """Share of the effort's variance that a fit explains, R2."""
+    tau, residual = regression.tau[regression.periods > 0], fit_residual(regression, estimate)
     spread = tau - tau.mean()
     return float(1 - residual @ residual / (spread @ spread))
 
 
-def repeated(model: IndependentJoint, t: Trajectory, known: Known = NOTHING) -> Part:
-    """An averaged period."""
+def periodic_part(model: IndependentJoint, t: Trajectory, prior: Known = NOTHING) -> Part:
+    """Regression over an averaged period; `prior` holds parameters from tables."""
     sigmas = (t.sigma_q, t.sigma_dq, t.sigma_tau)
-    return Part(t.log, t.rate, t.periods, t.period, sigmas, t.t, t.q, t.dq, pose(model, [t], known))
+    return Part(t.log, t.rate, t.periods, t.period, sigmas, t.t, t.q, t.dq, pose(model, [t], prior))
 
 
-def unrepeated(model: IndependentJoint, record: Motion, lowpass: float, known: Known) -> Part:
-    """Samples, motion and effort through one low-pass."""
-    regression, kept = pose_samples(model, observed([record], (), lowpass, 0), known=known)
-    step = float(np.median(np.diff(kept))) if len(kept) > 1 else 1.0
-    t, q, dq = (x[kept] for x in (record.t, record.q, record.dq))
+def sampled_part(model: IndependentJoint, record: Motion, lowpass: float, prior: Known) -> Part:
+    """Regression over samples of a motion that does not repeat, with motion and effort through one low-pass."""
+    regression, rows = pose_samples(model, observed([record], (), lowpass, 0), known=prior)
+    step = float(np.median(np.diff(rows))) if len(rows) > 1 else 1.0
+    t, q, dq = (x[rows] for x in (record.t, record.q, record.dq))
     sigmas = (record.sigma_q, record.sigma_dq, record.sigma_tau)
     return Part(record.log, record.rate / step, 1, float(t[-1] - t[0]), sigmas, t, q, dq, regression)
 
 
 def has_positive_inertia(model: IndependentJoint, theta: Array, parts: Sequence[Part]) -> bool:
-    """Whether M is positive definite along the trajectories; where it is not, no motion follows from the model."""
+    """Whether M is positive definite along the trajectories; elsewhere the model has no forward dynamics."""
     return all(np.linalg.eigvalsh(model.inertia(theta, part.q[:, None])).min() > 0 for part in parts)
 
 
-def summarised(
+def fit_record(
     parts: Sequence[Part], model: IndependentJoint, name: str, regression: Regression, estimate: Estimate
 ) -> Fit:
-    """A Fit with how well it describes what it was fitted to."""
-    residual = left(regression, estimate)
+    """The Fit of an estimate, with its mean square error and R2 on its own data."""
+    residual = fit_residual(regression, estimate)
     return Fit(
         group=model.group,
         model=model.name,
@@ -246,7 +240,7 @@ def summarised(
         samples=len(regression.tau),
         periods=min(part.periods for part in parts),
         mse=float(np.mean(residual**2)),
-        r2=explained(regression, estimate),
+        r2=r_squared(regression, estimate),
         condition=float(np.linalg.cond(regression.Phi)),
         correlated_lags=estimate.correlated_lags,
         parameter=np.array([parameter.name for parameter in model.parameters], object),
@@ -261,7 +255,7 @@ def summarised(
 
 
 def guesses(model: IndependentJoint, regression: Regression) -> Iterator[Guess]:
-    """What the robot's tables make of the parameters, where it has any.  (6.7), (6.10), (6.13)"""
+    """The parameters from the robot's tables, where it has any.  (6.7), (6.10), (6.13)"""
     theta = regression.known.guess
     if theta is None:
         return
@@ -276,7 +270,7 @@ def guesses(model: IndependentJoint, regression: Regression) -> Iterator[Guess]:
 
 
 def swarm_search(model: IndependentJoint, name: str, search: Search) -> SwarmSearch:
-    """A search with its history.  Fig 6.14"""
+    """The record of a swarm search, with its history.  Fig 6.14"""
     return SwarmSearch(
         group=model.group,
         model=model.name,
@@ -296,14 +290,16 @@ def swarm_search(model: IndependentJoint, name: str, search: Search) -> SwarmSea
 def cross_fits(
     logs: Sequence[str], model: IndependentJoint, name: str, regression: Regression
 ) -> Iterator[CrossFit | Diagnostic]:
-    """The parameters without each fold of the logs, and which logs no refit can do without."""
+    """Estimate the parameters without each fold of the logs; a diagnostic names folds that no refit can omit."""
     fold = folds(len(logs))
     left_out, thetas = [], []
     for out, theta in enumerate(refits(regression, estimator(name))):
-        names = ", ".join(log for log, own in zip(logs, fold, strict=True) if own == out)
+        names = ", ".join(log for log, number in zip(logs, fold, strict=True) if number == out)
         if isinstance(theta, NotIdentifiable):
-            said = f"{model.group}: {name} has no leave-out score of {names}, because a refit is not possible: {theta}"
-            yield diagnostic("fit", model.group, "note", said)
+            why = f"because a refit is not possible: {theta}"
+            yield diagnostic(
+                "fit", model.group, "note", f"{model.group}: {name} has no leave-out score of {names}, {why}"
+            )
         else:
             left_out.append(names)
             thetas.append(theta)
@@ -320,29 +316,30 @@ def cross_fits(
 
 
 def fitted_paths(joint: str, parts: Sequence[Part]) -> Iterator[FittedPaths | Diagnostic]:
-    """The paths of a joint's logs, or of many logs those that differ most."""
-    chosen, likeness = most_different([(part.t, part.q, part.period) for part in parts], PATHS)
+    """The paths of a joint's logs, or the `MAX_PATHS` that differ most."""
+    indices, likeness = most_different([(part.t, part.q, part.period) for part in parts], MAX_PATHS)
     if likeness < SAME_PATH:
-        said = f"{joint}: its identification logs follow more than {PATHS} paths; recordings are compared with {PATHS}"
-        yield diagnostic("fit", joint, "note", f"{said} that differ most, and may be said to follow another path")
-    kept = [parts[i] for i in chosen]
+        message = f"{joint}: its identification logs follow more than {MAX_PATHS} paths"
+        follows = f"recordings are compared with the {MAX_PATHS} that differ most, so a path may be called new"
+        yield diagnostic("fit", joint, "note", f"{message}; {follows} that is not")
+    parts = [parts[i] for i in indices]
     yield FittedPaths(
         joint=joint,
-        source=np.repeat(np.array([part.log for part in kept], object), [len(part.t) for part in kept]),
-        period=np.repeat([part.period for part in kept], [len(part.t) for part in kept]),
-        t=np.concatenate([part.t for part in kept]),
-        q=np.concatenate([part.q for part in kept]),
+        source=np.repeat(np.array([part.log for part in parts], object), [len(part.t) for part in parts]),
+        period=np.repeat([part.period for part in parts], [len(part.t) for part in parts]),
+        t=np.concatenate([part.t for part in parts]),
+        q=np.concatenate([part.q for part in parts]),
     )
 
 
 def noise(joint: str, parts: Sequence[Part]) -> MeasurementNoise:
-    """The noise between periods, or beyond the low-pass, over all logs of a joint."""
+    """Standard deviations between periods, or of what the low-pass removes, over all logs of a joint."""
     sigma_q, sigma_dq, sigma_tau = np.sqrt(np.mean([np.square(part.noise) for part in parts], axis=0)).tolist()
     return MeasurementNoise(joint, sigma_q, sigma_dq, sigma_tau)
 
 
 def residuals(parts: Sequence[Part], model: IndependentJoint, name: str, estimate: Estimate) -> Iterator[Residual]:
-    """What the fit leaves of each log's effort.  (6.54)"""
+    """Residual effort of a fit along each log.  (6.54)"""
     for part in parts:
         tau_hat, tau = part.regression.Phi @ estimate.theta, part.regression.tau
         yield Residual(part.log, model.group, model.name, name, part.rate, part.t, part.dq, tau, tau_hat)

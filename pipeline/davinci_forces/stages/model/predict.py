@@ -1,4 +1,4 @@
-"""Predict the effort of logs that a fit has not seen, and score it; and model every joint along every log."""
+"""Predict and score the effort of logs that no fit has seen, and evaluate the model of every joint along every log."""
 
 from collections.abc import Collection, Iterable, Iterator
 
@@ -31,39 +31,39 @@ def run(
     *,
     lowpass: float,
 ) -> Iterator[Prediction | Diagnostic]:
-    """One Prediction per fit and joint of a log that no parameter was fitted to.
+    """Predict the effort of each moving joint by each fit, in a log that no parameter was fitted to.
 
-    A joint at rest is not predicted: at standstill friction takes any value up to its Coulomb level.  Predictions of
-    identification logs come with the fits, and with the choice.
+    A joint at rest is not predicted: at standstill friction takes any value up to its Coulomb level.  Stages `fit` and
+    `choose` predict identification logs.
     """
     if entry.role in ("validation", "contact"):
         along = Along(Identified(robot, fits), motions)
         for motion in motions:
             if not motion.at_rest:
-                yield from unseen(motion, along, entry, lowpass)
+                yield from predict_joint(motion, along, entry, lowpass)
 
 
-def unseen(motion: Motion, along: Along, entry: LogEntry, lowpass: float) -> Iterator[Prediction | Diagnostic]:
-    """Predict a joint of a log that no parameter was fitted to, by its own fits and by the chosen one."""
+def predict_joint(motion: Motion, along: Along, entry: LogEntry, lowpass: float) -> Iterator[Prediction | Diagnostic]:
+    """Predict the effort of a joint by its own fits and by the chosen one."""
     name, free = f"{motion.log}/{motion.joint}", outside(motion.t, entry.contact)
     if not free.any():
-        said = f"{name}: its contact windows cover the whole log, so nothing is left to score a prediction on"
-        yield diagnostic("predict", f"{motion.log}.{motion.joint}", "warning", said)
+        message = f"{name}: its contact windows cover the whole log, so no prediction can be scored"
+        yield diagnostic("predict", f"{motion.log}.{motion.joint}", "warning", message)
         return
     identified = along.identified
-    own = [f for f in identified.fits if f.group == motion.joint and f.model == "independent"]
+    independent = [f for f in identified.fits if f.group == motion.joint and f.model == "independent"]
     chosen = identified.used(motion.joint, CHOSEN)
     if chosen is not None and not set(identified.model(chosen).joints) <= along.held(motion.joint):
         missing = f"{name}: the log does not hold the other joints that the chosen model needs"
-        said = f"{missing}, so {FALLBACK} stands in for it; add their channels"
-        yield diagnostic("predict", f"{motion.log}.{motion.joint}", "note", said)
+        message = f"{missing}, so {FALLBACK} replaces it; add their channels"
+        yield diagnostic("predict", f"{motion.log}.{motion.joint}", "note", message)
         chosen = identified.used(motion.joint, FALLBACK)
-    named = [(f.model, f.estimator, f) for f in own]
+    labelled = [(f.model, f.estimator, f) for f in independent]
     if chosen is not None:
-        named.append((CHOSEN, f"{chosen.model}.{chosen.estimator}", chosen))
+        labelled.append((CHOSEN, f"{chosen.model}.{chosen.estimator}", chosen))
     judge, path = Judge(motion, free, lowpass), identified.path(motion)
-    for model, by, fit in named:
-        yield judge.scored(model, by, entry.role, entry.role, path, along.tau_hat(fit, motion.joint))
+    for model, estimator, fit in labelled:
+        yield judge.scored(model, estimator, entry.role, entry.role, path, along.tau_hat(fit, motion.joint))
 
 
 def apply(
@@ -75,12 +75,12 @@ def apply(
     *,
     fit: str,
 ) -> Iterator[JointModel | Diagnostic]:
-    """One JointModel per joint that a fit describes; a joint without one says why.
+    """Evaluate the model of each joint along a log; a diagnostic says why a joint has none.
 
     Raises
     ------
     PipelineError
-        If there is no fit of the name that the settings say.
+        If no fit has the name that the settings state.
     """
     if entry.role == "friction":
         return
@@ -88,19 +88,21 @@ def apply(
     along = Along(identified, motions)
     described = [joint for joint in along.joints if identified.describing(joint)]
     used = {joint: identified.used_along(joint, fit, along.held(joint)) for joint in described}
-    refits = refits_of(predictions, {joint: own for joint, (own, _) in used.items()}, fit) if is_fitted else {}
+    refits = (
+        refits_of(predictions, {joint: joint_fit for joint, (joint_fit, _) in used.items()}, fit) if is_fitted else {}
+    )
     for motion in motions:
         about, name = f"{motion.log}.{motion.joint}.model", f"{motion.log}/{motion.joint}"
         if motion.joint not in used:
-            said = "no identification log moves this joint, so its external effort is not tracked"
-            yield diagnostic("predict", about, "note", f"{name}: {said}")
+            message = "no identification log moves this joint, so its external effort is not estimated"
+            yield diagnostic("predict", about, "note", f"{name}: {message}")
             continue
-        own, stand_in = used[motion.joint]
+        joint_fit, stand_in = used[motion.joint]
         if stand_in:
             yield diagnostic("predict", about, "note", f"{name}: {stand_in}")
-        terms = along.by(own, motion.joint)
+        terms = along.by(joint_fit, motion.joint)
         if terms["inertia"].min() <= 0:
-            yield diagnostic("predict", about, "warning", not_positive(motion, own))
+            yield diagnostic("predict", about, "warning", inertia_warning(motion, joint_fit))
             continue
         path = SAME_PATH if is_fitted else identified.path(motion)
         refit = refits.get(motion.joint)
@@ -114,10 +116,10 @@ def apply(
         )  # fmt: skip
 
 
-def not_positive(motion: Motion, fit: Fit) -> str:
-    """Why a joint is not tracked."""
+def inertia_warning(motion: Motion, fit: Fit) -> str:
+    """State why the external effort of a joint is not estimated."""
     return (
-        f"{motion.log}/{motion.joint}: the inertia of {fit.model}.{fit.estimator} is not positive along it, so no "
-        f"motion follows from it and nothing is tracked; what `fit` says of {motion.joint} tells why: a motion that "
-        "hardly excites it, a sign, other joints that move in the same logs, or what the model leaves out"
+        f"{motion.log}/{motion.joint}: the inertia of {fit.model}.{fit.estimator} is not positive along this log, so "
+        f"its external effort is not estimated; the remarks of stage fit on {motion.joint} say why: a motion that "
+        "hardly excites it, a wrong sign, other joints that move in the same logs, or terms that the model lacks"
     )

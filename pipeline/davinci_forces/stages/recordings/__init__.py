@@ -1,1 +1,1 @@
-"""From logs to the motion of every joint: read, put on one clock, averaged over its periods and differentiated."""
+"""Compute the motion of every joint from the logs: read, resample, average and differentiate."""

@@ -1,4 +1,4 @@
-"""Differentiate every averaged period exactly, by its harmonics."""
+"""Compute exact velocities and accelerations of every averaged period from its harmonics."""
 
 from collections.abc import Iterator
 
@@ -8,13 +8,13 @@ from davinci_forces.maths.periods import harmonics as fourier
 from davinci_forces.records import Average, Column, Diagnostic, Spectrum, Trajectory, diagnostic
 from davinci_forces.robots.robot import Joint
 
-LEFT_OUT = 0.01  # share of the largest harmonic above which one that is left out is worth a remark
+MAX_OMITTED_HARMONIC = 0.01  # share of the largest harmonic, above which an omitted one is worth a remark
 
 
 def run(average: Average, joint: Joint, *, harmonics: int) -> Iterator[Trajectory | Spectrum | Diagnostic]:
-    """Position, velocity and acceleration from the harmonics of the excitation.  (6.34)"""
+    """Compute position, velocity and acceleration from the harmonics of the excitation.  (6.34)"""
     orders = harmonics or joint.harmonics
-    q, dq, ddq = differentiated(average, orders)
+    q, dq, ddq = derivatives(average, orders)
     yield Trajectory(
         log=average.log,
         joint=average.joint,
@@ -37,19 +37,19 @@ def run(average: Average, joint: Joint, *, harmonics: int) -> Iterator[Trajector
     )
     amplitude = fourier.amplitudes(average.q)
     yield Spectrum(average.log, average.joint, orders, np.arange(len(amplitude)) / average.period, amplitude)
-    beyond = amplitude[orders + 1 :]
-    if len(beyond) and beyond.max() > LEFT_OUT * amplitude[1:].max():
-        highest = orders + 1 + int(beyond.argmax())
+    omitted = amplitude[orders + 1 :]
+    if len(omitted) and omitted.max() > MAX_OMITTED_HARMONIC * amplitude[1:].max():
+        largest = orders + 1 + int(omitted.argmax())
         yield diagnostic(
             "differentiate", f"{average.log}.{average.joint}", "warning",
-            f"{average.log}/{average.joint}: harmonic {highest} of the position is "
-            f"{beyond.max() / amplitude[1:].max():.1%} of the largest, and {orders} harmonics are kept; raise "
+            f"{average.log}/{average.joint}: harmonic {largest} of the position is "
+            f"{omitted.max() / amplitude[1:].max():.1%} of the largest, but only {orders} harmonics are kept; raise "
             "`harmonics` in [settings] if it was commanded",
         )  # fmt: skip
 
 
-def differentiated(average: Average, harmonics: int) -> Iterator[Column]:
-    """The averaged position (K,) by its first harmonics, its velocity and its acceleration.  (6.34)"""
+def derivatives(average: Average, harmonics: int) -> Iterator[Column]:
+    """Position, velocity and acceleration (K,) from the first harmonics of an averaged position.  (6.34)"""
     omega = 2 * np.pi / average.period
     c = fourier.project(average.t, average.q, omega, harmonics)
     for _ in range(3):

@@ -1,4 +1,4 @@
-"""Read every log into recordings, one per joint, in SI and at the joint's side of the gears; and what touched."""
+"""Read every log into SI units at the joint side of the gears: one recording per joint, and the contact channels."""
 
 from collections.abc import Iterator
 
@@ -12,13 +12,13 @@ from davinci_forces.study.intake.summary import remarks, summary
 
 
 def run(log: Log, entry: LogEntry, robot: Robot) -> Iterator[Recording | Touch | LogSummary | Diagnostic]:
-    """Recordings and touches in consecutive blocks, then what the reader noticed.
+    """Read recordings and touches in consecutive blocks, then a summary and the remarks of the reader.
 
     Raises
     ------
     BadLog
-        If a channel is not there, its unit is unknown or contradicts the study, it holds what is not a number, time
-        does not increase, or channels have clocks that do not go together.
+        If a channel is missing, holds something that is not a number, or has a unit that is unknown or contradicts
+        the study; if time does not increase; or if the clocks of channels do not go together.
     """
     intake = Intake(log, entry, robot)
     for block in mended(intake, intake.blocks()):
@@ -27,6 +27,6 @@ def run(log: Log, entry: LogEntry, robot: Robot) -> Iterator[Recording | Touch |
             break
     yield summary(intake)
     noticed = [f"{entry.name}: {remark}" for remark in (*log.warnings, *remarks(intake))]
-    for severity, said in (("warning", noticed), ("note", list(intake.clocks.note()))):
-        if said:
-            yield diagnostic("ingest", entry.name, severity, *map(visible, said))
+    for severity, texts in (("warning", noticed), ("note", list(intake.clocks.note()))):
+        if texts:
+            yield diagnostic("ingest", entry.name, severity, *map(visible, texts))

@@ -1,4 +1,4 @@
-"""Put every recording on a uniform clock, with its gaps marked, and low-pass and differentiate its motion."""
+"""Resample every recording on a uniform clock, with its gaps marked, and low-pass and differentiate its motion."""
 
 from collections.abc import Iterator
 
@@ -26,16 +26,16 @@ from davinci_forces.robots.robot import Joint
 Indices = NDArray[np.intp]
 
 EVEN = 0.02  # of a sampling time: clocks that stray less than this from a uniform one are taken as uniform
-AT_REST = 0.01  # share of a joint's range, or of 1 rad or 1 m where it has no limits, below which it is at rest
-SLOW = 5.0  # [Hz] below which a logged velocity is compared with that of the position
-FAR = 20.0  # times its limits, beyond which no position of a joint is
-AGREES = 0.1  # how far their ratio may be from 1
-FEWEST = 4  # samples that a cubic spline needs; a shorter segment is left out
-NAMED = 3  # stretches at most that a remark names
+MIN_MOTION = 0.01  # share of a joint's range, or of 1 rad or 1 m where it has no limits, below which it is at rest
+VELOCITY_CUTOFF = 5.0  # [Hz] below which a logged velocity is compared with that of the position
+MAX_VELOCITY_ERROR = 0.1  # of their ratio
+MAX_POSITION = 20.0  # times the limits of a joint
+MIN_SAMPLES_SEGMENT = 4  # that a cubic spline needs
+MAX_LISTED_STRETCHES = 3  # in a remark
 
 
 def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signal | Motion | Diagnostic]:
-    """One Signal and one Motion per recording.  Gaps start a new segment; nothing is interpolated across one.
+    """Make one Signal and one Motion of a recording.  Gaps start a new segment; nothing is interpolated across one.
 
     Raises
     ------
@@ -45,9 +45,9 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
     T_s = even_step(recording.t) or float(np.median(np.diff(recording.t)))
     whole = unbroken(recording.t, GAP * T_s)
     cuts = [part.start for part in whole[1:]]
-    parts = [part for part in whole if part.stop - part.start >= FEWEST]
+    parts = [part for part in whole if part.stop - part.start >= MIN_SAMPLES_SEGMENT]
     if not parts:
-        raise BadLog(f"{recording.log}/{recording.joint}: no segment without a gap holds {FEWEST} samples")
+        raise BadLog(f"{recording.log}/{recording.joint}: no segment without a gap holds {MIN_SAMPLES_SEGMENT} samples")
     if all(is_even(recording.t[part], T_s) for part in parts):
         # The mean over the longest segment; a median would carry the rounding of the time stamps.
         T_s = step_of(max((recording.t[part] for part in parts), key=len))
@@ -82,27 +82,27 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
     yield from remarks(recording, method, cuts, sum(part.stop - part.start for part in parts))
     if recording.role == "identification" and not at_rest and motion.standing.any():
         yield diagnostic("resample", f"{recording.log}.{recording.joint}", "note", standstill(motion))
-    wrong = [] if at_rest else [*disagreement(recording, q, dq, segment, 1.0 / T_s), *faults(recording, joint)]
+    wrong = [] if at_rest else [*velocity_faults(recording, q, dq, segment, 1.0 / T_s), *faults(recording, joint)]
     if wrong:
         yield diagnostic("resample", f"{recording.log}.{recording.joint}", "warning", *wrong)
 
 
 def moves(q: Column, joint: Joint) -> bool:
-    """Whether a joint moves enough to say anything about its dynamics."""
+    """Whether a joint moves enough for its dynamics to show."""
     low, high = joint.limits.q
     # Percentiles, so that a single glitch of an encoder does not set a joint at rest moving.
     reach = float(np.subtract(*np.percentile(q, [99.0, 1.0])))
-    return reach > AT_REST * (high - low if np.isfinite(high - low) else 1.0)
+    return reach > MIN_MOTION * (high - low if np.isfinite(high - low) else 1.0)
 
 
-def derived(q: Column, segment: Indices, rate: float, cutoff: float) -> Column:
-    """The velocity (N,) of a low-passed position (N,), segment by segment."""
+def slow_velocity(q: Column, segment: Indices, rate: float, cutoff: float) -> Column:
+    """Velocity (N,) of a low-passed position (N,), segment by segment."""
     slow = smoothed(q, segment, rate, cutoff)
     return np.concatenate([np.gradient(slow[part], 1.0 / rate) for part in segments(segment)])
 
 
 def without_noise(signal: Signal, smooth: tuple[Column, Column, Column], lowpass: float) -> Motion:
-    """The Motion of a joint, at rest, too: others may move about it; the noise is what the low-pass takes out."""
+    """The Motion of a joint, also at rest, as others may move it along; its noise is what the low-pass removes."""
     q, dq, ddq = smooth
     passed, rate, segment = share_passed(signal.rate, lowpass), signal.rate, signal.segment
     sigma_q = white_std(signal.q - q, passed)
@@ -118,54 +118,48 @@ def without_noise(signal: Signal, smooth: tuple[Column, Column, Column], lowpass
     )  # fmt: skip
 
 
-def disagreement(recording: Recording, q: Column, dq: Column, segment: Indices, rate: float) -> list[str]:
-    """Whether a logged velocity is that of the logged position, judged where both are slow enough to compare."""
+def velocity_faults(recording: Recording, q: Column, dq: Column, segment: Indices, rate: float) -> list[str]:
+    """State where a logged velocity is not that of the logged position, both low-passed."""
     if recording.velocity == "derived":
         return []
-    cutoff = min(SLOW, 0.1 * rate)
-    expected, logged = derived(q, segment, rate, cutoff), smoothed(dq, segment, rate, cutoff)
+    cutoff = min(VELOCITY_CUTOFF, 0.1 * rate)
+    expected, logged = slow_velocity(q, segment, rate, cutoff), smoothed(dq, segment, rate, cutoff)
     slope = float(expected @ logged / (expected @ expected))
-    if abs(slope - 1) < AGREES:
+    if abs(slope - 1) < MAX_VELOCITY_ERROR:
         return []
     return [
-        f"{recording.log}/{recording.joint}: the logged velocity is {slope:.3g} times that of the logged position; "
-        "check the sign, unit or column of either, and the rate of the clock"
+        f"{recording.log}/{recording.joint}: the logged velocity is {slope:.3g} times the derivative of the logged "
+        "position; check the sign, unit and column of both, and the rate of the clock"
     ]
 
 
 def faults(recording: Recording, joint: Joint) -> Iterator[str]:
-    """What the recording shows of a sensor that was stuck, a drive at its limit, or a unit that is not as stated."""
+    """State where a sensor was stuck, a drive was at its limit, or a unit is not as stated."""
     name, far = f"{recording.log}/{recording.joint}", max(map(abs, joint.limits.q))
-    for one in stuck(recording.t, recording.q):
+    for stop in stuck(recording.t, recording.q):
         yield (
-            f"{name}: the position stands still from {one.start:.3f} to {one.end:.3f} s and then jumps by "
-            f"{one.jump:.3g}, as of a sensor that was stuck; leave that out by `skip` and `until`, or record it again"
+            f"{name}: the position stands still from {stop.start:.3f} to {stop.end:.3f} s and then jumps by "
+            f"{stop.jump:.3g}, as if its sensor was stuck; leave that out by `skip` and `until`, or record it again"
         )
     if samples := saturated(recording.tau):
         yield (
-            f"{name}: the effort is exactly at its largest or least value in {samples} samples: the drive, or what "
-            "measures it, was saturated, and more was asked of the joint than the log says; record with less effort"
+            f"{name}: the effort is exactly at its largest or smallest value in {samples} samples: the drive or its "
+            "sensor was saturated, so the true effort may be larger than the log says; record with less effort"
         )
     size = np.abs(recording.q)
-    if size.max() > FAR * far and (reach := float(np.percentile(size, 99.0))) > FAR * far:
-        said = f"{name}: positions reach {reach:.3g}, {reach / far:.0f} times the joint's limits"
-        yield f"{said}; check the unit of the position"
+    if size.max() > MAX_POSITION * far and (reach := float(np.percentile(size, 99.0))) > MAX_POSITION * far:
+        times = f"{reach / far:.0f} times the joint's limits"
+        yield f"{name}: positions reach {reach:.3g}, {times}; check the unit of the position"
 
 
 def is_even(t: Column, T_s: float) -> bool:
-    """Whether a segment runs on a uniform clock of its own, to a fraction of a sampling time."""
+    """Whether the clock of a segment is uniform to a fraction of a sampling time."""
     return are_apart(t, step_of(t), EVEN * T_s / step_of(t))
 
 
 def step_of(t: Column) -> float:
-    """The mean time between samples."""
+    """Mean time [s] between samples."""
     return float((t[-1] - t[0]) / (len(t) - 1))
-
-
-def uniform(t: Column, T_s: float) -> Column:
-    """A uniform clock from the first sample of a segment, no further than its last."""
-    steps = int(np.floor((t[-1] - t[0]) / T_s * (1 + 1e-12)))
-    return np.asarray(t[0] + T_s * np.arange(steps + 1))
 
 
 def as_recorded(recording: Recording, part: slice) -> tuple[Column, ...]:
@@ -174,33 +168,36 @@ def as_recorded(recording: Recording, part: slice) -> tuple[Column, ...]:
 
 
 def on_uniform_clock(recording: Recording, part: slice, T_s: float) -> tuple[Column, ...]:
-    """Time, position, velocity and effort of one segment on a uniform clock."""
+    """Time, position, velocity and effort of one segment on a uniform clock, to at most its last sample."""
     from scipy.interpolate import make_interp_spline
 
     t, *columns = as_recorded(recording, part)
-    clock = uniform(t, T_s)
+    steps = int(np.floor((t[-1] - t[0]) / T_s * (1 + 1e-12)))
+    clock = t[0] + T_s * np.arange(steps + 1)
     return clock, *np.ascontiguousarray(make_interp_spline(t, np.column_stack(columns), k=3)(clock).T)
 
 
-def remarks(recording: Recording, method: str, cuts: list[int], kept: int) -> Iterator[Diagnostic]:
-    """What was done to the clock, where anything was."""
-    name, said = f"{recording.log}/{recording.joint}", []
-    if len(cuts):
+def remarks(recording: Recording, method: str, cuts: list[int], samples: int) -> Iterator[Diagnostic]:
+    """Note the gaps of the clock, the samples that were left out, and the resampling of an uneven clock."""
+    name, notes = f"{recording.log}/{recording.joint}", []
+    if cuts:
         where = ", ".join(f"{recording.t[c - 1]:.3f} s" for c in cuts[:5])
-        said.append(f"{name}: {len(cuts)} gaps, not bridged, after {where}{' ...' if len(cuts) > 5 else ''}")
-    if kept < len(recording):
-        said.append(f"{name}: {len(recording) - kept} samples in segments of fewer than {FEWEST} were left out")
+        notes.append(f"{name}: {len(cuts)} gaps, not bridged, after {where}{' ...' if len(cuts) > 5 else ''}")
+    if samples < len(recording):
+        short = f"segments of fewer than {MIN_SAMPLES_SEGMENT}"
+        notes.append(f"{name}: {len(recording) - samples} samples in {short} were left out")
     if method != "as recorded":
-        said.append(f"{name}: the clock is uneven, so the samples were put on a uniform one: {method}")
-    if said:
-        yield diagnostic("resample", f"{recording.log}.{recording.joint}", "note", *said)
+        notes.append(f"{name}: the clock is uneven, so the samples were put on a uniform one: {method}")
+    if notes:
+        yield diagnostic("resample", f"{recording.log}.{recording.joint}", "note", *notes)
 
 
 def standstill(motion: Motion) -> str:
-    """When a joint stands still, and what follows from that."""
+    """State when a joint stands still, and what follows from that."""
     still: Booleans = motion.standing > 0
     parts = [f"{motion.t[part][0]:.2f} to {motion.t[part][-1]:.2f} s" for part in runs(still)]
-    where = ", ".join(parts[:NAMED]) + (f" and {len(parts) - NAMED} times more" if len(parts) > NAMED else "")
+    where, more = ", ".join(parts[:MAX_LISTED_STRETCHES]), len(parts) - MAX_LISTED_STRETCHES
+    where += f" and {more} times more" if more > 0 else ""
     share = f"{100.0 * float(still.mean()):.2g} % of the log"
-    why = "friction takes any value there, so no model is fitted to its effort then, nor judged by it"
+    why = "friction takes any value there, so its effort is used neither to fit nor to score a model"
     return f"{motion.log}/{motion.joint}: it stands still from {where}, {share}; {why}"

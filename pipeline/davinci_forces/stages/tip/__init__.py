@@ -1,1 +1,1 @@
-"""The force at the tip, from the external efforts of three joints, and beside that of a force sensor."""
+"""Compute the force at the tip from the external efforts of three joints, and compare it with a force sensor."""

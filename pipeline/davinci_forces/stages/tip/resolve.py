@@ -1,4 +1,4 @@
-"""Resolve the external efforts of the joints into the force at the tip, with its covariance."""
+"""Compute the force at the tip, with its covariance, from the external efforts of the joints."""
 
 from collections.abc import Iterable, Iterator, Sequence
 
@@ -25,38 +25,38 @@ from davinci_forces.records import (
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
-ARM = 3  # joints that carry the tip; the wrist is taken to be straight
-FEWEST = 100  # samples of free space, below which nothing is said of it
-LOGS = 20  # at most, that a correlation is taken from
+TIP_JOINTS = 3  # that carry the tip; the wrist is taken to be straight
+MIN_SAMPLES_FREE_SPACE = 100
+MAX_LOGS_CORRELATION = 20
 UNKNOWN = FreeSpaceLevels(*[float("nan")] * len(FreeSpaceLevels._fields))
 
 
 def run(tracks: Sequence[Track], entry: LogEntry, robot: Robot) -> Iterator[JointCorrelation]:
-    """One JointCorrelation of a log; none where a joint is at rest, or where it is not known when it was touched."""
-    own = [track for joint in robot.joints[:ARM] for track in tracks if track.joint == joint.name and not track.at_rest]
-    if robot.chain is None or len(robot.joints) != ARM or len(own) < ARM or not entry.tells_free_space:
+    """Correlate the errors of the joints in free space, in a log in which all move and contacts are known."""
+    names = [joint.name for joint in robot.joints[:TIP_JOINTS]]
+    moving = [track for name in names for track in tracks if track.joint == name and not track.at_rest]
+    if robot.chain is None or len(robot.joints) != TIP_JOINTS or len(moving) < TIP_JOINTS or not entry.tells_free_space:
         return
-    calm = [(start - SETTLE, end) for start, end in entry.contact]  # the smoother sees a contact coming
-    free = free_space(own[0].t, calm, own[0].rate)
-    errors = np.array([track.tau_ext_smooth[free] for track in own])
-    if errors.shape[1] < FEWEST or not errors.std(1).all():
+    free = free_smoothed(moving[0], entry)
+    errors = np.array([track.tau_ext_smooth[free] for track in moving])
+    if errors.shape[1] < MIN_SAMPLES_FREE_SPACE or not errors.std(1).all():
         return
     rho = np.corrcoef(errors)
     yield JointCorrelation(entry.name, errors.shape[1], float(rho[0, 1]), float(rho[0, 2]), float(rho[1, 2]))
 
 
 def gather(correlations: Iterable[JointCorrelation], robot: Robot) -> Iterator[ArmCorrelation]:
-    """One ArmCorrelation where any log tells of it."""
-    own = list(correlations)
-    if not own:
+    """Collect the correlations of at most `MAX_LOGS_CORRELATION` logs."""
+    rows = list(correlations)
+    if not rows:
         return
-    some = [own[i] for i in evenly(len(own), LOGS)]
+    rows = [rows[i] for i in evenly(len(rows), MAX_LOGS_CORRELATION)]
     yield ArmCorrelation(
         robot=robot.name,
-        source=np.array([one.log for one in some], object),
-        rho_12=np.array([one.rho_12 for one in some]),
-        rho_13=np.array([one.rho_13 for one in some]),
-        rho_23=np.array([one.rho_23 for one in some]),
+        source=np.array([row.log for row in rows], object),
+        rho_12=np.array([row.rho_12 for row in rows]),
+        rho_13=np.array([row.rho_13 for row in rows]),
+        rho_23=np.array([row.rho_23 for row in rows]),
     )
 
 
@@ -67,14 +67,17 @@ def apply(
     entry: LogEntry,
     robot: Robot,
 ) -> Iterator[TipForce | TipContact | TipBudget | Diagnostic]:
-    """The force at the tip in a log in which all joints that carry it move, if nothing else is touched.  (7.26)"""
-    if robot.chain is None or len(robot.joints) < ARM or entry.role in ("weight", "friction"):
+    """Compute the force at the tip in a log in which all joints that carry it move.  (7.26)
+
+    It holds if the arm touches nothing else than by its tip.
+    """
+    if robot.chain is None or len(robot.joints) < TIP_JOINTS or entry.role in ("weight", "friction"):
         return
     by_joint = {track.joint: track for track in tracks}
-    if len(robot.joints) > ARM:  # the chain would be taken to stand still beyond them
+    if len(robot.joints) > TIP_JOINTS:  # the chain would be taken to stand still beyond them
         if entry.role in ("contact", "tissue"):
-            said = f"{robot.name} has {len(robot.joints)} joints, and a force at the tip is told by {ARM} that carry it"
-            yield diagnostic("resolve", entry.name, "note", f"{entry.name}: no force at the tip: {said}")
+            why = f"{robot.name} has {len(robot.joints)} joints, and it is computed only for arms of {TIP_JOINTS}"
+            yield diagnostic("resolve", entry.name, "note", f"{entry.name}: no force at the tip: {why}")
         return
     names = [joint.name for joint in robot.joints]
     missing = list(missing_joints(names, by_joint))
@@ -82,48 +85,51 @@ def apply(
         if entry.role in ("contact", "tissue"):
             yield diagnostic("resolve", entry.name, "note", f"{entry.name}: no force at the tip: {'; '.join(missing)}")
         return
-    own, free = [by_joint[name] for name in names], np.zeros(len(by_joint[names[0]]), np.bool_)
-    if entry.tells_free_space:
-        calm = [(start - SETTLE, end) for start, end in entry.contact]  # the smoother sees a contact coming
-        free = free_space(own[0].t, calm, own[0].rate)
+    tracks = [by_joint[name] for name in names]
+    free = free_smoothed(tracks[0], entry) if entry.tells_free_space else np.zeros(len(tracks[0]), np.bool_)
     rho, source = correlation(entry.name, correlations)
-    force = resolved(own, robot.chain, rho, source, free)
+    force = tip_force_of(tracks, robot.chain, rho, source, free)
     yield force
-    yield budget(own, robot.chain, free if free.any() else ~free)
-    yield from touching(force, own, robot.chain, [*windows(entry, contacts)])
+    yield budget(tracks, robot.chain, free if free.any() else ~free)
+    yield from tip_contacts(force, tracks, robot.chain, [*windows(entry, contacts)])
+
+
+def free_smoothed(track: Track, entry: LogEntry) -> Booleans:
+    """Samples (N,) in free space for the smoother, which shows a contact before it begins."""
+    return free_space(track.t, [(start - SETTLE, end) for start, end in entry.contact], track.rate)
 
 
 def missing_joints(names: Sequence[str], tracks: dict[str, Track]) -> Iterator[str]:
-    """Why the effort of joints is not known in a log."""
+    """State why the effort of joints is not known in a log."""
     for name in names:
         if name not in tracks:
-            yield f"{name} is not tracked, as nothing recorded or fitted tells of it"
+            yield f"the external effort of {name} is not known, because it is not recorded or has no fit"
         elif tracks[name].at_rest:
             yield f"{name} is at rest, where friction hides its effort; move it"
 
 
 def correlation(log: str, correlations: Iterable[ArmCorrelation]) -> tuple[Array, str]:
-    """What other logs say of how the joints' errors go together (3,), and which they are; 0 where they do not agree."""
+    """Correlation of the joints' errors (3,) in all other logs, and their names; 0 where they do not agree."""
     for arm in correlations:
-        others = arm.source != log
-        rho = shared(np.column_stack([arm.rho_12, arm.rho_13, arm.rho_23])[others])
+        is_other = arm.source != log
+        rho = shared(np.column_stack([arm.rho_12, arm.rho_13, arm.rho_23])[is_other])
         if rho.any():
-            return rho, ", ".join(arm.source[others].tolist())
-    return np.zeros(ARM), ""
+            return rho, ", ".join(arm.source[is_other].tolist())
+    return np.zeros(TIP_JOINTS), ""
 
 
-def resolved(own: Sequence[Track], chain: Chain, rho: Array, source: str, free: Booleans) -> TipForce:
-    """The force at the tip of one log, without delay: joints that lag differently would point it elsewhere."""
-    first, q = own[0], np.stack([track.q for track in own], axis=-1)
-    J = along(lambda some: jacobian(chain, some)[0], q)
-    tau_ext, std = (np.stack([getattr(t, name) for t in own], axis=-1) for name in ("tau_ext_smooth", "tau_ext_std"))
+def tip_force_of(tracks: Sequence[Track], chain: Chain, rho: Array, source: str, free: Booleans) -> TipForce:
+    """The force at the tip in one log, by the smoother: different lags of the joints would turn its direction."""
+    first, q = tracks[0], np.stack([track.q for track in tracks], axis=-1)
+    J = along(lambda block: jacobian(chain, block)[0], q)
+    tau_ext, std = (np.stack([getattr(t, name) for t in tracks], axis=-1) for name in ("tau_ext_smooth", "tau_ext_std"))
     f, C = tip_force.from_efforts(J, tau_ext, tip_force.covariance(std, matrix(*rho.tolist())))
-    blur, (x, y, z) = condition(J), along(lambda some: tip(chain, some), q).T
+    blur, (x, y, z) = condition(J), along(lambda block: tip(chain, block), q).T
     near = blur > NEAR_SINGULAR
-    judged = free & ~near
-    space = levels_of(f[judged], C[judged]) if int(judged.sum()) >= FEWEST else UNKNOWN
+    tested = free & ~near
+    space = levels_of(f[tested], C[tested]) if int(tested.sum()) >= MIN_SAMPLES_FREE_SPACE else UNKNOWN
     return TipForce(
-        log=first.log, role=first.role, filter=first.filter, model=first.model, tested=int(judged.sum()),
+        log=first.log, role=first.role, filter=first.filter, model=first.model, tested=int(tested.sum()),
         force_rms=space.rms, force_rms_std=space.rms_std, force_level=space.level_95,
         force_level_std=space.level_95_std, force_detection=space.level_99, force_detection_std=space.level_99_std,
         force_coverage=space.coverage, force_coverage_std=space.coverage_std, rho_12=float(rho[0]),
@@ -136,53 +142,54 @@ def resolved(own: Sequence[Track], chain: Chain, rho: Array, source: str, free: 
 
 
 def levels_of(f: Array, C: Array) -> FreeSpaceLevels:
-    """The levels of the size of forces (N, 3) in free space, and the share within their 95 % ellipsoids."""
+    """Levels of the magnitude of forces (N, 3) in free space, and the share within their 95 % ellipsoids."""
     return levels(np.linalg.norm(f, axis=1), tip_force.reach_95(f, C) / NORMAL_95)
 
 
-def budget(own: Sequence[Track], chain: Chain, which: Booleans) -> TipBudget:
-    """What the parts of each joint's deviation come to at the tip, at the median pose of some samples."""
-    median = np.array([float(np.median(track.q[which])) for track in own])
+def budget(tracks: Sequence[Track], chain: Chain, which: Booleans) -> TipBudget:
+    """Force at the tip from each part of the error of each joint, at the median pose of some samples."""
+    median = np.array([float(np.median(track.q[which])) for track in tracks])
     lever = tip_force.lever(jacobian(chain, median)[0])
     noise, model, late = (
-        lever * np.array([getattr(track, part) for track in own]) for part in ("filter_part", "model_part", "lag_part")
+        lever * np.array([getattr(track, part) for track in tracks])
+        for part in ("filter_part", "model_part", "lag_part")
     )
     total = np.sqrt(noise**2 + model**2 + late**2)
-    wider = np.sqrt(total**2 + lever**2 * [model_variance_std(track) for track in own])
+    wider = np.sqrt(total**2 + lever**2 * [model_variance_std(track) for track in tracks])
     return TipBudget(
-        log=own[0].log, of_joint=np.array([track.joint for track in own], object), lever=lever, filter_force=noise,
-        model_force=model, model_force_std=lever * [track.model_part_std for track in own], lag_force=late,
-        total_force=total, total_force_std=wider - total,
+        log=tracks[0].log, of_joint=np.array([track.joint for track in tracks], object), lever=lever,
+        filter_force=noise, model_force=model, model_force_std=lever * [track.model_part_std for track in tracks],
+        lag_force=late, total_force=total, total_force_std=wider - total,
     )  # fmt: skip
 
 
 def model_variance_std(track: Track) -> float:
-    """The standard error of the variance that the model's error adds to an external effort."""
+    """Standard error of the variance that the model's error adds to an external effort."""
     return (track.model_part + track.model_part_std) ** 2 - track.model_part**2
 
 
 def windows(entry: LogEntry, contacts: Iterable[Contact]) -> Iterator[tuple[float, float, bool]]:
-    """Start, end and whether it is stated, of the study's windows and of what was found beside them on any joint."""
+    """Start, end and whether it is stated, of the study's windows and of other contacts detected on any joint."""
     yield from ((start, end, True) for start, end in sorted(entry.contact))
-    found = sorted(
+    detected = sorted(
         (float(contact.onset[i]), float(contact.release[i]))
         for contact in contacts for i in np.flatnonzero(contact.stated == 0)
     )  # fmt: skip
-    while found:
-        start, end = found.pop(0)
-        while found and found[0][0] <= end:
-            end = max(end, found.pop(0)[1])
+    while detected:
+        start, end = detected.pop(0)
+        while detected and detected[0][0] <= end:
+            end = max(end, detected.pop(0)[1])
         if not any(start <= last and end >= first for first, last in entry.contact):
             yield start, end, False
 
 
-def touching(
-    force: TipForce, own: Sequence[Track], chain: Chain, windows: Sequence[tuple[float, float, bool]]
+def tip_contacts(
+    force: TipForce, tracks: Sequence[Track], chain: Chain, windows: Sequence[tuple[float, float, bool]]
 ) -> Iterator[TipContact]:
-    """The force where it is largest in each window in which it is known anywhere."""
+    """The largest force in each window in which it is known."""
     f = np.column_stack([force.f_x, force.f_y, force.f_z])
     size = np.where(np.isnan(f[:, 0]), -1.0, np.linalg.norm(f, axis=1))
-    peaks = [(*window, k) for window in windows if (k := largest(force.t, size, window)) is not None]
+    peaks = [(*window, k) for window in windows if (k := peak_sample(force.t, size, window)) is not None]
     if not peaks:
         return
     onset, release, stated, at = (np.array(column) for column in zip(*peaks, strict=True))
@@ -190,7 +197,7 @@ def touching(
         [force.c_xx, force.c_xy, force.c_xz], [force.c_xy, force.c_yy, force.c_yz], [force.c_xz, force.c_yz, force.c_zz]
     ])[..., at].transpose(2, 0, 1)  # fmt: skip
     sigma, axes = tip_force.sigma_ellipsoid(C)
-    sigma_std = half_axes_std(force, own, chain, at, sigma)
+    sigma_std = half_axes_std(force, tracks, chain, at, sigma)
     std, u = np.sqrt(np.diagonal(C, axis1=1, axis2=2)), f[at] / size[at, None]
     yield TipContact(
         log=force.log, filter=force.filter, stated=stated.astype(np.int64), onset=onset, release=release,
@@ -203,13 +210,13 @@ def touching(
     )  # fmt: skip
 
 
-def half_axes_std(force: TipForce, own: Sequence[Track], chain: Chain, at: Integers, sigma: Array) -> Array:
-    """The standard errors (K, 3) of the half-axes at samples (K,): what each joint's model variance adds by its own."""
-    J, _ = jacobian(chain, np.stack([track.q[at] for track in own], axis=-1))
-    std = np.stack([track.tau_ext_std[at] for track in own], axis=-1)
+def half_axes_std(force: TipForce, tracks: Sequence[Track], chain: Chain, at: Integers, sigma: Array) -> Array:
+    """Standard errors (K, 3) of the half-axes at samples (K,), from the error of each joint's model variance."""
+    J, _ = jacobian(chain, np.stack([track.q[at] for track in tracks], axis=-1))
+    std = np.stack([track.tau_ext_std[at] for track in tracks], axis=-1)
     rho = matrix(force.rho_12, force.rho_13, force.rho_23)
     squares = np.zeros(sigma.shape)
-    for i, track in enumerate(own):
+    for i, track in enumerate(tracks):
         wider = std.copy()
         wider[:, i] = np.sqrt(std[:, i] ** 2 + model_variance_std(track))
         _, C = tip_force.from_efforts(J, np.zeros(std.shape), tip_force.covariance(wider, rho))
@@ -217,8 +224,8 @@ def half_axes_std(force: TipForce, own: Sequence[Track], chain: Chain, at: Integ
     return np.asarray(np.sqrt(squares))
 
 
-def largest(t: Array, size: Array, window: tuple[float, float, bool]) -> int | None:
-    """The sample at which a size (N,) is largest within a window, None where there is none of a size above 0."""
+def peak_sample(t: Array, size: Array, window: tuple[float, float, bool]) -> int | None:
+    """Index of the largest size (N,) within a window; None where none is above 0."""
     inside = np.where((t >= window[0]) & (t <= window[1]), size, -1.0)
     k = int(np.argmax(inside))
     return k if inside[k] > 0.0 else None

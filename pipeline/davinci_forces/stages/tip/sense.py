@@ -1,4 +1,4 @@
-"""Set the estimated force against that of a force sensor, where a log has one: error, range, lag and coverage."""
+"""Compare the estimated force with that of a force sensor, where a log has one: error, range, lag and coverage."""
 
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
@@ -12,69 +12,70 @@ from davinci_forces.records import Diagnostic, SensorForce, TipForce, Touch, Tra
 from davinci_forces.robots.robot import Kind, Robot
 from davinci_forces.study import LogEntry
 
-FEWEST = 100  # samples, below which nothing is said
+MIN_SAMPLES_ERROR = 100
 AXES = ("x", "y", "z")
 
 
 class EstimatedForce(NamedTuple):
-    """A force (N, k) with its covariance (N, k, k) over time, and where it is to be judged (N,)."""
+    """A force (N, k) with its covariance (N, k, k) over time, and the samples that are tested (N,)."""
 
     t: Array
     f: Array
     C: Array
-    judged: Booleans
+    tested: Booleans
 
 
 def run(
     touch: Touch, forces: Iterable[TipForce], tracks: Iterable[Track], entry: LogEntry, robot: Robot
 ) -> Iterator[SensorForce | Diagnostic]:
-    """The force at the tip, component by component and as a vector, against a sensor of three axes in base axes.
+    """Compare the force at the tip, by component and as a vector, with a sensor of three axes in base axes.
 
-    A sensor of one axis is set against the size of that force; where that is not known, against the external effort
-    of the joint that slides, with the sign with which both go together.
+    A sensor of one axis is compared with the magnitude of that force.  Where that is not known, it is compared with the
+    external effort of the prismatic joint, with the sign of their correlation.
     """
     sensor = np.column_stack([getattr(touch, name) for name in ("force_x", "force_y", "force_z")])
-    one = touch.force[:, None]
-    if not entry.joints or not (np.isfinite(sensor).all() or np.isfinite(one).all()):
+    if not np.isfinite(sensor).all():
+        sensor = touch.force[:, None]
+    if not entry.joints or not np.isfinite(sensor).all():
         return
-    made = list(compared(touch.t, sensor if np.isfinite(sensor).all() else one, list(forces), list(tracks), robot))
-    if not made:
-        said = (
-            f"{entry.name}: its force sensor is compared with nothing: neither the force at the tip nor the external "
-            "effort of a joint that slides is known there, or too few of their samples"
+    pairs = list(comparisons(touch.t, sensor, list(forces), list(tracks), robot))
+    if not pairs:
+        message = (
+            f"{entry.name}: its force sensor is not compared with an estimate: neither the force at the tip nor the "
+            "external effort of a prismatic joint is known for enough samples"
         )
-        yield diagnostic("sense", entry.name, "note", said)
-    for axis, estimate, shown in made:
-        yield from against(entry, axis, estimate, touch.t, shown)
+        yield diagnostic("sense", entry.name, "note", message)
+    for axis, estimate, measured in pairs:
+        yield from sensor_force(entry, axis, estimate, touch.t, measured)
 
 
-def compared(
+def comparisons(
     clock: Array, sensor: Array, forces: list[TipForce], tracks: list[Track], robot: Robot
 ) -> Iterator[tuple[str, EstimatedForce, Array]]:
-    """What is set against what: an axis, the estimate, and what the sensor shows of it (M, k) on its clock (M,)."""
+    """Axis, estimate and force of the sensor (M, k), on its clock (M,), of each comparison."""
     if forces:
-        whole = of_tip(forces[0])
-        if int(whole.judged.sum()) < FEWEST:
+        vector = estimate_at_tip(forces[0])
+        if int(vector.tested.sum()) < MIN_SAMPLES_ERROR:
             return
         if sensor.shape[1] == 1:
-            yield "size", size(whole), np.abs(sensor)
+            yield "size", size(vector), np.abs(sensor)
             return
         for i, axis in enumerate(AXES):
-            yield axis, whole._replace(f=whole.f[:, [i]], C=whole.C[:, i : i + 1, i : i + 1]), sensor[:, [i]]
-        yield "vector", whole, sensor
+            yield axis, vector._replace(f=vector.f[:, [i]], C=vector.C[:, i : i + 1, i : i + 1]), sensor[:, [i]]
+        yield "vector", vector, sensor
         return
-    slide = sliding(tracks, robot)
-    if slide is not None and int(settled(slide.t).sum()) >= FEWEST:
+    slide = prismatic_track(tracks, robot)
+    if slide is not None and int(settled(slide.t).sum()) >= MIN_SAMPLES_ERROR:
         f, C = slide.tau_ext_smooth[:, None], (slide.tau_ext_std**2)[:, None, None]
-        along = sensor if sensor.shape[1] == 1 else np.linalg.norm(sensor, axis=1)[:, None]
-        shown = at(slide.t, clock, along, 3.0 / slide.rate)[:, 0]
-        known = np.isfinite(shown)
-        sign = -1.0 if known.any() and np.cov(shown[known], f[known, 0])[0, 1] < 0.0 else 1.0
-        yield slide.joint, EstimatedForce(slide.t, f, C, settled(slide.t)), sign * along
+        measured = sensor if sensor.shape[1] == 1 else np.linalg.norm(sensor, axis=1)[:, None]
+        resampled = at(slide.t, clock, measured, 3.0 / slide.rate)[:, 0]
+        finite = np.isfinite(resampled)
+        sign = -1.0 if finite.any() and np.cov(resampled[finite], f[finite, 0])[0, 1] < 0.0 else 1.0
+        yield slide.joint, EstimatedForce(slide.t, f, C, settled(slide.t)), sign * measured
 
 
-def of_tip(force: TipForce) -> EstimatedForce:
-    """The force at the tip where its pose tells it."""
+def estimate_at_tip(force: TipForce) -> EstimatedForce:
+    """The force at the tip, tested where its pose is not near a singularity."""
     f = np.column_stack([force.f_x, force.f_y, force.f_z])
     C = np.stack([
         [force.c_xx, force.c_xy, force.c_xz], [force.c_xy, force.c_yy, force.c_yz], [force.c_xz, force.c_yz, force.c_zz]
@@ -82,37 +83,39 @@ def of_tip(force: TipForce) -> EstimatedForce:
     return EstimatedForce(force.t, f, C, settled(force.t) & (force.near_singular == 0) & np.isfinite(f).all(1))
 
 
-def size(of: EstimatedForce) -> EstimatedForce:
-    """The size of a force, with its variance along itself."""
-    length = np.linalg.norm(of.f, axis=1)
-    u = of.f / np.maximum(length, 1e-300)[:, None]
+def size(force: EstimatedForce) -> EstimatedForce:
+    """Magnitude of a force, with its variance along the force."""
+    length = np.linalg.norm(force.f, axis=1)
+    u = force.f / np.maximum(length, 1e-300)[:, None]
     u[:, 0] += length == 0.0  # of no force, any direction
-    return of._replace(f=length[:, None], C=np.einsum("ni,nij,nj->n", u, of.C, u)[:, None, None])
+    return force._replace(f=length[:, None], C=np.einsum("ni,nij,nj->n", u, force.C, u)[:, None, None])
 
 
-def sliding(tracks: list[Track], robot: Robot) -> Track | None:
-    """The joint that slides farthest, of those whose effort is a force."""
+def prismatic_track(tracks: list[Track], robot: Robot) -> Track | None:
+    """The prismatic joint that moves farthest, of those whose effort is a force."""
     slides = [t for t in tracks if robot.joint(t.joint).kind is Kind.PRISMATIC and not t.at_rest]
     forces = [t for t in slides if not robot.joint(t.joint).effort]
     return max(forces, key=lambda track: float(np.ptp(track.q)), default=None)
 
 
-def against(entry: LogEntry, axis: str, estimate: EstimatedForce, clock: Array, shown: Array) -> Iterator[SensorForce]:
-    """One SensorForce, if enough samples of both are known."""
+def sensor_force(
+    entry: LogEntry, axis: str, estimate: EstimatedForce, clock: Array, sensor: Array
+) -> Iterator[SensorForce]:
+    """The error of an estimate, if enough samples of it and of the sensor are known."""
     rate = 1.0 / float(np.median(np.diff(estimate.t)))
-    measured = at(estimate.t, clock, shown, 3.0 / rate)
-    judged = estimate.judged & np.isfinite(measured).all(1)
-    if int(judged.sum()) < FEWEST:
+    measured = at(estimate.t, clock, sensor, 3.0 / rate)
+    tested = estimate.tested & np.isfinite(measured).all(1)
+    if int(tested.sum()) < MIN_SAMPLES_ERROR:
         return
-    of = errors(estimate.f[judged], estimate.C[judged], measured[judged])
-    late = lag(estimate.t, estimate.f, clock, shown, rate, judged)
+    error = errors(estimate.f[tested], estimate.C[tested], measured[tested])
+    late = lag(estimate.t, estimate.f, clock, sensor, rate, tested)
     drawn = size(estimate) if estimate.f.shape[1] > 1 else estimate
     yield SensorForce(
-        log=entry.name, axis=axis, role=entry.role, tested=int(judged.sum()), force_error=of.rmse,
-        force_error_std=of.rmse_std, force_bias=of.bias, force_bias_std=of.bias_std, force_error_max=of.largest,
-        force_range=of.span, force_relative_error=of.relative, force_relative_error_std=of.relative_std,
-        sensor_lag=late.value, sensor_lag_std=late.std, sensor_coverage=of.coverage,
-        sensor_coverage_std=of.coverage_std, t=estimate.t,
+        log=entry.name, axis=axis, role=entry.role, tested=int(tested.sum()), force_error=error.rmse,
+        force_error_std=error.rmse_std, force_bias=error.bias, force_bias_std=error.bias_std,
+        force_error_max=error.largest, force_range=error.span, force_relative_error=error.relative,
+        force_relative_error_std=error.relative_std, sensor_lag=late.value, sensor_lag_std=late.std,
+        sensor_coverage=error.coverage, sensor_coverage_std=error.coverage_std, t=estimate.t,
         measured_force=measured[:, 0] if measured.shape[1] == 1 else np.linalg.norm(measured, axis=1),
         estimated_force=drawn.f[:, 0], estimated_force_std=np.sqrt(drawn.C[:, 0, 0]),
     )  # fmt: skip

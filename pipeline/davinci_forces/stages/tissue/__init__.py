@@ -1,1 +1,1 @@
-"""Tissue that was pushed into: how stiff it is, and how stiff it may be for a hand that feels it."""
+"""Estimate the stiffness of tissue, and the stiffness above which haptic feedback is unstable."""

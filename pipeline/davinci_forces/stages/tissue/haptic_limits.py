@@ -1,4 +1,4 @@
-"""Limit what a hand can feel: how stiff tissue may be before a haptic loop is unstable, in theory and in simulation."""
+"""Compute the stability limits of haptic feedback: how stiff tissue may be, in theory and in simulation."""
 
 from collections.abc import Iterable, Iterator
 
@@ -29,47 +29,47 @@ from davinci_forces.records import (
 from davinci_forces.robots.robot import Joint, Kind, Robot
 from davinci_forces.study import HapticScenario
 
-BEYOND = 1.5  # times the limit of arbitrary switching, at which motions are shown
-TURNS = 5.0  # of the free hand, that they last
-AT = 0.5  # [Hz] as fast as tissue is felt for, at which the rendered stiffness is stated
+UNSTABLE_STIFFNESS = 1.5  # times the limit of arbitrary switching, of the simulated motions
+MOTION_CYCLES = 5.0  # of the free hand, in a simulated motion
+PALPATION_FREQUENCY = 0.5  # [Hz] at which the rendered stiffness is stated
 FROM_FILE, FROM_THESIS = "the scenario", "the thesis"
 
 
 def run(
     stiffnesses: Iterable[Stiffness], comparisons: Iterable[Comparison], robot: Robot
 ) -> Iterator[StabilityMap | StabilityLimit | DelayLimit | TissueLimit | HapticMotion]:
-    """The limits of the thesis's hand, and where the tissues are that have been measured; nothing without any."""
-    tissues = [one for one in stiffnesses if one.pushes and one.stiffness > 0.0]
+    """Compute the stability limits of the thesis's hand, and the requirements of each measured tissue."""
+    tissues = [tissue for tissue in stiffnesses if tissue.pushes and tissue.stiffness > 0.0]
     if not tissues:
         return
-    yield mapped(robot)
-    yield limits(robot)
-    yield delayed(robot)
+    yield stability_map(robot)
+    yield stability_limit(robot)
+    yield delay_limits(robot)
     for law in (worst, at_contact):
-        yield moved(robot, law)
-    joint, lag = slowest(list(comparisons), robot)
-    for one in tissues:
-        yield asked(one, joint, lag)
+        yield unstable_motion(robot, law)
+    joint, lag = slowest_filter(list(comparisons), robot)
+    for tissue in tissues:
+        yield tissue_limit(tissue, joint, lag)
 
 
-def mapped(robot: Robot) -> StabilityMap:
-    """Whether the solver found a Lyapunov function, cell by cell.  (8.10), Fig 8.9"""
+def stability_map(robot: Robot) -> StabilityMap:
+    """Whether a solver found a common quadratic Lyapunov function, by stiffness of hand and tissue.  (8.10), Fig 8.9"""
     k_h, k_t = np.repeat(bimodal.K_H, len(bimodal.K_T)), np.tile(bimodal.K_T, len(bimodal.K_H))
-    found = np.arange(len(bimodal.K_T)) < np.array(bimodal.PROVED)[:, None]
-    return StabilityMap(robot.name, THESIS.m, THESIS.b, k_h, k_t, found.ravel().astype(int))
+    proved = np.arange(len(bimodal.K_T)) < np.array(bimodal.PROVED)[:, None]
+    return StabilityMap(robot.name, THESIS.m, THESIS.b, k_h, k_t, proved.ravel().astype(int))
 
 
-def limits(robot: Robot) -> StabilityLimit:
-    """The exact borders beside that map."""
+def stability_limit(robot: Robot) -> StabilityLimit:
+    """The exact limits of the same plane, with a Lyapunov function and under arbitrary switching."""
     k_h = np.geomspace(bimodal.SOFTEST, bimodal.STIFFEST, 101)
     hands = [THESIS._replace(k=k) for k in k_h.tolist()]
     proved, switching = (np.array([limit(hand) for hand in hands]) for limit in (cqlf_limit, switching_limit))
     return StabilityLimit(robot.name, THESIS.m, THESIS.b, k_h, proved, switching)
 
 
-def delayed(robot: Robot) -> DelayLimit:
-    """The limit over the delay, of a force that changes at once and of one that the link holds."""
-    late = np.array([delay_limit(THESIS, delay) for delay in bimodal.DELAYS.tolist()])
+def delay_limits(robot: Robot) -> DelayLimit:
+    """The limit over the delay, for a continuous force and for one that the link holds between samples."""
+    continuous = np.array([delay_limit(THESIS, delay) for delay in bimodal.DELAYS.tolist()])
     leaving = np.full(len(bimodal.DELAYS), np.nan)
     leaving[bimodal.SIMULATED] = bimodal.LEAVING
     return DelayLimit(
@@ -81,33 +81,33 @@ def delayed(robot: Robot) -> DelayLimit:
         k_t_cqlf=cqlf_limit(THESIS),
         k_t_switching=switching_limit(THESIS),
         delay=bimodal.DELAYS,
-        k_t_delay=late,
+        k_t_delay=continuous,
         k_t_held=np.array(bimodal.HELD),
         k_t_leaving=leaving,
     )
 
 
-def moved(robot: Robot, law: Law) -> HapticMotion:
-    """The hand let go beside the tissue, by the worst switching or by the one there is.  Fig 8.8, 8.10"""
-    k_t = BEYOND * switching_limit(THESIS)
-    motion = switched(THESIS, k_t, (-0.01, 0.0), TURNS * 2.0 * np.pi / THESIS.frequency, law)
+def unstable_motion(robot: Robot, law: Law) -> HapticMotion:
+    """The motion of a released hand beside the tissue, with the worst or the actual switching.  Fig 8.8, 8.10"""
+    k_t = UNSTABLE_STIFFNESS * switching_limit(THESIS)
+    motion = switched(THESIS, k_t, (-0.01, 0.0), MOTION_CYCLES * 2.0 * np.pi / THESIS.frequency, law)
     name = law.__name__.replace("_", " ")
     return HapticMotion(robot.name, name, k_t, *motion, energy(THESIS, k_t, motion.x, motion.dx))
 
 
-def slowest(comparisons: list[Comparison], robot: Robot) -> tuple[str, float]:
-    """The joint that slides, as it felt for tissue in section 8.4, else any, and the filter's largest lag there [s]."""
-    own = [one for one in comparisons if one.default]
-    sliding = [one for one in own if robot.joint(one.joint).kind is Kind.PRISMATIC]
-    latest = max(sliding or own, key=lambda one: one.push_delay, default=None)
+def slowest_filter(comparisons: list[Comparison], robot: Robot) -> tuple[str, float]:
+    """The prismatic joint, which palpates in section 8.4, else any, and the largest lag of its filter [s]."""
+    default = [c for c in comparisons if c.default]
+    prismatic = [c for c in default if robot.joint(c.joint).kind is Kind.PRISMATIC]
+    latest = max(prismatic or default, key=lambda c: c.push_delay, default=None)
     return (latest.joint, latest.push_delay) if latest is not None else ("", float("nan"))
 
 
-def asked(tissue: Stiffness, joint: str, lag: float) -> TissueLimit:
-    """What a tissue asks of the hand: stiffness for a Lyapunov function, damping for the lag and the link."""
+def tissue_limit(tissue: Stiffness, joint: str, lag: float) -> TissueLimit:
+    """What a tissue requires of the hand: stiffness for a Lyapunov function, damping for the lag and the link."""
     m, b, k_t = THESIS.m, THESIS.b, tissue.stiffness
     needed = m * (max(k_t - b**2 / m, 0.0) / (2.0 * b)) ** 2
-    known = lag > 0.0
+    has_lag = lag > 0.0
     total = lag + 0.5 / bimodal.LINK_RATE  # a held force is half a sample later
     return TissueLimit(
         log=tissue.log,
@@ -115,8 +115,8 @@ def asked(tissue: Stiffness, joint: str, lag: float) -> TissueLimit:
         k_h_needed=needed,
         lag_of=joint,
         force_lag=lag,
-        k_t_lag=sampled_limit(THESIS, lag, bimodal.LINK_RATE) if known else float("nan"),
-        damping_needed=damping_needed(THESIS, k_t, total) if known else float("nan"),
+        k_t_lag=sampled_limit(THESIS, lag, bimodal.LINK_RATE) if has_lag else float("nan"),
+        damping_needed=damping_needed(THESIS, k_t, total) if has_lag else float("nan"),
     )
 
 
@@ -129,31 +129,29 @@ def gather(
     *,
     q_tau: float,
 ) -> Iterator[HapticResponse | HapticRun]:
-    """The experiment of section 8.4 with every hand of the scenario; nothing where no tissue was measured."""
-    tissues = [one.stiffness for one in stiffnesses if one.pushes and one.stiffness > 0.0]
+    """Simulate the experiment of section 8.4 on the measured tissue, with every hand of the scenario."""
+    tissues = [tissue.stiffness for tissue in stiffnesses if tissue.pushes and tissue.stiffness > 0.0]
     if not tissues:
         return
     joint = next((joint for joint in robot.joints if joint.kind is Kind.PRISMATIC and not joint.effort), None)
-    body, arm_from = fitted(robot, fits, joint)
-    settled = [AxisNoise(one.r_q, one.r_dq, one.r_tau) for one in noises if joint and one.joint == joint.name]
-    noise = next(iter(settled), SLIDE_NOISE)
+    body, arm_from = moving_body(robot, fits, joint)
+    joint_noises = (AxisNoise(n.r_q, n.r_dq, n.r_tau) for n in noises if joint and n.joint == joint.name)
+    noise = next(joint_noises, SLIDE_NOISE)
     scenario = haptic.filled(haptics, body, noise, float(np.median(tissues)), q_tau or (joint.q_tau if joint else 0.0))
     answer = haptic.response(scenario)
-    yield rendered(robot, FROM_FILE if haptics.body else arm_from, scenario, answer)
+    yield haptic_response(robot, FROM_FILE if haptics.body else arm_from, scenario, answer)
     for name, hand in scenario.hands:
-        yield felt(name, hand, scenario, answer)
+        yield haptic_run(name, hand, scenario, answer)
 
 
-def fitted(robot: Robot, fits: Iterable[Fit], joint: Joint | None) -> tuple[Body, str]:
-    """What slides as its own fit has it, and what it is called; as the thesis has it where there is no such fit."""
+def moving_body(robot: Robot, fits: Iterable[Fit], joint: Joint | None) -> tuple[Body, str]:
+    """The body that a prismatic joint moves, by the joint's fit, and its name; without a fit, that of the thesis."""
     identified = Identified(robot, fits)
-    kept = identified.used(joint.name, FALLBACK) if joint else None
-    if kept is None or joint is None:
+    fit = identified.used(joint.name, FALLBACK) if joint else None
+    if fit is None or joint is None:
         return SLIDE, FROM_THESIS
     still = np.zeros((1, 1))
-    [dynamics] = identified.model(kept).joint_dynamics(
-        kept.theta, ArmMotion(still, still, still, 1.0, np.zeros(1, int))
-    )
+    [dynamics] = identified.model(fit).joint_dynamics(fit.theta, ArmMotion(still, still, still, 1.0, np.zeros(1, int)))
     coulomb, viscous = max(dynamics.coefficients[COULOMB], 0.0), max(dynamics.coefficients[VISCOUS], 0.0)
     inertia = float(dynamics.inertia[0])
     if inertia <= 0.0:
@@ -161,26 +159,28 @@ def fitted(robot: Robot, fits: Iterable[Fit], joint: Joint | None) -> tuple[Body
     return Body(inertia, dynamics.coefficients[0], viscous, (coulomb, coulomb), (coulomb, coulomb)), joint.name
 
 
-def rendered(robot: Robot, arm_from: str, scenario: HapticScenario, answer: haptic.FeltResponse) -> HapticResponse:
-    """The tissue as it is felt."""
-    share = float(np.interp(AT, answer.frequency, answer.share))
+def haptic_response(
+    robot: Robot, arm_from: str, scenario: HapticScenario, answer: haptic.FeltResponse
+) -> HapticResponse:
+    """The frequency response from the tissue to the hand, and the stiffness that the hand feels."""
+    share = float(np.interp(PALPATION_FREQUENCY, answer.frequency, answer.share))
     gain, stiffness = scenario.device.force * scenario.device.motion, scenario.stiffness or float("nan")
     return HapticResponse(
         robot=robot.name,
         arm_from=arm_from,
         tissue_stiffness=stiffness,
-        at_frequency=AT,
+        at_frequency=PALPATION_FREQUENCY,
         rendered_stiffness=gain * share * stiffness,
         transparency=share,
-        felt_delay=float(np.interp(AT, answer.frequency, answer.late)),
+        felt_delay=float(np.interp(PALPATION_FREQUENCY, answer.frequency, answer.late)),
         frequency=answer.frequency,
         felt_share=answer.share,
         felt_late=answer.late,
     )
 
 
-def felt(name: str, hand: Hand, scenario: HapticScenario, answer: haptic.FeltResponse) -> HapticRun:
-    """One hand: what it feels, and its margins."""
+def haptic_run(name: str, hand: Hand, scenario: HapticScenario, answer: haptic.FeltResponse) -> HapticRun:
+    """The forces that one hand feels, and its stability margins."""
     run, margins = haptic.experiment(scenario, hand), haptic.margins(scenario, hand, answer)
     return HapticRun(
         hand=name,

@@ -1,4 +1,4 @@
-"""Palpate tissue: find every push of a tissue log, how stiff what it meets is, and which model predicts its force."""
+"""Find every push of a tissue log, and estimate the stiffness and the model of the tissue."""
 
 from collections.abc import Iterator, Sequence
 
@@ -14,49 +14,47 @@ from davinci_forces.records import Column, Diagnostic, Push, Stiffness, TissueMo
 from davinci_forces.robots.robot import Kind, Robot
 from davinci_forces.study import WHOLE, LogEntry
 
-COUNTS = 0.9  # R2 of a straight line, above which a push counts
-FEWEST = 8  # samples that a log needs, and a push that models are judged by
+MIN_R2 = 0.9  # of a straight line, for a push that counts
+MIN_SAMPLES_PUSH = 8  # that a log needs, and a push by which models are compared
 FILTER = "ekf"
 
 
 def run(
     touches: Sequence[Touch], tracks: Sequence[Track], entry: LogEntry, robot: Robot, *, lowpass: float
 ) -> Iterator[Push | Stiffness | TissueModel | Diagnostic]:
-    """The pushes of one tissue log, what they come to together, and what is wrong with them.
+    """Find the pushes of a tissue log, and estimate the stiffness and the model of the tissue.
 
-    The force is that of a sensor's channel.  Where there is none, it is what the joint that slides exerts: its effort
-    less the model's, low-passed without delay.  The filter's own estimate comes later than the depth it belongs to,
-    which shifts first contact and opens a loop where there is none; the model's error is in both alike.
+    The force is that of a sensor's channel.  Without one, it is the external effort of the prismatic joint: its effort
+    less the model's, low-passed without delay.  The filter's estimate would lag the depth, which shifts first contact
+    and adds a false hysteresis loop; the model's error is in both alike.
     """
     if entry.role != "tissue":
         return
-    touch, slide = next(iter(touches), None), sliding(tracks, robot)
-    given = probing(touch, slide, lowpass)
-    if given is None or len(given.t) < FEWEST:
-        said = (
-            "no push can be found, because no force or no depth is known; give their channels, or an identification "
-            "log of the joint that slides"
-        )
-        yield diagnostic("palpate", entry.name, "warning", f"{entry.name}: {said}")
+    touch, slide = next(iter(touches), None), prismatic_track(tracks, robot)
+    data = palpation_data(touch, slide, lowpass)
+    if data is None or len(data.t) < MIN_SAMPLES_PUSH:
+        message = "no push can be found, because no force or no depth is known"
+        advice = "state their channels, or add an identification log of the prismatic joint"
+        yield diagnostic("palpate", entry.name, "warning", f"{entry.name}: {message}; {advice}")
         return
     whole, windows = entry.contact == WHOLE, () if entry.contact == WHOLE else entry.contact
-    pushes = palpated(given, windows, whole, rate_of(given.t), lowpass)
+    pushes = palpated(data, windows, whole, rate_of(data.t), lowpass)
     touched = [push for push in pushes if push.line is not None]
-    said_of = [f"{entry.name}: {remark}" for remark in remarks(pushes)]
-    if said_of:
-        yield diagnostic("palpate", entry.name, "warning", *said_of)
+    texts = [f"{entry.name}: {remark}" for remark in remarks(pushes)]
+    if texts:
+        yield diagnostic("palpate", entry.name, "warning", *texts)
     if not touched:
         return
-    models, best, why = judged_on(touched, clocked=bool(rate_of(given.t)))
+    models, best, why = choose_law(touched, clocked=bool(rate_of(data.t)))
     yield from (record_of(push, entry.name, best) for push in touched)
     by_joint = touch is None or not has_force(touch)
-    yield tissue_of(touched, entry.name, slide.joint if by_joint and slide else "force sensor", len(pushes))
+    yield stiffness_of(touched, entry.name, slide.joint if by_joint and slide else "force sensor", len(pushes))
     if best is not None:
         yield model_of(models, best, why, touched, entry.name)
 
 
-def sliding(tracks: Sequence[Track], robot: Robot) -> Track | None:
-    """The joint that pushes: of those that slide and move, the one that goes farthest."""
+def prismatic_track(tracks: Sequence[Track], robot: Robot) -> Track | None:
+    """The prismatic joint that moves farthest."""
     slides = [t for t in tracks if robot.joint(t.joint).kind is Kind.PRISMATIC and not t.at_rest and t.filter == FILTER]
     return max(slides, key=lambda track: float(np.ptp(track.q)), default=None)
 
@@ -66,16 +64,16 @@ def has_force(touch: Touch) -> bool:
     return bool(np.isfinite(touch.force).any() or np.isfinite(touch.force_x).any())
 
 
-def probing(touch: Touch | None, slide: Track | None, cutoff: float) -> Probing | None:
-    """What a log says of pushes, by its own channels as far as it has them, and else by the joint that slides."""
+def palpation_data(touch: Touch | None, slide: Track | None, cutoff: float) -> Probing | None:
+    """Force, depth and place of a log, by its own channels where it has them, else by the prismatic joint."""
     if touch is not None and has_force(touch):
-        one = np.isfinite(touch.force).any()
-        force = touch.force[:, None] if one else np.column_stack([touch.force_x, touch.force_y, touch.force_z])
-        nothing = np.zeros(len(touch))
+        is_scalar = np.isfinite(touch.force).any()
+        force = touch.force[:, None] if is_scalar else np.column_stack([touch.force_x, touch.force_y, touch.force_z])
+        zeros = np.zeros(len(touch))
         depth = depth_of(touch, slide, touch.t)
         if depth is None:
             return None
-        return known(Probing(touch.t, touch.push, depth, force, place_of(touch), nothing + np.nan, nothing))
+        return known(Probing(touch.t, touch.push, depth, force, place_of(touch), zeros + np.nan, zeros))
     if slide is None:
         return None
     direct, dq = np.zeros(len(slide)), np.zeros(len(slide))
@@ -92,15 +90,15 @@ def probing(touch: Touch | None, slide: Track | None, cutoff: float) -> Probing 
 
 
 def model_std(slide: Track) -> Column:
-    """Standard deviation (N,) of the error that pushes may share: the model's, and of that which is not known, all.
+    """Standard deviation (N,) of the error that pushes may share: that of the model, or where unknown, the total.
 
-    Noise is in what a line leaves, there is no lag, and the offset of the day is the line's intercept.
+    The residual of a line contains the noise, and its intercept the offset of the day; there is no lag.
     """
     return np.full(len(slide), slide.model_part) if slide.band_from else slide.tau_ext_std
 
 
 def depth_of(touch: Touch | None, slide: Track | None, t: Column) -> Array | None:
-    """Depth (N, 1), or position of the tip (N, 3), at times (N,): stated, else the tip's, else that of the slide."""
+    """Depth (N, 1), or position of the tip (N, 3), at times (N,), by a channel; else the prismatic joint's position."""
     for columns in ((touch.depth,), (touch.x, touch.y, touch.z)) if touch is not None else ():
         if np.isfinite(columns[0]).any():
             return np.column_stack([x if t is touch.t else np.interp(t, touch.t, x) for x in columns])  # type: ignore[union-attr]
@@ -108,28 +106,28 @@ def depth_of(touch: Touch | None, slide: Track | None, t: Column) -> Array | Non
 
 
 def place_of(touch: Touch) -> Array:
-    """Where the tip is (N, 3)."""
+    """Position of the tip (N, 3)."""
     return np.column_stack([touch.x, touch.y, touch.z])
 
 
 def rate_of(t: Column) -> float:
-    """The sampling rate [Hz]; 0 without a clock."""
+    """Sampling rate [Hz]; 0 without a clock."""
     return 1.0 / float(np.median(np.diff(t))) if np.isfinite(t).all() else 0.0
 
 
-def judged_on(pushes: Sequence[Pushed], *, clocked: bool) -> tuple[list[FittedLaw], FittedLaw | None, str]:
-    """Every model of the tissue by pushes that it has not seen, and the chosen one with why; of two pushes at least."""
-    long = [push for push in pushes if push.contact.inside.sum() >= FEWEST]
+def choose_law(pushes: Sequence[Pushed], *, clocked: bool) -> tuple[list[FittedLaw], FittedLaw | None, str]:
+    """Score every model of the tissue on pushes that it has not seen, and choose one; of at least two pushes."""
+    long = [push for push in pushes if push.contact.inside.sum() >= MIN_SAMPLES_PUSH]
     if len(long) < 2:
         return [], None, ""
     inside = [push.contact.inside for push in long]
-    given = moments([(p.below[i], p.rate[i], p.force[i]) for p, i in zip(long, inside, strict=True)])
-    models = [judged(given, law) for law in LAWS if clocked or not law.damped]
+    sums = moments([(p.below[i], p.rate[i], p.force[i]) for p, i in zip(long, inside, strict=True)])
+    models = [judged(sums, law) for law in LAWS if clocked or not law.damped]
     return models, *chosen(models)
 
 
 def record_of(push: Pushed, log: str, best: FittedLaw | None) -> Push:
-    """One push, with the force that the model gives; where none was chosen, the straight line's."""
+    """One push, with the force of the chosen model, or of the straight line where none was chosen."""
     inside, line = push.contact.inside, push.line
     assert line is not None
     fitted = line.c + line.k * push.depth
@@ -160,15 +158,15 @@ def record_of(push: Pushed, log: str, best: FittedLaw | None) -> Push:
     )
 
 
-def tissue_of(pushes: Sequence[Pushed], log: str, source: str, swings: int) -> Stiffness:
-    """The pushes of a log together: the median slope of those whose force is a straight line."""
+def stiffness_of(pushes: Sequence[Pushed], log: str, source: str, swings: int) -> Stiffness:
+    """The stiffness of a log: the median slope of the pushes whose force is a straight line."""
     lines = [push.line for push in pushes if push.line is not None]
-    k, own, r2 = (np.array([getattr(line, name) for line in lines]) for name in ("k", "k_std", "r2"))
+    k, k_std, r2 = (np.array([getattr(line, name) for line in lines]) for name in ("k", "k_std", "r2"))
     model = np.array([push.k_std_model for push in pushes])
-    counts = r2 > COUNTS
+    counts = r2 > MIN_R2
     common = float(np.median(model[counts])) if counts.any() else float("nan")
     low, middle, high = np.quantile(k[counts], [0.25, 0.5, 0.75]) if counts.any() else [float("nan")] * 3
-    std = median_std(k[counts], own[counts], common) if counts.any() else float("nan")
+    std = median_std(k[counts], k_std[counts], common) if counts.any() else float("nan")
     lost = np.array([push.lost for push in pushes])
     return Stiffness(
         log=log,
@@ -183,7 +181,7 @@ def tissue_of(pushes: Sequence[Pushed], log: str, source: str, swings: int) -> S
         push=np.array([push.number for push in pushes]),
         counted=counts.astype(np.int64),
         k_t=k,
-        k_t_std=np.hypot(own, model),
+        k_t_std=np.hypot(k_std, model),
         r2=r2,
         onset_depth=np.array([push.contact.onset for push in pushes]),
         onset_depth_std=np.array([push.contact.onset_std for push in pushes]),
@@ -197,7 +195,7 @@ def tissue_of(pushes: Sequence[Pushed], log: str, source: str, swings: int) -> S
 
 
 def model_of(models: Sequence[FittedLaw], best: FittedLaw, why: str, pushes: Sequence[Pushed], log: str) -> TissueModel:
-    """What each model of the tissue comes to, at half the usual depth."""
+    """Stiffness and damping of each model of the tissue at half the median depth of the pushes."""
     middle = float(np.median([push.below[push.contact.inside].max() for push in pushes])) / 2
     stiff, damping = np.array([tangent(model, middle) for model in models]).T
     return TissueModel(

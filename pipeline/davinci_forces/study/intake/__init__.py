@@ -1,4 +1,4 @@
-"""How the channels of a log become quantities of joints, in one pass: clocks, units, gears, and what is odd."""
+"""Convert the channels of a log to quantities of joints in one pass: clocks, units, gears, and remarks."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -17,58 +17,58 @@ from davinci_forces.study import WHOLE, LogEntry, Source
 from davinci_forces.study.intake.clocks import ALIGNED, UsedClocks
 
 # Channels of the log by the columns of a Touch; those of joints become recordings.
-TOUCHED = {
+TOUCH_COLUMNS = {
     "depth": "depth", "force": "force", "force_x": "force_x", "force_y": "force_y", "force_z": "force_z",
     "x": "tip_x", "y": "tip_y", "z": "tip_z",
 }  # fmt: skip
 
 
-def touched(reading: "Intake", block: Block, t: Column, kept: Booleans) -> Touch | None:
-    """What the channels of the log say of contact; NaN in columns that it has no channel of."""
-    if not set(reading.sources) & {*TOUCHED.values(), "push"}:
+def touch_of(reading: "Intake", block: Block, t: Column, selected: Booleans) -> Touch | None:
+    """The contact quantities of a block; NaN in columns for which the log has no channel."""
+    if not set(reading.sources) & {*TOUCH_COLUMNS.values(), "push"}:
         return None
     unknown = np.full(len(t), np.nan)
     columns = {
-        name: reading.converted(block, quantity) if quantity in reading.sources else unknown
-        for name, quantity in TOUCHED.items()
+        name: reading.to_si(block, quantity) if quantity in reading.sources else unknown
+        for name, quantity in TOUCH_COLUMNS.items()
     }
     return Touch(
         log=reading.entry.name,
         role=reading.entry.role,
-        sample=(reading.rows + np.arange(len(t)))[kept],
-        push=_pushes(reading, block, len(t))[kept],
-        t=(t if reading.clocked else unknown)[kept],
-        **{name: column[kept] for name, column in columns.items()},
+        sample=(reading.rows + np.arange(len(t)))[selected],
+        push=_pushes(reading, block, len(t))[selected],
+        t=(t if reading.has_clock else unknown)[selected],
+        **{name: column[selected] for name, column in columns.items()},
     )
 
 
 def _pushes(reading: "Intake", block: Block, rows: int) -> Counts:
-    """The numbers of the pushes, 0 throughout where the log does not count them."""
+    """The numbers of the pushes; 0 throughout where the log does not count them."""
     if "push" not in reading.sources:
         return np.zeros(rows, dtype=np.int64)
-    numbers = reading.converted(block, "push")
+    numbers = reading.to_si(block, "push")
     odd = np.flatnonzero((numbers != np.round(numbers)) | (np.abs(numbers) >= 2**53))
     if len(odd):
         raise BadLog(
             f"{reading.log.path}: channel {reading.channels['push'].name!r} holds {numbers[odd[0]]:g} at row "
-            f"{reading.rows + int(odd[0])} (counted from 0), but the number of a push is a whole one; name another "
-            "channel, or leave push out, and pushes are found"
+            f"{reading.rows + int(odd[0])} (counted from 0), but the number of a push must be whole; name another "
+            "channel, or leave push out and the pushes are detected"
         )
     return numbers.astype(np.int64)
 
 
 @dataclass
 class Intake:
-    """One pass over a log: which channels feed what, and how far the clock has come."""
+    """One pass over a log: its channels by quantity, and the state of its clock."""
 
     log: Log
     entry: LogEntry
     robot: Robot
     clock: ClockStatistics = field(default_factory=ClockStatistics)
     rows: int = 0
-    lost: int = 0  # at the end of a file that was cut
-    ended: bool = False  # where the study says that the log ends
-    jumps: list[tuple[float, float]] = field(default_factory=list)  # when the clock stepped, and how far
+    lost: int = 0  # rows at the end of a truncated file
+    ended: bool = False  # whether the `until` of the study was reached
+    jumps: list[tuple[float, float]] = field(default_factory=list)  # times of clock jumps, and their sizes [s]
 
     def __post_init__(self) -> None:
         self.sources = {s.quantity: s for s in self.entry.channels}
@@ -83,53 +83,53 @@ class Intake:
         self.clocks = UsedClocks(
             self.log, self.entry, self.scales.get("time", 1.0), list(dict.fromkeys(used)), reference
         )
-        if not self.clocked and self.entry.needs_clock and not self.clocks.are_several:
+        if not self.has_clock and self.entry.needs_clock and not self.clocks.are_several:
             raise BadLog(
-                f"{self.log.path}: the log carries no clock; name its time channel in [log.channels], "
-                "or say rate = ... [Hz]"
+                f"{self.log.path}: the log has no clock; name its time channel in [log.channels], "
+                "or give rate = ... [Hz]"
             )
-        if not self.clocked and (self.entry.skip or self.entry.until or self.entry.contact not in ((), WHOLE)):
+        if not self.has_clock and (self.entry.skip or self.entry.until or self.entry.contact not in ((), WHOLE)):
             raise BadLog(
-                f"{self.log.path}: the log carries no clock, but skip, until and contact windows count in seconds; say "
-                'rate = ... [Hz], or leave them out: contact = "all" needs no clock'
+                f"{self.log.path}: the log has no clock, but skip, until and contact windows are in seconds; give "
+                'rate = ... [Hz], or leave them out; contact = "all" needs no clock'
             )
         whole = [channel.name for quantity, channel in self.channels.items()] if not self.clocks.are_several else used
         self.names = list(dict.fromkeys([*whole, *([self.clocks.time] if self.clocks.time else [])]))
 
     @property
-    def clocked(self) -> bool:
-        """Whether it is known when the samples were taken."""
-        return self.clocks.known
+    def has_clock(self) -> bool:
+        """Whether the times of the samples are known."""
+        return self.clocks.all_timed
 
     def unit(self, source: Source, channel: Channel) -> float:
-        """What one unit of a channel is in SI: by the study's word, else the log's, else SI."""
-        said = "s" if channel.kind == "time" else canonical(channel.unit)
-        if source.scale != 1.0:  # its unit is that of what it comes to
-            said = ""
-        if source.unit and said in UNITS and said != source.unit:
+        """The size of a channel's unit in SI: as the study gives it, else the log, else 1."""
+        log_unit = "s" if channel.kind == "time" else canonical(channel.unit)
+        if source.scale != 1.0:  # the unit is that after scaling
+            log_unit = ""
+        if source.unit and log_unit in UNITS and log_unit != source.unit:
             raise BadLog(
-                f"{self.log.path}: channel {channel.name!r} says {channel.unit!r} and study.toml says {source.unit!r}; "
-                f"correct the unit of {source.quantity} in study.toml, or leave it out"
+                f"{self.log.path}: channel {channel.name!r} is in {channel.unit!r}, but study.toml says "
+                f"{source.unit!r}; correct the unit of {source.quantity} in study.toml, or leave it out"
             )
-        unit = source.unit or said or SI[source.measures]
+        unit = source.unit or log_unit or SI[source.measures]
         if source.measures == "count":
             return 1.0
         if measures(unit) != source.measures:
-            what = f"measures {measures(unit)}" if unit in UNITS else "is not known"
+            what = f"measures {measures(unit)}" if unit in UNITS else "is an unknown unit"
             fitting = ", ".join(u for u in UNITS if measures(u) == source.measures)
             raise BadLog(
                 f"{self.log.path}: channel {channel.name!r} is in {channel.unit!r}, which {what}, but "
-                f"{source.quantity} needs {source.measures}; say unit = ... for it in study.toml: {fitting}"
+                f"{source.quantity} needs {source.measures}; give its unit in study.toml, one of {fitting}"
             )
         return size(unit)
 
     def positions(self, block: Block) -> Column:
-        """The positions of all joints at the joints, one a row."""
+        """The positions of all joints, on the joint side, one a row."""
         either = [self.of_joint(block, self.robot.joint(name), ("q", "theta_m")) for name in self.entry.joints]
         return np.array([q for q in either if q is not None])
 
     def recordings(self, block: Block) -> Iterator[Recording | Touch]:
-        """The joints of one block, and what touched, after the transient that the study skips."""
+        """Convert one block to recordings of its joints and a touch, without the skipped start."""
         block = self.until_the_end(block)
         if not len(block[self.names[0]]):
             return
@@ -139,7 +139,7 @@ class Intake:
         self.clock.update(t, [block[c.name] for q, c in self.channels.items() if q != "time"])
         self.require_increasing()
         first = self.clock.first
-        kept = t - first >= self.entry.skip - 1e-9
+        selected = t - first >= self.entry.skip - 1e-9
         for name in self.entry.joints:
             joint = self.robot.joint(name)
             q, dq, tau = (
@@ -153,17 +153,17 @@ class Intake:
                 role=self.entry.role,
                 rate=self.clock.rate,
                 velocity="derived" if dq is None else "logged",
-                t=(t - first)[kept],
-                q=q[kept],
-                dq=np.zeros(int(kept.sum())) if dq is None else dq[kept],
-                tau=tau[kept],
+                t=(t - first)[selected],
+                q=q[selected],
+                dq=np.zeros(int(selected.sum())) if dq is None else dq[selected],
+                tau=tau[selected],
             )
-        if touch := touched(self, block, t - first, kept):
+        if touch := touch_of(self, block, t - first, selected):
             yield touch
         self.rows += len(t)
 
     def without_cut_end(self, block: Block) -> Block:
-        """A block without the rows at the end of a file that was cut, which some channels no longer have."""
+        """A block without the last rows of a truncated file, which some channels lack."""
         if not self.log.cut:
             return block
         whole = np.all([np.isfinite(block[name]) for name in self.names], axis=0)
@@ -173,7 +173,7 @@ class Intake:
         return {name: values[:end] for name, values in block.items()}
 
     def until_the_end(self, block: Block) -> Block:
-        """A block without the rows after the time at which the study says that the log ends, whatever they hold."""
+        """A block without the rows after the study's `until`, whatever they hold."""
         if self.entry.until is None or not len(block[self.names[0]]):
             return block
         t = self.times(block)
@@ -188,25 +188,25 @@ class Intake:
         return self.clocks.blocks()
 
     def times(self, block: Block) -> Column:
-        """Time of each row [s], by the study's time channel, its rate, the log's time channel or the log's clock; of a
-        log without any, its number.
+        """Time of each row [s]: by the study's time channel or rate, or the log's time channel or clock; else its
+        number.
         """
         return self.clocks.times(block, self.rows, len(block[self.names[0]]))
 
-    def converted(self, block: Block, quantity: str) -> Column:
-        """A channel in SI: offset first, in the channel's unit, then sign, scale and unit."""
+    def to_si(self, block: Block, quantity: str) -> Column:
+        """Convert a channel to SI: offset first, in the channel's unit, then sign, scale and unit."""
         source = self.sources[quantity]
         shifted = block[self.channels[quantity].name] + source.offset
         return shifted * (source.sign * self.scales[quantity])
 
     def of_joint(self, block: Block, joint: Joint, either: tuple[str, str]) -> Column | None:
-        """A quantity at the joint, from whichever side of the gears it was logged on.  (6.28), (6.29)"""
+        """A quantity on the joint side, converted from the motor side of the gears if needed.  (6.28), (6.29)"""
         at_joint, at_motor = (f"{joint.name}.{symbol}" for symbol in either)
         if at_joint in self.sources:
-            return self.converted(block, at_joint)
+            return self.to_si(block, at_joint)
         if at_motor not in self.sources:
             return None
-        value = self.converted(block, at_motor)
+        value = self.to_si(block, at_motor)
         ratio = joint.gear_ratio
         if either[1] != "i":
             return value / ratio
@@ -222,37 +222,37 @@ class Intake:
         what = f"has no sample at row {row}" if missing else f"holds {values[bad[0]]} at row {row}"
         raise BadLog(
             f"{self.log.path}: channel {name!r} {what} (counted from 0), and {len(bad)} of the {len(values)} rows "
-            "read with it lack a number; record it again, or give the part before it as a log of its own"
+            "read with it lack a number; record the log again, or save the part before this row as a separate log"
         )
 
     def require_increasing(self) -> None:
-        """Refuse a clock that stands still or goes back, and say where."""
+        """Refuse a clock that stands still or goes back, with the row."""
         clock = self.clock
         if clock.backward or clock.repeated:
             raise BadLog(
                 f"{self.log.path}: time does not increase at row {clock.bad_row} (counted from 0): "
                 f"{clock.bad_pair[0]:.9g} s, then {clock.bad_pair[1]:.9g} s; name another time channel, "
-                "or say rate = ... [Hz] to count samples instead"
+                "or give rate = ... [Hz] to count samples instead"
             )
 
 
 def mended(intake: Intake, blocks: Iterator[Block]) -> Iterator[Block]:
-    """The blocks with steps of the clock taken out of its channel, where the motion tells that no time passed.
+    """Remove jumps of the clock from its channel, where the motion shows that no time passed.
 
-    Of identification logs only: others lose nothing by a gap, and their contact windows count on their clock.
-    The end of a block waits for the next, which says how the motion goes on.
+    Only for identification logs: others lose nothing by a gap, and their contact windows are times of their clock.
+    The end of a block waits for the next, which shows how the motion continues.
     """
     several = intake.clocks.are_several
     name = ALIGNED if several else intake.clocks.time
-    whole = (intake.without_cut_end(block) for block in blocks)
+    complete = (intake.without_cut_end(block) for block in blocks)
     if not (name or several) or intake.entry.role != "identification":
-        yield from whole
+        yield from complete
         return
-    stated = intake.clocks.groups[0].is_stated and not several
-    scale = intake.sources["time"].sign * intake.scales["time"] if stated else 1.0
-    passed = 0.0  # by the channel, in its unit, while nothing moved on
+    from_study = intake.clocks.groups[0].is_stated and not several
+    scale = intake.sources["time"].sign * intake.scales["time"] if from_study else 1.0
+    passed = 0.0  # sum of the jumps, in the channel's unit
     waiting: Block = {}
-    for block in whole:
+    for block in complete:
         late = block | {name: block[name] - passed} if passed else block
         joined = {key: np.concatenate([waiting[key], late[key]]) for key in late} if waiting else late
         for i, jump in steps(intake.times(joined), intake.positions(joined)):

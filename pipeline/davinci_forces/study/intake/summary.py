@@ -1,4 +1,4 @@
-"""What was noticed of a log while it was read."""
+"""Summarise a log after reading it, with remarks on its clock and rows."""
 
 from collections.abc import Iterator
 
@@ -10,12 +10,12 @@ from davinci_forces.maths.signals.clock import GAP
 from davinci_forces.records import LogSummary
 from davinci_forces.study.intake import Intake
 
-MOST_REPEATED = 0.1  # share of rows equal to the one before, above which the recorder was faster than the robot
+MOST_REPEATED = 0.1  # share of rows equal to the one before; above it, the recorder was faster than the robot
 MOST_JITTER = 0.1  # of the sampling time
 
 
 def summary(intake: Intake) -> LogSummary:
-    """What the reader noticed, once the log is exhausted.
+    """Summarise a log that was read to its end.
 
     Raises
     ------
@@ -24,7 +24,7 @@ def summary(intake: Intake) -> LogSummary:
     """
     clock, log, entry, nan = intake.clock, intake.log, intake.entry, float("nan")
     if clock.samples < 2 or clock.last - clock.first <= entry.skip:
-        until = f" and what comes after {entry.until:g} s left out" if intake.ended else ""
+        until = f" and those after {entry.until:g} s left out" if intake.ended else ""
         raise BadLog(
             f"{log.path}: {clock.samples} samples are too few, with {entry.skip:g} s skipped at the start{until}"
         )
@@ -44,10 +44,10 @@ def summary(intake: Intake) -> LogSummary:
         started=log.started,
         zone=log.zone,
         rows=clock.samples,
-        rate=clock.rate if intake.clocked else nan,
-        duration=clock.last - clock.first if intake.clocked else nan,
-        jitter=clock.jitter if intake.clocked else nan,
-        longest_gap=clock.longest_gap if intake.clocked else nan,
+        rate=clock.rate if intake.has_clock else nan,
+        duration=clock.last - clock.first if intake.has_clock else nan,
+        jitter=clock.jitter if intake.has_clock else nan,
+        longest_gap=clock.longest_gap if intake.has_clock else nan,
         backward=clock.backward,
         repeated=clock.repeated,
         duplicates=clock.duplicates,
@@ -63,14 +63,14 @@ def summary(intake: Intake) -> LogSummary:
 
 
 def remarks(intake: Intake) -> Iterator[str]:
-    """What a reviewer should know about the clock and the rows."""
+    """Remarks for a reviewer on the clock and the rows."""
     clock, entry = intake.clock, intake.entry
     if intake.jumps:
         when = ", ".join(f"{jump:.6g} s after {t - clock.first:.3f} s" for t, jump in intake.jumps[:5])
         more = " ..." if len(intake.jumps) > 5 else ""
         yield (
-            f"the clock jumps while the motion goes on, by {when}{more}: the times after it are set back; find out "
-            "why the recorder does so"
+            f"the clock jumps while the motion continues, by {when}{more}. The later times are moved back by the jump; "
+            "find out why the recorder's clock jumps"
         )
     for start, end in entry.contact:
         if start >= clock.last - clock.first or end <= entry.skip:
@@ -85,7 +85,7 @@ def remarks(intake: Intake) -> Iterator[str]:
             f"{clock.last - clock.first:g} s; both count from its first sample"
         )
     if intake.lost:
-        yield f"the file is cut, and its last {intake.lost} rows lack some channels: they are left out"
+        yield f"the file is truncated: its last {intake.lost} rows lack some channels and are left out"
     if clock.duplicates > MOST_REPEATED * clock.samples:
         yield (
             f"{clock.duplicates} of {clock.samples} rows ({clock.duplicates / clock.samples:.0%}) repeat the one "

@@ -1,4 +1,4 @@
-"""A page a joint: its equation, its parameters, and what the fit leaves unexplained."""
+"""One page a joint: its equation, its parameters, and the residual of its fit."""
 
 from collections.abc import Iterator
 
@@ -46,10 +46,10 @@ def section(context: Context) -> Section | None:
 def intro() -> Prose:
     """How to read the tables."""
     return Prose(
-        "The parameters of each joint come from the averaged periods of all its identification logs together. The "
-        "standard error after each value allows for residuals that are correlated; the classical one "
-        "takes them as independent. Where the two differ much, the model misses something that repeats in every "
-        "period. $z$ is the value over its standard error: a parameter with $abs(z) < 2$ cannot be told from zero."
+        "The parameters of each joint are fitted to the averaged periods of all its identification logs. The standard "
+        "error after each value allows for correlated residuals; the classical one takes them as independent. Where "
+        "the two differ much, the model misses something that repeats in every period. $z$ is the value over its "
+        "standard error. A parameter with $abs(z) < 2$ cannot be distinguished from zero."
     )
 
 
@@ -59,7 +59,7 @@ def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
     terms = " + ".join(f"theta_{i} {phi}" for i, phi in enumerate(first.phi, start=1))
     yield Equation(f"tau = {terms}", f"effort is the sum of {', '.join(first.parameter)}, each times its parameter")
     yield parameters(context, first)
-    yield from wanting(context, first.group)
+    yield from unidentified_parameters(context, first.group)
     residuals = context.catalogue.about(Residual, joint=first.group, model=first.model, estimator=first.estimator)
     for i, residual in enumerate(residuals):
         shown = tuple(residual_blocks(context, residual))
@@ -69,11 +69,11 @@ def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
             yield OnScreen(run_name(residual.log, residual.joint), f"residual-{residual.log}-{residual.joint}", shown)
     yield from implausible(fits)
     yield from left_out(context, first.group)
-    yield compared(context, fits)
+    yield comparison(context, fits)
 
 
 def implausible(fits: list[Fit]) -> Iterator[Verdict]:
-    """Parameters that no mechanism has."""
+    """Negative values of parameters that are positive in every mechanism."""
     for fit in fits:
         negative = [
             f"{name} ({value:.2g} ± {std:.1g})"
@@ -82,7 +82,8 @@ def implausible(fits: list[Fit]) -> Iterator[Verdict]:
         ]
         if negative:
             who = f"{title_of(fit.estimator)} ({fit.model})"
-            yield Verdict("warn", f"{who} finds a negative {', '.join(negative)}, which no mechanism has.")
+            message = f"{who} gives a negative {', '.join(negative)}, which is physically impossible."
+            yield Verdict("warn", message)
 
 
 def parameters(context: Context, fit: Fit) -> Table:
@@ -97,7 +98,7 @@ def parameters(context: Context, fit: Fit) -> Table:
     mse = context.number(f"{'.'.join(('fit', *fit.key))}.mse", 3)
     return Table(
         f"Parameters of the {literal(fit.group.replace('_', ' '))} ({fit.model}, "
-        f"{title_of(fit.estimator)}), {standing(context, fit)}, from {literal(', '.join(fit.logs))}; "
+        f"{title_of(fit.estimator)}), {fit_in_use(context, fit)}, from {literal(', '.join(fit.logs))}; "
         f"mean squared error {mse} of the averaged effort.",
         ("Symbol", "Parameter", "Unit", "Value", "Classical standard error", "$z$"),
         tuple(rows),
@@ -106,15 +107,15 @@ def parameters(context: Context, fit: Fit) -> Table:
     )
 
 
-def standing(context: Context, fit: Fit) -> str:
-    """Whether the filter runs with a fit, or with what."""
+def fit_in_use(context: Context, fit: Fit) -> str:
+    """Which fit the filter uses: this one or another."""
     used = context.used_fit(fit.group)
     if used.removeprefix(f"{CHOSEN}.") == f"{fit.model}.{fit.estimator}":
-        return "which the filter runs with"
-    return f"beside which the filter runs with {fit_name(*used.split('.', 1))}"
+        return "the fit that the filter uses"
+    return f"while the filter uses {fit_name(*used.split('.', 1))}"
 
 
-def compared(context: Context, fits: list[Fit]) -> Block:
+def comparison(context: Context, fits: list[Fit]) -> Block:
     """Parameters of all fits side by side, and how well each describes the averaged periods."""
     names = list(dict.fromkeys(name for fit in fits for name in fit.parameter))
     rows: list[tuple[Cell, ...]] = []
@@ -138,39 +139,37 @@ def compared(context: Context, fits: list[Fit]) -> Block:
         *correlations(context, group),
         *friction_maps(context, group),
     )
-    return OnScreen(f"{title(group)}: all fits, and what they rest on", f"all-fits-{group}", (table, *more))
+    return OnScreen(f"{title(group)}: all fits, and what supports them", f"all-fits-{group}", (table, *more))
 
 
-def wanting(context: Context, joint: str) -> Iterator[Verdict]:
-    """What the identification logs of a joint do not tell; nothing where nothing is wanting."""
-    for told in context.catalogue.about(Identifiability, group=joint):
-        said = [literal(text) for text in (*told.together, *told.not_seen)]
-        if said:
-            text = "; ".join(said)
-            yield Verdict("info", f"{text[:1].upper()}{text[1:]}. {told.advice}.")
+def unidentified_parameters(context: Context, joint: str) -> Iterator[Verdict]:
+    """Parameters that the identification logs of a joint do not determine."""
+    for record in context.catalogue.about(Identifiability, group=joint):
+        if text := "; ".join(literal(text) for text in (*record.together, *record.not_seen)):
+            yield Verdict("info", f"{text[:1].upper()}{text[1:]}. {record.advice}.")
 
 
 def correlations(context: Context, joint: str) -> Iterator[Block]:
-    """The correlation matrix of a joint's parameters, and the condition of what they were found from."""
-    for told in context.catalogue.about(Identifiability, group=joint):
-        names = tuple(dict.fromkeys(map(str, told.parameter)))
-        number = context.number(f"identifiability.{'.'.join(told.key)}.condition", 3)
+    """The correlation matrix of a joint's parameters, and the condition number of their regressor."""
+    for record in context.catalogue.about(Identifiability, group=joint):
+        names = tuple(dict.fromkeys(map(str, record.parameter)))
+        number = context.number(f"identifiability.{'.'.join(record.key)}.condition", 3)
         yield Prose(
-            f"The columns of the regressor, scaled to one length, have the condition number {number}. What errors "
-            "in the effort make of two parameters is correlated as the figure shows: where it is near 1 or −1, only "
-            "a sum or a difference of the two is known well."
+            f"The columns of the regressor, scaled to one length, have the condition number {number}. The figure shows "
+            "the correlation of the errors of each two parameters. Where it is near 1 or −1, only a sum or a "
+            "difference of the two is known well."
         )
-        strongest = max((abs(r) for r, a, b in rows(told) if a != b), default=0.0)
+        strongest = max((abs(r) for r, a, b in pairs(record) if a != b), default=0.0)
         numbered = tuple(f"θ{i} {name}" for i, name in enumerate(names, start=1))
         yield Figure(
             f"{title(joint)}: correlation of the errors of its parameters (least squares).",
             f"A matrix of correlations between {', '.join(names)}: the strongest is {strongest:.2f}.",
-            (Panel("", "", "", (Tiles(told.correlation, numbered),)),),
+            (Panel("", "", "", (Tiles(record.correlation, numbered),)),),
             f"correlation-{joint}",
             height=12.0 + 9.0 * len(names),
         )
 
 
-def rows(told: Identifiability) -> Iterator[tuple[float, str, str]]:
-    """Each correlation with the two parameters that it is of."""
-    return zip(told.correlation.tolist(), map(str, told.parameter), map(str, told.beside), strict=True)
+def pairs(record: Identifiability) -> Iterator[tuple[float, str, str]]:
+    """Each correlation with its two parameters."""
+    return zip(record.correlation.tolist(), map(str, record.parameter), map(str, record.beside), strict=True)

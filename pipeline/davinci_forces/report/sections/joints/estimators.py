@@ -29,22 +29,22 @@ WALLS: dict[str, Colour] = {"reflecting": "green", "clipping": "vermillion"}
 
 def estimators(context: Context, fit: Fit) -> Iterator[Figure]:
     """The efforts of several estimators over the averaged effort of a joint's first log; those alike are named."""
-    every = context.catalogue.about(Residual, joint=fit.group, model=fit.model, log=fit.logs[0])
-    own = {residual.estimator: residual for residual in every if residual.estimator in LOOKS}
-    if "lse" not in own or len(own) < 2:
+    all_residuals = context.catalogue.about(Residual, joint=fit.group, model=fit.model, log=fit.logs[0])
+    residuals = {residual.estimator: residual for residual in all_residuals if residual.estimator in LOOKS}
+    if "lse" not in residuals or len(residuals) < 2:
         return
-    plain = own["lse"]
-    same = [name for name in MEANT_TO_DIFFER if name in own and apart(own[name], plain) < ALIKE]
-    own = {name: r for name, r in own.items() if name not in same}
-    others = {name: r for name, r in own.items() if name != "lse"}
+    plain = residuals["lse"]
+    same = [name for name in MEANT_TO_DIFFER if name in residuals and effort_difference(residuals[name], plain) < ALIKE]
+    residuals = {name: r for name, r in residuals.items() if name not in same}
+    others = {name: r for name, r in residuals.items() if name != "lse"}
     if not others:
         return
     effort = label(plain, "tau", "effort")
     name = f"{title(fit.group)} in {literal(plain.log)}"
-    named = ", ".join(map(estimator_name, own))
+    named = ", ".join(map(estimator_name, residuals))
     largest = max(float(abs(r.tau_hat - plain.tau_hat).max()) for r in others.values())
     yield Figure(
-        f"{name}: averaged effort with the model's by {named}, and how far the others are from least squares."
+        f"{name}: averaged effort, the model's effort by {named}, and the difference from least squares."
         f"{alike(same)}",
         f"{name}: the estimators' efforts differ from least squares by {largest:.2g} at most.",
         (
@@ -52,11 +52,11 @@ def estimators(context: Context, fit: Fit) -> Iterator[Figure]:
                 "Averaged effort and models", "time [s]", effort,
                 (
                     Line(plain.t, plain.tau, "measured", "sky"),
-                    *(Line(r.t, r.tau_hat, estimator_name(e), LOOKS[e]) for e, r in own.items()),
+                    *(Line(r.t, r.tau_hat, estimator_name(e), LOOKS[e]) for e, r in residuals.items()),
                 ),
             ),
             Panel(
-                "Less that of least squares", "time [s]", effort,
+                "Difference from least squares", "time [s]", effort,
                 tuple(Line(r.t, r.tau_hat - plain.tau_hat, estimator_name(e), LOOKS[e]) for e, r in others.items()),
             ),
         ),
@@ -66,15 +66,15 @@ def estimators(context: Context, fit: Fit) -> Iterator[Figure]:
     )  # fmt: skip
 
 
-def apart(one: Residual, other: Residual) -> float:
-    """The largest difference of two models' efforts, in deviations of the effort."""
-    return float(abs(one.tau_hat - other.tau_hat).max() / (other.tau.std() or 1.0))
+def effort_difference(a: Residual, b: Residual) -> float:
+    """The largest difference of two models' efforts, in standard deviations of the effort."""
+    return float(abs(a.tau_hat - b.tau_hat).max() / (b.tau.std() or 1.0))
 
 
 def alike(names: list[str]) -> str:
     """Which estimators are not drawn, as they say the same as least squares."""
     verb = "is" if len(names) == 1 else "are"
-    return f" {' and '.join(map(estimator_name, names))} {verb} least squares' own." if names else ""
+    return f" {' and '.join(map(estimator_name, names))} {verb} the same as least squares." if names else ""
 
 
 def convergence(context: Context, joint: str) -> Iterator[Figure]:
@@ -82,14 +82,14 @@ def convergence(context: Context, joint: str) -> Iterator[Figure]:
     searches = context.catalogue.about(SwarmSearch, group=joint)
     if not searches:
         return
-    ends = " and ".join(f"with {s.walls} walls it {reached(s.excess)}" for s in searches)
+    ends = " and ".join(f"with {s.walls} walls it {excess_in_words(s.excess)}" for s in searches)
     lines = tuple(
         Line(np.arange(1.0, len(s) + 1.0), s.best_mse, f"{s.walls} walls", WALLS.get(s.walls, "")) for s in searches
     )
     unit = label(searches[0], "best_mse", "mean squared error")
     yield Figure(
-        f"{title(joint)}: the least mean squared error that the swarm knew after each iteration, of "
-        f"{searches[0].searched} parameters by {searches[0].particles} particles. The least that the known signs "
+        f"{title(joint)}: the least mean squared error of the swarm after each iteration, of "
+        f"{searches[0].searched} parameters by {searches[0].particles} particles. The least error that the known signs "
         f"allow: {ends}.",
         f"Squared error over iterations, falling until it stays: {ends}.",
         (Panel("", "iteration", unit, lines, x_log=True, y_log=True),),
@@ -98,8 +98,8 @@ def convergence(context: Context, joint: str) -> Iterator[Figure]:
     )
 
 
-def reached(excess: float) -> str:
-    """How near a search came to the least squared error that there is."""
+def excess_in_words(excess: float) -> str:
+    """State the error of a search over the least possible one."""
     if excess < REACHED:
         return "is reached"
     return f"is exceeded by {100 * excess:.2g} %" if excess < 1 else f"is exceeded {1 + excess:.2g} times"
@@ -109,22 +109,27 @@ DIGITS = 3  # of a number that has no standard error
 
 
 def printed_beside(context: Context, fit: Fit) -> Iterator[Block]:
-    """The printed table of a joint, each column beside this study's own; none where nothing was printed of it."""
+    """The thesis's table of a joint, each column beside this study's; none in a user's study."""
     joint = context.study.robot.joint(fit.group)
     printed = joint.printed
-    if printed is None or joint.effort or any(len(c.theta) != len(fit.parameter) for c in printed.columns):
+    if (
+        not context.compares_with_thesis
+        or printed is None
+        or joint.effort
+        or any(len(c.theta) != len(fit.parameter) for c in printed.columns)
+    ):
         return
-    simulated = " The study is simulated: what it is made from, not the arm, is found here." * context.study.simulated
     yield Prose(
-        f"{printed.name} of the thesis, with what this study finds: first guesses recomputed from the robot's masses "
-        f"and lengths, and every estimator on this study's own periods.{simulated}"
+        f"{printed.name} of the thesis, beside this study's values: first guesses, recomputed from the robot's masses "
+        "and lengths, and every estimator on this study's periods. The study is simulated, so its values are those of "
+        "the simulation, not of the arm."
     )
     yield table(context, fit, printed)
     yield Bullets(tuple(f"Misprint: {text[:1].lower()}{text[1:]}" for text in printed.misprints))
 
 
 def table(context: Context, fit: Fit, printed: Printed) -> Table:
-    """Parameters and mean squared error, printed and found."""
+    """Parameters and mean squared error, printed and of this study."""
     header = ["Parameter", "Unit"]
     for column in printed.columns:
         header += [f"{estimator_name(column.estimator) or 'Guess'}, printed", "here"]
@@ -141,35 +146,39 @@ def table(context: Context, fit: Fit, printed: Printed) -> Table:
                 context.number(f"{prefix}.{slug(name)}", DIGITS, unit="", std=None),
             ]
         rows.append(("mean squared error" if last else name, unit, *pairs))
-    caption = f"{title(fit.group)}: {printed.name} as printed, and as found here."
+    caption = f"{title(fit.group)}: {printed.name} as printed, and this study's values."
     return Table(caption, tuple(header), tuple(rows), f"printed-{fit.group}", "ll" + "r" * (len(header) - 2))
 
 
 def left_out(context: Context, joint: str) -> Iterator[Block]:
     """Every fit of a joint by the measure that all of them have, and the chosen one by that which it was chosen by."""
-    made = [p for p in context.catalogue.about(Prediction, joint=joint, role="identification") if p.model != CHOSEN]
-    if not made:
+    predictions = [
+        p for p in context.catalogue.about(Prediction, joint=joint, role="identification") if p.model != CHOSEN
+    ]
+    if not predictions:
         return
-    names = list(dict.fromkeys((p.model, p.estimator) for p in made))
-    rows = tuple(left_out_row(context, joint, [p for p in made if (p.model, p.estimator) == name]) for name in names)
+    names = list(dict.fromkeys((p.model, p.estimator) for p in predictions))
+    rows = tuple(
+        left_out_row(context, joint, [p for p in predictions if (p.model, p.estimator) == name]) for name in names
+    )
     header = ("Fit", "Left out", "Relative error", "Path blocks left out, raw samples")
-    caption = f"{title(joint)}: relative error of its fits where they were not fitted, in the worst log."
+    caption = f"{title(joint)}: relative error of its fits on data that were left out, in the worst log."
     table = Table(caption, header, rows, f"left-out-{joint}", "llrr")
     says = Prose(f"{MEASURES}{noise_share(context, joint)}")
-    yield OnScreen(f"{title(joint)}: its fits where they were not fitted", f"all-left-out-{joint}", (says, table))
+    yield OnScreen(f"{title(joint)}: its fits on data that were left out", f"all-left-out-{joint}", (says, table))
 
 
 def left_out_row(context: Context, joint: str, of_fit: list[Prediction]) -> tuple[Cell, ...]:
     """One fit, by its worst log, and the same of the chosen one by blocks of path."""
     worst = max(of_fit, key=lambda p: p.relative_error)
     chosen = context.catalogue.about(Prediction, joint=joint, role="identification", model=CHOSEN)
-    own = [p for p in chosen if p.estimator == f"{worst.model}.{worst.estimator}"]
+    by_blocks = [p for p in chosen if p.estimator == f"{worst.model}.{worst.estimator}"]
     blocks: Cell = "–"
-    if own:
-        blocks = context.number(f"{max(own, key=lambda p: p.relative_error).prefix}.relative_error", 3)
+    if by_blocks:
+        blocks = context.number(f"{max(by_blocks, key=lambda p: p.relative_error).prefix}.relative_error", 3)
     name = fit_name(worst.model, worst.estimator)
     which = LEFT_OUT.get(worst.scheme, worst.scheme.removeprefix("leave ").removesuffix(" out"))
-    return f"**{name}**" if own else name, which, context.number(f"{worst.prefix}.relative_error", 3), blocks
+    return f"**{name}**" if by_blocks else name, which, context.number(f"{worst.prefix}.relative_error", 3), blocks
 
 
 def noise_share(context: Context, joint: str) -> str:
@@ -180,5 +189,6 @@ def noise_share(context: Context, joint: str) -> str:
     worst = max(logs, key=lambda log: context.results[f"noise.{log}.{joint}.relative_noise"].value)
     least = context.number(f"noise.{worst}.{joint}.relative_noise", 2)
     return (
-        f" Noise alone makes {least} of either: what neither repeats nor is as slow as motion, which no model can lose."
+        f" Noise alone makes {least} of either error. It neither repeats nor is as slow as motion, so no model can "
+        "remove it."
     )

@@ -9,21 +9,22 @@ from davinci_forces.report.content import Figure, Line, Panel, Points
 from davinci_forces.report.content.marks import Colour
 from davinci_forces.report.context import Context, label, title
 
-PANELS = 6  # maps at most
+MAX_PANELS = 6  # of maps
 BRANCHES: tuple[tuple[int, str, Colour], ...] = ((1, "gaining speed", "blue"), (0, "losing speed", "vermillion"))
 
 
 def friction_maps(context: Context, joint: str) -> Iterator[Figure]:
-    """What is left of the effort when a fit's other terms are taken off, over velocity, one panel a log and model."""
+    """The effort minus a fit's other terms, over velocity, one panel a log and model."""
     maps = [m for m in context.catalogue.about(FrictionMap, joint=joint) if len(m)]
     if not maps:
         return
-    shown = sorted(maps, key=lambda m: (m.role != "friction", m.model))[:PANELS]
+    shown = sorted(maps, key=lambda m: (m.role != "friction", m.model))[:MAX_PANELS]
     more = f" Of {len(maps)} maps, {len(shown)} are shown." if len(maps) > len(shown) else ""
     yield Figure(
-        f"{title(joint)}: friction, as what all other terms leave of the effort, over velocity (means of ranges, bars: "
-        "their standard deviations), while the joint gains speed and while it loses speed, and the model's friction. "
-        f"Where the two branches differ, friction has a memory, or turns over slower than its sign.{more}",
+        f"{title(joint)}: friction (the effort minus all other terms of the model) over velocity, while the joint "
+        "gains speed and while it loses speed, and the model's friction. Points are means of ranges, bars their "
+        "standard deviations. Where the two branches differ, friction depends on the past, or reverses slower than its "
+        f"sign.{more}",
         f"Friction over velocity of the {joint.replace('_', ' ')}: {in_words(shown[0])}",
         tuple(panel(m) for m in shown),
         f"friction-{joint}",
@@ -36,9 +37,9 @@ def panel(m: FrictionMap) -> Panel:
     """One map."""
     marks = []
     for gaining, name, colour in BRANCHES:
-        own = m.gaining == gaining
-        if own.any():
-            marks.append(Points(m.dq[own], m.tau_friction[own], name, colour, y_std=m.tau_friction_std[own]))
+        branch = m.gaining == gaining
+        if branch.any():
+            marks.append(Points(m.dq[branch], m.tau_friction[branch], name, colour, y_std=m.tau_friction_std[branch]))
     return Panel(
         f"{m.log} ({m.model})", label(m, "dq", "velocity"), label(m, "tau_friction", "friction"),
         (*marks, *curves(m)),

@@ -1,4 +1,4 @@
-"""What a fit leaves of a log: over time, against the motion, and against itself."""
+"""The residual of a fit: over time, against the motion, and its autocorrelation."""
 
 from collections.abc import Iterator
 
@@ -11,17 +11,17 @@ from davinci_forces.report.sections.parts import autocorrelation, effort_panel, 
 from davinci_forces.report.verdicts import percent
 
 LAGS = 50  # of the cross-correlation, each way
-SEEN = 0.1  # share of a residual's variance that a motion explains, from which on the residual follows it
-REVERSALS = 2.0  # times as large around reversals as elsewhere, from which on that is said
+MIN_SHARE_FOLLOWED = 0.1  # share of a residual's variance that a motion explains, from which on the residual follows it
+MIN_RATIO_REVERSALS = 2.0  # times as large around reversals as elsewhere, from which on that is said
 
 
 def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
-    """What a fit leaves of one log: over time, against the motion, and against itself."""
+    """The residual of one log: over time, against the motion, and its autocorrelation."""
     name = run_name(residual.log, residual.joint)
     errors, effort = residual.tau - residual.tau_hat, label(residual, "tau", "effort")
     who = fit_name(residual.model, residual.estimator)
     yield Figure(
-        f"{name}: averaged effort and model ({who}), and what the model leaves of it.",
+        f"{name}: averaged effort and model ({who}), and the residual of the model.",
         f"{name}: the model follows the averaged effort up to {errors.std():.2g} (root mean square).",
         (
             effort_panel(residual, heading="Averaged effort and model"),
@@ -83,25 +83,25 @@ def own_correlations(context: Context, residual: Residual, errors: Column, q: Co
 
 
 def in_words(residual: Residual, errors: Column, q: Column | None) -> str:
-    """What the residual follows, and what to try.
+    """State which motion the residual follows, and what to try.
 
-    Least squares leave no straight line in any motion that is a column of the model, so means over ranges are asked.
+    Least squares leave no straight line in any motion that is a column of the model, so means over ranges are used.
     """
     motions = {"velocity": residual.dq} | ({} if q is None else {"position": q})
     shares = {name: explained_by(x, errors) for name, x in motions.items()}
-    said = " and ".join(f"{percent(max(share, 0.0))} by {name}" for name, share in shares.items())
+    shares_in_words = " and ".join(f"{percent(max(share, 0.0))} by {name}" for name, share in shares.items())
     follows = max(shares, key=lambda name: shares[name])
-    text = f"Of the residual's variance, its means over ranges explain {said}"
-    if shares[follows] > SEEN:
+    text = f"The means over ranges of motion explain {shares_in_words} of the residual's variance"
+    if shares[follows] > MIN_SHARE_FOLLOWED:
         tries = {
             "position": "a spring, gravity or friction that varies with position, or the coupling to other joints",
             "velocity": "friction with another shape, or coupling to other joints",
         }
-        return f"{text}: it follows the {follows}. Worth trying: {tries[follows]}."
+        return f"{text}. So the residual follows the {follows}. Worth trying: {tries[follows]}."
     within = share_within_reversals(errors, residual.dq)
-    if within > REVERSALS:
-        return f"{text}, but around reversals it is {within:.1f} times as large as elsewhere. Worth trying: presliding."
-    return f"{text}: no term of one motion is missing that these plots could show."
+    if within > MIN_RATIO_REVERSALS:
+        return f"{text}. Around reversals it is {within:.1f} times as large as elsewhere. Worth trying: presliding."
+    return f"{text}. These plots show no missing term of a single motion."
 
 
 def share_within_reversals(errors: Column, dq: Column) -> float:
@@ -139,7 +139,11 @@ def explained_by(x: Column, y: Column, bins: int = 40) -> float:
     place = np.digitize(x, np.linspace(x.min(), x.max(), bins + 1)[1:-1])
     counts = np.bincount(place, minlength=bins)
     means = np.bincount(place, y, bins) / np.maximum(counts, 1)
-    left, ranges, spread = float(np.sum((y - means[place]) ** 2)), int((counts > 0).sum()), float(y.var() * len(y))
+    unexplained, ranges, spread = (
+        float(np.sum((y - means[place]) ** 2)),
+        int((counts > 0).sum()),
+        float(y.var() * len(y)),
+    )
     if not spread or len(y) <= ranges:
         return 0.0
-    return 1.0 - left / spread * (len(y) - 1) / (len(y) - ranges)
+    return 1.0 - unexplained / spread * (len(y) - 1) / (len(y) - ranges)
