@@ -265,7 +265,7 @@ def test_a_clock_that_jumps_in_a_log_of_another_role_has_a_gap(lab):
 def test_a_clock_is_set_back_wherever_the_blocks_of_a_log_end(tmp_path, rows):
     from davinci_forces.logs import open_log
     from davinci_forces.study import reading as study
-    from davinci_forces.study.intake import Intake, mended
+    from davinci_forces.study.intake import Intake, without_clock_jumps
 
     signal = arm.signal("hand_roll", period=2.0, rate=50.0, periods=5)
     speed = np.abs(arm.excitation("hand_roll", signal.t, 2.0)[1])
@@ -278,7 +278,7 @@ def test_a_clock_is_set_back_wherever_the_blocks_of_a_log_end(tmp_path, rows):
         reading = Intake(log, entry, arm.ARM)
         [whole] = log.blocks(reading.names)
         parts = [{k: v[i : i + rows] for k, v in whole.items()} for i in range(0, len(signal), rows)]
-        t = np.concatenate([block["time"] for block in mended(reading, iter(parts))])
+        t = np.concatenate([block["time"] for block in without_clock_jumps(reading, iter(parts))])
         if speed[at] > 0.1:
             np.testing.assert_allclose(t, signal.t, atol=1e-9)
 

@@ -11,7 +11,7 @@ from typer.testing import CliRunner
 
 from davinci_forces.cli import app
 from davinci_forces.errors import BadStudy
-from davinci_forces.report.changes import Change, Stated, changes
+from davinci_forces.report.changes import Change, StatedValue, changes
 from davinci_forces.study import reading
 from tests.arm import write_study
 
@@ -34,48 +34,48 @@ def results(file: Path, **values) -> Path:
     return file
 
 
-def changed(a: Stated, b: Stated) -> bool:
+def changed(a: StatedValue, b: StatedValue) -> bool:
     return bool(changes({"x": a}, {"x": b}))
 
 
 def test_a_number_has_changed_beyond_two_standard_errors_of_the_difference():
     std = math.hypot(0.3, 0.4)
     for sign in (1, -1):
-        assert not changed(Stated(5.0, 0.3), Stated(5.0 + sign * 1.999 * std, 0.4))
-        assert changed(Stated(5.0, 0.3), Stated(5.0 + sign * 2.001 * std, 0.4))
+        assert not changed(StatedValue(5.0, 0.3), StatedValue(5.0 + sign * 1.999 * std, 0.4))
+        assert changed(StatedValue(5.0, 0.3), StatedValue(5.0 + sign * 2.001 * std, 0.4))
 
 
 def test_the_error_of_one_side_alone_counts():
-    assert not changed(Stated(1.0), Stated(1.1, 0.06))
-    assert changed(Stated(1.0), Stated(1.1, 0.04))
+    assert not changed(StatedValue(1.0), StatedValue(1.1, 0.06))
+    assert changed(StatedValue(1.0), StatedValue(1.1, 0.04))
 
 
 @pytest.mark.parametrize("std", [None, 0.0])
 def test_without_an_error_a_billionth_is_a_change(std):
-    assert not changed(Stated(3e6, std), Stated(3e6 * (1 + 0.9e-9), std))
-    assert changed(Stated(3e6, std), Stated(3e6 * (1 + 1.1e-9), std))
-    assert changed(Stated(0.0, std), Stated(1e-300, std))
+    assert not changed(StatedValue(3e6, std), StatedValue(3e6 * (1 + 0.9e-9), std))
+    assert changed(StatedValue(3e6, std), StatedValue(3e6 * (1 + 1.1e-9), std))
+    assert changed(StatedValue(0.0, std), StatedValue(1e-300, std))
 
 
 def test_text_and_truth_are_compared_as_they_are_and_nan_is_nan():
-    assert not changed(Stated("lse"), Stated("lse"))
-    assert changed(Stated("lse"), Stated("wlse"))
-    assert changed(Stated(True), Stated(False))
-    assert changed(Stated(True), Stated(1.0))
-    assert not changed(Stated(math.nan, 1.0), Stated(math.nan, 1.0))
-    assert changed(Stated(math.nan, 1.0), Stated(0.0, 1.0))
-    assert changed(Stated(1.0, 5.0), Stated(math.inf, 5.0))
+    assert not changed(StatedValue("lse"), StatedValue("lse"))
+    assert changed(StatedValue("lse"), StatedValue("wlse"))
+    assert changed(StatedValue(True), StatedValue(False))
+    assert changed(StatedValue(True), StatedValue(1.0))
+    assert not changed(StatedValue(math.nan, 1.0), StatedValue(math.nan, 1.0))
+    assert changed(StatedValue(math.nan, 1.0), StatedValue(0.0, 1.0))
+    assert changed(StatedValue(1.0, 5.0), StatedValue(math.inf, 5.0))
 
 
 def test_another_unit_is_a_change():
-    assert changed(Stated(1.0, 0.1, "N m"), Stated(1.0, 0.1, "A"))
+    assert changed(StatedValue(1.0, 0.1, "N m"), StatedValue(1.0, 0.1, "A"))
 
 
 def test_z_counts_standard_errors_of_the_difference():
-    change = Change("x", Stated(1.0, 3.0), Stated(21.0, 4.0))
+    change = Change("x", StatedValue(1.0, 3.0), StatedValue(21.0, 4.0))
     assert (change.std, change.z) == (5.0, 4.0)
-    assert Change("x", Stated(1.0), Stated(2.0)).z is None
-    assert Change("x", None, Stated(2.0, 1.0)).std is None
+    assert Change("x", StatedValue(1.0), StatedValue(2.0)).z is None
+    assert Change("x", None, StatedValue(2.0, 1.0)).std is None
 
 
 def test_rows_name_what_changed_came_and_went(tmp_path):
@@ -213,6 +213,6 @@ def test_a_report_says_what_changed_since_its_baseline_and_is_made_anew_when_tha
     call("verify", finished)
     baseline.write_text(json.dumps(rows))
     assert "raw/old.json changed" in call("report", finished)
-    assert "0 changed; 0 came and 0 went" in (finished.parents[1] / "reports/arm/report.html").read_text()
+    assert "New numbers: 0; missing: 0" in (finished.parents[1] / "reports/arm/report.html").read_text()
     baseline.write_text("[")
     assert f"{baseline} is no results.json" in call("report", finished, code=1)

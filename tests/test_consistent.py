@@ -9,7 +9,7 @@ from scipy.optimize import minimize, nnls
 
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators import estimator
-from davinci_forces.estimators.problem import Known
+from davinci_forces.estimators.problem import Prior
 from davinci_forces.maths.estimation import conic
 from davinci_forces.maths.estimation.conic import ENTRIES, nearest, scale_unknowns
 from davinci_forces.maths.estimation.least_squares import triangle
@@ -17,13 +17,13 @@ from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias, pseudo_ine
 from davinci_forces.maths.models.model import ArmMotion, Mechanism, of_signs
 from davinci_forces.records import Diagnostic, Fit, Motion
 from davinci_forces.robots.dvrk_psm import ROBOT
-from davinci_forces.robots.models import coupled
+from davinci_forces.robots.models import coupled_arm
 from davinci_forces.stages.model import choose, fit
 from tests import arm
 from tests.contracts.test_estimators import NAMES, PHI, THETA, K, problem
 from tests.test_estimation import trajectory
 
-ARM = coupled(ROBOT, [0, 1, 2], [(), (), ()])
+ARM = coupled_arm(ROBOT, [0, 1, 2], [(), (), ()])
 RATE, N = 100.0, 3000
 
 
@@ -113,7 +113,7 @@ def test_bodies_that_exist_come_out_and_equal_least_squares(seed):
 
 
 def test_where_no_sign_is_wrong_consistent_parameters_are_least_squares_to_the_bit():
-    p = replace(problem(seed=1), known=Known(np.array([True, False, True, True])))
+    p = replace(problem(seed=1), known=Prior(np.array([True, False, True, True])))
     assert_array_equal(estimator("consistent")(p).theta, estimator("lse")(p).theta)
 
 
@@ -183,7 +183,7 @@ def test_one_link_is_the_same_as_by_descent_over_its_square_root(seed):
 
 
 def test_signs_alone_are_non_negative_least_squares():
-    p = replace(problem(seed=1), tau=PHI @ np.array([-0.05, 0.0103, -0.2, 0.21968]), known=Known(np.ones(4, bool)))
+    p = replace(problem(seed=1), tau=PHI @ np.array([-0.05, 0.0103, -0.2, 0.21968]), known=Prior(np.ones(4, bool)))
     found, free = (estimator(name)(p) for name in ("consistent", "lse"))
     assert_allclose(found.theta, nnls(PHI, p.tau)[0], atol=1e-6)
     assert found.theta[0] == found.theta[2] == 0.0  # a bound that holds is met exactly
@@ -192,7 +192,7 @@ def test_signs_alone_are_non_negative_least_squares():
 
 
 def test_the_stated_errors_are_those_of_least_squares():
-    p = replace(problem(seed=1), known=Known(np.ones(4, bool)))
+    p = replace(problem(seed=1), known=Prior(np.ones(4, bool)))
     p = replace(p, tau=p.tau - PHI @ (THETA * [2.0, 0.0, 0.0, 0.0]))
     found, free = (estimator(name)(p) for name in ("consistent", "lse"))
     assert free.theta[0] < 0 <= found.theta[0]

@@ -5,9 +5,17 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from davinci_forces.maths.contact.detection import FALSE_ALARMS, Quiet, alarm_level, events, mean_size, quiet, summarise
+from davinci_forces.maths.contact.detection import (
+    FALSE_ALARMS,
+    FreeMotionStatistics,
+    alarm_level,
+    events,
+    free_motion_statistics,
+    mean_size,
+    summarise,
+)
 from davinci_forces.maths.periods.shift import likeness, most_different
-from davinci_forces.maths.signals.smoothing import lowpass, noise_std, share_passed, smoothed
+from davinci_forces.maths.signals.smoothing import lowpass, lowpass_segments, noise_std, share_passed
 from davinci_forces.maths.signals.windows import free_space
 from davinci_forces.maths.uncertainty import bootstrap
 from davinci_forces.maths.uncertainty.bootstrap import (
@@ -105,7 +113,7 @@ def test_means_without_each_part_are_those_of_the_others(logs, together):
         each.append(own._replace(source=np.full(len(own.source), 7 * log)))
     of = SpeedCells(*(np.concatenate(column) for column in zip(*each, strict=True)))
     for parts in (units(of), of.source * 6 + of.block):
-        one_by_one = [means(rest := of.those(parts != part), rest.mean_square, together) for part in np.unique(parts)]
+        one_by_one = [means(rest := of.select(parts != part), rest.mean_square, together) for part in np.unique(parts)]
         np.testing.assert_allclose(without_each(of, of.mean_square, parts, together), one_by_one, rtol=1e-12)
 
 
@@ -171,11 +179,13 @@ def test_noise_is_told_from_the_error_of_a_model():
     jumps = np.where(np.arange(len(T)) % 500 == 0, 1.0, 0.0)
     residual = noise(std=0.2) + error
     assert noise_std(residual + jumps, segment, RATE, 17.0) == pytest.approx(0.2, rel=0.05)
-    slow = smoothed(residual, segment, RATE, 17.0)
+    slow = lowpass_segments(residual, segment, RATE, 17.0)
     found, std = model_error(slow, 0.2 * np.sqrt(share_passed(RATE, 17.0)))
     assert found == pytest.approx(0.05 / np.sqrt(2), abs=4 * std)
     assert std < 0.02
-    none, bound = model_error(smoothed(noise(std=0.2), segment, RATE, 17.0), 0.2 * np.sqrt(share_passed(RATE, 17.0)))
+    none, bound = model_error(
+        lowpass_segments(noise(std=0.2), segment, RATE, 17.0), 0.2 * np.sqrt(share_passed(RATE, 17.0))
+    )
     assert none <= 3 * bound
 
 
@@ -236,12 +246,13 @@ def slow_noise(std=0.05, seed=0, N=4000, cutoff=1.0):
 def test_free_motion_crosses_the_alarm_level_as_seldom_as_it_says():
     """Ten hours of normal noise: one upward crossing of either sign in ten minutes each, by Rice's formula."""
     x = slow_noise(1.0, 0, 3_600_000)
-    space = quiet(x, np.ones(len(x), bool), RATE)
+    space = free_motion_statistics(x, np.ones(len(x), bool), RATE)
     level = alarm_level([space._replace(largest=0.0)])
     crossings = np.sum((x[:-1] < level) & (x[1:] >= level))
     expected = len(x) / RATE * FALSE_ALARMS
     assert abs(crossings - expected) < 4 * np.sqrt(expected)
-    assert alarm_level([Quiet(0.1, 0.2, 0.3), Quiet(0.1, 5.0, 0.3)]) == 5.0  # the most that was ever seen
+    statistics = [FreeMotionStatistics(0.1, largest, 0.3) for largest in (0.2, 5.0)]
+    assert alarm_level(statistics) == 5.0  # the largest that occurred
 
 
 @pytest.mark.parametrize("seed", range(5))

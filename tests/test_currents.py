@@ -9,7 +9,7 @@ import pytest
 import davinci_forces
 from davinci_forces.identification.candidates import share_parameters
 from davinci_forces.robots.dvrk_psm import ROBOT
-from davinci_forces.robots.models import coupled
+from davinci_forces.robots.models import coupled_arm
 from tests import arm
 from tests.test_runs import call
 
@@ -72,7 +72,7 @@ def test_a_unit_of_torque_is_refused_for_a_current(in_current, tmp_path):
 
 
 def test_links_seen_through_a_drive_are_in_their_units_times_its_gain():
-    model = coupled(UNKNOWN, [0], [()], group="hand_roll")
+    model = coupled_arm(UNKNOWN, [0], [()], group="hand_roll")
     units = {p.name.partition(" of ")[0]: p.unit for p in model.parameters}
     assert units["Ixx"] == "kg m^2 A/(N m)"
     assert units["Coulomb friction"] == "A"

@@ -9,10 +9,10 @@ from numpy.testing import assert_allclose
 
 from davinci_forces.errors import PipelineError
 from davinci_forces.filters import ekf, rts, stepping, tracker
-from davinci_forces.filters.problem import Driven, NoiseModel
-from davinci_forces.filters.response import assumed, at_rest, lag, slowest
+from davinci_forces.filters.problem import FilterInput, NoiseModel
+from davinci_forces.filters.response import at_rest, lag, noise_model, slowest
 from davinci_forces.filters.stepping import covariances
-from davinci_forces.filters.tuning import likeliest_walk, tuned
+from davinci_forces.filters.tuning import likeliest_walk, tune_noise
 from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.independent import bias_coefficients, inertia_of
 from davinci_forces.records import Diagnostic, ErrorBand, Fit, MeasurementNoise, Track, Whiteness
@@ -43,8 +43,8 @@ def simulate(used, theta, tau_ext, tau, noise, seed=0, x=(0.1, -0.2), finer=20):
     return np.array(rows).T
 
 
-def recorded(used, theta, y, tau, first_std=1.0) -> Driven:
-    return Driven(arm.dynamics(used, theta, len(tau)), *y, np.zeros(len(tau)), tau, T_S, first_std)
+def recorded(used, theta, y, tau, first_std=1.0) -> FilterInput:
+    return FilterInput(arm.dynamics(used, theta, len(tau)), *y, np.zeros(len(tau)), tau, T_S, first_std)
 
 
 def walk(N, step, seed=1):
@@ -159,7 +159,7 @@ def test_tuning_finds_the_noise_that_was_put_in():
     tau = 1.5 * np.sin(2 * T_S * np.arange(N))
     y = simulate(used, theta, np.zeros(N), tau, true)
     start = true._replace(r_q=6e-4, r_dq=1e-3, q_dq=6e-3)
-    found = tuned([recorded(used, theta, y, tau)], start, theta[0], theta[2])
+    found = tune_noise([recorded(used, theta, y, tau)], start, theta[0], theta[2])
     assert_allclose(found[:2], true[:2], rtol=0.1)
     # The walk that a push needs explains some of what moves the joint.
     assert 0.8 * true.q_dq < found.q_dq < true.q_dq
@@ -256,9 +256,9 @@ def test_the_filters_noise_is_that_of_the_recording(identified):
 def test_the_walk_is_the_settings_else_the_joints_else_the_slowest_that_shows_a_push(identified):
     [noise], joint = identified[1], arm.joint("hand_roll")
     own = replace(joint, q_tau=0.3)
-    walks = [assumed(noise, which, T_S, q_tau).q_tau / np.sqrt(T_S) for which, q_tau in ((own, 0.7), (own, 0.0))]
+    walks = [noise_model(noise, which, T_S, q_tau).q_tau / np.sqrt(T_S) for which, q_tau in ((own, 0.7), (own, 0.0))]
     assert_allclose(walks, [0.7, 0.3])
-    found = assumed(noise, joint, T_S, 0.0)
+    found = noise_model(noise, joint, T_S, 0.0)
     assert found.q_tau == slowest(ekf.track, noise.inertia, noise.viscous, T_S, found._replace(q_tau=0.0))
 
 

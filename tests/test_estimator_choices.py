@@ -9,7 +9,7 @@ from scipy.optimize import nnls
 
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators import estimator
-from davinci_forces.estimators.problem import Known, Regression, factorise
+from davinci_forces.estimators.problem import Prior, Regression, factorise
 from davinci_forces.estimators.wlse import pool_variance
 from davinci_forces.maths.models.independent import regressor
 from tests import arm
@@ -76,24 +76,24 @@ def test_noise_of_the_motion_pulls_least_squares_and_not_instrumental_variables(
 
 def test_a_bound_is_met_exactly_and_the_rest_is_the_best_there_is():
     theta = np.array([-0.05, 0.0103, 0.3706, 0.21968])
-    p = replace(problem(seed=1), tau=PHI @ theta, known=Known(POSITIVE))
+    p = replace(problem(seed=1), tau=PHI @ theta, known=Prior(POSITIVE))
     found = estimator("bounded")(p)
     assert found.theta[0] == 0.0
     rest = np.linalg.lstsq(PHI[:, 1:], p.tau, rcond=None)[0]
     assert_allclose(found.theta[1:], rest, rtol=1e-9)
-    everything = replace(p, known=Known(np.ones(len(NAMES), bool)))
+    everything = replace(p, known=Prior(np.ones(len(NAMES), bool)))
     assert_allclose(estimator("bounded")(everything).theta, nnls(PHI, p.tau)[0], atol=1e-9)
 
 
 def test_where_no_bound_holds_bounded_least_squares_are_least_squares():
-    p = replace(problem(seed=1), known=Known(POSITIVE))
+    p = replace(problem(seed=1), known=Prior(POSITIVE))
     assert_allclose(estimator("bounded")(p).theta, estimator("lse")(p).theta, rtol=0, atol=0)
 
 
 def test_what_the_motion_hardly_shows_is_drawn_to_the_guess_and_the_rest_is_not():
     """The acceleration is a thousandth of what it is, so noise leaves the inertia open."""
     weak = PHI * [1e-3, 1.0, 1.0, 1.0]
-    guess = Known(guess=np.array([0.4, 0.0, 0.3, 0.2]))
+    guess = Prior(guess=np.array([0.4, 0.0, 0.3, 0.2]))
     problems = [
         replace(p, Phi=weak, tau=p.tau - PHI @ THETA + weak @ THETA, known=guess) for p in map(problem, range(50))
     ]

@@ -2,11 +2,11 @@
 
 import numpy as np
 
-from davinci_forces.identification.joint_models import Along
+from davinci_forces.identification.joint_models import LogModels
 from davinci_forces.identification.used import Identified
 from davinci_forces.records import Fit, JointModel
 from davinci_forces.robots import davinci
-from davinci_forces.robots.models import coupled, independent
+from davinci_forces.robots.models import coupled_arm, independent
 from davinci_forces.stages.forces.whiteness import THIS_LOG, alternatives
 from tests import arm
 
@@ -15,7 +15,7 @@ ROLL = davinci.ROBOT.joint("hand_roll")
 
 def fit(model: str) -> Fit:
     """A fit of the roll, each of its parameters 1."""
-    described = independent(ROLL) if model == "independent" else coupled(davinci.ROBOT, [0], [()], "", ROLL.name)
+    described = independent(ROLL) if model == "independent" else coupled_arm(davinci.ROBOT, [0], [()], "", ROLL.name)
     names = np.array([parameter.name for parameter in described.parameters], object)
     columns = dict.fromkeys(Fit.columns(), np.zeros(len(names))) | dict.fromkeys(("parameter", "phi", "unit"), names)
     about = {"group": ROLL.name, "model": model, "estimator": "lse", "logs": ("a",), "theta": np.ones(len(names))}
@@ -25,7 +25,7 @@ def fit(model: str) -> Fit:
 def told_by(signals) -> list[str]:
     """What the roll of a log with these joints is explained by, where it was fitted alone and with the whole arm."""
     fits = [fit("independent"), fit("coupled")]
-    along = Along(Identified(davinci.ROBOT, fits), [arm.motion(signal) for signal in signals])
+    along = LogModels(Identified(davinci.ROBOT, fits), [arm.motion(signal) for signal in signals])
     model = next(m for m in arm.models(signals, fits, robot=davinci.ROBOT) if isinstance(m, JointModel))
     return [name for name, _ in alternatives(model, along, np.ones(len(model), bool))]
 

@@ -9,7 +9,7 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.stats import norm
 
-from davinci_forces.maths.contact.force_sensor import at, errors, lag
+from davinci_forces.maths.contact.force_sensor import errors, interpolate_sensor, lag
 from davinci_forces.records import Diagnostic, SensorForce, TipForce, Touch, store
 from davinci_forces.robots import load
 from davinci_forces.runner import runs
@@ -72,7 +72,7 @@ def test_a_bias_along_one_axis_keeps_its_sign():
 
 def test_a_sensor_is_not_read_across_a_gap_or_beyond_its_ends():
     clock = np.array([0.0, 0.01, 0.02, 0.5, 0.51])
-    shown = at(np.array([-0.1, 0.005, 0.02, 0.3, 0.505, 0.6]), clock, clock[:, None], reach=0.03)
+    shown = interpolate_sensor(np.array([-0.1, 0.005, 0.02, 0.3, 0.505, 0.6]), clock, clock[:, None], reach=0.03)
     assert_allclose(shown[:, 0], [np.nan, 0.005, 0.02, np.nan, 0.505, np.nan])
 
 

@@ -9,8 +9,14 @@ from numpy.testing import assert_allclose
 
 from davinci_forces.estimators import estimator
 from davinci_forces.estimators.problem import Estimate, StandardErrors, factorise
-from davinci_forces.identification.identifiability import advice, hardly_described, inertia_at_fault, not_seen, together
-from davinci_forces.maths.estimation.least_squares import combinations, deviation, pairs, told, triangle
+from davinci_forces.identification.identifiability import (
+    advice,
+    describe_correlated,
+    hardly_described,
+    inertia_at_fault,
+    not_seen,
+)
+from davinci_forces.maths.estimation.least_squares import analyse_columns, combinations, deviation, pairs, triangle
 from davinci_forces.records import Diagnostic, Identifiability
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.report.sections.joints import unidentified_parameters
@@ -24,11 +30,11 @@ ROLL = arm.joint("hand_roll")
 
 
 def of(Phi: np.ndarray):
-    return told(triangle(Phi, PHI @ THETA, np.ones(len(Phi))))
+    return analyse_columns(triangle(Phi, PHI @ THETA, np.ones(len(Phi))))
 
 
 def test_the_correlation_of_parameters_is_that_of_their_errors():
-    found = told(factorise(problem(seed=0), np.full(K, float(M))))
+    found = analyse_columns(factorise(problem(seed=0), np.full(K, float(M))))
     thetas = np.array([estimator("lse")(problem(seed)).theta for seed in range(1000)])
     assert_allclose(found.correlation, np.corrcoef(thetas.T), atol=4 / np.sqrt(1000))
     assert_allclose(np.diag(found.correlation), 1.0, rtol=1e-12)
@@ -41,7 +47,7 @@ def test_the_condition_is_that_of_scaled_columns_whatever_their_units():
 
 def test_the_deviation_of_a_sum_of_parameters_is_that_of_its_errors():
     weights, seeds = np.array([1.0, 2.0, 0.0, -1.0]), 2000
-    found = told(factorise(problem(seed=0), np.full(K, float(M))))
+    found = analyse_columns(factorise(problem(seed=0), np.full(K, float(M))))
     std = SIGMA / np.sqrt(M) * np.sqrt(np.diag(np.linalg.inv(PHI.T @ PHI)))
     sums = [estimator("lse")(problem(seed)).theta @ weights for seed in range(seeds)]
     assert deviation(found.correlation, std, weights) == pytest.approx(np.std(sums), rel=4 / np.sqrt(2 * seeds))
@@ -53,8 +59,10 @@ def test_parameters_that_move_together_are_named_with_their_correlation():
     ((i, j, r),) = pairs(found, 0.95)
     assert (i, j) == (1, 4)
     names = [*NAMES, "gravity, cosine"]
-    assert f"the estimates of gravity, sine and gravity, cosine are correlated: {r:.2f}" in together(names, found)
-    assert together(NAMES, of(PHI)) == []
+    assert f"the estimates of gravity, sine and gravity, cosine are correlated: {r:.2f}" in describe_correlated(
+        names, found
+    )
+    assert describe_correlated(NAMES, of(PHI)) == []
 
 
 def test_a_combination_of_three_is_named_where_no_two_of_them_are_alike():

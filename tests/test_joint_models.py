@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
-from davinci_forces.filters.problem import driven
+from davinci_forces.filters.problem import filter_inputs
 from davinci_forces.maths.models.bias import bias
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.signals.smoothing import lowpass, measured_motion, noise_std
@@ -84,7 +84,7 @@ def test_the_model_of_a_joint_is_its_fit_along_the_low_passed_motion(identified)
     assert (model.model, model.estimator, model.stand_in) == ("independent", "huber", "")
     terms = arm.joint("hand_roll").terms
     assert_allclose(model.tau_hat, regressor(terms, motion.q, motion.dq, motion.ddq) @ theta)
-    b, _, _ = bias(driven(model)[0].joint.coefficients, model.q, model.dq, 0.0)
+    b, _, _ = bias(filter_inputs(model)[0].joint.coefficients, model.q, model.dq, 0.0)
     assert_allclose(model.inertia * model.ddq + b + model.tau_known, model.tau_hat)
     assert_array_equal(model.q_measured, signal.q)
 

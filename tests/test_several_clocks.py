@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import davinci_forces
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.joined import Alignment, Timed, aligned
+from davinci_forces.logs.joined import Alignment, TimedBlock, align
 from davinci_forces.maths.signals.clock import GAP
 from tests import arm
 from tests.logs.test_clocks import said, tdms
@@ -21,14 +21,14 @@ from tests.test_runs import call
 Samples = NDArray[np.float64]
 
 
-def in_blocks(name: str, t: Samples, x: Samples, rows: int) -> Iterator[Timed]:
+def in_blocks(name: str, t: Samples, x: Samples, rows: int) -> Iterator[TimedBlock]:
     return ((t[i : i + rows], {name: x[i : i + rows]}) for i in range(0, len(t), rows))
 
 
 def put_on(t: Samples, their_t: Samples, x: Samples, rows: int = 1000) -> tuple[Samples, Samples, Alignment]:
     """The samples `x` of another clock on the clock `t`: its times that are kept, and the samples there."""
     done = Alignment()
-    timed = aligned(in_blocks("q", t, t, rows), {"x": in_blocks("x", their_t, x, rows)}, done, BadLog)
+    timed = align(in_blocks("q", t, t, rows), {"x": in_blocks("x", their_t, x, rows)}, done, BadLog)
     blocks = list(timed)
     for times, block in blocks:
         assert_array_equal(times, block["q"])
@@ -83,7 +83,7 @@ def test_samples_of_the_same_times_stay_what_they_are() -> None:
     times, same, done = put_on(t, t, x)
     assert_array_equal(times, t)
     assert_array_equal(same, x)
-    assert not done.changed
+    assert not done.clocks_differ
 
 
 def test_white_noise_keeps_what_a_cubic_leaves_of_it() -> None:

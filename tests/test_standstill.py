@@ -7,9 +7,9 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.maths.models.independent import regressor
-from davinci_forces.maths.selection import gathered, path_blocks
+from davinci_forces.maths.selection import path_blocks, sum_equations
 from davinci_forces.maths.signals.smoothing import lowpass, noise_std
-from davinci_forces.maths.signals.standstill import HOLD, standing
+from davinci_forces.maths.signals.standstill import HOLD, is_standing_still
 from davinci_forces.records import Average, Choice, Diagnostic, Fit, Prediction, Recording, Trajectory
 from davinci_forces.stages.model import choose, fit
 from davinci_forces.stages.recordings import average, differentiate, resample
@@ -28,7 +28,7 @@ def moved(t):
 
 
 def stands(q, dq, segment=None, **more):
-    return standing(q, dq, np.zeros(len(q), int) if segment is None else segment, RATE, **more)
+    return is_standing_still(q, dq, np.zeros(len(q), int) if segment is None else segment, RATE, **more)
 
 
 @pytest.mark.parametrize("noise", [0.0, 1e-4, 1e-3])
@@ -72,7 +72,7 @@ def test_an_effort_that_is_not_known_counts_nothing_and_the_others_do():
     unknown = np.zeros(60, bool)
     unknown[[0, 25, 26, 40]] = True
     unknown[40:] = True
-    made = gathered(Phi, np.where(np.stack([unknown, np.zeros(60, bool)], 1), np.nan, tau), cell, 3)
+    made = sum_equations(Phi, np.where(np.stack([unknown, np.zeros(60, bool)], 1), np.nan, tau), cell, 3)
     for effort, known in enumerate((~unknown, np.ones(60, bool))):
         for c in range(3):
             rows = known & (cell == c)

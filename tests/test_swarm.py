@@ -7,9 +7,9 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from davinci_forces.estimators import pso
-from davinci_forces.estimators.problem import Known, Regression
+from davinci_forces.estimators.problem import Prior, Regression
 from davinci_forces.identification.regression import known_of
-from davinci_forces.maths.estimation.least_squares import bounded, triangle
+from davinci_forces.maths.estimation.least_squares import solve_bounded, triangle
 from davinci_forces.maths.estimation.swarm import CONSTRICTED, THESIS, search
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.physical import reduced_parameters
@@ -34,7 +34,7 @@ def problem(name: str, theta=None, seed: int = 3, known: bool = True) -> Regress
     Phi = regressor(joint.terms, *arm.excitation(name, np.arange(K) / 100))
     noise = arm.NOISE[name] / np.sqrt(10) * np.random.default_rng(seed).normal(size=K)
     tau = Phi @ (arm.THETA[name] if theta is None else theta) + noise
-    before = known_of(joint) if known else Known(known_of(joint).positive)
+    before = known_of(joint) if known else Prior(known_of(joint).positive)
     names = tuple(term.name for term in joint.terms)
     return Regression(Phi, tau, np.full(K, arm.NOISE[name] ** 2), np.full(K, 10), (0,), names, before)
 
@@ -42,7 +42,7 @@ def problem(name: str, theta=None, seed: int = 3, known: bool = True) -> Regress
 def least(p: Regression) -> tuple:
     """The triangle of a problem, and the least squares that the known signs allow."""
     R = triangle(p.Phi, p.tau, p.periods.astype(float))
-    return R, R.squares + float(R.excess(bounded(R, p.known.positive)))
+    return R, R.squares + float(R.excess(solve_bounded(R, p.known.positive)))
 
 
 @pytest.mark.parametrize("known", [True, False], ids=["physical", "lumped"])

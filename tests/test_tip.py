@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from davinci_forces.maths.mechanics import kinematics, tip_force
-from davinci_forces.maths.mechanics.tip_force import matrix, shared
+from davinci_forces.maths.mechanics.tip_force import matrix, shared_correlations
 from davinci_forces.records import (
     ArmCorrelation,
     Contact,
@@ -128,13 +128,13 @@ def test_joints_whose_errors_go_together_blur_the_force_in_another_direction():
 
 def test_what_one_log_says_of_correlations_counts_only_where_others_agree():
     agreed, other = np.array([0.5, -0.2, 0.1]), np.array([-0.5, 0.2, -0.1])
-    np.testing.assert_array_equal(shared(agreed[None]), np.zeros(3))
-    np.testing.assert_array_equal(shared(np.array([agreed, other])), np.zeros(3))
-    np.testing.assert_allclose(shared(np.array([agreed, agreed])), agreed)
+    np.testing.assert_array_equal(shared_correlations(agreed[None]), np.zeros(3))
+    np.testing.assert_array_equal(shared_correlations(np.array([agreed, other])), np.zeros(3))
+    np.testing.assert_allclose(shared_correlations(np.array([agreed, agreed])), agreed)
     rng = np.random.default_rng(4)
     for _ in range(50):
         logs = [np.corrcoef(rng.normal(size=(3, 5)))[np.triu_indices(3, 1)] for _ in range(3)]
-        assert np.linalg.eigvalsh(matrix(*shared(np.array(logs)))).min() > -1e-12
+        assert np.linalg.eigvalsh(matrix(*shared_correlations(np.array(logs)))).min() > -1e-12
 
 
 def test_how_errors_go_together_is_measured_in_free_space_of_joints_that_all_move():

@@ -10,7 +10,7 @@ from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators import estimator
 from davinci_forces.estimators.problem import Regression
 from davinci_forces.estimators.tls import Noise, fit_for_noise
-from davinci_forces.identification.regression import averaged_motion, joined, pose, row_covariance
+from davinci_forces.identification.regression import averaged_motion, join_regressions, pose, row_covariance
 from davinci_forces.identification.scores import select_logs
 from davinci_forces.maths.estimation.least_squares import triangle
 from davinci_forces.maths.models.independent import regressor
@@ -173,10 +173,10 @@ def test_noise_of_averaged_positions_comes_to_the_columns_as_is_said():
 def test_what_is_known_of_the_columns_goes_with_the_logs():
     model = independent(arm.joint("hand_roll"))
     one, other = (pose(model, [trajectory(arm.signal(seed=seed, log=f"log-{seed}"))]) for seed in (0, 1))
-    both = joined([one, other])
+    both = join_regressions([one, other])
     assert_array_equal(both.Phi_cov, np.concatenate([one.Phi_cov, other.Phi_cov]))
     assert_array_equal(select_logs(both, [1]).Phi_cov, other.Phi_cov)
-    assert joined([one, replace(other, Phi_cov=None)]).Phi_cov is None
+    assert join_regressions([one, replace(other, Phi_cov=None)]).Phi_cov is None
     assert select_logs(replace(both, Phi_cov=None), [1]).Phi_cov is None
 
 

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from davinci_forces.maths.contact.weighing import PARTS, Rows, Weighed, better, offset, unit_load, weighed, widening
+from davinci_forces.maths.contact.weighing import (
+    PARTS,
+    MassEstimate,
+    Rows,
+    better,
+    fit_mass,
+    offset,
+    unit_load,
+    widening_factor,
+)
 from davinci_forces.maths.periods.shift import circular, roll, straight
 from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Motion, Signal, Weight
 from davinci_forces.robots import dvrk_psm
@@ -39,13 +48,13 @@ def test_the_mass_of_several_joints_is_that_of_weighted_least_squares_with_an_of
     w = np.repeat(1 / np.array(sigma), 60)
     want = np.linalg.lstsq(A * w[:, None], y.ravel() * w, rcond=None)[0]
     each = [rows(x[j], y[j], sigma[j]) for j in range(2)]
-    found = weighed(each).mass
+    found = fit_mass(each).mass
     assert_allclose([found, *(offset(row, found) for row in each)], want, rtol=1e-10)
 
 
 def test_a_column_that_hardly_varies_is_given_no_offset():
     x = -9.81 + 0.1 * np.sin(T)
-    assert weighed([rows(x, 0.1 * x)]).mass == pytest.approx(0.1)
+    assert fit_mass([rows(x, 0.1 * x)]).mass == pytest.approx(0.1)
     assert offset(rows(x, 0.1 * x + 0.5), 0.1) == 0.0
 
 
@@ -55,16 +64,16 @@ def test_intervals_hold_the_mass_where_what_the_model_leaves_is_as_slow_as_a_par
     kernel = np.ones(60) / np.sqrt(60)
     for seed in range(draws):
         e = np.convolve(np.random.default_rng(seed).normal(size=659), kernel, mode="valid")
-        found = weighed([rows(x, 0.2 * x + 0.1 * e)])
+        found = fit_mass([rows(x, 0.2 * x + 0.1 * e)])
         held += abs(found.mass - 0.2) < 2.57 * found.std  # of Student's t with 5 degrees of freedom
     assert 0.90 < held / draws < 0.99
 
 
 def test_masses_of_free_motion_that_exceed_their_errors_widen_them_and_others_do_not_narrow_them():
-    assert widening([Weighed(0.03, 0.01), Weighed(0.03, 0.01)], 0.0) == pytest.approx(3.0)
-    assert widening([Weighed(0.03, 0.01)], 0.02) == pytest.approx(3.0 / np.sqrt(5.0))
-    assert widening([Weighed(0.001, 0.01)], 0.0) == 1.0
-    assert widening([], 0.01) == 1.0
+    assert widening_factor([MassEstimate(0.03, 0.01), MassEstimate(0.03, 0.01)], 0.0) == pytest.approx(3.0)
+    assert widening_factor([MassEstimate(0.03, 0.01)], 0.02) == pytest.approx(3.0 / np.sqrt(5.0))
+    assert widening_factor([MassEstimate(0.001, 0.01)], 0.0) == 1.0
+    assert widening_factor([], 0.01) == 1.0
 
 
 def test_the_column_that_made_the_effort_explains_it_better():

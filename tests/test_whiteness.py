@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose, assert_array_equal
 
 from davinci_forces.filters import ekf
 from davinci_forces.filters.innovations import coloured
-from davinci_forces.filters.innovations.innovations import delays, innovations, mended
-from davinci_forces.filters.innovations.search import finding, search, verdict
+from davinci_forces.filters.innovations.innovations import correct_times, delays, innovations
+from davinci_forces.filters.innovations.search import classify, search, verdict
 from davinci_forces.filters.innovations.trials import (
     CLOCK,
     COLOUR,
@@ -21,10 +21,10 @@ from davinci_forces.filters.innovations.trials import (
     Passes,
     Subject,
 )
-from davinci_forces.filters.problem import Driven, NoiseModel
+from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.maths.models.independent import bias_coefficients, inertia_of
 from davinci_forces.maths.signals import whiteness
-from davinci_forces.maths.signals.standstill import moving
+from davinci_forces.maths.signals.standstill import is_far_from_reversals
 from tests import arm
 from tests.test_ekf import NOISE, T_S, matched, simulate, walk
 
@@ -177,7 +177,7 @@ def recording(q, dq, ddq, tau, factor=1.0):
     theta = arm.THETA[NAME].copy()
     theta[-1] = 0.0
     theta[3] *= factor  # viscous friction
-    return Driven(arm.dynamics(arm.joint(NAME).terms, theta, len(tau)), q, dq, ddq, tau, T_S, 1.0)
+    return FilterInput(arm.dynamics(arm.joint(NAME).terms, theta, len(tau)), q, dq, ddq, tau, T_S, 1.0)
 
 
 EVERYWHERE = np.ones(N, bool)
@@ -196,7 +196,7 @@ def without(found):
 def test_a_matched_run_is_white_and_nothing_is_looked_for():
     found = search(subject(measured(), free=TOUCHED))
     assert len(found.trials) == 1
-    assert (finding(found), verdict(found)) == ("white", "white")
+    assert (classify(found), verdict(found)) == ("white", "white")
 
 
 def test_a_walk_faster_than_the_data_ask_is_named_and_so_is_one_that_is_too_slow():
@@ -207,7 +207,7 @@ def test_a_walk_faster_than_the_data_ask_is_named_and_so_is_one_that_is_too_slow
     assert without(slow)[0] == {WALK}
     assert "a random walk faster than the data show" in verdict(fast)
     assert "a random walk slower than the data show" in verdict(slow)
-    assert finding(fast) == "mended"
+    assert classify(fast) == "mended"
 
 
 def test_contact_is_named_where_it_was_and_not_where_another_window_is_left_out():
@@ -215,14 +215,14 @@ def test_contact_is_named_where_it_was_and_not_where_another_window_is_left_out(
     found = search(subject(run, free=TOUCHED))
     assert {CONTACT} in without(found)
     assert verdict(found).startswith("white outside contact")
-    assert finding(found) == "left out"
+    assert classify(found) == "left out"
     elsewhere = np.roll(TOUCHED, N // 2)
     assert not any(CONTACT in names for names in without(search(subject(run, free=elsewhere))))
 
 
 def test_reversals_are_named_where_friction_jumps_at_them():
     run = measured(coulomb=1.0)
-    found = search(subject(run, far=moving(truth(coulomb=1.0)[1][1], T_S)))
+    found = search(subject(run, far=is_far_from_reversals(truth(coulomb=1.0)[1][1], T_S)))
     assert {REVERSALS} in without(found)
     assert "white outside reversals" in verdict(found)
 
@@ -290,7 +290,7 @@ def three_joints(late):
     runs = [measured(seed=seed, v_q=FINE * noise(seed + 50, N), late=late) for seed in range(3)]
     own = [(truth(seed)[1][1], np.gradient(truth(seed)[1][1], T_S)) for seed in range(3)]
     told = delays([dq for dq, _ in own], [innovations(run, NOISE).q for run in runs])
-    return runs[0], mended(runs[0], *own[0], told[0]), told[0]
+    return runs[0], correct_times(runs[0], *own[0], told[0]), told[0]
 
 
 def test_the_other_joints_tell_an_uneven_clock_and_it_is_named():
@@ -324,17 +324,17 @@ def test_what_no_cause_explains_is_said_to_be_unexplained():
     line = 2 * NOISE.r_q * np.sin(2.2 * np.arange(N))
     found = search(subject(measured(v_q=NOISE.r_q * noise(8, N) + line)))
     assert found.explaining == []
-    assert finding(found) == "unexplained"
+    assert classify(found) == "unexplained"
     assert verdict(found).startswith("not white: ")
 
 
 def test_samples_far_from_reversals_have_no_change_of_sign_near():
     t = np.arange(1000) * T_S
     dq = np.cos(2 * np.pi * t / 4.0)
-    far = moving(dq, T_S)
+    far = is_far_from_reversals(dq, T_S)
     turns = np.array([1.0, 3.0, 5.0, 7.0, 9.0])
     since = t[:, None] - turns
-    jumping = moving(np.where(t < 5.0, 1.0, -1.0), T_S)  # which is never slow
+    jumping = is_far_from_reversals(np.where(t < 5.0, 1.0, -1.0), T_S)  # which is never slow
     assert_array_equal(np.flatnonzero(~jumping), np.arange(500 - 5, 500 + 25 + 1))
     assert not far[np.any((since > -0.04) & (since < 0.24), axis=1)].any()
     assert far[np.all((since < -0.15) | (since > 0.35), axis=1)].all()

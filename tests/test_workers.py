@@ -20,7 +20,7 @@ from davinci_forces.runner.fingerprints.fingerprint import Fingerprint
 from davinci_forces.runner.graph import ALL_LOGS, Graph, Part, every_step, required_steps
 from davinci_forces.runner.plan import Task
 from davinci_forces.runner.processes import workers
-from davinci_forces.runner.processes.workers import Crew, Others, pool
+from davinci_forces.runner.processes.workers import TaskQueue, WorkerPool, pool
 from davinci_forces.runner.runner import Runner
 from davinci_forces.runner.runs import folders
 from davinci_forces.study import reading
@@ -50,7 +50,7 @@ def die(each: Task) -> Outcome:
     raise AssertionError
 
 
-def outcomes(crew: Crew) -> list[Outcome]:
+def outcomes(crew: TaskQueue) -> list[Outcome]:
     done = []
     while not crew.idle:
         done += crew.outcomes()
@@ -64,7 +64,7 @@ def at_once(monkeypatch):
 
 
 def test_tasks_run_here_while_there_is_little_to_do():
-    with closing(Crew(Others(partial(pool, 2)))) as crew:
+    with closing(TaskQueue(WorkerPool(partial(pool, 2)))) as crew:
         for i in range(20):
             crew.submit(tell_process, task(str(i)))
         assert {o.outputs["pid"] for o in outcomes(crew)} == {str(os.getpid())}
@@ -72,7 +72,7 @@ def test_tasks_run_here_while_there_is_little_to_do():
 
 
 def test_tasks_run_elsewhere_where_there_is_much(at_once):
-    with closing(Crew(Others(partial(pool, 2)))) as crew:
+    with closing(TaskQueue(WorkerPool(partial(pool, 2)))) as crew:
         for i in range(20):
             crew.submit(tell_process, task(str(i)))
         done = outcomes(crew)
@@ -81,7 +81,7 @@ def test_tasks_run_elsewhere_where_there_is_much(at_once):
 
 
 def test_a_worker_that_is_killed_is_replaced_and_its_task_runs_again(at_once, tmp_path):
-    with closing(Crew(Others(partial(pool, 2)))) as crew:
+    with closing(TaskQueue(WorkerPool(partial(pool, 2)))) as crew:
         for i in range(12):
             crew.submit(partial(die_once, tmp_path / "mark"), task(str(i)))
         assert sorted(int(o.task.name) for o in outcomes(crew)) == list(range(12))
@@ -89,7 +89,7 @@ def test_a_worker_that_is_killed_is_replaced_and_its_task_runs_again(at_once, tm
 
 
 def test_a_worker_that_is_killed_with_nothing_to_do_is_replaced(at_once):
-    with closing(Crew(Others(partial(pool, 1)))) as crew:
+    with closing(TaskQueue(WorkerPool(partial(pool, 1)))) as crew:
         pids = set()
         for names in (("1", "2"), ("3", "4")):
             for name in names:
@@ -103,7 +103,7 @@ def test_a_worker_that_is_killed_with_nothing_to_do_is_replaced(at_once):
 
 
 def test_a_task_that_ends_every_worker_ends_the_run(at_once):
-    with closing(Crew(Others(partial(pool, 2)))) as crew:
+    with closing(TaskQueue(WorkerPool(partial(pool, 2)))) as crew:
         for i in range(2):
             crew.submit(die, task(str(i)))
         with pytest.raises(BrokenExecutor):
@@ -130,7 +130,7 @@ def took(seconds: float, each: Task) -> Outcome:
 @pytest.mark.parametrize(("seconds", "together"), [(0.03, 7), (0.15, 2), (1.0, 1)])
 def test_tasks_that_are_known_to_be_short_are_handed_over_together(at_once, seconds, together):
     there = Recording()
-    crew = Crew(Others(lambda: there, hands=2))
+    crew = TaskQueue(WorkerPool(lambda: there, hands=2))
     for i in range(400):
         crew.submit(partial(took, seconds), task(str(i)))
     assert [int(o.task.name) for o in outcomes(crew)] == list(range(400))
@@ -150,7 +150,7 @@ def test_what_one_of_the_others_left_half_written_goes_with_the_run_though_nobod
 
     there = Leaving()
     where, silent = folders(study, None, None), Console(lambda line: None, lambda line: None)
-    assert Runner(reading.read(study), where, silent, others=Others(lambda: there)).run(["ingest"])
+    assert Runner(reading.read(study), where, silent, others=WorkerPool(lambda: there)).run(["ingest"])
     assert there.shares
     assert (where.processed / "recording").is_dir()
     assert not list(where.processed.rglob("*.partial"))
@@ -159,7 +159,7 @@ def test_what_one_of_the_others_left_half_written_goes_with_the_run_though_nobod
 def test_others_are_prepared_as_soon_as_there_is_work_for_them_in_sight(monkeypatch):
     monkeypatch.setattr(workers, "SECONDS_ALONE", 0.2)
     prepared: list[int] = []
-    crew = Crew(Others(Recording, hands=2, prepare=lambda: prepared.append(crew.counts[0])))
+    crew = TaskQueue(WorkerPool(Recording, hands=2, prepare=lambda: prepared.append(crew.counts[0])))
     for i in range(40):
         crew.submit(lambda each: time.sleep(0.01) or Outcome(each, {}), task(str(i)))
     assert len(outcomes(crew)) == 40

@@ -97,7 +97,7 @@ def write_bytes(file: Path, content: bytes) -> None:
 
 def write_together(contents: Mapping[Path, bytes]) -> None:
     """Write files that belong together: all are complete before the first gets its name, so the last name proves it."""
-    name = unnamed()
+    name = temporary_name()
     try:
         for file, content in contents.items():
             file.parent.mkdir(parents=True, exist_ok=True)
@@ -109,7 +109,7 @@ def write_together(contents: Mapping[Path, bytes]) -> None:
             name(file).unlink(missing_ok=True)
 
 
-def unnamed() -> Callable[[Path], Path]:
+def temporary_name() -> Callable[[Path], Path]:
     """A function that gives the temporary name of a file; two processes that write one file use different names."""
     token = uuid4().hex[:12]
     return lambda file: file.with_name(f"{file.name}.{token}{PARTIAL}")

@@ -7,7 +7,7 @@ import numpy as np
 from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.records import Choice, Motion
 from davinci_forces.robots.dvrk_psm import ROBOT
-from davinci_forces.robots.models import coupled
+from davinci_forces.robots.models import coupled_arm
 from davinci_forces.stages.model import choose
 
 LOGS, SAMPLES, RATE = 6, 6000, 200.0
@@ -17,7 +17,7 @@ AT_MOST = 15.0  # [s] of one core
 def smoothed() -> list[Motion]:
     """Six logs of an arm whose three joints move, each on a path of its own that does not repeat."""
     random = np.random.default_rng(0)
-    t, model = np.arange(SAMPLES) / RATE, coupled(ROBOT, [0, 1, 2], [(), (), ()])
+    t, model = np.arange(SAMPLES) / RATE, coupled_arm(ROBOT, [0, 1, 2], [(), (), ()])
     theta = random.normal(size=len(model.parameters)) * 0.01
     theta[[p.positive for p in model.parameters]] = 0.5
     records = []

@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 
 from davinci_forces.filters import rts
 from davinci_forces.filters.ekf import track
-from davinci_forces.filters.problem import Driven, NoiseModel
+from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.filters.stepping import INITIAL_VARIANCE_RATIO, covariances
 from davinci_forces.maths.models.model import JointDynamics
 from davinci_forces.records import Track
@@ -37,14 +37,14 @@ def rival(tmp_path_factory):
     return getattr(ctypes.CDLL(str(library)), "pass")
 
 
-def recording() -> Driven:
+def recording() -> FilterInput:
     """Anew: a million samples of a joint with gravity and friction."""
     t = np.arange(N) * 1e-3
     rng = np.random.default_rng(0)
     q, dq = 0.4 * np.sin(t) + 1e-4 * rng.normal(size=N), 0.4 * np.cos(t) + 1e-3 * rng.normal(size=N)
     tau = -0.2 * np.sin(t) + 0.3 * np.sign(np.cos(t)) + 0.1 * rng.normal(size=N)
     joint = JointDynamics(np.full(N, 0.5), (0.1, 0.7, -0.2, 0.0, 0.3, 0.2, 0.0), np.zeros(N))
-    return Driven(joint, q, dq, -q, tau, 1e-3, 1.0)
+    return FilterInput(joint, q, dq, -q, tau, 1e-3, 1.0)
 
 
 def track_in_cpp(loop, recording):

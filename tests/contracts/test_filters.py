@@ -14,7 +14,7 @@ from numpy.testing import assert_allclose
 from scipy.stats import chi2, multivariate_normal
 
 from davinci_forces.filters import FILTERS, kalman, title, tracker
-from davinci_forces.filters.problem import Driven, Filter, NoiseModel
+from davinci_forces.filters.problem import Filter, FilterInput, NoiseModel
 from davinci_forces.filters.stepping import INITIAL_VARIANCE_RATIO
 from davinci_forces.maths.models.model import JointDynamics
 from davinci_forces.maths.models.terms import inertia, offset, stiffness, viscous
@@ -33,9 +33,9 @@ STEPPED = pytest.mark.parametrize("name", ["ekf", "ekf_euler"])
 STATED = pytest.mark.parametrize("name", ["ekf", "ekf_euler", "rts"])  # of the model of chance that is simulated
 
 
-def recording(joint: JointDynamics, q, dq, tau, first_std=FIRST_STD) -> Driven:
+def recording(joint: JointDynamics, q, dq, tau, first_std=FIRST_STD) -> FilterInput:
     """What a filter is given of a joint whose acceleration nobody measured."""
-    return Driven(joint, q, dq, np.zeros(len(q)), tau, T_S, first_std)
+    return FilterInput(joint, q, dq, np.zeros(len(q)), tau, T_S, first_std)
 
 
 def swaying(N: int) -> JointDynamics:

@@ -8,7 +8,7 @@ import pytest
 
 from davinci_forces.records import KINDS, Track
 from davinci_forces.records.catalogue import Catalogue, Provenance
-from davinci_forces.report.changes import Stated
+from davinci_forces.report.changes import StatedValue
 from davinci_forces.report.content import (
     Bullets,
     Document,
@@ -22,7 +22,7 @@ from davinci_forces.report.content import (
     name_of,
     walk,
 )
-from davinci_forces.report.content.layout import place
+from davinci_forces.report.content.layout import number_blocks
 from davinci_forces.report.context import Context
 from davinci_forces.report.results import Results, collect
 from davinci_forces.report.sections import DOCUMENTS, SECTIONS
@@ -44,18 +44,18 @@ def context(lab: Lab, catalogue: Catalogue) -> Context:
     return Context(catalogue, lab.study, results, PROVENANCE, RATINGS, baseline=baseline(results))
 
 
-def baseline(results: Results) -> dict[str, Stated]:
+def baseline(results: Results) -> dict[str, StatedValue]:
     """The same numbers, of which one was another, one is gone and one is new."""
-    earlier = {key: Stated(result.value, result.std, result.unit) for key, result in results.items()}
+    earlier = {key: StatedValue(result.value, result.std, result.unit) for key, result in results.items()}
     for key in [*earlier][-1:]:
         del earlier[key]
     for key in [*earlier][:1]:
         earlier[key] = replace(earlier[key], value=results[key].value + 1.0)
-    return earlier | {"gone": Stated(1.0)}
+    return earlier | {"gone": StatedValue(1.0)}
 
 
 def without(catalogue: Catalogue, *kinds: type) -> Catalogue:
-    return Catalogue(lambda kind: [] if kind in kinds else catalogue.all(kind))
+    return Catalogue(lambda kind: [] if kind in kinds else catalogue.records(kind))
 
 
 def written(name: str, about: Context) -> Section | None:
@@ -100,7 +100,7 @@ def test_every_number_of_a_table_is_the_result_of_its_key(name: str, full: Conte
 def test_a_study_without_records_has_no_section_or_one_that_says_so(name: str, lab: Lab, catalogue: Catalogue):
     section = written(name, context(lab, without(catalogue, *KINDS.values())))
     if section is not None:
-        place(Document("A test", "arm", True, (section,)))
+        number_blocks(Document("A test", "arm", True, (section,)))
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -109,13 +109,13 @@ def test_a_kind_of_record_that_is_missing_costs_no_section(kind: str, lab: Lab, 
     poorer = context(lab, without(catalogue, KINDS[kind]))
     for _, names in DOCUMENTS.values():
         sections = tuple(section for name in names if (section := written(name, poorer)))
-        place(Document("A test", "arm", True, sections))
+        number_blocks(Document("A test", "arm", True, sections))
 
 
 def test_the_sections_together_are_a_document_whose_labels_differ_and_whose_references_lead_somewhere(full: Context):
     for _, names in DOCUMENTS.values():
         sections = tuple(section for name in names if (section := written(name, full)))
-        assert len(place(Document("A test", "arm", True, sections))) == len(names)
+        assert len(number_blocks(Document("A test", "arm", True, sections))) == len(names)
 
 
 @SECTION

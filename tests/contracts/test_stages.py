@@ -106,7 +106,8 @@ def test_no_two_tasks_make_the_same_file(lab: Lab):
 def test_the_report_of_the_same_records_is_the_same(lab: Lab, catalogue: Catalogue, monkeypatch):
     """Its numbers; the writers are slow, and `test_runs` compares what they write."""
     monkeypatch.setattr(report, "render_all", lambda documents: {})
+    provenance = Provenance("lab", "1", {}, {}, {}, {})
     with away(lab.folders.processed, lab.study.folder):
-        first, second = (report.write(catalogue, lab.study, Provenance("lab", "1", {}, {}, {}, {})) for _ in range(2))
+        first, second = (report.write_report(catalogue, lab.study, provenance) for _ in range(2))
     assert first["results.json"] == second["results.json"]
     assert b'"fit.hand_roll.independent.lse.inertia"' in first["results.json"]

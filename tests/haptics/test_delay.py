@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.errors import BadRequest
-from davinci_forces.haptics.maths.bimodal import THESIS, Hand
+from davinci_forces.haptics.maths.bimodal import THESIS_HAND, Hand
 from davinci_forces.haptics.maths.delay import damping_needed, delay_limit, delayed_hold, sampled_limit
 from davinci_forces.haptics.maths.motion import SAMPLES_PER_DELAY, flow, grows, leaving_limit, simulate_delayed
 
@@ -34,7 +34,7 @@ def spectral_radius(hand: Hand, k_t: float, delay: float, rate: float) -> float:
     return float(np.abs(np.linalg.eigvals(A)).max())
 
 
-@pytest.mark.parametrize("hand", [THESIS, Hand(1.0, 10.0, 300.0), Hand(0.5, 2.0, 50.0)])
+@pytest.mark.parametrize("hand", [THESIS_HAND, Hand(1.0, 10.0, 300.0), Hand(0.5, 2.0, 50.0)])
 @pytest.mark.parametrize("delay", DELAYS)
 def test_a_pressed_hand_is_stable_below_the_limit_of_a_delay_and_not_beyond(hand, delay):
     limit, rate = delay_limit(hand, delay), 4 * SAMPLES_PER_DELAY / delay
@@ -42,14 +42,14 @@ def test_a_pressed_hand_is_stable_below_the_limit_of_a_delay_and_not_beyond(hand
     assert [simulated(hand, share * limit, exact, rate) for share in (0.98, 1.02)] == [False, True]
 
 
-@pytest.mark.parametrize("hand", [THESIS, Hand(1.0, 10.0, 300.0), Hand(0.1, 0.2, 3000.0)])
+@pytest.mark.parametrize("hand", [THESIS_HAND, Hand(1.0, 10.0, 300.0), Hand(0.1, 0.2, 3000.0)])
 @pytest.mark.parametrize(("delay", "rate"), [(0.0, 100.0), (0.05, 100.0), (0.053, 100.0), (0.0004, 1000.0)])
 def test_a_pressed_hand_is_stable_below_the_limit_of_a_held_force_and_not_beyond(hand, delay, rate):
     limit = sampled_limit(hand, delay, rate)
     assert [simulated(hand, share * limit, delay, rate) for share in (0.98, 1.02)] == [False, True]
 
 
-@pytest.mark.parametrize("hand", [THESIS, Hand(0.1, 0.02, 3000.0), Hand(2.0, 40.0, 50.0)])
+@pytest.mark.parametrize("hand", [THESIS_HAND, Hand(0.1, 0.02, 3000.0), Hand(2.0, 40.0, 50.0)])
 @pytest.mark.parametrize(("delay", "rate"), [(0.0, 100.0), (0.053, 100.0), (0.02, 30.0), (0.2, 250.0)])
 def test_the_limit_of_a_held_force_is_the_first_at_which_a_root_leaves_the_unit_circle(hand, delay, rate):
     limit = sampled_limit(hand, delay, rate)
@@ -60,11 +60,11 @@ def test_the_limit_of_a_held_force_is_the_first_at_which_a_root_leaves_the_unit_
 def test_small_delays_and_periods_cost_what_the_textbook_says():
     """b > K_T (T/2 + d), for a hand that is slow beside both."""
     for delay, rate in ((0.001, 1000.0), (0.0, 2000.0), (0.0005, 4000.0)):
-        assert_allclose(sampled_limit(THESIS, delay, rate) * (0.5 / rate + delay), THESIS.b, rtol=2e-3)
-    assert_allclose(delay_limit(THESIS, 1e-4) * 1e-4, THESIS.b, rtol=1e-4)
+        assert_allclose(sampled_limit(THESIS_HAND, delay, rate) * (0.5 / rate + delay), THESIS_HAND.b, rtol=2e-3)
+    assert_allclose(delay_limit(THESIS_HAND, 1e-4) * 1e-4, THESIS_HAND.b, rtol=1e-4)
 
 
-@pytest.mark.parametrize("hand", [THESIS, Hand(0.1, 0.02, 3000.0), Hand(1.0, 0.1, 400.0)])
+@pytest.mark.parametrize("hand", [THESIS_HAND, Hand(0.1, 0.02, 3000.0), Hand(1.0, 0.1, 400.0)])
 def test_a_force_held_ever_more_often_is_a_delayed_one(hand):
     """A hand that is hardly damped meets the limit after whole turns of its delay."""
     for delay in (0.05, 0.17):
@@ -78,22 +78,22 @@ def test_a_sample_is_the_hand_s_motion_under_the_force_before_and_then_the_new_o
     rest = delay - int(delay * rate + 1e-9) / rate
     state = x
     for force, duration in ((before, rest), (new, 1.0 / rate - rest)):
-        still = force / THESIS.k  # where the hand would rest
-        at, dx = flow(THESIS, 0.0, (state[0] - still, state[1]), duration)
+        still = force / THESIS_HAND.k  # where the hand would rest
+        at, dx = flow(THESIS_HAND, 0.0, (state[0] - still, state[1]), duration)
         state = at + still, dx
-    Phi, early, after, samples = delayed_hold(THESIS, delay, rate)
+    Phi, early, after, samples = delayed_hold(THESIS_HAND, delay, rate)
     assert samples == round((delay - rest) * rate)
     assert_allclose(Phi @ x + early * new + after * before, state, rtol=1e-9)
 
 
 def test_a_hand_that_nothing_presses_is_stable_for_stiffer_tissue():
     for delay in (0.02, 0.1):
-        pressed = delay_limit(THESIS, delay)
-        free = leaving_limit(THESIS, delay, pressed)
+        pressed = delay_limit(THESIS_HAND, delay)
+        free = leaving_limit(THESIS_HAND, delay, pressed)
         assert free > 1.5 * pressed
         rate = 4 * SAMPLES_PER_DELAY / delay
         exact = delay - 0.5 / rate
-        assert [simulated(THESIS, share * free, exact, rate, 0.0) for share in (0.97, 1.03)] == [False, True]
+        assert [simulated(THESIS_HAND, share * free, exact, rate, 0.0) for share in (0.97, 1.03)] == [False, True]
 
 
 def test_a_hand_that_hardly_comes_back_has_no_such_limit_within_reach():
@@ -103,10 +103,10 @@ def test_a_hand_that_hardly_comes_back_has_no_such_limit_within_reach():
 
 @pytest.mark.parametrize("delay", DELAYS)
 def test_the_damping_that_is_needed_puts_the_limit_at_the_tissue(delay):
-    needed = damping_needed(THESIS, 457.24, delay)
-    assert_allclose(delay_limit(THESIS._replace(b=needed), delay), 457.24, rtol=1e-6)
+    needed = damping_needed(THESIS_HAND, 457.24, delay)
+    assert_allclose(delay_limit(THESIS_HAND._replace(b=needed), delay), 457.24, rtol=1e-6)
 
 
 def test_a_delay_of_too_many_samples_is_refused_with_a_remedy():
     with pytest.raises(BadRequest, match=r"20 s is 20000 samples of 1000 Hz.*leave the rate out"):
-        sampled_limit(THESIS, 20.0, 1000.0)
+        sampled_limit(THESIS_HAND, 20.0, 1000.0)

@@ -89,8 +89,10 @@ def test_without_a_fit_that_can_be_it_is_the_thesis_s(fits):
 
 def test_the_filter_s_noise_is_the_joint_s(monkeypatch):
     taken = []
-    filled = haptic.filled
-    monkeypatch.setattr(haptic, "filled", lambda *given: (taken.append(given[2]), filled(*given))[1])
+    complete_scenario = haptic.complete_scenario
+    monkeypatch.setattr(
+        haptic, "complete_scenario", lambda *given: (taken.append(given[2]), complete_scenario(*given))[1]
+    )
     made([stiffness()], noises=[noise("hand_roll"), noise()])
     made([stiffness()], noises=[noise("hand_roll")])
     assert taken == [(1e-6, 2e-3, 0.7), SLIDE_NOISE]

@@ -7,18 +7,18 @@ import pytest
 from numpy.testing import assert_allclose, assert_array_equal
 
 from davinci_forces.filters import ekf
-from davinci_forces.filters.problem import Driven
+from davinci_forces.filters.problem import FilterInput
 from davinci_forces.haptics import loop as haptic
-from davinci_forces.haptics.maths.bimodal import THESIS, Hand
+from davinci_forces.haptics.maths.bimodal import THESIS_HAND, Hand
 from davinci_forces.haptics.maths.delay import delay_limit, harmonic, response_limit, sampled_limit, zero_order_hold
-from davinci_forces.haptics.maths.motion import switched
+from davinci_forces.haptics.maths.motion import simulate_switching
 from davinci_forces.haptics.maths.simulated_loop import Clocks, FeltTissue, Grip, simulate
 from davinci_forces.haptics.scenario import FIRM, SLIDE, AxisNoise, HapticScenario
 from davinci_forces.maths.models.model import JointDynamics
 
 K = 457.24
 NOBODY = np.zeros((0, 2))
-FULL = haptic.filled(HapticScenario())
+FULL = haptic.complete_scenario(HapticScenario())
 IDEAL = replace(FULL, exact=True, filtered=False, damping=0.0, friction=0.0)
 QUIET = replace(FULL, noise=AxisNoise(5e-7, 5e-4, 1e-6))
 SLOW = ((0.0, -0.02), (4.0, 0.04), (8.0, -0.02))
@@ -27,13 +27,13 @@ SLOW = ((0.0, -0.02), (4.0, 0.04), (8.0, -0.02))
 def let_go(tick: float):
     """The hand let go 1 cm from a spring, its force continuous but for the ticks."""
     T = round(2.0 / tick)
-    clocks, grip = Clocks(tick, 1, 1, 0, 0), Grip(*zero_order_hold(THESIS, tick), NOBODY)
+    clocks, grip = Clocks(tick, 1, 1, 0, 0), Grip(*zero_order_hold(THESIS_HAND, tick), NOBODY)
     axis, tissue, noise = haptic._axis(IDEAL), FeltTissue(K, 0.0, 0.0), np.zeros((T, 3))
     return simulate(grip, IDEAL.device, axis, tissue, clocks, np.zeros(T), noise, (-0.01, 0.0), lambda r: r.force)
 
 
 def test_with_an_ideal_arm_and_ever_smaller_ticks_the_hand_moves_as_the_bimodal_model_does():
-    exact, errors = switched(THESIS, K, (-0.01, 0.0), 2.0), []
+    exact, errors = simulate_switching(THESIS_HAND, K, (-0.01, 0.0), 2.0), []
     for tick in (1e-3, 5e-4):
         run = let_go(tick)
         errors.append(np.abs(np.interp(run.t, exact.t, exact.x) - run.x).max())
@@ -49,13 +49,13 @@ def test_the_filter_in_the_loop_is_the_one_that_tracks_logs(name):
     q, dq, tau, _ = run.readings.T
     nothing = np.zeros(len(q))
     joint = JointDynamics(np.full(len(q), SLIDE.inertia), haptic.coefficients(SLIDE), nothing)
-    recorded = Driven(joint, q, dq, nothing, tau, 1.0 / scenario.rate, scenario.noise.tau)
+    recorded = FilterInput(joint, q, dq, nothing, tau, 1.0 / scenario.rate, scenario.noise.tau)
     assert run.estimates.max() > 5.0
     assert_array_equal(run.estimates, ekf.track(recorded, haptic.filter_noise(scenario)).tau_ext)
 
 
 @pytest.mark.medium
-@pytest.mark.parametrize("hand", [THESIS, FIRM, Hand(1.0, 10.0, 300.0)])
+@pytest.mark.parametrize("hand", [THESIS_HAND, FIRM, Hand(1.0, 10.0, 300.0)])
 @pytest.mark.parametrize("delay", [0.0, 0.03])
 def test_with_an_ideal_arm_the_limit_is_that_of_a_held_force(hand, delay):
     """Where a swing that shrinks by 3 % in a quarter of the time counts as lasting: that is within 3 %."""
@@ -68,15 +68,15 @@ def test_the_response_of_an_ideal_arm_is_half_a_message_late_and_its_limit_that_
     answer = haptic.response(replace(IDEAL, position_delay=0.01, force_delay=0.02))
     assert_allclose(answer.late[:8], 0.035, atol=2e-4)
     assert_allclose(answer.share[:8], 1.0, atol=2e-3)
-    limit = response_limit(THESIS, 2.0 * np.pi * answer.frequency, answer.T, 0.0)
-    assert_allclose(limit, delay_limit(THESIS, 0.035), rtol=0.02)
+    limit = response_limit(THESIS_HAND, 2.0 * np.pi * answer.frequency, answer.T, 0.0)
+    assert_allclose(limit, delay_limit(THESIS_HAND, 0.035), rtol=0.02)
 
 
 def test_tissue_that_damps_makes_the_limit_by_the_response_higher():
     w = 2.0 * np.pi * np.geomspace(0.2, 12.0, 200)
     T = np.exp(-0.05j * w)
-    plain, damped = (response_limit(THESIS, w, T, damping) for damping in (0.0, 2.0))
-    assert_allclose(plain, delay_limit(THESIS, 0.05), rtol=1e-3)
+    plain, damped = (response_limit(THESIS_HAND, w, T, damping) for damping in (0.0, 2.0))
+    assert_allclose(plain, delay_limit(THESIS_HAND, 0.05), rtol=1e-3)
     assert damped > 2.0 * plain
 
 
@@ -128,8 +128,8 @@ def test_without_coulomb_friction_the_limit_by_simulation_and_by_response_agree(
 @pytest.mark.medium
 def test_a_weaker_felt_force_bears_stiffer_tissue_in_proportion():
     halved = replace(IDEAL, device=IDEAL.device._replace(force=0.5))
-    margins = haptic.margins(halved, THESIS, haptic.response(halved))
-    assert_allclose(margins.stiffness, 2.0 * sampled_limit(THESIS, 0.0, 100.0), rtol=0.03)
+    margins = haptic.margins(halved, THESIS_HAND, haptic.response(halved))
+    assert_allclose(margins.stiffness, 2.0 * sampled_limit(THESIS_HAND, 0.0, 100.0), rtol=0.03)
 
 
 def test_the_thesis_s_hand_is_thrown_out_of_reach_and_the_firm_one_is_not():

@@ -56,7 +56,7 @@ def said(*options: str, code: int = 0) -> str:
 
 def test_the_shipped_file_says_what_is_taken_where_none_says_another(tmp_path):
     shipped = read(written(tmp_path, SHIPPED))
-    assert canonical(haptic.filled(shipped)) == canonical(haptic.filled(HapticScenario()))
+    assert canonical(haptic.complete_scenario(shipped)) == canonical(haptic.complete_scenario(HapticScenario()))
     assert (shipped.body, shipped.noise) == (SLIDE, SLIDE_NOISE)
     assert canonical(read(written(tmp_path, ""))) == canonical(HapticScenario())
 
@@ -123,13 +123,13 @@ def test_a_file_that_is_not_there_or_is_no_toml_is_said(tmp_path):
 def test_what_is_left_open_is_filled_and_what_is_stated_is_kept(tmp_path):
     stated = read(written(tmp_path, SHORT))
     body = SLIDE._replace(inertia=3.0)
-    assert haptic.filled(stated).stiffness == 100.0
-    assert haptic.filled(HapticScenario(), stiffness=333.0).stiffness == 333.0
-    found = haptic.filled(stated, body)
+    assert haptic.complete_scenario(stated).stiffness == 100.0
+    assert haptic.complete_scenario(HapticScenario(), stiffness=333.0).stiffness == 333.0
+    found = haptic.complete_scenario(stated, body)
     assert (found.body, found.assumed_body) == (body, body)
     own = replace(stated, body=SLIDE)
     assert (
-        haptic.filled(own, body).assumed_body == SLIDE
+        haptic.complete_scenario(own, body).assumed_body == SLIDE
     )  # the filter assumes the true body, unless the file says another
 
 
@@ -201,7 +201,7 @@ def test_a_study_that_names_no_such_file_is_told(study, value, words):
 
 
 def test_a_plan_begins_and_ends_where_it_says(tmp_path):
-    scenario = haptic.filled(read(written(tmp_path, SHORT)))
+    scenario = haptic.complete_scenario(read(written(tmp_path, SHORT)))
     run = haptic.experiment(scenario, scenario.hands[0][1])
     assert run.plan[0] == pytest.approx(-0.01)
     assert run.plan[50] == pytest.approx(0.01)

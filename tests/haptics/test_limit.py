@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.haptics.maths import bimodal
-from davinci_forces.haptics.maths.bimodal import THESIS, cqlf_limit, switching_limit
+from davinci_forces.haptics.maths.bimodal import THESIS_HAND, cqlf_limit, switching_limit
 from davinci_forces.haptics.maths.delay import delay_limit, sampled_limit
 from davinci_forces.haptics.maths.lmi import cqlf_exists
 from davinci_forces.haptics.maths.motion import leaving_limit
@@ -55,27 +55,29 @@ def records():
 def test_the_map_is_cut_by_the_exact_border(records):
     cells, exact = only(records, StabilityMap), only(records, StabilityLimit)
     assert len(cells) == 900
-    border = np.array([cqlf_limit(THESIS._replace(k=k)) for k in cells.k_h.tolist()])
+    border = np.array([cqlf_limit(THESIS_HAND._replace(k=k)) for k in cells.k_h.tolist()])
     assert np.array_equal(cells.has_cqlf == 1, cells.tissue_stiffness < border)
     assert 100 < cells.has_cqlf.sum() < 800
     assert (exact.k_t_switching > exact.k_t_cqlf).all()
 
 
 def test_what_is_shipped_of_the_thesis_s_hand_is_what_is_found_of_it():
-    for k, proved in zip(bimodal.K_H.tolist(), bimodal.PROVED, strict=True):
-        assert cqlf_exists(THESIS._replace(k=k), bimodal.K_T).tolist() == [i < proved for i in range(len(bimodal.K_T))]
-    held = [sampled_limit(THESIS, delay, bimodal.LINK_RATE) for delay in bimodal.DELAYS.tolist()]
-    assert_allclose(bimodal.HELD, held, rtol=1e-9)
-    simulated = bimodal.DELAYS[bimodal.SIMULATED].tolist()
-    leaving = [leaving_limit(THESIS, delay, delay_limit(THESIS, delay)) for delay in simulated]
-    assert_allclose(bimodal.LEAVING, leaving, rtol=1e-9)
+    for k, proved in zip(bimodal.K_H.tolist(), bimodal.CQLF_COUNTS, strict=True):
+        assert cqlf_exists(THESIS_HAND._replace(k=k), bimodal.K_T).tolist() == [
+            i < proved for i in range(len(bimodal.K_T))
+        ]
+    held = [sampled_limit(THESIS_HAND, delay, bimodal.LINK_RATE) for delay in bimodal.DELAYS.tolist()]
+    assert_allclose(bimodal.SAMPLED_LIMITS, held, rtol=1e-9)
+    simulated = bimodal.DELAYS[bimodal.SIMULATED_DELAYS].tolist()
+    leaving = [leaving_limit(THESIS_HAND, delay, delay_limit(THESIS_HAND, delay)) for delay in simulated]
+    assert_allclose(bimodal.LEAVING_LIMITS, leaving, rtol=1e-9)
 
 
 def test_the_delay_s_limits_are_those_of_the_thesis_s_hand(records):
     late = only(records, DelayLimit)
     i = 20
-    assert_allclose(late.k_t_delay[i], delay_limit(THESIS, late.delay[i]))
-    assert_allclose(late.k_t_held[i], sampled_limit(THESIS, late.delay[i], 100.0))
+    assert_allclose(late.k_t_delay[i], delay_limit(THESIS_HAND, late.delay[i]))
+    assert_allclose(late.k_t_held[i], sampled_limit(THESIS_HAND, late.delay[i], 100.0))
     short = late.delay < 0.1  # beyond, the limit rises again with the delay
     assert (late.k_t_held[short] < late.k_t_delay[short]).all()
     simulated = np.isfinite(late.k_t_leaving)
@@ -86,17 +88,17 @@ def test_the_delay_s_limits_are_those_of_the_thesis_s_hand(records):
 def test_the_lag_is_the_default_filter_s_largest_on_the_joint_that_slides(records):
     tissue = only(records, TissueLimit)
     assert (tissue.lag_of, tissue.force_lag) == ("instrument_slide", 0.09)
-    assert_allclose(tissue.k_t_lag, sampled_limit(THESIS, 0.09, 100.0))
-    damped = THESIS._replace(b=tissue.damping_needed)
+    assert_allclose(tissue.k_t_lag, sampled_limit(THESIS_HAND, 0.09, 100.0))
+    damped = THESIS_HAND._replace(b=tissue.damping_needed)
     assert_allclose(sampled_limit(damped, 0.09, 100.0), K, rtol=0.01)
-    assert_allclose(cqlf_limit(THESIS._replace(k=tissue.k_h_needed)), K)
+    assert_allclose(cqlf_limit(THESIS_HAND._replace(k=tissue.k_h_needed)), K)
 
 
 def test_the_motion_grows_by_the_worst_switching_and_comes_to_rest_as_it_is(records):
     runs = {record.switching: record for record in records if isinstance(record, HapticMotion)}
     for name, grows in (("worst", True), ("at contact", False)):
         V, run = runs[name].V, runs[name]
-        assert run.tissue_stiffness > switching_limit(THESIS)
+        assert run.tissue_stiffness > switching_limit(THESIS_HAND)
         assert (V[-100:].max() > V[:100].max()) == grows
 
 

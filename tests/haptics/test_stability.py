@@ -11,7 +11,7 @@ from scipy.sparse import csc_array
 
 from davinci_forces.haptics.maths import lmi, motion
 from davinci_forces.haptics.maths.bimodal import Hand, cqlf_limit, energy, log_growth, mode, switching_limit
-from davinci_forces.haptics.maths.motion import switched, worst
+from davinci_forces.haptics.maths.motion import simulate_switching, worst
 from davinci_forces.maths.estimation import conic
 
 HANDS = (Hand(1.0, 1.0, 100.0), Hand(1.0, 30.0, 100.0), Hand(0.2, 0.05, 2000.0), Hand(1.0, 20.0, 100.0))
@@ -72,7 +72,9 @@ def test_the_worst_switching_grows_beyond_its_limit_and_dies_out_below(hand):
     limit = switching_limit(hand)
     assert limit > cqlf_limit(hand)
     for share in (0.97, 1.03):
-        run = switched(hand, share * limit, (0.0, 1.0), 12.0 / hand.frequency * (1.0 + hand.damping_ratio()), worst)
+        run = simulate_switching(
+            hand, share * limit, (0.0, 1.0), 12.0 / hand.frequency * (1.0 + hand.damping_ratio()), worst
+        )
         speeds = [at_the_axis(hand, share * limit, run, i) for i in np.flatnonzero(np.diff(np.sign(run.x[1:]))) + 1]
         assert len(speeds) > 2
         assert (speeds[-1] > speeds[0]) == (share > 1.0)
@@ -95,7 +97,7 @@ def test_no_switching_at_random_grows_below_the_limit(share):
     for angle in rng.uniform(0.0, np.pi, (30, 2)):
         (a, b), (c, d) = np.cos(angle), np.sin(angle)
         law = lambda x, dx, a=a, b=b, c=c, d=d: (a * x + c * dx / hand.frequency) * (b * x + d * dx / hand.frequency)
-        run = switched(hand, k_t, (0.01, 0.0), 12.0, law)
+        run = simulate_switching(hand, k_t, (0.01, 0.0), 12.0, law)
         first, last = (np.hypot(run.x[part], run.dx[part] / 10.0).max() for part in (slice(0, 100), slice(-100, None)))
         assert last < first
 
@@ -105,7 +107,7 @@ def test_the_energy_never_rises_where_the_tissue_acts_on_one_side_of_its_surface
     for hand, rng in hands(100, 2):
         k_t = cqlf_limit(hand) * 10 ** rng.uniform(0.0, 2.0)
         x, dx = rng.normal(size=2) * [0.01, 0.01 * hand.frequency]
-        run = switched(hand, k_t, (float(x), float(dx)), 10.0 / hand.frequency)
+        run = simulate_switching(hand, k_t, (float(x), float(dx)), 10.0 / hand.frequency)
         V = energy(hand, k_t, run.x, run.dx)
         assert np.diff(V).max() <= 1e-13 * V[0]
         assert_allclose(V[0] - V[-1], hand.b * np.trapezoid(run.dx**2, run.t), rtol=1e-2)
@@ -113,7 +115,7 @@ def test_the_energy_never_rises_where_the_tissue_acts_on_one_side_of_its_surface
 
 def test_a_run_is_that_of_a_solver_of_differential_equations():
     hand, k_t = HANDS[0], 457.24
-    run = switched(hand, k_t, (-0.01, 0.5), 3.0)
+    run = simulate_switching(hand, k_t, (-0.01, 0.5), 3.0)
 
     def rate(t, state):
         return state[1], -(hand.k * state[0] + hand.b * state[1] + k_t * max(state[0], 0.0)) / hand.m

@@ -7,7 +7,7 @@ from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 from davinci_forces.cli import app
-from davinci_forces.haptics.maths.bimodal import THESIS
+from davinci_forces.haptics.maths.bimodal import THESIS_HAND
 from davinci_forces.haptics.maths.delay import delay_limit, sampled_limit
 
 
@@ -36,9 +36,9 @@ def test_options_are_the_hand_s():
 
 
 def test_a_delay_or_a_rate_adds_the_limit_of_a_late_force():
-    assert_allclose(limits("--delay", "0.05")["k_t_delay"], delay_limit(THESIS, 0.05))
-    assert_allclose(limits("--rate", "100")["k_t_delay"], sampled_limit(THESIS, 0.0, 100.0))
-    assert_allclose(limits("--delay", "0.05", "--rate", "100")["k_t_delay"], sampled_limit(THESIS, 0.05, 100.0))
+    assert_allclose(limits("--delay", "0.05")["k_t_delay"], delay_limit(THESIS_HAND, 0.05))
+    assert_allclose(limits("--rate", "100")["k_t_delay"], sampled_limit(THESIS_HAND, 0.0, 100.0))
+    assert_allclose(limits("--delay", "0.05", "--rate", "100")["k_t_delay"], sampled_limit(THESIS_HAND, 0.05, 100.0))
     assert limits("--delay", "0")["k_t_delay"] is None  # no limit
 
 

@@ -7,8 +7,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.filters import FILTERS, tracker
-from davinci_forces.filters.problem import Driven, NoiseModel
-from davinci_forces.identification.observations import observed
+from davinci_forces.filters.problem import FilterInput, NoiseModel
+from davinci_forces.identification.observations import observe
 from davinci_forces.maths.mechanics.rigid_body import inverse_dynamics, mass_matrix
 from davinci_forces.maths.models import bias as derivation
 from davinci_forces.maths.models import kernels, terms
@@ -20,12 +20,12 @@ from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.records import Motion
 from davinci_forces.robots.davinci_chain import BODIES, CHAIN
 
-DAHL = terms.presliding(0.01)
+DAHL = terms.presliding_friction(0.01)
 T_S = 0.005
 
 
 UNITS = {"inertia": "kg m^2", "effort": "N m", "position": "rad", "gain": ""}
-FRICTION = ((terms.viscous, terms.presliding(0.02)), (terms.viscous, terms.coulomb))
+FRICTION = ((terms.viscous, terms.presliding_friction(0.02)), (terms.viscous, terms.coulomb))
 
 
 def coupled(rows=(0, 1), group="arm"):
@@ -105,7 +105,7 @@ def test_rows_for_a_fit_are_low_passed_piece_by_piece_as_they_would_be_at_once(m
         Motion("log", name, *about, t, q, dq, ddq, q, dq, own, motion.segment, still)
         for name, q, dq, ddq, own in columns
     ]
-    log = observed(records, (), 4.0, 0)
+    log = observe(records, (), 4.0, 0)
     at_once = log.rows(coupled())
     monkeypatch.setattr("davinci_forces.maths.models.memory.PIECE_SAMPLES", 700)
     for piecewise, whole in zip(log.rows(coupled()), at_once, strict=True):
@@ -156,7 +156,7 @@ def test_a_filter_tracks_each_joint_of_a_coupled_arm_with_what_the_model_says_of
         push = np.where((t > 8) & (t < 12), 1.0, 0.0)
         y = (motion.q[:, i] + 1e-5 * rng.normal(size=4000), motion.dq[:, i] + 1e-4 * rng.normal(size=4000))
         made, untold = (
-            tracker(name)(Driven(told, *y, motion.ddq[:, i], tau[:, i] + push, T_S, 1.0), noise)
+            tracker(name)(FilterInput(told, *y, motion.ddq[:, i], tau[:, i] + push, T_S, 1.0), noise)
             for told in (joint, joint._replace(known=np.zeros(4000)))
         )
         inside, outside = (t > 9) & (t < 12), (t > 1) & (t < 8)

@@ -8,21 +8,21 @@ from davinci_forces.identification import unseen
 from davinci_forces.identification.candidates import Library
 from davinci_forces.identification.unseen import RefitModel
 from davinci_forces.maths.selection import (
-    BLOCKS,
-    MOST,
-    Judged,
+    MAX_GROUPS,
+    PATH_BLOCKS,
+    CrossValidation,
     Ridge,
+    choose_candidate,
+    combine_efforts,
     covariance,
-    gathered,
-    judged,
+    cross_validate,
     left_out,
     path_blocks,
     penalty,
-    preferred,
     side_by_side,
     solve,
     standard_error,
-    together,
+    sum_equations,
 )
 from davinci_forces.robots import davinci
 from davinci_forces.robots.models import independent
@@ -36,20 +36,20 @@ PLAIN = Ridge(0.0, np.ones(1), np.zeros((0, 0)))
 
 
 def test_leaving_cells_out_is_least_squares_on_the_other_rows():
-    equations = gathered(PHI, TAU, CELL, CELLS)
+    equations = sum_equations(PHI, TAU, CELL, CELLS)
     out = np.arange(CELLS) < 2
     kept = ~out[CELL]
     theta, *_ = np.linalg.lstsq(PHI[kept, 0], TAU[kept, 0])
-    assert_allclose(solve(equations.without(out), PLAIN), theta, rtol=1e-10)
+    assert_allclose(solve(equations.omit_cells(out), PLAIN), theta, rtol=1e-10)
     error = TAU[~kept, 0] - PHI[~kept, 0] @ theta
-    assert equations.of(out).errors(theta)[0, 0] == pytest.approx(error @ error, rel=1e-9)
+    assert equations.sum_cells(out).errors(theta)[0, 0] == pytest.approx(error @ error, rel=1e-9)
 
 
 def test_logs_side_by_side_are_those_gathered_together_and_one_that_is_not_there_counts_nothing():
     log = np.arange(N) * 3 // N
-    parts = [gathered(PHI[log == i], TAU[log == i], CELL[log == i], CELLS) for i in (0, 2)]
+    parts = [sum_equations(PHI[log == i], TAU[log == i], CELL[log == i], CELLS) for i in (0, 2)]
     there = log != 1
-    together = gathered(PHI[there], TAU[there], (CELL + CELLS * log)[there], 4 * CELLS)
+    together = sum_equations(PHI[there], TAU[there], (CELL + CELLS * log)[there], 4 * CELLS)
     for whole, placed in zip(together, side_by_side(parts, (0, 2), 4), strict=True):
         assert_allclose(placed, whole, rtol=0, atol=0)
 
@@ -59,7 +59,7 @@ def test_refits_that_several_logs_ask_for_are_made_once(monkeypatch):
     model = independent(davinci.ROBOT.joint("hand_roll"))
     p = len(model.parameters)
     Phi = RNG.normal(size=(N, 1, p))
-    cells = gathered(Phi, Phi @ np.ones(p), CELL, CELLS)
+    cells = sum_equations(Phi, Phi @ np.ones(p), CELL, CELLS)
     library = Library(model, (), ((),), np.array([N]), cells, cells, np.empty(0))
     made = RefitModel(model, library, PLAIN, list(range(p)), 1)
     solved = []
@@ -73,7 +73,7 @@ def test_what_is_predicted_has_not_been_seen():
     """Effort that only one cell holds is predicted from the others, which know nothing of it."""
     tau = TAU + 100.0 * (CELL == 0)[:, None] * PHI[:, :, 0]
     schemes = [np.eye(CELLS, dtype=bool)]
-    by_itself = judged(gathered(PHI, tau, CELL, CELLS), PLAIN, schemes)
+    by_itself = cross_validate(sum_equations(PHI, tau, CELL, CELLS), PLAIN, schemes)
     kept = CELL != 0
     theta, *_ = np.linalg.lstsq(PHI[kept, 0], tau[kept, 0])
     error = tau[~kept, 0] - PHI[~kept, 0] @ theta
@@ -81,7 +81,7 @@ def test_what_is_predicted_has_not_been_seen():
 
 
 def test_a_ridge_is_least_squares_with_rows_of_scaled_columns():
-    equations = gathered(PHI, TAU, CELL, 1 + CELL.max()).of(np.ones(CELLS, bool))
+    equations = sum_equations(PHI, TAU, CELL, 1 + CELL.max()).sum_cells(np.ones(CELLS, bool))
     size = np.linalg.norm(PHI[:, 0], axis=0)
     rows = np.vstack([PHI[:, 0], np.sqrt(0.3) * np.diag(size)])
     theta, *_ = np.linalg.lstsq(rows, np.append(TAU[:, 0], np.zeros(P)))
@@ -98,7 +98,7 @@ def test_the_penalty_of_combinations_is_that_of_the_smallest_parts_they_can_have
 
 def test_dependent_columns_are_refused_unless_a_ridge_tells_them_apart():
     twice = np.concatenate([PHI, PHI[:, :, :1]], axis=2)
-    equations = gathered(twice, TAU, CELL, CELLS).of(np.ones(CELLS, bool))
+    equations = sum_equations(twice, TAU, CELL, CELLS).sum_cells(np.ones(CELLS, bool))
     with pytest.raises(np.linalg.LinAlgError, match="dependent"):
         solve(equations, PLAIN)
     theta = solve(equations, PLAIN._replace(strength=1e-6))
@@ -106,7 +106,7 @@ def test_dependent_columns_are_refused_unless_a_ridge_tells_them_apart():
 
 
 def test_the_covariance_of_parameters_is_the_textbook_s_without_a_ridge():
-    equations = gathered(PHI, TAU, CELL, CELLS).of(np.ones(CELLS, bool))
+    equations = sum_equations(PHI, TAU, CELL, CELLS).sum_cells(np.ones(CELLS, bool))
     expected = 0.01 * np.linalg.inv(PHI[:, 0].T @ PHI[:, 0])
     assert_allclose(covariance(equations, PLAIN, np.array([0.01])), expected, rtol=1e-9)
 
@@ -124,33 +124,33 @@ def test_blocks_are_sixths_of_the_period_or_of_the_recording():
 
 @pytest.mark.parametrize("logs", [1, 2, 7, 100])
 def test_every_scheme_leaves_every_cell_out_once_in_few_groups(logs):
-    log, block = np.repeat(np.arange(logs), BLOCKS), np.tile(np.arange(BLOCKS), logs)
+    log, block = np.repeat(np.arange(logs), PATH_BLOCKS), np.tile(np.arange(PATH_BLOCKS), logs)
     schemes = left_out(log, block)
     assert len(schemes) == (2 if logs == 1 else 3)
     for groups in schemes:
         assert_allclose(groups.sum(axis=0), 1)
-    assert sum(map(len, schemes)) <= MOST
+    assert sum(map(len, schemes)) <= MAX_GROUPS
 
 
-def worth(error: float, spread: float = 0.0, seed: int = 0) -> Judged:
+def worth(error: float, spread: float = 0.0, seed: int = 0) -> CrossValidation:
     """A candidate of this relative error, its groups' errors scattered by this share."""
     shares = 1.0 + spread * np.random.default_rng(seed).uniform(-1, 1, (6, 1))
-    return Judged((error**2 * shares / shares.sum(),), np.array([error]))
+    return CrossValidation((error**2 * shares / shares.sum(),), np.array([error]))
 
 
 def test_the_smallest_is_preferred_unless_it_is_clearly_worse():
     doubtful = [worth(0.100, 0.9, 1), worth(0.101, 0.9, 2), worth(0.5)]
     assert standard_error(doubtful[1], doubtful[0]) > 0.001
-    assert preferred(doubtful, [20, 10, 5], [True] * 3) == (1, 0)
+    assert choose_candidate(doubtful, [20, 10, 5], [True] * 3) == (1, 0)
     certain = [worth(0.100), worth(0.101), worth(0.5)]  # all groups alike: a difference is one
-    assert preferred(certain, [20, 10, 5], [True] * 3) == (0, 0)
+    assert choose_candidate(certain, [20, 10, 5], [True] * 3) == (0, 0)
 
 
 def test_a_candidate_that_physics_forbids_is_not_chosen_however_good():
-    assert preferred([worth(0.01), worth(0.1)], [3, 3], [False, True]) == (1, 1)
+    assert choose_candidate([worth(0.01), worth(0.1)], [3, 3], [False, True]) == (1, 1)
     with pytest.raises(ValueError, match="empty"):
-        preferred([worth(0.1)], [3], [False])
+        choose_candidate([worth(0.1)], [3], [False])
 
 
 def test_fits_of_different_efforts_make_one_candidate_of_their_mean_error():
-    assert together([worth(0.1), worth(0.3)]).score == pytest.approx(0.2)
+    assert combine_efforts([worth(0.1), worth(0.3)]).score == pytest.approx(0.2)

@@ -13,7 +13,7 @@ from numpy.testing import assert_allclose
 from typer.testing import CliRunner
 
 from davinci_forces.cli import app
-from davinci_forces.maths.estimation.drift import holm, scatter, stands_out, trend
+from davinci_forces.maths.estimation.drift import holm, outlier_probabilities, scatter, trend
 from davinci_forces.report.content import literal
 from davinci_forces.report.content.inline import Span, parse
 
@@ -212,7 +212,11 @@ def test_what_is_constant_alarms_no_more_often_than_stated():
     random, alarms = np.random.default_rng(2), 0
     for _ in range(300):
         x = random.normal(size=10)
-        p = [trend(np.arange(10.0), x, np.ones(10)).p, scatter(x, np.ones(10)), *stands_out(x, np.ones(10)).tolist()]
+        p = [
+            trend(np.arange(10.0), x, np.ones(10)).p,
+            scatter(x, np.ones(10)),
+            *outlier_probabilities(x, np.ones(10)).tolist(),
+        ]
         alarms += bool(holm(p, 0.05).any())
     assert alarms <= 15 + 4 * np.sqrt(15)
 

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from davinci_forces.report.content import Document, Equation, Number, Prose, Section, Table
-from davinci_forces.report.content.layout import place, references
+from davinci_forces.report.content.layout import number_blocks, references
 from davinci_forces.report.writers import pdf
 from davinci_forces.report.writers.typesetting import NotTypeset, typeset
 
@@ -66,7 +66,7 @@ def test_both_files_print_the_same_numbers(source: bytes, full: Document) -> Non
     text = read(source)
     for name in ("Figure 1.", "Figure 2.", "Figure 3.", "Table 1.", "(1)", "1.1"):
         assert name in text
-    for reference in references(place(full)).values():
+    for reference in references(number_blocks(full)).values():
         assert reference.split()[-1].strip(".") in text
 
 

@@ -7,7 +7,7 @@ from report_documents import HOSTILE
 
 from davinci_forces.report.content import Document, Equation, Number, Prose, Section, Table, literal
 from davinci_forces.report.content.inline import Span, parse, printable
-from davinci_forces.report.content.layout import columns, place, references
+from davinci_forces.report.content.layout import columns, number_blocks, references
 
 anything = st.text(st.one_of(st.sampled_from("\\$`*[]@a "), st.characters()))
 
@@ -40,7 +40,7 @@ def test_marks_are_read_and_a_mark_without_its_partner_is_text() -> None:
 
 
 def test_sections_equations_figures_and_tables_are_numbered_in_reading_order(full: Document) -> None:
-    assert references(place(full)) == {
+    assert references(number_blocks(full)) == {
         "first": "Section 1",
         "method": "Section 1.1",
         "second": "Section 2",
@@ -55,7 +55,7 @@ def test_sections_equations_figures_and_tables_are_numbered_in_reading_order(ful
 
 def test_a_reference_that_leads_nowhere_is_named() -> None:
     with pytest.raises(ValueError, match="nowhere"):
-        place(Document("T", "s", False, (Section("A", "a", (Prose("[@a] and [@nowhere]"),)),)))
+        number_blocks(Document("T", "s", False, (Section("A", "a", (Prose("[@a] and [@nowhere]"),)),)))
 
 
 def test_two_blocks_of_one_label_are_refused() -> None:

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from report_documents import zoomable
 
 from davinci_forces.report.content import Band, Figure, Line, Panel, Points
-from davinci_forces.report.content.document import HELD
+from davinci_forces.report.content.document import MAX_POINTS_OF_MARK
 from davinci_forces.report.content.thinning import envelope, thin_mark
 from davinci_forces.report.writers.numbers import thin_figure
 
@@ -83,8 +83,8 @@ def test_a_figure_holds_so_many_points_of_a_long_mark_and_knows_how_many_there_w
     line, band, points = figure.panels[0].marks
     assert isinstance(line, Line)
     assert isinstance(band, Band)
-    assert 0.9 * HELD < len(line.x) <= HELD
-    assert 0.9 * HELD < 2 * len(band.x) <= HELD
+    assert 0.9 * MAX_POINTS_OF_MARK < len(line.x) <= MAX_POINTS_OF_MARK
+    assert 0.9 * MAX_POINTS_OF_MARK < 2 * len(band.x) <= MAX_POINTS_OF_MARK
     assert points is short
     assert line.x[line.y == 7.0] == [654_321.0]
     result = thin_figure(figure, 1000)

@@ -122,6 +122,6 @@ def test_the_research_kit_s_counterweight_keeps_to_the_back_link():
 def test_what_is_said_of_many_poses_so_many_at_a_time_is_what_is_said_of_all(N, monkeypatch):
     monkeypatch.setattr(kinematics, "POSES_AT_ONCE", 10)
     q, asked = np.random.default_rng(N).normal(size=(N, 3)), []
-    found = kinematics.along(lambda some: asked.append(len(some)) or kinematics.tip(PSM, some), q)
+    found = kinematics.evaluate_in_blocks(lambda some: asked.append(len(some)) or kinematics.tip(PSM, some), q)
     assert found.tolist() == kinematics.tip(PSM, q).tolist()
     assert max(asked) <= 10

@@ -5,7 +5,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.maths.constants import GRAVITY
-from davinci_forces.maths.contact.weighing import mirrored, moved_with, unit_load
+from davinci_forces.maths.contact.weighing import mirror_position, moved_with, unit_load
 from davinci_forces.maths.mechanics.kinematics import frames, remote_centre
 from davinci_forces.robots import davinci, dvrk_psm
 
@@ -78,7 +78,7 @@ def test_the_slide_carries_a_mass_on_the_carriage_and_none_on_the_end_link():
 
 
 def test_the_other_side_of_a_link_is_as_high_and_as_far_out():
-    assert_allclose(mirrored(AT), [-0.03, 0.024, 0.35])
+    assert_allclose(mirror_position(AT), [-0.03, 0.024, 0.35])
 
 
 def test_a_coordinate_that_moves_nothing_towards_the_tip_carries_nothing():

@@ -59,7 +59,7 @@ def test_the_second_jaw_counts_with_the_seventh_coordinate_only():
 def test_masses_known_badly_scale_every_effort_alike():
     q, dq, ddq = motions(6, 5)
     np.testing.assert_allclose(
-        rigid_body.inverse_dynamics(CHAIN, BODIES.scaled(0.9), q, dq, ddq),
+        rigid_body.inverse_dynamics(CHAIN, BODIES.with_density_factor(0.9), q, dq, ddq),
         0.9 * rigid_body.inverse_dynamics(CHAIN, BODIES, q, dq, ddq),
     )
 

@@ -23,7 +23,7 @@ VISCOUS = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])  # the initial guesses of Tab
 @cache
 def study(integral: bool, masses: float, start: str, duration: float) -> Regulated:
     plant = arm(ROBOT.chain, ROBOT.bodies, REST)
-    known = arm(ROBOT.chain, ROBOT.bodies.scaled(masses), REST)
+    known = arm(ROBOT.chain, ROBOT.bodies.with_density_factor(masses), REST)
     law = Regulator(K_P, K_D, K_I if integral else REST, 1.0)
     here, there = (POSE, REST) if start == "pose" else (REST, POSE)
     return regulate(plant, known, law, VISCOUS, here, there, duration)

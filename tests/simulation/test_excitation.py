@@ -74,13 +74,13 @@ def test_ranges_are_reached_and_never_left(series):
 def test_a_vector_of_coefficients_gives_the_series_back():
     series = Fourier(0.1, (1.0, 2.0), (3.0, 4.0), 7.0)
     assert series.x.tolist() == [0.1, 1.0, 3.0, 2.0, 4.0]
-    assert Fourier.of(series.x, 7.0) == series
+    assert Fourier.from_coefficients(series.x, 7.0) == series
 
 
 @pytest.mark.parametrize("name", TABLE_6_1)
 def test_table_6_1_has_its_printed_objective(name):
     x, period, printed = TABLE_6_1[name]
-    F = observation(ROBOT.joint(name).terms, Fourier.of(np.array(x), period))
+    F = observation(ROBOT.joint(name).terms, Fourier.from_coefficients(np.array(x), period))
     assert determinant(F) == pytest.approx(printed, abs=1e-3)
     assert determinant(F) == pytest.approx(-np.log10(np.linalg.det(F.T @ F)), abs=1e-9)
     assert 10 ** condition(F) == pytest.approx(np.linalg.cond(F), rel=1e-9)

@@ -22,7 +22,7 @@ def arm() -> ArmExcitationProblem:
 
 def series(seed: int) -> list[Fourier]:
     x = np.random.default_rng(seed).uniform(-0.1, 0.1, (3, 5))
-    return [Fourier.of(each, 8.0) for each in x]
+    return [Fourier.from_coefficients(each, 8.0) for each in x]
 
 
 def test_the_base_columns_explain_the_efforts_of_links_rotors_and_friction(arm):

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from davinci_forces.maths.excitation.fourier import Fourier, motion, ranges
 from davinci_forces.maths.excitation.joint import delay, extremes, from_standstill, scale_to_limits
-from davinci_forces.maths.excitation.search import descend, lowest
+from davinci_forces.maths.excitation.search import descend, minimise
 
 LIMITS = ((-0.3, 0.5), (-1.0, 0.2), (-np.inf, 2.0))
 numbers = st.lists(st.floats(-1e3, 1e3).filter(lambda c: c == 0 or abs(c) > 1e-3), min_size=3, max_size=11).filter(
@@ -22,20 +22,20 @@ def stairs(z):
 
 
 def test_a_minimum_among_jumps_and_kinks_is_found():
-    best = lowest(stairs, 3, 8, 0)
+    best = minimise(stairs, 3, 8, 0)
     assert np.abs(stairs(best.z[None]) - 0).max() < 1e-5
     assert best.values.min() == stairs(best.z[None])[0]
 
 
 def test_more_starts_begin_with_the_same_ones():
-    few, more = lowest(stairs, 3, 2, 5), lowest(stairs, 3, 4, 5)
+    few, more = minimise(stairs, 3, 2, 5), minimise(stairs, 3, 4, 5)
     assert few.values.tolist() == more.values[:2].tolist()
-    assert lowest(stairs, 3, 2, 6).values.tolist() != few.values.tolist()
+    assert minimise(stairs, 3, 2, 6).values.tolist() != few.values.tolist()
 
 
 def test_each_start_is_told_of_when_it_is_done():
     heard = []
-    best = lowest(stairs, 3, 3, 0, lambda *start: heard.append(start))
+    best = minimise(stairs, 3, 3, 0, lambda *start: heard.append(start))
     assert heard == [(i + 1, 3, value) for i, value in enumerate(best.values)]
 
 
@@ -46,7 +46,7 @@ def test_where_nothing_is_worth_anything_the_search_ends_without_a_warning():
 @given(numbers, st.floats(0.5, 20))
 def test_any_numbers_are_a_trajectory_within_the_limits(z, period):
     x = scale_to_limits(np.array([z]), LIMITS, period)[0]
-    for (low, high), (lowest_, highest) in zip(LIMITS, ranges(Fourier.of(x, period)), strict=True):
+    for (low, high), (lowest_, highest) in zip(LIMITS, ranges(Fourier.from_coefficients(x, period)), strict=True):
         room = 1e-6 * max(abs(low) if np.isfinite(low) else 0.0, abs(high))
         assert low - room <= lowest_
         assert highest <= high + room
@@ -58,7 +58,7 @@ def test_harmonics_of_size_one_touch_a_limit_and_the_mean_goes_through_the_slack
     lowest_, highest = extremes(c, 7.0)
     size = max((highest[0] - lowest_[0]) / 0.8, lowest_[1] / -1.0, highest[1] / 0.2, highest[2] / 2.0)
     x = scale_to_limits(np.column_stack([[mean], c / size]), LIMITS, 7.0)[0]
-    q, dq, ddq = ranges(Fourier.of(x, 7.0))
+    q, dq, ddq = ranges(Fourier.from_coefficients(x, 7.0))
     used = max((q[1] - q[0]) / 0.8, dq[0] / -1.0, dq[1] / 0.2, ddq[1] / 2.0)
     assert used == pytest.approx(1, abs=2e-7)
     where = (q[0] + 0.3) / (0.8 - (q[1] - q[0]))
@@ -68,7 +68,7 @@ def test_harmonics_of_size_one_touch_a_limit_and_the_mean_goes_through_the_slack
 def test_extremes_on_the_grid_are_the_exact_ones_to_a_ten_millionth():
     c = np.random.default_rng(0).normal(size=(200, 6))
     lowest_, highest = extremes(c, 3.0)
-    exact = np.array([ranges(Fourier.of(np.array([0.0, *one]), 3.0)) for one in c])
+    exact = np.array([ranges(Fourier.from_coefficients(np.array([0.0, *one]), 3.0)) for one in c])
     size = np.abs(exact).max(axis=2)
     assert (np.abs(lowest_.T - exact[:, :, 0]) < 1e-7 * size).all()
     assert (np.abs(highest.T - exact[:, :, 1]) < 1e-7 * size).all()
@@ -81,6 +81,8 @@ def test_harmonics_stand_still_when_time_starts_but_for_the_phase_that_is_left()
     assert phase == pytest.approx(np.pi / 300 * z[:, 5] ** 3)
     for before, after, late in zip(known, delay(known, phase), phase, strict=True):
         t = np.linspace(0, 8, 50)
-        moved = motion(Fourier.of(after, 8.0), t)
-        for values, same in zip(moved, motion(Fourier.of(before, 8.0), t - late * 8 / (2 * np.pi)), strict=True):
+        moved = motion(Fourier.from_coefficients(after, 8.0), t)
+        for values, same in zip(
+            moved, motion(Fourier.from_coefficients(before, 8.0), t - late * 8 / (2 * np.pi)), strict=True
+        ):
             assert values == pytest.approx(same, abs=1e-12)

@@ -17,8 +17,8 @@ from davinci_forces.maths.tissue.indentation import (
     work,
 )
 from davinci_forces.maths.tissue.palpation import between_troughs
-from davinci_forces.maths.tissue.tissue import LAWS, judged, moments
-from davinci_forces.study import WHOLE
+from davinci_forces.maths.tissue.tissue import LAWS, cross_validate_law, moments
+from davinci_forces.study import WHOLE_LOG
 from tests.tissue.pushing import APPROACH, SURFACE, TWICE, K, coloured, motion, palpated, pressed, sensed, slid, touch
 
 SEEDS = 100
@@ -70,7 +70,7 @@ def test_the_stiffness_is_the_median_slope_of_the_pushes_that_are_straight():
     depth, number = np.tile(np.linspace(0, 2e-3, 10), 30), np.repeat(np.arange(5, 35), 10)
     force = rng.normal(450, 60, 30)[number - 5] * depth + 0.1 + 0.03 * rng.normal(size=300)
     force[:30] = rng.normal(size=30)  # three pushes that tell nothing
-    tissue, pushes, models, said = palpated([touch(push=number, depth=depth, force=force)], contact=WHOLE)
+    tissue, pushes, models, said = palpated([touch(push=number, depth=depth, force=force)], contact=WHOLE_LOG)
     lines = [np.polyfit(depth[number == n], force[number == n], 1) for n in np.unique(number)]
     r2 = [np.corrcoef(depth[number == n], force[number == n])[0, 1] ** 2 for n in np.unique(number)]
     straight_ones = np.array(lines)[np.array(r2) > 0.9, 0]
@@ -110,7 +110,7 @@ def test_loading_and_unloading_are_told_apart_by_what_is_lost_between_them():
     A, w, b, t = 0.02, 2 * np.pi / 4, 60.0, np.arange(1200) / 100
     depth = A * (1 - np.cos(w * t)) / 2
     force = K * depth + b * A * w * np.sin(w * t) / 2
-    tissue, _, models, _ = palpated([touch(t, depth=depth, force=force)], contact=WHOLE)
+    tissue, _, models, _ = palpated([touch(t, depth=depth, force=force)], contact=WHOLE_LOG)
     assert len(tissue) == 3
     np.testing.assert_allclose(tissue.lost, np.pi * b * w * A**2 / 4, rtol=0.02)
     assert models.chosen == "Kelvin-Voigt"
@@ -157,7 +157,7 @@ def test_models_are_judged_by_pushes_that_they_were_not_fitted_to():
         x, v, f = pushes[i]
         left = f - x * theta[0] - v * theta[1]
         squares.append(np.sum((left - left.mean()) ** 2))
-    found = judged(moments(pushes), next(law for law in LAWS if law.name == "Kelvin-Voigt"))
+    found = cross_validate_law(moments(pushes), next(law for law in LAWS if law.name == "Kelvin-Voigt"))
     np.testing.assert_allclose(found.errors, squares, rtol=1e-6)
 
 

@@ -13,7 +13,7 @@ from davinci_forces.errors import BadStudy
 from davinci_forces.logs import open_log
 from davinci_forces.records import Touch
 from davinci_forces.stages.recordings import ingest
-from davinci_forces.study import WHOLE, reading
+from davinci_forces.study import WHOLE_LOG, reading
 from tests import arm
 
 PROBES = """[[log]]
@@ -146,7 +146,7 @@ def test_what_a_tissue_log_lacks_is_said_with_its_remedy(tmp_path, old, new, say
 
 def test_all_of_a_log_is_contact_where_the_study_says_so(tmp_path):
     [entry] = reading.read(study(tmp_path)).logs
-    assert entry.contact == WHOLE
+    assert entry.contact == WHOLE_LOG
     assert not entry.needs_clock
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from davinci_forces.study import WHOLE
+from davinci_forces.study import WHOLE_LOG
 from tests.tissue.pushing import TWICE, coloured, motion, palpated, pressed, sensed, slid, touch
 
 
@@ -17,7 +17,7 @@ def of(depth_scale=1.0, force_scale=1.0, surface=0.008, contact=()):
 
 def test_pushes_that_are_right_are_passed_over_in_silence():
     assert not of()[1]
-    assert not of(contact=WHOLE, surface=0.0)[1]
+    assert not of(contact=WHOLE_LOG, surface=0.0)[1]
 
 
 def test_no_contact_is_said():
@@ -61,7 +61,7 @@ def test_both_signs_turned_is_the_same_tissue():
 
 
 def test_pushes_of_which_no_line_explains_enough_are_said():
-    tissue, _, _, [said] = palpated([sensed(std=3.0)], contact=WHOLE)
+    tissue, _, _, [said] = palpated([sensed(std=3.0)], contact=WHOLE_LOG)
     assert tissue.pushes == 0
     assert np.isnan(tissue.stiffness)
     assert "no push counts: a straight line explains at most" in said

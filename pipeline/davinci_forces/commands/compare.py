@@ -14,7 +14,7 @@ import typer
 from davinci_forces.runner.console import echo
 
 if TYPE_CHECKING:
-    from davinci_forces.report.changes import Change, Stated
+    from davinci_forces.report.changes import Change, StatedValue
 
 
 def run(
@@ -49,7 +49,7 @@ def _plain(value: Any) -> Any:
     return str(value) if isinstance(value, float) and not isfinite(value) else value
 
 
-def _lines(differing: list["Change"], before: dict[str, "Stated"], after: dict[str, "Stated"]) -> list[str]:
+def _lines(differing: list["Change"], before: dict[str, "StatedValue"], after: dict[str, "StatedValue"]) -> list[str]:
     """The comparison as lines of text."""
     changed = [change for change in differing if change.before and change.after]
     shared = [key for key in before if key in after]
@@ -74,7 +74,7 @@ def _cells(change: "Change") -> tuple[str, ...]:
             "" if change.z is None else f"{change.z:+.1f}")  # fmt: skip
 
 
-def _pair(a: "Stated", b: "Stated") -> tuple[str, str]:
+def _pair(a: "StatedValue", b: "StatedValue") -> tuple[str, str]:
     """Two values with their units, in at least 5 digits and as many as show the difference."""
     from davinci_forces.report.results import format_unit
 

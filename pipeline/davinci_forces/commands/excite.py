@@ -98,7 +98,7 @@ def _lines(e: "ExcitationTrajectory") -> list[str]:
     for symbol, (low, high) in facts["ranges"].items():
         lower, upper = facts["limits"][symbol]
         lines += [f"  {symbol:3} from {low:.5f} to {high:.5f}, limits {lower:g} and {upper:g}"]
-    return lines + [f"  LIMIT EXCEEDED: {text}" for text in e.broken]
+    return lines + [f"  LIMIT EXCEEDED: {text}" for text in e.violations]
 
 
 def _spread(starts: dict[str, float | None]) -> str:

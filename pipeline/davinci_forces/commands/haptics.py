@@ -33,7 +33,7 @@ def run(
     from davinci_forces.haptics import loop as haptic
     from davinci_forces.haptics import scenario as haptics
 
-    answer = _answer(haptic.filled(haptics.read(scenario) if scenario else haptics.HapticScenario()), csv)
+    answer = _answer(haptic.complete_scenario(haptics.read(scenario) if scenario else haptics.HapticScenario()), csv)
     echo(json.dumps(answer, indent=2, allow_nan=False) if as_json else _format_text(answer))
 
 

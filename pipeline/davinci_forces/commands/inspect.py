@@ -116,7 +116,7 @@ def _clock(log: "Log", source: str, clock: "ClockStatistics") -> dict[str, Any]:
     if not source and not log.clock:
         from davinci_forces.study.guessing import clock_hint
 
-        hint = clock_hint(log.apart())
+        hint = clock_hint(log.independent_copy())
         advice = "none: add rate = ... [Hz] for this log in study.toml" + (f", or {hint}" if hint else "")
         return {"source": advice, "duplicates": clock.duplicates}
     return {

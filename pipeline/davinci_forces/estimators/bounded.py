@@ -12,5 +12,5 @@ def estimate(problem: Regression) -> Estimate:
     The standard errors are those of least squares, which are too large for a parameter at its bound.
     """
     weight, R = problem.weight, problem.triangle
-    theta = least_squares.bounded(R, problem.known.signs(len(R.y)))
+    theta = least_squares.solve_bounded(R, problem.known.signs(len(R.y)))
     return Estimate(theta, lambda: standard_errors(problem, weight, R, theta))

@@ -10,7 +10,7 @@ import numpy as np
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators.problem import MAX_CONDITION, MIN_PART_NAMED, Estimate, Regression, standard_errors_by
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.estimation.least_squares import not_told_apart
+from davinci_forces.maths.estimation.least_squares import dependent_parameters
 
 NAME = "instrumental variables"
 LAG = 3  # samples before and after: further than a low-pass correlates noise
@@ -30,7 +30,7 @@ def estimate(problem: Regression) -> Estimate:
     Q, _ = np.linalg.qr(instruments(problem) * root / R.scale)
     ZF = Q.T @ F
     if (condition := np.linalg.cond(ZF)) > MAX_CONDITION:
-        alike = ", ".join(problem.names[i] for i in not_told_apart(ZF, MIN_PART_NAMED))
+        alike = ", ".join(problem.names[i] for i in dependent_parameters(ZF, MIN_PART_NAMED))
         motion = f"the motion {LAG} samples before and after"
         raise NotIdentifiable(f"{motion} does not separate {alike}: condition number {condition:.1e}")
     theta = np.linalg.solve(ZF, Q.T @ (problem.tau * root[:, 0])) / R.scale

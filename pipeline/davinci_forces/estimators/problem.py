@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.maths.arrays import Array, Booleans
-from davinci_forces.maths.estimation.correlation import correlated
-from davinci_forces.maths.estimation.least_squares import Triangle, not_told_apart, triangle
+from davinci_forces.maths.estimation.correlation import correlated_variance
+from davinci_forces.maths.estimation.least_squares import Triangle, dependent_parameters, triangle
 from davinci_forces.maths.models.physical import Box
 
 ROUNDING = 1e-13  # of the longest column, below which a column is only rounding
@@ -19,7 +19,7 @@ MIN_PART_NAMED = 0.01  # share in the square of the least certain combination fo
 MAX_CONDITION = 1e10  # of scaled columns, above which rounding separates them as much as the motion does
 
 
-class Known(NamedTuple):
+class Prior(NamedTuple):
     """Prior knowledge of p parameters."""
 
     positive: Booleans | None = None  # (p,) whether physics requires that they are not negative
@@ -31,7 +31,7 @@ class Known(NamedTuple):
         return np.zeros(p, np.bool_) if self.positive is None else self.positive
 
 
-NOTHING = Known()
+NO_PRIOR = Prior()
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,7 +44,7 @@ class Regression:
     periods: NDArray[np.int64]  # (K,) number of periods M behind each sample; 0 where none was recorded
     starts: tuple[int, ...]  # where each log begins
     names: tuple[str, ...]  # of the parameters
-    known: Known = NOTHING
+    known: Prior = NO_PRIOR
     Phi_cov: Array | None = None  # (S, p, p) covariance of the errors of a row, the mean over each log; None: not known
 
     @cached_property
@@ -140,7 +140,7 @@ def factorise(problem: Regression, weight: Array) -> Triangle:
     if unexcited:
         raise NotIdentifiable(f"the motion does not excite {', '.join(unexcited)}")
     if (condition := np.linalg.cond(R.U)) > MAX_CONDITION:
-        alike = ", ".join(problem.names[i] for i in not_told_apart(R.U, MIN_PART_NAMED))
+        alike = ", ".join(problem.names[i] for i in dependent_parameters(R.U, MIN_PART_NAMED))
         size = f"{condition:.1e} of scaled columns"
         raise NotIdentifiable(f"the motion does not separate {alike}: condition number {size}")
     return R
@@ -151,7 +151,7 @@ def standard_errors_by(problem: Regression, weight: Array, theta: Array, Q: Arra
     residual = np.sqrt(weight) * (problem.tau - problem.Phi @ theta)
     degrees = int((weight > 0).sum()) - len(theta)
     classical = np.sqrt(residual @ residual / degrees * (D**2).sum(axis=1))
-    stated = correlated(Q, residual, problem.starts, D, degrees)
+    stated = correlated_variance(Q, residual, problem.starts, D, degrees)
     return StandardErrors(classical, np.sqrt(stated.variance), stated.lags)
 
 
@@ -170,5 +170,5 @@ def standard_errors(
         residual = root * (problem.tau - problem.Phi @ theta)
     degrees = int((weight > 0).sum()) - len(theta)
     classical = np.sqrt(residual @ residual / degrees * (inverse**2).sum(axis=1)) / R.scale
-    stated = correlated(Q, residual, problem.starts, inverse / R.scale[:, None], degrees)
+    stated = correlated_variance(Q, residual, problem.starts, inverse / R.scale[:, None], degrees)
     return StandardErrors(classical, np.sqrt(stated.variance), stated.lags)

@@ -7,7 +7,7 @@ squares; inertia and friction are not negative.
 import numpy as np
 
 from davinci_forces.estimators.problem import Estimate, Regression, Search, standard_errors
-from davinci_forces.maths.estimation.least_squares import Triangle, bounded
+from davinci_forces.maths.estimation.least_squares import Triangle, solve_bounded
 from davinci_forces.maths.estimation.swarm import CONSTRICTED, PARTICLES, THESIS, Manner, search
 from davinci_forces.maths.models.physical import Box, each_for_itself
 
@@ -48,7 +48,7 @@ def run_search(R: Triangle, box: Box, problem: Regression, manner: Manner) -> Se
     """Run a search, and compare it with least squares under the known signs."""
     result = search(R, box, SEED, manner)
     total = float(problem.periods.sum())
-    least = R.squares + float(R.excess(bounded(R, problem.known.signs(len(R.y)))))
+    least = R.squares + float(R.excess(solve_bounded(R, problem.known.signs(len(R.y)))))
     return Search(
         walls=manner.name,
         seed=SEED,

@@ -5,7 +5,7 @@ from importlib import import_module
 
 import numpy as np
 
-from davinci_forces.filters.problem import Driven, Filter, NoiseModel, Tracked
+from davinci_forces.filters.problem import Filter, FilterInput, NoiseModel, Tracked
 
 FILTERS = ("ekf", "ekf_euler", "ekf_adaptive", "rts", "rate", "momentum", "direct")
 DEFAULT = "ekf"  # the others are compared with it
@@ -23,7 +23,7 @@ def title(name: str) -> str:
     return str(import_module(f"davinci_forces.filters.{name}").NAME)
 
 
-def through(name: str, parts: Sequence[Driven], noise: NoiseModel) -> Tracked:
+def filter_parts(name: str, parts: Sequence[FilterInput], noise: NoiseModel) -> Tracked:
     """Run a filter over the parts of a recording between gaps; each part starts it anew."""
     track = tracker(name)
     passes = [track(part, noise) for part in parts]

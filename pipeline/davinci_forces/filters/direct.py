@@ -5,13 +5,13 @@ tau_ext = tau - M ddq - b(q, dq)                                                
 
 import numpy as np
 
-from davinci_forces.filters.problem import Driven, NoiseModel, Tracked
+from davinci_forces.filters.problem import FilterInput, NoiseModel, Tracked
 from davinci_forces.maths.models.bias import bias
 
 NAME = "Measured minus model"
 
 
-def track(recording: Driven, noise: NoiseModel) -> Tracked:
+def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
     """Subtract the model's effort; the standard deviation is that of the effort's noise."""
     joint, q, dq, ddq, tau, T_s, _ = recording
     tau_ext = tau - joint.inertia * ddq - bias(joint.coefficients, q, dq, 0.0)[0] - joint.known

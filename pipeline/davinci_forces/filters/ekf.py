@@ -11,29 +11,29 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.filters.problem import Driven, NoiseModel, Tracked
+from davinci_forces.filters.problem import FilterInput, NoiseModel, Tracked
 from davinci_forces.filters.stepping import Belief, arguments, correct, covariances, predict, transition
-from davinci_forces.maths.compiled import cached
+from davinci_forces.maths.compiled import compile_and_store
 from davinci_forces.maths.models.bias import Coefficients
-from davinci_forces.maths.signals.windows import SETTLE
+from davinci_forces.maths.signals.windows import TRANSIENT
 
 NAME = "Extended Kalman filter"
 LOG_2_PI = float(np.log(2.0 * np.pi))
 
 
-def track(recording: Driven, noise: NoiseModel) -> Tracked:
+def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
     """Filter a recording: correct with y_k, then predict with tau_k.  (7.6), (7.7)"""
     out = np.empty((7, len(recording.q)))
     _pass(*arguments(recording, noise), *out)
     return Tracked(*out)
 
 
-def log_likelihood(recording: Driven, noise: NoiseModel) -> float:
+def log_likelihood(recording: FilterInput, noise: NoiseModel) -> float:
     """Compute the log-likelihood of the measurements (2 N): -1/2 sum of (i' S^-1 i + log det 2 pi S).
 
     The first second is omitted, because the initial state still acts on it.
     """
-    settle = min(round(SETTLE / recording.T_s), len(recording.q) // 2)
+    settle = min(round(TRANSIENT / recording.T_s), len(recording.q) // 2)
     return float(_likelihood(settle, *arguments(recording, noise)))
 
 
@@ -49,7 +49,7 @@ def step(
     return corrected, predicted
 
 
-@cached
+@compile_and_store
 def _step(
     s: Any, y_q: float, y_dq: float, drive: float, M: float, c_b: Any, T_s: float, R_q: float, R_dq: float,
     Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float,
@@ -59,7 +59,7 @@ def _step(
     return now, predict(now, q, dq, F, Q_qq, Q_qd, Q_dd + friction_var, Q_tau)
 
 
-@cached
+@compile_and_store
 def _pass(
     s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float, Q_qq: float,
     Q_qd: float, Q_dd: float, Q_tau: float, out_q: Any, out_dq: Any, out_tau: Any, out_std: Any, out_iq: Any,
@@ -73,7 +73,7 @@ def _pass(
         s = predict(s, q, dq, F, Q_qq, Q_qd, Q_dd + friction_var, Q_tau)
 
 
-@cached
+@compile_and_store
 def _likelihood(
     settle: int, s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float,
     Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float,

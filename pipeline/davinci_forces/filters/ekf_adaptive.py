@@ -9,13 +9,13 @@ R stays between 0.1 and 1000 times the tuned variance, so that the filter does n
 import numpy as np
 
 from davinci_forces.filters import kalman
-from davinci_forces.filters.problem import Driven, NoiseModel, Tracked
+from davinci_forces.filters.problem import FilterInput, NoiseModel, Tracked
 
 NAME = "The same, adaptive noise"
 WINDOW = 1.0  # [s] time constant of the mean
 
 
-def track(recording: Driven, noise: NoiseModel) -> Tracked:
+def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
     """Filter a recording: correct with y_k, then predict with tau_k."""
     forgets = 1.0 - float(np.exp(-recording.T_s / WINDOW))
     model = kalman.states(recording, noise)._replace(forgets=forgets)

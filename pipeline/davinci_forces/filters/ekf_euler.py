@@ -10,12 +10,12 @@ The error of a step in position and velocity counts as process noise, by its roo
 import numpy as np
 
 from davinci_forces.filters import kalman
-from davinci_forces.filters.problem import Driven, NoiseModel, Tracked
+from davinci_forces.filters.problem import FilterInput, NoiseModel, Tracked
 
 NAME = "The same, forward Euler"
 
 
-def track(recording: Driven, noise: NoiseModel) -> Tracked:
+def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
     """Filter a recording: correct with y_k, then predict with tau_k.  (7.6), (7.7)"""
     T_s = recording.T_s
     jerk = np.gradient(recording.ddq, T_s) if len(recording.q) > 1 else np.zeros(1)

@@ -5,7 +5,14 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans
-from davinci_forces.maths.uncertainty.error_band import BLOCKS, SpeedCells, centred, excess, excess_std, speed_bin
+from davinci_forces.maths.uncertainty.error_band import (
+    LOG_BLOCKS,
+    SpeedCells,
+    excess,
+    excess_std,
+    speed_bin,
+    subtract_log_means,
+)
 from davinci_forces.records import ErrorBand
 from davinci_forces.records.prediction import ANOTHER_PATH
 
@@ -36,7 +43,7 @@ def model_variance(band: ErrorBand, log: str, path: str, dq: Array, is_centred: 
             cells = select_cells(band, which, is_centred)
             return ModelVariance(excess(cells)[bins], excess_std(cells)[bins], names)
     variance, std = np.empty(len(dq)), np.empty(len(dq))
-    for number, part in enumerate(np.array_split(np.arange(len(dq)), BLOCKS)):
+    for number, part in enumerate(np.array_split(np.arange(len(dq)), LOG_BLOCKS)):
         cells = select_cells(band, band.block != number, is_centred)
         variance[part], std[part] = excess(cells)[bins[part]], excess_std(cells)[bins[part]]
     return ModelVariance(variance, std, OTHER_BLOCKS)
@@ -46,5 +53,5 @@ def select_cells(band: ErrorBand, which: Booleans, is_centred: bool) -> SpeedCel
     """Return the selected cells of a band, centred where asked."""
     _, source = np.unique(np.asarray(band.source).astype(str), return_inverse=True)
     sums = (band.count, band.mean_square, band.filter_square, band.log_mean)
-    cells = SpeedCells(source, band.block, band.speed_bin, *sums).those(which)
-    return centred(cells) if is_centred else cells
+    cells = SpeedCells(source, band.block, band.speed_bin, *sums).select(which)
+    return subtract_log_means(cells) if is_centred else cells

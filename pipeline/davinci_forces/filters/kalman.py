@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from davinci_forces.filters.ekf import LOG_2_PI
-from davinci_forces.filters.problem import Driven, NoiseModel
+from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.filters.stepping import INITIAL_VARIANCE_RATIO, columns, covariances, transition
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.compiled import cached
+from davinci_forces.maths.compiled import compile_and_store
 
 MIN_NOISE_RATIO, MAX_NOISE_RATIO = 0.1, 1e3  # of an adapted measurement variance to the tuned one
 
@@ -38,7 +38,7 @@ class States(NamedTuple):
     forgets: float = 0.0  # share of the innovations' mean square forgotten a sample, where R adapts to it; 0: never
 
 
-def states(recording: Driven, noise: NoiseModel, n: int = 3) -> States:
+def states(recording: FilterInput, noise: NoiseModel, n: int = 3) -> States:
     """Return the states of `ekf`, and n - 3 further states that are 0, constant and not measured."""
     R_q, R_dq, Q_qq, Q_qd, Q_dd, Q_tau = covariances(noise, recording.T_s)
     x, others = (float(recording.q[0]), float(recording.dq[0]), 0.0), [0.0] * (n - 3)
@@ -48,26 +48,26 @@ def states(recording: Driven, noise: NoiseModel, n: int = 3) -> States:
     return States((*x, *others), P, np.array([R_q, R_dq]), np.eye(n), Q)
 
 
-def run_filter(recording: Driven, model: States) -> Array:
+def run_filter(recording: FilterInput, model: States) -> Array:
     """Compute the columns of `Tracked` (7, N): correct with y_k, then predict with tau_k.  (7.6), (7.7)"""
     out = np.empty((7, len(recording.q)))
     _run(recording, model, len(recording.q), out)
     return out
 
 
-def log_likelihood(recording: Driven, model: States, settle: int) -> float:
+def log_likelihood(recording: FilterInput, model: States, settle: int) -> float:
     """Compute the log-likelihood from sample `settle` on: -1/2 sum of (i' S^-1 i + log det 2 pi S)."""
     return _run(recording, model, settle, np.empty((7, len(recording.q))))
 
 
-def _run(recording: Driven, model: States, settle: int, out: Array) -> float:
+def _run(recording: FilterInput, model: States, settle: int, out: Array) -> float:
     x, P, R, Phi, Q, in_q, in_dq, order, doubts, forgets = model
     h = 0.5 * recording.T_s**2 * (order - 1)
     noises = (in_q, in_dq, *R.tolist(), Phi.copy(), Q, h, float(doubts), forgets)
     return float(_pass(settle, out, x, P.copy(), *noises, *columns(recording)))
 
 
-@cached
+@compile_and_store
 def _pass(
     settle: int, out: Any, start: Any, P: Any, in_q: Any, in_dq: Any, R_q: float, R_dq: float, F: Any, Q: Any, h: float,
     doubts: float, forgets: float, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float,

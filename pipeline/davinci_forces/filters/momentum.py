@@ -9,14 +9,14 @@ walk of `q_tau` a sample under the noise of effort and velocity, so all filters 
 
 import numpy as np
 
-from davinci_forces.filters.problem import Driven, NoiseModel, Tracked
+from davinci_forces.filters.problem import FilterInput, NoiseModel, Tracked
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.models.bias import bias
 
 NAME = "Momentum observer"
 
 
-def track(recording: Driven, noise: NoiseModel) -> Tracked:
+def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
     """Run the observer, exact for a drive that is constant over a sample."""
     from scipy.signal import lfilter
 

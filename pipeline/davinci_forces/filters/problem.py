@@ -12,7 +12,7 @@ from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.records import JointModel
 
 
-class Driven(NamedTuple):
+class FilterInput(NamedTuple):
     """A recording as a filter takes it: (N,) samples in the joint's units; T_s [s].
 
     `ddq` has no delay; `first_std` is the standard deviation of the external effort before the first sample.
@@ -26,18 +26,18 @@ class Driven(NamedTuple):
     T_s: float
     first_std: float
 
-    def part(self, which: slice) -> "Driven":
+    def part(self, which: slice) -> "FilterInput":
         """Return some of the samples, in their order."""
         joint = self.joint._replace(inertia=self.joint.inertia[which], known=self.joint.known[which])
         q, dq, ddq, tau = (x[which] for x in (self.q, self.dq, self.ddq, self.tau))
-        return Driven(joint, q, dq, ddq, tau, self.T_s, self.first_std)
+        return FilterInput(joint, q, dq, ddq, tau, self.T_s, self.first_std)
 
 
-def stationary_joint(inertia: Array, viscous: float, tau: Array, T_s: float, first_std: float) -> Driven:
+def stationary_joint(inertia: Array, viscous: float, tau: Array, T_s: float, first_std: float) -> FilterInput:
     """Return a joint at rest whose motor exerts an effort (N,) on the environment; a filter is linear there."""
     still = np.zeros(len(tau))
     coefficients = tuple(viscous if i == VISCOUS else 0.0 for i in range(len(COEFFICIENTS)))
-    return Driven(JointDynamics(inertia, coefficients, still), still, still, still, tau, T_s, first_std)  # type: ignore[arg-type]
+    return FilterInput(JointDynamics(inertia, coefficients, still), still, still, still, tau, T_s, first_std)  # type: ignore[arg-type]
 
 
 class NoiseModel(NamedTuple):
@@ -65,10 +65,10 @@ class Tracked(NamedTuple):
     nis: Array
 
 
-Filter = Callable[[Driven, NoiseModel], Tracked]  # track(recording, noise)
+Filter = Callable[[FilterInput, NoiseModel], Tracked]  # track(recording, noise)
 
 
-def driven(model: JointModel, tau_hat: Array | None = None) -> list[Driven]:
+def filter_inputs(model: JointModel, tau_hat: Array | None = None) -> list[FilterInput]:
     """Return the segments of a joint's log for a filter, as measured; each gap starts a filter anew.
 
     `tau_hat` (N,) is the effort of another fit, to be subtracted in place of the model's.
@@ -77,14 +77,14 @@ def driven(model: JointModel, tau_hat: Array | None = None) -> list[Driven]:
     return _segments(model, model.q_measured, model.dq_measured, tau_known)
 
 
-def driven_smooth(model: JointModel) -> list[Driven]:
+def smooth_filter_inputs(model: JointModel) -> list[FilterInput]:
     """Return the segments of a joint's log for a filter, with the motion low-passed."""
     return _segments(model, model.q, model.dq, model.tau_known)
 
 
-def _segments(model: JointModel, q: Array, dq: Array, tau_known: Array) -> list[Driven]:
+def _segments(model: JointModel, q: Array, dq: Array, tau_known: Array) -> list[FilterInput]:
     gravity, friction = (model.gravity_sine, model.gravity_cosine), (model.viscous, model.coulomb, model.presliding)
     joint = JointDynamics(model.inertia, (model.constant, *gravity, model.spring, *friction), tau_known)
     first_std = float(np.std(model.tau)) or 1.0
-    whole = Driven(joint, q, dq, model.ddq, model.tau, 1.0 / model.rate, first_std)
+    whole = FilterInput(joint, q, dq, model.ddq, model.tau, 1.0 / model.rate, first_std)
     return [whole.part(part) for part in segments(model.segment)]

@@ -9,12 +9,12 @@ the rate's change over a sample, times T_s.
 import numpy as np
 
 from davinci_forces.filters import kalman
-from davinci_forces.filters.problem import Driven, NoiseModel, Tracked
+from davinci_forces.filters.problem import FilterInput, NoiseModel, Tracked
 
 NAME = "Kalman filter with rate"
 
 
-def track(recording: Driven, noise: NoiseModel) -> Tracked:
+def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
     """Filter a recording: correct with y_k, then predict with tau_k."""
     T_s = recording.T_s
     model = kalman.states(recording, noise, 4)._replace(doubts=False)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.filters import DEFAULT, ekf, rts, tracker
-from davinci_forces.filters.problem import Driven, Filter, NoiseModel, stationary_joint
+from davinci_forces.filters.problem import Filter, FilterInput, NoiseModel, stationary_joint
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.models.bias import VISCOUS
 from davinci_forces.records import FilterNoise
@@ -51,7 +51,7 @@ def at_rest(track: Filter, inertia: float, viscous: float, T_s: float, noise: No
     return response(track(pushed, noise).tau_ext, t, BEFORE, 1.0)
 
 
-def rise(track: Filter, recording: Driven, noise: NoiseModel) -> float:
+def rise(track: Filter, recording: FilterInput, noise: NoiseModel) -> float:
     """Compute the rise time [s] of a filter's step response at a joint at rest: 1 over its steepest slope."""
     T_s, joint = recording.T_s, recording.joint
     t = np.asarray(T_s * np.arange(round(2.0 * BEFORE / T_s) + 1), np.float64)
@@ -75,7 +75,7 @@ def slowest(track: Filter, inertia: float, viscous: float, T_s: float, noise: No
     return high
 
 
-def assumed(noises: FilterNoise, joint: Joint, T_s: float, q_tau: float, name: str = DEFAULT) -> NoiseModel:
+def noise_model(noises: FilterNoise, joint: Joint, T_s: float, q_tau: float, name: str = DEFAULT) -> NoiseModel:
     """Compute the noise of a sample of T_s [s] for the filter of that name.
 
     The effort's noise drives the model, as an acceleration that is constant over a sample.  `q_tau` is the random walk
@@ -89,7 +89,7 @@ def assumed(noises: FilterNoise, joint: Joint, T_s: float, q_tau: float, name: s
     )  # fmt: skip
 
 
-def lag(recordings: Sequence[Driven], noise: NoiseModel) -> tuple[Array, Array]:
+def lag(recordings: Sequence[FilterInput], noise: NoiseModel) -> tuple[Array, Array]:
     """Return the smoothed external effort (N,) of all recordings, and how far the filter lags behind it (N,).
 
     The filter is run on that effort at a joint at rest, where it is linear: position and velocity stay 0.

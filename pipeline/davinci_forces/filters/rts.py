@@ -12,17 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.filters.problem import Driven, NoiseModel, Tracked
+from davinci_forces.filters.problem import FilterInput, NoiseModel, Tracked
 from davinci_forces.filters.stepping import arguments, correct, gains, predict, transition
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.compiled import cached
+from davinci_forces.maths.compiled import compile_and_store
 
 NAME = "Smoother"
 MIN_VARIANCE_SHARE = 1e-12  # of the predicted variance: below it a smoothed one is rounding
 STORED = 15  # numbers of each sample: the prediction, and the transition to the next
 
 
-def track(recording: Driven, noise: NoiseModel) -> Tracked:
+def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
     """Filter a recording forwards and smooth it backwards; the innovations are the filter's."""
     innovations, stored = forwards(recording, noise)
     out = np.empty((4, len(recording.q)))
@@ -30,14 +30,14 @@ def track(recording: Driven, noise: NoiseModel) -> Tracked:
     return Tracked(*out, *innovations)
 
 
-def forwards(recording: Driven, noise: NoiseModel) -> tuple[Array, Array]:
+def forwards(recording: FilterInput, noise: NoiseModel) -> tuple[Array, Array]:
     """Return the filter's innovations and NIS (3, N), and its predictions and F of each sample (N, `STORED`)."""
     out, stored = np.empty((3, len(recording.q))), np.empty((len(recording.q), STORED))
     _forwards(stored, *arguments(recording, noise), *out)
     return out, stored
 
 
-@cached
+@compile_and_store
 def _forwards(
     stored: Any, s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float,
     Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float, out_iq: Any, out_idq: Any, out_nis: Any,
@@ -53,7 +53,7 @@ def _forwards(
         s = predict(s, q, dq, F, Q_qq, Q_qd, Q_dd + friction_var, Q_tau)
 
 
-@cached
+@compile_and_store
 def _backwards(
     stored: Array, R_q: float, R_dq: float, out_q: Any, out_dq: Any, out_tau: Any, out_std: Any, i_q: Any, i_dq: Any
 ) -> None:

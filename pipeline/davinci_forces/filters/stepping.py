@@ -18,8 +18,8 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.filters.problem import Driven, NoiseModel
-from davinci_forces.maths.compiled import compiled
+from davinci_forces.filters.problem import FilterInput, NoiseModel
+from davinci_forces.maths.compiled import compile_function
 from davinci_forces.maths.models.bias import COULOMB
 from davinci_forces.maths.models.kernels import bias
 
@@ -29,13 +29,13 @@ TINY = 1e-300
 INITIAL_VARIANCE_RATIO = 1e6
 
 
-def arguments(recording: Driven, noise: NoiseModel) -> tuple[Any, ...]:
+def arguments(recording: FilterInput, noise: NoiseModel) -> tuple[Any, ...]:
     """Return a recording and its noise as the compiled passes take them."""
     before = first(float(recording.q[0]), float(recording.dq[0]), noise.r_q, noise.r_dq, recording.first_std)
     return (before, *columns(recording), *covariances(noise, recording.T_s))
 
 
-def columns(recording: Driven) -> tuple[Any, ...]:
+def columns(recording: FilterInput) -> tuple[Any, ...]:
     """Return position, velocity, drive and inertia (N,) of a recording, the coefficients of its bias, and T_s."""
     joint = recording.joint
     samples = (recording.q, recording.dq, recording.tau - joint.known, joint.inertia)
@@ -48,7 +48,7 @@ def covariances(noise: NoiseModel, T_s: float) -> tuple[float, float, float, flo
     return r_q**2, r_dq**2, q_q**2 + (0.5 * T_s * q_dq) ** 2, 0.5 * T_s * q_dq**2, q_dq**2, q_tau**2
 
 
-@compiled
+@compile_function
 def transition(
     q: float, dq: float, tau_ext: float, dq_var: float, drive: float, M: float, c_b: Any, T_s: float, h: float
 ) -> Any:
@@ -76,7 +76,7 @@ def first(q: float, dq: float, r_q: float, r_dq: float, first_std: float) -> Bel
     return q, dq, 0.0, q_var, 0.0, 0.0, dq_var, 0.0, first_std * first_std
 
 
-@compiled
+@compile_function
 def gains(s: Any, R_q: float, R_dq: float) -> Any:
     """Compute S^-1 (3 numbers), K = P H' S^-1 (6, row by row), and det S."""
     _, _, _, a, b, c, d, e, _ = s
@@ -92,7 +92,7 @@ def gains(s: Any, R_q: float, R_dq: float) -> Any:
     )  # fmt: skip
 
 
-@compiled
+@compile_function
 def correct(s: Any, y_q: float, y_dq: float, R_q: float, R_dq: float) -> Any:
     """Correct a belief by a measurement; return it, the innovations, their normalised square and det S.  (7.6)
 
@@ -120,7 +120,7 @@ def correct(s: Any, y_q: float, y_dq: float, R_q: float, R_dq: float) -> Any:
     return after, i_q, i_dq, nis, det
 
 
-@compiled
+@compile_function
 def predict(s: Any, q: float, dq: float, F: Any, Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float) -> Any:
     """Predict the belief at the next sample, of position q and velocity dq: P is F P F' + Q.  (7.7)"""
     _, _, tau_ext, a, b, c, d, e, f = s

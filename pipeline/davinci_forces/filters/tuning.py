@@ -10,7 +10,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from davinci_forces.filters import ekf
-from davinci_forces.filters.problem import Driven, NoiseModel
+from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.filters.response import slowest
 from davinci_forces.maths.arrays import Array
 
@@ -19,7 +19,7 @@ MAX_LOG_CHANGE = np.log(1e3)  # of a standard deviation, from where the search s
 MAX_SAMPLES_TUNING = 20_000  # of each recording
 
 
-def tuned(recordings: Sequence[Driven], start: NoiseModel, inertia: float, viscous: float) -> NoiseModel:
+def tune_noise(recordings: Sequence[FilterInput], start: NoiseModel, inertia: float, viscous: float) -> NoiseModel:
     """Tune the noise of a joint to all recordings together, from `start`, an estimate without the filter.
 
     `inertia` is the largest along the recordings, with which the filter is slowest.
@@ -54,7 +54,7 @@ def noise_of(logarithms: Array, q_tau: float) -> NoiseModel:
     return NoiseModel(r_q, r_dq, 0.0, q_dq, q_tau)
 
 
-def likeliest_walk(recordings: Sequence[Driven], noise: NoiseModel) -> float:
+def likeliest_walk(recordings: Sequence[FilterInput], noise: NoiseModel) -> float:
     """Find the `q_tau` of greatest likelihood, for recordings with external effort, as in section 7.3."""
     from scipy.optimize import minimize_scalar
 

@@ -57,7 +57,7 @@ class FeltResponse(NamedTuple):
         return np.asarray(-np.unwrap(np.angle(self.T)) / (2.0 * np.pi * self.frequency))
 
 
-def filled(
+def complete_scenario(
     scenario: HapticScenario,
     body: Body = SLIDE,
     noise: AxisNoise = SLIDE_NOISE,

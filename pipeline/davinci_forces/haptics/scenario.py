@@ -13,7 +13,7 @@ import numpy as np
 
 from davinci_forces import toml
 from davinci_forces.errors import PipelineError
-from davinci_forces.haptics.maths.bimodal import THESIS, Hand
+from davinci_forces.haptics.maths.bimodal import THESIS_HAND, Hand
 from davinci_forces.maths.simulation.actuators import Cascade, Device, Motors
 from davinci_forces.robots.from_toml import NAME
 from davinci_forces.toml import TomlTable
@@ -69,7 +69,7 @@ class HapticScenario:
 
     title: str = "Section 8.4: in and out of tissue"
     seed: int = 8
-    hands: tuple[tuple[str, Hand], ...] = (("thesis", THESIS), ("firm", FIRM))
+    hands: tuple[tuple[str, Hand], ...] = (("thesis", THESIS_HAND), ("firm", FIRM))
     device: Device = DEVICE
     reach: float = 0.15  # [m] of the device, to either side of the tissue's surface
     link_rate: float = 100.0  # [Hz], chapter 9

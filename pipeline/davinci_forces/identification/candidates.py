@@ -13,9 +13,9 @@ from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.model import Model
-from davinci_forces.maths.models.terms import Term, presliding
-from davinci_forces.maths.selection import Equations, Judged, Ridge, judged, solve, together
-from davinci_forces.robots.models import ARM, AddedFriction, Reach, coupled, frictions, independent, rounded
+from davinci_forces.maths.models.terms import Term, presliding_friction
+from davinci_forces.maths.selection import CrossValidation, Equations, Ridge, combine_efforts, cross_validate, solve
+from davinci_forces.robots.models import ARM, AddedFriction, Reach, coupled_arm, frictions, independent, round_scale
 from davinci_forces.robots.robot import Robot
 
 RIDGES = {"independent": (0.0, 1e-3), "coupled": (1e-4, 1e-3, 1e-2, 3e-2)}
@@ -92,23 +92,23 @@ class Candidate(NamedTuple):
 
     def cross_validate(
         self, schemes: Sequence[Booleans], reaches: dict[str, Reach], by_period: bool = False
-    ) -> Judged | None:
+    ) -> CrossValidation | None:
         """Compute its errors on data left out; None where the remaining data do not separate its parameters."""
         parts = []
         for library, ridge in zip(self.libraries, self.ridges(), strict=True):
             cells = library.by_period if by_period else library.by_block
             try:
-                parts.append(judged(cells.columns(library.columns(self.friction, reaches)), ridge, schemes))
+                parts.append(cross_validate(cells.columns(library.columns(self.friction, reaches)), ridge, schemes))
             except np.linalg.LinAlgError:
                 return None
-        return together(parts)
+        return combine_efforts(parts)
 
     def parameters(self, reaches: dict[str, Reach], out: Booleans | None = None) -> list[Array]:
         """Fit theta of each library to all cells, or without some of them."""
         thetas = []
         for library, ridge in zip(self.libraries, self.ridges(), strict=True):
             cells = library.by_block.columns(library.columns(self.friction, reaches))
-            thetas.append(solve(cells.of(np.ones(len(cells.gram), np.bool_) if out is None else ~out), ridge))
+            thetas.append(solve(cells.sum_cells(np.ones(len(cells.gram), np.bool_) if out is None else ~out), ridge))
         return thetas
 
     def models(self, robot: Robot, reaches: dict[str, Reach]) -> list[Model]:
@@ -121,7 +121,7 @@ class Candidate(NamedTuple):
                 models.append(independent(robot.joint(group), added[0], self.friction.variant))
             else:
                 rows = [library.model.joints.index(effort) for effort in efforts]
-                models.append(coupled(robot, rows, added, self.friction.variant, group))
+                models.append(coupled_arm(robot, rows, added, self.friction.variant, group))
         return models
 
     def is_physical(self, reaches: dict[str, Reach]) -> bool:
@@ -173,7 +173,7 @@ def coupled_library(
     """Return the library of joints (indices) of a coupled arm that share parameters."""
     names = [robot.joints[row].name for row in rows]
     terms = tuple(added[name] for name in names)
-    return library(coupled(robot, rows, terms, group=ARM if len(rows) > 1 else names[0]), arm, terms, count)
+    return library(coupled_arm(robot, rows, terms, group=ARM if len(rows) > 1 else names[0]), arm, terms, count)
 
 
 def variants(structure: str, shared: bool, libraries: tuple[Library, ...], weights: Sequence[Array]) -> list[Candidate]:
@@ -198,13 +198,13 @@ def every_term(reach: Reach) -> tuple[Term, ...]:
     terms = {(t.width, t.faded, t.displacement): t for friction in frictions() for t in friction.terms(reach)}
     slow = sorted(t.displacement for t in terms.values() if t.displacement)
     others = (t for t in terms.values() if not t.displacement)
-    return (*others, *(presliding(x, number) for number, x in enumerate(slow, start=1)))
+    return (*others, *(presliding_friction(x, number) for number, x in enumerate(slow, start=1)))
 
 
 def residual_variance(part: Library, reaches: dict[str, Reach]) -> float:
     """Return the residual variance of a joint of a coupled arm, with its own parameters and no added friction."""
     cells = part.by_block.columns(part.columns(AddedFriction(""), reaches))
-    total = cells.of(np.ones(len(cells.gram), np.bool_))
+    total = cells.sum_cells(np.ones(len(cells.gram), np.bool_))
     theta = solve(total, WEIGHTS_RIDGE._replace(combination=part.combination))
     return float(total.errors(theta)[0, 0])
 
@@ -219,4 +219,4 @@ def reach_of(logs: Sequence[Observed], joint: str) -> Reach:
         ranges.append(float(high - low))
         squares += float(dq @ dq)
         count += len(dq)
-    return Reach(rounded(max(ranges)), rounded(float(np.sqrt(squares / count))))
+    return Reach(round_scale(max(ranges)), round_scale(float(np.sqrt(squares / count))))

@@ -12,21 +12,21 @@ from davinci_forces.maths.estimation.conic import nearest
 from davinci_forces.maths.estimation.least_squares import Triangle
 from davinci_forces.maths.models.model import Model
 from davinci_forces.maths.selection import (
-    BLOCKS,
-    MOST,
+    MAX_GROUPS,
+    PATH_BLOCKS,
+    CrossValidation,
     Equations,
-    Judged,
     Ridge,
+    choose_candidate,
     covariance,
     left_out,
-    preferred,
     scaled_equations,
     standard_error,
 )
 from davinci_forces.robots.models import Reach
 from davinci_forces.robots.robot import Robot
 
-NOTHING = 1e-8  # of the effort's square: a smaller excess is within the solver's accuracy
+NEGLIGIBLE_EXCESS = 1e-8  # of the effort's square: a smaller excess is within the solver's accuracy
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class BlockEstimate(NamedTuple):
     condition: float
 
 
-def selected(candidates: Sequence[Candidate], reaches: dict[str, Reach], count: int) -> Selection | None:
+def select_candidate(candidates: Sequence[Candidate], reaches: dict[str, Reach], count: int) -> Selection | None:
     """Cross-validate all candidates on the same groups, and choose one; None if none can be refitted."""
     schemes = usable_schemes(candidates, count)
     pairs = [(c, errors) for c in candidates if (errors := c.cross_validate(schemes, reaches))] if schemes else []
@@ -66,7 +66,7 @@ def selected(candidates: Sequence[Candidate], reaches: dict[str, Reach], count: 
     physical = [c.is_physical(reaches) for c in models]
     eligible = physical if any(physical) else [True] * len(models)
     sizes = [c.size(reaches) for c in models]
-    chosen, best = preferred(results, sizes, eligible)
+    chosen, best = choose_candidate(results, sizes, eligible)
     return Selection(
         candidates=tuple(models),
         physical=tuple(physical),
@@ -82,7 +82,7 @@ def selected(candidates: Sequence[Candidate], reaches: dict[str, Reach], count: 
 
 def usable_schemes(candidates: Sequence[Candidate], count: int) -> list[Booleans]:
     """Return the schemes of leaving out in which each refit has data of every effort."""
-    log, block = np.repeat(np.arange(count), BLOCKS), np.tile(np.arange(BLOCKS), count)
+    log, block = np.repeat(np.arange(count), PATH_BLOCKS), np.tile(np.arange(PATH_BLOCKS), count)
     by_library = {id(library): library.by_block.squares for c in candidates for library in c.libraries}
     squares = np.concatenate(list(by_library.values()), axis=1)
     return [groups for groups in left_out(log, block) if all(bool((squares[~g].sum(axis=0) > 0).all()) for g in groups)]
@@ -90,16 +90,18 @@ def usable_schemes(candidates: Sequence[Candidate], count: int) -> list[Booleans
 
 def over_periods(candidate: Candidate, reaches: dict[str, Reach], count: int) -> float:
     """Return the score on periods left out, of the same path as the fitted ones; NaN where a path does not repeat."""
-    number = np.tile(np.arange(MOST), count)
+    number = np.tile(np.arange(MAX_GROUPS), count)
     squares = np.concatenate([library.by_period.squares for library in candidate.libraries], axis=1)
-    groups = np.array([number == k for k in range(MOST) if squares[number == k].any()])
+    groups = np.array([number == k for k in range(MAX_GROUPS) if squares[number == k].any()])
     if len(groups) < 2 or not all((squares[~group].sum(axis=0) > 0).all() for group in groups):
         return float("nan")
     errors = candidate.cross_validate([groups], reaches, by_period=True)
     return errors.score if errors else float("nan")
 
 
-def reason(candidates: Sequence[Candidate], results: Sequence[Judged], sizes: Sequence[int], i: int, best: int) -> str:
+def reason(
+    candidates: Sequence[Candidate], results: Sequence[CrossValidation], sizes: Sequence[int], i: int, best: int
+) -> str:
     """State why a candidate was chosen, and whether one that fits better overfits."""
     text = f"{candidates[i].name} has an out-of-sample error of {results[i].score:.4f} of the effort"
     if i == best:
@@ -125,16 +127,16 @@ def parameters(
     candidate: Candidate, robot: Robot, reaches: dict[str, Reach], count: int
 ) -> Iterator[tuple[Model, Library, BlockEstimate]]:
     """Fit a candidate's parameters to all data, one model at a time."""
-    block = np.tile(np.arange(BLOCKS), count)
+    block = np.tile(np.arange(PATH_BLOCKS), count)
     fits = candidate.parameters(reaches)
-    refits = [candidate.parameters(reaches, block == b) for b in range(BLOCKS)]
+    refits = [candidate.parameters(reaches, block == b) for b in range(PATH_BLOCKS)]
     models = zip(candidate.models(robot, reaches), candidate.libraries, candidate.ridges(), strict=True)
     for i, (model, library, ridge) in enumerate(models):
         theta, thetas = fits[i], np.array([refit[i] for refit in refits])
         cells = library.by_block.columns(library.columns(candidate.friction, reaches))
-        total = cells.of(np.ones(len(cells.gram), np.bool_))
+        total = cells.sum_cells(np.ones(len(cells.gram), np.bool_))
         errors, samples = total.errors(theta)[0], library.samples
-        jackknife = (BLOCKS - 1) / BLOCKS * ((thetas - thetas.mean(axis=0)) ** 2).sum(axis=0)
+        jackknife = (PATH_BLOCKS - 1) / PATH_BLOCKS * ((thetas - thetas.mean(axis=0)) ** 2).sum(axis=0)
         estimate = BlockEstimate(
             theta=theta,
             theta_std_classical=np.sqrt(np.diag(covariance(total, ridge, errors / samples))),
@@ -156,7 +158,9 @@ class ConsistentFit(NamedTuple):
     excess: float  # of the criterion over its minimum, as a share of the effort's square
 
 
-def held(model: Model, library: Library, equations: Equations, ridge: Ridge, free: BlockEstimate) -> ConsistentFit:
+def fit_consistent(
+    model: Model, library: Library, equations: Equations, ridge: Ridge, free: BlockEstimate
+) -> ConsistentFit:
     """Fit the parameters nearest to a candidate's that a mechanism can have, to the equations (one cell) of all logs.
 
     The standard errors stay the candidate's, as those of the estimator `consistent` stay least squares'.

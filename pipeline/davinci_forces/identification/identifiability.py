@@ -6,7 +6,7 @@ import numpy as np
 
 from davinci_forces.estimators.problem import Estimate, Regression
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.estimation.least_squares import Told, combinations, deviation, pairs
+from davinci_forces.maths.estimation.least_squares import ColumnAnalysis, combinations, deviation, pairs
 from davinci_forces.robots import ROBOTS
 from davinci_forces.robots.robot import Joint, Robot
 
@@ -17,7 +17,7 @@ MIN_Z = 2.0  # standard errors from zero, below which a parameter is not signifi
 MIN_R2 = 0.5  # share of the effort's variance, below which a model hardly describes it
 
 
-def together(names: Sequence[str], conditioning: Told) -> list[str]:
+def describe_correlated(names: Sequence[str], conditioning: ColumnAnalysis) -> list[str]:
     """Describe correlated parameters: pairs by their correlation, and larger combinations by their uncertainty.
 
     A combination of two that are named as a pair is not named again.
@@ -27,7 +27,7 @@ def together(names: Sequence[str], conditioning: Told) -> list[str]:
     named = [{i, j} for i, j, _ in close]
     for members, ratio in combinations(conditioning, MIN_UNCERTAINTY_RATIO, MIN_PART_NAMED):
         if len(members) > 1 and set(members) not in named:
-            parameters = listed([names[i] for i in members])
+            parameters = join_names([names[i] for i in members])
             texts.append(f"one combination of {parameters} is {ratio:.0f} times less certain than the best one")
     return texts
 
@@ -55,7 +55,9 @@ def better_motion(robot: Robot, joint: Joint) -> str:
     return f"`davinci-forces excite {name} {joint.name}`"
 
 
-def inertia_at_fault(robot: Robot, joint: Joint, estimate: Estimate, conditioning: Told, others: Sequence[str]) -> str:
+def inertia_at_fault(
+    robot: Robot, joint: Joint, estimate: Estimate, conditioning: ColumnAnalysis, others: Sequence[str]
+) -> str:
     """Explain by the same fit why an inertia is not positive; `others` are joints that move in the same logs.
 
     If it may be positive, it was not excited.  If friction is negative, too, a sign is wrong.  Otherwise the model
@@ -90,7 +92,7 @@ def hardly_described(joint: Joint, r2: float, others: Sequence[str]) -> str:
     return f"{text}: check that its effort and its motion are channels of one joint, and which terms it needs"
 
 
-def listed(names: Sequence[str]) -> str:
+def join_names(names: Sequence[str]) -> str:
     """Join names: 'a, b and c'."""
     *first, last = names
     return f"{', '.join(first)} and {last}" if first else last
@@ -98,7 +100,7 @@ def listed(names: Sequence[str]) -> str:
 
 def joints_move(joints: Sequence[str]) -> str:
     """Return the clause 'a moves', or 'a and b move'."""
-    return f"{listed(joints)} move{'s' if len(joints) == 1 else ''}"
+    return f"{join_names(joints)} move{'s' if len(joints) == 1 else ''}"
 
 
 def percent(share: float) -> str:
@@ -111,6 +113,6 @@ def moving_with(joint: str, logs: Sequence[str], moves: Sequence[tuple[str, str]
     return list(dict.fromkeys(name for log, name in moves if log in logs and name != joint))
 
 
-def flat(conditioning: Told) -> Array:
+def flat(conditioning: ColumnAnalysis) -> Array:
     """Return the correlation matrix row by row (p^2,)."""
     return np.asarray(conditioning.correlation.ravel())

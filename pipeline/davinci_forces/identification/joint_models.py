@@ -20,7 +20,7 @@ BIAS = ("constant", "gravity_sine", "gravity_cosine", "spring", "viscous", "coul
 MIN_SINGULAR_SHARE = 1e-3  # of the largest singular value: less certain combinations are not refitted
 
 
-class Along:
+class LogModels:
     """The models of fits along one log; what the joints of an arm share is computed once."""
 
     def __init__(self, identified: Identified, motions: Iterable[Motion | JointModel]) -> None:
@@ -34,7 +34,7 @@ class Along:
         """The joints in the log."""
         return tuple(self._motions)
 
-    def held(self, joint: str) -> set[str]:
+    def joints_on_clock(self, joint: str) -> set[str]:
         """Return the joints of the log that share the clock of one of them."""
         length = len(self._motions[joint].q)
         return {name for name, motion in self._motions.items() if len(motion.q) == length}
@@ -61,7 +61,7 @@ class Along:
             self._dynamics[fit.key] = dynamics
         return dynamics[model.efforts.index(joint)]
 
-    def by(self, fit: Fit, joint: str) -> dict[str, Any]:
+    def fields_of(self, fit: Fit, joint: str) -> dict[str, Any]:
         """Return the fields of a JointModel that follow from a fit."""
         dynamics = self.dynamics(fit, joint)
         return {
@@ -70,10 +70,10 @@ class Along:
             **dict(zip(BIAS, map(float, dynamics.coefficients), strict=True)),
         }  # fmt: skip
 
-    def under(self, model: JointModel, fit: Fit) -> JointModel:
+    def with_fit(self, model: JointModel, fit: Fit) -> JointModel:
         """Return a joint's model by another fit, without predictions of unseen data."""
         unknown: dict[str, Any] = {"scheme": "", "path_unseen": "", "tau_hat_unseen": np.full(len(model), np.nan)}
-        return replace(model, **self.by(fit, model.joint), **unknown)
+        return replace(model, **self.fields_of(fit, model.joint), **unknown)
 
 
 def refits_of(predictions: Iterable[Prediction], used: dict[str, Fit], setting: str) -> dict[str, Prediction]:
@@ -94,7 +94,7 @@ def at_samples(prediction: Prediction, motion: Motion) -> Array:
     return np.where(np.abs(prediction.t[at] - motion.t) < half, prediction.tau_hat[at], np.nan)
 
 
-def refitted(joint: JointModel, fit: Fit, along: Along, free: Booleans) -> Array:
+def refit_effort(joint: JointModel, fit: Fit, along: LogModels, free: Booleans) -> Array:
     """Correct tau_hat (N,) of a fit by least squares on its residual along a joint's log, over the free samples (N,).
 
     Phi (theta + D d),    d = arg min |tau - tau_hat - Phi D d|,    D scales each column of Phi to length 1

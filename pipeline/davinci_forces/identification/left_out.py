@@ -8,15 +8,15 @@ import numpy as np
 
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators import ESTIMATORS, estimator
-from davinci_forces.estimators.problem import Known, Regression
-from davinci_forces.identification.observations import averaged_samples, observed, pose_samples
+from davinci_forces.estimators.problem import Prior, Regression
+from davinci_forces.identification.observations import averaged_samples, observe, pose_samples
 from davinci_forces.identification.regression import known_of, pose, recorded_motion, stands_still
-from davinci_forces.identification.scores import Judge, folds, select_samples
+from davinci_forces.identification.scores import Scorer, folds, select_samples
 from davinci_forces.maths.arrays import Array, Integers
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.memory import efforts
 from davinci_forces.maths.periods import averaging
-from davinci_forces.maths.selection import BLOCKS
+from davinci_forces.maths.selection import PATH_BLOCKS
 from davinci_forces.records import CrossFit, Diagnostic, Motion, Prediction, Trajectory, diagnostic
 from davinci_forces.records.prediction import ANOTHER_PATH, SAME_PATH
 from davinci_forces.robots.models import independent
@@ -41,7 +41,7 @@ def without_the_log(
 ) -> Iterator[Prediction]:
     """Predict a log from fits to other identification logs."""
     part = motion if average is None else select_samples(motion, whole_periods(motion.t, average))
-    judge = Judge(part, part.standing == 0, lowpass, average.sigma_tau_white if average else None)
+    judge = Scorer(part, part.standing == 0, lowpass, average.sigma_tau_white if average else None)
     along = recorded_motion(part)
     for fit in cross_fits:
         left_out = [str(names).split(", ") for names in fit.left_out]
@@ -50,17 +50,17 @@ def without_the_log(
             number = len(left_out[rows[0]])
             scheme = "leave one log out" if number == 1 else f"leave {number} logs out"
             tau_hat = np.ascontiguousarray(efforts(model, fit.theta[rows], along)[:, 0])
-            yield judge.scored(fit.model, fit.estimator, motion.role, scheme, ANOTHER_PATH, tau_hat)
+            yield judge.score(fit.model, fit.estimator, motion.role, scheme, ANOTHER_PATH, tau_hat)
 
 
 def without_a_period(
-    motion: Motion, average: Trajectory, model: IndependentJoint, prior: Known, lowpass: float
+    motion: Motion, average: Trajectory, model: IndependentJoint, prior: Prior, lowpass: float
 ) -> Iterator[Prediction | Diagnostic]:
     """Predict each period of a log from fits to the other periods; only the effort is left out, not the path."""
     part = select_samples(motion, whole_periods(motion.t, average))
     runs, others = without_folds(part, average, model, prior)
     Phi = model.regressor(recorded_motion(part)).Phi[:, 0]
-    judge = Judge(part, part.standing == 0, lowpass, average.sigma_tau_white)
+    judge = Scorer(part, part.standing == 0, lowpass, average.sigma_tau_white)
     for name in ESTIMATORS:
         try:
             thetas = [estimator(name)(regression).theta for regression in others]
@@ -68,12 +68,12 @@ def without_a_period(
             yield not_predicted(motion, name, error)
             continue
         tau_hat = np.concatenate([Phi[run] @ theta for run, theta in zip(runs, thetas, strict=True)])
-        yield judge.scored(model.name, name, motion.role, "leave one period out", SAME_PATH, tau_hat)
+        yield judge.score(model.name, name, motion.role, "leave one period out", SAME_PATH, tau_hat)
         del tau_hat  # in a long log it is large: free it before the next
 
 
 def without_folds(
-    part: Motion, average: Trajectory, model: IndependentJoint, prior: Known
+    part: Motion, average: Trajectory, model: IndependentJoint, prior: Prior
 ) -> tuple[list[slice], list[Regression]]:
     """Return the samples of each fold of a log's whole periods, and the least squares problem of the other folds."""
     fold = fold_of(part.t, average)
@@ -93,22 +93,22 @@ def fold_of(t: Array, average: Trajectory) -> Integers:
 
 
 def without_a_segment(
-    motion: Motion, model: IndependentJoint, prior: Known, lowpass: float
+    motion: Motion, model: IndependentJoint, prior: Prior, lowpass: float
 ) -> Iterator[Prediction | Diagnostic]:
     """Predict each sixth of a log that does not repeat from fits to the other five."""
-    log = observed([motion], (), lowpass, 0)
+    log = observe([motion], (), lowpass, 0)
     Phi = model.regressor(log.motion).Phi[:, 0]
-    judge = Judge(motion, motion.standing == 0, lowpass)
+    judge = Scorer(motion, motion.standing == 0, lowpass)
     for name in ESTIMATORS:
         tau_hat = np.empty(len(motion))
         try:
-            for block in range(BLOCKS):
+            for block in range(PATH_BLOCKS):
                 out = log.block == block
                 tau_hat[out] = Phi[out] @ estimator(name)(pose_samples(model, log, ~out, prior)[0]).theta
         except NotIdentifiable as error:
             yield not_predicted(motion, name, error)
             continue
-        yield judge.scored(model.name, name, "identification", "leave a segment out", ANOTHER_PATH, tau_hat)
+        yield judge.score(model.name, name, "identification", "leave a segment out", ANOTHER_PATH, tau_hat)
 
 
 def not_predicted(motion: Motion, name: str, error: NotIdentifiable) -> Diagnostic:

@@ -5,13 +5,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.estimators.problem import NOTHING, Known, Regression
+from davinci_forces.estimators.problem import NO_PRIOR, Prior, Regression
 from davinci_forces.identification.regression import joined_motion, recorded_motion
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.memory import pieces
 from davinci_forces.maths.models.model import ArmMotion, Model
-from davinci_forces.maths.selection import BLOCKS, MOST, Equations, gathered, path_blocks, repetitions, side_by_side
-from davinci_forces.maths.signals.smoothing import reach, smoothed
+from davinci_forces.maths.selection import (
+    MAX_GROUPS,
+    PATH_BLOCKS,
+    Equations,
+    path_blocks,
+    repetitions,
+    side_by_side,
+    sum_equations,
+)
+from davinci_forces.maths.signals.smoothing import lowpass_segments, reach
 from davinci_forces.records import Average, Motion, Trajectory
 
 SAMPLES_PER_CUTOFF = 3  # per period of the low-pass's cutoff: more add no information
@@ -30,11 +38,11 @@ class Observed(NamedTuple):
     white: dict[str, float]  # the noise of each joint's effort, if periods repeat
 
     @property
-    def moving(self) -> Booleans:
+    def is_moving(self) -> Booleans:
         """Whether each of its joints moves (n,)."""
         return np.array([not record.at_rest for record in self.records])
 
-    def alone(self, joint: int) -> "Observed":
+    def single_joint(self, joint: int) -> "Observed":
         """Return one joint by itself."""
         column = slice(joint, joint + 1)
         motion = self.motion._replace(**{name: getattr(self.motion, name)[:, column] for name in ("q", "dq", "ddq")})
@@ -55,7 +63,7 @@ class Observed(NamedTuple):
             taken = np.flatnonzero(is_known[piece.inside] & wanted[piece.place])
             smooth = np.zeros((len(taken), *Phi.shape[1:]))
             present = Phi.any(axis=0)  # most columns are of one effort only
-            passed = smoothed(Phi[:, present], piece.motion.segment, rate, self.lowpass)
+            passed = lowpass_segments(Phi[:, present], piece.motion.segment, rate, self.lowpass)
             smooth[:, present] = passed[piece.inside][taken]
             rows.append(smooth)
             indices.append(taken + piece.place.start)
@@ -63,7 +71,7 @@ class Observed(NamedTuple):
         return np.concatenate(rows), tau[samples], samples
 
 
-def observed(records: Sequence[Motion], averages: Iterable[Average], lowpass: float, number: int) -> Observed:
+def observe(records: Sequence[Motion], averages: Iterable[Average], lowpass: float, number: int) -> Observed:
     """Return the joints of one log, in their order, which share a clock."""
     first = records[0]
     by_joint = {a.joint: a for a in averages if a.log == first.log}
@@ -76,7 +84,7 @@ def observed(records: Sequence[Motion], averages: Iterable[Average], lowpass: fl
     period = np.full(len(first), -1)
     if average is not None:
         inside = averaged_samples(first.t, average)
-        groups = min(average.periods, MOST)  # of whole periods
+        groups = min(average.periods, MAX_GROUPS)  # of whole periods
         period[inside] = repetitions(first.t[inside], average.period) * groups // average.periods
     return Observed(tuple(records), motion, tau, block, period, lowpass, number, white)
 
@@ -85,7 +93,7 @@ def smooth_effort(record: Motion, lowpass: float) -> Array:
     """Low-pass the effort (N,) of a joint; NaN where it stands still, and everywhere if it is at rest."""
     if record.at_rest:
         return np.full(len(record), np.nan)
-    return np.where(record.standing > 0, np.nan, smoothed(record.tau, record.segment, record.rate, lowpass))
+    return np.where(record.standing > 0, np.nan, lowpass_segments(record.tau, record.segment, record.rate, lowpass))
 
 
 def averaged_samples(t: Array, average: Average | Trajectory) -> Booleans:
@@ -95,7 +103,7 @@ def averaged_samples(t: Array, average: Average | Trajectory) -> Booleans:
 
 
 def pose_samples(
-    model: Model, log: Observed, which: Booleans | None = None, known: Known = NOTHING
+    model: Model, log: Observed, which: Booleans | None = None, known: Prior = NO_PRIOR
 ) -> tuple[Regression, Integers]:
     """Return the least squares problem of a joint of a log that does not repeat, and its samples (K,).
 
@@ -117,7 +125,7 @@ def equations(model: Model, logs: Sequence[Observed], count: int) -> tuple[Integ
     for log in logs:
         Phi, tau, rows = log.rows(model)
         samples += (~np.isnan(tau)).sum(axis=0)
-        by_block.append(gathered(Phi, tau, log.block[rows], BLOCKS))
-        by_period.append(gathered(Phi, tau, log.period[rows], MOST))
+        by_block.append(sum_equations(Phi, tau, log.block[rows], PATH_BLOCKS))
+        by_period.append(sum_equations(Phi, tau, log.period[rows], MAX_GROUPS))
     numbers = [log.number for log in logs]
     return samples, side_by_side(by_block, numbers, count), side_by_side(by_period, numbers, count)

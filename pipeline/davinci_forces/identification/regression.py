@@ -4,18 +4,18 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from davinci_forces.estimators.problem import NOTHING, Known, Regression
+from davinci_forces.estimators.problem import NO_PRIOR, Prior, Regression
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.model import ArmMotion
-from davinci_forces.maths.models.physical import ROUNDING, Box, lumping
+from davinci_forces.maths.models.physical import ROUNDING, Box, physical_lumping
 from davinci_forces.maths.periods.harmonics import kept_noise
-from davinci_forces.maths.signals.standstill import standing
+from davinci_forces.maths.signals.standstill import is_standing_still
 from davinci_forces.records import JointModel, Motion, Trajectory
 from davinci_forces.robots.robot import Joint
 
 
-def pose(model: IndependentJoint, trajectories: Sequence[Trajectory], known: Known = NOTHING) -> Regression:
+def pose(model: IndependentJoint, trajectories: Sequence[Trajectory], known: Prior = NO_PRIOR) -> Regression:
     """Return the least squares problem of a joint: the averaged periods of all its logs, one after the other.  (6.37)
 
     Samples at standstill have weight 0, because friction is undetermined there.
@@ -36,7 +36,7 @@ def pose(model: IndependentJoint, trajectories: Sequence[Trajectory], known: Kno
 def stands_still(t: Trajectory) -> Booleans:
     """Return the samples (K,) of an averaged period at which the joint stands still; the period repeats."""
     q, dq = np.tile(t.q, 3), np.tile(t.dq, 3)
-    return standing(q, dq, np.zeros(len(q), np.int64), len(t.q) / t.period)[len(t.q) : 2 * len(t.q)]
+    return is_standing_still(q, dq, np.zeros(len(q), np.int64), len(t.q) / t.period)[len(t.q) : 2 * len(t.q)]
 
 
 def row_covariance(model: IndependentJoint, t: Trajectory) -> Array:
@@ -49,7 +49,7 @@ def row_covariance(model: IndependentJoint, t: Trajectory) -> Array:
     return np.asarray(np.tensordot(J, noise @ J, axes=((0, 1), (0, 1))) / len(t.q))
 
 
-def joined(parts: Sequence[Regression]) -> Regression:
+def join_regressions(parts: Sequence[Regression]) -> Regression:
     """Return the least squares problem of several parts together."""
     ends = np.cumsum([0, *(len(p.tau) for p in parts[:-1])]).tolist()
     noises = [p.Phi_cov for p in parts if p.Phi_cov is not None]
@@ -84,15 +84,15 @@ def joined_motion(motions: Sequence[ArmMotion]) -> ArmMotion:
     return motions[0]._replace(q=q, dq=dq, ddq=ddq)
 
 
-def known_of(joint: Joint) -> Known:
+def known_of(joint: Joint) -> Prior:
     """Return the signs that physics requires, and the box of physical parameters with a guess if the robot has one."""
     positive = np.array([term.positive for term in joint.terms])
     if joint.physical is None or joint.effort:  # a current does not say how much its motor pushes
-        return Known(positive)
-    lumped = lumping(joint.physical, joint.gear_ratio, tuple(term.name for term in joint.terms))
+        return Prior(positive)
+    lumped = physical_lumping(joint.physical, joint.gear_ratio, tuple(term.name for term in joint.terms))
     if lumped is None:
-        return Known(positive)
+        return Prior(positive)
     guess, lower, upper = np.array([(x.guess, x.lower, x.upper) for x in joint.physical.parameters]).T
     theta = lumped.theta(guess)
     # A difference of masses that is only rounding is no guess; as one, it would be trusted to all its digits.
-    return Known(positive, Box(lower, upper, lumped), np.where(np.abs(theta) > ROUNDING, theta, 0.0))
+    return Prior(positive, Box(lower, upper, lumped), np.where(np.abs(theta) > ROUNDING, theta, 0.0))

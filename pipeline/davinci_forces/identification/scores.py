@@ -8,7 +8,7 @@ import numpy as np
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators.problem import Estimator, Regression
 from davinci_forces.maths.arrays import Array, Booleans
-from davinci_forces.maths.signals.smoothing import share_passed, smoothed, white_std
+from davinci_forces.maths.signals.smoothing import lowpass_segments, share_passed, white_std
 from davinci_forces.maths.uncertainty.bootstrap import model_error
 from davinci_forces.records import Motion, Prediction
 
@@ -48,7 +48,7 @@ def select_logs(problem: Regression, logs: Sequence[int]) -> Regression:
     )
 
 
-class Judge:
+class Scorer:
     """The effort of a recording, against which predictions are scored; what they share is computed once.
 
     `free` (N,) are the samples that count, at which nothing touches the robot.  `white` is the noise of the effort from
@@ -64,7 +64,7 @@ class Judge:
         self.spread = float(np.linalg.norm(tau - tau.mean())) or 1.0
         self.passed = share_passed(motion.rate, lowpass)
 
-    def scored(self, model: str, name: str, role: str, scheme: str, path: str, tau_hat: Array) -> Prediction:
+    def score(self, model: str, name: str, role: str, scheme: str, path: str, tau_hat: Array) -> Prediction:
         """Return a prediction (N,) with its scores."""
         error = self.motion.tau - tau_hat
         slow = self._smoothed(error)
@@ -97,7 +97,7 @@ class Judge:
         )
 
     def _smoothed(self, x: Array) -> Array:
-        return smoothed(x, self.motion.segment, self.motion.rate, self.lowpass)
+        return lowpass_segments(x, self.motion.segment, self.motion.rate, self.lowpass)
 
 
 def select_samples(motion: Motion, which: Booleans | slice) -> Motion:

@@ -11,11 +11,11 @@ import numpy as np
 
 from davinci_forces.identification.candidates import Candidate, Library
 from davinci_forces.identification.observations import Observed
-from davinci_forces.identification.scores import Judge, folds, select_samples
+from davinci_forces.identification.scores import Scorer, folds, select_samples
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.memory import efforts
 from davinci_forces.maths.models.model import Model
-from davinci_forces.maths.selection import BLOCKS, MOST, Equations, Ridge, solve
+from davinci_forces.maths.selection import MAX_GROUPS, PATH_BLOCKS, Equations, Ridge, solve
 from davinci_forces.records import Prediction
 from davinci_forces.records.prediction import ANOTHER_PATH, CHOSEN, SAME_PATH
 from davinci_forces.robots.models import Reach
@@ -44,7 +44,7 @@ class RefitModel:
         """Fit the parameters (p,) without some cells (C,); raises LinAlgError where the others do not separate them."""
         key = out.tobytes()
         if key not in self._thetas:
-            self._thetas[key] = solve(cells.without(out), self._ridge)
+            self._thetas[key] = solve(cells.omit_cells(out), self._ridge)
         return self._thetas[key]
 
 
@@ -87,13 +87,13 @@ def predict_scheme(
         record = select_samples(log.records[names.index(effort)], is_predicted)
         moves = record.standing == 0
         if not record.at_rest and moves.any():
-            judge = Judge(record, moves, log.lowpass, log.white.get(effort))
-            yield judge.scored(name, estimator, "identification", scheme.name, scheme.path, tau_hat[:, m])
+            judge = Scorer(record, moves, log.lowpass, log.white.get(effort))
+            yield judge.score(name, estimator, "identification", scheme.name, scheme.path, tau_hat[:, m])
 
 
 def leave_blocks_out(refits: RefitModel, log: Observed, name: str) -> Scheme:
     """Leave each sixth of the path out, of all logs together."""
-    out = np.tile(np.arange(BLOCKS), refits.total) == np.arange(BLOCKS)[:, None]
+    out = np.tile(np.arange(PATH_BLOCKS), refits.total) == np.arange(PATH_BLOCKS)[:, None]
     return Scheme(name, ANOTHER_PATH, refits.by_block, out, log.block)
 
 
@@ -102,12 +102,12 @@ def scheme_of_own_fits(refits: RefitModel, log: Observed) -> Scheme:
     if len(refits.logs) > 1:
         fold = dict(zip(refits.logs, folds(len(refits.logs)), strict=True))
         omitted = [number for number in fold if fold[number] == fold[log.number]]
-        out = np.isin(np.repeat(np.arange(refits.total), BLOCKS), omitted)[None]
+        out = np.isin(np.repeat(np.arange(refits.total), PATH_BLOCKS), omitted)[None]
         refit = np.where(log.period < 0, -1, 0) if log.period.max() >= 0 else np.zeros_like(log.period)
         name = "leave one log out" if len(omitted) == 1 else f"leave {len(omitted)} logs out"
         return Scheme(name, ANOTHER_PATH, refits.by_block, out, refit)
     if log.period.max() >= 1:
         periods = np.arange(log.period.max() + 1)
-        out = MOST * log.number + periods[:, None] == np.arange(MOST * refits.total)
+        out = MAX_GROUPS * log.number + periods[:, None] == np.arange(MAX_GROUPS * refits.total)
         return Scheme("leave one period out", SAME_PATH, refits.by_period, out, log.period)
     return leave_blocks_out(refits, log, "leave a segment out")

@@ -11,7 +11,7 @@ from davinci_forces.maths.periods.shift import likeness
 from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.records import Choice, CrossFit, Fit, FittedPaths, Motion
 from davinci_forces.records.prediction import ANOTHER_PATH, CHOSEN, SAME_PATH
-from davinci_forces.robots.models import ARM, described
+from davinci_forces.robots.models import ARM, model_of
 from davinci_forces.robots.robot import Robot
 
 FALLBACK = "independent.lse"  # for joints that the chosen model does not cover
@@ -46,22 +46,22 @@ class Identified:
         """Return the model of a fit."""
         if fit.key not in self._models:
             scales, names = fit.scale.tolist(), [str(name) for name in fit.parameter]
-            self._models[fit.key] = described(self.robot, fit.model, fit.group, names, scales)
+            self._models[fit.key] = model_of(self.robot, fit.model, fit.group, names, scales)
         return self._models[fit.key]
 
-    def describing(self, joint: str) -> list[Fit]:
+    def fits_of(self, joint: str) -> list[Fit]:
         """Return the fits of a joint's effort: its own, and those of its arm."""
         return [f for f in self.fits if f.group == joint or (f.group == ARM and joint in self.model(f).efforts)]
 
-    def used(self, joint: str, setting: str) -> Fit | None:
+    def fit_of(self, joint: str, setting: str) -> Fit | None:
         """Return the fit named by the setting `fit`, or `FALLBACK` where the chosen model does not cover the joint."""
-        by_name = {f"{f.model}.{f.estimator}": f for f in self.describing(joint)}
+        by_name = {f"{f.model}.{f.estimator}": f for f in self.fits_of(joint)}
         if setting != CHOSEN:
             return by_name.get(setting)
         names = [f"{choice.model}.{choice.estimator}" for choice in self._choices if choice.group in (joint, ARM)]
         return next((by_name[name] for name in (*names, FALLBACK) if name in by_name), None)
 
-    def used_along(self, joint: str, setting: str, held: Collection[str]) -> tuple[Fit, str]:
+    def fit_along(self, joint: str, setting: str, held: Collection[str]) -> tuple[Fit, str]:
         """Return the fit of a joint along a log that holds these joints, and why it replaces that of the setting.
 
         Raises
@@ -69,9 +69,9 @@ class Identified:
         PipelineError
             If there is no fit of that name.
         """
-        fit, stand_in = self.used(joint, setting), self.used(joint, FALLBACK)
+        fit, stand_in = self.fit_of(joint, setting), self.fit_of(joint, FALLBACK)
         if fit is None:
-            names = ", ".join(f"{f.model}.{f.estimator}" for f in self.describing(joint))
+            names = ", ".join(f"{f.model}.{f.estimator}" for f in self.fits_of(joint))
             raise PipelineError(f"{joint}: there is no fit {setting!r}; set fit in [settings] to one of {names}")
         if stand_in is None or set(self.model(fit).joints) <= set(held):
             return fit, ""

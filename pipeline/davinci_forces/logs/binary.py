@@ -19,7 +19,7 @@ TYPES = {"dbl": "f8", "sgl": "f4", "double": "f8", "single": "f4", "float64": "f
 TYPES |= {name: f"{sign}{bits // 8}" for sign, word in (("i", "int"), ("u", "uint")) for bits in (16, 32, 64)
           for name in (f"{word}{bits}", f"{sign}{bits}")}  # fmt: skip
 TYPES |= {code: code for code in ("i2", "i4", "u2", "u4")}
-EXAMPLE = 'dtype = "float64" and columns = ["time", "q", "i"], or their number'
+BINARY_EXAMPLE = 'dtype = "float64" and columns = ["time", "q", "i"], or their number'
 
 
 def recognises(path: Path, head: bytes) -> bool:
@@ -48,8 +48,8 @@ def read(path: Path, options: Options) -> Log:
     dtype = dtype_of(options.dtype or "")
     if dtype is None or not options.columns:
         raise BadLog(
-            f"{path}: raw binary files do not say what they hold; describe it in [[log]] of study.toml: {EXAMPLE} "
-            '(big-endian, as LabVIEW writes; "<float64" is little-endian)'
+            f"{path}: raw binary files do not say what they hold; describe it in [[log]] of study.toml: "
+            f'{BINARY_EXAMPLE} (big-endian, as LabVIEW writes; "<float64" is little-endian)'
         )
     count = options.columns if isinstance(options.columns, int) else len(options.columns)
     names = [f"column_{i}" for i in range(count)] if isinstance(options.columns, int) else options.columns

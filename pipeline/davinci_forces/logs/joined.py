@@ -14,7 +14,7 @@ import numpy as np
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs import open_log
-from davinci_forces.logs.log import COUNTED, Block, Channel, Log, Options, unique
+from davinci_forces.logs.log import UNIT_OF_COUNTS, Block, Channel, Log, Options, unique
 from davinci_forces.logs.parts import ABSOLUTE, SAMPLED_KINDS, require_different, starts_of
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals.clock import GAP, ClockStatistics, cubic, means
@@ -67,7 +67,7 @@ class Joined(Log):
             [name] = unique(["time" if part.clock else "sample"], [channel.name for channel in part.channels])
             counted = f"{stem}/{name}"
             self.of[counted], self.counted[counted] = stem, sampled[0]
-            yield Channel(counted, "s" if part.clock else COUNTED, "time", derived=True, time=counted)
+            yield Channel(counted, "s" if part.clock else UNIT_OF_COUNTS, "time", derived=True, time=counted)
         for channel in part.channels:
             clock = channel.time or part.time
             time = f"{stem}/{clock}" if clock else counted
@@ -81,11 +81,11 @@ class Joined(Log):
             return super().times_called(name)
         return [self.find(f"{stem}/{part.find(name).name}") for stem, part in self.parts.items()]
 
-    def apart(self) -> "Joined":
+    def independent_copy(self) -> "Joined":
         """Copy the log and its files, to be read at the same time as this one."""
-        twin = super().apart()
+        twin = super().independent_copy()
         assert isinstance(twin, Joined)
-        twin.parts = {stem: part.apart() for stem, part in self.parts.items()}
+        twin.parts = {stem: part.independent_copy() for stem, part in self.parts.items()}
         return twin
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
@@ -123,7 +123,7 @@ class Joined(Log):
         return values + self.offsets[stem] if counts_from_start and self.offsets[stem] else values
 
 
-Timed = tuple[Array, Block]  # times (N,) [s], and samples (N,) by the names of their channels
+TimedBlock = tuple[Array, Block]  # times (N,) [s], and samples (N,) by the names of their channels
 Refuse = Callable[[str], BadLog]
 
 
@@ -137,14 +137,14 @@ class Alignment:
     others: dict[str, "Follower"] = field(default_factory=dict)
 
     @property
-    def changed(self) -> bool:
+    def clocks_differ(self) -> bool:
         """Whether the clocks differed, so that rows were dropped, interpolated or averaged."""
         return bool(self.left_out) or any(f.interpolated or f.many > 1 for f in self.others.values())
 
 
-def aligned(
-    timed: Iterator[Timed], others: dict[str, Iterator[Timed]], done: Alignment, refuse: Refuse
-) -> Iterator[Timed]:
+def align(
+    timed: Iterator[TimedBlock], others: dict[str, Iterator[TimedBlock]], done: Alignment, refuse: Refuse
+) -> Iterator[TimedBlock]:
     """Align channels of other clocks to the rows of one clock; `done` records how.
 
     Rows that are not between samples of every other clock are left out.
@@ -213,7 +213,7 @@ class _Rising:
 class Follower:
     """Channels of another clock, interpolated to requested times; keeps only the samples around them."""
 
-    def __init__(self, name: str, source: Iterator[Timed], period: float, refuse: Refuse) -> None:
+    def __init__(self, name: str, source: Iterator[TimedBlock], period: float, refuse: Refuse) -> None:
         self.source, self.rising = source, _Rising(name, refuse)
         self.names: list[str] = []
         self.interpolated = 0  # interpolated rows
@@ -242,14 +242,14 @@ class Follower:
         self.t, self.x = self.t[begin:], self.x[begin:]
         return dict(zip(self.names, x.T, strict=True)), exact | between
 
-    def _next(self) -> Timed | None:
+    def _next(self) -> TimedBlock | None:
         following = next((timed for timed in self.source if len(timed[0])), None)
         self.ended = following is None
         if following:
             self.rising.update(following[0])
         return following
 
-    def _take(self, timed: Timed | None) -> None:
+    def _take(self, timed: TimedBlock | None) -> None:
         """Append samples to those kept."""
         if timed is None:
             return

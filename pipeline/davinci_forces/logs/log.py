@@ -10,7 +10,8 @@ A format is a module of this folder that exports two functions:
 A channel may have its own clock: `Channel.time` names the channel of the same log with its sample times, in seconds
 from `Log.started`.  Where the file has no such channel, the reader derives one (`derived`, of kind "time"), with
 the correct times of every file segment and write.  Channels on one uniform clock need none: `Log.clock` describes it.
-To read several clocks at once, use `Log.apart`, a shallow copy; `blocks` therefore keeps the state of its own pass.
+To read several clocks at once, use `Log.independent_copy`, which is shallow; `blocks` therefore keeps the state of its
+own pass.
 """
 
 import re
@@ -29,7 +30,7 @@ from numpy.typing import NDArray
 from davinci_forces.errors import BadLog
 
 Block = dict[str, NDArray[np.float64]]  # channel name -> samples; every array of a block has one length
-COUNTED = "samples"  # unit of a time channel that only counts samples
+UNIT_OF_COUNTS = "samples"  # unit of a time channel that only counts samples
 IN_BRACKETS = re.compile(r".*\S\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*")
 BLOCK_ROWS = 1 << 16  # of a full block
 BLOCK_CELLS = 1 << 20  # of a full block of many channels
@@ -146,7 +147,7 @@ class Log(ABC):
         others = [c for c in alike if c not in exact] if not exact or "/" in name else []
         return [*exact, *others] or [self.find(name)]
 
-    def apart(self) -> "Log":
+    def independent_copy(self) -> "Log":
         """Copy the log, to be read at the same time as this one, with separate counts and warnings."""
         twin = copy(self)
         twin.warnings, twin.comments, twin.facts = [*self.warnings], [*self.comments], {**self.facts}

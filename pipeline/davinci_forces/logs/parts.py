@@ -101,11 +101,11 @@ class Parts(Log):
         new = (Channel(t, "s", "time", True, "" if t == main else t) for t in self.times if t not in names)
         self.channels = (*timed, *new)
 
-    def apart(self) -> "Parts":
+    def independent_copy(self) -> "Parts":
         """Copy the log and its parts, to be read at the same time as this one."""
-        twin = super().apart()
+        twin = super().independent_copy()
         assert isinstance(twin, Parts)
-        twin.parts = [part.apart() for part in self.parts]
+        twin.parts = [part.independent_copy() for part in self.parts]
         return twin
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:

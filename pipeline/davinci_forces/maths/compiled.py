@@ -32,7 +32,7 @@ F = TypeVar("F", bound=Callable[..., object])
 _setting = Lock()
 
 
-def compiled(function: F, **options: Any) -> F:
+def compile_function(function: F, **options: Any) -> F:
     """Compile a function at its first call, in every process again."""
     from numba import njit
 
@@ -42,17 +42,17 @@ def compiled(function: F, **options: Any) -> F:
 
 def inline(function: F) -> F:
     """Compile a function into every compiled function that calls it."""
-    return compiled(function, inline="always")
+    return compile_function(function, inline="always")
 
 
-def cached(function: F) -> F:
+def compile_and_store(function: F) -> F:
     """Compile a function once, and store the code on disk."""
     from numba import config
 
     with _setting:  # threads may import several modules at once
         before, config.CACHE_DIR = config.CACHE_DIR, str(folder())
         try:
-            return compiled(function, cache=True, error_model="numpy")
+            return compile_function(function, cache=True, error_model="numpy")
         finally:
             config.CACHE_DIR = before
 

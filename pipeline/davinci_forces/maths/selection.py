@@ -28,8 +28,8 @@ from davinci_forces.maths.arrays import Array, Booleans, Integers
 UNSEEN = 1e-12  # of the largest column's square: a smaller column is rounding only
 ROUNDING_OF_COLUMN = 1e-12  # of the largest column: a smaller column is rounding only
 DEPENDENT = 1e12  # condition of the equations of scaled columns, the square of the columns' own
-BLOCKS = 6  # of a period, or of a recording that does not repeat
-MOST = 20  # groups at most that are left out, each with a fit of its own
+PATH_BLOCKS = 6  # of a period, or of a recording that does not repeat
+MAX_GROUPS = 20  # groups at most that are left out, each with a fit of its own
 CLEARLY = 1.0  # standard errors of the difference, from which a candidate is clearly worse
 
 
@@ -40,11 +40,11 @@ class Equations(NamedTuple):
     right: Array  # (C, m, p)
     squares: Array  # (C, m)
 
-    def without(self, cells: Booleans) -> "Equations":
+    def omit_cells(self, cells: Booleans) -> "Equations":
         """Sum the equations of all cells but these (C,)."""
-        return self.of(~cells)
+        return self.sum_cells(~cells)
 
-    def of(self, cells: Booleans) -> "Equations":
+    def sum_cells(self, cells: Booleans) -> "Equations":
         """Sum the equations of these cells (C,)."""
         return Equations(*(part[cells].sum(axis=0, keepdims=True) for part in self))
 
@@ -59,7 +59,7 @@ class Equations(NamedTuple):
         return Equations(self.gram[:, :, index][..., index], self.right[..., index], self.squares)
 
 
-def gathered(Phi: Array, tau: Array, cell: Integers, cells: int) -> Equations:
+def sum_equations(Phi: Array, tau: Array, cell: Integers, cells: int) -> Equations:
     """Sum the equations of Phi (N, m, p) and tau (N, m) by the cell of each sample (N,); cell -1 is left out.
 
     Efforts that are NaN are left out.
@@ -148,7 +148,7 @@ def path_blocks(t: Array, period: float, moving: Booleans | None = None) -> Inte
     if moving is not None and not moving.all() and not period:
         since = np.concatenate([[0.0], np.cumsum(np.diff(t) * moving[1:])])
     length = period or float(since[-1]) * (1 + 1e-9) or 1.0
-    return np.asarray((since / length % 1.0 * BLOCKS).astype(np.int64) % BLOCKS)
+    return np.asarray((since / length % 1.0 * PATH_BLOCKS).astype(np.int64) % PATH_BLOCKS)
 
 
 def repetitions(t: Array, period: float) -> Integers:
@@ -162,15 +162,15 @@ def left_out(log: Integers, block: Integers) -> tuple[Booleans, ...]:
     The schemes leave out sixths of the path, its halves, and each of several logs: at most `MOST` groups together.
     """
     logs = np.unique(log)
-    sixths = block == np.arange(BLOCKS)[:, None]
-    halves = block // (BLOCKS // 2) == np.arange(2)[:, None]
-    room = MOST - BLOCKS - 2
+    sixths = block == np.arange(PATH_BLOCKS)[:, None]
+    halves = block // (PATH_BLOCKS // 2) == np.arange(2)[:, None]
+    room = MAX_GROUPS - PATH_BLOCKS - 2
     together = np.searchsorted(logs, log) * min(room, len(logs)) // len(logs)
     by_log = together == np.arange(min(room, len(logs)))[:, None]
     return (sixths, halves, by_log) if len(logs) > 1 else (sixths, halves)
 
 
-class Judged(NamedTuple):
+class CrossValidation(NamedTuple):
     """Relative squared errors of a candidate on the data that its fits left out, by scheme."""
 
     unseen: tuple[Array, ...]  # of each scheme (G, m): squared error of each group, over the effort's in all of them
@@ -187,7 +187,7 @@ class Judged(NamedTuple):
         return float(self.errors.mean())
 
 
-def judged(equations: Equations, ridge: Ridge, schemes: Sequence[Booleans]) -> Judged:
+def cross_validate(equations: Equations, ridge: Ridge, schemes: Sequence[Booleans]) -> CrossValidation:
     """Cross-validate a candidate: leave out each group (G, C) of cells in turn, and predict it.
 
     Raises
@@ -198,20 +198,20 @@ def judged(equations: Equations, ridge: Ridge, schemes: Sequence[Booleans]) -> J
     whole = equations.squares.sum(axis=0)
     unseen = []
     for groups in schemes:
-        thetas = [solve(equations.without(out), ridge) for out in groups]
-        errors = [equations.of(out).errors(theta)[0] for out, theta in zip(groups, thetas, strict=True)]
+        thetas = [solve(equations.omit_cells(out), ridge) for out in groups]
+        errors = [equations.sum_cells(out).errors(theta)[0] for out, theta in zip(groups, thetas, strict=True)]
         unseen.append(np.array(errors) / whole)
-    theta = solve(equations.of(np.ones(len(equations.gram), np.bool_)), ridge)
-    return Judged(tuple(unseen), np.sqrt(equations.errors(theta).sum(axis=0) / whole))
+    theta = solve(equations.sum_cells(np.ones(len(equations.gram), np.bool_)), ridge)
+    return CrossValidation(tuple(unseen), np.sqrt(equations.errors(theta).sum(axis=0) / whole))
 
 
-def together(parts: Sequence[Judged]) -> Judged:
+def combine_efforts(parts: Sequence[CrossValidation]) -> CrossValidation:
     """Combine the fits to different efforts into one candidate."""
     unseen = tuple(np.concatenate(shares, axis=1) for shares in zip(*(part.unseen for part in parts), strict=True))
-    return Judged(unseen, np.concatenate([part.training for part in parts]))
+    return CrossValidation(unseen, np.concatenate([part.training for part in parts]))
 
 
-def standard_error(candidate: Judged, reference: Judged | None = None) -> float:
+def standard_error(candidate: CrossValidation, reference: CrossValidation | None = None) -> float:
     """Standard error of a score, or of the difference of two scores, by the jackknife over groups."""
     variances = []
     for i, shares in enumerate(candidate.unseen):
@@ -225,7 +225,9 @@ def standard_error(candidate: Judged, reference: Judged | None = None) -> float:
     return float(np.sqrt(np.mean(variances)))
 
 
-def preferred(candidates: Sequence[Judged], sizes: Sequence[int], eligible: Sequence[bool]) -> tuple[int, int]:
+def choose_candidate(
+    candidates: Sequence[CrossValidation], sizes: Sequence[int], eligible: Sequence[bool]
+) -> tuple[int, int]:
     """Indices of the chosen candidate and of the best: the chosen one is the smallest that is not clearly worse.
 
     Of several equally small candidates, the better one is chosen; `sizes` are numbers of parameters.

@@ -26,12 +26,12 @@ class Catalogue:
         self._read = read
         self._records: dict[type[Record], list[Record]] = {}
 
-    def all(self, kind: type[AnyRecord]) -> list[AnyRecord]:
+    def records(self, kind: type[AnyRecord]) -> list[AnyRecord]:
         """Return all records of a kind, in the order of the study's logs and the robot's joints."""
         if kind not in self._records:
             self._records[kind] = list(self._read(kind))
         return list(self._records[kind])  # type: ignore[arg-type]
 
-    def about(self, kind: type[AnyRecord], **scalars: str) -> list[AnyRecord]:
+    def select(self, kind: type[AnyRecord], **scalars: str) -> list[AnyRecord]:
         """Return the records of a kind whose scalars have these values."""
-        return [r for r in self.all(kind) if all(getattr(r, k) == v for k, v in scalars.items())]
+        return [r for r in self.records(kind) if all(getattr(r, k) == v for k, v in scalars.items())]

@@ -19,7 +19,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from davinci_forces.errors import BadRecord, BadRequest, MissingRecord, PipelineError
-from davinci_forces.files import PARTIAL, digest, require_file, unnamed
+from davinci_forces.files import PARTIAL, digest, require_file, temporary_name
 from davinci_forces.records import AnyRecord, Column, Counts, Labels, Names, Origin, Record
 from davinci_forces.records.quantities import QUANTITIES
 
@@ -46,7 +46,7 @@ class Writer:
         self.folder, self.unit = folder, unit
         self.made_from = json.dumps(made_from, ensure_ascii=False, sort_keys=True)
         self._open: dict[Path, pq.ParquetWriter] = {}
-        self._unnamed = unnamed()
+        self._unnamed = temporary_name()
         self._described: dict[Path, dict[str, str]] = {}
 
     def __enter__(self) -> "Writer":

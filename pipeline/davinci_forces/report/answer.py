@@ -17,7 +17,7 @@ HEADER = ("joint", "verdict", "model error", "of effort", "R2", "at most", "dete
 def answer(context: Context) -> str:
     """The table of verdicts and the three things to look at first, in plain text."""
     trusts = [trust(context, joint) for joint in fitted_joints(context)]
-    stiffness = context.catalogue.all(Stiffness)
+    stiffness = context.catalogue.records(Stiffness)
     tissue = [f"tissue {plain(verdict(context, log).text)}" for log in stiffness]
     if not trusts:
         message = "no joint could be identified: there is no usable identification log, so no effort was tracked"
@@ -42,7 +42,7 @@ def align(rows: Sequence[Sequence[str]]) -> list[str]:
 
 def digest(context: Context) -> bytes:
     """The content of summary.json; a key leads to its number in results.json, null where there is none."""
-    started = [s.started for s in context.catalogue.all(LogSummary) if s.started]
+    started = [s.started for s in context.catalogue.records(LogSummary) if s.started]
     study = context.study
     content = {
         "title": study.title,

@@ -11,7 +11,7 @@ Value = float | int | str | bool | None
 
 
 @dataclass(frozen=True)
-class Stated:
+class StatedValue:
     """A number as a results.json states it; `std` is None where it has no standard error."""
 
     value: Value
@@ -30,8 +30,8 @@ class Change:
     """A key whose number changed, came or went: `before` is None where it came, `after` where it went."""
 
     key: str
-    before: Stated | None
-    after: Stated | None
+    before: StatedValue | None
+    after: StatedValue | None
 
     @property
     def std(self) -> float | None:
@@ -47,14 +47,14 @@ class Change:
         return (b - a) / self.std if a is not None and b is not None and math.isfinite(b - a) else None
 
 
-def changes(before: Mapping[str, Stated], after: Mapping[str, Stated]) -> list[Change]:
+def changes(before: Mapping[str, StatedValue], after: Mapping[str, StatedValue]) -> list[Change]:
     """Every key that changed, went or came, in the order of the files."""
     both = [Change(key, a, after.get(key)) for key, a in before.items()]
     came = [Change(key, None, b) for key, b in after.items() if key not in before]
     return [d for d in (*both, *came) if d.before is None or d.after is None or has_changed(d.before, d.after)]
 
 
-def has_changed(a: Stated, b: Stated) -> bool:
+def has_changed(a: StatedValue, b: StatedValue) -> bool:
     """|b - a| > 2 sqrt(s_a^2 + s_b^2), or > 1e-9 of the larger where neither states an error; a unit is no other."""
     if a.unit != b.unit:
         return True
@@ -68,6 +68,6 @@ def has_changed(a: Stated, b: Stated) -> bool:
     return not math.isfinite(q - p) or abs(q - p) > allowed
 
 
-def difference_std(a: Stated, b: Stated) -> float | None:
+def difference_std(a: StatedValue, b: StatedValue) -> float | None:
     """sqrt(s_a^2 + s_b^2), with 0 for an error that only one of them states; None where there is no error at all."""
     return math.hypot(a.std or 0.0, b.std or 0.0) or None

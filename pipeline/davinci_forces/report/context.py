@@ -8,13 +8,13 @@ from davinci_forces.records import Fit, FreeSpace, Prediction, Record
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.records.quantities import QUANTITIES
-from davinci_forces.report.changes import Stated
+from davinci_forces.report.changes import StatedValue
 from davinci_forces.report.content import Number, literal
 from davinci_forces.report.results import Results, format_unit
 from davinci_forces.study import Study
 from davinci_forces.study.review import Rating
 
-PLAIN = "independent.lse"  # the fit that every other one is compared with
+BASELINE_FIT = "independent.lse"  # the fit that every other one is compared with
 THESIS_SCENARIOS = ("davinci-demo", "davinci-thesis")  # simulations of the thesis's experiments
 ACRONYMS = ("lse", "wlse", "pso", "iv", "tls")  # of estimators
 
@@ -29,7 +29,7 @@ class Context:
     provenance: Provenance
     ratings: tuple[Rating, ...] = ()  # what reviewers said, where the study holds it
     labels: frozenset[str] = frozenset()  # of what stands before a section in its document
-    baseline: Mapping[str, Stated] | None = None  # the numbers of an earlier report, where the study names one
+    baseline: Mapping[str, StatedValue] | None = None  # the numbers of an earlier report, where the study names one
 
     @property
     def compares_with_thesis(self) -> bool:
@@ -59,7 +59,7 @@ class Context:
 
     def used_fit(self, joint: str) -> str:
         """`<model>.<estimator>` of the fit that the filter ran with, as its predictions go by: `chosen.<fit>`."""
-        chosen = [f"{p.model}.{p.estimator}" for p in self.catalogue.about(Prediction, joint=joint, model=CHOSEN)]
+        chosen = [f"{p.model}.{p.estimator}" for p in self.catalogue.select(Prediction, joint=joint, model=CHOSEN)]
         if self.study.settings.fit == CHOSEN and chosen:
             return chosen[0]
         return self.own_fit(joint)
@@ -67,19 +67,23 @@ class Context:
     def own_fit(self, joint: str) -> str:
         """`<model>.<estimator>` of the fit of a joint by itself: the one that the filter ran with, or least squares."""
         names = [f"{fit.model}.{fit.estimator}" for fit in self.own_fits() if fit.group == joint]
-        chosen = [p.estimator for p in self.catalogue.about(Prediction, joint=joint, model=CHOSEN)]
-        wanted = (*chosen[:1], PLAIN) if self.study.settings.fit == CHOSEN else (self.study.settings.fit, PLAIN)
-        return next((name for name in (*wanted, *names) if name in names), self.study.settings.fit)
+        chosen = [p.estimator for p in self.catalogue.select(Prediction, joint=joint, model=CHOSEN)]
+        wanted = (
+            (*chosen[:1], BASELINE_FIT)
+            if self.study.settings.fit == CHOSEN
+            else (self.study.settings.fit, BASELINE_FIT)
+        )
+        return next((name for name in (*wanted, BASELINE_FIT, *names) if name in names), self.study.settings.fit)
 
     def worst_space(self, joint: str) -> FreeSpace | None:
         """The free space of a joint with the highest detection level, of a log not fitted where there is one."""
-        spaces = self.catalogue.about(FreeSpace, joint=joint)
+        spaces = self.catalogue.select(FreeSpace, joint=joint)
         unseen = [space for space in spaces if space.role != "identification"]
         return max(unseen or spaces, key=lambda space: space.detection_level, default=None)
 
     def own_fits(self) -> list[Fit]:
         """The fits of the joints' own terms, one joint at a time."""
-        return self.catalogue.about(Fit, model="independent")
+        return self.catalogue.select(Fit, model="independent")
 
 
 def fit_name(model: str, estimator: str) -> str:

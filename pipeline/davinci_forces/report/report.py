@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.report.answer import answer, digest
-from davinci_forces.report.changes import Stated
+from davinci_forces.report.changes import StatedValue
 from davinci_forces.report.content import Document, Rated, Section, name_of, walk
 from davinci_forces.report.context import Context
 from davinci_forces.report.results import MANIFEST, collect, identity, manifest
@@ -16,11 +16,11 @@ from davinci_forces.study import Study
 from davinci_forces.study.review import Rating
 
 
-def write(
+def write_report(
     catalogue: Catalogue,
     study: Study,
     provenance: Provenance,
-    baseline: Mapping[str, Stated] | None = None,
+    baseline: Mapping[str, StatedValue] | None = None,
     ratings: tuple[Rating, ...] = (),
 ) -> dict[str, bytes]:
     """The files of the report, by name; what is shown and results.json come from the same numbers."""

@@ -61,7 +61,7 @@ def collect(catalogue: Catalogue) -> Results:
     for kind in KINDS.values():
         if kind.published is Record.published:  # it has none, and may be large
             continue
-        for record in catalogue.all(kind):
+        for record in catalogue.records(kind):
             for number in record.published():
                 results.add(record, number)
     return results

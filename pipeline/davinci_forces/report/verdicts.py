@@ -11,7 +11,6 @@ DETECTED, DETECTABLE = 1 / 3, 1.0  # detection level over the effort that the us
 STIFF, STIFFER = 0.10, 0.25  # standard error of a stiffness over it
 COVERED = (0.90, 0.98)  # coverage of a 95 % band that is right
 NEAR_SINGULAR = 100.0  # condition number of the tip's Jacobian, as the stage that finds the force marks it
-NORMAL_95 = 1.96  # standard deviations of a 95 % interval
 WITHIN = 4.0  # standard errors that an estimate may be off the truth
 WORDS: dict[Level, str] = {  # the mark and its word stay on one line
     "good": "●\N{NO-BREAK SPACE}Good",

@@ -75,7 +75,7 @@ def bodies(lc5: float = -CYLINDERS[HOLDER][5]) -> Bodies:
 
     They are in the links' own frames, as the dynamics take them.
     """
-    return in_table_frames(lc5).within(CHAIN.of_links)
+    return in_table_frames(lc5).in_frames(CHAIN.of_links)
 
 
 def in_table_frames(lc5: float = -CYLINDERS[HOLDER][5]) -> Bodies:

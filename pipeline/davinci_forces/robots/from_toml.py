@@ -246,4 +246,4 @@ def _bodies(weights: Sequence[_Weight | None], chain: Chain) -> Bodies:
         np.array([weight.centre for weight in stated]),
         np.array([_tensor(weight.inertia) for weight in stated]),
         np.zeros(len(stated), np.int64),
-    ).within(chain.of_links)
+    ).in_frames(chain.of_links)

@@ -9,7 +9,7 @@ from typing import NamedTuple
 from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.model import Model
-from davinci_forces.maths.models.terms import Term, coulomb, presliding, smooth_sign, stribeck, viscous
+from davinci_forces.maths.models.terms import Term, coulomb, presliding_friction, smooth_sign, stribeck, viscous
 from davinci_forces.robots.robot import Joint, Robot
 
 STRUCTURES = ("independent", "coupled")
@@ -44,11 +44,11 @@ class AddedFriction(NamedTuple):
     def terms(self, reach: Reach) -> tuple[Term, ...]:
         """Its terms for a joint with this range of motion."""
         if self.variant == "smooth":
-            return (smooth_sign(rounded(WIDTH * reach.velocity)),)
+            return (smooth_sign(round_scale(WIDTH * reach.velocity)),)
         if self.variant == "stribeck":
-            return (stribeck(rounded(FADED * reach.velocity)),)
-        scales = (rounded(share * reach.displacement) for share in self.shares)
-        return tuple(presliding(scale, number) for number, scale in enumerate(scales, start=1))
+            return (stribeck(round_scale(FADED * reach.velocity)),)
+        scales = (round_scale(share * reach.displacement) for share in self.shares)
+        return tuple(presliding_friction(scale, number) for number, scale in enumerate(scales, start=1))
 
     def __str__(self) -> str:
         percentages = ", ".join(f"{100 * share:g} %" for share in self.shares)
@@ -61,7 +61,7 @@ def frictions() -> tuple[AddedFriction, ...]:
     return (*alone, *(AddedFriction(variant, shares) for variant, sets in DISPLACEMENTS.items() for shares in sets))
 
 
-def rounded(scale: float) -> float:
+def round_scale(scale: float) -> float:
     """Round a scale to three digits, more than its effect needs."""
     return float(f"{scale:.3g}")
 
@@ -73,7 +73,7 @@ def independent(joint: Joint, added: Sequence[Term] = (), variant: str = "") -> 
     return IndependentJoint(joint.name, terms, tuple(joint.unit(term.unit) for term in terms), name)
 
 
-def coupled(
+def coupled_arm(
     robot: Robot, rows: Sequence[int], added: Sequence[Sequence[Term]], variant: str = "", group: str = ARM
 ) -> CoupledArm:
     """Model joints (indices) that move together, each with viscous, Coulomb and added friction.
@@ -93,7 +93,7 @@ def coupled(
     return CoupledArm(group, names, tuple(rows), robot.chain, friction, units, f"coupled+{variant}".removesuffix("+"))
 
 
-def described(robot: Robot, name: str, group: str, parameters: Sequence[str], scales: Sequence[float]) -> Model:
+def model_of(robot: Robot, name: str, group: str, parameters: Sequence[str], scales: Sequence[float]) -> Model:
     """Rebuild a model from its name, its group, and the names and scales of its parameters."""
     structure, _, variant = name.partition("+")
     by_name = dict(zip(parameters, scales, strict=True))
@@ -103,7 +103,7 @@ def described(robot: Robot, name: str, group: str, parameters: Sequence[str], sc
     moving = [i for i, n in enumerate(names) if f"{viscous.name} of {n}" in by_name]
     rows = [names.index(group)] if group != ARM else moving
     suffixes = [f" of {names[row]}" if group == ARM and len(rows) > 1 else "" for row in rows]
-    return coupled(robot, rows, [_driven(variant, by_name, suffix) for suffix in suffixes], variant, group)
+    return coupled_arm(robot, rows, [_driven(variant, by_name, suffix) for suffix in suffixes], variant, group)
 
 
 def _driven(variant: str, scales: dict[str, float], suffix: str) -> tuple[Term, ...]:
@@ -112,5 +112,5 @@ def _driven(variant: str, scales: dict[str, float], suffix: str) -> tuple[Term, 
     if variant in make:
         term = make[variant](1.0)
         return (make[variant](scales[f"{term.name}{suffix}"]),)
-    numbered = ((n, scales.get(f"{presliding(1.0, n).name}{suffix}", 0.0)) for n in range(1, len(scales) + 1))
-    return tuple(presliding(scale, number) for number, scale in numbered if scale > 0)
+    numbered = ((n, scales.get(f"{presliding_friction(1.0, n).name}{suffix}", 0.0)) for n in range(1, len(scales) + 1))
+    return tuple(presliding_friction(scale, number) for number, scale in numbered if scale > 0)

@@ -147,7 +147,7 @@ class Robot:
         """
         if self.tool is None or self.chain is None:
             raise BadRobot(f"robot {self.name} has no known tool in its chain; leave the length of the tool out")
-        chain = self.chain.lengthened(self.tool.link, length - self.tool.length)
+        chain = self.chain.lengthen(self.tool.link, length - self.tool.length)
         return replace(self, chain=chain, tool=replace(self.tool, length=length))
 
     @property

@@ -149,7 +149,7 @@ class Ledger:
         self._entries.setdefault(entry.stage, {})[file_name(entry.task)] = entry
         self.changes.append((removed, entry.outputs))
 
-    def void(self) -> dict[str, str]:
+    def invalid_files(self) -> dict[str, str]:
         """Files in the place of entries that are not valid ones, each with the reason."""
         return self._void if self._entries is not None else {}
 

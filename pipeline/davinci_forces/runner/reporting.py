@@ -68,11 +68,11 @@ def render(ledger: Ledger, task: Task) -> dict[str, bytes]:
     BadRecord
         If a record cannot be read.
     """
-    from davinci_forces.report.report import write  # importing its plotting library takes longer than most runs
+    from davinci_forces.report.report import write_report  # importing its plotting library takes longer than most runs
 
     study, located = task.given["study"], task.records["records"]
     baseline = stated.read(study.folder / study.baseline) if study.baseline else None
-    return write(catalogue(ledger, located), study, provenance(study, ledger, located), baseline, ratings(study))
+    return write_report(catalogue(ledger, located), study, provenance(study, ledger, located), baseline, ratings(study))
 
 
 def ratings(study: Study) -> tuple[Rating, ...]:

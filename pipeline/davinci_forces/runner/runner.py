@@ -17,7 +17,7 @@ from davinci_forces.runner.graph import ALL_LOGS, Graph, Part, every_step, goes_
 from davinci_forces.runner.ledger import Entry, Folders, Ledger, file_name
 from davinci_forces.runner.lock import hold_lock
 from davinci_forces.runner.plan import Plan, Task, log_of, reuse
-from davinci_forces.runner.processes.workers import Crew, Others
+from davinci_forces.runner.processes.workers import TaskQueue, WorkerPool
 from davinci_forces.runner.signature import declaration, stage_of
 from davinci_forces.study import Study
 
@@ -40,7 +40,7 @@ class Runner:
     folders: Folders
     console: Console
     force: bool = False
-    others: Others | None = None
+    others: WorkerPool | None = None
     perform: Callable[[Folders, Task], Outcome] | None = None  # runs a task in a worker of a cluster
 
     def __post_init__(self) -> None:
@@ -68,11 +68,11 @@ class Runner:
         with (
             hold_lock(self.folders.processed) as self.writable,
             self._clean_up(),
-            closing(Crew(self.others)) as self._crew,
+            closing(TaskQueue(self.others)) as self._crew,
         ):
             if self.writable:
                 self._remove_leftovers()
-                for file, reason in self.ledger.void().items():
+                for file, reason in self.ledger.invalid_files().items():
                     self.console.warn(f"{file} is ignored, and the files it names are kept: {reason}")
                 self._remove_obsolete(steps)
             self._run(Graph(steps, [entry.name for entry in self.study.logs]))

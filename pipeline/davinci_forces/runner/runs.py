@@ -11,7 +11,7 @@ from davinci_forces.report import REPORT
 from davinci_forces.runner.console import Verbosity, console, durations, echo
 from davinci_forces.runner.execution import Outcome
 from davinci_forces.runner.ledger import Folders
-from davinci_forces.runner.processes.workers import Others, pool, prepare
+from davinci_forces.runner.processes.workers import WorkerPool, pool, prepare
 from davinci_forces.runner.runner import Runner
 from davinci_forces.runner.signature import stage_of
 from davinci_forces.study import Study, reading
@@ -141,7 +141,7 @@ def run(
     terminal = console(verbosity)
     kind = VerboseRunner if verbosity == "verbose" else Runner
     places = folders(folder.resolve() if cluster else folder, processed, reports)
-    runner = kind(study, places, terminal, force, Others(partial(pool, jobs), jobs, prepare) if jobs > 1 else None)
+    runner = kind(study, places, terminal, force, WorkerPool(partial(pool, jobs), jobs, prepare) if jobs > 1 else None)
     terminal.say(f"{folder}: {study.title}{' (SIMULATED)' if study.simulated else ''}", bold=True)
     if dry_run:
         for line in runner.preview(names):
@@ -162,7 +162,7 @@ def run_on_cluster(runner: Runner, names: Sequence[str], address: str) -> bool:
     from davinci_forces.runner.processes.cluster import connect, perform_there
 
     with connect(address, runner.folders) as (executor, hands, terms):
-        runner.others, runner.perform = Others(lambda: executor, hands), partial(perform_there, terms)
+        runner.others, runner.perform = WorkerPool(lambda: executor, hands), partial(perform_there, terms)
         return runner.run(names)
 
 

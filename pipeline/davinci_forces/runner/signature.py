@@ -20,7 +20,7 @@ from davinci_forces.study import HapticScenario, LogEntry, Settings, Weighings
 FUNCTIONS = ("run", "gather", "apply")  # that a stage may export, in the order of their steps
 FUNCTION = re.compile(r"^def (\w+)\(", re.MULTILINE)
 Kinds = tuple[type[Record], ...]
-GIVEN = {
+ARGUMENT_KINDS = {
     Log: "log", LogEntry: "entry", Joint: "joint", Robot: "robot", Weighings: "weighings", HapticScenario: "haptics",
 }  # fmt: skip
 SETTINGS = tuple(f.name for f in fields(Settings))
@@ -84,8 +84,8 @@ def declaration(step: str) -> Declaration:
         if get_origin(hint) is Annotated:
             hint, declared.roles[parameter] = get_args(hint)
             declared.in_turn.add(parameter)
-        if hint in GIVEN:
-            declared.given[parameter] = GIVEN[hint]
+        if hint in ARGUMENT_KINDS:
+            declared.given[parameter] = ARGUMENT_KINDS[hint]
         elif get_origin(hint) in (Sequence, Collection):
             declared.per_log[parameter] = _kinds(_inner(hint))
             if get_origin(hint) is Collection:

@@ -54,7 +54,7 @@ def verify(study: Study, folders: Folders, report_id: str = "", pages: bool = Tr
     """
     ledger = Ledger(folders, one_by_one=True)
     recorded = known_files(ledger)
-    problems = [f"{file} was altered: {reason}" for file, reason in ledger.void().items()]
+    problems = [f"{file} was altered: {reason}" for file, reason in ledger.invalid_files().items()]
     if not recorded and not problems:
         raise NotReproduced(f"{folders.processed} has no results; run `davinci-forces all {folders.raw}` first")
     strays, unrelated = unknown_files(folders, recorded)

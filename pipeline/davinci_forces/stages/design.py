@@ -84,7 +84,7 @@ def control(robot: Robot, chain: Chain, bodies: Bodies) -> Iterator[Control | Ly
             (study.start, study.target, study.proportional, study.derivative, study.integral, study.viscous),
         )
         law, rotors = Regulator(K_p, K_d, K_i, 1.0), np.zeros(len(start))
-        plant, belief = (arm(chain, bodies.scaled(share), rotors) for share in (1.0, study.known_masses))
+        plant, belief = (arm(chain, bodies.with_density_factor(share), rotors) for share in (1.0, study.known_masses))
         run = regulate(plant, belief, law, viscous, start, target, study.duration)
         for i, name in enumerate(robot.coordinates[: len(start)]):
             yield control_record(study, name, run.t, run.q[:, i], run.dq[:, i], start[i], target[i])
@@ -126,7 +126,7 @@ def control_record(
 def excitations(joint: Joint) -> Iterator[Excitation]:
     """The published excitations of a joint, and the optimal one within its limits.  (6.27), Table 6.1"""
     for source, (period, *x) in joint.published:
-        yield excitation_record(joint, source, Fourier.of(np.array(x), period))
+        yield excitation_record(joint, source, Fourier.from_coefficients(np.array(x), period))
     if joint.published and all(np.isfinite(pair).all() for pair in limits_of(joint)):
         period = joint.published[0][1][0]
         problem = ExcitationProblem(joint.terms, limits_of(joint), period, 2, "determinant")

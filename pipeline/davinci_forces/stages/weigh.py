@@ -10,22 +10,22 @@ import numpy as np
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.contact.weighing import (
     PARTS,
+    MassEstimate,
     Rows,
-    Weighed,
     better,
-    mirrored,
+    fit_mass,
+    mirror_position,
     model_errors,
     moved_with,
     offset,
     residual,
     unit_load,
-    weighed,
-    widening,
+    widening_factor,
 )
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.periods.period import guess, refine
 from davinci_forces.maths.periods.shift import circular, straight
-from davinci_forces.maths.signals.smoothing import segments, smoothed
+from davinci_forces.maths.signals.smoothing import lowpass_segments, segments
 from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Motion, Weight, diagnostic
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import HungMass, LogEntry, Weighing, Weighings
@@ -81,7 +81,7 @@ def run(
             first = float(model.t[0]) - 0.5 / model.rate  # a sample is in the middle of its time
             length = period or float(model.t[-1]) + 0.5 / model.rate - first
             count = max(int(length * min(model.rate, ROWS_PER_CUTOFF_PERIOD * lowpass) * (1 + 1e-9)), 1)
-            loads = [smoothed(side[:, column], motions[0].segment, model.rate, lowpass) for side in sides]
+            loads = [lowpass_segments(side[:, column], motions[0].segment, model.rate, lowpass) for side in sides]
             columns = {
                 "q": path_means(model.t, motion[0][:, column], first, length, count),
                 "load": path_means(model.t, loads[0], first, length, count),
@@ -124,7 +124,7 @@ def external_effort(model: JointModel, tau_hat: Array, lowpass: float) -> tuple[
     predicted = np.isfinite(tau_hat)
     tau_ext = (model.tau - tau_hat)[predicted]
     if predicted.any():
-        tau_ext = smoothed(tau_ext, model.segment[predicted], model.rate, lowpass)
+        tau_ext = lowpass_segments(tau_ext, model.segment[predicted], model.rate, lowpass)
     return model.t[predicted], tau_ext
 
 
@@ -136,7 +136,9 @@ def loads_per_kilogram(
     link = weight.moves_with  # a link, or a joint, with which a link moves
     if link in names:
         link = moved_with(chain, names.index(link))
-    stated, opposite = (unit_load(chain, link, at, *motion) for at in (weight.position, mirrored(weight.position)))
+    stated, opposite = (
+        unit_load(chain, link, at, *motion) for at in (weight.position, mirror_position(weight.position))
+    )
     return stated, opposite
 
 
@@ -182,7 +184,7 @@ class FreeMotionErrors(NamedTuple):
     sigma: dict[str, float]  # error of the model, by joint
     fit_std: float  # [kg] of the error that all masses by this fit share
     widening: float
-    masses: dict[str, Weighed]  # by log
+    masses: dict[str, MassEstimate]  # by log
     roles: dict[str, str]
 
 
@@ -194,12 +196,12 @@ def estimate_mass(
     loads = tare or loads
     sides = [rows_of(loads, free.sigma, column) for column in ("load", "load_mirrored")]
     fit_std = 0.0 if tare else free.fit_std
-    (mass, run_std), (mass_mirrored, mirrored_run_std) = (weighed(rows) for rows in sides)
+    (mass, run_std), (mass_mirrored, mirrored_run_std) = (fit_mass(rows) for rows in sides)
     std, mirrored_std = (free.widening * float(np.hypot(part, fit_std)) for part in (run_std, mirrored_run_std))
     advantage = better(*sides)
     stated = float("nan") if weighing.weight.mass is None else weighing.weight.mass
-    tare_mass = free.masses.get(weighing.tare, Weighed(float("nan"), float("nan"))) if tare else None
-    by_joint = [weighed([row]) for row in sides[0]]
+    tare_mass = free.masses.get(weighing.tare, MassEstimate(float("nan"), float("nan"))) if tare else None
+    by_joint = [fit_mass([row]) for row in sides[0]]
     residual_rms = [float(np.sqrt(np.mean(residual(row, mass) ** 2))) for row in sides[0]]
     yield Weight(
         log=weighing.log,
@@ -237,7 +239,7 @@ def side_of(advantage: float) -> str:
     return "the other one" if advantage < -MIN_SIDE_DIFFERENCE else "not told"
 
 
-def total_std(mass: Weighed, free: FreeMotionErrors) -> float:
+def total_std(mass: MassEstimate, free: FreeMotionErrors) -> float:
     """Standard error of a mass: of its run and of the fit, widened by the factor from free motion."""
     return free.widening * float(np.hypot(mass.std, free.fit_std))
 
@@ -259,15 +261,15 @@ def free_motion_errors(weight_loads: Sequence[Load], logs: dict[str, list[Load]]
     sigma = {joint: model_errors(rows) for joint, rows in by_joint.items()}
     for load in weight_loads:  # a joint without free motion gets the residual of its weight log
         [row] = rows_of([load], {}, "load")
-        sigma.setdefault(load.joint, float(np.std(residual(row, weighed([row]).mass))))
+        sigma.setdefault(load.joint, float(np.std(residual(row, fit_mass([row]).mass))))
     roles = {log: ls[0].role for log, ls in unseen.items()}
     rows = {log: rows_of(ls, sigma, "load") for log, ls in unseen.items()}
-    masses = {log: weighed(log_rows) for log, log_rows in rows.items()}
+    masses = {log: fit_mass(log_rows) for log, log_rows in rows.items()}
     fitted = [row for log, log_rows in rows.items() if roles[log] == "identification" for row in log_rows]
-    fit_mass = weighed(fitted) if fitted else Weighed(0.0, 0.0)
-    fit_std = max(abs(fit_mass.mass), fit_mass.std)
+    of_fitted = fit_mass(fitted) if fitted else MassEstimate(0.0, 0.0)
+    fit_std = max(abs(of_fitted.mass), of_fitted.std)
     validation = [mass for log, mass in masses.items() if roles[log] != "identification"]
-    return FreeMotionErrors(sigma, fit_std, widening(validation, fit_std), masses, roles)
+    return FreeMotionErrors(sigma, fit_std, widening_factor(validation, fit_std), masses, roles)
 
 
 def unseen_part(load: Load) -> Load | None:

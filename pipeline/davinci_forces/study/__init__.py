@@ -10,7 +10,7 @@ from davinci_forces.robots.robot import Robot
 
 __all__ = ["WHOLE", "HapticScenario", "HungMass", "LogEntry", "Settings", "Source", "Study", "Weighing", "Weighings"]
 
-WHOLE = ((0.0, math.inf),)  # the windows of a log that is in contact throughout
+WHOLE_LOG = ((0.0, math.inf),)  # the windows of a log that is in contact throughout
 
 
 @dataclass(frozen=True)

@@ -144,7 +144,7 @@ def guess_joined(log: Joined) -> Holding:
     for stem, part in log.parts.items():
         names = [c.name for c in part.channels if c.kind == "number" and not c.derived]
         values = samples_of(part, names)
-        first = columns.rising([values[name] for name in names])
+        first = columns.first_rising_column([values[name] for name in names])
         times.append(first)
         signals = [name for i, name in enumerate(names) if i != first]
         symbol = symbol_of(stem)

@@ -6,10 +6,10 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from davinci_forces.logs.binary import EXAMPLE, dtype_of
+from davinci_forces.logs.binary import BINARY_EXAMPLE, dtype_of
 from davinci_forces.robots import Robot
 from davinci_forces.robots.from_toml import wrong_name
-from davinci_forces.study import WHOLE, HungMass, LogEntry
+from davinci_forces.study import WHOLE_LOG, HungMass, LogEntry
 from davinci_forces.study.channels import Channels
 from davinci_forces.toml import TomlTable, excerpt
 from davinci_forces.toml.lines import MOST_LISTED
@@ -141,7 +141,7 @@ def _binary(table: TomlTable) -> dict[str, Any]:
     """Read the type and columns of raw binary numbers, which such a file does not state."""
     for key, partner in (("dtype", "columns"), ("columns", "dtype")):
         if key in table and partner not in table:
-            table.problem(f"{key} needs {partner}; a file of raw binary numbers takes {EXAMPLE}", key)
+            table.problem(f"{key} needs {partner}; a file of raw binary numbers takes {BINARY_EXAMPLE}", key)
     fields: dict[str, Any] = {}
     if "dtype" in table:
         words = 'a type of number as "float64", "DBL" or "<int16", where < stands for little-endian'
@@ -162,7 +162,7 @@ def _windows(table: TomlTable, key: str) -> tuple[tuple[float, float], ...]:
     if key == "contact" and key in table and table.values[key] == ALL:
         if table.values.get("role") != "tissue":
             table.problem(f'contact = "{ALL}" is only for logs of role tissue; give {WINDOWS}', key)
-        return WHOLE
+        return WHOLE_LOG
     windows = table.pairs(key, WINDOWS, [])
     for i, (start, end) in enumerate(windows):
         if not 0 <= start < end:

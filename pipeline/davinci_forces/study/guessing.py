@@ -111,7 +111,7 @@ def clock_hint(log: Log) -> str:
     if has_clock(log) or named_time(log) or not 0 < len(names) <= MAX_CHANNELS or len(log.by_clock(names)) > 1:
         return ""
     samples = samples_of(log, names)
-    first = columns.rising([samples[name] for name in names])
+    first = columns.first_rising_column([samples[name] for name in names])
     if first is not None:
         return f"time = {names[first]!r}, which {_rises(samples[names[first]])}"
     rate = guess(log).rate
@@ -155,7 +155,7 @@ def _by_content(log: Log, names: Sequence[str]) -> Holding:
         return Holding()
     samples = samples_of(log, names)
     named = named_time(log)
-    first = None if named or has_clock(log) else columns.rising([samples[name] for name in names])
+    first = None if named or has_clock(log) else columns.first_rising_column([samples[name] for name in names])
     time = named or ("" if first is None else names[first])
     why = "" if named or not time else _rises(samples[time])
     signals = [name for name in names if name != time]
@@ -201,7 +201,7 @@ def with_motion(holding: Holding, samples: dict[str, Array]) -> Holding:
     if not q or not all(len(values) for values in q.values()):
         return holding
     joints = sorted(q)
-    moving = tuple(joints[i] for i in columns.moving([q[joint] for joint in joints]))
+    moving = tuple(joints[i] for i in columns.moving_positions([q[joint] for joint in joints]))
     again = repetition([q[joint] for joint in moving]) if moving else None
     velocity = dq.get(moving[0], np.gradient(q[moving[0]])) if len(moving) == 1 else None
     return replace(

@@ -115,7 +115,7 @@ def _haptics(table: TomlTable, folder: Path) -> HapticScenario:
 
 def _overridden(robot: Robot, overrides: TomlTable) -> Robot:
     joints = {joint.name: joint for joint in robot.joints}
-    for name, changes in overrides.each():
+    for name, changes in overrides.subtables():
         if name in joints:
             joints[name] = from_toml.change(joints[name], changes)
         else:

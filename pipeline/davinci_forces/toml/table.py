@@ -130,7 +130,7 @@ class TomlTable:
         self.asked[key] = None
         return TomlTable(self.values.get(key, {}), self.file, (*self.path, key), self._within(key))
 
-    def each(self) -> list[tuple[str, "TomlTable"]]:
+    def subtables(self) -> list[tuple[str, "TomlTable"]]:
         """The tables that this one is made of, by key."""
         return [(key, self.table(key)) for key in self.values]
 

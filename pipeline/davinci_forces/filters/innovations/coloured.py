@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.filters import ekf, kalman
-from davinci_forces.filters.problem import Driven, NoiseModel
+from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.filters.tuning import MAX_LOG_CHANGE
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.signals.windows import SETTLE
+from davinci_forces.maths.signals.windows import TRANSIENT
 
 MAX_SAMPLES_COLOURED = 2000  # of the likelihood
 TRIALS = 60  # of the likelihood, a parameter
@@ -29,19 +29,19 @@ class Noise(NamedTuple):
     phi: tuple[float, float]  # of position and velocity
 
 
-def innovations(recording: Driven, noise: Noise) -> tuple[Array, Array]:
+def innovations(recording: FilterInput, noise: Noise) -> tuple[Array, Array]:
     """Compute the innovations of position and velocity (N,)."""
     _, _, _, _, i_q, i_dq, _ = kalman.run_filter(recording, states(recording, noise))
     return i_q, i_dq
 
 
-def log_likelihood(recording: Driven, noise: Noise) -> float:
+def log_likelihood(recording: FilterInput, noise: Noise) -> float:
     """Compute the log-likelihood of the measurements, as that of `ekf`."""
-    settle = min(round(SETTLE / recording.T_s), len(recording.q) // 2)
+    settle = min(round(TRANSIENT / recording.T_s), len(recording.q) // 2)
     return kalman.log_likelihood(recording, states(recording, noise), settle)
 
 
-def states(recording: Driven, noise: Noise) -> kalman.States:
+def states(recording: FilterInput, noise: Noise) -> kalman.States:
     """Return the states of `ekf` and the noise of each measurement, which decays by phi."""
     model = kalman.states(recording, noise.white, 5)
     for i, (r, phi) in enumerate(zip(noise.white[:2], noise.phi, strict=True)):
@@ -50,7 +50,7 @@ def states(recording: Driven, noise: Noise) -> kalman.States:
     return model._replace(R=np.zeros(2), in_q=(0, 3), in_dq=(1, 4))
 
 
-def fit_noise(recording: Driven, start: NoiseModel, walks: bool, coloured: bool) -> Noise:
+def fit_noise(recording: FilterInput, start: NoiseModel, walks: bool, coloured: bool) -> Noise:
     """Fit the noise of one recording by maximum likelihood: the standard deviations of q, dq and the drive.
 
     That of the random walk is fitted if it `walks` freely, and phi if it is `coloured`.

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.filters import rts
-from davinci_forces.filters.problem import Driven, NoiseModel
+from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.maths.arrays import Array
 
 MIN_SHARE_AT_REST = 1e-3  # of an innovation's variance that is not due to the clock
@@ -32,7 +32,7 @@ class Innovations(NamedTuple):
     dq_std: Array
 
 
-def innovations(recording: Driven, noise: NoiseModel) -> Innovations:
+def innovations(recording: FilterInput, noise: NoiseModel) -> Innovations:
     """Compute the innovations of `ekf`, number for number, by the smoother's forward pass.  (7.6), (7.7)"""
     (i_q, i_dq, _), predicted = rts.forwards(recording, noise)
     return Innovations(i_q, i_dq, np.sqrt(predicted[:, 3] + noise.r_q**2), np.sqrt(predicted[:, 6] + noise.r_dq**2))
@@ -55,7 +55,7 @@ def delays(velocities: Sequence[Array], innovations: Sequence[Array]) -> list[Ar
     return estimates
 
 
-def mended(recording: Driven, dq: Array, ddq: Array, late: Array) -> Driven:
+def correct_times(recording: FilterInput, dq: Array, ddq: Array, late: Array) -> FilterInput:
     """Correct a recording to even times, by its velocity and acceleration (N,) without noise."""
     return recording._replace(q=recording.q - dq * late, dq=recording.dq - ddq * late)
 

@@ -123,7 +123,7 @@ def shorten(subject: Subject) -> Subject:
     return subject._replace(models=models, free=subject.free[first], moving=subject.moving[first])
 
 
-def finding(search: CauseSearch) -> str:
+def classify(search: CauseSearch) -> str:
     """Classify the result: white, white where samples are left out, explained by a cause, or unexplained."""
     if search.trials[0].white:
         return WHITE

@@ -7,11 +7,11 @@ import numpy as np
 
 from davinci_forces.filters import DEFAULT, tracker
 from davinci_forces.filters.innovations import coloured
-from davinci_forces.filters.problem import Driven, NoiseModel
+from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.filters.tuning import likeliest_walk
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals.whiteness import tests
-from davinci_forces.maths.signals.windows import SETTLE, runs, settled
+from davinci_forces.maths.signals.windows import TRANSIENT, is_past_transient, runs
 
 LEVEL = 0.01  # probability below which a test rejects white noise
 LAGS = 20  # of the Ljung-Box statistic
@@ -28,7 +28,7 @@ class Subject(NamedTuple):
     With its sampling times corrected it counts as another model, `CLOCK`.
     """
 
-    models: Mapping[str, Driven]
+    models: Mapping[str, FilterInput]
     noise: NoiseModel
     free: Booleans  # whether nothing touches the robot
     moving: Booleans  # whether the joint is far from any reversal
@@ -93,7 +93,7 @@ class Passes:
         """Return the samples (N,) whose innovations are tested."""
         return self.subject.moving if REVERSALS in without else np.ones_like(self.subject.moving)
 
-    def run_under_model(self, without: tuple[str, ...]) -> Driven:
+    def run_under_model(self, without: tuple[str, ...]) -> FilterInput:
         """Return the run under the model that replaces a removed one, or that in use."""
         names = list(self.subject.models)
         return self.subject.models[next((name for name in names[1:] if name in without), names[0])]
@@ -104,7 +104,7 @@ class Passes:
         for run in self.runs(free):
             part = self.run_under_model(without).part(run)
             i_q, i_dq = self.innovations(without, part)
-            for piece in runs(settled(np.asarray(np.arange(len(i_q)) * part.T_s, np.float64)) & moving[run]):
+            for piece in runs(is_past_transient(np.asarray(np.arange(len(i_q)) * part.T_s, np.float64)) & moving[run]):
                 if piece.stop - piece.start > LAGS:
                     pieces_q.append(i_q[piece])
                     pieces_dq.append(i_dq[piece])
@@ -113,10 +113,10 @@ class Passes:
     def runs(self, free: Booleans) -> list[slice]:
         """Return the runs that are long enough for the filter to settle, or else the longest."""
         T_s = next(iter(self.subject.models.values())).T_s
-        long = [run for run in runs(free) if (run.stop - run.start) * T_s > 6.0 * SETTLE]
+        long = [run for run in runs(free) if (run.stop - run.start) * T_s > 6.0 * TRANSIENT]
         return long or [max(runs(free), key=lambda run: run.stop - run.start, default=slice(0, 0))]
 
-    def innovations(self, without: tuple[str, ...], part: Driven) -> tuple[Array, Array]:
+    def innovations(self, without: tuple[str, ...], part: FilterInput) -> tuple[Array, Array]:
         """Compute the innovations of one run."""
         noise = self.noise(without)
         if COLOUR in without:

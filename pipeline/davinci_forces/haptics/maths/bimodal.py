@@ -31,18 +31,21 @@ from davinci_forces.maths.arrays import Array
 THESIS_TISSUE = 457.24  # [N/m], section 8.2
 SERIES_RANGE = 1e-6  # distance of a damping ratio from 1 within which the series is used
 # Results for the thesis's hand that take seconds to compute and are the same in every study; tests recompute them.
-SOFTEST, STIFFEST = 1.0, 1e5  # [N/m] hands
-K_H, K_T = np.geomspace(SOFTEST, STIFFEST, 30), np.geomspace(0.5, 2e3, 30)  # [N/m] hands and tissues of the map
+MIN_HAND_STIFFNESS, MAX_HAND_STIFFNESS = 1.0, 1e5  # [N/m] hands
+K_H, K_T = (
+    np.geomspace(MIN_HAND_STIFFNESS, MAX_HAND_STIFFNESS, 30),
+    np.geomspace(0.5, 2e3, 30),
+)  # [N/m] of the map
 DELAYS = np.geomspace(1e-3, 0.5, 55)  # [s]
-SIMULATED = slice(18, None, 9)  # of the delays: those for which a hand that leaves the tissue is simulated
+SIMULATED_DELAYS = slice(18, None, 9)  # of the delays: those for which a hand that leaves the tissue is simulated
 LINK_RATE = 100.0  # [Hz] of messages, chapter 9
 # For each hand of the map, the number of tissues, from the softest on, for which `lmi.cqlf_exists`.
-PROVED = (
+CQLF_COUNTS = (
     7, 7, 8, 8, 9, 9, 10, 11, 11, 12, 13, 13, 14, 14, 15, 16, 17, 17, 18, 19, 19, 20, 21, 21, 22, 23, 23, 24, 25,
     25,
 )  # fmt: skip
 # [N/m] `delay.sampled_limit` of each delay at LINK_RATE.
-HELD = (
+SAMPLED_LIMITS = (
     167.09132452095844, 163.76653710101584, 160.19105826948277, 156.36177491875574, 152.27869772527805,
     147.94540170726037, 143.3694072223424, 138.56247043556272, 133.54075245898127, 128.32483943775333,
     122.9395921412851, 117.41381304288058, 111.77973089305058, 106.07231638501256, 100.32845626057407,
@@ -56,7 +59,7 @@ HELD = (
     35.27063234937405, 45.75508918133681, 55.492032799221484, 63.89019209613135,
 )  # fmt: skip
 # [N/m] `motion.leaving_limit` of each delay that is simulated.
-LEAVING = (
+LEAVING_LIMITS = (
     416.321006868175, 112.70170340262258, 38.25106184546224, 22.067132844844714, 127.46037697679003,
 )  # fmt: skip
 
@@ -78,7 +81,7 @@ class Hand(NamedTuple):
         return self.b / (2.0 * float(np.sqrt(self.m * (self.k + k_t))))
 
 
-THESIS = Hand(1.0, 1.0, 100.0)  # m and b of section 8.3; it states no K_H, and 100 N/m is a relaxed arm
+THESIS_HAND = Hand(1.0, 1.0, 100.0)  # m and b of section 8.3; it states no K_H, and 100 N/m is a relaxed arm
 
 
 def mode(hand: Hand, k_t: float) -> Array:

@@ -17,7 +17,7 @@ import numpy as np
 from davinci_forces.haptics.maths.bimodal import Hand
 from davinci_forces.haptics.maths.delay import delayed_hold
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.compiled import cached
+from davinci_forces.maths.compiled import compile_and_store
 
 State = tuple[float, float]  # x [m], dx [m/s]
 Law = Callable[[float, float], float]  # of x and dx: the tissue acts where the value is positive
@@ -47,7 +47,7 @@ def worst(x: float, dx: float) -> float:
     return -x * dx
 
 
-def switched(hand: Hand, k_t: float, start: State, duration: float, law: Law = at_contact) -> Swing:
+def simulate_switching(hand: Hand, k_t: float, start: State, duration: float, law: Law = at_contact) -> Swing:
     """Simulate the hand released at `start`, with tissue of k_t [N/m] switched by a law, for a duration [s]."""
     step = 2.0 * math.pi / math.sqrt((hand.k + k_t) / hand.m) / SAMPLES_PER_PERIOD
     t = step * np.arange(math.ceil(duration / step) + 1, dtype=float)
@@ -103,7 +103,7 @@ def simulate_delayed(hand: Hand, k_t: float, delay: float, rate: float, push: fl
     return Swing(np.arange(ticks) / rate, x - x_0, dx)
 
 
-@cached
+@compile_and_store
 def _fill(Phi: Array, early: Array, after: Array, bias: Array, k_t: float, forces: Array, x: Array, dx: Array) -> None:
     """Fill x and dx (N,) from their first values; `forces` is a ring buffer of the last forces."""
     n = len(forces)

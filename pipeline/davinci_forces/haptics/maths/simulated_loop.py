@@ -20,7 +20,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.compiled import cached, compiled
+from davinci_forces.maths.compiled import compile_and_store, compile_function
 from davinci_forces.maths.simulation.actuators import Cascade, Device, Loops, Motors
 from davinci_forces.maths.simulation.control import drive, follow, read
 from davinci_forces.maths.simulation.step import Friction, State, at_rest, middle, step
@@ -134,7 +134,7 @@ def simulate(
     return LoopRun(clocks.tick * np.arange(T, dtype=float), x, dx, q, true, felt, readings, estimates)
 
 
-@compiled
+@compile_function
 def tissue_force(tissue: Any, x: float, dx: float) -> float:
     """The force [N] on the tissue."""
     if x <= 0.0:
@@ -143,7 +143,7 @@ def tissue_force(tissue: Any, x: float, dx: float) -> float:
     return float(force * (1.0 + tissue.friction * dx / np.sqrt(dx * dx + FRICTION_VELOCITY * FRICTION_VELOCITY)))
 
 
-@compiled
+@compile_function
 def _parts(plant: Any, loop: Any) -> Any:
     """Motors, law, friction, loops and state as named tuples of rows."""
     m, c, f, i, s = plant.motors, plant.law, plant.friction, loop.loops, loop.state
@@ -156,7 +156,7 @@ def _parts(plant: Any, loop: Any) -> Any:
     )
 
 
-@cached
+@compile_and_store
 def _sense(device: Any, plant: Any, tissue: Any, clocks: Any, noise: Any, loop: Any, k: int, readings: Any) -> None:
     """Begin a period of the controller: follow the latest reference, and read the sensors."""
     now, h = k * clocks.turn, clocks.tick
@@ -180,7 +180,7 @@ def _sense(device: Any, plant: Any, tissue: Any, clocks: Any, noise: Any, loop: 
     readings[k, 3] = tissue_force(tissue, state.q[0], state.dq[0])
 
 
-@compiled
+@compile_function
 def _send_motion(device: Any, loop: Any, message: int) -> None:
     """Send the position and velocity of the hand, as the device measures them."""
     x = loop.hand[0]
@@ -188,7 +188,7 @@ def _send_motion(device: Any, loop: Any, message: int) -> None:
     loop.sent_motion[message, 1] = loop.hand[1]
 
 
-@cached
+@compile_and_store
 def _run_ticks(
     grip: Any, device: Any, plant: Any, tissue: Any, clocks: Any, push: Any, loop: Any, k: int, ticks: Any
 ) -> None:
@@ -214,7 +214,7 @@ def _run_ticks(
         _move_hand(grip, loop.hand, push[now] - force, now)
 
 
-@compiled
+@compile_function
 def _move_arm(body: Any, friction: Any, tissue: Any, tau: Any, state: Any, h: float) -> None:
     """Advance the arm by one tick."""
     at, velocity, free = np.empty(1), np.empty(1), np.empty(1)
@@ -223,7 +223,7 @@ def _move_arm(body: Any, friction: Any, tissue: Any, tau: Any, state: Any, h: fl
     step(body[:1], body[1], free, friction, body[2], body[3], state, np.ones(1, np.bool_), h)
 
 
-@compiled
+@compile_function
 def _move_hand(grip: Any, hand: Any, net: float, now: int) -> None:
     """Advance the hand by one tick, under a constant force."""
     if len(grip.path):

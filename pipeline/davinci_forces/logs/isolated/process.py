@@ -74,7 +74,7 @@ class Child:
         path = [str(PACKAGES), *(entry or os.getcwd() for entry in sys.path)]
         self.owner = os.getpid()
         self.late = False
-        with uninterrupted():
+        with block_interrupts():
             self.process = subprocess.Popen(
                 [sys.executable, "-S", "-c", START.format(path=path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
                 stderr=subprocess.DEVNULL, env=os.environ | CHILD_ENVIRONMENT,
@@ -172,7 +172,7 @@ def close_all() -> None:
 
 
 @contextmanager
-def uninterrupted() -> Iterator[None]:
+def block_interrupts() -> Iterator[None]:
     """Start processes that ignore Ctrl-C, which a terminal sends to all: their parent ends them."""
     if sys.platform == "win32":
         yield

@@ -29,7 +29,7 @@ MAX_GAP_CONTACT = 0.25  # [s] between two crossings of one sign that count as on
 PEAK_REACH = 0.2  # [s] around a peak that include the largest error by a filter's lag
 
 
-class Quiet(NamedTuple):
+class FreeMotionStatistics(NamedTuple):
     """An external effort where nothing touches the robot."""
 
     rms: float
@@ -46,15 +46,15 @@ class Event(NamedTuple):
     release_std: float
 
 
-def quiet(tau_ext: Array, free: Booleans, rate: float) -> Quiet:
+def free_motion_statistics(tau_ext: Array, free: Booleans, rate: float) -> FreeMotionStatistics:
     """Statistics of an effort (N,) at `rate` [Hz] at its `free` samples (N,)."""
     x, follows = tau_ext[free], np.diff(np.flatnonzero(free)) == 1
     upwards = (x[:-1] < 0.0) & (x[1:] >= 0.0) & follows
     rms = float(np.sqrt(np.mean(x**2)))
-    return Quiet(rms, float(np.abs(x).max()), float(upwards.sum()) / (len(x) / rate))
+    return FreeMotionStatistics(rms, float(np.abs(x).max()), float(upwards.sum()) / (len(x) / rate))
 
 
-def alarm_level(spaces: Sequence[Quiet]) -> float:
+def alarm_level(spaces: Sequence[FreeMotionStatistics]) -> float:
     """The effort that each of these free motions crosses at most once in ten minutes."""
     often = (max(s.crossings / FALSE_ALARMS, 1.0) for s in spaces)
     return max(max(s.largest, s.rms * float(np.sqrt(2.0 * np.log(n)))) for s, n in zip(spaces, often, strict=True))

@@ -40,7 +40,7 @@ class ForceErrors(NamedTuple):
     coverage_std: float
 
 
-def at(t: Array, clock: Array, f: Array, reach: float) -> Array:
+def interpolate_sensor(t: Array, clock: Array, f: Array, reach: float) -> Array:
     """Interpolate a sensor (M, k) on its clock (M,) linearly at times (N,); NaN outside and in gaps.
 
     Samples more than `reach` [s] apart have a gap between them.
@@ -91,7 +91,7 @@ def lag(t: Array, estimated: Array, clock: Array, measured: Array, rate: float, 
     f, parts = estimated[judged] - estimated[judged].mean(0), blocks(int(judged.sum()))
     mean, products = measured.mean(0), np.zeros((len(parts), len(lags), 3))
     for j, late in enumerate(lags.tolist()):
-        shown = at(t[judged] + late, clock, measured, 3.0 / rate) - mean
+        shown = interpolate_sensor(t[judged] + late, clock, measured, 3.0 / rate) - mean
         comparable = np.isfinite(shown).all(1)
         sums = [np.where(comparable, np.einsum("ni,ni->n", a, b), 0.0) for a, b in ((f, shown), (f, f), (shown, shown))]
         products[:, j] = [[float(total[part].sum()) for total in sums] for part in parts]

@@ -42,20 +42,20 @@ class Rows(NamedTuple):
         """Whether the load varies enough to be distinguished from an offset."""
         return bool(np.var(self.x) >= MIN_VARIANCE_SHARE * np.mean(self.x**2))
 
-    def centred(self, which: Booleans | None = None) -> tuple[Array, Array]:
+    def centre(self, which: Booleans | None = None) -> tuple[Array, Array]:
         """Column and effort at some of the rows, without their means where the joint has an offset."""
         x, y = (self.x, self.y) if which is None else (self.x[which], self.y[which])
         return (x - x.mean(), y - y.mean()) if self.varies and len(x) else (x, y)
 
 
-class Weighed(NamedTuple):
+class MassEstimate(NamedTuple):
     """A mass and its standard error [kg]."""
 
     mass: float
     std: float
 
 
-def weighed(rows: Sequence[Rows]) -> Weighed:
+def fit_mass(rows: Sequence[Rows]) -> MassEstimate:
     """Estimate the mass from all joints, with its standard error by the jackknife over sixths of the path.
 
     The residuals of a model repeat with the path: its sixths are nearly independent, but samples and periods are not.
@@ -63,13 +63,13 @@ def weighed(rows: Sequence[Rows]) -> Weighed:
     """
     without = np.array([_mass(rows, block) for block in range(PARTS)])
     spread = (PARTS - 1) / PARTS * np.sum((without - without.mean()) ** 2)
-    return Weighed(_mass(rows), float(np.sqrt(spread)))
+    return MassEstimate(_mass(rows), float(np.sqrt(spread)))
 
 
 def _mass(rows: Sequence[Rows], without: int | None = None) -> float:
     up = down = 0.0
     for row in rows:
-        x, y = row.centred(None if without is None else row.block != without)
+        x, y = row.centre(None if without is None else row.block != without)
         up += float(x @ y) / row.sigma**2
         down += float(x @ x) / row.sigma**2
     return up / down if down > 0 else float("nan")
@@ -105,7 +105,7 @@ def _squares(rows: Sequence[Rows]) -> Array:
     return np.asarray(np.sum([np.bincount(r.block, (residual(r, mass) / r.sigma) ** 2, PARTS) for r in rows], axis=0))
 
 
-def widening(free: Sequence[Weighed], common: float) -> float:
+def widening_factor(free: Sequence[MassEstimate], common: float) -> float:
     """Factor, at least 1, by which masses estimated on free motion, where 0 is true, exceed their standard errors.
 
     `common` is the standard error of the fit, which all of them share.  (Birge, 1932)
@@ -128,7 +128,7 @@ def moved_with(chain: Chain, coordinate: int) -> str:
     raise ValueError(f"coordinate {coordinate} does not move {chain.tip}")
 
 
-def mirrored(position: ArrayLike) -> Array:
+def mirror_position(position: ArrayLike) -> Array:
     """The position (3,) rotated by half a turn about the vertical: at the same height on the other side of the link."""
     return np.asarray(position, float) * (-1.0, -1.0, 1.0)
 

@@ -43,7 +43,7 @@ def settings(tolerance: float) -> Any:
     return chosen
 
 
-class Made(NamedTuple):
+class ConsistentParameters(NamedTuple):
     """Physically possible parameters, a mechanism that has them, and their excess over least squares."""
 
     theta: Array  # (p,)
@@ -61,7 +61,7 @@ class Cones(NamedTuple):
     positive: Integers  # of those with an effect, the ones outside links that are not negative
 
 
-def nearest(R: Triangle, mechanism: Mechanism) -> Made:
+def nearest(R: Triangle, mechanism: Mechanism) -> ConsistentParameters:
     """Find the best physically possible parameters.
 
     Of a mechanism without bodies, these are exactly those of least squares if their signs are possible.
@@ -72,13 +72,13 @@ def nearest(R: Triangle, mechanism: Mechanism) -> Made:
         If the solver does not converge.
     """
     if not mechanism.has_bodies and (R.theta[mechanism.positive] >= 0).all():
-        return Made(R.theta, R.theta, 0.0, 0.0)
+        return ConsistentParameters(R.theta, R.theta, 0.0, 0.0)
     F, size = (R.U * R.scale) @ mechanism.matrix, float(np.sqrt(R.y @ R.y + R.squares))
     cones = scale_unknowns(F, mechanism)
     z, gap = solve(csc_array(F @ cones.scale)[:, cones.seen], R.y / size, cones)
     x = np.asarray(cones.scale[:, cones.seen] @ z * size)
     theta = np.asarray(mechanism.matrix @ x)
-    return Made(theta, x, float(R.excess(theta)) / size**2, gap)
+    return ConsistentParameters(theta, x, float(R.excess(theta)) / size**2, gap)
 
 
 def scale_unknowns(F: Array, mechanism: Mechanism) -> Cones:

@@ -44,14 +44,16 @@ class Bands(NamedTuple):
     power: Array  # (B,) of the residuals
 
 
-class Correlated(NamedTuple):
+class CorrelatedVariance(NamedTuple):
     """The variance of parameters, and the number of lags over which the residuals are correlated."""
 
     variance: Array  # (p,)
     lags: float
 
 
-def correlated(Q: Array, residual: Array, starts: tuple[int, ...], D: Array, degrees: int) -> Correlated:
+def correlated_variance(
+    Q: Array, residual: Array, starts: tuple[int, ...], D: Array, degrees: int
+) -> CorrelatedVariance:
     """Variance of D y for y = Q' tau, from orthonormal columns Q (K, p), D (p, p) and the residuals (K,).
 
     Each log is a period that begins at its entry of `starts`; `degrees` are K - p.  Larger residuals in one part of the
@@ -65,7 +67,7 @@ def correlated(Q: Array, residual: Array, starts: tuple[int, ...], D: Array, deg
     covariance = np.einsum("b,bij->ij", mean, bands.basis)
     variance = np.einsum("ki,ij,kj->k", D, covariance, D)
     factor = unevenness(spectra, D, np.maximum(mean, SMALLEST), bands.frequency)
-    return Correlated(variance * factor, float(share @ lags))
+    return CorrelatedVariance(variance * factor, float(share @ lags))
 
 
 def transform_logs(Q: Array, residual: Array, starts: tuple[int, ...]) -> Spectra:

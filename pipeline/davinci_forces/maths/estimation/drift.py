@@ -46,7 +46,7 @@ def scatter(x: Array, std: Array) -> float:
     return float(chdtrc(len(x) - 1, np.sum(w * (x - np.average(x, weights=w)) ** 2))) if len(x) > 1 else 1.0
 
 
-def stands_out(x: Array, std: Array) -> Array:
+def outlier_probabilities(x: Array, std: Array) -> Array:
     """Probability (n,) by chance of each value's distance from the mean of the others.
 
     The scatter of the others widens the error of their mean; 1 with fewer than three others.

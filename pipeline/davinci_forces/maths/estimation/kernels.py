@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.maths.compiled import cached, inline
+from davinci_forces.maths.compiled import compile_and_store, inline
 
 BLOCK_ROWS = 512  # rows at a time, whose columns all fit into the processor's nearest cache
 
@@ -27,7 +27,7 @@ def dot(x: Any, y: Any, n: int) -> float:
     return (a + b) + (c + d)
 
 
-@cached
+@compile_and_store
 def triangularise(Phi: Any, tau: Any, weight: Any, R: Any) -> None:
     """Write the triangle R (p + 1, p + 1) of the rows sqrt(w) [Phi tau], by Householder's reflections block by block.
 
@@ -71,7 +71,7 @@ def residual_squares(x: Any, factors: Any, C: Any, y: Any, monomials: Any) -> fl
     return total
 
 
-@cached
+@compile_and_store
 def fly(
     x: Any, v: Any, best: Any, costs: Any, lower: Any, upper: Any, factors: Any, C: Any, y: Any, r: Any, w: Any,
     cognitive: float, social: float, reflects: bool, history: Any,

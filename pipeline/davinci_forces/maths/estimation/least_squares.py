@@ -47,7 +47,7 @@ def triangle(Phi: Array, tau: Array, weight: Array) -> Triangle:
     return Triangle(R[:p, :p] / np.where(scale > 0, scale, 1.0), R[:p, p], float(R[p, p] ** 2), scale)
 
 
-def bounded(R: Triangle, positive: Booleans) -> Array:
+def solve_bounded(R: Triangle, positive: Booleans) -> Array:
     """Least-squares parameters (p,) that are not negative where `positive` (p,).
 
     The active-set method (Stark and Parker, 1995) meets an active bound exactly.
@@ -61,7 +61,7 @@ def bounded(R: Triangle, positive: Booleans) -> Array:
     return np.asarray(solution.x / R.scale)
 
 
-class Told(NamedTuple):
+class ColumnAnalysis(NamedTuple):
     """Correlations of p estimates, and the singular values and directions of their columns."""
 
     correlation: Array  # (p, p) of their estimates
@@ -74,23 +74,23 @@ class Told(NamedTuple):
         return float(self.sizes[0] / self.sizes[-1])
 
 
-def told(R: Triangle) -> Told:
+def analyse_columns(R: Triangle) -> ColumnAnalysis:
     """Analyse the columns of a triangle, which must be independent."""
     inverse = np.linalg.inv(R.U)
     covariance = inverse @ inverse.T
     std = np.sqrt(np.diag(covariance))
     _, sizes, directions = np.linalg.svd(R.U)
-    return Told(covariance / std / std[:, None], sizes, directions)
+    return ColumnAnalysis(covariance / std / std[:, None], sizes, directions)
 
 
-def pairs(analysis: Told, least: float) -> list[tuple[int, int, float]]:
+def pairs(analysis: ColumnAnalysis, least: float) -> list[tuple[int, int, float]]:
     """Pairs of parameters whose estimates correlate by at least `least`, the largest first, with the correlation."""
     p = len(analysis.sizes)
     entries = [(i, j, float(analysis.correlation[i, j])) for i in range(p) for j in range(i + 1, p)]
     return sorted((pair for pair in entries if abs(pair[2]) >= least), key=lambda pair: -abs(pair[2]))
 
 
-def combinations(analysis: Told, weak: float, part: float) -> list[tuple[tuple[int, ...], float]]:
+def combinations(analysis: ColumnAnalysis, weak: float, part: float) -> list[tuple[tuple[int, ...], float]]:
     """Directions determined at least `weak` times worse than the best one: their parameters and that ratio.
 
     A parameter belongs to a direction if its share of the unit vector's square is at least `part`.
@@ -103,7 +103,7 @@ def combinations(analysis: Told, weak: float, part: float) -> list[tuple[tuple[i
     ]
 
 
-def not_told_apart(U: Array, part: float) -> list[int]:
+def dependent_parameters(U: Array, part: float) -> list[int]:
     """Parameters with at least the share `part` of the square of the direction that columns U (p, p) show least."""
     return np.flatnonzero(np.linalg.svd(U)[2][-1] ** 2 >= part).tolist()
 

@@ -37,7 +37,7 @@ CONSTRICTED = Manner("reflecting", (0.7298, 0.7298), 1, 1.49618, 1.49618, True)
 THESIS = Manner("clipping", (0.9, 0.4), 1500, 2.0, 2.0, False)
 
 
-class Found(NamedTuple):
+class SwarmOptimum(NamedTuple):
     """The optimum of a swarm."""
 
     x: Array  # (n,)
@@ -47,7 +47,7 @@ class Found(NamedTuple):
     swarms: int  # that ran until two agreed
 
 
-def search(R: Triangle, box: Box, seed: int, manner: Manner = CONSTRICTED) -> Found:
+def search(R: Triangle, box: Box, seed: int, manner: Manner = CONSTRICTED) -> SwarmOptimum:
     """Run swarms until the squares of two agree, and return the best; the same seed gives the same result."""
     best = swarm(R, box, np.random.default_rng([seed, 0]), manner)
     for number in range(1, SWARMS):
@@ -59,7 +59,7 @@ def search(R: Triangle, box: Box, seed: int, manner: Manner = CONSTRICTED) -> Fo
     return best
 
 
-def swarm(R: Triangle, box: Box, random: np.random.Generator, manner: Manner) -> Found:
+def swarm(R: Triangle, box: Box, random: np.random.Generator, manner: Manner) -> SwarmOptimum:
     """Run one swarm from random places of the box until its best has not changed for `PATIENCE` iterations."""
     from davinci_forces.maths.estimation import kernels
 
@@ -80,4 +80,4 @@ def swarm(R: Triangle, box: Box, random: np.random.Generator, manner: Manner) ->
             break
     leader = best[int(costs.argmin()), :n]
     history = history[:done] + R.squares
-    return Found(leader, box.lumping.theta(leader), float(history[-1]), history, 1)
+    return SwarmOptimum(leader, box.lumping.theta(leader), float(history[-1]), history, 1)

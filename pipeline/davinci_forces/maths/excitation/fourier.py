@@ -42,7 +42,7 @@ class Fourier:
     period: float  # T_f [s]
 
     @classmethod
-    def of(cls, x: Array, period: float) -> "Fourier":
+    def from_coefficients(cls, x: Array, period: float) -> "Fourier":
         """The series of a vector of coefficients."""
         return cls(float(x[0]), tuple(x[1::2].tolist()), tuple(x[2::2].tolist()), period)
 
@@ -151,7 +151,7 @@ def run_in(series: Fourier, t: Array, duration: float) -> tuple[Array, Array, Ar
     return q, speed * dq, speed**2 * ddq + rise * dq
 
 
-def shortest(series: Sequence[Fourier], accelerations: Sequence[Range], durations: Array) -> float | None:
+def shortest_stretch(series: Sequence[Fourier], accelerations: Sequence[Range], durations: Array) -> float | None:
     """The first of these durations [s] in which the run-in of every series keeps its limits of acceleration, or None.
 
     A series that exceeds the limits itself may reach the same accelerations in its run-in.

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.excitation.fourier import CRITERIA, PERIOD_SAMPLES, Fourier, Range, basis, instants, ranges
-from davinci_forces.maths.excitation.search import Tell, lowest, nothing
+from davinci_forces.maths.excitation.search import Tell, minimise, report_nothing
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.terms import Term
 
@@ -65,7 +65,7 @@ def impossible(limits: tuple[Range, Range, Range]) -> str:
     return ""
 
 
-def design(problem: ExcitationProblem, starts: int, seed: int, tell: Tell = nothing) -> Design:
+def design(problem: ExcitationProblem, starts: int, seed: int, tell: Tell = report_nothing) -> Design:
     """Design the best of several optima, each of its own population.  (6.27)
 
     Raises
@@ -81,12 +81,12 @@ def design(problem: ExcitationProblem, starts: int, seed: int, tell: Tell = noth
         x = trajectories(problem, z)
         return CRITERIA[problem.criterion](regressor(problem.terms, *(x @ B for B in bases)))
 
-    best = lowest(objective, 1 + 2 * problem.harmonics, starts, seed, tell)
+    best = minimise(objective, 1 + 2 * problem.harmonics, starts, seed, tell)
     if not np.isfinite(best.values).any():
         names = ", ".join(term.name for term in problem.terms)
         raise ValueError(f"no trajectory of {problem.harmonics} harmonics identifies all of the terms {names}")
     x = trajectories(problem, best.z[None])[0]
-    return Design(shrink_into_limits(problem, Fourier.of(x, problem.period)), best.values)
+    return Design(shrink_into_limits(problem, Fourier.from_coefficients(x, problem.period)), best.values)
 
 
 def trajectories(problem: ExcitationProblem, z: Array) -> Array:
@@ -107,7 +107,7 @@ def shrink_into_limits(problem: ExcitationProblem, series: Fourier) -> Fourier:
     if scale == 1.0:
         return series
     shrunk = (series.x - problem.centre) / (scale * (1 + MARGIN))
-    return Fourier.of(problem.centre + shrunk, series.period)
+    return Fourier.from_coefficients(problem.centre + shrunk, series.period)
 
 
 Indices = NDArray[np.intp]

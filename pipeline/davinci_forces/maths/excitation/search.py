@@ -29,11 +29,11 @@ class Optimum(NamedTuple):
     values: Array
 
 
-def nothing(start: int, starts: int, value: float) -> None:
+def report_nothing(start: int, starts: int, value: float) -> None:
     """Say nothing of a start."""
 
 
-def lowest(objective: Objective, d: int, starts: int, seed: int, tell: Tell = nothing) -> Optimum:
+def minimise(objective: Objective, d: int, starts: int, seed: int, tell: Tell = report_nothing) -> Optimum:
     """Minimise from several starts; the first ones are the same for any number of starts."""
     optima = []
     for start in range(starts):

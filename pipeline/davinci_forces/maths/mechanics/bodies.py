@@ -49,11 +49,11 @@ class Bodies:
         there = self.counts_from <= n
         return replace(self, masses=self.masses * there, inertias=self.inertias * there[:, None, None])
 
-    def scaled(self, factor: float) -> "Bodies":
+    def with_density_factor(self, factor: float) -> "Bodies":
         """The same bodies with another density, as in a compensator with wrong masses.  Section 5.2"""
         return replace(self, masses=self.masses * factor, inertias=self.inertias * factor)
 
-    def within(self, T: Array) -> "Bodies":
+    def in_frames(self, T: Array) -> "Bodies":
         """The same bodies in other frames, relative to which their present frames are at T (L, 4, 4) [m]."""
         R = T[:, :3, :3]
         centres = np.einsum("lij,lj->li", R, self.centres) + T[:, :3, 3]

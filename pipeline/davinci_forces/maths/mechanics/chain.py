@@ -68,7 +68,7 @@ class Chain:
             raise ValueError(f"the chain has {self.n} coordinates, and q has {n}")
         return replace(self, n=n, coordinate=np.where(self.coordinate < n, self.coordinate, FIXED))
 
-    def lengthened(self, link: str, by: float) -> "Chain":
+    def lengthen(self, link: str, by: float) -> "Chain":
         """The same arm with a link, and all that it carries, further out along its own axis [m].
 
         In a table of modified parameters, whose rows have the links' axes, d of that row changes.

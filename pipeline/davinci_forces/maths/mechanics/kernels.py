@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from numba.extending import register_jitable
 
-from davinci_forces.maths.compiled import cached
+from davinci_forces.maths.compiled import compile_and_store
 from davinci_forces.maths.mechanics import link, recursions
 
 LANES = 32  # samples
@@ -37,7 +37,7 @@ def load(q: Any, dq: Any, ddq: Any, joints: Any) -> None:
             joints[k, 3, s], joints[k, 4, s] = dq[s, k], ddq[s, k]
 
 
-@cached
+@compile_and_store
 def mass_and_bias(tree: Any, gravity: Any, q: Any, dq: Any, ddq: Any, M: Any, bias: Any) -> None:
     """Put M(q) (n, n) and the effort (n,) of one sample into arrays; with ddq 0 this is C dq + G.  (4.41)"""
     n, L, samples = tree.n, len(tree.parent), range(1)
@@ -48,7 +48,7 @@ def mass_and_bias(tree: Any, gravity: Any, q: Any, dq: Any, ddq: Any, M: Any, bi
     recursions.mass_matrix(tree, joints, work, M.reshape(n, n, 1), samples)
 
 
-@cached
+@compile_and_store
 def place_and_jacobian(tree: Any, body: Any, point: Any, q: Any, J: Any) -> Any:
     """Put J_v (3, n) of a point of a body into J, and give its place in the base frame; `point` is in the body's.
 
@@ -74,7 +74,7 @@ def place_and_jacobian(tree: Any, body: Any, point: Any, q: Any, J: Any) -> Any:
     return point
 
 
-@cached
+@compile_and_store
 def inverse_dynamics(tree: Any, gravity: Any, q: Any, dq: Any, ddq: Any, tau: Any) -> None:
     """Put the efforts of N samples into tau; all are (N, n)."""
     n, L = tree.n, len(tree.parent)
@@ -88,7 +88,7 @@ def inverse_dynamics(tree: Any, gravity: Any, q: Any, dq: Any, ddq: Any, tau: An
                 tau[first + s, k] = efforts[k, s]
 
 
-@cached
+@compile_and_store
 def mass_matrices(tree: Any, q: Any, M: Any) -> None:
     """Put the mass matrices (N, n, n) of N poses (N, n) into M."""
     n, L = tree.n, len(tree.parent)
@@ -103,7 +103,7 @@ def mass_matrices(tree: Any, q: Any, M: Any) -> None:
                     M[first + s, k, o] = entries[k, o, s]
 
 
-@cached
+@compile_and_store
 def regressors(tree: Any, gravity: Any, q: Any, dq: Any, ddq: Any, Y: Any) -> None:
     """Put the regressors (N, n, 10 L) of N samples (N, n) into Y."""
     n, L = tree.n, len(tree.parent)

@@ -66,7 +66,7 @@ def _jacobian(chain: Chain, T: Array, n: int, body: int, at: Array) -> tuple[Arr
     return J_v, J_w
 
 
-def along(of: Callable[[Array], Array], q: Array) -> Array:
+def evaluate_in_blocks(of: Callable[[Array], Array], q: Array) -> Array:
     """Evaluate a function of poses (N, n) in chunks: all bodies' poses at all samples may take gigabytes."""
     return np.concatenate([of(q[i : i + POSES_AT_ONCE]) for i in range(0, max(len(q), 1), POSES_AT_ONCE)])
 

@@ -32,7 +32,7 @@ class PlacedLink(NamedTuple):
     parameters: Array = np.zeros(len(PARAMETERS))  # (10,), in the order of PARAMETERS
 
 
-def assembled(base: str, links: Sequence[PlacedLink], tip: str) -> tuple[Chain, Bodies]:
+def assemble_chain(base: str, links: Sequence[PlacedLink], tip: str) -> tuple[Chain, Bodies]:
     """The chain of such links, and its bodies: those fixed to a link add to it, those on the base are left out."""
     body, offset, moving = [0], [np.eye(4)], list[PlacedLink]()
     parent, placement, pseudo = list[int](), list[Array](), list[Array]()

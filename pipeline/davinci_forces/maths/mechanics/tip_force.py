@@ -114,7 +114,7 @@ def lever(J: ArrayLike) -> Array:
     return np.asarray(np.linalg.norm(np.linalg.inv(np.swapaxes(np.asarray(J, float), -1, -2))[..., :3, :], axis=-2))
 
 
-def shared(rho: Array) -> Array:
+def shared_correlations(rho: Array) -> Array:
     """The correlations (p,) that logs (n, p) share; of fewer than two logs, none."""
     if len(rho) < 2:
         return np.zeros(rho.shape[1])

@@ -5,14 +5,14 @@ Import this module only where a loop runs: compiling it, or reading it back from
 
 from typing import Any
 
-from davinci_forces.maths.compiled import cached, inline
+from davinci_forces.maths.compiled import compile_and_store, inline
 from davinci_forces.maths.models import bias as derivation
 
 bias = inline(derivation.bias)
 deflect = inline(derivation.deflect)
 
 
-@cached
+@compile_and_store
 def deflections(dq: Any, T_s: float, x_0: float, z: float, out: Any) -> None:
     """Write the deflection at each sample (N,) of velocities dq (N,), from z at the first."""
     for k in range(len(dq)):

@@ -118,7 +118,7 @@ def reduced_parameters(
 
 
 @cache
-def lumping(table: PhysicalTable, gear_ratio: float, names: tuple[str, ...]) -> Lumping | None:
+def physical_lumping(table: PhysicalTable, gear_ratio: float, names: tuple[str, ...]) -> Lumping | None:
     """Derive from the chain how a joint's physical parameters determine those of its model.
 
     None if they do not determine exactly the parameters `names`.  Cached, since every task needs it again.
@@ -156,5 +156,5 @@ def of_link(
     L, which = len(chain.links), chain.links.index(link)
     masses, centres, inertias = np.zeros(L), np.zeros((L, 3)), np.zeros((L, 3, 3))
     masses[which], centres[which, axis], inertias[which, axis, axis] = mass, centre, moment
-    bodies = Bodies(masses, centres, inertias, np.zeros(L, np.int64)).within(chain.of_links)
+    bodies = Bodies(masses, centres, inertias, np.zeros(L, np.int64)).in_frames(chain.of_links)
     return reduced_parameters(chain, bodies, table.joint, table.coordinates)

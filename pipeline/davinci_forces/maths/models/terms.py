@@ -64,7 +64,7 @@ offset = Term("offset", "1", "{effort}", b={"1": 1.0})
 stiffness = Term("stiffness", "q", "{effort}/{position}", b={"q": 1.0})
 
 
-def presliding(displacement: float, number: int = 1) -> Term:
+def presliding_friction(displacement: float, number: int = 1) -> Term:
     """Friction of bristles that reverse within a displacement, in the joint's units; several are numbered from 1."""
     return Term(f"presliding friction {number}", f"z_{number}", "{effort}", b={"z": 1.0}, displacement=displacement)
 

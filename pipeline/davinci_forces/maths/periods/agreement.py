@@ -29,12 +29,12 @@ class Difference(NamedTuple):
     ratio: float  # of its root mean square to what noise explains
 
     @property
-    def inside(self) -> bool:
+    def has_periods_on_both_sides(self) -> bool:
         """Whether there are periods on both sides, which agree with each other."""
         return 0 < self.period < self.periods - 1
 
 
-def alike(
+def agreeing_stretch(
     t: Array, positions: Sequence[Array], signals: Sequence[Array], span: slice, length: float, rate: float, orders: int
 ) -> tuple[slice, float, list[Difference]]:
     """Leave out the first and last periods that differ from the others; return stretch, period and differences.
@@ -49,7 +49,7 @@ def alike(
         M = whole_periods(t[span], length, rate)
         used = slice(span.start, end(t, span, length, rate))
         odd = differing_periods(t[used], [x[used] for x in signals], length, rate)
-        at_the_edges = sorted((d for d in odd if not d.inside), key=lambda d: -d.ratio)
+        at_the_edges = sorted((d for d in odd if not d.has_periods_on_both_sides), key=lambda d: -d.ratio)
         if not at_the_edges or fewest >= M:
             return span, length, left_out + sorted(odd, key=lambda d: -d.ratio)[:1]
         left_out.append(at_the_edges[0])

@@ -32,13 +32,13 @@ class Blocks(NamedTuple):
     correlation: float  # the least of a joint that moves
 
 
-def rising(columns: Sequence[Array]) -> int | None:
+def first_rising_column(columns: Sequence[Array]) -> int | None:
     """The first column (N,) that increases from every sample to the next, as a time does."""
     indices = (i for i, column in enumerate(columns) if len(column) > 2 and bool(np.all(np.diff(column) > 0)))
     return next(indices, None)
 
 
-def moving(positions: Sequence[Array]) -> tuple[int, ...]:
+def moving_positions(positions: Sequence[Array]) -> tuple[int, ...]:
     """The positions (N,) that move: by a share of the widest range, and beyond the noise of an arm at rest."""
     ranges = [float(np.ptp(q)) for q in positions]
     return tuple(i for i, width in enumerate(ranges) if width >= max(MIN_RANGE_SHARE * max(ranges), MIN_RANGE_MOVING))
@@ -50,7 +50,7 @@ def blocks(columns: Sequence[Array], t: Array | None = None) -> Blocks | None:
     `columns` (N,) each, of n positions, n velocities and more; `t` (N,) [s] where there is a time.
     """
     for n in range(len(columns) // 3, 0, -1):
-        moves = moving(columns[:n])
+        moves = moving_positions(columns[:n])
         pairs = [derivative(columns[i], columns[n + i], t) for i in moves]
         if pairs and min(correlation for correlation, _ in pairs) >= MIN_COSINE:
             best = max(pairs)

@@ -25,7 +25,7 @@ class Stuck(NamedTuple):
     jump: float
 
 
-def stuck(t: Array, x: Array) -> list[Stuck]:
+def find_stuck(t: Array, x: Array) -> list[Stuck]:
     """Find where a signal (N,) at times (N,) [s] repeats a value and then jumps, unlike a joint that was at rest."""
     step = np.abs(np.diff(x))
     still = [(a, b) for a, b in repeated_runs(step == 0.0) if t[b] - t[a] >= MIN_TIME_STUCK and b < len(step)]
@@ -39,7 +39,7 @@ def stuck(t: Array, x: Array) -> list[Stuck]:
     return [Stuck(float(t[a]), float(t[b]), float(x[b + 1] - x[b])) for a, b in jumping]
 
 
-def saturated(x: Array) -> int:
+def count_saturated(x: Array) -> int:
     """Count the samples of a signal (N,) in runs of several exactly at its largest or its least value."""
     return sum(
         b - a + 1

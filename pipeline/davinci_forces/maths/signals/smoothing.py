@@ -103,7 +103,7 @@ def noise_std(residual: Array, segment: Integers, rate: float, cutoff: float) ->
     The model's error is slower than that but for jumps at reversals, which hardly move the median.  0 where the
     low-pass removes nothing at this sampling rate.
     """
-    return white_std(residual - smoothed(residual, segment, rate, cutoff), share_passed(rate, cutoff))
+    return white_std(residual - lowpass_segments(residual, segment, rate, cutoff), share_passed(rate, cutoff))
 
 
 def white_std(removed: Array, passed: float) -> float:
@@ -111,6 +111,6 @@ def white_std(removed: Array, passed: float) -> float:
     return float(np.median(np.abs(removed)) / NORMAL_MAD / np.sqrt(1.0 - passed)) if passed < 1.0 else 0.0
 
 
-def smoothed(x: Array, segment: Integers, rate: float, cutoff: float) -> Array:
+def lowpass_segments(x: Array, segment: Integers, rate: float, cutoff: float) -> Array:
     """Low-pass each segment of a signal (N,), or of columns (N, ...)."""
     return np.concatenate([lowpass(x[part], rate, cutoff) for part in segments(segment)])

@@ -14,7 +14,9 @@ BEFORE, AFTER = 0.05, 0.25
 SLOW = 0.05  # of the root mean square of the velocity, below which friction may stick
 
 
-def standing(q: Array, dq: Array, segment: Integers, rate: float, q_std: float = 0.0, spread: int = 0) -> Booleans:
+def is_standing_still(
+    q: Array, dq: Array, segment: Integers, rate: float, q_std: float = 0.0, spread: int = 0
+) -> Booleans:
     """Whether a joint stands still at each sample (N,) of its motion, sampled at `rate` [Hz].
 
     It stands still throughout every window of `HOLD` in which its position, with noise of `q_std`, hardly changes.  The
@@ -42,7 +44,7 @@ def _standing(q: Array, window: int, spread: int, least: float) -> Booleans:
     return np.asarray(np.cumsum(covers[:-1]) > 0)
 
 
-def moving(dq: Array, T_s: float) -> Booleans:
+def is_far_from_reversals(dq: Array, T_s: float) -> Booleans:
     """Whether each sample of a velocity (N,), low-passed without delay, is far from reversals and standstills."""
     size = float(np.sqrt(np.mean(dq**2)))
     standing = np.abs(dq) <= SLOW * size

@@ -15,8 +15,8 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array
 
-NORMAL_95, NORMAL_99 = 1.96, 2.576  # standard deviations within which 95 and 99 % of a normal distribution lie
-FEWEST = 20  # samples that the tests need
+TWO_SIDED_95, TWO_SIDED_99 = 1.96, 2.576  # standard deviations within which 95 and 99 % of a normal distribution lie
+MIN_SAMPLES_WHITENESS = 20  # samples that the tests need
 
 
 class LjungBox(NamedTuple):
@@ -35,7 +35,7 @@ class Cumulative(NamedTuple):
     probability: float  # of a larger distance if the signal were white
 
 
-def centred(pieces: Sequence[Array]) -> list[Array]:
+def centre_pieces(pieces: Sequence[Array]) -> list[Array]:
     """Subtract the common mean from the pieces."""
     mean = sum(float(x.sum()) for x in pieces) / sum(len(x) for x in pieces)
     return [x - mean for x in pieces]
@@ -102,9 +102,9 @@ def tests(pieces: Sequence[Array], lags: int) -> tuple[LjungBox, float]:
     Both probabilities are 0 for too few or constant samples.
     """
     n = sum(len(x) for x in pieces)
-    if n < FEWEST or max(map(len, pieces)) < 5 or all(np.ptp(x) == 0 for x in pieces):
+    if n < MIN_SAMPLES_WHITENESS or max(map(len, pieces)) < 5 or all(np.ptp(x) == 0 for x in pieces):
         return LjungBox(0.0, 0.0), 0.0
-    level, tested = centred(pieces), min(lags, n // 5)
+    level, tested = centre_pieces(pieces), min(lags, n // 5)
     return ljung_box(level, autocorrelation(level, tested), tested), cumulative_periodogram(level).probability
 
 

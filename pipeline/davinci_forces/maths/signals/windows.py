@@ -7,10 +7,10 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals.smoothing import segments
 
-SETTLE = 1.0  # [s] of a filter's transient, left out of the statistics of the whole run
+TRANSIENT = 1.0  # [s] of a filter's transient, left out of the statistics of the whole run
 
 
-def outside(t: Array, windows: Sequence[tuple[float, float]]) -> Booleans:
+def is_outside(t: Array, windows: Sequence[tuple[float, float]]) -> Booleans:
     """Whether each time (N,) lies outside all windows."""
     inside = np.zeros(len(t), dtype=bool)
     for start, end in windows:
@@ -18,9 +18,9 @@ def outside(t: Array, windows: Sequence[tuple[float, float]]) -> Booleans:
     return ~inside
 
 
-def settled(t: Array) -> Booleans:
+def is_past_transient(t: Array) -> Booleans:
     """Whether a filter's transient is over: all but the first second, unless there is little more than that."""
-    return t - t[0] >= SETTLE if t[-1] - t[0] > 5 * SETTLE else np.ones(len(t), dtype=bool)
+    return t - t[0] >= TRANSIENT if t[-1] - t[0] > 5 * TRANSIENT else np.ones(len(t), dtype=bool)
 
 
 def free_space(t: Array, windows: Sequence[tuple[float, float]], rate: float) -> Booleans:
@@ -28,9 +28,9 @@ def free_space(t: Array, windows: Sequence[tuple[float, float]], rate: float) ->
 
     There is a transient at the start, after each gap and after each window.
     """
-    widened = [(start, end + SETTLE) for start, end in windows]
-    steady = np.concatenate([settled(t[part]) for part in unbroken(t, 1.5 / rate)])
-    return np.asarray(outside(t, widened) & steady)
+    widened = [(start, end + TRANSIENT) for start, end in windows]
+    steady = np.concatenate([is_past_transient(t[part]) for part in unbroken(t, 1.5 / rate)])
+    return np.asarray(is_outside(t, widened) & steady)
 
 
 def runs(which: Booleans) -> list[slice]:

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.compiled import compiled
+from davinci_forces.maths.compiled import compile_function
 from davinci_forces.maths.constants import GRAVITY
 from davinci_forces.maths.mechanics.bodies import Bodies
 from davinci_forces.maths.mechanics.chain import Chain, Tree, fold_fixed_links, tree_of
@@ -77,7 +77,7 @@ def simulate(
     return out
 
 
-@compiled
+@compile_function
 def _cascade(
     dynamics: Any, tip: Any, data: Any, body: Any, motors: Any, law: Any, timing: Any, reference: Any, around: Any,
     state: Any, out: Any,
@@ -98,7 +98,7 @@ def _cascade(
             _tick(dynamics, tip, data, body, around, state, tau, h, k, tick, timing.ticks, out)
 
 
-@compiled
+@compile_function
 def _regulator(
     dynamics: Any, tip: Any, data: Any, body: Any, motors: Any, law: Any, timing: Any, reference: Any, around: Any,
     state: Any, out: Any,
@@ -121,7 +121,7 @@ def _regulator(
             _tick(dynamics, tip, data, body, around, state, tau, timing.tick, k, tick, timing.ticks, out)
 
 
-@compiled
+@compile_function
 def _tick(
     dynamics: Any, tip: Any, data: Any, body: Any, around: Any, state: Any, tau: Any, h: float, k: int, tick: int,
     ticks: int, out: Any,
@@ -160,7 +160,7 @@ def _tick(
                 out.tau_ext[k, i] += around.mass * J[c, i] * velocity[c]
 
 
-@compiled
+@compile_function
 def _through(J: Any, dq: Any, velocity: Any) -> None:
     """J dq (3,)."""
     for c in range(3):
@@ -169,7 +169,7 @@ def _through(J: Any, dq: Any, velocity: Any) -> None:
             velocity[c] += J[c, i] * dq[i]
 
 
-@compiled
+@compile_function
 def _record(state: Any, tau: Any, external: Any, force: Any, k: int, out: Any) -> None:
     for i in range(len(tau)):
         out.q[k, i], out.dq[k, i], out.tau[k, i], out.tau_ext[k, i] = state.q[i], state.dq[i], tau[i], external[i]
@@ -199,7 +199,7 @@ def arm(chain: Chain, bodies: Bodies, rotors: Array) -> Plant:
     return Plant(dynamics, _tip, data)
 
 
-@compiled
+@compile_function
 def dynamics(body: Any, q: Any, dq: Any, M: Any, b: Any) -> None:
     """Fill M, with the rotors', and b = C dq + G.  (A.12)"""
     mass_and_bias(body.tree, GRAVITY, q, dq, body.rest, M, b)
@@ -207,7 +207,7 @@ def dynamics(body: Any, q: Any, dq: Any, M: Any, b: Any) -> None:
         M[i, i] += body.rotors[i]
 
 
-@compiled
+@compile_function
 def _tip(body: Any, q: Any, J: Any) -> Any:
     """Fill the Jacobian (3, n) of the tip, and give its position (3,).  (7.23)"""
     return np.array(place_and_jacobian(body.tree, body.body, body.tip, q, J))

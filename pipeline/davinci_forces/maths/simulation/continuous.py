@@ -9,7 +9,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.compiled import cached
+from davinci_forces.maths.compiled import compile_and_store
 from davinci_forces.maths.simulation import closed_loop as arms
 from davinci_forces.maths.simulation.actuators import Regulator
 from davinci_forces.maths.simulation.closed_loop import Plant
@@ -57,7 +57,7 @@ def regulate(
     return Regulated(solution.t, q_t, dq_t, efforts, V)
 
 
-@cached
+@compile_and_store
 def _forces(body: Any, model: Any, law: Any, target: Any, state: Any, M: Any, tau: Any, b: Any) -> None:
     """Fill inertia, the controller's effort and bias at a state, (3 n,): position, velocity, integral of the error."""
     n = len(target)
@@ -68,7 +68,7 @@ def _forces(body: Any, model: Any, law: Any, target: Any, state: Any, M: Any, ta
     arms.dynamics(body, q, dq, M, b)
 
 
-@cached
+@compile_and_store
 def _slope(
     body: Any, model: Any, law: Any, target: Any, viscous: Any, state: Any, M: Any, tau: Any, b: Any, rate: Any
 ) -> None:

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.compiled import compiled
+from davinci_forces.maths.compiled import compile_function
 from davinci_forces.maths.simulation.actuators import Motors
 
 
-@compiled
+@compile_function
 def pi(error: float, p: float, i: float, integral: float, h: float, limit: float) -> tuple[float, float]:
     """Advance a PI loop by a step: its output, clipped at the limit, and its integral, which stops growing there."""
     output = p * error + integral + i * h * error
@@ -23,7 +23,7 @@ def pi(error: float, p: float, i: float, integral: float, h: float, limit: float
     return output, integral + i * h * error
 
 
-@compiled
+@compile_function
 def current_after(motors: Motors, j: int, current: float, voltage: float, speed: float, h: float) -> float:
     """The current after h [s] of a constant voltage at a constant motor speed [rad/s]: (A.5), solved exactly."""
     decay = np.exp(-h * motors.resistance[j] / motors.inductance[j])
@@ -31,7 +31,7 @@ def current_after(motors: Motors, j: int, current: float, voltage: float, speed:
     return float(final + (current - final) * decay)
 
 
-@compiled
+@compile_function
 def follow(motors: Any, law: Any, loops: Any, reference: Any, angle: Any, turn: float) -> None:
     """Advance the position loop: the velocity reference of the drivers, once every turn [s] of the controller."""
     for j in range(len(angle)):
@@ -41,7 +41,7 @@ def follow(motors: Any, law: Any, loops: Any, reference: Any, angle: Any, turn: 
         )
 
 
-@compiled
+@compile_function
 def drive(motors: Any, law: Any, loops: Any, angle: Any, dq: Any, part: float, h: float, tau: Any) -> None:
     """Advance the velocity and current loops by one tick of h [s], and fill the efforts at the joints tau (n,).
 
@@ -65,7 +65,7 @@ def drive(motors: Any, law: Any, loops: Any, angle: Any, dq: Any, part: float, h
         tau[j] = motors.gear_ratio[j] * motors.torque_constant[j] * loops.current[j]
 
 
-@compiled
+@compile_function
 def read(motors: Any, q: Any, angle: Any) -> None:
     """Fill the motors' angles (n,) [rad] as the encoders give them.  (6.28)"""
     for j in range(len(q)):

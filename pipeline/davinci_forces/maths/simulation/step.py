@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.compiled import compiled
+from davinci_forces.maths.compiled import compile_function
 
 MAX_SWEEPS = 100
 SWEEP_TOLERANCE = 1e-13  # relative change of a sweep
@@ -44,7 +44,7 @@ class Friction(NamedTuple):
     bristle_damping: Array  # sigma_1
 
 
-@compiled
+@compile_function
 def level(friction: Friction, i: int, v: float) -> float:
     """Friction, without its viscous part, of joint i when it slides at v, or starts to move in that direction."""
     up = v >= 0.0
@@ -53,7 +53,7 @@ def level(friction: Friction, i: int, v: float) -> float:
     return float(c + (s - c) * np.exp(-((v / friction.stribeck_velocity[i]) ** 2)))
 
 
-@compiled
+@compile_function
 def bristle(friction: Friction, i: int, v: float, z: float, h: float) -> tuple[float, float, float]:
     """The bristles' effort at the end of a step of h [s], constant + slope dq, and the decay of their deflection.
 
@@ -83,7 +83,7 @@ def at_rest(q: Array) -> State:
     return State(q.astype(np.float64), np.zeros(len(q)), np.zeros(len(q)), np.zeros(len(q)))
 
 
-@compiled
+@compile_function
 def middle(state: Any, h: float, q: Any, dq: Any) -> None:
     """Fill the predicted position and velocity (n,) in the middle of the coming step."""
     for i in range(len(q)):
@@ -91,7 +91,7 @@ def middle(state: Any, h: float, q: Any, dq: Any) -> None:
         dq[i] = state.dq[i] + (state.dq[i] - state.before[i]) / 2
 
 
-@compiled
+@compile_function
 def step(
     M: Any, b: Any, tau: Any, friction: Friction, lower: Any, upper: Any, state: State, moving: Any, h: float
 ) -> None:
@@ -130,7 +130,7 @@ def step(
         before[i], dq[i] = dq[i], new[i]
 
 
-@compiled
+@compile_function
 def _rub(friction: Any, dq: Any, z: Any, h: float, A: Any, r: Any, up: Any, down: Any, decay: Any) -> None:
     """Add smooth friction to A and r, and fill the impulses up and down that sticking friction can hold."""
     for i in range(len(dq)):
@@ -145,7 +145,7 @@ def _rub(friction: Any, dq: Any, z: Any, h: float, A: Any, r: Any, up: Any, down
             down[i] = h * level(friction, i, min(dq[i], -1e-300))
 
 
-@compiled
+@compile_function
 def _velocity(A: Any, r: Any, up: Any, down: Any, free: Any, v: Any) -> None:
     """Minimise v^T A v / 2 - r^T v + sum_i (up_i max(v_i, 0) + down_i max(-v_i, 0)), one joint at a time, from v."""
     n = len(r)

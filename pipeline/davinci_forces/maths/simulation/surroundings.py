@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.compiled import compiled
+from davinci_forces.maths.compiled import compile_function
 from davinci_forces.maths.constants import GRAVITY
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -41,7 +41,7 @@ def pulse(t: Array, start: float, end: float, peak: float) -> Array:
 SHAPES = {"triangle": triangle, "pulse": pulse}
 
 
-@compiled
+@compile_function
 def on_tip(around: Any, tick: int, x: Any, velocity: Any, force: Any) -> None:
     """Fill the force (3,) [N] of the tip at x (3,) [m] on its surroundings: that of this tick, and that of tissue.
 
@@ -58,7 +58,7 @@ def on_tip(around: Any, tick: int, x: Any, velocity: Any, force: Any) -> None:
             force[k] -= pressed * around.normal[k]
 
 
-@compiled
+@compile_function
 def weigh(tip: Any, data: Any, q: Any, dq: Any, J: Any, drift: Any) -> None:
     """Fill the Jacobian (3, n) of the tip, and dJ/dt dq + g up (3,) [m/s^2]: the load of a mass there, less J ddq.
 

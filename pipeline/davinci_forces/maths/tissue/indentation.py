@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, evenly
-from davinci_forces.maths.estimation.correlation import correlated
+from davinci_forces.maths.estimation.correlation import correlated_variance
 
 CANDIDATES = 41  # onsets of a round; each further round searches between the neighbours of the best
 ROUNDS = 3
@@ -87,7 +87,7 @@ def onset_std(depth: Array, force: Array, bend: Hinge) -> float:
     if np.abs(np.diag(R)).min() <= 1e-12 * np.abs(np.diag(R)).max() or len(depth) <= 4:
         return float("nan")
     residual = residual - Q @ (Q.T @ residual)
-    variance = correlated(Q, residual, (0,), np.linalg.inv(R), len(depth) - 3).variance
+    variance = correlated_variance(Q, residual, (0,), np.linalg.inv(R), len(depth) - 3).variance
     return float(np.sqrt(variance[2]))
 
 
@@ -190,7 +190,7 @@ def straight(depth: Array, force: Array) -> StraightLine | None:
     away = float(np.sum((force - force.mean()) ** 2))
     if not away > 0:
         return StraightLine(0.0, 0.0, float(c), 0.0)
-    variance = correlated(Q, residual, (0,), np.linalg.inv(R), len(depth) - 2).variance
+    variance = correlated_variance(Q, residual, (0,), np.linalg.inv(R), len(depth) - 2).variance
     return StraightLine(
         float(k), float(np.sqrt(variance[1])), float(c - k * depth.mean()), 1.0 - float(residual @ residual) / away
     )

@@ -61,7 +61,7 @@ class Probing(NamedTuple):
         return self.force[:, 0] if self.force.shape[1] == 1 else np.asarray(np.linalg.norm(self.force, axis=1))
 
 
-def known(probing: Probing) -> Probing:
+def known_samples(probing: Probing) -> Probing:
     """Keep the samples at which both depth and force are finite."""
     whole = np.isfinite(probing.depth).all(axis=1) & np.isfinite(probing.force).all(axis=1)
     return probing if whole.all() else Probing._make(column[whole] for column in probing)
@@ -134,7 +134,7 @@ def _unit(vector: Array) -> Array:
     return vector / length if length > 0 else np.zeros_like(vector)
 
 
-class Pushed(NamedTuple):
+class PalpatedPush(NamedTuple):
     """One push of n samples."""
 
     number: int
@@ -150,13 +150,13 @@ class Pushed(NamedTuple):
     k_std_model: float  # [N/m] by the error of the force that a joint's model leaves
 
     @property
-    def below(self) -> Array:
+    def depth_in_contact(self) -> Array:
         """Depth below first contact (n,) [m], or below the least depth in contact where first contact is not known."""
         onset = self.contact.onset
         return self.depth - (onset if np.isfinite(onset) else self.depth[self.contact.inside].min())
 
     @property
-    def lost(self) -> tuple[float, float]:
+    def dissipated_energy(self) -> tuple[float, float]:
         """Energy [J] dissipated between first and last contact, and its share of the work of loading.
 
         The loop is closed along the force at its end.  NaN for a push without unloading.
@@ -169,9 +169,9 @@ class Pushed(NamedTuple):
         return into + out, (into + out) / into if into > 0 else float("nan")
 
 
-def palpated(
+def evaluate_pushes(
     probing: Probing, windows: Sequence[tuple[float, float]], everything: bool, rate: float, cutoff: float
-) -> list[Pushed]:
+) -> list[PalpatedPush]:
     """Evaluate every push of a log, with its contact detected, stated by windows [s], or all of it with `everything`.
 
     `rate` [Hz] is the sampling rate, 0 without a clock; rates of depth are low-passed at `cutoff` [Hz].
@@ -195,7 +195,7 @@ def _numbers(probing: Probing, pushes: Sequence[slice]) -> list[int]:
 def _pushed(
     probing: Probing, part: slice, number: int, way: tuple[Array, Array], stated: bool, rate: float, cutoff: float,
     reach: int,
-) -> Pushed:  # fmt: skip
+) -> PalpatedPush:  # fmt: skip
     (depth, force), speed = way, probing.speed[part]
     counted = moves(speed, float(np.quantile(np.abs(speed), USUAL_SPEED_QUANTILE)), reach)
     contact = indentation.all_of(depth, counted) if stated else indentation.find_contact(depth, force, counted)
@@ -210,10 +210,10 @@ def _pushed(
         contact = contact._replace(onset_std=float(np.hypot(contact.onset_std, common / abs(line.k))))
     loaded, unloaded = (indentation.slope(depth[i], force[i]) for i in (inside & loading, inside & ~loading))
     place = probing.place[part]
-    return Pushed(number, probing.t[part], depth, force, d_rate, place, contact, line, loaded, unloaded, error)
+    return PalpatedPush(number, probing.t[part], depth, force, d_rate, place, contact, line, loaded, unloaded, error)
 
 
-def remarks(pushes: Sequence[Pushed]) -> Iterator[str]:
+def remarks(pushes: Sequence[PalpatedPush]) -> Iterator[str]:
     """Diagnostics of the pushes of one log, each once."""
     touched = [(push, push.line) for push in pushes if push.line is not None]
     yield from _contact(pushes, touched)
@@ -234,7 +234,7 @@ def remarks(pushes: Sequence[Pushed]) -> Iterator[str]:
         )
 
 
-def _contact(pushes: Sequence[Pushed], touched: Sequence[tuple[Pushed, StraightLine]]) -> Iterator[str]:
+def _contact(pushes: Sequence[PalpatedPush], touched: Sequence[tuple[PalpatedPush, StraightLine]]) -> Iterator[str]:
     free = [push for push in pushes if push.contact.state == NONE]
     if not touched:
         largest = max(float(np.ptp(push.force)) for push in pushes)
@@ -252,7 +252,7 @@ def _contact(pushes: Sequence[Pushed], touched: Sequence[tuple[Pushed, StraightL
         )
 
 
-def _units(touched: Sequence[tuple[Pushed, StraightLine]]) -> Iterator[str]:
+def _units(touched: Sequence[tuple[PalpatedPush, StraightLine]]) -> Iterator[str]:
     deep = float(np.median([np.ptp(push.depth[push.contact.inside]) for push, _ in touched]))
     k = float(np.median([abs(line.k) for _, line in touched]))
     if deep > MAX_DEPTH or k < MIN_STIFFNESS:
@@ -267,7 +267,7 @@ def _units(touched: Sequence[tuple[Pushed, StraightLine]]) -> Iterator[str]:
         )
 
 
-def _which(some: Sequence[Pushed], pushes: Sequence[Pushed]) -> str:
+def _which(some: Sequence[PalpatedPush], pushes: Sequence[PalpatedPush]) -> str:
     if len(some) == len(pushes) > 1:
         return f"all {_count(len(pushes))}"
     names = ", ".join(str(push.number) for push in some[:MAX_NAMED])

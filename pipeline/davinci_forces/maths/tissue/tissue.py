@@ -38,7 +38,7 @@ class ForceLaw(NamedTuple):
         return len(self.columns) + self.free
 
     @property
-    def damped(self) -> bool:
+    def has_damping(self) -> bool:
         """Whether the force depends on velocity."""
         return len(self.columns) > 1
 
@@ -82,7 +82,7 @@ def moments(pushes: Sequence[tuple[Array, Array, Array]]) -> Moments:
     return Moments(np.array(A), np.array(b), np.array(squares))
 
 
-def judged(data: Moments, law: ForceLaw) -> FittedLaw:
+def cross_validate_law(data: Moments, law: ForceLaw) -> FittedLaw:
     """Fit and cross-validate a model: leave out one push at a time, or a twentieth of them."""
     parts = blocks(len(data.squares), FOLDS)
     A, b, _ = (column.sum(axis=0) for column in data)
@@ -124,7 +124,7 @@ def _columns(x: Array, v: Array, exponents: Array) -> Array:
     return np.stack([power, np.broadcast_to(v[:, None], power.shape), power * v[:, None]], axis=2)
 
 
-def chosen(candidates: Sequence[FittedLaw]) -> tuple[FittedLaw, str]:
+def preferred_law(candidates: Sequence[FittedLaw]) -> tuple[FittedLaw, str]:
     """The model of the fewest parameters that predicts omitted pushes not clearly worse than the best, and why."""
     best = min(candidates, key=lambda c: c.score)
     for candidate in sorted(candidates, key=lambda c: (c.law.parameters, c.score)):

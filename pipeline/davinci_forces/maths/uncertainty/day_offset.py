@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.signals.windows import outside
+from davinci_forces.maths.signals.windows import is_outside
 from davinci_forces.maths.uncertainty.bootstrap import blocks, error_of_mean
 
 MIN_DRIFT_ERRORS = 2.0  # standard errors of a difference that count as a drift
@@ -31,7 +31,7 @@ def day_offset(t: Array, residual: Array, windows: Sequence[tuple[float, float]]
 
     Without windows, or with fewer than two samples in them, the offset is 0 with error 0.
     """
-    inside = residual[~outside(t, windows)]
+    inside = residual[~is_outside(t, windows)]
     if len(inside) < 2:
         return DayOffset(0.0, 0.0, 0.0, 0.0)
     halves = np.array_split(inside, 2)

@@ -15,8 +15,8 @@ from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, err
 
 EDGES = (0.25, 0.5, 1.0, 1.5)  # of the ranges, in root mean squares of the identification's velocity
 BINS = len(EDGES) + 1
-BLOCKS = 6
-FEWEST = 3  # logs; with fewer, standard errors leave out blocks instead
+LOG_BLOCKS = 6
+MIN_LOGS_BAND = 3  # logs; with fewer, standard errors leave out blocks instead
 DETECTED_SHARE = 0.99  # share of free-space samples below the detection level
 TYPICAL_SHARE = 0.95  # share of free-space samples below the lower level
 NORMAL_95 = 1.959963984540054
@@ -34,7 +34,7 @@ class SpeedCells(NamedTuple):
     filter_square: Array  # mean of the variance that the filter accounts for, its lag included
     log_mean: Array  # of the external effort over the whole log
 
-    def those(self, which: Booleans) -> "SpeedCells":
+    def select(self, which: Booleans) -> "SpeedCells":
         """Select cells."""
         return SpeedCells(*(column[which] for column in self))  # type: ignore[arg-type]
 
@@ -47,7 +47,7 @@ def speed_bin(dq: Array, speed: float) -> Integers:
 def cells(tau_ext: Array, variance: Array, dq: Array, speed: float) -> SpeedCells:
     """Average one log's free motion by cells: external effort (N,), the filter's variance (N,) and velocity (N,)."""
     block, bins = np.empty(len(dq), np.int64), speed_bin(dq, speed)
-    for number, part in enumerate(np.array_split(np.arange(len(dq)), BLOCKS)):
+    for number, part in enumerate(np.array_split(np.arange(len(dq)), LOG_BLOCKS)):
         block[part] = number
     cell, inverse, count = np.unique(block * BINS + bins, return_inverse=True, return_counts=True)
     squares, filter_squares = (np.bincount(inverse, weights=x) / count for x in (tau_ext**2, variance))
@@ -55,7 +55,7 @@ def cells(tau_ext: Array, variance: Array, dq: Array, speed: float) -> SpeedCell
     return SpeedCells(np.zeros(len(cell), np.int64), cell // BINS, cell % BINS, count, squares, filter_squares, mean)
 
 
-def centred(of: SpeedCells) -> SpeedCells:
+def subtract_log_means(of: SpeedCells) -> SpeedCells:
     """Subtract the squared mean of each log, as an offset of the day does."""
     return of._replace(mean_square=of.mean_square - of.log_mean**2)
 
@@ -78,7 +78,7 @@ def excess_std(of: SpeedCells) -> Array:
 
 def units(of: SpeedCells) -> Integers:
     """Uncorrelated unit of each cell (C,): its log, or its block where logs are few."""
-    return of.source if len(np.unique(of.source)) >= FEWEST else of.source * BLOCKS + of.block
+    return of.source if len(np.unique(of.source)) >= MIN_LOGS_BAND else of.source * LOG_BLOCKS + of.block
 
 
 def means(of: SpeedCells, values: Array, together: bool) -> Array:
@@ -118,7 +118,7 @@ def sums(of: SpeedCells, values: Array, group: Integers) -> tuple[Array, Array]:
 
 def depends_on_speed(of: SpeedCells) -> bool:
     """Whether variances by range of speed give omitted blocks a higher likelihood than one variance does."""
-    unit = np.unique(of.source * BLOCKS + of.block, return_inverse=True)[1]
+    unit = np.unique(of.source * LOG_BLOCKS + of.block, return_inverse=True)[1]
     if unit.max() < 2:
         return False
     variances = (without_each(of, of.mean_square, unit, together) for together in (True, False))

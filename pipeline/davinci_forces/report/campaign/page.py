@@ -4,7 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from davinci_forces.report.campaign.studies import FLOORS, Campaigned, Findings, Series, joints_of, place
+from davinci_forces.report.campaign.studies import FLOORS, CampaignStudy, Findings, Series, joints_of, series_key
 from davinci_forces.report.content import (
     Block,
     Bullets,
@@ -27,7 +27,7 @@ from davinci_forces.report.verdicts import band, verdict_words
 from davinci_forces.report.writers import render_all
 
 
-def page(studies: Sequence[Campaigned], left_out: Sequence[str], findings: Findings) -> dict[str, bytes]:
+def render_campaign(studies: Sequence[CampaignStudy], left_out: Sequence[str], findings: Findings) -> dict[str, bytes]:
     """campaign.html and campaign.pdf of studies in their order; `left_out` names those that have no results."""
     sections = (
         Section("The campaign", "campaign", tuple(overview(studies, left_out, findings))),
@@ -38,7 +38,7 @@ def page(studies: Sequence[Campaigned], left_out: Sequence[str], findings: Findi
     return render_all((Document("Campaign", heading, simulated, sections, "", "campaign", links=()),))
 
 
-def overview(studies: Sequence[Campaigned], left_out: Sequence[str], findings: Findings) -> Iterator[Block]:
+def overview(studies: Sequence[CampaignStudy], left_out: Sequence[str], findings: Findings) -> Iterator[Block]:
     """The prose, the findings, and a table with one row a study."""
     dates = f", recorded from {studies[0].started[:10]} to {studies[-1].started[:10]}" if findings.by_date else ""
     undated = " Some logs state no date of recording, so studies are in the order in which they are named."
@@ -53,7 +53,7 @@ def overview(studies: Sequence[Campaigned], left_out: Sequence[str], findings: F
     if left_out:
         names = ", ".join(f"`{literal(name)}`" for name in left_out)
         yield Verdict("info", f"Left out, as they have no results: {names}. Run `davinci-forces all` on them.")
-    changes = (series for series in findings.every if place(series) in {*findings.slopes, *findings.varying})
+    changes = (series for series in findings.every if series_key(series) in {*findings.slopes, *findings.varying})
     messages = tuple(change_in_words(series, findings) for series in changes)
     messages += tuple(text for series in findings.every for text in outliers_in_words(series, findings))
     if messages:
@@ -70,7 +70,7 @@ def overview(studies: Sequence[Campaigned], left_out: Sequence[str], findings: F
 def change_in_words(series: Series, findings: Findings) -> str:
     """How a number drifts or varies, in words."""
     name = f"**{title(series.joint)}, {literal(words(series.name))}**"
-    if line := findings.slopes.get(place(series)):
+    if line := findings.slopes.get(series_key(series)):
         slope = Number(line.value, f"{format_unit(series.unit)} a {findings.unit}".strip(), line.std)
         return f"{name} drifts by {literal(str(slope))} over {len(series.value)} studies."
     return f"{name} varies by more than its standard errors, without a trend."
@@ -84,12 +84,12 @@ def outliers_in_words(series: Series, findings: Findings) -> Iterator[str]:
         yield f"{series.studies[i].link} stands out: **{where}** is {literal(str(shown))}."
 
 
-def date(study: Campaigned) -> str:
+def date(study: CampaignStudy) -> str:
     """The day of its first log."""
     return study.started[:10] if study.when else "–"
 
 
-def word(study: Campaigned, joint: str) -> str:
+def word(study: CampaignStudy, joint: str) -> str:
     """The verdict of one joint."""
     verdict = study.joints.get(joint)
     if verdict is None:
@@ -99,7 +99,7 @@ def word(study: Campaigned, joint: str) -> str:
     return verdict_words(verdict.verdict, verdict.same_path, narrow)
 
 
-def joint_section(joint: str, studies: Sequence[Campaigned], findings: Findings) -> Section:
+def joint_section(joint: str, studies: Sequence[CampaignStudy], findings: Findings) -> Section:
     """The numbers of one joint, drawn and listed."""
     of_joint = [series for series in findings.every if series.joint == joint]
     names = list(dict.fromkeys(series.name for series in of_joint))
@@ -130,7 +130,7 @@ def table(
     label: str,
     names: Sequence[str],
     of_joint: Sequence[Series],
-    studies: Sequence[Campaigned],
+    studies: Sequence[CampaignStudy],
 ) -> Table:
     """Some numbers of a joint, one row a study."""
     keys = {(s.name, study.name): key for s in of_joint for study, key in zip(s.studies, s.keys, strict=True)}
@@ -156,7 +156,7 @@ def words(name: str) -> str:
     return name.replace("_", " ")
 
 
-def cell(study: Campaigned, key: str | None) -> Cell:
+def cell(study: CampaignStudy, key: str | None) -> Cell:
     """A number of a study, or a dash."""
     stated = study.numbers.get(key) if key else None
     if stated is None or stated.number is None:

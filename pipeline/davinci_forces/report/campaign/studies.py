@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array
-from davinci_forces.report.changes import Stated
+from davinci_forces.report.changes import StatedValue
 from davinci_forces.report.content import Level, literal
 
 FIT = "independent.lse"  # the fit whose parameters mean the same in every study
@@ -26,7 +26,7 @@ class JointVerdict:
 
 
 @dataclass(frozen=True)
-class Campaigned:
+class CampaignStudy:
     """One study of a campaign: its name, its report beside the page, when it was recorded, and its numbers."""
 
     name: str
@@ -35,7 +35,7 @@ class Campaigned:
     simulated: bool
     started: str
     joints: Mapping[str, JointVerdict]
-    numbers: Mapping[str, Stated]
+    numbers: Mapping[str, StatedValue]
 
     @property
     def when(self) -> datetime | None:
@@ -58,20 +58,20 @@ class Series(NamedTuple):
     joint: str
     name: str
     unit: str
-    studies: tuple[Campaigned, ...]
+    studies: tuple[CampaignStudy, ...]
     keys: tuple[str, ...]
     value: Array
     std: Array  # NaN where none is stated
 
 
-def joints_of(studies: Sequence[Campaigned]) -> list[str]:
+def joints_of(studies: Sequence[CampaignStudy]) -> list[str]:
     """The joints that any study judges, in order."""
     return list(dict.fromkeys(joint for study in studies for joint in study.joints))
 
 
-def series_of(studies: Sequence[Campaigned], joint: str) -> Iterator[Series]:
+def series_of(studies: Sequence[CampaignStudy], joint: str) -> Iterator[Series]:
     """Every parameter of a joint, and how far it is to be trusted, over the studies; one a unit."""
-    keyed: dict[tuple[str, str], list[tuple[Campaigned, str]]] = {}
+    keyed: dict[tuple[str, str], list[tuple[CampaignStudy, str]]] = {}
     prefix = f"fit.{joint}.{FIT}."
     for study in studies:
         named = [(key.removeprefix(prefix), key) for key in study.numbers if key.startswith(prefix)]
@@ -127,13 +127,13 @@ class Findings:
 
     def stand_out(self, one: Series) -> tuple[int, ...]:
         """Which of its studies stand out from the others."""
-        return self.outliers.get(place(one), ())
+        return self.outliers.get(series_key(one), ())
 
     def tell(self, one: Series) -> bool:
         """Whether there is anything to say of it."""
-        return place(one) in self.slopes or place(one) in self.varying or bool(self.stand_out(one))
+        return series_key(one) in self.slopes or series_key(one) in self.varying or bool(self.stand_out(one))
 
 
-def place(one: Series) -> Place:
+def series_key(one: Series) -> Place:
     """What tells a series from the others."""
     return one.joint, one.name, one.unit

@@ -20,7 +20,9 @@ from davinci_forces.study.review import Rating
 Cell = str | Number
 Level = Literal["good", "warn", "bad", "info"]
 Part = TypeVar("Part", bound=Any)
-HELD = 1 << 16  # points of a mark at most: several times what a page shows, so that thinning again hides nothing
+MAX_POINTS_OF_MARK = (
+    1 << 16
+)  # points of a mark at most: several times what a page shows, so that thinning again hides nothing
 
 
 @dataclass(frozen=True)
@@ -110,7 +112,7 @@ class Figure:
 
 def _held(panel: Panel) -> Panel:
     """A panel with what is kept of its marks."""
-    return _shown(replace(panel, marks=tuple(_shown(thin_mark(mark, HELD)) for mark in panel.marks)))
+    return _shown(replace(panel, marks=tuple(_shown(thin_mark(mark, MAX_POINTS_OF_MARK)) for mark in panel.marks)))
 
 
 def _shown(part: Part) -> Part:

@@ -26,7 +26,7 @@ from davinci_forces.report.content.inline import Kind, literal, parse
 from davinci_forces.report.content.number import Number
 
 KINDS: dict[type, str] = {Figure: "figure", Figure3D: "figure", Table: "table", Equation: "equation"}
-NAMES = {"figure": "Figure {}", "table": "Table {}", "equation": "Eq. ({})", "section": "Section {}"}
+NUMBERED_LABELS = {"figure": "Figure {}", "table": "Table {}", "equation": "Eq. ({})", "section": "Section {}"}
 TEXTS: dict[type, Callable[[Any], tuple[str, ...]]] = {
     Prose: lambda prose: (prose.text,),
     Bullets: lambda bullets: bullets.items,
@@ -53,7 +53,7 @@ class Placed:
     blocks: tuple["Placed", ...] = ()
 
 
-def place(document: Document) -> tuple[Placed, ...]:
+def number_blocks(document: Document) -> tuple[Placed, ...]:
     """The sections of a document, numbered: sections 1, 1.1; figures, tables and equations 1, 2, 3, and S1, S2, S3
     where they are on screen only.
 
@@ -79,7 +79,7 @@ def references(placed: tuple[Placed, ...]) -> dict[str, str]:
     printed: dict[str, str] = {}
     for item in flatten(placed):
         if item.number and name_of(item.block):
-            printed[item.anchor] = NAMES[item.kind].format(item.number)
+            printed[item.anchor] = NUMBERED_LABELS[item.kind].format(item.number)
         elif isinstance(item.block, OnScreen):
             printed[item.anchor] = f"“{''.join(span.text for span in parse(item.block.title))}”"
     return printed

@@ -35,7 +35,7 @@ DASHES: dict[str, Any] = {
     "dotted": (0, (1, 1.4)),
     "dashdot": (0, (5, 1.4, 1, 1.4)),
 }
-WIDTH = 0.9  # [pt] of a line
+BAR_WIDTH = 0.9  # [pt] of a line
 MANY = 60  # stems, beyond which they are thin and have no heads, so that what is behind them can be seen
 
 
@@ -58,7 +58,7 @@ def draw_mark(mark: Any, axes: "Axes", order: float) -> None:
 def _stroke(mark: Any, order: float) -> dict[str, Any]:
     """The looks of a mark that is a line."""
     style, label = DASHES[mark.style], escape_label(mark.label)
-    return {"color": COLOURS[mark.colour], "linewidth": WIDTH, "linestyle": style, "label": label, "zorder": order}
+    return {"color": COLOURS[mark.colour], "linewidth": BAR_WIDTH, "linestyle": style, "label": label, "zorder": order}
 
 
 def _fill(mark: Any, alpha: float, order: float) -> dict[str, Any]:
@@ -76,7 +76,7 @@ def _(mark: Line, axes: "Axes", order: float) -> None:
 def _(mark: Points, axes: "Axes", order: float) -> None:
     colour = COLOURS[mark.colour]
     axes.errorbar(
-        mark.x, mark.y, mark.y_std, fmt="o", markersize=2.6, markeredgewidth=0, color=colour, elinewidth=WIDTH,
+        mark.x, mark.y, mark.y_std, fmt="o", markersize=2.6, markeredgewidth=0, color=colour, elinewidth=BAR_WIDTH,
         capsize=2, label=escape_label(mark.label), zorder=order,
     )  # fmt: skip
     for x, y, name in zip(mark.x, mark.y, mark.names, strict=False):
@@ -95,7 +95,7 @@ def _(mark: Band, axes: "Axes", order: float) -> None:
 def _(mark: Stems, axes: "Axes", order: float) -> None:
     colour, many = COLOURS[mark.colour], len(mark.x) > MANY
     axes.vlines(
-        mark.x, 0.0, mark.y, color=colour, linewidth=0.5 if many else WIDTH, label=escape_label(mark.label),
+        mark.x, 0.0, mark.y, color=colour, linewidth=0.5 if many else BAR_WIDTH, label=escape_label(mark.label),
         zorder=order,
     )  # fmt: skip
     if not many:

@@ -3,7 +3,7 @@
 from typing import TYPE_CHECKING
 
 from davinci_forces.report.content import Figure
-from davinci_forces.report.figures.panels import LINE, draw_heading, make_room_for_names, plan_heading
+from davinci_forces.report.figures.panels import LINE_HEIGHT, draw_heading, make_room_for_names, plan_heading
 from davinci_forces.report.figures.ticks import spread_ticks
 
 if TYPE_CHECKING:
@@ -11,25 +11,25 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
     from matplotlib.figure import Figure as Canvas
 
-WIDTH = 170.0  # [mm] of the text on an A4 page
+PAGE_WIDTH = 170.0  # [mm] of the text on an A4 page
 INCH = 25.4  # [mm]
 DIGIT = 1.8  # [mm] that a letter of the numbers on an axis takes
 TICK = 2.6  # [mm] from an axis to its numbers, and from these to its label
 RIGHT = 4.0  # [mm] beside the axes, where half of the last number may be
 NUMBERS = 3.4  # [mm] that a line of the numbers of an axis is high
-ROW_ABOVE = 2 * LINE + 1.5  # [mm] of a heading of one line of title and one of legend
+ROW_ABOVE = 2 * LINE_HEIGHT + 1.5  # [mm] of a heading of one line of title and one of legend
 MIN_AXES_HEIGHT = 15.0  # [mm]
 
 
 def arrange(canvas: "Canvas", figure: Figure) -> None:
     """Put the axes of a figure in their places, with their headings; the canvas becomes as high as they need."""
     columns = figure.columns
-    width = WIDTH / columns
+    width = PAGE_WIDTH / columns
     rows = [canvas.axes[i : i + columns] for i in range(0, len(canvas.axes), columns)]
     for axes, panel in zip(canvas.axes, figure.panels, strict=True):  # which may change the numbers beside the axes
         make_room_for_names(axes, panel, max(figure.height - ROW_ABOVE - _room_below(axes), MIN_AXES_HEIGHT))
     numbers = max(_letters(axes.yaxis) for axes in canvas.axes) * DIGIT
-    left = TICK + numbers + max(_lines(axes.get_ylabel()) for axes in canvas.axes) * LINE + 1
+    left = TICK + numbers + max(_lines(axes.get_ylabel()) for axes in canvas.axes) * LINE_HEIGHT + 1
     wide = width - left - RIGHT
     for axes in canvas.axes:
         spread_ticks(axes.xaxis, wide / DIGIT)
@@ -40,12 +40,12 @@ def arrange(canvas: "Canvas", figure: Figure) -> None:
     asked = figure.height * len(rows) + sum(max(room - ROW_ABOVE, 0) for room in rooms)
     high = max((asked - sum(rooms) - sum(below)) / len(rows), MIN_AXES_HEIGHT)
     total = sum(rooms) + sum(below) + high * len(rows)
-    canvas.set_size_inches(WIDTH / INCH, total / INCH)
+    canvas.set_size_inches(PAGE_WIDTH / INCH, total / INCH)
     bottom = total
     for i, (row, room) in enumerate(zip(rows, rooms, strict=True)):
         bottom -= room + high
         for j, axes in enumerate(row):
-            axes.set_position(((j * width + left) / WIDTH, bottom / total, wide / WIDTH, high / total))
+            axes.set_position(((j * width + left) / PAGE_WIDTH, bottom / total, wide / PAGE_WIDTH, high / total))
             # Where a label is stands fixed: matplotlib would measure the numbers of every axis for it, twice.
             axes.yaxis.set_label_coords(-(TICK + numbers) / wide, 0.5)
             axes.xaxis.set_label_coords(0.5, -(TICK + _lines_of_numbers(axes.xaxis) * NUMBERS) / high)
@@ -55,7 +55,7 @@ def arrange(canvas: "Canvas", figure: Figure) -> None:
 
 def _room_below(axes: "Axes") -> float:
     """What stands below axes [mm]: numbers, and a label."""
-    return TICK + _lines_of_numbers(axes.xaxis) * NUMBERS + _lines(axes.get_xlabel()) * LINE + 0.5
+    return TICK + _lines_of_numbers(axes.xaxis) * NUMBERS + _lines(axes.get_xlabel()) * LINE_HEIGHT + 0.5
 
 
 def _numbers(axis: "Axis") -> list[str]:

@@ -14,9 +14,13 @@ if TYPE_CHECKING:
     from matplotlib.artist import Artist
     from matplotlib.axes import Axes
 
-VERTICES, LOOP_VERTICES, SYMBOLS = 8, 30, 3  # of one mark in a millimetre: finer than its lines and symbols are wide
-LETTER = 1.65  # [mm] that a letter of a label takes
-LINE = 3.9  # [mm] that a line of a label, a row of a legend takes
+VERTICES, LOOP_VERTICES, SYMBOLS_PER_MM = (
+    8,
+    30,
+    3,
+)  # of one mark in a millimetre: finer than its lines and symbols are wide
+LETTER_WIDTH = 1.65  # [mm] that a letter of a label takes
+LINE_HEIGHT = 3.9  # [mm] that a line of a label, a row of a legend takes
 SAMPLE = 10.0  # [mm] that the sample before a legend entry takes, with the gaps about it
 
 NAME = 3.6  # [mm] above or below a point that its name takes
@@ -42,18 +46,18 @@ class Heading:
         # Entries that stand side by side have one line each.
         rows = -(-len(self.entries) // self.columns) if self.columns > 1 else sum(map(_lines, self.entries))
         lines = rows * (not self.beside) + (_lines(self.title) if self.title else 0)
-        return LINE * lines + 1.5
+        return LINE_HEIGHT * lines + 1.5
 
 
 def plan_heading(panel: Panel, room: float) -> Heading:
     """The heading of a panel whose axes are this wide [mm]."""
     labels = tuple(mark.label for mark in panel.marks if mark.label)
     longest = max(map(len, labels), default=0)
-    columns = max(1, min(len(labels), int(room / (SAMPLE + LETTER * longest))))
+    columns = max(1, min(len(labels), int(room / (SAMPLE + LETTER_WIDTH * longest))))
     entries = tuple(_wrap(label, room - SAMPLE) for label in labels)
     title = _wrap(panel.title, 0.9 * room)  # bold letters are wider
-    row = sum(SAMPLE + LETTER * len(label) for label in labels) + 3
-    beside = bool(title and labels) and columns == len(labels) and 1.2 * LETTER * len(title) + row <= room
+    row = sum(SAMPLE + LETTER_WIDTH * len(label) for label in labels) + 3
+    beside = bool(title and labels) and columns == len(labels) and 1.2 * LETTER_WIDTH * len(title) + row <= room
     return Heading(title, labels, entries, columns, beside)
 
 
@@ -97,7 +101,7 @@ def make_room_for_names(axes: "Axes", panel: Panel, height: float) -> None:
 def max_points(mark: AnyMark, width: float) -> int:
     """Points beyond which more of them cannot be seen in a panel of this width [mm]."""
     if isinstance(mark, Points | Stems):
-        return round(SYMBOLS * width)
+        return round(SYMBOLS_PER_MM * width)
     return round((VERTICES if not isinstance(mark, Line) or is_sorted(mark.x) else LOOP_VERTICES) * width)
 
 
@@ -115,13 +119,13 @@ def _ticks(axes: "Axes", name: str, log: bool, label: str, max_ticks: int) -> st
 def wrap_label(label: str, room: float) -> str:
     """An axis label in lines that fit into `room` [mm], the unit on a line of its own where that is enough."""
     meaning, bracket, unit = label.rpartition(" [")
-    if not meaning or len(label) * LETTER <= room:
+    if not meaning or len(label) * LETTER_WIDTH <= room:
         return _wrap(label, room)
     return f"{_wrap(meaning, room)}\n{bracket.strip()}{unit}"
 
 
 def _wrap(text: str, room: float) -> str:
-    return textwrap.fill(text, max(int(room / LETTER), 1), break_long_words=False, break_on_hyphens=False)
+    return textwrap.fill(text, max(int(room / LETTER_WIDTH), 1), break_long_words=False, break_on_hyphens=False)
 
 
 def draw_heading(axes: "Axes", heading: Heading, room: float, height: float) -> None:
@@ -136,7 +140,7 @@ def draw_heading(axes: "Axes", heading: Heading, room: float, height: float) -> 
         # In the order of the marks, which is not that of matplotlib's kinds of artists.
         ranks = [heading.labels.index(unescape_label(label)) for label in labels]
         handles = [handle for _, handle in sorted(zip(ranks, handles, strict=True), key=lambda pair: pair[0])]
-        anchor = (1.0, 1 + (room - LINE - 1.0) / height) if heading.beside else (0.0, 1.0)
+        anchor = (1.0, 1 + (room - LINE_HEIGHT - 1.0) / height) if heading.beside else (0.0, 1.0)
         draw_legend(axes, handles, heading, anchor)
 
 

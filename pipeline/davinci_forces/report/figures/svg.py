@@ -10,7 +10,7 @@ import numpy as np
 from davinci_forces.report.content import Figure, Figure3D
 from davinci_forces.report.content.marks import Panel
 from davinci_forces.report.figures.draw import draw_mark_3d
-from davinci_forces.report.figures.grid import INCH, WIDTH, arrange
+from davinci_forces.report.figures.grid import INCH, PAGE_WIDTH, arrange
 from davinci_forces.report.figures.palette import SURROUNDINGS, assign_looks
 from davinci_forces.report.figures.panels import draw_heading, draw_panel, plan_heading
 
@@ -109,7 +109,7 @@ def draw_figure(figure: Figure | Figure3D) -> "Canvas":
     if isinstance(figure, Figure3D):
         return _draw_space(figure)
     canvas = _canvas(figure.height)
-    width = WIDTH / figure.columns
+    width = PAGE_WIDTH / figure.columns
     shared: Axes | None = None
     for place, panel in enumerate(figure.panels):
         axes = canvas.add_axes((0, 0, 1, 1), sharex=shared, label=str(place))
@@ -125,14 +125,14 @@ def _canvas(height: float) -> "Canvas":
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure as Canvas
 
-    canvas = Canvas(figsize=(WIDTH / INCH, height / INCH), dpi=72)
+    canvas = Canvas(figsize=(PAGE_WIDTH / INCH, height / INCH), dpi=72)
     FigureCanvasSVG(canvas)  # words are laid out by the sizes they have in SVG, not in pixels
     return canvas
 
 
 def _draw_space(figure: Figure3D) -> "Canvas":
     canvas = _canvas(figure.height)
-    legend = plan_heading(Panel("", "", "", figure.marks), WIDTH)  # type: ignore[arg-type]
+    legend = plan_heading(Panel("", "", "", figure.marks), PAGE_WIDTH)  # type: ignore[arg-type]
     height = figure.height - legend.height
     axes: Any = canvas.add_axes((0, 0, 1, height / figure.height), projection="3d")
     for mark in assign_looks(figure.marks):

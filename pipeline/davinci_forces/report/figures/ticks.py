@@ -9,12 +9,12 @@ if TYPE_CHECKING:
     from matplotlib.axis import Axis
 
 FEW_DECADES = 3  # that still have room for more numbers than their powers of ten
-PLAIN = (2e-3, 2e4)  # greatest values between which an axis has numbers as they are
+PLAIN_RANGE = (2e-3, 2e4)  # greatest values between which an axis has numbers as they are
 
 
 def power_of_ten(greatest: float) -> int:
     """The power of ten, a multiple of three, that leaves numbers between one and a thousand; 0 where none is needed."""
-    if greatest == 0 or PLAIN[0] <= greatest < PLAIN[1]:
+    if greatest == 0 or PLAIN_RANGE[0] <= greatest < PLAIN_RANGE[1]:
         return 0
     return 3 * math.floor(math.log10(greatest) / 3)
 

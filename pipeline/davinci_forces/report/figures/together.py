@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import IO
 
-from davinci_forces.logs.isolated.process import uninterrupted
+from davinci_forces.logs.isolated.process import block_interrupts
 from davinci_forces.report.content import Figure, Figure3D
 from davinci_forces.report.figures.svg import draw_svg, drawn
 
@@ -51,7 +51,7 @@ def _draw(figures: list[Figure | Figure3D]) -> None:
 def _ask(share: list[Figure | Figure3D]) -> "subprocess.Popen[bytes]":
     """Have another process draw a share.  It starts anew: a fork would inherit locks of threads that it has not."""
     path = os.pathsep.join(filter(None, [str(Path(__file__).parents[3]), os.environ.get("PYTHONPATH")]))
-    with uninterrupted():
+    with block_interrupts():
         process = subprocess.Popen(
             [sys.executable, "-P", "-c", PROGRAM], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL, env=os.environ | {"PYTHONPATH": path},

@@ -2,11 +2,11 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 
-from davinci_forces.report.changes import Change, Stated, changes
+from davinci_forces.report.changes import Change, StatedValue, changes
 from davinci_forces.report.content import Block, Listing, Number, OnScreen, Prose, Section, Table, literal
 from davinci_forces.report.context import Context, count
 from davinci_forces.report.results import format_unit
-from davinci_forces.report.sections.parts import listed
+from davinci_forces.report.sections.parts import paper_or_screen
 
 MAX_ROWS = 300  # of a table; `davinci-forces compare` has them all
 
@@ -15,13 +15,13 @@ def section(context: Context) -> Section | None:
     """How many numbers changed, the largest changes, and the keys that came or went."""
     if context.baseline is None:
         return None
-    now = {key: Stated(r.value, r.std, r.unit) for key, r in context.results.items()}
+    now = {key: StatedValue(r.value, r.std, r.unit) for key, r in context.results.items()}
     return Section(
         "Since the baseline", "baseline", tuple(blocks(context, context.baseline, changes(context.baseline, now)))
     )
 
 
-def blocks(context: Context, before: Mapping[str, Stated], differences: Sequence[Change]) -> Iterator[Block]:
+def blocks(context: Context, before: Mapping[str, StatedValue], differences: Sequence[Change]) -> Iterator[Block]:
     """The section's content."""
     changed = sorted((c for c in differences if c.before and c.after), key=weight, reverse=True)
     came, went = [c.key for c in differences if not c.before], [c.key for c in differences if not c.after]
@@ -62,7 +62,7 @@ def table(context: Context, changed: Sequence[Change]) -> Iterator[Block]:
         f"{changes} since the baseline, the largest first: a, b, and their difference over its standard error.",
         ("Number", "a, the baseline", "b, now", "Standard errors"), rows, "baseline-changes", "lrrr",
     )  # fmt: skip
-    yield from listed(whole, "Changes since the baseline")
+    yield from paper_or_screen(whole, "Changes since the baseline")
 
 
 def before_text(change: Change) -> str:

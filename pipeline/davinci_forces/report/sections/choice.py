@@ -21,7 +21,7 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, fit_name, title
-from davinci_forces.report.sections.parts import MEASURES, listed
+from davinci_forces.report.sections.parts import MEASURES, paper_or_screen
 
 MAX_RUNS_ON_PAPER = 9
 ERROR_TOLERANCE = 1e-9  # relative errors closer than this are equal
@@ -29,7 +29,7 @@ ERROR_TOLERANCE = 1e-9  # relative errors closer than this are equal
 
 def section(context: Context) -> Section | None:
     """The choice with its scores, and what it is worth on unseen logs; none where nothing was chosen."""
-    choices = context.catalogue.all(Choice)
+    choices = context.catalogue.records(Choice)
     return Section("Choice of the model", "choice", tuple(blocks(context, choices[0]))) if choices else None
 
 
@@ -119,7 +119,7 @@ def overfitting_note(choice: Choice) -> Iterator[Verdict]:
 
 def unseen(context: Context) -> Iterator[Block]:
     """The chosen model beside each joint by itself, on logs that were not fitted."""
-    predictions = [p for p in context.catalogue.about(Prediction, model=CHOSEN) if p.role != "identification"]
+    predictions = [p for p in context.catalogue.select(Prediction, model=CHOSEN) if p.role != "identification"]
     if not predictions:
         return
     rows = tuple(
@@ -134,13 +134,13 @@ def unseen(context: Context) -> Iterator[Block]:
     )
     header = ("Log", "Joint", "Path", "Chosen", "Joint by itself")
     table = Table("Relative error on logs that were not fitted.", header, rows, "choice-unseen", "lllrr")
-    yield from listed(table, "The chosen model beside each joint by itself, run by run", MAX_RUNS_ON_PAPER)
+    yield from paper_or_screen(table, "The chosen model beside each joint by itself, run by run", MAX_RUNS_ON_PAPER)
 
 
 def parameters(context: Context) -> Iterator[Block]:
     """The parameters of the chosen fits, where they are not those of a joint by itself."""
     used = {context.used_fit(joint) for joint in (j.name for j in context.study.robot.joints)}
-    fits = [f for f in context.catalogue.all(Fit) if f"{CHOSEN}.{f.model}.{f.estimator}" in used]
+    fits = [f for f in context.catalogue.records(Fit) if f"{CHOSEN}.{f.model}.{f.estimator}" in used]
     tables = tuple(parameter_table(context, fit) for fit in fits if fit.model != "independent")
     if tables:
         yield OnScreen("Parameters of the chosen model", "chosen-parameters", tables)

@@ -7,7 +7,7 @@ import numpy as np
 from davinci_forces.records import Contact, Stiffness, Track, Weight
 from davinci_forces.report.content import Block, Cell, Figure, HBand, Panel, Points, Prose, Section, Table, literal
 from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.sections.parts import listed
+from davinci_forces.report.sections.parts import paper_or_screen
 from davinci_forces.study import LogEntry
 
 
@@ -19,7 +19,7 @@ def section(context: Context) -> Section | None:
 
 def blocks(context: Context) -> Iterator[Block]:
     """The section's content."""
-    contacts = context.catalogue.all(Contact)
+    contacts = context.catalogue.records(Contact)
     if contacts:
         yield Prose(
             "A contact is measured on each joint that moved in it. Its window is one that the study states, or one "
@@ -31,7 +31,7 @@ def blocks(context: Context) -> Iterator[Block]:
             "worst free run stay below."
         )
         yield peaks(contacts)
-        yield from listed(
+        yield from paper_or_screen(
             Table(
                 "Contacts, log by log. Detected: whether the peak exceeds the detection level; “peak only” where it "
                 "does, yet not the alarm level; “found, not stated” for a contact outside the study's windows.",
@@ -93,10 +93,10 @@ def peak_panel(contacts: list[Contact], named: bool) -> Panel:
 
 def not_analysed(context: Context) -> Iterator[tuple[str, str, str]]:
     """Log, joints and reason of every recording without a measured contact."""
-    measured = {(contact.log, contact.joint) for contact in context.catalogue.all(Contact)}
-    weighed = {weight.log for weight in context.catalogue.all(Weight)}
-    tracked = {(track.log, track.joint): track for track in context.catalogue.all(Track)}
-    palpated = {tissue.log for tissue in context.catalogue.all(Stiffness)}
+    measured = {(contact.log, contact.joint) for contact in context.catalogue.records(Contact)}
+    weighed = {weight.log for weight in context.catalogue.records(Weight)}
+    tracked = {(track.log, track.joint): track for track in context.catalogue.records(Track)}
+    palpated = {tissue.log for tissue in context.catalogue.records(Stiffness)}
     for entry in context.study.logs:
         analysed = entry.name in weighed | palpated
         if entry.role not in ("contact", "weight", "tissue", "friction") or analysed:

@@ -12,7 +12,7 @@ SHARE_DRAWN = 0.5  # of a study's time, in which it settles
 
 def section(context: Context) -> Section | None:
     """How the robot's controllers behave in simulation, where it has any."""
-    names = {run.controller for run in context.catalogue.all(Control)}
+    names = {run.controller for run in context.catalogue.records(Control)}
     studies = [study for study in context.study.robot.control if study.name in names]
     return Section("Control, in simulation", "control", tuple(blocks(context, studies))) if studies else None
 
@@ -64,7 +64,7 @@ def response(context: Context, study: ControlStudy) -> Figure:
         Panel("Position", "time [s]", "position [rad or m]", q),
         Panel("Velocity of the joints that are identified", "time [s]", "velocity [rad/s or m/s]", dq),
     ]
-    for lyapunov in context.catalogue.about(Lyapunov, controller=study.name):
+    for lyapunov in context.catalogue.select(Lyapunov, controller=study.name):
         early = lyapunov.t < until
         line = (Line(lyapunov.t[early], lyapunov.V[early], "", "black"), HLine(0.0))
         panels.append(Panel("Lyapunov function", "time [s]", label(lyapunov, "V"), line))
@@ -105,7 +105,7 @@ def errors(context: Context, studies: list[ControlStudy]) -> Table:
 
 def runs_of(context: Context, study: ControlStudy) -> list[Control]:
     """The joints of a study."""
-    return context.catalogue.about(Control, controller=study.name)
+    return context.catalogue.select(Control, controller=study.name)
 
 
 def row(context: Context, name: str, run: Control, numbers: tuple[str, ...]) -> tuple[Cell, ...]:

@@ -11,7 +11,7 @@ SOURCES = {"table-6.1": "published", "table-6.1-corrected": "published, correcte
 
 def section(context: Context) -> Section | None:
     """Objectives and limits of every trajectory."""
-    excitations = context.catalogue.all(Excitation)
+    excitations = context.catalogue.records(Excitation)
     return Section("Excitation", "excitation", tuple(blocks(context, excitations))) if excitations else None
 
 

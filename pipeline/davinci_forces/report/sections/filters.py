@@ -26,7 +26,7 @@ def section(context: Context) -> Section | None:
 
 def blocks(context: Context) -> Iterator[Block]:
     """The section's content."""
-    noises = context.catalogue.all(FilterNoise)
+    noises = context.catalogue.records(FilterNoise)
     if not noises:
         return
     yield Prose(
@@ -46,7 +46,7 @@ def blocks(context: Context) -> Iterator[Block]:
             "of the day is added where free windows determine one."
         )
         yield budget(context, worst)
-    comparisons = [c for track in worst for c in context.catalogue.about(Comparison, log=track.log, joint=track.joint)]
+    comparisons = [c for track in worst for c in context.catalogue.select(Comparison, log=track.log, joint=track.joint)]
     if comparisons:
         yield comparison(context, comparisons)
         yield OnScreen("Filters beside each other over time", "filters-over-time", (overlay(comparisons),))
@@ -55,7 +55,7 @@ def blocks(context: Context) -> Iterator[Block]:
 def worst_track(context: Context, joint: str) -> Iterator[Track]:
     """The free run of a joint that its detection level comes from."""
     if (space := context.worst_space(joint)) is not None:
-        yield from context.catalogue.about(Track, log=space.log, joint=joint)
+        yield from context.catalogue.select(Track, log=space.log, joint=joint)
 
 
 def tuning(context: Context, noises: list[FilterNoise]) -> Table:

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Prediction, TipContact, TipForce, Track
 from davinci_forces.records.record import slug
 from davinci_forces.report.content import (
@@ -21,11 +22,14 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.content.number import MINUS
-from davinci_forces.report.context import PLAIN, Context, count, fit_name, label, title
+from davinci_forces.report.context import BASELINE_FIT, Context, count, fit_name, label, title
 from davinci_forces.report.sections.parts import first_on_paper, run_name
-from davinci_forces.report.verdicts import NORMAL_95, WITHIN
+from davinci_forces.report.verdicts import WITHIN
 
-SHAPES = {"triangle": ((0.0, 0.0), (0.5, 1.0), (1.0, 0.0)), "pulse": ((0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0))}
+PUSH_SHAPES = {
+    "triangle": ((0.0, 0.0), (0.5, 1.0), (1.0, 0.0)),
+    "pulse": ((0.0, 0.0), (0.0, 1.0), (1.0, 1.0), (1.0, 0.0)),
+}
 COMPONENTS = ("f_x", "f_y", "f_z")
 Push = dict[str, Any]
 
@@ -48,7 +52,7 @@ def blocks(context: Context) -> Iterator[Block]:
     figures: list[Figure] = []
     for log in context.study.truth.get("log", []):
         for joint in dict.fromkeys(push.get("joint") for push in log.get("push", [])):
-            tracks = context.catalogue.about(Track, log=log["name"], joint=str(joint))
+            tracks = context.catalogue.select(Track, log=log["name"], joint=str(joint))
             pushes = [push for push in log["push"] if push.get("joint") == joint]
             figures += [effort_figure(track, pushes) for track in tracks]
     tip = list(tip_forces(context))
@@ -77,8 +81,8 @@ def of_friction(context: Context) -> Iterator[Block]:
 
 def errors_by_family(context: Context, family: dict[str, str]) -> Table:
     """The model error of each joint in logs that nobody fitted, by what their friction is."""
-    unseen = [p for p in context.catalogue.all(Prediction) if p.role != "identification"]
-    used = [p for p in unseen if f"{p.model}.{p.estimator}" in (context.used_fit(p.joint), PLAIN)]
+    unseen = [p for p in context.catalogue.records(Prediction) if p.role != "identification"]
+    used = [p for p in unseen if f"{p.model}.{p.estimator}" in (context.used_fit(p.joint), BASELINE_FIT)]
     rows = tuple(
         (
             title(p.joint),
@@ -141,7 +145,7 @@ def true_effort(pushes: list[Push], end: float) -> tuple[Any, Any]:
     corners = [(0.0, 0.0)]
     for push in sorted(pushes, key=lambda p: float(p["start"])):
         span = push["end"] - push["start"]
-        corners += [(push["start"] + x * span, y * push["peak"]) for x, y in SHAPES[push["shape"]]]
+        corners += [(push["start"] + x * span, y * push["peak"]) for x, y in PUSH_SHAPES[push["shape"]]]
     corners.append((end, 0.0))
     return np.array([x for x, _ in corners]), np.array([y for _, y in corners])
 
@@ -150,7 +154,7 @@ def tip_forces(context: Context) -> Iterator[Block]:
     """The force at the tip, estimated and true; nothing where no push of a simulation is at the tip."""
     pushed = {log["name"]: pushes for log in context.study.truth.get("log", []) if (pushes := at_the_tip(log))}
     contacts = [
-        (contact, pushed[contact.log]) for contact in context.catalogue.all(TipContact) if contact.log in pushed
+        (contact, pushed[contact.log]) for contact in context.catalogue.records(TipContact) if contact.log in pushed
     ]
     pairs = [
         (contact, i, push)
@@ -159,7 +163,7 @@ def tip_forces(context: Context) -> Iterator[Block]:
     if pairs:
         yield comparison(context, pairs)
         yield verdict([size for pair in pairs for size in errors_in_deviations(*pair)])
-    forces = [force for force in context.catalogue.all(TipForce) if force.log in pushed]
+    forces = [force for force in context.catalogue.records(TipForce) if force.log in pushed]
     figures = [force_figure(force, pushed[force.log]) for force in forces]
     yield from first_on_paper(figures, "Force at the tip, estimated and true, in other logs", "more-tip-truth")
 

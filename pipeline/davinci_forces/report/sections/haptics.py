@@ -24,21 +24,21 @@ from davinci_forces.report.content import (
 )
 from davinci_forces.report.content.marks import AnyMark
 from davinci_forces.report.context import Context, title
+from davinci_forces.report.sections.parts import MM, MS
 
-MM, MS = 1e3, 1e3
 SAMPLES_DRAWN = 300  # of a run
 
 
 def section(context: Context) -> Section | None:
     """The haptic loop; None where none was simulated."""
-    runs = context.catalogue.all(HapticRun)
+    runs = context.catalogue.records(HapticRun)
     return Section("Haptic loop, simulated", "haptics", tuple(blocks(context, runs))) if runs else None
 
 
 def blocks(context: Context, runs: list[HapticRun]) -> Iterator[Block]:
     """The section's content.  Section 8.4"""
     yield from (verdict(context, run) for run in runs)
-    responses = context.catalogue.all(HapticResponse)
+    responses = context.catalogue.records(HapticResponse)
     yield OnScreen(
         "The haptic loop, simulated: the force that each hand feels, its error, and its stability margins",
         "haptic-loop",

@@ -21,7 +21,7 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.sections.parts import autocorrelation, first_on_paper, listed, run_name
+from davinci_forces.report.sections.parts import autocorrelation, first_on_paper, paper_or_screen, run_name
 
 UNEXPLAINED = "unexplained"  # a finding: no cause that was tried explains it
 FINDINGS = {  # from the best to the least known
@@ -30,18 +30,18 @@ FINDINGS = {  # from the best to the least known
     "mended": "white but for a cause that was tested",
     UNEXPLAINED: "not white, which no tested cause explains",
 }
-SIGNALS = (("innovation_q", "position"), ("innovation_dq", "velocity"))
+INNOVATION_FIELDS = (("innovation_q", "position"), ("innovation_dq", "velocity"))
 
 
 def section(context: Context) -> Section | None:
     """The verdict on every run, the worst run of each joint drawn, and every test on demand."""
-    explained = context.catalogue.all(Explanation)
+    explained = context.catalogue.records(Explanation)
     return Section("Innovations", "innovations", tuple(blocks(context, explained))) if explained else None
 
 
 def blocks(context: Context, explained: list[Explanation]) -> Iterator[Block]:
     """The section's content."""
-    assumed = " ([@filter-assumptions])" if context.catalogue.all(Track) else ""
+    assumed = " ([@filter-assumptions])" if context.catalogue.records(Track) else ""
     yield Prose(
         "An innovation is a measurement minus its prediction by the filter. Innovations are white (uncorrelated over "
         "time) if model and noise are as the filter assumes. Each run is tested whole, except for its first second, by "
@@ -53,7 +53,7 @@ def blocks(context: Context, explained: list[Explanation]) -> Iterator[Block]:
         f"chosen to show pushes{assumed}; free motion does not need it, so it colours the innovations a little.\n\n"
         + summary(explained)
     )
-    yield from listed(verdicts(context, explained))
+    yield from paper_or_screen(verdicts(context, explained))
     drawn = [e for e in explained if is_worst(context, e)]
     drawn.sort(key=lambda e: least_probability(e)[0])
     figures = [figure(context, e, whole=True) for e in drawn]
@@ -98,7 +98,7 @@ def verdicts(context: Context, explained: list[Explanation]) -> Table:
         )
         for e in explained
     )
-    band = max((i.nis_high - 1.0 for i in context.catalogue.all(Innovation)), default=0.0)
+    band = max((i.nis_high - 1.0 for i in context.catalogue.records(Innovation)), default=0.0)
     within = f" White innovations are within {band:.2f} of 1 in 95 of 100 runs." if band else ""
     return Table(
         "Are the innovations white, and if not, why? NIS (normalised innovation squared): the mean square of each "
@@ -173,21 +173,21 @@ def probability_text(probability: float) -> str:
 def figure(context: Context, e: Explanation, whole: bool) -> Figure:
     """Autocorrelation, cumulative periodogram, correlation with the motion; over time, if `whole`.  Fig 7.9-7.11"""
     name, about = run_name(e.log, e.joint), {"log": e.log, "joint": e.joint}
-    white = {w.signal: w for w in context.catalogue.about(Whiteness, **about)}
-    moved = {i.signal: i for i in context.catalogue.about(Innovation, **about)}
-    tracks = context.catalogue.about(Track, **about) if whole else []
-    more = SIGNALS if whole else ()
+    white = {w.signal: w for w in context.catalogue.select(Whiteness, **about)}
+    moved = {i.signal: i for i in context.catalogue.select(Innovation, **about)}
+    tracks = context.catalogue.select(Track, **about) if whole else []
+    more = INNOVATION_FIELDS if whole else ()
     rows = [
-        *(tuple(over_time(t, field, of) for field, of in SIGNALS) for t in tracks),
+        *(tuple(over_time(t, field, of) for field, of in INNOVATION_FIELDS) for t in tracks),
         tuple(
-            autocorrelation(white[field], f"ACF, {of}", named=field == SIGNALS[0][0])
-            for field, of in SIGNALS
+            autocorrelation(white[field], f"ACF, {of}", named=field == INNOVATION_FIELDS[0][0])
+            for field, of in INNOVATION_FIELDS
             if field in white
         ),
         tuple(periodogram(white[field], of) for field, of in more if field in white),
         tuple(with_motion(moved[field], of) for field, of in more if field in moved),
     ]
-    firsts = " and ".join(f"{w.acf1:.2f}" for field, _ in SIGNALS if (w := white.get(field)))
+    firsts = " and ".join(f"{w.acf1:.2f}" for field, _ in INNOVATION_FIELDS if (w := white.get(field)))
     return Figure(
         f"{name}, the worst free run of this joint: innovations, their autocorrelation and cumulative periodogram with "
         "the bands of 95 % (grey) and 99 % (blue) of white noise, and their correlation with the motion before."
@@ -222,7 +222,7 @@ def with_motion(i: Innovation, of: str) -> Panel:
     """The correlation with velocity, acceleration and the sign of the velocity, as many samples before."""
     lag = i.lag.astype(float)
     # Both panels of a row show the same lines: the first names some, the second the rest.
-    names = ("velocity", "acceleration", "") if of == SIGNALS[0][1] else ("", "", "sign of velocity")
+    names = ("velocity", "acceleration", "") if of == INNOVATION_FIELDS[0][1] else ("", "", "sign of velocity")
     marks: tuple[AnyMark, ...] = (
         HBand(-i.band_99, i.band_99, "", "sky"),
         HBand(-i.band, i.band, ""),

@@ -198,5 +198,5 @@ def blocks(context: Context) -> Iterator[Block]:
     settings = context.study.settings
     words = {"lowpass": f"{settings.lowpass:g}", "in_current": in_current(context)}
     for kind, method in METHODS:
-        if context.catalogue.all(kind):
+        if context.catalogue.records(kind):
             yield from (Prose(block.text.format(**words)) if isinstance(block, Prose) else block for block in method)

@@ -26,14 +26,14 @@ from davinci_forces.report.content import (
 from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.parts import autocorrelation, run_name
 
-SIGNALS = {"q_noise": "position", "dq_noise": "velocity", "tau_noise": "effort"}
+NOISE_FIELDS = {"q_noise": "position", "dq_noise": "velocity", "tau_noise": "effort"}
 MIN_OUTLIER = 3.0  # times the median period's noise
 MAX_BARS = 24  # periods drawn one by one
 
 
 def section(context: Context) -> Section | None:
     """A table of standard deviations, the tests of the noise, and what averaging removed from each log."""
-    averages = context.catalogue.all(Average)
+    averages = context.catalogue.records(Average)
     return Section("Averaging and noise", "noise", tuple(blocks(context, averages))) if averages else None
 
 
@@ -74,7 +74,7 @@ def tests(context: Context, averages: list[Average]) -> Table:
     rows = tuple(
         (literal(a.log), title(a.joint), meaning, *statistics(context, f"whiteness.{a.log}.{a.joint}.{signal}"))
         for a in averages
-        for signal, meaning in SIGNALS.items()
+        for signal, meaning in NOISE_FIELDS.items()
     )
     return Table(
         "Is the noise white (uncorrelated over time) and normal? First autocorrelation (ACF), and the probabilities of "
@@ -98,8 +98,8 @@ def statistics(context: Context, prefix: str) -> tuple[Cell, ...]:
 
 def outliers(context: Context, average: Average) -> Iterator[Verdict]:
     """Periods that are noisier than the others."""
-    for residual in context.catalogue.about(PeriodResidual, log=average.log, joint=average.joint):
-        for signal, meaning in SIGNALS.items():
+    for residual in context.catalogue.select(PeriodResidual, log=average.log, joint=average.joint):
+        for signal, meaning in NOISE_FIELDS.items():
             rms = by_period(residual, average, getattr(residual, signal))
             noisy = [i for i, value in enumerate(rms, 1) if len(rms) > 2 and value > MIN_OUTLIER * np.median(rms)]
             if noisy:
@@ -121,12 +121,12 @@ def by_period(residual: PeriodResidual, average: Average, noise: Column) -> Colu
 def average_figures(context: Context, average: Average) -> Iterator[Block]:
     """The figures of one log and joint."""
     about = {"log": average.log, "joint": average.joint}
-    period_residuals = context.catalogue.about(PeriodResidual, **about)
-    trajectories = context.catalogue.about(Trajectory, **about)
-    spectra, signals = context.catalogue.about(Spectrum, **about), context.catalogue.about(Signal, **about)
+    period_residuals = context.catalogue.select(PeriodResidual, **about)
+    trajectories = context.catalogue.select(Trajectory, **about)
+    spectra, signals = context.catalogue.select(Spectrum, **about), context.catalogue.select(Signal, **about)
     if not (period_residuals and trajectories and spectra and signals):
         return
-    whiteness = {w.signal: w for w in context.catalogue.about(Whiteness, **about)}
+    whiteness = {w.signal: w for w in context.catalogue.select(Whiteness, **about)}
     name = run_name(average.log, average.joint)
     yield Figure(
         f"{name}: the mean of {average.periods} periods and the first of them; the position's spectrum with the "
@@ -194,7 +194,7 @@ def noise_panels(residual: PeriodResidual, average: Average, whiteness: dict[str
     periods = min(average.periods, MAX_BARS)
     names = tuple(str(i) for i in range(1, periods + 1))
     bars = []
-    for signal, meaning in SIGNALS.items():
+    for signal, meaning in NOISE_FIELDS.items():
         rms = by_period(residual, average, getattr(residual, signal))
         bars.append(Bars(names, rms[:periods] / (np.median(rms) or 1.0), meaning))
     yield Panel("Noise by period", "period", "over the median period", tuple(bars))

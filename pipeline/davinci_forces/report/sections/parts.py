@@ -7,6 +7,7 @@ from davinci_forces.records import Prediction, Residual, Track, Whiteness
 from davinci_forces.report.content import AnyMark, Block, HBand, Line, OnScreen, Panel, Stems, Table, VSpan, literal
 from davinci_forces.report.context import Context, label, title
 
+MM = MS = 1000.0  # millimetres in a metre, milliseconds in a second
 PAPER = 18  # rows of a table at most, in the PDF
 THESIS_TISSUE = 457.24  # [N/m], section 8.2
 LEFT_OUT = {
@@ -22,7 +23,7 @@ MEASURES = (
 )
 
 
-def listed(table: Table, name: str = "", most: int = PAPER) -> Iterator[Block]:
+def paper_or_screen(table: Table, name: str = "", most: int = PAPER) -> Iterator[Block]:
     """A table on paper, or on screen if it has more rows than `most`, under a name or the start of its caption."""
     name = name or re.split(r"[;:.?](?: |$)", table.caption)[0]
     yield OnScreen(name, f"all-{table.label}", (table,)) if len(table.rows) > most else table

@@ -5,13 +5,20 @@ from collections.abc import Iterator
 from davinci_forces.records import Prediction
 from davinci_forces.report.content import Block, Cell, Figure, Line, OnScreen, Panel, Prose, Section, Table, literal
 from davinci_forces.report.context import Context, fit_name, label, title
-from davinci_forces.report.sections.parts import LEFT_OUT, contact_spans, effort_panel, first_on_paper, listed, run_name
+from davinci_forces.report.sections.parts import (
+    LEFT_OUT,
+    contact_spans,
+    effort_panel,
+    first_on_paper,
+    paper_or_screen,
+    run_name,
+)
 from davinci_forces.report.verdicts import percent
 
 
 def section(context: Context) -> Section | None:
     """Scores of the fit that the filter uses on every log, the estimators compared once, and the worst predictions."""
-    predictions = context.catalogue.all(Prediction)
+    predictions = context.catalogue.records(Prediction)
     return Section("Prediction", "prediction", tuple(blocks(context, predictions))) if predictions else None
 
 
@@ -29,7 +36,9 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     used = [p for p in predictions if f"{p.model}.{p.estimator}" == context.used_fit(p.joint)]
     header = ("Log", "Joint", "Left out", "Path", "Model error", "Of effort", "$R^2$", "Ceiling")
     caption = "Prediction of unseen effort by the fit that the filter uses, one row a run."
-    yield from listed(Table(caption, header, tuple(row(context, p) for p in used), "prediction-table", "llllrrrr"))
+    yield from paper_or_screen(
+        Table(caption, header, tuple(row(context, p) for p in used), "prediction-table", "llllrrrr")
+    )
     yield from estimators(context, predictions)
     yield OnScreen("Every score of every fit in every run", "all-scores", (every_score(context, predictions),))
     joints = dict.fromkeys(p.joint for p in used)

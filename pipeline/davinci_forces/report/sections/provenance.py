@@ -8,7 +8,7 @@ from davinci_forces.records import KINDS, LogSummary
 from davinci_forces.records.catalogue import Provenance
 from davinci_forces.report.content import Block, Listing, OnScreen, Prose, Section, Table, literal
 from davinci_forces.report.context import Context
-from davinci_forces.report.sections.parts import listed
+from davinci_forces.report.sections.parts import paper_or_screen
 
 PER_LINE = 4  # settings
 
@@ -30,7 +30,7 @@ def blocks(context: Context) -> Iterator[Block]:
     )
     raw = tuple((literal(file), f"`{sha[:16]}`") for file, sha in provenance.raw.items())
     caption = "Raw files, with the first 16 digits of their SHA-256."
-    yield from listed(Table(caption, ("File", "SHA-256"), raw, "raw-files", "ll"))
+    yield from paper_or_screen(Table(caption, ("File", "SHA-256"), raw, "raw-files", "ll"))
     versions = Table("Versions.", ("Package", "Version"), tuple(provenance.packages.items()), align="ll")
     yield OnScreen("Versions of packages", "versions", (versions,))
     yield Prose("Settings used, defaults included:")
@@ -43,7 +43,7 @@ def blocks(context: Context) -> Iterator[Block]:
     yield Prose(f"This report is made from {number} processed files; their hashes are in `manifest.txt`.")
     if number:
         yield OnScreen("Records that were made, and those without input", "made", (record_counts(provenance),))
-    if summaries := context.catalogue.all(LogSummary):
+    if summaries := context.catalogue.records(LogSummary):
         tables = (start_times(summaries), channels(summaries))
         yield OnScreen("Files, dates and channels of every log", "channels", tables)
     if provenance.study:

@@ -5,7 +5,7 @@ from hashlib import sha256
 
 from davinci_forces.report.content import Block, Cell, Prose, Section, Table, Verdict, literal
 from davinci_forces.report.context import Context, count
-from davinci_forces.report.sections.parts import listed
+from davinci_forces.report.sections.parts import paper_or_screen
 from davinci_forces.study.review import Rating
 
 MARKS = {"accept": "● Accept", "doubt": "▲ Doubt", "reject": "✖ Reject"}
@@ -33,7 +33,7 @@ def blocks(context: Context) -> Iterator[Block]:
     else:
         yield Verdict("info", "All ratings are of the numbers that this report shows.")
     rows = tuple(row(context, rating, rating.results == now) for rating in context.ratings)
-    yield from listed(
+    yield from paper_or_screen(
         Table(
             "Ratings, in the order of review.toml.",
             ("Of", "Rating", "Comment", "Reviewer", "Date", "Numbers"),

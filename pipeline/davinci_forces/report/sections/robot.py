@@ -9,7 +9,7 @@ from davinci_forces.report.context import Context
 
 def section(context: Context) -> Section | None:
     """The chain and its table, where the robot's geometry is known."""
-    links = context.catalogue.all(Links)
+    links = context.catalogue.records(Links)
     return Section("The robot", "robot", tuple(blocks(context, links[0]))) if links else None
 
 
@@ -55,9 +55,9 @@ def chain(context: Context) -> Figure3D:
     colours = {"zero": "black", "low": "blue", "high": "vermillion"}
     configurations = {"zero": "q = 0", "low": "lower limits", "high": "upper limits"}
     marks: list[Line3D | Points3D] = []
-    for workspace in context.catalogue.all(Workspace):
+    for workspace in context.catalogue.records(Workspace):
         marks.append(Points3D(workspace.x, workspace.y, workspace.z, "places of the tip", "sky"))
-    for pose in context.catalogue.all(Pose):
+    for pose in context.catalogue.records(Pose):
         path = walk(pose)
         marks.append(
             Line3D(pose.x[path], pose.y[path], pose.z[path], configurations[pose.pose], colours[pose.pose])  # type: ignore[arg-type]

@@ -19,7 +19,7 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.sections.parts import contact_spans, effort_panel, first_on_paper, listed, run_name
+from davinci_forces.report.sections.parts import contact_spans, effort_panel, first_on_paper, paper_or_screen, run_name
 from davinci_forces.report.verdicts import band_in_words
 
 WORST = "the worst free run of this joint"
@@ -30,8 +30,8 @@ LEVELS = ("free_rms", "detection_level")
 def section(context: Context) -> Section | None:
     """What was recorded, a table over all tracks, the worst run of each joint, and every run on demand."""
     content = (
-        *recording_blocks(context, context.catalogue.all(LogSummary)),
-        *track_blocks(context, context.catalogue.all(Track)),
+        *recording_blocks(context, context.catalogue.records(LogSummary)),
+        *track_blocks(context, context.catalogue.records(Track)),
     )
     return Section("Runs", "runs", content) if content else None
 
@@ -41,7 +41,7 @@ def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:
     if not tracks:
         return
     yield from intro(context, tracks)
-    yield from listed(scores(context, tracks))
+    yield from paper_or_screen(scores(context, tracks))
     worst = list(worst_runs(context, tracks))
     drawn = {(t.log, t.joint) for t in worst}
     traces = [trace(context, t, WORST) for t in worst]
@@ -59,11 +59,11 @@ def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:
 
 def intro(context: Context, tracks: list[Track]) -> Iterator[Prose]:
     """Describe the filter, and name the joints at rest."""
-    tuned = ", tuned as in [@filter-tuning]" if context.catalogue.all(FilterNoise) else ""
+    tuned = ", tuned as in [@filter-tuning]" if context.catalogue.records(FilterNoise) else ""
     tested = " Its innovations test whether it fits the data ([@innovations])."
     yield Prose(
         f"An extended Kalman filter estimates position, velocity and external effort of each joint by itself{tuned}."
-        + (tested if context.catalogue.all(Explanation) else "")
+        + (tested if context.catalogue.records(Explanation) else "")
     )
     at_rest = [run_name(t.log, t.joint) for t in tracks if t.at_rest]
     if at_rest:
@@ -102,7 +102,7 @@ def scores(context: Context, tracks: list[Track]) -> Table:
 
 def coverage(context: Context, t: Track) -> tuple[Cell, Cell]:
     """The coverage of a run's band, and whether that is right."""
-    spaces = context.catalogue.about(FreeSpace, log=t.log, joint=t.joint, filter=t.filter)
+    spaces = context.catalogue.select(FreeSpace, log=t.log, joint=t.joint, filter=t.filter)
     words = band_in_words(spaces[0].coverage) if spaces else "–"
     return context.number(f"{t.filter}.{t.log}.{t.joint}.coverage", 2), words
 
@@ -156,10 +156,10 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
     """One table over all logs, and the remarks of the readers and of the first stages."""
     if not summaries:
         return
-    yield from listed(overview(context, summaries))
+    yield from paper_or_screen(overview(context, summaries))
     remarks_of_stages = [
         literal(text)
-        for diagnostic in context.catalogue.all(Diagnostic)
+        for diagnostic in context.catalogue.records(Diagnostic)
         if diagnostic.stage in ("ingest", "resample", "average")
         for text in diagnostic.text
     ]
@@ -169,7 +169,7 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
         # Remarks of the stages follow: "Good" would stand beside what may deny it.
         yield Verdict("info" if remarks_of_stages else "good", f"{which} read without a warning.")
     yield from (Verdict("warn", f"**{literal(log)}**: {literal('; '.join(texts))}.") for log, texts in remarked.items())
-    methods = sorted({(s.method, s.velocity) for s in context.catalogue.all(Signal)})
+    methods = sorted({(s.method, s.velocity) for s in context.catalogue.records(Signal)})
     if methods:
         yield Prose("Sources of the uniform clock and of the velocities of the recordings:")
         yield Bullets(

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import SensorForce
 from davinci_forces.report.content import (
     Band,
@@ -18,8 +19,8 @@ from davinci_forces.report.content import (
 )
 from davinci_forces.report.content.marks import AnyMark
 from davinci_forces.report.context import Context, label, title
-from davinci_forces.report.sections.parts import listed
-from davinci_forces.report.verdicts import NORMAL_95, band_in_words
+from davinci_forces.report.sections.parts import paper_or_screen
+from davinci_forces.report.verdicts import band_in_words
 
 PUBLISHED_ERROR = 0.0307  # root mean square error over range of a neural network on the dVRK, Yang et al. (2024)
 VECTOR = "vector"  # the axis that stands for all three
@@ -27,7 +28,7 @@ VECTOR = "vector"  # the axis that stands for all three
 
 def section(context: Context) -> Section | None:
     """A table of all logs with a sensor, beside the best that is published for this arm, and both forces over time."""
-    forces = context.catalogue.all(SensorForce)
+    forces = context.catalogue.records(SensorForce)
     return Section("Against a force sensor", "sensor", tuple(blocks(context, forces))) if forces else None
 
 
@@ -42,7 +43,7 @@ def blocks(context: Context, forces: Sequence[SensorForce]) -> Iterator[Block]:
         "range (Yang et al. 2024, arXiv:2405.07453). That is the root mean square error, averaged over axes, over the "
         "range averaged over axes; the row **vector** states the same here."
     )
-    yield from listed(table(context, forces))
+    yield from paper_or_screen(table(context, forces))
     first, *others = dict.fromkeys(force.log for force in forces)
     yield figure([force for force in forces if force.log == first])
     for log in others:

@@ -23,21 +23,20 @@ from davinci_forces.report.content import (
 )
 from davinci_forces.report.content.marks import AnyMark, Colour
 from davinci_forces.report.context import Context, label, title
-from davinci_forces.report.sections.parts import THESIS_TISSUE
+from davinci_forces.report.sections.parts import MS, THESIS_TISSUE
 
-MS = 1e3
 LAWS: dict[str, tuple[str, Colour]] = {"worst": ("worst", "vermillion"), "at contact": ("as it is", "blue")}
 
 
 def section(context: Context) -> Section | None:
     """The limits of one assumed hand; None where no tissue was measured."""
-    delayed = context.catalogue.all(DelayLimit)
+    delayed = context.catalogue.records(DelayLimit)
     return Section("Stability of haptic feedback", "stability", tuple(blocks(context, delayed[0]))) if delayed else None
 
 
 def blocks(context: Context, delayed: DelayLimit) -> Iterator[Block]:
     """The section's content.  Section 8.3"""
-    tissues = context.catalogue.all(TissueLimit)
+    tissues = context.catalogue.records(TissueLimit)
     if tissues:
         yield verdict(context, tissues)
     yield Prose(f"{model(context)}\n\n{without_delay(context)}\n\n{with_delay(context, tissues)}")
@@ -142,9 +141,9 @@ def map_panel(context: Context, tissues: list[TissueLimit]) -> Panel:
     """Fig 8.9 with the exact curves and the tissues."""
     beyond = "red in Fig 8.9" if context.compares_with_thesis else "no Lyapunov function"
     marks: list[AnyMark] = [
-        mark for cells in context.catalogue.all(StabilityMap) for mark in lyapunov_marks(cells, beyond)
+        mark for cells in context.catalogue.records(StabilityMap) for mark in lyapunov_marks(cells, beyond)
     ]
-    for limit in context.catalogue.all(StabilityLimit):
+    for limit in context.catalogue.records(StabilityLimit):
         marks.append(Line(limit.k_h, limit.k_t_cqlf, "exact limit", "black", "solid"))
         marks.append(Line(limit.k_h, limit.k_t_switching, "worst switching", "vermillion", "dashed"))
     return Panel(
@@ -222,7 +221,7 @@ def requirements(context: Context, tissues: list[TissueLimit]) -> Table:
 
 def motions(context: Context) -> Iterator[Figure]:
     """Fig 8.8 and 8.10: the same hand and tissue, by the worst switching and as it is."""
-    runs = [run for run in context.catalogue.all(HapticMotion) if run.switching in LAWS]
+    runs = [run for run in context.catalogue.records(HapticMotion) if run.switching in LAWS]
     if not runs:
         return
     k_t = context.size(runs[0], "tissue_stiffness", runs[0].tissue_stiffness, 3)

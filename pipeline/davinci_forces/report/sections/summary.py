@@ -47,7 +47,7 @@ def blocks(context: Context) -> Iterator[Block]:
         yield nothing_identified(context)
         return
     trusts = [trust(context, joint) for joint in fitted_joints(context)]
-    contacts = context.catalogue.all(Contact)
+    contacts = context.catalogue.records(Contact)
     yield Prose(opening_paragraph(context, trusts, contacts))
     panels = [panel for trusted in trusts for panel in effort_panel(context, trusted)]
     if panels:
@@ -67,7 +67,7 @@ def blocks(context: Context) -> Iterator[Block]:
 def nothing_identified(context: Context) -> Verdict:
     """Why there is no effort to show, and what there is instead."""
     text = "No joint could be identified: there is no usable identification log, so no effort was tracked."
-    if context.catalogue.all(Stiffness):
+    if context.catalogue.records(Stiffness):
         return Verdict("info", f"{text} What sensors say of tissue is in [@tissue].")
     return Verdict("bad", text)
 
@@ -108,7 +108,9 @@ def fitted_joints(context: Context) -> list[str]:
 def trust(context: Context, joint: str) -> Trust:
     """The worst unseen prediction of a joint by the fit that the filter uses, and its worst free space."""
     fit = context.used_fit(joint)
-    scored = [p for p in context.catalogue.all(Prediction) if p.joint == joint and f"{p.model}.{p.estimator}" == fit]
+    scored = [
+        p for p in context.catalogue.records(Prediction) if p.joint == joint and f"{p.model}.{p.estimator}" == fit
+    ]
     scored = [p for p in scored if p.role != "contact" or context.study.log(p.log).contact]
     others = [p for p in scored if p.role != "identification"] or scored
     unseen = [p for p in others if p.path == "another path"] or others
@@ -123,7 +125,7 @@ def trust(context: Context, joint: str) -> Trust:
 def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Contact]) -> str:
     """One paragraph: what was estimated, and which contacts stand out."""
     kind = "simulated " if context.study.simulated else ""
-    runs = len({track.log for track in context.catalogue.all(Track)})
+    runs = len({track.log for track in context.catalogue.records(Track)})
     windows = sum(len(contact) for contact in contacts)
     above = sum(int(contact.above.sum()) for contact in contacts)
     text = (
@@ -141,13 +143,13 @@ def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Cont
 
 def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
     """The external effort of a joint in its most doubtful contact log, or where there is none, in its worst run."""
-    contacts = context.catalogue.about(Contact, joint=trusted.joint)
-    errors = {p.log: p.model_error for p in context.catalogue.about(Prediction, joint=trusted.joint)}
+    contacts = context.catalogue.select(Contact, joint=trusted.joint)
+    errors = {p.log: p.model_error for p in context.catalogue.select(Prediction, joint=trusted.joint)}
     logs = sorted(
         (c.log for c in contacts if len(joints_touched(context, c)) == 1), key=lambda log: errors.get(log, 0.0)
     )
     logs = logs or [c.log for c in contacts] or ([trusted.space.log] if trusted.space is not None else [])
-    for track in context.catalogue.about(Track, joint=trusted.joint, log=logs[-1]) if logs else []:
+    for track in context.catalogue.select(Track, joint=trusted.joint, log=logs[-1]) if logs else []:
         spans = [VSpan(start, end, "", "sky") for start, end in context.study.log(track.log).contact]
         levels = [trusted.space.free_level] if trusted.space is not None else []
         level = [HBand(-size, size, "free space: 95 % of samples") for size in levels]
@@ -168,7 +170,7 @@ def in_column(panels: list[Panel]) -> Iterator[Panel]:
 
 def joints_touched(context: Context, contact: Contact) -> list[Contact]:
     """The joints with contact windows in the same log."""
-    return [contact for contact in context.catalogue.about(Contact, log=contact.log) if contact.above.any()]
+    return [contact for contact in context.catalogue.select(Contact, log=contact.log) if contact.above.any()]
 
 
 def named_peaks(track: Track, contact: Contact) -> Points:
@@ -237,7 +239,7 @@ def looks_at(context: Context, trusts: list[Trust]) -> Iterator[tuple[float, str
         yield from looks_at_model(context, trusted)
         yield from looks_at_band(context, trusted)
     yield from looks_at_paths(context, trusts)
-    for diagnostic in context.catalogue.all(Diagnostic):
+    for diagnostic in context.catalogue.records(Diagnostic):
         for text in warning_texts(diagnostic):
             yield 1.5, literal(text)
 
@@ -281,7 +283,7 @@ def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str
 
 def see(context: Context, kind: type[Record], anchor: str) -> str:
     """A reference to a section, or "" where no record of that kind exists and so the section is missing."""
-    return f" See [@{anchor}]." if context.catalogue.all(kind) else ""
+    return f" See [@{anchor}]." if context.catalogue.records(kind) else ""
 
 
 def warning_texts(diagnostic: Diagnostic) -> Iterator[str]:

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Column, Diagnostic, TipBudget, TipContact, TipForce
 from davinci_forces.report.content import (
     Band,
@@ -30,9 +31,9 @@ from davinci_forces.report.content import (
 from davinci_forces.report.content.marks import AnyMark, Colour
 from davinci_forces.report.content.number import MINUS
 from davinci_forces.report.context import Context, label, title
-from davinci_forces.report.verdicts import NEAR_SINGULAR, NORMAL_95, band, percent
+from davinci_forces.report.verdicts import NEAR_SINGULAR, band, percent
 
-AXES = {"x": "x0", "y": "y0, the roll axis", "z": "z0, up"}
+AXIS_LABELS = {"x": "x0", "y": "y0, the roll axis", "z": "z0, up"}
 PATH_POINTS = 600  # of the path in space
 CONVERGENCE = 1.0  # [s] of the filter, left out of the range of the force
 SPACING = 0.2  # [s] between the vectors that are drawn in a contact
@@ -41,7 +42,7 @@ REACH = 0.5  # of the path's extent, that the largest force is long
 
 def section(context: Context) -> Section | None:
     """The force at the tip of every log in which all joints that carry it move."""
-    forces = context.catalogue.all(TipForce)
+    forces = context.catalogue.records(TipForce)
     return Section("Force at the tip", "tip", tuple(blocks(context, forces))) if forces else None
 
 
@@ -60,18 +61,18 @@ def blocks(context: Context, forces: list[TipForce]) -> Iterator[Block]:
         "tip-force",
     )
     yield Prose(correlations(forces))
-    contacts = {contact.log: contact for contact in context.catalogue.all(TipContact)}
+    contacts = {contact.log: contact for contact in context.catalogue.records(TipContact)}
     if contacts:
         yield contact_table(context, list(contacts.values()))
     yield level_table(context, forces)
     yield from narrow(forces)
-    budgets = {budget.log: budget for budget in context.catalogue.all(TipBudget)}
+    budgets = {budget.log: budget for budget in context.catalogue.records(TipBudget)}
     first, *others = sorted(forces, key=lambda force: priority(force, contacts), reverse=True)
     yield from log_blocks(first, contacts.get(first.log), budgets.get(first.log))
     for force in others:
         inside = tuple(log_blocks(force, contacts.get(force.log), budgets.get(force.log)))
         yield OnScreen(f"Force at the tip in {literal(force.log)}", f"tip-{force.log}", inside)
-    left_out = [literal(text) for d in context.catalogue.about(Diagnostic, stage="resolve") for text in d.text]
+    left_out = [literal(text) for d in context.catalogue.select(Diagnostic, stage="resolve") for text in d.text]
     if left_out:
         yield OnScreen("Logs of contact without a force at the tip", "tip-left-out", (Bullets(tuple(left_out)),))
 
@@ -173,7 +174,7 @@ def log_blocks(force: TipForce, contact: TipContact | None, budget: TipBudget | 
         f"{name}: force at the tip with its 95 % band, and the condition number of the Jacobian."
         f"{' Windows of contact are shaded.' if contact is not None else ''}",
         f"Components of the force at the tip over time in {name}, and the condition number of its poses.",
-        (*(component_panel(force, axis, contact) for axis in AXES), condition_panel(force)),
+        (*(component_panel(force, axis, contact) for axis in AXIS_LABELS), condition_panel(force)),
         f"tip-time-{force.log}",
         zoomable=True,
         height=32,
@@ -195,7 +196,7 @@ def component_panel(force: TipForce, axis: str, contact: TipContact | None) -> P
         Line(force.t, f, "force" if axis == "x" else "", "vermillion", "solid"),
     )
     shown = reach(force, f - NORMAL_95 * std, f + NORMAL_95 * std)
-    return Panel(f"Along {AXES[axis]}", "time [s]", label(force, f"f_{axis}", "force"), marks, y_range=shown)
+    return Panel(f"Along {AXIS_LABELS[axis]}", "time [s]", label(force, f"f_{axis}", "force"), marks, y_range=shown)
 
 
 def reach(force: TipForce, lower: Column, upper: Column) -> tuple[float, float] | None:

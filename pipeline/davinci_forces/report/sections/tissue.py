@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from davinci_forces.maths.arrays import Booleans, evenly
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Column, Push, Stiffness, TissueModel
 from davinci_forces.report.content import (
     Band,
@@ -26,8 +27,8 @@ from davinci_forces.report.content import (
 )
 from davinci_forces.report.content.marks import AnyMark, Colour
 from davinci_forces.report.context import Context, title
-from davinci_forces.report.sections.parts import THESIS_TISSUE
-from davinci_forces.report.verdicts import NORMAL_95, STIFF, STIFFER, grade
+from davinci_forces.report.sections.parts import MM, THESIS_TISSUE
+from davinci_forces.report.verdicts import STIFF, STIFFER, grade
 
 FIGURES_ON_PAPER = 1  # of force, and of maps; the others are on screen
 PUSHES_PER_PANEL = 8
@@ -35,12 +36,11 @@ SAMPLES_PER_PUSH = 60  # in a panel of several pushes
 MAX_PUSHES_LISTED = 20  # of a log; with more, their spread says more than one loop
 MIN_SPACING_MAP = 1e-3  # [m] between places, below which there is no map
 CLASSES: tuple[Colour, ...] = ("blue", "sky", "orange", "vermillion")
-MM = 1e3
 
 
 def section(context: Context) -> Section | None:
     """All tissue logs; None of a study without any."""
-    tissues = context.catalogue.all(Stiffness)
+    tissues = context.catalogue.records(Stiffness)
     return Section("Tissue", "tissue", tuple(blocks(context, tissues))) if tissues else None
 
 
@@ -59,7 +59,7 @@ def blocks(context: Context, tissues: list[Stiffness]) -> Iterator[Block]:
     forces = [figure for tissue in tissues for figure in force_figures(context, tissue)]
     maps = [surface_map(tissue) for tissue in tissues if spread(tissue) > MIN_SPACING_MAP]
     yield from (*forces[:FIGURES_ON_PAPER], *maps[:FIGURES_ON_PAPER])
-    models = context.catalogue.all(TissueModel)
+    models = context.catalogue.records(TissueModel)
     details: tuple[Block, ...] = (
         *forces[FIGURES_ON_PAPER:],
         *maps[FIGURES_ON_PAPER:],
@@ -96,7 +96,7 @@ def true_stiffness(context: Context, log: str) -> float | None:
 
 def chosen_law(context: Context, log: str) -> str:
     """The model that predicts the pushes of a log best, or "" where none could be chosen."""
-    return next((model.chosen for model in context.catalogue.about(TissueModel, log=log)), "")
+    return next((model.chosen for model in context.catalogue.select(TissueModel, log=log)), "")
 
 
 def comparison(context: Context, tissues: Sequence[Stiffness]) -> Table:
@@ -128,7 +128,7 @@ def comparison(context: Context, tissues: Sequence[Stiffness]) -> Table:
 
 def force_figures(context: Context, tissue: Stiffness) -> Iterator[Figure]:
     """Force against depth of one log, where its pushes are at hand."""
-    pushes = {push.push: push for push in context.catalogue.about(Push, log=tissue.log)}
+    pushes = {push.push: push for push in context.catalogue.select(Push, log=tissue.log)}
     typical = pushes.get(int(tissue.push[nearest(tissue)]))
     if typical is not None:
         few = evenly(len(tissue), PUSHES_PER_PANEL)

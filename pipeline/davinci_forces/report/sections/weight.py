@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import FreeWeight, Load, Weight
 from davinci_forces.report.content import (
     Block,
@@ -19,12 +20,11 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, label, title
-from davinci_forces.report.verdicts import NORMAL_95
 
 
 def section(context: Context) -> Section | None:
     """One part per weight log."""
-    weights = context.catalogue.all(Weight)
+    weights = context.catalogue.records(Weight)
     if not weights:
         return None
     content: list[Block] = [intro(), summary(context, weights)]
@@ -79,7 +79,7 @@ def log_blocks(context: Context, weight: Weight) -> Iterator[Block]:
     if loads := loads_of(context, weight):
         yield figure(weight, loads)
     yield by_joint(context, weight)
-    free = context.catalogue.about(FreeWeight, weight=weight.log)
+    free = context.catalogue.select(FreeWeight, weight=weight.log)
     if free:
         yield OnScreen("Apparent mass in free motion", f"free-{weight.log}", (free_motion(context, weight, free),))
 
@@ -114,7 +114,7 @@ def disagreement(context: Context, weight: Weight) -> Prose:
 
 def loads_of(context: Context, weight: Weight) -> list[Load]:
     """What the joints carry along the path of a log."""
-    loads = context.catalogue.about(Load, log=weight.log, weight=weight.log)
+    loads = context.catalogue.select(Load, log=weight.log, weight=weight.log)
     return [load for load in loads if load.joint in weight.loaded]
 
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from davinci_forces.report.content import Document, Equation, Figure, Figure3D, walk
 from davinci_forces.report.content.inline import Span, parse, printable
-from davinci_forces.report.content.layout import columns, flatten, marked_texts, on_screen, place, references
+from davinci_forces.report.content.layout import columns, flatten, marked_texts, number_blocks, on_screen, references
 from davinci_forces.report.figures.svg import svg
 from davinci_forces.report.writers.miniature import LARGER, SMALL, miniature
 from davinci_forces.report.writers.numbers import Json, ThinnedFigure, numbers_json, thin_figure
@@ -28,7 +28,7 @@ STILL_POINTS = 2_000  # of a figure that does not zoom, for those who want its n
 SIGN = "\0"  # which no text can hold: it is not printable
 SCRIPTS = ("contents.js", "figures.js", "tables.js")
 REVIEW_SCRIPTS = ("review.js",)
-SHAPES = {"text": "{}", "code": "<code>{}</code>", "bold": "<strong>{}</strong>"}
+HTML_FORMATS = {"text": "{}", "code": "<code>{}</code>", "bold": "<strong>{}</strong>"}
 TRACE_SCRIPTS = ("axes.js", "marks.js", "traces.js")
 
 
@@ -42,7 +42,7 @@ def render(document: Document) -> bytes:
     NotTypeset
         If an equation is wrong.
     """
-    placed = place(document)
+    placed = number_blocks(document)
     figures = {item.anchor: item.block for item in flatten(placed) if isinstance(item.block, Figure | Figure3D)}
     zooms = {name: f for name, f in figures.items() if isinstance(f, Figure) and f.zoomable}
     folded = on_screen(placed)
@@ -139,16 +139,16 @@ def _inline(page: Json) -> Callable[[str], "Markup"]:
     """A filter from marked text to HTML."""
     from markupsafe import Markup
 
-    def shaped(span: Span) -> Markup:
+    def convert(span: Span) -> Markup:
         if span.kind == "maths":
             return _maths(span.text, page["formulas"][Formula(span.text, False)])
         if span.kind == "reference":
             return Markup('<a href="#{}">{}</a>').format(span.text, page["references"][span.text])
         if span.kind == "link":
             return Markup('<a href="{}">{}</a>').format(span.to, span.text)
-        return Markup(SHAPES[span.kind]).format(span.text)
+        return Markup(HTML_FORMATS[span.kind]).format(span.text)
 
-    return lambda text: Markup("").join(map(shaped, parse(text)))
+    return lambda text: Markup("").join(map(convert, parse(text)))
 
 
 def _maths(text: str, drawing: Drawing) -> "Markup":

@@ -18,7 +18,7 @@ from davinci_forces.report.content import (
     Verdict,
 )
 from davinci_forces.report.content.inline import parse, printable
-from davinci_forces.report.content.layout import NO_BREAK, Placed, columns, on_screen, place, references
+from davinci_forces.report.content.layout import NO_BREAK, Placed, columns, number_blocks, on_screen, references
 from davinci_forces.report.figures.svg import svg
 from davinci_forces.report.writers.typesetting import typeset
 
@@ -36,7 +36,7 @@ def render(document: Document) -> bytes:
     NotTypeset
         If Typst fails or warns.
     """
-    placed = place(document)
+    placed = number_blocks(document)
     content = {
         "title": printable(document.title),
         "study": printable(document.study),

@@ -45,7 +45,7 @@ def typeset(template: Path, content: Any, output: Literal["pdf", "svg"]) -> list
     return pages if isinstance(pages, list) else [pages]
 
 
-TEMPLATE = Path(__file__).parent / "templates/equations.typ"
+EQUATIONS_TEMPLATE = Path(__file__).parent / "templates/equations.typ"
 SIZE = 10.0  # [pt] of the text in the template
 STRUT = 20.0  # [pt] an inline formula stands on a strut of this height in the template, which tells its baseline
 ROOM = 12.0  # [pt] of the strut that is shown; formulas of a line of text are lower
@@ -82,11 +82,11 @@ def draw_formulas(formulas: list[Formula]) -> tuple[dict[Formula, Drawing], str]
 
 def _pages(formulas: list[Formula]) -> list[bytes]:
     try:
-        return typeset(TEMPLATE, [formula._asdict() for formula in formulas], "svg")
+        return typeset(EQUATIONS_TEMPLATE, [formula._asdict() for formula in formulas], "svg")
     except NotTypeset:
         for formula in formulas:  # name the one that is wrong, which Typst does not
             try:
-                typeset(TEMPLATE, [formula._asdict()], "svg")
+                typeset(EQUATIONS_TEMPLATE, [formula._asdict()], "svg")
             except NotTypeset as error:
                 raise NotTypeset(f"the equation {formula.typst!r}: {error}") from error
         raise

@@ -16,7 +16,7 @@ import numpy as np
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.mechanics.bodies import PARAMETERS
 from davinci_forces.maths.mechanics.chain import FIXED, Chain
-from davinci_forces.maths.mechanics.placed import PlacedLink, assembled
+from davinci_forces.maths.mechanics.placed import PlacedLink, assemble_chain
 from davinci_forces.maths.mechanics.rigid_body import regressor
 from davinci_forces.maths.models.terms import Term, coulomb, gravity_cos, gravity_sin, inertia, offset, viscous
 from davinci_forces.robots.robot import ANYWHERE, MOST_JOINTS, Joint, Kind, Limits, Robot
@@ -67,7 +67,7 @@ def robot_of(outermost: Element, file: TomlFile, stem: str) -> Robot | None:
         Notes(file, outermost).problem(f"no joint moves; at least one must be {' or '.join(MOVING)}")
     if file.problems():
         return None
-    chain, bodies = assembled(root, _placed(root, ordered, moved, list(coordinates), weights), _tip(root, ordered))
+    chain, bodies = assemble_chain(root, _placed(root, ordered, moved, list(coordinates), weights), _tip(root, ordered))
     weighed = bodies if any(weight is not None for weight in weights.values()) else None
     name = outermost.attributes.get("name", "") or stem
     moved_by_gravity = _moved_by_gravity(chain)

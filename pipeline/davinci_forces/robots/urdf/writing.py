@@ -65,7 +65,7 @@ def _turned(robot: Robot, chain: Chain) -> _Turned:
     back = np.linalg.inv(by_body)
     return _Turned(
         robot, (chain.names[0], *chain.links), back[chain.parent] @ chain.placement @ frames, back[1:, :3, 2],
-        robot.bodies.within(back[1:]) if robot.bodies else None, back[chain.body] @ chain.offset,
+        robot.bodies.in_frames(back[1:]) if robot.bodies else None, back[chain.body] @ chain.offset,
     )  # fmt: skip
 
 

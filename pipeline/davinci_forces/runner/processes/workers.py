@@ -41,7 +41,7 @@ def prepare() -> None:
 
         forkserver.set_forkserver_preload(["davinci_forces.runner.processes.preloaded"])
         resource_tracker.ensure_running()  # starting it later would unblock Ctrl-C
-        with process.uninterrupted():
+        with process.block_interrupts():
             forkserver.ensure_running()
 
 
@@ -78,7 +78,7 @@ def perform_all(share: Sequence[tuple[Perform, Task]]) -> list[Fields]:
 
 
 @dataclass(frozen=True)
-class Others:
+class WorkerPool:
     """Other processes for tasks: how to start them, their number, and a preparation that takes time."""
 
     start: Callable[[], Executor]
@@ -87,13 +87,13 @@ class Others:
 
 
 @dataclass
-class Crew:
+class TaskQueue:
     """Runs tasks in this process or in others, and yields their outcomes as they are done.
 
     Others are prepared once enough work is in sight, and started once there is work for them.
     """
 
-    others: Others | None = None
+    others: WorkerPool | None = None
     restarts: int = 0  # of the others
 
     def __post_init__(self) -> None:

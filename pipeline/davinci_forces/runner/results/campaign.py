@@ -11,19 +11,19 @@ import numpy as np
 
 from davinci_forces.errors import BadRequest, MissingRecord
 from davinci_forces.files import read_bytes, write_bytes
-from davinci_forces.maths.estimation.drift import holm, scatter, stands_out, trend
-from davinci_forces.report.campaign.page import page
+from davinci_forces.maths.estimation.drift import holm, outlier_probabilities, scatter, trend
+from davinci_forces.report.campaign.page import render_campaign
 from davinci_forces.report.campaign.studies import (
     DAY,
     FLOORS,
-    Campaigned,
+    CampaignStudy,
     Findings,
     JointVerdict,
     Place,
     Series,
     Slope,
     joints_of,
-    place,
+    series_key,
     series_of,
 )
 from davinci_forces.report.verdicts import WORDS
@@ -56,13 +56,13 @@ def write(studies: Sequence[Path], reports: Path | None, out: Path | None) -> tu
     by_date = all(study.when is not None for study in summaries)
     ordered = sorted(summaries, key=lambda study: study.started) if by_date else summaries
     series = [row for joint in joints_of(ordered) for row in series_of(ordered, joint)]
-    files = page(ordered, left_out, findings(series, ordered, by_date))
+    files = render_campaign(ordered, left_out, findings(series, ordered, by_date))
     for name, content in files.items():
         write_bytes(place / name, content)
     return [place / name for name in files], left_out
 
 
-def read_study(folder: Path, place: Path) -> Campaigned:
+def read_study(folder: Path, place: Path) -> CampaignStudy:
     """Read a study from the files of its report; `place` is the folder of the page that links to it."""
     numbers, about = stated.read(folder / "results.json"), read_summary(folder / "summary.json")
     joints = {
@@ -73,7 +73,7 @@ def read_study(folder: Path, place: Path) -> Campaigned:
         )
         for joint in about["joints"]
     }
-    return Campaigned(
+    return CampaignStudy(
         folder.name, link_to(folder / "report.html", place), about["robot"], bool(about["simulated"]),
         about["started"], joints, numbers,
     )  # fmt: skip
@@ -114,7 +114,7 @@ def read_summary(file: Path) -> dict[str, Any]:
 Test = tuple[str, Place, int]  # kind of test, its series, and the number of the study in it
 
 
-def findings(series: Sequence[Series], studies: Sequence[Campaigned], by_date: bool) -> Findings:
+def findings(series: Sequence[Series], studies: Sequence[CampaignStudy], by_date: bool) -> Findings:
     """Drifts, variations and outliers of the series beyond their standard errors, where all have one."""
     time = times(studies, by_date)
     slopes: dict[Place, Slope] = {}
@@ -124,10 +124,12 @@ def findings(series: Sequence[Series], studies: Sequence[Campaigned], by_date: b
             continue
         line = trend(np.array([time[study.name] for study in row.studies]), row.value, row.std)
         if line is not None:
-            slopes[place(row)] = Slope(line.slope, line.std)
-            tests["drift", place(row), 0] = line.p
-        tests["scatter", place(row), 0] = scatter(row.value, row.std)
-        tests |= {("outlier", place(row), i): p for i, p in enumerate(stands_out(row.value, row.std).tolist())}
+            slopes[series_key(row)] = Slope(line.slope, line.std)
+            tests["drift", series_key(row), 0] = line.p
+        tests["scatter", series_key(row), 0] = scatter(row.value, row.std)
+        tests |= {
+            ("outlier", series_key(row), i): p for i, p in enumerate(outlier_probabilities(row.value, row.std).tolist())
+        }
     rejections = holm([*tests.values()], FALSE_ALARM_PROBABILITY).tolist()
     significant = [test for test, rejected in zip(tests, rejections, strict=True) if rejected]
     drifting, varying = ({where for kind, where, _ in significant if kind == k} for k in ("drift", "scatter"))
@@ -138,7 +140,7 @@ def findings(series: Sequence[Series], studies: Sequence[Campaigned], by_date: b
     )  # fmt: skip
 
 
-def times(studies: Sequence[Campaigned], by_date: bool) -> dict[str, float]:
+def times(studies: Sequence[CampaignStudy], by_date: bool) -> dict[str, float]:
     """The date of each study [days from the first], or its number in order."""
     first = studies[0].when if studies else None
     return {

@@ -7,10 +7,10 @@ from typing import Any
 
 from davinci_forces.errors import BadRequest
 from davinci_forces.files import read_bytes
-from davinci_forces.report.changes import Stated, Value
+from davinci_forces.report.changes import StatedValue, Value
 
 
-def read(file: Path) -> dict[str, Stated]:
+def read(file: Path) -> dict[str, StatedValue]:
     """Read all numbers of a results.json by key, in the order of the file.
 
     Raises
@@ -26,7 +26,7 @@ def read(file: Path) -> dict[str, Stated]:
         raise BadRequest(f"{file} is no results.json: {error}") from None
     if not isinstance(rows, list):
         raise BadRequest(f"{file} is no results.json: it holds no list of numbers")
-    numbers: dict[str, Stated] = {}
+    numbers: dict[str, StatedValue] = {}
     for i, row in enumerate(rows, 1):
         key, problem = _problem(row)
         if key in numbers:
@@ -35,7 +35,7 @@ def read(file: Path) -> dict[str, Stated]:
             raise BadRequest(f"{file}: number {i}{f' ({key})' if key else ''}: {problem}")
         std = row.get("std")
         has_std = std is not None and not math.isnan(std)
-        numbers[key] = Stated(row["value"], float(std) if has_std else None, row.get("unit") or "")
+        numbers[key] = StatedValue(row["value"], float(std) if has_std else None, row.get("unit") or "")
     return numbers
 
 

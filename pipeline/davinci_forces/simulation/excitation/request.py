@@ -12,7 +12,7 @@ from davinci_forces.errors import BadRequest
 from davinci_forces.maths.excitation.arm import ArmExcitationProblem, arm_observation, arm_problem, design_together
 from davinci_forces.maths.excitation.fourier import CRITERIA, Fourier, Range, condition
 from davinci_forces.maths.excitation.joint import ExcitationProblem
-from davinci_forces.maths.excitation.search import Tell, nothing
+from davinci_forces.maths.excitation.search import Tell, report_nothing
 from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.simulation.excitation.trajectory import (
     PERIODS,
@@ -58,7 +58,7 @@ class Answer(NamedTuple):
     arm: ArmExcitation | None = None
 
 
-def answer(request: Request, tell: Tell = nothing) -> Answer:
+def answer(request: Request, tell: Tell = report_nothing) -> Answer:
     """Design or evaluate a trajectory for each requested joint; `tell` reports each start for an arm.
 
     Joints that move together share a period.  Where the arm's links are known, the trajectories are optimal for the
@@ -118,7 +118,7 @@ def _excitation(request: Request, joint: Joint, problem: ExcitationProblem) -> E
         names = ",".join(coefficient_names(2))
         raise BadRequest(f"--evaluate takes {names}, or a0 and a pair for each harmonic, not {len(x)} numbers")
     problem = replace(problem, harmonics=(len(x) - 1) // 2)
-    return ExcitationTrajectory(joint, problem, Fourier.of(np.array(x), problem.period))
+    return ExcitationTrajectory(joint, problem, Fourier.from_coefficients(np.array(x), problem.period))
 
 
 def _limits(option: str, text: str) -> Range:

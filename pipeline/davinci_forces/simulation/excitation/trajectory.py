@@ -41,7 +41,7 @@ class ExcitationTrajectory:
         return float(10 ** fourier.condition(self._F()))
 
     @property
-    def broken(self) -> list[str]:
+    def violations(self) -> list[str]:
         """The limits that the trajectory exceeds, one a line."""
         names = zip(
             ("q", "dq", "ddq"), ("", "/s", "/s^2"), fourier.ranges(self.series), self.problem.limits, strict=True
@@ -67,7 +67,7 @@ class ExcitationTrajectory:
             "samples": self.problem.samples,
             "ranges": {s: list(r) for s, r in zip(symbols, fourier.ranges(self.series), strict=True)},
             "limits": {s: list(r) for s, r in zip(symbols, self.problem.limits, strict=True)},
-            "within_limits": not self.broken,
+            "within_limits": not self.violations,
             **({"starts": spread(self.optima)} if self.optima else {}),
         }
 
@@ -196,7 +196,7 @@ def _run_in_samples(excitations: Sequence[ExcitationTrajectory], samples: int, r
     """The samples of the shortest run-in that keeps the limits."""
     durations = np.unique(np.linspace(samples / 4, samples, RUN_INS).round().clip(1)) / rate
     accelerations = [e.problem.limits[2] for e in excitations]
-    if duration := fourier.shortest([e.series for e in excitations], accelerations, durations):
+    if duration := fourier.shortest_stretch([e.series for e in excitations], accelerations, durations):
         return round(duration * rate)
     raise BadRequest(
         "no run-in of at most one period keeps the acceleration limits; write the period alone, with --no-run-in, and "

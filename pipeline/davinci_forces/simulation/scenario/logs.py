@@ -35,7 +35,7 @@ def _log(table: TomlTable, joints: dict[str, SimulatedJoint], families: Sequence
         table.problem(f"file must be a plain file name that ends in {' or '.join(FORMATS)}, not {file!r}", "file")
     duration = table.number("duration", above=0.0)
     role = table.text("role", choices=ROLES)
-    moves = {key: _move(entry) for key, entry in table.table("moves").each()}
+    moves = {key: _move(entry) for key, entry in table.table("moves").subtables()}
     held_table, external = table.table("held"), table.table("external")
     held = {key: held_table.number(key) for key in held_table.values}
     pushes = {key: tuple(_push(e, duration, False) for e in external.tables(key)) for key in external.values}

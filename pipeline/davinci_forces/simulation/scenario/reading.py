@@ -56,7 +56,7 @@ def load(scenario: str) -> Scenario:
 def _scenario(name: str, table: TomlTable) -> Scenario:
     robot = _robot(table)
     whole_arm = "arm" in table
-    joints = {key: _joint(robot, key, entry, whole_arm) for key, entry in table.table("joint").each()}
+    joints = {key: _joint(robot, key, entry, whole_arm) for key, entry in table.table("joint").subtables()}
     if not joints:
         table.problem("it has no [joint.<name>] table, so nothing can move")
     arm = arm_of(table, robot, joints) if whole_arm else None
@@ -124,7 +124,7 @@ def arm_of(table: TomlTable, robot: Robot, joints: dict[str, SimulatedJoint]) ->
     )
     control = _control(arm.table("control"), n)
     arm.close()
-    families = {name: _family(entry, robot) for name, entry in table.table("family").each()}
+    families = {name: _family(entry, robot) for name, entry in table.table("family").subtables()}
     if not families:
         table.problem("it has no [family.<name>], which states the friction and noise of the arm")
     return SimulatedArm(tick, rotors, motors, control, families)

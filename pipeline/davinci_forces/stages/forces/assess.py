@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from davinci_forces.maths.contact.detection import Quiet, alarm_level, quiet
+from davinci_forces.maths.contact.detection import FreeMotionStatistics, alarm_level, free_motion_statistics
 from davinci_forces.maths.signals.windows import free_space
 from davinci_forces.maths.uncertainty.error_band import levels
 from davinci_forces.records import FreeSpace, Threshold, Track
@@ -24,7 +24,7 @@ def run(track: Track, entry: LogEntry) -> Iterator[FreeSpace]:
         return
     windows = [(start - MARGIN_BEFORE_CONTACT, end) for start, end in entry.contact]
     free_smooth = free_space(track.t, windows, track.rate)
-    smooth = quiet(track.tau_ext_smooth, free_smooth if free_smooth.any() else free, track.rate)
+    smooth = free_motion_statistics(track.tau_ext_smooth, free_smooth if free_smooth.any() else free, track.rate)
     space = levels(track.tau_ext[free], track.tau_ext_std[free])
     yield FreeSpace(
         log=track.log,
@@ -63,4 +63,4 @@ def gather(spaces: Iterable[FreeSpace]) -> Iterator[Threshold]:
 
 def alarm_level_of(space: FreeSpace) -> float:
     """Alarm level: the effort that free motion exceeds at most once in ten minutes; it grows with its rms."""
-    return alarm_level([Quiet(space.smooth_rms, space.smooth_max, space.crossings)])
+    return alarm_level([FreeMotionStatistics(space.smooth_rms, space.smooth_max, space.crossings)])

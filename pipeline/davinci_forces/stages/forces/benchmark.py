@@ -5,10 +5,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from davinci_forces.filters import DEFAULT, FILTERS, through
-from davinci_forces.filters.problem import Driven, NoiseModel, driven, driven_smooth
-from davinci_forces.filters.response import DURATION, assumed, half_sine, response
-from davinci_forces.identification.joint_models import Along
+from davinci_forces.filters import DEFAULT, FILTERS, filter_parts
+from davinci_forces.filters.problem import FilterInput, NoiseModel, filter_inputs, smooth_filter_inputs
+from davinci_forces.filters.response import DURATION, half_sine, noise_model, response
+from davinci_forces.identification.joint_models import LogModels
 from davinci_forces.identification.used import FALLBACK, Identified
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals.windows import free_space, runs
@@ -41,13 +41,13 @@ def run(
     if not unfitted or model.at_rest or noise is None or int(free.sum()) < MIN_SAMPLES_COMPARISON:
         return
     variants, identified = [(name.replace("_", "-"), name, model) for name in FILTERS], Identified(robot, fits)
-    fit = identified.used(model.joint, FALLBACK)
+    fit = identified.fit_of(model.joint, FALLBACK)
     if fit is not None and model.model != "independent":
-        independent = Along(identified, [model]).under(model, fit)
+        independent = LogModels(identified, [model]).with_fit(model, fit)
         variants += [(INDEPENDENT, DEFAULT, independent)] if independent.inertia.min() > 0 else []
     joint = robot.joint(model.joint)
     for label, name, variant in variants:
-        filter_noise = assumed(noise, joint, 1.0 / model.rate, q_tau, name)
+        filter_noise = noise_model(noise, joint, 1.0 / model.rate, q_tau, name)
         yield from compare(label, name, variant, filter_noise, free, PUSH[joint.kind])
 
 
@@ -55,13 +55,13 @@ def compare(
     label: str, name: str, model: JointModel, noise: NoiseModel, free: Booleans, push: float
 ) -> Iterator[Comparison | Diagnostic]:
     """Filter a joint of a log, and the same with a push; measure the level in free space and the response."""
-    parts = driven_smooth(model) if name == "direct" else driven(model)
-    estimate = through(name, parts, noise)
+    parts = smooth_filter_inputs(model) if name == "direct" else filter_inputs(model)
+    estimate = filter_parts(name, parts, noise)
     if not np.isfinite(estimate.tau_ext).all():
         return
     space = levels(estimate.tau_ext[free], estimate.tau_ext_std[free])
     pushed, start = add_push(model.t, parts, free, push)
-    shown = response(through(name, pushed, noise).tau_ext - estimate.tau_ext, model.t, start, push)
+    shown = response(filter_parts(name, pushed, noise).tau_ext - estimate.tau_ext, model.t, start, push)
     if label == DEFAULT and shown.share < MIN_PUSH_SHARE:
         message = f"{model.log}/{model.joint}: the filter shows only {shown.share:.0%} of a push of {DURATION:g} s"
         yield diagnostic("benchmark", f"{model.log}.{model.joint}", "warning", f"{message}; raise q_tau in [settings]")
@@ -73,7 +73,7 @@ def compare(
     )  # fmt: skip
 
 
-def add_push(t: Array, parts: Sequence[Driven], free: Booleans, push: float) -> tuple[list[Driven], float]:
+def add_push(t: Array, parts: Sequence[FilterInput], free: Booleans, push: float) -> tuple[list[FilterInput], float]:
     """Add a push to the recorded effort, in the middle of the longest free space, and return its start [s]."""
     longest = max(runs(free), key=lambda run: run.stop - run.start)
     start = float(t[(longest.start + longest.stop) // 2]) - 0.5 * DURATION

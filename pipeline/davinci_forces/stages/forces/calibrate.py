@@ -4,14 +4,14 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from davinci_forces.filters import DEFAULT, diverges, through
-from davinci_forces.filters.problem import driven
-from davinci_forces.filters.response import assumed, lag
+from davinci_forces.filters import DEFAULT, diverges, filter_parts
+from davinci_forces.filters.problem import filter_inputs
+from davinci_forces.filters.response import lag, noise_model
 from davinci_forces.maths.arrays import Booleans, evenly
 from davinci_forces.maths.signals.windows import free_space
 from davinci_forces.maths.uncertainty import bootstrap
-from davinci_forces.maths.uncertainty.error_band import BLOCKS, cells
-from davinci_forces.maths.uncertainty.error_band import FEWEST as MIN_LOGS_BAND
+from davinci_forces.maths.uncertainty.error_band import LOG_BLOCKS, cells
+from davinci_forces.maths.uncertainty.error_band import MIN_LOGS_BAND as MIN_LOGS_BAND
 from davinci_forces.records import ErrorBand, FilterNoise, FreeMotion, JointModel
 from davinci_forces.robots.robot import Joint
 from davinci_forces.study import LogEntry
@@ -32,9 +32,9 @@ def run(
     free = free_space(model.t, entry.contact, model.rate)
     if int(free.sum()) < MIN_SAMPLES_BAND:
         return
-    filter_noise = assumed(noise, joint, 1.0 / model.rate, q_tau)
-    parts = driven(model, np.where(np.isnan(model.tau_hat_unseen), model.tau_hat, model.tau_hat_unseen))
-    estimate = through(DEFAULT, parts, filter_noise)
+    filter_noise = noise_model(noise, joint, 1.0 / model.rate, q_tau)
+    parts = filter_inputs(model, np.where(np.isnan(model.tau_hat_unseen), model.tau_hat, model.tau_hat_unseen))
+    estimate = filter_parts(DEFAULT, parts, filter_noise)
     if diverges(estimate):
         return
     late = lag(parts, filter_noise)[1]
@@ -65,7 +65,7 @@ def band(joint: str, motions: list[FreeMotion], speed: float) -> ErrorBand:
     columns = {name: np.concatenate([getattr(motion, name) for motion in motions]) for name in names}
     lengths = [len(motion) for motion in motions]
     logs = np.repeat(np.arange(len(motions)), lengths)
-    parts = logs if len(motions) >= MIN_LOGS_BAND else logs * BLOCKS + columns["block"]
+    parts = logs if len(motions) >= MIN_LOGS_BAND else logs * LOG_BLOCKS + columns["block"]
     return ErrorBand(
         joint=joint,
         speed=speed,

@@ -4,13 +4,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.filters import DEFAULT, diverges, rts, through
+from davinci_forces.filters import DEFAULT, diverges, filter_parts, rts
 from davinci_forces.filters.error_bands import ModelVariance, model_variance
-from davinci_forces.filters.problem import NoiseModel, driven
-from davinci_forces.filters.response import assumed, lag, rise
+from davinci_forces.filters.problem import NoiseModel, filter_inputs
+from davinci_forces.filters.response import lag, noise_model, rise
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals.smoothing import segments
-from davinci_forces.maths.signals.windows import free_space, settled
+from davinci_forces.maths.signals.windows import free_space, is_past_transient
 from davinci_forces.maths.uncertainty.day_offset import DayOffset, day_offset
 from davinci_forces.records import Diagnostic, ErrorBand, FilterNoise, JointModel, Track, diagnostic
 from davinci_forces.robots.robot import Joint
@@ -31,7 +31,7 @@ def run(
     The effect of other joints and of the friction's memory enters by the measured motion.  (7.6)-(7.16)
     """
     if noise is not None:
-        yield from track_effort(model, assumed(noise, joint, 1.0 / model.rate, q_tau), band, entry)
+        yield from track_effort(model, noise_model(noise, joint, 1.0 / model.rate, q_tau), band, entry)
         return
     message = "no identification log gives the noise of the filter, so its external effort is not estimated"
     yield diagnostic("ekf", f"{model.log}.{model.joint}", "note", f"{model.log}/{model.joint}: {message}")
@@ -41,8 +41,8 @@ def track_effort(
     model: JointModel, noise: NoiseModel, band: ErrorBand | None, entry: LogEntry
 ) -> Iterator[Track | Diagnostic]:
     """Estimate the external effort of one joint of a log, with its error."""
-    parts = driven(model)
-    estimate = through(DEFAULT, parts, noise)
+    parts = filter_inputs(model)
+    estimate = filter_parts(DEFAULT, parts, noise)
     if diverges(estimate):
         yield divergence_warning(model, float(np.mean(estimate.nis)))
         if not np.isfinite(estimate.tau_ext).all():
@@ -56,7 +56,7 @@ def track_effort(
     if band is not None:
         model_error = model_variance(band, model.log, model.path, model.dq_measured, bool(entry.free))
     total = estimate.tau_ext_std**2 + model_error.variance + late**2 + offset.std**2
-    converged = np.concatenate([settled(model.t[part]) for part in segments(model.segment)])
+    converged = np.concatenate([is_past_transient(model.t[part]) for part in segments(model.segment)])
     free = free_space(model.t, entry.contact, model.rate)
     model_part = float(np.sqrt(np.mean(model_error.variance)))
     yield Track(

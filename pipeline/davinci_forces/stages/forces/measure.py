@@ -6,7 +6,7 @@ import numpy as np
 
 from davinci_forces.identification.used import Identified
 from davinci_forces.maths.contact.detection import Event, events, summarise
-from davinci_forces.maths.signals.windows import free_space, settled
+from davinci_forces.maths.signals.windows import free_space, is_past_transient
 from davinci_forces.records import Contact, Diagnostic, Fit, Threshold, Track, diagnostic
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
@@ -31,7 +31,7 @@ def run(
     threshold = next((t for t in thresholds if (t.joint, t.filter) == (track.joint, track.filter)), None)
     if threshold is None:
         return
-    converged = settled(track.t)
+    converged = is_past_transient(track.t)
     detected = [
         event
         for event in events(track.t, track.tau_ext_smooth, track.tau_ext_std, threshold.alarm_level, track.smooth_rise)
@@ -94,7 +94,7 @@ def stiction_note(track: Track, fits: Iterable[Fit], robot: Robot) -> Diagnostic
     name = f"{track.log}/{track.joint}"
     levels = [
         abs(float(theta))
-        for fit in Identified(robot, fits).describing(track.joint)
+        for fit in Identified(robot, fits).fits_of(track.joint)
         if f"{fit.model}.{fit.estimator}" == "independent.lse"
         for parameter, theta in zip(fit.parameter, fit.theta, strict=True)
         if parameter == "Coulomb friction"

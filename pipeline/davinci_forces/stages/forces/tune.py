@@ -5,8 +5,8 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from davinci_forces.filters import ekf
-from davinci_forces.filters.problem import NoiseModel, driven
-from davinci_forces.filters.tuning import tuned
+from davinci_forces.filters.problem import NoiseModel, filter_inputs
+from davinci_forces.filters.tuning import tune_noise
 from davinci_forces.maths.signals.smoothing import noise_std
 from davinci_forces.records import FilterNoise, JointModel, MeasurementNoise, Tuning
 
@@ -22,8 +22,8 @@ def run(model: JointModel, noise: MeasurementNoise | None, *, lowpass: float) ->
 
 def tuning(model: JointModel, before: NoiseModel) -> Tuning:
     """Maximise the likelihood of one joint of a log over the noise; the gain is over the noise `before`."""
-    parts, T_s, inertia = driven(model), 1.0 / model.rate, float(model.inertia.max())
-    noise = tuned(parts, before, inertia, model.viscous)
+    parts, T_s, inertia = filter_inputs(model), 1.0 / model.rate, float(model.inertia.max())
+    noise = tune_noise(parts, before, inertia, model.viscous)
     initial, final = (
         sum(ekf.log_likelihood(part, n) for part in parts) for n in (before._replace(q_tau=noise.q_tau), noise)
     )

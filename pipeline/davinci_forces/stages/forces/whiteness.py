@@ -4,18 +4,18 @@ from collections.abc import Collection, Iterable, Iterator, Sequence
 
 import numpy as np
 
-from davinci_forces.filters.innovations.innovations import Innovations, delays, innovations, mended
-from davinci_forces.filters.innovations.search import CauseSearch, finding, search, verdict
+from davinci_forces.filters.innovations.innovations import Innovations, correct_times, delays, innovations
+from davinci_forces.filters.innovations.search import CauseSearch, classify, search, verdict
 from davinci_forces.filters.innovations.trials import CLOCK, Subject
-from davinci_forces.filters.problem import Driven, driven
-from davinci_forces.filters.response import assumed
-from davinci_forces.identification.joint_models import Along, refitted
+from davinci_forces.filters.problem import FilterInput, filter_inputs
+from davinci_forces.filters.response import noise_model
+from davinci_forces.identification.joint_models import LogModels, refit_effort
 from davinci_forces.identification.used import Identified
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals import whiteness
-from davinci_forces.maths.signals.standstill import moving
-from davinci_forces.maths.signals.whiteness import NORMAL_95, NORMAL_99, cross_correlation, mean_square_band
-from davinci_forces.maths.signals.windows import longest_run, outside, settled
+from davinci_forces.maths.signals.standstill import is_far_from_reversals
+from davinci_forces.maths.signals.whiteness import TWO_SIDED_95, TWO_SIDED_99, cross_correlation, mean_square_band
+from davinci_forces.maths.signals.windows import is_outside, is_past_transient, longest_run
 from davinci_forces.records import (
     Column,
     Explanation,
@@ -48,7 +48,7 @@ def run(subject: PeriodResidual | Residual | Track) -> Iterator[Whiteness]:
     else:
         # Correlations across a gap mean nothing, and after one the filter starts anew.
         part = longest_run(subject.t, subject.rate)
-        converged = settled(subject.t[part])
+        converged = is_past_transient(subject.t[part])
         signals = {name: getattr(subject, name)[part][converged] for name in ("innovation_q", "innovation_dq")}
     results = {name: statistics(x) for name, x in signals.items()}
     all_white = int(all(r["white"] and float(r["periodogram_p"]) > MIN_PROBABILITY for r in results.values()))  # type: ignore[arg-type]
@@ -67,8 +67,8 @@ def statistics(x: Column) -> dict[str, object]:
     correlation, straight = np.eye(1, lags + 1)[0], 2.0 * cycles
     box, wave = whiteness.LjungBox(0.0, 0.0), whiteness.Cumulative(cycles, straight, 0.0, 0.0)
     skewness = kurtosis = normal = 0.0
-    if whiteness.FEWEST <= N and np.ptp(x) > 0:
-        level = whiteness.centred([x])
+    if whiteness.MIN_SAMPLES_WHITENESS <= N and np.ptp(x) > 0:
+        level = whiteness.centre_pieces([x])
         correlation = whiteness.autocorrelation(level, lags)
         box = whiteness.ljung_box(level, correlation, tested_lags)
         wave = whiteness.cumulative_periodogram(level)
@@ -77,10 +77,10 @@ def statistics(x: Column) -> dict[str, object]:
     band, ordinates = 1.0 / np.sqrt(N), (N - 1) // 2
     return {
         "tested": N,
-        "band": float(whiteness.NORMAL_95 * band),
-        "band_99": float(whiteness.NORMAL_99 * band),
+        "band": float(whiteness.TWO_SIDED_95 * band),
+        "band_99": float(whiteness.TWO_SIDED_99 * band),
         "acf1": float(correlation[1]) if lags else 0.0,
-        "outside": float(np.mean(np.abs(correlation[1:]) > whiteness.NORMAL_95 * band)) if lags else 0.0,
+        "outside": float(np.mean(np.abs(correlation[1:]) > whiteness.TWO_SIDED_95 * band)) if lags else 0.0,
         "ljung_box": box.statistic,
         "ljung_box_lags": tested_lags,
         "ljung_box_p": box.probability,
@@ -88,7 +88,7 @@ def statistics(x: Column) -> dict[str, object]:
         "periodogram_p": wave.probability,
         "periodogram_band": whiteness.distance_of(0.05, ordinates),
         "periodogram_band_99": whiteness.distance_of(0.01, ordinates),
-        "jarque_bera_p": normal if N >= whiteness.FEWEST else 0.0,
+        "jarque_bera_p": normal if N >= whiteness.MIN_SAMPLES_WHITENESS else 0.0,
         "skewness": skewness,
         "kurtosis": kurtosis,
         "white": int(box.probability > MIN_PROBABILITY),
@@ -114,19 +114,19 @@ def apply(
     A cause is named only where the innovations pass every test without it.  Section 7.4
     """
     noise_of, modelled = {noise.joint: noise for noise in noises}, {model.joint for model in models}
-    along = Along(Identified(robot, fits), [*models, *(m for m in motions if m.joint not in modelled)])
+    along = LogModels(Identified(robot, fits), [*models, *(m for m in motions if m.joint not in modelled)])
     models = [model for model in models if not model.at_rest and model.joint in noise_of]
-    filter_noises = [assumed(noise_of[m.joint], robot.joint(m.joint), 1.0 / m.rate, q_tau) for m in models]
+    filter_noises = [noise_model(noise_of[m.joint], robot.joint(m.joint), 1.0 / m.rate, q_tau) for m in models]
     results = [innovations(longest_part(m), noise) for m, noise in zip(models, filter_noises, strict=True)]
     clock_delays = delays([velocities(m)[0] for m in models], [result.q for result in results])
     for model, noise, result, delay in zip(models, filter_noises, results, clock_delays, strict=True):
         part = longest_run(model.t, model.rate)
-        motion, free = velocities(model), outside(model.t, entry.contact)
+        motion, free = velocities(model), is_outside(model.t, entry.contact)
         yield from innovation_records(model, result, motion)
         trials = dict(alternatives(model, along, free))
         if delay.any():
-            trials[CLOCK] = mended(longest_part(model), *motion, delay)
-        subject = Subject(trials, noise, free[part], moving(motion[0], 1.0 / model.rate))
+            trials[CLOCK] = correct_times(longest_part(model), *motion, delay)
+        subject = Subject(trials, noise, free[part], is_far_from_reversals(motion[0], 1.0 / model.rate))
         yield explanation(model, search(subject), entry, float(np.std(delay)))
 
 
@@ -136,29 +136,29 @@ def velocities(model: JointModel) -> tuple[Array, Array]:
     return model.dq[part], model.ddq[part]
 
 
-def longest_part(model: JointModel, tau_hat: Array | None = None) -> Driven:
+def longest_part(model: JointModel, tau_hat: Array | None = None) -> FilterInput:
     """The longest run of a joint's recording; `tau_hat` (N,) is the effort by another fit."""
-    return max(driven(model, tau_hat), key=lambda part: len(part.q))
+    return max(filter_inputs(model, tau_hat), key=lambda part: len(part.q))
 
 
-def alternatives(model: JointModel, along: Along, free: Booleans) -> Iterator[tuple[str, Driven]]:
+def alternatives(model: JointModel, along: LogModels, free: Booleans) -> Iterator[tuple[str, FilterInput]]:
     """The joint under the model in use, with parameters fitted to this log, and under another structure."""
     identified, joint = along.identified, model.joint
-    fit = identified.used(joint, f"{model.model}.{model.estimator}")
+    fit = identified.fit_of(joint, f"{model.model}.{model.estimator}")
     yield "", longest_part(model)
     if fit is not None:
-        yield THIS_LOG, longest_part(model, refitted(model, fit, along, free))
+        yield THIS_LOG, longest_part(model, refit_effort(model, fit, along, free))
     structures = [f for f in identified.fits if f.group == joint and f.model != model.model]
     possible = [f for f in structures if set(along.joints) >= set(identified.model(f).joints)]
     for alternative in possible[:1]:  # of those whose joints the log holds
-        under = along.under(model, alternative)
+        under = along.with_fit(model, alternative)
         if under.inertia.min() > 0:
             yield alternative.model, longest_part(under)
 
 
 def innovation_records(model: JointModel, result: Innovations, motion: tuple[Array, Array]) -> Iterator[Innovation]:
     """The normalised square of both innovations, and their correlation with the motion before."""
-    converged = settled(np.arange(len(result.q)) / model.rate)
+    converged = is_past_transient(np.arange(len(result.q)) / model.rate)
     dq, ddq = (x[converged] for x in motion)
     N = int(converged.sum())
     lags = min(LAGS, N // 4)
@@ -167,8 +167,8 @@ def innovation_records(model: JointModel, result: Innovations, motion: tuple[Arr
         normalised = (x / std)[converged]
         with_dq, with_ddq, with_sign = (cross_correlation(normalised, u, lags) for u in (dq, ddq, np.sign(dq)))
         yield Innovation(
-            log=model.log, joint=model.joint, signal=name, tested=N, band=NORMAL_95 / N**0.5,
-            band_99=NORMAL_99 / N**0.5, nis_own=float(np.mean(normalised**2)), nis_low=low, nis_high=high,
+            log=model.log, joint=model.joint, signal=name, tested=N, band=TWO_SIDED_95 / N**0.5,
+            band_99=TWO_SIDED_99 / N**0.5, nis_own=float(np.mean(normalised**2)), nis_low=low, nis_high=high,
             lag=np.arange(lags + 1), with_dq=with_dq, with_ddq=with_ddq, with_sign=with_sign,
         )  # fmt: skip
 
@@ -180,7 +180,7 @@ def explanation(model: JointModel, causes: CauseSearch, entry: LogEntry, clock_s
     return Explanation(
         log=model.log,
         joint=model.joint,
-        finding=finding(causes),
+        finding=classify(causes),
         verdict=verdict(causes) + caveat,
         clock_std=clock_std,
         without=np.array([" + ".join(t.without) or "nothing" for t in trials], object),

@@ -8,13 +8,20 @@ import numpy as np
 
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.identification.candidates import Candidate, Library, candidates, reach_of
-from davinci_forces.identification.chosen import NOTHING, BlockEstimate, Selection, held, parameters, selected
-from davinci_forces.identification.observations import Observed, observed
+from davinci_forces.identification.chosen import (
+    NEGLIGIBLE_EXCESS,
+    BlockEstimate,
+    Selection,
+    fit_consistent,
+    parameters,
+    select_candidate,
+)
+from davinci_forces.identification.observations import Observed, observe
 from davinci_forces.identification.regression import recorded_motion
 from davinci_forces.identification.unseen import predictions
 from davinci_forces.identification.used import Identified
 from davinci_forces.maths.models.model import Model
-from davinci_forces.maths.signals.smoothing import smoothed
+from davinci_forces.maths.signals.smoothing import lowpass_segments
 from davinci_forces.maths.signals.velocity_map import over_velocity
 from davinci_forces.records import Average, Choice, Diagnostic, Fit, FrictionMap, Motion, Prediction, diagnostic
 from davinci_forces.robots.models import Reach
@@ -42,7 +49,7 @@ def run(
     if not separate:
         return
     reaches = {name: reach_of(joint_logs, name) for name, joint_logs in separate.items()}
-    selection = selected(candidates(robot, separate, arm, reaches, len(logs)), reaches, len(logs))
+    selection = select_candidate(candidates(robot, separate, arm, reaches, len(logs)), reaches, len(logs))
     if selection is None:
         message = "no model could be chosen: no candidate can be fitted with a part of the path left out"
         yield diagnostic("choose", "arm", "warning", f"{message}; record more of the path, or more periods")
@@ -73,7 +80,7 @@ def logs_of(motions: Iterable[Motion], averages: Iterable[Average], robot: Robot
     logs: list[Observed] = []
     for log_records in records.values():
         ordered = sorted(log_records, key=lambda record: joints.index(record.joint))
-        logs.append(observed([r for r in ordered if len(r) == len(ordered[0])], periods, lowpass, len(logs)))
+        logs.append(observe([r for r in ordered if len(r) == len(ordered[0])], periods, lowpass, len(logs)))
     return logs
 
 
@@ -81,13 +88,13 @@ def modelled_logs(
     logs: Sequence[Observed], robot: Robot
 ) -> tuple[dict[str, tuple[Observed, ...]], tuple[Observed, ...]]:
     """The logs of each moving joint by itself, and those that hold all joints, where some move together."""
-    whole = tuple(log for log in logs if len(log.records) == len(robot.joints) and log.moving.any())
-    arm = whole if robot.chain is not None and any(log.moving.sum() > 1 for log in whole) else ()
+    whole = tuple(log for log in logs if len(log.records) == len(robot.joints) and log.is_moving.any())
+    arm = whole if robot.chain is not None and any(log.is_moving.sum() > 1 for log in whole) else ()
     separate: dict[str, list[Observed]] = defaultdict(list)
     for log in arm or logs:
         for i, record in enumerate(log.records):
             if not record.at_rest:
-                separate[record.joint].append(log.alone(i))
+                separate[record.joint].append(log.single_joint(i))
     order = [joint.name for joint in robot.joints if joint.name in separate]
     return {name: tuple(separate[name]) for name in order}, arm
 
@@ -145,14 +152,15 @@ def consistent_fits(
     name = f"{candidate.variant}.{candidate.estimator}"
     for (model, library, free), ridge in zip(estimates, candidate.ridges(), strict=True):
         cells = library.by_block.columns(library.columns(candidate.friction, reaches))
+        every_cell = cells.sum_cells(np.ones(len(cells.gram), np.bool_))
         try:
-            consistent = held(model, library, cells.of(np.ones(len(cells.gram), np.bool_)), ridge, free)
+            consistent = fit_consistent(model, library, every_cell, ridge, free)
         except NotIdentifiable as error:
             message = f"{model.group}: {candidate.variant}.consistent is left out: {error}"
             yield diagnostic("choose", model.group, "warning", message)
             continue
         yield fit_record(candidate, "consistent", model, library, consistent.estimate)
-        if consistent.excess > NOTHING:
+        if consistent.excess > NEGLIGIBLE_EXCESS:
             units = [robot.joint(effort).unit("{effort}") for effort in model.efforts]
             errors = zip(model.efforts, consistent.rmse, consistent.rmse_free, units, strict=True)
             costs = ", ".join(f"{rmse:.3g} instead of {before:.3g} {unit} of {j}" for j, rmse, before, unit in errors)
@@ -188,7 +196,7 @@ def apply(motion: Motion, fits: Iterable[Fit], robot: Robot, *, lowpass: float) 
     if motion.role not in MAPPED_ROLES or motion.at_rest:
         return
     identified = Identified(robot, fits)
-    for fit in identified.describing(motion.joint):
+    for fit in identified.fits_of(motion.joint):
         if fit.estimator in MAPPED_ESTIMATORS and fit.model.startswith("independent"):
             yield friction_map(motion, fit, identified, lowpass)
 
@@ -197,7 +205,7 @@ def friction_map(motion: Motion, fit: Fit, identified: Identified, lowpass: floa
     """tau - Phi_other theta_other, and Phi_friction theta_friction, as means over ranges of velocity."""
     Phi, valid = identified.model(fit).regressor(recorded_motion(motion))
     is_friction = np.array(["friction" in str(name) for name in fit.parameter])
-    tau, theta = smoothed(motion.tau, motion.segment, motion.rate, lowpass), fit.theta
+    tau, theta = lowpass_segments(motion.tau, motion.segment, motion.rate, lowpass), fit.theta
     measured = tau - Phi[:, 0] @ np.where(is_friction, 0.0, theta)
     modelled = Phi[:, 0] @ np.where(is_friction, theta, 0.0)
     means = over_velocity(motion.dq[valid], motion.ddq[valid], np.column_stack([measured, modelled])[valid])

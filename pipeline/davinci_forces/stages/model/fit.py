@@ -7,23 +7,23 @@ import numpy as np
 
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators import ESTIMATORS, estimator
-from davinci_forces.estimators.problem import NOTHING, Estimate, Known, Regression, Search
+from davinci_forces.estimators.problem import NO_PRIOR, Estimate, Prior, Regression, Search
 from davinci_forces.identification.identifiability import (
     advice,
+    describe_correlated,
     flat,
     hardly_described,
     inertia_at_fault,
-    listed,
+    join_names,
     moving_with,
     not_seen,
-    together,
 )
 from davinci_forces.identification.left_out import left_out
-from davinci_forces.identification.observations import observed, pose_samples
-from davinci_forces.identification.regression import joined, known_of, pose
+from davinci_forces.identification.observations import observe, pose_samples
+from davinci_forces.identification.regression import join_regressions, known_of, pose
 from davinci_forces.identification.scores import folds, refits
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.estimation.least_squares import told
+from davinci_forces.maths.estimation.least_squares import analyse_columns
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.periods.shift import SAME_PATH, most_different
 from davinci_forces.records import (
@@ -116,7 +116,7 @@ def fit_joint(
     Fit | CrossFit | FittedPaths | Guess | Identifiability | MeasurementNoise | Residual | SwarmSearch | Diagnostic
 ]:
     """Fit one joint by every estimator, with residuals, identifiability and noise; `others` move in its logs, too."""
-    regression = joined([part.regression for part in parts])
+    regression = join_regressions([part.regression for part in parts])
     estimates: dict[str, Estimate] = {}
     for name in ESTIMATORS:
         try:
@@ -151,9 +151,9 @@ def identifiability(
     plain = estimates.get("lse")
     if plain is None:
         return
-    excitation = told(regression.triangle)
+    excitation = analyse_columns(regression.triangle)
     names = [parameter.name for parameter in model.parameters]
-    pairs, insignificant = together(names, excitation), not_seen(regression, plain)
+    pairs, insignificant = describe_correlated(names, excitation), not_seen(regression, plain)
     yield Identifiability(
         group=model.group,
         model=model.name,
@@ -170,7 +170,7 @@ def identifiability(
         estimate = plain if "lse" in wrong else estimates[wrong[0]]
         verb = "estimates" if len(wrong) == 1 else "estimate"
         why = inertia_at_fault(robot, joint, estimate, excitation, others)
-        message = f"{model.group}: {listed(wrong)} {verb} an inertia that is not positive: {why}"
+        message = f"{model.group}: {join_names(wrong)} {verb} an inertia that is not positive: {why}"
         yield diagnostic("fit", model.group, "warning", message)
     if message := hardly_described(joint, r_squared(regression, plain), others):
         yield diagnostic("fit", model.group, "warning", f"{model.group}: {message}")
@@ -190,7 +190,7 @@ def cost_of_consistency(
             np.sqrt(np.mean((regression.tau - regression.Phi @ estimates[name].theta) ** 2))
             for name in ("consistent", "lse")
         )
-        message = f"{group}: lse estimates a negative {listed(wrong)}, which no mechanism has"
+        message = f"{group}: lse estimates a negative {join_names(wrong)}, which no mechanism has"
         cost = f"{rmse:.3g} {unit} root mean square instead of {before:.3g} {unit}"
         yield diagnostic("fit", group, "note", f"{message}; consistent has none, and leaves an effort of {cost}")
 
@@ -207,15 +207,15 @@ def r_squared(regression: Regression, estimate: Estimate) -> float:
     return float(1 - residual @ residual / (spread @ spread))
 
 
-def periodic_part(model: IndependentJoint, t: Trajectory, prior: Known = NOTHING) -> Part:
+def periodic_part(model: IndependentJoint, t: Trajectory, prior: Prior = NO_PRIOR) -> Part:
     """Regression over an averaged period; `prior` holds parameters from tables."""
     sigmas = (t.sigma_q, t.sigma_dq, t.sigma_tau)
     return Part(t.log, t.rate, t.periods, t.period, sigmas, t.t, t.q, t.dq, pose(model, [t], prior))
 
 
-def sampled_part(model: IndependentJoint, record: Motion, lowpass: float, prior: Known) -> Part:
+def sampled_part(model: IndependentJoint, record: Motion, lowpass: float, prior: Prior) -> Part:
     """Regression over samples of a motion that does not repeat, with motion and effort through one low-pass."""
-    regression, rows = pose_samples(model, observed([record], (), lowpass, 0), known=prior)
+    regression, rows = pose_samples(model, observe([record], (), lowpass, 0), known=prior)
     step = float(np.median(np.diff(rows))) if len(rows) > 1 else 1.0
     t, q, dq = (x[rows] for x in (record.t, record.q, record.dq))
     sigmas = (record.sigma_q, record.sigma_dq, record.sigma_tau)

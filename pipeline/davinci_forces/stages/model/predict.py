@@ -4,10 +4,10 @@ from collections.abc import Collection, Iterable, Iterator
 
 import numpy as np
 
-from davinci_forces.identification.joint_models import Along, at_samples, refits_of
-from davinci_forces.identification.scores import Judge
+from davinci_forces.identification.joint_models import LogModels, at_samples, refits_of
+from davinci_forces.identification.scores import Scorer
 from davinci_forces.identification.used import FALLBACK, Identified
-from davinci_forces.maths.signals.windows import outside
+from davinci_forces.maths.signals.windows import is_outside
 from davinci_forces.records import (
     Choice,
     Diagnostic,
@@ -37,33 +37,35 @@ def run(
     `choose` predict identification logs.
     """
     if entry.role in ("validation", "contact"):
-        along = Along(Identified(robot, fits), motions)
+        along = LogModels(Identified(robot, fits), motions)
         for motion in motions:
             if not motion.at_rest:
                 yield from predict_joint(motion, along, entry, lowpass)
 
 
-def predict_joint(motion: Motion, along: Along, entry: LogEntry, lowpass: float) -> Iterator[Prediction | Diagnostic]:
+def predict_joint(
+    motion: Motion, along: LogModels, entry: LogEntry, lowpass: float
+) -> Iterator[Prediction | Diagnostic]:
     """Predict the effort of a joint by its own fits and by the chosen one."""
-    name, free = f"{motion.log}/{motion.joint}", outside(motion.t, entry.contact)
+    name, free = f"{motion.log}/{motion.joint}", is_outside(motion.t, entry.contact)
     if not free.any():
         message = f"{name}: its contact windows cover the whole log, so no prediction can be scored"
         yield diagnostic("predict", f"{motion.log}.{motion.joint}", "warning", message)
         return
     identified = along.identified
     independent = [f for f in identified.fits if f.group == motion.joint and f.model == "independent"]
-    chosen = identified.used(motion.joint, CHOSEN)
-    if chosen is not None and not set(identified.model(chosen).joints) <= along.held(motion.joint):
+    chosen = identified.fit_of(motion.joint, CHOSEN)
+    if chosen is not None and not set(identified.model(chosen).joints) <= along.joints_on_clock(motion.joint):
         missing = f"{name}: the log does not hold the other joints that the chosen model needs"
         message = f"{missing}, so {FALLBACK} replaces it; add their channels"
         yield diagnostic("predict", f"{motion.log}.{motion.joint}", "note", message)
-        chosen = identified.used(motion.joint, FALLBACK)
+        chosen = identified.fit_of(motion.joint, FALLBACK)
     labelled = [(f.model, f.estimator, f) for f in independent]
     if chosen is not None:
         labelled.append((CHOSEN, f"{chosen.model}.{chosen.estimator}", chosen))
-    judge, path = Judge(motion, free, lowpass), identified.path(motion)
+    judge, path = Scorer(motion, free, lowpass), identified.path(motion)
     for model, estimator, fit in labelled:
-        yield judge.scored(model, estimator, entry.role, entry.role, path, along.tau_hat(fit, motion.joint))
+        yield judge.score(model, estimator, entry.role, entry.role, path, along.tau_hat(fit, motion.joint))
 
 
 def apply(
@@ -85,9 +87,9 @@ def apply(
     if entry.role == "friction":
         return
     identified, is_fitted = Identified(robot, fits), entry.role == "identification"
-    along = Along(identified, motions)
-    described = [joint for joint in along.joints if identified.describing(joint)]
-    used = {joint: identified.used_along(joint, fit, along.held(joint)) for joint in described}
+    along = LogModels(identified, motions)
+    described = [joint for joint in along.joints if identified.fits_of(joint)]
+    used = {joint: identified.fit_along(joint, fit, along.joints_on_clock(joint)) for joint in described}
     refits = (
         refits_of(predictions, {joint: joint_fit for joint, (joint_fit, _) in used.items()}, fit) if is_fitted else {}
     )
@@ -100,7 +102,7 @@ def apply(
         joint_fit, stand_in = used[motion.joint]
         if stand_in:
             yield diagnostic("predict", about, "note", f"{name}: {stand_in}")
-        terms = along.by(joint_fit, motion.joint)
+        terms = along.fields_of(joint_fit, motion.joint)
         if terms["inertia"].min() <= 0:
             yield diagnostic("predict", about, "warning", inertia_warning(motion, joint_fit))
             continue

@@ -6,11 +6,11 @@ import numpy as np
 
 from davinci_forces.errors import NotPeriodic
 from davinci_forces.maths.periods import averaging
-from davinci_forces.maths.periods.agreement import Difference, alike, alternation, stretch
+from davinci_forces.maths.periods.agreement import Difference, agreeing_stretch, alternation, stretch
 from davinci_forces.maths.periods.averaging import Folded, Phases, end, phases, whole_periods
 from davinci_forces.maths.periods.period import Period, refine, standard_error
 from davinci_forces.maths.periods.repetition import Repetition, repetition
-from davinci_forces.maths.signals.smoothing import noise_std, segments, share_passed, smoothed
+from davinci_forces.maths.signals.smoothing import lowpass_segments, noise_std, segments, share_passed
 from davinci_forces.records import Average, Counts, Diagnostic, PeriodResidual, Signal, diagnostic
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
@@ -50,7 +50,7 @@ def run(
     columns = [getattr(signal, symbol) for signal in moving for symbol in MEASURED]
     positions = [signal.q for signal in moving]
     t, rate = moving[0].t, moving[0].rate
-    core, length, odd = alike(t, positions, columns, span, length, rate, orders)
+    core, length, odd = agreeing_stretch(t, positions, columns, span, length, rate, orders)
     remarks += omissions(moving[0], span, core, length, [(names[d.signal], d) for d in odd])
     std = standard_error(t[core], [x[core] for x in positions], length, orders)
     period, period_remarks = reconcile_period(Period(length, std), entry)
@@ -143,9 +143,12 @@ def omissions(
     faults = [f"{' and '.join(sides)} do not, as in a stop, a ramp or another motion{gaps_at(first, span)}"]
     faults *= bool(sides)
     for name, d in odd:
-        if d.inside or t[core.start] - t[span.start] > MIN_REMARKED_LOSS * length or not sides:
+        at_end = not d.has_periods_on_both_sides
+        if not at_end or t[core.start] - t[span.start] > MIN_REMARKED_LOSS * length or not sides:
             differs = f"period {d.period + 1} of {d.periods} differs from the others by {d.rms:.3g} rms in {name}"
-            what = ", and is kept, because it is not at an end" if d.inside else ", as in a transient"
+            what = (
+                ", and is kept, because it is not at an end" if d.has_periods_on_both_sides else ", as in a transient"
+            )
             faults.append(f"{differs}, {d.ratio:.1f} times what noise explains{what}")
     keys = [f"skip = {np.floor(t[core.start] * 1e4 + 1e-3) / 1e4:.10g}"] * (core.start > 0)
     keys += [f"until = {np.ceil(t[core.stop - 1] * 1e4 - 1e-3) / 1e4:.10g}"] * (core.stop < len(t))
@@ -185,7 +188,7 @@ def average_joint(
     signal: Signal, used: slice, phased: Phases, period: Period, stated: float, lowpass: float
 ) -> Iterator[Average | PeriodResidual]:
     """Average one joint over its periods at each phase, from the first used sample on."""
-    size = float(np.sqrt(np.mean(smoothed(signal.tau, signal.segment, signal.rate, lowpass)[used] ** 2))) or 1.0
+    size = float(np.sqrt(np.mean(lowpass_segments(signal.tau, signal.segment, signal.rate, lowpass)[used] ** 2))) or 1.0
     tau = phased.fold(signal.tau[used])
     white = white_noise(tau, signal.segment[used], signal.rate, lowpass)
     q, dq = phased.fold(signal.q[used]), phased.fold(signal.dq[used])

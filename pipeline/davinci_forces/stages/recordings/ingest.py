@@ -7,7 +7,7 @@ from davinci_forces.logs.log import Log
 from davinci_forces.records import Diagnostic, LogSummary, Recording, Touch, diagnostic
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
-from davinci_forces.study.intake import Intake, mended
+from davinci_forces.study.intake import Intake, without_clock_jumps
 from davinci_forces.study.intake.summary import remarks, summary
 
 
@@ -21,7 +21,7 @@ def run(log: Log, entry: LogEntry, robot: Robot) -> Iterator[Recording | Touch |
         the study; if time does not increase; or if the clocks of channels do not go together.
     """
     intake = Intake(log, entry, robot)
-    for block in mended(intake, intake.blocks()):
+    for block in without_clock_jumps(intake, intake.blocks()):
         yield from intake.recordings(block)
         if intake.ended:
             break

@@ -9,16 +9,16 @@ from davinci_forces.errors import BadLog
 from davinci_forces.maths.arrays import Booleans
 from davinci_forces.maths.periods.harmonics import are_apart, even_step
 from davinci_forces.maths.signals.clock import GAP
-from davinci_forces.maths.signals.faults import saturated, stuck
+from davinci_forces.maths.signals.faults import count_saturated, find_stuck
 from davinci_forces.maths.signals.smoothing import (
+    lowpass_segments,
     measured_motion,
     noise_std,
     segments,
     share_passed,
-    smoothed,
     white_std,
 )
-from davinci_forces.maths.signals.standstill import standing
+from davinci_forces.maths.signals.standstill import is_standing_still
 from davinci_forces.maths.signals.windows import runs, unbroken
 from davinci_forces.records import Column, Diagnostic, Motion, Recording, Signal, diagnostic
 from davinci_forces.robots.robot import Joint
@@ -97,7 +97,7 @@ def moves(q: Column, joint: Joint) -> bool:
 
 def slow_velocity(q: Column, segment: Indices, rate: float, cutoff: float) -> Column:
     """Velocity (N,) of a low-passed position (N,), segment by segment."""
-    slow = smoothed(q, segment, rate, cutoff)
+    slow = lowpass_segments(q, segment, rate, cutoff)
     return np.concatenate([np.gradient(slow[part], 1.0 / rate) for part in segments(segment)])
 
 
@@ -107,7 +107,7 @@ def without_noise(signal: Signal, smooth: tuple[Column, Column, Column], lowpass
     passed, rate, segment = share_passed(signal.rate, lowpass), signal.rate, signal.segment
     sigma_q = white_std(signal.q - q, passed)
     logged = signal.velocity == "logged"
-    still = standing(q, dq, segment, rate, sigma_q * float(np.sqrt(passed)), round(rate / lowpass))
+    still = is_standing_still(q, dq, segment, rate, sigma_q * float(np.sqrt(passed)), round(rate / lowpass))
     return Motion(
         log=signal.log, joint=signal.joint, role=signal.role, rate=rate, velocity=signal.velocity,
         cutoff=lowpass, effort_lag=0.0, at_rest=signal.at_rest, sigma_q=sigma_q,
@@ -123,7 +123,7 @@ def velocity_faults(recording: Recording, q: Column, dq: Column, segment: Indice
     if recording.velocity == "derived":
         return []
     cutoff = min(VELOCITY_CUTOFF, 0.1 * rate)
-    expected, logged = slow_velocity(q, segment, rate, cutoff), smoothed(dq, segment, rate, cutoff)
+    expected, logged = slow_velocity(q, segment, rate, cutoff), lowpass_segments(dq, segment, rate, cutoff)
     slope = float(expected @ logged / (expected @ expected))
     if abs(slope - 1) < MAX_VELOCITY_ERROR:
         return []
@@ -136,12 +136,12 @@ def velocity_faults(recording: Recording, q: Column, dq: Column, segment: Indice
 def faults(recording: Recording, joint: Joint) -> Iterator[str]:
     """State where a sensor was stuck, a drive was at its limit, or a unit is not as stated."""
     name, far = f"{recording.log}/{recording.joint}", max(map(abs, joint.limits.q))
-    for stop in stuck(recording.t, recording.q):
+    for stop in find_stuck(recording.t, recording.q):
         yield (
             f"{name}: the position stands still from {stop.start:.3f} to {stop.end:.3f} s and then jumps by "
             f"{stop.jump:.3g}, as if its sensor was stuck; leave that out by `skip` and `until`, or record it again"
         )
-    if samples := saturated(recording.tau):
+    if samples := count_saturated(recording.tau):
         yield (
             f"{name}: the effort is exactly at its largest or smallest value in {samples} samples: the drive or its "
             "sensor was saturated, so the true effort may be larger than the log says; record with less effort"

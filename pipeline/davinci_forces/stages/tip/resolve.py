@@ -7,9 +7,9 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, Booleans, Integers, evenly
 from davinci_forces.maths.mechanics import tip_force
 from davinci_forces.maths.mechanics.chain import Chain
-from davinci_forces.maths.mechanics.kinematics import along, jacobian, tip
-from davinci_forces.maths.mechanics.tip_force import NEAR_SINGULAR, condition, matrix, shared
-from davinci_forces.maths.signals.windows import SETTLE, free_space
+from davinci_forces.maths.mechanics.kinematics import evaluate_in_blocks, jacobian, tip
+from davinci_forces.maths.mechanics.tip_force import NEAR_SINGULAR, condition, matrix, shared_correlations
+from davinci_forces.maths.signals.windows import TRANSIENT, free_space
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, FreeSpaceLevels, levels
 from davinci_forces.records import (
     ArmCorrelation,
@@ -96,7 +96,7 @@ def apply(
 
 def free_smoothed(track: Track, entry: LogEntry) -> Booleans:
     """Samples (N,) in free space for the smoother, which shows a contact before it begins."""
-    return free_space(track.t, [(start - SETTLE, end) for start, end in entry.contact], track.rate)
+    return free_space(track.t, [(start - TRANSIENT, end) for start, end in entry.contact], track.rate)
 
 
 def missing_joints(names: Sequence[str], tracks: dict[str, Track]) -> Iterator[str]:
@@ -112,7 +112,7 @@ def correlation(log: str, correlations: Iterable[ArmCorrelation]) -> tuple[Array
     """Correlation of the joints' errors (3,) in all other logs, and their names; 0 where they do not agree."""
     for arm in correlations:
         is_other = arm.source != log
-        rho = shared(np.column_stack([arm.rho_12, arm.rho_13, arm.rho_23])[is_other])
+        rho = shared_correlations(np.column_stack([arm.rho_12, arm.rho_13, arm.rho_23])[is_other])
         if rho.any():
             return rho, ", ".join(arm.source[is_other].tolist())
     return np.zeros(TIP_JOINTS), ""
@@ -121,10 +121,10 @@ def correlation(log: str, correlations: Iterable[ArmCorrelation]) -> tuple[Array
 def tip_force_of(tracks: Sequence[Track], chain: Chain, rho: Array, source: str, free: Booleans) -> TipForce:
     """The force at the tip in one log, by the smoother: different lags of the joints would turn its direction."""
     first, q = tracks[0], np.stack([track.q for track in tracks], axis=-1)
-    J = along(lambda block: jacobian(chain, block)[0], q)
+    J = evaluate_in_blocks(lambda block: jacobian(chain, block)[0], q)
     tau_ext, std = (np.stack([getattr(t, name) for t in tracks], axis=-1) for name in ("tau_ext_smooth", "tau_ext_std"))
     f, C = tip_force.from_efforts(J, tau_ext, tip_force.covariance(std, matrix(*rho.tolist())))
-    blur, (x, y, z) = condition(J), along(lambda block: tip(chain, block), q).T
+    blur, (x, y, z) = condition(J), evaluate_in_blocks(lambda block: tip(chain, block), q).T
     near = blur > NEAR_SINGULAR
     tested = free & ~near
     space = levels_of(f[tested], C[tested]) if int(tested.sum()) >= MIN_SAMPLES_FREE_SPACE else UNKNOWN

@@ -6,8 +6,8 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans
-from davinci_forces.maths.contact.force_sensor import at, errors, lag
-from davinci_forces.maths.signals.windows import settled
+from davinci_forces.maths.contact.force_sensor import errors, interpolate_sensor, lag
+from davinci_forces.maths.signals.windows import is_past_transient
 from davinci_forces.records import Diagnostic, SensorForce, TipForce, Touch, Track, diagnostic
 from davinci_forces.robots.robot import Kind, Robot
 from davinci_forces.study import LogEntry
@@ -65,13 +65,13 @@ def comparisons(
         yield "vector", vector, sensor
         return
     slide = prismatic_track(tracks, robot)
-    if slide is not None and int(settled(slide.t).sum()) >= MIN_SAMPLES_ERROR:
+    if slide is not None and int(is_past_transient(slide.t).sum()) >= MIN_SAMPLES_ERROR:
         f, C = slide.tau_ext_smooth[:, None], (slide.tau_ext_std**2)[:, None, None]
         measured = sensor if sensor.shape[1] == 1 else np.linalg.norm(sensor, axis=1)[:, None]
-        resampled = at(slide.t, clock, measured, 3.0 / slide.rate)[:, 0]
+        resampled = interpolate_sensor(slide.t, clock, measured, 3.0 / slide.rate)[:, 0]
         finite = np.isfinite(resampled)
         sign = -1.0 if finite.any() and np.cov(resampled[finite], f[finite, 0])[0, 1] < 0.0 else 1.0
-        yield slide.joint, EstimatedForce(slide.t, f, C, settled(slide.t)), sign * measured
+        yield slide.joint, EstimatedForce(slide.t, f, C, is_past_transient(slide.t)), sign * measured
 
 
 def estimate_at_tip(force: TipForce) -> EstimatedForce:
@@ -80,7 +80,9 @@ def estimate_at_tip(force: TipForce) -> EstimatedForce:
     C = np.stack([
         [force.c_xx, force.c_xy, force.c_xz], [force.c_xy, force.c_yy, force.c_yz], [force.c_xz, force.c_yz, force.c_zz]
     ]).transpose(2, 0, 1)  # fmt: skip
-    return EstimatedForce(force.t, f, C, settled(force.t) & (force.near_singular == 0) & np.isfinite(f).all(1))
+    return EstimatedForce(
+        force.t, f, C, is_past_transient(force.t) & (force.near_singular == 0) & np.isfinite(f).all(1)
+    )
 
 
 def size(force: EstimatedForce) -> EstimatedForce:
@@ -103,7 +105,7 @@ def sensor_force(
 ) -> Iterator[SensorForce]:
     """The error of an estimate, if enough samples of it and of the sensor are known."""
     rate = 1.0 / float(np.median(np.diff(estimate.t)))
-    measured = at(estimate.t, clock, sensor, 3.0 / rate)
+    measured = interpolate_sensor(estimate.t, clock, sensor, 3.0 / rate)
     tested = estimate.tested & np.isfinite(measured).all(1)
     if int(tested.sum()) < MIN_SAMPLES_ERROR:
         return

@@ -6,9 +6,9 @@ import numpy as np
 
 from davinci_forces.haptics import loop as haptic
 from davinci_forces.haptics.maths import bimodal
-from davinci_forces.haptics.maths.bimodal import THESIS, Hand, cqlf_limit, energy, switching_limit
+from davinci_forces.haptics.maths.bimodal import THESIS_HAND, Hand, cqlf_limit, energy, switching_limit
 from davinci_forces.haptics.maths.delay import damping_needed, delay_limit, sampled_limit
-from davinci_forces.haptics.maths.motion import Law, at_contact, switched, worst
+from davinci_forces.haptics.maths.motion import Law, at_contact, simulate_switching, worst
 from davinci_forces.haptics.scenario import SLIDE, SLIDE_NOISE, AxisNoise, Body
 from davinci_forces.identification.used import FALLBACK, Identified
 from davinci_forces.maths.models.bias import COULOMB, VISCOUS
@@ -55,44 +55,46 @@ def run(
 def stability_map(robot: Robot) -> StabilityMap:
     """Whether a solver found a common quadratic Lyapunov function, by stiffness of hand and tissue.  (8.10), Fig 8.9"""
     k_h, k_t = np.repeat(bimodal.K_H, len(bimodal.K_T)), np.tile(bimodal.K_T, len(bimodal.K_H))
-    proved = np.arange(len(bimodal.K_T)) < np.array(bimodal.PROVED)[:, None]
-    return StabilityMap(robot.name, THESIS.m, THESIS.b, k_h, k_t, proved.ravel().astype(int))
+    proved = np.arange(len(bimodal.K_T)) < np.array(bimodal.CQLF_COUNTS)[:, None]
+    return StabilityMap(robot.name, THESIS_HAND.m, THESIS_HAND.b, k_h, k_t, proved.ravel().astype(int))
 
 
 def stability_limit(robot: Robot) -> StabilityLimit:
     """The exact limits of the same plane, with a Lyapunov function and under arbitrary switching."""
-    k_h = np.geomspace(bimodal.SOFTEST, bimodal.STIFFEST, 101)
-    hands = [THESIS._replace(k=k) for k in k_h.tolist()]
+    k_h = np.geomspace(bimodal.MIN_HAND_STIFFNESS, bimodal.MAX_HAND_STIFFNESS, 101)
+    hands = [THESIS_HAND._replace(k=k) for k in k_h.tolist()]
     proved, switching = (np.array([limit(hand) for hand in hands]) for limit in (cqlf_limit, switching_limit))
-    return StabilityLimit(robot.name, THESIS.m, THESIS.b, k_h, proved, switching)
+    return StabilityLimit(robot.name, THESIS_HAND.m, THESIS_HAND.b, k_h, proved, switching)
 
 
 def delay_limits(robot: Robot) -> DelayLimit:
     """The limit over the delay, for a continuous force and for one that the link holds between samples."""
-    continuous = np.array([delay_limit(THESIS, delay) for delay in bimodal.DELAYS.tolist()])
+    continuous = np.array([delay_limit(THESIS_HAND, delay) for delay in bimodal.DELAYS.tolist()])
     leaving = np.full(len(bimodal.DELAYS), np.nan)
-    leaving[bimodal.SIMULATED] = bimodal.LEAVING
+    leaving[bimodal.SIMULATED_DELAYS] = bimodal.LEAVING_LIMITS
     return DelayLimit(
         robot=robot.name,
-        hand_mass=THESIS.m,
-        hand_damping=THESIS.b,
-        hand_stiffness=THESIS.k,
+        hand_mass=THESIS_HAND.m,
+        hand_damping=THESIS_HAND.b,
+        hand_stiffness=THESIS_HAND.k,
         link_rate=bimodal.LINK_RATE,
-        k_t_cqlf=cqlf_limit(THESIS),
-        k_t_switching=switching_limit(THESIS),
+        k_t_cqlf=cqlf_limit(THESIS_HAND),
+        k_t_switching=switching_limit(THESIS_HAND),
         delay=bimodal.DELAYS,
         k_t_delay=continuous,
-        k_t_held=np.array(bimodal.HELD),
+        k_t_held=np.array(bimodal.SAMPLED_LIMITS),
         k_t_leaving=leaving,
     )
 
 
 def unstable_motion(robot: Robot, law: Law) -> HapticMotion:
     """The motion of a released hand beside the tissue, with the worst or the actual switching.  Fig 8.8, 8.10"""
-    k_t = UNSTABLE_STIFFNESS * switching_limit(THESIS)
-    motion = switched(THESIS, k_t, (-0.01, 0.0), MOTION_CYCLES * 2.0 * np.pi / THESIS.frequency, law)
+    k_t = UNSTABLE_STIFFNESS * switching_limit(THESIS_HAND)
+    motion = simulate_switching(
+        THESIS_HAND, k_t, (-0.01, 0.0), MOTION_CYCLES * 2.0 * np.pi / THESIS_HAND.frequency, law
+    )
     name = law.__name__.replace("_", " ")
-    return HapticMotion(robot.name, name, k_t, *motion, energy(THESIS, k_t, motion.x, motion.dx))
+    return HapticMotion(robot.name, name, k_t, *motion, energy(THESIS_HAND, k_t, motion.x, motion.dx))
 
 
 def slowest_filter(comparisons: list[Comparison], robot: Robot) -> tuple[str, float]:
@@ -105,7 +107,7 @@ def slowest_filter(comparisons: list[Comparison], robot: Robot) -> tuple[str, fl
 
 def tissue_limit(tissue: Stiffness, joint: str, lag: float) -> TissueLimit:
     """What a tissue requires of the hand: stiffness for a Lyapunov function, damping for the lag and the link."""
-    m, b, k_t = THESIS.m, THESIS.b, tissue.stiffness
+    m, b, k_t = THESIS_HAND.m, THESIS_HAND.b, tissue.stiffness
     needed = m * (max(k_t - b**2 / m, 0.0) / (2.0 * b)) ** 2
     has_lag = lag > 0.0
     total = lag + 0.5 / bimodal.LINK_RATE  # a held force is half a sample later
@@ -115,8 +117,8 @@ def tissue_limit(tissue: Stiffness, joint: str, lag: float) -> TissueLimit:
         k_h_needed=needed,
         lag_of=joint,
         force_lag=lag,
-        k_t_lag=sampled_limit(THESIS, lag, bimodal.LINK_RATE) if has_lag else float("nan"),
-        damping_needed=damping_needed(THESIS, k_t, total) if has_lag else float("nan"),
+        k_t_lag=sampled_limit(THESIS_HAND, lag, bimodal.LINK_RATE) if has_lag else float("nan"),
+        damping_needed=damping_needed(THESIS_HAND, k_t, total) if has_lag else float("nan"),
     )
 
 
@@ -137,7 +139,9 @@ def gather(
     body, arm_from = moving_body(robot, fits, joint)
     joint_noises = (AxisNoise(n.r_q, n.r_dq, n.r_tau) for n in noises if joint and n.joint == joint.name)
     noise = next(joint_noises, SLIDE_NOISE)
-    scenario = haptic.filled(haptics, body, noise, float(np.median(tissues)), q_tau or (joint.q_tau if joint else 0.0))
+    scenario = haptic.complete_scenario(
+        haptics, body, noise, float(np.median(tissues)), q_tau or (joint.q_tau if joint else 0.0)
+    )
     answer = haptic.response(scenario)
     yield haptic_response(robot, FROM_FILE if haptics.body else arm_from, scenario, answer)
     for name, hand in scenario.hands:
@@ -147,7 +151,7 @@ def gather(
 def moving_body(robot: Robot, fits: Iterable[Fit], joint: Joint | None) -> tuple[Body, str]:
     """The body that a prismatic joint moves, by the joint's fit, and its name; without a fit, that of the thesis."""
     identified = Identified(robot, fits)
-    fit = identified.used(joint.name, FALLBACK) if joint else None
+    fit = identified.fit_of(joint.name, FALLBACK) if joint else None
     if fit is None or joint is None:
         return SLIDE, FROM_THESIS
     still = np.zeros((1, 1))

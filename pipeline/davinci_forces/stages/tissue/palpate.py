@@ -8,11 +8,19 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals.smoothing import lowpass as lowpass_of
 from davinci_forces.maths.signals.windows import unbroken
 from davinci_forces.maths.tissue.indentation import median_std
-from davinci_forces.maths.tissue.palpation import Probing, Pushed, known, palpated, remarks
-from davinci_forces.maths.tissue.tissue import LAWS, FittedLaw, chosen, force_of, judged, moments, tangent
+from davinci_forces.maths.tissue.palpation import PalpatedPush, Probing, evaluate_pushes, known_samples, remarks
+from davinci_forces.maths.tissue.tissue import (
+    LAWS,
+    FittedLaw,
+    cross_validate_law,
+    force_of,
+    moments,
+    preferred_law,
+    tangent,
+)
 from davinci_forces.records import Column, Diagnostic, Push, Stiffness, TissueModel, Touch, Track, diagnostic
 from davinci_forces.robots.robot import Kind, Robot
-from davinci_forces.study import WHOLE, LogEntry
+from davinci_forces.study import WHOLE_LOG, LogEntry
 
 MIN_R2 = 0.9  # of a straight line, for a push that counts
 MIN_SAMPLES_PUSH = 8  # that a log needs, and a push by which models are compared
@@ -37,8 +45,8 @@ def run(
         advice = "state their channels, or add an identification log of the prismatic joint"
         yield diagnostic("palpate", entry.name, "warning", f"{entry.name}: {message}; {advice}")
         return
-    whole, windows = entry.contact == WHOLE, () if entry.contact == WHOLE else entry.contact
-    pushes = palpated(data, windows, whole, rate_of(data.t), lowpass)
+    whole, windows = entry.contact == WHOLE_LOG, () if entry.contact == WHOLE_LOG else entry.contact
+    pushes = evaluate_pushes(data, windows, whole, rate_of(data.t), lowpass)
     touched = [push for push in pushes if push.line is not None]
     texts = [f"{entry.name}: {remark}" for remark in remarks(pushes)]
     if texts:
@@ -73,7 +81,7 @@ def palpation_data(touch: Touch | None, slide: Track | None, cutoff: float) -> P
         depth = depth_of(touch, slide, touch.t)
         if depth is None:
             return None
-        return known(Probing(touch.t, touch.push, depth, force, place_of(touch), zeros + np.nan, zeros))
+        return known_samples(Probing(touch.t, touch.push, depth, force, place_of(touch), zeros + np.nan, zeros))
     if slide is None:
         return None
     direct, dq = np.zeros(len(slide)), np.zeros(len(slide))
@@ -86,7 +94,7 @@ def palpation_data(touch: Touch | None, slide: Track | None, cutoff: float) -> P
     if touch is not None:
         nearest = np.clip(np.searchsorted(touch.t, slide.t), 0, len(touch) - 1)
         push, place = touch.push[nearest], place_of(touch)[nearest]
-    return known(Probing(slide.t, push, depth, direct[:, None], place, dq, model_std(slide)))
+    return known_samples(Probing(slide.t, push, depth, direct[:, None], place, dq, model_std(slide)))
 
 
 def model_std(slide: Track) -> Column:
@@ -115,24 +123,24 @@ def rate_of(t: Column) -> float:
     return 1.0 / float(np.median(np.diff(t))) if np.isfinite(t).all() else 0.0
 
 
-def choose_law(pushes: Sequence[Pushed], *, clocked: bool) -> tuple[list[FittedLaw], FittedLaw | None, str]:
+def choose_law(pushes: Sequence[PalpatedPush], *, clocked: bool) -> tuple[list[FittedLaw], FittedLaw | None, str]:
     """Score every model of the tissue on pushes that it has not seen, and choose one; of at least two pushes."""
     long = [push for push in pushes if push.contact.inside.sum() >= MIN_SAMPLES_PUSH]
     if len(long) < 2:
         return [], None, ""
     inside = [push.contact.inside for push in long]
-    sums = moments([(p.below[i], p.rate[i], p.force[i]) for p, i in zip(long, inside, strict=True)])
-    models = [judged(sums, law) for law in LAWS if clocked or not law.damped]
-    return models, *chosen(models)
+    sums = moments([(p.depth_in_contact[i], p.rate[i], p.force[i]) for p, i in zip(long, inside, strict=True)])
+    models = [cross_validate_law(sums, law) for law in LAWS if clocked or not law.has_damping]
+    return models, *preferred_law(models)
 
 
-def record_of(push: Pushed, log: str, best: FittedLaw | None) -> Push:
+def record_of(push: PalpatedPush, log: str, best: FittedLaw | None) -> Push:
     """One push, with the force of the chosen model, or of the straight line where none was chosen."""
     inside, line = push.contact.inside, push.line
     assert line is not None
     fitted = line.c + line.k * push.depth
     if best is not None:
-        fitted = force_of(best, push.below, push.rate)
+        fitted = force_of(best, push.depth_in_contact, push.rate)
         fitted = fitted + float(np.mean((push.force - fitted)[inside]))
     return Push(
         log=log,
@@ -158,7 +166,7 @@ def record_of(push: Pushed, log: str, best: FittedLaw | None) -> Push:
     )
 
 
-def stiffness_of(pushes: Sequence[Pushed], log: str, source: str, swings: int) -> Stiffness:
+def stiffness_of(pushes: Sequence[PalpatedPush], log: str, source: str, swings: int) -> Stiffness:
     """The stiffness of a log: the median slope of the pushes whose force is a straight line."""
     lines = [push.line for push in pushes if push.line is not None]
     k, k_std, r2 = (np.array([getattr(line, name) for line in lines]) for name in ("k", "k_std", "r2"))
@@ -167,7 +175,7 @@ def stiffness_of(pushes: Sequence[Pushed], log: str, source: str, swings: int) -
     common = float(np.median(model[counts])) if counts.any() else float("nan")
     low, middle, high = np.quantile(k[counts], [0.25, 0.5, 0.75]) if counts.any() else [float("nan")] * 3
     std = median_std(k[counts], k_std[counts], common) if counts.any() else float("nan")
-    lost = np.array([push.lost for push in pushes])
+    lost = np.array([push.dissipated_energy for push in pushes])
     return Stiffness(
         log=log,
         source=source,
@@ -194,9 +202,11 @@ def stiffness_of(pushes: Sequence[Pushed], log: str, source: str, swings: int) -
     )
 
 
-def model_of(models: Sequence[FittedLaw], best: FittedLaw, why: str, pushes: Sequence[Pushed], log: str) -> TissueModel:
+def model_of(
+    models: Sequence[FittedLaw], best: FittedLaw, why: str, pushes: Sequence[PalpatedPush], log: str
+) -> TissueModel:
     """Stiffness and damping of each model of the tissue at half the median depth of the pushes."""
-    middle = float(np.median([push.below[push.contact.inside].max() for push in pushes])) / 2
+    middle = float(np.median([push.depth_in_contact[push.contact.inside].max() for push in pushes])) / 2
     stiff, damping = np.array([tangent(model, middle) for model in models]).T
     return TissueModel(
         log=log,

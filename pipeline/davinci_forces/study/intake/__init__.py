@@ -13,7 +13,7 @@ from davinci_forces.maths.signals.clock import ClockStatistics
 from davinci_forces.maths.units import SI, UNITS, canonical, measures, size
 from davinci_forces.records import Column, Counts, Recording, Touch
 from davinci_forces.robots.robot import Joint, Robot
-from davinci_forces.study import WHOLE, LogEntry, Source
+from davinci_forces.study import WHOLE_LOG, LogEntry, Source
 from davinci_forces.study.intake.clocks import ALIGNED, UsedClocks
 
 # Channels of the log by the columns of a Touch; those of joints become recordings.
@@ -88,7 +88,7 @@ class Intake:
                 f"{self.log.path}: the log has no clock; name its time channel in [log.channels], "
                 "or give rate = ... [Hz]"
             )
-        if not self.has_clock and (self.entry.skip or self.entry.until or self.entry.contact not in ((), WHOLE)):
+        if not self.has_clock and (self.entry.skip or self.entry.until or self.entry.contact not in ((), WHOLE_LOG)):
             raise BadLog(
                 f"{self.log.path}: the log has no clock, but skip, until and contact windows are in seconds; give "
                 'rate = ... [Hz], or leave them out; contact = "all" needs no clock'
@@ -236,7 +236,7 @@ class Intake:
             )
 
 
-def mended(intake: Intake, blocks: Iterator[Block]) -> Iterator[Block]:
+def without_clock_jumps(intake: Intake, blocks: Iterator[Block]) -> Iterator[Block]:
     """Remove jumps of the clock from its channel, where the motion shows that no time passed.
 
     Only for identification logs: others lose nothing by a gap, and their contact windows are times of their clock.

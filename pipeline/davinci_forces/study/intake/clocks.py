@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.joined import Alignment, Follower, Timed, aligned
-from davinci_forces.logs.log import COUNTED, Block, Log
+from davinci_forces.logs.joined import Alignment, Follower, TimedBlock, align
+from davinci_forces.logs.log import UNIT_OF_COUNTS, Block, Log
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals.clock import GAP
 from davinci_forces.study import LogEntry, Source
@@ -71,7 +71,7 @@ class UsedClocks:
 
     def _is_known(self, group: ClockGroup) -> bool:
         log_time = next(iter(self.log.by_clock(group.names)))
-        if group.time and not group.is_stated and self.log.find(group.time).unit == COUNTED:
+        if group.time and not group.is_stated and self.log.find(group.time).unit == UNIT_OF_COUNTS:
             return False
         return bool(group.time or self.entry.rate or (self.log.clock and not log_time))
 
@@ -101,16 +101,16 @@ class UsedClocks:
                 f"{self.log.path}: channel {without.names[0]!r} has no clock, but other channels that are used have "
                 "clocks; name its time in [log.channels], give rate = ... [Hz] for all channels, or leave it out"
             )
-        logs = [self.log.apart() for _ in self.groups]
+        logs = [self.log.independent_copy() for _ in self.groups]
         first, *others = (self._timed(log, group) for log, group in zip(logs, self.groups, strict=True))
         followers = {_listed(group.names): follower for group, follower in zip(self.groups[1:], others, strict=True)}
         try:
-            for t, block in aligned(first, followers, self.done, lambda why: BadLog(f"{self.log.path}: {why}")):
+            for t, block in align(first, followers, self.done, lambda why: BadLog(f"{self.log.path}: {why}")):
                 yield block | {ALIGNED: t}
         finally:
             self._noticed(logs)
 
-    def _timed(self, log: Log, group: ClockGroup) -> Iterator[Timed]:
+    def _timed(self, log: Log, group: ClockGroup) -> Iterator[TimedBlock]:
         rows = 0
         for block in log.blocks(list(dict.fromkeys((*group.names, *([group.time] if group.time else []))))):
             count = len(next(iter(block.values())))
@@ -144,7 +144,7 @@ class UsedClocks:
     def note(self) -> Iterator[str]:
         """Notes on how channels were resampled on one clock."""
         done, name = self.done, self.entry.name
-        if not done.changed:
+        if not done.clocks_differ:
             return
         how = "; ".join(_how(follower_name, follower) for follower_name, follower in done.others.items())
         yield (

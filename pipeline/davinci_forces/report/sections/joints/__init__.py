@@ -60,7 +60,7 @@ def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
     yield Equation(f"tau = {terms}", f"effort is the sum of {', '.join(first.parameter)}, each times its parameter")
     yield parameters(context, first)
     yield from unidentified_parameters(context, first.group)
-    residuals = context.catalogue.about(Residual, joint=first.group, model=first.model, estimator=first.estimator)
+    residuals = context.catalogue.select(Residual, joint=first.group, model=first.model, estimator=first.estimator)
     for i, residual in enumerate(residuals):
         shown = tuple(residual_blocks(context, residual))
         if i == 0:
@@ -144,14 +144,14 @@ def comparison(context: Context, fits: list[Fit]) -> Block:
 
 def unidentified_parameters(context: Context, joint: str) -> Iterator[Verdict]:
     """Parameters that the identification logs of a joint do not determine."""
-    for record in context.catalogue.about(Identifiability, group=joint):
+    for record in context.catalogue.select(Identifiability, group=joint):
         if text := "; ".join(literal(text) for text in (*record.together, *record.not_seen)):
             yield Verdict("info", f"{text[:1].upper()}{text[1:]}. {record.advice}.")
 
 
 def correlations(context: Context, joint: str) -> Iterator[Block]:
     """The correlation matrix of a joint's parameters, and the condition number of their regressor."""
-    for record in context.catalogue.about(Identifiability, group=joint):
+    for record in context.catalogue.select(Identifiability, group=joint):
         names = tuple(dict.fromkeys(map(str, record.parameter)))
         number = context.number(f"identifiability.{'.'.join(record.key)}.condition", 3)
         yield Prose(

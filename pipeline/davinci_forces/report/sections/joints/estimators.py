@@ -29,7 +29,7 @@ WALLS: dict[str, Colour] = {"reflecting": "green", "clipping": "vermillion"}
 
 def estimators(context: Context, fit: Fit) -> Iterator[Figure]:
     """The efforts of several estimators over the averaged effort of a joint's first log; those alike are named."""
-    all_residuals = context.catalogue.about(Residual, joint=fit.group, model=fit.model, log=fit.logs[0])
+    all_residuals = context.catalogue.select(Residual, joint=fit.group, model=fit.model, log=fit.logs[0])
     residuals = {residual.estimator: residual for residual in all_residuals if residual.estimator in LOOKS}
     if "lse" not in residuals or len(residuals) < 2:
         return
@@ -79,7 +79,7 @@ def alike(names: list[str]) -> str:
 
 def convergence(context: Context, joint: str) -> Iterator[Figure]:
     """The least squared error that swarms knew, over iterations.  Fig 6.14"""
-    searches = context.catalogue.about(SwarmSearch, group=joint)
+    searches = context.catalogue.select(SwarmSearch, group=joint)
     if not searches:
         return
     ends = " and ".join(f"with {s.walls} walls it {excess_in_words(s.excess)}" for s in searches)
@@ -153,7 +153,7 @@ def table(context: Context, fit: Fit, printed: Printed) -> Table:
 def left_out(context: Context, joint: str) -> Iterator[Block]:
     """Every fit of a joint by the measure that all of them have, and the chosen one by that which it was chosen by."""
     predictions = [
-        p for p in context.catalogue.about(Prediction, joint=joint, role="identification") if p.model != CHOSEN
+        p for p in context.catalogue.select(Prediction, joint=joint, role="identification") if p.model != CHOSEN
     ]
     if not predictions:
         return
@@ -171,7 +171,7 @@ def left_out(context: Context, joint: str) -> Iterator[Block]:
 def left_out_row(context: Context, joint: str, of_fit: list[Prediction]) -> tuple[Cell, ...]:
     """One fit, by its worst log, and the same of the chosen one by blocks of path."""
     worst = max(of_fit, key=lambda p: p.relative_error)
-    chosen = context.catalogue.about(Prediction, joint=joint, role="identification", model=CHOSEN)
+    chosen = context.catalogue.select(Prediction, joint=joint, role="identification", model=CHOSEN)
     by_blocks = [p for p in chosen if p.estimator == f"{worst.model}.{worst.estimator}"]
     blocks: Cell = "–"
     if by_blocks:
@@ -183,7 +183,7 @@ def left_out_row(context: Context, joint: str, of_fit: list[Prediction]) -> tupl
 
 def noise_share(context: Context, joint: str) -> str:
     """What of either error is noise, where periods tell."""
-    logs = [average.log for average in context.catalogue.about(Average, joint=joint)]
+    logs = [average.log for average in context.catalogue.select(Average, joint=joint)]
     if not logs:
         return ""
     worst = max(logs, key=lambda log: context.results[f"noise.{log}.{joint}.relative_noise"].value)

@@ -15,7 +15,7 @@ BRANCHES: tuple[tuple[int, str, Colour], ...] = ((1, "gaining speed", "blue"), (
 
 def friction_maps(context: Context, joint: str) -> Iterator[Figure]:
     """The effort minus a fit's other terms, over velocity, one panel a log and model."""
-    maps = [m for m in context.catalogue.about(FrictionMap, joint=joint) if len(m)]
+    maps = [m for m in context.catalogue.select(FrictionMap, joint=joint) if len(m)]
     if not maps:
         return
     shown = sorted(maps, key=lambda m: (m.role != "friction", m.model))[:MAX_PANELS]

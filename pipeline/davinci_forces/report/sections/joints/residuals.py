@@ -31,7 +31,7 @@ def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
         columns=2,
         height=42,
     )  # fmt: skip
-    moved = context.catalogue.about(Trajectory, log=residual.log, joint=residual.joint)
+    moved = context.catalogue.select(Trajectory, log=residual.log, joint=residual.joint)
     q = moved[0].q if moved and len(moved[0].q) == len(errors) else None
     against = [motion_panel(residual, errors, residual.dq, label(residual, "dq", "velocity"), by_direction=True)]
     if q is not None:
@@ -69,7 +69,7 @@ def direction_means(dq: Column, errors: Column) -> Iterator[Line]:
 def own_correlations(context: Context, residual: Residual, errors: Column, q: Column | None) -> Iterator[Panel]:
     """The residual's correlation with itself and with the motion."""
     signal = f"tau.{residual.model}.{residual.estimator}"
-    for w in context.catalogue.about(Whiteness, log=residual.log, joint=residual.joint, signal=signal):
+    for w in context.catalogue.select(Whiteness, log=residual.log, joint=residual.joint, signal=signal):
         yield autocorrelation(w, "Autocorrelation")
     lags = np.arange(-min(LAGS, len(errors) // 4), min(LAGS, len(errors) // 4) + 1)
     shown = lags.astype(np.float64)
