@@ -17,8 +17,10 @@ from davinci_forces.report.content import (
     Figure3D,
     Listing,
     Number,
+    Prose,
     Section,
     Table,
+    Verdict,
     name_of,
     walk,
 )
@@ -28,6 +30,7 @@ from davinci_forces.report.results import Results, collect
 from davinci_forces.report.sections import DOCUMENTS, SECTIONS
 from davinci_forces.study.review import Rating
 from tests.contracts.conftest import Lab
+from tests.test_words import LONG_SENTENCE, MEDIAN_SENTENCE, median_and_90th_percentile
 
 SECTION = pytest.mark.parametrize("name", SECTIONS)
 PROVENANCE = Provenance("lab", "1", {"numpy": "2"}, {"raw/arm/roll.csv": "0" * 64}, {}, {"fit": "no joint moves"})
@@ -126,6 +129,18 @@ def test_nothing_but_the_references_names_the_thesis_in_a_user_s_study(name: str
     shown = [block for block in walk(section) if not isinstance(block, Listing | Bullets | Section)]
     assert not full.compares_with_thesis
     assert not re.search(r"457\.24|(?<![.-])\bthesis\b(?!\.)|Fig 8\.9", " ".join(map(repr, shown)))
+
+
+def test_sentences_of_a_report_are_short(full: Context):
+    texts = []
+    for _, names in DOCUMENTS.values():
+        for block in [block for name in names if (section := written(name, full)) for block in walk(section)]:
+            texts += [block.text] if isinstance(block, Prose | Verdict) else []
+            texts += block.items if isinstance(block, Bullets) else []
+            texts += [block.caption] if isinstance(block, Figure | Figure3D | Table) else []
+    middle, long = median_and_90th_percentile("\n\n".join(texts))
+    assert middle <= MEDIAN_SENTENCE
+    assert long <= LONG_SENTENCE
 
 
 def test_methods_tell_of_the_stages_that_ran_and_of_no_other(lab: Lab, catalogue: Catalogue):

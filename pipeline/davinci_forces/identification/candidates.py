@@ -42,8 +42,12 @@ class Library(NamedTuple):
         indices = []
         for i, parameter in enumerate(self.model.parameters):
             effort, term = added.get(parameter.name, ("", None))
-            wanted = {(t.width, t.faded, t.displacement) for t in friction.terms(reaches[effort])} if term else set()
-            if term is None or (term.width, term.faded, term.displacement) in wanted:
+            wanted = (
+                {(t.width, t.decay_velocity, t.displacement) for t in friction.terms(reaches[effort])}
+                if term
+                else set()
+            )
+            if term is None or (term.width, term.decay_velocity, term.displacement) in wanted:
                 indices.append(i)
         return indices
 
@@ -195,7 +199,7 @@ def library(
 
 def every_term(reach: Reach) -> tuple[Term, ...]:
     """Return all friction that may be added to a joint, each term once."""
-    terms = {(t.width, t.faded, t.displacement): t for friction in frictions() for t in friction.terms(reach)}
+    terms = {(t.width, t.decay_velocity, t.displacement): t for friction in frictions() for t in friction.terms(reach)}
     slow = sorted(t.displacement for t in terms.values() if t.displacement)
     others = (t for t in terms.values() if not t.displacement)
     return (*others, *(presliding_friction(x, number) for number, x in enumerate(slow, start=1)))

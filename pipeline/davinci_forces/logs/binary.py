@@ -98,8 +98,8 @@ Pieces = list[tuple[int, int]]
 def _pieces(path: Path, dtype: np.dtype[np.generic], columns: int) -> tuple[Pieces, str, int]:
     """Find the position and count of rows; the layout in words; and the bytes of an incomplete last row.
 
-    LabVIEW puts the sizes of an array before it by default.  They are taken for sizes if they lead from array to array
-    to the end of the file, or if there are two of them before floating-point numbers: as numbers they would be 1e-300.
+    LabVIEW puts the sizes of an array before it by default.  Numbers are sizes if they lead from array to array to
+    the end of the file.  Two of them before floating-point numbers are sizes, too: as numbers they would be 1e-300.
     """
     size, row = path.stat().st_size, columns * dtype.itemsize
     with open_file(path) as file:

@@ -141,8 +141,8 @@ def penalty(G: Array, combination: Array) -> Array:
 def path_blocks(t: Array, period: float, moving: Booleans | None = None) -> Integers:
     """The block of the path, 0 to 5, of each sample (N,) at times `t` [s]: a sixth of its period or of the recording.
 
-    A `period` of 0 [s] stands for a recording that does not repeat: its blocks are sixths of the time that it is
-    `moving` (N,), or of all its time without that.
+    A `period` of 0 [s] stands for a recording that does not repeat.  Its blocks are sixths of the time in which it is
+    `moving` (N,), or of all its time without that mask.
     """
     since = t - t[0]
     if moving is not None and not moving.all() and not period:

@@ -87,8 +87,8 @@ class ErrorBand(JointRecord):
 class Track(LogJointRecord):
     """The external effort on one joint during one log, as a filter tracked it, with its standard deviation.
 
-    The standard deviation combines four parts: the filter's own, the model's error in free motion outside the fit, the
-    filter's lag, and the offset of the day where the log has `free` windows.
+    The standard deviation combines the filter's covariance, the model's error in free motion outside the fit and the
+    filter's lag.  In a log with `free` windows, the offset of the day is added.
     """
 
     model: str

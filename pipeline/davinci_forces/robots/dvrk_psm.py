@@ -1,9 +1,9 @@
 """The same arm driven by the da Vinci Research Kit, which logs effort at the joint, already in N m and N.
 
-The chain is from its published geometry.  The base frame is where the back link is pivoted, z up and y along the axis
-of the yaw; the remote centre lies on that axis, at (0, L2, 0), and at q = 0 the tool points along -z through it.  Two
-bars that stay parallel to the axis of the yaw carry the end link, which turns about the remote centre without being
-held there.  Masses are not published.
+The chain is from its published geometry.  The base frame is at the pivot of the back link, z up and y along the axis
+of the yaw.  The remote centre lies on that axis, at (0, L2, 0), and at q = 0 the tool points along -z through it.  Two
+bars that stay parallel to the axis of the yaw carry the end link, which turns about the remote centre without a bearing
+there.  Masses are not published.
 
 Wang, Gondokaryono, Munawar and Fischer, A convex optimization-based dynamic model identification package for the da
 Vinci Research Kit, 2019.

@@ -92,7 +92,7 @@ def mode(hand: Hand, k_t: float) -> Array:
 def cqlf_limit(hand: Hand) -> float:
     """The K_T [N/m] below which, and only below which, a common quadratic Lyapunov function exists.
 
-    K_T < b^2/m + 2 b sqrt(K_H/m): for two modes that differ by a matrix of rank one, such a function exists where the
+    K_T < b^2/m + 2 b sqrt(K_H/m).  For two modes that differ by a matrix of rank one, such a function exists where the
     product A_1 A_2 has no negative real eigenvalue.
     """
     return float(hand.b**2 / hand.m + 2.0 * hand.b * hand.frequency)

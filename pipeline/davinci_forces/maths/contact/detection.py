@@ -9,10 +9,10 @@ A flank is modelled as a ramp of duration T that the smoother widens about its m
 
     onset = t(half the peak) - T/2,    T^2 = T_seen^2 - T_s^2,    T_seen = 2 (t(3/4 of the peak) - t(1/4))
 
-A window of contact is summarised by peak, mean and impulse of the external effort, with standard errors.  These are the
-values of the same statistics without contact, model error included: of a peak the root mean square of the largest
-samples of windows of the same length, of a mean that of means over such windows.  The standard deviation of the effort
-near a peak, which includes the lag of a filter, is added to that of the peak.
+A window of contact is summarised by peak, mean and impulse of the external effort, with standard errors.  They are
+computed from free motion in windows of the same length, model error included.  That of a peak is the root mean square
+of the windows' largest samples, that of a mean the root mean square of the windows' means.  The standard deviation of
+the effort near a peak, which includes the lag of a filter, is added to that of the peak.
 """
 
 from collections.abc import Iterator, Sequence

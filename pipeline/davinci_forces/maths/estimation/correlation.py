@@ -128,8 +128,8 @@ def weigh_candidates(bands: Bands, S: Array, degrees: int) -> tuple[Array, Array
 def unevenness(spectra: Spectra, D: Array, S: Array, frequency: Array) -> Array:
     """Factors (p,) of the variances of D y against those of innovations of constant variance.
 
-    With u = Omega^(-1/2) e the innovations and h the rows of D Q' Omega^(1/2), D Q' e = sum of h_k u_k: its variance is
-    the sum of h_k^2 u_k^2, and would be that of h_k^2 times the mean of u^2.  (White, 1980)
+    With u = Omega^(-1/2) e the innovations and h the rows of D Q' Omega^(1/2), D Q' e = sum of h_k u_k.  Its variance
+    is the sum of h_k^2 u_k^2; with even residuals it is the sum of h_k^2 times the mean of u^2.  (White, 1980)
     """
     order = np.argsort(frequency, kind="stable")
     sums = np.zeros((3, len(D)))

@@ -74,8 +74,8 @@ def turning_points(series: Fourier) -> tuple[Array, Array, Array]:
     """The times [s] within a period at which position, velocity and acceleration may be extreme: 2 N_f + 1 of each.
 
     The derivative of a trigonometric polynomial is, times z^N with z = exp(i omega t), a polynomial in z whose roots
-    on the unit circle are the extrema.  The angles of *all* roots are given, so that a double root which rounding
-    has moved off the circle is not lost; the others do no harm, since the series passes through them as well.
+    on the unit circle are the extrema.  The angles of *all* roots are returned, so that a double root which
+    rounding has moved off the circle is not lost.  Additional angles do no harm: the series passes through them, too.
     """
     k = np.arange(1, len(series.a) + 1)
     velocity = np.array(series.a) - 1j * np.array(series.b)  # a_k cos + b_k sin = Re(velocity_k z^k)

@@ -35,7 +35,7 @@ class Bodies:
     """The inertia of every link: masses (L,) [kg], centres (L, 3) [m] and inertias (L, 3, 3) [kg m^2].
 
     Centres are in the link's frame; inertias are about the centre of mass, in axes parallel to the link's frame (4.21).
-    `counts_from` (L,) is the number of coordinates from which on a link is part of the model at all: the arm with six
+    `counts_from` (L,) is the least number of coordinates with which a link is part of the model.  The arm with six
     coordinates has one jaw, and the second comes with the seventh (section 3.1.2).
     """
 

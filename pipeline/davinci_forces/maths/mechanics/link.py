@@ -2,8 +2,8 @@
 
 Every link has a frame at its joint: it turns about, or slides along, that frame's z.  A `row` of `Tree.rows` holds what
 is constant: the rotation (by rows) and the place of this frame at q = 0 in its carrier, and the ten inertial
-parameters.  `turn` is (cos q, sin q).  Vectors are tuples of three, in a link's own axes; a motion is (w, e, a),
-angular velocity, angular acceleration and acceleration of the origin; a wrench is (force, moment about the origin).
+parameters.  `turn` is (cos q, sin q).  Vectors are tuples of three, in the axes of a link.  A motion is (w, e, a),
+angular velocity, angular acceleration and acceleration of the origin.  A wrench is (force, moment about the origin).
 
 Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 2, 5 and 6.
 """

@@ -2,8 +2,8 @@
 
     frame = carrier * placement * turn about, or shift along, axis by sign q + bias
 
-A chain's links move about or along their own z: a link's frame is turned so that its z is the axis, and the frame that
-was described keeps its place as a named frame of the link.
+A chain's links move about or along their z axis.  A link's frame is therefore turned so that its z is the axis; the
+described frame stays in its place as a named frame of the link.
 """
 
 from collections.abc import Sequence

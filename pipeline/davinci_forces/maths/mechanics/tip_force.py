@@ -3,8 +3,8 @@
 tau_ext = J' w                                                                     (7.17), (7.18), (7.25)
 w = J^-T tau_ext,    C_w = J^-T C_tau J^-1                                         (7.26)
 
-J is J_v of the first three joints, and w the force [N]; or J_v above J_omega of six, and w the wrench: the force [N]
-and the moment [N m].  Shapes: k is 3 or 6, and any leading axes come before it.
+J is J_v of the first three joints, and w the force [N].  Of six joints J is J_v above J_omega, and w the wrench: force
+[N] and moment [N m].  Shapes: k is 3 or 6, and any leading axes come before it.
 
 The correlation of the errors of several joints is shared by logs as far as they agree:
 
@@ -52,8 +52,8 @@ def is_singular(chain: Chain, q: ArrayLike) -> NDArray[np.bool_]:
 def singular_slides(chain: Chain, q_pitch: float) -> Array:
     """Slides at which J_v of the first three joints is singular at this pitch, ascending (0, 1 or 2,) [m].
 
-    det J_v is a polynomial of the second degree in q3, and the roll does not change it: two levers, that of the roll
-    about its axis and that of the pitch about the remote centre, each grow linearly with the slide.
+    det J_v is a polynomial of the second degree in q3, and the roll does not change it.  The levers of the roll about
+    its axis and of the pitch about the remote centre each grow linearly with the slide.
     """
     q = np.array([[0.0, q_pitch, slide] for slide in (-1.0, 0.0, 1.0)])
     low, middle, high = np.linalg.det(jacobian(chain, q)[0])

@@ -30,8 +30,8 @@ def friction_state(motion: ArmMotion, joint: int, term: Term) -> tuple[Array, Bo
     valid = np.ones(len(dq), np.bool_)
     if term.width:
         return np.tanh(dq / term.width), valid
-    if term.faded:
-        return np.sign(dq) * np.exp(-((dq / term.faded) ** 2)), valid
+    if term.decay_velocity:
+        return np.sign(dq) * np.exp(-((dq / term.decay_velocity) ** 2)), valid
     return np.zeros(len(dq)), valid
 
 

@@ -12,7 +12,7 @@ Parameters are combinations of masses, inertias and friction, none of which is n
 x are the inertial parameters of links, ten each, and all others of a model.  A link is possible if its pseudo-inertia
 J_l is positive semidefinite: then its mass density is nowhere negative, and the triangle inequalities hold.
 Traversaro, Brossette, Escande and Nori, Identification of fully physical consistent inertial parameters using
-optimization on manifolds, 2016; Wensing, Kim and Slotine, 2018; of base parameters Sousa and Cortesao, Physical
+optimization on manifolds, 2016.  Wensing, Kim and Slotine, 2018.  Of base parameters: Sousa and Cortesao, Physical
 feasibility of robot base inertial parameter identification: a linear matrix inequality approach, 2014.
 """
 

@@ -19,10 +19,10 @@ from davinci_forces.maths.models.bias import COEFFICIENTS, Coefficients
 class Term:
     """One column of the regressor: phi = a ddq + sum of b[f] f(q, dq) over functions f of `COEFFICIENTS`.
 
-    `unit` is that of the parameter, with {inertia}, {mass_moment}, {effort} and {position} left to the joint; `typst`
-    is phi in Typst's maths, for equations; a `positive` parameter is one whose sign physics knows. A term of z says
-    what z is by one of three, in the joint's units: the `displacement` of a deflection, the `width` [velocity] of a
-    smooth sign, or the velocity at which Stribeck's peak has `faded`; see `friction_state`.
+    `unit` is that of the parameter; the joint fills in {inertia}, {mass_moment}, {effort} and {position}.  `typst` is
+    phi in Typst's maths, for equations.  By physics, a `positive` parameter is not negative.  A term of z states
+    one value of it, in the joint's units (`friction_state`): the `displacement` of a deflection, the `width` of a
+    smooth sign [velocity], or the `decay_velocity` of Stribeck's peak.
     """
 
     name: str
@@ -33,19 +33,19 @@ class Term:
     positive: bool = False
     displacement: float = 0.0
     width: float = 0.0
-    faded: float = 0.0
+    decay_velocity: float = 0.0
 
     def __post_init__(self) -> None:
         if unknown := sorted(set(self.b) - set(COEFFICIENTS)):
             raise ValueError(f"term {self.name!r}: no functions {unknown}; there are {', '.join(COEFFICIENTS)}")
-        if sum(scale > 0 for scale in (self.displacement, self.width, self.faded)) != int("z" in self.b):
+        if sum(scale > 0 for scale in (self.displacement, self.width, self.decay_velocity)) != int("z" in self.b):
             message = "a term of z needs one displacement, width or velocity above 0, and other terms have none"
             raise ValueError(f"term {self.name!r}: {message}")
 
     @property
     def scale(self) -> float:
         """The displacement or velocity that z depends on, in the joint's units; 0 for a term without z."""
-        return self.displacement or self.width or self.faded
+        return self.displacement or self.width or self.decay_velocity
 
     @property
     def coefficients(self) -> Coefficients:
@@ -74,10 +74,10 @@ def smooth_sign(width: float) -> Term:
     return Term("smooth friction", 'tanh(dot(q) \\/ dot(q)_"w")', "{effort}", b={"z": 1.0}, width=width)
 
 
-def stribeck(faded: float) -> Term:
-    """Additional friction near standstill, which decays e-fold at the velocity `faded`, in the joint's units."""
+def stribeck(decay_velocity: float) -> Term:
+    """Additional friction near standstill, which decays e-fold at `decay_velocity`, in the joint's units."""
     phi = 'op("sign")(dot(q)) e^(-(dot(q) \\/ dot(q)_"s")^2)'
-    return Term("Stribeck friction", phi, "{effort}", b={"z": 1.0}, faded=faded)
+    return Term("Stribeck friction", phi, "{effort}", b={"z": 1.0}, decay_velocity=decay_velocity)
 
 
 TERMS = {

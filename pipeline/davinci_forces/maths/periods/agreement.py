@@ -125,9 +125,9 @@ def is_unlikely(F: float, rho: float, degrees: float, degrees_others: float) -> 
 def differing_periods(t: Array, signals: Sequence[Array], length: float, rate: float) -> list[Difference]:
     """Find the periods of signals (N,) that differ from the others; none of fewer than three periods.
 
-    A period is compared with the mean of the others at each phase, as in an analysis of variance: the mean square of
-    the difference over the variance between the others.  Correlated noise reduces the degrees of freedom of both, so
-    their number follows from the correlation of the others.
+    A period is compared with the mean of the others at each phase, as in an analysis of variance.  The statistic is the
+    mean square of the difference over the variance between the others.  Correlated noise reduces the degrees of
+    freedom of both, so their number follows from the correlation of the others.
     """
     periods = _Periods.from_times(t, length, rate)
     if len(periods.numbers) < 3:

@@ -1,8 +1,8 @@
 """A robot in closed loop, as the laboratory runs it: motors, drivers, controller, friction, stops, and what it touches.
 
-Time goes in ticks of the motor drivers.  Every so many ticks the controller reads the encoders and sets what the
-drivers follow, and the recorder takes a sample; between ticks the arm moves by one implicit step of its
-rigid body, whose inertia, bias and tip are compiled for one configuration.
+Time is counted in ticks of the motor drivers.  At every n-th tick the controller reads the encoders and sets the
+drivers' commands, and at every m-th the recorder takes a sample.  Between ticks the arm moves by one implicit step of
+its rigid body, whose inertia, bias and tip are compiled for one configuration.
 """
 
 from collections.abc import Callable
@@ -24,9 +24,9 @@ from davinci_forces.maths.simulation.surroundings import Surroundings, on_tip, w
 
 
 class Plant(NamedTuple):
-    """The rigid body that moves: two compiled functions, and what they are told about it.
+    """The rigid body that moves: two compiled functions, and their data.
 
-    `dynamics(data, q, dq, M, b)` fills the inertia (n, n), with the motors', and the bias (n,), Coriolis and gravity;
+    `dynamics(data, q, dq, M, b)` fills the inertia (n, n), with the motors', and the bias (n,), Coriolis and gravity.
     `tip(data, q, J)` fills the Jacobian (3, n) of the tip and returns its position (3,), both in the base frame.
     """
 
@@ -178,7 +178,7 @@ def _record(state: Any, tau: Any, external: Any, force: Any, k: int, out: Any) -
 
 
 class PlantData(NamedTuple):
-    """What the two functions of the plant are told: the arm, its rotors, and what its tip is fixed to."""
+    """The data of the plant's two functions: the arm, its rotors, and what its tip is fixed to."""
 
     tree: Tree
     rest: Array  # no acceleration (n,)

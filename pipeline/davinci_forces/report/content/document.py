@@ -1,8 +1,8 @@
 """What a report says: documents of sections of blocks, as data, with no HTML and no page in them.
 
-Titles of sections, prose, captions, list items and table cells take inline marks (see `inline`): `$x$` for Typst maths,
-backticks for code, `**bold**`, and `[words](file)` for a link to a file beside the document.  `[@label]` refers to a
-labelled figure, table, equation or section.  Text that came from a log goes through `literal` there.
+Titles of sections, prose, captions, list items and table cells take inline marks (see `inline`).  `$x$` is Typst maths,
+backticks enclose code, `**bold**` is bold, and `[words](file)` links to a file beside the document.  `[@label]` refers
+to a labelled figure, table, equation or section.  Text that came from a log goes through `literal` there.
 Words in figures, listings, and the title and study of a document are shown as they are.
 """
 

@@ -1,8 +1,9 @@
 """Write a robot as URDF: its chain, the masses of its links, and the limits of its joints.
 
-A link's frame is at its joint: the frame of the link's name where that is on the axis, else the one with z along the
-axis, as the dynamics take it.  Other frames of the chain are fixed links without mass.  A coordinate that moves several
-links moves the first, which the others mimic.  URDF cannot express limits of acceleration, missing limits or drives.
+A link's frame is at its joint.  It is the frame of the link's name where that is on the axis, else the frame with z
+along the axis, as in the dynamics.  Other frames of the chain are fixed links without mass.  A coordinate that
+moves several links moves the first, which the others mimic.  URDF cannot express limits of acceleration, missing limits
+or drives.
 """
 
 from collections.abc import Iterator
