@@ -48,7 +48,7 @@ from davinci_forces.robots.robot import Joint
 from davinci_forces.runner import ALL
 from davinci_forces.runner.graph import every_step
 from davinci_forces.runner.signature import declaration, stage_of
-from davinci_forces.study import HungMass, LogEntry, Settings, reading
+from davinci_forces.study import AttachedMass, LogEntry, Settings, reading
 from davinci_forces.study.channels import OF_A_JOINT, OF_THE_LOG
 from davinci_forces.study.entries import ROLES
 from tests.conftest import ROOT
@@ -151,7 +151,7 @@ def test_keys_of_a_study_and_its_logs_are_all_told():
     said = re.sub(r"```.*?```", "", README.partition("## In Python")[0], flags=re.S)
     told = set(re.findall(r"\b(\w+) = ", code + " ".join(spans(said))))
     told |= set(re.findall(r"\[+(?:log\.)?(\w+)", code)) | {span for span in spans(said) if span.isidentifier()}
-    assert {f.name for f in fields(LogEntry)} | {f.name for f in fields(HungMass)} | {"file"} <= told
+    assert {f.name for f in fields(LogEntry)} | {f.name for f in fields(AttachedMass)} | {"file"} <= told
     changeable = {f.name for f in fields(Joint)} - {"name", "kind", "published", "physical", "printed"}
     assert {"title", "robot", "simulated", "settings", "log", "tool", "length", "baseline"} | changeable <= told
     assert "[robot_overrides." in said

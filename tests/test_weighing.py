@@ -20,7 +20,7 @@ from davinci_forces.maths.periods.shift import circular, roll, straight
 from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Motion, Signal, Weight
 from davinci_forces.robots import dvrk_psm
 from davinci_forces.stages import weigh
-from davinci_forces.study import HungMass, Weighing, Weighings
+from davinci_forces.study import AttachedMass, Weighing, Weighings
 from tests import arm
 from tests.arm import ARM
 from tests.test_averaging import entry
@@ -29,7 +29,7 @@ RATE, PERIOD, PERIODS = 100.0, 5.0, 6
 T = np.arange(round(PERIODS * PERIOD * RATE)) / RATE
 ROBOT, MASS = dvrk_psm.ROBOT, 0.205
 JOINTS = ("hand_roll", "hand_pitch", "instrument_slide")
-HUNG = HungMass("hand_pitch", (0.0, -0.1, 0.5), MASS)
+HUNG = AttachedMass("hand_pitch", (0.0, -0.1, 0.5), MASS)
 
 
 def rows(x, y, sigma=1.0) -> Rows:

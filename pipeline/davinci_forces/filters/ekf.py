@@ -33,8 +33,8 @@ def log_likelihood(recording: FilterInput, noise: NoiseModel) -> float:
 
     The first second is omitted, because the initial state still acts on it.
     """
-    settle = min(round(TRANSIENT / recording.T_s), len(recording.q) // 2)
-    return float(_likelihood(settle, *arguments(recording, noise)))
+    transient = min(round(TRANSIENT / recording.T_s), len(recording.q) // 2)
+    return float(_likelihood(transient, *arguments(recording, noise)))
 
 
 def step(
@@ -75,13 +75,13 @@ def _pass(
 
 @compile_and_store
 def _likelihood(
-    settle: int, s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float, R_dq: float,
-    Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float,
+    transient: int, s: Any, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float, R_q: float,
+    R_dq: float, Q_qq: float, Q_qd: float, Q_dd: float, Q_tau: float,
 ) -> float:  # fmt: skip
     total = 0.0
     for k in range(len(y_q)):
         s, _, _, nis, det = correct(s, y_q[k], y_dq[k], R_q, R_dq)
-        if k >= settle:
+        if k >= transient:
             total -= 0.5 * (nis + np.log(det)) + LOG_2_PI
         q, dq, F, friction_var = transition(s[0], s[1], s[2], s[6], drive[k], inertia[k], c_b, T_s, 0.5 * T_s * T_s)
         s = predict(s, q, dq, F, Q_qq, Q_qd, Q_dd + friction_var, Q_tau)

@@ -24,7 +24,7 @@ class ModelVariance(NamedTuple):
 
     variance: Array
     std: Array
-    told_by: str  # logs, or blocks of this log
+    source: str  # logs, or blocks of this log
 
 
 def model_variance(band: ErrorBand, log: str, path: str, dq: Array, is_centred: bool) -> ModelVariance:

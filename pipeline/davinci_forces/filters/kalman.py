@@ -55,22 +55,22 @@ def run_filter(recording: FilterInput, model: States) -> Array:
     return out
 
 
-def log_likelihood(recording: FilterInput, model: States, settle: int) -> float:
-    """Compute the log-likelihood from sample `settle` on: -1/2 sum of (i' S^-1 i + log det 2 pi S)."""
-    return _run(recording, model, settle, np.empty((7, len(recording.q))))
+def log_likelihood(recording: FilterInput, model: States, transient: int) -> float:
+    """Compute the log-likelihood from sample `transient` on: -1/2 sum of (i' S^-1 i + log det 2 pi S)."""
+    return _run(recording, model, transient, np.empty((7, len(recording.q))))
 
 
-def _run(recording: FilterInput, model: States, settle: int, out: Array) -> float:
+def _run(recording: FilterInput, model: States, transient: int, out: Array) -> float:
     x, P, R, Phi, Q, in_q, in_dq, order, doubts, forgets = model
     h = 0.5 * recording.T_s**2 * (order - 1)
     noises = (in_q, in_dq, *R.tolist(), Phi.copy(), Q, h, float(doubts), forgets)
-    return float(_pass(settle, out, x, P.copy(), *noises, *columns(recording)))
+    return float(_pass(transient, out, x, P.copy(), *noises, *columns(recording)))
 
 
 @compile_and_store
 def _pass(
-    settle: int, out: Any, start: Any, P: Any, in_q: Any, in_dq: Any, R_q: float, R_dq: float, F: Any, Q: Any, h: float,
-    doubts: float, forgets: float, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float,
+    transient: int, out: Any, start: Any, P: Any, in_q: Any, in_dq: Any, R_q: float, R_dq: float, F: Any, Q: Any,
+    h: float, doubts: float, forgets: float, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float,
 ) -> float:  # fmt: skip
     """Run the loop.  `start` is a tuple, whose length n the compiler knows: twice as fast."""
     n, first_q, first_dq, C_q, C_dq, total = len(start), R_q, R_dq, 0.0, 0.0, 0.0
@@ -98,7 +98,7 @@ def _pass(
         det = s_qq * s_dd - s_qd * s_qd
         v_qq, v_qd, v_dd = s_dd / det, -s_qd / det, s_qq / det
         nis = i_q * (v_qq * i_q + v_qd * i_dq) + i_dq * (v_qd * i_q + v_dd * i_dq)
-        if k >= settle:
+        if k >= transient:
             total -= 0.5 * (nis + np.log(det)) + LOG_2_PI
         # Joseph form, positive for any gain: P - K B' - D K' with D = B - K S
         for i in range(n):

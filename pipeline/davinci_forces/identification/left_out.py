@@ -41,7 +41,7 @@ def without_the_log(
 ) -> Iterator[Prediction]:
     """Predict a log from fits to other identification logs."""
     part = motion if average is None else select_samples(motion, whole_periods(motion.t, average))
-    judge = Scorer(part, part.standing == 0, lowpass, average.sigma_tau_white if average else None)
+    scorer = Scorer(part, part.standing == 0, lowpass, average.sigma_tau_white if average else None)
     along = recorded_motion(part)
     for fit in cross_fits:
         left_out = [str(names).split(", ") for names in fit.left_out]
@@ -50,7 +50,7 @@ def without_the_log(
             number = len(left_out[rows[0]])
             scheme = "leave one log out" if number == 1 else f"leave {number} logs out"
             tau_hat = np.ascontiguousarray(efforts(model, fit.theta[rows], along)[:, 0])
-            yield judge.score(fit.model, fit.estimator, motion.role, scheme, ANOTHER_PATH, tau_hat)
+            yield scorer.score(fit.model, fit.estimator, motion.role, scheme, ANOTHER_PATH, tau_hat)
 
 
 def without_a_period(
@@ -60,7 +60,7 @@ def without_a_period(
     part = select_samples(motion, whole_periods(motion.t, average))
     runs, others = without_folds(part, average, model, prior)
     Phi = model.regressor(recorded_motion(part)).Phi[:, 0]
-    judge = Scorer(part, part.standing == 0, lowpass, average.sigma_tau_white)
+    scorer = Scorer(part, part.standing == 0, lowpass, average.sigma_tau_white)
     for name in ESTIMATORS:
         try:
             thetas = [estimator(name)(regression).theta for regression in others]
@@ -68,7 +68,7 @@ def without_a_period(
             yield not_predicted(motion, name, error)
             continue
         tau_hat = np.concatenate([Phi[run] @ theta for run, theta in zip(runs, thetas, strict=True)])
-        yield judge.score(model.name, name, motion.role, "leave one period out", SAME_PATH, tau_hat)
+        yield scorer.score(model.name, name, motion.role, "leave one period out", SAME_PATH, tau_hat)
         del tau_hat  # in a long log it is large: free it before the next
 
 
@@ -98,7 +98,7 @@ def without_a_segment(
     """Predict each sixth of a log that does not repeat from fits to the other five."""
     log = observe([motion], (), lowpass, 0)
     Phi = model.regressor(log.motion).Phi[:, 0]
-    judge = Scorer(motion, motion.standing == 0, lowpass)
+    scorer = Scorer(motion, motion.standing == 0, lowpass)
     for name in ESTIMATORS:
         tau_hat = np.empty(len(motion))
         try:
@@ -108,7 +108,7 @@ def without_a_segment(
         except NotIdentifiable as error:
             yield not_predicted(motion, name, error)
             continue
-        yield judge.score(model.name, name, "identification", "leave a segment out", ANOTHER_PATH, tau_hat)
+        yield scorer.score(model.name, name, "identification", "leave a segment out", ANOTHER_PATH, tau_hat)
 
 
 def not_predicted(motion: Motion, name: str, error: NotIdentifiable) -> Diagnostic:

@@ -87,8 +87,8 @@ def predict_scheme(
         record = select_samples(log.records[names.index(effort)], is_predicted)
         moves = record.standing == 0
         if not record.at_rest and moves.any():
-            judge = Scorer(record, moves, log.lowpass, log.white.get(effort))
-            yield judge.score(name, estimator, "identification", scheme.name, scheme.path, tau_hat[:, m])
+            scorer = Scorer(record, moves, log.lowpass, log.white.get(effort))
+            yield scorer.score(name, estimator, "identification", scheme.name, scheme.path, tau_hat[:, m])
 
 
 def leave_blocks_out(refits: RefitModel, log: Observed, name: str) -> Scheme:

@@ -98,15 +98,15 @@ def model_of(robot: Robot, name: str, group: str, parameters: Sequence[str], sca
     structure, _, variant = name.partition("+")
     by_name = dict(zip(parameters, scales, strict=True))
     if structure == "independent":
-        return independent(robot.joint(group), _driven(variant, by_name, ""), variant)
+        return independent(robot.joint(group), _terms_of(variant, by_name, ""), variant)
     names = [joint.name for joint in robot.joints]
     moving = [i for i, n in enumerate(names) if f"{viscous.name} of {n}" in by_name]
     rows = [names.index(group)] if group != ARM else moving
     suffixes = [f" of {names[row]}" if group == ARM and len(rows) > 1 else "" for row in rows]
-    return coupled_arm(robot, rows, [_driven(variant, by_name, suffix) for suffix in suffixes], variant, group)
+    return coupled_arm(robot, rows, [_terms_of(variant, by_name, suffix) for suffix in suffixes], variant, group)
 
 
-def _driven(variant: str, scales: dict[str, float], suffix: str) -> tuple[Term, ...]:
+def _terms_of(variant: str, scales: dict[str, float], suffix: str) -> tuple[Term, ...]:
     """The added terms of a joint, from the scales of its parameters."""
     make = {"smooth": smooth_sign, "stribeck": stribeck}
     if variant in make:

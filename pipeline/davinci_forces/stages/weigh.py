@@ -28,7 +28,7 @@ from davinci_forces.maths.periods.shift import circular, straight
 from davinci_forces.maths.signals.smoothing import lowpass_segments, segments
 from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Motion, Weight, diagnostic
 from davinci_forces.robots.robot import Robot
-from davinci_forces.study import HungMass, LogEntry, Weighing, Weighings
+from davinci_forces.study import AttachedMass, LogEntry, Weighing, Weighings
 
 FREE_ROLES = ("identification", "validation")  # of logs in which nothing touches the arm
 ROWS_PER_CUTOFF_PERIOD = 6.0  # of the low-pass
@@ -129,7 +129,7 @@ def external_effort(model: JointModel, tau_hat: Array, lowpass: float) -> tuple[
 
 
 def loads_per_kilogram(
-    chain: Chain, robot: Robot, weight: HungMass, motion: tuple[Array, Array, Array]
+    chain: Chain, robot: Robot, weight: AttachedMass, motion: tuple[Array, Array, Array]
 ) -> tuple[Array, Array]:
     """Joint effort of a kilogram (N, n) at the stated position, and at its mirror position on the link."""
     names = [joint.name for joint in robot.joints]

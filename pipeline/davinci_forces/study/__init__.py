@@ -48,7 +48,7 @@ class Source:
 
 
 @dataclass(frozen=True)
-class HungMass:
+class AttachedMass:
     """A mass attached to the arm, at a point fixed to a link.  Section 7.5"""
 
     moves_with: str  # a joint, for the link that turns about the remote centre with it, or a link
@@ -61,7 +61,7 @@ class Weighing:
     """A weight log: its mass, and the log that is subtracted from it."""
 
     log: str
-    weight: HungMass
+    weight: AttachedMass
     tare: str  # the log to be subtracted, or ""
 
 
@@ -87,7 +87,7 @@ class LogEntry:
     until: float | None = None
     contact: tuple[tuple[float, float], ...] = ()  # [s] known windows; WHOLE where all samples are of contact
     free: tuple[tuple[float, float], ...] = ()
-    weight: HungMass | None = None
+    weight: AttachedMass | None = None
     tare: str = ""  # the log of the same path that is subtracted from a weight log
     delimiter: str | None = None
     decimal: str | None = None
@@ -97,7 +97,7 @@ class LogEntry:
     columns: int | tuple[str, ...] | None = None  # of a row of them: how many, or their names
 
     @property
-    def tells_free_space(self) -> bool:
+    def has_known_free_motion(self) -> bool:
         """Whether the log has samples that are known to be free of contact."""
         return self.role in ("identification", "validation") or (self.role == "contact" and bool(self.contact))
 

@@ -9,7 +9,7 @@ from typing import Any
 from davinci_forces.logs.binary import BINARY_EXAMPLE, dtype_of
 from davinci_forces.robots import Robot
 from davinci_forces.robots.from_toml import wrong_name
-from davinci_forces.study import WHOLE_LOG, HungMass, LogEntry
+from davinci_forces.study import WHOLE_LOG, AttachedMass, LogEntry
 from davinci_forces.study.channels import Channels
 from davinci_forces.toml import TomlTable, excerpt
 from davinci_forces.toml.lines import MOST_LISTED
@@ -183,7 +183,7 @@ def _wrong_tare(log: LogEntry, by_name: dict[str, LogEntry]) -> str:
     return ""
 
 
-def _weight(table: TomlTable, robot: Robot | None) -> HungMass | None:
+def _weight(table: TomlTable, robot: Robot | None) -> AttachedMass | None:
     if "weight" not in table:
         if table.values.get("role") == "weight":
             table.problem("a weight log needs weight = { moves_with = ..., position = ... }, with mass = ... if known")
@@ -197,4 +197,4 @@ def _weight(table: TomlTable, robot: Robot | None) -> HungMass | None:
         far = f"position must lie within {MAX_POSITION:g} m of the remote centre, not {list(position)}; it is in metres"
         weight.problem(far, "position")
     weight.close()
-    return HungMass(moves_with, (position[0], position[1], position[2]), mass) if position else None
+    return AttachedMass(moves_with, (position[0], position[1], position[2]), mass) if position else None

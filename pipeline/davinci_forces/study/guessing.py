@@ -26,7 +26,7 @@ COMMAND_WORDS = ("desired", "target", "setpoint", "command", "commanded", "refer
 NUMBERED = re.compile(r"(.*?)(?:\[([^\]]+)\]|_?(\d+))")
 TIME_WORDS = ("time", "t", "t_s", "elapsed", "x_value", "seconds")
 FREE = re.compile(r"no_?-?(weight|load|mass|contact)|unloaded|free", re.IGNORECASE)
-HUNG = re.compile(r"weight|payload|(?<![a-z0-9])(\d+)(k?g)(?![a-z])", re.IGNORECASE)
+MASS_IN_NAME = re.compile(r"weight|payload|(?<![a-z0-9])(\d+)(k?g)(?![a-z])", re.IGNORECASE)
 TOUCH = re.compile(r"contact|touch|push|collision", re.IGNORECASE)
 HELD_OUT = re.compile(r"valid|(?<![a-z])test(?![a-z])", re.IGNORECASE)
 
@@ -253,7 +253,7 @@ def roles_of(names: Sequence[str], guesses: Sequence[Holding]) -> list[Role]:
 def _by_word(name: str) -> Role | None:
     if match := FREE.search(name):
         return Role("validation", f'"{match[0]}" in its name: free motion for validation')
-    if match := HUNG.search(name):
+    if match := MASS_IN_NAME.search(name):
         mass = f"mass = {float(match[1]) * (1.0 if match[2].lower() == 'kg' else 1e-3):g}, " if match[1] else ""
         hint = f'# weight = {{ {mass}moves_with = "<joint>", position = [0.0, 0.0, 0.0] }}  # with role = "weight"'
         return Role("contact", f'"{match[0]}" in its name; "weight", if you know where the mass hangs', (hint,))

@@ -37,8 +37,8 @@ def innovations(recording: FilterInput, noise: Noise) -> tuple[Array, Array]:
 
 def log_likelihood(recording: FilterInput, noise: Noise) -> float:
     """Compute the log-likelihood of the measurements, as that of `ekf`."""
-    settle = min(round(TRANSIENT / recording.T_s), len(recording.q) // 2)
-    return kalman.log_likelihood(recording, states(recording, noise), settle)
+    transient = min(round(TRANSIENT / recording.T_s), len(recording.q) // 2)
+    return kalman.log_likelihood(recording, states(recording, noise), transient)
 
 
 def states(recording: FilterInput, noise: Noise) -> kalman.States:

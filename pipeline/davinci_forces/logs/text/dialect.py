@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from davinci_forces.logs.log import Options, renaming_remarks, unique, unit_in
-from davinci_forces.logs.text.stamps import Stamps, from_first_cell, stamps_of, tells_time
+from davinci_forces.logs.text.stamps import Stamps, from_first_cell, is_time, stamps_of
 from davinci_forces.maths.units import canonical, measures
 
 NAMED = {"tab": "\t", "comma": ",", "semicolon": ";", "space": " ", "\\t": "\t"}
@@ -116,7 +116,7 @@ def _score(body: Sequence[Sequence[str]], number: re.Pattern[str]) -> tuple[int,
 def _are_mostly(count: int, cells: Sequence[str]) -> bool:
     """Whether so many cells are most of them; cells of times count as empty: any delimiter keeps them."""
     filled = [cell for cell in cells if cell]
-    return 2 * count >= len(filled) or 2 * count >= sum(not tells_time(cell) for cell in filled)
+    return 2 * count >= len(filled) or 2 * count >= sum(not is_time(cell) for cell in filled)
 
 
 def _comma(rows: Sequence[str], body: Sequence[str]) -> tuple[str, str]:

@@ -76,7 +76,7 @@ def stamps_of(cells: Sequence[str]) -> Stamps | None:
     return None
 
 
-def tells_time(cell: str) -> bool:
+def is_time(cell: str) -> bool:
     """Whether a cell is a date, a time of day or both."""
     return cell[:1].isdecimal() and any(pattern.fullmatch(cell) for pattern in (MOMENT, TIME_OF_DAY, DAY_ALONE))
 

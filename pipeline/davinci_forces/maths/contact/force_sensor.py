@@ -81,17 +81,17 @@ class Lag(NamedTuple):
     std: float
 
 
-def lag(t: Array, estimated: Array, clock: Array, measured: Array, rate: float, judged: Booleans) -> Lag:
+def lag(t: Array, estimated: Array, clock: Array, measured: Array, rate: float, compared: Booleans) -> Lag:
     """Delay of a sensor (M, k) on its clock (M,) behind the estimated force (N, k) at times (N,).
 
-    `judged` (N,) selects samples; `rate` [Hz] is that of the estimate.
+    `compared` (N,) selects samples; `rate` [Hz] is that of the estimate.
     """
     step = np.ceil(MIN_LAG_STEP * rate - 1e-9) / rate
     lags = step * np.arange(-MAX_LAG_STEPS, MAX_LAG_STEPS + 1)
-    f, parts = estimated[judged] - estimated[judged].mean(0), blocks(int(judged.sum()))
+    f, parts = estimated[compared] - estimated[compared].mean(0), blocks(int(compared.sum()))
     mean, products = measured.mean(0), np.zeros((len(parts), len(lags), 3))
     for j, late in enumerate(lags.tolist()):
-        shown = interpolate_sensor(t[judged] + late, clock, measured, 3.0 / rate) - mean
+        shown = interpolate_sensor(t[compared] + late, clock, measured, 3.0 / rate) - mean
         comparable = np.isfinite(shown).all(1)
         sums = [np.where(comparable, np.einsum("ni,ni->n", a, b), 0.0) for a, b in ((f, shown), (f, f), (shown, shown))]
         products[:, j] = [[float(total[part].sum()) for total in sums] for part in parts]

@@ -1,1 +1,1 @@
-"""Trajectories that tell most about a joint or an arm, within its limits."""
+"""Trajectories that excite the parameters of a joint or an arm most, within its limits."""

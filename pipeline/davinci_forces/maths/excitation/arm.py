@@ -22,7 +22,7 @@ from davinci_forces.maths.excitation.joint import (
     scale_to_limits,
     shrink_into_limits,
 )
-from davinci_forces.maths.excitation.search import Tell, minimise, report_nothing
+from davinci_forces.maths.excitation.search import ReportStart, ignore_start, minimise
 from davinci_forces.maths.mechanics.bodies import RANDOM_SAMPLES, base_parameters
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.rigid_body import compiled_regressor
@@ -58,7 +58,9 @@ def arm_observation(problem: ArmExcitationProblem, series: Sequence[Fourier]) ->
     return np.asarray(_observations(problem, [joint_series.x[None] for joint_series in series])[0])
 
 
-def design_together(problem: ArmExcitationProblem, starts: int, seed: int, tell: Tell = report_nothing) -> ArmDesign:
+def design_together(
+    problem: ArmExcitationProblem, starts: int, seed: int, report_start: ReportStart = ignore_start
+) -> ArmDesign:
     """Design the best of several optima, each of its own population.
 
     Raises
@@ -74,7 +76,7 @@ def design_together(problem: ArmExcitationProblem, starts: int, seed: int, tell:
         chunks = (z[i : i + TRAJECTORIES_AT_ONCE] for i in range(0, len(z), TRAJECTORIES_AT_ONCE))
         return np.concatenate([criterion(_observations(problem, _trajectories(problem, chunk))) for chunk in chunks])
 
-    best = minimise(objective, sum(1 + 2 * joint.harmonics for joint in problem.joints), starts, seed, tell)
+    best = minimise(objective, sum(1 + 2 * joint.harmonics for joint in problem.joints), starts, seed, report_start)
     if not np.isfinite(best.values).any():
         raise ValueError("no trajectory of these harmonics identifies all base parameters of the arm")
     parts = zip(problem.joints, _trajectories(problem, best.z[None]), strict=True)

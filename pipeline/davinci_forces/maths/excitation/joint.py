@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.excitation.fourier import CRITERIA, PERIOD_SAMPLES, Fourier, Range, basis, instants, ranges
-from davinci_forces.maths.excitation.search import Tell, minimise, report_nothing
+from davinci_forces.maths.excitation.search import ReportStart, ignore_start, minimise
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.terms import Term
 
@@ -65,7 +65,7 @@ def impossible(limits: tuple[Range, Range, Range]) -> str:
     return ""
 
 
-def design(problem: ExcitationProblem, starts: int, seed: int, tell: Tell = report_nothing) -> Design:
+def design(problem: ExcitationProblem, starts: int, seed: int, report_start: ReportStart = ignore_start) -> Design:
     """Design the best of several optima, each of its own population.  (6.27)
 
     Raises
@@ -81,7 +81,7 @@ def design(problem: ExcitationProblem, starts: int, seed: int, tell: Tell = repo
         x = trajectories(problem, z)
         return CRITERIA[problem.criterion](regressor(problem.terms, *(x @ B for B in bases)))
 
-    best = minimise(objective, 1 + 2 * problem.harmonics, starts, seed, tell)
+    best = minimise(objective, 1 + 2 * problem.harmonics, starts, seed, report_start)
     if not np.isfinite(best.values).any():
         names = ", ".join(term.name for term in problem.terms)
         raise ValueError(f"no trajectory of {problem.harmonics} harmonics identifies all of the terms {names}")

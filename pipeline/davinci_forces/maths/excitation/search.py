@@ -19,7 +19,7 @@ STEP_FACTORS = (0.5, 1.0)  # of a difference between two candidates
 CROSSING = 0.9  # share of the numbers that a step changes
 
 Objective = Callable[[Array], Array]  # of many candidates (S, d) at once (S,)
-Tell = Callable[[int, int, float], None]  # the number of a start, from 1, of how many, and its optimum
+ReportStart = Callable[[int, int, float], None]  # the number of a start, from 1, of how many, and its optimum
 
 
 class Optimum(NamedTuple):
@@ -29,16 +29,16 @@ class Optimum(NamedTuple):
     values: Array
 
 
-def report_nothing(start: int, starts: int, value: float) -> None:
+def ignore_start(start: int, starts: int, value: float) -> None:
     """Say nothing of a start."""
 
 
-def minimise(objective: Objective, d: int, starts: int, seed: int, tell: Tell = report_nothing) -> Optimum:
+def minimise(objective: Objective, d: int, starts: int, seed: int, report_start: ReportStart = ignore_start) -> Optimum:
     """Minimise from several starts; the first ones are the same for any number of starts."""
     optima = []
     for start in range(starts):
         optima.append(descend(objective, d, np.random.default_rng([seed, start])))
-        tell(start + 1, starts, optima[-1][1])
+        report_start(start + 1, starts, optima[-1][1])
     values = np.array([value for _, value in optima])
     return Optimum(optima[int(values.argmin())][0], values)
 

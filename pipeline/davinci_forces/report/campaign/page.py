@@ -103,7 +103,7 @@ def joint_section(joint: str, studies: Sequence[CampaignStudy], findings: Findin
     """The numbers of one joint, drawn and listed."""
     of_joint = [series for series in findings.every if series.joint == joint]
     names = list(dict.fromkeys(series.name for series in of_joint))
-    changed = sorted({series.name for series in of_joint if findings.tell(series)})
+    changed = sorted({series.name for series in of_joint if findings.has_change(series)})
     changes = f"beyond errors: {', '.join(changed)}" if changed else "none changes beyond its errors"
     drawn = [series for series in of_joint if len(series.studies) > 1]  # one study is no course over time
     figure = Figure(

@@ -75,8 +75,8 @@ def series_of(studies: Sequence[CampaignStudy], joint: str) -> Iterator[Series]:
     prefix = f"fit.{joint}.{FIT}."
     for study in studies:
         named = [(key.removeprefix(prefix), key) for key in study.numbers if key.startswith(prefix)]
-        judged = study.joints.get(joint)
-        floors = [(said, judged.keys.get(name)) for name, said in FLOORS.items()] if judged else []
+        results = study.joints.get(joint)
+        floors = [(title, results.keys.get(name)) for name, title in FLOORS.items()] if results else []
         for name, key in [*named, *floors]:
             if (
                 key is not None
@@ -85,11 +85,11 @@ def series_of(studies: Sequence[CampaignStudy], joint: str) -> Iterator[Series]:
                 and not name.endswith(".std_classical")
             ):
                 keyed.setdefault((name, study.numbers[key].unit), []).append((study, key))
-    for (name, unit), found in keyed.items():
-        stated = [study.numbers[key] for study, key in found]
-        value = np.array([one.number if one.number is not None else np.nan for one in stated])
-        std = np.array([one.std or np.nan for one in stated])
-        yield Series(joint, name, unit, tuple(s for s, _ in found), tuple(k for _, k in found), value, std)
+    for (name, unit), places in keyed.items():
+        numbers = [study.numbers[key] for study, key in places]
+        value = np.array([number.number if number.number is not None else np.nan for number in numbers])
+        std = np.array([number.std or np.nan for number in numbers])
+        yield Series(joint, name, unit, tuple(s for s, _ in places), tuple(k for _, k in places), value, std)
 
 
 DAY = 86400.0  # [s]
@@ -129,7 +129,7 @@ class Findings:
         """Which of its studies stand out from the others."""
         return self.outliers.get(series_key(one), ())
 
-    def tell(self, one: Series) -> bool:
+    def has_change(self, one: Series) -> bool:
         """Whether there is anything to say of it."""
         return series_key(one) in self.slopes or series_key(one) in self.varying or bool(self.stand_out(one))
 

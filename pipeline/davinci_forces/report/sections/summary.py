@@ -277,8 +277,8 @@ def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str
         yield 3 * trusted.fineness, f"**{name}, {literal(space.log)}**: {text}{see_runs}"
     if trusted.narrow:
         narrow = f"the 95 % band is too narrow: it covers {percent(space.coverage)} of free-space samples. "
-        judge = f"Judge contacts by the detection level.{see_runs}"
-        yield 1.0 + 10 * (COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {narrow}{judge}"
+        remedy = f"Judge contacts by the detection level.{see_runs}"
+        yield 1.0 + 10 * (COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {narrow}{remedy}"
 
 
 def see(context: Context, kind: type[Record], anchor: str) -> str:

@@ -188,9 +188,9 @@ def _moved_by_gravity(chain: Chain) -> list[bool]:
     return [bool(x) for x in abs(Y).max(axis=(0, 2)) > 1e-6]
 
 
-def _joint(joint: UrdfJoint, name: str, feels_gravity: bool) -> Joint:
+def _joint(joint: UrdfJoint, name: str, has_gravity: bool) -> Joint:
     kind = Kind.PRISMATIC if joint.kind == "prismatic" else Kind.REVOLUTE
-    turning: tuple[Term, ...] = (gravity_sin, gravity_cos) if feels_gravity and kind is Kind.REVOLUTE else ()
+    turning: tuple[Term, ...] = (gravity_sin, gravity_cos) if has_gravity and kind is Kind.REVOLUTE else ()
     rates = (-joint.velocity, joint.velocity) if math.isfinite(joint.velocity) else ANYWHERE
     limits = Limits(joint.position, rates, ANYWHERE, joint.effort)
     return Joint(name, joint.name, kind, (inertia, *turning, *FRICTION), limits, harmonics=DEFAULT_HARMONICS)

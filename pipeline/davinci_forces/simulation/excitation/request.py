@@ -12,7 +12,7 @@ from davinci_forces.errors import BadRequest
 from davinci_forces.maths.excitation.arm import ArmExcitationProblem, arm_observation, arm_problem, design_together
 from davinci_forces.maths.excitation.fourier import CRITERIA, Fourier, Range, condition
 from davinci_forces.maths.excitation.joint import ExcitationProblem
-from davinci_forces.maths.excitation.search import Tell, report_nothing
+from davinci_forces.maths.excitation.search import ReportStart, ignore_start
 from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.simulation.excitation.trajectory import (
     PERIODS,
@@ -58,8 +58,8 @@ class Answer(NamedTuple):
     arm: ArmExcitation | None = None
 
 
-def answer(request: Request, tell: Tell = report_nothing) -> Answer:
-    """Design or evaluate a trajectory for each requested joint; `tell` reports each start for an arm.
+def answer(request: Request, report_start: ReportStart = ignore_start) -> Answer:
+    """Design or evaluate a trajectory for each requested joint; `report_start` reports each start for an arm.
 
     Joints that move together share a period.  Where the arm's links are known, the trajectories are optimal for the
     whole arm.  Otherwise the joints' models are independent, and each trajectory is optimal for its own joint.
@@ -84,13 +84,13 @@ def answer(request: Request, tell: Tell = report_nothing) -> Answer:
     period = request.period or max(PERIODS[joint.kind] for joint in joints)
     problems = [_problem(request, joint, period) for joint in joints]
     if all_joints and robot.chain is not None:
-        return _of_arm(request, robot, arm_problem(robot.chain, problems), tell)
+        return _of_arm(request, robot, arm_problem(robot.chain, problems), report_start)
     return Answer([_excitation(request, *pair) for pair in zip(joints, problems, strict=True)])
 
 
-def _of_arm(request: Request, robot: Robot, problem: ArmExcitationProblem, tell: Tell) -> Answer:
+def _of_arm(request: Request, robot: Robot, problem: ArmExcitationProblem, report_start: ReportStart) -> Answer:
     try:
-        design = design_together(problem, max(1, request.starts // STARTS_OF_ARM), request.seed, tell)
+        design = design_together(problem, max(1, request.starts // STARTS_OF_ARM), request.seed, report_start)
     except ValueError as error:
         raise BadRequest(f"{robot.name}: {error}") from None
     F = arm_observation(problem, design.series)

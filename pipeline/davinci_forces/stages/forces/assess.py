@@ -20,7 +20,7 @@ def run(track: Track, entry: LogEntry) -> Iterator[FreeSpace]:
     Joints at rest are left out: friction takes any value up to its Coulomb level, which hides a small external effort.
     """
     free = free_space(track.t, entry.contact, track.rate)
-    if track.at_rest or not entry.tells_free_space or int(free.sum()) < MIN_SAMPLES_LEVEL:
+    if track.at_rest or not entry.has_known_free_motion or int(free.sum()) < MIN_SAMPLES_LEVEL:
         return
     windows = [(start - MARGIN_BEFORE_CONTACT, end) for start, end in entry.contact]
     free_smooth = free_space(track.t, windows, track.rate)

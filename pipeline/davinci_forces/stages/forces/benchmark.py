@@ -37,7 +37,7 @@ def run(
     Each filter has the slowest random walk with which it shows a push, so that all are compared at the same speed.
     """
     free = free_space(model.t, entry.contact, model.rate)
-    unfitted = entry.role != "identification" and entry.tells_free_space
+    unfitted = entry.role != "identification" and entry.has_known_free_motion
     if not unfitted or model.at_rest or noise is None or int(free.sum()) < MIN_SAMPLES_COMPARISON:
         return
     variants, identified = [(name.replace("_", "-"), name, model) for name in FILTERS], Identified(robot, fits)

@@ -27,7 +27,7 @@ def run(
 
     In an identification log, the model is that of refits which left out what they predict.
     """
-    if not entry.tells_free_space or model.at_rest or noise is None or not model.scheme:
+    if not entry.has_known_free_motion or model.at_rest or noise is None or not model.scheme:
         return
     free = free_space(model.t, entry.contact, model.rate)
     if int(free.sum()) < MIN_SAMPLES_BAND:

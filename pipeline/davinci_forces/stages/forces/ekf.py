@@ -82,7 +82,7 @@ def track_effort(
         model_part_std=float(np.sqrt(model_part**2 + np.mean(model_error.std))) - model_part,
         lag_part=rms(late[converged]),
         smooth_rise=smooth_rise,
-        band_from=model_error.told_by,
+        band_from=model_error.source,
         t=model.t,
         q=estimate.q,
         dq=estimate.dq,

@@ -63,9 +63,9 @@ def predict_joint(
     labelled = [(f.model, f.estimator, f) for f in independent]
     if chosen is not None:
         labelled.append((CHOSEN, f"{chosen.model}.{chosen.estimator}", chosen))
-    judge, path = Scorer(motion, free, lowpass), identified.path(motion)
+    scorer, path = Scorer(motion, free, lowpass), identified.path(motion)
     for model, estimator, fit in labelled:
-        yield judge.score(model, estimator, entry.role, entry.role, path, along.tau_hat(fit, motion.joint))
+        yield scorer.score(model, estimator, entry.role, entry.role, path, along.tau_hat(fit, motion.joint))
 
 
 def apply(

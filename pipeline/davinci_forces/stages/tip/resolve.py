@@ -35,7 +35,9 @@ def run(tracks: Sequence[Track], entry: LogEntry, robot: Robot) -> Iterator[Join
     """Correlate the errors of the joints in free space, in a log in which all move and contacts are known."""
     names = [joint.name for joint in robot.joints[:TIP_JOINTS]]
     moving = [track for name in names for track in tracks if track.joint == name and not track.at_rest]
-    if robot.chain is None or len(robot.joints) != TIP_JOINTS or len(moving) < TIP_JOINTS or not entry.tells_free_space:
+    if robot.chain is None or len(robot.joints) != TIP_JOINTS:
+        return
+    if len(moving) < TIP_JOINTS or not entry.has_known_free_motion:
         return
     free = free_smoothed(moving[0], entry)
     errors = np.array([track.tau_ext_smooth[free] for track in moving])
@@ -86,7 +88,7 @@ def apply(
             yield diagnostic("resolve", entry.name, "note", f"{entry.name}: no force at the tip: {'; '.join(missing)}")
         return
     tracks = [by_joint[name] for name in names]
-    free = free_smoothed(tracks[0], entry) if entry.tells_free_space else np.zeros(len(tracks[0]), np.bool_)
+    free = free_smoothed(tracks[0], entry) if entry.has_known_free_motion else np.zeros(len(tracks[0]), np.bool_)
     rho, source = correlation(entry.name, correlations)
     force = tip_force_of(tracks, robot.chain, rho, source, free)
     yield force
