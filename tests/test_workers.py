@@ -175,7 +175,7 @@ from davinci_forces.runner.processes import workers
 from tests.test_workers import {busy}, task
 workers.SECONDS_ALONE = -1.0
 if __name__ == "__main__":
-    crew = workers.Crew(workers.Others(partial(workers.pool, 2)))
+    crew = workers.TaskQueue(workers.WorkerPool(partial(workers.pool, 2)))
     for i in range(2):
         crew.submit(partial({busy}, Path(sys.argv[1])), task(str(i)))
     list(crew.outcomes())

@@ -11,7 +11,7 @@ from davinci_forces.toml.file import TomlFile
 ROBOTS = ("davinci", "dvrk_psm")
 FILES = (".toml", ".urdf")  # formats in which laboratories describe their robots
 
-__all__ = ["FILES", "ROBOTS", "Joint", "Kind", "Limits", "Robot", "described", "load"]
+__all__ = ["FILES", "ROBOTS", "Joint", "Kind", "Limits", "Robot", "load"]
 
 
 def load(name: str, folder: Path) -> Robot:

@@ -8,7 +8,17 @@ from typing import Any
 from davinci_forces.haptics.scenario import HapticScenario
 from davinci_forces.robots.robot import Robot
 
-__all__ = ["WHOLE", "HapticScenario", "HungMass", "LogEntry", "Settings", "Source", "Study", "Weighing", "Weighings"]
+__all__ = [
+    "WHOLE_LOG",
+    "AttachedMass",
+    "HapticScenario",
+    "LogEntry",
+    "Settings",
+    "Source",
+    "Study",
+    "Weighing",
+    "Weighings",
+]
 
 WHOLE_LOG = ((0.0, math.inf),)  # the windows of a log that is in contact throughout
 
