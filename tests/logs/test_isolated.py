@@ -22,7 +22,7 @@ class Odd(Log):
     """Does with its child whatever the file says."""
 
     def blocks(self, names):
-        self._start_anew(names)
+        self._restart(names)
         yield {"x": np.arange(3.0)}
         what = self.path.read_text()
         if what == "crash":

@@ -86,7 +86,7 @@ class ArrayLog(Log):
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, as `Log.blocks` says."""
-        self._start_anew(names, kinds=("number", "time"))
+        self._restart(names, kinds=("number", "time"))
         of = {name: self.of[name] for name in names}
         arrays = {id(array): array for array, _ in of.values()}
         rows = max((array.rows for array in arrays.values()), default=0)

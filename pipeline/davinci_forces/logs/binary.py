@@ -72,7 +72,7 @@ class BinaryLog(Log):
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, as `Log.blocks` says."""
-        self._start_anew(names)
+        self._restart(names)
         yield from read_ahead(self._blocks(names))
 
     def _blocks(self, names: Sequence[str]) -> Iterator[Block]:

@@ -90,7 +90,7 @@ class Joined(Log):
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read channels of one clock, which are therefore of one file."""
-        self._start_anew(names, kinds=SAMPLED_KINDS)
+        self._restart(names, kinds=SAMPLED_KINDS)
         self.warnings[:] = self.remarks
         stem = self.of[names[0]]
         part = self.parts[stem]

@@ -176,7 +176,7 @@ class Log(ABC):
             raise BadLog(f"{self.path}: there is no column {number}; its {len(written)} columns are counted from 0")
         return written[number]
 
-    def _start_anew(self, names: Sequence[str], kinds: Sequence[str] = ("number",)) -> None:
+    def _restart(self, names: Sequence[str], kinds: Sequence[str] = ("number",)) -> None:
         """Reset the counts before blocks are read, and refuse channels that do not hold numbers."""
         self.nulls, self.nans = dict.fromkeys(names, 0), dict.fromkeys(names, 0)
         self.dropped = 0

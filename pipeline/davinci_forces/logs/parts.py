@@ -116,7 +116,7 @@ class Parts(Log):
         BadLog
             If a part begins before its predecessor has ended.
         """
-        self._start_anew(names, kinds=SAMPLED_KINDS)
+        self._restart(names, kinds=SAMPLED_KINDS)
         self.warnings[:] = self.remarks
         time = next((time for time in names if self.starts and time in self.times), "")
         axis = _Axis(self.parts, self.starts)

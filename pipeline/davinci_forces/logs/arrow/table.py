@@ -96,7 +96,7 @@ class ArrowLog(Log):
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, as `Log.blocks` says."""
-        self._start_anew(names, kinds=("number", "time"))
+        self._restart(names, kinds=("number", "time"))
         for batch in self.batches([self.columns[name] for name in names]):
             columns = {name: batch.column(self.columns[name]) for name in names}
             block = {name: _numbers(column, self.origin) for name, column in columns.items()}

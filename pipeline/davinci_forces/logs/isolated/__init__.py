@@ -63,7 +63,7 @@ class IsolatedLog(Log):
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, as `Log.blocks` says."""
-        self._start_anew(names, kinds=("number", "time"))
+        self._restart(names, kinds=("number", "time"))
         yield from read_ahead(self._blocks(list(names)))
 
     def _blocks(self, names: list[str]) -> Iterator[Block]:

@@ -132,6 +132,6 @@ class LvmLog(Log):
 
         If channels have several clocks, rows without a sample on this clock are skipped.
         """
-        self._start_anew(names, kinds=("number", "time"))
+        self._restart(names, kinds=("number", "time"))
         [clock] = self.by_clock(names) or [""]
         yield from read_ahead(Reading(self, self.options.encoding, tuple(names), self.clocks, clock).blocks())

@@ -208,7 +208,7 @@ class BagLog(Log):
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, all of one topic, as `Log.blocks` says."""
-        self._start_anew(names, kinds=("number", "time"))
+        self._restart(names, kinds=("number", "time"))
         if not names:
             return
         topic, columns = next(

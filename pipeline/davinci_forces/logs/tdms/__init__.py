@@ -100,7 +100,7 @@ class TdmsLog(Log):
 
         Shorter channels are filled up with NaN.
         """
-        self._start_anew(names, kinds=("number", "time"))
+        self._restart(names, kinds=("number", "time"))
         if problem := next((self.mixed[name] for name in names if name in self.mixed), ""):
             raise BadLog(f"{self.path}: {problem}")
         yield from read_ahead(self._timed(names))

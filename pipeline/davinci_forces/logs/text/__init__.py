@@ -67,7 +67,7 @@ class TextLog(Log):
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, as `Log.blocks` says."""
-        self._start_anew(names, kinds=("number", "time"))
+        self._restart(names, kinds=("number", "time"))
         assert self.dialect is not None
         yield from read_ahead(_Reading(self, self.dialect, tuple(names)).blocks())
 

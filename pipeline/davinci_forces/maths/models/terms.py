@@ -22,7 +22,7 @@ class Term:
     `unit` is that of the parameter; the joint fills in {inertia}, {mass_moment}, {effort} and {position}.  `typst` is
     phi in Typst's maths, for equations.  By physics, a `positive` parameter is not negative.  A term of z states
     one value of it, in the joint's units (`friction_state`): the `displacement` of a deflection, the `width` of a
-    smooth sign [velocity], or the `decay_velocity` of Stribeck's peak.
+    smooth sign [velocity], or Stribeck's `decay_velocity`.
     """
 
     name: str
