@@ -6,8 +6,9 @@ from importlib import import_module
 
 import pytest
 
-from davinci_forces.records import KINDS, Track
+from davinci_forces.records import KINDS, Diagnostic, LogSummary, Stiffness, Track
 from davinci_forces.records.catalogue import Catalogue, Provenance
+from davinci_forces.records.record import diagnostic
 from davinci_forces.report.changes import StatedValue
 from davinci_forces.report.content import (
     Bullets,
@@ -27,7 +28,7 @@ from davinci_forces.report.content import (
 from davinci_forces.report.content.layout import number_blocks
 from davinci_forces.report.context import Context
 from davinci_forces.report.results import Results, collect
-from davinci_forces.report.sections import DOCUMENTS, SECTIONS
+from davinci_forces.report.sections import DOCUMENTS, SECTIONS, runs, tissue
 from davinci_forces.study.review import Rating
 from tests.contracts.conftest import Lab
 from tests.test_words import LONG_SENTENCE, MEDIAN_SENTENCE, median_and_90th_percentile
@@ -129,6 +130,26 @@ def test_nothing_but_the_references_names_the_thesis_in_a_user_s_study(name: str
     shown = [block for block in walk(section) if not isinstance(block, Listing | Bullets | Section)]
     assert not full.compares_with_thesis
     assert not re.search(r"457\.24|(?<![.-])\bthesis\b(?!\.)|Fig 8\.9", " ".join(map(repr, shown)))
+
+
+@pytest.mark.parametrize(("true", "level"), [(1000.5, "good"), (1500.0, "info")])
+def test_a_precise_stiffness_that_misses_the_truth_is_not_called_good(full: Context, true: float, level: str):
+    [*_, measured] = full.catalogue.records(Stiffness)
+    precise = replace(measured, stiffness=1000.0, stiffness_std=1.0, pushes=5)
+    study = replace(full.study, truth={"log": [{"name": measured.log, "stiffness": true}]})
+    assert tissue.verdict(replace(full, study=study), precise).level == level
+
+
+def test_logs_are_not_called_good_above_the_remarks_of_a_stage(full: Context, catalogue: Catalogue):
+    def levels(about: Context) -> set[str]:
+        return {v.level for v in runs.recording_blocks(about, summaries) if isinstance(v, Verdict)}
+
+    [summary, *_] = full.catalogue.records(LogSummary)
+    summaries = [replace(summary, warnings=(), dropped=0, duplicates=0, jitter=0.0)]
+    assert levels(replace(full, catalogue=without(catalogue, Diagnostic))) == {"good"}
+    remark = diagnostic("average", "push", "warning", "a transient was left out")
+    with_remark = Catalogue(lambda kind: [remark] if kind is Diagnostic else catalogue.records(kind))
+    assert levels(replace(full, catalogue=with_remark)) == {"info"}
 
 
 def test_sentences_of_a_report_are_short(full: Context):
