@@ -1,5 +1,6 @@
 """Estimate the contact forces of a da Vinci arm from its motor currents, without a force sensor."""
 
+import atexit
 import os
 import re
 import signal
@@ -31,6 +32,7 @@ from davinci_forces.stages import GROUPS, module
 if TYPE_CHECKING:
     from davinci_forces.runner.console import Verbosity
 
+STOP_SIGNALS = signal.SIGINT, signal.SIGTERM
 STOP_TIMEOUT = 3.0  # [s] until a stopped run is ended by force
 STAGE = "stage"  # the command that is copied for every stage and group
 FIRST_PANEL, LAST_PANEL = "Start here", "Other commands"  # of the help, around the panels of the groups
@@ -111,7 +113,8 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):  # names in logs need not fit the console's encoding
             stream.reconfigure(errors="replace")
-    for number in (signal.SIGINT, signal.SIGTERM):
+    atexit.register(ignore_signals)  # one that comes while Python ends would end it without a word
+    for number in STOP_SIGNALS:
         if signal.getsignal(number) != signal.SIG_IGN:  # a script's background process ignores it
             signal.signal(number, stop)
     try:
@@ -134,10 +137,15 @@ class Stopped(SystemExit):
             echo("stopped; run again to continue", err=True)
 
 
+def ignore_signals() -> None:
+    """Ignore further signals that stop a run."""
+    for number in STOP_SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+
+
 def stop(number: int, _: object) -> None:
     """Raise `Stopped` once, and end the process if that has not ended it in time."""
-    for ignored in (signal.SIGINT, signal.SIGTERM):
-        signal.signal(ignored, signal.SIG_IGN)
+    ignore_signals()
     sys.unraisablehook = lambda _: None  # an exception raised in a destructor stops nothing
     threading.excepthook = lambda _: None  # nor does one of a thread whose processes end
     start_new_thread(leave, (128 + number,))  # a `threading.Thread` waits for a lock that this thread may hold
