@@ -88,4 +88,4 @@ def test_a_model_with_memory_is_chosen_and_predicts_such_friction_better(results
 def test_the_report_says_what_friction_does(study):
     page = (study.parent.parent / "reports" / "davinci-thesis" / "report.html").read_text()
     assert "What friction does to a fit." in page
-    assert "Model error by the friction of logs that nobody fitted." in page
+    assert "Model error by the friction of logs not fitted." in page

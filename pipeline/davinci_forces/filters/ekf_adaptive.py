@@ -11,7 +11,7 @@ import numpy as np
 from davinci_forces.filters import kalman
 from davinci_forces.filters.problem import FilterInput, NoiseModel, Tracked
 
-NAME = "The same, adaptive noise"
+NAME = "Extended Kalman filter, adaptive noise"
 WINDOW = 1.0  # [s] time constant of the mean
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from davinci_forces.filters import kalman
 from davinci_forces.filters.problem import FilterInput, NoiseModel, Tracked
 
-NAME = "The same, forward Euler"
+NAME = "Extended Kalman filter, forward Euler"
 
 
 def track(recording: FilterInput, noise: NoiseModel) -> Tracked:

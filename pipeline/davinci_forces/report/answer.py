@@ -1,4 +1,4 @@
-"""The answer without its page: as a terminal shows it (summary.txt), and as data (summary.json)."""
+"""The answer in plain text for a terminal (summary.txt), and as data (summary.json)."""
 
 import json
 import re
@@ -41,7 +41,7 @@ def align(rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def digest(context: Context) -> bytes:
-    """The content of summary.json; a key leads to its number in results.json, null where there is none."""
+    """The content of summary.json; each value is a key of results.json, or null if there is no such number."""
     started = [s.started for s in context.catalogue.records(LogSummary) if s.started]
     study = context.study
     content = {
@@ -55,7 +55,7 @@ def digest(context: Context) -> bytes:
 
 
 def _joint(context: Context, joint: str) -> dict[str, Any]:
-    """One joint as page one judges it: its verdict, and where its numbers are."""
+    """The verdict on one joint as on page one, and the keys of its numbers."""
     trusted = trust(context, joint)
     p, space = trusted.prediction, trusted.space
     free = f"{space.filter}.{space.log}.{space.joint}" if space is not None else ""

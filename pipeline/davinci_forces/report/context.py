@@ -1,4 +1,4 @@
-"""What every section is handed: the records, the results, and how to name things."""
+"""The input of every section: records, results, and the names of fits, logs and axes."""
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
@@ -14,7 +14,7 @@ from davinci_forces.report.results import Results, format_unit
 from davinci_forces.study import Study
 from davinci_forces.study.review import Rating
 
-BASELINE_FIT = "independent.lse"  # the fit that every other one is compared with
+BASELINE_FIT = "independent.lse"  # each joint by itself, least squares: other fits are compared with this fit
 THESIS_SCENARIOS = ("davinci-demo", "davinci-thesis")  # simulations of the thesis's experiments
 ACRONYMS = ("lse", "wlse", "pso", "iv", "tls")  # of estimators
 
@@ -27,17 +27,17 @@ class Context:
     study: Study
     results: Results
     provenance: Provenance
-    ratings: tuple[Rating, ...] = ()  # what reviewers said, where the study holds it
-    labels: frozenset[str] = frozenset()  # of what stands before a section in its document
-    baseline: Mapping[str, StatedValue] | None = None  # the numbers of an earlier report, where the study names one
+    ratings: tuple[Rating, ...] = ()  # by reviewers, from review.toml
+    labels: frozenset[str] = frozenset()  # of the blocks before a section in its document
+    baseline: Mapping[str, StatedValue] | None = None  # the numbers of an earlier report, if the study names one
 
     @property
     def compares_with_thesis(self) -> bool:
-        """Whether results stand beside those of the thesis: in its two simulations, not in a user's study."""
+        """Whether results are compared with the thesis: only in the simulations of its experiments."""
         return self.study.truth.get("scenario") in THESIS_SCENARIOS
 
     def number(self, key: str, digits: int = 4, **looks: Any) -> Number | str:
-        """The result of that key as a cell, or a dash where there is none; `looks` are fields of a Number."""
+        """The result of that key as a cell, or a dash if there is none; `looks` are fields of a Number."""
         return replace(self.results[key].number(digits), **looks) if key in self.results else "–"
 
     def numbers(self, prefix: str, names: Iterable[str], digits: int = 3) -> tuple[Number | str, ...]:
@@ -45,7 +45,7 @@ class Context:
         return tuple(self.number(f"{prefix}.{name}", digits) for name in names)
 
     def probability(self, key: str) -> Number | str:
-        """A probability as a cell: below 0.001 it is only said to be."""
+        """A probability as a cell; small ones are printed as < 0.001."""
         return self.number(key, 2, least=0.001)
 
     def count(self, key: str) -> Number | str:
@@ -53,19 +53,19 @@ class Context:
         return self.number(key, len(str(round(self.results[key].value))) if key in self.results else 1)
 
     def size(self, record: Record, field: str, value: float, digits: int = 2) -> str:
-        """A value of a record's field with its unit, in words of a sentence."""
+        """A value of a record's field with its unit, as text for a sentence."""
         unit = record.origin.units.get(field, "") if record.origin else ""
         return str(Number(value, format_unit(unit), digits=digits))
 
     def used_fit(self, joint: str) -> str:
-        """`<model>.<estimator>` of the fit that the filter ran with, as its predictions go by: `chosen.<fit>`."""
+        """`<model>.<estimator>` of the fit that the filter used; a chosen fit is named `chosen.<fit>`."""
         chosen = [f"{p.model}.{p.estimator}" for p in self.catalogue.select(Prediction, joint=joint, model=CHOSEN)]
         if self.study.settings.fit == CHOSEN and chosen:
             return chosen[0]
         return self.own_fit(joint)
 
     def own_fit(self, joint: str) -> str:
-        """`<model>.<estimator>` of the fit of a joint by itself: the one that the filter ran with, or least squares."""
+        """`<model>.<estimator>` of the fit of a joint by itself: the fit that the filter used, or least squares."""
         names = [f"{fit.model}.{fit.estimator}" for fit in self.own_fits() if fit.group == joint]
         chosen = [p.estimator for p in self.catalogue.select(Prediction, joint=joint, model=CHOSEN)]
         wanted = (
@@ -76,18 +76,18 @@ class Context:
         return next((name for name in (*wanted, BASELINE_FIT, *names) if name in names), self.study.settings.fit)
 
     def worst_space(self, joint: str) -> FreeSpace | None:
-        """The free space of a joint with the highest detection level, of a log not fitted where there is one."""
+        """The free space of a joint with the highest detection level, if possible of a log that was not fitted."""
         spaces = self.catalogue.select(FreeSpace, joint=joint)
         unseen = [space for space in spaces if space.role != "identification"]
         return max(unseen or spaces, key=lambda space: space.detection_level, default=None)
 
     def own_fits(self) -> list[Fit]:
-        """The fits of the joints' own terms, one joint at a time."""
+        """The fits of each joint by itself."""
         return self.catalogue.select(Fit, model="independent")
 
 
 def fit_name(model: str, estimator: str) -> str:
-    """A fit as a reader knows it: 'independent, LSE'; the chosen one with what was chosen."""
+    """The printed name of a fit, as 'independent, LSE' or 'chosen: independent, LSE'."""
     if model != CHOSEN:
         return f"{model}, {estimator_name(estimator)}"
     structure, _, by = estimator.rpartition(".")
@@ -95,7 +95,7 @@ def fit_name(model: str, estimator: str) -> str:
 
 
 def estimator_name(estimator: str) -> str:
-    """An estimator as a reader knows it: acronyms in capitals, and 'Huber'."""
+    """The printed name of an estimator: acronyms in capitals, and 'Huber'."""
     if estimator in ACRONYMS:
         return estimator.upper()
     return "Huber" if estimator == "huber" else estimator

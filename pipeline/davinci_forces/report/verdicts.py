@@ -1,4 +1,4 @@
-"""All thresholds of the report: from where on a number is good, calls for caution or is a problem."""
+"""All thresholds of the report: the limits of good, caution and problem."""
 
 import math
 from dataclasses import dataclass
@@ -8,10 +8,10 @@ from davinci_forces.report.content import Cell, Level
 
 GOOD, CAUTION = 0.10, 0.25  # model error over the root mean square of the measured effort
 DETECTED, DETECTABLE = 1 / 3, 1.0  # detection level over the effort that the user wants to see
-STIFF, STIFFER = 0.10, 0.25  # standard error of a stiffness over it
-COVERED = (0.90, 0.98)  # coverage of a 95 % band that is right
-NEAR_SINGULAR = 100.0  # condition number of the tip's Jacobian, as the stage that finds the force marks it
-WITHIN = 4.0  # standard errors that an estimate may be off the truth
+STIFF, STIFFER = 0.10, 0.25  # standard error of a stiffness over the stiffness
+COVERED = (0.90, 0.98)  # coverage of a right 95 % band: not too narrow, not too wide
+NEAR_SINGULAR = 100.0  # condition number of the tip's Jacobian; the stage `resolve` uses the same limit
+WITHIN = 4.0  # largest accepted error of an estimate in standard errors
 WORDS: dict[Level, str] = {  # the mark and its word stay on one line
     "good": "●\N{NO-BREAK SPACE}Good",
     "warn": "▲\N{NO-BREAK SPACE}Caution",
@@ -21,7 +21,7 @@ WORDS: dict[Level, str] = {  # the mark and its word stay on one line
 
 @dataclass(frozen=True)
 class Trust:
-    """How far the external effort of one joint can be trusted, by its worst run that was not fitted."""
+    """The trust in the external effort of one joint, from its worst run that was not fitted."""
 
     joint: str
     prediction: Prediction | None
@@ -30,18 +30,18 @@ class Trust:
 
     @property
     def share(self) -> float:
-        """Model error over the root mean square of the effort, NaN where no run was predicted."""
+        """Model error over the root mean square of the effort; NaN if no run was predicted."""
         p = self.prediction
         return p.model_error / p.effort_rms if p is not None and p.effort_rms > 0 else math.nan
 
     @property
     def fineness(self) -> float:
-        """Detection level over the effort sought, NaN where none is stated."""
+        """Detection level over the effort sought; NaN if the study states no effort."""
         return self.space.detection_level / self.sought if self.space is not None and self.sought else math.nan
 
     @property
     def same_path(self) -> bool:
-        """Whether the run repeats the path that was fitted, where the model's error repeats."""
+        """Whether the run repeats the fitted path; there the model's error repeats, too."""
         return self.prediction is not None and self.prediction.path == "same path"
 
     @property
@@ -62,7 +62,7 @@ class Trust:
 
 
 def verdict_words(level: Level, same_path: bool, narrow: bool) -> str:
-    """A verdict with what limits it; a band that is too narrow denies "Good", so that word is not printed beside it."""
+    """A verdict with its limitation; the word "Good" is not printed with a band that is too narrow."""
     if level == "good" and narrow:
         return "●\N{NO-BREAK SPACE}Small error, narrow band"
     return WORDS[level] + (", same path" if same_path else "")
@@ -93,20 +93,21 @@ def percent(share: float) -> str:
 def thresholds() -> tuple[tuple[Cell, ...], ...]:
     """The rows of the table of thresholds: quantity, measure, and the bounds of good, caution and problem."""
     return (
-        ("External effort of a joint, where `effort` is stated", "detection level over the effort sought",
+        ("External effort of a joint, if the study states the `effort` sought", "detection level over this effort",
          f"at most {percent(DETECTED)}", f"at most {percent(DETECTABLE)}", "beyond"),
-        ("External effort of a joint, without `effort`", "model error over the root mean square of the effort",
+        ("External effort of a joint, if no `effort` is stated", "model error over the root mean square of the effort",
          f"at most {percent(GOOD)}, on a path that was not fitted", f"at most {percent(CAUTION)}, or the same path",
          "beyond"),
-        ("95 % band of the external effort", "share of free-space samples that it covers",
+        ("95 % band of the external effort", "coverage: share of free-space samples in the band",
          f"{percent(COVERED[0])} to {percent(COVERED[1])}", f"above {percent(COVERED[1])}: too wide",
          f"below {percent(COVERED[0])}: too narrow"),
-        ("Stiffness of tissue", "its standard error over it",
-         f"at most {percent(STIFF)}, of two pushes at least", f"at most {percent(STIFFER)}",
-         "beyond, or no push counts"),
+        ("Stiffness of tissue", "standard error over stiffness",
+         f"at most {percent(STIFF)}, from at least two pushes", f"at most {percent(STIFFER)}",
+         "beyond, or no usable push"),
         ("Pose of the tip", "condition number of its Jacobian", "–", f"above {NEAR_SINGULAR:g}: near singular", "–"),
         ("Parameter of a simulated study", "standard errors from the truth", f"at most {WITHIN:g}", "–", "beyond"),
-        ("White noise", "probability of a larger Ljung-Box statistic over 20 lags", "above 1 %", "–", "–"),
-        ("Innovations of the filter", "this probability and that of the cumulative periodogram, both signals",
-         "each above 1 %, of the whole run or outside contact and reversals", "with or without a tested cause", "–"),
+        ("White noise", "p-value of the Ljung-Box test over 20 lags", "above 1 %", "–", "–"),
+        ("Innovations of the filter", "p-values of this test and of the cumulative periodogram, both signals",
+         "each above 1 %, in the whole run or outside contact and reversals",
+         "below, with or without a known cause", "–"),
     )  # fmt: skip

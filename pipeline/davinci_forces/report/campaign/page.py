@@ -39,14 +39,14 @@ def render_campaign(studies: Sequence[CampaignStudy], left_out: Sequence[str], f
 
 
 def overview(studies: Sequence[CampaignStudy], left_out: Sequence[str], findings: Findings) -> Iterator[Block]:
-    """The prose, the findings, and a table with one row a study."""
+    """Prose, findings, and a table with one row a study."""
     dates = f", recorded from {studies[0].started[:10]} to {studies[-1].started[:10]}" if findings.by_date else ""
     undated = " Some logs state no date of recording, so studies are in the order in which they are named."
     order = "" if findings.by_date else undated
     yield Prose(
         f"This page compares {count(len(studies), 'report')}{dates}; each row links to its report.{order} Parameters "
         "are least-squares estimates of each joint by itself. A number drifts if a weighted line through it has "
-        "a slope beyond the standard error of the slope, which is widened where values scatter. A number varies if its "
+        "a slope beyond the standard error of the slope, which is widened if values scatter. A number varies if its "
         "values scatter about one mean by more than their errors. A study stands out if it is far from the mean of the "
         f"others. The chance of a false alarm in all {findings.tests} tests together is {100 * findings.chance:.0f} %."
     )
@@ -68,7 +68,7 @@ def overview(studies: Sequence[CampaignStudy], left_out: Sequence[str], findings
 
 
 def change_in_words(series: Series, findings: Findings) -> str:
-    """How a number drifts or varies, in words."""
+    """State how a number drifts or varies."""
     name = f"**{title(series.joint)}, {literal(words(series.name))}**"
     if line := findings.slopes.get(series_key(series)):
         slope = Number(line.value, f"{format_unit(series.unit)} a {findings.unit}".strip(), line.std)
@@ -77,7 +77,7 @@ def change_in_words(series: Series, findings: Findings) -> str:
 
 
 def outliers_in_words(series: Series, findings: Findings) -> Iterator[str]:
-    """Studies that stand out."""
+    """State the studies that stand out."""
     for i in findings.stand_out(series):
         shown = Number(float(series.value[i]), format_unit(series.unit), float(series.std[i]))
         where = f"{title(series.joint)}, {literal(words(series.name))}"
@@ -85,12 +85,12 @@ def outliers_in_words(series: Series, findings: Findings) -> Iterator[str]:
 
 
 def date(study: CampaignStudy) -> str:
-    """The day of its first log."""
+    """The date of the first log of a study."""
     return study.started[:10] if study.when else "–"
 
 
 def word(study: CampaignStudy, joint: str) -> str:
-    """The verdict of one joint."""
+    """The verdict on one joint in one study."""
     verdict = study.joints.get(joint)
     if verdict is None:
         return "–"
@@ -105,7 +105,7 @@ def joint_section(joint: str, studies: Sequence[CampaignStudy], findings: Findin
     names = list(dict.fromkeys(series.name for series in of_joint))
     changed = sorted({series.name for series in of_joint if findings.has_change(series)})
     changes = f"beyond errors: {', '.join(changed)}" if changed else "none changes beyond its errors"
-    drawn = [series for series in of_joint if len(series.studies) > 1]  # one study is no course over time
+    drawn = [series for series in of_joint if len(series.studies) > 1]  # a series of one study is not drawn
     figure = Figure(
         f"{title(joint)}: its parameters and the measures of trust, with standard errors, study by study. Studies that "
         "stand out are named.",

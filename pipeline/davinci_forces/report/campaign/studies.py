@@ -18,7 +18,7 @@ FLOORS = {"model_error": "model error", "detection_level": "detection level", "c
 
 @dataclass(frozen=True)
 class JointVerdict:
-    """One joint of a study as its report judges it; the keys lead to its numbers."""
+    """The verdict of a report on one joint, with the keys of its numbers."""
 
     verdict: Level
     same_path: bool
@@ -39,7 +39,7 @@ class CampaignStudy:
 
     @property
     def when(self) -> datetime | None:
-        """When its first log began, as far as a log says so."""
+        """Start of the first log; None if no log states its start."""
         try:
             return datetime.fromisoformat(self.started[:19])
         except ValueError:
@@ -47,7 +47,7 @@ class CampaignStudy:
 
     @property
     def link(self) -> str:
-        """Its name, which leads to its report."""
+        """Name of the study as a link to its report."""
         words = literal(self.name).replace("]", "\\]")
         return f"[{words}]({self.report})"
 
@@ -65,12 +65,12 @@ class Series(NamedTuple):
 
 
 def joints_of(studies: Sequence[CampaignStudy]) -> list[str]:
-    """The joints that any study judges, in order."""
+    """The joints with a verdict in any study, in order."""
     return list(dict.fromkeys(joint for study in studies for joint in study.joints))
 
 
 def series_of(studies: Sequence[CampaignStudy], joint: str) -> Iterator[Series]:
-    """Every parameter of a joint, and how far it is to be trusted, over the studies; one a unit."""
+    """Every parameter and measure of trust of a joint over the studies; numbers in other units are other series."""
     keyed: dict[tuple[str, str], list[tuple[CampaignStudy, str]]] = {}
     prefix = f"fit.{joint}.{FIT}."
     for study in studies:
@@ -97,7 +97,7 @@ Place = tuple[str, str, str]  # joint, name and unit of a series
 
 
 class Slope(NamedTuple):
-    """By how much a number drifts a day, or a study, with its standard error."""
+    """Drift of a number per day or per study, with its standard error."""
 
     value: float
     std: float
@@ -105,35 +105,35 @@ class Slope(NamedTuple):
 
 @dataclass(frozen=True)
 class Findings:
-    """What of all series drifts, varies beyond its errors or stands out, many tests taken together."""
+    """The series that drift, vary beyond their errors or stand out, corrected for the number of tests."""
 
     every: tuple[Series, ...]
     by_date: bool
-    time: Mapping[str, float]  # of each study [days from the first], or which one it is in order
-    slopes: Mapping[Place, Slope] = field(default_factory=dict)  # of what drifts
+    time: Mapping[str, float]  # of each study [days from the first], or its number in order
+    slopes: Mapping[Place, Slope] = field(default_factory=dict)  # of the series that drift
     varying: frozenset[Place] = frozenset()
     outliers: Mapping[Place, tuple[int, ...]] = field(default_factory=dict)  # studies, by their place in the series
     tests: int = 0
-    chance: float = 0.0  # that any of them tells falsely
+    chance: float = 0.0  # that any test gives a false alarm
 
     def times(self, one: Series) -> Array:
-        """When the studies of a series were."""
+        """Times of the studies of a series."""
         return np.array([self.time[study.name] for study in one.studies])
 
     @property
     def unit(self) -> str:
-        """What a slope is by."""
+        """Unit of time of a slope."""
         return "day" if self.by_date else "study"
 
     def stand_out(self, one: Series) -> tuple[int, ...]:
-        """Which of its studies stand out from the others."""
+        """Indices of the studies of a series that stand out."""
         return self.outliers.get(series_key(one), ())
 
     def has_change(self, one: Series) -> bool:
-        """Whether there is anything to say of it."""
+        """Whether a series drifts, varies or has studies that stand out."""
         return series_key(one) in self.slopes or series_key(one) in self.varying or bool(self.stand_out(one))
 
 
 def series_key(one: Series) -> Place:
-    """What tells a series from the others."""
+    """Joint, name and unit, which identify a series."""
     return one.joint, one.name, one.unit

@@ -1,6 +1,6 @@
-"""What a report says, in order: one module per section, exporting `section`, and its name in the list below.
+"""The sections of a report, in order: one module per section, exporting `section`, and its name in the list below.
 
-section(context: Context) -> Section | None        None where a study has nothing to say on it; they share `parts`
+section(context: Context) -> Section | None        None if a study has no such content; they share `parts`
 """
 
 from collections.abc import Callable
@@ -9,7 +9,7 @@ from importlib import import_module
 from davinci_forces.report.content import Section
 from davinci_forces.report.context import Context
 
-# A file, its title, and its sections: each answers one question.
+# The file, the title and the sections of each document.
 DOCUMENTS: dict[str, tuple[str, tuple[str, ...]]] = {
     "report": (
         "Contact forces without a force sensor",

@@ -8,7 +8,7 @@ from davinci_forces.report.context import Context, count
 from davinci_forces.report.results import format_unit
 from davinci_forces.report.sections.parts import paper_or_screen
 
-MAX_ROWS = 300  # of a table; `davinci-forces compare` has them all
+MAX_ROWS = 300  # of a table; `davinci-forces compare` prints all changes
 
 
 def section(context: Context) -> Section | None:
@@ -43,12 +43,12 @@ def blocks(context: Context, before: Mapping[str, StatedValue], differences: Seq
 
 
 def weight(change: Change) -> float:
-    """A change in standard errors; without any, it comes before all that have them."""
+    """A change in standard errors; changes without standard error come first."""
     return abs(change.z) if change.z is not None else float("inf")
 
 
 def table(context: Context, changed: Sequence[Change]) -> Iterator[Block]:
-    """The changes, the largest first; on screen where they are many."""
+    """The changes, the largest first; on screen if they are many."""
     rows = tuple(
         (literal(c.key), before_text(c), context.number(c.key), "–" if c.z is None else f"{c.z:+.1f}")
         for c in changed[:MAX_ROWS]
@@ -59,7 +59,7 @@ def table(context: Context, changed: Sequence[Change]) -> Iterator[Block]:
         else count(len(changed), "change")
     )
     whole = Table(
-        f"{changes} since the baseline, the largest first: a, b, and their difference over its standard error.",
+        f"{changes} since the baseline, the largest first: values a and b, and b minus a over its standard error.",
         ("Number", "a, the baseline", "b, now", "Standard errors"), rows, "baseline-changes", "lrrr",
     )  # fmt: skip
     yield from paper_or_screen(whole, "Changes since the baseline")

@@ -28,7 +28,7 @@ ERROR_TOLERANCE = 1e-9  # relative errors closer than this are equal
 
 
 def section(context: Context) -> Section | None:
-    """The choice with its scores, and what it is worth on unseen logs; none where nothing was chosen."""
+    """The choice with its scores, and its error on unseen logs; None if no model was chosen."""
     choices = context.catalogue.records(Choice)
     return Section("Choice of the model", "choice", tuple(blocks(context, choices[0]))) if choices else None
 
@@ -36,15 +36,18 @@ def section(context: Context) -> Section | None:
 def blocks(context: Context, choice: Choice) -> Iterator[Block]:
     """The section's content."""
     yield Prose(
-        "A candidate model is a structure (each joint by itself, or coupled through the arm's links), a friction "
-        "model, and a ridge, which keeps poorly determined parameters small. Each candidate is refitted without a "
-        "sixth of the path, without half of it, and without each log where there are several. Its score is the "
-        "relative error on what was left out: the mean over joints that move, with motion, effort and prediction "
-        "through one low-pass. The whole arm gets the smallest candidate that is not clearly worse than the best, and "
-        f"whose inertia is positive definite along the trajectories. {MEASURES}"
+        "A candidate model has a structure: `independent` (each joint by itself) or `coupled` (through the arm's "
+        "links). A name after + is added friction: `smooth` (continuous at zero velocity), `stribeck` (larger near "
+        "rest), or one to three `dahl` elements (elastic before sliding; the percentages are their presliding "
+        "distances over the joint's range of motion). A ridge keeps poorly determined parameters small. Each candidate "
+        "is refitted without a sixth of the path, without half of it, and without each log if there are several. Its "
+        "score is the relative error on the data left out: the mean over moving joints, after position, effort and "
+        "prediction pass the same low-pass. The whole arm gets the smallest candidate that is not clearly worse than "
+        f"the best, and whose inertia is positive definite along the trajectories. {MEASURES}"
     )
     yield Verdict("info", f"**Chosen: {literal(choice.chosen)}.** {literal(choice.why)}.")
-    yield table(context, choice, best_rows(choice), "The best candidate of each variant.", "choice-table")
+    caption = "The best candidate of each structure and added friction."
+    yield table(context, choice, best_rows(choice), caption, "choice-table")
     yield figure(choice)
     order = np.argsort(choice.score, kind="stable").tolist()
     yield OnScreen(
@@ -68,8 +71,11 @@ def best_rows(choice: Choice) -> list[int]:
 
 def table(context: Context, choice: Choice, rows: list[int], caption: str, label: str) -> Table:
     """Scores of candidates."""
-    header = ("Candidate", "Parameters", "Path blocks left out", "Where fitted", "Periods left out", "Physical")
-    caption += " Relative errors: on blocks of path left out (raw samples), where fitted, and on periods left out."
+    header = ("Candidate", "Parameters", "Path blocks left out", "Fitted data", "Periods left out", "Physical")
+    caption += (
+        " Relative errors: on blocks of path left out (raw samples), on the fitted data, and on periods left out. "
+        "Physical: whether the inertia is positive definite along the trajectories."
+    )
     return Table(caption, header, tuple(row(context, choice, i) for i in rows), label, "lrrrrl")
 
 
@@ -83,10 +89,10 @@ def row(context: Context, choice: Choice, i: int) -> tuple[Cell, ...]:
 
 
 def figure(choice: Choice) -> Figure:
-    """Error over number of parameters: it always falls on fitted data, not on data that were left out."""
+    """Error over number of parameters: it falls on fitted data, but not always on data left out."""
     size, chosen = choice.parameters.astype(float), choice.row_number(choice.chosen)
     marks = (
-        Points(size, choice.training, "where fitted", "sky"),
+        Points(size, choice.training, "fitted data", "sky"),
         Points(size, choice.score, "blocks of path left out", "vermillion"),
         Points(size[[chosen]], choice.score[[chosen]], "chosen", "black", y_std=choice.score_std[[chosen]]),
     )
@@ -95,7 +101,7 @@ def figure(choice: Choice) -> Figure:
     return Figure(
         "Relative error of every candidate over its number of parameters, on fitted data and on data that were left "
         "out.",
-        "Relative error over number of parameters: falling where fitted, not always where data were left out.",
+        "Relative error over number of parameters: falling on fitted data, but not always on data left out.",
         (Panel("Candidates", "parameters", "relative error", (*marks, *repeated)),),
         label="choice-figure",
         height=46,
@@ -118,7 +124,7 @@ def overfitting_note(choice: Choice) -> Iterator[Verdict]:
 
 
 def unseen(context: Context) -> Iterator[Block]:
-    """The chosen model beside each joint by itself, on logs that were not fitted."""
+    """The chosen model compared with each joint by itself, on logs that were not fitted."""
     predictions = [p for p in context.catalogue.select(Prediction, model=CHOSEN) if p.role != "identification"]
     if not predictions:
         return
@@ -134,7 +140,7 @@ def unseen(context: Context) -> Iterator[Block]:
     )
     header = ("Log", "Joint", "Path", "Chosen", "Joint by itself")
     table = Table("Relative error on logs that were not fitted.", header, rows, "choice-unseen", "lllrr")
-    yield from paper_or_screen(table, "The chosen model beside each joint by itself, run by run", MAX_RUNS_ON_PAPER)
+    yield from paper_or_screen(table, "The chosen model and each joint by itself, run by run", MAX_RUNS_ON_PAPER)
 
 
 def parameters(context: Context) -> Iterator[Block]:

@@ -12,7 +12,7 @@ from davinci_forces.study import LogEntry
 
 
 def section(context: Context) -> Section | None:
-    """All windows of contact, and what was recorded without being analysed."""
+    """All contact windows, and the recordings that were not analysed."""
     content = tuple(blocks(context))
     return Section("Contacts", "contacts", content) if content else None
 
@@ -22,19 +22,20 @@ def blocks(context: Context) -> Iterator[Block]:
     contacts = context.catalogue.records(Contact)
     if contacts:
         yield Prose(
-            "A contact is measured on each joint that moved in it. Its window is one that the study states, or one "
-            "where the smoothed external effort exceeds the alarm level. Free motion crosses the alarm level at most "
-            "once in ten minutes. Each contact has an onset, a release, a peak (the largest external effort), a mean "
-            "and an impulse (effort times time). The standard errors are the spread of the same quantities over "
-            "windows of the same length in free space; that of a peak includes its own standard deviation. A contact "
-            "is detected if its peak exceeds the joint's detection level: the level that 99 % of the samples of its "
-            "worst free run stay below."
+            "A contact is measured on each joint that moves during the contact. The study states its window, or the "
+            "window is the time in which the smoothed external effort exceeds the alarm level. This level is set so "
+            "that free motion crosses it at most once in ten minutes. Each contact has an onset, a release, a peak "
+            "(the largest external effort), a mean and an impulse (effort times time). The standard error of each "
+            "quantity is its spread over windows of the same length in free space; the standard error of a peak also "
+            "includes the filter's standard deviation at that peak. A contact is detected if its peak exceeds the "
+            "joint's detection level: 99 % of the samples of the joint's worst run in free space stay below this "
+            "level."
         )
         yield peaks(contacts)
         yield from paper_or_screen(
             Table(
-                "Contacts, log by log. Detected: whether the peak exceeds the detection level; “peak only” where it "
-                "does, yet not the alarm level; “found, not stated” for a contact outside the study's windows.",
+                "Contacts, log by log. Detected: whether the peak exceeds the detection level; “peak only” if it does "
+                "but stays below the alarm level; “found, not stated” for a contact outside the study's windows.",
                 ("Log", "Joint", "Onset", "Release", "Peak", "Mean", "Impulse", "Detected"),
                 tuple(row for contact in contacts for row in rows(context, contact)),
                 "contact-table",
@@ -45,7 +46,7 @@ def blocks(context: Context) -> Iterator[Block]:
     if unused:
         yield Table(
             "Logs that were recorded, but not analysed for contact.",
-            ("Log", "Joint", "Why, and what would change it"),
+            ("Log", "Joint", "Reason, and remedy"),
             unused,
             "not-analysed",
         )
@@ -67,7 +68,7 @@ def detection(contact: Contact, i: int, above: bool) -> str:
 
 
 def peaks(contacts: list[Contact]) -> Figure:
-    """The peak of every window beside the detection level of its joint."""
+    """The peak of every window, with the detection level of its joint."""
     joints = list(dict.fromkeys(contact.joint for contact in contacts))
     missed = sum(int((contact.above == 0).sum()) for contact in contacts)
     total = sum(len(contact) for contact in contacts)
@@ -110,11 +111,11 @@ def not_analysed(context: Context) -> Iterator[tuple[str, str, str]]:
 
 
 def reason(entry: LogEntry, track: Track | None) -> str:
-    """Why a joint of a log has no contact measured."""
+    """The reason why no contact was measured on a joint of a log."""
     if entry.role == "friction":
         return "a friction log gives friction maps; its external effort is not tracked"
     if track is None:
-        return "no fit of the joint to compare with: record an identification log of it"
+        return "the joint has no fit to compare with; record an identification log of this joint"
     if track.at_rest:
         return (
             "at rest, where friction takes any value up to its Coulomb level and hides efforts up to that level; move "
@@ -122,4 +123,4 @@ def reason(entry: LogEntry, track: Track | None) -> str:
         )
     if entry.role != "contact":
         return f"a log of role “{entry.role}” is tracked, but its windows are not measured"
-    return "no contact was found above the alarm level; write `contact = [[start, end]]` where there was one"
+    return "no contact was found above the alarm level; write `contact = [[start, end]]` if there was a contact"

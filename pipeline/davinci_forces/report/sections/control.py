@@ -11,7 +11,7 @@ SHARE_DRAWN = 0.5  # of a study's time, in which it settles
 
 
 def section(context: Context) -> Section | None:
-    """How the robot's controllers behave in simulation, where it has any."""
+    """Simulations of the robot's controllers; None if there are none."""
     names = {run.controller for run in context.catalogue.records(Control)}
     studies = [study for study in context.study.robot.control if study.name in names]
     return Section("Control, in simulation", "control", tuple(blocks(context, studies))) if studies else None
@@ -38,8 +38,8 @@ def blocks(context: Context, studies: list[ControlStudy]) -> Iterator[Block]:
         yield settling_table(context, exact)
     if light:
         yield Prose(
-            "If the compensator does not know all of the masses, PD is left with an offset. Integral action removes "
-            "it, but slowly: its slow pole keeps the error **larger** than PD's offset for some twenty seconds."
+            "If the compensator does not know all of the masses, PD settles with an offset. Integral action removes "
+            "this offset slowly: its slow pole keeps the error **larger** than PD's offset for some twenty seconds."
             + (" The thesis calls the response faster, which this simulation does not confirm." if thesis else "")
         )
         yield errors(context, light)
@@ -78,7 +78,7 @@ def response(context: Context, study: ControlStudy) -> Figure:
 
 
 def settling_table(context: Context, studies: list[ControlStudy]) -> Table:
-    """How fast each joint settles, and how far it overshoots."""
+    """Settling time and overshoot of each joint."""
     names = ("settling_time", "overshoot", "error_end")
     return Table(
         "Time after which each joint stays within 2 % of its step, overshoot over the step, and error at the end.",

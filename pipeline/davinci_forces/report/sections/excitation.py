@@ -21,12 +21,12 @@ def blocks(context: Context, excitations: list[Excitation]) -> Iterator[Block]:
         "The smaller the objective $-log_10 det(F^T F)$ over 300 samples of a period, the better a trajectory "
         "separates the parameters. Position, velocity and acceleration must keep their limits at every instant, so the "
         "extremes are computed, not sampled. Trajectories designed here are the best of several searches without "
-        "limits: the harmonics are scaled until they touch one, and the mean may lie anywhere in the remaining room."
+        "limits: the harmonics are scaled until they reach a limit; the mean may lie anywhere in the remaining range."
         + (" The published ones are those of the thesis's Table 6.1." if context.compares_with_thesis else "")
     )
     yield Table(
-        "Objective and condition of published trajectories and of those designed here, and how far each exceeds its "
-        "position limits.",
+        "Objective and condition number of published trajectories and of trajectories designed here, and the excess of "
+        "each over its position limits.",
         ("Joint", "Trajectory", "Objective", "Condition", "Beyond limits"),
         tuple(
             (
@@ -50,7 +50,7 @@ def blocks(context: Context, excitations: list[Excitation]) -> Iterator[Block]:
 
 
 def source_label(e: Excitation) -> str:
-    """Where a trajectory comes from."""
+    """The source of a trajectory."""
     return SOURCES.get(e.source, literal(e.source))
 
 

@@ -9,7 +9,7 @@ from davinci_forces.records import Comparison, FilterNoise, Track
 from davinci_forces.report.content import Block, Cell, Figure, Line, OnScreen, Panel, Prose, Section, Table, literal
 from davinci_forces.report.context import Context, label, title
 
-SECONDS_DRAWN = 8.0  # [s] of a run, few enough to see differences of filters
+SECONDS_DRAWN = 8.0  # [s] part of a run that is drawn, short enough to see the filters differ
 DRAWN = {
     "direct": ("grey", "dotted"),
     "momentum": ("green", "dashdot"),
@@ -19,7 +19,7 @@ DRAWN = {
 
 
 def section(context: Context) -> Section | None:
-    """Tuning, budget and comparison, where anything was tracked."""
+    """Tuning, error budget and comparison; None if no run was tracked."""
     content = tuple(blocks(context))
     return Section("The filter", "filters", content) if content else None
 
@@ -30,36 +30,38 @@ def blocks(context: Context) -> Iterator[Block]:
     if not noises:
         return
     yield Prose(
-        "The filter assumes noise of position, velocity and effort. Its size maximises the likelihood of the "
-        "innovations (each measurement minus its prediction) in identification logs, where nothing touches the robot. "
-        "The external effort is a random walk. Such logs cannot tell how fast it may change: a filter tuned to them "
-        "would miss pushes. So the walk is the slowest with which a push, a half-sine of 1 s, shows 90 % of its peak "
-        "at most 0.1 s late ([@filter-tuning])."
+        "The filter assumes noise of position, velocity and effort. Its standard deviations maximise the likelihood of "
+        "the innovations (each measurement minus its prediction) in identification logs, where nothing touches the "
+        "robot. The external effort is modelled as a random walk. Identification logs cannot show how fast the "
+        "external effort may change: a filter tuned to them would miss pushes. So the random walk has the smallest "
+        "intensity with which the filter returns 90 % of the peak of a push (a half-sine of 1 s) at most 0.1 s late "
+        "([@filter-tuning])."
     )
     yield tuning(context, noises)
     worst = [track for noise in noises for track in worst_track(context, noise.joint)]
     if worst:
         yield Prose(
             "The stated standard deviation of the external effort combines independent parts ([@error-budget]). The "
-            "filter's part comes from noise and random walk. The model's part is its error in free motion of other "
-            "logs that no fit had seen. The lag's part is what the filter misses of the smoothed effort. The offset "
-            "of the day is added where free windows determine one."
+            "filter's part comes from noise and random walk. The model's part is the model's error in free motion of "
+            "other logs, which were not fitted. The lag's part is the smoothed effort minus the filter's, due to the "
+            "filter's delay. The error of the offset of the day (a constant effort that differs from day to day) is "
+            "added if windows without contact determine this offset."
         )
         yield budget(context, worst)
     comparisons = [c for track in worst for c in context.catalogue.select(Comparison, log=track.log, joint=track.joint)]
     if comparisons:
         yield comparison(context, comparisons)
-        yield OnScreen("Filters beside each other over time", "filters-over-time", (overlay(comparisons),))
+        yield OnScreen("Filters compared over time", "filters-over-time", (overlay(comparisons),))
 
 
 def worst_track(context: Context, joint: str) -> Iterator[Track]:
-    """The free run of a joint that its detection level comes from."""
+    """The run in free space that sets the detection level of a joint."""
     if (space := context.worst_space(joint)) is not None:
         yield from context.catalogue.select(Track, log=space.log, joint=joint)
 
 
 def tuning(context: Context, noises: list[FilterNoise]) -> Table:
-    """The tuned noise of each joint, and the logs that it was tuned on."""
+    """The tuned noise of each joint, and the logs of the tuning."""
     rows: tuple[tuple[Cell, ...], ...] = tuple(
         (
             title(noise.joint),
@@ -68,9 +70,12 @@ def tuning(context: Context, noises: list[FilterNoise]) -> Table:
         )
         for noise in noises
     )
-    caption = "Noise that the filter assumes (standard deviations of a sample; the walk per square root of a second)."
+    caption = (
+        "Noise that the filter assumes: standard deviations of a sample, and of the random walk of the external effort "
+        "per square root of a second."
+    )
     return Table(
-        caption, ("Joint", "Position", "Velocity", "Effort", "Walk", "Tuned on"), rows, "filter-tuning", "lrrrrl"
+        caption, ("Joint", "Position", "Velocity", "Effort", "Random walk", "Tuned on"), rows, "filter-tuning", "lrrrrl"
     )
 
 
@@ -80,9 +85,10 @@ def budget(context: Context, tracks: list[Track]) -> Table:
     rows: tuple[tuple[Cell, ...], ...] = tuple(
         (title(t.joint), literal(t.log), *context.numbers(f"ekf.{t.log}.{t.joint}", names, 2)) for t in tracks
     )
-    header = ("Joint", "Worst free run", "Filter", "Model", "Lag", "RMS", "Covered by 95 % band")
+    header = ("Joint", "Worst free run", "Filter", "Model", "Lag", "RMS", "Coverage")
     return Table(
-        "Parts of the standard deviation (root mean squares), beside the RMS and the coverage of the run.",
+        "Parts of the standard deviation of the external effort, in each joint's worst run in free space (root mean "
+        "squares); RMS of the external effort in this run; and coverage, the share of its samples in the 95 % band.",
         header,
         rows,
         "error-budget",
@@ -94,12 +100,13 @@ def comparison(context: Context, compared: list[Comparison]) -> Table:
     """Every filter on the worst free run of each joint."""
     rows = tuple(compared_row(context, c) for c in compared)
     caption = (
-        "Filters compared on the worst free run of each joint, each with the slowest walk that shows a push: their "
-        "external effort in free motion, and their response to a push that is added to the recorded effort in software."
+        "Filters compared on the worst free run of each joint, each with the smallest random walk that follows a push: "
+        "RMS and detection level of the external effort in free motion; and, for a push that software adds to the "
+        "recorded effort, estimated over true peak, and the delay of the estimated peak."
     )
     return Table(
         caption,
-        ("Joint", "Filter", "RMS", "Detection level", "Push shown", "Delay"),
+        ("Joint", "Filter", "RMS", "Detection level", "Peak ratio", "Delay"),
         rows,
         "filter-comparison",
         "llrrrr",
@@ -114,18 +121,18 @@ def compared_row(context: Context, c: Comparison) -> tuple[Cell, ...]:
 
 
 def name_of(label: str) -> str:
-    """What the filter of a comparison is called; one is the default again, with the joint's own terms."""
+    """The title of a filter in a comparison; one is the default filter with the terms of the joint alone."""
     name = label.replace("-", "_")
-    return filters.title(name) if name in filters.FILTERS else "The same, own terms only"
+    return filters.title(name) if name in filters.FILTERS else f"{filters.title(filters.DEFAULT)}, joint alone"
 
 
 def overlay(compared: list[Comparison]) -> Figure:
-    """Some filters in the middle of the same run, joint by joint."""
+    """The efforts of four filters in the middle of a run, joint by joint."""
     joints = list(dict.fromkeys(c.joint for c in compared))
     panels = tuple(panel([c for c in compared if c.joint == joint], i == 0) for i, joint in enumerate(joints))
     return Figure(
-        "External effort in free motion by four filters. It should be 0; the rest is the model's error, which all of "
-        "them share. The smoother has no delay.",
+        "External effort in free motion by four filters. The true one is 0; the deviation is mainly the model's error, "
+        "which all filters share. The smoother has no delay.",
         f"External effort by four filters over {SECONDS_DRAWN:g} s of the worst free run of {len(joints)} joints.",
         panels,
         "filters-figure",

@@ -57,13 +57,13 @@ def blocks(context: Context) -> Iterator[Block]:
             figures += [effort_figure(track, pushes) for track in tracks]
     tip = list(tip_forces(context))
     yield from tip
-    shown = 0 if tip else 1  # on paper, where no force at the tip shows the same
+    shown = 0 if tip else 1  # figures on paper, if no force at the tip is compared there
     name = f"{count(len(figures) - shown, 'comparison')} of tracked and true effort"
     yield from first_on_paper(figures, name, "more-truth", shown)
 
 
 def of_friction(context: Context) -> Iterator[Block]:
-    """What friction does to a fit, where parameters are fitted to recordings of another friction than the models'."""
+    """The effect of friction on a fit, if parameters are fitted to recordings with other friction than the models."""
     family = {log["name"]: log.get("family", "") for log in context.study.truth.get("log", [])}
     matched = [name for name in context.study.truth.get("theta", {}) if name in family.values()]
     fitted = sorted({family.get(log, "") for fit in context.own_fits() for log in fit.logs})
@@ -72,15 +72,15 @@ def of_friction(context: Context) -> Iterator[Block]:
     yield Prose(
         f"**What friction does to a fit.** Parameters are identified from the recordings {literal(', '.join(fitted))}, "
         "whose friction differs by direction, rises near rest and yields elastically before it slides. The true "
-        f"parameters below are those of the recordings {literal(', '.join(matched))}, which differ in friction only: "
-        "theirs is that of the models. So the error of an estimate is the effect of such friction. The standard errors "
+        f"parameters below are those of the recordings {literal(', '.join(matched))}, which differ only in having the "
+        "friction of the models. So the error of an estimate is the effect of the other friction. The standard errors "
         "are wide because the residual repeats in every period."
     )
     yield errors_by_family(context, family)
 
 
 def errors_by_family(context: Context, family: dict[str, str]) -> Table:
-    """The model error of each joint in logs that nobody fitted, by what their friction is."""
+    """The model error of each joint in logs that were not fitted, by the friction of the logs."""
     unseen = [p for p in context.catalogue.records(Prediction) if p.role != "identification"]
     used = [p for p in unseen if f"{p.model}.{p.estimator}" in (context.used_fit(p.joint), BASELINE_FIT)]
     rows = tuple(
@@ -93,7 +93,7 @@ def errors_by_family(context: Context, family: dict[str, str]) -> Table:
         for p in sorted(used, key=lambda p: (p.joint, p.model, family.get(p.log, "")))
     )
     header = ("Joint", "Friction", "Fit", "Model error", "Effort")
-    return Table("Model error by the friction of logs that nobody fitted.", header, rows, "error-by-friction", "lllrr")
+    return Table("Model error by the friction of logs not fitted.", header, rows, "error-by-friction", "lllrr")
 
 
 def true_parameters(context: Context) -> Iterator[tuple[str, tuple[str, ...], dict[str, float]]]:
@@ -200,7 +200,7 @@ def comparison(context: Context, pairs: list[tuple[TipContact, int, Push]]) -> T
         )
     return Table(
         "The largest force at the tip in each contact [N], true and estimated, and the error of the worst component in "
-        "standard deviations. The true force is the largest of the push, at its own time.",
+        "standard deviations. The true force is the peak of the push; the estimate can peak at another instant.",
         ("Log", "Contact", *(f"true ${f}$" for f in COMPONENTS), *(f"${f}$" for f in COMPONENTS), "Error"),
         tuple(rows),
         "tip-truth",

@@ -26,11 +26,11 @@ from davinci_forces.report.content.marks import AnyMark
 from davinci_forces.report.context import Context, title
 from davinci_forces.report.sections.parts import MM, MS
 
-SAMPLES_DRAWN = 300  # of a run
+SAMPLES_DRAWN = 300  # samples of a run in its figure
 
 
 def section(context: Context) -> Section | None:
-    """The haptic loop; None where none was simulated."""
+    """The haptic loop; None if no loop was simulated."""
     runs = context.catalogue.records(HapticRun)
     return Section("Haptic loop, simulated", "haptics", tuple(blocks(context, runs))) if runs else None
 
@@ -52,7 +52,7 @@ def blocks(context: Context, runs: list[HapticRun]) -> Iterator[Block]:
 
 
 def verdict(context: Context, run: HapticRun) -> Verdict:
-    """Whether a hand is stable against the tissue, and the stiffest tissue against which it is."""
+    """Whether a hand is stable against the measured tissue, and the stiffest tissue against which it settles."""
     key, name = f"haptics.{run.hand}", f"**Simulated**, hand “{hand_name(context, run)}”"
     limit, margin = context.numbers(key, ("k_t_settles", "stiffness_margin"), 2)
     where = f"it settles against tissue up to {limit}, {margin} times the measured one"
@@ -60,10 +60,10 @@ def verdict(context: Context, run: HapticRun) -> Verdict:
         where = "no limit of the tissue's stiffness was found"
     if run.out_of_reach:
         return Verdict("warn", f"{name}: **unstable**, leaves the reach of the device at {run.t[-1]:.1f} s; {where}.")
-    stable = run.delay_margin != 0.0  # NaN where no delay was found that it does not bear
+    stable = run.delay_margin != 0.0  # NaN if the hand is stable with every delay tried
     off = context.number(f"{key}.felt_error", 2)
     motion = "stable" if stable else "goes in and out within reach, but is **unstable** when it stays in the tissue"
-    return Verdict("good" if stable else "warn", f"{name}: {motion}; {where}. The felt force errs by {off} (rms).")
+    return Verdict("good" if stable else "warn", f"{name}: {motion}; {where}. RMS error of the felt force: {off}.")
 
 
 def experiment(context: Context, responses: list[HapticResponse]) -> str:
@@ -89,14 +89,14 @@ def experiment(context: Context, responses: list[HapticResponse]) -> str:
         f"{text}\n\nThe model of the slide is {arm}; the model's error on the real arm is not included. To a hand that "
         f"moves at {frequency}, tissue of {true} feels like {felt}, with a delay of {late}. A hand settles if its "
         "oscillation dies out after it releases a quarter of its push. The limit by simulation includes the arm's "
-        "friction, which makes the felt force hunt near rest. The limit by response takes the loop as linear. Both "
-        "include the damping of the tissue; limits by delay alone leave it out. Try your own numbers: `davinci-forces "
-        "haptics --help`."
+        "friction, which makes the felt force oscillate near rest. The limit by linear response treats the loop as "
+        "linear. Both include the damping of the tissue; limits from the delay alone leave this damping out. Try your "
+        "own numbers: `davinci-forces haptics --help`."
     )
 
 
 def hand_name(context: Context, run: HapticRun) -> str:
-    """The name of a hand; the default one is the thesis's, but only its simulations say so."""
+    """The name of a hand; the default hand is named after the thesis only in simulations of the thesis."""
     return "default" if run.hand == "thesis" and not context.compares_with_thesis else literal(run.hand)
 
 
@@ -109,9 +109,9 @@ def traces(context: Context, run: HapticRun) -> Figure:
     return Figure(
         f"Simulated, hand “{hand_name(context, run)}” in and out of the tissue, contact shaded. Positions from the "
         "surface of the tissue: the plan (without force feedback), the hand and the arm. Forces: the true and the felt "
-        f"one.{ends}",
+        f"force.{ends}",
         f"Positions of hand and arm over {run.t[-1] - run.t[0]:.0f} s, and below them a true force of at most "
-        f"{run.true_peak:.2g} N and a felt one of at most {run.felt_peak:.2g} N.",
+        f"{run.true_peak:.2g} N and a felt force of at most {run.felt_peak:.2g} N.",
         (
             Panel(
                 "Position",
@@ -179,12 +179,12 @@ def margins(context: Context, runs: list[HapticRun]) -> Table:
         cells = context.numbers(f"haptics.{run.hand}", (*names, "delay_margin"))
         rows.append((hand_name(context, run), *cells))
     header = (
-        "Hand", "Mass", "$b_H$", "$K_H$", "True peak", "Felt peak", "Settles up to", "By response", "Delay margin",
+        "Hand", "Mass", "Damping", "Stiffness", "True peak", "Felt peak", "Simulation", "By response", "Delay margin",
     )  # fmt: skip
     return Table(
-        "Simulated hands: peaks of the true and the felt force; the stiffest tissue that each settles against, by "
-        "simulation and by the response of the loop; and the delay that may be added before the hand is unstable (0: "
-        "it is unstable already). A dash marks that no limit was found.",
+        "Simulated hands: mass, damping and stiffness; peaks of the true and the felt force; the stiffest tissue that "
+        "each hand settles against, by simulation and by the linear response of the loop; and the delay that may be "
+        "added before the hand is unstable (0: already unstable). A dash marks that no limit was found.",
         header,
         tuple(rows),
         "haptic-margins",

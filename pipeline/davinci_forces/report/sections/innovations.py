@@ -1,4 +1,4 @@
-"""Tests whether the filter's innovations are white, and the causes where they are not."""
+"""Tests whether the filter's innovations are white, and the causes if they are not."""
 
 from collections import Counter
 from collections.abc import Iterator
@@ -23,18 +23,18 @@ from davinci_forces.report.content import (
 from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.parts import autocorrelation, first_on_paper, paper_or_screen, run_name
 
-UNEXPLAINED = "unexplained"  # a finding: no cause that was tried explains it
+UNEXPLAINED = "unexplained"  # the finding if no tested cause explains the correlation
 FINDINGS = {  # from the best to the least known
     "white": "white throughout",
     "left out": "white outside contact or reversals",
-    "mended": "white but for a cause that was tested",
-    UNEXPLAINED: "not white, which no tested cause explains",
+    "mended": "white if tested causes are corrected",
+    UNEXPLAINED: "not white for reasons that no tested cause explains",
 }
 INNOVATION_FIELDS = (("innovation_q", "position"), ("innovation_dq", "velocity"))
 
 
 def section(context: Context) -> Section | None:
-    """The verdict on every run, the worst run of each joint drawn, and every test on demand."""
+    """The verdict on every run, figures of the worst run of each joint, and every test on demand."""
     explained = context.catalogue.records(Explanation)
     return Section("Innovations", "innovations", tuple(blocks(context, explained))) if explained else None
 
@@ -46,12 +46,13 @@ def blocks(context: Context, explained: list[Explanation]) -> Iterator[Block]:
         "An innovation is a measurement minus its prediction by the filter. Innovations are white (uncorrelated over "
         "time) if model and noise are as the filter assumes. Each run is tested whole, except for its first second, by "
         "the autocorrelation and the cumulative periodogram (power summed over frequency) of both innovations "
-        "([@thresholds]). If a run fails, possible causes are removed one after the other, as few at once as suffice. "
-        "Contact and reversals are left out. The walk, the size of the noise, its colour, the times of the samples and "
-        "the model are replaced by the likeliest for this log. A cause is named only if all tests pass without it with "
-        "a hundred times the probability, and if as many samples at other times still fail. The filter's walk is "
-        f"chosen to show pushes{assumed}; free motion does not need it, so it colours the innovations a little.\n\n"
-        + summary(explained)
+        "([@thresholds]). If a run fails, possible causes are removed, first singly and then in combinations, until "
+        "the tests pass. Samples in contact or around reversals are left out. The random walk, the noise level, the "
+        "noise colour (a correlation over time), the sample times and the model are each replaced by their "
+        "maximum-likelihood estimate for this log. A cause is named only if the tests pass without it, with p-values "
+        "at least a hundred times larger, and if leaving out as many samples at other times does not suffice. The "
+        f"filter's random walk is chosen to follow pushes{assumed}; free motion does not need this random walk, so it "
+        "correlates the innovations a little.\n\n" + summary(explained)
     )
     yield from paper_or_screen(verdicts(context, explained))
     drawn = [e for e in explained if is_worst(context, e)]
@@ -67,11 +68,11 @@ def blocks(context: Context, explained: list[Explanation]) -> Iterator[Block]:
         )
         for e in explained
     )
-    yield OnScreen(f"Innovations of {count(len(others), 'run')}, and what was tried", "innovation-runs", others)
+    yield OnScreen(f"Innovations of {count(len(others), 'run')}, and the tested causes", "innovation-runs", others)
 
 
 def summary(explained: list[Explanation]) -> str:
-    """How many runs are white, and how many are explained."""
+    """State how many runs are white, and how many are explained."""
     counts = Counter(e.finding for e in explained)
     findings = [
         f"{counts[finding]} {'is' if counts[finding] == 1 else 'are'} {words}"
@@ -82,7 +83,7 @@ def summary(explained: list[Explanation]) -> str:
 
 
 def is_worst(context: Context, e: Explanation) -> bool:
-    """Whether it is the run of its joint that is drawn among runs."""
+    """Whether this is the worst run of its joint, which is drawn."""
     space = context.worst_space(e.joint)
     return space is not None and space.log == e.log
 
@@ -113,13 +114,12 @@ def verdicts(context: Context, explained: list[Explanation]) -> Table:
 def tests(context: Context, explained: list[Explanation]) -> Table:
     """Every test of every run."""
     rows = tuple((literal(e.log), title(e.joint), *statistics(context, f"ekf.{e.log}.{e.joint}")) for e in explained)
-    header = ("Log", "Joint", "NIS", "ACF(1) of $q$", "of $dot(q)$", "Ljung-Box, $q$", "$dot(q)$")
+    header = ("Log", "Joint", "NIS", "ACF(1), $q$", "ACF(1), $dot(q)$", "Ljung-Box, $q$", "Ljung-Box, $dot(q)$")
     return Table(
         "The filter's innovations: normalised innovation squared (NIS) of both together (expected: 2) and first "
-        "autocorrelations (ACF). The probabilities are those of a larger Ljung-Box statistic, and of a cumulative "
-        "periodogram farther from the line, if the innovations were white. Times: the error of the sample times, where "
-        "other joints of the log show it.",
-        (*header, "Periodogram, $q$", "$dot(q)$", "Times"),
+        "autocorrelations (ACF); p-values of the Ljung-Box test and of the cumulative periodogram for white noise. "
+        "Times: the error of the sample times, if the other joints of the log show the same error.",
+        (*header, "Periodogram, $q$", "Periodogram, $dot(q)$", "Times"),
         rows,
         "innovation-table",
         "llrrrrrrrr",
@@ -137,7 +137,7 @@ def statistics(context: Context, prefix: str) -> tuple[Cell, ...]:
 
 
 def trials(e: Explanation) -> Table:
-    """The results of the tests without each cause, the largest probability first."""
+    """The results of the tests without each cause, the largest p-value first."""
     least = least_probability(e)
     order = [0, *sorted(range(1, len(e)), key=lambda i: -least[i])]
     rows = tuple(
@@ -151,9 +151,9 @@ def trials(e: Explanation) -> Table:
         for i in order
     )
     return Table(
-        f"{title(e.joint)} in {literal(e.log)}: the cause that was removed, the samples left to test, the walk over "
-        "the one in use, and the smallest probability of all tests. A ● marks causes that explain the run.",
-        ("Without", "Samples", "Walk", "Smallest $p$", "Explains"),
+        f"{title(e.joint)} in {literal(e.log)}: the removed cause, the number of tested samples, the random walk over "
+        "the one in use, and the smallest p-value of all tests. A ● marks causes that explain the run.",
+        ("Without", "Samples", "Random walk", "Smallest $p$", "Explains"),
         rows,
         f"trials-{e.log}-{e.joint}",
         "lrrrl",
@@ -189,8 +189,9 @@ def figure(context: Context, e: Explanation, whole: bool) -> Figure:
     ]
     firsts = " and ".join(f"{w.acf1:.2f}" for field, _ in INNOVATION_FIELDS if (w := white.get(field)))
     return Figure(
-        f"{name}, the worst free run of this joint: innovations, their autocorrelation and cumulative periodogram with "
-        "the bands of 95 % (grey) and 99 % (blue) of white noise, and their correlation with the motion before."
+        f"{name}, the worst free run of this joint: innovations, their autocorrelation, their cumulative periodogram "
+        "minus that of white noise, and their correlation with the preceding motion. White noise stays in the bands of "
+        "95 % (grey) and 99 % (blue)."
         if whole
         else f"{name}: autocorrelation of the innovations.",
         f"{name}: the innovations have first autocorrelations of {firsts or 'unknown size'}; verdict: {e.verdict}.",
@@ -209,19 +210,19 @@ def over_time(t: Track, field: str, of: str) -> Panel:
 
 
 def periodogram(w: Whiteness, of: str) -> Panel:
-    """A cumulative periodogram less the straight line of white noise, with its bands."""
+    """A cumulative periodogram minus the straight line of white noise, with the bands of white noise."""
     marks: tuple[AnyMark, ...] = (
         HBand(-w.periodogram_band_99, w.periodogram_band_99, "", "sky"),
         HBand(-w.periodogram_band, w.periodogram_band, ""),
         Line(w.cycles, w.cumulated - 2.0 * w.cycles, "", "blue"),
     )
-    return Panel(f"Periodogram, {of}", "frequency [1/sample]", "excess power", marks)
+    return Panel(f"Periodogram, {of}", "frequency [1/sample]", "power above white", marks)
 
 
 def with_motion(i: Innovation, of: str) -> Panel:
     """The correlation with velocity, acceleration and the sign of the velocity, as many samples before."""
     lag = i.lag.astype(float)
-    # Both panels of a row show the same lines: the first names some, the second the rest.
+    # Both panels of a row show the same lines, so each legend names only some of them.
     names = ("velocity", "acceleration", "") if of == INNOVATION_FIELDS[0][1] else ("", "", "sign of velocity")
     marks: tuple[AnyMark, ...] = (
         HBand(-i.band_99, i.band_99, "", "sky"),
@@ -230,4 +231,4 @@ def with_motion(i: Innovation, of: str) -> Panel:
         Line(lag, i.with_ddq, names[1], "vermillion", "dashed"),
         Line(lag, i.with_sign, names[2], "green", "dotted"),
     )
-    return Panel(f"Motion and {of}", "lag [samples]", "correlation", marks)
+    return Panel(f"{of.capitalize()} innovation and motion", "lag [samples]", "correlation", marks)

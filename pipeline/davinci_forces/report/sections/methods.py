@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 
 from davinci_forces.records import Average, Fit, LogSummary, Record, Signal, Track, Trajectory, Whiteness
+from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.report.content import Block, Bullets, Equation, Listing, Prose, Section, Table
 from davinci_forces.report.context import Context
 from davinci_forces.report.verdicts import thresholds
@@ -18,7 +19,7 @@ SYMBOLS = (
     ("$i, K_m, eta$", "motor current, torque constant and gear ratio", "A, N m/A, –"),
     ("$theta_m$", "motor angle", "rad"),
     ("$N_p$", "number of periods that are averaged", ""),
-    ("$sigma$", "standard deviation of noise, of the signal named beside it", ""),
+    ("$sigma$", "standard deviation of the noise of the signal in the index", ""),
     ("$T_s$", "sampling time", "s"),
     ("$x, y, hat(x), tilde(y)$", "state and measurement of the filter, estimated state, innovation", ""),
     ("$P, R, S, K$", "covariance of the state, of the measurement noise and of the innovation; Kalman gain", ""),
@@ -46,7 +47,7 @@ REFERENCES = (
     "A. De Luca, R. Mattone: Actuator failure detection and isolation using generalized momenta. IEEE International "
     "Conference on Robotics and Automation, 2003.",
 )
-# What a stage does, by the records that it makes; in braces, what the study sets.
+# The method of each stage, by the records that it makes; the settings of the study replace the braces.
 METHODS: tuple[tuple[type[Record], tuple[Block, ...]], ...] = (
     (LogSummary, (
         Prose(
@@ -63,8 +64,9 @@ METHODS: tuple[tuple[type[Record], tuple[Block, ...]], ...] = (
         Prose(
             "**Periods.** The period is the shortest lag after which all moving joints repeat their motion. It is "
             "refined until the harmonics of the excitation fit the positions best. Samples rarely fall on the phases "
-            "of the averaged period. A smooth harmonic fit moves them there, and its residual is averaged over the "
-            "$N_p$ periods. The variance between periods is that of one period; the mean's is smaller by $N_p$."
+            "of the averaged period. They are interpolated to these phases: a harmonic series is fitted and evaluated "
+            "there, and its residual, averaged over the $N_p$ periods, is added. The variance between periods is the "
+            "variance of a sample of one period; the variance of the mean is $N_p$ times smaller."
         ),
         Equation(
             "overline(x)(k) = 1/N_p sum_(m=1)^(N_p) x_m (k), "
@@ -95,8 +97,8 @@ METHODS: tuple[tuple[type[Record], tuple[Block, ...]], ...] = (
             "**Identification.** The model of each joint is linear in its parameters. Least squares gives every "
             "averaged sample the same weight. Weighted least squares gives it the inverse of its variance, pooled over "
             "neighbouring samples because the variance between few periods is itself uncertain. Both are solved by "
-            "orthogonal factorisation, never by the normal equations. Consistent parameters are the nearest that are "
-            "physically possible."
+            "orthogonal factorisation, never by the normal equations. Consistent parameters are the physically "
+            "possible parameters that are nearest to least squares."
         ),
         Equation(
             "hat(theta) = arg min_theta norm(W^(1/2) (tau - Phi(q, dot(q), dot.double(q)) theta))^2",
@@ -131,16 +133,17 @@ METHODS: tuple[tuple[type[Record], tuple[Block, ...]], ...] = (
             "correction",
         ),
         Prose(
-            "The measured effort is the input of the model, so its noise is process noise, as of an acceleration that "
-            "is constant over a sample. Where the velocity passes through zero, Coulomb friction takes its average, "
-            "and the uncertainty of its sign counts as noise. A contact is found where the smoothed effort (Bierman, "
-            "1973) exceeds the level that free motion crosses once in ten minutes (Rice, 1944)."
+            "The measured effort is the input of the model, so its noise is process noise: it acts as an error of the "
+            "acceleration that is constant over a sample. Near zero velocity, Coulomb friction is replaced by its "
+            "expected value given the uncertain velocity, and the uncertainty of its sign is added to the noise. A "
+            "contact is found if the smoothed effort (Bierman, 1973) exceeds the level that free motion crosses once "
+            "in ten minutes (Rice, 1944)."
         ),
     )),
     (Whiteness, (
         Prose(
             "**Whiteness** is tested by the autocorrelation, its 95 % band $1.96 \\/ sqrt(N)$, and the Ljung-Box "
-            "statistic over 20 lags. A signal is called white if its probability exceeds 1 %. The cumulative "
+            "statistic over 20 lags. A signal is called white if its p-value exceeds 1 %. The cumulative "
             "periodograms of innovations must pass, too, by their Kolmogorov-Smirnov distance from a straight line "
             "(Bartlett, 1955)."
         ),
@@ -163,27 +166,28 @@ def section(context: Context) -> Section:
 
 
 def paragraph_for_paper(context: Context) -> str:
-    """A paragraph on the method with this study's numbers, to be pasted."""
+    """A paragraph on the method with this study's numbers, for a paper."""
     settings, robot = context.study.settings, context.study.robot
     fits = context.own_fits()
     joints = ", ".join(dict.fromkeys(fit.group.replace("_", " ") for fit in fits)) or "no joint"
     logs = sorted({log for fit in fits for log in fit.logs})
-    random_walk = f"{settings.q_tau:g} (effort/s^0.5)" if settings.q_tau else "the slowest that shows a push of 1 s"
+    follows = "the smallest with which the filter returns 90 % of the peak of a push of 1 s within 0.1 s"
+    random_walk = f"{settings.q_tau:g} (effort/s^0.5)" if settings.q_tau else follows
+    model = "selected by cross-validation over blocks of path" if settings.fit == CHOSEN else settings.fit
     return (
         f"External efforts of the {robot.title} ({joints}) were estimated from motor efforts and joint positions with "
         f"davinci-forces {context.provenance.version}. Dynamic parameters were identified from {len(logs)} periodic "
         f"excitation recording{'' if len(logs) == 1 else 's'} ({', '.join(logs)}), averaged over periods and "
-        f"differentiated in the frequency domain; the model used was {settings.fit}. Motion that does not repeat was "
-        f"low-pass filtered at {settings.lowpass:g} Hz with zero phase. The external effort was tracked by an extended "
-        f"Kalman filter with position, velocity and external effort as states, the last as a random walk of intensity "
+        f"differentiated in the frequency domain; the model was {model}. Motion that does not repeat was low-pass "
+        f"filtered at {settings.lowpass:g} Hz with zero phase. The external effort was tracked by an extended Kalman "
+        "filter with position, velocity and external effort as states, the last as a random walk. Its intensity was "
         f"{random_walk}. Standard errors allow for autocorrelated residuals, by restricted likelihood (Patterson and "
-        "Thompson, 1971); levels of free "
-        "motion were bootstrapped over blocks (Künsch, 1989)."
+        "Thompson, 1971); levels of free motion were bootstrapped over blocks (Künsch, 1989)."
     )
 
 
 def in_current(context: Context) -> str:
-    """Which joints' effort is a current, because no torque constant is known."""
+    """State the joints whose effort is a current, because no torque constant is known."""
     joints = [joint.title.lower() for joint in context.study.robot.joints if joint.effort]
     if not joints:
         return ""

@@ -27,12 +27,12 @@ from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.parts import autocorrelation, run_name
 
 NOISE_FIELDS = {"q_noise": "position", "dq_noise": "velocity", "tau_noise": "effort"}
-MIN_OUTLIER = 3.0  # times the median period's noise
-MAX_BARS = 24  # periods drawn one by one
+MIN_OUTLIER = 3.0  # smallest noise of an outlying period over that of the median period
+MAX_BARS = 24  # periods in the bar plot
 
 
 def section(context: Context) -> Section | None:
-    """A table of standard deviations, the tests of the noise, and what averaging removed from each log."""
+    """A table of standard deviations, the tests of the noise, and the noise that averaging removed from each log."""
     averages = context.catalogue.records(Average)
     return Section("Averaging and noise", "noise", tuple(blocks(context, averages))) if averages else None
 
@@ -41,8 +41,8 @@ def blocks(context: Context, averages: list[Average]) -> Iterator[Block]:
     """The section's content."""
     yield Prose(
         "Every identification log repeats one period. Its periods are averaged. Differences between periods are taken "
-        "as noise, even slow differences of the path. The period is estimated from the longest stretch in which the "
-        "joints' motion repeats; remarks name the samples that are left out."
+        "as noise, even slow differences of the path. The period is estimated from the longest interval in which the "
+        "joints' motion repeats; remarks on the recordings name the samples outside this interval."
     )
     rows = tuple(
         (
@@ -77,9 +77,9 @@ def tests(context: Context, averages: list[Average]) -> Table:
         for signal, meaning in NOISE_FIELDS.items()
     )
     return Table(
-        "Is the noise white (uncorrelated over time) and normal? First autocorrelation (ACF), and the probabilities of "
-        "a larger Ljung-Box and Jarque-Bera statistic if it were. Below 0.01 it is not. Real encoders, their "
-        "derivative and a jittering clock give noise that is not white; the filter takes it as white.",
+        "Is the noise white (uncorrelated over time) and normal? First autocorrelation (ACF), and the p-values of the "
+        "Ljung-Box test (white) and of the Jarque-Bera test (normal). A p-value below 0.01 means no. Real encoders, "
+        "their derivative and a jittering clock give coloured noise (not white); the filter assumes white noise.",
         header,
         rows,
         "noise-tests",

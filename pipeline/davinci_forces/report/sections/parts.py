@@ -8,7 +8,7 @@ from davinci_forces.report.content import AnyMark, Block, HBand, Line, OnScreen,
 from davinci_forces.report.context import Context, label, title
 
 MM = MS = 1000.0  # millimetres in a metre, milliseconds in a second
-PAPER = 18  # rows of a table at most, in the PDF
+PAPER = 18  # largest number of rows of a table in the PDF
 THESIS_TISSUE = 457.24  # [N/m], section 8.2
 LEFT_OUT = {
     "leave one log out": "the log",
@@ -17,9 +17,10 @@ LEFT_OUT = {
     "leave a segment out": "a segment",
 }
 MEASURES = (
-    "With periods or logs left out, the error tells how well a model describes the motion that it was fitted to: each "
-    "period repeats the path of the others, so every parameter helps. With path blocks left out, on raw samples, it "
-    "tells what to expect on a new path. That error is larger, and the model is chosen by it."
+    "With periods or logs left out, the error measures how well a model describes the motion that it was fitted to. "
+    "All periods follow the same path, so extra parameters lower this error even if they overfit. With blocks of path "
+    "left out, on raw samples, the error measures what to expect on a new path. This error is larger, and the model is "
+    "chosen by this error."
 )
 
 
@@ -30,7 +31,7 @@ def paper_or_screen(table: Table, name: str = "", most: int = PAPER) -> Iterator
 
 
 def first_on_paper(blocks: Sequence[Block], name: str, anchor: str, number: int = 1) -> Iterator[Block]:
-    """The first blocks as they are, the others on screen under a name."""
+    """The first blocks on paper, the others on screen under a name."""
     yield from blocks[:number]
     if blocks[number:]:
         yield OnScreen(name, anchor, tuple(blocks[number:]))
@@ -60,7 +61,7 @@ def autocorrelation(w: Whiteness, heading: str, named: bool = True) -> Panel:
     names = ("99 % band", "95 % band") if named else ("", "")
     bands = (HBand(-w.band_99, w.band_99, names[0], "sky"), HBand(-w.band, w.band, names[1]))
     marks = (*bands, Stems(w.lag[1:].astype(float), acf, "", "blue"))
-    # Small ones are drawn large enough to be told from the band, and always on both sides of zero.
+    # The range shows small correlations apart from the band, and both sides of zero.
     reach = max(4 * w.band, 0.1)
     low, high = min(-reach, 1.1 * float(acf.min())), max(reach, min(1.1 * float(acf.max()), 1.0))
     return Panel(heading, "lag [samples]", "autocorrelation", marks, y_range=(low, high))

@@ -17,7 +17,7 @@ from davinci_forces.report.verdicts import percent
 
 
 def section(context: Context) -> Section | None:
-    """Scores of the fit that the filter uses on every log, the estimators compared once, and the worst predictions."""
+    """Scores of the fit that the filter uses on every log, a comparison of the fits, and the worst predictions."""
     predictions = context.catalogue.records(Prediction)
     return Section("Prediction", "prediction", tuple(blocks(context, predictions))) if predictions else None
 
@@ -26,16 +26,20 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     """The section's content."""
     yield Prose(
         "A fit is tested on data that it was not fitted to: validation logs, contact logs outside their contact "
-        "windows, and identification logs. These are predicted by refits that leave the log out, together with its "
-        "neighbours where a joint has more than 20. Where a joint has one log only, each of its periods is left out in "
-        "turn. On the path that was fitted the model's error repeats, so scores there are too good. "
-        '$R^2$ is of the raw effort; noise alone keeps it below its ceiling $1 - sigma^2 \\/ "var"(tau)$. The model '
-        "error is the difference beyond noise. Samples of identification logs at which the joint stands still are left "
-        "out, as friction can then take any value; other logs are tested throughout."
+        "windows, and identification logs. Identification logs are predicted by fits that leave the log out; if a "
+        "joint has more than 20 such logs, groups of successive logs are left out together. If a joint has one log "
+        "only, each of its periods is left out in turn. On the fitted path the model's error repeats, so scores there "
+        "are too good. $R^2$ refers to the raw effort; noise alone keeps it below its ceiling "
+        '$1 - sigma^2 \\/ "var"(tau)$. The model error is the root mean square of measured minus predicted effort, '
+        "after the noise variance is subtracted. Samples of identification logs at which the joint stands still are "
+        "left out, as friction can then take any value; other logs are tested throughout."
     )
     used = [p for p in predictions if f"{p.model}.{p.estimator}" == context.used_fit(p.joint)]
-    header = ("Log", "Joint", "Left out", "Path", "Model error", "Of effort", "$R^2$", "Ceiling")
-    caption = "Prediction of unseen effort by the fit that the filter uses, one row a run."
+    header = ("Log", "Joint", "Left out", "Path", "Model error", "Error/effort", "$R^2$", "Ceiling")
+    caption = (
+        "Prediction of unseen effort by the fit that the filter uses, one row a run: data left out of the fit, path of "
+        "the run compared with the fitted one, model error, and its ratio to the root mean square of the effort."
+    )
     yield from paper_or_screen(
         Table(caption, header, tuple(row(context, p) for p in used), "prediction-table", "llllrrrr")
     )
@@ -75,14 +79,19 @@ def every_score(context: Context, predictions: list[Prediction]) -> Table:
 
 
 def estimators(context: Context, predictions: list[Prediction]) -> Iterator[Table]:
-    """The worst model error of every fit, joint by joint: which estimator predicts best."""
+    """The worst model error of every fit, joint by joint."""
     fits = list(dict.fromkeys((p.model, p.estimator) for p in predictions))
     joints = list(dict.fromkeys(p.joint for p in predictions))
     if len(fits) < 2:
         return
     errors = {fit: [worst(context, predictions, joint, *fit) for joint in joints] for fit in fits}
     rows = tuple((fit_name(*fit), *cells) for fit, cells in errors.items() if any(cell != "–" for cell in cells))
-    caption = "Every fit compared: its model error in the worst unseen run of each joint."
+    caption = (
+        "Every fit compared: its model error in the worst unseen run of each joint. Models: independent (each joint by "
+        "itself) or coupled (the whole arm). Estimators: least squares (LSE), weighted (WLSE), total (TLS), bounded, "
+        "robust (Huber), with prior parameters, consistent (physically possible), instrumental variables (IV), "
+        "particle swarm (PSO)."
+    )
     yield Table(caption, ("Fit", *map(title, joints)), rows, "estimators-table", "l" + "r" * len(joints))
 
 
@@ -99,11 +108,11 @@ def worst(context: Context, predictions: list[Prediction], joint: str, model: st
 def figure(context: Context, p: Prediction) -> Figure:
     """Measured and predicted effort of one log."""
     name, windows = run_name(p.log, p.joint), contact_spans(context, p.log, "contact")
-    error, beyond = Line(p.t, p.tau - p.tau_hat, "", "blue"), context.size(p, "model_error", p.model_error)
+    error, size = Line(p.t, p.tau - p.tau_hat, "", "blue"), context.size(p, "model_error", p.model_error)
     return Figure(
         f"{name}, the worst run of this joint: measured effort and the model's ({fit_name(p.model, p.estimator)}), "
         "and their difference.",
-        f"{name}: the model's effort differs from the measured one by {beyond} beyond noise.",
+        f"{name}: the model error is {size}.",
         (
             effort_panel(p, *windows),
             Panel("Measured minus model", "time [s]", label(p, "tau", "effort"), (*windows, error)),

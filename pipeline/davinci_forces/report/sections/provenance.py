@@ -23,10 +23,10 @@ def blocks(context: Context) -> Iterator[Block]:
     provenance, study = context.provenance, context.study
     yield Prose(
         f"Made by davinci-forces {provenance.version}. The report ID on page one is the first half of the SHA-256 of "
-        "`manifest.txt`. This lists raw files, study file, processed files and numbers, each with its own SHA-256. Two "
-        "reports with the same ID have the same content. `davinci-forces verify --id` checks whether files and pages "
-        "are those of an ID. Every number of the tables is in `results.json` under its own key, with the processed "
-        "file and the field that it comes from."
+        "`manifest.txt`. This file lists raw files, study file, processed files and numbers, each with its own "
+        "SHA-256. Two reports with the same ID have the same content. `davinci-forces verify --id` checks whether "
+        "files and pages are those of an ID. Every number of the tables is in `results.json` under its own key, with "
+        "the processed file and the field that it comes from."
     )
     raw = tuple((literal(file), f"`{sha[:16]}`") for file, sha in provenance.raw.items())
     caption = "Raw files, with the first 16 digits of their SHA-256."
@@ -42,7 +42,7 @@ def blocks(context: Context) -> Iterator[Block]:
     number = len(provenance.processed)
     yield Prose(f"This report is made from {number} processed files; their hashes are in `manifest.txt`.")
     if number:
-        yield OnScreen("Records that were made, and those without input", "made", (record_counts(provenance),))
+        yield OnScreen("Records that were made, and records without input data", "made", (record_counts(provenance),))
     if summaries := context.catalogue.records(LogSummary):
         tables = (start_times(summaries), channels(summaries))
         yield OnScreen("Files, dates and channels of every log", "channels", tables)
@@ -61,7 +61,7 @@ def record_counts(provenance: Provenance) -> Table:
 
 
 def channels(summaries: list[LogSummary]) -> Table:
-    """What each channel of every log feeds; channels that feed nothing are left out."""
+    """The use of each channel of every log, without unused channels."""
     rows = tuple(
         (literal(summary.log), literal(summary.channel[i]), literal(summary.unit[i]) or "–", literal(summary.feeds[i]))
         for summary in summaries

@@ -17,7 +17,7 @@ def section(context: Context) -> Section | None:
 
 
 def blocks(context: Context) -> Iterator[Block]:
-    """What they come to, and each of them."""
+    """Whether the ratings are still valid, and a table of them."""
     now = sha256(context.results.json()).hexdigest()
     old = [rating for rating in context.ratings if rating.results != now]
     yield Prose(
@@ -57,7 +57,7 @@ def row(context: Context, rating: Rating, same: bool) -> tuple[Cell, ...]:
 
 
 def subject(context: Context, rating: Rating) -> str:
-    """What is rated: a figure that the report has, by its number; anything else by its name."""
+    """The rated subject: a figure of this report by its number, anything else by its name."""
     if rating.subject == "figure" and rating.name in context.labels:
         return f"[@{rating.name}]"
     here = rating.subject == "run" and rating.name in [log.name for log in context.study.logs]

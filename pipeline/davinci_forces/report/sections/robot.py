@@ -8,7 +8,7 @@ from davinci_forces.report.context import Context
 
 
 def section(context: Context) -> Section | None:
-    """The chain and its table, where the robot's geometry is known."""
+    """The chain and its table; None if the robot's geometry is not known."""
     links = context.catalogue.records(Links)
     return Section("The robot", "robot", tuple(blocks(context, links[0]))) if links else None
 
@@ -20,7 +20,7 @@ def blocks(context: Context, links: Links) -> Iterator[Block]:
         f"The {literal(context.study.robot.title)} is modelled as a Denavit-Hartenberg chain. The parallelogram's "
         "links share the coordinate of the pitch, so the tool pivots about a remote centre without a bearing there. "
         "Forces at the tip follow from efforts at the joints through the Jacobian. Its condition number reaches "
-        f"{worst} within the joints' limits: by so much it can multiply the relative error of an effort."
+        f"{worst} within the joints' limits: this factor can multiply the relative error of an effort."
     )
     rows = tuple(
         (
@@ -37,7 +37,7 @@ def blocks(context: Context, links: Links) -> Iterator[Block]:
 
 
 def walk(pose: Pose) -> list[int]:
-    """The frames in an order in which one line passes along every link: to and fro where the chain branches."""
+    """The frames in the order of one line along every link, which goes to and fro at branches."""
     number = {name: i for i, name in enumerate(pose.link)}
     path = [0]
     for i in range(1, len(pose.link)):

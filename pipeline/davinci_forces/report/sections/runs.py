@@ -23,12 +23,12 @@ from davinci_forces.report.sections.parts import contact_spans, effort_panel, fi
 from davinci_forces.report.verdicts import band_in_words
 
 WORST = "the worst free run of this joint"
-ON_PAPER = 2  # joints whose worst run is drawn in the PDF, too
+ON_PAPER = 2  # joints whose worst run is drawn in the PDF
 LEVELS = ("free_rms", "detection_level")
 
 
 def section(context: Context) -> Section | None:
-    """What was recorded, a table over all tracks, the worst run of each joint, and every run on demand."""
+    """The recordings, a table of all tracks, the worst run of each joint, and every run on demand."""
     content = (
         *recording_blocks(context, context.catalogue.records(LogSummary)),
         *track_blocks(context, context.catalogue.records(Track)),
@@ -46,9 +46,7 @@ def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:
     drawn = {(t.log, t.joint) for t in worst}
     traces = [trace(context, t, WORST) for t in worst]
     yield from first_on_paper(traces, "The worst free run of each other joint", "worst-runs", ON_PAPER)
-    yield OnScreen(
-        "What the filter assumes of noise, run by run", "filter-assumptions", (assumptions(context, tracks),)
-    )
+    yield OnScreen("Noise that the filter assumes, run by run", "filter-assumptions", (assumptions(context, tracks),))
     others = [t for t in tracks if (t.log, t.joint) not in drawn and not t.at_rest]
     if others:
         folded = tuple(
@@ -74,14 +72,14 @@ def intro(context: Context, tracks: list[Track]) -> Iterator[Prose]:
 
 
 def worst_runs(context: Context, tracks: list[Track]) -> Iterator[Track]:
-    """Of each joint, the free run with the highest detection level that was not fitted."""
+    """For each joint, the run with the highest detection level in free space that was not fitted."""
     for joint in dict.fromkeys(track.joint for track in tracks):
         if (space := context.worst_space(joint)) is not None:
             yield from (track for track in tracks if (track.log, track.joint) == (space.log, joint))
 
 
 def scores(context: Context, tracks: list[Track]) -> Table:
-    """The external effort of every track in free space, and whether its band covers it."""
+    """The external effort of every track in free space, and the coverage of its band."""
     rows = tuple(
         (
             literal(t.log),
@@ -91,30 +89,30 @@ def scores(context: Context, tracks: list[Track]) -> Table:
         )
         for t in tracks
     )
-    header = ("Log", "Joint", "RMS", "Detection level", "Covered", "Band")
+    header = ("Log", "Joint", "RMS", "Detection level", "Coverage", "Band")
     caption = (
         "External effort in free space, where nothing touches the robot: its root mean square (RMS), the level that "
-        "99 % of samples stay below, and the share of samples in the 95 % band. A dash marks runs whose contacts are "
-        "not known."
+        "99 % of samples stay below (detection level), and the share of samples in the 95 % band (coverage). A dash "
+        "marks runs whose contacts are not known."
     )
     return Table(caption, header, rows, "free-space-table", "llrrrl")
 
 
 def coverage(context: Context, t: Track) -> tuple[Cell, Cell]:
-    """The coverage of a run's band, and whether that is right."""
+    """The coverage of a run's band, and whether this coverage is right."""
     spaces = context.catalogue.select(FreeSpace, log=t.log, joint=t.joint, filter=t.filter)
     words = band_in_words(spaces[0].coverage) if spaces else "–"
     return context.number(f"{t.filter}.{t.log}.{t.joint}.coverage", 2), words
 
 
 def assumptions(context: Context, tracks: list[Track]) -> Table:
-    """What the filter assumed of noise."""
+    """The noise that the filter assumes in each run."""
     names = ("r_q", "r_dq", "q_dq", "q_tau")
     rows = tuple((literal(t.log), title(t.joint), *context.numbers(f"ekf.{t.log}.{t.joint}", names)) for t in tracks)
     return Table(
         "Noise that the filter assumes (standard deviations): of the measured position and velocity, of the velocity "
         "per sample due to effort noise, and of the random walk of the external effort. The first three maximise the "
-        "likelihood of the innovations of identification logs; the walk is the slowest that shows a push.",
+        "likelihood of the innovations of identification logs; the random walk is the smallest that follows a push.",
         ("Log", "Joint", "Position", "Velocity", "Process, $dot(q)$", "Random walk"),
         rows,
         "filter-noise",
@@ -126,7 +124,7 @@ def trace(context: Context, t: Track, why: str) -> Figure:
     """One run over time.  Fig 7.6-7.11"""
     name, windows = run_name(t.log, t.joint), contact_spans(context, t.log, "stated contact")
     sigma = 2 * t.tau_ext_std
-    # The filter has not converged in the first samples: their band would set the scale of the whole plot.
+    # The filter has not converged in the first samples: their wide band would set the scale of the plot.
     shown = slice(min(int(0.25 * t.rate), len(t) // 10), None)
     largest = float(abs(t.tau_ext[shown]).max()) if len(t.tau_ext[shown]) else 0.0
     return Figure(
@@ -166,7 +164,7 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
     remarked = {summary.log: texts for summary in summaries if (texts := remarks(summary))}
     if clean := len(summaries) - len(remarked):
         which = f"{clean} of {count(len(summaries), 'log')} were" if remarked else "Every log was"
-        # Remarks of the stages follow: "Good" would stand beside what may deny it.
+        # Remarks of the stages follow, so the verdict is not "Good" yet.
         yield Verdict("info" if remarks_of_stages else "good", f"{which} read without a warning.")
     yield from (Verdict("warn", f"**{literal(log)}**: {literal('; '.join(texts))}.") for log, texts in remarked.items())
     methods = sorted({(s.method, s.velocity) for s in context.catalogue.records(Signal)})
@@ -181,7 +179,7 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
 
 
 def velocity_source(velocity: str, context: Context) -> str:
-    """Where a velocity comes from."""
+    """The source of a velocity."""
     cutoff = context.study.settings.lowpass
     derived = f"differences of the position after a zero-phase low-pass at {cutoff:g} Hz"
     return "as logged" if velocity == "logged" else derived
@@ -213,7 +211,7 @@ def remarks(summary: LogSummary) -> list[str]:
     if summary.dropped:
         texts.append(f"{summary.dropped} rows could not be used")
     if summary.duplicates > 0.1 * summary.rows:
-        texts.append(f"{summary.duplicates} of {summary.rows} rows repeat the one before")
+        texts.append(f"{summary.duplicates} of {summary.rows} rows repeat the row before")
     if summary.jitter * summary.rate >= 0.1:
         texts.append(f"the clock jitters by {summary.jitter * 1e3:.3g} ms")
     return texts

@@ -27,7 +27,7 @@ VECTOR = "vector"  # the axis that stands for all three
 
 
 def section(context: Context) -> Section | None:
-    """A table of all logs with a sensor, beside the best that is published for this arm, and both forces over time."""
+    """A table of all logs with a sensor and of the best published error for this arm, and both forces over time."""
     forces = context.catalogue.records(SensorForce)
     return Section("Against a force sensor", "sensor", tuple(blocks(context, forces))) if forces else None
 
@@ -37,7 +37,7 @@ def blocks(context: Context, forces: Sequence[SensorForce]) -> Iterator[Block]:
     yield Prose(
         "A sensor measured the force in these logs; nothing was fitted to it. The error is the estimated force minus "
         "the sensor's at the same instant. The filter's first second and poses near a singularity are left out. The "
-        "lag is the delay of the sensor behind the estimate, by their correlation; it is part of the error. Coverage "
+        "lag is the delay of the sensor behind the estimate, from their correlation; it is part of the error. Coverage "
         "is the share of samples at which the 95 % band, with the sensor's noise, contains the sensor's force.\n\nFor "
         f"comparison: a neural network on the da Vinci Research Kit had an error of {100 * PUBLISHED_ERROR:.2f} % of "
         "range (Yang et al. 2024, arXiv:2405.07453). That is the root mean square error, averaged over axes, over the "
@@ -71,7 +71,7 @@ def table(context: Context, forces: Sequence[SensorForce]) -> Table:
         "The estimated force minus the sensor's: root mean square (RMSE), mean (bias) and largest difference; the "
         "range of the sensor's force, and the RMSE as a share of it; the lag of the sensor; the share of samples "
         "within the 95 % band.",
-        ("Log", "Axis", "RMSE", "Bias", "Largest", "Range", "Of range", "Lag", "Coverage", "Band"),
+        ("Log", "Axis", "RMSE", "Bias", "Largest", "Range", "RMSE / range", "Lag", "Coverage", "Band"),
         tuple(rows),
         "sensor-errors",
         "llrrrrrrrl",
@@ -79,7 +79,7 @@ def table(context: Context, forces: Sequence[SensorForce]) -> Table:
 
 
 def axis_name(axis: str) -> str:
-    """An axis as a reader knows it."""
+    """The printed name of an axis."""
     return f"${axis}_0$" if axis in ("x", "y", "z") else title(axis).lower()
 
 

@@ -25,11 +25,11 @@ from davinci_forces.report.content.marks import AnyMark, Colour
 from davinci_forces.report.context import Context, label, title
 from davinci_forces.report.sections.parts import MS, THESIS_TISSUE
 
-LAWS: dict[str, tuple[str, Colour]] = {"worst": ("worst", "vermillion"), "at contact": ("as it is", "blue")}
+LAWS: dict[str, tuple[str, Colour]] = {"worst": ("worst switching", "vermillion"), "at contact": ("contact", "blue")}
 
 
 def section(context: Context) -> Section | None:
-    """The limits of one assumed hand; None where no tissue was measured."""
+    """The stability limits of one assumed hand; None if no tissue was measured."""
     delayed = context.catalogue.records(DelayLimit)
     return Section("Stability of haptic feedback", "stability", tuple(blocks(context, delayed[0]))) if delayed else None
 
@@ -49,28 +49,30 @@ def blocks(context: Context, delayed: DelayLimit) -> Iterator[Block]:
 
 
 def verdict(context: Context, tissues: list[TissueLimit]) -> Verdict:
-    """Whether the hand is stable against the stiffest tissue with the filter's lag."""
+    """Whether the hand is stable against the stiffest tissue with the filter's delay."""
     softest, stiffest = (choose(tissues, key=lambda tissue: tissue.stiffness) for choose in (min, max))
     low, high = (stiffness(context, tissue) for tissue in (softest, stiffest))
     measured = f"the measured tissue, {low}" + f" to {high}" * (softest is not stiffest)
     prefix = f"stability.{stiffest.log}"
     if f"{prefix}.k_t_lag" not in context.results:
-        return Verdict("info", f"Stability against {measured}, is not known: no log tells the delay of the filter.")
+        return Verdict("info", f"Stability against {measured}, is not known: no log shows the delay of the filter.")
     limit, lag, damping = (
         context.results[f"{prefix}.{n}"].number(2) for n in ("k_t_lag", "force_lag", "damping_needed")
     )
+    rate = context.results["stability.link_rate"].number(3)
     stable = stiffest.stiffness < stiffest.k_t_lag
     return Verdict(
         "good" if stable else "warn",
-        f"{'The thesis’s' if context.compares_with_thesis else 'The assumed'} hand is {'' if stable else '**not** '}"
-        f"stable against {measured}. With the link and the filter of the {title(stiffest.lag_of).lower()}, which is "
-        f"{lag} late, it is stable up to {limit}."
-        + ("" if stable else f" A hand with a damping of {damping} or more would be."),
+        f"{'The thesis’s' if context.compares_with_thesis else 'The assumed'} model of a hand is "
+        f"{'' if stable else '**not** '}"
+        f"stable against {measured}. With a communication link of {rate} and the filter's delay of {lag} "
+        f"({title(stiffest.lag_of).lower()}), it is stable up to {limit}."
+        + ("" if stable else f" A hand with a damping of at least {damping} would be stable against this tissue."),
     )
 
 
 def stiffness(context: Context, tissue: TissueLimit) -> str:
-    """The stiffness of a measured tissue, with its error where there is one."""
+    """The stiffness of a measured tissue, with its standard error if there is one."""
     key = f"tissue.{tissue.log}.stiffness"
     return (
         str(context.results[key].number())
@@ -86,7 +88,7 @@ def model(context: Context) -> str:
         f"Mass {m} and damping {b} are the thesis's (8.2)–(8.7); it states no stiffness, and {k} stands for an arm "
         "held loosely."
         if context.compares_with_thesis
-        else f"Assumed are a mass of {m}, a damping of {b} and a stiffness of {k}, as of an arm held loosely."
+        else f"Its mass is assumed as {m}, its damping as {b} and its stiffness as {k}, as of an arm held loosely."
     )
     return (
         "A surgeon's hand on a haptic device is modelled as a mass $m$ on a spring $K_H$ and a damper $b$. Tissue is a "
@@ -95,39 +97,41 @@ def model(context: Context) -> str:
 
 
 def without_delay(context: Context) -> str:
-    """Explain what the map of Lyapunov functions says, and what it does not.  Fig 8.9"""
+    """Explain what the map of Lyapunov functions proves, and what it does not prove.  Fig 8.9"""
     proved, switching = (context.results[f"stability.{n}"].number(3) for n in ("k_t_cqlf", "k_t_switching"))
-    region = "the region that the thesis's map paints red" if context.compares_with_thesis else "the shaded region"
+    region = "the red region of the thesis's Figure 8.9" if context.compares_with_thesis else "the shaded region"
     return (
-        "A common quadratic Lyapunov function proves stability without delay. It exists exactly where "
-        f"$K_T < b^2/m + 2 b sqrt(K_H/m)$, here below {proved}; the solver's points agree. Beyond it lies {region}. "
-        "That is **not** a region of instability: **this criterion** merely proves nothing there. Even tissue that "
-        f"switched on and off at any moment would do no harm below {switching}. Real tissue acts only where $x >= 0$. "
-        "There $V = 1/2 m dot(x)^2 + 1/2 K_H x^2 + 1/2 K_T max(x, 0)^2$ falls by $b dot(x)^2$. So **every** "
+        "A common quadratic Lyapunov function proves stability without delay. It exists if and only if "
+        f"$K_T < b^2/m + 2 b sqrt(K_H/m)$, here below {proved}; the numerical solutions of its linear matrix "
+        f"inequality (LMI) in [@stability-limits] agree. Above this limit lies {region}. "
+        "That is **not** a region of instability: **this criterion** merely proves nothing there. Even if the spring "
+        f"of the tissue switched on and off at arbitrary times, the hand would be stable below {switching}. Real "
+        "tissue acts only in contact, at $x >= 0$. The energy "
+        "$V = 1/2 m dot(x)^2 + 1/2 K_H x^2 + 1/2 K_T max(x, 0)^2$ then falls by $b dot(x)^2$. So **every** "
         "$K_T >= 0$ is stable without delay, also in that region."
     )
 
 
 def with_delay(context: Context, tissues: list[TissueLimit]) -> str:
-    """Explain the limits that delay and sampling set."""
+    """Explain the stability limits due to delay and sampling."""
     rate = context.results["stability.link_rate"].number(3)
     late = any(f"stability.{tissue.log}.force_lag" in context.results for tissue in tissues)
-    lag = " The filter's lag is the delay with which it shows the peak of a push of 1 s." if late else ""
+    lag = " The filter's delay is the time from the peak of a push of 1 s to the peak of its estimate." if late else ""
     return (
-        "The limit comes from the delay of the force. A delay $d$ takes a damping of about $K_T d$ from a hand in "
-        f"contact. A link of {rate} holds each force for one period, which adds half a period of delay. The stated "
-        "limit is that of a hand pressed into the tissue. A hand that nothing presses bounces off, and by simulation "
-        f"it is stable up to at least twice as much.{lag}"
+        "The limit is due to the delay of the force. A delay $d$ reduces the damping of a hand in contact by about "
+        f"$K_T d$. A communication link of {rate} holds each force for one period, which adds half a period of delay. "
+        "The stated limit applies to a hand that is pressed into the tissue. A hand that is not pressed bounces off; "
+        f"in simulation it is stable up to at least twice this stiffness.{lag}"
     )
 
 
 def limits_figure(context: Context, delayed: DelayLimit, tissues: list[TissueLimit]) -> Figure:
     """The map without delay, and the limit over the delay."""
     return Figure(
-        "Limits of the tissue's stiffness. Left, without delay, over the stiffness of the hand: where the solver found "
-        "a Lyapunov function, and both exact limits of arbitrary switching; tissue that switches at first contact is "
-        "stable beyond them, too. Right, over the delay of the force: for a hand in contact, and by simulation for "
-        "one that leaves the tissue.",
+        "Limits of the tissue's stiffness. Left, without delay, against the stiffness of the hand: points where the "
+        "LMI solver found a Lyapunov function, the exact limit of this function, and the exact limit under the worst "
+        "switching. Real tissue, which acts only in contact, is stable above both limits, too. Right, against the "
+        "delay of the force: a hand that stays in contact, and by simulation a hand that leaves the tissue.",
         "Limits of the tissue's stiffness, rising with the stiffness of the hand and falling with the delay of the "
         "force.",
         (map_panel(context, tissues), delay_panel(context, delayed, tissues)),
@@ -157,7 +161,7 @@ def map_panel(context: Context, tissues: list[TissueLimit]) -> Panel:
 
 
 def lyapunov_marks(cells: StabilityMap, beyond: str) -> tuple[AnyMark, ...]:
-    """Up to where the solver found a function and from where it did not, column by column of cells."""
+    """The stiffest tissue with a Lyapunov function and the softest without, for each stiffness of the hand."""
     k_h, stable = np.unique(cells.k_h), cells.has_cqlf == 1
     columns = [cells.k_h == k for k in k_h]
     top = float(cells.tissue_stiffness.max())
@@ -172,7 +176,7 @@ def lyapunov_marks(cells: StabilityMap, beyond: str) -> tuple[AnyMark, ...]:
 
 
 def tissue_lines(context: Context, tissues: list[TissueLimit]) -> Iterator[HLine]:
-    """The measured tissues, and in simulations of the thesis's experiments the thesis's."""
+    """The measured tissues; in simulations of the thesis's experiments, also the tissue of the thesis."""
     for i, tissue in enumerate(tissues):
         yield HLine(tissue.stiffness, "" if i else "measured", "green", "solid")
     if context.compares_with_thesis:
@@ -184,13 +188,13 @@ def delay_panel(context: Context, delayed: DelayLimit, tissues: list[TissueLimit
     delay = MS * delayed.delay
     tried = delayed.k_t_leaving == delayed.k_t_leaving
     marks: list[AnyMark] = [
-        Line(delay, delayed.k_t_delay, "delayed", "blue", "solid"),
-        Line(delay, delayed.k_t_held, f"and held at {delayed.link_rate:g} Hz", "vermillion", "dashed"),
+        Line(delay, delayed.k_t_delay, "delay only", "blue", "solid"),
+        Line(delay, delayed.k_t_held, f"delay and link of {delayed.link_rate:g} Hz", "vermillion", "dashed"),
         Points(delay[tried], delayed.k_t_leaving[tried], "leaving the tissue", "purple"),
         *tissue_lines(context, tissues),
     ]
     late = [tissue for tissue in tissues if tissue.force_lag > 0.0]
-    marks += [VLine(MS * tissue.force_lag, "filter's lag") for tissue in late[:1]]
+    marks += [VLine(MS * tissue.force_lag, "filter's delay") for tissue in late[:1]]
     return Panel(
         "With delay", "delay of the force [ms]", "stiffness of tissue [N/m]", tuple(marks), x_log=True, y_log=True
     )
@@ -207,11 +211,11 @@ def requirements(context: Context, tissues: list[TissueLimit]) -> Table:
         )
         for tissue in tissues
     )
-    header = ("Log", "Stiffness", "$K_H$ for a Lyapunov function", "Filter's lag", "Stable up to", "Damping needed")
+    header = ("Log", "Stiffness", "$K_H$ for a Lyapunov function", "Filter's delay", "Stable up to", "Damping needed")
     return Table(
         "The measured tissue: the stiffness of the hand above which a common quadratic Lyapunov function exists; the "
-        "stiffest tissue that is stable with the filter's lag and the link; and the damping that a hand needs to be "
-        "stable against the measured tissue with this lag.",
+        "stiffest tissue that is stable with the filter's delay and the link; and the damping that a hand needs to be "
+        "stable against the measured tissue with this delay.",
         header,
         rows,
         "stability-table",
@@ -220,7 +224,7 @@ def requirements(context: Context, tissues: list[TissueLimit]) -> Table:
 
 
 def motions(context: Context) -> Iterator[Figure]:
-    """Fig 8.8 and 8.10: the same hand and tissue, by the worst switching and as it is."""
+    """Fig 8.8 and 8.10: the same hand and tissue, under the worst switching and in real contact."""
     runs = [run for run in context.catalogue.records(HapticMotion) if run.switching in LAWS]
     if not runs:
         return
@@ -230,10 +234,10 @@ def motions(context: Context) -> Iterator[Figure]:
         for x, y in (("hand_x", "hand_dx"), ("t", "hand_x"), ("t", "V"))
     )
     yield Figure(
-        f"The same hand and tissue of {k_t}, beyond both limits of arbitrary switching. It is unstable by the worst "
-        "switching, and stable as it switches at first contact. Under the worst switching V is not the stored energy, "
-        "so it can rise.",
-        "A spiral that grows by the worst switching, and one that shrinks to rest by switching at first contact.",
+        f"The same hand and tissue of {k_t}, above both limits of arbitrary switching. The motion is unstable under "
+        "the worst switching, and stable if the tissue acts only in contact. Under the worst switching V is not the "
+        "stored energy, so V can rise.",
+        "A spiral that grows under the worst switching, and one that shrinks to rest if the tissue acts in contact.",
         (
             Panel("Phase plane", label(runs[0], "hand_x"), label(runs[0], "hand_dx"), phase),
             Panel("Position", "time [s]", label(runs[0], "hand_x"), position),

@@ -36,7 +36,7 @@ from davinci_forces.report.verdicts import (
 
 
 def section(context: Context) -> Section:
-    """The answer on one page, then what the analysis warned of."""
+    """The answer on one page."""
     return Section("The answer", "summary", tuple(blocks(context)))
 
 
@@ -65,10 +65,10 @@ def blocks(context: Context) -> Iterator[Block]:
 
 
 def nothing_identified(context: Context) -> Verdict:
-    """Why there is no effort to show, and what there is instead."""
+    """State that no joint was identified, and refer to the tissue that sensors measured."""
     text = "No joint could be identified: there is no usable identification log, so no effort was tracked."
     if context.catalogue.records(Stiffness):
-        return Verdict("info", f"{text} What sensors say of tissue is in [@tissue].")
+        return Verdict("info", f"{text} Tissue measured by sensors is in [@tissue].")
     return Verdict("bad", text)
 
 
@@ -84,13 +84,13 @@ def thresholds_in_words(trusts: list[Trust]) -> str:
     stated = [trust.sought is not None for trust in trusts]
     rule = by_level if all(stated) else f"{by_level}; without `effort`, {by_error}" if any(stated) else by_error
     return (
-        f"Each row is of the joint's worst run that was not fitted. Good: {rule}. A band is right if it covers "
+        f"Each row shows the joint's worst run that was not fitted. Good: {rule}. A band is right if its coverage is "
         f"{percent(COVERED[0])} to {percent(COVERED[1])}. See [@thresholds]."
     )
 
 
 def caption(contacts: list[Contact]) -> str:
-    """What the figure shows."""
+    """The caption of the figure."""
     level = "The grey band holds 95 % of the samples in free space, where nothing touches the robot."
     if not contacts:
         return f"External effort on each joint in its worst run that was not fitted. {level}"
@@ -191,10 +191,13 @@ def spoken(contact: Contact) -> str:
 def trust_table(context: Context, trusts: list[Trust]) -> Table:
     """One row a joint."""
     sought = ("Sought",) if any(trust.sought for trust in trusts) else ()
-    header = ("Joint", "Verdict", "Model error", "Of effort", "$R^2$", "At most", "Detection level", *sought, "Covered")
+    header = (
+        "Joint", "Verdict", "Model error", "Error/effort", "$R^2$", "Ceiling", "Detection level", *sought, "Coverage",
+    )  # fmt: skip
     return Table(
-        "How far to trust the estimates. Model error: beyond noise. At most: the limit that noise sets to $R^2$. "
-        "Detection level: 99 % of free-space samples stay below it. Covered: the share of them in the 95 % band.",
+        "Trust in the estimates. Model error: root mean square (RMS) of measured minus modelled effort, without noise; "
+        "next to it, its ratio to the RMS effort. Ceiling: the largest $R^2$ that noise allows. Detection level: 99 % "
+        "of free-space samples stay below it. Coverage: the share of free-space samples in the 95 % band.",
         header,
         tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts),
         label="trust-table",
@@ -203,7 +206,7 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
 
 
 def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell, ...]:
-    """The numbers of one joint, with the runs that they are of."""
+    """The numbers of one joint."""
     p, space = trusted.prediction, trusted.space
     row: list[Cell] = [title(trusted.joint), trusted.words]
     if p is None:
@@ -261,7 +264,7 @@ def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, st
     if p is not None and trusted.share > GOOD:
         error = context.results[f"{p.prefix}.model_error"].number(2)
         text = f"the model error is {error}, {percent(trusted.share)} of the effort."
-        by_level = " The verdict goes by the detection level." if trusted.level == "good" else ""
+        by_level = " The verdict follows from the detection level." if trusted.level == "good" else ""
         yield trusted.share / GOOD, f"**{name}, {literal(p.log)}**: {text}{by_level}{see_runs}"
 
 
@@ -277,7 +280,7 @@ def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str
         yield 3 * trusted.fineness, f"**{name}, {literal(space.log)}**: {text}{see_runs}"
     if trusted.narrow:
         narrow = f"the 95 % band is too narrow: it covers {percent(space.coverage)} of free-space samples. "
-        remedy = f"Judge contacts by the detection level.{see_runs}"
+        remedy = f"Compare contacts with the detection level.{see_runs}"
         yield 1.0 + 10 * (COVERED[0] - space.coverage), f"**{name}, {literal(space.log)}**: {narrow}{remedy}"
 
 

@@ -34,10 +34,10 @@ from davinci_forces.report.context import Context, label, title
 from davinci_forces.report.verdicts import NEAR_SINGULAR, band, percent
 
 AXIS_LABELS = {"x": "x0", "y": "y0, the roll axis", "z": "z0, up"}
-PATH_POINTS = 600  # of the path in space
-CONVERGENCE = 1.0  # [s] of the filter, left out of the range of the force
+PATH_POINTS = 600  # points drawn of the path in space
+CONVERGENCE = 1.0  # [s] time in which the filter converges; the axis of the force does not show its wide band
 SPACING = 0.2  # [s] between the vectors that are drawn in a contact
-REACH = 0.5  # of the path's extent, that the largest force is long
+REACH = 0.5  # drawn length of the largest force over the extent of the path
 
 
 def section(context: Context) -> Section | None:
@@ -84,17 +84,17 @@ def priority(force: TipForce, contacts: dict[str, TipContact]) -> tuple[bool, bo
 
 
 def correlations(forces: Sequence[TipForce]) -> str:
-    """State the correlation that is assumed of the joints' errors."""
+    """State the assumed correlation of the joints' errors."""
     correlated = [force for force in forces if force.correlation_from]
     if not correlated:
         return (
-            "The joints' errors are taken as independent. There are no two other logs whose free motion agrees on "
-            "their correlation."
+            "The joints' errors are taken as independent. Their correlation could not be estimated: at least two other "
+            "logs with free motion would have to give consistent values."
         )
     sizes = [max(abs(f.rho_12), abs(f.rho_13), abs(f.rho_23)) for f in correlated]
     return (
-        "The correlation of the joints' errors is estimated from the free motion of other logs, as far as these "
-        f"agree. It reaches {max(sizes):.2f}."
+        "The correlation of the joints' errors is estimated from the free motion of other logs, as far as these logs "
+        f"agree. Its largest value is {max(sizes):.2f}."
     )
 
 
@@ -102,10 +102,10 @@ def contact_table(context: Context, contacts: Sequence[TipContact]) -> Table:
     """The largest force of every contact, component by component."""
     rows = tuple(row for contact in contacts for row in contact_rows(context, contact))
     return Table(
-        "The largest force at the tip in each contact, with standard deviations. Least certain: the standard deviation "
-        "along the direction in which it is largest. “Found” marks windows that the study does not state; “near "
-        "singular” marks poses in which the force is uncertain.",
-        ("Log", "Window", "$f_x$", "$f_y$", "$f_z$", "$abs(f)$", "Least certain", "along"),
+        "The largest force at the tip in each contact, with standard deviations. Least certain: the largest standard "
+        "deviation over all directions, and the direction of this deviation. “Found” marks windows that the study does "
+        "not state; “near singular” marks poses in which the force is uncertain.",
+        ("Log", "Window", "$f_x$", "$f_y$", "$f_z$", "$abs(f)$", "Least certain", "Direction"),
         rows,
         "tip-contacts",
         "llrrrrrl",
@@ -143,11 +143,11 @@ def level_table(context: Context, forces: Sequence[TipForce]) -> Table:
     )
     return Table(
         "The size of the estimated force at the tip in free space, where the true force is zero: root mean square "
-        "(RMS), and the levels that 95 % and 99 % of samples stay below. Smaller forces than the detection level "
-        "cannot be distinguished from free space. Coverage: the share of samples whose 95 % ellipsoid contains zero. "
-        "The condition number of the Jacobian (median) compares the certainty of the force between directions. Samples "
-        f"above {NEAR_SINGULAR:g} are near singular and not counted; the tip is then within about a centimetre of the "
-        "remote centre.",
+        "(RMS), and the levels that 95 % and 99 % (detection level) of samples stay below. Forces below the detection "
+        "level cannot be distinguished from free space. Coverage: the share of samples whose 95 % ellipsoid contains "
+        "zero. Condition: the median condition number of the Jacobian, which compares the certainty of the force "
+        f"between directions. Near singular: samples with a condition number above {NEAR_SINGULAR:g}, at which the tip "
+        "is within about a centimetre of the remote centre; these samples are left out.",
         ("Log", "Role", "RMS", "95 %", "Detection level", "Coverage", "Condition", "Near singular"),
         rows,
         "tip-levels",
@@ -200,7 +200,7 @@ def component_panel(force: TipForce, axis: str, contact: TipContact | None) -> P
 
 
 def reach(force: TipForce, lower: Column, upper: Column) -> tuple[float, float] | None:
-    """The range of a band once the filter has converged; its wide start would hide everything else."""
+    """The range of a band after the filter has converged; the wide band before would hide the force."""
     values = np.concatenate([edge[force.t >= force.t[0] + CONVERGENCE] for edge in (lower, upper)])
     values = values[np.isfinite(values)]
     if not len(values) or np.ptp(values) == 0.0:
@@ -219,7 +219,7 @@ def condition_panel(force: TipForce) -> Panel:
 
 
 def in_space(force: TipForce, contact: TipContact) -> Figure3D:
-    """The path of the tip, with the force along it in every contact."""
+    """The path of the tip, with the force at each point in contact."""
     path = np.column_stack([force.x, force.y, force.z])
     extent = float(np.ptp(path, axis=0).max())
     per_newton = REACH * extent / float(contact.f_peak.max())
@@ -238,9 +238,9 @@ def in_space(force: TipForce, contact: TipContact) -> Figure3D:
         ),
     )
     return Figure3D(
-        f"{literal(force.log)}: the path of the tip, and the force that it exerts in each contact, numbered as in "
-        f"[@tip-contacts]; 1 N is {1e3 * per_newton:.2g} mm long. The black line at its end is the 95 % interval along "
-        "the least certain direction.",
+        f"{literal(force.log)}: the path of the tip, and the force that it exerts in each contact, numbered in the "
+        f"order of [@tip-contacts]; 1 N is {1e3 * per_newton:.2g} mm long. The black line at its end is the 95 % interval "
+        "along the least certain direction.",
         f"The path of the tip in space in {literal(force.log)}, with the force in each contact as a line from it.",
         marks,
         f"tip-space-{force.log}",
@@ -261,7 +261,7 @@ def contact_samples(force: TipForce, contact: TipContact) -> tuple[Column, Colum
 
 
 def strokes(start: Column, end: Column) -> Column:
-    """Separate lines from each start (N, 3) to its end, as one that is interrupted (3 N, 3)."""
+    """A line from each start (N, 3) to its end, as one interrupted line (3 N, 3)."""
     return np.stack([start, end, np.full_like(start, np.nan)], axis=1).reshape(-1, 3)
 
 
@@ -271,7 +271,7 @@ def line(points: Column, name: str, colour: Colour) -> Line3D:
 
 
 def windows(contact: TipContact) -> list[tuple[float, float]]:
-    """Where each contact begins and ends."""
+    """The start and the end [s] of each contact."""
     return list(zip(contact.onset.tolist(), contact.release.tolist(), strict=True))
 
 

@@ -30,16 +30,16 @@ from davinci_forces.report.context import Context, title
 from davinci_forces.report.sections.parts import MM, THESIS_TISSUE
 from davinci_forces.report.verdicts import STIFF, STIFFER, grade
 
-FIGURES_ON_PAPER = 1  # of force, and of maps; the others are on screen
+FIGURES_ON_PAPER = 1  # figures of force, and as many maps, in the PDF; the others are on screen only
 PUSHES_PER_PANEL = 8
-SAMPLES_PER_PUSH = 60  # in a panel of several pushes
-MAX_PUSHES_LISTED = 20  # of a log; with more, their spread says more than one loop
-MIN_SPACING_MAP = 1e-3  # [m] between places, below which there is no map
+SAMPLES_PER_PUSH = 60  # samples drawn of each push in a panel of several pushes
+MAX_PUSHES_LISTED = 20  # pushes of a log; with more, a histogram of their stiffness replaces the loop of one push
+MIN_SPACING_MAP = 1e-3  # [m] extent of the pushed places, below which no map is drawn
 CLASSES: tuple[Colour, ...] = ("blue", "sky", "orange", "vermillion")
 
 
 def section(context: Context) -> Section | None:
-    """All tissue logs; None of a study without any."""
+    """All tissue logs; None if the study has no tissue log."""
     tissues = context.catalogue.records(Stiffness)
     return Section("Tissue", "tissue", tuple(blocks(context, tissues))) if tissues else None
 
@@ -49,11 +49,12 @@ def blocks(context: Context, tissues: list[Stiffness]) -> Iterator[Block]:
     yield from (verdict(context, tissue) for tissue in tissues)
     yield Prose(
         "The stiffness of a push is the slope of a straight line, fitted by least squares to force over depth during "
-        "contact. Contact begins and ends where the force bends. A push counts if the line explains 90 % of its force; "
-        "the stiffness of a log is the median of these pushes. The error allows for correlated residuals, for tissue "
-        "that differs from place to place, and for the worst effect of the joint model's error on the slope. The force "
-        "of a joint is its measured effort minus the model's, low-passed without delay; the filter's would come late. "
-        "Samples at rest do not count, because friction can then take any value."
+        "contact. Contact begins and ends at the kinks of the force-depth curve. A push is used if the line explains "
+        "90 % of its force; the stiffness of a log is the median over the used pushes. The standard error allows for "
+        "correlated residuals, for tissue that differs from place to place, and for the worst effect of the joint "
+        "model's error on the slope. The force of a joint is its measured minus its modelled effort, low-passed "
+        "without delay. The filter's estimate is not used here, because it is delayed. Samples at rest are not used, "
+        "because friction can then take any value."
     )
     yield comparison(context, tissues)
     forces = [figure for tissue in tissues for figure in force_figures(context, tissue)]
@@ -74,7 +75,7 @@ def verdict(context: Context, tissue: Stiffness) -> Verdict:
     """Grade the stiffness of one log by its standard error."""
     name = f"**{literal(tissue.log)}**"
     if not tissue.pushes:
-        return Verdict("bad", f"{name}: in none of {pushes(len(tissue))} a straight line explains 90 % of the force.")
+        return Verdict("bad", f"{name}: a straight line explains 90 % of the force in none of {pushes(len(tissue))}.")
     level = grade(tissue.stiffness_std / tissue.stiffness, STIFF, STIFFER) if tissue.stiffness > 0 else "bad"
     stiffness = context.results[f"tissue.{tissue.log}.stiffness"].number()
     law = chosen_law(context, tissue.log)
@@ -84,7 +85,8 @@ def verdict(context: Context, tissue: Stiffness) -> Verdict:
     if true is not None:
         text += f"; the 95 % interval {'misses' if missed else 'contains'} the true {true:g} N/m"
     if level == "good" and (missed or tissue.pushes == 1):
-        level = "info" if missed and tissue.pushes > 1 else "warn"  # a good precision is not called good if it misses
+        # A small error is not called good from one push only, or if the interval misses the truth.
+        level = "info" if missed and tissue.pushes > 1 else "warn"
     return Verdict(level, f"{text}.")
 
 
@@ -115,10 +117,10 @@ def comparison(context: Context, tissues: Sequence[Stiffness]) -> Table:
     ]
     if context.compares_with_thesis:
         rows.append(("thesis, section 8.2", "Instrument slide", f"{THESIS_TISSUE}", "–", "–", "1", "1 of 1"))
-    header = ("Log", "Force of", "Stiffness", "Quartile 1", "Quartile 3", "Count", "In contact")
+    header = ("Log", "Force from", "Stiffness", "Quartile 1", "Quartile 3", "Used", "In contact")
     return Table(
-        "Stiffness of the tissue, its quartiles over pushes, the number of pushes that count, and the number of pushes "
-        "with contact.",
+        "Stiffness of the tissue, its quartiles over pushes, the number of used pushes, and the number of pushes with "
+        "contact among all examined pushes.",
         header,
         tuple(rows),
         "tissue-table",
@@ -127,7 +129,7 @@ def comparison(context: Context, tissues: Sequence[Stiffness]) -> Table:
 
 
 def force_figures(context: Context, tissue: Stiffness) -> Iterator[Figure]:
-    """Force against depth of one log, where its pushes are at hand."""
+    """Force against depth of one log, if its pushes were recorded."""
     pushes = {push.push: push for push in context.catalogue.select(Push, log=tissue.log)}
     typical = pushes.get(int(tissue.push[nearest(tissue)]))
     if typical is not None:
@@ -138,21 +140,21 @@ def force_figures(context: Context, tissue: Stiffness) -> Iterator[Figure]:
 
 
 def nearest(tissue: Stiffness) -> int:
-    """The push whose stiffness is nearest to that of the log; where none counts, the one of the best line."""
+    """The push whose stiffness is nearest to that of the log; if no push is used, the push with the best line."""
     if not tissue.pushes:
         return int(np.argmax(tissue.r2))
     return int(np.argmin(np.where(tissue.counted == 1, np.abs(tissue.k_t - tissue.stiffness), np.inf)))
 
 
 def force_figure(tissue: Stiffness, pushes: Sequence[Push], typical: Push) -> Figure:
-    """Pushes with the typical line and its interval, what the line leaves, and the loop or the spread."""
+    """Pushes with the line of a typical push, the residual of this line, and its loop or a histogram."""
     name = literal(tissue.log)
     many = len(tissue) > MAX_PUSHES_LISTED
     last = spread_panel(tissue) if many else loop_panel(typical)
     third = "the distribution of the stiffness of pushes" if many else "its loop on the way in and out"
     return Figure(
         f"{name}: force against depth of contact, with the line of push {typical.push} and its 95 % interval; the "
-        f"residual of the line; and {third}. This push is the nearest to the stiffness of the log.",
+        f"residual of the line; and {third}. The stiffness of this push is nearest to that of the log.",
         f"Force over depth in {name}, with a line of slope {typical.k_t:.4g} N/m that explains {typical.r2:.0%}.",
         (line_panel(pushes, typical), residual_panel(typical), last),
         f"tissue-{tissue.log}",
@@ -200,20 +202,20 @@ def in_and_out(x: Column, y: Column, inside: Booleans, loading: Booleans) -> tup
 
 
 def spread_panel(tissue: Stiffness) -> Panel:
-    """A histogram of the stiffness of the pushes that count, with its quartiles."""
+    """A histogram of the stiffness of the used pushes, with its quartiles."""
     counts, edges = np.histogram(tissue.k_t[tissue.counted == 1], bins=40)
     quartiles = VSpan(tissue.stiffness_q1, tissue.stiffness_q3, "quartiles")
     return Panel("Stiffness of pushes", "stiffness [N/m]", "pushes", (quartiles, Histogram(edges, counts, "", "blue")))
 
 
 def spread(tissue: Stiffness) -> float:
-    """The second largest distance [m] between places that pushes go to, along x, y and z."""
+    """The second largest extent [m] of the pushed places among x, y and z."""
     reach = [float(np.ptp(places)) if np.isfinite(places).all() else 0.0 for places in (tissue.x, tissue.y, tissue.z)]
     return sorted(reach)[1] if len(tissue) > 3 else 0.0
 
 
 def surface_map(tissue: Stiffness) -> Figure:
-    """The stiffness over the surface, in four classes of as many pushes each, along its two longest axes."""
+    """The stiffness over the surface, along its two longest axes, in four classes of equally many pushes."""
     places = {"x": tissue.x, "y": tissue.y, "z": tissue.z}
     across, along = sorted(sorted(places, key=lambda name: -float(np.ptp(places[name])))[:2])
     k = tissue.k_t
@@ -237,14 +239,19 @@ def surface_map(tissue: Stiffness) -> Figure:
 
 
 def each_push(context: Context, tissues: Sequence[Stiffness]) -> Iterator[Table]:
-    """Every push of logs that hold few."""
+    """Every push of the logs with few pushes."""
     header = ("Push", "Stiffness", "R2", "First contact", "On the way in", "On the way out", "Energy lost", "Share")
+    caption = (
+        "Stiffness with the $R^2$ of its line, depth of first contact, stiffness on the way in and out, and the energy "
+        "that the tissue absorbs, also as a share of the work of loading."
+    )
     names = ("k_t", "r2", "onset_depth", "k_t_loading", "k_t_unloading", "lost", "lost_share")
     for tissue in tissues:
         prefix = f"tissue.{tissue.log}"
         rows = tuple((str(push), *context.numbers(f"{prefix}.{push}", names)) for push in tissue.push.tolist())
         if len(rows) <= MAX_PUSHES_LISTED:
-            yield Table(f"{literal(tissue.log)}: every push.", header, rows, f"pushes-{tissue.log}", "lrrrrrrr")
+            name = f"{literal(tissue.log)}: every push"
+            yield Table(f"{name}. {caption}", header, rows, f"pushes-{tissue.log}", "lrrrrrrr")
 
 
 def model_tables(context: Context, models: Sequence[TissueModel]) -> Iterator[Table]:
@@ -262,5 +269,5 @@ def model_tables(context: Context, models: Sequence[TissueModel]) -> Iterator[Ta
 
 
 def pushes(number: int) -> str:
-    """A number of pushes in words: count() makes '2 pushs' of it."""
+    """A number of pushes in words; count() would write '2 pushs'."""
     return f"{number} push" if number == 1 else f"{number} pushes"

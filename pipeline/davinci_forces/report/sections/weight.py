@@ -1,4 +1,4 @@
-"""The mass on the arm: its estimate, the scale of the efforts, and the apparent mass in free motion.  Section 7.5"""
+"""Masses on the arm: their estimates, the scale of the efforts, and apparent masses in free motion.  Section 7.5"""
 
 import math
 from collections.abc import Iterator
@@ -21,9 +21,11 @@ from davinci_forces.report.content import (
 )
 from davinci_forces.report.context import Context, label, title
 
+SIDES = {"not told": "undecided"}  # words of the table for the sides in records
+
 
 def section(context: Context) -> Section | None:
-    """One part per weight log."""
+    """The masses of all weight logs in a table, then each log in detail."""
     weights = context.catalogue.records(Weight)
     if not weights:
         return None
@@ -40,11 +42,12 @@ def intro() -> Prose:
     """Explain the estimate of a mass and its standard error."""
     return Prose(
         "A mass on a link adds its gravity and its inertia to the effort of the joints, as computed from the robot's "
-        "chain. The mass follows by regression: the external effort of all joints that move and carry it, over the "
-        "effort that one kilogram would need. This external effort is measured minus modelled, low-passed without "
-        "delay. Each joint is weighted by the inverse of its model's squared error in free motion. A joint also has an "
-        "offset of the day, where the data can separate it from the load. The standard error combines that of the fit "
-        "with that of leaving out one of six parts of the path at a time. It is widened where logs without a mass "
+        "chain. The mass is estimated by regression of the external effort of all joints that move and carry it on the "
+        "effort that one kilogram would need. Here the external effort is measured minus modelled effort, low-passed "
+        "without delay. Each joint is weighted by the inverse of its model's squared error in free motion. The effort "
+        "of a joint can have a constant offset that differs from day to day (offset of the day). It is estimated, too, "
+        "if the data can separate it from the load. The standard error combines the standard error of the fit with a "
+        "jackknife, which leaves out one of six parts of the path at a time. It is widened if logs without a mass "
         "appear to carry more than their standard errors allow."
     )
 
@@ -57,15 +60,15 @@ def summary(context: Context, weights: list[Weight]) -> Table:
             literal(weight.moves_with),
             "–" if math.isnan(weight.stated_mass) else str(Number(weight.stated_mass, "kg")),
             *context.numbers(f"weight.{weight.log}", ("mass", "mass_mirrored", "scale")),
-            weight.side,
+            SIDES.get(weight.side, weight.side),
         )
         for weight in weights
     )
     return Table(
-        "Masses with their standard errors, at the stated position and on the other side of the link. The better side "
-        "is named if the difference is two standard errors or more. The scale is the estimated mass over the stated "
-        "one.",
-        ("Log", "Moves with", "Stated", "Mass", "Other side", "Scale", "Side"),
+        "Masses with their standard errors, at the stated position and mirrored to the other side of the link, in case "
+        "the sign of the position is wrong. Better side: the side that explains the efforts better by two standard "
+        "errors or more. The scale is the estimated mass over the stated mass.",
+        ("Log", "Moves with", "Stated", "Mass", "Mirrored", "Scale", "Better side"),
         rows,
         "weight-table",
         "llrrrrl",
@@ -87,7 +90,7 @@ def log_blocks(context: Context, weight: Weight) -> Iterator[Block]:
 def verdict(context: Context, weight: Weight) -> Verdict:
     """Whether the estimated mass agrees with the stated one, and what follows for the scale of the efforts."""
     mass = context.number(f"weight.{weight.log}.mass", 3)
-    name = f"**{literal(weight.log)}**: the mass by the efforts is {mass}"
+    name = f"**{literal(weight.log)}**: the mass estimated from the efforts is {mass}"
     if weight.side == "the other one":
         return Verdict("warn", f"{name}. The other side of its link explains the efforts better: check its position.")
     if math.isnan(weight.stated_mass):
@@ -102,24 +105,24 @@ def verdict(context: Context, weight: Weight) -> Verdict:
 
 
 def disagreement(context: Context, weight: Weight) -> Prose:
-    """State the apparent mass of the tare by the fit alone."""
+    """State the apparent mass of the tare according to the model alone."""
     apparent = context.number(f"weight.{weight.log}.tare_mass", 2)
     return Prose(
-        f"The run {literal(weight.tare)} without the mass (tare), along the same path, is subtracted. By the fit alone "
-        f"the tare appears to carry {apparent}, and by so much the mass differs from the one without the tare. The "
-        "error of the fit repeats along the path and cancels, so the standard error does not include it. A change "
-        "between the two runs remains in the mass."
+        f"The run {literal(weight.tare)} without the mass (tare), along the same path, is subtracted. According to the "
+        f"model alone, the tare appears to carry {apparent}; without the tare, the estimated mass would differ by this "
+        "amount. The error of the model repeats along the path and cancels, so the standard error does not include it. "
+        "A change between the two runs remains in the estimated mass."
     )
 
 
 def loads_of(context: Context, weight: Weight) -> list[Load]:
-    """What the joints carry along the path of a log."""
+    """The loads of the joints along the path of a log."""
     loads = context.catalogue.select(Load, log=weight.log, weight=weight.log)
     return [load for load in loads if load.joint in weight.loaded]
 
 
 def figure(weight: Weight, loads: list[Load]) -> Figure:
-    """The external effort of each joint beside the effort of the mass.  Fig 7.12"""
+    """The external effort of each joint and the effort of the mass.  Fig 7.12"""
     mass = weight.mass if math.isnan(weight.stated_mass) else weight.stated_mass
     by = "estimated" if math.isnan(weight.stated_mass) else "stated"
     offsets = dict(zip(weight.loaded, weight.joint_offset, strict=True))
@@ -127,7 +130,7 @@ def figure(weight: Weight, loads: list[Load]) -> Figure:
     once = "over one period, averaged" if loads[0].period else "over the run"
     return Figure(
         f"{name}: external effort of each joint that carries the mass {once}{subtracted}, and the effort of the {by} "
-        "mass, with the joint's offset of the day.",
+        "mass, plus the joint's offset of the day.",
         f"{name}: the external effort of {', '.join(title(load.joint) for load in loads)} follows the load of "
         f"{Number(mass, 'kg')}.",
         tuple(
@@ -146,13 +149,14 @@ def figure(weight: Weight, loads: list[Load]) -> Figure:
 
 
 def by_joint(context: Context, weight: Weight) -> Table:
-    """The mass by each joint alone."""
+    """The mass estimated from each joint alone."""
     names = ("mass", "joint_offset", "left_rms", "free_error")
     rows = tuple((title(joint), *context.numbers(f"weight.{weight.log}.{joint}", names)) for joint in weight.loaded)
     return Table(
-        f"{literal(weight.log)}, joint by joint: the mass by that joint alone, with the standard error from parts of "
-        "the path; its offset of the day; and the root mean square of the residual, beside that of the model in free "
-        "motion. Where the residual is larger, more than the mass has changed.",
+        f"{literal(weight.log)}, joint by joint: the mass estimated from that joint alone, with the standard error "
+        "from parts of the path; the joint's offset of the day; and the root mean squares of the residual with the "
+        "mass and of the model's error in free motion. If the residual is larger than in free motion, "
+        "something other than the mass has changed, too.",
         ("Joint", "Mass alone", "Offset", "Residual", "Free motion"),
         rows,
         f"weight-joints-{weight.log}",
@@ -168,8 +172,8 @@ def free_motion(context: Context, weight: Weight, free: list[FreeWeight]) -> Tab
     widening = context.number(f"weight.{weight.log}.widening", 3)
     return Table(
         f"Apparent mass in free motion at the position of the mass of {literal(weight.log)}: it should be 0. Fitted "
-        "logs are predicted by refits that leave them out. Because of the other logs, standard errors are widened "
-        f"{widening} times.",
+        "logs are predicted by fits without these logs. Apparent masses beyond their errors widen all standard "
+        f"errors, here by the factor {widening}.",
         ("Log", "Role", "Mass"),
         rows,
         f"weight-free-{weight.log}",

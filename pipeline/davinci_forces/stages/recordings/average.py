@@ -143,16 +143,15 @@ def omissions(
     faults = [f"{' and '.join(sides)} do not, as in a stop, a ramp or another motion{gaps_at(first, span)}"]
     faults *= bool(sides)
     for name, d in odd:
-        at_end = not d.has_periods_on_both_sides
-        if not at_end or t[core.start] - t[span.start] > MIN_REMARKED_LOSS * length or not sides:
-            differs = f"period {d.period + 1} of {d.periods} differs from the others by {d.rms:.3g} rms in {name}"
-            what = (
-                ", and is kept, because it is not at an end" if d.has_periods_on_both_sides else ", as in a transient"
-            )
-            faults.append(f"{differs}, {d.ratio:.1f} times what noise explains{what}")
+        inside = d.has_periods_on_both_sides
+        if inside or t[core.start] - t[span.start] > MIN_REMARKED_LOSS * length or not sides:
+            number = f"{'the remaining ' * (d.periods < odd[0][1].periods)}{d.periods}"
+            differs = f"period {d.period + 1} of {number} differs from the others by {d.rms:.3g} rms in {name}"
+            what = "and is kept, because it is not at an end" if inside else "as in a transient"
+            faults.append(f"{differs}, {d.ratio:.1f} times what noise explains, {what}")
     keys = [f"skip = {np.floor(t[core.start] * 1e4 + 1e-3) / 1e4:.10g}"] * (core.start > 0)
     keys += [f"until = {np.ceil(t[core.stop - 1] * 1e4 - 1e-3) / 1e4:.10g}"] * (core.stop < len(t))
-    advice = f"; the rest is left out: write {' and '.join(keys)} in study.toml to confirm that" if keys else ""
+    advice = f"; other samples are left out: write {' and '.join(keys)} in study.toml to confirm that" if keys else ""
     return [
         f"{first.log}: {t[core.start]:.2f} to {t[core.stop - 1]:.2f} s are evaluated, which repeat every "
         f"{length:.4f} s; {'; '.join(faults)}{advice}"

@@ -44,11 +44,11 @@ def section(context: Context) -> Section | None:
 
 
 def intro() -> Prose:
-    """How to read the tables."""
+    """Explain the columns of the tables."""
     return Prose(
         "The parameters of each joint are fitted to the averaged periods of all its identification logs. The standard "
         "error after each value allows for correlated residuals; the classical one takes them as independent. Where "
-        "the two differ much, the model misses something that repeats in every period. $z$ is the value over its "
+        "the two differ much, the model lacks an effect that repeats in every period. $z$ is the value over its "
         "standard error. A parameter with $abs(z) < 2$ cannot be distinguished from zero."
     )
 
@@ -97,7 +97,7 @@ def parameters(context: Context, fit: Fit) -> Table:
         rows.append((f"$theta_{i + 1}$", name, unit, *values, f"{z:.1f}" if np.isfinite(z) else "–"))
     mse = context.number(f"{'.'.join(('fit', *fit.key))}.mse", 3)
     return Table(
-        f"Parameters of the {literal(fit.group.replace('_', ' '))} ({fit.model}, "
+        f"Parameters of the {literal(fit.group.replace('_', ' '))} ({fit.model}: without coupling to other joints; "
         f"{title_of(fit.estimator)}), {fit_in_use(context, fit)}, from {literal(', '.join(fit.logs))}; "
         f"mean squared error {mse} of the averaged effort.",
         ("Symbol", "Parameter", "Unit", "Value", "Classical standard error", "$z$"),
@@ -108,7 +108,7 @@ def parameters(context: Context, fit: Fit) -> Table:
 
 
 def fit_in_use(context: Context, fit: Fit) -> str:
-    """Which fit the filter uses: this one or another."""
+    """State whether the filter uses this fit or another."""
     used = context.used_fit(fit.group)
     if used.removeprefix(f"{CHOSEN}.") == f"{fit.model}.{fit.estimator}":
         return "the fit that the filter uses"
@@ -156,8 +156,8 @@ def correlations(context: Context, joint: str) -> Iterator[Block]:
         number = context.number(f"identifiability.{'.'.join(record.key)}.condition", 3)
         yield Prose(
             f"The columns of the regressor, scaled to one length, have the condition number {number}. The figure shows "
-            "the correlation of the errors of each two parameters. Where it is near 1 or −1, only a sum or a "
-            "difference of the two is known well."
+            "the correlation of the errors of each two parameters. If it is near 1 or −1, only a sum or a "
+            "difference of the two parameters is known well."
         )
         strongest = max((abs(r) for r, a, b in pairs(record) if a != b), default=0.0)
         numbered = tuple(f"θ{i} {name}" for i, name in enumerate(names, start=1))

@@ -1,4 +1,4 @@
-"""The estimators of a joint beside each other, beside what was published, and where they were not fitted."""
+"""The estimators of a joint compared with each other, with published values, and on data left out."""
 
 from collections.abc import Iterator
 
@@ -21,9 +21,9 @@ LOOKS: dict[str, Colour] = {
     "consistent": "purple",
     "tls": "orange",
 }
-MEANT_TO_DIFFER = ("consistent", "tls")  # where least squares cannot be: drawn only where they do
-ALIKE = 1e-3  # of the effort's deviation, below which two efforts are drawn as one
-REACHED = 1e-6  # of the squared error: what is less is none
+MEANT_TO_DIFFER = ("consistent", "tls")  # drawn only if they differ from least squares
+ALIKE = 1e-3  # difference over the effort's standard deviation, below which two efforts are drawn as one
+REACHED = 1e-6  # relative excess of the squared error, below which the least error is reached
 WALLS: dict[str, Colour] = {"reflecting": "green", "clipping": "vermillion"}
 
 
@@ -72,13 +72,13 @@ def effort_difference(a: Residual, b: Residual) -> float:
 
 
 def alike(names: list[str]) -> str:
-    """Which estimators are not drawn, as they say the same as least squares."""
+    """State the estimators that are not drawn because they agree with least squares."""
     verb = "is" if len(names) == 1 else "are"
     return f" {' and '.join(map(estimator_name, names))} {verb} the same as least squares." if names else ""
 
 
 def convergence(context: Context, joint: str) -> Iterator[Figure]:
-    """The least squared error that swarms knew, over iterations.  Fig 6.14"""
+    """The smallest squared error of each swarm, over iterations.  Fig 6.14"""
     searches = context.catalogue.select(SwarmSearch, group=joint)
     if not searches:
         return
@@ -105,11 +105,11 @@ def excess_in_words(excess: float) -> str:
     return f"is exceeded by {100 * excess:.2g} %" if excess < 1 else f"is exceeded {1 + excess:.2g} times"
 
 
-DIGITS = 3  # of a number that has no standard error
+DIGITS = 3  # digits of a number without standard error
 
 
 def printed_beside(context: Context, fit: Fit) -> Iterator[Block]:
-    """The thesis's table of a joint, each column beside this study's; none in a user's study."""
+    """The thesis's table of a joint, next to this study's values; none in a user's study."""
     joint = context.study.robot.joint(fit.group)
     printed = joint.printed
     if (
@@ -120,7 +120,7 @@ def printed_beside(context: Context, fit: Fit) -> Iterator[Block]:
     ):
         return
     yield Prose(
-        f"{printed.name} of the thesis, beside this study's values: first guesses, recomputed from the robot's masses "
+        f"{printed.name} of the thesis, next to this study's values: first guesses, recomputed from the robot's masses "
         "and lengths, and every estimator on this study's periods. The study is simulated, so its values are those of "
         "the simulation, not of the arm."
     )
@@ -151,7 +151,7 @@ def table(context: Context, fit: Fit, printed: Printed) -> Table:
 
 
 def left_out(context: Context, joint: str) -> Iterator[Block]:
-    """Every fit of a joint by the measure that all of them have, and the chosen one by that which it was chosen by."""
+    """Every fit of a joint by its error on logs or periods left out; the chosen one also by blocks of path left out."""
     predictions = [
         p for p in context.catalogue.select(Prediction, joint=joint, role="identification") if p.model != CHOSEN
     ]
@@ -169,7 +169,7 @@ def left_out(context: Context, joint: str) -> Iterator[Block]:
 
 
 def left_out_row(context: Context, joint: str, of_fit: list[Prediction]) -> tuple[Cell, ...]:
-    """One fit, by its worst log, and the same of the chosen one by blocks of path."""
+    """One fit by its worst log; the chosen fit also by blocks of path."""
     worst = max(of_fit, key=lambda p: p.relative_error)
     chosen = context.catalogue.select(Prediction, joint=joint, role="identification", model=CHOSEN)
     by_blocks = [p for p in chosen if p.estimator == f"{worst.model}.{worst.estimator}"]
@@ -182,7 +182,7 @@ def left_out_row(context: Context, joint: str, of_fit: list[Prediction]) -> tupl
 
 
 def noise_share(context: Context, joint: str) -> str:
-    """What of either error is noise, where periods tell."""
+    """State the noise in either error, if the periods determine it."""
     logs = [average.log for average in context.catalogue.select(Average, joint=joint)]
     if not logs:
         return ""

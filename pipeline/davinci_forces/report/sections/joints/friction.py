@@ -9,7 +9,7 @@ from davinci_forces.report.content import Figure, Line, Panel, Points
 from davinci_forces.report.content.marks import Colour
 from davinci_forces.report.context import Context, label, title
 
-MAX_PANELS = 6  # of maps
+MAX_PANELS = 6  # maps in a figure
 BRANCHES: tuple[tuple[int, str, Colour], ...] = ((1, "gaining speed", "blue"), (0, "losing speed", "vermillion"))
 
 
@@ -22,9 +22,9 @@ def friction_maps(context: Context, joint: str) -> Iterator[Figure]:
     more = f" Of {len(maps)} maps, {len(shown)} are shown." if len(maps) > len(shown) else ""
     yield Figure(
         f"{title(joint)}: friction (the effort minus all other terms of the model) over velocity, while the joint "
-        "gains speed and while it loses speed, and the model's friction. Points are means of ranges, bars their "
-        "standard deviations. Where the two branches differ, friction depends on the past, or reverses slower than its "
-        f"sign.{more}",
+        "gains speed and while it loses speed, and the model's friction. Points are means in bins of "
+        "velocity, bars their standard deviations. If the two branches differ, friction depends on the past, or "
+        f"changes more slowly than the sign of the velocity.{more}",
         f"Friction over velocity of the {joint.replace('_', ' ')}: {in_words(shown[0])}",
         tuple(panel(m) for m in shown),
         f"friction-{joint}",
@@ -47,7 +47,7 @@ def panel(m: FrictionMap) -> Panel:
 
 
 def curves(m: FrictionMap) -> Iterator[Line]:
-    """The model's friction: one curve for both branches where it has no memory, else one of each."""
+    """The model's friction: one curve for both branches if it has no memory, else one curve for each."""
     branches = [np.flatnonzero(m.gaining == gaining) for gaining in (1, 0)]
     for rows in branches if m.model != "independent" else [np.arange(len(m))]:
         ordered = rows[np.argsort(m.dq[rows], kind="stable")]
@@ -61,6 +61,6 @@ def curves(m: FrictionMap) -> Iterator[Line]:
 
 
 def in_words(m: FrictionMap) -> str:
-    """Its size in either direction."""
+    """State the mean friction in either direction."""
     sides = [float(m.tau_friction[side].mean()) if side.any() else 0.0 for side in (m.dq < 0, m.dq > 0)]
     return f"{sides[0]:.2g} on average backwards and {sides[1]:.2g} forwards."

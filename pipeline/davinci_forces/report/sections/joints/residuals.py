@@ -10,9 +10,9 @@ from davinci_forces.report.context import Context, fit_name, label
 from davinci_forces.report.sections.parts import autocorrelation, effort_panel, run_name
 from davinci_forces.report.verdicts import percent
 
-LAGS = 50  # of the cross-correlation, each way
-MIN_SHARE_FOLLOWED = 0.1  # share of a residual's variance that a motion explains, from which on the residual follows it
-MIN_RATIO_REVERSALS = 2.0  # times as large around reversals as elsewhere, from which on that is said
+LAGS = 50  # lags of the cross-correlation on either side
+MIN_SHARE_FOLLOWED = 0.1  # smallest share of a residual's variance by which the residual is said to follow a motion
+MIN_RATIO_REVERSALS = 2.0  # smallest remarked ratio of the residual around reversals to that elsewhere
 
 
 def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
@@ -38,8 +38,9 @@ def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
         against.insert(0, motion_panel(residual, errors, q, label(moved[0], "q", "position")))
     tests = [*against, *own_correlations(context, residual, errors, q)]
     yield Figure(
-        f"{name}: the residual against position and velocity (points: means of 1/40 of the range, bars: their "
-        "standard errors) and direction (its mean), its autocorrelation, and its cross-correlation with the motion.",
+        f"{name}: the residual against position and velocity (points: means in 40 equal bins of the range, bars: "
+        "their standard errors; line: mean of each direction), its autocorrelation, and its cross-correlation with the "
+        "motion.",
         f"{name}: {in_words(residual, errors, q)}",
         tuple(tests),
         f"residual-figure-{residual.log}-{residual.joint}",
@@ -50,7 +51,7 @@ def residual_blocks(context: Context, residual: Residual) -> Iterator[Block]:
 
 
 def motion_panel(residual: Residual, errors: Column, x: Column, x_label: str, by_direction: bool = False) -> Panel:
-    """Means of the residual over ranges of one motion, flat at zero where no term is missing."""
+    """Means of the residual in bins of position or velocity, flat at zero if no term is missing."""
     middle, mean, std = binned_means(x, errors)
     heading = f"Against {x_label.partition(' [')[0]}{' and direction' if by_direction else ''}"
     points = Points(middle, mean, "", "blue", y_std=std)
@@ -83,15 +84,15 @@ def own_correlations(context: Context, residual: Residual, errors: Column, q: Co
 
 
 def in_words(residual: Residual, errors: Column, q: Column | None) -> str:
-    """State which motion the residual follows, and what to try.
+    """State whether the residual follows position or velocity, and which terms to try.
 
-    Least squares leave no straight line in any motion that is a column of the model, so means over ranges are used.
+    Least squares leave no straight line in a variable that is a column of the model, so means in bins are used.
     """
     motions = {"velocity": residual.dq} | ({} if q is None else {"position": q})
     shares = {name: explained_by(x, errors) for name, x in motions.items()}
-    shares_in_words = " and ".join(f"{percent(max(share, 0.0))} by {name}" for name, share in shares.items())
+    shares_in_words = " and ".join(f"{percent(max(share, 0.0))} over {name}" for name, share in shares.items())
     follows = max(shares, key=lambda name: shares[name])
-    text = f"The means over ranges of motion explain {shares_in_words} of the residual's variance"
+    text = f"Of the residual's variance, the means in these bins explain {shares_in_words}"
     if shares[follows] > MIN_SHARE_FOLLOWED:
         tries = {
             "position": "a spring, gravity or friction that varies with position, or the coupling to other joints",
@@ -100,12 +101,13 @@ def in_words(residual: Residual, errors: Column, q: Column | None) -> str:
         return f"{text}. So the residual follows the {follows}. Worth trying: {tries[follows]}."
     within = share_within_reversals(errors, residual.dq)
     if within > MIN_RATIO_REVERSALS:
-        return f"{text}. Around reversals it is {within:.1f} times as large as elsewhere. Worth trying: presliding."
-    return f"{text}. These plots show no missing term of a single motion."
+        larger = f"Around reversals of velocity the residual's RMS is {within:.1f} times its RMS elsewhere"
+        return f"{text}. {larger}. Worth trying: presliding."
+    return f"{text}. These plots show no missing term that depends on position alone or on velocity alone."
 
 
 def share_within_reversals(errors: Column, dq: Column) -> float:
-    """Root mean square of the residual while slow, over that while fast; slow is a tenth of the rms velocity."""
+    """RMS of the residual at low velocity over its RMS at high velocity; the limit is a tenth of the RMS velocity."""
     slow = np.abs(dq) < 0.1 * float(np.sqrt(np.mean(dq**2)) or 1.0)
     if not slow.any() or slow.all():
         return 1.0
@@ -114,7 +116,7 @@ def share_within_reversals(errors: Column, dq: Column) -> float:
 
 
 def binned_means(x: Column, y: Column, bins: int = 40) -> tuple[Column, Column, Column]:
-    """Middles of equal ranges of x that hold samples, the mean of y in each, and its standard error."""
+    """Middles of the equal bins of x with samples, the mean of y in each bin, and its standard error."""
     edges = np.linspace(x.min(), x.max(), bins + 1)
     place = np.clip(np.digitize(x, edges) - 1, 0, bins - 1)
     held = [y[place == i] for i in range(bins)]
@@ -132,9 +134,9 @@ def correlation(x: Column, y: Column, lags: Counts) -> Column:
 
 
 def explained_by(x: Column, y: Column, bins: int = 40) -> float:
-    """The share of the variance of y that its means over ranges of x explain, less what chance explains.
+    """The share of the variance of y that its means in bins of x explain, less the share due to chance.
 
-    The correlation ratio with Wherry's correction, 0 where y does not depend on x, however crookedly.
+    The correlation ratio with Wherry's correction, 0 if y does not depend on x in any way.
     """
     place = np.digitize(x, np.linspace(x.min(), x.max(), bins + 1)[1:-1])
     counts = np.bincount(place, minlength=bins)
