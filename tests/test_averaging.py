@@ -170,7 +170,7 @@ def test_a_log_in_which_nothing_moves_is_refused_by_name(signals, says):
 def test_a_log_that_does_not_repeat_is_not_averaged_and_says_so():
     made, [note] = run([arm.signal(periods=1.4)])
     assert made == []
-    assert "run: 14.00 s hold no motion that repeats at least twice, so nothing is averaged" in note.text[0]
+    assert "run: 14.00 s contain no motion that repeats at least twice, so nothing is averaged" in note.text[0]
 
 
 def test_a_stated_period_that_the_data_do_not_have_is_refused():

@@ -96,7 +96,7 @@ def test_a_log_of_one_period_is_not_averaged_which_is_remarked_on(lab):
     edit(lab, lambda lines: lines[:120])
     run(lab)
     remarks = " ".join(davinci_forces.read(lab, "Diagnostic")["text"])
-    assert "bad: 2.38 s hold no motion that repeats at least twice, so nothing is averaged" in remarks
+    assert "bad: 2.38 s contain no motion that repeats at least twice, so nothing is averaged" in remarks
 
 
 def test_what_is_kept_of_an_error_knows_no_folder_of_this_machine(lab, tmp_path):

@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 from davinci_forces.errors import PipelineError
 from davinci_forces.filters import ekf, rts, stepping, tracker
 from davinci_forces.filters.problem import FilterInput, NoiseModel
-from davinci_forces.filters.response import at_rest, lag, noise_model, slowest
+from davinci_forces.filters.response import lag, noise_model, push_response_at_rest, smallest_q_tau
 from davinci_forces.filters.stepping import covariances
 from davinci_forces.filters.tuning import likeliest_walk, tune_noise
 from davinci_forces.maths.models.bias import bias
@@ -163,14 +163,15 @@ def test_tuning_finds_the_noise_that_was_put_in():
     assert_allclose(found[:2], true[:2], rtol=0.1)
     # The walk that a push needs explains some of what moves the joint.
     assert 0.8 * true.q_dq < found.q_dq < true.q_dq
-    assert found.q_tau == slowest(ekf.track, theta[0], theta[2], T_S, found)
+    assert found.q_tau == smallest_q_tau(ekf.track, theta[0], theta[2], T_S, found)
 
 
 def test_the_slowest_walk_is_the_least_with_which_a_push_is_shown():
     for name in ("ekf", "ekf_euler", "rts", "rate", "momentum"):
-        walk_of = slowest(tracker(name), 0.4, 0.3, T_S, NOISE)
+        walk_of = smallest_q_tau(tracker(name), 0.4, 0.3, T_S, NOISE)
         shown, slower = (
-            at_rest(tracker(name), 0.4, 0.3, T_S, NOISE._replace(q_tau=x)) for x in (walk_of, 0.98 * walk_of)
+            push_response_at_rest(tracker(name), 0.4, 0.3, T_S, NOISE._replace(q_tau=x))
+            for x in (walk_of, 0.98 * walk_of)
         )
         assert shown.share >= 0.9, name
         assert shown.delay <= 0.1, name
@@ -259,7 +260,7 @@ def test_the_walk_is_the_settings_else_the_joints_else_the_slowest_that_shows_a_
     walks = [noise_model(noise, which, T_S, q_tau).q_tau / np.sqrt(T_S) for which, q_tau in ((own, 0.7), (own, 0.0))]
     assert_allclose(walks, [0.7, 0.3])
     found = noise_model(noise, joint, T_S, 0.0)
-    assert found.q_tau == slowest(ekf.track, noise.inertia, noise.viscous, T_S, found._replace(q_tau=0.0))
+    assert found.q_tau == smallest_q_tau(ekf.track, noise.inertia, noise.viscous, T_S, found._replace(q_tau=0.0))
 
 
 def test_a_gap_starts_the_filter_anew(identified):

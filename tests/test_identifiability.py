@@ -12,11 +12,17 @@ from davinci_forces.estimators.problem import Estimate, StandardErrors, factoris
 from davinci_forces.identification.identifiability import (
     advice,
     describe_correlated,
+    describe_insignificant,
     hardly_described,
     inertia_at_fault,
-    not_seen,
 )
-from davinci_forces.maths.estimation.least_squares import analyse_columns, combinations, deviation, pairs, triangle
+from davinci_forces.maths.estimation.least_squares import (
+    analyse_columns,
+    correlated_pairs,
+    std_of_sum,
+    triangle,
+    uncertain_combinations,
+)
 from davinci_forces.records import Diagnostic, Identifiability
 from davinci_forces.records.catalogue import Catalogue
 from davinci_forces.report.sections.joints import unidentified_parameters
@@ -50,13 +56,13 @@ def test_the_deviation_of_a_sum_of_parameters_is_that_of_its_errors():
     found = analyse_columns(factorise(problem(seed=0), np.full(K, float(M))))
     std = SIGMA / np.sqrt(M) * np.sqrt(np.diag(np.linalg.inv(PHI.T @ PHI)))
     sums = [estimator("lse")(problem(seed)).theta @ weights for seed in range(seeds)]
-    assert deviation(found.correlation, std, weights) == pytest.approx(np.std(sums), rel=4 / np.sqrt(2 * seeds))
+    assert std_of_sum(found.correlation, std, weights) == pytest.approx(np.std(sums), rel=4 / np.sqrt(2 * seeds))
 
 
 def test_parameters_that_move_together_are_named_with_their_correlation():
     near = np.column_stack([PHI, PHI[:, 1] * (1 + 0.1 * np.random.default_rng(0).normal(size=K))])
     found = of(near)
-    ((i, j, r),) = pairs(found, 0.95)
+    ((i, j, r),) = correlated_pairs(found, 0.95)
     assert (i, j) == (1, 4)
     names = [*NAMES, "gravity, cosine"]
     assert f"the estimates of gravity, sine and gravity, cosine are correlated: {r:.2f}" in describe_correlated(
@@ -69,7 +75,7 @@ def test_a_combination_of_three_is_named_where_no_two_of_them_are_alike():
     sum_of_three = PHI[:, 0] / np.linalg.norm(PHI[:, 0]) + PHI[:, 2] / np.linalg.norm(PHI[:, 2])
     random = np.random.default_rng(0)
     found = of(np.column_stack([PHI, sum_of_three + 1e-3 * random.normal(size=K)]))
-    ((members, ratio),) = combinations(found, 20.0, 0.1)
+    ((members, ratio),) = uncertain_combinations(found, 20.0, 0.1)
     assert members == (0, 2, 4)
     assert ratio == pytest.approx(found.condition)
 
@@ -79,10 +85,10 @@ def test_a_parameter_that_cannot_be_told_from_zero_is_not_seen_and_its_share_is_
     p = problem(seed=0)
     p = replace(p, tau=p.tau - PHI[:, 1] * THETA[1])
     found = estimator("lse")(p)
-    (said,) = [text for text in not_seen(p, found) if text.startswith("gravity, sine")]
+    (said,) = [text for text in describe_insignificant(p, found) if text.startswith("gravity, sine")]
     most = (abs(found.theta[1]) + 2 * found.theta_std[1]) * np.linalg.norm(PHI[:, 1]) / np.linalg.norm(p.tau)
     assert said.endswith(f"at most {100 * most:.2g} % of the effort")
-    assert not_seen(problem(), estimator("lse")(problem())) == []
+    assert describe_insignificant(problem(), estimator("lse")(problem())) == []
 
 
 def test_advice_is_a_command_for_that_joint_and_only_where_something_is_wanting():

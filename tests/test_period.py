@@ -129,7 +129,7 @@ def test_two_whole_periods_are_enough(T, periods):
 
 
 def test_less_than_two_periods_are_not_averaged_and_refused_where_a_period_is_stated():
-    with pytest.raises(NotPeriodic, match=r"19.00 s hold no motion that repeats at least twice.*skip and until"):
+    with pytest.raises(NotPeriodic, match=r"19.00 s contain no motion that repeats at least twice.*skip and until"):
         run(moved(np.arange(1900) / RATE), period=10.0)
     [note] = average.run([moved(np.arange(1900) / RATE)], entry(), arm.ARM, harmonics=0, lowpass=17.0)
     assert note.text[0].endswith("nothing is averaged; its parameters come from the low-passed samples")
@@ -171,7 +171,7 @@ def test_a_period_that_changes_halfway_is_that_of_the_longer_part_and_said_to_be
     assert made.period == pytest.approx(10.0, abs=5 * made.period_std)
     assert made.periods == 5
     assert "the 39." in text
-    assert "after do not, as in a stop, a ramp or another motion" in text
+    assert "after do not repeat, as in a stop, a ramp or another motion" in text
 
 
 @pytest.mark.parametrize("symbol", ["q", "dq", "tau"])

@@ -182,7 +182,7 @@ def test_effort_of_a_drive_of_unknown_gain_is_in_amperes_and_so_are_its_paramete
 def test_one_remark_says_what_the_stop_costs_and_none_where_the_study_says_it(ur10e):
     _, skipped, both = (" ".join(said.split()) if isinstance(said, str) else said for said in ur10e)
     assert skipped.count("warning") == 1
-    assert "the 2.44 s after do not, as in a stop, a ramp or another motion" in skipped
+    assert "the 2.44 s after do not repeat, as in a stop, a ramp or another motion" in skipped
     assert "write until = 60." in skipped
     assert "warning: ended" not in both
 

@@ -33,14 +33,14 @@ if TYPE_CHECKING:
     from davinci_forces.runner.console import Verbosity
 
 STOP_SIGNALS = signal.SIGINT, signal.SIGTERM
-STOP_TIMEOUT = 3.0  # [s] until a stopped run is ended by force
-STAGE = "stage"  # the command that is copied for every stage and group
-FIRST_PANEL, LAST_PANEL = "Start here", "Other commands"  # of the help, around the panels of the groups
+STOP_TIMEOUT = 3.0  # [s] from a stop signal to the forced end of the process
+STAGE = "stage"  # name of the command that is copied for every stage and group
+FIRST_PANEL, LAST_PANEL = "Start here", "Other commands"  # panels of the help before and after those of the groups
 FIRST_COMMANDS = ("all", "new", "inspect", "compare", REPORT)
 
 
 class Stages(TyperGroup):
-    """Commands in panels.  The commands of stages differ in name and help only, so they copy one command."""
+    """The command line, with its commands in panels.  The stages share one command under different names and help."""
 
     def __init__(self, *, commands: dict[str, Any], **attributes: Any) -> None:
         stage = commands.pop(STAGE)
@@ -54,7 +54,7 @@ class Stages(TyperGroup):
 
 
 def copy_command(command: TyperCommand, name: str, module: str, panel: str) -> TyperCommand:
-    """Copy a command under another name, with the docstring of a module as its help, into a panel."""
+    """Copy a command into a panel under another name; its help is the docstring of a module."""
     copied = copy(command)
     copied.name, copied.help, copied.rich_help_panel = name, escape_tags(read_docstring(module)), panel
     return copied
@@ -67,7 +67,7 @@ def read_docstring(module: str) -> str:
 
 
 def escape_tags(text: str) -> str:
-    """Escape `raw/<study>`, which Markdown takes for an HTML tag and leaves out."""
+    """Escape `<` outside code, because Markdown takes <study> for an HTML tag and omits it."""
     return re.sub(r"(`[^`]*`)|<", lambda match: match[1] or r"\<", text)
 
 
@@ -76,13 +76,13 @@ app = typer.Typer(
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
-    rich_markup_mode="markdown",  # the default swallows units in square brackets
+    rich_markup_mode="markdown",  # the default omits units in square brackets
 )
 
-StudyFolder = Annotated[Path, typer.Argument(help="Folder of a study: raw/<study>, which holds study.toml.")]
+StudyFolder = Annotated[Path, typer.Argument(help="Folder of a study: raw/<study>, with its study.toml.")]
 Studies = Annotated[list[Path] | None, typer.Argument(help="Folders of studies; without any, all studies in raw/.")]
-Processed = Annotated[Path | None, typer.Option(help="Folder for processed files, instead of processed/ beside raw/.")]
-Reports = Annotated[Path | None, typer.Option(help="Folder for reports, instead of reports/ beside raw/.")]
+Processed = Annotated[Path | None, typer.Option(help="Folder for processed files, instead of processed/ next to raw/.")]
+Reports = Annotated[Path | None, typer.Option(help="Folder for reports, instead of reports/ next to raw/.")]
 Force = Annotated[bool, typer.Option("--force", help="Run the named stages even if they are up to date.")]
 Jobs = Annotated[int, typer.Option(min=1, help="Number of processes to run tasks in.")]
 Cluster = Annotated[
@@ -94,7 +94,7 @@ Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Also print the t
 
 
 class ShownAsWritten(TyperCommand):
-    """A command whose help shows `<study>` as it is written."""
+    """A command whose help shows <study> as it is written."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -107,15 +107,15 @@ class ShownAsWritten(TyperCommand):
 def main() -> None:
     """Run the command line."""
     if sys.getfilesystemencoding() == "ascii" and os.environ.get("PYTHONUTF8") != "1":
-        # Which names no file with an umlaut.  Anew, as children are, which get the environment.
+        # ASCII cannot represent a file name with an umlaut.  Python restarts, and child processes start, in UTF-8 mode.
         os.execve(sys.executable, [sys.executable, *sys.orig_argv[1:]], os.environ | {"PYTHONUTF8": "1"})
-    arithmetic.pin()
+    arithmetic.pin()  # one thread and the same kernels for numpy, in this process and its children
     for stream in (sys.stdout, sys.stderr):
-        if hasattr(stream, "reconfigure"):  # names in logs need not fit the console's encoding
+        if hasattr(stream, "reconfigure"):  # the console's encoding may lack characters of names in logs
             stream.reconfigure(errors="replace")
-    atexit.register(ignore_signals)  # one that comes while Python ends would end it without a word
+    atexit.register(ignore_signals)  # a signal that arrives while Python ends would end it without a message
     for number in STOP_SIGNALS:
-        if signal.getsignal(number) != signal.SIG_IGN:  # a script's background process ignores it
+        if signal.getsignal(number) != signal.SIG_IGN:  # a background process of a script ignores the signal
             signal.signal(number, stop)
     try:
         app()
@@ -131,7 +131,7 @@ class Stopped(SystemExit):
 
     @classmethod
     def say(cls) -> None:
-        """Print the message, once."""
+        """Print the message, but only once."""
         if not cls.is_printed:
             cls.is_printed = True
             echo("stopped; run again to continue", err=True)
@@ -144,16 +144,16 @@ def ignore_signals() -> None:
 
 
 def stop(number: int, _: object) -> None:
-    """Raise `Stopped` once, and end the process if that has not ended it in time."""
+    """Raise `Stopped` once; if the process still runs after `STOP_TIMEOUT`, end it."""
     ignore_signals()
-    sys.unraisablehook = lambda _: None  # an exception raised in a destructor stops nothing
-    threading.excepthook = lambda _: None  # nor does one of a thread whose processes end
-    start_new_thread(leave, (128 + number,))  # a `threading.Thread` waits for a lock that this thread may hold
+    sys.unraisablehook = lambda _: None  # if a destructor raises `Stopped`, Python only prints it
+    threading.excepthook = lambda _: None  # threads may raise because their worker processes end
+    start_new_thread(leave, (128 + number,))  # `threading.Thread` waits for a lock that this thread may hold
     raise Stopped(128 + number)
 
 
 def leave(code: int) -> None:
-    """End this process after `STOP_TIMEOUT`, whatever it waits for."""
+    """End this process after `STOP_TIMEOUT`, even if it waits for something."""
     sleep(STOP_TIMEOUT)
     Stopped.say()
     os._exit(code)
@@ -161,10 +161,10 @@ def leave(code: int) -> None:
 
 @contextmanager
 def messages() -> Iterator[None]:
-    """Print expected errors, of the pipeline and of the system, without a traceback; exit with code 1."""
+    """Print errors of the pipeline and of the system without a traceback, and exit with code 1."""
     try:
         yield
-    except BrokenPipeError:  # nobody reads the output any more
+    except BrokenPipeError:  # the reader of the output has closed the pipe
         raise
     except (PipelineError, OSError) as error:
         echo(f"error: {error}", fg="red", err=True)
@@ -206,11 +206,11 @@ Version = Annotated[
 
 @app.callback(help=__doc__)
 def options(version: Version = False) -> None:
-    """Take the options of all commands; `print_version` does the work of the only one."""
+    """Declare the options without a command: only --version, which `print_version` handles."""
 
 
 def verbosity(quiet: bool, verbose: bool) -> "Verbosity":
-    """Verbosity of a run.
+    """Return the verbosity of a run.
 
     Raises
     ------

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from davinci_forces.maths.excitation.fourier import Fourier, motion, run_in, shortest_stretch
+from davinci_forces.maths.excitation.fourier import Fourier, motion, run_in, shortest_run_in
 
 SERIES = Fourier(0.05, (0.2, 0.2), (0.1, 0.3), 10.0)
 
@@ -28,13 +28,13 @@ def test_the_shortest_run_in_that_keeps_the_limits_of_acceleration_is_taken():
     peaks = [np.abs(run_in(SERIES, np.linspace(-d, 0, 20_000), d)[2]).max() for d in durations]
     first = next(d for d, peak in zip(durations, peaks, strict=True) if peak <= 0.6)
     assert durations[0] < first < durations[-1]
-    assert shortest_stretch([SERIES], [limits], durations) == first
-    assert shortest_stretch([SERIES, SERIES], [(-9.0, 9.0), limits], durations) == first
+    assert shortest_run_in([SERIES], [limits], durations) == first
+    assert shortest_run_in([SERIES, SERIES], [(-9.0, 9.0), limits], durations) == first
 
 
 def test_where_no_run_in_keeps_the_limits_there_is_none():
-    assert shortest_stretch([SERIES], [(-0.6, 0.6)], np.array([0.1, 0.2])) is None
+    assert shortest_run_in([SERIES], [(-0.6, 0.6)], np.array([0.1, 0.2])) is None
 
 
 def test_a_trajectory_that_leaves_the_limits_by_itself_can_still_be_run_into():
-    assert shortest_stretch([SERIES], [(-0.01, 0.01)], np.linspace(2.5, 10, 31)) is not None
+    assert shortest_run_in([SERIES], [(-0.01, 0.01)], np.linspace(2.5, 10, 31)) is not None

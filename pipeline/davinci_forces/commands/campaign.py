@@ -12,9 +12,9 @@ def run(
     studies: Annotated[
         list[Path] | None, typer.Argument(help="Folders of studies; without any, all studies in raw/.")
     ] = None,
-    reports: Annotated[Path | None, typer.Option(help="Folder of reports, instead of reports/ beside raw/.")] = None,
+    reports: Annotated[Path | None, typer.Option(help="Folder of reports, instead of reports/ next to raw/.")] = None,
     out: Annotated[
-        Path | None, typer.Option(help="Folder for campaign.html and campaign.pdf, instead of that of the reports.")
+        Path | None, typer.Option(help="Folder for campaign.html and campaign.pdf, instead of the reports' folder.")
     ] = None,
 ) -> None:
     """Write campaign.html and campaign.pdf from the reports of studies, and name the studies that have none."""

@@ -1,7 +1,7 @@
 """Compare the numbers of two reports: which changed, which were added and which were removed.
 
 A number has changed from a to b if |b - a| > 2 sqrt(s_a^2 + s_b^2). Without a standard error in either report, it has
-changed if it differs by more than 1e-9 of its size. A change of its unit counts, too. The exit code is always 0.
+changed if the relative difference exceeds 1e-9. It has also changed if its unit has. The exit code is always 0.
 """
 
 import json
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 def run(
     a: Annotated[Path, typer.Argument(help="A results.json, or a study, raw/<study>, that has one.")],
     b: Annotated[Path, typer.Argument(help="The results.json or study to compare with it.")],
-    reports: Annotated[Path | None, typer.Option(help="Folder of reports, instead of reports/ beside raw/.")] = None,
+    reports: Annotated[Path | None, typer.Option(help="Folder of reports, instead of reports/ next to raw/.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print rows of key, a, b, std and z as JSON.")] = False,
 ) -> None:
     """Print every number of B that differs from that of A, and the keys that only one of them has."""

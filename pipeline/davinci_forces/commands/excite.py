@@ -25,15 +25,15 @@ def run(
         str, typer.Option(help="What to minimise: `determinant`, -log10 det(F'F), or `condition`, log10 cond(F).")
     ] = "determinant",
     q: Annotated[str | None, typer.Option(help="Position limits, lower,upper, instead of the joint's.")] = None,
-    dq: Annotated[str | None, typer.Option(help="Velocity limits, likewise.")] = None,
-    ddq: Annotated[str | None, typer.Option(help="Acceleration limits, likewise.")] = None,
-    starts: Annotated[int, typer.Option(min=1, help="Random starts of the search; half as many for `all`.")] = 24,
+    dq: Annotated[str | None, typer.Option(help="Velocity limits, in the same form.")] = None,
+    ddq: Annotated[str | None, typer.Option(help="Acceleration limits, in the same form.")] = None,
+    starts: Annotated[int, typer.Option(min=1, help="Random search starts; half as many if JOINT is `all`.")] = 24,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the random starts.")] = 0,
     samples: Annotated[int, typer.Option(min=2, help="Samples K per period at which the criterion is computed.")] = 300,
-    rate: Annotated[float, typer.Option(help="Sampling rate of the table [Hz].")] = 100.0,
+    rate: Annotated[float, typer.Option(help="Sampling rate [Hz] of the table of --csv.")] = 100.0,
     csv: Annotated[Path | None, typer.Option(help="Write a table for the controller: t, q, dq, ddq.")] = None,
     run_in: Annotated[
-        bool, typer.Option(help="Let the table begin at rest, before t = 0, instead of with the period.")
+        bool, typer.Option(help="Begin the table of --csv with a run-in from rest, before t = 0.")
     ] = True,
     plot: Annotated[Path | None, typer.Option(help="Draw the trajectory: .svg, .png or .pdf.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,

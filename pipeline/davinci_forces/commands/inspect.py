@@ -1,4 +1,4 @@
-"""Show what a log holds: channels, units, samples, clock, warnings and first rows."""
+"""Show the contents of a log: channels, units, samples, clock, warnings and first rows."""
 
 import json
 from collections.abc import Iterator

@@ -1,6 +1,6 @@
-"""Compute how stiff tissue may be for a hand that feels it through a haptic device to stay stable.
+"""Compute the largest tissue stiffness at which a hand on a haptic device remains stable.
 
-The hand is a mass on a spring and a damper. The tissue is a spring that acts below its surface only, as in chapter 8
+The hand is a mass on a spring and a damper. The tissue is a spring that acts only below its surface, as in chapter 8
 of the thesis.
 """
 
@@ -22,9 +22,9 @@ def run(
     b_h: Annotated[float, typer.Option(help="Damping b_H of the hand [N s/m].")] = 1.0,
     m: Annotated[float, typer.Option(help="Mass m of the hand and what it holds [kg].")] = 1.0,
     delay: Annotated[
-        float | None, typer.Option(help="Delay of the felt force [s]: of the filter and of the link.")
+        float | None, typer.Option(help="Delay of the force on the hand [s], by filter and data link.")
     ] = None,
-    rate: Annotated[float | None, typer.Option(help="Rate [Hz] at which the force is updated and held.")] = None,
+    rate: Annotated[float | None, typer.Option(help="Update rate [Hz] of the force, held in between.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Print the largest stable tissue stiffness K_T [N/m]: by (8.10), by arbitrary switching, by delay and sampling."""

@@ -9,13 +9,13 @@ from davinci_forces.runner.console import echo
 
 
 def run(
-    study: Annotated[Path, typer.Argument(help="Folder of a study: raw/<study>, which holds study.toml.")],
+    study: Annotated[Path, typer.Argument(help="Folder of a study: raw/<study>, with its study.toml.")],
     processed: Annotated[
-        Path | None, typer.Option(help="Folder of processed files, instead of processed/ beside raw/.")
+        Path | None, typer.Option(help="Folder of processed files, instead of processed/ next to raw/.")
     ] = None,
-    reports: Annotated[Path | None, typer.Option(help="Folder of reports, instead of reports/ beside raw/.")] = None,
+    reports: Annotated[Path | None, typer.Option(help="Folder of reports, instead of reports/ next to raw/.")] = None,
     report_id: Annotated[
-        str, typer.Option("--id", help="Check that the report ID is this one, which a printed page shows.")
+        str, typer.Option("--id", help="Check that the study has this report ID, as printed in its report.")
     ] = "",
     again: Annotated[
         bool, typer.Option("--again", help="Recompute everything from raw/ in a temporary folder, and compare.")

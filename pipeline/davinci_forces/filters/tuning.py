@@ -1,7 +1,7 @@
 """Tune the noise of a joint's filter on recordings in which nothing touches the robot.
 
 The noise of position, velocity and drive maximises the likelihood of the innovations (section 7.3).  The random walk of
-the external effort is the slowest that follows a push.  By likelihood it would be 0 without external effort, and the
+the external effort is the smallest that follows a push.  By likelihood it would be 0 without external effort, and the
 filter would then follow none.
 """
 
@@ -11,7 +11,7 @@ import numpy as np
 
 from davinci_forces.filters import ekf
 from davinci_forces.filters.problem import FilterInput, NoiseModel
-from davinci_forces.filters.response import slowest
+from davinci_forces.filters.response import smallest_q_tau
 from davinci_forces.maths.arrays import Array
 
 ROUNDS = 4  # of likelihood and push in turn
@@ -31,7 +31,7 @@ def tune_noise(recordings: Sequence[FilterInput], start: NoiseModel, inertia: fl
     noise, center = start, np.log([start.r_q, start.r_dq, start.q_dq])
     change = np.zeros(len(center))
     for _ in range(ROUNDS):
-        noise = noise._replace(q_tau=slowest(ekf.track, inertia, viscous, T_s, noise))
+        noise = noise._replace(q_tau=smallest_q_tau(ekf.track, inertia, viscous, T_s, noise))
         walk = noise.q_tau
 
         def cost(change: Array, walk: float = walk) -> float:
@@ -45,7 +45,7 @@ def tune_noise(recordings: Sequence[FilterInput], start: NoiseModel, inertia: fl
             cost, change, method="Nelder-Mead", options={"initial_simplex": simplex, "xatol": 1e-3, "fatol": 1e-2}
         ).x
         noise = noise_of(center + change, walk)
-    return noise._replace(q_tau=slowest(ekf.track, inertia, viscous, T_s, noise))
+    return noise._replace(q_tau=smallest_q_tau(ekf.track, inertia, viscous, T_s, noise))
 
 
 def noise_of(logarithms: Array, q_tau: float) -> NoiseModel:

@@ -12,7 +12,7 @@ import numpy as np
 
 from davinci_forces.filters import ekf, stepping
 from davinci_forces.filters.problem import NoiseModel
-from davinci_forces.filters.response import slowest
+from davinci_forces.filters.response import smallest_q_tau
 from davinci_forces.haptics.maths.bimodal import THESIS_TISSUE, Hand
 from davinci_forces.haptics.maths.delay import Complex, harmonic, max_stable, response_limit, settles, zero_order_hold
 from davinci_forces.haptics.maths.simulated_loop import Axis, Clocks, FeltTissue, Grip, LoopRun, SensorReading, simulate
@@ -209,7 +209,7 @@ def filter_noise(scenario: HapticScenario) -> NoiseModel:
     body, T_s = scenario.assumed_body or SLIDE, 1.0 / scenario.rate
     _, noise = _parts(scenario)
     model = NoiseModel(noise.q, noise.dq, 0.0, noise.tau * T_s / body.inertia, scenario.q_tau * T_s**0.5)
-    walk = model.q_tau or slowest(ekf.track, body.inertia, body.viscous, T_s, model)
+    walk = model.q_tau or smallest_q_tau(ekf.track, body.inertia, body.viscous, T_s, model)
     return model._replace(q_tau=walk)
 
 

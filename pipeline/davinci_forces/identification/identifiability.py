@@ -1,4 +1,4 @@
-"""The identifiability of a joint's parameters in words: correlated ones, insignificant ones, what to record next."""
+"""Text on the identifiability of a joint: correlated and insignificant parameters, and what to record next."""
 
 from collections.abc import Sequence
 
@@ -6,33 +6,33 @@ import numpy as np
 
 from davinci_forces.estimators.problem import Estimate, Regression
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.estimation.least_squares import ColumnAnalysis, combinations, deviation, pairs
+from davinci_forces.maths.estimation import least_squares
 from davinci_forces.robots import ROBOTS
 from davinci_forces.robots.robot import Joint, Robot
 
-MIN_CORRELATION = 0.95  # from which on two parameters are named as correlated
-MIN_UNCERTAINTY_RATIO = 20.0  # to the best combination, from which on one is named as uncertain
-MIN_PART_NAMED = 0.1  # share of a combination's square for a parameter to be named with it
-MIN_Z = 2.0  # standard errors from zero, below which a parameter is not significant
-MIN_R2 = 0.5  # share of the effort's variance, below which a model hardly describes it
+MIN_CORRELATION = 0.95  # two parameters are reported as correlated from this correlation on
+MIN_UNCERTAINTY_RATIO = 20.0  # a combination this many times less certain than the best one is reported
+MIN_PART_NAMED = 0.1  # a combination is reported with the parameters whose squared component is at least this
+MIN_Z = 2.0  # a parameter within this many standard errors of zero is not significant
+MIN_R2 = 0.5  # a model that explains less of the effort's variance hardly describes the effort
 
 
-def describe_correlated(names: Sequence[str], conditioning: ColumnAnalysis) -> list[str]:
+def describe_correlated(names: Sequence[str], conditioning: least_squares.ColumnAnalysis) -> list[str]:
     """Describe correlated parameters: pairs by their correlation, and larger combinations by their uncertainty.
 
-    A combination of two that are named as a pair is not named again.
+    A combination of the two parameters of a reported pair is not reported again.
     """
-    close = pairs(conditioning, MIN_CORRELATION)
-    texts = [f"the estimates of {names[i]} and {names[j]} are correlated: {r:.2f}" for i, j, r in close]
-    named = [{i, j} for i, j, _ in close]
-    for members, ratio in combinations(conditioning, MIN_UNCERTAINTY_RATIO, MIN_PART_NAMED):
-        if len(members) > 1 and set(members) not in named:
+    correlated = least_squares.correlated_pairs(conditioning, MIN_CORRELATION)
+    texts = [f"the estimates of {names[i]} and {names[j]} are correlated: {r:.2f}" for i, j, r in correlated]
+    reported = [{i, j} for i, j, _ in correlated]
+    for members, ratio in least_squares.uncertain_combinations(conditioning, MIN_UNCERTAINTY_RATIO, MIN_PART_NAMED):
+        if len(members) > 1 and set(members) not in reported:
             parameters = join_names([names[i] for i in members])
             texts.append(f"one combination of {parameters} is {ratio:.0f} times less certain than the best one")
     return texts
 
 
-def not_seen(problem: Regression, estimate: Estimate) -> list[str]:
+def describe_insignificant(problem: Regression, estimate: Estimate) -> list[str]:
     """Describe parameters that do not differ significantly from zero, with an upper bound of their effort."""
     upper = np.abs(estimate.theta) + MIN_Z * estimate.theta_std
     shares = upper * np.linalg.norm(problem.Phi, axis=0) / (np.linalg.norm(problem.tau) or 1.0)
@@ -45,30 +45,31 @@ def not_seen(problem: Regression, estimate: Estimate) -> list[str]:
 
 
 def advice(robot: Robot, joint: Joint, problems: Sequence[str]) -> str:
-    """Say what to record next; "" without problems."""
+    """Recommend what to record next; "" without problems."""
     return f"{better_motion(robot, joint)} designs a motion that excites them best" if problems else ""
 
 
 def better_motion(robot: Robot, joint: Joint) -> str:
-    """Return the command that designs a motion of a joint; a robot that is not listed has a file beside the study."""
+    """Return the command that designs a motion of a joint; an unlisted robot has a file in the study's folder."""
     name = robot.file or (robot.name if robot.name in ROBOTS else f"{robot.name}.toml")
     return f"`davinci-forces excite {name} {joint.name}`"
 
 
 def inertia_at_fault(
-    robot: Robot, joint: Joint, estimate: Estimate, conditioning: ColumnAnalysis, others: Sequence[str]
+    robot: Robot, joint: Joint, estimate: Estimate, conditioning: least_squares.ColumnAnalysis, others: Sequence[str]
 ) -> str:
-    """Explain by the same fit why an inertia is not positive; `others` are joints that move in the same logs.
+    """Explain from its fit why an inertia is not positive; `others` are joints that move in the same logs.
 
-    If it may be positive, it was not excited.  If friction is negative, too, a sign is wrong.  Otherwise the model
-    lacks a term.
+    If the inertia may be positive, the motion did not excite it.  If friction is negative, too, a sign is wrong.
+    Otherwise the model lacks a term.
     """
-    weights = np.array([term.a for term in joint.terms])
-    value, std = float(weights @ estimate.theta), deviation(conditioning.correlation, estimate.theta_std, weights)
+    weights = np.array([term.a for term in joint.terms])  # share of each parameter in the inertia
+    value = float(weights @ estimate.theta)
+    std = least_squares.std_of_sum(conditioning.correlation, estimate.theta_std, weights)
     inertia = f"{value:.2g} ± {std:.1g} {joint.unit('{inertia}')}"
-    beside = f", and {joints_move(others)} in the same logs, which this model omits" if others else ""
+    omitted = f", and {joints_move(others)} in the same logs, which this model omits" if others else ""
     if value > -MIN_Z * std:
-        text = f"{inertia} may be positive, because the motion hardly excites it{beside}"
+        text = f"{inertia} may be positive, because the motion hardly excites it{omitted}"
         by_itself = "by itself, " if others else ""
         return f"{text}; record it {by_itself}accelerating more: {better_motion(robot, joint)}"
     friction = np.array([term.positive and not term.a for term in joint.terms])
@@ -78,24 +79,25 @@ def inertia_at_fault(
         return f"{text}; correct the `sign` of one of them"
     text = f"{inertia}, while friction is not negative, so the signs are right"
     if others:
-        return f"{text}{beside}; record it by itself: {better_motion(robot, joint)}"
-    return f"{text}: effort and motion may be logged at different times, or friction yields before it slides"
+        return f"{text}{omitted}; record it by itself: {better_motion(robot, joint)}"
+    causes = "effort and motion may be logged at different times, or friction acts as a spring at reversals"
+    return f"{text}: {causes}"
 
 
 def hardly_described(joint: Joint, r2: float, others: Sequence[str]) -> str:
-    """Say that a model hardly describes the effort, and why that may be; "" if it does."""
+    """Report that a model hardly describes the effort, with a possible cause; "" if it describes the effort."""
     if r2 >= MIN_R2:
         return ""
     text = f"its own terms explain {percent(max(r2, 0.0))} of the effort's variance"
     if others:
-        return f"{text}: {joints_move(others)} in the same logs, which they omit; record it moving by itself"
-    return f"{text}: check that its effort and its motion are channels of one joint, and which terms it needs"
+        return f"{text}: {joints_move(others)} in the same logs, which its terms omit; record it moving by itself"
+    return f"{text}: check that its effort and motion are channels of one joint, and which terms its model needs"
 
 
 def join_names(names: Sequence[str]) -> str:
     """Join names: 'a, b and c'."""
-    *first, last = names
-    return f"{', '.join(first)} and {last}" if first else last
+    *others, last = names
+    return f"{', '.join(others)} and {last}" if others else last
 
 
 def joints_move(joints: Sequence[str]) -> str:
@@ -109,10 +111,10 @@ def percent(share: float) -> str:
 
 
 def moving_with(joint: str, logs: Sequence[str], moves: Sequence[tuple[str, str]]) -> list[str]:
-    """Return the other joints that move in some logs; `moves` are (log, joint) of all that move."""
+    """Return the other joints that move in these logs; `moves` has (log, joint) of every joint that moves."""
     return list(dict.fromkeys(name for log, name in moves if log in logs and name != joint))
 
 
-def flat(conditioning: ColumnAnalysis) -> Array:
+def correlation_entries(conditioning: least_squares.ColumnAnalysis) -> Array:
     """Return the correlation matrix row by row (p^2,)."""
     return np.asarray(conditioning.correlation.ravel())

@@ -1,4 +1,4 @@
-"""Sample times of evenly sampled channels from their writes or headers, and the groups sampled together."""
+"""Sample times of evenly sampled channels from headers of files or data blocks, and groups sampled together."""
 
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
@@ -12,12 +12,12 @@ from davinci_forces.logs.log import Block
 from davinci_forces.maths.arrays import Array
 
 UNIX_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-ROUNDING = 1.5e-6  # [s] rounding of the difference of two starts written in whole microseconds
-SKEW = 0.02  # of a sampling time: channels whose times differ by less were sampled together
+ROUNDING = 1.5e-6  # [s] largest rounding error of the difference of two start times in whole microseconds
+SKEW = 0.02  # channels whose times differ by less than this share of a sampling time were sampled together
 
 
 def moment(zero: datetime, seconds: int, microseconds: int = 0) -> datetime | None:
-    """The date and time so long after `zero`; None beyond the range of dates."""
+    """The date and time after `zero` by these seconds and microseconds; None beyond the range of dates."""
     try:
         return zero + timedelta(seconds=seconds, microseconds=microseconds)
     except OverflowError:
@@ -26,7 +26,7 @@ def moment(zero: datetime, seconds: int, microseconds: int = 0) -> datetime | No
 
 @dataclass
 class Timeline:
-    """Uniform stretches of samples: the first row, start time [s] and sampling time [s] of each."""
+    """Parts of a log with uniform sampling: the first row, start time [s] and sampling time [s] of each part."""
 
     first: list[int] = field(default_factory=list)
     start: list[float] = field(default_factory=list)
@@ -34,12 +34,12 @@ class Timeline:
     rows: int = 0
 
     def add(self, rows: int, start: float | None, step: float) -> None:
-        """Append samples; without a `start`, or with the time that is due, they continue those before."""
+        """Append samples; if `start` [s] is None or the time that is `due`, they continue the last part."""
         due = self.due
-        follows = bool(self.first) and (start is None or abs(start - due) <= ROUNDING)
-        if not follows or step != self.step[-1]:
+        continues = bool(self.first) and (start is None or abs(start - due) <= ROUNDING)
+        if not continues or step != self.step[-1]:
             self.first.append(self.rows)
-            self.start.append(due if follows or start is None else start)
+            self.start.append(due if continues or start is None else start)
             self.step.append(step)
         self.rows += rows
 
@@ -54,31 +54,31 @@ class Timeline:
         return len(self.first) == 1
 
     def times(self, row: int, count: int) -> Array:
-        """Compute the times (count,) [s] of the samples from a row on; the last stretch has no end."""
+        """Compute the times (count,) [s] of the samples from a row on; times after the last sample are extrapolated."""
         begin, end = bisect_right(self.first, row) - 1, bisect_right(self.first, row + count - 1)
         first, start, step = (np.array(column[begin:end]) for column in (self.first, self.start, self.step))
         rows = row + np.arange(count)
         if len(first) == 1:
             return np.asarray(start[0] + (rows - first[0]) * step[0])
-        stretch = np.searchsorted(first, rows, side="right") - 1
-        return np.asarray(start[stretch] + (rows - first[stretch]) * step[stretch])
+        part = np.searchsorted(first, rows, side="right") - 1
+        return np.asarray(start[part] + (rows - first[part]) * step[part])
 
     def is_like(self, timeline: "Timeline") -> bool:
-        """Whether both were sampled together, though one may have more samples."""
+        """Whether both were sampled together; one may have more samples than the other."""
         if self.first != timeline.first:
             return False
-        # Most unequal clocks are found without arrays: by the drift between their first sampling times.
-        difference, least = abs(self.step[0] - timeline.step[0]), min(abs(self.step[0]), abs(timeline.step[0]))
-        if difference * (self.first[1] if len(self.first) > 1 else max(self.rows, timeline.rows)) > SKEW * least:
+        # The drift over the first part shows most differences between clocks, without arrays.
+        difference, shorter = abs(self.step[0] - timeline.step[0]), min(abs(self.step[0]), abs(timeline.step[0]))
+        if difference * (self.first[1] if len(self.first) > 1 else max(self.rows, timeline.rows)) > SKEW * shorter:
             return False
         mine, theirs = np.array([self.start, self.step]), np.array([timeline.start, timeline.step])
         ends = np.array([*self.first[1:], max(self.rows, timeline.rows)])
-        strays = np.abs(mine[0] - theirs[0]) + np.abs(mine[1] - theirs[1]) * (ends - self.first)
-        return bool(np.all(strays <= SKEW * np.minimum(np.abs(mine[1]), np.abs(theirs[1]))))
+        drifts = np.abs(mine[0] - theirs[0]) + np.abs(mine[1] - theirs[1]) * (ends - self.first)
+        return bool(np.all(drifts <= SKEW * np.minimum(np.abs(mine[1]), np.abs(theirs[1]))))
 
 
 def group_by_clock(timelines: dict[str, Timeline]) -> list[list[str]]:
-    """Group the names of channels that were sampled together, in their order."""
+    """Group the names of channels that were sampled together, in the order of `timelines`."""
     order = {name: i for i, name in enumerate(timelines)}
     ranked = sorted(timelines, key=lambda name: (*_rank(timelines[name]), order[name]))
     groups: list[list[str]] = []
@@ -91,63 +91,63 @@ def group_by_clock(timelines: dict[str, Timeline]) -> list[list[str]]:
 
 
 def _rank(timeline: Timeline) -> tuple[list[int], list[str], list[float]]:
-    """Sort key that puts similar timelines next to each other, without comparing all pairs."""
+    """Sort key that puts similar timelines next to each other, so that not all pairs need a comparison."""
     return timeline.first, [f"{step:.9g}" for step in timeline.step], timeline.start
 
 
 @dataclass(frozen=True)
 class Sampling:
-    """The sampling of one channel as a header states it; `start` [s] counts from the year 1 in local time."""
+    """The sampling of one channel as a header states it."""
 
-    start: Decimal | None
-    x0: float
-    step: float
+    start: Decimal | None  # [s] since the year 1, in local time
+    x0: float  # [s] value of X, the time since `start`, at the first sample
+    step: float  # [s] sampling time
 
-    def is_like(self, sampling: "Sampling", x_is_written: bool) -> bool:
-        """Whether both were sampled together, as far as the header tells."""
-        if (self.start is None) != (sampling.start is None) or (self.step != sampling.step and not x_is_written):
+    def is_like(self, sampling: "Sampling", has_x_columns: bool) -> bool:
+        """Whether both were sampled together according to the header; columns of X make its X0 and step irrelevant."""
+        if (self.start is None) != (sampling.start is None) or (self.step != sampling.step and not has_x_columns):
             return False
-        start, its_start = self.start, sampling.start
-        difference = float(start - its_start) if start is not None and its_start is not None else 0.0
-        if not x_is_written:
+        start, other_start = self.start, sampling.start
+        difference = float(start - other_start) if start is not None and other_start is not None else 0.0
+        if not has_x_columns:
             difference += self.x0 - sampling.x0
         return abs(difference) <= max(SKEW * min(abs(self.step), abs(sampling.step)), ROUNDING)
 
 
 @dataclass(frozen=True)
 class OwnClock:
-    """A clock of some channels other than the first clock of the log."""
+    """A further clock of a log, and the channels that were sampled by it."""
 
-    time: str  # the derived channel of its times
+    time: str  # name of the channel that is added with the times of this clock
     channels: tuple[str, ...]  # in the order of the file
-    x: str = ""  # the column of x, where one is written for them
+    x: str = ""  # name of the column of X of these channels; "" if the file has none
 
 
-def refine_groups(groups: Sequence[list[str]], sampled: dict[str, Sampling], x_is_written: bool) -> list[list[str]]:
-    """Split groups of channels sampled together so far, where one more header shows different clocks."""
+def refine_groups(groups: Sequence[list[str]], sampled: dict[str, Sampling], has_x_columns: bool) -> list[list[str]]:
+    """Split groups of channels whose clocks differ according to a further header of the file."""
     split: list[list[str]] = []
     for group in groups:
         parts: list[list[str]] = []
         for name in group:
-            _joined(parts, name, sampled, x_is_written)
+            _add_to_group(parts, name, sampled, has_x_columns)
         split += parts
     for name in [n for n in sampled if not any(n in group for group in groups)]:
-        _joined(split, name, sampled, x_is_written)
+        _add_to_group(split, name, sampled, has_x_columns)
     return split
 
 
-def _joined(groups: list[list[str]], name: str, sampled: dict[str, Sampling], x_is_written: bool) -> None:
-    """Put a channel into the first group that it may belong to; the header need not name all channels."""
+def _add_to_group(groups: list[list[str]], name: str, sampled: dict[str, Sampling], has_x_columns: bool) -> None:
+    """Add a channel to the first group with its clock; a channel that the header omits may have any clock."""
     for group in groups:
-        its = next((sampled[member] for member in group if member in sampled), None)
-        if its is None or name not in sampled or its.is_like(sampled[name], x_is_written):
+        member_sampling = next((sampled[member] for member in group if member in sampled), None)
+        if not (member_sampling and name in sampled) or member_sampling.is_like(sampled[name], has_x_columns):
             group.append(name)
             return
     groups.append([name])
 
 
 def equal_columns(names: Sequence[str], blocks: Iterable[Block]) -> list[list[str]]:
-    """Group columns with equal values throughout, and with the same cells missing."""
+    """Group columns that have equal values in all rows; missing values are equal to each other."""
     groups = [[*names]]
     for block in blocks:
         split: list[list[str]] = []

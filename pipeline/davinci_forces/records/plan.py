@@ -1,4 +1,4 @@
-"""Records of a robot without its logs: its chain, its controllers, and its excitation."""
+"""Records of a robot that need no logs: its chain, its controllers, and its excitation."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from davinci_forces.records.record import Column, Counts, JointRecord, Labels, P
 class Links(RobotRecord):
     """The links of a robot: Denavit-Hartenberg parameters and masses.  Tables 3.1 and 4.2"""
 
-    UNKNOWN = ("alpha", "a", "d", "offset", "mass")
+    UNKNOWN = ("alpha", "a", "d", "offset", "mass")  # NaN for a link without these parameters
     ROWS = "link"
 
     worst_condition: float
@@ -20,7 +20,7 @@ class Links(RobotRecord):
     a: Column
     d: Column
     offset: Column
-    moved_by: Counts
+    moved_by: Counts  # number of the coordinate, from 1; 0 for a link that no coordinate moves
     mass: Column
 
     def published(self) -> Iterator[Published]:
@@ -56,7 +56,7 @@ class Workspace(RobotRecord):
 
 @dataclass(frozen=True, eq=False)
 class Control(Record):
-    """One joint in a simulated control study of chapter 5."""
+    """The motion of one joint in a simulated control study of chapter 5."""
 
     KEY = ("controller", "joint")
 
@@ -64,9 +64,9 @@ class Control(Record):
     joint: str
     start: float
     reference: float
-    settling_time: float  # NaN where the joint does not settle, or has no step
+    settling_time: float  # NaN if the joint does not settle, or its reference has no step
     overshoot: float
-    error_10: float
+    error_10: float  # position error after 10 s
     error_20: float
     error_end: float
     t: Column
@@ -74,14 +74,14 @@ class Control(Record):
     dq: Column
 
     def published(self) -> Iterator[Published]:
-        """The tracking of the reference."""
+        """How well the joint tracks its reference."""
         names = ("start", "reference", "settling_time", "overshoot", "error_10", "error_20", "error_end")
         yield from self.publish(f"control.{self.controller}.{self.joint}", *names)
 
 
 @dataclass(frozen=True, eq=False)
 class Lyapunov(Record):
-    """The Lyapunov function along a simulated control study.  (5.9)"""
+    """The Lyapunov function over time in a simulated control study.  (5.9)"""
 
     KEY = ("controller",)
 
@@ -92,13 +92,13 @@ class Lyapunov(Record):
     V: Column
 
     def published(self) -> Iterator[Published]:
-        """The initial value, and the largest rise."""
+        """The initial value, and the largest rise between two steps."""
         yield from self.publish(f"control.{self.controller}", "V_rise", "V_0")
 
 
 @dataclass(frozen=True, eq=False)
 class Excitation(JointRecord):
-    """One period of an excitation trajectory, published or designed, with its criteria and its excess over limits."""
+    """One period of an excitation trajectory, of the thesis or designed, its criteria and its excess over limits."""
 
     KEY = ("joint", "source")
 

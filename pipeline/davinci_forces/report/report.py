@@ -1,4 +1,4 @@
-"""Write the reports of a study: report and robot, each as HTML and PDF, results.json, and the answer as text."""
+"""Write the reports of a study: report and robot as .html and .pdf, results.json, and the answer as summary.txt."""
 
 import hashlib
 from collections.abc import Mapping

@@ -16,12 +16,12 @@ from davinci_forces.toml.lines import MOST_LISTED
 
 ZERO_ALLOWED = ("skip", "harmonics", "q_tau")
 ROLES = ("identification", "validation", "contact", "weight", "tissue", "friction")
-TARES = ("validation", "identification")  # roles of logs in which nothing touches the arm
-MAX_LISTED = 100  # logs that a problem lists
-MAX_POSITION = 3.0  # [m] from the remote centre, beyond which a position is more likely in another unit
+TARE_ROLES = ("validation", "identification")  # roles of logs in which nothing touches the arm
+MAX_LISTED = 100  # names of logs that one message lists
+MAX_POSITION = 3.0  # [m] distance from the remote centre; a larger position is probably in another unit
 WINDOWS = "a list of [start, end] in seconds, with 0 <= start < end"
-SEVERAL = ("files", "join")  # keys of several files: parts in order, or side by side
-ALL = "all"  # of a tissue log: every sample is one of contact
+SEVERAL = ("files", "join")  # keys with several files: parts of a log in order, or files with its channels side by side
+ALL = "all"  # value of `contact` in a tissue log whose samples are all in contact
 
 
 def optional(table: TomlTable, key: str) -> float | None:
@@ -30,14 +30,14 @@ def optional(table: TomlTable, key: str) -> float | None:
 
 
 def check_positive(table: TomlTable, key: str, value: float) -> float:
-    """Return a number unchanged; note it if it is negative, or if it is 0 where that is not allowed."""
+    """Return a number unchanged; report a problem if it is negative, or if it is 0 and must not be."""
     if value < 0 or (value == 0 and key not in ZERO_ALLOWED and key in table.values):
         table.problem(f"{key} must be positive, not {excerpt(value)}", key)
     return value
 
 
 def entries_of(study: TomlTable, robot: Robot | None) -> tuple[LogEntry, ...]:
-    """Read every [[log]]; `robot` is None where the study's robot is unknown."""
+    """Read every [[log]]; `robot` is None if the study's robot is unknown."""
     tables = study.tables("log", "it has no [[log]] table, so there is nothing to analyse", most=MOST_LISTED)
     logs = tuple(_entry(study, i, table, robot) for i, table in enumerate(tables))
     study.unique("log", "name", enumerate(log.name for log in logs), "two logs are named")
@@ -49,7 +49,7 @@ def entries_of(study: TomlTable, robot: Robot | None) -> tuple[LogEntry, ...]:
 
 
 def lines_of_files(study: TomlTable, logs: Sequence[LogEntry]) -> dict[str, int]:
-    """The line that first names each file."""
+    """The first line of the study file that names each log file."""
     lines: dict[str, int] = {}
     for n, log in enumerate(logs):
         key = next((key for key in SEVERAL if ("log", n, key) in study.file.lines), "file")
@@ -59,7 +59,7 @@ def lines_of_files(study: TomlTable, logs: Sequence[LogEntry]) -> dict[str, int]
 
 
 def is_inside(file: str) -> bool:
-    """Whether a path as written stays in the study; a link in the study may point anywhere."""
+    """Whether a path is inside the study's folder; symbolic links in the folder may point anywhere."""
     path = Path(file)
     return not path.anchor and Path(os.path.normpath(file)).parts[:1] != ("..",)
 
@@ -87,7 +87,7 @@ def _entry(study: TomlTable, index: int, table: TomlTable, robot: Robot | None) 
         encoding=table.text("encoding") if "encoding" in table else None,
         **_binary(table),
     )
-    table.close()
+    table.close()  # reports unknown keys
     return entry
 
 
@@ -107,14 +107,14 @@ def _files(table: TomlTable) -> tuple[str, ...]:
         return ()
     [key] = keys
     if key in SEVERAL:
-        words = "a list of file names"
-        named = table.take(key, [], (list,), words, lambda files: files and all(map(_is_name, files)))
+        expected = "a list of file names"
+        files = table.take(key, [], (list,), expected, lambda names: names and all(map(_is_name, names)))
     else:
-        named = [table.take("file", "", (str,), "a file name", _is_name)]
-    for i, file in enumerate(named):
+        files = [table.take("file", "", (str,), "a file name", _is_name)]
+    for i, file in enumerate(files):
         if not is_inside(file):
             table.problem(f"{file!r} lies outside the study's folder", key, i)
-    return tuple(file for file in named if file and is_inside(file))
+    return tuple(file for file in files if file and is_inside(file))
 
 
 def _is_name(value: object) -> bool:
@@ -122,7 +122,7 @@ def _is_name(value: object) -> bool:
 
 
 def _end(table: TomlTable) -> float | None:
-    """Read where the log ends; note it if that is not after the skipped start."""
+    """Read the end of the log [s]; report a problem if the end is not after the skipped start."""
     until = optional(table, "until")
     skip = table.values.get("skip", 0.0)
     if until is not None and isinstance(skip, int | float) and 0 < until <= skip:
@@ -138,14 +138,14 @@ def _delimiter(table: TomlTable) -> str | None:
 
 
 def _binary(table: TomlTable) -> dict[str, Any]:
-    """Read the type and columns of raw binary numbers, which such a file does not state."""
-    for key, partner in (("dtype", "columns"), ("columns", "dtype")):
-        if key in table and partner not in table:
-            table.problem(f"{key} needs {partner}; a file of raw binary numbers takes {BINARY_EXAMPLE}", key)
+    """Read the type and columns of a file of raw binary numbers, which has no header."""
+    for key, other_key in (("dtype", "columns"), ("columns", "dtype")):
+        if key in table and other_key not in table:
+            table.problem(f"{key} needs {other_key}; a file of raw binary numbers takes {BINARY_EXAMPLE}", key)
     fields: dict[str, Any] = {}
     if "dtype" in table:
-        words = 'a type of number as "float64", "DBL" or "<int16", where < stands for little-endian'
-        fields["dtype"] = table.take("dtype", None, (str,), words, lambda word: dtype_of(word) is not None)
+        expected = 'a type of number as "float64", "DBL" or "<int16", where < stands for little-endian'
+        fields["dtype"] = table.take("dtype", None, (str,), expected, lambda word: dtype_of(word) is not None)
     if "columns" in table:
         columns = table.take("columns", None, (int, list), "how many numbers a row has, or their names", _are_columns)
         fields["columns"] = tuple(columns) if isinstance(columns, list) else columns
@@ -177,9 +177,9 @@ def _wrong_tare(log: LogEntry, by_name: dict[str, LogEntry]) -> str:
     tare = by_name.get(log.tare)
     if tare is None:
         return f"tare = {log.tare!r} is not a log of this study; its logs are {', '.join(islice(by_name, MAX_LISTED))}"
-    if tare.role not in TARES:
+    if tare.role not in TARE_ROLES:
         role = f"its tare {log.tare!r} has role {tare.role}"
-        return f"{role}; a tare must be free motion along the same path, with role {' or '.join(TARES)}"
+        return f"{role}; a tare must be free motion along the same path, with role {' or '.join(TARE_ROLES)}"
     return ""
 
 
@@ -194,7 +194,7 @@ def _weight(table: TomlTable, robot: Robot | None) -> AttachedMass | None:
     moves_with = weight.text("moves_with", choices=[*(joint.name for joint in robot.joints), *links] if robot else ())
     position = weight.numbers("position", count=3, words="[x, y, z] in metres")
     if position and max(map(abs, position)) > MAX_POSITION:
-        far = f"position must lie within {MAX_POSITION:g} m of the remote centre, not {list(position)}; it is in metres"
-        weight.problem(far, "position")
-    weight.close()
+        must = f"position must lie within {MAX_POSITION:g} m of the remote centre"
+        weight.problem(f"{must}, not {list(position)}; it is in metres", "position")
+    weight.close()  # reports unknown keys
     return AttachedMass(moves_with, (position[0], position[1], position[2]), mass) if position else None

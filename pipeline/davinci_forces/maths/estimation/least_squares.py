@@ -1,14 +1,14 @@
-"""Least squares by orthogonal triangles, in one pass over the rows.
+"""Least squares by QR factorisation, in one pass over the rows.
 
     W^(1/2) [Phi tau] = Q [[U, y], [0, e]],    theta = U^-1 y,    |W^(1/2) (tau - Phi theta)|^2 = |U theta - y|^2 + e^2
 
-The triangle has all the information of the data for least squares, with or without bounds.  It also shows which
-parameters the data determine singly, and which only in combination:
+The triangular factor contains all information of the data for least squares, with or without bounds.  Its singular
+values show which parameters the data determine one by one, and which only in combination:
 
-    cov(theta) ~ (Phi' Phi)^-1,    Phi D^-1 = Q U,    U = A diag(sizes) B'
+    cov(theta) ~ (Phi' Phi)^-1,    Phi D^-1 = Q U,    U = A diag(singular_values) B'
 
-D scales the columns to unit length.  A direction of B whose size is small is a combination of parameters that hardly
-changes the effort; two parameters whose estimates are correlated move together.
+D scales the columns to unit length.  A column of B with a small singular value is a combination of parameters that
+hardly changes the effort.  If two estimates are correlated, an error of one comes with an error of the other.
 """
 
 from typing import NamedTuple
@@ -23,7 +23,7 @@ class Triangle(NamedTuple):
 
     U: Array  # (p, p) upper triangular
     y: Array  # (p,)
-    squares: float  # e^2, the least residual squares
+    squares: float  # e^2, the minimum of the weighted sum of squared residuals
     scale: Array  # (p,) lengths of the columns
 
     @property
@@ -32,12 +32,12 @@ class Triangle(NamedTuple):
         return np.asarray(np.linalg.solve(self.U, self.y) / self.scale)
 
     def excess(self, theta: Array) -> Array:
-        """Excess (...) of the weighted squares of parameters (..., p) over the least."""
+        """Excess (...) of the weighted sum of squared residuals over its minimum, at parameters (..., p)."""
         return np.asarray((((theta * self.scale) @ self.U.T - self.y) ** 2).sum(axis=-1))
 
 
 def triangle(Phi: Array, tau: Array, weight: Array) -> Triangle:
-    """Factor Phi (K, p) and tau (K,), with a weight (K,) of each row; a column of zeros stays one."""
+    """Factor Phi (K, p) and tau (K,), with a weight (K,) of each row; a column of zeros remains zero."""
     from davinci_forces.maths.estimation import kernels
 
     p = Phi.shape[1]
@@ -48,7 +48,7 @@ def triangle(Phi: Array, tau: Array, weight: Array) -> Triangle:
 
 
 def solve_bounded(R: Triangle, positive: Booleans) -> Array:
-    """Least-squares parameters (p,) that are not negative where `positive` (p,).
+    """Least-squares parameters (p,), of which those marked in `positive` (p,) are not negative.
 
     The active-set method (Stark and Parker, 1995) meets an active bound exactly.
     """
@@ -62,53 +62,55 @@ def solve_bounded(R: Triangle, positive: Booleans) -> Array:
 
 
 class ColumnAnalysis(NamedTuple):
-    """Correlations of p estimates, and the singular values and directions of their columns."""
+    """Correlations of p estimates, and the singular value decomposition of their scaled columns."""
 
-    correlation: Array  # (p, p) of their estimates
-    sizes: Array  # (p,) singular values of the columns scaled to unit length, the largest first
-    directions: Array  # (p, p) the unit vector of scaled parameters that belongs to each, in rows
+    correlation: Array  # (p, p) of the estimates
+    singular_values: Array  # (p,) of the columns scaled to unit length, the largest first
+    directions: Array  # (p, p) right singular vectors in rows, in the order of `singular_values`
 
     @property
     def condition(self) -> float:
         """Condition number of the scaled columns."""
-        return float(self.sizes[0] / self.sizes[-1])
+        return float(self.singular_values[0] / self.singular_values[-1])
 
 
 def analyse_columns(R: Triangle) -> ColumnAnalysis:
-    """Analyse the columns of a triangle, which must be independent."""
+    """Analyse the columns of a triangular factor; they must be linearly independent."""
     inverse = np.linalg.inv(R.U)
     covariance = inverse @ inverse.T
     std = np.sqrt(np.diag(covariance))
-    _, sizes, directions = np.linalg.svd(R.U)
-    return ColumnAnalysis(covariance / std / std[:, None], sizes, directions)
+    _, singular_values, directions = np.linalg.svd(R.U)
+    return ColumnAnalysis(covariance / std / std[:, None], singular_values, directions)
 
 
-def pairs(analysis: ColumnAnalysis, least: float) -> list[tuple[int, int, float]]:
-    """Pairs of parameters whose estimates correlate by at least `least`, the largest first, with the correlation."""
-    p = len(analysis.sizes)
+def correlated_pairs(analysis: ColumnAnalysis, minimum: float) -> list[tuple[int, int, float]]:
+    """Pairs of parameters, and their correlation if its magnitude is at least `minimum`; the strongest first."""
+    p = len(analysis.singular_values)
     entries = [(i, j, float(analysis.correlation[i, j])) for i in range(p) for j in range(i + 1, p)]
-    return sorted((pair for pair in entries if abs(pair[2]) >= least), key=lambda pair: -abs(pair[2]))
+    return sorted((pair for pair in entries if abs(pair[2]) >= minimum), key=lambda pair: -abs(pair[2]))
 
 
-def combinations(analysis: ColumnAnalysis, weak: float, part: float) -> list[tuple[tuple[int, ...], float]]:
-    """Directions determined at least `weak` times worse than the best one: their parameters and that ratio.
+def uncertain_combinations(
+    analysis: ColumnAnalysis, min_ratio: float, min_part: float
+) -> list[tuple[tuple[int, ...], float]]:
+    """Combinations at least `min_ratio` times less certain than the best one: their parameters and that ratio.
 
-    A parameter belongs to a direction if its share of the unit vector's square is at least `part`.
+    A parameter belongs to a combination if its squared component in the unit vector is at least `min_part`.
     """
-    ratios = analysis.sizes[0] / analysis.sizes
+    ratios = analysis.singular_values[0] / analysis.singular_values
     return [
-        (tuple(np.flatnonzero(direction**2 >= part).tolist()), float(ratio))
+        (tuple(np.flatnonzero(direction**2 >= min_part).tolist()), float(ratio))
         for ratio, direction in zip(ratios[::-1], analysis.directions[::-1], strict=True)
-        if ratio >= weak
+        if ratio >= min_ratio
     ]
 
 
-def dependent_parameters(U: Array, part: float) -> list[int]:
-    """Parameters with at least the share `part` of the square of the direction that columns U (p, p) show least."""
-    return np.flatnonzero(np.linalg.svd(U)[2][-1] ** 2 >= part).tolist()
+def dependent_parameters(U: Array, min_part: float) -> list[int]:
+    """Parameters whose squared component in the least determined direction of U (p, p) is at least `min_part`."""
+    return np.flatnonzero(np.linalg.svd(U)[2][-1] ** 2 >= min_part).tolist()
 
 
-def deviation(correlation: Array, std: Array, weights: Array) -> float:
-    """Standard error of a weighted sum of parameters with standard errors (p,)."""
+def std_of_sum(correlation: Array, std: Array, weights: Array) -> float:
+    """Standard error of the weighted sum of parameters that have the standard errors `std` (p,)."""
     scaled = weights * std
     return float(np.sqrt(max(float(scaled @ correlation @ scaled), 0.0)))

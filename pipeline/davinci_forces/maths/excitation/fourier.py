@@ -1,17 +1,17 @@
-"""Trajectories as finite Fourier series: their motion, exact ranges, run-in, and criteria of their excitation.
+"""Trajectories as finite Fourier series: motion, exact ranges, run-in, and criteria of excitation.
 
-The coefficients of a series are also written as one vector x = (a0, a1, b1, a2, b2, ...), in which position, velocity
-and acceleration are linear.  Section 6.3
+The coefficients of a series form one vector x = (a0, a1, b1, a2, b2, ...).  Position, velocity and acceleration are
+linear in x.  Section 6.3
 
 The criteria measure how well regressors F (..., K, p) determine their parameters; they are infinite without full rank.
 
-A trajectory is entered from a standstill along its own path, slowly at first:
+The run-in leads from a standstill into the trajectory along the same path, slowly at first:
 
     q(sigma(t)),    dq sigma',    ddq sigma'^2 + dq sigma'',    sigma' = 10 u^3 - 15 u^4 + 6 u^5,    u = 1 + t / T
 
 over -T <= t <= 0.  sigma' rises from 0 to 1 with sigma'' = 0 at both ends, so position, velocity and acceleration are
 continuous, as is jerk.  Positions and velocities keep every limit that the periodic trajectory keeps; accelerations
-keep theirs where T is long enough.
+keep their limits if T is long enough.
 """
 
 from collections.abc import Callable, Sequence
@@ -24,12 +24,12 @@ from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.terms import Term
 
 Range = tuple[float, float]
-PERIOD_SAMPLES = 300  # K, of one period without its end point: what reproduces Table 6.1
-# Entries of a matrix that is factored at once: for more, the library starts threads.  Thousands of times a second,
-# they cost more than they save, and on a busy machine 20 times as much.
+PERIOD_SAMPLES = 300  # K, of one period without its end point; this number reproduces Table 6.1
+# Largest matrix, in entries, that is factored in one piece: for a larger one, the library starts threads.  A search
+# factors thousands of matrices a second.  Threads would make it slower, on a busy machine by a factor of 20.
 MAX_TRIANGLE_ENTRIES = 8000
 RUN_IN_INSTANTS = 4000  # instants of a run-in at which the limits are checked
-LIMIT_MARGIN = 1e-5  # of a limit, for extremes between two instants
+LIMIT_MARGIN = 1e-5  # share of a limit that is kept free for extremes between two instants
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Fourier:
 
     @classmethod
     def from_coefficients(cls, x: Array, period: float) -> "Fourier":
-        """The series of a vector of coefficients."""
+        """The series with the vector of coefficients x."""
         return cls(float(x[0]), tuple(x[1::2].tolist()), tuple(x[2::2].tolist()), period)
 
     @property
@@ -66,23 +66,25 @@ def motion(series: Fourier, t: Array) -> tuple[Array, Array, Array]:
 
 
 def instants(period: float, samples: int = PERIOD_SAMPLES) -> Array:
-    """The times (K,) [s] at which one period is sampled; its end, which is its start, is left out."""
+    """The times (K,) [s] at which one period is sampled, without its end point, which repeats its start."""
     return np.arange(samples, dtype=np.float64) * (period / samples)
 
 
 def turning_points(series: Fourier) -> tuple[Array, Array, Array]:
     """The times [s] within a period at which position, velocity and acceleration may be extreme: 2 N_f + 1 of each.
 
-    The derivative of a trigonometric polynomial is, times z^N with z = exp(i omega t), a polynomial in z whose roots
-    on the unit circle are the extrema.  The angles of *all* roots are returned, so that a double root which
-    rounding has moved off the circle is not lost.  Additional angles do no harm: the series passes through them, too.
+    Multiplied by z^N, z = exp(i omega t), the derivative of a trigonometric polynomial is a polynomial in z.  Its roots
+    on the unit circle are the extrema.  The angles of *all* roots are returned: rounding may move a double root off the
+    circle.  Additional angles do no harm, because the series takes its values there, too.
     """
     k = np.arange(1, len(series.a) + 1)
     velocity = np.array(series.a) - 1j * np.array(series.b)  # a_k cos + b_k sin = Re(velocity_k z^k)
     times = []
     for derivative in (velocity, 1j * k * velocity, -(k**2) * velocity):
         size = np.abs(derivative)
-        derivative = np.where(size > 1e-14 * size.max(), derivative, 0.0)  # rounding errors would spoil the roots
+        derivative = np.where(
+            size > 1e-14 * size.max(), derivative, 0.0
+        )  # a coefficient of rounding errors would spoil the roots
         roots = np.roots(np.concatenate([derivative[::-1], [0.0], derivative.conj()]))
         angles = np.concatenate([[0.0], np.angle(roots) % (2 * np.pi)])
         times.append(angles * (series.period / (2 * np.pi)))
@@ -90,7 +92,7 @@ def turning_points(series: Fourier) -> tuple[Array, Array, Array]:
 
 
 def ranges(series: Fourier) -> tuple[Range, Range, Range]:
-    """The lowest and highest position, velocity and acceleration over all time, not over samples."""
+    """The lowest and highest position, velocity and acceleration at any time, also between samples."""
     values = [motion(series, t)[i] for i, t in enumerate(turning_points(series))]
     q, dq, ddq = ((float(v.min()), float(v.max())) for v in values)
     return q, dq, ddq
@@ -122,7 +124,7 @@ def condition(F: Array) -> Array:
 
 
 def triangle(F: Array) -> Array:
-    """R (..., p, p) of F = Q R, from the R of blocks of samples where there are many."""
+    """R (..., p, p) of F = Q R; F with many samples is factored in blocks, and then the R of all blocks together."""
     samples, parameters = F.shape[-2:]
     rows = max(2 * parameters, MAX_TRIANGLE_ENTRIES // parameters)
     if samples <= rows:
@@ -142,19 +144,19 @@ CRITERIA: dict[str, Criterion] = {"determinant": determinant, "condition": condi
 
 
 def run_in(series: Fourier, t: Array, duration: float) -> tuple[Array, Array, Array]:
-    """Position, velocity and acceleration (K,) at the times t (K,) [s] from -duration, at rest, to 0, at full speed."""
+    """Position, velocity and acceleration (K,) at t (K,) [s] of a run-in, from rest at -duration to full speed at 0."""
     u = 1 + t / duration
-    path = duration * (u**4 * (2.5 - 3 * u + u**2) - 0.5)
-    speed = u**3 * (10 - 15 * u + 6 * u**2)
-    rise = 30 * (u * (1 - u)) ** 2 / duration
-    q, dq, ddq = motion(series, path)
-    return q, speed * dq, speed**2 * ddq + rise * dq
+    sigma = duration * (u**4 * (2.5 - 3 * u + u**2) - 0.5)
+    dsigma = u**3 * (10 - 15 * u + 6 * u**2)
+    ddsigma = 30 * (u * (1 - u)) ** 2 / duration
+    q, dq, ddq = motion(series, sigma)
+    return q, dsigma * dq, dsigma**2 * ddq + ddsigma * dq
 
 
-def shortest_stretch(series: Sequence[Fourier], accelerations: Sequence[Range], durations: Array) -> float | None:
-    """The first of these durations [s] in which the run-in of every series keeps its limits of acceleration, or None.
+def shortest_run_in(series: Sequence[Fourier], accelerations: Sequence[Range], durations: Array) -> float | None:
+    """The first of `durations` [s] for which the run-ins of all series keep their limits of acceleration, or None.
 
-    A series that exceeds the limits itself may reach the same accelerations in its run-in.
+    If a series itself exceeds the limits, its run-in may reach the accelerations of the series.
     """
     bounds = []
     for joint_series, (low, high) in zip(series, accelerations, strict=True):
@@ -162,7 +164,7 @@ def shortest_stretch(series: Sequence[Fourier], accelerations: Sequence[Range], 
         bounds.append((min(low * (1 - LIMIT_MARGIN), lowest), max(high * (1 - LIMIT_MARGIN), highest)))
     for duration in durations.tolist():
         t = np.linspace(-duration, 0.0, RUN_IN_INSTANTS)
-        used = [run_in(joint_series, t, duration)[2] for joint_series in series]
-        if all(low <= ddq.min() and ddq.max() <= high for ddq, (low, high) in zip(used, bounds, strict=True)):
+        joint_ddq = [run_in(joint_series, t, duration)[2] for joint_series in series]
+        if all(low <= ddq.min() and ddq.max() <= high for ddq, (low, high) in zip(joint_ddq, bounds, strict=True)):
             return float(duration)
     return None

@@ -1,12 +1,13 @@
-"""The dynamics of a tree of links, from that of one: outwards from the base with motions, inwards with wrenches.
+"""The dynamics of a tree of links: motions are computed from the base outwards, wrenches from the tips inwards.
 
-Recursive Newton-Euler and composite rigid bodies (Featherstone 2008, chapters 5 and 6), and the regressor.  Where a
-coordinate moves several links, it collects the effort of all of them.
+Recursive Newton-Euler and composite rigid bodies (Featherstone 2008, chapters 5 and 6), and the regressor; `link` has
+the equations of one link.  The effort of a coordinate that moves several links is the sum over these links.
 
-One source for numpy and for compiled loops (`kernels`).  The last axis of every array has S samples, and `samples` are
-the indices to compute with: one slice of all in numpy, `range(S)` where it is compiled.  `joints` (n + 1, 5, S) holds
-cos q, sin q, q, dq, ddq of each coordinate, and zeros for what never moves.  `work` (bodies, numbers, S) is space for
-what is kept of every body in between, the base first, and 0 before its first use.
+The same source runs on numpy arrays and in compiled loops (`kernels`).  The last axis of every array has S samples.
+`samples` are the indices to compute with: one slice of all in numpy, `range(S)` in compiled loops.  `joints` (n + 1, 5,
+S) has cos q, sin q, q, dq, ddq of each coordinate, and a last row of zeros for links that no coordinate moves.
+`scratch` (bodies, numbers, S) has the intermediate results of every body, the base first.  The caller sets it to 0
+before its first use.
 """
 
 from collections.abc import Iterable
@@ -17,138 +18,139 @@ from davinci_forces.maths.mechanics.chain import Tree
 from davinci_forces.maths.mechanics.link import Vector, plus
 
 Samples = Iterable[Any]
+INERTIA = 13  # index of the first moment and the inertia, nine numbers, in a row of `tree.rows`
 
 
 def vector(numbers: Any, first: int, s: Any) -> Vector:
-    """Three numbers of a body, from `first` on."""
+    """Read the vector that begins at number `first` of a body."""
     return numbers[first, s], numbers[first + 1, s], numbers[first + 2, s]
 
 
-def put(numbers: Any, first: int, s: Any, x: Vector) -> None:
-    """Keep three numbers of a body, from `first` on."""
+def store(numbers: Any, first: int, s: Any, x: Vector) -> None:
+    """Store a vector from number `first` of a body on."""
     numbers[first, s], numbers[first + 1, s], numbers[first + 2, s] = x
 
 
 def fill(numbers: Any, value: float, samples: Samples) -> None:
-    """Give all samples one value."""
+    """Set all samples to one value."""
     for s in samples:
         numbers[s] = value
 
 
-def add(total: Any, wrench: Any, slides: bool, samples: Samples) -> None:
-    """Add what a joint exerts of a wrench on its link: its force along z, or its moment about z."""
-    part = wrench[2 if slides else 5]
+def add_effort(total: Any, wrench: Any, slides: bool, samples: Samples) -> None:
+    """Add the effort of a joint that exerts a wrench on its link: the force along z, or the moment about z."""
+    effort = wrench[2 if slides else 5]
     for s in samples:
-        total[s] += part[s]
+        total[s] += effort[s]
 
 
-def motions(tree: Tree, gravity: float, joints: Any, work: Any, samples: Samples) -> None:
-    """Put the motion of every link into the first 9 numbers of its body."""
-    fill(work[0, 8], gravity, samples)  # standing still feels like accelerating upwards with g
+def motions(tree: Tree, gravity: float, joints: Any, scratch: Any, samples: Samples) -> None:
+    """Store the motion (w, dw, a) of every link in the first 9 numbers of its body."""
+    fill(scratch[0, 8], gravity, samples)  # gravity acts like an upward acceleration g of the base
     for i in range(len(tree.parent)):
-        row, slides, joint = tree.rows[i], tree.slides[i], joints[tree.coordinate[i]]
-        carrier, body = work[tree.parent[i]], work[i + 1]
+        constants, slides, joint = tree.rows[i], tree.slides[i], joints[tree.coordinate[i]]
+        parent, body = scratch[tree.parent[i]], scratch[i + 1]
         for s in samples:
-            motion = vector(carrier, 0, s), vector(carrier, 3, s), vector(carrier, 6, s)
-            turn = joint[0, s], joint[1, s]
-            w, e, a = link.link_motion(row, slides, turn, joint[2, s], joint[3, s], joint[4, s], motion)
-            put(body, 0, s, w)
-            put(body, 3, s, e)
-            put(body, 6, s, a)
+            motion = vector(parent, 0, s), vector(parent, 3, s), vector(parent, 6, s)
+            cos_sin = joint[0, s], joint[1, s]
+            w, dw, a = link.link_motion(constants, slides, cos_sin, joint[2, s], joint[3, s], joint[4, s], motion)
+            store(body, 0, s, w)
+            store(body, 3, s, dw)
+            store(body, 6, s, a)
 
 
-def inverse_dynamics(tree: Tree, gravity: float, joints: Any, work: Any, tau: Any, samples: Samples) -> None:
-    """Put the effort of each coordinate into tau (n, S); with gravity 0, and ddq 0, it is C dq.  (4.27)
+def inverse_dynamics(tree: Tree, gravity: float, joints: Any, scratch: Any, tau: Any, samples: Samples) -> None:
+    """Store the effort of each coordinate in tau (n, S); with gravity 0 and ddq 0 the effort is C dq.  (4.27)
 
-    The work space has 15 numbers of each body: motion and wrench.
+    `scratch` has 15 numbers of each body: motion and wrench.
     """
-    motions(tree, gravity, joints, work, samples)
+    motions(tree, gravity, joints, scratch, samples)
     for i in range(len(tree.parent)):
-        row, body = tree.rows[i], work[i + 1]
+        constants, body = tree.rows[i], scratch[i + 1]
         for s in samples:
-            f, n = link.wrench_of(row, (vector(body, 0, s), vector(body, 3, s), vector(body, 6, s)))
-            put(body, 9, s, f)
-            put(body, 12, s, n)
+            f, n = link.wrench_of(constants, (vector(body, 0, s), vector(body, 3, s), vector(body, 6, s)))
+            store(body, 9, s, f)
+            store(body, 12, s, n)
     for k in range(tree.n):
         fill(tau[k], 0.0, samples)
     for i in range(len(tree.parent) - 1, -1, -1):
-        row, slides, joint = tree.rows[i], tree.slides[i], joints[tree.coordinate[i]]
-        carrier, body = work[tree.parent[i]], work[i + 1]
-        add(tau[tree.coordinate[i]], body[9:], slides, samples)
+        constants, slides, joint = tree.rows[i], tree.slides[i], joints[tree.coordinate[i]]
+        parent, body = scratch[tree.parent[i]], scratch[i + 1]
+        add_effort(tau[tree.coordinate[i]], body[9:], slides, samples)
         for s in samples:
             wrench = vector(body, 9, s), vector(body, 12, s)
-            f, n = link.carrier_wrench(row, slides, (joint[0, s], joint[1, s]), joint[2, s], wrench)
-            put(carrier, 9, s, plus(vector(carrier, 9, s), f))
-            put(carrier, 12, s, plus(vector(carrier, 12, s), n))
+            f, n = link.carrier_wrench(constants, slides, (joint[0, s], joint[1, s]), joint[2, s], wrench)
+            store(parent, 9, s, plus(vector(parent, 9, s), f))
+            store(parent, 12, s, plus(vector(parent, 12, s), n))
 
 
-def mass_matrix(tree: Tree, joints: Any, work: Any, M: Any, samples: Samples) -> None:
+def mass_matrix(tree: Tree, joints: Any, scratch: Any, M: Any, samples: Samples) -> None:
     """Fill M (n, n, S).  (4.38)
 
-    The work space has 9 numbers of each body: first moment and inertia of all that it carries.  The base's are those
-    of the wrench that one unit of a joint's acceleration takes, on its way inwards.
+    `scratch` has 9 numbers of each body: the first moment and the inertia of the body with all links that it carries.
+    The numbers of the base have another use: the wrench of a unit acceleration of one joint, carried inwards.
     """
-    wrench = work[0]
+    wrench = scratch[0]
     for k in range(tree.n):
-        for o in range(tree.n):
-            fill(M[k, o], 0.0, samples)
+        for column in range(tree.n):
+            fill(M[k, column], 0.0, samples)
     for i in range(len(tree.parent)):
         for c in range(9):
-            fill(work[i + 1, c], tree.rows[i][13 + c], samples)
+            fill(scratch[i + 1, c], tree.rows[i][INERTIA + c], samples)
     for i in range(len(tree.parent) - 1, -1, -1):
-        k, slides, m, body = tree.coordinate[i], tree.slides[i], tree.carried[i], work[i + 1]
+        k, slides, m, body = tree.coordinate[i], tree.slides[i], tree.carried[i], scratch[i + 1]
         for s in samples:
             f, n = link.unit_wrench(slides, m, (vector(body, 0, s), vector(body, 3, s), vector(body, 6, s)))
-            put(wrench, 0, s, f)
-            put(wrench, 3, s, n)
-        add(M[k, k], wrench, slides, samples)
+            store(wrench, 0, s, f)
+            store(wrench, 3, s, n)
+        add_effort(M[k, k], wrench, slides, samples)
         if tree.parent[i] > 0:
-            row, joint, carrier = tree.rows[i], joints[k], work[tree.parent[i]]
+            constants, joint, parent = tree.rows[i], joints[k], scratch[tree.parent[i]]
             for s in samples:
                 inertia = vector(body, 0, s), vector(body, 3, s), vector(body, 6, s)
-                h, upper, lower = link.moved_inertia(slides, (joint[0, s], joint[1, s]), joint[2, s], m, inertia)
-                put(body, 0, s, h)
-                put(body, 3, s, upper)
-                put(body, 6, s, lower)
+                h, I_x, I_yz = link.moved_inertia(slides, (joint[0, s], joint[1, s]), joint[2, s], m, inertia)
+                store(body, 0, s, h)
+                store(body, 3, s, I_x)
+                store(body, 6, s, I_yz)
             for s in samples:
                 inertia = vector(body, 0, s), vector(body, 3, s), vector(body, 6, s)
-                h, upper, lower = link.carried_inertia(row, m, inertia)
-                put(carrier, 0, s, plus(vector(carrier, 0, s), h))
-                put(carrier, 3, s, plus(vector(carrier, 3, s), upper))
-                put(carrier, 6, s, plus(vector(carrier, 6, s), lower))
+                h, I_x, I_yz = link.carried_inertia(constants, m, inertia)
+                store(parent, 0, s, plus(vector(parent, 0, s), h))
+                store(parent, 3, s, plus(vector(parent, 3, s), I_x))
+                store(parent, 6, s, plus(vector(parent, 6, s), I_yz))
         j = i
         while tree.parent[j] > 0:
-            row, slides, joint = tree.rows[j], tree.slides[j], joints[tree.coordinate[j]]
+            constants, slides, joint = tree.rows[j], tree.slides[j], joints[tree.coordinate[j]]
             for s in samples:
-                push = vector(wrench, 0, s), vector(wrench, 3, s)
-                f, n = link.carrier_wrench(row, slides, (joint[0, s], joint[1, s]), joint[2, s], push)
-                put(wrench, 0, s, f)
-                put(wrench, 3, s, n)
+                link_wrench = vector(wrench, 0, s), vector(wrench, 3, s)
+                f, n = link.carrier_wrench(constants, slides, (joint[0, s], joint[1, s]), joint[2, s], link_wrench)
+                store(wrench, 0, s, f)
+                store(wrench, 3, s, n)
             j = tree.parent[j] - 1
-            add(M[k, tree.coordinate[j]], wrench, tree.slides[j], samples)
-            add(M[tree.coordinate[j], k], wrench, tree.slides[j], samples)
+            add_effort(M[k, tree.coordinate[j]], wrench, tree.slides[j], samples)
+            add_effort(M[tree.coordinate[j], k], wrench, tree.slides[j], samples)
 
 
-def regressor(tree: Tree, gravity: float, joints: Any, work: Any, Y: Any, samples: Samples) -> None:
-    """Put the ten columns of link i and coordinate k, where it moves the link, into Y[k, i] (10, S).  (6.3)
+def regressor(tree: Tree, gravity: float, joints: Any, scratch: Any, Y: Any, samples: Samples) -> None:
+    """Store the ten columns of link i and coordinate k in Y[k, i] (10, S), if the coordinate moves the link.  (6.3)
 
-    The work space has 9 numbers of (n + 1) (L + 1) bodies: their motions, and then, coordinate by coordinate, their
-    velocities by one unit of it.
+    `scratch` has 9 numbers of (n + 1) (L + 1) bodies: first the motion of every body.  Then, for each coordinate, they
+    have the velocity of every body if this coordinate has unit velocity and all others stand still.
     """
-    motions(tree, gravity, joints, work, samples)
+    motions(tree, gravity, joints, scratch, samples)
     bodies = len(tree.parent) + 1
     for i in range(bodies - 1):
-        row, slides, joint, motion = tree.rows[i], tree.slides[i], joints[tree.coordinate[i]], work[i + 1]
+        constants, slides, joint, motion = tree.rows[i], tree.slides[i], joints[tree.coordinate[i]], scratch[i + 1]
         for k in range(tree.n):
             if tree.moves[i][k]:
                 unit, first = (1.0 if k == tree.coordinate[i] else 0.0), (k + 1) * bodies
-                carrier, body, columns = work[first + tree.parent[i]], work[first + i + 1], Y[k, i]
+                parent, body, columns = scratch[first + tree.parent[i]], scratch[first + i + 1], Y[k, i]
                 for s in samples:
-                    turn, before = (joint[0, s], joint[1, s]), (vector(carrier, 0, s), vector(carrier, 3, s))
-                    J = link.link_velocity(row, slides, turn, joint[2, s], unit, before)
-                    put(body, 0, s, J[0])
-                    put(body, 3, s, J[1])
-                    wea = vector(motion, 0, s), vector(motion, 3, s), vector(motion, 6, s)
-                    ten = link.columns(wea, J)
+                    cos_sin, parent_velocity = (joint[0, s], joint[1, s]), (vector(parent, 0, s), vector(parent, 3, s))
+                    J = link.link_velocity(constants, slides, cos_sin, joint[2, s], unit, parent_velocity)
+                    store(body, 0, s, J[0])
+                    store(body, 3, s, J[1])
+                    body_motion = vector(motion, 0, s), vector(motion, 3, s), vector(motion, 6, s)
+                    ten = link.columns(body_motion, J)
                     for c in range(10):
                         columns[c, s] = ten[c]

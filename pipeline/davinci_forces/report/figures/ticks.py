@@ -1,4 +1,4 @@
-"""Numbers on axes: short ones, the power of ten written once in the axis label."""
+"""Short numbers on the axes of figures; the axis label states their common power of ten."""
 
 import math
 from typing import TYPE_CHECKING
@@ -8,22 +8,22 @@ from davinci_forces.report.content.number import MINUS, SUPERSCRIPTS
 if TYPE_CHECKING:
     from matplotlib.axis import Axis
 
-FEW_DECADES = 3  # that still have room for more numbers than their powers of ten
-PLAIN_RANGE = (2e-3, 2e4)  # greatest values between which an axis has numbers as they are
+FEW_DECADES = 3  # axes of fewer decades are also numbered at 2 and 5
+PLAIN_RANGE = (2e-3, 2e4)  # no power of ten is taken out if the largest magnitude is in this range
 
 
 def power_of_ten(greatest: float) -> int:
-    """The power of ten, a multiple of three, that leaves numbers between one and a thousand; 0 where none is needed."""
+    """The power of ten, a multiple of three, that leaves numbers from 1 to 1000; 0 if `greatest` needs no power."""
     if greatest == 0 or PLAIN_RANGE[0] <= greatest < PLAIN_RANGE[1]:
         return 0
     return 3 * math.floor(math.log10(greatest) / 3)
 
 
 def scale_ticks(axis: "Axis", label: str) -> str:
-    """Take a power of ten out of the numbers of an axis whose range is set; returns its label with that power."""
+    """Divide the numbers of an axis by a power of ten, and return its label with this power; set its range first."""
     from matplotlib.ticker import FuncFormatter
 
-    # matplotlib would put the power at the end of the axis, where the legend is.
+    # By default, matplotlib writes the power at the end of the axis, where the legend is.
     exponent = power_of_ten(float(max(abs(limit) for limit in axis.get_view_interval())))
     if exponent == 0:
         return label
@@ -33,22 +33,22 @@ def scale_ticks(axis: "Axis", label: str) -> str:
     return f"{meaning}[{ten} {unit}" if bracket else f"{label} [{ten}]"
 
 
-def spread_ticks(axis: "Axis", room: float) -> None:
-    """Put fewer numbers on a linear axis along which so many letters fit, until none touches the next."""
+def spread_ticks(axis: "Axis", capacity: float) -> None:
+    """Reduce the numbers on a linear axis, which is `capacity` characters long, until no two of them touch."""
     from matplotlib.ticker import MaxNLocator
 
     locator, (low, high) = axis.get_major_locator(), axis.get_view_interval()
     while isinstance(locator, MaxNLocator):
         values = [value for value in locator() if low <= value <= high]
         numbers = axis.get_major_formatter().format_ticks(values)
-        letters = 1 + max((len(number.replace(".", "")) for number in numbers), default=0)
-        if len(values) < 3 or letters <= room * (values[1] - values[0]) / (high - low):
+        characters = 1 + max((len(number.replace(".", "")) for number in numbers), default=0)
+        if len(values) < 3 or characters <= capacity * (values[1] - values[0]) / (high - low):
             break
         locator.set_params(nbins=len(values) - 2)
 
 
 def set_log_ticks(axis: "Axis") -> None:
-    """Number a logarithmic axis whose range is set: 1, 2 and 5 of each of a few decades, else some whole decades."""
+    """Number a logarithmic axis at 1, 2 and 5 of each decade, or a long one at powers of ten; set its range first."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
     low, high = sorted(math.log10(limit) for limit in axis.get_view_interval())

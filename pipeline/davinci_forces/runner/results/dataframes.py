@@ -13,11 +13,11 @@ from davinci_forces.runner.ledger import Ledger
 from davinci_forces.runner.runs import folders
 
 
-def read(study: Path, kind: str, about: dict[str, str]) -> pd.DataFrame:
-    """All records of a kind in one DataFrame; see `davinci_forces.read`."""
+def read(study: Path, kind: str, selection: dict[str, str]) -> pd.DataFrame:
+    """All records of a kind whose fields equal those of `selection`, in one DataFrame; see `davinci_forces.read`."""
     if kind not in KINDS:
         raise BadRequest(f"there is no record {kind!r}; there are {', '.join(KINDS)}")
-    unknown = set(about) - set(KINDS[kind].scalars())
+    unknown = set(selection) - set(KINDS[kind].scalars())
     if unknown:
         raise BadRequest(f"{kind} has no {', '.join(sorted(unknown))}; it has {', '.join(KINDS[kind].scalars())}")
     study_folders = folders(study, None, None)
@@ -25,11 +25,10 @@ def read(study: Path, kind: str, about: dict[str, str]) -> pd.DataFrame:
     folder = f"processed/{KINDS[kind].folder()}/"
     files = [Path(name).relative_to("processed") for name in outputs if name.startswith(folder)]
     records = [store.read(KINDS[kind], study_folders.processed, file) for file in files]
-    records = [r for r in records if all(str(getattr(r, k)) == v for k, v in about.items())]
+    records = [r for r in records if all(str(getattr(r, k)) == v for k, v in selection.items())]
     if not records:
-        raise MissingRecord(
-            f"{study} has no {kind} records{f' with {about}' if about else ''}; run `davinci-forces all {study}`"
-        )
+        condition = f" with {selection}" if selection else ""
+        raise MissingRecord(f"{study} has no {kind} records{condition}; run `davinci-forces all {study}`")
     frame = pd.concat([as_frame(record) for record in records], ignore_index=True)
     for name in KINDS[kind].KEY:
         frame[name] = frame[name].astype("category")
@@ -46,14 +45,14 @@ def results(study: Path) -> pd.DataFrame:
     except FileNotFoundError:
         raise MissingRecord(f"{file} does not exist; run `davinci-forces all {study}`") from None
     except (ValueError, TypeError, LookupError) as error:
-        again = f"`davinci-forces report {study}` writes it again"
-        raise MissingRecord(f"{file} is not as the report wrote it ({error!r}); {again}") from None
+        advice = f"`davinci-forces report {study}` writes it again"
+        raise MissingRecord(f"{file} is not as the report wrote it ({error!r}); {advice}") from None
     frame = pd.DataFrame(rows, columns=names).set_index("key")
     return frame.astype({"value": float, "std": float})
 
 
 def as_frame(record: Record) -> pd.DataFrame:
-    """A record as a DataFrame, its key and single scalars repeated in every row."""
+    """A record as a DataFrame; its key and its scalars, except tuples, are repeated in every row."""
     scalars = {name: getattr(record, name) for name in record.scalars()}
     repeated = {name: value for name, value in scalars.items() if not isinstance(value, tuple)}
     columns = {name: getattr(record, name) for name in record.columns()}

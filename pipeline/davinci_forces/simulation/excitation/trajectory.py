@@ -196,7 +196,7 @@ def _run_in_samples(excitations: Sequence[ExcitationTrajectory], samples: int, r
     """The samples of the shortest run-in that keeps the limits."""
     durations = np.unique(np.linspace(samples / 4, samples, RUN_INS).round().clip(1)) / rate
     accelerations = [e.problem.limits[2] for e in excitations]
-    if duration := fourier.shortest_stretch([e.series for e in excitations], accelerations, durations):
+    if duration := fourier.shortest_run_in([e.series for e in excitations], accelerations, durations):
         return round(duration * rate)
     raise BadRequest(
         "no run-in of at most one period keeps the acceleration limits; write the period alone, with --no-run-in, and "

@@ -1,4 +1,4 @@
-"""Compare all filters: their level in free space, and their response to a push added to the recorded effort."""
+"""Compare all filters: the level of their estimates in free space, and their response to a push added to the effort."""
 
 from collections.abc import Iterable, Iterator, Sequence
 from itertools import pairwise

@@ -1,4 +1,4 @@
-"""Calibrate the error band of the external effort on free motion that the fits have not seen, over all logs."""
+"""Calibrate the error band of the external effort on free motion of all logs that no fit has used."""
 
 from collections.abc import Iterable, Iterator
 

@@ -1,4 +1,4 @@
-"""Measure every contact: onset, release, peak, mean and impulse, compared with the level of free space."""
+"""Measure every contact: onset, release, peak, mean and impulse, compared with the effort level in free space."""
 
 from collections.abc import Iterable, Iterator, Sequence
 

@@ -1,4 +1,4 @@
-"""Test whether the residuals of averaging, fit and filter are white noise, and explain why innovations are not."""
+"""Test whether the residuals of averaging, fit and filter are white noise, and find causes if innovations are not."""
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 

@@ -1,4 +1,4 @@
-"""Estimate the parameters of every joint from all identification logs, and from parts of them, by every estimator."""
+"""Estimate the parameters of every joint, from all identification logs and from parts of them, by each estimator."""
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from typing import Annotated, NamedTuple
@@ -10,13 +10,13 @@ from davinci_forces.estimators import ESTIMATORS, estimator
 from davinci_forces.estimators.problem import NO_PRIOR, Estimate, Prior, Regression, Search
 from davinci_forces.identification.identifiability import (
     advice,
+    correlation_entries,
     describe_correlated,
-    flat,
+    describe_insignificant,
     hardly_described,
     inertia_at_fault,
     join_names,
     moving_with,
-    not_seen,
 )
 from davinci_forces.identification.left_out import left_out
 from davinci_forces.identification.observations import observe, pose_samples
@@ -153,7 +153,7 @@ def identifiability(
         return
     excitation = analyse_columns(regression.triangle)
     names = [parameter.name for parameter in model.parameters]
-    pairs, insignificant = describe_correlated(names, excitation), not_seen(regression, plain)
+    pairs, insignificant = describe_correlated(names, excitation), describe_insignificant(regression, plain)
     yield Identifiability(
         group=model.group,
         model=model.name,
@@ -163,7 +163,7 @@ def identifiability(
         advice=advice(robot, joint, (*pairs, *insignificant)),
         parameter=np.repeat(np.array(names, object), len(names)),
         beside=np.tile(np.array(names, object), len(names)),
-        correlation=flat(excitation),
+        correlation=correlation_entries(excitation),
     )
     wrong = [name for name, estimate in estimates.items() if not has_positive_inertia(model, estimate.theta, parts)]
     if wrong:

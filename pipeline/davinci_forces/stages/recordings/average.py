@@ -15,18 +15,18 @@ from davinci_forces.records import Average, Counts, Diagnostic, PeriodResidual, 
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
-MIN_MISMATCH = 5e-4  # of a stated period, above which it may be called wrong
-MIN_STANDARD_ERRORS = 4.0  # between a stated period and the estimate, above which the data exclude the former
-MAX_SEGMENTS = 5  # the longest, in which a repetition is looked for
-MULTIPLES = (2, 3)  # a motion may nearly repeat within its period
-MIN_REMARKED_LOSS = 0.1  # of a period: less may be left out beside a stop without a remark
+MIN_MISMATCH = 5e-4  # relative difference above which a stated period may be reported as wrong
+MIN_STANDARD_ERRORS = 4.0  # difference, in standard errors, above which the data exclude a stated period
+MAX_SEGMENTS = 5  # a repetition is searched for in this many of the longest segments
+MULTIPLES = (2, 3)  # the period may be this many times the one found, if the motion nearly repeats within it
+MIN_REMARKED_LOSS = 0.1  # next to a stop, a smaller share of a period is left out without a remark
 MEASURED = ("q", "dq", "tau")
 
 
 def run(
     signals: Sequence[Signal], entry: LogEntry, robot: Robot, *, harmonics: int, lowpass: float
 ) -> Iterator[Average | PeriodResidual | Diagnostic]:
-    """Average the periods of each moving joint over the longest periodic stretch, which all joints of a log share."""
+    """Average the periods of each moving joint over the longest periodic stretch that all joints of a log share."""
     if entry.role != "identification":
         return
     moving = [signal for signal in signals if not signal.at_rest]
@@ -39,23 +39,23 @@ def run(
         raise NotPeriodic(
             f"{entry.name}: no joint moves, so there is nothing to identify; check its channels and units"
         )
-    orders = max(harmonics or robot.joint(signal.joint).harmonics for signal in moving)
+    max_harmonics = max(harmonics or robot.joint(signal.joint).harmonics for signal in moving)
     moving, repeat, remarks = periodic_joints(moving, entry)
     if repeat is None:
         message = f"{no_repetition(moving[0], entry)}, so nothing is averaged"
         yield diagnostic("average", entry.name, "note", f"{message}; its parameters come from the low-passed samples")
         return
-    span, length = longest_stretch(moving, repeat, orders, entry)
+    span, length = longest_stretch(moving, repeat, max_harmonics, entry)
     names = [f"{symbol} of {signal.joint}" for signal in moving for symbol in MEASURED]
     columns = [getattr(signal, symbol) for signal in moving for symbol in MEASURED]
     positions = [signal.q for signal in moving]
     t, rate = moving[0].t, moving[0].rate
-    core, length, odd = agreeing_stretch(t, positions, columns, span, length, rate, orders)
-    remarks += omissions(moving[0], span, core, length, [(names[d.signal], d) for d in odd])
-    std = standard_error(t[core], [x[core] for x in positions], length, orders)
+    agreeing, length, differing = agreeing_stretch(t, positions, columns, span, length, rate, max_harmonics)
+    remarks += omissions(moving[0], span, agreeing, length, [(names[d.signal], d) for d in differing])
+    std = standard_error(t[agreeing], [x[agreeing] for x in positions], length, max_harmonics)
     period, period_remarks = reconcile_period(Period(length, std), entry)
     remarks += period_remarks
-    used = slice(core.start, end(t, core, period.length, rate))
+    used = slice(agreeing.start, end(t, agreeing, period.length, rate))
     phased = Phases(t[used], period.length, phases(period.length, rate))
     for signal in moving:
         yield from average_joint(signal, used, phased, period, entry.period or 0.0, lowpass)
@@ -89,14 +89,13 @@ def periodic_joints(moving: list[Signal], entry: LogEntry) -> tuple[list[Signal]
 
 
 def no_repetition(first: Signal, entry: LogEntry) -> str:
-    """State how long a log is that does not repeat."""
-    return (
-        f"{entry.name}: {first.t[-1] - first.t[0] + 1.0 / first.rate:.2f} s hold no motion that repeats at least twice"
-    )
+    """Return the message that a log does not repeat, with its duration."""
+    duration = first.t[-1] - first.t[0] + 1.0 / first.rate
+    return f"{entry.name}: {duration:.2f} s contain no motion that repeats at least twice"
 
 
 def common_repetition(signals: Sequence[Signal]) -> Repetition | None:
-    """The repetition that joints share, in the longest segment with one."""
+    """The repetition that joints share, in the longest segment with a repetition."""
     parts = sorted(segments(signals[0].segment), key=lambda part: part.start - part.stop)
     for part in parts[:MAX_SEGMENTS]:
         if repeat := repetition([signal.q[part] for signal in signals]):
@@ -104,21 +103,24 @@ def common_repetition(signals: Sequence[Signal]) -> Repetition | None:
     return None
 
 
-def longest_stretch(signals: Sequence[Signal], repeat: Repetition, orders: int, entry: LogEntry) -> tuple[slice, float]:
+def longest_stretch(
+    signals: Sequence[Signal], repeat: Repetition, max_harmonics: int, entry: LogEntry
+) -> tuple[slice, float]:
     """The longest stretch around a repetition that has one period, and that period.
 
     Raises
     ------
     NotPeriodic
-        If it holds fewer than two periods.
+        If the stretch has fewer than two periods.
     """
     t, rate, positions = signals[0].t, signals[0].rate, [signal.q for signal in signals]
-    core = slice(repeat.core, min(repeat.core + round(2 * repeat.lag), len(t)))
-    span, length = stretch(t, positions, repeat.lag / rate, core, orders)
+    two_periods = slice(repeat.core, min(repeat.core + round(2 * repeat.lag), len(t)))
+    span, length = stretch(t, positions, repeat.lag / rate, two_periods, max_harmonics)
     t, positions = t[span], [x[span] for x in positions]
-    k = alternation(t, positions, length, rate, multiples(length, entry.period, whole_periods(t, length, rate)))
-    if k > 1:
-        length = refine(t, positions, k * length, orders)
+    factors = multiples(length, entry.period, whole_periods(t, length, rate))
+    factor = alternation(t, positions, length, rate, factors)
+    if factor > 1:
+        length = refine(t, positions, factor * length, max_harmonics)
     if whole_periods(t, length, rate) < 2:
         raise NotPeriodic(
             f"{entry.name}: the motion repeats only from {t[0]:.2f} to {t[-1]:.2f} s, fewer than two periods of "
@@ -128,38 +130,38 @@ def longest_stretch(signals: Sequence[Signal], repeat: Repetition, orders: int, 
 
 
 def multiples(length: float, stated: float | None, M: int) -> list[int]:
-    """Factors by which the period may be longer than it seems; that of the period which the study states first."""
+    """Factors by which the period may be longer than `length`; the factor of the stated period is the first."""
     stated_factor = [round(stated / length)] if stated else []
     return [k for k in dict.fromkeys([*stated_factor, *MULTIPLES]) if 2 <= k <= M // 2]
 
 
 def omissions(
-    first: Signal, span: slice, core: slice, length: float, odd: Sequence[tuple[str, Difference]]
+    first: Signal, span: slice, agreeing: slice, length: float, differing: Sequence[tuple[str, Difference]]
 ) -> list[str]:
-    """State what does not repeat or repeats badly, and which keys of study.toml leave it out without a remark."""
+    """Describe samples that do not repeat or repeat badly, and the keys of study.toml that confirm their omission."""
     t = first.t
-    sides = [f"the {t[core.start] - t[0]:.2f} s before"] * (span.start > 0)
-    sides += [f"the {t[-1] - t[core.stop - 1]:.2f} s after"] * (span.stop < len(t))
-    faults = [f"{' and '.join(sides)} do not, as in a stop, a ramp or another motion{gaps_at(first, span)}"]
+    sides = [f"the {t[agreeing.start] - t[0]:.2f} s before"] * (span.start > 0)
+    sides += [f"the {t[-1] - t[agreeing.stop - 1]:.2f} s after"] * (span.stop < len(t))
+    faults = [f"{' and '.join(sides)} do not repeat, as in a stop, a ramp or another motion{gaps_at(first, span)}"]
     faults *= bool(sides)
-    for name, d in odd:
+    for name, d in differing:
         inside = d.has_periods_on_both_sides
-        if inside or t[core.start] - t[span.start] > MIN_REMARKED_LOSS * length or not sides:
-            number = f"{'the remaining ' * (d.periods < odd[0][1].periods)}{d.periods}"
+        if inside or t[agreeing.start] - t[span.start] > MIN_REMARKED_LOSS * length or not sides:
+            number = f"{'the remaining ' * (d.periods < differing[0][1].periods)}{d.periods}"
             differs = f"period {d.period + 1} of {number} differs from the others by {d.rms:.3g} rms in {name}"
             what = "and is kept, because it is not at an end" if inside else "as in a transient"
             faults.append(f"{differs}, {d.ratio:.1f} times what noise explains, {what}")
-    keys = [f"skip = {np.floor(t[core.start] * 1e4 + 1e-3) / 1e4:.10g}"] * (core.start > 0)
-    keys += [f"until = {np.ceil(t[core.stop - 1] * 1e4 - 1e-3) / 1e4:.10g}"] * (core.stop < len(t))
+    keys = [f"skip = {np.floor(t[agreeing.start] * 1e4 + 1e-3) / 1e4:.10g}"] * (agreeing.start > 0)
+    keys += [f"until = {np.ceil(t[agreeing.stop - 1] * 1e4 - 1e-3) / 1e4:.10g}"] * (agreeing.stop < len(t))
     advice = f"; other samples are left out: write {' and '.join(keys)} in study.toml to confirm that" if keys else ""
     return [
-        f"{first.log}: {t[core.start]:.2f} to {t[core.stop - 1]:.2f} s are evaluated, which repeat every "
+        f"{first.log}: {t[agreeing.start]:.2f} to {t[agreeing.stop - 1]:.2f} s are evaluated, which repeat every "
         f"{length:.4f} s; {'; '.join(faults)}{advice}"
     ] * bool(faults)
 
 
 def gaps_at(signal: Signal, span: slice) -> str:
-    """State the gaps of the clock at which a stretch ends: they are then not as long as the clock says."""
+    """Report the gaps in the clock at which a stretch ends; the motion shows that their duration is wrong."""
     t, segment = signal.t, signal.segment
     edges = [i for i in (span.start, span.stop) if 0 < i < len(t) and segment[i] != segment[i - 1]]
     gaps = [f"{t[i] - t[i - 1]:.4g} s after {t[i - 1]:.2f} s" for i in edges]
@@ -167,7 +169,7 @@ def gaps_at(signal: Signal, span: slice) -> str:
 
 
 def reconcile_period(estimate: Period, entry: LogEntry) -> tuple[Period, list[str]]:
-    """The stated period unless the data exclude it, with its standard error from the data; and a remark if they do."""
+    """The stated period, or the estimated one and a remark if the data exclude it; the standard error is estimated."""
     stated = entry.period
     if not stated:
         return estimate, []
@@ -187,7 +189,8 @@ def average_joint(
     signal: Signal, used: slice, phased: Phases, period: Period, stated: float, lowpass: float
 ) -> Iterator[Average | PeriodResidual]:
     """Average one joint over its periods at each phase, from the first used sample on."""
-    size = float(np.sqrt(np.mean(lowpass_segments(signal.tau, signal.segment, signal.rate, lowpass)[used] ** 2))) or 1.0
+    slow_tau = lowpass_segments(signal.tau, signal.segment, signal.rate, lowpass)
+    rms_tau = float(np.sqrt(np.mean(slow_tau[used] ** 2))) or 1.0
     tau = phased.fold(signal.tau[used])
     white = white_noise(tau, signal.segment[used], signal.rate, lowpass)
     q, dq = phased.fold(signal.q[used]), phased.fold(signal.dq[used])
@@ -204,7 +207,7 @@ def average_joint(
         sigma_dq=averaging.noise_std(dq),
         sigma_tau=averaging.noise_std(tau),
         sigma_tau_white=white,
-        relative_noise=white * float(np.sqrt(share_passed(signal.rate, lowpass))) / size,
+        relative_noise=white * float(np.sqrt(share_passed(signal.rate, lowpass))) / rms_tau,
         t=np.arange(phased.K) / phased.K * period.length,
         q=q.mean,
         dq=dq.mean,
@@ -218,10 +221,10 @@ def average_joint(
 
 
 def white_noise(folded: Folded, segment: Counts, rate: float, lowpass: float) -> float:
-    """Standard deviation of the noise that neither repeats nor is as slow as the motion.
+    """Standard deviation of the noise that does not repeat and is faster than the motion.
 
-    The mean at each phase takes one degree of freedom.  A ripple of the drive is fast, too, but repeats; errors that
-    depend on the motion are slower.
+    The mean at each phase takes one degree of freedom.  A ripple of the drive is fast, too, but it repeats.  Errors
+    that depend on the motion are slower.
     """
-    shrunk = float(np.sqrt(len(folded.noise) / averaging.degrees(folded)))
-    return noise_std(folded.noise, segment, rate, lowpass) * shrunk
+    correction = float(np.sqrt(len(folded.noise) / averaging.degrees(folded)))
+    return noise_std(folded.noise, segment, rate, lowpass) * correction

@@ -1,4 +1,4 @@
-"""Compute the stability limits of haptic feedback: how stiff tissue may be, in theory and in simulation."""
+"""Compute the stability limits of haptic feedback: the largest tissue stiffness, in theory and in simulation."""
 
 from collections.abc import Iterable, Iterator
 
