@@ -98,7 +98,7 @@ def test_standard_errors_of_many_draws_at_once_are_those_of_one_draw_after_the_o
         found = standard_error(lambda drawn, share=share: float(np.quantile(np.concatenate(drawn), share)), parts)
         assert error_of_quantile(x, share) == pytest.approx(found, rel=1e-12)
     found = standard_error(lambda drawn: float(np.sqrt(np.mean(np.concatenate(drawn) ** 2))), parts)
-    assert error_of_pooled_mean(x**2, of=np.sqrt) == pytest.approx(found, rel=1e-12)
+    assert error_of_pooled_mean(x**2, function=np.sqrt) == pytest.approx(found, rel=1e-12)
     assert np.isnan(error_of_pooled_mean(x[:1]))
     assert np.isnan(error_of_quantile(x[:1], 0.5))
 

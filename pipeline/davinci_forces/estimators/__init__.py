@@ -14,5 +14,5 @@ def estimator(name: str) -> Estimator:
 
 
 def title_of(name: str) -> str:
-    """Return the title of an estimator, as `least squares`; the name itself where there is none."""
+    """Return the title of an estimator, as `least squares`, or the name if it is no estimator's."""
     return str(import_module(f"davinci_forces.estimators.{name}").NAME) if name in ESTIMATORS else name

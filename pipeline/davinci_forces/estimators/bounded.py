@@ -7,7 +7,7 @@ NAME = "bounded least squares"
 
 
 def estimate(problem: Regression) -> Estimate:
-    """theta = arg min |tau - Phi theta|^2 with theta_i >= 0 where physics gives the sign; the global minimum.
+    """theta = arg min |tau - Phi theta|^2 with theta_i >= 0 if physics requires it; the global minimum.
 
     The standard errors are those of least squares, which are too large for a parameter at its bound.
     """

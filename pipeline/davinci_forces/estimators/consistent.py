@@ -13,14 +13,14 @@ NAME = "physically consistent least squares"
 def estimate(problem: Regression) -> Estimate:
     """theta = arg min |tau - Phi theta|^2 over the parameters of mechanisms; over signs for a joint without bodies.
 
-    The standard errors are those of least squares.  Where no constraint is active the estimates are the same.  Where
-    one is, the effort errs less than that of least squares, because projections onto a convex set are no further apart
+    The standard errors are those of least squares.  If no constraint is active, both estimates are equal.  If one is
+    active, the effort errs less than that of least squares, because projections onto a convex set are no further apart
     than their points.  The stated error of a parameter at its bound is too large.
 
     Raises
     ------
     NotIdentifiable
-        If the conic program is not solved, or if least squares raise it.
+        If the conic program is not solved, or if least squares raise this error.
     """
     weight, R = problem.weight, problem.triangle
     theta = nearest(R, of_signs(problem.known.signs(len(R.y)))).theta

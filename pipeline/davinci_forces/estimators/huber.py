@@ -9,10 +9,10 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation.least_squares import Triangle
 
 NAME = "robust least squares"
-HUBER_K = 1.345  # deviations of the residuals: 95 % as efficient as least squares on normal noise
-MAD_TO_STD = 1.4826  # of normal residuals: from their median absolute value to their standard deviation
+HUBER_K = 1.345  # in standard deviations of the residuals: 95 % as efficient as least squares on normal noise
+MAD_TO_STD = 1.4826  # standard deviation of normal residuals over their median absolute value
 MAX_STEPS_HUBER = 200
-TOLERANCE_HUBER = 1e-12  # of the effort
+TOLERANCE_HUBER = 1e-12  # change of the fitted effort at which the iteration stops, as a share of the effort
 
 
 class RobustFit(NamedTuple):
@@ -30,7 +30,7 @@ def estimate(problem: Regression) -> Estimate:
     least squares on residuals s psi(r / s), over the share of samples within `HUBER_K`.  (Huber, 1981, (7.6.5))
 
     The parameters are those of statsmodels' RLM, which has no weights and no standard errors for correlated residuals,
-    and needs eight times as long for 600 000 rows.
+    and takes eight times as long for 600 000 rows.
     """
     weight, R = problem.weight, problem.triangle
     fit = fit_robustly(problem, weight, R)
@@ -55,6 +55,6 @@ def fit_robustly(problem: Regression, weight: Array, R: Triangle) -> RobustFit:
 
 def robust_standard_errors(problem: Regression, weight: Array, R: Triangle, fit: RobustFit) -> StandardErrors:
     """Compute the standard errors from pseudo-residuals."""
-    near = float(np.mean(np.abs(fit.off[weight > 0]) < HUBER_K))
-    pseudo = fit.deviation * np.clip(fit.off, -HUBER_K, HUBER_K) / near
+    share_inside = float(np.mean(np.abs(fit.off[weight > 0]) < HUBER_K))
+    pseudo = fit.deviation * np.clip(fit.off, -HUBER_K, HUBER_K) / share_inside
     return standard_errors(problem, weight, R, fit.theta, pseudo)

@@ -1,8 +1,8 @@
 """Instrumental variables: parameters that noise of the measured motion does not bias towards zero.
 
-Noise of positions and velocities is in the regressor, too, where least squares take it for motion.  The motion a few
-samples before and after is as informative, but its noise is independent.  Periods averaged over the excitation's
-harmonics have little noise, and both estimators agree.
+Noise of positions and velocities enters the regressor, and least squares treat it as motion.  The motion a few samples
+before and after is as informative, but its noise is independent.  Periods averaged over the excitation's harmonics have
+little noise, so both estimators agree on them.
 """
 
 import numpy as np
@@ -13,7 +13,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation.least_squares import dependent_parameters
 
 NAME = "instrumental variables"
-LAG = 3  # samples before and after: further than a low-pass correlates noise
+LAG = 3  # samples before and after: a low-pass does not correlate noise over this lag
 
 
 def estimate(problem: Regression) -> Estimate:
@@ -22,7 +22,7 @@ def estimate(problem: Regression) -> Estimate:
     Raises
     ------
     NotIdentifiable
-        If the instruments do not separate the parameters, or if least squares raise it.
+        If the instruments do not separate the parameters, or if least squares raise this error.
     """
     weight, R = problem.weight, problem.triangle
     root = np.sqrt(weight)[:, None]

@@ -8,7 +8,7 @@ NAME = "least squares"
 def estimate(problem: Regression) -> Estimate:
     """theta = (Phi' W Phi)^-1 Phi' W tau, W the number of periods, by QR of the weighted rows.  (6.46), (6.50)
 
-    The standard errors scale with the residuals, so those of a model that does not fit are larger than the noise's.
+    The standard errors scale with the residuals, so a model that does not fit has larger ones than noise.
     """
     weight, R = problem.weight, problem.triangle
     return Estimate(R.theta, lambda: standard_errors(problem, weight, R, R.theta))

@@ -1,4 +1,4 @@
-"""Least squares with a prior: parameters that the data leave open stay near a first guess."""
+"""Least squares with a prior: parameters that the data do not determine stay near a first guess."""
 
 import numpy as np
 
@@ -13,10 +13,10 @@ STRENGTHS = np.geomspace(1e-32, 1e3, 141)  # lambda, for columns of unit length
 def estimate(problem: Regression) -> Estimate:
     """theta = arg min |tau - Phi theta|^2 + lambda |(theta - theta_0) / d|^2.
 
-    theta_0 comes from the robot's tables, and d = |theta_0|, so the penalty counts relative deviations.  Where there is
-    no guess, or one of 0, d is the parameter that would make the whole effort by itself.  lambda maximises the
-    likelihood of the data where parameters scatter around theta_0 by one variance, and the effort around Phi theta by
-    another (MacKay, 1992).  The standard errors are those of least squares, without the information of the guess.
+    theta_0 comes from the robot's tables, and d = |theta_0|, so the penalty is on relative deviations.  Without a
+    guess, or with a guess of 0, d is the parameter that alone would cause the whole effort.  lambda maximises the
+    likelihood of the data, with one variance of the parameters around theta_0 and one of the effort around Phi theta
+    (MacKay, 1992).  The standard errors are those of least squares, without the information of the guess.
     """
     weight, R = problem.weight, problem.triangle
     guess = np.zeros(len(R.y)) if problem.known.guess is None else problem.known.guess

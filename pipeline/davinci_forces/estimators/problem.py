@@ -14,16 +14,16 @@ from davinci_forces.maths.estimation.correlation import correlated_variance
 from davinci_forces.maths.estimation.least_squares import Triangle, dependent_parameters, triangle
 from davinci_forces.maths.models.physical import Box
 
-ROUNDING = 1e-13  # of the longest column, below which a column is only rounding
-MIN_PART_NAMED = 0.01  # share in the square of the least certain combination for a parameter to be named
-MAX_CONDITION = 1e10  # of scaled columns, above which rounding separates them as much as the motion does
+ROUNDING = 1e-13  # a column with a smaller share of the longest column is only rounding
+MIN_PART_NAMED = 0.01  # a parameter is named from this share in the square of the least certain combination on
+MAX_CONDITION = 1e10  # with a larger one, rounding separates the scaled columns as much as the motion does
 
 
 class Prior(NamedTuple):
     """Prior knowledge of p parameters."""
 
-    positive: Booleans | None = None  # (p,) whether physics requires that they are not negative
-    box: Box | None = None  # of the physical parameters that they consist of
+    positive: Booleans | None = None  # (p,) whether physics requires a parameter not to be negative
+    box: Box | None = None  # of the physical parameters that make up these p
     guess: Array | None = None  # (p,)
 
     def signs(self, p: int) -> Booleans:
@@ -41,20 +41,20 @@ class Regression:
     Phi: Array  # (K, p)
     tau: Array  # (K,)
     tau_var: Array  # (K,) variance of one period at each sample
-    periods: NDArray[np.int64]  # (K,) number of periods M behind each sample; 0 where none was recorded
+    periods: NDArray[np.int64]  # (K,) number of periods M in each averaged sample; 0 if none was recorded
     starts: tuple[int, ...]  # where each log begins
     names: tuple[str, ...]  # of the parameters
     known: Prior = NO_PRIOR
-    Phi_cov: Array | None = None  # (S, p, p) covariance of the errors of a row, the mean over each log; None: not known
+    Phi_cov: Array | None = None  # (S, p, p) mean covariance of a row's errors in each log; None: not known
 
     @cached_property
     def weight(self) -> Array:
-        """The weight of each sample (K,) where all periods count the same."""
+        """The weight of each sample (K,) if all periods have the same weight."""
         return self.periods.astype(float)
 
     @cached_property
     def triangle(self) -> Triangle:
-        """The QR factors of the samples where all periods count the same.  Raises what `factorise` does."""
+        """The QR factors of the samples if all periods have the same weight.  Raises the errors of `factorise`."""
         return factorise(self, self.weight)
 
 
@@ -62,7 +62,7 @@ class StandardErrors(NamedTuple):
     """Standard errors of parameters."""
 
     classical: Array  # (p,) standard errors for residuals that are uncorrelated and of equal variance
-    stated: Array  # (p,) for residuals that are neither
+    stated: Array  # (p,) for residuals that are correlated and of varying variance
     lags: float  # the sum of the residuals' correlations over all lags but 0
 
 
@@ -72,9 +72,9 @@ class Search(NamedTuple):
     walls: str  # what happens to particles at the box
     seed: int
     particles: int
-    searched: int  # parameters, n
+    searched: int  # number of parameters, n
     swarms: int
-    excess: float  # of the squared error over the smallest that the known signs allow, as a share of it
+    excess: float  # of the squared error over the smallest one under the known signs, as a share of that
     history: Array  # (I,) mean squared error after each iteration
     theta: Array  # (p,)
 
@@ -117,7 +117,7 @@ Estimator = Callable[[Regression], Estimate]
 
 
 def factorise(problem: Regression, weight: Array) -> Triangle:
-    """Compute the QR factors of the weighted rows; weight (K,) is 0 where there is no sample.  (6.42)
+    """Compute the QR factors of the weighted rows; weight (K,) is 0 without a sample.  (6.42)
 
     Raises
     ------
@@ -160,7 +160,7 @@ def standard_errors(
 ) -> StandardErrors:
     """Compute the standard errors of parameters of least squares, or close to them.
 
-    They come from the weighted residuals, or from a `residual` (K,) in place of them.
+    They follow from the weighted residuals, or from a `residual` (K,) instead.
     """
     inverse = np.linalg.inv(R.U)
     root = np.sqrt(weight)

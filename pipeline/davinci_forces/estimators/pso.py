@@ -1,6 +1,6 @@
 """Particle swarm optimisation: the physical parameters of a joint, searched in a box.  Section 6.5
 
-Without a table of physical parameters the search runs over those of the model, `REACH` standard errors around least
+Without a table of physical parameters, the search is over those of the model, `REACH` standard errors around least
 squares; inertia and friction are not negative.
 """
 
@@ -32,11 +32,11 @@ def estimate(problem: Regression) -> Estimate:
 
 
 def box_around(R: Triangle, problem: Regression) -> Box:
-    """Return a box around least squares that holds the best parameters of the known signs."""
+    """Return a box around least squares that contains the best parameters with the known signs."""
     K, p = int((problem.periods > 0).sum()), len(R.y)
     std = np.sqrt(R.squares / (K - p) * (np.linalg.inv(R.U) ** 2).sum(axis=1)) / R.scale
     theta, positive = R.theta, problem.known.signs(p)
-    std = np.maximum(std, np.finfo(float).eps * np.abs(theta))  # data without noise have none
+    std = np.maximum(std, np.finfo(float).eps * np.abs(theta))  # data without noise have no error
     missing = np.max(-theta[positive] / std[positive], initial=0.0)
     reach = (REACH + missing) * std
     lower, upper = theta - reach, theta + reach

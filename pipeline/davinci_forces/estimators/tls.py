@@ -3,7 +3,7 @@
     theta = arg min |tau - Phi theta|^2 / (v + theta' C theta)
 
 C is what the noise of the motion adds to Phi' Phi, and v the variance of the effort's noise.  QR eliminates columns
-without noise; of the others, each over its noise, the smallest singular direction is noise.  Golub and Van Loan, An
+without noise.  Of the others, each over its noise, the smallest singular direction is noise.  Golub and Van Loan, An
 analysis of the total least squares problem, 1980; Van Huffel and Vandewalle, The Total Least Squares Problem, 1991,
 section 3.5 (generalised: mixed, and correlated noise).
 """
@@ -19,10 +19,10 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation.least_squares import Triangle
 
 NAME = "total least squares"
-EXACT = 1e-12  # of the noisiest combination's variance, below which one has no noise
+EXACT = 1e-12  # a combination with a smaller share of the noisiest one's variance has no noise
 MAX_STEPS_TLS = 100
-TOLERANCE_TLS = 1e-10  # of the effort's noise
-MAX_NOISE_SHARE = 0.5  # of a combination's square: with more noise the remainder is not known
+TOLERANCE_TLS = 1e-10  # relative change of the effort's noise at which the iteration stops
+MAX_NOISE_SHARE = 0.5  # with a larger share of noise in a combination's square, its motion is not known
 
 
 class Noise(NamedTuple):
@@ -35,16 +35,16 @@ class Noise(NamedTuple):
 def estimate(problem: Regression) -> Estimate:
     """Find theta of the smallest singular value of columns and effort over their noise; without noise, least squares.
 
-    The effort's noise v is the residual beyond the columns' part, because a model errs, too.  It is at least the
-    variance between periods.  The standard errors are those of the estimating equation (Phi' Phi - C) theta = Phi' tau
-    by residuals, which hold both noises.  The classical ones are right to first order.  The others assume that noise in
-    columns is as smooth as they are, as that of kept harmonics is.  White noise there would count as correlation, and
-    make them too large.  None of them shows noise of the columns that is not in the residual.
+    The effort's noise v is the residual without the part of the columns' noise, because it includes the model's error.
+    It is at least the variance between periods.  The standard errors are those of (Phi' Phi - C) theta = Phi' tau, from
+    residuals, which contain both noises.  The classical errors are right to first order.  The others assume that the
+    noise in a column is as smooth as the column, as noise of kept harmonics is; white noise in columns would make them
+    too large.  Neither includes noise of the columns that is not in the residual.
 
     Raises
     ------
     NotIdentifiable
-        If the noise of the columns is not known or too large, or if least squares raise it.
+        If the noise of the columns is not known or too large, or if least squares raise this error.
     """
     weight, R = problem.weight, problem.triangle
     if problem.Phi_cov is None:
@@ -59,7 +59,7 @@ def estimate(problem: Regression) -> Estimate:
 
 
 def refuse_noisy(problem: Regression, R: Triangle, C: Array) -> None:
-    """Raise NotIdentifiable where noise is half the square of a combination of columns without the others."""
+    """Raise NotIdentifiable if more than half the square of a combination of columns, without the others, is noise."""
     inverse = np.linalg.inv(R.U)
     share, axes = np.linalg.eigh(inverse.T @ C @ inverse)
     if share[-1] > MAX_NOISE_SHARE:
@@ -70,7 +70,7 @@ def refuse_noisy(problem: Regression, R: Triangle, C: Array) -> None:
 
 
 def fit_scaled(R: Triangle, C: Array, v_min: float) -> Array:
-    """Fit the scaled parameters (p,) with the effort's noise of their residual, at least `v_min`."""
+    """Fit the scaled parameters (p,) with the effort's noise from their residual, at least `v_min`."""
     variance, axes = np.linalg.eigh(C)
     noise = Noise(axes, np.where(variance > EXACT * variance[-1], variance, 0.0))
     theta = R.theta * R.scale
@@ -86,7 +86,7 @@ def fit_scaled(R: Triangle, C: Array, v_min: float) -> Array:
 
 
 def fit_for_noise(R: Triangle, noise: Noise, v: float) -> Array:
-    """Fit the scaled parameters (p,) where the effort's noise is v: QR of the exact columns, then SVD of the others."""
+    """Fit the scaled parameters (p,) for noise v of the effort: QR of the exact columns, then SVD of the others."""
     p = len(R.y)
     M = np.zeros((p + 1, p + 1))
     M[:p, :p], M[:p, p], M[p, p] = R.U @ noise.axes, R.y, np.sqrt(R.squares)

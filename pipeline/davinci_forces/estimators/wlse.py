@@ -1,4 +1,4 @@
-"""Weighted least squares: samples at which the periods differ more count less."""
+"""Weighted least squares: samples at which the periods differ more have less weight."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,10 +8,10 @@ from davinci_forces.estimators.problem import Estimate, Regression, factorise, s
 from davinci_forces.maths.arrays import Array
 
 NAME = "weighted least squares"
-MIN_PERIODS = 4  # fewer say too little of their variance
-DEGREES = 200  # of freedom behind each weight, whose uncertainty is then 10 %
-MIN_EXCESS_Z = 3.0  # of the residuals over the noise [standard errors],
-MIN_EXCESS_SHARE = 0.05  # and as a share of it: the pooled variance itself is not known better
+MIN_PERIODS = 4  # fewer periods do not determine their variance
+DEGREES = 200  # degrees of freedom of each weight, which give it an uncertainty of 10 %
+MIN_EXCESS_Z = 3.0  # [standard errors] least excess of the residuals over the noise that is the model's error
+MIN_EXCESS_SHARE = 0.05  # the same as a share of the noise: the pooled variance is not known better
 MAX_STEPS_WLSE = 100
 
 
@@ -19,15 +19,15 @@ def estimate(problem: Regression) -> Estimate:
     """theta = (Phi' W Phi)^-1 Phi' W tau, with W the inverse variance of the averaged effort.  (6.49), corrected
 
     The variance between M periods at one sample has M - 1 degrees of freedom; weights of its inverse are so uncertain
-    that they do worse than none.  It is therefore pooled over neighbouring samples of the period until each weight has
-    `DEGREES` degrees of freedom.  The variance of the mean is that of one period over M.  Where the residuals exceed
-    the noise, the model's error adds a constant variance to all samples, and weights become more equal.  Otherwise they
-    would favour samples of little noise, at which the model errs as much as elsewhere.
+    that they do worse than none.  The variance is pooled over neighbouring samples until each weight has
+    `DEGREES` degrees of freedom.  The variance of the mean is that of one period over M.  If the residuals exceed the
+    noise, a constant variance of the model's error is added to all samples, so that weights become more equal.  Without
+    it, the weights would favour samples of little noise, at which the model errs as much as at all others.
 
     Raises
     ------
     NotIdentifiable
-        If a log holds fewer than `MIN_PERIODS` periods.
+        If a log has fewer than `MIN_PERIODS` periods.
     """
     fewest = min(median_periods(M) for M in np.split(problem.periods, problem.starts[1:]))
     if fewest < MIN_PERIODS:
@@ -65,8 +65,8 @@ def add_model_error(weight: Array, residual: Array, degrees: int) -> Array:
 def pool_variance(var: Array, M: NDArray[np.int64]) -> Array:
     """Average the variance (K,) of one period over neighbouring samples that have `DEGREES` degrees of freedom.
 
-    Each sample is weighted by its degrees of freedom, M - 1 for M (K,) periods.  Where periods do not differ at all,
-    all samples get the same variance.
+    Each sample is weighted by its degrees of freedom, M - 1 for M (K,) periods.  If periods do not differ at all, all
+    samples get the same variance.
     """
     K, lowest, highest = len(var), max(int(M.min()) - 1, 0), max(int(M.max()) - 1, 0)
     if lowest == highest:
@@ -86,7 +86,7 @@ def half_width(degrees: float, K: int) -> int:
 
 
 def median_periods(M: NDArray[np.int64]) -> int:
-    """Return the median number of periods (K,) of the samples that have any."""
+    """Return the median number of periods (K,) over the samples with at least one."""
     return int(M[0]) if M.min() == M.max() else int(np.median(M[M > 0]))
 
 

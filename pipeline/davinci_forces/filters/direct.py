@@ -12,7 +12,7 @@ NAME = "Measured minus model"
 
 
 def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
-    """Subtract the model's effort; the standard deviation is that of the effort's noise."""
+    """Subtract the model's effort; the standard deviation is that of the noise of the effort."""
     joint, q, dq, ddq, tau, T_s, _ = recording
     tau_ext = tau - joint.inertia * ddq - bias(joint.coefficients, q, dq, 0.0)[0] - joint.known
     zeros = np.zeros(len(q))

@@ -1,10 +1,10 @@
-"""The extended Kalman filter of one joint, with the external effort as a state, stepped to second order.
+"""The extended Kalman filter of one joint, with the external effort as a state, with steps of second order.
 
     f(x, u) = [dq, (u - b(q, dq) - tau_ext) / M, 0],    A = df/dx
     x[k+1] = x + T_s f + T_s^2 / 2 A f + w,    F = I + T_s A + T_s^2 / 2 A^2          (7.11)-(7.16), stepped further
 
-Forward Euler, as the source prints it (`ekf_euler`), omits T_s^2 / 2 times the acceleration, which exceeds an encoder's
-noise.  The process noise of the velocity is that of an acceleration that is constant over a sample.
+Forward Euler, as the source prints it (`ekf_euler`), omits T_s^2 / 2 times the acceleration.  This term exceeds an
+encoder's noise.  The process noise of the velocity is that of an acceleration that is constant over a sample.
 """
 
 from typing import Any
@@ -31,7 +31,7 @@ def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
 def log_likelihood(recording: FilterInput, noise: NoiseModel) -> float:
     """Compute the log-likelihood of the measurements (2 N): -1/2 sum of (i' S^-1 i + log det 2 pi S).
 
-    The first second is omitted, because the initial state still acts on it.
+    The first second is omitted, because it still depends on the initial state.
     """
     transient = min(round(TRANSIENT / recording.T_s), len(recording.q) // 2)
     return float(_likelihood(transient, *arguments(recording, noise)))
@@ -43,7 +43,7 @@ def step(
     """Filter one sample as it arrives: return the corrected state, and its prediction for the next sample.
 
     `s` is the last prediction, or `stepping.first`; `y` are position and velocity; `drive` is the effort less the known
-    effort of other joints.  The same as `track`, number for number, for the same drive and inertia M.
+    effort of other joints.  The results equal those of `track` exactly for the same drive and inertia M.
     """
     corrected, predicted = _step(s, *y, drive, M, c_b, T_s, *covariances(noise, T_s))
     return corrected, predicted

@@ -2,8 +2,8 @@
 
     R = C - H P H',    C the mean of i i' with weights that decay over `WINDOW`
 
-R stays between 0.1 and 1000 times the tuned variance, so that the filter does not lose the joint.  All else is as in
-`ekf`.
+R stays between 0.1 and 1000 times the tuned variance, so that the filter does not lose track of the joint.  Everything
+else is as in `ekf`.
 """
 
 import numpy as np

@@ -4,7 +4,7 @@
     dq[k+1]      = dq + T_s (tau - b(q, dq) - tau_ext) / M + w_dq
     tau_ext[k+1] = tau_ext + w_tau                                                        (7.11)-(7.16)
 
-The error of a step in position and velocity counts as process noise, by its root mean square over the recording.
+The errors of a step in position and velocity are added to the process noise, by their mean squares over the recording.
 """
 
 import numpy as np

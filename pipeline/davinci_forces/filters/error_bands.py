@@ -16,7 +16,7 @@ from davinci_forces.maths.uncertainty.error_band import (
 from davinci_forces.records import ErrorBand
 from davinci_forces.records.prediction import ANOTHER_PATH
 
-OTHER_BLOCKS = "its own other blocks"  # the source where there is no other log
+OTHER_BLOCKS = "its own other blocks"  # the source if there is no other log
 
 
 class ModelVariance(NamedTuple):
@@ -31,8 +31,8 @@ def model_variance(band: ErrorBand, log: str, path: str, dq: Array, is_centred: 
     """Compute the variance of a log's external effort beyond the filter's, along its velocity (N,).
 
     The errors are those of other logs on a path of the same kind, because on a fitted path a model's error repeats.
-    Without such logs they are those on another path, which are larger.  Where there is no other log, the variance of
-    each block is that of the other blocks.  `is_centred` is for efforts whose offset of the day was subtracted.
+    Without such logs, the larger errors on another path are used.  If there is no other log, the variance of a block is
+    that of the other blocks.  `is_centred` is for efforts whose day offset was subtracted.
     """
     source, others = np.asarray(band.source).astype(str), np.asarray(band.source).astype(str) != log
     kinds = np.asarray(band.path_of).astype(str)
@@ -50,7 +50,7 @@ def model_variance(band: ErrorBand, log: str, path: str, dq: Array, is_centred: 
 
 
 def select_cells(band: ErrorBand, which: Booleans, is_centred: bool) -> SpeedCells:
-    """Return the selected cells of a band, centred where asked."""
+    """Return the selected cells of a band; without the mean of each log if `is_centred`."""
     _, source = np.unique(np.asarray(band.source).astype(str), return_inverse=True)
     sums = (band.count, band.mean_square, band.filter_square, band.log_mean)
     cells = SpeedCells(source, band.block, band.speed_bin, *sums).select(which)

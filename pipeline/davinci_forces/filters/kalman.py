@@ -3,8 +3,8 @@
     x = [q, dq, tau_ext, ...],    y = H x + v,    v ~ N(0, diag(R))                                              (7.6)
     x[k+1] = [f(q, dq, tau_ext), Phi x] + w,    w ~ N(0, Q)                                                      (7.7)
 
-f is the step of the joint's motion (`stepping`).  `ekf` is the same with three states, written out, which takes three
-quarters of the time.
+f is the step of the joint's motion (`stepping`).  `ekf` is the same filter for three states; its written-out equations
+take three quarters of the time.
 """
 
 from typing import Any, NamedTuple
@@ -17,7 +17,7 @@ from davinci_forces.filters.stepping import INITIAL_VARIANCE_RATIO, columns, cov
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import compile_and_store
 
-MIN_NOISE_RATIO, MAX_NOISE_RATIO = 0.1, 1e3  # of an adapted measurement variance to the tuned one
+MIN_NOISE_RATIO, MAX_NOISE_RATIO = 0.1, 1e3  # range of an adapted measurement variance, relative to the tuned one
 
 
 class States(NamedTuple):
@@ -33,9 +33,9 @@ class States(NamedTuple):
     Q: Array  # (n, n)
     in_q: tuple[int, ...] = (0,)  # the states whose sum is measured as position
     in_dq: tuple[int, ...] = (1,)  # the states whose sum is measured as velocity
-    order: int = 2  # in T_s, of the step of the motion: 1 or 2
-    doubts: bool = True  # whether the sign of Coulomb friction is uncertain where the velocity may be 0
-    forgets: float = 0.0  # share of the innovations' mean square forgotten a sample, where R adapts to it; 0: never
+    order: int = 2  # of the motion's step in T_s: 1 or 2
+    doubts: bool = True  # whether the sign of Coulomb friction is uncertain near zero velocity
+    forgets: float = 0.0  # share of the innovations' mean square forgotten per sample, if R adapts; 0: R is fixed
 
 
 def states(recording: FilterInput, noise: NoiseModel, n: int = 3) -> States:
@@ -72,8 +72,8 @@ def _pass(
     transient: int, out: Any, start: Any, P: Any, in_q: Any, in_dq: Any, R_q: float, R_dq: float, F: Any, Q: Any,
     h: float, doubts: float, forgets: float, y_q: Any, y_dq: Any, drive: Any, inertia: Any, c_b: Any, T_s: float,
 ) -> float:  # fmt: skip
-    """Run the loop.  `start` is a tuple, whose length n the compiler knows: twice as fast."""
-    n, first_q, first_dq, C_q, C_dq, total = len(start), R_q, R_dq, 0.0, 0.0, 0.0
+    """Run the loop.  `start` is a tuple, so that the compiler knows its length n, which is twice as fast."""
+    n, tuned_q, tuned_dq, C_q, C_dq, total = len(start), R_q, R_dq, 0.0, 0.0, 0.0
     x, B, D, K, G = np.array(start), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, 2)), np.zeros((n, n))
     for k in range(len(y_q)):
         i_q, i_dq, s_qq, s_qd, s_dd = y_q[k], y_dq[k], 0.0, 0.0, 0.0
@@ -92,8 +92,8 @@ def _pass(
             if k == 1:  # the first sample has set the velocity
                 C_q, C_dq = s_qq + R_q, s_dd + R_dq
             C_q, C_dq = C_q + forgets * (i_q * i_q - C_q), C_dq + forgets * (i_dq * i_dq - C_dq)
-            R_q = min(max(C_q - s_qq, MIN_NOISE_RATIO * first_q), MAX_NOISE_RATIO * first_q)
-            R_dq = min(max(C_dq - s_dd, MIN_NOISE_RATIO * first_dq), MAX_NOISE_RATIO * first_dq)
+            R_q = min(max(C_q - s_qq, MIN_NOISE_RATIO * tuned_q), MAX_NOISE_RATIO * tuned_q)
+            R_dq = min(max(C_dq - s_dd, MIN_NOISE_RATIO * tuned_dq), MAX_NOISE_RATIO * tuned_dq)
         s_qq, s_dd = s_qq + R_q, s_dd + R_dq
         det = s_qq * s_dd - s_qd * s_qd
         v_qq, v_qd, v_dd = s_dd / det, -s_qd / det, s_qq / det
@@ -115,7 +115,7 @@ def _pass(
         x[0], x[1], top, friction_var = transition(x[0], x[1], x[2], dq_var, drive[k], inertia[k], c_b, T_s, h)
         for j in range(3):
             F[0, j], F[1, j] = top[j], top[3 + j]
-        for i in range(3, n):  # what changes the effort changes the velocity, to second order
+        for i in range(3, n):  # a change of the effort changes the velocity, to second order
             F[1, i] = -h / T_s / inertia[k] * F[2, i]
             x[1] += F[1, i] * x[i]
         for i in range(n):

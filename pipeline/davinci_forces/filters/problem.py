@@ -46,7 +46,7 @@ class NoiseModel(NamedTuple):
     r_q: float
     r_dq: float
     q_q: float
-    q_dq: float  # by an acceleration that is constant over the sample, which changes q by T_s q_dq / 2
+    q_dq: float  # due to an acceleration that is constant over the sample and changes q by T_s q_dq / 2
     q_tau: float  # of one step of the random walk
 
 
@@ -69,9 +69,9 @@ Filter = Callable[[FilterInput, NoiseModel], Tracked]  # track(recording, noise)
 
 
 def filter_inputs(model: JointModel, tau_hat: Array | None = None) -> list[FilterInput]:
-    """Return the segments of a joint's log for a filter, as measured; each gap starts a filter anew.
+    """Return the segments of a joint's log for a filter, as measured; a filter restarts after each gap.
 
-    `tau_hat` (N,) is the effort of another fit, to be subtracted in place of the model's.
+    `tau_hat` (N,) is the effort of another fit, to be subtracted instead of the model's effort.
     """
     tau_known = model.tau_known if tau_hat is None else model.tau_known + (tau_hat - model.tau_hat)
     return _segments(model, model.q_measured, model.dq_measured, tau_known)

@@ -2,8 +2,8 @@
 
     d/dt tau_ext = rate,    rate[k+1] = rate[k] + w,    w ~ N(0, q_tau^2 / T_s^2)
 
-The motion is stepped as in `ekf`, with the sign of the velocity taken as known.  `q_tau` is the standard deviation of
-the rate's change over a sample, times T_s.
+The step of the motion is that of `ekf`, but the sign of the velocity is taken as known.  `q_tau` is the standard
+deviation of the rate's change over a sample, times T_s.
 """
 
 import numpy as np

@@ -1,7 +1,7 @@
 """The smoother: every state estimated from the whole recording, before and after it.
 
-The filter runs forwards, then the recursion of Bryson and Frazier backwards (in the form of Bierman 1973).  It equals
-that of Rauch, Tung and Striebel, without an inverse of P:
+The filter runs forwards, then the recursion of Bryson and Frazier backwards (in the form of Bierman 1973).  The result
+equals that of Rauch, Tung and Striebel, without an inverse of P:
 
     l~ = -H' S^-1 i + (I - K H)' l^,    L~ = H' S^-1 H + (I - K H)' L^ (I - K H),
 
@@ -18,8 +18,8 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import compile_and_store
 
 NAME = "Smoother"
-MIN_VARIANCE_SHARE = 1e-12  # of the predicted variance: below it a smoothed one is rounding
-STORED = 15  # numbers of each sample: the prediction, and the transition to the next
+MIN_VARIANCE_SHARE = 1e-12  # a smoothed variance with a smaller share of the predicted one is rounding
+STORED = 15  # numbers stored per sample: its prediction, and the transition to the next sample
 
 
 def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
@@ -68,7 +68,7 @@ def _backwards(
         m11, m12, m21, m22 = 1.0 - k11, -k12, -k21, 1.0 - k22
         t1, t2 = v_qq * i_q[k] + v_qd * i_dq[k], v_qd * i_q[k] + v_dd * i_dq[k]
         l1, l2 = m11 * l1 + m21 * l2 - k31 * l3 - t1, m12 * l1 + m22 * l2 - k32 * l3 - t2
-        # L^ (I - K H), then (I - K H)' times that
+        # L^ (I - K H), then (I - K H)' L^ (I - K H)
         g11, g12 = L11 * m11 + L12 * m21 - L13 * k31, L11 * m12 + L12 * m22 - L13 * k32
         g21, g22 = L12 * m11 + L22 * m21 - L23 * k31, L12 * m12 + L22 * m22 - L23 * k32
         g31, g32 = L13 * m11 + L23 * m21 - L33 * k31, L13 * m12 + L23 * m22 - L33 * k32
@@ -84,7 +84,7 @@ def _backwards(
             before = stored[k - 1]
             f11, f12, f13, f21, f22, f23 = before[9], before[10], before[11], before[12], before[13], before[14]
             l1, l2, l3 = f11 * l1 + f21 * l2, f12 * l1 + f22 * l2, f13 * l1 + f23 * l2 + l3
-            # L~ F, then F' times that
+            # L~ F, then F' L~ F
             h11, h12, h13 = L11 * f11 + L12 * f21, L11 * f12 + L12 * f22, L11 * f13 + L12 * f23 + L13
             h21, h22, h23 = L12 * f11 + L22 * f21, L12 * f12 + L22 * f22, L12 * f13 + L22 * f23 + L23
             h33 = L13 * f13 + L23 * f23 + L33

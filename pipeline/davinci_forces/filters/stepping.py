@@ -4,7 +4,7 @@
     x[k+1] = x + T_s f + T_s^2 / 2 A f + w,    F = I + T_s A + T_s^2 / 2 A^2          (7.11)-(7.16), stepped further
 
 Where the velocity passes through 0, the sign of Coulomb friction is uncertain.  The friction's mean is then
-c_f erf(dq / sqrt(2 P_dq)), and its variance c_f^2 (1 - erf^2) counts as noise of the drive.
+c_f erf(dq / sqrt(2 P_dq)), and its variance c_f^2 (1 - erf^2) is added to the noise of the drive.
 
 A filter corrects its belief of one joint by a measurement, and predicts it for the next sample.
 
@@ -24,8 +24,8 @@ from davinci_forces.maths.models.bias import COULOMB
 from davinci_forces.maths.models.kernels import bias
 
 TINY = 1e-300
-# Of the first position and velocity to the measurement's variance: they then weigh nothing beside what is measured.
-# More than that would leave the smoother without digits.
+# Initial variance of position and velocity over that of a measurement: with this ratio the initial state has no weight
+# against measurements.  A larger ratio would leave the smoother without digits.
 INITIAL_VARIANCE_RATIO = 1e6
 
 
@@ -52,7 +52,7 @@ def covariances(noise: NoiseModel, T_s: float) -> tuple[float, float, float, flo
 def transition(
     q: float, dq: float, tau_ext: float, dq_var: float, drive: float, M: float, c_b: Any, T_s: float, h: float
 ) -> Any:
-    """Step position and velocity by a sample; return them, F, and the velocity variance of an uncertain friction sign.
+    """Step position and velocity by a sample; return both, F, and the velocity variance by an uncertain friction sign.
 
     h is T_s^2 / 2; with 0 the step is forward Euler's.
     """
@@ -71,7 +71,7 @@ Transition = tuple[float, float, float, float, float, float]  # F = [f11 f12 f13
 
 
 def first(q: float, dq: float, r_q: float, r_dq: float, first_std: float) -> Belief:
-    """Return the initial belief: at the first position and velocity, not the printed x = 0 and P = Q_0.  (7.6)"""
+    """Return the initial belief, at the first position and velocity instead of the printed x = 0, P = Q_0.  (7.6)"""
     q_var, dq_var = INITIAL_VARIANCE_RATIO * r_q * r_q, INITIAL_VARIANCE_RATIO * r_dq * r_dq
     return q, dq, 0.0, q_var, 0.0, 0.0, dq_var, 0.0, first_std * first_std
 
@@ -94,7 +94,7 @@ def gains(s: Any, R_q: float, R_dq: float) -> Any:
 
 @compile_function
 def correct(s: Any, y_q: float, y_dq: float, R_q: float, R_dq: float) -> Any:
-    """Correct a belief by a measurement; return it, the innovations, their normalised square and det S.  (7.6)
+    """Correct a belief by a measurement; return the belief, the innovations, their normalised square and det S.  (7.6)
 
     Joseph form: P = (I - K H) P (I - K H)' + K R K', symmetric and positive for any gain.
     """

@@ -1,8 +1,8 @@
 """Tune the noise of a joint's filter on recordings in which nothing touches the robot.
 
 The noise of position, velocity and drive maximises the likelihood of the innovations (section 7.3).  The random walk of
-the external effort is the smallest that follows a push.  By likelihood it would be 0 without external effort, and the
-filter would then follow none.
+the external effort is the smallest one that follows a push.  Without external effort the likeliest walk would be 0, and
+the filter would then not follow any external effort.
 """
 
 from collections.abc import Sequence
@@ -14,15 +14,15 @@ from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.filters.response import smallest_q_tau
 from davinci_forces.maths.arrays import Array
 
-ROUNDS = 4  # of likelihood and push in turn
-MAX_LOG_CHANGE = np.log(1e3)  # of a standard deviation, from where the search starts
-MAX_SAMPLES_TUNING = 20_000  # of each recording
+ROUNDS = 4  # number of rounds that fit the likelihood and the push in turn
+MAX_LOG_CHANGE = np.log(1e3)  # largest change of a standard deviation's logarithm from the start of the search
+MAX_SAMPLES_TUNING = 20_000  # at most this number of each recording's samples is used
 
 
 def tune_noise(recordings: Sequence[FilterInput], start: NoiseModel, inertia: float, viscous: float) -> NoiseModel:
     """Tune the noise of a joint to all recordings together, from `start`, an estimate without the filter.
 
-    `inertia` is the largest along the recordings, with which the filter is slowest.
+    `inertia` is the largest along the recordings: with the largest inertia the filter is slowest.
     """
     from scipy.optimize import minimize
 

@@ -1,6 +1,6 @@
-"""All candidate models, with the normal equations of all logs, which the candidates of a library share.
+"""All candidate models, with the normal equations of all logs; candidates of one library share the equations.
 
-A library is a model with every friction that may be added; a candidate is some of its columns, and a ridge.
+A library is a model with every friction that may be added.  A candidate is a choice of its columns, and a ridge.
 """
 
 from collections.abc import Iterator, Sequence
@@ -20,7 +20,7 @@ from davinci_forces.robots.robot import Robot
 
 RIDGES = {"independent": (0.0, 1e-3), "coupled": (1e-4, 1e-3, 1e-2, 3e-2)}
 WEIGHTS_RIDGE = Ridge(1e-3, np.ones(1), np.empty((0, 0)))
-POSES = 50  # of each log, at which the inertia has to be positive definite
+POSES = 50  # number of poses of each log at which the inertia has to be positive definite
 
 
 class Library(NamedTuple):
@@ -28,8 +28,8 @@ class Library(NamedTuple):
 
     model: CoupledArm | IndependentJoint
     logs: tuple[Observed, ...]
-    added: tuple[tuple[Term, ...], ...]  # of each effort
-    samples: Integers  # (m,) number behind the equations of each effort
+    added: tuple[tuple[Term, ...], ...]  # friction terms of each effort
+    samples: Integers  # (m,) number of samples in the equations of each effort
     by_block: Equations
     by_period: Equations
     inertias: Array  # (S, m, m, p) with M = inertias theta, along the trajectories
@@ -53,7 +53,7 @@ class Library(NamedTuple):
 
     @property
     def combination(self) -> Array:
-        """The combination of inertial parameters in the first of the model's; empty for a single joint."""
+        """The combinations of inertial parameters that the model's first parameters are; empty for a single joint."""
         return self.model.base.combination if isinstance(self.model, CoupledArm) else np.empty((0, 0))
 
 
@@ -74,7 +74,7 @@ class Candidate(NamedTuple):
 
     @property
     def estimator(self) -> str:
-        """The name of its estimator."""
+        """The name of the candidate's estimator."""
         return "ridge" if self.strength else "lse"
 
     @property
@@ -97,7 +97,7 @@ class Candidate(NamedTuple):
     def cross_validate(
         self, schemes: Sequence[Booleans], reaches: dict[str, Reach], by_period: bool = False
     ) -> CrossValidation | None:
-        """Compute its errors on data left out; None where the remaining data do not separate its parameters."""
+        """Compute the errors on data left out; None if the remaining data do not separate the parameters."""
         parts = []
         for library, ridge in zip(self.libraries, self.ridges(), strict=True):
             cells = library.by_period if by_period else library.by_block
@@ -147,7 +147,7 @@ def candidates(
 ) -> list[Candidate]:
     """Return all candidate models of `count` logs.
 
-    `separate` are the logs of each joint by itself, `arm` those of all joints together.
+    `separate` are the logs of each joint alone, `arm` the logs of all joints together.
     """
     added = {name: every_term(reach) for name, reach in reaches.items()}
     independents = tuple(

@@ -1,4 +1,4 @@
-"""The choice among candidates, and the parameters of those that are fitted."""
+"""The choice among candidate models, and the parameters of the fitted candidates."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -26,7 +26,7 @@ from davinci_forces.maths.selection import (
 from davinci_forces.robots.models import Reach
 from davinci_forces.robots.robot import Robot
 
-NEGLIGIBLE_EXCESS = 1e-8  # of the effort's square: a smaller excess is within the solver's accuracy
+NEGLIGIBLE_EXCESS = 1e-8  # a smaller share of the effort's square is within the solver's accuracy
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +38,7 @@ class Selection:
     score: Array
     score_std: Array
     training: Array
-    over_periods: Array  # NaN where no path repeats
+    over_periods: Array  # scores with periods left out; NaN if no path repeats
     chosen: Candidate
     best: Candidate
     why: str
@@ -81,7 +81,7 @@ def select_candidate(candidates: Sequence[Candidate], reaches: dict[str, Reach],
 
 
 def usable_schemes(candidates: Sequence[Candidate], count: int) -> list[Booleans]:
-    """Return the schemes of leaving out in which each refit has data of every effort."""
+    """Return the leave-out schemes in which each refit has data of every effort."""
     log, block = np.repeat(np.arange(count), PATH_BLOCKS), np.tile(np.arange(PATH_BLOCKS), count)
     by_library = {id(library): library.by_block.squares for c in candidates for library in c.libraries}
     squares = np.concatenate(list(by_library.values()), axis=1)
@@ -89,7 +89,7 @@ def usable_schemes(candidates: Sequence[Candidate], count: int) -> list[Booleans
 
 
 def over_periods(candidate: Candidate, reaches: dict[str, Reach], count: int) -> float:
-    """Return the score on periods left out, of the same path as the fitted ones; NaN where a path does not repeat."""
+    """Return the score on periods left out, whose path is that of the fitted periods; NaN if no path repeats."""
     number = np.tile(np.arange(MAX_GROUPS), count)
     squares = np.concatenate([library.by_period.squares for library in candidate.libraries], axis=1)
     groups = np.array([number == k for k in range(MAX_GROUPS) if squares[number == k].any()])
@@ -161,9 +161,9 @@ class ConsistentFit(NamedTuple):
 def fit_consistent(
     model: Model, library: Library, equations: Equations, ridge: Ridge, free: BlockEstimate
 ) -> ConsistentFit:
-    """Fit the parameters nearest to a candidate's that a mechanism can have, to the equations (one cell) of all logs.
+    """Fit a candidate's parameters within those that a mechanism can have, to the equations (one cell) of all logs.
 
-    The standard errors stay the candidate's, as those of the estimator `consistent` stay least squares'.
+    The standard errors remain those of the candidate, as `consistent` keeps those of least squares.
 
     Raises
     ------
@@ -180,7 +180,7 @@ def fit_consistent(
 
 
 def factor(equations: Equations, ridge: Ridge) -> Triangle:
-    """Factor a ridge problem into |U D theta - y|^2 plus a constant, which has the same parameters.
+    """Factor a ridge problem into |U D theta - y|^2 plus a constant, with the same optimal parameters.
 
     U' U = D^-1 (G + lambda P) D^-1, and U' y = D^-1 r
     """

@@ -1,4 +1,4 @@
-"""The model of each joint along a log, as a filter takes it, and the effort of a fit along it."""
+"""The model of each joint along a log, as a filter takes it, and the effort that a fit predicts along the log."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -15,13 +15,13 @@ from davinci_forces.records import Fit, JointModel, Motion, Prediction
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.robots.models import ARM
 
-# The fields of a record for the coefficients of the bias, in their order in `maths.models.bias`.
+# Fields of a record with the coefficients of the bias, in the order of `maths.models.bias`.
 BIAS = ("constant", "gravity_sine", "gravity_cosine", "spring", "viscous", "coulomb", "presliding")
-MIN_SINGULAR_SHARE = 1e-3  # of the largest singular value: less certain combinations are not refitted
+MIN_SINGULAR_SHARE = 1e-3  # combinations with a smaller share of the largest singular value are not refitted
 
 
 class LogModels:
-    """The models of fits along one log; what the joints of an arm share is computed once."""
+    """The models of fits along one log; results that the joints of an arm share are computed once."""
 
     def __init__(self, identified: Identified, motions: Iterable[Motion | JointModel]) -> None:
         self.identified = identified
@@ -35,12 +35,12 @@ class LogModels:
         return tuple(self._motions)
 
     def joints_on_clock(self, joint: str) -> set[str]:
-        """Return the joints of the log that share the clock of one of them."""
+        """Return the joints of the log that share the clock of a joint."""
         length = len(self._motions[joint].q)
         return {name for name, motion in self._motions.items() if len(motion.q) == length}
 
     def motion(self, fit: Fit) -> ArmMotion:
-        """Return the low-passed motion of the joints of a fit's model, which the log has to hold."""
+        """Return the low-passed motion of the joints of a fit's model; the log must contain these joints."""
         return joined_motion([self._motions[name] for name in self.identified.model(fit).joints])
 
     def tau_hat(self, fit: Fit, joint: str) -> Array:

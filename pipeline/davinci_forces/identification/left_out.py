@@ -56,7 +56,7 @@ def without_the_log(
 def without_a_period(
     motion: Motion, average: Trajectory, model: IndependentJoint, prior: Prior, lowpass: float
 ) -> Iterator[Prediction | Diagnostic]:
-    """Predict each period of a log from fits to the other periods; only the effort is left out, not the path."""
+    """Predict each period of a log from fits to the other periods; the path of the period is not left out."""
     part = select_samples(motion, whole_periods(motion.t, average))
     runs, others = without_folds(part, average, model, prior)
     Phi = model.regressor(recorded_motion(part)).Phi[:, 0]
@@ -69,7 +69,7 @@ def without_a_period(
             continue
         tau_hat = np.concatenate([Phi[run] @ theta for run, theta in zip(runs, thetas, strict=True)])
         yield scorer.score(model.name, name, motion.role, "leave one period out", SAME_PATH, tau_hat)
-        del tau_hat  # in a long log it is large: free it before the next
+        del tau_hat  # large in a long log: freed before the next is allocated
 
 
 def without_folds(
@@ -118,6 +118,6 @@ def not_predicted(motion: Motion, name: str, error: NotIdentifiable) -> Diagnost
 
 
 def whole_periods(t: Array, average: Trajectory) -> slice:
-    """Return the samples of the averaged periods, at these times [s]; views of a slice take no memory."""
+    """Return the samples of the averaged periods, at these times [s], as a slice, because its views take no memory."""
     inside = np.flatnonzero(averaged_samples(t, average))
     return slice(int(inside[0]), int(inside[-1]) + 1)

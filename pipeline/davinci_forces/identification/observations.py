@@ -22,7 +22,7 @@ from davinci_forces.maths.selection import (
 from davinci_forces.maths.signals.smoothing import lowpass_segments, reach
 from davinci_forces.records import Average, Motion, Trajectory
 
-SAMPLES_PER_CUTOFF = 3  # per period of the low-pass's cutoff: more add no information
+SAMPLES_PER_CUTOFF = 3  # samples per period of the low-pass's cutoff: more samples add no information
 
 
 class Observed(NamedTuple):
@@ -30,12 +30,12 @@ class Observed(NamedTuple):
 
     records: tuple[Motion, ...]  # of n joints
     motion: ArmMotion
-    tau: Array  # (N, n) low-passed effort; NaN where a joint stands still: its friction is undetermined there
+    tau: Array  # (N, n) low-passed effort; NaN while a joint stands still and its friction is undetermined
     block: Integers  # (N,) of the path
-    period: Integers  # (N,) which repetition of the path; -1 where it does not repeat
+    period: Integers  # (N,) number of the repetition of the path; -1 if it does not repeat
     lowpass: float  # [Hz]
     number: int  # of the log, from 0
-    white: dict[str, float]  # the noise of each joint's effort, if periods repeat
+    white: dict[str, float]  # standard deviation of each joint's effort noise, if periods repeat
 
     @property
     def is_moving(self) -> Booleans:
@@ -43,7 +43,7 @@ class Observed(NamedTuple):
         return np.array([not record.at_rest for record in self.records])
 
     def single_joint(self, joint: int) -> "Observed":
-        """Return one joint by itself."""
+        """Return the log of one joint alone."""
         column = slice(joint, joint + 1)
         motion = self.motion._replace(**{name: getattr(self.motion, name)[:, column] for name in ("q", "dq", "ddq")})
         return self._replace(records=self.records[column], motion=motion, tau=self.tau[:, column])
@@ -62,7 +62,7 @@ class Observed(NamedTuple):
             Phi, is_known = model.regressor(piece.motion)
             taken = np.flatnonzero(is_known[piece.inside] & wanted[piece.place])
             smooth = np.zeros((len(taken), *Phi.shape[1:]))
-            present = Phi.any(axis=0)  # most columns are of one effort only
+            present = Phi.any(axis=0)  # most columns belong to one effort only
             passed = lowpass_segments(Phi[:, present], piece.motion.segment, rate, self.lowpass)
             smooth[:, present] = passed[piece.inside][taken]
             rows.append(smooth)
@@ -72,7 +72,7 @@ class Observed(NamedTuple):
 
 
 def observe(records: Sequence[Motion], averages: Iterable[Average], lowpass: float, number: int) -> Observed:
-    """Return the joints of one log, in their order, which share a clock."""
+    """Return the joints of one log, in their order; the joints share a clock."""
     first = records[0]
     by_joint = {a.joint: a for a in averages if a.log == first.log}
     average = next(iter(by_joint.values()), None)
@@ -90,7 +90,7 @@ def observe(records: Sequence[Motion], averages: Iterable[Average], lowpass: flo
 
 
 def smooth_effort(record: Motion, lowpass: float) -> Array:
-    """Low-pass the effort (N,) of a joint; NaN where it stands still, and everywhere if it is at rest."""
+    """Low-pass the effort (N,) of a joint; NaN while it stands still, and throughout if it is at rest."""
     if record.at_rest:
         return np.full(len(record), np.nan)
     return np.where(record.standing > 0, np.nan, lowpass_segments(record.tau, record.segment, record.rate, lowpass))
@@ -107,7 +107,7 @@ def pose_samples(
 ) -> tuple[Regression, Integers]:
     """Return the least squares problem of a joint of a log that does not repeat, and its samples (K,).
 
-    `which` (N,) selects samples; all are taken without it.  Each counts as one period.
+    `which` (N,) selects samples; without it all are taken.  The weight of each sample is that of one period.
     """
     Phi, tau, samples = log.rows(model)
     if which is not None:
@@ -119,7 +119,7 @@ def pose_samples(
 def equations(model: Model, logs: Sequence[Observed], count: int) -> tuple[Integers, Equations, Equations]:
     """Return the normal equations of all `count` logs in cells of the path (6 a log) and of the periods (20 a log).
 
-    First comes the number of samples of each effort (m,) behind them.
+    The first result is the number of samples (m,) of each effort in the equations.
     """
     samples, by_block, by_period = np.zeros(len(model.efforts), np.int64), [], []
     for log in logs:

@@ -18,7 +18,7 @@ from davinci_forces.robots.robot import Joint
 def pose(model: IndependentJoint, trajectories: Sequence[Trajectory], known: Prior = NO_PRIOR) -> Regression:
     """Return the least squares problem of a joint: the averaged periods of all its logs, one after the other.  (6.37)
 
-    Samples at standstill have weight 0, because friction is undetermined there.
+    Samples at standstill have weight 0, because friction is undetermined at standstill.
     """
     lengths = [len(t) for t in trajectories]
     return Regression(
@@ -40,7 +40,7 @@ def stands_still(t: Trajectory) -> Booleans:
 
 
 def row_covariance(model: IndependentJoint, t: Trajectory) -> Array:
-    """Compute the mean covariance (p, p) of a row of Phi by the noise of the averaged motion.
+    """Compute the mean covariance (p, p) of a row of Phi due to the noise of the averaged motion.
 
     cov(Phi_k) = J_k cov(q, dq, ddq) J_k' / M,    J_k the derivatives of Phi by the motion.
     """
@@ -66,7 +66,7 @@ def join_regressions(parts: Sequence[Regression]) -> Regression:
 
 
 def averaged_motion(trajectory: Trajectory) -> ArmMotion:
-    """Return the motion of one averaged period of a joint, which repeats."""
+    """Return the motion of one averaged period of a joint, as a periodic motion."""
     q, dq, ddq = (x[:, None] for x in (trajectory.q, trajectory.dq, trajectory.ddq))
     return ArmMotion(q, dq, ddq, trajectory.period / len(q), np.zeros(len(q), np.int64), periodic=True)
 
@@ -77,7 +77,7 @@ def recorded_motion(record: Motion | JointModel) -> ArmMotion:
 
 
 def joined_motion(motions: Sequence[ArmMotion]) -> ArmMotion:
-    """Join the motions of several joints of one recording, in this order, which share a clock."""
+    """Join the motions of several joints of one recording, in this order; the joints share a clock."""
     if len(motions) == 1:
         return motions[0]
     q, dq, ddq = (np.concatenate(columns, axis=1) for columns in zip(*(m[:3] for m in motions), strict=True))
@@ -87,12 +87,12 @@ def joined_motion(motions: Sequence[ArmMotion]) -> ArmMotion:
 def known_of(joint: Joint) -> Prior:
     """Return the signs that physics requires, and the box of physical parameters with a guess if the robot has one."""
     positive = np.array([term.positive for term in joint.terms])
-    if joint.physical is None or joint.effort:  # a current does not say how much its motor pushes
+    if joint.physical is None or joint.effort:  # a current does not determine its motor's effort
         return Prior(positive)
     lumped = physical_lumping(joint.physical, joint.gear_ratio, tuple(term.name for term in joint.terms))
     if lumped is None:
         return Prior(positive)
     guess, lower, upper = np.array([(x.guess, x.lower, x.upper) for x in joint.physical.parameters]).T
     theta = lumped.theta(guess)
-    # A difference of masses that is only rounding is no guess; as one, it would be trusted to all its digits.
+    # A difference of masses that is only rounding is no guess, because a guess is trusted to all its digits.
     return Prior(positive, Box(lower, upper, lumped), np.where(np.abs(theta) > ROUNDING, theta, 0.0))

@@ -12,18 +12,18 @@ from davinci_forces.maths.signals.smoothing import lowpass_segments, share_passe
 from davinci_forces.maths.uncertainty.bootstrap import model_error
 from davinci_forces.records import Motion, Prediction
 
-MAX_FOLDS = 20  # enough refits to show how far a fit can be trusted, whatever the amount of data
-SAMPLES_RIVAL = 1111  # behind the published rival's errors
+MAX_FOLDS = 20  # this number of refits is enough for out-of-sample errors, whatever the amount of data
+SAMPLES_RIVAL = 1111  # number of samples of the errors published for the compared method
 
 
 def folds(count: int) -> list[int]:
-    """Return the fold of each of `count` logs or periods, in order; above `MAX_FOLDS` neighbours share one."""
+    """Return the fold of each of `count` logs or periods, in order; above `MAX_FOLDS`, neighbours share a fold."""
     number = min(count, MAX_FOLDS)
     return [i * number // count for i in range(count)]
 
 
 def refits(problem: Regression, estimate: Estimator) -> Iterator[Array | NotIdentifiable]:
-    """Fit the parameters (p,) without each fold of the logs in turn, or yield why that is not possible."""
+    """Fit the parameters (p,) without each fold of the logs in turn, or yield why a fit is not possible."""
     fold = folds(len(problem.starts))
     for out in range(fold[-1] + 1):
         try:
@@ -49,10 +49,10 @@ def select_logs(problem: Regression, logs: Sequence[int]) -> Regression:
 
 
 class Scorer:
-    """The effort of a recording, against which predictions are scored; what they share is computed once.
+    """The effort of a recording, against which predictions are scored; shared results are computed once.
 
-    `free` (N,) are the samples that count, at which nothing touches the robot.  `white` is the noise of the effort from
-    repeated periods.  Without it the noise is what a low-pass removes from the error, including ripple of the drive.
+    `free` (N,) are the scored samples, at which nothing touches the robot.  `white` is the noise of the effort from
+    repeated periods.  Without it, the noise is the part of the error that a low-pass removes, including drive ripple.
     """
 
     def __init__(self, motion: Motion, free: Booleans, lowpass: float, white: float | None = None) -> None:

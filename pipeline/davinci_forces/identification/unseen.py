@@ -1,7 +1,7 @@
 """Out-of-sample predictions of identification logs by candidates.
 
-One scheme leaves blocks of path out; it is that by which a candidate is chosen.  The other is that of the joints' own
-fits, for comparison: it leaves out the log or, of a single log, a period or a segment.
+One scheme leaves blocks of path out; a candidate is chosen by this scheme.  The other scheme is that of the joints' own
+fits, for comparison.  It leaves out the log or, with a single log, a period or a segment.
 """
 
 from collections.abc import Iterator, Sequence
@@ -28,8 +28,8 @@ class Scheme(NamedTuple):
     name: str
     path: str  # whether the path left out is repeated in the fitted data
     cells: Equations
-    out: Booleans  # (G, C) of each refit
-    refit: Integers  # (N,) of each sample, from 0; -1 of those that are not predicted
+    out: Booleans  # (G, C) the cells that each refit leaves out
+    refit: Integers  # (N,) number of the refit that predicts each sample, from 0; -1 for none
 
 
 class RefitModel:
@@ -41,7 +41,7 @@ class RefitModel:
         self._ridge, self._thetas = ridge, dict[bytes, Array]()
 
     def theta(self, cells: Equations, out: Booleans) -> Array:
-        """Fit the parameters (p,) without some cells (C,); raises LinAlgError where the others do not separate them."""
+        """Fit the parameters (p,) without some cells (C,); raises LinAlgError if the others do not separate them."""
         key = out.tobytes()
         if key not in self._thetas:
             self._thetas[key] = solve(cells.omit_cells(out), self._ridge)
@@ -53,7 +53,7 @@ def predictions(
 ) -> Iterator[Prediction]:
     """Predict the effort of each joint of all logs by refits of a candidate, by the scheme of the joints' own fits.
 
-    The chosen one is also predicted without blocks of path, as `chosen`.  Without a refit there is no prediction.
+    The chosen candidate is also refitted without blocks of path, as `chosen`.  Without a refit there is no prediction.
     """
     name = f"{candidate.variant}.{candidate.estimator}"
     parts = zip(candidate.models(robot, reaches), candidate.libraries, candidate.ridges(), strict=True)
@@ -67,7 +67,7 @@ def predictions(
             if is_chosen:
                 scheme = leave_blocks_out(model, log, "leave a block of path out")
                 yield from predict_scheme(scheme, model, log, CHOSEN, name)
-            if name != "independent.lse":  # which is a joint's own fit
+            if name != "independent.lse":  # this candidate is the joint's own fit
                 scheme = scheme_of_own_fits(model, log)
                 yield from predict_scheme(scheme, model, log, candidate.variant, candidate.estimator)
 
@@ -75,7 +75,7 @@ def predictions(
 def predict_scheme(
     scheme: Scheme, refits: RefitModel, log: Observed, name: str, estimator: str
 ) -> Iterator[Prediction]:
-    """Predict the efforts of a model in a log, each sample out of sample, and score them where the joint moves."""
+    """Predict the efforts of a model in a log, each sample out of sample, and score the moving samples."""
     try:
         thetas = np.array([refits.theta(scheme.cells, out) for out in scheme.out])
     except np.linalg.LinAlgError:
@@ -98,7 +98,7 @@ def leave_blocks_out(refits: RefitModel, log: Observed, name: str) -> Scheme:
 
 
 def scheme_of_own_fits(refits: RefitModel, log: Observed) -> Scheme:
-    """Leave out what the joints' own fits leave out: the fold of the log, or of a single log a period or a segment."""
+    """Leave out what the joints' own fits leave out: the fold of the log or, of a single log, a period or a segment."""
     if len(refits.logs) > 1:
         fold = dict(zip(refits.logs, folds(len(refits.logs)), strict=True))
         omitted = [number for number in fold if fold[number] == fold[log.number]]

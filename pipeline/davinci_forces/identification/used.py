@@ -1,4 +1,4 @@
-"""The fits of a robot's joints, and the one that a setting names for a joint."""
+"""The fits of a robot's joints, and the fit that a setting names for a joint."""
 
 from collections.abc import Collection, Iterable
 
@@ -31,7 +31,7 @@ def follows(motion: Motion, paths: FittedPaths) -> bool:
 class Identified:
     """The fits of a robot's joints, refits without some logs, chosen models and fitted paths.
 
-    It takes the records of these that a stage has.
+    `records` are those of these kinds that a stage has read.
     """
 
     def __init__(self, robot: Robot, records: Iterable[Fit | CrossFit | Choice | FittedPaths]) -> None:
@@ -54,7 +54,7 @@ class Identified:
         return [f for f in self.fits if f.group == joint or (f.group == ARM and joint in self.model(f).efforts)]
 
     def fit_of(self, joint: str, setting: str) -> Fit | None:
-        """Return the fit named by the setting `fit`, or `FALLBACK` where the chosen model does not cover the joint."""
+        """Return the fit named by the setting `fit`, or `FALLBACK` if the chosen model does not cover the joint."""
         by_name = {f"{f.model}.{f.estimator}": f for f in self.fits_of(joint)}
         if setting != CHOSEN:
             return by_name.get(setting)
@@ -62,7 +62,7 @@ class Identified:
         return next((by_name[name] for name in (*names, FALLBACK) if name in by_name), None)
 
     def fit_along(self, joint: str, setting: str, held: Collection[str]) -> tuple[Fit, str]:
-        """Return the fit of a joint along a log that holds these joints, and why it replaces that of the setting.
+        """Return the fit of a joint along a log with the joints `held`, and why it replaces the fit of the setting.
 
         Raises
         ------

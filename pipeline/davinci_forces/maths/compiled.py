@@ -26,7 +26,7 @@ PACKAGE = Path(__file__).parents[1]
 SOURCES = ("maths", "filters", "haptics/maths")  # folders that compiled code depends on
 NAME = re.compile("compiled-[0-9a-f]{32}")
 MAX_UNUSED = 30 * 86400.0  # [s]
-MIN_FOLDERS = 5  # kept however long they are unused
+MIN_FOLDERS = 5  # number of folders that are never removed
 
 F = TypeVar("F", bound=Callable[..., object])
 _setting = Lock()
@@ -36,8 +36,8 @@ def compile_function(function: F, **options: Any) -> F:
     """Compile a function at its first call, in every process again."""
     from numba import njit
 
-    jitted: F = njit(**options)(function)
-    return jitted
+    compiled: F = njit(**options)(function)
+    return compiled
 
 
 def inline(function: F) -> F:
@@ -61,25 +61,25 @@ def compile_and_store(function: F) -> F:
 def folder() -> Path:
     """The folder of numba's code for these sources; folders of other sources are removed after `MAX_UNUSED`."""
     digest = sha256(f"{sys.version} {version('numba')} {version('llvmlite')}".encode())
-    for file in sorted(file for room in SOURCES for file in PACKAGE.joinpath(room).rglob("*.py")):
+    for file in sorted(file for source in SOURCES for file in PACKAGE.joinpath(source).rglob("*.py")):
         digest.update(f"\n{file.relative_to(PACKAGE).as_posix()} {sha256(file.read_bytes()).hexdigest()}".encode())
     name = f"compiled-{digest.hexdigest()[:32]}"
     try:
         place = private(home() / name)
-        os.utime(place)  # its last use
+        os.utime(place)  # records its last use
         place.chmod(0o700)
     except OSError:
         place = private(temporary() / name)
-    with suppress(OSError):  # another process removes them, too
+    with suppress(OSError):  # another process may remove the same folders
         remove_unused(place.parent)
     return place
 
 
 @cache
 def home() -> Path:
-    """The folder of all compiled code: in NUMBA_CACHE_DIR where that is set, else in the user's cache folder.
+    """The folder of all compiled code: in NUMBA_CACHE_DIR if that is set, else in the user's cache folder.
 
-    If there is none, or others could write to it, it is a temporary one, shared with processes that start later.
+    Without such a folder, or if others could write to it, a temporary folder is shared with later child processes.
     """
     user, chosen = os.environ.get("HOME", ""), os.environ.get("NUMBA_CACHE_DIR")
     linux = os.environ.get("XDG_CACHE_HOME") or os.path.join(user, ".cache")
@@ -95,7 +95,7 @@ def home() -> Path:
 
 @cache
 def temporary() -> Path:
-    """A folder for this process and those that it starts later, removed when this process ends."""
+    """A folder for this process and its later child processes, removed when this process ends."""
     place = os.environ["NUMBA_CACHE_DIR"] = tempfile.mkdtemp(prefix="davinci-forces-")
     atexit.register(shutil.rmtree, place, ignore_errors=True)
     return private(Path(place, "davinci-forces"))
@@ -107,12 +107,12 @@ def private(place: Path, parents: bool = False) -> Path:
     Raises
     ------
     PermissionError
-        If it is a link or another user's, or others may write to it.
+        If the folder is a link or belongs to another user, or if others may write to it.
     """
     place.mkdir(mode=0o700, parents=parents, exist_ok=True)
     status = place.lstat()
-    alone = os.name == "nt" or (status.st_uid == os.geteuid() and not status.st_mode & 0o022)
-    if not (stat.S_ISDIR(status.st_mode) and alone):
+    is_private = os.name == "nt" or (status.st_uid == os.geteuid() and not status.st_mode & 0o022)
+    if not (stat.S_ISDIR(status.st_mode) and is_private):
         raise PermissionError(f"{place} is no folder to which this user alone may write")
     return place
 

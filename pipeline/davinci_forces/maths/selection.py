@@ -1,19 +1,19 @@
 """Cross-validation of models: least squares with parts of the path left out, and the choice among the candidates.
 
-Parts of a path are left out one at a time, so that neither a predicted sample nor its neighbours are in the fit.  With
-a period left out, the others repeat its path, which rewards every column; with a block of the path left out, they do
-not.
+Parts of a path are left out one at a time, so that neither a predicted sample nor its neighbours are in the fit.  If
+a period is left out, the others repeat its path, so every column improves the prediction.  If a block of the path is
+left out, no other part repeats it.
 
 The fit is regularised by a ridge on columns scaled to the same size.
 
     theta = arg min sum_i w_i |tau_i - Phi_i theta|^2 + lambda theta' P theta
 
-The penalty of base parameters beta = K pi is that of the smallest pi that gives them, each scaled by its column.  So it
-does not depend on which parameters lead the combinations:
+The penalty of base parameters beta = K pi is that of the smallest pi that gives beta, with each entry scaled by its
+column.  So the penalty does not depend on which parameters lead the combinations:
 
     P = (K D^-1 K')^-1,    D = diag(K' G K)
 
-Normal equations are summed by cells of the data, so that any cells can be left out of a fit without their samples:
+Normal equations are summed by cells of the data, so that a fit without some of the cells needs no samples:
 
     G = sum Phi' Phi,    r = sum Phi' tau,    s = sum tau^2,    |tau - Phi theta|^2 = s - 2 r' theta + theta' G theta
 """
@@ -25,12 +25,12 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 
-UNSEEN = 1e-12  # of the largest column's square: a smaller column is rounding only
-ROUNDING_OF_COLUMN = 1e-12  # of the largest column: a smaller column is rounding only
-DEPENDENT = 1e12  # condition of the equations of scaled columns, the square of the columns' own
-PATH_BLOCKS = 6  # of a period, or of a recording that does not repeat
-MAX_GROUPS = 20  # groups at most that are left out, each with a fit of its own
-CLEARLY = 1.0  # standard errors of the difference, from which a candidate is clearly worse
+UNSEEN = 1e-12  # a column with a smaller share of the largest square is only rounding
+ROUNDING_OF_COLUMN = 1e-12  # a column with a smaller share of the largest length is only rounding
+DEPENDENT = 1e12  # condition number above which equations of scaled columns are dependent; it is the columns' squared
+PATH_BLOCKS = 6  # a period, or a recording that does not repeat, is divided into this number of blocks
+MAX_GROUPS = 20  # largest number of groups that are left out in turn, each with a separate fit
+CLEARLY = 1.0  # a candidate is clearly worse by more than this many standard errors of the difference
 
 
 class Equations(NamedTuple):
@@ -77,7 +77,7 @@ def sum_equations(Phi: Array, tau: Array, cell: Integers, cells: int) -> Equatio
 
 
 def side_by_side(parts: Sequence[Equations], places: Sequence[int], count: int) -> Equations:
-    """Join equations of equally many cells as parts of `count` such blocks, each at its place; other blocks hold 0."""
+    """Join equations of equally many cells into `count` parts, each at its place; all other parts are 0."""
     joined = Equations(*(np.zeros((count, *column.shape)) for column in parts[0]))
     for place, part in zip(places, parts, strict=True):
         for whole, column in zip(joined, part, strict=True):
@@ -90,7 +90,7 @@ class Ridge(NamedTuple):
 
     strength: float  # lambda [-]
     weights: Array  # w (m,) of the efforts
-    combination: Array  # K (b, 10 L + ...) of the first b parameters; each other one is itself
+    combination: Array  # K (b, 10 L + ...) of the first b parameters; each other parameter is no combination
 
 
 def solve(equations: Equations, ridge: Ridge) -> Array:
@@ -109,8 +109,8 @@ def scaled_equations(equations: Equations, ridge: Ridge) -> tuple[Array, Array]:
     """G + lambda P (p, p) of columns scaled to unit length, and their lengths (p,); raises as `solve` does."""
     G = np.einsum("m,mpq->pq", ridge.weights, equations.gram[0])
     size = np.sqrt(np.diag(G))
-    # Scaled up, a column of rounding errors would look like any other column to the ridge.  Where a joint is held, some
-    # base parameters of an arm have no column at all, which does the others no harm.
+    # After scaling, a column of rounding errors would look like any other column to the ridge.  If a joint stands
+    # still, some base parameters of an arm have a column of zeros, which does not affect the others.
     least = 0.0 if len(ridge.combination) else ROUNDING_OF_COLUMN * size.max()
     if not (size > least).all():
         raise np.linalg.LinAlgError("a column is zero throughout")
@@ -128,13 +128,13 @@ def covariance(equations: Equations, ridge: Ridge, variances: Array) -> Array:
 
 
 def penalty(G: Array, combination: Array) -> Array:
-    """Penalty P (p, p): the square of each parameter's column; of base parameters that of the smallest pi."""
+    """Penalty P (p, p): the square of each parameter's column; for base parameters, that of the smallest pi."""
     P, b = np.diag(np.diag(G)), len(combination)
     if b:
         D = ((G[:b, :b] @ combination) * combination).sum(axis=0)
-        shown = UNSEEN * D.max() < D
-        K = combination[:, shown]
-        P[:b, :b] = np.linalg.inv((K / D[shown]) @ K.T)
+        excited = UNSEEN * D.max() < D
+        K = combination[:, excited]
+        P[:b, :b] = np.linalg.inv((K / D[excited]) @ K.T)
     return P
 
 
@@ -144,11 +144,11 @@ def path_blocks(t: Array, period: float, moving: Booleans | None = None) -> Inte
     A `period` of 0 [s] stands for a recording that does not repeat.  Its blocks are sixths of the time in which it is
     `moving` (N,), or of all its time without that mask.
     """
-    since = t - t[0]
+    elapsed = t - t[0]
     if moving is not None and not moving.all() and not period:
-        since = np.concatenate([[0.0], np.cumsum(np.diff(t) * moving[1:])])
-    length = period or float(since[-1]) * (1 + 1e-9) or 1.0
-    return np.asarray((since / length % 1.0 * PATH_BLOCKS).astype(np.int64) % PATH_BLOCKS)
+        elapsed = np.concatenate([[0.0], np.cumsum(np.diff(t) * moving[1:])])
+    length = period or float(elapsed[-1]) * (1 + 1e-9) or 1.0
+    return np.asarray((elapsed / length % 1.0 * PATH_BLOCKS).astype(np.int64) % PATH_BLOCKS)
 
 
 def repetitions(t: Array, period: float) -> Integers:
@@ -157,23 +157,23 @@ def repetitions(t: Array, period: float) -> Integers:
 
 
 def left_out(log: Integers, block: Integers) -> tuple[Booleans, ...]:
-    """The cells (C,), each a block of one log, that every group leaves out: schemes of groups (G, C).
+    """Schemes (G, C) of the cells that each of G groups leaves out; a cell is a block of one log.
 
-    The schemes leave out sixths of the path, its halves, and each of several logs: at most `MOST` groups together.
+    The schemes leave out sixths of the path, its halves, and each of several logs: at most `MAX_GROUPS` groups in all.
     """
     logs = np.unique(log)
     sixths = block == np.arange(PATH_BLOCKS)[:, None]
     halves = block // (PATH_BLOCKS // 2) == np.arange(2)[:, None]
-    room = MAX_GROUPS - PATH_BLOCKS - 2
-    together = np.searchsorted(logs, log) * min(room, len(logs)) // len(logs)
-    by_log = together == np.arange(min(room, len(logs)))[:, None]
+    most = MAX_GROUPS - PATH_BLOCKS - 2
+    group = np.searchsorted(logs, log) * min(most, len(logs)) // len(logs)
+    by_log = group == np.arange(min(most, len(logs)))[:, None]
     return (sixths, halves, by_log) if len(logs) > 1 else (sixths, halves)
 
 
 class CrossValidation(NamedTuple):
     """Relative squared errors of a candidate on the data that its fits left out, by scheme."""
 
-    unseen: tuple[Array, ...]  # of each scheme (G, m): squared error of each group, over the effort's in all of them
+    unseen: tuple[Array, ...]  # of each scheme (G, m): squared error of a group over the effort's square in all groups
     training: Array  # (m,) relative error of the fit to all data
 
     @property
@@ -230,18 +230,18 @@ def choose_candidate(
 ) -> tuple[int, int]:
     """Indices of the chosen candidate and of the best: the chosen one is the smallest that is not clearly worse.
 
-    Of several equally small candidates, the better one is chosen; `sizes` are numbers of parameters.
+    Among equally small candidates, the better one is chosen; `sizes` are numbers of parameters.
 
     Raises
     ------
     ValueError
-        If none is eligible.
+        If no candidate is eligible.
     """
-    among = [i for i, good in enumerate(eligible) if good]
-    best = min(among, key=lambda i: candidates[i].score)
+    indices = [i for i, good in enumerate(eligible) if good]
+    best = min(indices, key=lambda i: candidates[i].score)
     near = [
         i
-        for i in among
+        for i in indices
         if candidates[i].score - candidates[best].score <= CLEARLY * standard_error(candidates[i], candidates[best])
     ]
     return min(near, key=lambda i: (sizes[i], candidates[i].score)), best

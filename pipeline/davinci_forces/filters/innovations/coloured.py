@@ -2,8 +2,8 @@
 
     x = [q, dq, tau_ext, v_q, v_dq],    y = [q + v_q, dq + v_dq],    v[k+1] = phi v[k] + (1 - phi^2)^0.5 r e[k]
 
-With phi = 0 its innovations are those of `ekf`.  It tests whether coloured noise is why these are not white.  For
-tracking, white noise needs fewer states and gives the same slow external effort.
+With phi = 0 its innovations are those of `ekf`.  It tests whether coloured noise is the reason why innovations are
+not white.  For tracking, white noise needs fewer states and gives the same slow external effort.
 """
 
 from typing import NamedTuple
@@ -16,9 +16,9 @@ from davinci_forces.filters.tuning import MAX_LOG_CHANGE
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals.windows import TRANSIENT
 
-MAX_SAMPLES_COLOURED = 2000  # of the likelihood
-TRIALS = 60  # of the likelihood, a parameter
-MAX_ATANH_PHI = 4.0  # phi = .9993
+MAX_SAMPLES_COLOURED = 2000  # the likelihood is computed on at most this number of samples
+TRIALS = 60  # largest number of evaluations of the likelihood per parameter
+MAX_ATANH_PHI = 4.0  # for phi = 0.9993
 UNCOLOURED = (0.0, 0.0)
 
 
@@ -36,7 +36,7 @@ def innovations(recording: FilterInput, noise: Noise) -> tuple[Array, Array]:
 
 
 def log_likelihood(recording: FilterInput, noise: Noise) -> float:
-    """Compute the log-likelihood of the measurements, as that of `ekf`."""
+    """Compute the log-likelihood of the measurements, as `ekf` does."""
     transient = min(round(TRANSIENT / recording.T_s), len(recording.q) // 2)
     return kalman.log_likelihood(recording, states(recording, noise), transient)
 
@@ -53,7 +53,7 @@ def states(recording: FilterInput, noise: Noise) -> kalman.States:
 def fit_noise(recording: FilterInput, start: NoiseModel, walks: bool, coloured: bool) -> Noise:
     """Fit the noise of one recording by maximum likelihood: the standard deviations of q, dq and the drive.
 
-    That of the random walk is fitted if it `walks` freely, and phi if it is `coloured`.
+    The standard deviation of the random walk is fitted if it `walks` freely, and phi if the noise is `coloured`.
     """
     from scipy.optimize import minimize
 

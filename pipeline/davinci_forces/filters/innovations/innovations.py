@@ -6,8 +6,8 @@ Errors of a recording's clock, estimated from the other joints: a late sample sh
 
     i_j = v_j + dq_j delta,    delta_j = sum_(i != j) w_i dq_i i_i / (1 / s^2 + sum_(i != j) w_i dq_i^2),    w = 1 / r^2
 
-i are innovations of position, s is the standard deviation of the times, and r that of the innovations at rest.  Both
-follow from the growth of the innovations' squares with those of the velocity.  A joint's own innovation does not enter
+i are innovations of position, s is the standard deviation of the times, and r that of the innovations at rest.  s and r
+follow from a line fitted to the squared innovations over the squared velocity.  A joint's own innovation does not enter
 its delta.
 """
 
@@ -20,7 +20,7 @@ from davinci_forces.filters import rts
 from davinci_forces.filters.problem import FilterInput, NoiseModel
 from davinci_forces.maths.arrays import Array
 
-MIN_SHARE_AT_REST = 1e-3  # of an innovation's variance that is not due to the clock
+MIN_SHARE_AT_REST = 1e-3  # least share of an innovation's variance that is not due to the clock
 
 
 class Innovations(NamedTuple):
@@ -39,7 +39,7 @@ def innovations(recording: FilterInput, noise: NoiseModel) -> Innovations:
 
 
 def delays(velocities: Sequence[Array], innovations: Sequence[Array]) -> list[Array]:
-    """Estimate how late [s] each sample (N,) was taken, for each joint from all others."""
+    """Estimate how late [s] each sample (N,) was taken: for each joint, from all other joints."""
     variances = [fit_variances(dq, i) for dq, i in zip(velocities, innovations, strict=True)]
     numerators = [dq * i / r2 for dq, i, (r2, _) in zip(velocities, innovations, variances, strict=True)]
     weights = [dq**2 / r2 for dq, (r2, _) in zip(velocities, variances, strict=True)]

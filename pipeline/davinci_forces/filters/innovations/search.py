@@ -1,9 +1,9 @@
 """Search for the causes of innovations that are not white, by removing one after the other.
 
 A cause is named only if the innovations pass every test without it.  As few causes as possible are removed at once; if
-several removals suffice, each is named.  A test may also pass by chance, so the smallest probability has to grow by
-`MIN_GROWTH`.  It may pass because it has fewer samples, so as many samples at other times must still fail, with the
-removed ones among them.
+several removals suffice, each is named.  A test may pass by chance, so the smallest probability has to grow by the
+factor `MIN_GROWTH`.  A test may also pass because samples are omitted; so if as many other samples are omitted
+instead, the tests must still fail.
 """
 
 from collections.abc import Iterator
@@ -25,11 +25,11 @@ from davinci_forces.filters.innovations.trials import (
     Trial,
 )
 
-MIN_GROWTH = 100.0  # of the smallest probability where a cause is removed
+MIN_GROWTH = 100.0  # least factor by which the removal of a cause increases the smallest probability
 MAX_SAMPLES_SEARCH = 50_000
-MIN_SAMPLES_TRIAL = 200  # of a run whose tests count
-NEARLY_BEST = 0.95  # of the largest share of the correlation that a trial explains
-MAX_CAUSES = 3  # removed at once
+MIN_SAMPLES_TRIAL = 200  # tests on fewer samples are ignored
+NEARLY_BEST = 0.95  # a trial is nearly best if it explains this part of the largest share
+MAX_CAUSES = 3  # largest number of causes removed at once
 WHITE, LEFT_OUT, MENDED, UNEXPLAINED = "white", "left out", "mended", "unexplained"
 OMITTED = (CONTACT, REVERSALS)
 CAUSES = {
@@ -40,7 +40,7 @@ CAUSES = {
 }
 NO_CAUSE = "not white: no tested cause explains it"
 BY_CHANCE = "not white, but only slightly, as happens by chance in one of many runs"
-MIN_SHARE_NAMED = 0.5  # of the correlation that a cause has to explain to be named
+MIN_SHARE_NAMED = 0.5  # a cause is named if it explains at least this share of the correlation
 
 
 class CauseSearch(NamedTuple):
@@ -102,8 +102,8 @@ def causes(subject: Subject) -> Iterator[str]:
 def may_combine(without: tuple[str, ...], subject: Subject, explaining: list[Trial]) -> bool:
     """Whether these causes may be removed together.
 
-    They hold one model at a time, and no colour for another model.  Sizes are part of colour and of the clock, which
-    are not tried where sizes suffice.  Of three causes, two omit samples.
+    Causes are combined with at most one other model, and colour only with that of the clock.  Fits of colour and of the
+    clock include sizes, so neither is tried if sizes suffice.  Of three causes, two omit samples.
     """
     if len(without) == MAX_CAUSES and not {CONTACT, REVERSALS} <= {*without}:
         return False

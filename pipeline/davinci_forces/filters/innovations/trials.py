@@ -14,18 +14,18 @@ from davinci_forces.maths.signals.whiteness import tests
 from davinci_forces.maths.signals.windows import TRANSIENT, is_past_transient, runs
 
 LEVEL = 0.01  # probability below which a test rejects white noise
-LAGS = 20  # of the Ljung-Box statistic
-ELSEWHERE = 8  # other times at which as many samples are tested
+LAGS = 20  # number of lags of the Ljung-Box statistic
+ELSEWHERE = 8  # number of other times at which as many samples are tested
 
 CONTACT, REVERSALS = "contact", "reversals"  # their samples are omitted
-STEP, WALK, SIZES, CLOCK, COLOUR = "step", "walk", "sizes", "clock", "colour"  # corrected; so is each other model
-FINER_STEPS = {"ekf_euler": DEFAULT}  # a filter, and the one of smaller step errors
+STEP, WALK, SIZES, CLOCK, COLOUR = "step", "walk", "sizes", "clock", "colour"  # corrected, as other models are
+FINER_STEPS = {"ekf_euler": DEFAULT}  # a filter, and the filter with smaller step errors
 
 
 class Subject(NamedTuple):
     """A joint's run without a gap under each model, the one in use first; (N,) samples.
 
-    With its sampling times corrected it counts as another model, `CLOCK`.
+    The run with corrected sampling times is the additional model `CLOCK`.
     """
 
     models: Mapping[str, FilterInput]
@@ -43,7 +43,7 @@ class Trial(NamedTuple):
     ljung_box: tuple[float, float]  # probabilities, of q and dq
     periodogram: tuple[float, float]
     excess: float  # the sum of squared autocorrelations beyond that of white noise, of q and dq together
-    walk: float  # `q_tau` over the one in use
+    walk: float  # fitted `q_tau` over the `q_tau` in use
 
     @property
     def lowest(self) -> float:
@@ -80,7 +80,7 @@ class Passes:
             return True
         failed = 0
         for i in range(1, ELSEWHERE + 1):
-            later = round(len(free) * (i * 0.6180339887498949 % 1.0))  # at even distances that fit no period
+            later = round(len(free) * (i * 0.6180339887498949 % 1.0))  # even offsets, no multiples of a period
             pieces = self.pieces(without, np.roll(free, later), np.roll(moving, later))
             failed += any(min(box.probability, wave) <= LEVEL for box, wave in (tests(x, LAGS) for x in pieces))
         return failed > ELSEWHERE // 2
@@ -94,7 +94,7 @@ class Passes:
         return self.subject.moving if REVERSALS in without else np.ones_like(self.subject.moving)
 
     def run_under_model(self, without: tuple[str, ...]) -> FilterInput:
-        """Return the run under the model that replaces a removed one, or that in use."""
+        """Return the run under the model that replaces a removed one, or the model in use."""
         names = list(self.subject.models)
         return self.subject.models[next((name for name in names[1:] if name in without), names[0])]
 
@@ -111,7 +111,7 @@ class Passes:
         return pieces_q, pieces_dq
 
     def runs(self, free: Booleans) -> list[slice]:
-        """Return the runs that are long enough for the filter to settle, or else the longest."""
+        """Return the runs that are long enough for the filter to settle, or else the longest run."""
         T_s = next(iter(self.subject.models.values())).T_s
         long = [run for run in runs(free) if (run.stop - run.start) * T_s > 6.0 * TRANSIENT]
         return long or [max(runs(free), key=lambda run: run.stop - run.start, default=slice(0, 0))]
@@ -126,7 +126,7 @@ class Passes:
         return tracked.innovation_q, tracked.innovation_dq
 
     def noise(self, without: tuple[str, ...]) -> coloured.Noise:
-        """Return the noise in use, or that of greatest likelihood where it is a removed cause."""
+        """Return the noise in use, or that of greatest likelihood if noise is a removed cause."""
         key = tuple(name for name in without if name != REVERSALS)
         if not {WALK, SIZES, CLOCK, COLOUR} & {*key}:
             return coloured.Noise(self.subject.noise, coloured.UNCOLOURED)

@@ -5,14 +5,14 @@ that level once in ten minutes; the level is at least the largest effort of free
 
     level = rms sqrt(2 ln(v_0 / false alarms a second)),    v_0 upward crossings of zero a second         (Rice 1944)
 
-A flank is modelled as a ramp of duration T that the smoother widens about its middle; a step becomes T_s long:
+An onset is modelled as a ramp of duration T that the smoother widens about its middle; a step becomes T_s long:
 
     onset = t(half the peak) - T/2,    T^2 = T_seen^2 - T_s^2,    T_seen = 2 (t(3/4 of the peak) - t(1/4))
 
 A window of contact is summarised by peak, mean and impulse of the external effort, with standard errors.  They are
-computed from free motion in windows of the same length, model error included.  That of a peak is the root mean square
-of the windows' largest samples, that of a mean the root mean square of the windows' means.  The standard deviation of
-the effort near a peak, which includes the lag of a filter, is added to that of the peak.
+computed from free motion in windows of the same length, so the model's error is included.  That of a peak is the root
+mean square of the windows' largest samples; that of a mean is the root mean square of the windows' means.
+The standard deviation of the effort near a peak, which includes the lag of a filter, is added to that of the peak.
 """
 
 from collections.abc import Iterator, Sequence
@@ -24,9 +24,9 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals.windows import runs
 
-FALSE_ALARMS = 1.0 / 600.0  # [1/s]
-MAX_GAP_CONTACT = 0.25  # [s] between two crossings of one sign that count as one contact
-PEAK_REACH = 0.2  # [s] around a peak that include the largest error by a filter's lag
+FALSE_ALARMS = 1.0 / 600.0  # [1/s] rate of false alarms
+MAX_GAP_CONTACT = 0.25  # [s] longest gap between two crossings of one sign that belong to one contact
+PEAK_REACH = 0.2  # [s] before and after a peak: a filter's lag causes its largest error within this time
 
 
 class FreeMotionStatistics(NamedTuple):
@@ -34,7 +34,7 @@ class FreeMotionStatistics(NamedTuple):
 
     rms: float
     largest: float
-    crossings: float  # of zero, upwards, a second
+    crossings: float  # [1/s] upward crossings of zero
 
 
 class Event(NamedTuple):
@@ -54,10 +54,10 @@ def free_motion_statistics(tau_ext: Array, free: Booleans, rate: float) -> FreeM
     return FreeMotionStatistics(rms, float(np.abs(x).max()), float(upwards.sum()) / (len(x) / rate))
 
 
-def alarm_level(spaces: Sequence[FreeMotionStatistics]) -> float:
-    """The effort that each of these free motions crosses at most once in ten minutes."""
-    often = (max(s.crossings / FALSE_ALARMS, 1.0) for s in spaces)
-    return max(max(s.largest, s.rms * float(np.sqrt(2.0 * np.log(n)))) for s, n in zip(spaces, often, strict=True))
+def alarm_level(statistics: Sequence[FreeMotionStatistics]) -> float:
+    """The effort level that each free motion crosses at most once in ten minutes."""
+    alarms = (max(s.crossings / FALSE_ALARMS, 1.0) for s in statistics)
+    return max(max(s.largest, s.rms * float(np.sqrt(2.0 * np.log(n)))) for s, n in zip(statistics, alarms, strict=True))
 
 
 def events(t: Array, tau_ext: Array, std: Array, level: float, rise: float) -> Iterator[Event]:
@@ -106,10 +106,10 @@ def outer_crossing(t: Array, size: Array, k: int, inwards: int, level: float) ->
     """Time at which a size, followed outwards from sample k, falls below a level, interpolated between samples."""
     while 0 <= k - inwards < len(t) and size[k - inwards] >= level:
         k -= inwards
-    out = k - inwards
-    if not 0 <= out < len(t) or size[k] <= size[out]:
+    outer = k - inwards
+    if not 0 <= outer < len(t) or size[k] <= size[outer]:
         return float(t[k])
-    return float(t[k] + (t[out] - t[k]) * (size[k] - level) / (size[k] - size[out]))
+    return float(t[k] + (t[outer] - t[k]) * (size[k] - level) / (size[k] - size[outer]))
 
 
 class Summary(NamedTuple):
@@ -124,9 +124,9 @@ class Summary(NamedTuple):
 
 
 def summarise(t: Array, tau_ext: Array, std: Array, window: tuple[float, float], free: Booleans) -> Summary | None:
-    """Peak, mean and impulse of an external effort (N,) with deviation (N,) in a window [s]; None where it is empty.
+    """Peak, mean and impulse of an external effort (N,) with deviation (N,) in a window [s]; None if that is empty.
 
-    `free` (N,) says at which samples nothing touches the robot.
+    `free` (N,) are the samples at which nothing touches the robot.
     """
     start, end = window
     inside = tau_ext[(t >= start) & (t <= end)]
@@ -166,5 +166,5 @@ def _size(parts: list[Array]) -> float:
 
 
 def _moving_means(x: Array, length: int) -> Array:
-    total = np.cumsum(np.concatenate([[0.0], x]))
-    return np.asarray((total[length:] - total[:-length]) / length)
+    sums = np.cumsum(np.concatenate([[0.0], x]))
+    return np.asarray((sums[length:] - sums[:-length]) / length)

@@ -3,7 +3,7 @@
     e = f_hat - f_s,    relative error = sum_i rms(e_i) / sum_i (max f_s,i - min f_s,i)
 
 over the components i, as Yang et al. (2024, arXiv:2405.07453) define it.  The lag d maximises the correlation of both
-forces, less their means:
+forces without their means:
 
     c(d) = sum f_hat(t) f_s(t + d) / sqrt(sum f_hat(t)^2 sum f_s(t + d)^2)
 
@@ -19,10 +19,10 @@ from davinci_forces.maths.mechanics.tip_force import CHI_SQUARED_95
 from davinci_forces.maths.uncertainty.bootstrap import blocks, standard_error
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 
-MAX_LAG_STEPS = 25  # lags that are tried to either side
-MIN_LAG_STEP = 0.01  # [s] between them: a parabola interpolates the correlation of smooth forces
-MAX_PEAK_NEIGHBOURS = 10  # lags to either side of the largest correlation that the parabola is fitted to
-MIN_CORRELATION = 0.5  # below which the two signals do not show one force, so there is no lag
+MAX_LAG_STEPS = 25  # number of lags that are tried on either side of 0
+MIN_LAG_STEP = 0.01  # [s] smallest step between lags: a parabola interpolates the correlation of smooth forces
+MAX_PEAK_NEIGHBOURS = 10  # the parabola is fitted to at most this number of lags on either side
+MIN_CORRELATION = 0.5  # signals with a smaller correlation do not show one force, so there is no lag
 
 
 class ForceErrors(NamedTuple):
@@ -43,14 +43,14 @@ class ForceErrors(NamedTuple):
 def interpolate_sensor(t: Array, clock: Array, f: Array, reach: float) -> Array:
     """Interpolate a sensor (M, k) on its clock (M,) linearly at times (N,); NaN outside and in gaps.
 
-    Samples more than `reach` [s] apart have a gap between them.
+    An interval of more than `reach` [s] between samples is a gap.
     """
-    after = np.clip(np.searchsorted(clock, t), 1, len(clock) - 1)
-    gap = (clock[after] - clock[after - 1] > reach) & (t != clock[after])
+    following = np.clip(np.searchsorted(clock, t), 1, len(clock) - 1)
+    gap = (clock[following] - clock[following - 1] > reach) & (t != clock[following])
     outside = (t < clock[0]) | (t > clock[-1])
-    shown = np.stack([np.interp(t, clock, column) for column in f.T], axis=-1)
-    shown[gap | outside] = np.nan
-    return shown
+    sensor = np.stack([np.interp(t, clock, column) for column in f.T], axis=-1)
+    sensor[gap | outside] = np.nan
+    return sensor
 
 
 def errors(estimated: Array, C: Array, measured: Array) -> ForceErrors:
@@ -60,7 +60,7 @@ def errors(estimated: Array, C: Array, measured: Array) -> ForceErrors:
     limit = {1: NORMAL_95**2, 3: CHI_SQUARED_95}[k]
     inside = np.einsum("ni,ni->n", e, np.linalg.solve(C, e[..., None])[..., 0]) <= limit
     parts = blocks(len(e))
-    errors_of, held = [e[part] for part in parts], [inside[part].astype(float)[:, None] for part in parts]
+    errors_of, covered = [e[part] for part in parts], [inside[part].astype(float)[:, None] for part in parts]
     share = float(np.mean(inside))
     span = float(spans.mean())
     values = [(f(errors_of), standard_error(f, errors_of)) for f in (_rmse, _bias, _mean_rmse)]
@@ -70,12 +70,12 @@ def errors(estimated: Array, C: Array, measured: Array) -> ForceErrors:
         bias = float(e.mean())
     largest = float(np.linalg.norm(e, axis=1).max())
     return ForceErrors(
-        rmse, rmse_std, bias, bias_std, largest, span, relative, relative_std, share, standard_error(_bias, held)
+        rmse, rmse_std, bias, bias_std, largest, span, relative, relative_std, share, standard_error(_bias, covered)
     )
 
 
 class Lag(NamedTuple):
-    """Delay [s] of one force behind another, NaN where they do not correlate."""
+    """Delay [s] of one force behind another, NaN if they do not correlate."""
 
     value: float
     std: float
@@ -90,15 +90,15 @@ def lag(t: Array, estimated: Array, clock: Array, measured: Array, rate: float, 
     lags = step * np.arange(-MAX_LAG_STEPS, MAX_LAG_STEPS + 1)
     f, parts = estimated[compared] - estimated[compared].mean(0), blocks(int(compared.sum()))
     mean, products = measured.mean(0), np.zeros((len(parts), len(lags), 3))
-    for j, late in enumerate(lags.tolist()):
-        shown = interpolate_sensor(t[compared] + late, clock, measured, 3.0 / rate) - mean
-        comparable = np.isfinite(shown).all(1)
-        sums = [np.where(comparable, np.einsum("ni,ni->n", a, b), 0.0) for a, b in ((f, shown), (f, f), (shown, shown))]
+    for j, delay in enumerate(lags.tolist()):
+        s = interpolate_sensor(t[compared] + delay, clock, measured, 3.0 / rate) - mean
+        comparable = np.isfinite(s).all(1)
+        sums = [np.where(comparable, np.einsum("ni,ni->n", a, b), 0.0) for a, b in ((f, s), (f, f), (s, s))]
         products[:, j] = [[float(total[part].sum()) for total in sums] for part in parts]
 
-    def peak(of: list[Array]) -> float:
-        both, f_power, shown_power = np.sum(of, axis=0).T
-        return _vertex(both / np.sqrt(np.maximum(f_power * shown_power, 1e-300)), step)
+    def peak(draw: list[Array]) -> float:
+        product, f_power, sensor_power = np.sum(draw, axis=0).T
+        return _vertex(product / np.sqrt(np.maximum(f_power * sensor_power, 1e-300)), step)
 
     samples = list(products)
     return Lag(peak(samples), standard_error(peak, samples))
@@ -108,7 +108,7 @@ def _vertex(c: Array, step: float) -> float:
     """Lag of the largest correlation: the vertex of a parabola fitted to it and its neighbours on both sides.
 
     Noise decides which of nearly equal correlations is the largest.  The fit therefore includes the neighbours of the
-    same peak, up to `MAX_PEAK_NEIGHBOURS`, and is repeated around its vertex until that stays in place.
+    same peak, up to `MAX_PEAK_NEIGHBOURS`.  It is repeated around its vertex until the vertex stays at one lag.
     """
     i = int(c.argmax())
     for _ in range(len(c)):
@@ -119,15 +119,15 @@ def _vertex(c: Array, step: float) -> float:
         curvature, slope, _ = np.polyfit(k, c[i + k], 2).tolist()
         if curvature >= 0.0:
             return float("nan")
-        between = -0.5 * slope / curvature
-        if abs(between) <= 1.0:
+        vertex = -0.5 * slope / curvature
+        if abs(vertex) <= 1.0:
             break
-        i = int(np.clip(i + np.sign(between), 0, len(c) - 1))
-    return float(step * (i - MAX_LAG_STEPS + between))
+        i = int(np.clip(i + np.sign(vertex), 0, len(c) - 1))
+    return float(step * (i - MAX_LAG_STEPS + vertex))
 
 
 def reach(c: Array, i: int) -> int:
-    """Number of lags on both sides of lag i that belong to its peak; 0 if it is no peak."""
+    """Number of lags on both sides of lag i that belong to its peak; 0 if lag i is no peak."""
     near = min(MAX_PEAK_NEIGHBOURS, i, len(c) - 1 - i)
     below = [k for k in range(1, near + 1) if min(c[i - k], c[i + k]) < 0.5 * c[i]]
     return below[0] - 1 if below else near

@@ -2,14 +2,14 @@
 
     y_j = m x_j + b_j + e_j,    m = sum_j w_j x_j' y_j / sum_j w_j x_j' x_j,    w_j = 1 / sigma_j^2
 
-x_j is the effort of joint j per kilogram and b_j an offset of the day, which removes the mean of both.  A joint has an
-offset only where its column varies enough to be distinguished from a constant.
+x_j is the effort of joint j per kilogram, and b_j its day offset, a constant effort that differs from day to day.  The
+offset removes the mean of both.  A joint has an offset only if x_j varies enough to be distinguished from a constant.
 
 The mass is a point fixed to one of the arm's links.  Section 7.5
 
     tau_load = m (J' (a + g up)),    a = J ddq + dJ/dt dq                                          (4.27), (7.30)
 
-Positions are in metres from the remote centre, in axes fixed to the link that at q = 0 are the base axes.
+Positions are in metres from the remote centre, in axes fixed to the link; at q = 0 they are the base axes.
 """
 
 from collections.abc import Sequence
@@ -24,8 +24,8 @@ from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import frames, remote_centre, to_base
 from davinci_forces.maths.mechanics.rigid_body import inverse_dynamics
 
-PARTS = 6  # blocks of a path, as in the cross-validation of models
-# Share of a column's power that its variance must have: with less, an offset more than doubles the standard error.
+PARTS = 6  # number of blocks of a path, as in the cross-validation of models
+# If a smaller share of a column's power is variance, an offset more than doubles the standard error.
 MIN_VARIANCE_SHARE = 0.25
 
 
@@ -43,7 +43,7 @@ class Rows(NamedTuple):
         return bool(np.var(self.x) >= MIN_VARIANCE_SHARE * np.mean(self.x**2))
 
     def centre(self, which: Booleans | None = None) -> tuple[Array, Array]:
-        """Column and effort at some of the rows, without their means where the joint has an offset."""
+        """Column and effort at some of the rows, without their means if the joint has an offset."""
         x, y = (self.x, self.y) if which is None else (self.x[which], self.y[which])
         return (x - x.mean(), y - y.mean()) if self.varies and len(x) else (x, y)
 
@@ -67,16 +67,16 @@ def fit_mass(rows: Sequence[Rows]) -> MassEstimate:
 
 
 def _mass(rows: Sequence[Rows], without: int | None = None) -> float:
-    up = down = 0.0
+    numerator = denominator = 0.0
     for row in rows:
         x, y = row.centre(None if without is None else row.block != without)
-        up += float(x @ y) / row.sigma**2
-        down += float(x @ x) / row.sigma**2
-    return up / down if down > 0 else float("nan")
+        numerator += float(x @ y) / row.sigma**2
+        denominator += float(x @ x) / row.sigma**2
+    return numerator / denominator if denominator > 0 else float("nan")
 
 
 def offset(row: Rows, mass: float) -> float:
-    """Offset b of a joint with this mass; 0 where it has none."""
+    """Offset b of a joint with this mass; 0 if it has none."""
     return float(np.mean(row.y - mass * row.x)) if row.varies else 0.0
 
 
@@ -88,15 +88,15 @@ def residual(row: Rows, mass: float) -> Array:
 def model_errors(rows: Sequence[Rows]) -> float:
     """Root mean square of the free-motion residuals of one joint, over its recordings with equal weight."""
     squares = [np.mean(residual(row, 0.0) ** 2) for row in rows]
-    exact = 1e-9 * max(float(np.abs(row.x).max()) for row in rows)  # of a model without any error
-    return max(float(np.sqrt(np.mean(squares))), exact)
+    floor = 1e-9 * max(float(np.abs(row.x).max()) for row in rows)  # error of a model that fits exactly
+    return max(float(np.sqrt(np.mean(squares))), floor)
 
 
 def better(rows: Sequence[Rows], others: Sequence[Rows]) -> float:
-    """Number of standard errors by which these columns explain the same efforts better than others; < 0 if worse."""
-    apart = _squares(others) - _squares(rows)
-    spread = np.sqrt(PARTS / (PARTS - 1) * np.sum((apart - apart.mean()) ** 2))
-    return float(apart.sum() / spread) if spread > 0 else 0.0
+    """Number of standard errors by which these columns explain the efforts better than others do; < 0 if worse."""
+    gain = _squares(others) - _squares(rows)
+    spread = np.sqrt(PARTS / (PARTS - 1) * np.sum((gain - gain.mean()) ** 2))
+    return float(gain.sum() / spread) if spread > 0 else 0.0
 
 
 def _squares(rows: Sequence[Rows]) -> Array:
@@ -106,16 +106,16 @@ def _squares(rows: Sequence[Rows]) -> Array:
 
 
 def widening_factor(free: Sequence[MassEstimate], common: float) -> float:
-    """Factor, at least 1, by which masses estimated on free motion, where 0 is true, exceed their standard errors.
+    """Factor, at least 1, by which masses estimated on free motion, with true mass 0, exceed their standard errors.
 
-    `common` is the standard error of the fit, which all of them share.  (Birge, 1932)
+    `common` is the standard error of the fit, which all masses share.  (Birge, 1932)
     """
     ratios = [w.mass**2 / (w.std**2 + common**2) for w in free if w.std > 0]
     return max(1.0, float(np.sqrt(np.mean(ratios)))) if ratios else 1.0
 
 
 def moved_with(chain: Chain, coordinate: int) -> str:
-    """The link between base and tip that a coordinate moves; of a parallelogram, the one about the remote centre.
+    """The link between base and tip that a coordinate moves; in a parallelogram, the one about the remote centre.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def mirror_position(position: ArrayLike) -> Array:
 def unit_load(chain: Chain, link: str, position: ArrayLike, q: Array, dq: Array, ddq: Array) -> Array:
     """Effort (N, n) of the first n coordinates for a mass of 1 kg at a position (3,) of a link, along a motion (N, n).
 
-    It consists of gravity and inertia.  A mass m adds m times it to the effort of the motion.
+    The effort consists of gravity and inertia.  A mass m adds m times this effort to that of the motion.
     """
     n, L = q.shape[1], len(chain.links)
     masses, centres = np.zeros(L), np.zeros((L, 3))

@@ -1,10 +1,10 @@
 """Least squares over the physically possible parameters of a mechanism, as a conic program solved by Clarabel.
 
-    theta = arg min |U D theta - y|^2,    theta = A x,    J_l(x) >= 0 of every link,    x_i >= 0 where physics knows it
+    theta = arg min |U D theta - y|^2,    theta = A x,    J_l(x) >= 0 of every link,    x_i >= 0 if required
 
 Sousa and Cortesao, Inertia tensor properties in robot dynamics identification: a linear matrix inequality approach,
-2019.  Many x give the same theta: a small price on the traces of J selects the lightest.  Where the data demand first
-moments without inertia, masses grow without limit; a higher price stops the solver.
+2019.  Many x give the same theta: a small price on the traces of J selects the lightest.  If the data demand first
+moments without inertia, masses grow without limit; a higher price limits them, so that the solver stops.
 """
 
 from typing import Any, NamedTuple
@@ -18,16 +18,16 @@ from davinci_forces.maths.estimation.least_squares import Triangle
 from davinci_forces.maths.mechanics.bodies import of_pseudo_inertias
 from davinci_forces.maths.models.model import Mechanism
 
-TEN = 10  # inertial parameters of a link, and entries of a symmetric matrix of four rows
-ENTRIES = [(i, j) for j in range(4) for i in range(j + 1)]  # of the triangle of J, in the solver's order
-SECOND = [k for k, (_, j) in enumerate(ENTRIES) if j < 3]  # of them, those that are second moments of the mass
-FIRST = [k for k, (i, j) in enumerate(ENTRIES) if i < j == 3]
+TEN = 10  # number of inertial parameters of a link, and of entries of a symmetric 4 x 4 matrix
+ENTRIES = [(i, j) for j in range(4) for i in range(j + 1)]  # entries of the triangle of J, in the solver's order
+SECOND = [k for k, (_, j) in enumerate(ENTRIES) if j < 3]  # positions in `ENTRIES` of the second moments
+FIRST = [k for k, (i, j) in enumerate(ENTRIES) if i < j == 3]  # positions of the first moments
 DIAGONAL = [k for k, (i, j) in enumerate(ENTRIES) if i == j]
-NEGLIGIBLE_COLUMN = 1e-10  # of the longest column: a parameter of a shorter one has no effect on the effort
-PRICES = (1e-10, 1e-9, 1e-8, 1e-7)  # of the traces of J, where the square of the whole effort is 1
-AT_BOUND = 1e-8  # of the effort: a value nearer to its bound is set to the bound
-TOLERANCE = 1e-12  # of the solver
-MAX_STEP_FRACTION = 0.9  # of the way to the edge of a cone in one step: nearer to it, rounding stops the solver early
+NEGLIGIBLE_COLUMN = 1e-10  # a parameter has no effect on the effort if its column has a smaller share of the longest
+PRICES = (1e-10, 1e-9, 1e-8, 1e-7)  # weights of the traces of J, with the square of the whole effort scaled to 1
+AT_BOUND = 1e-8  # a value nearer to its bound than this share of the effort is set to the bound
+TOLERANCE = 1e-12  # of the solver's gaps and residuals
+MAX_STEP_FRACTION = 0.9  # a longer step towards the edge of a cone lets rounding stop the solver early
 MAX_GAP_SOLVER = 1e-8  # duality gap, as a share of the effort's square
 
 
@@ -48,8 +48,8 @@ class ConsistentParameters(NamedTuple):
 
     theta: Array  # (p,)
     x: Array  # (n,)
-    excess: float  # of the squares over the least, as a share of the effort's square
-    gap: float  # bound of the distance to the optimum, likewise
+    excess: float  # of the squared residuals over their minimum, as a share of the effort's square
+    gap: float  # bound of the distance to the optimum, as a share of the effort's square
 
 
 class Cones(NamedTuple):
@@ -57,14 +57,14 @@ class Cones(NamedTuple):
 
     scale: csc_array  # B (n, n)
     seen: Integers  # the unknowns with an effect on the effort, links first
-    links: int  # with an effect
-    positive: Integers  # of those with an effect, the ones outside links that are not negative
+    links: int  # number of links with an effect
+    positive: Integers  # places in `seen` of the unknowns outside links that must not be negative
 
 
 def nearest(R: Triangle, mechanism: Mechanism) -> ConsistentParameters:
     """Find the best physically possible parameters.
 
-    Of a mechanism without bodies, these are exactly those of least squares if their signs are possible.
+    For a mechanism without bodies, the parameters of least squares are returned if their signs are possible.
 
     Raises
     ------
@@ -84,26 +84,26 @@ def nearest(R: Triangle, mechanism: Mechanism) -> ConsistentParameters:
 def scale_unknowns(F: Array, mechanism: Mechanism) -> Cones:
     """Scale the unknowns so that their columns of F (p, n) have about unit length.
 
-    Scaling the axes of a link and its mass, J = T Z T', T = diag(s, s, s, t), leaves its cone as it is.
+    Scaling the axes of a link and its mass, J = T Z T', T = diag(s, s, s, t), does not change its cone.
     """
     L, n = mechanism.links, F.shape[1]
     to_ten, B = parameters_of_entries(), np.zeros((n, n))
     longest = float(np.linalg.norm(F, axis=0).max())
-    shown = list[int]()
+    excited = list[int]()
     for link in range(L):
         span = slice(TEN * link, TEN * (link + 1))
         columns = F[:, span] @ to_ten
         if (size := np.linalg.norm(columns, axis=0)).max() > NEGLIGIBLE_COLUMN * longest:
             B[span, span] = to_ten * scales_of_entries(size, NEGLIGIBLE_COLUMN * longest)
-            shown += range(span.start, span.stop)
+            excited += range(span.start, span.stop)
     others = np.arange(TEN * L, n)
     size = np.linalg.norm(F[:, others], axis=0)
     others, size = others[size > NEGLIGIBLE_COLUMN * longest], size[size > NEGLIGIBLE_COLUMN * longest]
     B[others, others] = 1.0 / size
-    which = np.array([*shown, *others.tolist()])
-    links = len(shown) // TEN
-    held = np.flatnonzero(mechanism.positive[which] & (np.arange(len(which)) >= TEN * links))
-    return Cones(csc_array(B), which, links, held)
+    seen = np.array([*excited, *others.tolist()])
+    links = len(excited) // TEN
+    bounded = np.flatnonzero(mechanism.positive[seen] & (np.arange(len(seen)) >= TEN * links))
+    return Cones(csc_array(B), seen, links, bounded)
 
 
 def parameters_of_entries() -> Array:
@@ -115,8 +115,8 @@ def parameters_of_entries() -> Array:
 
 
 def scales_of_entries(size: Array, least: float) -> Array:
-    """Scales of T J T' by entry (10,) from the lengths of their columns (10,); short columns use the others'."""
-    second, first, mass = (float(size[which].max()) for which in (SECOND, FIRST, [TEN - 1]))
+    """Scales (10,) of the entries of T J T' by the lengths (10,) of their columns; a short column uses the others."""
+    second, first, mass = (float(size[entries].max()) for entries in (SECOND, FIRST, [TEN - 1]))
     if max(second, mass) <= least:
         second = mass = first
     elif second <= least:
@@ -133,7 +133,7 @@ def solve(F: csc_array, y: Array, cones: Cones) -> tuple[Array, float]:
     Raises
     ------
     NotIdentifiable
-        If it converges at no price.
+        If the solver converges at no price.
     """
     for price in PRICES:
         z, gap, status = solve_at_price(F, y, cones, price)
@@ -145,33 +145,33 @@ def solve(F: csc_array, y: Array, cones: Cones) -> tuple[Array, float]:
 
 
 def solve_at_price(F: csc_array, y: Array, cones: Cones, price: float) -> tuple[Array, float, str]:
-    """Minimise |F z - y|^2 + price of the traces in the cones; return z, the gap, and the solver's status.
+    """Minimise |F z - y|^2 + price * traces in the cones; return z, the gap, and the solver's status.
 
-    The residual r = F z - y is an unknown of its own, so that F is not multiplied with itself.
+    The residual r = F z - y is a separate unknown, so that the solver never forms F' F.
     """
     import clarabel
 
     p, n = F.shape
-    held = np.concatenate([np.arange(TEN * cones.links), cones.positive])
+    bounded = np.concatenate([np.arange(TEN * cones.links), cones.positive])
     cost = np.zeros(n + p)
     cost[[TEN * link + k for link in range(cones.links) for k in DIAGONAL]] = price
     squares = diags_array(np.r_[np.zeros(n), np.full(p, 2.0)], format="csc")
-    in_cones = hstack([-eye_array(n, format="csr")[held], csc_array((len(held), p))])
+    in_cones = hstack([-eye_array(n, format="csr")[bounded], csc_array((len(bounded), p))])
     rows = vstack([hstack([F, -eye_array(p)]), in_cones], format="csc")
     kinds: list[Any] = [clarabel.ZeroConeT(p), *[clarabel.PSDTriangleConeT(4)] * cones.links]
     kinds += [clarabel.NonnegativeConeT(len(cones.positive))] if len(cones.positive) else []
-    bound = np.r_[y, np.zeros(len(held))]
+    bound = np.r_[y, np.zeros(len(bounded))]
     answer = clarabel.DefaultSolver(squares, cost, rows, bound, kinds, careful_settings()).solve()
     z = np.array(answer.x)[:n]
-    z[held] = np.array(answer.s)[p:]  # the slack lies exactly in the cones
+    z[bounded] = np.array(answer.s)[p:]  # the slack lies exactly in the cones
     values, multiplier = z[cones.positive], np.array(answer.z)[p + TEN * cones.links :]
-    z[cones.positive] = np.where((values < AT_BOUND) & (values < multiplier), 0.0, values)  # of the two one is 0
-    gap = float(((F @ z - y) ** 2).sum() + cost[:n] @ z) - float(answer.obj_val_dual)  # no z is below the dual's value
+    z[cones.positive] = np.where((values < AT_BOUND) & (values < multiplier), 0.0, values)  # one of the two is 0
+    gap = float(((F @ z - y) ** 2).sum() + cost[:n] @ z) - float(answer.obj_val_dual)  # the dual is a lower bound
     return z, gap if np.isfinite(gap) else np.inf, f"{answer.status} after {answer.iterations} steps"
 
 
 def careful_settings() -> Any:
-    """Settings of the solver with smaller steps."""
+    """Settings of the solver with steps of at most `MAX_STEP_FRACTION`."""
     cautious = settings(TOLERANCE)
     cautious.max_step_fraction = MAX_STEP_FRACTION
     return cautious

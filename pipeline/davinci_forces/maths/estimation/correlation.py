@@ -3,13 +3,13 @@
     r = (1 - Q Q') e,    cov(e) = sigma^2 Omega,    cov(Q' e) = sigma^2 Q' Omega Q
 
 Omega is that of a first-order autoregression plus white noise on a repeated period.  A model's error is slow and the
-noise of averaged samples is not, so one correlation for both would be that of the faster.  On a period Omega is
+noise of averaged samples is not, so one correlation for both would describe only the faster.  On a period Omega is
 diagonal in frequency,
 
     S(w) = (1 - a) (1 - rho^2) / (1 + rho^2 - 2 rho cos w) + a,    rho = exp(-1/T)
 
-so every candidate of T and a costs a product of small matrices.  Its weight is its restricted likelihood, which allows
-for the p fitted columns; they bias the residuals' own correlation.  (Patterson and Thompson, 1971; Harville, 1974.)
+so a candidate of T and a costs a product of small matrices.  Its weight is its restricted likelihood, which allows for
+the p fitted columns, which bias the correlation of the residuals.  (Patterson and Thompson, 1971; Harville, 1974.)
 The covariance is the mean over candidates: a single correlation gives too little coverage where a period has only a
 dozen correlation times.
 """
@@ -22,26 +22,26 @@ from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array
 
-TIMES = 24  # correlation times T, besides none, evenly spaced in their logarithm
+TIMES = 24  # number of correlation times T, evenly spaced in their logarithm; one more candidate has none
 SHORTEST_TIME = 0.3  # [samples]
-LONGEST_TIME = 0.25  # of the longest log
+LONGEST_TIME = 0.25  # as a share of the longest log
 WHITE = np.array([0.0, 0.03, 0.1, 0.3, 0.6])  # shares a of white noise in the variance
-SINGLE, BANDS = 64, 120  # lowest frequencies, one band each, and bands of all higher ones
-CACHED_ROWS = 8192  # rows at a time, which fit into the processor's cache
+SINGLE, BANDS = 64, 120  # number of lowest frequencies with one band each, and of bands for all higher frequencies
+CACHED_ROWS = 8192  # rows that are processed together: they fit into the processor's cache
 SMALLEST = np.finfo(float).tiny
 
 
-Spectra = list[tuple[NDArray[np.complex128], int]]  # of each log: F (p + 1, K // 2 + 1) of columns and residuals, and K
+Spectra = list[tuple[NDArray[np.complex128], int]]  # F (p + 1, K // 2 + 1) of columns and residuals, and K, per log
 
 
 class Bands(NamedTuple):
     """The spectra of the logs in B bands of frequency."""
 
     frequency: Array  # (B,) [rad/sample]
-    number: Array  # (B,) of frequencies in the band
-    basis: Array  # (B, p, p) of the columns Q
-    cross: Array  # (B, p) of columns and residuals
-    power: Array  # (B,) of the residuals
+    number: Array  # (B,) frequencies in the band
+    basis: Array  # (B, p, p) products of the columns Q
+    cross: Array  # (B, p) products of columns and residuals
+    power: Array  # (B,) squares of the residuals
 
 
 class CorrelatedVariance(NamedTuple):
@@ -56,7 +56,7 @@ def correlated_variance(
 ) -> CorrelatedVariance:
     """Variance of D y for y = Q' tau, from orthonormal columns Q (K, p), D (p, p) and the residuals (K,).
 
-    Each log is a period that begins at its entry of `starts`; `degrees` are K - p.  Larger residuals in one part of the
+    Each log is a period that begins at its entry of `starts`; `degrees` is K - p.  Larger residuals in one part of the
     period increase the variance of the parameters that depend on this part.
     """
     spectra = transform_logs(Q, residual, starts)
@@ -84,7 +84,7 @@ def transform_logs(Q: Array, residual: Array, starts: tuple[int, ...]) -> Spectr
 
 
 def band_spectra(spectra: Spectra) -> Bands:
-    """Sum the spectra of columns and residuals in bands that widen with frequency; logs of equal length share them."""
+    """Sum the spectra of columns and residuals in bands that widen with frequency; logs of equal length share bands."""
     parts = []
     for K in dict.fromkeys(K for _, K in spectra):
         logs, n = [F for F, samples in spectra if samples == K], K // 2 + 1
@@ -97,15 +97,15 @@ def band_spectra(spectra: Spectra) -> Bands:
         numbers = [F.view(float) for F in logs]  # real and imaginary parts, in turn
         columns = (np.hstack([x[:, a:b] for x in numbers]) for a, b in pairwise(2 * np.append(edges, n)))
         G = np.stack([2.0 * band @ band.T for band in columns])
-        for k in np.flatnonzero(w == 1.0):  # which have no negative frequency beside them
-            alone = np.column_stack([F[:, k].real for F in logs])
-            G[-1 if k else 0] -= alone @ alone.T
+        for k in np.flatnonzero(w == 1.0):  # frequencies without a negative counterpart
+            real = np.column_stack([F[:, k].real for F in logs])
+            G[-1 if k else 0] -= real @ real.T
         parts.append(Bands(frequency, len(logs) * count, G[:, :-1, :-1], G[:, :-1, -1], G[:, -1, -1]))
     return Bands(*(np.concatenate(columns) for columns in zip(*parts, strict=True)))
 
 
 def candidates(frequency: Array, K: int) -> tuple[Array, Array]:
-    """Spectra S (G, B) of all correlation times and shares of white noise, and their sums of correlations (G,)."""
+    """Spectra S (G, B) of all correlation times and shares of white noise, and the sums (G,) of their correlations."""
     times = np.concatenate([[1e-3], np.geomspace(SHORTEST_TIME, max(LONGEST_TIME * K, 1.0), TIMES)])
     rho, a = (x.ravel() for x in np.meshgrid(np.exp(-1.0 / times), WHITE, indexing="ij"))
     slow = (1 - rho**2)[:, None] / (1 + rho[:, None] ** 2 - 2 * rho[:, None] * np.cos(frequency))
@@ -116,12 +116,12 @@ def weigh_candidates(bands: Bands, S: Array, degrees: int) -> tuple[Array, Array
     """Weight (G,) of each candidate by its restricted likelihood, and its estimate of sigma^2 (G,)."""
     G, p = len(S), bands.cross.shape[1]
     normal = (1 / S @ bands.basis.reshape(-1, p * p)).reshape(G, p, p)
-    moved = np.linalg.solve(normal, (1 / S @ bands.cross)[:, :, None])[:, :, 0]
-    squares = 1 / S @ bands.power - np.einsum("gi,gij,gj->g", moved, normal, moved)
+    shift = np.linalg.solve(normal, (1 / S @ bands.cross)[:, :, None])[:, :, 0]
+    squares = 1 / S @ bands.power - np.einsum("gi,gij,gj->g", shift, normal, shift)
     squares = np.maximum(squares, SMALLEST)
     logarithm = np.log(S) @ bands.number + np.linalg.slogdet(normal)[1] + degrees * np.log(squares)
-    even = np.where(np.arange(G) < len(WHITE), (G - len(WHITE)) / len(WHITE), 1.0)  # correlated or not: even odds
-    share = even * np.exp(0.5 * (logarithm.min() - logarithm))
+    prior = np.where(np.arange(G) < len(WHITE), (G - len(WHITE)) / len(WHITE), 1.0)  # even odds of correlation
+    share = prior * np.exp(0.5 * (logarithm.min() - logarithm))
     return share / share.sum(), squares / degrees
 
 
@@ -135,13 +135,13 @@ def unevenness(spectra: Spectra, D: Array, S: Array, frequency: Array) -> Array:
     sums = np.zeros((3, len(D)))
     for F, K in spectra:
         root = np.sqrt(np.interp(2 * np.pi * np.arange(F.shape[1]) / K, frequency[order], S[order]))
-        numbers, both = F.view(float), np.repeat(root, 2)
-        numbers[:-1] *= both
-        numbers[-1] /= both
+        numbers, both_parts = F.view(float), np.repeat(root, 2)
+        numbers[:-1] *= both_parts
+        numbers[-1] /= both_parts
         columns = np.fft.irfft(F, K, norm="ortho")
         for first in range(0, K, CACHED_ROWS):
-            some = columns[:, first : first + CACHED_ROWS]
-            u2, h2 = some[-1] ** 2, (D @ some[:-1]) ** 2
+            block = columns[:, first : first + CACHED_ROWS]
+            u2, h2 = block[-1] ** 2, (D @ block[:-1]) ** 2
             sums += np.stack([h2 @ u2, h2.sum(axis=1), np.full(len(D), u2.sum())])
     samples = sum(K for _, K in spectra)
     return np.asarray(np.where(sums[2] > 0, sums[0] * samples / np.maximum(sums[1] * sums[2], SMALLEST), 1.0))

@@ -1,7 +1,7 @@
 """Test whether values with standard errors, one a day, are equal: for a trend, a scatter, an outlier.
 
 Weights are 1 / s^2.  If values scatter about a line by more than their errors, the Birge ratio sqrt(chi^2 / (n - 2))
-multiplies the error of its slope: one odd value makes no trend.  Holm's method keeps the probability of any
+multiplies the error of its slope: one outlier makes no trend.  Holm's method keeps the probability of any
 false alarm in many tests at the stated level (Scandinavian Journal of Statistics 6 (1979) 65-70).
 """
 
@@ -13,11 +13,11 @@ from scipy.special import chdtrc, stdtr
 
 from davinci_forces.maths.arrays import Array, Booleans
 
-MIN_VALUES_TREND = 3  # values of which a trend differs from a step
+MIN_VALUES_TREND = 3  # with fewer values, a trend cannot be distinguished from a step
 
 
 class Trend(NamedTuple):
-    """The slope of a line through values, its standard error, and the probability of a larger one by chance."""
+    """The slope of a line through values, its standard error, and the probability of a larger slope by chance."""
 
     slope: float
     std: float
@@ -27,29 +27,29 @@ class Trend(NamedTuple):
 def trend(t: Array, x: Array, std: Array) -> Trend | None:
     """Fit a weighted line to values (n,) at times (n,); None with fewer than three different times.
 
-    It is the line of statsmodels' WLS, whose errors would be below the stated ones where values scatter less.
+    The line is that of statsmodels' WLS, but the errors of WLS are below the stated ones if values scatter less.
     """
     if len(np.unique(t)) < MIN_VALUES_TREND:
         return None
-    w, since = std**-2, t - np.average(t, weights=std**-2)
-    squares = float(np.sum(w * since**2))
-    slope = float(np.sum(w * since * x) / squares)
-    residual = x - np.average(x, weights=w) - slope * since
+    w, centred = std**-2, t - np.average(t, weights=std**-2)
+    squares = float(np.sum(w * centred**2))
+    slope = float(np.sum(w * centred * x) / squares)
+    residual = x - np.average(x, weights=w) - slope * centred
     birge = max(float(np.sum(w * residual**2)) / (len(x) - 2), 1.0)
     error = float(np.sqrt(birge / squares))
     return Trend(slope, error, two_sided(slope / error, len(x) - 2))
 
 
 def scatter(x: Array, std: Array) -> float:
-    """Probability of a larger scatter of values (n,) with errors (n,) about one mean by chance, by chi^2."""
+    """Probability that values (n,) with errors (n,) scatter more about one mean by chance, by chi^2."""
     w = std**-2
     return float(chdtrc(len(x) - 1, np.sum(w * (x - np.average(x, weights=w)) ** 2))) if len(x) > 1 else 1.0
 
 
 def outlier_probabilities(x: Array, std: Array) -> Array:
-    """Probability (n,) by chance of each value's distance from the mean of the others.
+    """Probability (n,) that each value is further from the mean of the others by chance.
 
-    The scatter of the others widens the error of their mean; 1 with fewer than three others.
+    The scatter of the others widens the error of their mean.  With fewer than three others the probability is 1.
     """
     p = np.ones(len(x))
     for i in range(len(x)):

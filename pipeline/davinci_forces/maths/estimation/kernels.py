@@ -9,7 +9,7 @@ import numpy as np
 
 from davinci_forces.maths.compiled import compile_and_store, inline
 
-BLOCK_ROWS = 512  # rows at a time, whose columns all fit into the processor's nearest cache
+BLOCK_ROWS = 512  # rows of a block, whose columns fit into the processor's nearest cache
 
 
 @inline
@@ -29,9 +29,9 @@ def dot(x: Any, y: Any, n: int) -> float:
 
 @compile_and_store
 def triangularise(Phi: Any, tau: Any, weight: Any, R: Any) -> None:
-    """Write the triangle R (p + 1, p + 1) of the rows sqrt(w) [Phi tau], by Householder's reflections block by block.
+    """Write the triangular factor R (p + 1, p + 1) of the rows sqrt(w) [Phi tau], by Householder reflections.
 
-    A block stands below the triangle of those before it, so reflection k takes row k of the triangle and the block.
+    Each block is stacked below the triangle of the previous blocks: reflection k acts on row k of it and on the block.
     """
     K, p = Phi.shape
     R[:] = 0.0
@@ -76,7 +76,7 @@ def fly(
     x: Any, v: Any, best: Any, costs: Any, lower: Any, upper: Any, factors: Any, C: Any, y: Any, r: Any, w: Any,
     cognitive: float, social: float, reflects: bool, history: Any,
 ) -> None:  # fmt: skip
-    """Move particles x (S, n + 1) by velocities v (S, n), once for each r (I, S, n, 2) in [0, 1) and weight w (I,).
+    """Move particles x (S, n + 1) by velocities v (S, n), I times, with random r (I, S, n, 2) and weights w (I,).
 
     `best` (S, n + 1) and `costs` (S,) are the best place and cost of each particle; the least cost after each move goes
     to `history` (I,).

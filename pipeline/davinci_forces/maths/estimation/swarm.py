@@ -14,16 +14,16 @@ from davinci_forces.maths.estimation.least_squares import Triangle
 from davinci_forces.maths.models.physical import Box
 
 PARTICLES, MAX_ITERATIONS, PATIENCE = 24, 3000, 150  # PATIENCE: iterations without a change; section 6.5.1
-CHANGE = 1e-9  # of the squared error: a smaller change counts as none
-ITERATIONS_DRAWN = 50  # iterations whose random numbers are drawn together
-SWARMS = 4  # at most, until two agree
-AGREE = 1e-7  # of the squared error
+CHANGE = 1e-9  # a smaller share of the squared error is no change
+ITERATIONS_DRAWN = 50  # number of iterations whose random numbers are drawn together
+SWARMS = 4  # largest number of swarms that run until two agree
+AGREE = 1e-7  # largest difference of two agreeing swarms, as a share of the squared error
 
 
 class Manner(NamedTuple):
     """Weights and walls of a swarm."""
 
-    name: str  # for its walls
+    name: str  # what its walls do
     inertia: tuple[float, float]  # w at first, and after `falls` iterations
     falls: int
     cognitive: float  # C_1
@@ -43,8 +43,8 @@ class SwarmOptimum(NamedTuple):
     x: Array  # (n,)
     theta: Array  # (p,)
     squares: float  # |W^(1/2) (tau - Phi theta)|^2
-    history: Array  # (I,) the least squares after each iteration
-    swarms: int  # that ran until two agreed
+    history: Array  # (I,) smallest squares after each iteration
+    swarms: int  # number of swarms that ran
 
 
 def search(R: Triangle, box: Box, seed: int, manner: Manner = CONSTRICTED) -> SwarmOptimum:
@@ -73,10 +73,10 @@ def swarm(R: Triangle, box: Box, random: np.random.Generator, manner: Manner) ->
         w = first + (last - first) * np.minimum(np.arange(start, start + ITERATIONS_DRAWN) / manner.falls, 1.0)
         r = random.random((ITERATIONS_DRAWN, PARTICLES, n, 2))
         bounds = (box.lower, box.upper, box.lumping.factors, C, R.y)
-        into = history[start : start + ITERATIONS_DRAWN]
-        kernels.fly(x, v, best, costs, *bounds, r, w, manner.cognitive, manner.social, manner.reflects, into)
+        window = history[start : start + ITERATIONS_DRAWN]
+        kernels.fly(x, v, best, costs, *bounds, r, w, manner.cognitive, manner.social, manner.reflects, window)
         done = start + ITERATIONS_DRAWN
-        if done > PATIENCE and history[done - 1 - PATIENCE] - into[-1] <= CHANGE * (R.squares + into[-1]):
+        if done > PATIENCE and history[done - 1 - PATIENCE] - window[-1] <= CHANGE * (R.squares + window[-1]):
             break
     leader = best[int(costs.argmin()), :n]
     history = history[:done] + R.squares

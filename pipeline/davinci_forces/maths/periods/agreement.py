@@ -10,13 +10,13 @@ from davinci_forces.maths.periods.averaging import Phases, end, nearest, phases,
 from davinci_forces.maths.periods.harmonics import Harmonics
 from davinci_forces.maths.periods.period import refine, standard_error
 
-MIN_ODD_RATIO = 2.0  # times what noise explains: to lose a period costs more than a smaller difference
-NEGLIGIBLE_DIFFERENCE = 1e-4  # of a signal's standard deviation: encoder steps make smaller differences
-ODD_PROBABILITY = 1e-3  # of so large a difference by noise alone, below which a period differs
-STRAY_FACTOR = 4.0  # times the residual of the harmonics where the motion repeats: samples further away stray
-MIN_STRAY = 0.01  # of the motion's standard deviation: a nearer sample does not stray
-IN_A_ROW = 3  # samples that stray before the motion is over: one by itself is a glitch
-UNSURE = 0.02  # of a period, by which a phase may be uncertain beyond a gap
+MIN_ODD_RATIO = 2.0  # of a difference to what noise explains: dropping a period costs more than a smaller one
+NEGLIGIBLE_DIFFERENCE = 1e-4  # share of a signal's standard deviation: encoder steps cause smaller ones
+ODD_PROBABILITY = 1e-3  # a period differs if noise explains its difference with a smaller probability
+STRAY_FACTOR = 4.0  # a sample strays if it is this many residuals of the repeating motion away
+MIN_STRAY = 0.01  # share of the motion's standard deviation: a nearer sample does not stray
+IN_A_ROW = 3  # straying samples that end a repeated motion: a single one is a glitch
+UNSURE = 0.02  # largest uncertainty of the phase after a gap, as a share of a period
 
 
 class Difference(NamedTuple):
@@ -25,40 +25,40 @@ class Difference(NamedTuple):
     signal: int
     period: int  # counted from 0
     periods: int
-    rms: float  # beyond noise
-    ratio: float  # of its root mean square to what noise explains
+    rms: float  # of the difference beyond noise
+    ratio: float  # root mean square of the difference over what noise explains
 
     @property
     def has_periods_on_both_sides(self) -> bool:
-        """Whether there are periods on both sides, which agree with each other."""
+        """Whether the period lies between others, which agree with each other."""
         return 0 < self.period < self.periods - 1
 
 
 def agreeing_stretch(
-    t: Array, positions: Sequence[Array], signals: Sequence[Array], span: slice, length: float, rate: float, orders: int
+    t: Array, positions: Sequence[Array], signals: Sequence[Array], span: slice, length: float, rate: float, H: int
 ) -> tuple[slice, float, list[Difference]]:
-    """Leave out the first and last periods that differ from the others; return stretch, period and differences.
+    """Leave out the first and last periods that differ from the others; return the span, period, differences.
 
-    An incomplete period is left out at the start rather than at the end, before a whole one is.  Of the periods at most
-    half are left out, since those could be the right ones.  `t` (N,) and `length` [s]; `positions`, whose harmonics
-    give the period, and `signals`, which are compared, (N,) each.
+    At the start, an incomplete period is left out before a whole one.  At most half of the periods are left out, since
+    those could be the correct ones.  `t` (N,) and `length` are in seconds.  H harmonics of `positions` give the period,
+    and `signals` are compared, (N,) each.
     """
     left_out: list[Difference] = []
-    fewest = (whole_periods(t[span], length, rate) + 1) // 2
+    min_periods = (whole_periods(t[span], length, rate) + 1) // 2
     while True:
         M = whole_periods(t[span], length, rate)
         used = slice(span.start, end(t, span, length, rate))
         odd = differing_periods(t[used], [x[used] for x in signals], length, rate)
         at_the_edges = sorted((d for d in odd if not d.has_periods_on_both_sides), key=lambda d: -d.ratio)
-        if not at_the_edges or fewest >= M:
+        if not at_the_edges or min_periods >= M:
             return span, length, left_out + sorted(odd, key=lambda d: -d.ratio)[:1]
         left_out.append(at_the_edges[0])
-        span = _without(t, span, at_the_edges[0], M, length, rate)
-        length = refine(t[span], [x[span] for x in positions], length, orders)
+        span = _shorten(t, span, at_the_edges[0], M, length, rate)
+        length = refine(t[span], [x[span] for x in positions], length, H)
 
 
-def _without(t: Array, span: slice, odd: Difference, M: int, length: float, rate: float) -> slice:
-    """Shorten a stretch of M whole periods by the first or the last one, or by an incomplete one at the start."""
+def _shorten(t: Array, span: slice, odd: Difference, M: int, length: float, rate: float) -> slice:
+    """Shorten a span of M whole periods by its first or last period, or by an incomplete period at its start."""
     if odd.period > 0:
         return slice(span.start, end(t, span, length, rate, M - 1))
     late, next_one = t[span.stop - 1] + 0.5 / rate - M * length, t[span.start] + length - 0.5 / rate
@@ -69,8 +69,8 @@ def _without(t: Array, span: slice, odd: Difference, M: int, length: float, rate
 def alternation(t: Array, signals: Sequence[Array], length: float, rate: float, among: Sequence[int]) -> int:
     """The number k, the first of `among`, for which signals (N,) repeat only after k of these periods, or 1.
 
-    A motion may nearly repeat within its period.  Then every k-th period agrees, and those between them do not; the
-    groups are compared by an analysis of variance.
+    A motion may nearly repeat within its period.  Then every k-th period agrees with the first, and the periods between
+    do not.  The groups are compared by an analysis of variance.
     """
     phased, number = Phases(t, length, phases(length, rate)), numbers(t, length)
     residuals = [phased.move_to_phases(x)[1] for x in signals if among]
@@ -83,7 +83,7 @@ def alternation(t: Array, signals: Sequence[Array], length: float, rate: float, 
 
 
 def _alternates(x: Array, residual: Array, place: Integers, counts: Integers) -> bool:
-    """Whether groups of the periods of a signal (N,) differ by more than their noise; `counts` (k, K) are theirs."""
+    """Whether groups of the periods of a signal (N,) differ by more than noise; `counts` (k, K) are their samples."""
     sums = _sums(place, residual, counts)
     means = sums / np.maximum(counts, 1)
     mean = sums.sum(axis=0) / np.maximum(counts.sum(axis=0), 1)
@@ -97,8 +97,8 @@ def _alternates(x: Array, residual: Array, place: Integers, counts: Integers) ->
 
 def numbers(t: Array, length: float) -> Integers:
     """Number of the period of each time (N,), 0 for the first time."""
-    turns: Array = (t - t[0]) / length + 1e-9
-    return turns.astype(np.int64)
+    elapsed_periods: Array = (t - t[0]) / length + 1e-9
+    return elapsed_periods.astype(np.int64)
 
 
 def _sums(place: Integers, x: Array, counts: Integers) -> Array:
@@ -114,12 +114,12 @@ def _lag_one(noise: Array) -> float:
 def is_unlikely(F: float, rho: float, degrees: float, degrees_others: float) -> bool:
     """Whether noise with correlation `rho` from sample to sample rarely gives so large a ratio F of two variances.
 
-    Squares of first-order noise are correlated by rho^2, so they count as fewer independent ones.
+    Squares of first-order noise are correlated by rho^2, so they are worth fewer independent squares.
     """
     from scipy.special import fdtrc
 
-    worth = (1 - rho**2) / (1 + rho**2)
-    return bool(fdtrc(max(worth * degrees, 1.0), max(worth * degrees_others, 1.0), F) < ODD_PROBABILITY)
+    information = (1 - rho**2) / (1 + rho**2)
+    return bool(fdtrc(max(information * degrees, 1.0), max(information * degrees_others, 1.0), F) < ODD_PROBABILITY)
 
 
 def differing_periods(t: Array, signals: Sequence[Array], length: float, rate: float) -> list[Difference]:
@@ -127,7 +127,7 @@ def differing_periods(t: Array, signals: Sequence[Array], length: float, rate: f
 
     A period is compared with the mean of the others at each phase, as in an analysis of variance.  The statistic is the
     mean square of the difference over the variance between the others.  Correlated noise reduces the degrees of
-    freedom of both, so their number follows from the correlation of the others.
+    freedom of both squares, by a factor that follows from the correlation of the other periods.
     """
     periods = _Periods.from_times(t, length, rate)
     if len(periods.numbers) < 3:
@@ -139,12 +139,12 @@ class _Periods(NamedTuple):
     """The places of samples (N,) in a table of M periods by K phases, which all signals of a log share."""
 
     phased: Phases
-    numbers: Integers  # (M,) of the periods, those that hold no samples left out
-    first: Integers  # (M,) the first sample of each
+    numbers: Integers  # (M,) of the periods that hold samples
+    first: Integers  # (M,) first sample of each period
     place: Integers  # (N,) of each sample in the table
-    counts: Integers  # (M, K)
-    totals: Integers  # (K,) of the counts
-    weight: Array  # (M, K) of the squared deviation of a period's sum; 0 where it or the others have no samples
+    counts: Integers  # (M, K) samples in each cell
+    totals: Integers  # (K,) samples of each phase
+    weight: Array  # (M, K) of the squared deviation of a period's sum; 0 if the period or the others have no samples
     compared: Integers  # (M,) phases at which a period and the others have samples
     degrees: Integers  # (M,) of freedom behind the variance of the others
 
@@ -158,25 +158,25 @@ class _Periods(NamedTuple):
         counts = np.bincount(place, minlength=M * K).reshape(M, K)
         totals = counts.sum(axis=0)
         others = totals - counts
-        both = counts * others
-        weight = np.divide(totals, both, out=np.zeros(both.shape), where=both > 0)
+        pairs = counts * others
+        weight = np.divide(totals, pairs, out=np.zeros(pairs.shape), where=pairs > 0)
         degrees = np.maximum(others.sum(axis=1) - np.count_nonzero(others, axis=1), 1)
-        return cls(phased, number[first], first, place, counts, totals, weight, np.count_nonzero(both, axis=1), degrees)
+        return cls(phased, number[first], first, place, counts, totals, weight, (pairs > 0).sum(axis=1), degrees)
 
     def odd(self, x: Array, signal: int) -> list[Difference]:
-        """The periods in which a signal (N,) differs from the others."""
+        """The differences of the periods of a signal (N,) that differ from the others."""
         _, residual = self.phased.move_to_phases(x)
         sums = _sums(self.place, residual, self.counts)
         mean = sums.sum(axis=0) / np.maximum(self.totals, 1)
-        off = sums - self.counts * mean
-        explained = np.einsum("mk,mk,mk->m", off, off, self.weight)
-        # Squares between the other periods: all squares, less those within this period and those of its difference.
+        deviation = sums - self.counts * mean
+        explained = np.einsum("mk,mk,mk->m", deviation, deviation, self.weight)
+        # Squares between the other periods: all squares less the squares within this period and of its difference.
         squares = np.add.reduceat(residual * residual, self.first)
         within = squares - np.einsum("mk,mk->m", sums, sums / np.maximum(self.counts, 1))
         between = squares.sum() - mean @ sums.sum(axis=0)
         noise = np.maximum(between - explained - within, 0.0) / self.degrees
-        apart = explained / np.maximum(self.compared, 1)
-        ratio, rms = np.sqrt(apart / np.maximum(noise, 1e-300)), np.sqrt(np.maximum(apart - noise, 0.0))
+        difference = explained / np.maximum(self.compared, 1)
+        ratio, rms = np.sqrt(difference / np.maximum(noise, 1e-300)), np.sqrt(np.maximum(difference - noise, 0.0))
         return [
             Difference(signal, int(self.numbers[m]), int(self.numbers[-1]) + 1, float(rms[m]), float(ratio[m]))
             for m in np.flatnonzero(ratio > MIN_ODD_RATIO).tolist()
@@ -193,11 +193,11 @@ class _Periods(NamedTuple):
 
 
 def stretch(t: Array, signals: Sequence[Array], length: float, core: slice, harmonics: int) -> tuple[slice, float]:
-    """Extend `core` to the longest run of samples that repeats with one period, and refine that period [s].
+    """Extend the repeating samples `core` to the longest run that repeats with one period; refine that period [s].
 
-    The harmonics of the stretch so far predict up to as many samples again on either side.  Those that agree are added,
+    The harmonics of `core` predict up to as many samples again on either side.  Samples that agree are added to `core`,
     and the period is fitted again.  `t` (N,) [s], with or without gaps; `signals` (N,) each; `length` [s] precise
-    enough for the few periods of `core`.
+    enough for the few periods of the initial `core`.
     """
     length = refine(t[core], [x[core] for x in signals], length, harmonics)
     while (wide := _certain(t, signals, length, core, harmonics)) != core:
@@ -213,11 +213,11 @@ def stretch(t: Array, signals: Sequence[Array], length: float, core: slice, harm
 
 
 def _certain(t: Array, signals: Sequence[Array], length: float, core: slice, harmonics: int) -> slice:
-    """`core` and as many samples on either side, up to the first gap there beyond which the phase is not known."""
+    """`core` and as many samples on either side, up to the first gap after which the phase is not known."""
     reach = core.stop - core.start
     wide = slice(max(core.start - reach, 0), min(core.stop + reach, len(t)))
     steps = np.diff(t[wide])
-    # The error of a period is less than the period, so no shorter gap can matter.
+    # The error of a period is less than the period, so a shorter gap cannot matter.
     if not np.any(steps > UNSURE * length):
         return wide
     std = standard_error(t[core], [x[core] for x in signals], length, harmonics)
@@ -240,7 +240,7 @@ def _strays(t: Array, signals: Sequence[Array], length: float, core: slice, wide
         residual = wide_fit.evaluate(core_fit.project(x[core]))
         np.subtract(x[wide], residual, out=residual)
         residual -= (np.bincount(bins[inside], residual[inside], K) / counts)[bins]
-        # The mean of M periods contains their noise, so samples of other periods differ from it by more.
+        # The mean of M periods contains their noise, so samples of other periods differ more from this mean.
         expected = np.sqrt(residual[inside] @ residual[inside] / max(N - K, 1) * (1 + K / N))
         strays |= np.abs(residual) > max(STRAY_FACTOR * expected, MIN_STRAY * x[core].std())
     return strays

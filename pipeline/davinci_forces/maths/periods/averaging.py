@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from davinci_forces.maths.arrays import Array, Integers
 from davinci_forces.maths.periods.harmonics import Harmonics, are_apart
 
-SMOOTH = 30  # harmonics that describe how a signal moves within the width of one phase bin
-ON_PHASE = 1e-6  # of the time between phases, by which a sample on one may be off it
+SMOOTH = 30  # harmonics of the fit that moves samples within the width of one phase bin
+ON_PHASE = 1e-6  # of the time between phases: largest distance of a sample on a phase
 
 
 class Folded(NamedTuple):
@@ -24,17 +24,17 @@ class Folded(NamedTuple):
 
 
 def phases(period: float, rate: float) -> int:
-    """Number of phases K of a period: that of its whole samples, so that no phase stays empty."""
+    """Number of phases K of a period: the samples that fit into it, so that no phase stays empty."""
     return int(np.floor(period * rate * (1 + 1e-6)))
 
 
 def whole_periods(t: Array, period: float, rate: float) -> int:
-    """Number of whole periods M of the samples; the last may lack up to half a sample, since its end is uncertain."""
+    """Number of whole periods M of the samples; the last may lack half a sample, since its end is uncertain."""
     return int(np.floor(((t[-1] - t[0]) * rate + 1.5) / (period * rate)))
 
 
 def end(t: Array, span: slice, period: float, rate: float, M: int | None = None) -> int:
-    """Index after the last sample of the first M periods of a stretch, or of all its whole periods."""
+    """Index after the last sample of the first M periods of a span, or of all its whole periods."""
     M = whole_periods(t[span], period, rate) if M is None else M
     after = span.start + np.searchsorted(t[span] - t[span.start], M * period - 0.5 / rate)
     return int(after)
@@ -97,10 +97,10 @@ class Phases:
 
 def nearest(since: Array, period: float, K: int) -> Integers:
     """The nearest of the K phases of a period to each time (N,) since the first."""
-    turns = since / period
-    turns -= np.floor(turns)
-    turns *= K
-    bins = np.rint(turns, out=turns).astype(np.int64)
+    elapsed_periods = since / period
+    elapsed_periods -= np.floor(elapsed_periods)
+    elapsed_periods *= K
+    bins = np.rint(elapsed_periods, out=elapsed_periods).astype(np.int64)
     bins[bins == K] = 0
     return bins
 
@@ -111,7 +111,7 @@ def on_phases(t: Array, period: float, K: int) -> bool:
 
 
 def average_rows(x: Array, K: int) -> Folded:
-    """Average samples (N,) each of which falls on the next phase, which needs no fit."""
+    """Average samples (N,) that fall on one phase after the other, so that no fit is needed."""
     M, remainder = divmod(len(x), K)
     whole = M * K
     counts = np.full(K, M)
@@ -131,14 +131,14 @@ def average_rows(x: Array, K: int) -> Folded:
 def left_out(t: Array, x: Array, period: float, K: int, groups: Integers) -> Iterator[Folded]:
     """Average without each group of samples in turn, `groups` (N,) numbered from 0; `noise` stays empty.
 
-    The smooth fit is that of all samples, since it only moves each to the nearest phase.
+    The smooth fit is to all samples, because it only moves each sample to the nearest phase.
     """
     phased = Phases(t, period, K)
     smooth, residual = phased.move_to_phases(x)
     size = int(groups.max()) + 1
     place = groups * K + phased.bins
     powers = (np.ones_like(residual), residual, residual * residual)
-    sums = [np.bincount(place, w, size * K).reshape(size, K) for w in powers]
+    sums = [np.bincount(place, power, size * K).reshape(size, K) for power in powers]
     totals = [part.sum(axis=0) for part in sums]
     for group in range(size):
         n, total, squares = (whole - part[group] for whole, part in zip(totals, sums, strict=True))
@@ -154,5 +154,5 @@ def noise_std(folded: Folded) -> float:
 
 
 def degrees(folded: Folded) -> int:
-    """Degrees of freedom of the noise: one is spent per phase."""
+    """Degrees of freedom of the noise: all samples less one per phase."""
     return len(folded.noise) - int((folded.counts > 0).sum())

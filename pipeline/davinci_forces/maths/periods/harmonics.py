@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 
 from davinci_forces.maths.arrays import Array
 
-MAX_BASIS_SAMPLES = 1 << 15  # samples whose basis is held at a time
-EVEN = 256  # evenly spaced samples in a block
-UNEVEN = 1e-7  # of the time between samples: largest deviation of an even clock
+MAX_BASIS_SAMPLES = 1 << 15  # samples whose basis is in memory at a time
+EVEN = 256  # samples in a block of evenly spaced ones
+UNEVEN = 1e-7  # share of the time between samples: largest deviation of an even clock
 
 
 def basis(t: Array, omega: float, harmonics: int) -> Array:
     """The mean and the harmonics at these times, (N, 2 H + 1).  (6.16)"""
-    F = np.empty((2 * harmonics + 1, len(t)))  # a harmonic's samples beside each other, which halves the time
+    F = np.empty((2 * harmonics + 1, len(t)))  # a harmonic's samples are adjacent in memory, which halves the time
     F[0] = 1.0
-    # Powers of one rotation cost a product each, where a cosine and a sine would cost twenty times as much.
+    # A power of a rotation costs one product; a cosine and a sine cost twenty times as much.
     turn = np.exp(1j * omega * t)
     turned = np.ones_like(turn)
     for k in range(1, harmonics + 1):
@@ -33,15 +33,15 @@ class Harmonics:
     """The mean and the first harmonics of omega at times (N,), computed once for all signals.
 
     Evenly sampled blocks differ only by a rotation of each harmonic, so one basis serves all in a tenth of the time.
-    The samples after them, and all of an uneven clock, are processed block by block, which limits the memory.
+    Samples after the last even block, and all samples of an uneven clock, are processed in blocks to limit the memory.
     """
 
     def __init__(self, t: Array, omega: float, harmonics: int) -> None:
         self.omega, self.harmonics, self._size = omega, harmonics, len(t)
         step = even_step(t)
-        self._even = len(t) // EVEN * EVEN if step else 0  # samples in blocks that differ by a turn only
+        self._even = len(t) // EVEN * EVEN if step else 0  # samples in blocks that differ only by a rotation
         self._starts, self._within = t[: self._even : EVEN].copy(), np.arange(EVEN, dtype=np.float64) * step
-        self._rest = t[self._even :].copy() if step else t  # no view, which would keep all times of a long log
+        self._rest = t[self._even :].copy() if step else t  # a copy, because a view would keep all times in memory
 
     def project(self, x: Array) -> Array:
         """Fit the coefficients to samples (N,) by least squares.
@@ -90,24 +90,24 @@ class Harmonics:
     def _gram(self) -> Array:
         """The products (2 H + 1, 2 H + 1) of the basis with itself.
 
-        cos jx cos kx = (cos (j - k)x + cos (j + k)x) / 2, and so on: the sums of twice as many harmonics give them all.
+        cos jx cos kx = (cos (j - k)x + cos (j + k)x) / 2, and so on: the sums of 2 H harmonics give all products.
         """
         H = self.harmonics
         sums = self._sums(2 * H)
         cosines, sines = np.append(sums[0], sums[1::2]), np.append(0.0, sums[2::2])
         k = np.arange(H + 1)
-        ahead, behind = k[:, None] + k, k[:, None] - k
-        sine_behind = np.sign(behind) * sines[np.abs(behind)]
+        sum_of_orders, difference = k[:, None] + k, k[:, None] - k
+        sine_of_difference = np.sign(difference) * sines[np.abs(difference)]
         gram = np.empty((2 * H + 1, 2 * H + 1))
         of_cosine, of_sine = np.append(0, k[1:] * 2 - 1), k[1:] * 2
-        gram[np.ix_(of_cosine, of_cosine)] = (cosines[np.abs(behind)] + cosines[ahead]) / 2.0
-        gram[np.ix_(of_sine, of_sine)] = (cosines[np.abs(behind)] - cosines[ahead])[1:, 1:] / 2.0
-        gram[np.ix_(of_sine, of_cosine)] = (sines[ahead] + sine_behind)[1:] / 2.0
+        gram[np.ix_(of_cosine, of_cosine)] = (cosines[np.abs(difference)] + cosines[sum_of_orders]) / 2.0
+        gram[np.ix_(of_sine, of_sine)] = (cosines[np.abs(difference)] - cosines[sum_of_orders])[1:, 1:] / 2.0
+        gram[np.ix_(of_sine, of_cosine)] = (sines[sum_of_orders] + sine_of_difference)[1:] / 2.0
         gram[np.ix_(of_cosine, of_sine)] = gram[np.ix_(of_sine, of_cosine)].T
         return gram
 
     def _sums(self, harmonics: int) -> Array:
-        """Sum the basis of so many harmonics over all times: (2 H + 1,)."""
+        """Sum the basis of `harmonics` harmonics over all times: (2 H + 1,)."""
         sums: Array = basis(self._starts, self.omega, harmonics).sum(axis=0)
         within = basis(self._within, self.omega, harmonics).sum(axis=0)
         sums[0] *= within[0]
@@ -139,7 +139,7 @@ def _pairs(parts: Array) -> NDArray[np.complex128]:
 
 
 def even_step(t: Array) -> float:
-    """Time between samples (N,); 0 for an uneven clock, or where the samples are too few for it to matter."""
+    """Time between samples (N,); 0 for an uneven clock, or for fewer samples than a block."""
     if len(t) < EVEN:
         return 0.0
     step = float(t[-1] - t[0]) / (len(t) - 1)
@@ -147,7 +147,7 @@ def even_step(t: Array) -> float:
 
 
 def are_apart(t: Array, step: float, within: float) -> bool:
-    """Whether samples (N,) are one `step` apart, none off its place by more than a share `within` of the step."""
+    """Whether times (N,) follow at one `step`; no time deviates by more than a share `within` of the step."""
     due = t[0] + np.arange(MAX_BASIS_SAMPLES) * step
     for start in range(0, len(t), MAX_BASIS_SAMPLES):
         block = t[start : start + MAX_BASIS_SAMPLES]
@@ -175,10 +175,10 @@ def amplitudes(x: Array) -> Array:
 def kept_noise(sigma: float, K: int, harmonics: int, omega: float) -> Array:
     """Covariance (3, 3) of x, dx and ddx from white noise in K samples of a period, after the projection on harmonics.
 
-    Each harmonic keeps 2 sigma^2 / K of the noise, and the mean half of that.  A derivative is a quarter turn ahead, so
-    that only x and ddx correlate.
+    Each harmonic keeps 2 sigma^2 / K of the noise, and the mean half as much.  A derivative leads by a quarter of a
+    period, so that only x and ddx correlate.
     """
     rate = omega * np.arange(1, harmonics + 1)
     variance = sigma**2 / K * (1.0 + 2.0 * harmonics)
-    of_dx, of_ddx = (2.0 * sigma**2 / K * float((rate**order).sum()) for order in (2, 4))
+    of_dx, of_ddx = (2.0 * sigma**2 / K * float((rate**power).sum()) for power in (2, 4))
     return np.array([[variance, 0.0, -of_dx], [0.0, of_dx, 0.0], [-of_dx, 0.0, of_ddx]])

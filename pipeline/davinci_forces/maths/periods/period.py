@@ -9,8 +9,8 @@ from davinci_forces.maths.arrays import Array, Integers
 from davinci_forces.maths.periods.harmonics import Harmonics, derivative
 from davinci_forces.maths.periods.repetition import repetition
 
-LINES_LOST = 2.0  # lines of the spectrum by which an interval of two standard errors is widened; found by simulation
-LINES_BESIDE = 1000  # lines above the highest harmonic; the slope has 3e-4 of its power beyond them
+LINES_LOST = 2.0  # spectral lines by which an interval of two standard errors is widened; found by simulation
+LINES_BESIDE = 1000  # spectral lines used above the highest harmonic; 3e-4 of the slope's power is beyond them
 
 
 class Period(NamedTuple):
@@ -21,7 +21,7 @@ class Period(NamedTuple):
 
 
 def guess(signals: Sequence[Array]) -> float | None:
-    """Shortest lag after which all signals repeat, in samples, or None where they do not."""
+    """Shortest lag after which all signals repeat, in samples, or None if they do not repeat."""
     match = repetition(signals)
     return None if match is None else match.lag
 
@@ -29,7 +29,7 @@ def guess(signals: Sequence[Array]) -> float | None:
 def refine(t: Array, signals: Sequence[Array], period: float, harmonics: int, steps: int = 30) -> float:
     """Fit the period [s] of the signals' harmonics by Gauss-Newton with the coefficients projected out.
 
-    `t` (N,) [s]; `signals` (N,) each, weighted by what each leaves unexplained; `period` [s] close enough that the
+    `t` (N,) [s]; `signals` (N,) each, weighted by the inverse of its residual power; `period` [s] is close: the
     highest harmonic drifts less than half a turn over the record.  (G. Golub and V. Pereyra, variable projection, 1973)
     """
     omega, shifted = 2 * np.pi / period, t - t.mean()
@@ -48,14 +48,14 @@ def refine(t: Array, signals: Sequence[Array], period: float, harmonics: int, st
 def standard_error(t: Array, signals: Sequence[Array], period: float, harmonics: int) -> float:
     """Standard error [s] of the fitted period of signals (N,), for residuals of any colour.
 
-    Residuals may be correlated from sample to sample and from signal to signal: their own spectrum is used.  The slope
-    lies in narrow bands beside the harmonics, so few lines of the spectrum determine the error.
+    Residuals may be correlated from sample to sample and from signal to signal, so their spectrum is used.  The slope,
+    a signal's derivative by frequency, lies in narrow bands around the harmonics: few spectral lines give the error.
     """
     from scipy.fft import prev_fast_len, rfft
 
-    N = prev_fast_len(len(t), real=True)  # samples whose spectrum is taken: few less than there are
-    apart = (t[N - 1] - t[0]) / (N - 1) * N / period  # lines of the spectrum between two harmonics
-    lines = np.arange(min(int(harmonics * apart) + LINES_BESIDE, N // 2 + 1))
+    N = prev_fast_len(len(t), real=True)  # samples of the spectrum: slightly fewer, which is faster
+    spacing = (t[N - 1] - t[0]) / (N - 1) * N / period  # lines of the spectrum between two harmonics
+    lines = np.arange(min(int(harmonics * spacing) + LINES_BESIDE, N // 2 + 1))
     spectra, weights, information = np.zeros(len(lines), complex), np.zeros(len(lines)), 0.0
     for weight, slope, residual in _linearised(t - t.mean(), signals, 2 * np.pi / period, harmonics):
         information += weight * float(slope @ slope)
@@ -64,16 +64,16 @@ def standard_error(t: Array, signals: Sequence[Array], period: float, harmonics:
         weights += weight * np.abs(of_slope) ** 2
     power = float(np.vdot(spectra, spectra).real) / (N * float(weights.sum()))
     weights /= weights.sum()
-    alike = float(weights @ weights)  # the share of one line if all had the same weight
-    remaining = 1.0 - float(weights @ _taken(lines, N, apart, harmonics)) - alike / 2.0  # the slope was fitted, too
-    variance = power / information / remaining * (1.0 + LINES_LOST * alike)
+    line_share = float(weights @ weights)  # the share of one line if all lines had the same weight
+    remaining = 1.0 - float(weights @ _taken(lines, N, spacing, harmonics)) - line_share / 2.0  # the slope is fitted
+    variance = power / information / remaining * (1.0 + LINES_LOST * line_share)
     return float(period**2 / (2 * np.pi) * np.sqrt(variance))
 
 
 def _linearised(
     t: Array, signals: Sequence[Array], omega: float, harmonics: int
 ) -> Iterator[tuple[float, Array, Array]]:
-    """Yield of each signal its weight, its derivative by omega orthogonal to the harmonics, and its residual.
+    """Yield for each signal its weight, its derivative by omega orthogonal to the harmonics, and its residual.
 
     `t` (N,) is centred; `signals`, derivatives and residuals are (N,) each.
     """
@@ -84,11 +84,11 @@ def _linearised(
         yield len(t) / max(float(residual @ residual), 1e-24 * float(x @ x), 1e-300), slope, residual
 
 
-def _taken(lines: Integers, N: int, apart: float, harmonics: int) -> Array:
-    """Share of white noise that fitting the mean and the harmonics removes from these lines of a spectrum.
+def _taken(lines: Integers, N: int, spacing: float, harmonics: int) -> Array:
+    """Share of white noise that fitting the mean and the harmonics removes from some lines of a spectrum.
 
     A harmonic affects the lines around it by Dirichlet's kernel of the N samples.
     """
-    away = (lines - k * apart for k in range(-harmonics, harmonics + 1))
-    shares = ((np.sinc(d) / np.sinc(d / N)) ** 2 for d in away)
+    distances = (lines - k * spacing for k in range(-harmonics, harmonics + 1))
+    shares = ((np.sinc(d) / np.sinc(d / N)) ** 2 for d in distances)
     return np.minimum(sum(shares, np.zeros(len(lines))), 1.0)

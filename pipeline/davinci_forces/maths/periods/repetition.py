@@ -7,54 +7,54 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array
 
-POINTS = 1024  # of a search, each the mean of neighbouring samples
-MIN_PERIOD_POINTS = 4  # points in a period
-DIP = 0.02  # a span repeats where its halves differ by less than this share of twice its variance
-MIN_SPAN_VARIANCE = 0.01  # share of the recording's variance below which a span is at rest
-MAX_RATIO_PERIOD = 2.0  # to the smallest difference: a lag below it is a period, too
-# A stretch that repeats ends where the difference exceeds so many times its smallest value, but at least this bound.
-MAX_RATIO_STRETCH, MIN_BOUND_STRETCH = 20.0, 2e-3
-ROUNDED = 1e-5  # difference that a lag between two points leaves
-LAG_PARTS = 200  # parts of a lag, between which its difference is taken as a parabola
-PERIODS_SEARCHED = 4.2  # periods in which a shorter one is sought
-MIN_LENGTH_RATIO = 0.8  # to the longest stretch: a stretch of this length counts as equally long
-MIN_STRETCH_SHARE = 0.25  # of a recording: a shorter stretch may repeat by chance
+POINTS = 1024  # a search reduces a recording to this number of points, each the mean of neighbouring samples
+MIN_PERIOD_POINTS = 4  # a period of fewer points is not searched
+DIP = 0.02  # a span repeats if its halves differ by less than this share of twice its variance
+MIN_SPAN_VARIANCE = 0.01  # a span with a smaller share of the recording's variance is at rest
+MAX_RATIO_PERIOD = 2.0  # a lag whose difference is at most this many times the smallest one is a period, too
+# A repeating section ends where the difference exceeds this ratio to its smallest value, and this bound.
+MAX_RATIO_RUN, MIN_BOUND_RUN = 20.0, 2e-3
+ROUNDED = 1e-5  # difference that remains if the period lies between two points
+LAG_PARTS = 200  # the difference is taken as a parabola over one of this number of parts of a lag
+PERIODS_SEARCHED = 4.2  # a shorter period is searched within this number of periods
+MIN_LENGTH_RATIO = 0.8  # a section of at least this share of the longest one is as good as the longest
+MIN_RUN_SHARE = 0.25  # a section with a smaller share of a recording may repeat by chance
 
 
 class Repetition(NamedTuple):
-    """A stretch of a recording that repeats, and the two periods of it that differ least, all in samples."""
+    """A section of a recording that repeats, and its two adjacent periods that differ least; all in samples."""
 
-    lag: float  # after which it repeats
+    lag: float  # after which the section repeats
     start: int
     stop: int
-    core: int  # where the two periods begin
+    core: int  # first sample of the two periods
 
 
 class Lag(NamedTuple):
-    """Difference of the halves of every span of two lags, as a share of twice its variance (n - 2 lag + 1,)."""
+    """Difference (n - 2 lag + 1,) between the halves of each span of two lags, as a share of twice its variance."""
 
     lag: int
     difference: Array
 
 
 def repetition(signals: Sequence[Array]) -> Repetition | None:
-    """Find the longest stretch of a recording in which all signals repeat together, or None.
+    """Find the longest section of a recording in which all signals repeat together, or None.
 
-    `signals` are (N,) each, without gaps, equally weighted.  Every lag is tried everywhere, on few points; then on a
-    few periods of the match, which may contain shorter ones.  Where a recording has so many periods that the means of
-    neighbours cancel them, its parts are searched.  The cost is a few passes over the recording.
+    `signals` are (N,) each, without gaps, equally weighted.  Every lag is tried on the whole, reduced to few points,
+    then on a few periods of the match, which may contain shorter periods.  If a recording has so many periods that the
+    means of neighbours cancel them, its parts are searched.  The cost is a few passes over the recording.
     """
     N = len(signals[0])
     x = np.array([(s - s.mean()) / s.std() for s in signals if s.std() > 0]).reshape(-1, N)
     for start, stop in _parts(N):
-        match = _searched(x[:, start:stop]) if len(x) else None
+        match = _search(x[:, start:stop]) if len(x) else None
         if match is not None:
-            return _resolved(x, Repetition(match.lag, match.start + start, match.stop + start, match.core + start))
+            return _shorten(x, Repetition(match.lag, match.start + start, match.stop + start, match.core + start))
     return None
 
 
 def _parts(N: int) -> Iterator[tuple[int, int]]:
-    """Yield the whole, then middle, beginning and end of half its length, a quarter and so on, down to `POINTS`."""
+    """Yield the whole, then its middle, beginning and end of half the length, of a quarter, and so on to `POINTS`."""
     yield 0, N
     size = N // 2
     while size >= POINTS:
@@ -63,22 +63,22 @@ def _parts(N: int) -> Iterator[tuple[int, int]]:
         size //= 2
 
 
-def _resolved(x: Array, match: Repetition) -> Repetition:
-    """Replace the lag of a stretch by the shortest one that holds throughout its two best periods."""
+def _shorten(x: Array, match: Repetition) -> Repetition:
+    """Replace the lag of a section by the shortest lag after which its two best periods repeat."""
     lag, size = match.lag, round(PERIODS_SEARCHED * match.lag)
     middle, best = round(match.core + match.lag), x[:, match.core : match.core + 2 * round(match.lag) + 1]
     while True:
         start = max(min(middle - size // 2, match.stop - size), match.start)
-        closer = _searched(x[:, start : min(start + size, match.stop)])
-        if closer is not None and closer.lag < 0.75 * lag:
-            lag = _shortest([round(closer.lag), round(lag)], best)
+        shorter = _search(x[:, start : min(start + size, match.stop)])
+        if shorter is not None and shorter.lag < 0.75 * lag:
+            lag = _shortest([round(shorter.lag), round(lag)], best)
         if size <= POINTS:
             return match._replace(lag=lag)
         size = min(size // 4, round(PERIODS_SEARCHED * lag))
 
 
-def _searched(x: Array) -> Repetition | None:
-    """Find the longest stretch of signals `x` (J, N) that repeats, on means of neighbouring samples."""
+def _search(x: Array) -> Repetition | None:
+    """Find the longest section of signals `x` (J, N) that repeats, on means of neighbouring samples."""
     factor = -(-x.shape[1] // POINTS)
     n = x.shape[1] // factor
     points = x[:, : n * factor].reshape(len(x), n, factor).mean(axis=2)
@@ -88,10 +88,10 @@ def _searched(x: Array) -> Repetition | None:
     if best > DIP:
         return None
     good = [lag for lag, value in lows.items() if value <= MAX_RATIO_PERIOD * best + ROUNDED]
-    bounds = {lag: max(MAX_RATIO_STRETCH * lows[lag], 4 * _least(lags[lag]), MIN_BOUND_STRETCH) for lag in good}
+    bounds = {lag: max(MAX_RATIO_RUN * lows[lag], 4 * _least(lags[lag]), MIN_BOUND_RUN) for lag in good}
     runs = {lag: _longest(lags[lag], min(bound, DIP)) for lag, bound in bounds.items()}
     longest = max(stop - start for start, stop in runs.values())
-    if longest < MIN_STRETCH_SHARE * n:
+    if longest < MIN_RUN_SHARE * n:
         return None
     lag, (start, stop) = next((lag, run) for lag, run in runs.items() if run[1] - run[0] >= MIN_LENGTH_RATIO * longest)
     core = start + int(lags[lag].difference[start : stop - 2 * lag + 1].argmin())
@@ -101,7 +101,7 @@ def _searched(x: Array) -> Repetition | None:
 
 
 def _shortest(lags: list[int], x: Array) -> float:
-    """The shortest lag after which `x` (J, n), two periods of the last lag, repeats about as well as after that one."""
+    """The shortest lag after which `x` (J, n), two periods of the last lag, repeats about as well as after that lag."""
     steps = [max(1, lag // LAG_PARTS) for lag in lags]
     least = [_vertex(*(_apart(x, lag + d) for d in (-step, 0, step))) for lag, step in zip(lags, steps, strict=True)]
     for lag, step, (shift, value) in zip(lags, steps, least, strict=True):
@@ -118,7 +118,7 @@ def _apart(x: Array, lag: int) -> float:
 def _vertex(before: float, middle: float, after: float) -> tuple[float, float]:
     """Lowest point of the parabola through three neighbours: its place relative to the middle one, and its value.
 
-    It lies no further than the neighbours: beyond them noise would determine it.
+    The point lies no further than the neighbours, because noise would determine a point beyond them.
     """
     curvature = before - 2 * middle + after
     if not 0 < curvature < np.inf:

@@ -7,7 +7,7 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array
 
-MIN_OVERLAP = 0.8  # share of the shorter recording, of two that do not repeat, that must lie within the other
+MIN_OVERLAP = 0.8  # of two recordings that do not repeat: share of the shorter one that must lie within the other
 SAME_PATH = 0.95  # likeness above which two recordings follow the same path
 
 
@@ -15,11 +15,11 @@ class Shift(NamedTuple):
     """Delay of one recording against another, and the difference that remains."""
 
     samples: float
-    apart: Array  # (J,) root mean square of the difference over the standard deviation
+    apart: Array  # (J,) root mean square of the difference, over the standard deviation
 
 
 def circular(q: Array, reference: Array) -> Shift:
-    """Shift of a repeated period (K, J) against another of as many samples that brings them closest together."""
+    """Shift of a repeated period (K, J) against another of as many samples that minimises their difference."""
     spread = np.maximum(q.std(axis=0), 1e-300)
     spectra = np.conj(np.fft.rfft(q / spread, axis=0)) * np.fft.rfft(reference / spread, axis=0)
     products = np.fft.irfft(spectra.sum(axis=1), len(q))
@@ -29,16 +29,16 @@ def circular(q: Array, reference: Array) -> Shift:
 
 
 def roll(x: Array, samples: float) -> Array:
-    """Shift a repeated period (K, ...) by so many samples, with linear interpolation."""
+    """Shift a repeated period (K, ...) by a number of samples, with linear interpolation."""
     whole = int(np.floor(samples))
     share = samples - whole
     return np.asarray((1.0 - share) * np.roll(x, -whole, axis=0) + share * np.roll(x, -whole - 1, axis=0))
 
 
 def straight(q: Array, reference: Array) -> Shift:
-    """Shift in whole samples of a recording (N, J) against another (N', J) that brings them closest together.
+    """Shift in whole samples of a recording (N, J) against another (N', J) that minimises their difference.
 
-    They overlap by `MIN_OVERLAP` of the shorter one.
+    Both recordings overlap by at least `MIN_OVERLAP` of the shorter one.
     """
     spread = np.maximum(q.std(axis=0), 1e-300)
     a, b = q / spread, reference / spread
@@ -46,7 +46,7 @@ def straight(q: Array, reference: Array) -> Shift:
     size = 1 << (N + M - 1).bit_length()
     products = np.fft.irfft((np.conj(np.fft.rfft(a, size, axis=0)) * np.fft.rfft(b, size, axis=0)).sum(axis=1), size)
     lags = np.arange(-N + 1, M)
-    start, stop = np.maximum(0, -lags), np.minimum(N, M - lags)  # of the rows of a that have a partner
+    start, stop = np.maximum(0, -lags), np.minimum(N, M - lags)  # of the rows of a that overlap b
     squares_a, squares_b = (np.concatenate([[0.0], np.cumsum((x**2).sum(axis=1))]) for x in (a, b))
     power_a = squares_a[stop] - squares_a[start]
     power_b = squares_b[stop + lags] - squares_b[start + lags]
@@ -70,7 +70,7 @@ def _vertex(before: float, middle: float, after: float) -> float:
 def likeness(t: Array, q: Array, period: Array, length: float) -> float:
     """Largest correlation between a position (N,) and a repeated period (K,) of `length` [s] over all phases.
 
-    It is 1 for the same path, which may start anywhere in the period; `t` (N,) [s].  A recording of a period or more is
+    The value is 1 for the same path, from any start in the period; `t` (N,) [s].  A recording of a period or more is
     compared by its whole periods.
     """
     K, whole = len(period), int((t[-1] - t[0]) / length + 1e-9)
@@ -85,9 +85,9 @@ def likeness(t: Array, q: Array, period: Array, length: float) -> float:
 
 
 def most_different(periods: Sequence[tuple[Array, Array, float]], most: int) -> tuple[list[int], float]:
-    """Choose at most `most` periods (t (K,) [s], q (K,), length [s]) to represent all; and the least likeness to them.
+    """Choose at most `most` periods (t (K,) [s], q (K,), length [s]) to represent all; also return the least likeness.
 
-    The first is chosen, and then each time the one that is least like all chosen ones.
+    The first period is chosen, and then, one by one, the period that is least like all chosen ones.
     """
     chosen, nearest = [0], np.full(len(periods), -1.0)
     while True:

@@ -6,28 +6,28 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals.clock import GAP
 
 REACH = 10  # samples on either side of a step that show whether the motion continues
-POLYNOMIAL_ORDER = 4  # of the polynomial that describes the motion over these samples
-BREAK_PROBABILITY = 1e-3  # that noise breaks a continuous motion
-MIN_TRAVEL = 10.0  # standard errors that a motion must cover in the time in question
+POLYNOMIAL_ORDER = 4  # a polynomial of this order is fitted to the motion over these samples
+BREAK_PROBABILITY = 1e-3  # probability that noise makes a continuous motion look broken
+MIN_TRAVEL = 10.0  # a motion over the time of a gap is evidence from this many standard errors on
 
 
 def steps(t: Array, x: Array) -> list[tuple[int, float]]:
     """Find the first sample after each step of a clock, and the jump beyond one sampling time [s].
 
     `t` (N,) [s] increases; `x` (J, N) are positions.  A gap is a step of the clock if the motion of no joint jumps
-    there, although some joint moves fast enough that it would, had the time passed.  Gaps with fewer than `REACH`
+    there.  But a joint must move so fast that it would jump if the time had passed.  Gaps with fewer than `REACH`
     samples on either side are left as they are.
     """
     intervals = np.diff(t)
     T_s = float(np.median(intervals)) if len(intervals) else 0.0
     gaps = (np.flatnonzero(intervals > GAP * T_s) + 1).tolist()
-    around = [(i, x[:, i - REACH : i + REACH]) for i in gaps if REACH <= i <= len(t) - REACH]
-    jumps = [(i, part, float(intervals[i - 1]) - T_s) for i, part in around]
-    return [(i, jump) for i, part, jump in jumps if goes_on(part, jump / T_s)]
+    windows = [(i, x[:, i - REACH : i + REACH]) for i in gaps if REACH <= i <= len(t) - REACH]
+    jumps = [(i, part, float(intervals[i - 1]) - T_s) for i, part in windows]
+    return [(i, jump) for i, part, jump in jumps if is_continuous(part, jump / T_s)]
 
 
-def goes_on(x: Array, lost: float) -> bool:
-    """Whether positions (J, 2 `REACH`) continue in the middle as if one sample had passed there, not `lost` more.
+def is_continuous(x: Array, lost: float) -> bool:
+    """Whether positions (J, 2 `REACH`) continue in the middle as if one sample had passed there, and not `lost` more.
 
     A polynomial is fitted with and without a jump of its value and slope in the middle, and compared by an F test.
     """
@@ -43,14 +43,14 @@ def goes_on(x: Array, lost: float) -> bool:
     if np.any((smooth - jumping) / 2 / noise > fdtri(2, degrees, 1.0 - BREAK_PROBABILITY)):
         return False
     c = np.linalg.lstsq(broken, x.T, rcond=None)[0]
-    before, behind = c[1], c[1] + c[POLYNOMIAL_ORDER + 2]
-    # A motion that reverses here may be at the same place after that time, so it decides nothing.
-    per_sample = np.where(before * behind > 0, np.minimum(np.abs(before), np.abs(behind)), 0.0) / REACH
+    v_before, v_after = c[1], c[1] + c[POLYNOMIAL_ORDER + 2]
+    # A joint that reverses in a gap may return to the same place, so its motion is no evidence.
+    per_sample = np.where(v_before * v_after > 0, np.minimum(np.abs(v_before), np.abs(v_after)), 0.0) / REACH
     jump_std = np.sqrt(noise * np.linalg.inv(broken.T @ broken)[POLYNOMIAL_ORDER + 1, POLYNOMIAL_ORDER + 1])
     return bool(np.any(per_sample * min(lost, REACH) > MIN_TRAVEL * jump_std))
 
 
 def _residual(basis: Array, x: Array) -> Array:
-    """Sums of squares (J,) that a fit leaves of each signal."""
+    """Residual sum of squares (J,) of each signal."""
     c = np.linalg.lstsq(basis, x.T, rcond=None)[0]
     return np.asarray(((x.T - basis @ c) ** 2).sum(axis=0))

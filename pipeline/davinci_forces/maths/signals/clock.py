@@ -8,7 +8,7 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 
-GAP = 2.5  # sampling times between two samples that count as an interruption
+GAP = 2.5  # sampling times: a longer interval between two samples is an interruption
 
 
 @dataclass
@@ -18,14 +18,14 @@ class ClockStatistics:
     samples: int = 0
     first: float = math.nan
     last: float = math.nan
-    backward: int = 0  # steps that go back
-    repeated: int = 0  # steps of length 0
-    duplicates: int = 0  # rows equal to the one before in every channel
+    backward: int = 0  # number of steps that go back in time
+    repeated: int = 0  # number of steps of length 0
+    duplicates: int = 0  # number of rows equal to the previous row in every channel
     longest_gap: float = 0.0
-    bad_row: int = -1  # the first row whose time is not after the one before
+    bad_row: int = -1  # the first row whose time is not after that of the previous row
     bad_pair: tuple[float, float] = (math.nan, math.nan)
-    _mean: float = 0.0  # of the steps
-    _squares: float = 0.0  # sum of squared deviations from it
+    _mean: float = 0.0  # mean step
+    _squares: float = 0.0  # sum of the squared deviations of the steps from their mean
     _last_row: list[float] = field(default_factory=list)
 
     def update(self, t: Array, channels: Sequence[Array] = ()) -> None:
@@ -66,22 +66,22 @@ class ClockStatistics:
 
     @property
     def rate(self) -> float:
-        """Samples per second over the whole record; 0 before there are two."""
+        """Samples per second over the whole record; 0 with fewer than two samples."""
         return (self.samples - 1) / (self.last - self.first) if self.last > self.first else 0.0
 
     @property
     def jitter(self) -> float:
-        """Standard deviation of the time between samples [s]; 0 where rounding of the times explains it."""
+        """Standard deviation of the time between samples [s]; 0 if rounding of the times explains the deviation."""
         std = math.sqrt(self._squares / (self.samples - 2)) if self.samples > 2 else 0.0
         return std if std > 1e-9 * abs(self._mean) else 0.0
 
 
 def cubic(t: Array, x: Array, gap: float, at: Array) -> tuple[Array, Booleans, Booleans]:
-    """Interpolate signals `x` (N, C), sampled at times `t` (N,), at the times `at` (K,); and where that is valid.
+    """Interpolate signals `x` (N, C), sampled at times `t` (N,), at the times `at` (K,).
 
-    Returns the values, whether a time is that of a sample, and whether it lies between two samples no further apart
-    than `gap` [s].  Between them runs the cubic with their values and the slopes of the parabolas through their
-    neighbours.  Elsewhere values have no meaning.  (Catmull and Rom 1974)
+    Returns the values, a mask of the times of samples, and a mask of the times between two samples at most `gap` [s]
+    apart.  Between two samples the values follow the cubic through both.  Its slope at a sample is that of the parabola
+    through the sample and its neighbours.  Values at all other times have no meaning.  (Catmull and Rom 1974)
     """
     before: Integers = np.searchsorted(t, at, side="right") - 1
     if not len(t):
@@ -95,7 +95,7 @@ def cubic(t: Array, x: Array, gap: float, at: Array) -> tuple[Array, Booleans, B
         i = before[inside]
         m, step = _slopes(x, h, gap), h[i][:, None]
         s = (at[inside] - t[i])[:, None] / step
-        # The cubic of Hermite: values and slopes at both ends.
+        # Hermite's cubic has given values and slopes at both ends.
         values[inside] = (
             (1 + 2 * s) * (1 - s) ** 2 * x[i] + s * (1 - s) ** 2 * step * m[i]
             + s**2 * (3 - 2 * s) * x[i + 1] + s**2 * (s - 1) * step * m[i + 1]
@@ -104,27 +104,27 @@ def cubic(t: Array, x: Array, gap: float, at: Array) -> tuple[Array, Booleans, B
 
 
 def _slopes(x: Array, h: Array, gap: float) -> Array:
-    """Slopes (N, C) of the parabolas through each sample and its neighbours; of the chord beside a gap.
+    """Slopes (N, C) of the parabolas through each sample and its neighbours; next to a gap, that of the chord.
 
     A parabola's slope is the mean of its two chords' slopes, each weighted by the other's step.
     """
     chords = np.diff(x, axis=0) / h[:, None]
     near = h <= gap
-    step = np.zeros((2, len(x)))  # to the neighbours on the left and on the right; 0 where there is none
+    step = np.zeros((2, len(x)))  # to the left and to the right neighbour; 0 without a neighbour
     step[0, 1:], step[1, :-1] = np.where(near, h, 0.0), np.where(near, h, 0.0)
     weight = np.where(step[::-1] > 0, step[::-1], 1.0) * (step > 0)
-    both = np.zeros((2, *x.shape))
-    both[0, 1:], both[1, :-1] = chords, chords
-    return np.asarray((weight[:, :, None] * both).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-300)[:, None])
+    all_chords = np.zeros((2, *x.shape))
+    all_chords[0, 1:], all_chords[1, :-1] = chords, chords
+    return np.asarray((weight[:, :, None] * all_chords).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-300)[:, None])
 
 
 def means(t: Array, x: Array, many: int, gap: float) -> tuple[Array, Array, int]:
     """Average every `many` consecutive times (N,) and samples (N, C) into one, none across a gap.
 
-    Also returns how many samples at the end were too few for a mean.
+    Also returns the number of samples at the end that are too few for a mean.
     """
     cuts = np.flatnonzero(np.diff(t) > gap) + 1
     begins, ends = np.array([0, *cuts]), np.array([*cuts, len(t)])
     whole = np.concatenate([np.arange(b, e - many + 1, many) for b, e in zip(begins, ends, strict=True)])
-    of = whole[:, None] + np.arange(many)
-    return t[of].mean(axis=1), x[of].mean(axis=1), int((ends[-1] - begins[-1]) % many)
+    indices = whole[:, None] + np.arange(many)
+    return t[indices].mean(axis=1), x[indices].mean(axis=1), int((ends[-1] - begins[-1]) % many)

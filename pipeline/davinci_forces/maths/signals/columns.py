@@ -9,27 +9,27 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array
 
-SMOOTHED = 9  # samples over which differences are averaged before the comparison with a velocity
-MIN_COSINE = 0.9  # between proportional columns
-MIN_RANGE_SHARE = 0.02  # of the widest column's range, from which on a joint moves
-MIN_RANGE_MOVING = 0.005  # [rad or m] below which an arm stands still
-ROUND = (1.0, 1.25, 2.0, 2.5, 4.0, 5.0, 8.0, 10.0)  # times a power of ten: rates that recorders are set to
-ROUND_RATE_TOLERANCE = 0.01  # relative, of a rate from velocities to a round one
-MIN_RATIO_TORQUE = 2.0  # to a current, from which on a proportional column is a torque
-NOISY = 300  # parts of a recording, over one of which a velocity is averaged
-SHORT = 100  # parts of a recording, over one of which a velocity may be held
-MAX_CHANGE_LEVEL = 0.1  # relative change of a velocity that is held
-MIN_SPEED_SHARE = 0.02  # of the highest speed, below which a joint rests
-MIN_STEADY_SHARE = 0.28  # of the moving samples with a held velocity: ramps and returns lie between levels
+SMOOTHED = 9  # samples in the mean of differences that is compared with a velocity
+MIN_COSINE = 0.9  # columns with a larger cosine are proportional
+MIN_RANGE_SHARE = 0.02  # a joint moves if its range is at least this share of the widest column's
+MIN_RANGE_MOVING = 0.005  # [rad or m] an arm with a smaller range stands still
+ROUND = (1.0, 1.25, 2.0, 2.5, 4.0, 5.0, 8.0, 10.0)  # recorders are set to one of these rates times a power of ten
+ROUND_RATE_TOLERANCE = 0.01  # relative distance at which a rate from velocities is rounded
+MIN_RATIO_TORQUE = 2.0  # a column proportional to a current and this many times larger is a torque
+AVERAGED_PARTS = 300  # of a recording: a velocity is averaged over one part
+STEADY_PARTS = 100  # of a recording: a velocity is steady if it hardly changes within one part
+MAX_CHANGE_LEVEL = 0.1  # largest relative change of a steady velocity
+MIN_SPEED_SHARE = 0.02  # a joint is at rest below this share of its highest speed
+MIN_STEADY_SHARE = 0.28  # of moving samples that are steady; the others are ramps and returns between levels
 
 
 class Blocks(NamedTuple):
     """Columns in blocks of n joints: positions first, then their velocities."""
 
     n: int
-    rate: float  # samples a second for which the velocities fit the positions; 1 where times were given
+    rate: float  # [Hz] at which the velocities fit the positions; 1 if times are given
     moving: tuple[int, ...]  # joints, counted from 0
-    correlation: float  # the least of a joint that moves
+    correlation: float  # the lowest among the joints that move
 
 
 def first_rising_column(columns: Sequence[Array]) -> int | None:
@@ -39,7 +39,7 @@ def first_rising_column(columns: Sequence[Array]) -> int | None:
 
 
 def moving_positions(positions: Sequence[Array]) -> tuple[int, ...]:
-    """The positions (N,) that move: by a share of the widest range, and beyond the noise of an arm at rest."""
+    """Indices of the positions (N,) whose range exceeds a share of the widest one, and the noise at rest."""
     ranges = [float(np.ptp(q)) for q in positions]
     return tuple(i for i, width in enumerate(ranges) if width >= max(MIN_RANGE_SHARE * max(ranges), MIN_RANGE_MOVING))
 
@@ -47,7 +47,7 @@ def moving_positions(positions: Sequence[Array]) -> tuple[int, ...]:
 def blocks(columns: Sequence[Array], t: Array | None = None) -> Blocks | None:
     """Find the number of joints n for which the second n columns are the derivatives of the first n, or None.
 
-    `columns` (N,) each, of n positions, n velocities and more; `t` (N,) [s] where there is a time.
+    `columns` (N,) each, of n positions, n velocities and more; `t` (N,) [s], or None without a time column.
     """
     for n in range(len(columns) // 3, 0, -1):
         moves = moving_positions(columns[:n])
@@ -59,9 +59,9 @@ def blocks(columns: Sequence[Array], t: Array | None = None) -> Blocks | None:
 
 
 def derivative(q: Array, dq: Array, t: Array | None = None) -> tuple[float, float]:
-    """Correlation of a velocity (N,) with the differences of a position (N,), and samples a second by their slope.
+    """Correlation of a velocity (N,) with the differences of a position (N,), and the sampling rate [Hz] by the slope.
 
-    Both are averaged over a few samples; the slope is the geometric mean of the two regressions, as both have errors.
+    Both are averaged over a few samples.  The slope is the geometric mean of two regressions, as both have errors.
     """
     steps = np.diff(q) if t is None else np.diff(q) / np.diff(t)
     mean = np.ones(SMOOTHED) / SMOOTHED
@@ -75,7 +75,7 @@ def derivative(q: Array, dq: Array, t: Array | None = None) -> tuple[float, floa
 
 
 def round_rate(rate: float) -> float:
-    """Round a rate to the nearest usual rate if that is near, else to four digits."""
+    """Round a rate to the nearest usual rate if both are close, else to four digits."""
     power = 10.0 ** np.floor(np.log10(rate))
     nearest = min((factor * power for factor in ROUND), key=lambda candidate: abs(candidate - rate))
     return float(nearest if abs(nearest - rate) <= ROUND_RATE_TOLERANCE * rate else f"{rate:.4g}")
@@ -109,7 +109,7 @@ def _proportion(x: Array, y: Array) -> tuple[float, float]:
 
 
 def is_steady(velocity: Array) -> bool:
-    """Whether a velocity (N,) is held at one level after another, as in recordings for friction.
+    """Whether a velocity (N,) stays at one level after another, as in recordings for friction.
 
     Neighbouring samples are averaged, so that noise does not hide a level.
     """
@@ -119,18 +119,18 @@ def is_steady(velocity: Array) -> bool:
 def steadiness(velocity: Array) -> float:
     """Share of the moving samples of a velocity (N,) after which it hardly changes for a short time."""
     N = len(velocity)
-    width, lag = max(N // NOISY, 1), max(N // SHORT, 1)
+    width, lag = max(N // AVERAGED_PARTS, 1), max(N // STEADY_PARTS, 1)
     v = np.convolve(velocity, np.ones(width) / width, "valid")
     if len(v) <= 2 * lag or not v.any():
         return 0.0
-    size = np.abs(v[lag:])
-    moves = size > MIN_SPEED_SHARE * size.max()
-    return float((np.abs(v[lag:] - v[:-lag]) < MAX_CHANGE_LEVEL * size)[moves].mean()) if moves.any() else 0.0
+    speed = np.abs(v[lag:])
+    moves = speed > MIN_SPEED_SHARE * speed.max()
+    return float((np.abs(v[lag:] - v[:-lag]) < MAX_CHANGE_LEVEL * speed)[moves].mean()) if moves.any() else 0.0
 
 
 @dataclass
 class Outline:
-    """Extremes, mean, and the means of at most `2 * width` bins of equal length, of the finite samples."""
+    """Extremes, mean and course of the finite samples; the course is the means of at most `2 * width` equal bins."""
 
     width: int = 32
     samples: int = 0
@@ -138,34 +138,34 @@ class Outline:
     least: float = math.inf
     most: float = -math.inf
     bin_size: int = 1  # samples whose mean is one value of the course
-    _sums: Array = field(default_factory=lambda: np.zeros(0))  # of the bins
-    _counts: Array = field(default_factory=lambda: np.zeros(0))  # of the finite samples in them
+    _sums: Array = field(default_factory=lambda: np.zeros(0))  # sum of the finite samples in each bin
+    _counts: Array = field(default_factory=lambda: np.zeros(0))  # number of finite samples in each bin
 
     def update(self, values: Array) -> None:
         """Add the next block (N,)."""
-        good = np.isfinite(values)
-        if good.any():
-            self.least = min(self.least, float(values[good].min()))
-            self.most = max(self.most, float(values[good].max()))
-        self.finite += int(good.sum())
+        finite = np.isfinite(values)
+        if finite.any():
+            self.least = min(self.least, float(values[finite].min()))
+            self.most = max(self.most, float(values[finite].max()))
+        self.finite += int(finite.sum())
         end = self.samples + len(values)
         while end > 2 * self.width * self.bin_size:
             self._halve()
         needed = -(-end // self.bin_size)
-        which = np.arange(self.samples, end) // self.bin_size
-        self._sums = _grown(self._sums, needed) + np.bincount(which, np.where(good, values, 0.0), minlength=needed)
-        self._counts = _grown(self._counts, needed) + np.bincount(which, good, minlength=needed)
+        number = np.arange(self.samples, end) // self.bin_size
+        self._sums = _grown(self._sums, needed) + np.bincount(number, np.where(finite, values, 0.0), minlength=needed)
+        self._counts = _grown(self._counts, needed) + np.bincount(number, finite, minlength=needed)
         self.samples = end
 
     def _halve(self) -> None:
-        """Double the length of the bins."""
+        """Join bins in pairs, which doubles their length."""
         pairs = (self._sums, self._counts)
         self._sums, self._counts = (np.add.reduceat(p, np.arange(0, len(p), 2)) if len(p) else p for p in pairs)
         self.bin_size *= 2
 
     @property
     def mean(self) -> float:
-        """Mean of the finite samples; NaN where there is none."""
+        """Mean of the finite samples; NaN if there is none."""
         return float(self._sums.sum()) / self.finite if self.finite else math.nan
 
     @property

@@ -11,10 +11,10 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals.windows import runs
 
-MIN_TIME_STUCK = 0.25  # [s] of one value before a jump
-MIN_JUMP_RATIO = 5.0  # times the largest usual step between samples
-USUAL_STEP_QUANTILE = 0.999  # of all steps: the largest that motion makes
-MIN_SAMPLES_SATURATED = 5  # samples in a row at the largest value
+MIN_TIME_STUCK = 0.25  # [s] shortest time at one value before a jump
+MIN_JUMP_RATIO = 5.0  # of a jump to the largest usual step between samples
+USUAL_STEP_QUANTILE = 0.999  # quantile of all steps, taken as the largest step of a motion
+MIN_SAMPLES_SATURATED = 5  # in a row at the largest value
 
 
 class Stuck(NamedTuple):
@@ -40,7 +40,7 @@ def find_stuck(t: Array, x: Array) -> list[Stuck]:
 
 
 def count_saturated(x: Array) -> int:
-    """Count the samples of a signal (N,) in runs of several exactly at its largest or its least value."""
+    """Count the samples of a signal (N,) in runs of several exactly at its largest or its smallest value."""
     return sum(
         b - a + 1
         for level in (x.max(), x.min())
@@ -50,5 +50,5 @@ def count_saturated(x: Array) -> int:
 
 
 def repeated_runs(same: Booleans) -> list[tuple[int, int]]:
-    """First and last sample of each run in which each sample is the `same` (N-1,) as the next."""
+    """First and last sample of each run of equal samples; `same` (N-1,) is whether a sample equals the next one."""
     return [(run.start, run.stop) for run in runs(same)]

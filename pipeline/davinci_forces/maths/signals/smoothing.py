@@ -8,7 +8,7 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array, Integers
 
-FILTER_ORDER = 4  # of the Butterworth filter, run forwards and backwards
+FILTER_ORDER = 4  # of the Butterworth filter, which runs forwards and backwards
 NORMAL_MAD = 0.6744897501960817  # median of |x| of a standard normal variable
 
 
@@ -33,8 +33,8 @@ def reach(rate: float, cutoff: float) -> int:
         return 0
     from scipy.signal import sos2zpk
 
-    slowest = float(np.abs(sos2zpk(_sections(rate, cutoff))[1]).max())
-    return int(np.ceil(np.log(np.finfo(float).eps) / np.log(slowest)))
+    largest_pole = float(np.abs(sos2zpk(_sections(rate, cutoff))[1]).max())
+    return int(np.ceil(np.log(np.finfo(float).eps) / np.log(largest_pole)))
 
 
 @cache
@@ -60,9 +60,9 @@ def measured_motion(
 ) -> tuple[Array, Array, Array]:
     """Low-pass position, velocity and acceleration (N,) of a motion that need not repeat, each segment by itself.
 
-    The velocity is the logged one where there is one; differences are central, at the ends one-sided.  The effort is
-    measured `lag` [s] later than the motion, so each sample gets the motion of that time before it.  At the start of a
-    segment that is the segment's first.
+    The velocity is the logged one if there is one.  Differences are central, at the ends one-sided.  The effort is
+    measured `lag` [s] later than the motion, so the motion is delayed by `lag`.  At the start of a segment the delayed
+    motion is that of the segment's first sample.
     """
     parts = [_motion(q[part], None if dq is None else dq[part], rate, cutoff, lag) for part in segments(segment)]
     position, velocity, acceleration = (np.concatenate(columns) for columns in zip(*parts, strict=True))
@@ -75,11 +75,11 @@ def _motion(q: Array, dq: Array | None, rate: float, cutoff: float, lag: float) 
         return smooth, np.zeros_like(q), np.zeros_like(q)
     velocity = np.gradient(smooth, 1.0 / rate) if dq is None else lowpass(dq, rate, cutoff)
     acceleration = np.gradient(velocity, 1.0 / rate)
-    return _before(smooth, lag * rate), _before(velocity, lag * rate), _before(acceleration, lag * rate)
+    return _delay(smooth, lag * rate), _delay(velocity, lag * rate), _delay(acceleration, lag * rate)
 
 
-def _before(x: Array, samples: float) -> Array:
-    """Delay a low-passed signal (N,) by so many samples, with a cubic spline; its ends are held."""
+def _delay(x: Array, samples: float) -> Array:
+    """Delay a low-passed signal (N,) by `samples`, with a cubic spline; beyond its ends the signal is constant."""
     if samples == 0.0:
         return x
     from scipy.interpolate import make_interp_spline
@@ -100,8 +100,8 @@ def segments(segment: Integers) -> Iterator[slice]:
 def noise_std(residual: Array, segment: Integers, rate: float, cutoff: float) -> float:
     """Standard deviation of the white noise in a residual (N,), from what a low-pass at `cutoff` [Hz] removes.
 
-    The model's error is slower than that but for jumps at reversals, which hardly move the median.  0 where the
-    low-pass removes nothing at this sampling rate.
+    The low-pass keeps the model's error, except for jumps at reversals, which hardly change the median.  The result
+    is 0 if the low-pass removes nothing at this sampling rate.
     """
     return white_std(residual - lowpass_segments(residual, segment, rate, cutoff), share_passed(rate, cutoff))
 

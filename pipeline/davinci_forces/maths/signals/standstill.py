@@ -1,17 +1,17 @@
-"""Samples at which a joint stands still: friction takes any value up to its Coulomb level, which no model predicts."""
+"""Samples at which a joint stands still.  No model predicts its friction, which is anything up to the Coulomb level."""
 
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.signals.smoothing import segments
 
-HOLD = 1.0  # [s] of a standstill at least: longer than a motion takes to reverse
-STILL = 0.01  # of the mean travel in that time, below which a joint stands still
-STILL_AT_MOST = 0.05  # the same with noise; the slowest reversals of an excitation travel twice that
-NOISE = 6.0  # standard deviations of noise that the range of a resting position spans
-# [s] around a reversal that are left out: after that its effect on a filter has decayed.
+HOLD = 1.0  # [s] shortest standstill: longer than a motion takes to reverse
+STILL = 0.01  # a joint stands still below this share of its mean travel in `HOLD`
+STILL_AT_MOST = 0.05  # largest such share with noise; the slowest reversals of an excitation travel twice as far
+NOISE = 6.0  # range of a resting position, in standard deviations of its noise
+# [s] left out around a reversal: after `AFTER`, the effect of the reversal on a filter has decayed.
 BEFORE, AFTER = 0.05, 0.25
-SLOW = 0.05  # of the root mean square of the velocity, below which friction may stick
+SLOW = 0.05  # friction may stick below this share of the root mean square of the velocity
 
 
 def is_standing_still(
@@ -20,10 +20,10 @@ def is_standing_still(
     """Whether a joint stands still at each sample (N,) of its motion, sampled at `rate` [Hz].
 
     It stands still throughout every window of `HOLD` in which its position, with noise of `q_std`, hardly changes.  The
-    `spread` samples before and after count too: a low-pass carries its effort that far.
+    `spread` samples before and after are part of the standstill: a low-pass spreads its effort over them.
     """
-    usual = float(np.sqrt(np.mean(dq**2))) * HOLD if len(dq) else 0.0
-    least = min(max(STILL * usual, NOISE * q_std), STILL_AT_MOST * usual)
+    usual_travel = float(np.sqrt(np.mean(dq**2))) * HOLD if len(dq) else 0.0
+    least = min(max(STILL * usual_travel, NOISE * q_std), STILL_AT_MOST * usual_travel)
     window = round(HOLD * rate) + 1
     parts = [_standing(q[part], window, spread, least) for part in segments(segment)]
     return np.concatenate(parts) if parts else np.zeros(0, np.bool_)
@@ -36,8 +36,8 @@ def _standing(q: Array, window: int, spread: int, least: float) -> Booleans:
     N = len(q)
     if window > N:
         return np.zeros(N, np.bool_)
-    whole = slice(window // 2, N - (window - 1) // 2)  # centres of windows within the segment
-    first = np.flatnonzero((maximum_filter1d(q, window) - minimum_filter1d(q, window))[whole] < least)
+    centres = slice(window // 2, N - (window - 1) // 2)  # of windows within the segment
+    first = np.flatnonzero((maximum_filter1d(q, window) - minimum_filter1d(q, window))[centres] < least)
     covers = np.zeros(N + 1, np.int64)
     np.add.at(covers, np.maximum(first - spread, 0), 1)
     np.add.at(covers, np.minimum(first + window + spread, N), -1)
@@ -46,10 +46,10 @@ def _standing(q: Array, window: int, spread: int, least: float) -> Booleans:
 
 def is_far_from_reversals(dq: Array, T_s: float) -> Booleans:
     """Whether each sample of a velocity (N,), low-passed without delay, is far from reversals and standstills."""
-    size = float(np.sqrt(np.mean(dq**2)))
-    standing = np.abs(dq) <= SLOW * size
+    rms_velocity = float(np.sqrt(np.mean(dq**2)))
+    standing = np.abs(dq) <= SLOW * rms_velocity
     standing[1:] |= np.sign(dq[1:]) != np.sign(dq[:-1])
-    since = np.cumsum(np.concatenate([[0], standing]))
+    standing_before = np.cumsum(np.concatenate([[0], standing]))
     k, N = np.arange(len(dq)), len(dq)
     first, last = np.maximum(k - round(AFTER / T_s), 0), np.minimum(k + round(BEFORE / T_s) + 1, N)
-    return np.asarray(since[last] == since[first])
+    return np.asarray(standing_before[last] == standing_before[first])

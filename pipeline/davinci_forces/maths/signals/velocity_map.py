@@ -6,8 +6,8 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans
 
-RANGES = 20  # of equal width, in each direction
-MIN_SAMPLES_RANGE = 5  # in a range of the map
+RANGES = 20  # number of ranges in each direction, of equal width
+MIN_SAMPLES_RANGE = 5  # a range with fewer samples is left out
 
 
 class VelocityMap(NamedTuple):
@@ -22,12 +22,12 @@ class VelocityMap(NamedTuple):
 def over_velocity(dq: Array, ddq: Array, signals: Array) -> VelocityMap:
     """Average signals (N, c) over ranges of the velocity dq (N,), separately by the sign of dq ddq."""
     edges = float(np.abs(dq).max() or 1.0) * np.linspace(-1.0, 1.0, 2 * RANGES + 1)
-    place = np.clip(np.digitize(dq, edges) - 1, 0, 2 * RANGES - 1)
+    range_of_sample = np.clip(np.digitize(dq, edges) - 1, 0, 2 * RANGES - 1)
     gaining = dq * ddq > 0
     rows = []
     for number in range(2 * RANGES):
         for gains in (True, False):
-            inside = (place == number) & (gaining == gains)
+            inside = (range_of_sample == number) & (gaining == gains)
             if np.count_nonzero(inside) >= MIN_SAMPLES_RANGE:
                 rows.append((dq[inside].mean(), gains, signals[inside].mean(axis=0), signals[inside].std(axis=0)))
     if not rows:

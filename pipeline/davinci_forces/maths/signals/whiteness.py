@@ -4,8 +4,8 @@
 
     C_j = sum_(i <= j) I_i / sum_i I_i,   D = sup |C - j / q| ~ Kolmogorov and Smirnov, q - 1 steps      Bartlett (1955)
 
-n_k pairs of samples are k apart within a piece.  The ordinates I of all pieces are sorted by frequency: for white noise
-each is exponentially distributed with the same mean.
+n_k is the number of pairs of samples that are k apart within a piece.  The ordinates I of all pieces are sorted by
+frequency.  For white noise all ordinates have the same exponential distribution.
 """
 
 from collections.abc import Sequence
@@ -16,7 +16,7 @@ import numpy as np
 from davinci_forces.maths.arrays import Array
 
 TWO_SIDED_95, TWO_SIDED_99 = 1.96, 2.576  # standard deviations within which 95 and 99 % of a normal distribution lie
-MIN_SAMPLES_WHITENESS = 20  # samples that the tests need
+MIN_SAMPLES_WHITENESS = 20  # fewer samples are not tested
 
 
 class LjungBox(NamedTuple):
@@ -45,16 +45,16 @@ def autocorrelation(pieces: Sequence[Array], lags: int) -> Array:
     """Autocorrelation r (lags + 1,) of centred pieces, over pairs of samples within one piece."""
     from statsmodels.tsa.stattools import acovf
 
-    apart = np.full(lags, np.nan)  # so that no lag reaches from one piece into another
-    x = np.concatenate([part for piece in pieces for part in (piece, apart)][:-1])
+    separator = np.full(lags, np.nan)  # so that no lag reaches from one piece into another
+    x = np.concatenate([part for piece in pieces for part in (piece, separator)][:-1])
     products = acovf(x, demean=False, fft=False, missing="conservative", nlag=lags)
     return np.asarray(products / products[0])
 
 
 def ljung_box(pieces: Sequence[Array], r: Array, lags: int) -> LjungBox:
-    """The test of the first `lags` of an autocorrelation.
+    """Ljung and Box's test of the first `lags` of an autocorrelation.
 
-    statsmodels counts n - k pairs at lag k, as one piece has them; r is scaled for the fewer that pieces have.
+    statsmodels assumes the n - k pairs at lag k of a single piece; several pieces have fewer, so r is scaled.
     """
     from statsmodels.tsa.stattools import q_stat
 
@@ -66,7 +66,7 @@ def ljung_box(pieces: Sequence[Array], r: Array, lags: int) -> LjungBox:
 
 
 def cumulative_periodogram(pieces: Sequence[Array]) -> Cumulative:
-    """Cumulative periodogram of centred pieces, between the frequencies 0 and 1/2 cycle a sample, both left out."""
+    """Cumulative periodogram of centred pieces, at frequencies above 0 and below 1/2 cycle a sample."""
     from scipy.fft import rfft
     from scipy.stats import kstwo
 
@@ -90,7 +90,7 @@ def _ordinates(X: Array, length: int) -> tuple[Array, Array]:
 
 
 def distance_of(probability: float, ordinates: int) -> float:
-    """Half width of the band that a cumulative periodogram of white noise leaves with this probability."""
+    """Half-width of the band that a cumulative periodogram of white noise exceeds with this probability."""
     from scipy.stats import kstwo
 
     return float(kstwo.isf(probability, max(ordinates - 1, 1)))
@@ -104,8 +104,8 @@ def tests(pieces: Sequence[Array], lags: int) -> tuple[LjungBox, float]:
     n = sum(len(x) for x in pieces)
     if n < MIN_SAMPLES_WHITENESS or max(map(len, pieces)) < 5 or all(np.ptp(x) == 0 for x in pieces):
         return LjungBox(0.0, 0.0), 0.0
-    level, tested = centre_pieces(pieces), min(lags, n // 5)
-    return ljung_box(level, autocorrelation(level, tested), tested), cumulative_periodogram(level).probability
+    centred, tested = centre_pieces(pieces), min(lags, n // 5)
+    return ljung_box(centred, autocorrelation(centred, tested), tested), cumulative_periodogram(centred).probability
 
 
 def cross_correlation(x: Array, u: Array, lags: int) -> Array:

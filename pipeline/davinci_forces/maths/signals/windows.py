@@ -7,7 +7,7 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals.smoothing import segments
 
-TRANSIENT = 1.0  # [s] of a filter's transient, left out of the statistics of the whole run
+TRANSIENT = 1.0  # [s] duration of a filter's transient, left out of the statistics of the whole run
 
 
 def is_outside(t: Array, windows: Sequence[tuple[float, float]]) -> Booleans:
@@ -19,7 +19,7 @@ def is_outside(t: Array, windows: Sequence[tuple[float, float]]) -> Booleans:
 
 
 def is_past_transient(t: Array) -> Booleans:
-    """Whether a filter's transient is over: all but the first second, unless there is little more than that."""
+    """Whether a filter's transient is over: after the first second, or throughout a run of up to 5 s."""
     return t - t[0] >= TRANSIENT if t[-1] - t[0] > 5 * TRANSIENT else np.ones(len(t), dtype=bool)
 
 

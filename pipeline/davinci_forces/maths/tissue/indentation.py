@@ -5,7 +5,7 @@ Contact begins at the depth d0 at which the force starts to rise.  It is estimat
     f = c + k max(d - d0, 0)^n
 
 For a given d0 the model is linear in c and k, so the search is over d0 alone.  The force of tissue that stiffens under
-pressure rises so gently that n = 1 finds contact late: n is larger where that fits clearly better.
+pressure rises so gently that n = 1 detects contact late: n is larger if a larger n fits clearly better.
 """
 
 from typing import NamedTuple
@@ -15,20 +15,20 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, Booleans, evenly
 from davinci_forces.maths.estimation.correlation import correlated_variance
 
-CANDIDATES = 41  # onsets of a round; each further round searches between the neighbours of the best
+CANDIDATES = 41  # onsets tried in a round; the next round searches between the neighbours of the best
 ROUNDS = 3
-MAX_SAMPLES_SEARCH = 4000  # of the search for an onset; of more, evenly spaced ones
+MAX_SAMPLES_SEARCH = 4000  # an onset is searched on at most this number of evenly spaced samples
 CURVED_EXPONENTS = (1.5, 2.0)
-MIN_RATIO_CURVE = 1.5  # of the squares that a straight line leaves to those of a curve, for a curve to be chosen
-MIN_SAMPLES_ONSET = 3  # on either side of an onset
-MIN_RISE_DEVIATIONS = 4.0  # standard deviations of the residual by which the force must rise
-MIN_RATIO_BEND = 1.05  # of the squares that a line leaves to those of a hinge, from which on there is a bend
+MIN_RATIO_CURVE = 1.5  # a curve is chosen if a straight line leaves this many times its residual squares
+MIN_SAMPLES_ONSET = 3  # fewest samples on either side of an onset
+MIN_RISE_DEVIATIONS = 4.0  # smallest rise of the force, in standard deviations of the residual
+MIN_RATIO_BEND = 1.05  # there is a bend if a line leaves this many times the residual squares of a hinge
 MIN_SAMPLES_HINGE = 6
 FOUND, ALL_CONTACT, NONE, TOO_EARLY = "found", "all", "no contact", "contact from the first sample"
 MIN_SAMPLES_LINE = 5
-# Correlation lengths of a model's error, as shares of the range of depth, and how many of them.
+# Range of the correlation length of a model's error, as shares of the range of depth, and number of lengths tried.
 SHORTEST_LENGTH, LONGEST_LENGTH, LENGTHS = 0.05, 50.0, 25
-MAX_SAMPLES_ERROR = 200  # of the search for the worst correlation length
+MAX_SAMPLES_ERROR = 200  # the worst correlation length is searched on at most this number of samples
 
 
 class Hinge(NamedTuple):
@@ -41,7 +41,7 @@ class Hinge(NamedTuple):
     squares: float
     squares_line: float  # of a straight line throughout
     reach: float  # depth of the deepest sample below the onset
-    before: int  # samples, of those looked at, that are not as deep as the onset
+    before: int  # number of fitted samples before the onset depth
 
     @property
     def rise(self) -> float:
@@ -118,14 +118,14 @@ class Indentation(NamedTuple):
 
 
 def all_of(depth: Array, counted: Booleans, state: str = ALL_CONTACT) -> Indentation:
-    """A push with contact at all counted samples, at depths (N,), or in another state without an onset."""
+    """A push at depths (N,) with contact at all counted samples; or a push in another state, without an onset."""
     return Indentation(state, counted, is_loading(depth), float("nan"), float("nan"), float("nan"))
 
 
 def find_contact(depth: Array, force: Array, counted: Booleans) -> Indentation:
     """Find the contact of one push, in order of time: forces (N,) [N] at depths (N,) [m] that grow into the tissue.
 
-    `counted` (N,) says at which samples the force is known.  Loading and unloading have an onset each, since tissue
+    `counted` (N,) are the samples at which the force is known.  Loading and unloading have an onset each, since tissue
     recovers more slowly than it yields.
     """
     loading = is_loading(depth)
@@ -158,12 +158,12 @@ def stands_out(bend: Hinge, depth: Array) -> bool:
 
 
 def bends(bend: Hinge) -> bool:
-    """Whether there are samples before the onset, and a straight line fits worse."""
+    """Whether there are samples before the onset, and a straight line fits worse than the hinge."""
     return bend.before >= MIN_SAMPLES_ONSET and bend.squares_line > MIN_RATIO_BEND * bend.squares
 
 
 def into_tissue(depth: Array, force: Array) -> float:
-    """The sign that makes depths (N,) grow into the tissue: -1 where the force clearly bends as they shrink, else 1."""
+    """The sign that makes depths (N,) grow into the tissue: -1 if the force clearly bends as depths shrink, else 1."""
     return -1.0 if hinge(-depth, force).squares * MIN_RATIO_BEND < hinge(depth, force).squares else 1.0
 
 
@@ -197,7 +197,7 @@ def straight(depth: Array, force: Array) -> StraightLine | None:
 
 
 def slope(depth: Array, force: Array) -> float:
-    """Slope [N/m] of the straight line alone; NaN where there is none."""
+    """Slope [N/m] of the straight line alone; NaN if there is no line."""
     if len(depth) < MIN_SAMPLES_LINE or not np.ptp(depth) > 0:
         return float("nan")
     away = depth - depth.mean()
@@ -207,8 +207,8 @@ def slope(depth: Array, force: Array) -> float:
 def slope_error(depth: Array, std: float) -> float:
     """Standard deviation [N/m] of a line's slope by an error of the force that varies with depth (N,), of `std` [N].
 
-    A constant error only moves the intercept, and white noise averages out; what varies slowly matters most.  How fast
-    a model's error varies is not known, so this is the worst case over exponential correlations of length l:
+    A constant error only moves the intercept, and white noise averages out; an error that varies slowly matters most.
+    The correlation length l of a model's error is not known, so the worst of all exponential correlations is taken:
 
         k_std = std max over l of sqrt(a' C a),    C = exp(-|d_i - d_j| / l),    a = (d - mean(d)) / |d - mean(d)|^2
     """
@@ -226,9 +226,9 @@ def work(depth: Array, force: Array) -> float:
 
 
 def median_std(k: Array, random: Array, common: float) -> float:
-    """Standard error of the median of stiffnesses (n,), with an error (n,) of each and a `common` one.
+    """Standard error of the median of stiffnesses (n,), each with an error (n,), and a `common` error.
 
-    Differences beyond the errors are those of the tissue.  The variance of a median is pi/2 that of a mean.
+    Differences beyond the errors are due to the tissue.  The variance of a median is pi/2 that of a mean.
     """
     n = len(k)
     between = max(float(np.var(k, ddof=1)) - float(np.mean(random**2)), 0.0) if n > 1 else 0.0

@@ -1,8 +1,8 @@
-"""The pushes of a log into tissue: of each its contact, its straight lines and its hysteresis loop.
+"""The pushes of a log into tissue: the contact, the straight lines and the hysteresis loop of each push.
 
-A push is depths and forces along its direction.  Where the log has the position of the tip instead of a depth, the
-direction is that of the force.  Where the force is one number only, it is from the least force to the largest.  Both
-signs are flipped together so that depths grow into the tissue: the slope of force over depth stays that of the log.
+A push consists of depths and forces along its direction.  If the log has the position of the tip instead of a depth,
+the direction is that of the force.  For a force of one number, it points from the least force to the largest.  Depth
+and force change sign together so that depths grow into the tissue: the slope stays that of the log.
 """
 
 from collections.abc import Iterator, Sequence
@@ -16,15 +16,15 @@ from davinci_forces.maths.signals.smoothing import lowpass, segments
 from davinci_forces.maths.tissue import indentation
 from davinci_forces.maths.tissue.indentation import NONE, TOO_EARLY, Indentation, StraightLine
 
-MIN_PROMINENCE = 0.15  # of a peak, as a share of the signal's range
-MAX_REST_SPEED = 0.1  # of the usual speed, below which a joint is at rest
-MIN_SAMPLES_SIGN = 4  # that determine the sign of depth or force
-MIN_RATIO_SIDES = 2.0  # of a force's excursions to both sides of its median, from which on the larger side is pushing
-USUAL_SPEED_QUANTILE = 0.95  # of the speeds of a push
-MAX_DEPTH = 0.3  # [m] beyond which the unit is likely wrong
+MIN_PROMINENCE = 0.15  # least prominence of a peak, as a share of the signal's range
+MAX_REST_SPEED = 0.1  # a joint is at rest below this share of its usual speed
+MIN_SAMPLES_SIGN = 4  # fewer samples do not determine the sign of depth or force
+MIN_RATIO_SIDES = 2.0  # the side of the median with this many times larger excursions is pushing
+USUAL_SPEED_QUANTILE = 0.95  # quantile of the speeds of a push that is its usual speed
+MAX_DEPTH = 0.3  # [m] the unit of a larger depth is probably wrong
 MIN_STIFFNESS, MAX_STIFFNESS = 1.0, 1e5  # [N/m]
-MIN_R2 = 0.9  # of a straight line through a push
-MAX_NAMED = 5  # pushes that a remark names
+MIN_R2 = 0.9  # smallest R^2 of a straight line through a push that counts
+MAX_NAMED = 5  # largest number of pushes that a remark names
 
 
 def between_troughs(x: Array, rises: float = MIN_PROMINENCE) -> list[slice]:
@@ -48,16 +48,16 @@ class Probing(NamedTuple):
     """The samples (N,) of a log of pushes."""
 
     t: Array  # (N,) [s]; NaN without a clock
-    push: Integers  # (N,) number of the push; one number throughout where they are not counted
+    push: Integers  # (N,) number of the push; one number throughout if pushes are not numbered
     depth: Array  # (N, 1) [m], or (N, 3) the position of the tip
     force: Array  # (N, 1) [N], or (N, 3)
     place: Array  # (N, 3) [m] position of the tip; NaN where it is not known
-    speed: Array  # (N,) of a joint whose effort is the force, which is not known at rest; NaN of a force sensor
-    std: Array  # (N,) [N] standard deviation of the error that a model leaves in the force; 0 of a force sensor
+    speed: Array  # (N,) of a joint whose effort is the force; at rest that is not known; NaN with a force sensor
+    std: Array  # (N,) [N] standard deviation of a model's error in the force; 0 with a force sensor
 
     @property
     def size(self) -> Array:
-        """Magnitude of the force (N,), signed where it is one number."""
+        """Magnitude of the force (N,), signed if it is one number."""
         return self.force[:, 0] if self.force.shape[1] == 1 else np.asarray(np.linalg.norm(self.force, axis=1))
 
 
@@ -68,10 +68,10 @@ def known_samples(probing: Probing) -> Probing:
 
 
 def moves(speed: Array, usual: float, reach: int) -> Booleans:
-    """Whether the force is known at each sample (N,): at rest, friction hides any effort that it can hold.
+    """Whether the force is known at each sample (N,): at rest, friction hides any effort up to its Coulomb level.
 
-    A joint is at rest below a tenth of its `usual` speed, and for `reach` samples before and after, by which a low-pass
-    spreads the rest.
+    A joint is at rest below a tenth of its `usual` speed, and for `reach` samples before and after, over which a
+    low-pass spreads the standstill.
     """
     from scipy.ndimage import maximum_filter1d
 
@@ -82,7 +82,7 @@ def moves(speed: Array, usual: float, reach: int) -> Booleans:
 def orient_into_tissue(probing: Probing) -> Probing:
     """Choose the sign of depth and force so that the depths of the log grow into the tissue.
 
-    Of a log with positions of the tip, a single force gets the sign of its larger excursions.
+    In a log with positions of the tip, a single force gets the sign of its larger excursions.
     """
     counts = ~(np.abs(probing.speed) < MAX_REST_SPEED * np.median(np.abs(probing.speed)))
     if probing.force.shape[1] > 1 or counts.sum() < MIN_SAMPLES_SIGN:
@@ -144,14 +144,14 @@ class PalpatedPush(NamedTuple):
     rate: Array  # (n,) [m/s] of the depth; 0 without a clock
     place: Array  # (n, 3) [m]
     contact: Indentation
-    line: StraightLine | None  # through all of the contact; None where there is none
-    k_loading: float  # [N/m] slope of loading alone, NaN where it is too short
+    line: StraightLine | None  # through all of the contact; None without contact
+    k_loading: float  # [N/m] slope of loading alone; NaN if loading is too short
     k_unloading: float
-    k_std_model: float  # [N/m] by the error of the force that a joint's model leaves
+    k_std_model: float  # [N/m] by the error of a joint's model in the force
 
     @property
     def depth_in_contact(self) -> Array:
-        """Depth below first contact (n,) [m], or below the least depth in contact where first contact is not known."""
+        """Depth below first contact (n,) [m], or below the least depth in contact if first contact is not known."""
         onset = self.contact.onset
         return self.depth - (onset if np.isfinite(onset) else self.depth[self.contact.inside].min())
 
@@ -187,7 +187,7 @@ def evaluate_pushes(
 
 
 def _numbers(probing: Probing, pushes: Sequence[slice]) -> list[int]:
-    """The numbers of the pushes in the log, or 1, 2, ... where it has none or repeats one."""
+    """The numbers of the pushes in the log, or 1, 2, ... if the log has no numbers or repeats one."""
     numbers = [int(probing.push[part][0]) for part in pushes]
     return numbers if len(set(numbers)) == len(numbers) > 1 else list(range(1, len(pushes) + 1))
 
@@ -206,7 +206,7 @@ def _pushed(
     line = indentation.straight(depth[inside], force[inside]) if contact.has_contact else None
     common = float(np.sqrt(np.mean(probing.std[part][inside] ** 2))) if line else 0.0
     error = indentation.slope_error(depth[inside], common) if line else 0.0
-    if line and line.k:  # an error of the force moves the onset by that error over the stiffness
+    if line and line.k:  # an error of the force, over the stiffness, moves the onset
         contact = contact._replace(onset_std=float(np.hypot(contact.onset_std, common / abs(line.k))))
     loaded, unloaded = (indentation.slope(depth[i], force[i]) for i in (inside & loading, inside & ~loading))
     place = probing.place[part]

@@ -1,4 +1,4 @@
-"""Models of tissue: its force by depth and velocity, and which model predicts pushes that it was not fitted to best.
+"""Models of tissue: its force by depth and velocity, and the model that best predicts pushes outside its fit.
 
     spring          f = c + k x                                          (8.1)
 
@@ -7,7 +7,7 @@
     Hunt-Crossley   f = c + k x^n + b x^n v
 
 x is the depth below first contact and v its rate.  Each push has its own offset c.  For a given exponent n all models
-are linear: a push contributes small matrices of products, and leaving it out is a difference of sums.
+are linear: a push contributes small matrices of products, which are subtracted from the sums to leave the push out.
 
 Hunt and Crossley, Coefficient of restitution interpreted as damping in vibroimpact, Journal of Applied Mechanics 42
 (1975).
@@ -63,8 +63,8 @@ class FittedLaw(NamedTuple):
     """A model fitted to all pushes, and its errors on pushes that were left out of a fit."""
 
     law: ForceLaw
-    errors: Array  # (folds,) squares of the errors on pushes left out
-    score: float  # relative error on them
+    errors: Array  # (folds,) squares of the errors on omitted pushes
+    score: float  # relative error on omitted pushes
     score_std: float
     theta: Array  # (3,) of x^n [N/m^n], v [N s/m] and x^n v [N s/m^(n+1)]
     exponent: float
@@ -83,7 +83,7 @@ def moments(pushes: Sequence[tuple[Array, Array, Array]]) -> Moments:
 
 
 def cross_validate_law(data: Moments, law: ForceLaw) -> FittedLaw:
-    """Fit and cross-validate a model: leave out one push at a time, or a twentieth of them."""
+    """Fit and cross-validate a model: leave out one push at a time, or a twentieth of all pushes."""
     parts = blocks(len(data.squares), FOLDS)
     A, b, _ = (column.sum(axis=0) for column in data)
     errors, sizes = np.zeros(len(parts)), np.zeros(len(parts))
@@ -125,7 +125,7 @@ def _columns(x: Array, v: Array, exponents: Array) -> Array:
 
 
 def preferred_law(candidates: Sequence[FittedLaw]) -> tuple[FittedLaw, str]:
-    """The model of the fewest parameters that predicts omitted pushes not clearly worse than the best, and why."""
+    """The model of the fewest parameters that predicts omitted pushes not clearly worse than the best one, and why."""
     best = min(candidates, key=lambda c: c.score)
     for candidate in sorted(candidates, key=lambda c: (c.law.parameters, c.score)):
         worse = (candidate.errors - best.errors).tolist()
@@ -137,6 +137,6 @@ def preferred_law(candidates: Sequence[FittedLaw]) -> tuple[FittedLaw, str]:
 
 
 def _relative(pairs: list[tuple[float, float]]) -> float:
-    """Root of the errors' squares over the force's."""
+    """Root of the squared errors over the squared force."""
     errors, sizes = np.array(pairs).T
     return float(np.sqrt(max(errors.sum(), 0.0) / max(sizes.sum(), np.finfo(float).tiny)))

@@ -1,1 +1,1 @@
-"""How far estimates may be off: bands, levels, offsets, resampling."""
+"""Uncertainty of estimates: error bands, free-space levels, day offsets, resampling."""

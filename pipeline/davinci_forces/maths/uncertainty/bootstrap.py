@@ -47,14 +47,14 @@ def error_of_mean(values: Sequence[float] | Array, seed: int = 0) -> float:
     return _spread(np.asarray(values)[_draws(len(values), seed)].mean(axis=1), len(values))
 
 
-def error_of_pooled_mean(x: Array, seed: int = 0, of: Callable[[Array], Array] = np.asarray) -> float:
+def error_of_pooled_mean(x: Array, seed: int = 0, function: Callable[[Array], Array] = np.asarray) -> float:
     """Bootstrap the standard error of the mean of samples (N,), in blocks, or of a function of that mean."""
     parts = blocks(len(x))
     if len(parts) < 2:
         return float("nan")
     draws = _draws(len(parts), seed)
     sums, samples = (np.array(values)[draws].sum(axis=1) for values in ([x[p].sum() for p in parts], _lengths(parts)))
-    return _spread(of(sums / samples), len(parts))
+    return _spread(function(sums / samples), len(parts))
 
 
 def error_of_quantile(x: Array, share: float, seed: int = 0) -> float:
@@ -67,16 +67,16 @@ def error_of_quantile(x: Array, share: float, seed: int = 0) -> float:
     before[np.arange(len(x)), np.repeat(np.arange(len(parts)), _lengths(parts))[order]] = 1
     np.cumsum(before, axis=0, out=before)
     draws = _draws(len(parts), seed)
-    times = np.sum(draws[:, :, None] == np.arange(len(parts)), axis=1)  # that each draw takes each block
+    times = np.sum(draws[:, :, None] == np.arange(len(parts)), axis=1)  # how often each draw takes each block
     place = share * (times @ _lengths(parts) - 1)
-    below, above = (x[order[_reached(before, times, of)]] for of in (np.floor(place), np.ceil(place)))
+    below, above = (x[order[_reached(before, times, whole)]] for whole in (np.floor(place), np.ceil(place)))
     return _spread(below + (above - below) * (place % 1.0), len(parts))
 
 
 def _reached(before: Integers, times: Integers, place: Array) -> Integers:
-    """Index (DRAWS,) of the first of N samples up to which each draw has more than `place` (DRAWS,), by bisection.
+    """Index (DRAWS,) of the first sorted sample with more than `place` (DRAWS,) drawn samples up to it, by bisection.
 
-    `before` (N, n) counts the samples of each block, and `times` (DRAWS, n) how often a draw takes it.
+    `before` (N, n) counts the samples of each block; `times` (DRAWS, n) is how often a draw takes the block.
     """
     low, high = np.zeros(len(times), np.int64), np.full(len(times), len(before) - 1)
     while (low < high).any():
@@ -91,12 +91,12 @@ def _lengths(parts: Sequence[slice]) -> list[int]:
 
 
 def _draws(n: int, seed: int) -> Integers:
-    """Numbers (DRAWS, n) of the blocks, of n, that each draw takes."""
+    """Indices (DRAWS, n) of the n blocks that each draw takes, with replacement."""
     return np.random.default_rng(seed).integers(0, n, (DRAWS, n))
 
 
 def _spread(drawn: Array, n: int) -> float:
-    # A draw of as many blocks as there are understates a variance by (n - 1) / n.
+    # Drawing n of n blocks understates a variance by the factor (n - 1) / n.
     return float(np.sqrt(n / (n - 1)) * np.std(drawn))
 
 

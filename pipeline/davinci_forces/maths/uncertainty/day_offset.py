@@ -1,4 +1,4 @@
-"""The offset of an effort on the day of a log: its mean without contact, and whether it drifts."""
+"""The day offset, a constant effort that differs from day to day: the mean without contact, and its drift."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -9,11 +9,11 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals.windows import is_outside
 from davinci_forces.maths.uncertainty.bootstrap import blocks, error_of_mean
 
-MIN_DRIFT_ERRORS = 2.0  # standard errors of a difference that count as a drift
+MIN_DRIFT_ERRORS = 2.0  # a difference of more standard errors is a drift
 
 
 class DayOffset(NamedTuple):
-    """An offset with its standard error, and the difference of the second half of the samples from the first."""
+    """An offset with its standard error, and its drift from the first to the second half of the samples."""
 
     value: float
     std: float
