@@ -11,9 +11,10 @@ from davinci_forces.runner.console import echo
 def run(
     files: Annotated[list[Path], typer.Argument(help="Logs, in the folder of the study: raw/<study>/<log>.")],
     robot: Annotated[
-        str, typer.Option(help="A listed robot, or a .toml or .urdf file beside the study.", show_default="guessed")
+        str,
+        typer.Option(help="A listed robot, or a .toml or .urdf file in the study's folder.", show_default="guessed"),
     ] = "",
-    study: Annotated[Path | None, typer.Option(help="Folder of the study, instead of that of the first log.")] = None,
+    study: Annotated[Path | None, typer.Option(help="Folder of the study, instead of the first log's.")] = None,
     show: Annotated[bool, typer.Option("--print", help="Print the text instead of writing study.toml.")] = False,
 ) -> None:
     """Describe logs in a study.toml; an existing file is never overwritten."""
