@@ -1,4 +1,4 @@
-"""What a hung mass asks of the joints, against its potential energy and Newton's law along a motion."""
+"""What an attached mass asks of the joints, against its potential energy and Newton's law along a motion."""
 
 import numpy as np
 import pytest

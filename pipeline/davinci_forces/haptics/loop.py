@@ -1,6 +1,6 @@
-"""The haptic loop of a scenario: the force that a hand feels through the arm, and its stability margins.
+"""The haptic loop of a scenario: the force that a hand feels through the arm, and the stability margins of the loop.
 
-The filter in the loop is the one that tracks every log; it takes one sample at a time.
+The filter in the loop is the filter that tracks the logs; it takes one sample at a time.
 """
 
 import math
@@ -22,22 +22,25 @@ from davinci_forces.maths.models.bias import Coefficients
 from davinci_forces.maths.simulation.step import Friction
 from davinci_forces.maths.simulation.surroundings import Path
 
-NO_PATH = np.zeros((0, 2))  # the hand moves by itself
+NO_PATH = np.zeros((0, 2))  # no prescribed path: the hand moves freely
 PRESS_FORCE, EXTRA_SHARE = 10.0, 0.3  # [N] steady force of a hand, and share of it that is released at once
-RISE_TIME, RELEASE_TIME = 1.0, 3.0  # [s] when it presses with both, and when it releases that share
+RISE_TIME, RELEASE_TIME = (
+    1.0,
+    3.0,
+)  # [s] when the force has risen to steady force plus share, and when the share is released
 SETTLING_PERIODS = 30.0  # periods of the free hand in which growth becomes visible
 FREQUENCIES = np.geomspace(0.2, 12.0, 14)  # [Hz] of the frequency response
 MEAN_DEPTH, AMPLITUDE = 0.012, 0.008  # [m] of the hand's sinusoidal motion in the tissue
-TRANSIENT, MIN_WATCH = 2.0, 2.0  # [s] that is not evaluated, and least time that is
+TRANSIENT, MIN_WATCH = 2.0, 2.0  # [s] initial time that is not evaluated, and least evaluated time
 MAX_DELAY_MARGIN = 1.0  # [s]
 
 
 class Margins(NamedTuple):
     """Stability margins of a hand; NaN where no limit was found."""
 
-    stiffness: float  # K_T [N/m] up to which the hand settles, by simulation
-    by_response: float  # the same from the loop's frequency response
-    delay: float  # [s] additional delay of the force up to which it settles; 0 where it does not settle even without
+    stiffness: float  # [N/m] largest K_T with which the hand settles, by simulation
+    by_response: float  # [N/m] the same limit from the frequency response of the loop
+    delay: float  # [s] largest additional delay of the force with which the hand settles; 0 if it never settles
 
 
 class FeltResponse(NamedTuple):
@@ -77,7 +80,7 @@ def complete_scenario(
 
 
 def simulate_plan(scenario: HapticScenario, hand: Hand) -> LoopRun:
-    """Simulate the scenario's plan, with the noise of its seed."""
+    """Simulate the scenario's plan, with noise from its seed."""
     ticks = round(scenario.duration / scenario.tick)
     t = scenario.tick * np.arange(ticks, dtype=float) + scenario.plan[0][0]
     path = Path(scenario.plan, ease=True)
@@ -91,7 +94,7 @@ def simulate_plan(scenario: HapticScenario, hand: Hand) -> LoopRun:
 
 
 def hand_settles(scenario: HapticScenario, hand: Hand) -> bool:
-    """Whether a hand that presses into the tissue settles after a sudden release; without noise or stops."""
+    """Whether a hand pressed into the tissue settles after a sudden release; simulated without noise or stops."""
     ticks = round((RELEASE_TIME + SETTLING_PERIODS * 2.0 * math.pi / hand.frequency) / scenario.tick)
     t = np.arange(ticks) * scenario.tick
     push = PRESS_FORCE * (1.0 + EXTRA_SHARE) * 0.5 * (1.0 - np.cos(np.pi * np.clip(t / RISE_TIME, 0.0, 1.0)))
@@ -103,7 +106,7 @@ def hand_settles(scenario: HapticScenario, hand: Hand) -> bool:
 
 
 def margins(scenario: HapticScenario, hand: Hand, response: FeltResponse) -> Margins:
-    """Compute the limits of the tissue's stiffness and of the delay, all else unchanged."""
+    """Compute the limits of stiffness and of delay; each changes only one value of the scenario."""
     stiffness, _ = _parts(scenario)
     gain = scenario.device.force * scenario.device.motion
     w = 2.0 * np.pi * response.frequency
@@ -121,7 +124,7 @@ def margins(scenario: HapticScenario, hand: Hand, response: FeltResponse) -> Mar
 
 
 def response(scenario: HapticScenario) -> FeltResponse:
-    """Compute the response of the felt force to a hand that moves in the tissue; without noise."""
+    """Compute the response of the felt force to a hand that moves in the tissue, without noise."""
     return FeltResponse(FREQUENCIES, np.array([_answer(scenario, f) for f in FREQUENCIES.tolist()]))
 
 
@@ -184,7 +187,7 @@ def _axis(scenario: HapticScenario) -> Axis:
 
 
 def filter_in_loop(scenario: HapticScenario) -> Callable[[SensorReading], float]:
-    """The extended Kalman filter as a function from sensor readings, in their order, to forces.  (7.6), (7.7)"""
+    """The extended Kalman filter: a function from successive sensor readings to forces.  (7.6), (7.7)"""
     body, T_s = scenario.assumed_body or SLIDE, 1.0 / scenario.rate
     noise, c_b = filter_noise(scenario), coefficients(body)
     predicted: stepping.Belief | None = None
@@ -205,7 +208,7 @@ def coefficients(body: Body) -> Coefficients:
 
 
 def filter_noise(scenario: HapticScenario) -> NoiseModel:
-    """The noise of a sample that the filter assumes."""
+    """The noise per sample that the filter assumes."""
     body, T_s = scenario.assumed_body or SLIDE, 1.0 / scenario.rate
     _, noise = _parts(scenario)
     model = NoiseModel(noise.q, noise.dq, 0.0, noise.tau * T_s / body.inertia, scenario.q_tau * T_s**0.5)
@@ -222,8 +225,8 @@ class Experiment(NamedTuple):
     q: Array
     true: Array  # [N]
     felt: Array
-    thrown: bool  # whether the hand left the device's reach
-    error: float  # [N] root mean square of the felt force, at the tissue's scale, minus the true force
+    thrown: bool  # whether the hand left the reach of the device
+    error: float  # [N] root mean square of felt force over force scale, minus true force
 
 
 def experiment(scenario: HapticScenario, hand: Hand) -> Experiment:

@@ -1,6 +1,6 @@
 """Scenarios of haptic feedback: hand, device, link, arm, filter, tissue and plan, read from a TOML file.
 
-Defaults are those of the experiment of section 8.4; body, noise and tissue may come from a study instead.
+The defaults are the experiment of section 8.4; body, noise and tissue may come from a study instead.
 """
 
 import math
@@ -18,8 +18,8 @@ from davinci_forces.maths.simulation.actuators import Cascade, Device, Motors
 from davinci_forces.robots.from_toml import NAME
 from davinci_forces.toml import TomlTable
 
-MAX_TICKS = 2_000_000  # of one simulation
-MAX_DELAY = 5.0  # [s] of positions or forces on the link
+MAX_TICKS = 2_000_000  # ticks of one simulation
+MAX_DELAY = 5.0  # [s] largest delay of positions or forces on the link
 
 
 class BadHaptics(PipelineError):
@@ -71,20 +71,20 @@ class HapticScenario:
     seed: int = 8
     hands: tuple[tuple[str, Hand], ...] = (("thesis", THESIS_HAND), ("firm", FIRM))
     device: Device = DEVICE
-    reach: float = 0.15  # [m] of the device, to either side of the tissue's surface
-    link_rate: float = 100.0  # [Hz], chapter 9
-    position_delay: float = 0.0  # [s] of the link, besides the wait for a message
-    force_delay: float = 0.0
-    tick: float = 5e-4  # [s] of the motor drivers
-    rate: float = 100.0  # [Hz] of the controller, its sensors and the filter
+    reach: float = 0.15  # [m] reach of the device on either side of the tissue's surface
+    link_rate: float = 100.0  # [Hz] rate of messages, chapter 9
+    position_delay: float = 0.0  # [s] delay on the link, in addition to the wait for a message
+    force_delay: float = 0.0  # [s] likewise
+    tick: float = 5e-4  # [s] period of the motor drivers
+    rate: float = 100.0  # [Hz] rate of controller, sensors and filter
     exact: bool = False  # whether the arm follows its reference without error
     motor: Motors = MOTOR
     law: Cascade = LAW
     stops: tuple[float, float] = (-0.13, 0.09)  # [m] from the tissue's surface
     body: Body | None = None
     noise: AxisNoise | None = None
-    assumed_body: Body | None = None  # by the filter
-    filtered: bool = True  # by the extended Kalman filter; else the true force is sent
+    assumed_body: Body | None = None  # body that the filter assumes
+    filtered: bool = True  # whether the extended Kalman filter estimates the force; else the true force is sent
     q_tau: float = 0.0  # random walk of the external effort [N/s^0.5]; 0 selects the slowest that shows a push
     stiffness: float | None = None  # [N/m]
     damping: float = 5.0  # [N s/m]
@@ -103,7 +103,7 @@ def read(file: Path) -> HapticScenario:
     Raises
     ------
     BadHaptics
-        With every problem of the file, each with its line.
+        If the file has problems; the message lists each with its line.
     """
     table = toml.read(file, BadHaptics)
     scenario = scenario_of(table)
@@ -112,7 +112,7 @@ def read(file: Path) -> HapticScenario:
 
 
 def scenario_of(table: TomlTable) -> HapticScenario:
-    """Build the scenario of a whole file, and note its problems."""
+    """Build the scenario of a file, with problems noted."""
     default = HapticScenario()
     link, arm, tissue = table.table("link"), table.table("arm"), table.table("tissue")
     device = table.table("device")
@@ -182,7 +182,7 @@ def _delay(table: TomlTable, key: str) -> float:
 
 
 def _joint_arrays(table: TomlTable, default: Motors | Cascade) -> list[np.ndarray]:
-    """Read the numbers of one joint; those of a motor must be positive, except its encoder step."""
+    """Read the numbers of one joint; numbers of a motor must be positive, except the encoder step."""
     positive = isinstance(default, Motors)
     columns = []
     for key, value in zip(type(default)._fields, default, strict=True):
@@ -231,7 +231,7 @@ def _noise(table: TomlTable) -> AxisNoise:
 
 
 def _filter(table: TomlTable) -> tuple[bool, float, Body | None]:
-    """Read whether a filter estimates the force, its random walk, and the body that it assumes."""
+    """Read whether a filter estimates the force, the random walk of the filter, and the body that it assumes."""
     filtered = table.text("use", "ekf", ("ekf", "none")) == "ekf"
     q_tau = table.number("q_tau", 0.0, low=0.0)
     assumed_body = _body(table.table("body")) if "body" in table else None
@@ -256,7 +256,7 @@ def _plan(table: TomlTable) -> tuple[tuple[float, float], ...]:
 
 
 def _check_clocks(link: TomlTable, arm: TomlTable, scenario: HapticScenario) -> None:
-    """Note rates that are no whole number of ticks, and a simulation that is too long."""
+    """Note periods that are not a whole number of ticks, and a simulation that is too long."""
     ticks = scenario.duration / scenario.tick
     if ticks > MAX_TICKS:
         arm.problem(f"{ticks:.3g} ticks are too many to simulate; use at most {MAX_TICKS}", "tick")

@@ -1,4 +1,4 @@
-"""The robots: one module per robot, exporting `ROBOT`, and its name in the list below."""
+"""The robots: each has a module that exports `ROBOT`, and its name is in `ROBOTS`."""
 
 from dataclasses import replace
 from importlib import import_module
@@ -15,12 +15,12 @@ __all__ = ["FILES", "ROBOTS", "Joint", "Kind", "Limits", "Robot", "load"]
 
 
 def load(name: str, folder: Path) -> Robot:
-    """Load the robot of that name, or the one that a file beside the study describes, in TOML or as URDF.
+    """Load a listed robot by its name, or read a robot from a .toml or .urdf file in the folder.
 
     Raises
     ------
     BadRobot
-        If there is no such robot or file, or the file is wrong; it lists every problem with its line.
+        If there is no such robot or file, or the file has problems; the message lists each with its line.
     """
     robot, file = read_with_problems(name, folder)
     if file:
@@ -30,7 +30,7 @@ def load(name: str, folder: Path) -> Robot:
 
 
 def read_with_problems(name: str, folder: Path) -> tuple[Robot | None, TomlFile | None]:
-    """Read the same robot, None where its joints are unknown, and the problems of its file where it has one.
+    """Load the robot as `load` does, None if its joints are unknown, and its file with its problems, if it has a file.
 
     Raises
     ------

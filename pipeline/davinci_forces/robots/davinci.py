@@ -1,7 +1,7 @@
 """The first-generation da Vinci arm of the thesis: hand roll, hand pitch and instrument slide.
 
-With what the thesis prints of it: its excitation trajectories, the parameters of its joints and what is wrong with
-them, and the control studies of chapter 5.
+The thesis prints its excitation trajectories, the parameters of its joints, and the control studies of chapter 5.
+Misprints are listed with the parameters.
 """
 
 from dataclasses import replace
@@ -13,8 +13,8 @@ from davinci_forces.robots.robot import ControlStudy, Joint, Kind, Limits, Print
 
 HAND = Limits(q=(-0.6, 0.6), dq=(-1.2, 1.2), ddq=(-1.2, 1.2))  # Table 6.2
 SLIDE = Limits(q=(-0.0672, 0.1097), dq=(-2.0, 2.0), ddq=(-3.0, 3.0))
-TORQUE_CONSTANT = 0.0438  # [N m/A], of every motor.  Table 6.3, as the gear ratios
-# Hand roll (6.8), hand pitch (6.11) and instrument slide (6.13), before what is printed of them.
+TORQUE_CONSTANT = 0.0438  # [N m/A] of every motor; this and the gear ratios are from Table 6.3
+# Hand roll (6.8), hand pitch (6.11) and instrument slide (6.13), without the values that the thesis prints.
 ROLL = Joint(
     "hand_roll", "Hand roll", Kind.REVOLUTE, (inertia, gravity_sin, viscous, coulomb), HAND, 200.0, TORQUE_CONSTANT
 )
@@ -23,8 +23,8 @@ PITCH = Joint("hand_pitch", "Hand pitch", Kind.REVOLUTE, PITCH_TERMS, HAND, 200.
 SLIDE_TERMS = (lifted_mass, inertia, viscous, coulomb)
 INSERTION = Joint("instrument_slide", "Instrument slide", Kind.PRISMATIC, SLIDE_TERMS, SLIDE, 1340.0, TORQUE_CONSTANT)
 
-# Table 6.1 as printed; the roll's b1 and the slide's a0 are misprints, for their rows do not give their objectives or
-# break their limits.
+# Table 6.1 as printed.  The roll's b1 and the slide's a0 are misprints: with them, a row does not give its printed
+# objective, or exceeds its limits.
 ROLL_PUBLISHED = (
     ("table-6.1", (10.0, -0.1848, 0.0260, 0.0813, 0.0609, -0.4261)),
     ("table-6.1-corrected", (10.0, -0.1848, 0.0260, -0.2783, 0.0609, -0.4261)),
@@ -35,7 +35,7 @@ SLIDE_PUBLISHED = (
     ("table-6.1-corrected", (5.0, 0.0200, 0.0001, 0.0002, -0.1632, -0.1350)),
 )
 
-# The parameters that the thesis prints, Tables 6.4 to 6.6, and what is wrong with them.
+# The parameters that the thesis prints, Tables 6.4 to 6.6, and their misprints.
 GUESSES = "The printed error of the initial guesses does not belong to the printed guesses."
 ROLL_PRINTED = Printed(
     "Table 6.4",
@@ -83,9 +83,9 @@ K_P = (500.0, 500.0, 500.0, 10.0, 10.0, 1.0)
 K_D = (50.0, 50.0, 40.0, 2.0, 0.2, 0.02)
 K_I = (50.0, 50.0, 40.0, 2.0, 1.0, 0.1)
 ZERO = (0.0,) * 6
-# Tables 5.2 and 5.3, which start the slide at 0.2 m, beyond its limit of Table 6.2, which the simulation does not have.
+# Tables 5.2 and 5.3.  The slide starts at 0.2 m, beyond its limit in Table 6.2; the simulation has no such limit.
 POSE = (-pi / 8, pi / 8, 0.2, -pi / 4, -pi / 4, -pi / 4)
-# The thesis does not state the friction of its simulation; this is that of the initial guesses of Tables 6.4-6.6.
+# The thesis does not state the friction of its simulation; these are the initial guesses of Tables 6.4-6.6.
 VISCOUS = (1.0, 1.0, 1.0, 0.0, 0.0, 0.0)
 LIGHT = "gravity compensated with 0.9 of the masses"
 CONTROL = (

@@ -2,9 +2,9 @@
 
 z0 points up, the hand rolls about +y0, and at q = 0 the tool points along -z0.
 
-Of the physical parameters of its joints, 12, 21 and 7, they are the first guesses, by which the thesis computed those
-of Tables 6.4-6.6.  It does not print the box in which it searched.  This one holds every value that such a link or
-motor could have, and no more, the same for all of a kind.
+The joints have 12, 21 and 7 physical parameters.  The tables give their initial guesses, from which the thesis computed
+the guesses in Tables 6.4-6.6.  The thesis does not print the bounds of its search.  The bounds here, one range for each
+kind of parameter, contain all values that such a link or motor could have.
 """
 
 from math import pi
@@ -15,7 +15,7 @@ from davinci_forces.maths.mechanics.bodies import Bodies, Drives, cylinder
 from davinci_forces.maths.mechanics.chain import TableRow, denavit_hartenberg
 from davinci_forces.maths.models.physical import Physical, PhysicalTable, Quality
 
-# Table 3.1: name, carried by, alpha [rad], a [m], d [m], theta [rad], coordinate (the index of its q).
+# Table 3.1: name, parent frame, alpha [rad], a [m], d [m], theta [rad], coordinate (index in q).
 CHAIN = denavit_hartenberg(
     [
         TableRow("1", "0", -pi / 2, 0.0, 0.161, 0.0),  # base
@@ -34,8 +34,8 @@ CHAIN = denavit_hartenberg(
 
 # Table 4.2, links 2 to 9R: mass [kg], height [m], radius [m]; then the cylinder's axis and the centre of mass as a
 # distance [m] along an axis of the link's frame of Table 3.1 (Table 4.1, Eq 4.17).  Fig 4.3 shows the axes of links 3
-# and 4; the others are those that reproduce Eq 6.7 and 6.10.  Link 6's centre lies along -z: the printed [0, -lc6, 0]
-# would put it 0.4 m sideways.
+# and 4; the other axes are chosen to reproduce Eq 6.7 and 6.10.  Link 6's centre is along -z; the printed [0, -lc6, 0]
+# is 0.4 m to the side.
 X, Y, Z = 0, 1, 2
 CYLINDERS = (
     (0.5, 0.22, 0.035, Y, Y, 0.0),
@@ -49,10 +49,10 @@ CYLINDERS = (
     (0.01, 0.009, 0.005, X, X, -0.0045),
 )
 HOLDER = CHAIN.links.index("5")
-GUESSED_LC5 = 0.2  # [m] with which the initial guesses of Tables 6.4-6.6 were computed; Table 4.1 prints 0.3
+GUESSED_LC5 = 0.2  # [m] in the initial guesses of Tables 6.4-6.6; Table 4.1 prints 0.3
 WRIST_COORDINATES = ("instrument_roll", "instrument_pitch", "instrument_yaw", "grip")
-# Gear ratios of Table 6.3; friction of the initial guesses of Tables 6.4-6.6, which say nothing of the wrist; the
-# motors' inertia is neglected (4.29).
+# Gear ratios are from Table 6.3, friction from the initial guesses of Tables 6.4-6.6.  The thesis gives no friction of
+# the wrist, and neglects the inertia of the motors (4.29).
 DRIVES = Drives(
     gear_ratio=np.array([200.0, 200.0, 1340.0, 7.5, 12.4, 12.0, 12.0]),
     motor_inertia=np.zeros(7),
@@ -71,18 +71,18 @@ AXIS_INDEX = {"x": X, "y": Y, "z": Z}
 
 
 def bodies(lc5: float = -CYLINDERS[HOLDER][5]) -> Bodies:
-    """The links as uniform cylinders, with the centre of the instrument holder `lc5` [m] from its frame.
+    """The links as uniform cylinders in the frames of the dynamics.
 
-    They are in the links' own frames, as the dynamics take them.
+    The centre of the instrument holder is `lc5` [m] from the origin of its frame.
     """
     return in_table_frames(lc5).in_frames(CHAIN.of_links)
 
 
 def in_table_frames(lc5: float = -CYLINDERS[HOLDER][5]) -> Bodies:
-    """The same bodies as Tables 4.1 and 4.2 give them, in the frames of Table 3.1."""
+    """The same bodies in the frames of Table 3.1, as Tables 4.1 and 4.2 state them."""
     centres = np.zeros((len(CYLINDERS), 3))
-    for centre, (*_, axis, along) in zip(centres, CYLINDERS, strict=True):
-        centre[axis] = along
+    for centre, (*_, axis, distance) in zip(centres, CYLINDERS, strict=True):
+        centre[axis] = distance
     centres[HOLDER, Z] = -lc5
     inertias = [cylinder(mass, height, radius, axis) for mass, height, radius, axis, _, _ in CYLINDERS]
     # With six coordinates or fewer there is one jaw.
@@ -97,7 +97,7 @@ GUESSED = in_table_frames(GUESSED_LC5)
 
 
 def motor(joint: int) -> tuple[Physical, ...]:
-    """The rotor's inertia, and the friction of motor and joint together."""
+    """Inertia of a joint's rotor, and friction of motor and joint together."""
     guesses = (
         (f"Jm{joint + 1}", Quality.ROTOR, DRIVES.motor_inertia),
         (f"v{joint + 1}", Quality.VISCOUS, DRIVES.viscous),
@@ -107,14 +107,14 @@ def motor(joint: int) -> tuple[Physical, ...]:
 
 
 def masses(*links: str) -> tuple[Physical, ...]:
-    """Masses by link."""
-    at = map(CHAIN.links.index, links)
-    guesses = zip(links, GUESSED.masses[list(at)].tolist(), strict=True)
+    """The masses of links."""
+    rows = map(CHAIN.links.index, links)
+    guesses = zip(links, GUESSED.masses[list(rows)].tolist(), strict=True)
     return tuple(Physical(f"m{link}", Quality.MASS, guess, *BOX[Quality.MASS], link) for link, guess in guesses)
 
 
 def centres(*links: str) -> tuple[Physical, ...]:
-    """Distances of centres of mass from the origins of the links' frames, along the axis that they lie on."""
+    """The distance of each link's centre of mass from the origin of its frame, along the axis of the centre."""
     parameters = []
     for link in links:
         centre = GUESSED.centres[CHAIN.links.index(link)]
@@ -123,10 +123,10 @@ def centres(*links: str) -> tuple[Physical, ...]:
     return tuple(parameters)
 
 
-def moments(*named: str) -> tuple[Physical, ...]:
-    """Moments of inertia, by axis and link."""
+def moments(*names: str) -> tuple[Physical, ...]:
+    """Moments of inertia; each name is an axis and a link, such as "y3"."""
     parameters = []
-    for name in named:
+    for name in names:
         axis, link = AXIS_INDEX[name[0]], name[1:]
         guess = float(GUESSED.inertias[CHAIN.links.index(link), axis, axis])
         parameters.append(Physical(f"I{name}", Quality.MOMENT, guess, *BOX[Quality.MOMENT], link, axis))
@@ -134,13 +134,13 @@ def moments(*named: str) -> tuple[Physical, ...]:
 
 
 def table(joint: int, *parameters: tuple[Physical, ...]) -> PhysicalTable:
-    """The physical parameters of a joint of the arm's three."""
+    """The physical parameters of one of the arm's three joints."""
     return PhysicalTable(CHAIN, joint, 3, (*motor(joint), *(x for part in parameters for x in part)))
 
 
-# (6.7) leaves out links 6 to 9.
+# (6.7) omits links 6 to 9.
 ROLL_PARTS = table(0, masses("3", "4", "5"), centres("3", "5"), moments("y2", "y3", "x4", "x5"))
-# (6.10) leaves out Iz7, which only adds to Iy6; the print's signs do not matter, for the chain says how each enters.
+# (6.10) omits Iz7, which only adds to Iy6.  The signs printed there do not matter: the chain determines them.
 PITCH_PARTS = table(
     1,
     masses("3", "4", "5", "6", "7", "8", "9L"),

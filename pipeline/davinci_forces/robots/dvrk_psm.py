@@ -1,9 +1,9 @@
-"""The same arm driven by the da Vinci Research Kit, which logs effort at the joint, already in N m and N.
+"""The same arm with the controllers of the da Vinci Research Kit, which log joint efforts in N m and N.
 
-The chain is from its published geometry.  The base frame is at the pivot of the back link, z up and y along the axis
-of the yaw.  The remote centre lies on that axis, at (0, L2, 0), and at q = 0 the tool points along -z through it.  Two
-bars that stay parallel to the axis of the yaw carry the end link, which turns about the remote centre without a bearing
-there.  Masses are not published.
+The chain has the published geometry.  The base frame is at the pivot of the back link, with z up and y along the yaw
+axis.  The remote centre is on the yaw axis, at (0, L2, 0); at q = 0 the tool passes through it along -z.  Two bars stay
+parallel to the yaw axis and carry the end link, which turns about the remote centre without a bearing there.  Masses
+are not published.
 
 Wang, Gondokaryono, Munawar and Fischer, A convex optimization-based dynamic model identification package for the da
 Vinci Research Kit, 2019.
@@ -16,11 +16,11 @@ from davinci_forces.maths.mechanics.chain import TableRow, modified_denavit_hart
 from davinci_forces.robots import davinci
 from davinci_forces.robots.robot import Robot, Tool
 
-L1, L2, L3 = 0.096, 0.516, 0.04009  # [m] of the bars and the back link
-H1, H2 = 0.14454, 0.03808  # [m] from the back link's corner to the lower bar, and on to the upper one
-CARRIAGE = 0.04009  # [m] of the carriage from the end link's axis
+L1, L2, L3 = 0.096, 0.516, 0.04009  # [m] lengths of the bars and the back link
+H1, H2 = 0.14454, 0.03808  # [m] from the back link's corner to the lower bar, and from the lower to the upper bar
+CARRIAGE = 0.04009  # [m] distance of the carriage from the end link's axis
 REACH = 0.4318  # [m] from the remote centre to the carriage at q3 = 0, along the tool
-TOOL, WRIST = 0.4162, 0.0091  # [m] of the tool's shaft, and from the wrist's pitch to its yaw
+TOOL, WRIST = 0.4162, 0.0091  # [m] length of the tool's shaft, and from the wrist's pitch axis to its yaw axis
 
 Q_ROLL, Q_PITCH, Q_SLIDE, Q_TOOL_ROLL, Q_WRIST_PITCH, Q_WRIST_YAW = range(6)
 
@@ -43,7 +43,7 @@ PSM_CHAIN = modified_denavit_hartenberg(
 )
 
 
-HARMONICS = 6  # of the excitation trajectories of the public identification data.  Wang et al. 2019
+HARMONICS = 6  # in the excitation trajectories of the public identification data.  Wang et al. 2019
 
 ROBOT = Robot(
     name="dvrk_psm",

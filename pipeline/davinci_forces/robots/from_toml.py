@@ -59,7 +59,7 @@ from davinci_forces.toml import TomlTable, excerpt, is_number
 from davinci_forces.toml.file import TomlFile
 
 NAME = re.compile(r"[a-z0-9_-]+")
-# Names that Windows keeps for devices, whatever comes after a dot: records are files named by log and joint.
+# Names that Windows reserves for devices, with any suffix; records are files with the names of logs and joints.
 RESERVED = {"con", "prn", "aux", "nul", *(f"{port}{number}" for port in ("com", "lpt") for number in range(10))}
 KIND_NAMES = tuple(kind.value for kind in Kind)
 CONVENTIONS = {"modified": modified_denavit_hartenberg, "classic": denavit_hartenberg}
@@ -68,13 +68,13 @@ WEIGHT_KEYS = ("mass", "centre", "inertia")
 
 
 def read_with_problems(file: Path) -> tuple[Robot | None, TomlFile]:
-    """Read a robot, None where its joints are unknown, and its file's problems; raises BadRobot if it is not TOML."""
+    """Read a robot, None if its joints are unknown, and its file with problems; raises BadRobot if it is not TOML."""
     table = toml.read(file, BadRobot, "there is no such robot file")
     return robot_of(table, file.stem), table.file
 
 
 def robot_of(table: TomlTable, stem: str) -> Robot | None:
-    """Build a robot from its table, with problems noted; None where its joints are unknown."""
+    """Build a robot from its table, with problems noted; None if its joints are unknown."""
     name = table.text("name", stem)
     title = table.text("title", name)
     entries = table.tables("joint", "it has no [[joint]]", most=MOST_JOINTS)
@@ -87,14 +87,14 @@ def robot_of(table: TomlTable, stem: str) -> Robot | None:
 
 
 def wrong_name(name: str) -> str:
-    """The problem of the name of a log or a joint, which names files; "" if it is valid."""
+    """The problem of the name of a log or a joint, which is used in file names; "" if the name is valid."""
     if not NAME.fullmatch(name):
         return f"{excerpt(name)} may have only lower-case letters, digits, _ and -"
     return f"{name!r} is reserved on Windows; choose another" if name in RESERVED else ""
 
 
 def _joint(table: TomlTable) -> Joint | None:
-    """A joint, its problems noted; None where its name or kind is not known."""
+    """Read a joint, with problems noted; None if its name or kind is invalid."""
     name = table.text("name")
     wrong = wrong_name(name)
     if wrong and isinstance(table.values.get("name"), str):
@@ -109,7 +109,7 @@ def _joint(table: TomlTable) -> Joint | None:
 
 
 def change(joint: Joint, table: TomlTable) -> Joint:
-    """Change the properties of a joint that a table gives; problems are noted."""
+    """Replace the properties of a joint that a table states, with problems noted."""
     changed = replace(
         joint,
         title=table.text("title", joint.title),
@@ -123,7 +123,7 @@ def change(joint: Joint, table: TomlTable) -> Joint:
         ),
         q_tau=table.number("q_tau", joint.q_tau, low=0.0, words="a number from 0 on"),
     )
-    if changed.effort != joint.effort and "limits" not in table:  # which is then in another unit
+    if changed.effort != joint.effort and "limits" not in table:  # the effort limit is in the old unit
         changed = replace(changed, limits=replace(changed.limits, effort=math.inf))
     if "effort" in table and "torque_constant" in table:
         table.problem("torque_constant is not used where effort is in A; leave one of them out", "torque_constant")
@@ -163,7 +163,7 @@ def _are_bounds(pair: list[Any]) -> bool:
 
 
 class Geometry(NamedTuple):
-    """The chain of a robot, the bodies of its links where known, and its coordinates beyond the joints."""
+    """The chain of a robot, the bodies of its links if known, and its coordinates beyond the joints."""
 
     chain: Chain | None = None
     bodies: Bodies | None = None
@@ -177,7 +177,7 @@ class _Weight(NamedTuple):
 
 
 def read_chain(table: TomlTable, joints: Sequence[Joint]) -> Geometry:
-    """Read the chain that a robot's file describes, with problems noted; empty where it has no [[link]]."""
+    """Read the chain that a robot's file describes, with problems noted; empty if it has no [[link]]."""
     entries = table.tables("link", most=MOST_JOINTS)
     if not entries:
         return Geometry()
@@ -204,12 +204,12 @@ def read_chain(table: TomlTable, joints: Sequence[Joint]) -> Geometry:
     return Geometry(chain, _bodies(moving, chain) if any(moving) else None, wrist)
 
 
-def _row(table: TomlTable, carriers: list[str], coordinates: list[str], kinds: dict[str, Kind]) -> TableRow:
-    """One row of the table; a coordinate of the wrist turns its links."""
+def _row(table: TomlTable, parents: list[str], coordinates: list[str], kinds: dict[str, Kind]) -> TableRow:
+    """Read one row of the Denavit-Hartenberg table; coordinates of the wrist are revolute."""
     name = table.text("name")
     if name in BASE_NAMES:
         table.problem(f"name {name!r} is reserved for the base; choose another", "name")
-    on = table.text("on", carriers[-1], carriers)
+    on = table.text("on", parents[-1], parents)
     alpha, a, d, theta = (table.number(key, 0.0) for key in ("alpha", "a", "d", "theta"))
     moved_by = table.text("moved_by", "", coordinates) if "moved_by" in table else ""
     sign = table.take("sign", 1, (int,), "1 or -1", lambda x: x in (1, -1))
@@ -219,8 +219,8 @@ def _row(table: TomlTable, carriers: list[str], coordinates: list[str], kinds: d
 
 
 def _weight(table: TomlTable, row: TableRow) -> _Weight | None:
-    """The mass, centre and inertia of a link; None where the file does not give them."""
-    stated = [key in table for key in WEIGHT_KEYS]  # a list, as asking for a key makes it a known one
+    """Read mass, centre and inertia of a link; None if the file does not state them."""
+    stated = [key in table for key in WEIGHT_KEYS]  # a list, not a generator, because every key must be looked up
     if not any(stated):
         return None
     if row.coordinate == FIXED:
@@ -239,7 +239,7 @@ def _tensor(inertia: Sequence[float]) -> Array:
 
 
 def _bodies(weights: Sequence[_Weight | None], chain: Chain) -> Bodies:
-    """The bodies of the moving links, in the frames of the dynamics; unstated ones have no mass."""
+    """The bodies of the moving links, in the frames of the dynamics; links without a stated mass have mass 0."""
     stated = [weight or _Weight(0.0, (0.0,) * 3, (0.0,) * 6) for weight in weights]
     return Bodies(
         np.array([weight.mass for weight in stated]),

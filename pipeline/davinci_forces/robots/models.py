@@ -1,6 +1,6 @@
-"""The models of a robot's joints, with units filled in.
+"""The models of a robot's joints, with their units.
 
-A variant is a structure, `independent` or `coupled`, and the friction that is added to it: `coupled+dahl`.
+A variant is a structure, `independent` or `coupled`, plus an added friction, such as `coupled+dahl`.
 """
 
 from collections.abc import Sequence
@@ -15,12 +15,12 @@ from davinci_forces.robots.robot import Joint, Robot
 STRUCTURES = ("independent", "coupled")
 FRICTIONS = ("", "smooth", "stribeck", "dahl", "dahl2", "dahl3")
 VARIANTS = tuple(f"{model}+{friction}".removesuffix("+") for model in STRUCTURES for friction in FRICTIONS)
-ARM = "arm"  # the group of a model of several joints
+ARM = "arm"  # group of a model of the whole arm
 
-WIDTH = 0.1  # of a smooth sign, in root mean square velocities
-FADED = 0.3  # of Stribeck's peak, likewise
-# Displacements of Dahl's states, as shares of the range of the motion.  Real arms of two laboratories need between 0.2
-# and 1 %; cross-validation chooses among these.
+WIDTH = 0.1  # width of a smooth sign, as a share of the root mean square velocity
+FADED = 0.3  # decay velocity of Stribeck's peak, as the same kind of share
+# Displacements of Dahl's states, as shares of the range of the motion; cross-validation chooses one set.  Real arms of
+# two laboratories need 0.2 to 1 %.
 DISPLACEMENTS = {
     "dahl": ((0.002,), (0.005,), (0.01,), (0.02,)),
     "dahl2": ((0.002, 0.02), (0.005, 0.02)),
@@ -29,20 +29,20 @@ DISPLACEMENTS = {
 
 
 class Reach(NamedTuple):
-    """How far and how fast a joint moves, in its units; the scales of its friction are shares of these."""
+    """Range of position, and root mean square velocity, of a joint; the scales of its friction are shares of these."""
 
     displacement: float
     velocity: float
 
 
 class AddedFriction(NamedTuple):
-    """Friction that is added to a structure: its variant, and the shares of a joint's displacement that it has."""
+    """Friction added to a structure: its variant, and its displacements as shares of the range of the motion."""
 
     variant: str
     shares: tuple[float, ...] = ()
 
     def terms(self, reach: Reach) -> tuple[Term, ...]:
-        """Its terms for a joint with this range of motion."""
+        """The friction terms of a joint with this reach."""
         if self.variant == "smooth":
             return (smooth_sign(round_scale(WIDTH * reach.velocity)),)
         if self.variant == "stribeck":
@@ -57,8 +57,8 @@ class AddedFriction(NamedTuple):
 
 def frictions() -> tuple[AddedFriction, ...]:
     """All frictions that cross-validation chooses from."""
-    alone = tuple(AddedFriction(variant) for variant in FRICTIONS if variant not in DISPLACEMENTS)
-    return (*alone, *(AddedFriction(variant, shares) for variant, sets in DISPLACEMENTS.items() for shares in sets))
+    others = tuple(AddedFriction(variant) for variant in FRICTIONS if variant not in DISPLACEMENTS)
+    return (*others, *(AddedFriction(variant, shares) for variant, sets in DISPLACEMENTS.items() for shares in sets))
 
 
 def round_scale(scale: float) -> float:
@@ -67,7 +67,7 @@ def round_scale(scale: float) -> float:
 
 
 def independent(joint: Joint, added: Sequence[Term] = (), variant: str = "") -> IndependentJoint:
-    """Model a joint as moving independently, with friction added to its own terms.  Section 6.1"""
+    """Model a joint independently of the others, with friction terms added to its own terms.  Section 6.1"""
     terms = (*joint.terms, *added)
     name = f"independent+{variant}".removesuffix("+")
     return IndependentJoint(joint.name, terms, tuple(joint.unit(term.unit) for term in terms), name)
@@ -76,7 +76,7 @@ def independent(joint: Joint, added: Sequence[Term] = (), variant: str = "") -> 
 def coupled_arm(
     robot: Robot, rows: Sequence[int], added: Sequence[Sequence[Term]], variant: str = "", group: str = ARM
 ) -> CoupledArm:
-    """Model joints (indices) that move together, each with viscous, Coulomb and added friction.
+    """Model coupled joints (indices `rows`), each with viscous, Coulomb and added friction.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A robot as data: its joints, each with its motor, its model and its limits, and its kinematic chain."""
+"""A robot as data: its kinematic chain and its joints, each with a motor, a model and limits."""
 
 import math
 import re
@@ -13,8 +13,8 @@ from davinci_forces.maths.models.physical import PhysicalTable
 from davinci_forces.maths.models.terms import Term
 
 ANYWHERE = (-math.inf, math.inf)
-MOST_JOINTS = 200  # moving ones: more would take minutes, by their square; a humanoid with both hands has 80
-MOST_LINKS = 1000  # of a URDF, with frames that are fixed: sensors, tools, screws
+MOST_JOINTS = 200  # moving joints; the time grows with their square, to minutes; a humanoid with two hands has 80
+MOST_LINKS = 1000  # of a URDF, including fixed frames: sensors, tools, screws
 
 
 class Kind(Enum):
@@ -26,8 +26,8 @@ class Kind(Enum):
     def unit(self, template: str, measured: str = "") -> str:
         """Fill in a unit of `quantities` or of a term: '{position}/s' is 'rad/s' for a revolute joint.
 
-        Where effort is `measured` in A, parameters that multiply a motion are in A over the motion's unit.  Parameters
-        of links then have the unknown factor of the effort.
+        If effort is `measured` in A, a parameter that multiplies a motion is in A over the unit of that motion.  Link
+        parameters then contain the unknown factor between A and the effort's unit.
         """
         position, effort, inertia = ("rad", "N m", "kg m^2") if self is Kind.REVOLUTE else ("m", "N", "kg")
         units = {"position": position, "effort": effort, "inertia": inertia, "mass_moment": "kg m", "gain": ""}
@@ -45,22 +45,22 @@ class Limits:
     q: tuple[float, float]
     dq: tuple[float, float]
     ddq: tuple[float, float]
-    effort: float = math.inf  # the largest that its drive gives at the joint, in either direction
+    effort: float = math.inf  # largest effort of the drive at the joint, in either direction
 
 
 UNLIMITED = Limits(ANYWHERE, ANYWHERE, ANYWHERE)
 
 
 class PrintedColumn(NamedTuple):
-    """A joint's parameters as a publication prints them for one estimator; "" for initial guesses."""
+    """The parameters of a joint that a publication prints for one estimator; "" for initial guesses."""
 
     estimator: str
     theta: tuple[float, ...]  # in the order of the joint's terms
-    mse: float  # of the averaged effort
+    mse: float  # mean squared error of the averaged effort
 
 
 class Printed(NamedTuple):
-    """The table of a publication that states a joint's parameters, and its misprints in words."""
+    """The table of a publication that states a joint's parameters, and descriptions of its misprints."""
 
     name: str
     columns: tuple[PrintedColumn, ...]
@@ -69,7 +69,7 @@ class Printed(NamedTuple):
 
 @dataclass(frozen=True)
 class Joint:
-    """One joint: its motor (Table 6.3), the terms of its model (6.7-6.14), and how it is excited and filtered."""
+    """One joint: motor (Table 6.3), terms of its model (6.7-6.14), limits, and settings of excitation and filter."""
 
     name: str
     title: str
@@ -78,15 +78,15 @@ class Joint:
     limits: Limits
     gear_ratio: float = 1.0  # eta [-], or [rad/m] for a prismatic joint
     torque_constant: float = 1.0  # K_m [N m/A]
-    effort: str = ""  # "A" where no torque constant is known, and effort is the motor's current; "" where it is
+    effort: str = ""  # "A" if the torque constant is unknown, so that effort is the motor current; else ""
     harmonics: int = 2  # N_f of the excitation
     # Published excitation trajectories by name: period, a0, a1, b1, a2, b2, ...
     published: tuple[tuple[str, tuple[float, ...]], ...] = ()
-    # Intensity of the external effort's random walk, a standard deviation per square root of a second
-    # [effort/s^0.5]; 0 is the slowest that shows a push.  A choice, not a measurement; the report says so.
+    # Intensity of the random walk of the external effort: a standard deviation per square root of time [effort/s^0.5];
+    # 0 selects the slowest walk that shows a push.  It is a choice, not a measurement, as the report states.
     q_tau: float = 0.0
-    physical: PhysicalTable | None = None  # what the parameters of its terms are made of, where that is known
-    printed: Printed | None = None  # parameters that were published for it
+    physical: PhysicalTable | None = None  # physical parameters behind its terms, if known
+    printed: Printed | None = None  # published parameters of its terms
 
     def unit(self, template: str) -> str:
         """Fill in the joint's units."""
@@ -95,9 +95,9 @@ class Joint:
 
 @dataclass(frozen=True)
 class ControlStudy:
-    """A controller to be tried in simulation: PD or PID with gravity compensation.  Chapter 5
+    """A simulated controller: PD or PID with gravity compensation.  Chapter 5
 
-    Every tuple has one number for each coordinate that takes part, in its own units; the others are held at 0.
+    Every tuple has one number for each controlled coordinate, in the coordinate's units; other coordinates stay at 0.
     """
 
     name: str
@@ -108,13 +108,13 @@ class ControlStudy:
     derivative: tuple[float, ...]  # K_d
     integral: tuple[float, ...]  # K_i; 0 for PD
     viscous: tuple[float, ...]  # friction of the arm
-    known_masses: float  # share of the masses that gravity compensation knows
+    known_masses: float  # share of the masses in the gravity compensation
     duration: float  # [s]
 
 
 @dataclass(frozen=True)
 class Tool:
-    """The tool on a chain: the link at the far end of its shaft, which turns about it, and the shaft's length."""
+    """The tool of a chain: the link that turns about the shaft, at its far end, and the length of the shaft."""
 
     link: str
     length: float  # [m]
@@ -122,9 +122,9 @@ class Tool:
 
 @dataclass(frozen=True)
 class Robot:
-    """The joints of an arm, from the base outwards; with its chain and bodies where its geometry is known.
+    """The joints of an arm, from the base outwards, and its chain and bodies if they are known.
 
-    The first coordinates of the chain are the joints, in this order; `wrist` names those beyond them.
+    The first coordinates of the chain are the joints, in this order; `wrist` names the other coordinates.
     """
 
     name: str
@@ -134,16 +134,16 @@ class Robot:
     bodies: Bodies | None = None
     wrist: tuple[str, ...] = ()
     control: tuple[ControlStudy, ...] = ()
-    tool: Tool | None = None  # where it is known which part of the chain it is, so that another may take its place
-    file: str = field(default="", compare=False)  # that describes it, where a file does
+    tool: Tool | None = None  # None if the tool's part of the chain is unknown, so that the tool cannot be replaced
+    file: str = field(default="", compare=False)  # file that describes the robot, or ""
 
     def with_tool(self, length: float) -> "Robot":
-        """The robot with a tool whose shaft is this long [m].
+        """The robot with a tool whose shaft has this length [m].
 
         Raises
         ------
         BadRobot
-            If it is not known which part of its chain the tool is.
+            If the tool's part of the chain is unknown.
         """
         if self.tool is None or self.chain is None:
             raise BadRobot(f"robot {self.name} has no known tool in its chain; leave the length of the tool out")
@@ -156,12 +156,12 @@ class Robot:
         return (*(joint.name for joint in self.joints), *self.wrist)
 
     def joint(self, name: str) -> Joint:
-        """The joint of that name.
+        """The joint with this name.
 
         Raises
         ------
         BadRobot
-            If there is none; the message lists those there are.
+            If there is no such joint; the message lists the names.
         """
         for joint in self.joints:
             if joint.name == name:

@@ -16,8 +16,8 @@ from davinci_forces.maths.simulation.closed_loop import JointConstraints, Timing
 from davinci_forces.maths.simulation.surroundings import UP, Surroundings
 from davinci_forces.simulation.scenario.scenario import BadScenario, Scenario, SimulatedArm, SimulatedLog
 
-NEGLIGIBLE = 1e-9  # in SI: a parameter that a model lacks counts as 0 below it
-SIGNIFICANT_DIGITS = 12  # of true parameters from the links; further digits depend on the machine
+NEGLIGIBLE = 1e-9  # in SI units: a parameter below this is 0, so that a model may omit it
+SIGNIFICANT_DIGITS = 12  # digits of true parameters from the links; further digits depend on the machine
 
 
 @dataclass(frozen=True)
@@ -32,11 +32,11 @@ class SimulatedMotion:
 
 @dataclass(frozen=True)
 class SimulatedRun:
-    """The true motion of one recording: its clock (N,) [s], its joints, and the tip where it is known."""
+    """The true motion of one recording: its clock (N,) [s], its joints, and the tip if it is simulated."""
 
     t: Array
     motions: dict[str, SimulatedMotion]
-    force: Array | None = None  # (N, 3) [N] of the tip on its surroundings, base frame
+    force: Array | None = None  # (N, 3) [N] force of the tip on its surroundings, base frame
 
 
 def simulate_log(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
@@ -62,12 +62,12 @@ def _joint_motion(scenario: Scenario, log: SimulatedLog, name: str, t: Array) ->
 
 
 def _in_closed_loop(scenario: Scenario, log: SimulatedLog) -> SimulatedRun:
-    """Simulate the whole arm, from rest at its first reference; the lead is simulated but not recorded.
+    """Simulate the whole arm from rest at its first reference; the lead time is simulated but not recorded.
 
     Raises
     ------
     BadScenario
-        If the motion diverges, as it does with gains that are too high for the tick.
+        If the motion diverges, for example because the gains are too high for the tick.
     """
     simulated_arm, robot = cast(SimulatedArm, scenario.arm), scenario.robot
     chain, bodies = _geometry(scenario)
@@ -127,10 +127,10 @@ def mass_position(scenario: Scenario) -> Array:
 
 
 def theta(scenario: Scenario, family: str) -> dict[str, Array]:
-    """The parameters of each joint's model while the other joints stay at zero, where the model is exact.
+    """The true parameters of each joint's model, which is exact while the other joints are at zero.
 
-    Friction is that of the scenario.  Inertia and gravity follow from the links; `SIGNIFICANT_DIGITS` make them the
-    same on every machine.  Joints whose friction is more than viscous and Coulomb friction are omitted.
+    Friction is taken from the scenario.  Inertia and gravity follow from the links, rounded to `SIGNIFICANT_DIGITS` so
+    that every machine gives the same.  Joints with other friction than viscous and Coulomb friction are omitted.
     """
     simulated_arm = cast(SimulatedArm, scenario.arm)
     friction = simulated_arm.families[family].friction
@@ -138,8 +138,10 @@ def theta(scenario: Scenario, family: str) -> dict[str, Array]:
     drives = Drives(simulated_arm.motors.gear_ratio, simulated_arm.rotors, friction.viscous, friction.coulomb_up)
     parameters = {}
     for i, joint in enumerate(scenario.robot.joints):
-        plain = friction.coulomb_up[i] == friction.coulomb_down[i] == friction.static_up[i] == friction.static_down[i]
-        if not plain or friction.bristle_stiffness[i] > 0:
+        symmetric = (
+            friction.coulomb_up[i] == friction.coulomb_down[i] == friction.static_up[i] == friction.static_down[i]
+        )
+        if not symmetric or friction.bristle_stiffness[i] > 0:
             continue
         values = reduced_parameters(chain, bodies, i, len(scenario.robot.joints), drives)
         names = [term.name for term in joint.terms]

@@ -43,24 +43,24 @@ def record(
     angle, speed = (true + random.normal(0.0, sigma, N) for true, sigma in ((motion.q, noise.q), (motion.dq, noise.dq)))
     effort = motion.tau + random.normal(0.0, noise.tau, N) + drift(noise, rate, N, random)
     current = quantise(effort / (joint.gear_ratio * joint.torque_constant), simulated.current_step)
-    size = 1e3 if current_unit == "mA" else 1.0
+    scale = 1e3 if current_unit == "mA" else 1.0
     return [
         SimulatedChannel(f"{joint.name}.theta_m", f"{simulated.label} motor angle", "rad",
                 quantise(joint.gear_ratio * angle, simulated.encoder_step)),
         SimulatedChannel(f"{joint.name}.dtheta_m", f"{simulated.label} motor speed", "rad/s", joint.gear_ratio * speed),
-        SimulatedChannel(f"{joint.name}.i", f"{simulated.label} current", current_unit, size * current),
+        SimulatedChannel(f"{joint.name}.i", f"{simulated.label} current", current_unit, scale * current),
     ]  # fmt: skip
 
 
 def record_force(sensor: ForceSensor, t: Array, force: Array, random: np.random.Generator) -> list[SimulatedChannel]:
-    """Record the force (N, 3) of the tip at the times t (N,), base axes, with the delay and the noise of a sensor."""
-    delayed = np.stack([np.interp(t - sensor.lag, t, along) for along in force.T], axis=-1)
+    """Record the force (N, 3) of the tip at the times t (N,), base axes, with the delay and the noise of the sensor."""
+    delayed = np.stack([np.interp(t - sensor.lag, t, component) for component in force.T], axis=-1)
     measured = delayed + random.normal(0.0, sensor.noise, force.shape)
     return [SimulatedChannel(f"force_{a}", f"Force {a}", "N", measured[:, i].copy()) for i, a in enumerate("xyz")]
 
 
 def generator(seed: int, log: str, joint: str) -> np.random.Generator:
-    """The random generator for the noise of one joint in one log, which is independent of all other logs."""
+    """The random generator for the noise of one joint in one log; its noise does not depend on other logs."""
     return np.random.default_rng([seed, *f"{log}/{joint}".encode()])
 
 
@@ -80,13 +80,13 @@ def drift(noise: SensorNoise, rate: float, samples: int, random: np.random.Gener
 def write(path: Path, channels: Sequence[SimulatedChannel], rate: float, started: str) -> None:
     """Write the channels in the format of the file's suffix.
 
-    A channel whose quantity is `time` is the first column or channel; without one, the header states the step.
+    A channel whose quantity is `time` is the first column or channel; without it, the header states the sampling time.
     """
     {".tdms": tdms, ".lvm": lvm}[path.suffix](path, channels, rate, started)
 
 
 def channel_name(path: Path, channel: SimulatedChannel) -> str:
-    """The name of a channel in the file, for readers."""
+    """The name by which a study refers to a channel of the file."""
     if path.suffix == ".tdms":
         return f"{GROUP}/{channel.name}"
     return "X_Value" if channel.quantity == "time" else channel.name

@@ -1,4 +1,4 @@
-"""Simulated studies on disk: their logs, study.toml and truth.toml, moved into place when all are written."""
+"""Write simulated studies: logs, study.toml and truth.toml, which are moved into place when all are complete."""
 
 import json
 import shutil
@@ -110,12 +110,12 @@ def study_entry(scenario: Scenario, log: SimulatedLog, path: Path, channels: Seq
 
 
 def toml(value: object) -> str:
-    """Write a text, a number, a truth value or a list of them as TOML does, which is as in JSON."""
+    """Write a text, a number, a truth value or a list as TOML; for these, JSON has the same form."""
     return json.dumps(value, ensure_ascii=False)
 
 
 def truth_text(scenario: Scenario, entries: Sequence[str]) -> str:
-    """The text of truth.toml: parameters and noise of each joint, by family where there are any, then the logs."""
+    """The text of truth.toml: parameters and noise of each joint, for each family if there are any, then the logs."""
     lines = ["# What is true of the simulated recordings of this study.", "simulated = true"]
     lines += [f"scenario = {toml(scenario.name)}", f"seed = {scenario.seed}"]
     if scenario.arm is None:
@@ -148,7 +148,7 @@ def truth_entry(log: SimulatedLog, run: SimulatedRun) -> str:
 
 
 def contact_times(run: SimulatedRun) -> list[list[float]]:
-    """The contacts of the tip: [onset, end] of each [s], to one sample."""
+    """The contacts of the tip: [onset, end] [s] of each, accurate to one sample."""
     if run.force is None:
         return []
     contact = np.concatenate([[False], np.linalg.norm(run.force, axis=1) > 0, [False]])

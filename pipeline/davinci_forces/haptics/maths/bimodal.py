@@ -1,24 +1,25 @@
-"""The bimodal haptic model: hand and haptic device are one mass on a spring and a damper, with tissue on one side.
+"""The bimodal haptic model: hand and device are one mass with a spring and a damper, and tissue is on one side.
 
     m ddx = -K_H x - b dx - K_T x  in contact, x >= 0;  without the last term away from it.  (8.2)-(8.7)
 
 The thesis requires one quadratic function V = x' P x that decreases in both modes.  The model is then stable under
-arbitrary switching between them.  The real system switches at x = 0 only, where
+arbitrary switching between them.  The real system switches only at x = 0, and has the energy
 
     V = m dx^2/2 + K_H x^2/2 + K_T max(x, 0)^2/2,  dV/dt = -b dx^2,
 
 so that it is stable without delay for every K_T >= 0.
 
-Under arbitrary switching, the limit of K_T is where the trajectory of the worst switching law just closes.  The two
-modes differ in the force K_T x only, which pushes back.  The worst law omits that force while the hand moves away, and
-applies it while the hand returns.  It therefore switches on both axes of the phase plane, symmetrically.  With
-omega^2 = K/m and damping ratio zeta, a mode takes a speed v to the displacement X, and X to the speed v':
+Under arbitrary switching, K_T is at its limit if the trajectory of the worst switching law is closed.  The two modes
+differ only in the restoring force K_T x.  The worst law omits this force while the hand moves away, and applies it
+while the hand returns.  The law therefore switches on both axes of the phase plane, symmetrically.  With omega^2 = K/m
+and damping ratio zeta, a mode that starts at speed v reaches the displacement X, and returns from X with speed v':
 
     X  = v/omega   exp(-g(zeta)),        g = zeta/s  arccos(zeta)
     v' = X omega   exp(-h(zeta)),        h = zeta/s  (pi - arccos(zeta)),     s = sqrt(1 - zeta^2)
 
-Half a turn of the worst law multiplies the speed by omega_1/omega_2 exp(-g(zeta_2) - h(zeta_1)).  The limit is the K_T
-where that factor is 1: below it every switching law decays, above it one grows.  For planar systems that is exact.
+Half a turn of the worst law multiplies the speed by omega_1/omega_2 exp(-g(zeta_2) - h(zeta_1)).  At the limit of K_T
+this factor is 1.  Below the limit the motion decays under every switching law; above it the motion grows under the
+worst law.  This is exact for planar systems.
 """
 
 import math
@@ -30,21 +31,21 @@ from davinci_forces.maths.arrays import Array
 
 THESIS_TISSUE = 457.24  # [N/m], section 8.2
 SERIES_RANGE = 1e-6  # distance of a damping ratio from 1 within which the series is used
-# Results for the thesis's hand that take seconds to compute and are the same in every study; tests recompute them.
-MIN_HAND_STIFFNESS, MAX_HAND_STIFFNESS = 1.0, 1e5  # [N/m] hands
+# Results for the thesis's hand.  They take seconds to compute and are the same in every study; tests recompute them.
+MIN_HAND_STIFFNESS, MAX_HAND_STIFFNESS = 1.0, 1e5  # [N/m] range of K_H
 K_H, K_T = (
     np.geomspace(MIN_HAND_STIFFNESS, MAX_HAND_STIFFNESS, 30),
     np.geomspace(0.5, 2e3, 30),
-)  # [N/m] of the map
+)  # [N/m] axes of the stability map
 DELAYS = np.geomspace(1e-3, 0.5, 55)  # [s]
-SIMULATED_DELAYS = slice(18, None, 9)  # of the delays: those for which a hand that leaves the tissue is simulated
+SIMULATED_DELAYS = slice(18, None, 9)  # delays for which a hand that leaves the tissue is simulated
 LINK_RATE = 100.0  # [Hz] of messages, chapter 9
-# For each hand of the map, the number of tissues, from the softest on, for which `lmi.cqlf_exists`.
+# For each K_H of the map, the number of K_T, from the smallest upwards, for which `lmi.cqlf_exists`.
 CQLF_COUNTS = (
     7, 7, 8, 8, 9, 9, 10, 11, 11, 12, 13, 13, 14, 14, 15, 16, 17, 17, 18, 19, 19, 20, 21, 21, 22, 23, 23, 24, 25,
     25,
 )  # fmt: skip
-# [N/m] `delay.sampled_limit` of each delay at LINK_RATE.
+# [N/m] `delay.sampled_limit` at LINK_RATE, for each delay.
 SAMPLED_LIMITS = (
     167.09132452095844, 163.76653710101584, 160.19105826948277, 156.36177491875574, 152.27869772527805,
     147.94540170726037, 143.3694072223424, 138.56247043556272, 133.54075245898127, 128.32483943775333,
@@ -58,7 +59,7 @@ SAMPLED_LIMITS = (
     10.734308974921793, 11.94789278116265, 14.255706578798465, 18.482229295646924, 25.574513026342466,
     35.27063234937405, 45.75508918133681, 55.492032799221484, 63.89019209613135,
 )  # fmt: skip
-# [N/m] `motion.leaving_limit` of each delay that is simulated.
+# [N/m] `motion.leaving_limit` for each simulated delay.
 LEAVING_LIMITS = (
     416.321006868175, 112.70170340262258, 38.25106184546224, 22.067132844844714, 127.46037697679003,
 )  # fmt: skip
@@ -81,40 +82,40 @@ class Hand(NamedTuple):
         return self.b / (2.0 * float(np.sqrt(self.m * (self.k + k_t))))
 
 
-THESIS_HAND = Hand(1.0, 1.0, 100.0)  # m and b of section 8.3; it states no K_H, and 100 N/m is a relaxed arm
+THESIS_HAND = Hand(1.0, 1.0, 100.0)  # m and b of section 8.3, which states no K_H; 100 N/m is a relaxed arm
 
 
 def mode(hand: Hand, k_t: float) -> Array:
-    """The matrix (2, 2) of dx/dt = A x with a tissue of stiffness k_t [N/m]: A_1, and at 0 A_2.  (8.4), (8.6)"""
+    """A (2, 2) of dx/dt = A x with tissue of stiffness k_t [N/m]: A_1, or A_2 for k_t = 0.  (8.4), (8.6)"""
     return np.array([[0.0, 1.0], [-(hand.k + k_t) / hand.m, -hand.b / hand.m]])
 
 
 def cqlf_limit(hand: Hand) -> float:
-    """The K_T [N/m] below which, and only below which, a common quadratic Lyapunov function exists.
+    """The K_T [N/m] below which a common quadratic Lyapunov function exists; none exists above it.
 
-    K_T < b^2/m + 2 b sqrt(K_H/m).  For two modes that differ by a matrix of rank one, such a function exists where the
+    K_T < b^2/m + 2 b sqrt(K_H/m).  For two modes that differ by a matrix of rank one, a common function exists if the
     product A_1 A_2 has no negative real eigenvalue.
     """
     return float(hand.b**2 / hand.m + 2.0 * hand.b * hand.frequency)
 
 
 def energy(hand: Hand, k_t: float, x: Array, dx: Array) -> Array:
-    """V [J] of the model that switches at x = 0, which decreases during motion; x [m], dx [m/s]."""
+    """V [J] of the model that switches at x = 0; V decreases during motion; x [m], dx [m/s]."""
     return 0.5 * (hand.m * dx**2 + hand.k * x**2 + k_t * np.maximum(x, 0.0) ** 2)
 
 
 def switching_limit(hand: Hand) -> float:
-    """The K_T [N/m] at which the worst switching law neither grows nor decays."""
+    """The K_T [N/m] at which the motion neither grows nor decays under the worst switching law."""
     from scipy.optimize import brentq  # here, so that reading a hand from a file loads no solver
 
-    high = cqlf_limit(hand)  # below which no law grows
+    high = cqlf_limit(hand)  # below this K_T the motion grows under no law
     while log_growth(hand, high) < 0.0:
         high *= 2.0
     return float(brentq(lambda k_t: log_growth(hand, k_t), 0.5 * high, high, xtol=1e-12 * high, rtol=1e-12))
 
 
 def log_growth(hand: Hand, k_t: float) -> float:
-    """The logarithm of the factor of a speed over half a turn of the worst law; -inf where it never turns."""
+    """The log of the factor of the speed over half a turn of the worst law; -inf if the motion never turns."""
     soft, stiff = hand.damping_ratio(), hand.damping_ratio(k_t)
     if stiff >= 1.0:
         return -math.inf
@@ -131,5 +132,5 @@ def log_loss_away(zeta: float) -> float:
 
 
 def log_loss_back(zeta: float) -> float:
-    """h: the logarithmic loss on the way back, for zeta < 1; otherwise the axis is never reached."""
+    """h: the logarithmic loss of speed on the way back to the axis; zeta < 1, or the axis is never reached."""
     return zeta / math.sqrt(1.0 - zeta**2) * (math.pi - math.acos(zeta))

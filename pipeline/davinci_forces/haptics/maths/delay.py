@@ -1,27 +1,27 @@
-"""The stiffest tissue for which a hand is stable with a delayed force, or a delayed and held one.
+"""The stiffest tissue for which a hand is stable with a delayed force, or with a delayed and held force.
 
 In contact, m ddx + b dx + K_H x + K_T x(t - d) = 0.  A root reaches the imaginary axis, s = j w, where
 
     K_T = |m w^2 - K_H - j b w|   and   w d = arg(m w^2 - K_H + j b w) + 2 pi n.
 
-The angle decreases from pi to 0 while w d increases, so that each n has one w.  The smallest K_T of all n is the limit,
-below which no root crosses.  A computer samples x with period T and holds the force for it with a delay d.  The same
-condition then applies on the unit circle, z = exp(j w T), with the hand's exact response to a held force.
+The angle decreases from pi to 0 while w d increases, so that each n has one w.  The limit is the smallest K_T of all n:
+below the limit no root crosses.  A computer samples x with period T and holds the resulting force, with a delay d.  The
+same condition then applies on the unit circle, z = exp(j w T), with the hand's exact response to a held force.
 
-Both criteria apply to a hand that is pressed into tissue and stays in contact: small motions about a steady push grow
-beyond the limit.  A hand that nothing pushes leaves the tissue in every period, and no delayed force acts there.
+Both criteria apply to a hand that is pressed into tissue and stays in contact: above the limit, small motions about
+this position grow.  Without a push the hand leaves the tissue in every period, and no delayed force acts there.
 
 Other limits follow from the frequency response of the whole loop, or from simulations.  T(jw) is the felt force over
-the force K_T x + D dx that the tissue would exert at the hand's position: arm, filter, link and hold.  It is 1 where
-the hand feels the tissue itself.  The hand in contact,
+the force K_T x + D dx that the tissue would exert at the hand's position.  It contains arm, filter, link and hold, and
+is 1 if the hand feels the tissue directly.  The hand in contact,
 
     m ddx + b dx + K_H x + T (K_T x + D dx) = 0,
 
-has a root on the imaginary axis where
+has a root on the imaginary axis at each w for which
 
     K_T = (m w^2 - K_H - j b w) / T(jw) - j D w
 
-is real and positive; the smallest is the limit.
+is real and positive; the limit is the smallest of these K_T.
 """
 
 import math
@@ -38,18 +38,18 @@ from davinci_forces.maths.arrays import Array
 
 Complex = NDArray[np.complex128]
 
-MAX_DELAY_SAMPLES = 1000  # beyond, a held force is nearly continuous
-POINTS_PER_SAMPLE = 40  # on the unit circle, for each sample of delay and each width of the resonance
+MAX_DELAY_SAMPLES = 1000  # with a longer delay, a held force is nearly continuous
+POINTS_PER_SAMPLE = 40  # points on the unit circle, for each sample of delay and for each width of the resonance
 MIN_CIRCLE_POINTS = 2000
-RESPONSE_POINTS = 4000  # of an interpolated frequency response
-SUSTAINED_RATIO = 0.97  # amplitude over that of the quarter before, from which an oscillation counts as sustained
-SEARCH_FACTOR = 64.0  # largest limit over first guess, and the inverse
+RESPONSE_POINTS = 4000  # points of an interpolated frequency response
+SUSTAINED_RATIO = 0.97  # an oscillation is sustained if the amplitude ratio of successive quarters is at least this
+SEARCH_FACTOR = 64.0  # largest ratio of limit to first guess, and of guess to limit
 TRIAL_HALVINGS = 7
 
 
 def delay_limit(hand: Hand, delay: float) -> float:
-    """The K_T [N/m] below which the hand in contact is stable, with its force delayed by `delay` > 0 [s]."""
-    peak = np.sqrt(max(hand.k / hand.m - 0.5 * (hand.b / hand.m) ** 2, 0.0))  # above, stiffness increases with w
+    """The K_T [N/m] below which the hand in contact is stable, if the force is delayed by `delay` > 0 [s]."""
+    peak = np.sqrt(max(hand.k / hand.m - 0.5 * (hand.b / hand.m) ** 2, 0.0))  # above this w, K_T increases with w
     limit, turn = np.inf, 0
     while True:
         w = crossing_frequency(hand, delay, turn)
@@ -60,7 +60,7 @@ def delay_limit(hand: Hand, delay: float) -> float:
 
 
 def crossing_frequency(hand: Hand, delay: float, turn: int) -> float:
-    """The frequency [rad/s] at which a root crosses, for the turn n."""
+    """The frequency [rad/s] at which a root crosses the imaginary axis, for the integer n = `turn`."""
 
     def excess(w: float) -> float:
         angle = np.arctan2(hand.b * w, hand.m * w**2 - hand.k)
@@ -70,7 +70,7 @@ def crossing_frequency(hand: Hand, delay: float, turn: int) -> float:
 
 
 def damping_needed(hand: Hand, k_t: float, delay: float) -> float:
-    """The damping b [N s/m] that the hand needs for tissue of k_t > 0 [N/m] and a force delayed by `delay` > 0 [s]."""
+    """The damping b [N s/m] that makes the hand stable with tissue of k_t > 0 [N/m] and a delay > 0 [s]."""
 
     def log_excess(exponent: float) -> float:
         return float(np.log(k_t / delay_limit(hand._replace(b=float(np.exp(exponent))), delay)))
@@ -85,7 +85,7 @@ def damping_needed(hand: Hand, k_t: float, delay: float) -> float:
 
 
 def sampled_limit(hand: Hand, delay: float, rate: float) -> float:
-    """The K_T [N/m] below which the hand in contact is stable, with a force held at `rate` [Hz] and delayed [s].
+    """The K_T [N/m] below which the hand in contact is stable, if the force is held at `rate` [Hz] and delayed [s].
 
     Raises
     ------
@@ -123,7 +123,7 @@ def numerator(Phi: Array, column: Array, z: Complex) -> Complex:
 
 
 def unit_circle_angles(hand: Hand, rate: float, samples: int) -> Array:
-    """Angles in (0, pi), dense enough to separate the crossings, densest about the hand's resonance."""
+    """Angles in (0, pi), dense enough to separate the crossings, and densest around the hand's resonance."""
     even = np.linspace(0.0, np.pi, max(MIN_CIRCLE_POINTS, POINTS_PER_SAMPLE * (samples + 1)) + 1)[1:-1]
     width = 0.5 * hand.b / hand.m / rate
     swing = float(np.sqrt(max(hand.frequency**2 - (0.5 * hand.b / hand.m) ** 2, 0.0))) / rate
@@ -137,7 +137,7 @@ def delayed_hold(hand: Hand, delay: float, rate: float) -> tuple[Array, Array, A
     """The exact response of the free hand to a delayed and held force over one sample.
 
     x_(k+1) = Phi x_k + early u_(k-n) + late u_(k-n-1), where u = -K_T x is the tissue's force at a sample and n the
-    whole samples of delay.  The force of the sample before acts until the remainder of the delay is over.
+    whole samples of delay.  The force of the previous sample acts until the remainder of the delay is over.
     """
     period = 1.0 / rate
     samples = int(delay * rate + 1e-9)
@@ -180,17 +180,17 @@ def response_limit(hand: Hand, w: Array, T: Complex, damping: float) -> float:
 
 
 def settles(x: Array, shift: float) -> bool:
-    """Test whether a hand x (N,) settles after a release that moves its rest position by `shift` [m].
+    """Test whether a hand at x (N,) settles after a release that moves its rest position by `shift` [m].
 
-    It settles where it swings less than that shift in its last quarter, or ever less.  A limit of 0 would not do: near
-    rest, friction in the arm takes any value, and so does the felt force.
+    It settles if its motion in the last quarter is less than the shift, or if its motion decreases steadily.  The limit
+    is not 0 because near rest the friction in the arm, and with it the felt force, may have any value.
     """
     first, _, before, last = (float(np.ptp(part)) for part in np.array_split(x, 4))
     return bool(last < shift or (last < SUSTAINED_RATIO**3 * first and last < SUSTAINED_RATIO * before))
 
 
 def max_stable(stable: Callable[[float], bool], guess: float) -> float:
-    """The largest value for which `stable` holds; NaN where it is more than 64 times the guess, or less than 1/64.
+    """The largest value for which `stable` is true; NaN if it is above 64 times the guess, or below 1/64 of it.
 
     The search goes outwards from the guess, to within 0.5 %.
     """

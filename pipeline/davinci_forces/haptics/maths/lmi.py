@@ -1,8 +1,8 @@
-"""The common quadratic Lyapunov function as a linear matrix inequality, which Clarabel solves.  (8.8)-(8.10)
+"""The common quadratic Lyapunov function as a linear matrix inequality, solved by Clarabel.  (8.8)-(8.10)
 
     largest t:  P >= t I,  -(A_i' P + P A_i) >= t beta I for both modes,  trace P = 1
 
-A function exists where t > 0.  With P = [[p, r], [r, 1 - p]] there are three unknowns (p, r, t).  Time and position are
+A function exists if t > 0.  With P = [[p, r], [r, 1 - p]] there are three unknowns (p, r, t).  Time and position are
 scaled by the mean stiffness of both modes, which changes no result.  A mode is then [[0, 1], [-k, -beta]] with numbers
 near 1 for any hand.
 """
@@ -14,7 +14,7 @@ from davinci_forces.haptics.maths.bimodal import Hand
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.estimation import conic
 
-EXISTS = 1e-7  # t above the solver's tolerance
+EXISTS = 1e-7  # least t of an existing function; above the solver's tolerance
 TOLERANCE = 1e-9
 ROOT_2 = float(np.sqrt(2.0))  # factor of the off-diagonal entry in the solver's form of a symmetric matrix
 LMI_HALVINGS = 24
@@ -32,8 +32,8 @@ def cqlf_exists(hand: Hand, k_t: Array) -> Booleans:
     exists = []
     for k in np.asarray(k_t, float).tolist():
         A, bound = inequality(hand, k)
-        answer = clarabel.DefaultSolver(quadratic, cost, A, bound, cones, settings).solve()
-        exists.append(answer.x[2] > EXISTS)
+        solution = clarabel.DefaultSolver(quadratic, cost, A, bound, cones, settings).solve()
+        exists.append(solution.x[2] > EXISTS)
     return np.array(exists, bool)
 
 

@@ -1,10 +1,10 @@
-"""The motion of the hand against tissue: with modes that a law switches, or with a delayed and held force.
+"""The motion of the hand against tissue: with modes switched by a law, or with a delayed and held force.
 
 The flow of a mode with stiffness k over a time t is, with sigma = b / 2m and w^2 = sigma^2 - k/m,
 
     exp(A t) = exp(-sigma t) (cosh(w t) I + sinh(w t)/w (A + sigma I)),
 
-with cos and sin where w^2 < 0.  Where a law switches within a step, bisection finds the instant.
+with cos and sin for w^2 < 0.  If a law switches within a step, bisection finds the instant.
 """
 
 import cmath
@@ -20,13 +20,13 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import compile_and_store
 
 State = tuple[float, float]  # x [m], dx [m/s]
-Law = Callable[[float, float], float]  # of x and dx: the tissue acts where the value is positive
+Law = Callable[[float, float], float]  # function of x and dx: the tissue acts if its value is positive
 SWITCH_HALVINGS = 50
-SAMPLES_PER_PERIOD = 100  # of the faster mode
+SAMPLES_PER_PERIOD = 100  # periods of the faster mode
 GROWTH_PERIODS = 60  # periods of the free hand in which growth becomes visible
 SAMPLES_PER_DELAY = 100  # enough to approximate a continuous delay
 LIMIT_HALVINGS = 14
-BRACKET = (0.25, 64.0)  # search range of the limit of a hand that leaves the tissue, over the limit in contact
+BRACKET = (0.25, 64.0)  # search range for `leaving_limit`, as factors of the limit in contact
 
 
 class Swing(NamedTuple):
@@ -43,7 +43,7 @@ def at_contact(x: float, dx: float) -> float:
 
 
 def worst(x: float, dx: float) -> float:
-    """The worst switching law: the tissue acts on the way back only, on either side."""
+    """The worst switching law: on either side, the tissue acts only while the hand returns."""
     return -x * dx
 
 
@@ -62,7 +62,7 @@ def step_switched(hand: Hand, k_t: float, state: State, step: float, law: Law) -
     """The state after a step in which the law may switch."""
     remaining = step
     while remaining > 0.0:
-        ahead = flow(hand, 0.0, state, 1e-9 * step)  # on a switching line, the state just after decides
+        ahead = flow(hand, 0.0, state, 1e-9 * step)  # on a switching line, the state just after it selects the mode
         stiffness = k_t if law(*ahead) > 0.0 else 0.0
         after = flow(hand, stiffness, state, remaining)
         if (law(*after) > 0.0) == (stiffness > 0.0):
@@ -90,8 +90,8 @@ def flow(hand: Hand, k_t: float, state: State, t: float) -> State:
 def simulate_delayed(hand: Hand, k_t: float, delay: float, rate: float, push: float, duration: float) -> Swing:
     """Simulate the hand against tissue on one side, with a force held at `rate` [Hz] and delayed by `delay` [s].
 
-    Where `push` > 0 [N], the hand rests pressed into the tissue and is disturbed by 1 % of its depth, so that it stays
-    in contact.  Where it is 0, the hand is released 1 cm away from the tissue.
+    If `push` > 0 [N], the hand starts at rest, pressed into the tissue, and disturbed by 1 % of its depth; it stays in
+    contact.  If `push` is 0, the hand is released 1 cm away from the tissue.
     """
     Phi, early, after, samples = delayed_hold(hand, delay, rate)
     x_0 = push / (hand.k + k_t) if push else 0.0
@@ -115,7 +115,7 @@ def _fill(Phi: Array, early: Array, after: Array, bias: Array, k_t: float, force
 
 
 def grows(hand: Hand, motion: Swing) -> bool:
-    """Test whether the last quarter of a motion is at least as large as the quarter before."""
+    """Test whether a motion is at least as large in its last quarter as in the quarter before."""
     size = np.hypot(motion.x, motion.dx / hand.frequency)
     quarter = len(size) // 4
     last, before = float(size[-quarter:].max()), float(size[-2 * quarter : -quarter].max())
@@ -123,10 +123,10 @@ def grows(hand: Hand, motion: Swing) -> bool:
 
 
 def leaving_limit(hand: Hand, delay: float, contact_limit: float) -> float:
-    """The K_T [N/m] above which a hand that nothing pushes bounces ever higher off the tissue, by simulation.
+    """The K_T [N/m] above which a hand without push bounces off the tissue with growing amplitude, by simulation.
 
-    Contact lasts part of each period only.  The search starts from the limit of the hand in contact.  NaN means that 64
-    times that limit is not enough, as for a hand so damped that it hardly returns.
+    Contact lasts for part of each period.  The search starts from the limit of the hand in contact.  NaN means that the
+    motion does not grow at 64 times that limit, for example because a strongly damped hand hardly returns.
     """
     rate = SAMPLES_PER_DELAY / delay
     exact = delay - 0.5 / rate  # the hold adds half a sample

@@ -1,13 +1,13 @@
 """The haptic loop: hand, haptic device, link, arm with controller and friction, and tissue.
 
-Time advances in ticks of the motor drivers.  At every message of the link the device sends the position of the hand; it
-reaches the arm after a delay.  Once in a period the controller follows the latest position received, the sensors
-are read, and a function estimates a force from them.  At every message of the link the latest force is sent back, and
-the device holds it until the next one arrives.  Between ticks the hand moves exactly,
+Time advances in ticks of the motor drivers.  At every message of the link the device sends the position of the hand,
+which reaches the arm after a delay.  In each period of the controller, the controller follows the latest position, the
+sensors are read, and a function estimates a force from the readings.  At every message of the link the latest force is
+sent back; the device holds it until the next force arrives.  Between ticks the hand moves exactly,
 
     m ddx = F_H - K_H x - b dx - F,                                                                 (8.2), (8.5)
 
-with the held force F, and the arm by one implicit step.  Tissue begins at the arm's position 0 and pushes back with
+with the held force F, and the arm by one implicit step.  The tissue begins at the arm's position 0 and pushes back with
 
     f = max(K_T x + D dx, 0) (1 + mu dx / sqrt(dx^2 + w^2)),                                        (8.1)
 
@@ -25,7 +25,7 @@ from davinci_forces.maths.simulation.actuators import Cascade, Device, Loops, Mo
 from davinci_forces.maths.simulation.control import drive, follow, read
 from davinci_forces.maths.simulation.step import Friction, State, at_rest, middle, step
 
-FRICTION_VELOCITY = 1e-3  # w [m/s], below which the tissue's friction falls to 0 smoothly
+FRICTION_VELOCITY = 1e-3  # w [m/s]; at lower velocities the tissue's friction falls smoothly to 0
 
 
 class Grip(NamedTuple):
@@ -33,7 +33,7 @@ class Grip(NamedTuple):
 
     Phi: Array  # (2, 2)
     Gamma: Array  # (2,) [m/N], [m/(s N)]
-    path: Array  # (0, 2) where the hand moves by itself
+    path: Array  # (0, 2) if the hand moves freely
 
 
 class FeltTissue(NamedTuple):
@@ -45,7 +45,7 @@ class FeltTissue(NamedTuple):
 
 
 class Axis(NamedTuple):
-    """The prismatic joint alone: motor, controller, body and friction; every array is of one joint."""
+    """The prismatic joint: motor, controller, body and friction, as arrays of one joint."""
 
     inertia: Array  # (1, 1) [kg]
     gravity: Array  # (1,) [N]
@@ -53,7 +53,7 @@ class Axis(NamedTuple):
     motors: Motors
     law: Cascade
     stops: tuple[Array, Array]  # (1,) each [m], from the tissue's surface
-    exact: bool  # whether it follows its reference without error instead
+    exact: bool  # whether it follows its reference without error, without motor and controller
 
 
 class Clocks(NamedTuple):
@@ -62,12 +62,12 @@ class Clocks(NamedTuple):
     tick: float
     turn: int  # period of the controller and its sensors
     message: int  # period of the link
-    out: int  # delay of a position
-    back: int  # delay of a force
+    out: int  # delay of a position on its way to the arm
+    back: int  # delay of a force on its way back
 
 
 class SensorReading(NamedTuple):
-    """The sensor values at a period of the controller."""
+    """The sensor readings of one period of the controller."""
 
     q: float  # [m]
     dq: float  # [m/s]
@@ -79,9 +79,9 @@ class LoopRun(NamedTuple):
     """A simulated run: (T,) at the ticks; readings (K, 4) and estimated forces (K,) at the controller's periods."""
 
     t: Array
-    x: Array  # the hand
+    x: Array  # [m] position of the hand
     dx: Array
-    q: Array  # the arm, from the tissue's surface
+    q: Array  # [m] position of the arm, from the tissue's surface
     true: Array  # [N] force of the arm on the tissue
     felt: Array  # [N] force of the device on the hand
     readings: Array
@@ -89,7 +89,7 @@ class LoopRun(NamedTuple):
 
 
 class _Loop(NamedTuple):
-    """The changing state, in few arrays, because each argument of compiled code takes time at every call."""
+    """The state of the loop, in few arrays, because each argument of compiled code takes time at every call."""
 
     hand: Array  # (2,)
     state: Array  # (4, 1), a `State`
@@ -100,7 +100,7 @@ class _Loop(NamedTuple):
 
 
 class _Plant(NamedTuple):
-    """The constants of the axis, in few arrays likewise."""
+    """The constants of the axis, in few arrays for the same reason."""
 
     motors: Array  # (7, 1)
     law: Array  # (7, 1)
@@ -113,7 +113,7 @@ def simulate(
     grip: Grip, device: Device, axis: Axis, tissue: FeltTissue, clocks: Clocks, push: Array, noise: Array,
     start: tuple[float, float], estimate: Callable[[SensorReading], float],
 ) -> LoopRun:  # fmt: skip
-    """Simulate the loop over the ticks of `push`, F_H (T,) [N], from a hand at `start` and an arm at rest there.
+    """Simulate the loop over the ticks of `push`, F_H (T,) [N]; the hand begins at `start`, and the arm at rest there.
 
     `noise` (K, 3) is the noise of position, velocity and effort.  `estimate` returns the force [N] for the readings of
     each period of the controller, in order.
@@ -158,7 +158,7 @@ def _parts(plant: Any, loop: Any) -> Any:
 
 @compile_and_store
 def _sense(device: Any, plant: Any, tissue: Any, clocks: Any, noise: Any, loop: Any, k: int, readings: Any) -> None:
-    """Begin a period of the controller: follow the latest reference, and read the sensors."""
+    """Start a period of the controller: follow the latest reference and read the sensors."""
     now, h = k * clocks.turn, clocks.tick
     if now % clocks.message == 0:
         _send_motion(device, loop, now // clocks.message)
@@ -217,15 +217,15 @@ def _run_ticks(
 @compile_function
 def _move_arm(body: Any, friction: Any, tissue: Any, tau: Any, state: Any, h: float) -> None:
     """Advance the arm by one tick."""
-    at, velocity, free = np.empty(1), np.empty(1), np.empty(1)
-    middle(state, h, at, velocity)
-    free[0] = tau[0] - tissue_force(tissue, at[0], velocity[0])
+    q, dq, free = np.empty(1), np.empty(1), np.empty(1)
+    middle(state, h, q, dq)
+    free[0] = tau[0] - tissue_force(tissue, q[0], dq[0])
     step(body[:1], body[1], free, friction, body[2], body[3], state, np.ones(1, np.bool_), h)
 
 
 @compile_function
 def _move_hand(grip: Any, hand: Any, net: float, now: int) -> None:
-    """Advance the hand by one tick, under a constant force."""
+    """Advance the hand by one tick, under a constant net force [N]."""
     if len(grip.path):
         hand[0], hand[1] = grip.path[now + 1, 0], grip.path[now + 1, 1]
         return

@@ -1,8 +1,8 @@
-"""Design the most informative trajectories of all joints together: for links, rotors and friction of the arm.
+"""Design the most informative trajectories of all joints together, to identify links, rotors and friction of the arm.
 
     tau = Y(q, dq, ddq) pi + diag(ddq) J_m + diag(dq) v + diag(sign(dq)) c                            (6.3), (A.16)
 
-Dependent columns are left out, so the criterion is that of the arm's base parameters.
+Dependent columns are omitted, so that the criterion refers to the base parameters of the arm.
 """
 
 from collections.abc import Sequence
@@ -27,16 +27,16 @@ from davinci_forces.maths.mechanics.bodies import RANDOM_SAMPLES, base_parameter
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.rigid_body import compiled_regressor
 
-TRAJECTORIES_AT_ONCE = 8  # whose regressors fit into a processor's cache
+TRAJECTORIES_AT_ONCE = 8  # the regressors of this many trajectories fit into a processor's cache
 
 
 @dataclass(frozen=True)
 class ArmExcitationProblem:
-    """The excitation of the first joints of an arm together; all of them share period, samples and criterion."""
+    """The excitation of the first joints of an arm together; they share period, samples and criterion."""
 
     chain: Chain
     joints: tuple[ExcitationProblem, ...]
-    columns: NDArray[np.int64]  # of all columns, those of the base parameters (p,)
+    columns: NDArray[np.int64]  # indices of the base parameters' columns among all columns (p,)
 
 
 class ArmDesign(NamedTuple):
@@ -61,7 +61,7 @@ def arm_observation(problem: ArmExcitationProblem, series: Sequence[Fourier]) ->
 def design_together(
     problem: ArmExcitationProblem, starts: int, seed: int, report_start: ReportStart = ignore_start
 ) -> ArmDesign:
-    """Design the best of several optima, each of its own population.
+    """Design the trajectories of the best of several starts of the search.
 
     Raises
     ------
@@ -86,7 +86,7 @@ def design_together(
 
 
 def _trajectories(problem: ArmExcitationProblem, z: Array) -> list[Array]:
-    """Coefficients (S, 1 + 2 N_f) of each joint within its limits; the first one stands still when time starts."""
+    """Coefficients (S, 1 + 2 N_f) of each joint within its limits; the first joint starts at rest, up to the delay."""
     first = problem.joints[0]
     ends = np.cumsum([1 + 2 * joint.harmonics for joint in problem.joints])
     lead, *others = np.split(z, ends[:-1], axis=1)
@@ -96,7 +96,7 @@ def _trajectories(problem: ArmExcitationProblem, z: Array) -> list[Array]:
 
 
 def _observations(problem: ArmExcitationProblem, x: Sequence[Array]) -> Array:
-    """F (S, K n, p) of many trajectories by the coefficients (S, 1 + 2 N_f) of each joint."""
+    """F (S, K n, p) of many trajectories, from the coefficients (S, 1 + 2 N_f) of each joint."""
     first = problem.joints[0]
     t = instants(first.period, first.samples)
     bases = [basis(first.period, joint.harmonics, t) for joint in problem.joints]
@@ -105,9 +105,9 @@ def _observations(problem: ArmExcitationProblem, x: Sequence[Array]) -> Array:
 
 
 def _columns(chain: Chain, q: Array, dq: Array, ddq: Array, columns: NDArray[np.int64]) -> Array:
-    """Some columns (..., K n, p) of the links' inertial parameters, then rotors, viscous and Coulomb friction.
+    """The selected columns (..., K n, p) of F; q, dq and ddq are (..., K, n).
 
-    With q, dq and ddq (..., K, n), all columns are 10 L + 3 n.
+    The 10 L + 3 n columns are the inertial parameters of links, then rotors, viscous and Coulomb friction of joints.
     """
     links = 10 * len(chain.parent)
     of_links = columns[columns < links]

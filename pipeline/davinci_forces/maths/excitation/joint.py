@@ -1,10 +1,10 @@
 """Design the most informative trajectory of a joint, within limits that hold at every instant.  Section 6.3.2
 
-The search is unconstrained: any numbers z (..., 1 + 2 N_f) are mapped to trajectories within the limits.  They are the
-coefficients of a series x = (a0, a1, b1, ...), but for two of them.  z[0] places the mean in the slack that the
-harmonics leave.  Time may start anywhere, so it starts at a standstill, where the a_k add up to zero.  That determines
-a_N, whose place in z holds the distance of the standstill from an instant of the criterion.  Friction jumps there, and
-with it the criterion: the best trajectories come to rest within millionths of a sample of such an instant.
+The search is unconstrained: any numbers z (..., 1 + 2 N_f) are mapped to a trajectory within the limits.  They are the
+coefficients of a series x = (a0, a1, b1, ...), with two exceptions.  z[0] determines the mean within the range that the
+harmonics leave.  The series starts at a standstill, which is no restriction because it is periodic; its a_k then add up
+to zero and determine a_N.  In place of a_N, z has the time between the standstill and a sample of the criterion.  At a
+standstill friction jumps, and with it the criterion.  The best standstills are within millionths of a sample interval.
 """
 
 from collections.abc import Sequence
@@ -21,8 +21,8 @@ from davinci_forces.maths.excitation.search import ReportStart, ignore_start, mi
 from davinci_forces.maths.models.independent import regressor
 from davinci_forces.maths.models.terms import Term
 
-MARGIN = 1e-9  # of the limits, so that they also hold for printed numbers
-GRID = 96  # instants a harmonic of the search for extremes, which are found to 1e-7
+MARGIN = 1e-9  # share of the limits that is not used, so that rounded printed numbers also keep them
+GRID = 96  # instants for each harmonic in `extremes`, which are then accurate to 1e-7
 
 
 @dataclass(frozen=True)
@@ -38,19 +38,19 @@ class ExcitationProblem:
 
     @property
     def centre(self) -> Array:
-        """Coefficients of a standstill in the middle of the positions, which is within every limit."""
+        """Coefficients of rest at the mean position, which is within all limits."""
         return np.array([sum(self.limits[0]) / 2, *[0.0] * (2 * self.harmonics)])
 
 
 class Design(NamedTuple):
-    """A designed trajectory, and the lowest criterion of each start of the search (starts,)."""
+    """A designed trajectory, and the lowest criterion that each start of the search reached (starts,)."""
 
     series: Fourier
     optima: Array
 
 
 def impossible(limits: tuple[Range, Range, Range]) -> str:
-    """Why no periodic trajectory can keep these limits and move, or "" if one can."""
+    """The reason why no periodic motion can keep these limits; "" if one can."""
     (low, high), *rates = limits
     if not np.isfinite([low, high]).all():
         return f"positions must be limited on both sides to design a trajectory, not {low:g} to {high:g}"
@@ -66,7 +66,7 @@ def impossible(limits: tuple[Range, Range, Range]) -> str:
 
 
 def design(problem: ExcitationProblem, starts: int, seed: int, report_start: ReportStart = ignore_start) -> Design:
-    """Design the best of several optima, each of its own population.  (6.27)
+    """Design the trajectory of the best of several starts of the search.  (6.27)
 
     Raises
     ------
@@ -95,7 +95,7 @@ def trajectories(problem: ExcitationProblem, z: Array) -> Array:
 
 
 def shrink_into_limits(problem: ExcitationProblem, series: Fourier) -> Fourier:
-    """Shrink the series towards a standstill until every limit holds at every instant.
+    """Shrink the series towards rest at the mean position until every limit holds at every instant.
 
     The trajectories within the limits are a convex set, so the factor follows from the exact extrema of the series.
     """
@@ -106,17 +106,18 @@ def shrink_into_limits(problem: ExcitationProblem, series: Fourier) -> Fourier:
         scale = max(scale, (high_x - middle) / (high - middle), (low_x - middle) / (low - middle))
     if scale == 1.0:
         return series
-    shrunk = (series.x - problem.centre) / (scale * (1 + MARGIN))
-    return Fourier.from_coefficients(problem.centre + shrunk, series.period)
+    motion = (series.x - problem.centre) / (scale * (1 + MARGIN))
+    return Fourier.from_coefficients(problem.centre + motion, series.period)
 
 
 Indices = NDArray[np.intp]
 
 
 def scale_to_limits(z: Array, limits: tuple[Range, Range, Range], period: float) -> Array:
-    """Scale series to coefficients x (S, 1 + 2 N_f) that keep the limits, to about 1e-7 of them.
+    """Scale z to coefficients x (S, 1 + 2 N_f) of series that keep the limits, except for about 1e-7 of them.
 
-    Harmonics c of size n, where 1 touches a limit, become 2 c / (1 + n^2): of all sizes up to 1, and flat at 1.
+    Harmonics c of size n, with n = 1 at the first limit, become 2 c / (1 + n^2).  This has size 1 for n = 1, where its
+    slope is zero, and is smaller for any other n.
     """
     low, high = limits[0]
     lowest, highest = extremes(z[:, 1:], period)
@@ -130,9 +131,9 @@ def scale_to_limits(z: Array, limits: tuple[Range, Range, Range], period: float)
 
 
 def from_standstill(z: Array, samples: int) -> tuple[Array, Array]:
-    """Complete z (S, 1 + 2 N_f) by the harmonic that makes it stand still at 0; and the phase (S,) [rad] of its delay.
+    """Compute a_N, so that the series z (S, 1 + 2 N_f) stands still at t = 0, and the phase (S,) [rad] of its delay.
 
-    The cube favours phases that are small against that between two of `samples` instants.
+    The cube favours phases much smaller than the phase between two of the `samples` instants.
     """
     free = z[:, -2]
     complete = z.copy()
@@ -141,7 +142,7 @@ def from_standstill(z: Array, samples: int) -> tuple[Array, Array]:
 
 
 def delay(z: Array, phase: Array) -> Array:
-    """Delay series z (S, 1 + 2 N_f) by this phase (S,) [rad] of the period."""
+    """Delay series z (S, 1 + 2 N_f) by a phase (S,) [rad], where a period is 2 pi."""
     k = np.arange(1, z.shape[1] // 2 + 1)
     velocity = (z[:, 1::2] - 1j * z[:, 2::2]) * np.exp(-1j * k * phase[:, None])  # a cos + b sin = Re(velocity e^i)
     moved = z.copy()
@@ -150,10 +151,10 @@ def delay(z: Array, phase: Array) -> Array:
 
 
 def extremes(c: Array, period: float) -> tuple[Array, Array]:
-    """The lowest and highest position, velocity and acceleration (3, S) of harmonics c (S, 2 N_f) about a mean of 0.
+    """The lowest and highest position, velocity and acceleration (3, S) of harmonics c (S, 2 N_f) with a mean of 0.
 
-    At each extreme on a grid, a parabola through it and its neighbours gives the time to the second order of a step.
-    The value there is accurate to the fourth order.
+    A parabola through each extreme of a grid and its neighbours gives the time of the extreme.  The error of that time
+    is of second order in the grid's step, and the error of the value is of fourth order.
     """
     harmonics = c.shape[1] // 2
     grid = c @ _grid(period, harmonics)
@@ -165,20 +166,20 @@ def extremes(c: Array, period: float) -> tuple[Array, Array]:
     return values.min(axis=-1), values.max(axis=-1)
 
 
-def _values(c: Array, period: float, derivative: Indices, of: Indices, where: Array) -> Array:
-    """Position (0), velocity (1) or acceleration (2) of the series `of` (P,) of c `where` (P,) in the period."""
+def _values(c: Array, period: float, derivative: Indices, row: Indices, time: Array) -> Array:
+    """Position (0), velocity (1) or acceleration (2) of the `row` (P,) of c, at a `time` (P,) in periods."""
     jw = 2j * np.pi / period * np.arange(1, c.shape[1] // 2 + 1)
     phasors = (c[:, ::2] - 1j * c[:, 1::2]).T * np.array([1 / jw, np.ones_like(jw), jw])[..., None]
-    turn = np.exp(2j * np.pi * where)
+    turn = np.exp(2j * np.pi * time)
     total = np.zeros_like(turn)
     for phasor in reversed(np.swapaxes(phasors, 0, 1)):  # Horner's scheme
-        total = (total + phasor[derivative, of]) * turn
+        total = (total + phasor[derivative, row]) * turn
     return np.asarray(total.real)
 
 
 @lru_cache(maxsize=8)
 def _grid(period: float, harmonics: int) -> Array:
-    """Bases of position, velocity and acceleration (3, 2 N_f, G + 2) over a period and a step to both sides."""
+    """Bases of position, velocity and acceleration (3, 2 N_f, G + 2) over a period, with one more step at each end."""
     steps = GRID * harmonics
     t = np.arange(-1.0, steps + 1, dtype=np.float64) * (period / steps)
     return np.stack([B[:, 1:].T for B in basis(period, harmonics, t)])

@@ -1,6 +1,6 @@
-"""Minimise a function of a few numbers with kinks and jumps, without derivatives.
+"""Minimise a function of a few variables, without derivatives; the function may have kinks and jumps.
 
-Differential evolution takes the directions and sizes of its steps from the spread of a population.
+Differential evolution takes its steps from the differences between candidates of a population.
 R. Storn and K. Price, Differential evolution, Journal of Global Optimization 11, 1997 (best/1/bin).
 """
 
@@ -11,26 +11,28 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array
 
-POPULATION = 5  # candidates a dimension
-GENERATIONS = 24  # a dimension
-COLLAPSED = 1e-6  # range of the objective, below which a population is spread anew
-SPREAD = (1e-6, 0.1)  # sizes of the steps by which it is, small ones as likely as large ones
-STEP_FACTORS = (0.5, 1.0)  # of a difference between two candidates
-CROSSING = 0.9  # share of the numbers that a step changes
+POPULATION = 5  # candidates for each dimension
+GENERATIONS = 24  # for each dimension
+COLLAPSED = 1e-6  # a population is spread again if the range of its objective is below this
+SPREAD = (1e-6, 0.1)  # smallest and largest step of that spread, drawn log-uniformly
+STEP_FACTORS = (0.5, 1.0)  # range of the factor of a difference between two candidates
+CROSSING = 0.9  # share of the variables that a step changes
 
-Objective = Callable[[Array], Array]  # of many candidates (S, d) at once (S,)
-ReportStart = Callable[[int, int, float], None]  # the number of a start, from 1, of how many, and its optimum
+Objective = Callable[[Array], Array]  # the objective (S,) of S candidates (S, d)
+ReportStart = Callable[
+    [int, int, float], None
+]  # takes the number of a start, from 1, the number of starts, and the optimum
 
 
 class Optimum(NamedTuple):
-    """The best candidate (d,) of several starts, and the lowest value of each of them (starts,)."""
+    """The best candidate (d,) of several starts, and the lowest value of each start (starts,)."""
 
     z: Array
     values: Array
 
 
 def ignore_start(start: int, starts: int, value: float) -> None:
-    """Say nothing of a start."""
+    """Report nothing."""
 
 
 def minimise(objective: Objective, d: int, starts: int, seed: int, report_start: ReportStart = ignore_start) -> Optimum:
@@ -44,9 +46,9 @@ def minimise(objective: Objective, d: int, starts: int, seed: int, report_start:
 
 
 def descend(objective: Objective, d: int, random: np.random.Generator) -> tuple[Array, float]:
-    """Evolve one population; return its best candidate (d,) and the value.
+    """Evolve one population; return its best candidate (d,) and the objective there.
 
-    A collapsed population is spread about its best candidate, so that it also finds minima beyond a jump nearby.
+    A collapsed population is spread around its best candidate, so that it also finds minima beyond a nearby jump.
     """
     z = random.normal(size=(POPULATION * d, d))
     value = objective(z)
@@ -62,14 +64,14 @@ def descend(objective: Objective, d: int, random: np.random.Generator) -> tuple[
 
 
 def _steps(z: Array, best: Array, random: np.random.Generator) -> Array:
-    """A candidate (n, d) for each of the population."""
+    """A new candidate for each candidate of the population (n, d)."""
     a, b = random.integers(len(z), size=(2, len(z)))
     moved = best + random.uniform(*STEP_FACTORS) * (z[a] - z[b])
     return np.where(random.uniform(size=z.shape) < CROSSING, moved, z)
 
 
 def _spread(best: Array, n: int, random: np.random.Generator) -> Array:
-    """A population (n, d) about its best, which stays in it."""
+    """A population (n, d) around the best candidate, which is its first member."""
     smallest, largest = np.log10(SPREAD).tolist()
     size = 10 ** random.uniform(smallest, largest, size=(n, 1))
     size[0] = 0.0

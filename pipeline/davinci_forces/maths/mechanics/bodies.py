@@ -20,14 +20,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from davinci_forces.maths.arrays import Array
 
-# The ten inertial parameters of a link, in the order of the regressor's columns: mass, first moments, and the inertia
-# about the origin of the link's frame (not its centre of mass), in which the dynamics are linear.
+# The ten inertial parameters of a link, in the order of the regressor's columns: mass, first moments and inertia.  The
+# inertia is about the origin of the link's frame, not its centre of mass, because then the dynamics are linear.
 PARAMETERS = ("m", "mx", "my", "mz", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 _UPPER = np.triu_indices(3)
-# Share of a column's size that must remain after its projection on the columns before: rounding leaves 1e-15 times the
-# condition number of those, and an independent column of the arms here at least 1e-3.
+# A column depends on the earlier columns if its residual is at most this share of its length.  Rounding leaves 1e-15
+# times their condition number.  Independent columns of the arms here leave at least 1e-3.
 NEGLIGIBLE_RESIDUAL = 1e-9
-RANDOM_SAMPLES = 200  # random poses, velocities and accelerations, which show all base parameters of an arm
+RANDOM_SAMPLES = 200  # random poses, velocities and accelerations; enough to identify all base parameters of an arm
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +35,8 @@ class Bodies:
     """The inertia of every link: masses (L,) [kg], centres (L, 3) [m] and inertias (L, 3, 3) [kg m^2].
 
     Centres are in the link's frame; inertias are about the centre of mass, in axes parallel to the link's frame (4.21).
-    `counts_from` (L,) is the least number of coordinates with which a link is part of the model.  The arm with six
-    coordinates has one jaw, and the second comes with the seventh (section 3.1.2).
+    A link is part of the model if the model has at least `counts_from` (L,) coordinates.  With six coordinates the arm
+    has one jaw, and the seventh adds the second jaw (section 3.1.2).
     """
 
     masses: Array
@@ -45,16 +45,16 @@ class Bodies:
     counts_from: NDArray[np.int64]
 
     def with_coordinates(self, n: int) -> "Bodies":
-        """The bodies of the model with n coordinates; others get mass 0."""
-        there = self.counts_from <= n
-        return replace(self, masses=self.masses * there, inertias=self.inertias * there[:, None, None])
+        """The bodies of the model with n coordinates; links outside the model get mass 0."""
+        included = self.counts_from <= n
+        return replace(self, masses=self.masses * included, inertias=self.inertias * included[:, None, None])
 
     def with_density_factor(self, factor: float) -> "Bodies":
-        """The same bodies with another density, as in a compensator with wrong masses.  Section 5.2"""
+        """The same bodies with scaled density, as in a gravity compensator with wrong masses.  Section 5.2"""
         return replace(self, masses=self.masses * factor, inertias=self.inertias * factor)
 
     def in_frames(self, T: Array) -> "Bodies":
-        """The same bodies in other frames, relative to which their present frames are at T (L, 4, 4) [m]."""
+        """The same bodies in other frames; T (L, 4, 4) [m] are the poses of the present frames in the new ones."""
         R = T[:, :3, :3]
         centres = np.einsum("lij,lj->li", R, self.centres) + T[:, :3, 3]
         return replace(self, centres=centres, inertias=R @ self.inertias @ R.swapaxes(1, 2))
@@ -67,16 +67,16 @@ class Bodies:
 
     def parameters(self, n: int) -> Array:
         """The inertial parameters (10 L,) of the model with n coordinates, ten a link in the order of PARAMETERS."""
-        there = self.with_coordinates(n)
-        inertia = there.about_frames()[:, *_UPPER]
-        moments = there.masses[:, None] * there.centres
-        return np.concatenate([there.masses[:, None], moments, inertia], axis=1).ravel()
+        bodies = self.with_coordinates(n)
+        inertia = bodies.about_frames()[:, *_UPPER]
+        moments = bodies.masses[:, None] * bodies.centres
+        return np.concatenate([bodies.masses[:, None], moments, inertia], axis=1).ravel()
 
 
 def as_bodies(parameters: Array) -> Bodies:
-    """The bodies with inertial parameters (L, 10), the inverse of `Bodies.parameters`; part of the model for any n.
+    """The bodies with inertial parameters (L, 10): the inverse of `Bodies.parameters`.
 
-    The centre of a body without mass is at the origin.
+    All bodies are part of the model for any n.  The centre of a body without mass is at the origin.
     """
     masses = parameters[:, 0]
     centres = np.divide(parameters[:, 1:4], masses[:, None], out=np.zeros((len(masses), 3)), where=masses[:, None] > 0)
@@ -88,16 +88,16 @@ def as_bodies(parameters: Array) -> Bodies:
 
 
 def cylinder(mass: float, height: float, radius: float, axis: int) -> Array:
-    """The inertia (3, 3) [kg m^2] of a uniform cylinder about its centre; `axis` 0, 1 or 2 is its own.  (4.23)"""
+    """The inertia (3, 3) [kg m^2] of a uniform cylinder about its centre; `axis` is 0, 1 or 2.  (4.23)"""
     across = mass * height**2 / 12.0 + mass * radius**2 / 4.0
     return np.diag([mass * radius**2 / 2.0 if i == axis else across for i in range(3)])
 
 
 def pseudo_inertias(parameters: Array) -> Array:
-    """[[S, h], [h', m]] (L, 4, 4) of inertial parameters (L, 10), S the second moments: I = tr(S) 1 - S.
+    """J = [[S, h], [h', m]] (L, 4, 4) of inertial parameters (L, 10), with second moments S: I = tr(S) 1 - S.
 
-    In another frame it is T J T'.  Wensing, Kim and Slotine, Linear matrix inequalities for physically consistent
-    inertial parameter identification, 2018.
+    In a frame in which this frame has the pose T, it is T J T'.  Wensing, Kim and Slotine, Linear matrix inequalities
+    for physically consistent inertial parameter identification, 2018.
     """
     inertia = np.zeros((len(parameters), 3, 3))
     inertia[:, *_UPPER] = parameters[:, 4:]
@@ -118,9 +118,9 @@ def of_pseudo_inertias(J: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Drives:
-    """One drive a coordinate (n,): all quantities at the joint, except the motor's own inertia.
+    """The drive of each coordinate (n,): all quantities are at the joint, except the inertia of the motor.
 
-    `viscous` and `coulomb` are those of joint and motor together, at the joint.  (A.11)
+    `viscous` and `coulomb` are the friction of joint and motor together.  (A.11)
     """
 
     gear_ratio: Array  # eta [-], or [rad/m] for a prismatic joint
@@ -130,7 +130,7 @@ class Drives:
 
     @property
     def inertia(self) -> Array:
-        """The motors' inertia at the joints, eta^2 J_m (n,).  (4.28), which (4.29) neglects and (6.7)-(6.13) keep"""
+        """The motors' inertia at the joints, eta^2 J_m (n,).  (4.28); neglected in (4.29), kept in (6.7)-(6.13)"""
         return np.asarray(self.gear_ratio**2 * self.motor_inertia)
 
     def friction(self, dq: ArrayLike) -> Array:
@@ -142,34 +142,35 @@ class Drives:
 class BaseParameters(NamedTuple):
     """The identifiable inertial parameters: beta = K pi, p combinations of the 10 L."""
 
-    columns: NDArray[np.int64]  # (p,) of Y, which span all the others: tau = Y[:, columns] beta
-    combination: Array  # K (p, 10 L): how all parameters enter each
-    condition: float  # of the base columns, each scaled to unit length
+    columns: NDArray[np.int64]  # (p,) columns of Y that span all columns: tau = Y[:, columns] beta
+    combination: Array  # K (p, 10 L): beta = K pi
+    condition: float  # condition number of the base columns, scaled to unit length
 
 
 def base_parameters(Y: Array) -> BaseParameters:
     """Reduce the regressor (..., 10 L) of a motion to independent columns.
 
-    Columns are chosen in the order of Y, from the base outwards, if they do not depend on those before.  So they are
-    the same for any motion, as in the grouping by hand (Khalil and Kleinfinger 1987).  The motion must be rich, such as
-    random poses, velocities and accelerations: parameters that it does not show are left out.
+    A column is chosen if it does not depend on the columns before it, in the order of Y, from the base outwards.  The
+    choice is therefore the same for any rich motion, as in the grouping by hand (Khalil and Kleinfinger 1987).  The
+    motion must be rich, such as random poses, velocities and accelerations: a poor motion omits parameters.
     """
-    from scipy.linalg import qr, solve_triangular  # which every command would load
+    from scipy.linalg import qr, solve_triangular  # here, so that not every command loads it
 
-    (R,) = qr(Y.reshape(-1, Y.shape[-1]), mode="r")  # it has the dependences of Y's columns, in as many rows
+    (R,) = qr(Y.reshape(-1, Y.shape[-1]), mode="r")  # R has few rows, and its columns depend on each other like Y's
     scale = np.linalg.norm(R, axis=0)
-    shown = np.flatnonzero(scale > NEGLIGIBLE_RESIDUAL * scale.max())
-    unit = R[:, shown] / scale[shown]
+    excited = np.flatnonzero(scale > NEGLIGIBLE_RESIDUAL * scale.max())
+    unit = R[:, excited] / scale[excited]
     Q = np.empty((len(unit), 0))
-    taken = list[int]()
+    chosen = list[int]()
     for column, x in enumerate(unit.T):
         residual = x - Q @ (Q.T @ x)
-        residual -= Q @ (Q.T @ residual)  # once more, against the rounding of the first
-        if (size := np.linalg.norm(residual)) > NEGLIGIBLE_RESIDUAL:
-            Q = np.column_stack([Q, residual / size])
-            taken.append(column)
-    triangle = np.triu(Q.T @ unit[:, taken])
-    K = np.zeros((len(taken), len(scale)))
-    K[:, shown] = solve_triangular(triangle, Q.T @ unit) * scale[shown] / scale[shown[taken]][:, None]
-    K[:, shown[taken]] = np.eye(len(taken))
-    return BaseParameters(shown[taken], K, float(np.linalg.cond(triangle)))
+        residual -= Q @ (Q.T @ residual)  # again, to remove the rounding of the first projection
+        if (length := np.linalg.norm(residual)) > NEGLIGIBLE_RESIDUAL:
+            Q = np.column_stack([Q, residual / length])
+            chosen.append(column)
+    triangle = np.triu(Q.T @ unit[:, chosen])
+    columns = excited[chosen]
+    K = np.zeros((len(columns), len(scale)))
+    K[:, excited] = solve_triangular(triangle, Q.T @ unit) * scale[excited] / scale[columns][:, None]
+    K[:, columns] = np.eye(len(columns))
+    return BaseParameters(columns, K, float(np.linalg.cond(triangle)))

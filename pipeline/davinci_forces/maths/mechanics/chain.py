@@ -1,12 +1,12 @@
-"""The kinematic tree of an arm: a chain that may branch, and whose links may share a coordinate.
+"""The kinematic tree of an arm: it may branch, and several links may share a coordinate.
 
-Every link has a frame at its joint, whose z is the axis: the link's pose in its carrier's is its placement times Rz(q),
-or Tz(q).  One coordinate may move several links (a parallelogram's), and one link may carry several (two jaws).
-Further frames, by name, are fixed to links.  Bodies are numbered from the base, which is 0: link i is body i + 1.
+Every link has a frame at its joint, with z along the joint axis.  The pose of a link relative to its parent is its
+placement times Rz(q) or Tz(q).  One coordinate may move several links, as in a parallelogram.  A link may have several
+children, such as two jaws.  Named frames are fixed to links.  The base is body 0, and link i is body i + 1.
 Featherstone, Rigid Body Dynamics Algorithms, 2008, chapter 4.
 
-A chain is described by the placements themselves, or by a table of Denavit and Hartenberg's parameters.  Together with
-the inertial parameters of its links it makes the tree for the recursions.
+A chain is built from placements (`placed`) or from a table of Denavit-Hartenberg parameters.  With the inertial
+parameters of its links it gives the `Tree` that the recursions take.
 """
 
 from collections.abc import Sequence
@@ -24,17 +24,17 @@ BASE = "0"
 
 
 class TableRow(NamedTuple):
-    """One frame of a table of Denavit and Hartenberg's parameters; without a coordinate, it is fixed to its carrier."""
+    """One frame of a table of Denavit-Hartenberg parameters; without a coordinate, it is fixed to its parent frame."""
 
     name: str
-    before: str  # frame that carries it
+    before: str  # parent frame
     alpha: float  # [rad]
     a: float  # [m]
     d: float  # [m] at q = 0
     theta: float  # [rad] at q = 0
-    coordinate: int = FIXED  # index in q of the coordinate that moves it
+    coordinate: int = FIXED  # index in q of the coordinate that moves this frame
     sign: int = 1  # -1 where the coordinate is subtracted
-    slides: bool = False  # whether the coordinate is a part of d rather than of theta
+    slides: bool = False  # whether the coordinate is added to d, not to theta
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,25 +42,25 @@ class Chain:
     """The L links of an arm with n coordinates, and its F named frames."""
 
     links: tuple[str, ...]  # (L,)
-    parent: NDArray[np.int64]  # body that carries each link (L,)
-    placement: Array  # from the carrier's frame to the link's at q = 0 (L, 4, 4) [m]
-    slides: NDArray[np.bool_]  # along z, rather than turns about it (L,)
-    coordinate: NDArray[np.int64]  # index in q of the coordinate that moves it, or FIXED (L,)
-    names: tuple[str, ...]  # of the frames, the base first (F,)
-    body: NDArray[np.int64]  # that each frame is fixed to (F,)
-    offset: Array  # each frame in its body's (F, 4, 4) [m]
-    before: NDArray[np.int64]  # frame that each frame hangs on, as a drawing shows it (F,)
-    tip: str  # frame whose origin is the tip
+    parent: NDArray[np.int64]  # parent body of each link (L,)
+    placement: Array  # pose of each link in its parent's frame at q = 0 (L, 4, 4) [m]
+    slides: NDArray[np.bool_]  # whether the joint is prismatic (L,)
+    coordinate: NDArray[np.int64]  # index in q of the coordinate that moves each link, or FIXED (L,)
+    names: tuple[str, ...]  # names of the frames, the base first (F,)
+    body: NDArray[np.int64]  # body to which each frame is fixed (F,)
+    offset: Array  # pose of each frame in the frame of its body (F, 4, 4) [m]
+    before: NDArray[np.int64]  # parent frame of each frame, to which a drawing connects it (F,)
+    tip: str  # name of the frame whose origin is the tip
     n: int  # coordinates
-    table: tuple[TableRow, ...] = ()  # of the frames after the base, where the chain was described by one
+    table: tuple[TableRow, ...] = ()  # rows of all frames after the base, if the chain was built from a table
 
     def with_coordinates(self, n: int) -> "Chain":
-        """The same arm with all coordinates after the first n at rest at 0.
+        """The same arm with only its first n coordinates; all later ones are fixed at 0.
 
         Raises
         ------
         ValueError
-            If it has fewer than n coordinates.
+            If the chain has fewer than n coordinates.
         """
         if n == self.n:
             return self
@@ -68,34 +68,34 @@ class Chain:
             raise ValueError(f"the chain has {self.n} coordinates, and q has {n}")
         return replace(self, n=n, coordinate=np.where(self.coordinate < n, self.coordinate, FIXED))
 
-    def lengthen(self, link: str, by: float) -> "Chain":
-        """The same arm with a link, and all that it carries, further out along its own axis [m].
+    def lengthen(self, link: str, extension: float) -> "Chain":
+        """The same arm with a link and its descendants moved by `extension` [m] along the link's joint axis.
 
-        In a table of modified parameters, whose rows have the links' axes, d of that row changes.
+        In a table of modified parameters this changes d of the link's row.
         """
         i, placement = self.links.index(link), self.placement.copy()
-        placement[i, :3, 3] += by * placement[i, :3, 2]
-        table = tuple(row._replace(d=row.d + by) if row.name == link else row for row in self.table)
+        placement[i, :3, 3] += extension * placement[i, :3, 2]
+        table = tuple(row._replace(d=row.d + extension) if row.name == link else row for row in self.table)
         return replace(self, placement=placement, table=table)
 
     @property
     def moved_by(self) -> NDArray[np.int64]:
-        """The coordinate that moves each frame in the one before it, or FIXED (F,)."""
+        """The coordinate that moves each frame relative to its parent frame, or FIXED (F,)."""
         moved = self.body != self.body[self.before]
         return np.where(moved, np.append(FIXED, self.coordinate)[self.body], FIXED)
 
     @property
     def of_links(self) -> Array:
-        """The frames with the links' names, relative to the links' own (L, 4, 4) [m]: the frames of a table."""
+        """For each link, the pose of the named frame of the same name in the link's frame (L, 4, 4) [m]."""
         return np.asarray(self.offset[[self.names.index(link) for link in self.links]])
 
 
 def denavit_hartenberg(table: Sequence[TableRow], tip: str) -> Chain:
     """The chain of a table of classic parameters, T = Rz(theta) Tz(d) Tx(a) Rx(alpha).  (3.7)
 
-    A link turns about z of the frame that carries it, and bears its own frame at its other end.
+    A link turns about z of its parent frame, and its own frame is at its far end.
     """
-    return _described(
+    return _chain_of(
         table, tip, [(np.eye(4), _screw(2, row.theta, row.d) @ _screw(0, row.alpha, row.a)) for row in table]
     )
 
@@ -105,30 +105,30 @@ def modified_denavit_hartenberg(table: Sequence[TableRow], tip: str) -> Chain:
 
     A link turns about z of its own frame.  Craig, Introduction to Robotics, section 3.4.
     """
-    return _described(
+    return _chain_of(
         table, tip, [(_screw(0, row.alpha, row.a) @ _screw(2, row.theta, row.d), np.eye(4)) for row in table]
     )
 
 
-def _described(table: Sequence[TableRow], tip: str, around: list[tuple[Array, Array]]) -> Chain:
-    """The chain of a table, with the transforms before and after the motion of each row."""
+def _chain_of(table: Sequence[TableRow], tip: str, transforms: list[tuple[Array, Array]]) -> Chain:
+    """The chain of a table; each row has a transform before the motion of its joint and one after."""
     names, body, offset, before = [BASE], [0], [np.eye(4)], [0]
     parent, placement, moving = list[int](), list[Array](), list[TableRow]()
-    for row, (first, last) in zip(table, around, strict=True):
-        carrier = names.index(row.before)
-        placed, at = offset[carrier] @ first, body[carrier]
+    for row, (first, last) in zip(table, transforms, strict=True):
+        frame = names.index(row.before)
+        pose, index = offset[frame] @ first, body[frame]
         if row.coordinate == FIXED:
-            last = placed @ last
+            last = pose @ last
         else:
-            flipped = np.diag([1.0, row.sign, row.sign, 1.0])  # turns the axis round: Rz(-q) = Rx(pi) Rz(q) Rx(pi)
-            parent.append(at)
-            placement.append(placed @ flipped)
+            flipped = np.diag([1.0, row.sign, row.sign, 1.0])  # reverses the axis: Rz(-q) = Rx(pi) Rz(q) Rx(pi)
+            parent.append(index)
+            placement.append(pose @ flipped)
             moving.append(row)
-            at, last = len(moving), flipped @ last
+            index, last = len(moving), flipped @ last
         names.append(row.name)
-        body.append(at)
+        body.append(index)
         offset.append(last)
-        before.append(carrier)
+        before.append(frame)
     coordinate = np.array([row.coordinate for row in moving])
     return Chain(
         links=tuple(row.name for row in moving), parent=np.array(parent), placement=np.array(placement),
@@ -139,7 +139,7 @@ def _described(table: Sequence[TableRow], tip: str, around: list[tuple[Array, Ar
 
 
 def _screw(axis: int, angle: float, length: float) -> Array:
-    """A turn about, and a shift along, one axis (4, 4)."""
+    """The transform (4, 4) of a turn [rad] about and a shift [m] along one axis."""
     T, (i, j) = np.eye(4), ((axis + 1) % 3, (axis + 2) % 3)
     T[i, i] = T[j, j] = np.cos(angle)
     T[i, j], T[j, i], T[axis, 3] = -np.sin(angle), np.sin(angle), length
@@ -147,28 +147,27 @@ def _screw(axis: int, angle: float, length: float) -> Array:
 
 
 class Tree(NamedTuple):
-    """The tree of L links and n coordinates: arrays for compiled code, lists for others.
+    """The tree of L links and n coordinates: arrays for compiled code, lists for numpy code.
 
-    Bodies are numbered from the base, which is 0: link i is body i + 1.  A link with coordinate n never moves: lists of
-    coordinates have a 0 at that place.
+    The base is body 0, and link i is body i + 1.  Links that never move have the coordinate n, whose value is always 0.
     """
 
     n: int
-    parent: Any  # (L,) body that carries each link
-    coordinate: Any  # (L,) that moves it
-    slides: Any  # (L,) along z, rather than turns about it
-    moves: Any  # (L, n) whether a coordinate moves it, or one of its carriers
-    carried: Any  # (L,) mass of it and all that it carries [kg]
-    rows: Any  # (L, 22) rotation and place in the carrier at q = 0, and inertial parameters
+    parent: Any  # (L,) parent body of each link
+    coordinate: Any  # (L,) index of the coordinate that moves each link
+    slides: Any  # (L,) whether the joint is prismatic
+    moves: Any  # (L, n) whether a coordinate moves the link, itself or through an ancestor
+    carried: Any  # (L,) mass of the link and all its descendants [kg]
+    rows: Any  # (L, 22) rotation and position in the parent's frame at q = 0, and inertial parameters
 
     def lists(self) -> "Tree":
-        """The same, as lists."""
+        """The same tree, with lists in place of arrays."""
         return Tree(self.n, *(values.tolist() for values in self[1:]))
 
 
 def tree_of(chain: Chain, parameters: Array) -> Tree:
     """The tree of a chain whose links have these inertial parameters (L, 10)."""
-    L, at = len(chain.parent), chain.placement
+    L, T = len(chain.parent), chain.placement
     drives = chain.coordinate[:, None] == np.arange(chain.n)
     moves, carried = np.zeros((L + 1, chain.n), np.bool_), np.append(0.0, parameters[:, 0])
     for i in range(L):
@@ -176,30 +175,30 @@ def tree_of(chain: Chain, parameters: Array) -> Tree:
     for i in reversed(range(L)):
         carried[chain.parent[i]] += carried[i + 1]
     still = chain.coordinate == FIXED
-    rows = np.column_stack([at[:, :3, :3].reshape(-1, 9), at[:, :3, 3], parameters])
+    rows = np.column_stack([T[:, :3, :3].reshape(-1, 9), T[:, :3, 3], parameters])
     coordinate = np.where(still, chain.n, chain.coordinate)
     return Tree(chain.n, chain.parent, coordinate, chain.slides | still, moves[1:], carried[1:], rows)
 
 
 def fold_fixed_links(chain: Chain, parameters: Array) -> tuple[Chain, Array]:
-    """Merge links that do not move, and their inertial parameters (L, 10), into their carriers."""
+    """Merge links that do not move, and their inertial parameters (L, 10), into their parent links."""
     pseudo, body, within, movable = pseudo_inertias(parameters), [0], [np.eye(4)], list[int]()
     placement, merged = chain.placement.copy(), list[Array]()
-    for i, carrier in enumerate(chain.parent):
-        placement[i] = within[carrier] @ chain.placement[i]
+    for i, parent in enumerate(chain.parent):
+        placement[i] = within[parent] @ chain.placement[i]
         if chain.coordinate[i] != FIXED:
             movable.append(i)
             merged.append(pseudo[i])
             body.append(len(movable))
             within.append(np.eye(4))
         else:
-            body.append(body[carrier])
+            body.append(body[parent])
             within.append(placement[i])
-            if body[carrier]:
-                merged[body[carrier] - 1] = merged[body[carrier] - 1] + placement[i] @ pseudo[i] @ placement[i].T
-    fewer = replace(
+            if body[parent]:
+                merged[body[parent] - 1] = merged[body[parent] - 1] + placement[i] @ pseudo[i] @ placement[i].T
+    folded = replace(
         chain, links=tuple(chain.links[i] for i in movable), parent=np.array(body)[chain.parent[movable]],
         placement=placement[movable], slides=chain.slides[movable], coordinate=chain.coordinate[movable],
         body=np.array(body)[chain.body], offset=np.array(within)[chain.body] @ chain.offset,
     )  # fmt: skip
-    return fewer, of_pseudo_inertias(np.array(merged))
+    return folded, of_pseudo_inertias(np.array(merged))

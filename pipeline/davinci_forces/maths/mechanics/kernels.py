@@ -1,8 +1,8 @@
-"""The recursions compiled: for one sample, as a simulator's step needs it, and for many, LANES of them at a time.
+"""The compiled recursions: for one sample, as a simulator needs, and for many samples in blocks of LANES.
 
 The innermost loops run over LANES samples that are adjacent in memory, so that the compiler can use vector
-instructions.  Import this module only where it is used: compiling it, or reading it back from the cache on disk, takes
-longer than thousands of samples of numpy.
+instructions.  Import this module inside the function that uses it.  To compile it, or to load it from the disk cache,
+takes longer than to compute thousands of samples with numpy.
 """
 
 from collections.abc import Callable
@@ -25,7 +25,7 @@ def _functions(module: ModuleType) -> list[Callable[..., object]]:
 
 
 for _function in (*_functions(link), *_functions(recursions)):
-    register_jitable(forceinline=True)(_function)  # a loop with a call in it is done sample by sample
+    register_jitable(forceinline=True)(_function)  # a call inside a loop prevents vector instructions
 
 
 @register_jitable(forceinline=True)  # type: ignore[untyped-decorator]
@@ -50,15 +50,15 @@ def mass_and_bias(tree: Any, gravity: Any, q: Any, dq: Any, ddq: Any, M: Any, bi
 
 @compile_and_store
 def place_and_jacobian(tree: Any, body: Any, point: Any, q: Any, J: Any) -> Any:
-    """Put J_v (3, n) of a point of a body into J, and give its place in the base frame; `point` is in the body's.
+    """Put J_v (3, n) of a point of a body into J, and return it in the base frame; `point` is in the body's frame.
 
-    From the body to the base: what a joint does to the point is known in the axes of its link, and turned from there.
+    The loop goes from the body to the base.  Each joint's column is computed in the axes of its link, then turned.
     """
     J[:] = 0.0
     while body > 0:
         i = body - 1
         row, k = tree.rows[i], tree.coordinate[i]
-        angle = (1.0, 0.0) if tree.slides[i] else (cos(q[k]), sin(q[k]))
+        cos_sin = (1.0, 0.0) if tree.slides[i] else (cos(q[k]), sin(q[k]))
         x, y, z = point
         if tree.slides[i]:
             J[2, k] += 1.0
@@ -66,10 +66,10 @@ def place_and_jacobian(tree: Any, body: Any, point: Any, q: Any, J: Any) -> Any:
         else:
             J[0, k] -= y
             J[1, k] += x
-            point = link.from_link_axes(angle, point)
+            point = link.from_link_axes(cos_sin, point)
         point = link.plus(link.times(row, point), link.place(row))
         for o in range(tree.n):
-            J[0, o], J[1, o], J[2, o] = link.times(row, link.from_link_axes(angle, (J[0, o], J[1, o], J[2, o])))
+            J[0, o], J[1, o], J[2, o] = link.times(row, link.from_link_axes(cos_sin, (J[0, o], J[1, o], J[2, o])))
         body = tree.parent[i]
     return point
 

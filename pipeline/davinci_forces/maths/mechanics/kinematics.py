@@ -1,6 +1,6 @@
 """Poses and Jacobians of the frames of an arm.
 
-Shapes: `q` is (..., n) in rad or m, with any leading axes; n below the chain's own leaves the later coordinates at 0.
+Shapes: `q` is (..., n) in rad or m, with any leading axes.  If the chain has more than n coordinates, the others are 0.
 """
 
 from collections.abc import Callable, Iterator
@@ -23,30 +23,33 @@ def _bodies(chain: Chain, q: Array) -> Array:
     """The pose of every body in the base frame (..., L + 1, 4, 4), the base first."""
     chain = chain.with_coordinates(q.shape[-1])
     moved = np.where(chain.coordinate == FIXED, 0.0, q[..., chain.coordinate])
-    c, s = (np.where(chain.slides, still, of(moved))[..., None] for still, of in ((1.0, np.cos), (0.0, np.sin)))
-    x, y, z, place = np.moveaxis(chain.placement, -1, 0)
-    slid = place + np.where(chain.slides, moved, 0.0)[..., None] * z
-    local = np.stack([c * x + s * y, c * y - s * x, np.broadcast_to(z, slid.shape), slid], axis=-1)
+    c, s = (
+        np.where(chain.slides, fixed, function(moved))[..., None] for fixed, function in ((1.0, np.cos), (0.0, np.sin))
+    )
+    x, y, z, position = np.moveaxis(chain.placement, -1, 0)
+    origin = position + np.where(chain.slides, moved, 0.0)[..., None] * z
+    local = np.stack([c * x + s * y, c * y - s * x, np.broadcast_to(z, origin.shape), origin], axis=-1)
     T = np.empty((*q.shape[:-1], len(chain.parent) + 1, 4, 4))
     T[..., 0, :, :] = np.eye(4)
-    for i, carrier in enumerate(chain.parent):
-        T[..., i + 1, :, :] = T[..., carrier, :, :] @ local[..., i, :, :]
+    for i, parent in enumerate(chain.parent):
+        T[..., i + 1, :, :] = T[..., parent, :, :] @ local[..., i, :, :]
     return T
 
 
 def tip(chain: Chain, q: ArrayLike) -> Array:
     """Position of the tip (..., 3) [m], the origin of frame 9L of the da Vinci."""
     index = chain.names.index(chain.tip)
-    carrier = _bodies(chain, np.asarray(q, float))[..., chain.body[index], :, :]
-    return np.asarray((carrier @ chain.offset[index])[..., :3, 3])
+    body = _bodies(chain, np.asarray(q, float))[..., chain.body[index], :, :]
+    return np.asarray((body @ chain.offset[index])[..., :3, 3])
 
 
 def jacobian(
     chain: Chain, q: ArrayLike, frame: str | None = None, point: ArrayLike = (0.0, 0.0, 0.0)
 ) -> tuple[Array, Array]:
-    """J_v and J_omega (..., 3, n) of a point fixed to a frame, `point` (3,) in its axes [m]; of the tip by default.
+    """J_v and J_omega (..., 3, n) of a point fixed to a frame; the default point is the tip.
 
-    Velocities are in the base axes.  (7.21)-(7.24), with 6w7 for the second 5w6 of (4.20)
+    `point` (3,) [m] is in the axes of the frame.  Velocities are in the base axes.
+    (7.21)-(7.24), with 6w7 for the second 5w6 of (4.20)
     """
     q = np.asarray(q, float)
     index = chain.names.index(frame or chain.tip)
@@ -55,34 +58,34 @@ def jacobian(
     return _jacobian(chain, bodies, q.shape[-1], body, T[..., :3, :3] @ np.asarray(point, float) + T[..., :3, 3])
 
 
-def _jacobian(chain: Chain, T: Array, n: int, body: int, at: Array) -> tuple[Array, Array]:
-    """J_v and J_omega (..., 3, n) of a body's point that is at `at` (..., 3) in the base frame, with all bodies' T."""
+def _jacobian(chain: Chain, T: Array, n: int, body: int, point: Array) -> tuple[Array, Array]:
+    """J_v and J_omega (..., 3, n) of a point (..., 3) of a body; the point and the poses T are in base axes."""
     J_v, J_w = np.zeros((2, *T.shape[:-3], 3, n))
-    for carrier in to_base(chain, body):
-        k, z, origin = chain.coordinate[carrier - 1], T[..., carrier, :3, 2], T[..., carrier, :3, 3]
+    for ancestor in to_base(chain, body):
+        k, z, origin = chain.coordinate[ancestor - 1], T[..., ancestor, :3, 2], T[..., ancestor, :3, 3]
         if FIXED < k < n:
-            J_v[..., k] += z if chain.slides[carrier - 1] else np.cross(z, at - origin)
-            J_w[..., k] += 0.0 if chain.slides[carrier - 1] else z
+            J_v[..., k] += z if chain.slides[ancestor - 1] else np.cross(z, point - origin)
+            J_w[..., k] += 0.0 if chain.slides[ancestor - 1] else z
     return J_v, J_w
 
 
-def evaluate_in_blocks(of: Callable[[Array], Array], q: Array) -> Array:
-    """Evaluate a function of poses (N, n) in chunks: all bodies' poses at all samples may take gigabytes."""
-    return np.concatenate([of(q[i : i + POSES_AT_ONCE]) for i in range(0, max(len(q), 1), POSES_AT_ONCE)])
+def evaluate_in_blocks(function: Callable[[Array], Array], q: Array) -> Array:
+    """Evaluate a function of poses (N, n) in blocks: the poses of all bodies at all samples may take gigabytes."""
+    return np.concatenate([function(q[i : i + POSES_AT_ONCE]) for i in range(0, max(len(q), 1), POSES_AT_ONCE)])
 
 
 def to_base(chain: Chain, body: int) -> Iterator[int]:
-    """Yield a body and those that carry it, without the base."""
+    """Yield a body and its ancestors, without the base."""
     while body > 0:
         yield body
         body = int(chain.parent[body - 1])
 
 
 def remote_centre(chain: Chain) -> Array:
-    """The point (3,) [m] about which the first two coordinates turn whatever carries the instrument.
+    """The remote centre of motion (3,) [m]: the first two coordinates turn the instrument about this fixed point.
 
-    It is the point of the last link towards the tip that they move, which neither of them moves at q = 0.  The
-    parallelogram keeps it in place for all q.  Section 2.2
+    On the last link that the second coordinate moves, it is the point that neither coordinate moves at q = 0.  The
+    parallelogram keeps this point in place for all q.  Section 2.2
     """
     tip_body = int(chain.body[chain.names.index(chain.tip)])
     body = next(body for body in to_base(chain, tip_body) if chain.coordinate[body - 1] == 1)

@@ -1,8 +1,8 @@
-"""The dynamics of one link on numbers, which are floats or arrays of samples.
+"""The dynamics of one link, relative to its parent link; every number is a float or an array of samples.
 
-Every link has a frame at its joint: it turns about, or slides along, that frame's z.  A `row` of `Tree.rows` holds what
-is constant: the rotation (by rows) and the place of this frame at q = 0 in its carrier, and the ten inertial
-parameters.  `turn` is (cos q, sin q).  Vectors are tuples of three, in the axes of a link.  A motion is (w, e, a),
+Every link has a frame at its joint: the link turns about, or slides along, z of that frame.  `row` is the link's row of
+`Tree.rows`: rotation matrix (by rows) and position of that frame in the parent's frame at q = 0, and the ten inertial
+parameters.  `cos_sin` is (cos q, sin q).  Vectors are tuples of three, in the axes of a link.  A motion is (w, e, a):
 angular velocity, angular acceleration and acceleration of the origin.  A wrench is (force, moment about the origin).
 
 Featherstone, Rigid Body Dynamics Algorithms, 2008, chapters 2, 5 and 6.
@@ -15,8 +15,8 @@ Number = Any
 Vector = tuple[Number, Number, Number]
 Motion = tuple[Vector, Vector, Vector]
 Wrench = tuple[Vector, Vector]
-Velocity = tuple[Vector, Vector]  # angular, and of the origin
-Turn = tuple[Number, Number]
+Velocity = tuple[Vector, Vector]  # angular velocity, and velocity of the origin
+CosSin = tuple[Number, Number]
 Inertia = tuple[Vector, Vector, Vector]  # first moment h; Ixx, Ixy, Ixz; Iyy, Iyz, Izz, about the origin
 Row = Sequence[float]
 
@@ -41,12 +41,12 @@ def times(A: Sequence[Number], r: Vector) -> Vector:
 
 
 def place(row: Row) -> Vector:
-    """Where the joint is in the carrier's axes."""
+    """The position of the joint in the parent's frame."""
     return row[9], row[10], row[11]
 
 
 def to_joint_axes(row: Row, x: Vector) -> Vector:
-    """A vector in the carrier's axes, in those of the joint at q = 0."""
+    """Transform a vector from the parent's axes to the axes of the joint at q = 0."""
     return (
         row[0] * x[0] + row[3] * x[1] + row[6] * x[2],
         row[1] * x[0] + row[4] * x[1] + row[7] * x[2],
@@ -54,24 +54,24 @@ def to_joint_axes(row: Row, x: Vector) -> Vector:
     )
 
 
-def to_link_axes(turn: Turn, x: Vector) -> Vector:
-    """A vector in the axes of a joint at q = 0, in those of the link."""
-    return turn[0] * x[0] + turn[1] * x[1], turn[0] * x[1] - turn[1] * x[0], x[2]
+def to_link_axes(cos_sin: CosSin, x: Vector) -> Vector:
+    """Transform a vector from the axes of a joint at q = 0 to the axes of its link."""
+    return cos_sin[0] * x[0] + cos_sin[1] * x[1], cos_sin[0] * x[1] - cos_sin[1] * x[0], x[2]
 
 
-def from_link_axes(turn: Turn, x: Vector) -> Vector:
-    """A vector in a link's axes, in those of its joint at q = 0."""
-    return turn[0] * x[0] - turn[1] * x[1], turn[1] * x[0] + turn[0] * x[1], x[2]
+def from_link_axes(cos_sin: CosSin, x: Vector) -> Vector:
+    """Transform a vector from the axes of a link to the axes of its joint at q = 0."""
+    return cos_sin[0] * x[0] - cos_sin[1] * x[1], cos_sin[1] * x[0] + cos_sin[0] * x[1], x[2]
 
 
 def rates(w: Vector, e: Vector) -> tuple[Number, ...]:
-    """[e]x + [w]x [w]x by rows: the matrix from a point's place to its acceleration."""
+    """[e]x + [w]x [w]x by rows: times the position of a point, it is the point's acceleration about the origin."""
     xy, xz, yz, xx, yy, zz = w[0] * w[1], w[0] * w[2], w[1] * w[2], w[0] * w[0], w[1] * w[1], w[2] * w[2]
     return -yy - zz, xy - e[2], xz + e[1], xy + e[2], -xx - zz, yz - e[0], xz - e[1], yz + e[0], -xx - yy
 
 
-def link_motion(row: Row, slides: bool, turn: Turn, q: Number, dq: Number, ddq: Number, motion: Motion) -> Motion:
-    """The motion of a link from that of its carrier."""
+def link_motion(row: Row, slides: bool, cos_sin: CosSin, q: Number, dq: Number, ddq: Number, motion: Motion) -> Motion:
+    """The motion of a link from the motion of its parent."""
     w, e, a = motion
     a = to_joint_axes(row, plus(a, times(rates(w, e), place(row))))
     w, e = to_joint_axes(row, w), to_joint_axes(row, e)
@@ -80,15 +80,15 @@ def link_motion(row: Row, slides: bool, turn: Turn, q: Number, dq: Number, ddq: 
         y = a[1] + q * (w[1] * w[2] - e[0]) - 2.0 * dq * w[0]
         return w, e, (x, y, a[2] - q * (w[0] * w[0] + w[1] * w[1]) + ddq)
     e = e[0] + w[1] * dq, e[1] - w[0] * dq, e[2] + ddq
-    return to_link_axes(turn, (w[0], w[1], w[2] + dq)), to_link_axes(turn, e), to_link_axes(turn, a)
+    return to_link_axes(cos_sin, (w[0], w[1], w[2] + dq)), to_link_axes(cos_sin, e), to_link_axes(cos_sin, a)
 
 
-def link_velocity(row: Row, slides: bool, turn: Turn, q: Number, dq: Number, velocity: Velocity) -> Velocity:
-    """The velocity of a link from that of its carrier."""
+def link_velocity(row: Row, slides: bool, cos_sin: CosSin, q: Number, dq: Number, velocity: Velocity) -> Velocity:
+    """The velocity of a link from the velocity of its parent."""
     w, v = to_joint_axes(row, velocity[0]), to_joint_axes(row, plus(velocity[1], cross(velocity[0], place(row))))
     if slides:
         return w, (v[0] + w[1] * q, v[1] - w[0] * q, v[2] + dq)
-    return to_link_axes(turn, (w[0], w[1], w[2] + dq)), to_link_axes(turn, v)
+    return to_link_axes(cos_sin, (w[0], w[1], w[2] + dq)), to_link_axes(cos_sin, v)
 
 
 def wrench_of(row: Row, motion: Motion) -> Wrench:
@@ -101,19 +101,19 @@ def wrench_of(row: Row, motion: Motion) -> Wrench:
     return f, plus(cross(h, a), plus(times(inertia, e), cross(w, times(inertia, w))))
 
 
-def carrier_wrench(row: Row, slides: bool, turn: Turn, q: Number, wrench: Wrench) -> Wrench:
-    """A wrench on a link, at the origin and in the axes of its carrier."""
+def carrier_wrench(row: Row, slides: bool, cos_sin: CosSin, q: Number, wrench: Wrench) -> Wrench:
+    """Transform a wrench on a link to the origin and the axes of its parent."""
     f, n = wrench
     if slides:
         n = n[0] - q * f[1], n[1] + q * f[0], n[2]
     else:
-        f, n = from_link_axes(turn, f), from_link_axes(turn, n)
+        f, n = from_link_axes(cos_sin, f), from_link_axes(cos_sin, n)
     f, n = times(row, f), times(row, n)
     return f, plus(n, cross(place(row), f))
 
 
 def unit_wrench(slides: bool, m: float, inertia: Inertia) -> Wrench:
-    """The wrench that gives a body of mass m one unit of its joint's acceleration."""
+    """The wrench that accelerates a body of mass m at rest by 1 rad/s^2, or 1 m/s^2, along its joint."""
     h, (_, _, xz), (_, yz, zz) = inertia
     zero = 0.0 * zz
     if slides:
@@ -121,32 +121,35 @@ def unit_wrench(slides: bool, m: float, inertia: Inertia) -> Wrench:
     return (-h[1], h[0], zero), (xz, yz, zz)
 
 
-def turned_inertia(turn: Turn, inertia: Inertia) -> Inertia:
-    """The inertia of a link that turns, in the axes of its joint at q = 0."""
-    (c, s), (h, (xx, xy, xz), (yy, yz, zz)) = turn, inertia
-    cc, cs, ss, both = c * c, c * s, s * s, 2.0 * c * s * xy
+def turned_inertia(cos_sin: CosSin, inertia: Inertia) -> Inertia:
+    """Transform the inertia of a link that turns to the axes of its joint at q = 0."""
+    (c, s), (h, (xx, xy, xz), (yy, yz, zz)) = cos_sin, inertia
+    cc, cs, ss, cs_xy = c * c, c * s, s * s, 2.0 * c * s * xy
     mixed = cs * (xx - yy) + (cc - ss) * xy
-    upper, lower = (cc * xx - both + ss * yy, mixed, c * xz - s * yz), (ss * xx + both + cc * yy, s * xz + c * yz, zz)
-    return from_link_axes(turn, h), upper, lower
+    xx_xy_xz, yy_yz_zz = (
+        (cc * xx - cs_xy + ss * yy, mixed, c * xz - s * yz),
+        (ss * xx + cs_xy + cc * yy, s * xz + c * yz, zz),
+    )
+    return from_link_axes(cos_sin, h), xx_xy_xz, yy_yz_zz
 
 
 def shifted_inertia(m: float, r: Vector, inertia: Inertia) -> Inertia:
-    """The inertia of a body of mass m about another origin, from which its own one is at r."""
+    """Transform the inertia of a body of mass m to a new origin; r is the position of the old origin from there."""
     h, (xx, xy, xz), (yy, yz, zz) = inertia
     g = h[0] + 0.5 * m * r[0], h[1] + 0.5 * m * r[1], h[2] + 0.5 * m * r[2]
     x, y, z = 2.0 * g[0] * r[0], 2.0 * g[1] * r[1], 2.0 * g[2] * r[2]
-    upper = xx + y + z, xy - g[0] * r[1] - g[1] * r[0], xz - g[0] * r[2] - g[2] * r[0]
-    lower = yy + x + z, yz - g[1] * r[2] - g[2] * r[1], zz + x + y
-    return (h[0] + m * r[0], h[1] + m * r[1], h[2] + m * r[2]), upper, lower
+    xx_xy_xz = xx + y + z, xy - g[0] * r[1] - g[1] * r[0], xz - g[0] * r[2] - g[2] * r[0]
+    yy_yz_zz = yy + x + z, yz - g[1] * r[2] - g[2] * r[1], zz + x + y
+    return (h[0] + m * r[0], h[1] + m * r[1], h[2] + m * r[2]), xx_xy_xz, yy_yz_zz
 
 
-def moved_inertia(slides: bool, turn: Turn, q: Number, m: float, inertia: Inertia) -> Inertia:
-    """The inertia of what a link carries, itself included, in the frame of its joint at q = 0."""
-    return shifted_inertia(m, (0.0 * q, 0.0 * q, q), inertia) if slides else turned_inertia(turn, inertia)
+def moved_inertia(slides: bool, cos_sin: CosSin, q: Number, m: float, inertia: Inertia) -> Inertia:
+    """Transform the inertia of a link and all its descendants to the frame of its joint at q = 0."""
+    return shifted_inertia(m, (0.0 * q, 0.0 * q, q), inertia) if slides else turned_inertia(cos_sin, inertia)
 
 
 def carried_inertia(row: Row, m: float, inertia: Inertia) -> Inertia:
-    """The inertia of what a link carries in the frame of its joint at q = 0, in its carrier's frame."""
+    """Transform an inertia of mass m from the frame of a joint at q = 0 to the frame of the parent link."""
     h, (xx, xy, xz), (yy, yz, zz) = inertia
     x, y, z = times(row, (xx, xy, xz)), times(row, (xy, yy, yz)), times(row, (xz, yz, zz))  # columns of R I
     a, b, c = times(row, (x[0], y[0], z[0])), times(row, (x[1], y[1], z[1])), times(row, (x[2], y[2], z[2]))
@@ -154,18 +157,19 @@ def carried_inertia(row: Row, m: float, inertia: Inertia) -> Inertia:
 
 
 def columns(motion: Motion, J: Velocity) -> tuple[Number, ...]:
-    """The effort by each of a link's parameters (`bodies.PARAMETERS`), where the coordinate moves it with J.
+    """The effort at a coordinate for a unit of each inertial parameter of a link (`bodies.PARAMETERS`).
 
-    It is `wrench_of` projected on J: (w x u) . J = u . (J x w).
+    J is the velocity of the link at unit velocity of the coordinate.  The effort is `wrench_of` projected on J, where
+    (w x u) . J = u . (J x w).
     """
     (w, e, a), (J_w, J_v) = motion, J
-    along, w_J = w[0] * w[0] + w[1] * w[1] + w[2] * w[2], w[0] * J_v[0] + w[1] * J_v[1] + w[2] * J_v[2]
+    w_w, w_J = w[0] * w[0] + w[1] * w[1] + w[2] * w[2], w[0] * J_v[0] + w[1] * J_v[1] + w[2] * J_v[2]
     h, g = plus(cross(J_v, e), cross(a, J_w)), cross(J_w, w)
     return (
         a[0] * J_v[0] + a[1] * J_v[1] + a[2] * J_v[2],
-        h[0] + w[0] * w_J - along * J_v[0],
-        h[1] + w[1] * w_J - along * J_v[1],
-        h[2] + w[2] * w_J - along * J_v[2],
+        h[0] + w[0] * w_J - w_w * J_v[0],
+        h[1] + w[1] * w_J - w_w * J_v[1],
+        h[2] + w[2] * w_J - w_w * J_v[2],
         e[0] * J_w[0] + w[0] * g[0],
         e[1] * J_w[0] + e[0] * J_w[1] + w[1] * g[0] + w[0] * g[1],
         e[2] * J_w[0] + e[0] * J_w[2] + w[2] * g[0] + w[0] * g[2],

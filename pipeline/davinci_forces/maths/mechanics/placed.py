@@ -1,9 +1,9 @@
-"""Chains of frames that are placed anywhere and move about or along any axis, as URDF describes them.
+"""Build a chain from frames with any placement and any joint axis, as URDF describes them.
 
-    frame = carrier * placement * turn about, or shift along, axis by sign q + bias
+    frame = parent * placement * turn about, or shift along, axis by sign q + bias
 
-A chain's links move about or along their z axis.  A link's frame is therefore turned so that its z is the axis; the
-described frame stays in its place as a named frame of the link.
+The links of a `Chain` move about or along their z axis.  The frame of a link is therefore turned until z is along the
+joint axis.  The frame of the description becomes a named frame of the link.
 """
 
 from collections.abc import Sequence
@@ -19,39 +19,39 @@ Z = np.array([0.0, 0.0, 1.0])
 
 
 class PlacedLink(NamedTuple):
-    """One frame on an earlier one, and the link's inertial parameters in it; fixed there without a coordinate."""
+    """The frame of one link, and its inertial parameters; without a coordinate, it is fixed to its parent frame."""
 
     name: str
-    before: int  # frame that carries it: 0 is the base, and link i has frame i + 1
-    placement: Array  # in that frame at q = 0 (4, 4) [m]
-    axis: Array = Z  # (3,) in its own frame, of length 1
+    before: int  # index of the parent frame: the base is 0, and link i has frame i + 1
+    placement: Array  # pose in the parent frame at q = 0, without bias (4, 4) [m]
+    axis: Array = Z  # (3,) joint axis in the link's frame, of length 1
     coordinate: int = FIXED
-    sign: int = 1  # -1 where it moves against the coordinate
-    bias: float = 0.0  # by how much it is moved at q = 0 [rad or m]
+    sign: int = 1  # -1 if it moves opposite to the coordinate
+    bias: float = 0.0  # joint position at q = 0 [rad or m]
     slides: bool = False
     parameters: Array = np.zeros(len(PARAMETERS))  # (10,), in the order of PARAMETERS
 
 
 def assemble_chain(base: str, links: Sequence[PlacedLink], tip: str) -> tuple[Chain, Bodies]:
-    """The chain of such links, and its bodies: those fixed to a link add to it, those on the base are left out."""
+    """The chain of these links and its bodies; fixed links add their inertia to their parent, except on the base."""
     body, offset, moving = [0], [np.eye(4)], list[PlacedLink]()
     parent, placement, pseudo = list[int](), list[Array](), list[Array]()
     inertias = pseudo_inertias(np.array([link.parameters for link in links]).reshape(-1, len(PARAMETERS)))
     for link, J in zip(links, inertias, strict=True):
-        at = offset[link.before] @ link.placement @ _moved(link)
+        pose = offset[link.before] @ link.placement @ _bias_transform(link)
         if link.coordinate == FIXED:
             body.append(body[link.before])
         else:
             turned = _z_along(link.sign * link.axis)
             parent.append(body[link.before])
-            placement.append(at @ turned)
+            placement.append(pose @ turned)
             pseudo.append(np.zeros((4, 4)))
             moving.append(link)
             body.append(len(moving))
-            at = turned.T
-        offset.append(at)
+            pose = turned.T
+        offset.append(pose)
         if body[-1]:
-            pseudo[body[-1] - 1] = pseudo[body[-1] - 1] + at @ J @ at.T
+            pseudo[body[-1] - 1] = pseudo[body[-1] - 1] + pose @ J @ pose.T
     chain = Chain(
         links=tuple(link.name for link in moving), parent=np.array(parent), placement=np.array(placement),
         slides=np.array([link.slides for link in moving]), coordinate=np.array([link.coordinate for link in moving]),
@@ -63,7 +63,7 @@ def assemble_chain(base: str, links: Sequence[PlacedLink], tip: str) -> tuple[Ch
 
 
 def transform(xyz: Sequence[float], rpy: Sequence[float]) -> Array:
-    """The pose (4, 4) of a place [m] and of roll, pitch and yaw [rad] about fixed axes.
+    """The pose (4, 4) with this position [m] and this roll, pitch and yaw [rad] about fixed axes.
 
     R = Rz(yaw) Ry(pitch) Rx(roll)
     """
@@ -79,9 +79,9 @@ def transform(xyz: Sequence[float], rpy: Sequence[float]) -> Array:
 
 
 def roll_pitch_yaw(R: Array) -> tuple[float, float, float]:
-    """The angles of `transform` for a rotation (3, 3), exact to rounding for any rotation.
+    """The angles of `transform` [rad] for a rotation (3, 3), exact to rounding for any rotation.
 
-    At a pitch of a quarter turn, only roll and yaw together are determined: yaw is chosen, and roll follows.
+    At a pitch of a quarter turn, only the sum or difference of roll and yaw is determined: the yaw is chosen.
     """
     yaw = float(np.arctan2(R[1, 0], R[0, 0]))
     c, s = np.cos(yaw), np.sin(yaw)
@@ -90,8 +90,8 @@ def roll_pitch_yaw(R: Array) -> tuple[float, float, float]:
     return roll, pitch, yaw
 
 
-def _moved(link: PlacedLink) -> Array:
-    """The displacement of a link's frame (4, 4) by its bias."""
+def _bias_transform(link: PlacedLink) -> Array:
+    """The transform (4, 4) of a link's frame by its bias."""
     T = np.eye(4)
     if link.slides:
         T[:3, 3] = link.bias * link.axis
@@ -106,7 +106,7 @@ def _z_along(axis: Array) -> Array:
     T = np.eye(4)
     if np.array_equal(axis, Z):
         return T
-    x = np.eye(3)[int(np.abs(axis).argmin())]  # of the frame's axes the one that is least along it
+    x = np.eye(3)[int(np.abs(axis).argmin())]  # the coordinate axis that is most perpendicular to the joint axis
     x = x - (x @ axis) * axis
     x /= np.linalg.norm(x)
     T[:3, :3] = np.column_stack([x, np.cross(axis, x), axis])

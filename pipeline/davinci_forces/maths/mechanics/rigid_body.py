@@ -2,8 +2,8 @@
 
     tau = M(q) ddq + C(q, dq) dq + G(q)                                                              (4.9), (4.27)
 
-Shapes: q, dq, ddq, tau are (..., n) in rad or m, their rates, and N m or N.  Any leading axes; they broadcast.  With n
-below the chain's own, the later coordinates are at rest at 0.
+Shapes: q, dq, ddq, tau are (..., n) in rad or m, their rates, and N m or N.  Leading axes broadcast.  If the chain has
+more than n coordinates, the others are at rest at 0.
 """
 
 import numpy as np
@@ -15,12 +15,12 @@ from davinci_forces.maths.mechanics import recursions
 from davinci_forces.maths.mechanics.bodies import Bodies, Drives
 from davinci_forces.maths.mechanics.chain import Chain, Tree, fold_fixed_links, tree_of
 
-ALL = (slice(None),)  # samples at once
-COMPILE_FROM = 20_000  # samples; fewer are done before the kernels are loaded
+ALL = (slice(None),)  # index of all samples, for numpy
+COMPILE_FROM = 20_000  # samples; numpy computes fewer before the kernels are loaded
 
 
 def mass_matrix(chain: Chain, bodies: Bodies, q: ArrayLike, drives: Drives | None = None) -> Array:
-    """M (..., n, n), symmetric positive definite; with the rotors' inertia where drives are given.  (4.28), (4.38)"""
+    """M (..., n, n), symmetric positive definite; if drives are given, with their rotors' inertia.  (4.28), (4.38)"""
     q = np.asarray(q, float)
     n, tree = q.shape[-1], moving_tree(chain, bodies, q.shape[-1])
     if _many(q):
@@ -58,7 +58,7 @@ def inverse_dynamics(
 
 
 def regressor(chain: Chain, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Array:
-    """Y (..., n, 10 L) with tau = Y pi, pi the inertial parameters of all links (`Bodies.parameters`).  (6.3)"""
+    """Y (..., n, 10 L) of tau = Y pi, with the inertial parameters pi of all links (`Bodies.parameters`).  (6.3)"""
     q, dq, ddq = np.broadcast_arrays(*(np.asarray(x, float) for x in (q, dq, ddq)))
     if _many(q):
         return compiled_regressor(chain, q, dq, ddq)
@@ -71,7 +71,7 @@ def regressor(chain: Chain, q: ArrayLike, dq: ArrayLike, ddq: ArrayLike) -> Arra
 
 
 def compiled_regressor(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
-    """Y (..., n, 10 L) of `regressor`, by the kernels for any number of samples, for repeated calls."""
+    """Y (..., n, 10 L) of `regressor`, always by the compiled kernels: for callers that compute it repeatedly."""
     from davinci_forces.maths.mechanics.kernels import regressors
 
     n, L = q.shape[-1], len(chain.parent)
@@ -82,7 +82,7 @@ def compiled_regressor(chain: Chain, q: Array, dq: Array, ddq: Array) -> Array:
 
 
 def moving_tree(chain: Chain, bodies: Bodies, n: int) -> Tree:
-    """The arm with its first n coordinates, and only the links that they move."""
+    """The tree of the arm with its first n coordinates; links that do not move are merged into their parents."""
     return tree_of(*fold_fixed_links(chain.with_coordinates(n), bodies.parameters(n).reshape(-1, 10)))
 
 
@@ -100,17 +100,17 @@ def _newton_euler(tree: Tree, g: float, q: Array, dq: Array, ddq: Array) -> Arra
 
 
 def _many(q: Array) -> bool:
-    """Whether q (..., n) has so many samples that the compiled kernels are worth their start."""
+    """Whether q (..., n) has so many samples that the kernels save more time than loading them takes."""
     return bool(q.size >= COMPILE_FROM * q.shape[-1])
 
 
 def _rows(x: Array) -> Array:
-    """All samples of (..., n) as one contiguous (N, n), a view where x is contiguous itself."""
+    """Reshape x (..., n) to a contiguous array (N, n); a view if x is contiguous."""
     return np.ascontiguousarray(x, float).reshape(-1, x.shape[-1])
 
 
 def _joints(q: Array, dq: Array, ddq: Array) -> Array:
-    """cos q, sin q, q, dq, ddq of every coordinate (n + 1, 5, N), and zeros for what never moves."""
+    """cos q, sin q, q, dq, ddq of every coordinate (n + 1, 5, N); the last row is zeros, for links that never move."""
     joints = np.zeros((q.shape[-1] + 1, 5, q.size // q.shape[-1]))
     for i, x in enumerate((np.cos(q), np.sin(q), q, dq, ddq)):
         joints[:-1, i] = x.reshape(-1, q.shape[-1]).T

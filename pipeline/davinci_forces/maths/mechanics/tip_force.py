@@ -3,15 +3,15 @@
 tau_ext = J' w                                                                     (7.17), (7.18), (7.25)
 w = J^-T tau_ext,    C_w = J^-T C_tau J^-1                                         (7.26)
 
-J is J_v of the first three joints, and w the force [N].  Of six joints J is J_v above J_omega, and w the wrench: force
-[N] and moment [N m].  Shapes: k is 3 or 6, and any leading axes come before it.
+For three joints, J is J_v and w the force [N].  For six joints, J is J_v above J_omega, and w the wrench: force [N] and
+moment [N m].  Shapes: k is 3 or 6, after any leading axes.
 
-The correlation of the errors of several joints is shared by logs as far as they agree:
+Logs share one correlation between the errors of several joints, which is shrunk by the spread between logs:
 
 R = (1 - s) I + s mean(R_i),    s = max(0, 1 - var / mean_of_squares)
 
-with the correlations R_i of n logs, and var the variance of their mean by the spread between logs.  Logs that disagree
-give no correlation.  Nor does a single one, since nothing shows whether it would repeat.
+with the correlations R_i of n logs, and var the variance of their mean, estimated from the spread between logs.  If the
+logs disagree, the shared correlation is 0.  For a single log it is 0 too: nothing shows whether the value repeats.
 """
 
 import numpy as np
@@ -21,21 +21,21 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import jacobian
 
-# Above this condition number a pose counts as singular: the first three joints leave one direction of the force
-# undetermined in practice.  It is 0.1 mm from an exact singularity; in the box of Table 6.2 it reaches 60.
+# Above this condition number a pose is singular: the efforts of the first three joints practically do not determine one
+# direction of the force.  This is 0.1 mm from an exact singularity.  Within Table 6.2 the number is at most 60.
 SINGULAR = 1e4
-# Above this one a force is marked: the error of one direction is a hundred times that of another, as where the lever of
-# a joint at the tip is about a centimetre.  The box of Table 6.2 stays below.
+# Above this condition number a force is marked: its error in one direction is a hundred times the error in another, for
+# example if a joint has a lever of about a centimetre at the tip.  Poses within Table 6.2 stay below.
 NEAR_SINGULAR = 1e2
-DOUBLE = 1e-6  # [m] imaginary part that rounding, at its square root, gives to a double root
+DOUBLE = 1e-6  # [m] largest imaginary part of a double root: the square root of the rounding
 ARM = 3  # coordinates of the reduced Jacobian
-CHI_SQUARED_95 = 7.814727903251179  # what 95 % of squared lengths of normal vectors of three components stay below
+CHI_SQUARED_95 = 7.814727903251179  # 95 % quantile of chi-squared with 3 degrees of freedom
 
 
 def condition(J_v: ArrayLike) -> Array:
-    """Condition number (...) of J_v (..., 3, n): the largest ratio of the errors of two directions of the force.
+    """Condition number (...) of J_v (..., 3, n): the largest ratio of the force errors in two directions.
 
-    It mixes metres per radian and metres per metre, as the Jacobian itself does.
+    Like the Jacobian, it mixes metres per radian with metres per metre.
     """
     values = np.linalg.svd(np.asarray(J_v, float), compute_uv=False)
     smallest = values[..., -1]
@@ -52,21 +52,21 @@ def is_singular(chain: Chain, q: ArrayLike) -> NDArray[np.bool_]:
 def singular_slides(chain: Chain, q_pitch: float) -> Array:
     """Slides at which J_v of the first three joints is singular at this pitch, ascending (0, 1 or 2,) [m].
 
-    det J_v is a polynomial of the second degree in q3, and the roll does not change it.  The levers of the roll about
-    its axis and of the pitch about the remote centre each grow linearly with the slide.
+    det J_v is a quadratic polynomial in q3 and does not depend on the roll.  The levers of the roll about its axis and
+    of the pitch about the remote centre are each linear in q3.
     """
     q = np.array([[0.0, q_pitch, slide] for slide in (-1.0, 0.0, 1.0)])
     low, middle, high = np.linalg.det(jacobian(chain, q)[0])
     square, linear = (low + high) / 2.0 - middle, (high - low) / 2.0
-    size = max(abs(square), abs(linear), abs(middle))
-    roots = np.roots([0.0 if abs(x) < 1e-12 * size else x for x in (square, linear, middle)])
+    scale = max(abs(square), abs(linear), abs(middle))
+    roots = np.roots([0.0 if abs(x) < 1e-12 * scale else x for x in (square, linear, middle)])
     return np.sort(roots[np.abs(roots.imag) < DOUBLE].real)
 
 
 def from_efforts(J: ArrayLike, tau_ext: ArrayLike, C_tau: ArrayLike) -> tuple[Array, Array]:
-    """Compute the force or wrench (..., k) of efforts (..., k) with covariance (..., k, k), and its covariance.
+    """Compute the force or wrench w (..., k) and C_w (..., k, k) from efforts (..., k) and C_tau (..., k, k).
 
-    Both are NaN at singular poses, where the efforts do not determine one direction.  (7.26)
+    Both results are NaN at singular poses, where the efforts do not determine one direction.  (7.26)
     """
     J, tau_ext = np.asarray(J, float), np.asarray(tau_ext, float)
     C_tau = np.broadcast_to(np.asarray(C_tau, float), J.shape)
@@ -85,9 +85,9 @@ def covariance(std: ArrayLike, correlation: ArrayLike) -> Array:
 
 
 def sigma_ellipsoid(C: ArrayLike) -> tuple[Array, Array]:
-    """Half-axes (..., 3) of the sigma ellipsoid of a covariance (..., 3, 3), and their directions (..., 3, 3) in rows.
+    """Half-axes (..., 3) of the 1-sigma ellipsoid of a covariance (..., 3, 3), the longest first.
 
-    The longest comes first.
+    Their directions (..., 3, 3) are in rows.
     """
     values, vectors = np.linalg.eigh(np.asarray(C, float))
     sigma = np.sqrt(np.maximum(values[..., ::-1], 0.0))
@@ -99,23 +99,23 @@ def sigma_ellipsoid(C: ArrayLike) -> tuple[Array, Array]:
 def reach_95(f: ArrayLike, C: ArrayLike) -> Array:
     """Radius (...,) of the 95 % ellipsoid of a covariance (..., 3, 3) in the direction of a force (..., 3).
 
-    |f| is no more than that where 0 lies in the 95 % ellipsoid about f.
+    The 95 % ellipsoid about f contains 0 if |f| is at most this radius.
     """
     f, C = np.asarray(f, float), np.asarray(C, float)
     size = np.linalg.norm(f, axis=-1)
     u = np.divide(f, size[..., None], out=np.zeros(f.shape), where=size[..., None] > 0.0)
-    u[..., 0] += size == 0.0  # of no force, any direction
+    u[..., 0] += size == 0.0  # any direction for a force of 0
     squared = np.einsum("...i,...i->...", u, np.linalg.solve(C, u[..., None])[..., 0])
     return np.asarray(np.sqrt(CHI_SQUARED_95 / squared))
 
 
 def lever(J: ArrayLike) -> Array:
-    """Force [N] at the tip of one unit of each effort (..., k): the lengths of the columns of J^-T."""
+    """Tip force (..., k) [N] per unit of each effort: the lengths of the columns of J^-T."""
     return np.asarray(np.linalg.norm(np.linalg.inv(np.swapaxes(np.asarray(J, float), -1, -2))[..., :3, :], axis=-2))
 
 
 def shared_correlations(rho: Array) -> Array:
-    """The correlations (p,) that logs (n, p) share; of fewer than two logs, none."""
+    """The correlations (p,) that n logs (n, p) share; 0 for fewer than two logs."""
     if len(rho) < 2:
         return np.zeros(rho.shape[1])
     mean, var = rho.mean(0), rho.var(0, ddof=1) / len(rho)

@@ -1,9 +1,9 @@
-"""The model of joints that move together: the arm's links, its drives and cables, and the friction of each joint.
+"""The model of coupled joints: the arm's links, drives and cables, and the friction of each joint.
 
     tau = Y_b(q, dq, ddq) beta + sum of friction,    beta = K pi                                   (4.27), (4.38), (6.3)
 
-pi are the inertial parameters of all links and, of every joint, a rotor's inertia, a spring and an offset.  beta are
-their identifiable combinations.  A counterweight is a link like any other.
+pi are the inertial parameters of all links, and a rotor inertia, a spring and an offset for every joint.  beta are
+the identifiable combinations of pi.  A counterweight is a link like any other.
 """
 
 from dataclasses import dataclass
@@ -20,18 +20,18 @@ from davinci_forces.maths.models.memory import PIECE_SAMPLES, efforts, friction_
 from davinci_forces.maths.models.model import ArmMotion, JointDynamics, Mechanism, Parameter, Regressor
 from davinci_forces.maths.models.terms import Term
 
-ADDED = ("rotor inertia", "spring", "offset")  # that the drive and the cables of each joint add to its links
-NOT_NEGATIVE = (True, True, False)  # which of them: a spring pulls back, an offset has either sign
+ADDED = ("rotor inertia", "spring", "offset")  # parameters of the drive and the cables of each joint
+NOT_NEGATIVE = (True, True, False)  # of `ADDED`: a spring pulls back, and an offset has either sign
 LINK_UNITS = ("kg", *["kg m"] * 3, *["kg m^2"] * 6)
 ADDED_UNITS = ("{inertia}", "{effort}/{position}", "{effort}")
 
 
 @dataclass(frozen=True)
 class CoupledArm:
-    """Joints whose efforts depend on the motion of all of them, with friction of each.
+    """Joints whose efforts depend on the motion of all joints, each with its friction.
 
-    `rows` are the joints (indices) whose effort the model gives, and `friction` and `units` those of each.
-    With one row it models that joint of a coupled arm, with parameters of its own.
+    `rows` are the indices of the joints whose effort the model gives.  `friction` and `units` have one entry a row.
+    A model with one row describes one joint of a coupled arm.
     """
 
     group: str
@@ -39,7 +39,7 @@ class CoupledArm:
     rows: tuple[int, ...]
     chain: Chain
     friction: tuple[tuple[Term, ...], ...]
-    units: tuple[dict[str, str], ...]  # of a row: what {inertia}, {effort}, {position} and {gain} are
+    units: tuple[dict[str, str], ...]  # for each row, the units of {inertia}, {effort}, {position} and {gain}
     name: str = "coupled"
 
     @property
@@ -49,24 +49,24 @@ class CoupledArm:
 
     @property
     def base(self) -> BaseParameters:
-        """Base parameters of links and drives: what the efforts of the rows show under a rich motion of all joints."""
+        """The parameters of links and drives that the rows' efforts identify under a rich motion of all joints."""
         return arm_base_parameters(self.chain, len(self.joints), self.rows)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """The base parameters, each named by its leading one, then the friction of each row."""
+        """The base parameters, each named by the column of pi that it leads with, then the friction of each row."""
         L = 10 * len(self.chain.links)
-        led = [self._link_parameter(c) if c < L else self._added_parameter(c - L) for c in self.base.columns.tolist()]
-        return (*led, *(self._friction_parameter(i, term) for i, terms in enumerate(self.friction) for term in terms))
+        names = [self._link_parameter(c) if c < L else self._added_parameter(c - L) for c in self.base.columns.tolist()]
+        return (*names, *(self._friction_parameter(i, term) for i, terms in enumerate(self.friction) for term in terms))
 
     @property
     def displacements(self) -> set[tuple[int, float]]:
-        """The displacements of its friction."""
+        """The joint and the displacement of each presliding friction."""
         return {(joint, term.displacement) for _, joint, term, _ in self._frictions() if term.displacement}
 
     @property
     def mechanism(self) -> Mechanism:
-        """Base parameters as combinations of those of links, drives and cables; friction as it is."""
+        """Base parameters as combinations of pi; friction parameters enter unchanged."""
         K, L, terms = self.base.combination, len(self.chain.links), [term for row in self.friction for term in row]
         A = np.zeros((len(K) + len(terms), K.shape[1] + len(terms)))
         A[: len(K), : K.shape[1]], A[len(K) :, K.shape[1] :] = K, np.eye(len(terms))
@@ -79,8 +79,8 @@ class CoupledArm:
         Phi, valid = np.zeros((N, len(self.rows), b + sum(map(len, self.friction)))), np.ones(N, np.bool_)
         Phi[:, :, :b] = of_links(self.chain, self.rows, motion.q, motion.dq, motion.ddq)[:, :, self.base.columns]
         for row, joint, term, column in self._frictions():
-            z, started = friction_state(motion, joint, term)
-            valid &= started
+            z, z_valid = friction_state(motion, joint, term)
+            valid &= z_valid
             _, _, _, _, viscous, coulomb, of_z = term.coefficients
             dq = motion.dq[:, joint]
             Phi[:, row, column] = viscous * dq + coulomb * np.sign(dq) + of_z * z
@@ -92,7 +92,7 @@ class CoupledArm:
         return np.concatenate([self.inertia_columns(q[i : i + PIECE_SAMPLES]) @ theta for i in starts])
 
     def inertia_columns(self, q: Array) -> Array:
-        """Derivatives (N, m, m, p) of M at q (N, n) by the parameters, in which it is linear."""
+        """Derivatives (N, m, m, p) of M at q (N, n) by the parameters; M is linear in them."""
         still, base = np.zeros_like(q), self.base.columns
         columns = np.zeros((len(q), len(self.rows), len(self.rows), len(self.parameters)))
         gravity = of_links(self.chain, self.rows, q, still, still)[:, :, base]
@@ -106,25 +106,25 @@ class CoupledArm:
         return efforts(self, theta, motion._replace(ddq=np.zeros_like(motion.ddq)))
 
     def joint_dynamics(self, theta: Array, motion: ArmMotion) -> tuple[JointDynamics, ...]:
-        """Each row with its own inertia, viscous and Coulomb friction; all other effort follows from the motion."""
+        """For each row its inertia, viscous and Coulomb friction; all other effort is known from the motion."""
         M, tau = self.inertia(theta, motion.q), efforts(self, theta, motion)
-        views = []
+        dynamics = []
         for i, joint in enumerate(self.rows):
             of_row = [(float(theta[column]), term) for row, _, term, column in self._frictions() if row == i]
             viscous = sum(value * term.coefficients[VISCOUS] for value, term in of_row)
             coulomb = sum(value * term.coefficients[COULOMB] for value, term in of_row)
             ddq, dq = motion.ddq[:, joint], motion.dq[:, joint]
             known_effort = tau[:, i] - M[:, i, i] * ddq - viscous * dq - coulomb * np.sign(dq)
-            views.append(JointDynamics(M[:, i, i], (0.0, 0.0, 0.0, 0.0, viscous, coulomb, 0.0), known_effort))
-        return tuple(views)
+            dynamics.append(JointDynamics(M[:, i, i], (0.0, 0.0, 0.0, 0.0, viscous, coulomb, 0.0), known_effort))
+        return tuple(dynamics)
 
     def _frictions(self) -> list[tuple[int, int, Term, int]]:
-        """Row, joint, term and column of Phi of every term of friction."""
+        """The row, the joint, the term and its column of Phi, for every friction term."""
         pairs = [(i, joint, term) for i, joint in enumerate(self.rows) for term in self.friction[i]]
         return [(*pair, len(self.base.columns) + k) for k, pair in enumerate(pairs)]
 
     def _of(self, row: int) -> str:
-        """Suffix of the names of a joint's parameters, where there are several joints."""
+        """The suffix of a row's parameter names; "" if there is only one row."""
         return f" of {self.efforts[row]}" if len(self.rows) > 1 else ""
 
     def _link_parameter(self, column: int) -> Parameter:
@@ -144,16 +144,16 @@ class CoupledArm:
 
 
 def of_links(chain: Chain, rows: tuple[int, ...], q: Array, dq: Array, ddq: Array) -> Array:
-    """Columns (N, m, 10 L + 3 m) of the parameters of all links, and of the drives and cables of each row."""
-    which = list(rows)
-    Y, identity = regressor(chain, q, dq, ddq)[:, which], np.eye(len(which))
-    added = (x[:, :, None] * identity for x in (ddq[:, which], q[:, which], np.ones_like(q[:, which])))
+    """The regressor (N, m, 10 L + 3 m) of all links, and of the drives and cables of each row."""
+    joints = list(rows)
+    Y, identity = regressor(chain, q, dq, ddq)[:, joints], np.eye(len(joints))
+    added = (x[:, :, None] * identity for x in (ddq[:, joints], q[:, joints], np.ones_like(q[:, joints])))
     return np.concatenate([Y, *added], axis=2)
 
 
 @cache
 def arm_base_parameters(chain: Chain, n: int, rows: tuple[int, ...]) -> BaseParameters:
-    """Base parameters of the first n coordinates of a chain, from the efforts of some of them."""
+    """The base parameters of a chain with n coordinates that the efforts of the joints `rows` identify."""
     random = np.random.default_rng(0)
     q, dq, ddq = (random.uniform(-1.0, 1.0, (RANDOM_SAMPLES, n)) for _ in range(3))
     slides = chain.slides[[int(np.flatnonzero(chain.coordinate == i)[0]) for i in range(n)]]

@@ -11,7 +11,9 @@ from davinci_forces.maths.models.memory import friction_state
 from davinci_forces.maths.models.model import ArmMotion, JointDynamics, Mechanism, Parameter, Regressor, of_signs
 from davinci_forces.maths.models.terms import Term
 
-FUNCTIONS: dict[str, Callable[[Array, Array, Array | float], Array | float]] = {  # those of `bias`, of q, dq and z
+FUNCTIONS: dict[
+    str, Callable[[Array, Array, Array | float], Array | float]
+] = {  # the functions in `bias`, of q, dq and z
     "1": lambda q, dq, z: 1.0,
     "sin q": lambda q, dq, z: np.sin(q),
     "cos q": lambda q, dq, z: np.cos(q),
@@ -24,7 +26,7 @@ FUNCTIONS: dict[str, Callable[[Array, Array, Array | float], Array | float]] = {
 
 @dataclass(frozen=True)
 class IndependentJoint:
-    """tau = sum_i theta_i (a_i ddq + b_i(q, dq)), with the units of the terms filled in.  (6.8), (6.11), (6.13)"""
+    """tau = sum_i theta_i (a_i ddq + b_i(q, dq)), with the unit of each parameter.  (6.8), (6.11), (6.13)"""
 
     group: str
     terms: tuple[Term, ...]
@@ -33,28 +35,28 @@ class IndependentJoint:
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """The joint alone."""
+        """The one joint of the model."""
         return (self.group,)
 
     @property
     def efforts(self) -> tuple[str, ...]:
-        """The same joint."""
+        """The one joint of the model."""
         return self.joints
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
-        """One parameter a term."""
+        """One parameter for each term."""
         pairs = zip(self.terms, self.units, strict=True)
         return tuple(Parameter(term.name, term.typst, unit, term.positive, term.scale) for term, unit in pairs)
 
     @property
     def displacements(self) -> set[tuple[int, float]]:
-        """The displacements of its terms."""
+        """The index 0 of the joint and the displacement, for each term of presliding friction."""
         return {(0, term.displacement) for term in self.terms if term.displacement}
 
     @property
     def mechanism(self) -> Mechanism:
-        """The parameters themselves: without bodies, only signs are constrained."""
+        """The parameters themselves: the model has no links, so that only signs are constrained."""
         return of_signs(np.array([term.positive for term in self.terms]))
 
     def regressor(self, motion: ArmMotion) -> Regressor:
@@ -64,15 +66,15 @@ class IndependentJoint:
         for i, term in enumerate(self.terms):
             z: Array | float = 0.0
             if term.scale:
-                z, started = friction_state(motion, 0, term)
-                valid &= started
+                z, z_valid = friction_state(motion, 0, term)
+                valid &= z_valid
             add(term, q, dq, ddq, z, Phi[:, 0, i])
         return Regressor(Phi, valid)
 
     def sensitivity(self, motion: ArmMotion) -> Array:
         """Derivatives (N, 3, p) of the regressor by q, dq and ddq.
 
-        The jump of sign(dq) counts as zero, and states of friction as constant.
+        The derivative of sign(dq) is taken as zero, and states z of friction as constant.
         """
         q, dq = motion.q[:, 0], motion.dq[:, 0]
         columns = []
@@ -82,7 +84,7 @@ class IndependentJoint:
         return np.stack(columns, axis=-1)
 
     def inertia(self, theta: Array, q: Array) -> Array:
-        """M (N, 1, 1), the same everywhere.  (6.5)"""
+        """M (N, 1, 1), the same at all positions.  (6.5)"""
         return np.full((len(q), 1, 1), inertia_of(self.terms, theta))
 
     def inertia_columns(self, q: Array) -> Array:
@@ -95,7 +97,7 @@ class IndependentJoint:
         return np.asarray(self.regressor(still).Phi @ theta)
 
     def joint_dynamics(self, theta: Array, motion: ArmMotion) -> tuple[JointDynamics]:
-        """Terms of the joint's own state as coefficients, and states of friction as known effort."""
+        """Terms of q, dq and ddq as inertia and coefficients; friction with a state z as known effort."""
         c = bias_coefficients(self.terms, theta)
         of_z = [theta_i * bool(term.scale) for theta_i, term in zip(theta, self.terms, strict=True)]
         known_effort = self.bias(np.array(of_z), motion)[:, 0] if any(of_z) else np.zeros(len(motion.q))
@@ -103,7 +105,7 @@ class IndependentJoint:
 
 
 def regressor(terms: Sequence[Term], q: Array, dq: Array, ddq: Array) -> Array:
-    """Phi (..., K, p) of terms without memory; q, dq and ddq (..., K) in the joint's units.  (6.9), (6.12), (6.14)"""
+    """Phi (..., K, p) of terms without z; q, dq and ddq (..., K) in the joint's units.  (6.9), (6.12), (6.14)"""
     Phi = np.zeros((len(terms), *q.shape))
     for phi, term in zip(Phi, terms, strict=True):
         add(term, q, dq, ddq, 0.0, phi)
@@ -111,7 +113,7 @@ def regressor(terms: Sequence[Term], q: Array, dq: Array, ddq: Array) -> Array:
 
 
 def add(term: Term, q: Array, dq: Array, ddq: Array, z: Array | float, phi: Array) -> None:
-    """Add a ddq + b(q, dq, z) of one term to `phi` (...); like `bias`, but of the functions that the term has only."""
+    """Add a ddq + b(q, dq, z) of one term to `phi` (...); unlike `bias`, only the term's functions are computed."""
     if term.a:
         phi += term.a * ddq
     for name, coefficient in term.b.items():
@@ -119,7 +121,7 @@ def add(term: Term, q: Array, dq: Array, ddq: Array, z: Array | float, phi: Arra
 
 
 def inertia_of(terms: Sequence[Term], theta: Array) -> float:
-    """The inertia M, the factor of the acceleration, which is constant for a joint that moves alone.  (6.5)"""
+    """The inertia M, the factor of ddq, which is constant for an independent joint.  (6.5)"""
     return float(sum(p * term.a for p, term in zip(theta, terms, strict=True)))
 
 

@@ -1,6 +1,6 @@
 """Compiled parts of a model: the bias and the deflection of one sample, and the deflection along a motion.
 
-Import this module only where a loop runs: compiling it, or reading it back from the cache on disk, takes a moment.
+Import this module inside the function that uses it: to compile it or to load it from the cache on disk takes time.
 """
 
 from typing import Any

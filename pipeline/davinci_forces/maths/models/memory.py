@@ -1,7 +1,7 @@
-"""Friction with a state z that follows from the measured motion, and regressors of long motions piece by piece.
+"""Friction with a state z that follows from the measured motion, and long motions in pieces.
 
-The regressors of all joints for a million samples would take gigabytes, so they are computed in pieces.  The deflection
-of presliding friction depends on the motion before, so it is computed along the whole motion first.
+A regressor of all joints for a million samples takes gigabytes, so it is computed in pieces.  The deflection of
+presliding friction depends on the earlier motion, so it is computed along the whole motion first.
 """
 
 from collections.abc import Iterator
@@ -15,14 +15,14 @@ from davinci_forces.maths.models.model import ArmMotion, Model
 from davinci_forces.maths.models.terms import Term
 from davinci_forces.maths.signals.smoothing import segments
 
-RUN_IN = 3.0  # displacements of travel after which the start of a deflection has decayed to exp(-2 RUN_IN)
-PIECE_SAMPLES = 1 << 15  # of a piece
+RUN_IN = 3.0  # travel, in displacements, after which the initial deflection has decayed to exp(-2 RUN_IN)
+PIECE_SAMPLES = 1 << 15  # samples of a piece
 
 
 def friction_state(motion: ArmMotion, joint: int, term: Term) -> tuple[Array, Booleans]:
-    """State z (N,) of a term of one joint, and where it is known (N,): a deflection, a smooth sign or Stribeck's peak.
+    """State z (N,) of a term of one joint, and at which samples it is known (N,).
 
-    A term without z has the state 0, known everywhere.
+    z is a deflection, a smooth sign or Stribeck's peak; a term without z has the state 0, known at all samples.
     """
     dq = motion.dq[:, joint]
     if term.displacement:
@@ -36,26 +36,26 @@ def friction_state(motion: ArmMotion, joint: int, term: Term) -> tuple[Array, Bo
 
 
 def deflection(motion: ArmMotion, joint: int, x_0: float) -> tuple[Array, Booleans]:
-    """Deflection z (N,) of one joint, and where it is known (N,); `x_0` is in the joint's units.
+    """Deflection z (N,) of one joint, and at which samples it is known (N,); `x_0` is in the joint's units.
 
-    It starts relaxed after each gap, and is known after a travel of `RUN_IN` displacements.  A period is run twice, so
-    that it starts where it ends.
+    The deflection is 0 after each gap, and it is known after a travel of `RUN_IN` displacements.  A period is computed
+    twice: the second time starts with the last deflection of the first.
     """
     dq = motion.dq[:, joint]
     z, valid = np.empty(len(dq)), np.empty(len(dq), np.bool_)
-    for part in segments(motion.segment):
-        v, z_0 = np.ascontiguousarray(dq[part]), 0.0
+    for samples in segments(motion.segment):
+        v, z_0 = np.ascontiguousarray(dq[samples]), 0.0
         if motion.periodic:
-            before = _run(v, motion.T_s, x_0, z_0)
-            z_0 = float(deflect(before[-1], v[-1], motion.T_s, x_0))
-        z[part] = _run(v, motion.T_s, x_0, z_0)
+            first = _run(v, motion.T_s, x_0, z_0)
+            z_0 = float(deflect(first[-1], v[-1], motion.T_s, x_0))
+        z[samples] = _run(v, motion.T_s, x_0, z_0)
         travel = np.cumsum(np.abs(v)) * motion.T_s
-        valid[part] = motion.periodic or travel >= RUN_IN * x_0
+        valid[samples] = motion.periodic or travel >= RUN_IN * x_0
     return z, valid
 
 
 def _run(dq: Array, T_s: float, x_0: float, z: float) -> Array:
-    """Deflection at each sample (N,), from z at the first."""
+    """Deflection at each sample (N,); z is the deflection at the first sample."""
     from davinci_forces.maths.models import kernels
 
     out = np.empty(len(dq))
@@ -64,11 +64,11 @@ def _run(dq: Array, T_s: float, x_0: float, z: float) -> Array:
 
 
 class Piece(NamedTuple):
-    """A part of a motion, with some samples before and after."""
+    """A part of a motion, with neighbouring samples before and after."""
 
-    motion: ArmMotion  # of the part and those samples
-    inside: slice  # where in that motion the part is
-    place: slice  # where in the whole motion the part is
+    motion: ArmMotion  # motion of the part and its neighbouring samples
+    inside: slice  # samples of the part in this motion
+    place: slice  # samples of the part in the whole motion
 
 
 def pieces(model: Model, motion: ArmMotion, beside: int = 0) -> Iterator[Piece]:
@@ -90,7 +90,7 @@ def select_samples(motion: ArmMotion, which: slice) -> ArmMotion:
 
 
 def efforts(model: Model, theta: Array, motion: ArmMotion, which: Integers | None = None) -> Array:
-    """Efforts Phi theta (N, m) of parameters (p,), or of several (G, p) with the number `which` (N,) at each sample."""
+    """Efforts Phi theta (N, m) for theta (p,), or for theta (G, p) with the row `which` (N,) at each sample."""
     tau = np.empty((len(motion.q), len(model.efforts)))
     for piece in pieces(model, motion):
         Phi = model.regressor(piece.motion).Phi

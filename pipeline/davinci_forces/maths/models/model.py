@@ -1,16 +1,17 @@
-"""What a model is: the dynamics of a joint or of the whole arm, linear in its parameters.
+"""The interface of a model: the dynamics of a joint or of the whole arm, linear in the parameters.
 
     tau = Phi(q, dq, ddq) theta,        tau = M(q) ddq + b(q, dq) + tau_ext                            (6.8), (7.8)
 
-Identification uses Phi, prediction Phi theta, and a filter, which tracks each joint by itself, `JointDynamics`.
+Identification uses Phi and prediction uses Phi theta.  A filter tracks each joint alone and uses `JointDynamics`.
 Shapes: N samples, n joints, m efforts, p parameters.
 
 Parameters are combinations of masses, inertias and friction, none of which is negative:
 
-    theta = A x,    J_l(x) >= 0 of every link,    x_i >= 0 where physics knows the sign
+    theta = A x,    J_l(x) >= 0 for every link l,    x_i >= 0 if physics determines the sign
 
-x are the inertial parameters of links, ten each, and all others of a model.  A link is possible if its pseudo-inertia
-J_l is positive semidefinite: then its mass density is nowhere negative, and the triangle inequalities hold.
+x are the ten inertial parameters of each link, then all other parameters of drives, cables and friction.  A link is
+physically possible if its pseudo-inertia J_l is positive semidefinite: its mass density is then nowhere negative, and
+the triangle inequalities hold.
 Traversaro, Brossette, Escande and Nori, Identification of fully physical consistent inertial parameters using
 optimization on manifolds, 2016.  Wensing, Kim and Slotine, 2018.  Of base parameters: Sousa and Cortesao, Physical
 feasibility of robot base inertial parameter identification: a linear matrix inequality approach, 2014.
@@ -26,20 +27,20 @@ from davinci_forces.maths.models.bias import Coefficients
 
 
 class Mechanism(NamedTuple):
-    """How p parameters depend on n numbers of links, drives, cables and friction."""
+    """The dependence theta = A x of p parameters on n numbers of links, drives, cables and friction."""
 
     matrix: Array  # A (p, n)
-    links: int  # L, of which the first 10 L of x are the inertial parameters, in the order of `bodies.PARAMETERS`
-    positive: Booleans  # (n,) the other numbers that are not negative
+    links: int  # L; the first 10 L of x are inertial parameters, in the order of `bodies.PARAMETERS`
+    positive: Booleans  # (n,) numbers of x, other than inertial parameters, that are not negative
 
     @property
     def has_bodies(self) -> bool:
-        """Whether links constrain the parameters, besides signs."""
+        """Whether links constrain the parameters, in addition to signs."""
         return self.links > 0
 
 
 def of_signs(positive: Booleans) -> Mechanism:
-    """A mechanism without links: parameters of their own, some of which (p,) are not negative."""
+    """A mechanism without links, theta = x; the parameters `positive` (p,) are not negative."""
     return Mechanism(np.eye(len(positive)), 0, positive)
 
 
@@ -47,10 +48,10 @@ class Parameter(NamedTuple):
     """One parameter of a model."""
 
     name: str
-    typst: str  # its column, in Typst's maths
+    typst: str  # its column of Phi, in Typst's maths
     unit: str
-    positive: bool  # whether physics knows its sign
-    scale: float = 0.0  # the displacement or velocity that its column depends on, in the joint's units; 0 for none
+    positive: bool  # whether physics excludes negative values
+    scale: float = 0.0  # displacement or velocity in its column, in the joint's units; 0 for none
 
 
 class ArmMotion(NamedTuple):
@@ -62,11 +63,11 @@ class ArmMotion(NamedTuple):
     T_s: float  # [s]
     segment: Integers  # (N,) a new number after each gap
     periodic: bool = False  # whether each segment is one period, which repeats
-    memory: Mapping[tuple[int, float], tuple[Array, Booleans]] = {}  # deflections computed before: `friction_state`
+    memory: Mapping[tuple[int, float], tuple[Array, Booleans]] = {}  # deflections already computed: `friction_state`
 
 
 class Regressor(NamedTuple):
-    """Phi of a motion, and the samples at which it is known: memory starts unknown after each gap."""
+    """Phi of a motion, and the samples at which it is known: after a gap, presliding friction is unknown at first."""
 
     Phi: Array  # (N, m, p)
     known: Booleans  # (N,)
@@ -76,8 +77,8 @@ class JointDynamics(NamedTuple):
     """Dynamics of one joint along a motion, for a filter: inertia ddq + b(c; q, dq) + known + tau_ext = tau."""
 
     inertia: Array  # (N,)
-    coefficients: Coefficients  # c, of what depends on the joint's own state
-    known: Array  # (N,) effort that the measured motion determines: of other joints, of friction's memory
+    coefficients: Coefficients  # c, of the bias as a function of the joint's q and dq
+    known: Array  # (N,) effort known from the measured motion: coupling to other joints, presliding friction
 
 
 class Model(Protocol):
@@ -85,12 +86,12 @@ class Model(Protocol):
 
     @property
     def name(self) -> str:
-        """Its structure, as keys and the setting `fit` name it: "independent"."""
+        """Its structure and friction, as in keys and in the setting `fit`, such as "independent"."""
         ...
 
     @property
     def group(self) -> str:
-        """Its subject: a joint by name, or "arm"."""
+        """The name of the joint that it models, or "arm"."""
         ...
 
     @property
@@ -100,7 +101,7 @@ class Model(Protocol):
 
     @property
     def efforts(self) -> tuple[str, ...]:
-        """The joints whose effort it gives, in the order of the axis m: its joints, or some of them."""
+        """The joints whose effort it predicts, in the order of the axis m: all its joints, or some."""
         ...
 
     @property
@@ -110,12 +111,12 @@ class Model(Protocol):
 
     @property
     def displacements(self) -> Collection[tuple[int, float]]:
-        """Joint and displacement of every deflection in the model."""
+        """The index of the joint and the displacement, for every deflection in the model."""
         ...
 
     @property
     def mechanism(self) -> Mechanism:
-        """The physical numbers behind its parameters, and their constraints."""
+        """The dependence of its parameters on physical numbers, and their constraints."""
         ...
 
     def regressor(self, motion: ArmMotion) -> Regressor:
@@ -123,7 +124,7 @@ class Model(Protocol):
         ...
 
     def inertia(self, theta: Array, q: Array) -> Array:
-        """M (N, m, m) at q (N, n), of the joints whose effort it gives.  (6.5)"""
+        """M (N, m, m) at q (N, n), of the joints in `efforts`.  (6.5)"""
         ...
 
     def bias(self, theta: Array, motion: ArmMotion) -> Array:
@@ -131,5 +132,5 @@ class Model(Protocol):
         ...
 
     def joint_dynamics(self, theta: Array, motion: ArmMotion) -> tuple[JointDynamics, ...]:
-        """Dynamics for a filter of each joint whose effort it gives.  (7.15), (7.16)"""
+        """The dynamics of each joint in `efforts`, for a filter.  (7.15), (7.16)"""
         ...

@@ -1,9 +1,9 @@
-"""The physical parameters behind those of a joint's model: masses, their centres, moments of inertia, the motor.
+"""The physical parameters behind a joint model: masses, centres of mass, moments of inertia, rotor and friction.
 
     theta = C m(x),    m(x) monomials such as m_3, m_3 l_c3, m_3 l_c3^2             (6.7), (6.10), (6.13)
 
-A joint's few parameters do not determine the many physical ones, which a search in a box varies.  C is derived from the
-chain, in which only this joint moves.
+A joint model has fewer parameters than x, so they do not determine x; a search varies x within bounds.  C is derived
+from the chain, in which only this joint moves.
 """
 
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ from davinci_forces.maths.mechanics.rigid_body import gravity, mass_matrix
 from davinci_forces.maths.models import terms
 
 POSES = np.linspace(-0.6, 0.6, 7)  # [rad] or [m]: three poses determine the coefficients, the others confirm them
-AGREEMENT = 1e-9  # relative deviation from the form of the model
-ROUNDING = 1e-12  # below which a parameter does not enter
+AGREEMENT = 1e-9  # largest relative deviation of the chain's M and G from the joint model
+ROUNDING = 1e-12  # a coefficient of C of at most this size is 0
 
 
 class Quality(Enum):
@@ -37,41 +37,41 @@ class Quality(Enum):
 
 
 class Physical(NamedTuple):
-    """One physical parameter, its guess, and the bounds of its search."""
+    """One physical parameter, its initial guess, and its bounds in the search."""
 
     name: str
     quality: Quality
     guess: float
     lower: float
     upper: float
-    link: str = ""  # that it belongs to, unless it is the motor's
-    axis: int = 0  # of the link's frame in the table of the chain, of a moment or a centre, which lies on its far side
+    link: str = ""  # link of the parameter; "" for rotor and friction
+    axis: int = 0  # axis of the link's frame, for a moment or a centre; a centre lies on its negative side
 
 
 @dataclass(frozen=True, eq=False)
 class PhysicalTable:
-    """The physical parameters of one joint, and the chain that determines how they enter."""
+    """The physical parameters of one joint, and the chain that determines C."""
 
     chain: Chain
-    joint: int  # counted from 0
-    coordinates: int  # of the chain, n
+    joint: int  # index, from 0
+    coordinates: int  # number n of coordinates of the chain
     parameters: tuple[Physical, ...]
 
 
 class Lumping(NamedTuple):
     """The p parameters as functions of n physical ones: theta = C m(x)."""
 
-    factors: Integers  # (T, 3): the parameters whose product a monomial is; n stands for 1
+    factors: Integers  # (T, 3): indices of the parameters that each monomial multiplies; the index n stands for 1
     coefficients: Array  # C (p, T)
 
     def theta(self, x: Array) -> Array:
-        """The parameters (..., p) of physical ones (..., n)."""
+        """The model parameters (..., p) for physical parameters (..., n)."""
         extended = np.concatenate([x, np.ones((*x.shape[:-1], 1))], axis=-1)
         return np.asarray(extended[..., self.factors].prod(axis=-1) @ self.coefficients.T)
 
 
 class Box(NamedTuple):
-    """A search space: n parameters between bounds, which determine the p of the model."""
+    """A search space: bounds of n parameters, and the p model parameters as functions of them."""
 
     lower: Array  # (n,)
     upper: Array  # (n,)
@@ -79,23 +79,23 @@ class Box(NamedTuple):
 
 
 def each_for_itself(n: int) -> Lumping:
-    """The lumping of parameters that are searched themselves: theta = x."""
+    """The lumping theta = x, for a search of the model parameters themselves."""
     return Lumping(np.column_stack([np.arange(n), np.full((n, 2), n)]), np.eye(n))
 
 
 def reduced_parameters(
     chain: Chain, bodies: Bodies, joint: int, n: int = 3, drives: Drives | None = None
 ) -> dict[str, float]:
-    """Parameters of a joint's terms, by the names of `maths.terms`, with the other joints held at 0.
+    """Parameters of a joint's terms, by name, with the other joints held at 0.
 
-    `joint` counts from 0; the arm has n coordinates, which decides whether the second jaw counts.  Revolute: inertia,
-    gravity sine and cosine; prismatic: lifted mass, and the inertia beyond it, which only drives have.  With drives,
-    viscous and Coulomb friction too.
+    `joint` is an index from 0.  The arm has n coordinates; the second jaw is included for n = 7.  A revolute joint has
+    inertia, gravity sine and cosine.  A prismatic joint has a lifted mass and the inertia of its rotor.  With drives,
+    there is also viscous and Coulomb friction.
 
     Raises
     ------
     ValueError
-        If the joint's inertia or gravity is not of this form.
+        If the inertia or gravity of the chain does not follow these terms.
     """
     q = np.zeros((len(POSES), n))
     q[:, joint] = POSES
@@ -121,7 +121,7 @@ def reduced_parameters(
 def physical_lumping(table: PhysicalTable, gear_ratio: float, names: tuple[str, ...]) -> Lumping | None:
     """Derive from the chain how a joint's physical parameters determine those of its model.
 
-    None if they do not determine exactly the parameters `names`.  Cached, since every task needs it again.
+    None if the lumping has other parameters than `names`.  The result is cached because every task needs it.
     """
     unit, place = len(table.parameters), {(x.quality, x.link): i for i, x in enumerate(table.parameters)}
     monomials = list[tuple[tuple[int, int, int], dict[str, float]]]()
@@ -141,8 +141,8 @@ def physical_lumping(table: PhysicalTable, gear_ratio: float, names: tuple[str, 
                 monomials.append(((i, unit, unit), {terms.inertia.name: gear_ratio**2}))
             case Quality.VISCOUS | Quality.COULOMB:
                 monomials.append(((i, unit, unit), {x.quality.value: 1.0}))
-    entering = {name for _, part in monomials for name, value in part.items() if abs(value) > ROUNDING}
-    if entering != set(names):
+    determined = {name for _, part in monomials for name, value in part.items() if abs(value) > ROUNDING}
+    if determined != set(names):
         return None
     coefficients = np.array([[part.get(name, 0.0) for _, part in monomials] for name in names])
     return Lumping(np.array([factors for factors, _ in monomials]), coefficients)
@@ -151,7 +151,7 @@ def physical_lumping(table: PhysicalTable, gear_ratio: float, names: tuple[str, 
 def of_link(
     table: PhysicalTable, link: str, mass: float = 0.0, centre: float = 0.0, moment: float = 0.0, axis: int = 0
 ) -> dict[str, float]:
-    """Parameters of a joint that carries a single link."""
+    """Parameters of the joint if only this link has mass or inertia."""
     chain = table.chain
     L, which = len(chain.links), chain.links.index(link)
     masses, centres, inertias = np.zeros(L), np.zeros((L, 3)), np.zeros((L, 3, 3))

@@ -4,8 +4,8 @@ A joint model is linear in its parameters (6.8), and each of its terms is linear
 
     tau = sum_i theta_i phi_i,        phi_i = a_i ddq + b_i(q, dq)
 
-So one tuple of terms gives the regressor for identification, and the inertia, the bias and its derivatives for the
-filter.  b_i is a combination of the functions of `bias`.
+One tuple of terms therefore gives the regressor for identification, and inertia, bias and its derivatives for the
+filter.  b_i is a linear combination of the functions `COEFFICIENTS` of `bias`.
 """
 
 from collections.abc import Mapping
@@ -19,10 +19,10 @@ from davinci_forces.maths.models.bias import COEFFICIENTS, Coefficients
 class Term:
     """One column of the regressor: phi = a ddq + sum of b[f] f(q, dq) over functions f of `COEFFICIENTS`.
 
-    `unit` is that of the parameter; the joint fills in {inertia}, {mass_moment}, {effort} and {position}.  `typst` is
-    phi in Typst's maths, for equations.  By physics, a `positive` parameter is not negative.  A term of z states
-    one value of it, in the joint's units (`friction_state`): the `displacement` of a deflection, the `width` of a
-    smooth sign [velocity], or Stribeck's `decay_velocity`.
+    `unit` is the parameter's unit: the joint fills {inertia}, {mass_moment}, {effort} and {position}.  `typst` is phi
+    in Typst's maths.  By physics, a `positive` parameter is not negative.  A term of z has one scale, in the joint's
+    units (`friction_state`).  It is the `displacement` of a deflection, the `width` of a smooth sign [velocity], or the
+    `decay_velocity` of Stribeck's peak.
     """
 
     name: str
@@ -65,7 +65,7 @@ stiffness = Term("stiffness", "q", "{effort}/{position}", b={"q": 1.0})
 
 
 def presliding_friction(displacement: float, number: int = 1) -> Term:
-    """Friction of bristles that reverse within a displacement, in the joint's units; several are numbered from 1."""
+    """Presliding friction, which reverses within a displacement in the joint's units; several terms count from 1."""
     return Term(f"presliding friction {number}", f"z_{number}", "{effort}", b={"z": 1.0}, displacement=displacement)
 
 

@@ -1,1 +1,1 @@
-"""The arm in closed loop: controllers, drives, friction, and what it touches."""
+"""The arm in closed loop: controllers, drives, friction and surroundings."""

@@ -1,6 +1,6 @@
-"""What moves an arm, as numbers: motors, the controllers before them, and the device that a hand holds.
+"""Parameters of motors, of their controllers, and of the haptic device.
 
-No loop runs here, so that whoever reads these from a file need not load a compiler.
+This module imports no compiled code, so that files with these parameters are read without loading a compiler.
 """
 
 from typing import NamedTuple
@@ -17,13 +17,13 @@ class Motors(NamedTuple):
     inductance: Array  # L [H]
     current_limit: Array  # [A]
     voltage_limit: Array  # [V]
-    encoder_step: Array  # [rad] of the motor; 0 for an encoder without steps
+    encoder_step: Array  # [rad] at the motor; 0 for a continuous encoder
 
 
 class Cascade(NamedTuple):
     """Position, velocity and current PI loops of n joints, in the motors' units.  Fig 2.5
 
-    The position loop runs at the controller's rate, the two others in the motor driver.
+    The position loop runs in the controller, the velocity and current loops in the motor driver.
     """
 
     position_p: Array  # [1/s]
@@ -32,19 +32,19 @@ class Cascade(NamedTuple):
     velocity_i: Array  # [A/rad]
     current_p: Array  # [V/A]
     current_i: Array  # [V/(A s)]
-    velocity_filter: Array  # [s] time constant of the driver's velocity, the low-passed difference of angles
+    velocity_filter: Array  # [s] time constant of the low-pass filter of the driver's velocity, a difference of angles
 
 
 class Loops(NamedTuple):
-    """What the cascade remembers of n joints, in the motors' units; every array is (n,)."""
+    """The state of the cascades of n joints, in the motors' units; every array is (n,)."""
 
-    position_i: Array  # the integrals
+    position_i: Array  # integral of each loop
     velocity_i: Array
     current_i: Array
-    last: Array  # velocity asked for in the last turn of the controller, and in this one
+    last: Array  # reference velocity of the previous period of the controller, then of the current period
     wanted: Array
-    angle: Array  # that the driver saw last
-    speed: Array  # that it makes of the angles
+    angle: Array  # last angle that the driver measured
+    speed: Array  # velocity that the driver computes from the angles
     current: Array
 
 
@@ -54,13 +54,13 @@ class Regulator(NamedTuple):
     proportional: Array  # K_p
     derivative: Array  # K_d
     integral: Array  # K_i; 0 for PD
-    gravity: float  # how much of the gravity is compensated: 0.9 of the masses, 1, or 0
+    gravity: float  # share of gravity that is compensated: 0 to 1; 0.9 where the compensator has 0.9 of the masses
 
 
 class Device(NamedTuple):
-    """What lies between hand and arm."""
+    """The haptic device between hand and arm."""
 
-    motion: float  # of the arm over that of the hand
-    force: float  # felt over estimated
-    strongest: float  # [N] that it can make
-    step: float  # [m] of its position; 0 for none
+    motion: float  # motion of the arm over motion of the hand
+    force: float  # felt force over estimated force
+    strongest: float  # [N] largest force of the device
+    step: float  # [m] resolution of its position sensor; 0 for a continuous one

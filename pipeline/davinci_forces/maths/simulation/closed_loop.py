@@ -1,8 +1,8 @@
-"""A robot in closed loop, as the laboratory runs it: motors, drivers, controller, friction, stops, and what it touches.
+"""A robot in closed loop: motors, motor drivers, controller, friction, end stops and surroundings.
 
-Time is counted in ticks of the motor drivers.  At every n-th tick the controller reads the encoders and sets the
-drivers' commands, and at every m-th the recorder takes a sample.  Between ticks the arm moves by one implicit step of
-its rigid body, whose inertia, bias and tip are compiled for one configuration.
+Time advances in ticks of the motor drivers.  At every n-th tick the controller reads the encoders and sets the drivers'
+commands, and a sample is recorded.  Between ticks the rigid body moves by one implicit step; the functions of its
+inertia, bias and tip are compiled.
 """
 
 from collections.abc import Callable
@@ -24,9 +24,9 @@ from davinci_forces.maths.simulation.surroundings import Surroundings, on_tip, w
 
 
 class Plant(NamedTuple):
-    """The rigid body that moves: two compiled functions, and their data.
+    """The rigid body: two compiled functions and their data.
 
-    `dynamics(data, q, dq, M, b)` fills the inertia (n, n), with the motors', and the bias (n,), Coriolis and gravity.
+    `dynamics(data, q, dq, M, b)` fills the inertia (n, n), motors included, and the bias (n,) of Coriolis and gravity.
     `tip(data, q, J)` fills the Jacobian (3, n) of the tip and returns its position (3,), both in the base frame.
     """
 
@@ -36,23 +36,23 @@ class Plant(NamedTuple):
 
 
 class JointConstraints(NamedTuple):
-    """What is around the rigid body."""
+    """Friction, end stops and locks of n joints."""
 
     friction: Friction
-    lower: Array  # hard stops (n,)
+    lower: Array  # end stops (n,)
     upper: Array
     moving: NDArray[np.bool_]  # (n,); the other joints stay at rest
 
 
 class Timing(NamedTuple):
-    """The clocks."""
+    """The clocks of drivers and controller."""
 
-    tick: float  # [s] of the motor drivers
-    ticks: int  # for one turn of the controller
+    tick: float  # [s] period of the motor drivers
+    ticks: int  # ticks in one period of the controller
 
 
 class Simulated(NamedTuple):
-    """What truly happened, at the controller's instants; every array is (K, n), but `force` (K, 3) [N]."""
+    """The true motion and efforts at the controller's instants; arrays are (K, n), except `force` (K, 3) [N]."""
 
     q: Array
     dq: Array
@@ -67,7 +67,7 @@ def simulate(
 ) -> Simulated:  # fmt: skip
     """Run the closed loop from rest at q (n,).
 
-    `reference` (K, n) holds the positions asked for at the controller's K instants.
+    `reference` (K, n) are the reference positions at the controller's K instants.
     """
     K, n = reference.shape
     out = Simulated(np.zeros((K, n)), np.zeros((K, n)), np.zeros((K, n)), np.zeros((K, n)), np.zeros((K, 3)))
@@ -82,7 +82,7 @@ def _cascade(
     dynamics: Any, tip: Any, data: Any, body: Any, motors: Any, law: Any, timing: Any, reference: Any, around: Any,
     state: Any, out: Any,
 ) -> None:  # fmt: skip
-    """The three cascaded PI loops.  Fig 2.5"""
+    """Simulate three cascaded PI loops for each joint.  Fig 2.5"""
     n, h = len(state.q), timing.tick
     loops = Loops(
         np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
@@ -103,19 +103,19 @@ def _regulator(
     dynamics: Any, tip: Any, data: Any, body: Any, motors: Any, law: Any, timing: Any, reference: Any, around: Any,
     state: Any, out: Any,
 ) -> None:  # fmt: skip
-    """PID with gravity compensation at the controller's rate; the motors give what is asked up to their current."""
-    n, turn = len(state.q), timing.tick * timing.ticks
-    M, G, still, integral, tau = np.zeros((n, n)), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
+    """Simulate PID with gravity compensation; the motors give the commanded effort up to their current limit."""
+    n, period = len(state.q), timing.tick * timing.ticks
+    M, G, zero, integral, tau = np.zeros((n, n)), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
     angle, before = np.zeros(n), np.zeros(n)
     read(motors, state.q, before)
     for k in range(len(reference)):
         read(motors, state.q, angle)
-        dynamics(data, angle / motors.gear_ratio, still, M, G)
+        dynamics(data, angle / motors.gear_ratio, zero, M, G)
         for j in range(n):
             error = reference[k, j] - angle[j] / motors.gear_ratio[j]
-            damping = law.derivative[j] * (angle[j] - before[j]) / (turn * motors.gear_ratio[j])
+            damping = law.derivative[j] * (angle[j] - before[j]) / (period * motors.gear_ratio[j])
             limit = motors.gear_ratio[j] * motors.torque_constant[j] * motors.current_limit[j]
-            output, integral[j] = pi(error, law.proportional[j], law.integral[j], integral[j], turn, limit)
+            output, integral[j] = pi(error, law.proportional[j], law.integral[j], integral[j], period, limit)
             tau[j], before[j] = min(max(output + (law.gravity * G[j] - damping), -limit), limit), angle[j]
         for tick in range(timing.ticks):
             _tick(dynamics, tip, data, body, around, state, tau, timing.tick, k, tick, timing.ticks, out)
@@ -126,7 +126,7 @@ def _tick(
     dynamics: Any, tip: Any, data: Any, body: Any, around: Any, state: Any, tau: Any, h: float, k: int, tick: int,
     ticks: int, out: Any,
 ) -> None:  # fmt: skip
-    """Move for one tick under constant motor efforts tau (n,), and record at the controller's instants."""
+    """Move for one tick with constant motor efforts tau (n,), and record at the controller's instants."""
     n, now = len(state.q), k * ticks + tick
     M, b, J, free = np.empty((n, n)), np.empty(n), np.zeros((3, n)), np.empty(n)
     q, dq, start = np.empty(n), np.empty(n), np.empty(n)
@@ -150,7 +150,7 @@ def _tick(
     if tick == 0:
         _record(state, tau, external, force, k, out)
     step(M, b, free, body.friction, body.lower, body.upper, state, body.moving, h)
-    if tick == 0 and around.mass > 0:  # what the mass's acceleration adds
+    if tick == 0 and around.mass > 0:  # add the effort and force of the mass's acceleration
         for i in range(n):
             dq[i] = (state.dq[i] - start[i]) / h
         _through(J, dq, velocity)
@@ -162,7 +162,7 @@ def _tick(
 
 @compile_function
 def _through(J: Any, dq: Any, velocity: Any) -> None:
-    """J dq (3,)."""
+    """Fill the velocity J dq (3,)."""
     for c in range(3):
         velocity[c] = 0.0
         for i in range(len(dq)):
@@ -178,17 +178,17 @@ def _record(state: Any, tau: Any, external: Any, force: Any, k: int, out: Any) -
 
 
 class PlantData(NamedTuple):
-    """The data of the plant's two functions: the arm, its rotors, and what its tip is fixed to."""
+    """The data of the plant's two functions: the arm, its rotors and its tip."""
 
     tree: Tree
-    rest: Array  # no acceleration (n,)
+    rest: Array  # zero acceleration (n,)
     rotors: Array  # eta^2 J_m (n,)
-    body: int  # that carries the tip
+    body: int  # body to which the tip is fixed
     tip: tuple[float, float, float]  # in that body's frame [m]
 
 
 def arm(chain: Chain, bodies: Bodies, rotors: Array) -> Plant:
-    """The arm with as many joints as there are `rotors` (n,), eta^2 J_m; later coordinates stay at rest at 0."""
+    """The plant of an arm with n joints and their `rotors` (n,), eta^2 J_m; later coordinates stay at rest at 0."""
     n = len(rotors)
     chain, parameters = fold_fixed_links(chain.with_coordinates(n), bodies.parameters(n).reshape(-1, 10))
     frame = chain.names.index(chain.tip)
@@ -201,7 +201,7 @@ def arm(chain: Chain, bodies: Bodies, rotors: Array) -> Plant:
 
 @compile_function
 def dynamics(body: Any, q: Any, dq: Any, M: Any, b: Any) -> None:
-    """Fill M, with the rotors', and b = C dq + G.  (A.12)"""
+    """Fill M, rotors included, and b = C dq + G.  (A.12)"""
     mass_and_bias(body.tree, GRAVITY, q, dq, body.rest, M, b)
     for i in range(len(q)):
         M[i, i] += body.rotors[i]
@@ -209,5 +209,5 @@ def dynamics(body: Any, q: Any, dq: Any, M: Any, b: Any) -> None:
 
 @compile_function
 def _tip(body: Any, q: Any, J: Any) -> Any:
-    """Fill the Jacobian (3, n) of the tip, and give its position (3,).  (7.23)"""
+    """Fill the Jacobian (3, n) of the tip, and return its position (3,).  (7.23)"""
     return np.array(place_and_jacobian(body.tree, body.body, body.tip, q, J))

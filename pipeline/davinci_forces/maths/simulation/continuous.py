@@ -1,6 +1,6 @@
-"""The studies of chapter 5: continuous controllers, viscous friction only, an implicit adaptive solver.
+"""The control studies of chapter 5: continuous controllers and viscous friction, with an implicit adaptive solver.
 
-The wrist's inertias are so small for its gains that an explicit solver would need steps of microseconds.
+The solver is implicit because the wrist has small inertias and high gains: explicit steps would take microseconds.
 """
 
 from typing import Any, NamedTuple
@@ -19,7 +19,7 @@ RELATIVE, ABSOLUTE = 1e-9, 1e-11
 
 
 class Regulated(NamedTuple):
-    """A run towards a fixed reference; the arrays are (K, n), but `t` (K,) [s] and `V` (K,) [J]."""
+    """A run towards a fixed reference; arrays are (K, n), except `t` (K,) [s] and `V` (K,) [J]."""
 
     t: Array
     q: Array
@@ -33,8 +33,8 @@ def regulate(
 ) -> Regulated:
     """Drive the arm from rest at q (n,) to `target` (n,) under PD or PID with gravity compensation.
 
-    `plant` and `model` are plants of an `arm`, `model` that of the compensator; `viscous` (n,) is the friction.  The
-    samples are the solver's own steps, so that V is computed there and not interpolated.  (5.8), (5.9), (5.17)
+    `plant` is the arm, and `model` is the arm that the gravity compensation assumes, both made by `arm`.  `viscous`
+    (n,) is the friction.  The samples are the solver's steps, so that V is not interpolated.  (5.8), (5.9), (5.17)
     """
     n = len(q)
     M, tau, b = np.empty((n, n)), np.empty(n), np.empty(n)
@@ -59,10 +59,10 @@ def regulate(
 
 @compile_and_store
 def _forces(body: Any, model: Any, law: Any, target: Any, state: Any, M: Any, tau: Any, b: Any) -> None:
-    """Fill inertia, the controller's effort and bias at a state, (3 n,): position, velocity, integral of the error."""
+    """Fill inertia M, controller effort tau and bias b at a state (3 n,): position, velocity, integral of the error."""
     n = len(target)
     q, dq = state[:n], state[n : 2 * n]
-    arms.dynamics(model, q, model.rest, M, b)  # b is the known arm's gravity
+    arms.dynamics(model, q, model.rest, M, b)  # b is now the gravity that the compensation assumes
     error = target - q
     tau[:] = law.proportional * error - law.derivative * dq + law.gravity * b + law.integral * state[2 * n :]  # (5.17)
     arms.dynamics(body, q, dq, M, b)
@@ -72,7 +72,7 @@ def _forces(body: Any, model: Any, law: Any, target: Any, state: Any, M: Any, ta
 def _slope(
     body: Any, model: Any, law: Any, target: Any, viscous: Any, state: Any, M: Any, tau: Any, b: Any, rate: Any
 ) -> None:
-    """Fill the derivative of a state.  (4.28)"""
+    """Fill the time derivative of a state.  (4.28)"""
     n = len(target)
     _forces(body, model, law, target, state, M, tau, b)
     dq = state[n : 2 * n]

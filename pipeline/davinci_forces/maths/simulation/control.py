@@ -1,6 +1,6 @@
 """Controllers: PD with gravity compensation and PID of chapter 5, and the laboratory's three cascaded PI loops.
 
-All of them are discrete, with n joints side by side.
+The PI loops run in discrete time, for n joints.
 """
 
 from typing import Any
@@ -14,7 +14,7 @@ from davinci_forces.maths.simulation.actuators import Motors
 
 @compile_function
 def pi(error: float, p: float, i: float, integral: float, h: float, limit: float) -> tuple[float, float]:
-    """Advance a PI loop by a step: its output, clipped at the limit, and its integral, which stops growing there."""
+    """Advance a PI loop by h [s]: its output, clipped at the limit, and its integral, which stops growing there."""
     output = p * error + integral + i * h * error
     if output > limit:
         return limit, min(integral, max(limit - p * error, 0.0))
@@ -25,34 +25,34 @@ def pi(error: float, p: float, i: float, integral: float, h: float, limit: float
 
 @compile_function
 def current_after(motors: Motors, j: int, current: float, voltage: float, speed: float, h: float) -> float:
-    """The current after h [s] of a constant voltage at a constant motor speed [rad/s]: (A.5), solved exactly."""
+    """The motor current after h [s] of constant voltage and motor speed [rad/s]: the exact solution of (A.5)."""
     decay = np.exp(-h * motors.resistance[j] / motors.inductance[j])
     final = (voltage - motors.torque_constant[j] * speed) / motors.resistance[j]
     return float(final + (current - final) * decay)
 
 
 @compile_function
-def follow(motors: Any, law: Any, loops: Any, reference: Any, angle: Any, turn: float) -> None:
-    """Advance the position loop: the velocity reference of the drivers, once every turn [s] of the controller."""
+def follow(motors: Any, law: Any, loops: Any, reference: Any, angle: Any, period: float) -> None:
+    """Advance the position loop, which sets the drivers' reference velocity, by a `period` [s] of the controller."""
     for j in range(len(angle)):
         error, loops.last[j] = motors.gear_ratio[j] * reference[j] - angle[j], loops.wanted[j]
         loops.wanted[j], loops.position_i[j] = pi(
-            error, law.position_p[j], law.position_i[j], loops.position_i[j], turn, np.inf
+            error, law.position_p[j], law.position_i[j], loops.position_i[j], period, np.inf
         )
 
 
 @compile_function
-def drive(motors: Any, law: Any, loops: Any, angle: Any, dq: Any, part: float, h: float, tau: Any) -> None:
+def drive(motors: Any, law: Any, loops: Any, angle: Any, dq: Any, share: float, h: float, tau: Any) -> None:
     """Advance the velocity and current loops by one tick of h [s], and fill the efforts at the joints tau (n,).
 
-    The drivers ramp to a new velocity over one turn of the controller, of which `part` is over.  Steps would disturb
-    the current at the moment of recording, like inertia.
+    The drivers ramp to a new reference velocity over one period of the controller; `share` of the period is over.  A
+    step in place of the ramp would disturb the current whenever it is recorded.
     """
     for j in range(len(angle)):
         gain = h / (law.velocity_filter[j] + h)
         loops.speed[j] += gain * ((angle[j] - loops.angle[j]) / h - loops.speed[j])
         loops.angle[j] = angle[j]
-        error = loops.last[j] + (loops.wanted[j] - loops.last[j]) * part - loops.speed[j]
+        error = loops.last[j] + (loops.wanted[j] - loops.last[j]) * share - loops.speed[j]
         wanted_current, loops.velocity_i[j] = pi(
             error, law.velocity_p[j], law.velocity_i[j], loops.velocity_i[j], h, motors.current_limit[j]
         )
@@ -60,14 +60,14 @@ def drive(motors: Any, law: Any, loops: Any, angle: Any, dq: Any, part: float, h
         voltage, loops.current_i[j] = pi(
             error, law.current_p[j], law.current_i[j], loops.current_i[j], h, motors.voltage_limit[j]
         )
-        turning = motors.gear_ratio[j] * dq[j]
-        loops.current[j] = current_after(motors, j, loops.current[j], voltage, turning, h)
+        motor_speed = motors.gear_ratio[j] * dq[j]
+        loops.current[j] = current_after(motors, j, loops.current[j], voltage, motor_speed, h)
         tau[j] = motors.gear_ratio[j] * motors.torque_constant[j] * loops.current[j]
 
 
 @compile_function
 def read(motors: Any, q: Any, angle: Any) -> None:
-    """Fill the motors' angles (n,) [rad] as the encoders give them.  (6.28)"""
+    """Fill the motors' angles (n,) [rad] as the encoders measure them.  (6.28)"""
     for j in range(len(q)):
         angle[j] = motors.gear_ratio[j] * q[j]
         if motors.encoder_step[j] > 0:

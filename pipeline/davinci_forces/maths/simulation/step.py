@@ -1,22 +1,22 @@
-"""One step of a robot with friction and hard stops: implicit in stiff terms, with exact sticking.
+"""One time step of a robot with friction and end stops: implicit in stiff terms, with exact sticking.
 
     M(q) ddq + b(q, dq) + v dq + friction + tau_ext = tau                                          (4.40), (A.16)
 
-The step is the midpoint rule, implicit in friction, with the bias at the predicted middle of the step.  This is Moreau
-and Jean's scheme for systems with dry friction, of second order where nothing sticks.  Bristles are evaluated at the
-end of the step so that they may be stiff, and are of first order (`bristle`).  The velocity at its end minimises
+The step is the midpoint rule, implicit in friction, with the bias at the predicted middle of the step.  This is the
+scheme of Moreau and Jean for dry friction; its order is two if no joint sticks.  Bristles are evaluated at the end of
+the step, so that they may be stiff, and have order one (`bristle`).  The velocity at the end of the step minimises
 
     dq^T A dq / 2 - r^T dq + h sum_i g_i |dq_i|
 
-which is strictly convex, so a joint that friction holds has a velocity of exactly zero.  Jean, Computer Methods in
+which is strictly convex, so that a sticking joint has a velocity of exactly zero.  Jean, Computer Methods in
 Applied Mechanics and Engineering 177 (1999) 235-257.
 
-Friction is viscous, Coulomb that differs by direction, Stribeck's rise near rest, and presliding:
+Friction has viscous and Coulomb parts, a Stribeck peak near rest, and presliding; levels depend on the direction:
 
     f = g(dq) sign(dq) + v dq,        g(dq) = c + (s - c) exp(-(dq / w)^2)
 
-with c the Coulomb and s the static level of the direction of motion, and w the Stribeck velocity.  A joint with
-bristles does not stick: it deflects elastically before it slides (LuGre), which makes friction lag.
+c and s are the Coulomb and static level in the direction of motion, and w is the Stribeck velocity.  A joint with
+bristles does not stick: it deflects elastically before it slides (LuGre), so that friction lags behind the motion.
 Section 6.7; Canudas de Wit, Olsson, Astrom and Lischinsky, IEEE Trans. Automatic Control 40 (1995) 419-425.
 """
 
@@ -28,7 +28,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.compiled import compile_function
 
 MAX_SWEEPS = 100
-SWEEP_TOLERANCE = 1e-13  # relative change of a sweep
+SWEEP_TOLERANCE = 1e-13  # relative change of the velocities in a sweep, at which the sweeps end
 
 
 class Friction(NamedTuple):
@@ -40,13 +40,13 @@ class Friction(NamedTuple):
     static_up: Array  # s for dq > 0
     static_down: Array  # s for dq < 0
     stribeck_velocity: Array  # w
-    bristle_stiffness: Array  # sigma_0; 0 for none: the joint sticks at rest
+    bristle_stiffness: Array  # sigma_0; 0 for no bristles: the joint sticks at rest
     bristle_damping: Array  # sigma_1
 
 
 @compile_function
 def level(friction: Friction, i: int, v: float) -> float:
-    """Friction, without its viscous part, of joint i when it slides at v, or starts to move in that direction."""
+    """The friction level g of joint i at velocity v, without viscous friction; at v = 0, of the positive direction."""
     up = v >= 0.0
     c = friction.coulomb_up[i] if up else friction.coulomb_down[i]
     s = friction.static_up[i] if up else friction.static_down[i]
@@ -55,12 +55,12 @@ def level(friction: Friction, i: int, v: float) -> float:
 
 @compile_function
 def bristle(friction: Friction, i: int, v: float, z: float, h: float) -> tuple[float, float, float]:
-    """The bristles' effort at the end of a step of h [s], constant + slope dq, and the decay of their deflection.
+    """Constant and slope of the bristles' effort, constant + slope dq, at the end of a step h [s]; and `decay`.
 
         dz/dt = dq - sigma_0 |dq| z / g,    f = sigma_0 z + sigma_1 dz/dt
 
-    dq and z are implicit, at the end of the step, and |dq| is from its start, which is stable for any stiffness.  The
-    deflection at the end is (z + h dq) / decay.
+    dq and z are those at the end of the step, and |dq| is taken at its start; this is stable for any stiffness.  The
+    deflection at the end of the step is (z + h dq) / decay.
     """
     stiffness, damping = friction.bristle_stiffness[i], friction.bristle_damping[i]
     decay = 1.0 + h * stiffness * abs(v) / level(friction, i, v)
@@ -70,22 +70,22 @@ def bristle(friction: Friction, i: int, v: float, z: float, h: float) -> tuple[f
 
 
 class State(NamedTuple):
-    """The mechanical state of n joints, changed in place by a step."""
+    """The mechanical state of n joints, which a step changes in place."""
 
     q: Array
     dq: Array
     z: Array  # deflection of the bristles
-    before: Array  # velocity a step ago
+    before: Array  # velocity one step before
 
 
 def at_rest(q: Array) -> State:
-    """Standing still at q (n,), with relaxed bristles."""
+    """The state at rest at q (n,), with relaxed bristles."""
     return State(q.astype(np.float64), np.zeros(len(q)), np.zeros(len(q)), np.zeros(len(q)))
 
 
 @compile_function
 def middle(state: Any, h: float, q: Any, dq: Any) -> None:
-    """Fill the predicted position and velocity (n,) in the middle of the coming step."""
+    """Fill the predicted position and velocity (n,) in the middle of the next step."""
     for i in range(len(q)):
         q[i] = state.q[i] + h / 2 * state.dq[i]
         dq[i] = state.dq[i] + (state.dq[i] - state.before[i]) / 2
@@ -97,9 +97,9 @@ def step(
 ) -> None:
     """Advance the state by h [s] under constant efforts.
 
-    `M` (n, n) and `b` (n,) are inertia and bias at the middle of the step, `tau` (n,) is the effort less the external
-    one.  Joints that are not `moving` (n,) stay at rest.  A joint that would pass `lower` or `upper` is set to it at
-    zero velocity, as by Simulink's second-order integrator (section 4.5).
+    `M` (n, n) and `b` (n,) are inertia and bias at the middle of the step; `tau` (n,) is the effort minus the external
+    effort.  Joints that are not `moving` (n,) stay at rest.  A joint that would pass `lower` or `upper` is set to this
+    stop with zero velocity, as in Simulink's second-order integrator (section 4.5).
     """
     q, dq, z, before = state
     n = len(q)
@@ -110,9 +110,9 @@ def step(
         for j in range(n):
             A[i, j] = M[i, j]
             r[i] += M[i, j] * dq[j]
-    _rub(friction, dq, z, h, A, r, up, down, decay)
+    _add_friction(friction, dq, z, h, A, r, up, down, decay)
     side = np.zeros(n)
-    for _ in range(n + 1):  # each turn may stop one joint more
+    for _ in range(n + 1):  # each iteration may stop one more joint
         _velocity(A, r, up, down, free, new)
         hit = False
         for i in range(n):
@@ -131,8 +131,8 @@ def step(
 
 
 @compile_function
-def _rub(friction: Any, dq: Any, z: Any, h: float, A: Any, r: Any, up: Any, down: Any, decay: Any) -> None:
-    """Add smooth friction to A and r, and fill the impulses up and down that sticking friction can hold."""
+def _add_friction(friction: Any, dq: Any, z: Any, h: float, A: Any, r: Any, up: Any, down: Any, decay: Any) -> None:
+    """Add viscous and bristle friction to A and r, and fill the impulses up and down of dry friction."""
     for i in range(len(dq)):
         A[i, i] += h / 2 * friction.viscous[i]
         r[i] -= h / 2 * friction.viscous[i] * dq[i]

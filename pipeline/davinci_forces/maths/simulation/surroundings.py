@@ -1,6 +1,6 @@
-"""The surroundings of a simulated robot: efforts at its joints, forces on its tip, a mass, tissue; and its path.
+"""The surroundings of a simulated robot: efforts at its joints, forces at its tip, a mass and tissue; and paths.
 
-Efforts and forces are those that the robot exerts on its surroundings (7.8).
+The robot exerts these efforts and forces on its surroundings (7.8).
 """
 
 from dataclasses import dataclass
@@ -18,23 +18,23 @@ UP = np.array([0.0, 0.0, 1.0])
 class Surroundings(NamedTuple):
     """External efforts and forces, mass and tissue, for T ticks."""
 
-    efforts: Array  # (T, n) at the joints
-    forces: Array  # (T, 3) of the tip, base frame [N]
+    efforts: Array  # (T, n) external efforts at the joints
+    forces: Array  # (T, 3) external forces at the tip, base frame [N]
     mass: float  # [kg] at the tip; 0 for none
     stiffness: float  # [N/m] of the tissue; 0 for none
-    damping: float  # [N s/m] of the tissue while it is pressed
+    damping: float  # [N s/m] of the tissue in contact
     surface: Array  # a point (3,) of the tissue's surface [m]
-    normal: Array  # (3,) out of the tissue, of length 1
-    at_tip: bool  # whether anything but efforts and the mass acts
+    normal: Array  # (3,) outward normal of the tissue, of length 1
+    at_tip: bool  # whether forces or tissue act at the tip
 
 
 def triangle(t: Array, start: float, end: float, peak: float) -> Array:
-    """An effort that rises from zero to its peak midway between start and end, and falls again.  Section 7.3"""
+    """An effort that rises linearly from zero to a peak midway between start and end, and falls again.  Section 7.3"""
     return peak * np.clip(1 - np.abs(2 * t - start - end) / (end - start), 0, None)
 
 
 def pulse(t: Array, start: float, end: float, peak: float) -> Array:
-    """An effort that is constant from start to end, and zero elsewhere."""
+    """An effort that is constant from start to end, and zero at other times."""
     return peak * ((t >= start) & (t < end)).astype(np.float64)
 
 
@@ -43,7 +43,7 @@ SHAPES = {"triangle": triangle, "pulse": pulse}
 
 @compile_function
 def on_tip(around: Any, tick: int, x: Any, velocity: Any, force: Any) -> None:
-    """Fill the force (3,) [N] of the tip at x (3,) [m] on its surroundings: that of this tick, and that of tissue.
+    """Fill the force (3,) [N] of the tip at x (3,) [m]: the external force of this tick plus the force on the tissue.
 
     Tissue is a spring with a damper, which pushes and never pulls.  (8.1)
     """
@@ -53,16 +53,16 @@ def on_tip(around: Any, tick: int, x: Any, velocity: Any, force: Any) -> None:
         depth += (around.surface[k] - x[k]) * around.normal[k]
         sinking -= velocity[k] * around.normal[k]
     if around.stiffness > 0 and depth > 0:
-        pressed = max(around.stiffness * depth + around.damping * sinking, 0.0)
+        pressure = max(around.stiffness * depth + around.damping * sinking, 0.0)
         for k in range(3):
-            force[k] -= pressed * around.normal[k]
+            force[k] -= pressure * around.normal[k]
 
 
 @compile_function
 def weigh(tip: Any, data: Any, q: Any, dq: Any, J: Any, drift: Any) -> None:
-    """Fill the Jacobian (3, n) of the tip, and dJ/dt dq + g up (3,) [m/s^2]: the load of a mass there, less J ddq.
+    """Fill the Jacobian J (3, n) of the tip, and `drift` = dJ/dt dq + g up (3,) [m/s^2].
 
-    The robot exerts m (a + g up) on the mass, with a = J ddq + dJ/dt dq.  Section 7.5
+    The robot exerts m (a + g up) = m (J ddq + drift) on a mass m at the tip.  Section 7.5
     """
     ahead, h = np.empty_like(J), 1e-6
     tip(data, q, J)
@@ -81,11 +81,11 @@ class Path:
     ease: bool
 
     def position(self, t: Array) -> Array:
-        """The position at the times t (N,) [s]; the first and the last position hold before and after."""
+        """The position at the times t (N,) [s]; constant before the first point and after the last."""
         times, positions = np.array(self.points).T
         if not self.ease:
             return np.asarray(np.interp(t, times, positions))
-        part = np.interp(t, times, np.arange(len(times), dtype=float))
-        whole = np.floor(part)
-        eased = whole + (1 - np.cos(np.pi * (part - whole))) / 2
+        index = np.interp(t, times, np.arange(len(times), dtype=float))
+        floor = np.floor(index)
+        eased = floor + (1 - np.cos(np.pi * (index - floor))) / 2
         return np.asarray(np.interp(eased, np.arange(len(times)), positions))

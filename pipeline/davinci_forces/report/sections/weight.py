@@ -35,7 +35,7 @@ def section(context: Context) -> Section | None:
     if weights[1:]:
         others = tuple(block for weight in weights[1:] for block in log_blocks(context, weight))
         content.append(OnScreen("The other runs with a mass", "other-masses", others))
-    return Section("Hung masses", "weight", tuple(content))
+    return Section("Attached masses", "weight", tuple(content))
 
 
 def intro() -> Prose:

@@ -1,1 +1,1 @@
-"""Robots as URDF, the description that simulators and ROS share: read from it, and written as it."""
+"""Read and write robots as URDF, the robot description of ROS and of simulators."""

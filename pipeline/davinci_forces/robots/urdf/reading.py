@@ -1,7 +1,7 @@
 """Read a robot from its URDF: chain, inertias, limits and joints that mimic others.
 
-A URDF has no gear ratio or torque constant.  Where logs hold currents instead of efforts in N m or N, a study gives
-them in [robot_overrides.<joint>]: gear_ratio and torque_constant, or effort = "A".
+A URDF states no gear ratio or torque constant.  If logs have motor currents instead of efforts in N m or N, the study
+states gear_ratio and torque_constant, or effort = "A", in [robot_overrides.<joint>].
 """
 
 import heapq
@@ -24,14 +24,14 @@ from davinci_forces.robots.urdf import tables
 from davinci_forces.robots.urdf.tables import MOVING, TIP, Element, Notes, UrdfJoint, inertial_parameters, read_joint
 from davinci_forces.toml.file import TomlFile
 
-DEFAULT_HARMONICS = 10  # of an unknown excitation: more than most have, and below most noise
+DEFAULT_HARMONICS = 10  # of an unknown excitation: more than most excitations have, and too few to fit noise
 TIPS = (TIP, "tcp", "tool0", "ee_link")  # customary names of the frame at the tip
-RANDOM_POSES = 20  # in which gravity is looked for in the effort of each joint
+RANDOM_POSES = 20  # poses in which the effort of each joint is tested for gravity
 FRICTION = (viscous, coulomb, offset)
 
 
 class Mover(NamedTuple):
-    """A joint at sign times the position of the joint `by`, plus a bias; `by` is "" of one that does not move."""
+    """A joint's position: sign times the position of joint `by`, plus a bias; `by` is "" if the joint does not move."""
 
     by: str
     sign: int = 1
@@ -39,13 +39,13 @@ class Mover(NamedTuple):
 
 
 def read_with_problems(file: Path) -> tuple[Robot | None, TomlFile]:
-    """Read a robot, None where its joints are unknown, and its file's problems; raises BadRobot if it is not XML."""
+    """Read a robot, None if its file has problems, and the file; raises BadRobot if it is not XML."""
     notes = TomlFile(str(file), {})
     return robot_of(tables.read(file), notes, file.stem), notes
 
 
 def robot_of(outermost: Element, file: TomlFile, stem: str) -> Robot | None:
-    """Build the robot that a <robot> describes, with problems noted; None where there are any."""
+    """Build the robot of a <robot> element, with problems noted; None if there are any."""
     if outermost.tag != "robot":
         Notes(file, outermost).problem("a URDF must consist of one <robot name=...> with <link> and <joint> in it")
         return None
@@ -68,18 +68,18 @@ def robot_of(outermost: Element, file: TomlFile, stem: str) -> Robot | None:
     if file.problems():
         return None
     chain, bodies = assemble_chain(root, _placed(root, ordered, moved, list(coordinates), weights), _tip(root, ordered))
-    weighed = bodies if any(weight is not None for weight in weights.values()) else None
+    known_bodies = bodies if any(weight is not None for weight in weights.values()) else None
     name = outermost.attributes.get("name", "") or stem
     moved_by_gravity = _moved_by_gravity(chain)
     robot_joints = tuple(
         _joint(by_name[joint], called, moves)
         for (joint, called), moves in zip(coordinates.items(), moved_by_gravity, strict=True)
     )
-    return Robot(name, name, robot_joints, chain, weighed)
+    return Robot(name, name, robot_joints, chain, known_bodies)
 
 
 def _named(elements: Sequence[Element], file: TomlFile) -> dict[str, Element]:
-    """Elements by name, which no two share."""
+    """The elements by name; missing, invalid and repeated names are noted."""
     by_name = dict[str, Element]()
     for element in elements:
         notes = Notes(file, element)
@@ -91,8 +91,8 @@ def _named(elements: Sequence[Element], file: TomlFile) -> dict[str, Element]:
 
 
 def _root(outermost: Element, links: dict[str, Element], joints: Sequence[UrdfJoint], file: TomlFile) -> str:
-    """The link without a parent; "" where there is not exactly one, which is noted."""
-    carried = dict[str, UrdfJoint]()
+    """The only link without a parent; "" if there is none or several, which is noted."""
+    parent_joints = dict[str, UrdfJoint]()
     for joint in joints:
         called = f"<joint name={joint.name!r}>"
         for end, link in (("parent", joint.parent), ("child", joint.child)):
@@ -100,13 +100,13 @@ def _root(outermost: Element, links: dict[str, Element], joints: Sequence[UrdfJo
                 file.note(
                     joint.line, f"{called} <{end}>: there is no <link name={link!r}>; add it, or correct the name"
                 )
-        if joint.child in carried:
-            parent = carried[joint.child].name
+        if joint.child in parent_joints:
+            parent = parent_joints[joint.child].name
             file.note(
                 joint.line, f"{called}: link {joint.child!r} already has the parent joint {parent!r}; cut the loop"
             )
-        carried.setdefault(joint.child, joint)
-    bases = [name for name in links if name not in carried]
+        parent_joints.setdefault(joint.child, joint)
+    bases = [name for name in links if name not in parent_joints]
     notes = Notes(file, outermost)
     if not links:
         notes.problem("it has no <link>")
@@ -122,20 +122,20 @@ def _root(outermost: Element, links: dict[str, Element], joints: Sequence[UrdfJo
 
 
 def _outwards(root: str, joints: Sequence[UrdfJoint]) -> list[UrdfJoint]:
-    """The joints connected to the base, each after its parent, else in the order of the file."""
-    on = dict[str, list[int]]()
+    """The joints connected to the base, parents first, otherwise in the order of the file."""
+    by_parent = dict[str, list[int]]()
     for number, joint in enumerate(joints):
-        on.setdefault(joint.parent, []).append(number)
-    ordered, ahead = list[UrdfJoint](), on.pop(root, [])
-    while ahead:
-        ordered.append(joints[heapq.heappop(ahead)])
-        for number in on.pop(ordered[-1].child, []):
-            heapq.heappush(ahead, number)
+        by_parent.setdefault(joint.parent, []).append(number)
+    ordered, queue = list[UrdfJoint](), by_parent.pop(root, [])
+    while queue:
+        ordered.append(joints[heapq.heappop(queue)])
+        for number in by_parent.pop(ordered[-1].child, []):
+            heapq.heappush(queue, number)
     return ordered
 
 
 def _coordinates(ordered: Sequence[UrdfJoint], file: TomlFile) -> dict[str, str]:
-    """The independent joints from the base outwards, and their names in logs and records."""
+    """The independent joints from the base outwards, each with its name in logs and records."""
     from davinci_forces.robots.from_toml import wrong_name
 
     called = dict[str, str]()
@@ -171,7 +171,7 @@ def _placed(
 
 
 def _tip(root: str, ordered: Sequence[UrdfJoint]) -> str:
-    """The frame at the tip: by its name, else the first of those with the most moving joints before them."""
+    """The tip: a frame with a customary name, else the first end link with the most moving joints before it."""
     depth = {root: 0}
     for joint in ordered:
         depth[joint.child] = depth[joint.parent] + (joint.kind != "fixed")
@@ -181,10 +181,10 @@ def _tip(root: str, ordered: Sequence[UrdfJoint]) -> str:
 
 
 def _moved_by_gravity(chain: Chain) -> list[bool]:
-    """Whether gravity loads each coordinate in any pose: not where it turns about a vertical axis."""
+    """Whether gravity loads each coordinate in any pose; a vertical axis of rotation is never loaded."""
     q = np.random.default_rng(0).uniform(-1.0, 1.0, (RANDOM_POSES, chain.n))
     Y = regressor(chain, q, np.zeros_like(q), np.zeros_like(q))
-    # Of lengths of metres, products of which round at 1e-15; files state angles to eleven digits.
+    # Products of lengths of metres have rounding errors of 1e-15; files state angles to eleven digits.
     return [bool(x) for x in abs(Y).max(axis=(0, 2)) > 1e-6]
 
 
@@ -197,7 +197,7 @@ def _joint(joint: UrdfJoint, name: str, has_gravity: bool) -> Joint:
 
 
 def _mover(joint: UrdfJoint, joints: Mapping[str, UrdfJoint], file: TomlFile) -> Mover:
-    """Follow joints that mimic each other to the independent one that moves them; problems of the mimic are noted."""
+    """Follow <mimic> from a joint to the independent joint that moves it; problems of <mimic> are noted."""
     sign, bias, visited, driver = 1.0, 0.0, [joint.name], joint
     while driver.kind != "fixed" and driver.mimic:
         sign, bias = sign * driver.multiplier, bias + sign * driver.bias
@@ -214,7 +214,7 @@ def _mover(joint: UrdfJoint, joints: Mapping[str, UrdfJoint], file: TomlFile) ->
 
 
 def _wrong(joint: UrdfJoint, following: UrdfJoint | None, visited: list[str]) -> str:
-    """The problem of what a joint mimics, or ""."""
+    """The problem of a joint's <mimic>, or ""."""
     if following is None:
         return f"there is no joint {joint.mimic!r}; correct the name"
     if following.name in visited:

@@ -1,7 +1,7 @@
 """Read the elements of a URDF as numbers and names; problems are noted with their lines.
 
-The file is XML, read as elements that know their lines.  A document type is refused: a URDF needs none, and it could
-define entities that expand a thousandfold or that name other files.
+The file is XML.  A document type is refused: a URDF needs none, and a document type could define entities that expand a
+thousandfold or that refer to other files.
 """
 
 import math
@@ -25,22 +25,22 @@ from davinci_forces.toml import excerpt
 from davinci_forces.toml.file import TomlFile
 from davinci_forces.toml.ranges import unlikely
 
-MAX_BYTES = 4_000_000  # bytes; a description has some thousands of lines, and shapes are in separate files
+MAX_BYTES = 4_000_000  # a description has a few thousand lines; shapes are in separate files
 TOO_LARGE = f"more than the {MAX_BYTES / 1e6:.0f} MB that are read; keep shapes in separate files"
-MAX_DEPTH = 30  # nested elements; those that simulators add are nested ten deep
-MOST_ELEMENTS = 30_000  # 30 for each of the most links, with their visual and collision shapes
+MAX_DEPTH = 30  # levels of nested elements; simulators nest their elements up to ten levels deep
+MOST_ELEMENTS = 30_000  # 30 for each of MOST_LINKS, including visual and collision shapes
 MOST_ATTRIBUTES = 30
-NAME = re.compile(r"[\w ./:+-]{1,100}")  # of links and joints, as files, equations and messages can show them
+NAME = re.compile(r"[\w ./:+-]{1,100}")  # links and joints; valid in files, equations and messages
 MOVING = ("revolute", "continuous", "prismatic")
-NO_LIMIT = 1e9  # [N m, N or their rates] stands for no limit, for which URDF has no word
-ROUNDING = 1e-9  # of an inertia's eigenvalues, as a share of the largest, that printed digits may leave below 0
+NO_LIMIT = 1e9  # [N m, N or SI units of motion] larger values mean no limit, which URDF cannot express
+ROUNDING = 1e-9  # share of an inertia's largest eigenvalue: rounded digits may make an eigenvalue this negative
 TIP = "tip"  # name of the frame at the tip in files that we write
 TENSOR = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 
 
 @dataclass(frozen=True)
 class Element:
-    """One element, its attributes, the line that it begins at, and what is in it."""
+    """One XML element: its tag, its attributes, its first line, and its inner elements."""
 
     tag: str
     attributes: dict[str, str]
@@ -48,16 +48,16 @@ class Element:
     inner: list["Element"] = field(default_factory=list)
 
     def children(self, tag: str) -> list["Element"]:
-        """The elements in it that have this tag."""
+        """The inner elements with this tag."""
         return [element for element in self.inner if element.tag == tag]
 
     def child(self, tag: str) -> "Element | None":
-        """The first of them, or None."""
+        """The first inner element with this tag, or None."""
         return next(iter(self.children(tag)), None)
 
 
 def read(file: Path) -> Element:
-    """The outermost element of a file.
+    """Read the outermost element of a file.
 
     Raises
     ------
@@ -74,7 +74,7 @@ def read(file: Path) -> Element:
 
 
 def parse(text: bytes, name: str) -> Element:
-    """The outermost element of a text of XML, called `name` in problems; raises as `read` does."""
+    """The outermost element of an XML text; errors name it `name`, and are those of `read`."""
     parser = expat.ParserCreate()
     outermost = Element("", {}, 0)
     open_elements = [outermost]
@@ -109,31 +109,31 @@ def parse(text: bytes, name: str) -> Element:
         wrong = f"not XML: {expat.ErrorString(error.code)}, at column {error.offset + 1}"
         hint = "; run xacro first, and name the .urdf that it writes" if b"xacro:" in text else ""
         raise BadRobot(f"{name}:{error.lineno}: {wrong}{hint}") from None
-    except (ValueError, LookupError) as error:  # of an encoding that Python does not know
+    except (ValueError, LookupError) as error:  # an encoding that Python does not know
         raise BadRobot(f"{name}: not XML: {error}; save it as UTF-8") from None
     return outermost.inner[0]
 
 
 class UrdfJoint(NamedTuple):
-    """One joint as its file has it."""
+    """One joint as its file states it."""
 
     name: str
     kind: str  # one of MOVING, or "fixed"
     parent: str
     child: str
-    placement: Array  # of the child's frame in the parent's at q = 0 (4, 4) [m]
+    placement: Array  # pose of the child's frame in the parent's frame at q = 0 (4, 4) [m]
     axis: Array  # (3,) in the child's frame, of length 1
     position: tuple[float, float]
     velocity: float
     effort: float
-    mimic: str  # the joint that moves it, or ""
+    mimic: str  # name of the joint that this joint mimics, or ""
     multiplier: float
     bias: float
     line: int
 
 
 class Notes:
-    """Notes the problems of one element, with its line and its name."""
+    """The problems of one element, noted with its line and its name."""
 
     def __init__(self, file: TomlFile, element: Element) -> None:
         self.file, self.element = file, element
@@ -141,21 +141,23 @@ class Notes:
         self.called = f"<{element.tag} name={excerpt(named)}>" if named is not None else f"<{element.tag}>"
 
     def problem(self, text: str, at: Element | None = None) -> None:
-        """Note something wrong with the element, or with one in it."""
+        """Note a problem of the element, or of an inner element."""
         inner = "" if at is None or at is self.element else f" <{at.tag}>"
         self.file.note((at or self.element).line, f"{self.called}{inner}: {text}")
 
-    def name(self, element: Element | None, key: str, says: str) -> str:
-        """A name that an element states, or ""."""
+    def name(self, element: Element | None, key: str, subject: str) -> str:
+        """The name in an attribute, or ""; a problem begins with its `subject`."""
         value = "" if element is None else element.attributes.get(key, "")
         if not value:
-            self.problem(f"{says} is missing", element)
+            self.problem(f"{subject} is missing", element)
         elif not NAME.fullmatch(value):
-            self.problem(f"{says} is {excerpt(value)}, but may have only letters, digits, spaces and _./:+-", element)
+            self.problem(
+                f"{subject} is {excerpt(value)}, but may have only letters, digits, spaces and _./:+-", element
+            )
         return value
 
     def numbers(self, element: Element | None, key: str, default: Sequence[float]) -> list[float]:
-        """As many finite numbers as the default has, which is taken where nothing is stated, or what is wrong."""
+        """The finite numbers of an attribute, as many as the default has; the default if it is missing or wrong."""
         if element is None or key not in element.attributes:
             return list(default)
         text = element.attributes[key]
@@ -167,7 +169,7 @@ class Notes:
             how = "a finite number" if len(default) == 1 else f"{len(default)} finite numbers with spaces between them"
             self.problem(f"{key} must be {how}, not {excerpt(text)}", element)
             return list(default)
-        limits = element.tag == "limit"  # of which the largest are none
+        limits = element.tag == "limit"  # numbers above NO_LIMIT mean no limit
         likely = (
             unlikely(key, x, "force" if key == "effort" else "") for x in values if abs(x) < NO_LIMIT or not limits
         )
@@ -181,13 +183,13 @@ class Notes:
         return self.numbers(element, key, [default])[0]
 
     def pose(self, element: Element | None) -> Array:
-        """The pose (4, 4) that an <origin> states."""
+        """The pose (4, 4) of an <origin>."""
         xyz, rpy = (self.numbers(element, key, [0.0] * 3) for key in ("xyz", "rpy"))
         return transform(xyz, rpy)
 
 
 def inertial_parameters(link: Element, file: TomlFile) -> Array | None:
-    """The inertial parameters (10,) of a link in its frame; None where it states none."""
+    """The inertial parameters (10,) of a link in its frame; None if it has no <inertial>."""
     stated = link.child("inertial")
     if stated is None:
         return None
@@ -204,13 +206,13 @@ def inertial_parameters(link: Element, file: TomlFile) -> Array | None:
         wrong = f"the smallest principal moment of inertia is {values[0]:.3g} kg m^2, but must be 0 or more"
         notes.problem(f"{wrong}; correct its signs, or leave the inertial out", tensor)
     about_centre = np.array([[0.0, 0.0, 0.0, 0.0, xx, xy, xz, yy, yz, zz]])
-    at, J = notes.pose(stated.child("origin")), pseudo_inertias(about_centre)[0]
+    T, J = notes.pose(stated.child("origin")), pseudo_inertias(about_centre)[0]
     J[3, 3] = m
-    return np.asarray(of_pseudo_inertias((at @ J @ at.T)[None])[0])
+    return np.asarray(of_pseudo_inertias((T @ J @ T.T)[None])[0])
 
 
 def read_joint(element: Element, file: TomlFile) -> UrdfJoint:
-    """Read a joint; one of an unknown type is taken as fixed, so that the links beyond it stay connected."""
+    """Read a joint; a joint of unknown type becomes a fixed joint, so that the links after it stay connected."""
     notes, kind = Notes(file, element), element.attributes.get("type", "")
     name = notes.name(element, "name", "its name")
     parent_link = notes.name(element.child("parent"), "link", 'its <parent link="..."/>')
@@ -235,7 +237,7 @@ def read_joint(element: Element, file: TomlFile) -> UrdfJoint:
 
 
 def _bounds(notes: Notes, limit: Element | None, kind: str) -> tuple[float, float]:
-    """The range of a joint's position; infinite where it turns without end, or states neither bound."""
+    """The range of a joint's position; infinite if the joint is continuous or states neither bound."""
     stated = limit is not None and {"lower", "upper"} & limit.attributes.keys()
     if kind not in ("revolute", "prismatic") or not stated:
         return -math.inf, math.inf
@@ -247,7 +249,7 @@ def _bounds(notes: Notes, limit: Element | None, kind: str) -> tuple[float, floa
 
 
 def _most(notes: Notes, limit: Element | None, key: str) -> float:
-    """A limit of velocity or effort; many files give 0 where it is not known."""
+    """A limit of velocity or effort; infinite for 0, which many files state for an unknown limit."""
     most = notes.number(limit, key, 0.0)
     if most < 0:
         notes.problem(f"{key} is {most:g}, but must be 0 or more", limit)

@@ -1,9 +1,9 @@
 """Write a robot as URDF: its chain, the masses of its links, and the limits of its joints.
 
-A link's frame is at its joint.  It is the frame of the link's name where that is on the axis, else the frame with z
-along the axis, as in the dynamics.  Other frames of the chain are fixed links without mass.  A coordinate that
-moves several links moves the first, which the others mimic.  URDF cannot express limits of acceleration, missing limits
-or drives.
+A link's frame is on its joint axis.  It is the named frame of the link if that frame is on the axis, else the frame of
+the dynamics, with z along the axis.  Other frames of the chain become fixed links without mass.  If a coordinate moves
+several links, the first joint is independent and the other joints mimic it.  URDF cannot express limits of
+acceleration, missing limits or drives.
 """
 
 from collections.abc import Iterator
@@ -21,11 +21,11 @@ from davinci_forces.robots.robot import UNLIMITED, Kind, Limits, Robot
 from davinci_forces.robots.urdf.tables import NO_LIMIT, TENSOR, TIP
 
 UPPER = np.triu_indices(3)
-FRAME_TOLERANCE = 1e-15  # by which rounding moves a frame that coincides with its link's
+FRAME_TOLERANCE = 1e-15  # largest rounding error of a frame that coincides with its link's frame
 
 
 def text(robot: Robot) -> str:
-    """Write the text of its URDF.
+    """The text of the robot's URDF.
 
     Raises
     ------
@@ -34,7 +34,7 @@ def text(robot: Robot) -> str:
     """
     if robot.chain is None:
         raise BadRobot(f"robot {robot.name} has no chain: its geometry is not known, and a URDF needs it")
-    title = robot.title.replace("--", "- -").rstrip("-")  # which a comment may not hold
+    title = robot.title.replace("--", "- -").rstrip("-")  # an XML comment may not contain --
     weightless = "" if robot.bodies else "; the masses of its links are not known"
     lines = [
         '<?xml version="1.0" encoding="utf-8"?>',
@@ -48,20 +48,22 @@ def text(robot: Robot) -> str:
 
 
 class _Turned(NamedTuple):
-    """A robot whose links have frames as in URDF: on their joint axes, in any orientation."""
+    """A robot in the frames of URDF: each on its joint axis, in any orientation."""
 
     robot: Robot
-    links: tuple[str, ...]  # by body, the base first (L + 1,)
+    links: tuple[str, ...]  # names of the bodies, the base first (L + 1,)
     placement: Array  # (L, 4, 4)
     axis: Array  # (L, 3)
     bodies: Bodies | None
-    offset: Array  # of the chain's frames (F, 4, 4)
+    offset: Array  # poses of the chain's frames in their bodies (F, 4, 4)
 
 
 def _turned(robot: Robot, chain: Chain) -> _Turned:
-    """Express the robot in the links' frames of the chain's names, where these are on the joint axes."""
+    """Express the robot in the named frames of its links, as far as these are on the joint axes."""
     frames = chain.of_links.copy()
-    frames[frames[:, :3, 3].any(axis=1)] = np.eye(4)  # beside the axis, or further along
+    frames[frames[:, :3, 3].any(axis=1)] = np.eye(
+        4
+    )  # the named frame is not at the joint: keep the frame of the dynamics
     by_body = np.concatenate([np.eye(4)[None], frames])
     back = np.linalg.inv(by_body)
     return _Turned(
@@ -71,7 +73,7 @@ def _turned(robot: Robot, chain: Chain) -> _Turned:
 
 
 def _body(turned: _Turned, chain: Chain) -> Iterator[str]:
-    """Every link with the joint that carries it, and the frames that are fixed to them."""
+    """The lines of all links and joints, and of the frames that are fixed to links."""
     moved = set[int]()
     for i, coordinate in enumerate(chain.coordinate.tolist()):
         yield from _link(turned, i)
@@ -81,7 +83,7 @@ def _body(turned: _Turned, chain: Chain) -> Iterator[str]:
     for name, body, offset in [*zip(chain.names, chain.body.tolist(), turned.offset, strict=True)][1:]:
         if name not in taken or not np.allclose(offset, np.eye(4), rtol=0, atol=FRAME_TOLERANCE):
             yield from _fixed(_unused(name, taken), turned.links[body], offset)
-    if TIP not in taken:  # a file says by this name which of its frames is the tip
+    if TIP not in taken:  # readers recognise the tip by this name
         at = chain.names.index(chain.tip)
         yield from _fixed(TIP, turned.links[chain.body[at]], turned.offset[at])
 
@@ -103,16 +105,16 @@ def _link(turned: _Turned, i: int) -> Iterator[str]:
 
 
 def _joint(turned: _Turned, chain: Chain, i: int, mimics: bool) -> Iterator[str]:
-    """The joint at which a link moves: the coordinate's own, or one that mimics it."""
+    """The lines of a link's joint: an independent joint, or a joint that mimics it."""
     robot, k = turned.robot, int(chain.coordinate[i])
-    carrier, child = turned.links[chain.parent[i]], turned.links[i + 1]
+    parent, child = turned.links[chain.parent[i]], turned.links[i + 1]
     coordinate = robot.coordinates[k]
     limits = robot.joints[k].limits if k < len(robot.joints) else UNLIMITED
     bounded = bool(np.isfinite(limits.q).all())
     kind = Kind.PRISMATIC.value if chain.slides[i] else Kind.REVOLUTE.value if bounded else "continuous"
     name = f"{coordinate} of {child}" if mimics else coordinate
     yield f'<joint name={quoteattr(name)} type="{kind}">'
-    yield from _carried(carrier, child, turned.placement[i])
+    yield from _origin(parent, child, turned.placement[i])
     yield f'  <axis xyz="{_numbers(turned.axis[i])}"/>'
     yield f"  <limit {_limits(limits, bounded or bool(chain.slides[i]))}/>"
     if mimics:
@@ -127,23 +129,23 @@ def _limits(limits: Limits, ends: bool) -> str:
     return f'{between}velocity="{_number(velocity)}" effort="{_number(effort)}"'
 
 
-def _fixed(name: str, carrier: str, placement: Array) -> Iterator[str]:
-    """A frame that is fixed to a link."""
-    joint = f"{name} on {carrier}"
+def _fixed(name: str, parent: str, placement: Array) -> Iterator[str]:
+    """The lines of a frame that is fixed to a link."""
+    joint = f"{name} on {parent}"
     yield f"<link name={quoteattr(name)}/>"
     yield f'<joint name={quoteattr(joint)} type="fixed">'
-    yield from _carried(carrier, name, placement)
+    yield from _origin(parent, name, placement)
     yield "</joint>"
 
 
-def _carried(carrier: str, child: str, placement: Array) -> Iterator[str]:
-    yield f"  <parent link={quoteattr(carrier)}/>"
+def _origin(parent: str, child: str, placement: Array) -> Iterator[str]:
+    yield f"  <parent link={quoteattr(parent)}/>"
     yield f"  <child link={quoteattr(child)}/>"
     yield f'  <origin xyz="{_numbers(placement[:3, 3])}" rpy="{_numbers(roll_pitch_yaw(placement[:3, :3]))}"/>'
 
 
 def _unused(name: str, taken: set[str]) -> str:
-    """A name that no link has yet: a frame of a link's name that is elsewhere is called the link's frame."""
+    """A name that no link has yet: a suffix distinguishes a frame from a link of the same name."""
     while name in taken:
         name = f"{name}_frame"
     taken.add(name)
@@ -155,5 +157,5 @@ def _numbers(values: object) -> str:
 
 
 def _number(value: float) -> str:
-    """A number in as few digits as read back to it."""
+    """A number with the fewest digits that read back as the same number."""
     return repr(float(value) + 0.0).removesuffix(".0")

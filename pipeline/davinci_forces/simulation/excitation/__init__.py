@@ -1,1 +1,1 @@
-"""Excitation experiments for a command line: trajectories, tables and plots."""
+"""Excitation trajectories for the command line, with their tables and plots."""

@@ -1,4 +1,4 @@
-"""Requests for excitation trajectories, as the options of a command state them, and their answers."""
+"""Requests for excitation trajectories, from the options of a command, and the answers."""
 
 import math
 from dataclasses import dataclass, replace
@@ -23,12 +23,12 @@ from davinci_forces.simulation.excitation.trajectory import (
 )
 from davinci_forces.toml import unlikely
 
-STARTS_OF_ARM = 2  # starts for one joint per start for the arm, which takes longer
+STARTS_OF_ARM = 2  # an arm has one start per this many requested starts, because it takes longer
 
 
 @dataclass(frozen=True)
 class Request:
-    """The options of a request; None takes the value of the joint."""
+    """The options of a request; None selects the value of the joint."""
 
     robot: str
     joint: str  # or "all"
@@ -39,7 +39,7 @@ class Request:
     limits: tuple[str | None, str | None, str | None]  # of position, velocity and acceleration: "lower,upper"
     starts: int
     seed: int
-    samples: int  # K, instants of a period in the criterion
+    samples: int  # K, samples of a period in the criterion
 
 
 class ArmExcitation(NamedTuple):

@@ -1,4 +1,4 @@
-"""Excitation trajectories: their properties, their plot, and their table for controllers, which starts from rest."""
+"""Excitation trajectories: their properties, their plot, and their table for controllers, which begins at rest."""
 
 import io
 import math
@@ -16,14 +16,14 @@ from davinci_forces.maths.excitation.joint import ExcitationProblem, design
 from davinci_forces.robots.robot import Joint, Kind
 from davinci_forces.toml import unlikely
 
-PERIODS = {Kind.REVOLUTE: 10.0, Kind.PRISMATIC: 5.0}  # [s] of Table 6.1
+PERIODS = {Kind.REVOLUTE: 10.0, Kind.PRISMATIC: 5.0}  # [s] default periods, from Table 6.1
 PLOTS = (".svg", ".png", ".pdf")
 RUN_INS = 31  # candidate lengths of the run-in, from a quarter of a period to one period
 
 
 @dataclass(frozen=True)
 class ExcitationTrajectory:
-    """A trajectory of one joint, and the problem that it solves or is evaluated for."""
+    """A trajectory of one joint, and the excitation problem for which it is designed or evaluated."""
 
     joint: Joint
     problem: ExcitationProblem
@@ -83,12 +83,12 @@ def spread(optima: Sequence[float]) -> dict[str, float | int | None]:
 
 
 def finite(value: float) -> float | None:
-    """The number, or JSON's null where it is infinite because the trajectory does not separate the terms."""
+    """The number, or None for JSON's null if it is infinite because the trajectory does not separate the terms."""
     return value if math.isfinite(value) else None
 
 
 def coefficient_names(harmonics: int) -> list[str]:
-    """a0, a1, b1, a2, b2, ..."""
+    """The names of a series' coefficients: a0, a1, b1, a2, b2, ..."""
     return ["a0", *(f"{letter}{k}" for k in range(1, harmonics + 1) for letter in "ab")]
 
 
@@ -156,7 +156,7 @@ def _draw(axes: Any, excitation: ExcitationTrajectory) -> None:
 def table(excitations: Sequence[ExcitationTrajectory], rate: float, from_rest: bool = True) -> str:
     """Write the run-in from rest and one period at the controller's rate [Hz]: t, q, dq, ddq, with SI units.
 
-    The period starts at t = 0, so that the run-in has negative times; without `from_rest` there is no run-in.
+    The period starts at t = 0, and the run-in has negative times; if `from_rest` is False, there is no run-in.
 
     Raises
     ------
@@ -175,7 +175,7 @@ def table(excitations: Sequence[ExcitationTrajectory], rate: float, from_rest: b
 
 
 def _samples(excitations: Sequence[ExcitationTrajectory], rate: float) -> int:
-    """The samples of one period."""
+    """The number of samples in one period."""
     if not (math.isfinite(rate) and rate > 0):
         raise BadRequest(f"--rate must be positive, not {rate:g}")
     if problem := unlikely("--rate", rate, "rate"):
@@ -193,7 +193,7 @@ def _samples(excitations: Sequence[ExcitationTrajectory], rate: float) -> int:
 
 
 def _run_in_samples(excitations: Sequence[ExcitationTrajectory], samples: int, rate: float) -> int:
-    """The samples of the shortest run-in that keeps the limits."""
+    """The number of samples in the shortest run-in that keeps the limits."""
     durations = np.unique(np.linspace(samples / 4, samples, RUN_INS).round().clip(1)) / rate
     accelerations = [e.problem.limits[2] for e in excitations]
     if duration := fourier.shortest_run_in([e.series for e in excitations], accelerations, durations):

@@ -19,7 +19,7 @@ FORMATS = (".tdms", ".lvm")
 
 
 def logs_of(table: TomlTable, joints: dict[str, SimulatedJoint], families: Sequence[str]) -> tuple[SimulatedLog, ...]:
-    """Read every [[log]]; one that several families record appears once for each, under a name with the family."""
+    """Read every [[log]]; a log of several families appears once for each family, with the family in its name."""
     entries = table.tables("log", "it has no [[log]], so nothing would be recorded")
     logs = [(i, log) for i, entry in enumerate(entries) for log in _log(entry, joints, families)]
     for field in ("name", "file"):

@@ -1,4 +1,4 @@
-"""Reading of scenarios from TOML, which reports all problems at once, each with its line."""
+"""Read scenarios from TOML; all problems of a file are reported together, each with its line."""
 
 import math
 import re
@@ -24,7 +24,7 @@ from davinci_forces.simulation.scenario.scenario import (
 )
 from davinci_forces.toml import TomlTable
 
-MAX_SAMPLES = 10_000_000  # samples of a log
+MAX_SAMPLES = 10_000_000  # samples in a log
 
 
 def shipped_scenarios() -> tuple[str, ...]:
@@ -39,7 +39,7 @@ def load(scenario: str) -> Scenario:
     Raises
     ------
     BadScenario
-        If it does not exist, or with all its problems, one a line.
+        If it does not exist or has problems; the message lists all of them, one a line.
     """
     if scenario in shipped_scenarios():
         text = files("davinci_forces.simulation").joinpath("shipped", f"{scenario}.toml").read_text(encoding="utf-8")
@@ -61,9 +61,9 @@ def _scenario(name: str, table: TomlTable) -> Scenario:
         table.problem("it has no [joint.<name>] table, so nothing can move")
     arm = arm_of(table, robot, joints) if whole_arm else None
     rate = table.number("rate", above=0.0)
-    turn = 1 / rate / arm.tick if arm else 1.0  # in ticks; NaN where a problem is already noted
-    if math.isfinite(turn) and abs(turn - round(turn)) > 1e-6:
-        message = f"the controller's period at {rate:g} Hz must be a whole number of ticks, not {turn:g}"
+    period = 1 / rate / arm.tick if arm else 1.0  # in ticks; NaN if a problem is already noted
+    if math.isfinite(period) and abs(period - round(period)) > 1e-6:
+        message = f"the controller's period at {rate:g} Hz must be a whole number of ticks, not {period:g}"
         table.problem(message, "arm", "tick")
     logs = logs_of(table, joints, tuple(arm.families) if arm else ())
     for log in logs:
@@ -81,7 +81,7 @@ def _robot(table: TomlTable) -> Robot:
     name = table.text("robot", choices=robots.ROBOTS)
     return robots.load(
         name if name in robots.ROBOTS else "davinci", File()
-    )  # the problem is noted; read on with another robot
+    )  # a wrong name is noted; read the file to its end with another robot
 
 
 def _joint(robot: Robot, name: str, table: TomlTable, whole_arm: bool) -> SimulatedJoint:

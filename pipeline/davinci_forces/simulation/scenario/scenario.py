@@ -1,4 +1,4 @@
-"""Scenarios: what is simulated and recorded."""
+"""Scenarios: the robot, the motions, the contacts and the sensors of a simulated study."""
 
 from dataclasses import dataclass, field
 
@@ -24,7 +24,7 @@ class SensorNoise:
     q: float = 0.0
     dq: float = 0.0
     tau: float = 0.0
-    drift: float = 0.0  # of the effort
+    drift: float = 0.0  # standard deviation of the drift of the effort
     correlation: float = 1.0  # [s] correlation time of the drift
 
 
@@ -40,11 +40,11 @@ class ForceSensor:
 class SimulatedPush:
     """An effort, or a force of the tip, that the robot exerts on its surroundings from start to end [s].  (7.8)"""
 
-    shape: str  # of SHAPES
+    shape: str  # a key of SHAPES
     start: float
     end: float
     peak: float  # [effort], or [N]
-    direction: tuple[float, float, float] | None = None  # of a force of the tip, base frame, of length 1
+    direction: tuple[float, float, float] | None = None  # direction of a force of the tip, base frame, of length 1
 
     def effort_at(self, t: Array) -> Array:
         """The push at the times t (N,) [s]."""
@@ -53,9 +53,9 @@ class SimulatedPush:
 
 @dataclass(frozen=True)
 class Tissue:
-    """A spring with a damper, below the height of the tip when the slide is at `surface`.  (8.1)"""
+    """A spring with a damper; its surface is at the height of the tip when the slide is at `surface`.  (8.1)"""
 
-    surface: float  # [m] of the slide
+    surface: float  # [m] position of the slide
     stiffness: float  # [N/m]
     damping: float  # [N s/m]
 
@@ -68,9 +68,9 @@ class SimulatedJoint:
     label: str  # the joint's name in the laboratory's channels
     encoder_step: float  # [rad] at the motor
     current_step: float  # [A]
-    stops: tuple[float, float]  # lower and upper
+    stops: tuple[float, float]  # lower and upper end stop
     noise: SensorNoise = field(default_factory=SensorNoise)
-    theta: tuple[float, ...] = ()  # of the joint's terms, where the joint follows its model exactly
+    theta: tuple[float, ...] = ()  # parameters of the joint's terms, if the joint follows its model exactly
 
 
 @dataclass(frozen=True)
@@ -85,7 +85,7 @@ class Family:
 class SimulatedArm:
     """The motors and controllers of the arm in closed loop."""
 
-    tick: float  # [s] of the motor drivers
+    tick: float  # [s] period of the motor drivers
     rotors: Array  # J_m (n,) [kg m^2]
     motors: Motors
     control: Cascade | Regulator
@@ -94,7 +94,7 @@ class SimulatedArm:
 
 @dataclass(frozen=True)
 class SimulatedLog:
-    """One recording: the moving joints with their motions, the resting ones with their positions, and all contacts."""
+    """One recording: motions of moving joints, positions of resting joints, and all contacts."""
 
     name: str
     file: str
@@ -104,18 +104,18 @@ class SimulatedLog:
     held: dict[str, float]
     external: dict[str, tuple[SimulatedPush, ...]]
     current_unit: str
-    clock: str  # "channel", or "header" where the header of the file states the step
+    clock: str  # "channel", or "header" if the header of the file states the sampling time
     family: str = ""
     lead: float = 0.0  # [s] of motion before the recording starts
-    skip: float = 0.0  # [s] at the start that the study leaves out
+    skip: float = 0.0  # [s] initial time that the study omits
     tip: tuple[SimulatedPush, ...] = ()
-    mass: float = 0.0  # [kg] on the tip
+    mass: float = 0.0  # [kg] mass attached to the tip
     tissue: Tissue | None = None
-    sensor: ForceSensor | None = None  # of the force at the tip
+    sensor: ForceSensor | None = None  # sensor of the force at the tip
 
     @property
     def joints(self) -> tuple[str, ...]:
-        """The joints that are recorded."""
+        """The recorded joints."""
         return (*self.moves, *self.held)
 
     @property
@@ -125,7 +125,7 @@ class SimulatedLog:
         return sorted({(push.start, push.end) for push in [*pushes, *self.tip]})
 
     def position(self, joint: str, t: Array) -> Array:
-        """The reference position of a joint at the times t (N,) [s]; zero for joints that are not mentioned."""
+        """The reference position of a joint at the times t (N,) [s]; zero for joints that are not recorded."""
         move = self.moves.get(joint)
         if move is None:
             return np.full_like(t, self.held.get(joint, 0.0))
@@ -134,7 +134,7 @@ class SimulatedLog:
 
 @dataclass(frozen=True)
 class Scenario:
-    """A simulated study: of joints that follow their models, or of the whole arm in closed loop."""
+    """A simulated study, either of joints that follow their models exactly or of the whole arm in closed loop."""
 
     name: str
     title: str
