@@ -14,15 +14,15 @@ from uuid import uuid4
 
 from davinci_forces.errors import NotAFile
 
-# Of files that a run writes.  Each log takes 70 kB of results.json, and as much of the ledger's index: this is enough
+# Size of files that a run writes.  Each log takes 70 kB of results.json and of the ledger's index: this is enough
 # for fifteen thousand logs, more than a study.toml has room for.
 MAX_BYTES = 1 << 30
-BLOCK_BYTES = 1 << 18  # that are read at a time
+BLOCK_BYTES = 1 << 18  # bytes that are read at a time
 PARTIAL = ".partial"  # ends the name of a file that is still being written
 # Open a pipe without a writer, or a line without a modem, without waiting; let no terminal control the process.
 NO_WAIT = getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_NOCTTY", 0)
 KINDS = {"p": "a pipe", "s": "a socket", "d": "a folder"}  # by the first letter of a mode; any other is a device
-# Characters that a terminal or a page would obey or hide instead of showing, and those that UTF-8 cannot encode.
+# Characters that a terminal or a page would interpret or hide, and characters that UTF-8 cannot encode.
 CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u061c\u200e\u200f\u2028-\u202e\u2066-\u2069\ud800-\udfff\ufffe\uffff]")
 
 

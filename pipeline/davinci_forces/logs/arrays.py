@@ -11,9 +11,9 @@ import numpy as np
 from davinci_forces.logs.log import BLOCK_CELLS, Block, Channel, Log, unique
 from davinci_forces.maths.arrays import Array
 
-MAX_COLUMNS = 256  # of a recording; a wider matrix is an image or another table
-MAX_DEPTH = 20  # of arrays within arrays that are followed
-MAX_FACTS = 40  # shown to the user
+MAX_COLUMNS = 256  # columns of a recording; a wider matrix is an image or another table
+MAX_DEPTH = 20  # nesting of arrays within arrays that are read
+MAX_FACTS = 40  # facts shown to the user
 NUMBER_KINDS = "biuf"  # kinds of numpy dtypes
 
 

@@ -96,7 +96,7 @@ Pieces = list[tuple[int, int]]
 
 
 def _pieces(path: Path, dtype: np.dtype[np.generic], columns: int) -> tuple[Pieces, str, int]:
-    """Find the position and count of rows; the layout in words; and the bytes of an incomplete last row.
+    """Find the position and count of rows, a description of the layout, and the bytes of an incomplete last row.
 
     LabVIEW puts the sizes of an array before it by default.  Numbers are sizes if they lead from array to array to
     the end of the file.  Two of them before floating-point numbers are sizes, too: as numbers they would be 1e-300.

@@ -1,9 +1,9 @@
 """Read signals that were recorded at the same time in separate files, and align channels of several clocks.
 
-Channels are interpolated by cubics, never across a gap.  The error on a motion goes with the fourth power of the
-sampling time, that of straight lines with the second.  Of white noise cubics leave 64 to 100 % of the variance,
-straight lines 50 to 100 %.  A channel sampled at least twice as fast as the clock is averaged over its sampling
-time first, so that noise above the clock's Nyquist frequency is not aliased.
+Channels are interpolated by cubics, never across a gap.  The error on a motion is proportional to the fourth power of
+the sampling time; for straight lines, to its second power.  Cubics leave 64 to 100 % of the variance of white noise,
+straight lines 50 to 100 %.  A channel sampled at least twice as fast as the clock is first averaged over the clock's
+sampling time, so that noise above the clock's Nyquist frequency is not aliased.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -19,7 +19,7 @@ from davinci_forces.logs.parts import ABSOLUTE, SAMPLED_KINDS, require_different
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals.clock import GAP, ClockStatistics, cubic, means
 
-MAX_PERIOD_RATIO = 10.0  # sampling time of a channel over that of the clock, above which it is not interpolated
+MAX_PERIOD_RATIO = 10.0  # sampling time of a channel over the clock's; beyond it, the channel is not interpolated
 
 
 def open_joined(files: Sequence[Path], options: Options) -> Log:
@@ -217,7 +217,7 @@ class Follower:
         self.source, self.rising = source, _Rising(name, refuse)
         self.names: list[str] = []
         self.interpolated = 0  # interpolated rows
-        self.many, self.ended = 1, False  # samples that are averaged into one
+        self.many, self.ended = 1, False  # number of samples that are averaged into one
         self.t, self.x = np.empty(0), np.empty((0, 0))
         self.waiting = self.t, self.x  # too few to be averaged yet
         following = self._next()
@@ -238,7 +238,7 @@ class Follower:
         x, exact, between = cubic(self.t, self.x, self.gap * self.many, t)
         self.interpolated += int(np.count_nonzero(between))
         last = int(np.searchsorted(self.t, t[-1], side="right")) - 1
-        begin = max(last - 1, 0)  # the slope at the last sample needs the one before
+        begin = max(last - 1, 0)  # the slope at the last sample needs the sample before it
         self.t, self.x = self.t[begin:], self.x[begin:]
         return dict(zip(self.names, x.T, strict=True)), exact | between
 

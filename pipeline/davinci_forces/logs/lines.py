@@ -46,7 +46,7 @@ class Lines:
 
     path: Path
     encoding: str | None = None
-    cut: bytes = b""  # the last line, where the file ends within it
+    cut: bytes = b""  # the last line, if the file ends within this line
     cut_at: int = 0  # number of that line, counted from 1
     padding: int = 0  # NUL bytes at the end, as a power cut leaves them
     damage: str = ""  # why a compressed file could not be read to its end

@@ -32,7 +32,7 @@ from davinci_forces.errors import BadLog
 Block = dict[str, NDArray[np.float64]]  # channel name -> samples; every array of a block has one length
 UNIT_OF_COUNTS = "samples"  # unit of a time channel that only counts samples
 IN_BRACKETS = re.compile(r".*\S\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*")
-BLOCK_ROWS = 1 << 16  # of a full block
+BLOCK_ROWS = 1 << 16  # rows of a full block
 BLOCK_CELLS = 1 << 20  # of a full block of many channels
 
 
@@ -85,7 +85,7 @@ class Log(ABC):
     zone: str = ""  # "UTC", "local" or ""
     facts: dict[str, str] = field(default_factory=dict)  # delimiter, encoding, operator ...: shown to the user
     warnings: list[str] = field(default_factory=list)  # one line each: the place in the file, and what was done
-    comments: list[str] = field(default_factory=list)  # what the operator wrote beside the samples, with the row
+    comments: list[str] = field(default_factory=list)  # the operator's comments in the file, each with its row
     nulls: dict[str, int] = field(default_factory=dict)  # missing samples of every channel read
     nans: dict[str, int] = field(default_factory=dict)  # samples logged as NaN of every channel read
     dropped: int = 0  # unusable rows

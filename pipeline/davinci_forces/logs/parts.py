@@ -17,7 +17,7 @@ from davinci_forces.logs.timeline import Timeline
 from davinci_forces.maths.arrays import Array
 
 UNSET_START = datetime(1904, 1, 1)  # LabVIEW's zero, which it writes for an unknown start
-ABSOLUTE = 1e9  # [s] a time above this counts from a fixed year, not from the start of its part
+ABSOLUTE = 1e9  # [s] a larger time counts from a fixed year, not from the start of its part
 SAMPLED_KINDS = ("number", "time")
 
 
@@ -137,7 +137,7 @@ class Parts(Log):
         clock_channels = self.times[time]
         part_time = _partition(part)[clock_channels]
         others = [name for name in names if name != time]
-        counted = [] if part_time or others else sorted(clock_channels)[:1]  # which says how many samples there are
+        counted = [] if part_time or others else sorted(clock_channels)[:1]  # gives the number of samples
         for block in part.blocks([*others, *([part_time] if part_time else []), *counted]):
             count = len(next(iter(block.values())))
             t = axis.read(number, part, part_time, block[part_time]) if part_time else axis.count(number, part, count)

@@ -8,7 +8,7 @@ from davinci_forces.records.record import Column, Counts, JointRecord, Labels, L
 
 @dataclass(frozen=True, eq=False)
 class Tuning(LogJointRecord):
-    """The noise of one joint in one identification log, of maximum likelihood for the filter's innovations."""
+    """The noise of one joint in one identification log that maximises the likelihood of the filter's innovations."""
 
     rate: float
     r_q: float
@@ -37,7 +37,7 @@ class FilterNoise(JointRecord):
     speed: float
 
     def published(self) -> Iterator[Published]:
-        """The noise, and the random walk that shows a push at the rate of the identification logs."""
+        """The noise, and the random walk that follows a push at the rate of the identification logs."""
         yield from self.publish(f"tuning.{self.joint}", "r_q", "r_dq", "r_tau", "q_tau")
 
 
@@ -88,7 +88,7 @@ class Track(LogJointRecord):
     """The external effort on one joint during one log, as a filter tracked it, with its standard deviation.
 
     The standard deviation combines the filter's covariance, the model's error in free motion outside the fit and the
-    filter's lag.  In a log with `free` windows, the offset of the day is added.
+    filter's lag.  In a log with `free` windows, it includes the uncertainty of the day's offset.
     """
 
     model: str
@@ -161,7 +161,7 @@ class FreeSpace(LogJointRecord):
 
 @dataclass(frozen=True, eq=False)
 class Threshold(JointRecord):
-    """The detection level for contacts on a joint: that of the log with the worst free space."""
+    """The detection level for contacts on a joint: the level of the log with the largest effort in free space."""
 
     KEY = ("joint", "filter")
 

@@ -113,7 +113,7 @@ class SwarmSearch(Record):
 
 @dataclass(frozen=True, eq=False)
 class Identifiability(Record):
-    """The identifiability of a model's parameters: the correlation of each pair, and advice in words."""
+    """The identifiability of a model's parameters: the correlation of each pair, and advice as text."""
 
     KEY = ("group", "model")
 
@@ -138,7 +138,7 @@ class Identifiability(Record):
 
 @dataclass(frozen=True, eq=False)
 class FittedPaths(JointRecord):
-    """The fitted paths of a joint, one period of each after the other; of many, those that differ most."""
+    """The fitted paths of a joint, one period per path, one after the other; of many paths, those that differ most."""
 
     source: Labels  # the log that follows the path
     period: Column

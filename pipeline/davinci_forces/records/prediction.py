@@ -11,7 +11,7 @@ SAME_PATH, ANOTHER_PATH = "same path", "another path"  # as fitted
 
 @dataclass(frozen=True, eq=False)
 class Prediction(LogJointRecord):
-    """The effort of a log that was left out of a fit, and the effort that the fit predicts for it.
+    """The effort of a log that was left out of a fit, and the effort that the fit predicts for that log.
 
     For the chosen model, `model` is "chosen" and `estimator` names its fit.
     """

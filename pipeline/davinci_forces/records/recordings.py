@@ -40,7 +40,7 @@ class LogSummary(LogRecord):
 
 @dataclass(frozen=True, eq=False)
 class Touch(LogRecord):
-    """The contact channels of one log, besides those of joints, as recorded; NaN without such a channel."""
+    """The contact channels of one log, which belong to no joint, as recorded; NaN without such a channel."""
 
     UNKNOWN = ("t", "depth", "force", "force_x", "force_y", "force_z", "x", "y", "z")
 

@@ -26,7 +26,7 @@ from davinci_forces.records.quantities import QUANTITIES
 Unit = Callable[[str], str]
 
 ARROW: dict[Any, pa.DataType] = {Column: pa.float64(), Counts: pa.int64(), Labels: pa.string()}
-MAX_ROWS_OF_GROUP = 1 << 24  # a recording in one row group is read without a copy
+MAX_ROWS_OF_GROUP = 1 << 24  # rows; a recording in one row group is read without a copy
 
 
 def path(kind: type[Record], key: Names) -> Path:

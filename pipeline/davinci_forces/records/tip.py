@@ -1,4 +1,4 @@
-"""Records of the force at the tip, and of a sensor beside it."""
+"""Records of the force at the tip, and of a force sensor that measures the same force."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -154,7 +154,7 @@ class TipBudget(LogRecord):
 class SensorForce(LogRecord):
     """The estimated force in one log, the force of a sensor, and their difference.
 
-    `axis` is x, y or z of the base, `vector` for all three together, `size` where the sensor shows only that, or the
+    `axis` is x, y or z of the base, `vector` for all three, `size` if the sensor measures only the magnitude, or the
     prismatic joint along the sensor's axis.  For a vector, the columns are the magnitudes of both forces.
     """
 

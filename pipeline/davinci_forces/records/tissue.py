@@ -5,12 +5,12 @@ from dataclasses import dataclass
 
 from davinci_forces.records.record import Column, Counts, Labels, LogRecord, Published, Record, RobotRecord, slug
 
-MAX_LISTED_PUSHES = 20  # of a log: up to this number, results.json has each push
+MAX_LISTED_PUSHES = 20  # up to this number of pushes in a log, results.json has each push
 
 
 @dataclass(frozen=True, eq=False)
 class Push(LogRecord):
-    """One push into tissue: force against depth, the straight line through its contact, and where that begins."""
+    """One push into tissue: force against depth, the straight line through its contact, and the onset of contact."""
 
     KEY = ("log", "push")
     UNKNOWN = ("t", "x", "y", "z", "fitted")
@@ -71,7 +71,7 @@ class Stiffness(LogRecord):
     z: Column
 
     def published(self) -> Iterator[Published]:
-        """The median and quartiles over the pushes that count, their number, and each push if there are few."""
+        """The median and quartiles over the pushes used, the number of these pushes, and each push if there are few."""
         prefix = f"tissue.{self.log}"
         yield from self.publish(prefix, "stiffness", with_std=True)
         yield from self.publish(prefix, "stiffness_q1", "stiffness_q3", "pushes")
@@ -152,7 +152,7 @@ class DelayLimit(RobotRecord):
 
 @dataclass(frozen=True, eq=False)
 class TissueLimit(LogRecord):
-    """The tissue of one log, compared with the limits of that hand."""
+    """The tissue of one log, compared with the stability limits of the hand."""
 
     stiffness: float
     k_h_needed: float
@@ -168,7 +168,7 @@ class TissueLimit(LogRecord):
 
 @dataclass(frozen=True, eq=False)
 class HapticMotion(RobotRecord):
-    """The motion of a hand against tissue beyond the limit of arbitrary switching, by a law.  Fig 8.8, 8.10"""
+    """The motion of a hand against tissue beyond the limit of arbitrary switching, by switching law.  Fig 8.8, 8.10"""
 
     KEY = ("robot", "switching")
 

@@ -36,7 +36,7 @@ class Weight(LogRecord):
 
     moves_with: str
     tare: str  # the log that was subtracted
-    stated_mass: float  # NaN where the study gives none
+    stated_mass: float  # NaN if the study gives no mass
     mass: float
     mass_std: float
     run_std: float

@@ -49,7 +49,7 @@ class Whiteness(LogJointRecord):
 
 @dataclass(frozen=True, eq=False)
 class Innovation(LogJointRecord):
-    """One innovation of the default filter: its size over the stated one, and its correlation with the motion."""
+    """One innovation of the default filter: its size over the predicted size, and its correlation with the motion."""
 
     KEY = ("log", "joint", "signal")
 

@@ -1,4 +1,4 @@
-"""Output of a run: lines, on a terminal a progress bar as well, and at the end the answer, times and files."""
+"""Output of a run: lines, on a terminal also a progress bar, and at the end the answer, times and files."""
 
 import atexit
 import sys
@@ -75,7 +75,7 @@ def durations(seconds: dict[str, float]) -> str:
 
 
 def echo(text: str, err: bool = False, **style: Any) -> None:
-    """Print a text, its control characters written out and `?` for what the terminal's encoding lacks."""
+    """Print a text, with control characters escaped and `?` for characters that the terminal's encoding lacks."""
     text, encoding = visible(text, "\n\t"), (sys.stderr if err else sys.stdout).encoding or "utf-8"
     with suppress(LookupError):
         text = text.encode(encoding, "replace").decode(encoding)

@@ -78,7 +78,7 @@ def error_message(error: Exception) -> str:
 
 
 def without_folders(message: str, folders: Folders) -> str:
-    """The message without the folders of this machine, so that records of it are the same everywhere."""
+    """The message without the folders of this machine, so that a recorded message is the same on every machine."""
     for folder in (folders.processed, folders.reports, folders.raw):
         message = message.replace(f"{folder}{os.sep}", "")
     return message
@@ -102,7 +102,7 @@ def arguments(folders: Folders, task: Task) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class InTurn(Collection[Record]):
-    """Records that are read one by one and not kept, since all of a long log would take much memory."""
+    """Records that are read one by one and not kept, since all records of a long log would take much memory."""
 
     folders: Folders
     task: Task
@@ -121,7 +121,7 @@ class InTurn(Collection[Record]):
 def _record(folders: Folders, task: Task, located: Located) -> Record:
     kind, place = located
     sha256 = task.fingerprint.inputs[f"processed/{place}"]
-    # The records of a joint are small, and the tasks of all its logs read them.
+    # The records of a joint are small, and the tasks of all the joint's logs read them.
     read = _read if is_about_log(KINDS[kind]) else _read_cached
     return read(kind, folders.processed, place, sha256)
 

@@ -19,7 +19,7 @@ ALL_LOGS = ""  # the log of a part that is about all logs
 class Part(NamedTuple):
     """The calls of a step about one log.
 
-    The part of `ALL_LOGS` is the whole step; where a step goes log by log, it only marks that all logs are done.
+    The part of `ALL_LOGS` is the whole step; if a step runs log by log, this part only marks that all logs are done.
     """
 
     step: str
@@ -44,14 +44,14 @@ class Graph:
                 heappush(self._ready, (self._rank[part], part))
 
     def next(self) -> list[Part]:
-        """Take the ready parts of one step; none if all have begun or wait for others."""
+        """Take the ready parts of one step; none if all parts have begun or wait for other parts."""
         batch: list[Part] = []
         while self._ready and (not batch or self._ready[0][1].step == batch[0].step):
             batch.append(heappop(self._ready)[1])
         return batch
 
     def finish(self, part: Part) -> None:
-        """Mark a part as done, which makes the parts that waited for it alone ready."""
+        """Mark a part as done; parts that waited only for this part become ready."""
         for follower in self._followers.get(part, ()):
             self._waits[follower] -= 1
             if not self._waits[follower]:
@@ -64,9 +64,9 @@ def stages_of(names: Iterable[str]) -> set[str]:
 
 
 def required_steps(names: Iterable[str]) -> list[str]:
-    """The steps of these stages and groups, and of those that make what they read, in the order of a run."""
+    """The steps of these stages and groups, and the steps that make their inputs, in the order of a run."""
     named = stages_of(names)
-    everything = REPORT in named  # it reads the records of all stages
+    everything = REPORT in named  # the report reads the records of all stages
     last = max((i for i, stage in enumerate(STAGES) if everything or stage in named), default=-1)
     read: set[type] = set()
     wanted = [REPORT] * everything
@@ -96,7 +96,7 @@ def _parts(step: str, logs: Sequence[str]) -> list[Part]:
 
 
 def _sources(part: Part, names: Iterable[str], logs: Sequence[str]) -> list[Part]:
-    """The parts that make what this one reads."""
+    """The parts that make the records that this part reads."""
     if part.step == REPORT:
         return [Part(name, ALL_LOGS) for name in names if name != REPORT]
     if part.log == ALL_LOGS and goes_by_log(declaration(part.step)):
@@ -106,7 +106,7 @@ def _sources(part: Part, names: Iterable[str], logs: Sequence[str]) -> list[Part
 
 @cache
 def _makers(step: str) -> tuple[tuple[str, bool], ...]:
-    """The steps that make what this one reads, and whether a part of it reads their records of its own log only."""
+    """The steps that make a step's inputs, and whether a part of the step reads only their records of its own log."""
     asks = declaration(step)
     earlier = takewhile(lambda name: name != step, every_step(STAGES.index(stage_of(step))))
     return tuple(

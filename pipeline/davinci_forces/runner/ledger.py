@@ -1,11 +1,11 @@
-"""The record of what each result was made from: one small JSON file per task, and an index of them all.
+"""The record of what each result was made from: one small JSON file per task, and an index of all these files.
 
 A task is up to date while its fingerprint and the content of its outputs agree with its entry.  The fingerprint covers
 inputs by content, settings, robot, declarations of records, code and version.  Comparing an old entry with a new
 fingerprint gives the reason to run.
 
-A study may come from somebody else, and files that an entry names may be removed.  So an entry counts only in its own
-place, and if it names nothing but files of the report and records of present or former kinds.
+A study may come from somebody else, and files that an entry names may be removed.  So an entry is valid only in its own
+place, and only if it names files of the report and records of present or former kinds.
 
 The index holds all entries in one file, so that a run with nothing to do reads one file and not thousands.  The first
 change of an entry removes it, and a run that ends writes it.  If an entry is newer or missing, all are read one by one.
@@ -29,7 +29,7 @@ from davinci_forces.records import FORMER_FOLDERS, KINDS
 from davinci_forces.report import FILES
 from davinci_forces.runner.fingerprints.fingerprint import Fingerprint, differences, hash_of_text
 
-MAX_NAME_BYTES = 200  # of a file's name, which may have 255 with all endings
+MAX_NAME_BYTES = 200  # in a file's name, which may have 255 bytes with all endings
 SEAL = ',\n "seal": "{}"\n}}\n'  # the end of an entry
 INDEX = "index.json"
 UNREADABLE = OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError  # raised by foreign JSON
@@ -54,7 +54,7 @@ class Folders:
         return Path(getattr(self, root)) / path
 
     def expand(self, name: str) -> list[str]:
-        """The names of the files right in a folder, such as a ROS 2 bag; the name of a file stands for itself."""
+        """The names of the files directly in a folder, such as a ROS 2 bag; the name of a file stays unchanged."""
         folder = self.file(name)
         if not folder.is_dir():
             return [name]
@@ -74,7 +74,7 @@ class Entry:
 
 
 class Ledger:
-    """The entries of one study, read once a run, as are the files that are hashed.
+    """The entries of one study; a run reads the entries, and hashes each file, once.
 
     Entries are read from their index if that is complete, or else, or with `one_by_one`, from their files.
     """
@@ -125,7 +125,7 @@ class Ledger:
         return self._entries.get(stage, {}).get(file_name(task))
 
     def read(self, stage: str, task: str) -> Entry | None:
-        """Read the entry of one task without those of the others; None as for `entry`."""
+        """Read the entry of one task without the entries of other tasks; None as for `entry`."""
         with suppress(*UNREADABLE):
             return _read(str(self.place(stage, task)))
         return None
@@ -161,7 +161,7 @@ class Ledger:
         self._unlink(f"processed/tasks/{entry.stage}/{file_name(entry.task)}.json")
 
     def _remove_outputs(self, names: Iterable[str]) -> list[str]:
-        """Remove outputs of a task that no other task makes, as a file may pass from stage to stage."""
+        """Remove outputs of a task that no other task makes, because a file may move from stage to stage."""
         self._outputs.subtract([*names])
         removed = [name for name in names if self._outputs[name] <= 0]
         for name in removed:
@@ -185,7 +185,7 @@ class Ledger:
                     folder.rmdir()
 
     def write_index(self) -> None:
-        """Write the index of all entries, unless it is there."""
+        """Write the index of all entries, unless the file exists."""
         if self._entries and not self._indexed:
             write_bytes(self.home / INDEX, self.index())
             self._indexed = True
@@ -219,7 +219,7 @@ class Ledger:
 
 
 def file_name(task: str) -> str:
-    """The file name of a task; one that would be too long ends in its hash."""
+    """The file name of a task; a name that would be too long is cut and ends in its hash."""
     name = task.replace("/", ".")
     if len(name.encode()) <= MAX_NAME_BYTES:
         return name
@@ -244,7 +244,7 @@ def check(entry: Entry, stage: str, name: str) -> Entry:
     Raises
     ------
     ValueError
-        If it is of another task, or names a file that no stage writes, which a run would remove.
+        If the entry is of another task, or names a file that no stage writes, which a run would remove.
     TypeError
         If a part of it has the wrong type.
     """
@@ -276,7 +276,7 @@ def _read(file: str) -> Entry:
 def _digest(file: str) -> str:
     try:
         return digest(file)
-    except OSError:  # nearly all files exist, so this is faster than asking first
+    except OSError:  # nearly all files exist, so this is faster than checking first
         if os.path.isfile(file):
             raise
         return ""
@@ -304,7 +304,7 @@ def read_index(folder: Path, files: Collection[tuple[str, str, str]]) -> Entries
 
 def index_of(entries: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> bytes:
     """The content of the index of these entries; `read_index` reads it."""
-    numbers: dict[str, int] = {}  # of the shared parts, by their text
+    numbers: dict[str, int] = {}  # numbers of the shared parts, by their text
     brief: Entries = {}
     for stage, named in sorted(entries.items()):
         for name, entry in sorted(named.items()):

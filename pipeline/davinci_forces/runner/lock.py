@@ -1,8 +1,8 @@
-"""A lock that lets one run at a time work on a study: two would remove each other's half-written files.
+"""A lock that lets one run at a time work on a study: two runs would remove each other's half-written files.
 
 Where the file system can lock files, the system locks the file `.lock`.  Elsewhere `.lock` is a folder of one file,
-whose name says who holds it.  No folder replaces one that holds a file, and only one run can rename the file of a run
-that has ended.
+whose name identifies the holder.  No folder replaces a folder with a file, and only one run can rename the file of a
+run that has ended.
 """
 
 import os
@@ -22,11 +22,11 @@ from uuid import uuid4
 
 from davinci_forces.errors import BadRequest
 
-NAME = ".lock"  # the file stays after a run; only a process that holds it counts
+NAME = ".lock"  # the file stays after a run; the lock is in force only while a process holds it
 BUSY, REMEDY = "another run is working on this study", "wait until it has ended, or stop it"
-MAX_TRIES = 100  # to take a lock while others take and release it
+MAX_TRIES = 100  # attempts to take a lock while other runs take and release it
 OPEN_FLAGS = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0) | getattr(os, "O_NONBLOCK", 0)  # never wait
-LOCKED_BYTE = 1 << 30  # that Windows locks, so that others can read the bytes before it
+LOCKED_BYTE = 1 << 30  # byte that Windows locks, so that other processes can read the bytes before it
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ def holder() -> Holder:
 
 
 def parse_holder(name: str) -> Holder | None:
-    """The holder of a name, or None if the name is not one of a holder."""
+    """The holder whose file has this name, or None if the name describes no holder."""
     with suppress(TypeError, ValueError):
         holder = Holder(**dict(parse_qsl(name, keep_blank_values=True)))
         int(holder.process)
@@ -81,7 +81,7 @@ def this_host() -> str:
 
 
 def start_of(process: int) -> str | None:
-    """The start time of a process; empty if the system does not tell it, `None` if the process has ended."""
+    """The start time of a process; empty if the system does not provide it, `None` if the process has ended."""
     if sys.platform == "win32":
         return _start_on_windows(process)
     try:
@@ -117,7 +117,7 @@ def _start_on_windows(process: int) -> str | None:
 def hold_lock(folder: Path) -> Iterator[bool]:
     """Hold the lock of a processed folder, and yield whether it is held: a read-only folder needs none.
 
-    The lock of a process that has ended does not count.
+    The lock of a process that has ended is ignored.
 
     Raises
     ------
@@ -151,7 +151,7 @@ def _lock_by_system(file: Path, me: Holder) -> int | None:
     """Lock a file by the system, and write its holder into it; `None` if the file system has no locks."""
     try:
         descriptor = os.open(file, OPEN_FLAGS, 0o666)
-    except (IsADirectoryError, PermissionError) as error:  # the latter for a folder on Windows
+    except (IsADirectoryError, PermissionError) as error:  # Windows raises PermissionError for a folder
         if isinstance(error, PermissionError) and not file.is_dir():
             raise
         return None

@@ -51,7 +51,7 @@ class Places:
     def find(self, kinds: Kinds, log: str = ANY, joint: str = ANY, role: str = ANY) -> tuple[Located, ...]:
         """Files of these kinds about a log, a joint and logs of a role.
 
-        A kind that is about no log, or no joint, is about every one.
+        A record of a kind without a log applies to every log, and one without a joint to every joint.
         """
         located: tuple[Located, ...] = ()
         for kind in sorted(kinds, key=ORDER.__getitem__) if len(kinds) > 1 else kinds:

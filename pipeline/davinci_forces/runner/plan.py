@@ -1,4 +1,4 @@
-"""The tasks of a step, one per call of its function, and everything that each of them depends on."""
+"""The tasks of a step, one per call of its function, and everything that each task depends on."""
 
 import importlib.metadata
 import json
@@ -33,7 +33,7 @@ class Task:
     records: dict[str, tuple[Located, ...]] = field(default_factory=dict)  # by parameter
     given: dict[str, Any] = field(default_factory=dict)  # by parameter; for a log, its entry
     settings: dict[str, Any] = field(default_factory=dict)
-    joints: dict[str, tuple[Kind, str]] = field(default_factory=dict)  # they give the units of its records
+    joints: dict[str, tuple[Kind, str]] = field(default_factory=dict)  # by joint, for the units of its records
 
     @property
     def subject(self) -> str:
@@ -62,7 +62,7 @@ class Plan:
         return self._places
 
     def tasks(self, asks: Declaration, log: str = "") -> Iterator[Task]:
-        """The tasks of a step that its study and records give, or those about one log."""
+        """The tasks of a step, given the study and its records; with `log`, only the tasks about that log."""
         if "weighings" in asks.given.values() and not self.study.weighings.each:
             return
         places = self.places()
@@ -111,7 +111,7 @@ class Plan:
         return Task(asks.name, name, fingerprint, records, values, settings, self._joints)
 
     def _given(self, what: str, log: str, joint: str) -> Any:
-        """An argument of a task besides its records; for a log, its entry in study.toml."""
+        """An argument of a task other than its records; for a log, its entry in study.toml."""
         if what in ("log", "entry"):
             return self._entries[log]
         if what in ("weighings", "haptics"):

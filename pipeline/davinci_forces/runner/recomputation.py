@@ -16,14 +16,14 @@ from davinci_forces.runner.ledger import Folders, Ledger
 from davinci_forces.runner.signature import stage_of
 from davinci_forces.runner.verification import shorten
 
-MAX_ROUNDING = 1e-9  # of a number that counts as the same
-MAX_RELATIVE_CHANGE = 1e-6  # of a number without standard deviation
-MAX_CHANGE_BY_STD = 0.1  # of a number, and of its standard deviation, over the latter
-MAX_ZERO = 1e-12  # in any unit: a number up to this size is 0 but for rounding
-# Keys of results that depend strongly on the last digits of others, so they have no limits.  With other kernels of BLAS
+MAX_ROUNDING = 1e-9  # relative change of a number that counts as unchanged
+MAX_RELATIVE_CHANGE = 1e-6  # relative change of a number without standard deviation
+MAX_CHANGE_BY_STD = 0.1  # change of a number, or of its standard deviation, over the standard deviation
+MAX_ZERO = 1e-12  # in any unit: a number up to this size is a rounding error of 0
+# Keys of results that depend strongly on the last digits of other numbers are not limited.  With other kernels of BLAS
 # and without AVX2 in numpy, all other numbers of the demonstration, a UR10e and a dVRK are within the limits.
 UNLIMITED = re.compile(
-    r"ekf-adaptive\..*"  # the noise is tuned to the innovations that it gives
+    r"ekf-adaptive\..*"  # the noise is tuned to innovations that depend on the noise
     r"|.*\.pso\..*"  # a swarm follows its best particle
     r"|control\..*"  # an integrator chooses its steps
     r"|haptics\..*"  # bisection for the tissue at which a simulated hand begins to diverge
@@ -49,7 +49,7 @@ def recompute(folders: Folders, by_bytes: bool, jobs: int = 1) -> list[str]:
     """
     with TemporaryDirectory(prefix="davinci-forces-") as home:
         new = runs.folders(folders.raw, Path(home, "processed"), Path(home, "reports"))
-        with redirect_stderr(StringIO()):  # its warnings were printed when the results were made
+        with redirect_stderr(StringIO()):  # the warnings were printed when the results were made
             runs.run(folders.raw, ALL, new.processed.parent, new.reports.parent, jobs=jobs, verbosity="quiet")
         stored, computed = Ledger(folders), Ledger(new)
         before = {(entry.stage, entry.task) for entry in stored.entries() if entry.failed}

@@ -23,7 +23,7 @@ from davinci_forces.runner.results import stated
 from davinci_forces.study import Study, review
 from davinci_forces.study.review import Rating
 
-MAX_CACHED_ROWS = 1 << 16  # of a record that is held in memory while the report is made
+MAX_CACHED_ROWS = 1 << 16  # rows of a record that stays in memory while the report is made
 PACKAGES = "numpy", "scipy", "pandas", "pyarrow", "statsmodels", "numba", "clarabel", "matplotlib", "typst", "npTDMS"
 
 
@@ -125,6 +125,6 @@ def environment() -> str:
 
 
 def study_files(study: Study) -> tuple[str, ...]:
-    """The files of a study besides its logs."""
+    """The files of a study other than its logs."""
     names = ("study.toml", study.robot_file, "truth.toml" if study.truth else "", study.baseline)
     return tuple(name for name in names if name)

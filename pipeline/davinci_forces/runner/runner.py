@@ -26,15 +26,15 @@ from davinci_forces.study import Study
 class Progress:
     """Progress of a step."""
 
-    unplanned: int = 0  # parts
+    unplanned: int = 0  # number of parts without planned tasks
     tasks: int = 0
-    current: int = 0  # tasks that are up to date
+    current: int = 0  # number of tasks that are up to date
     reasons: dict[str, list[str]] = field(default_factory=dict)  # reason to run -> tasks, until it is printed
 
 
 @dataclass
 class Runner:
-    """Runs stages of one study, in this process or in `others`."""
+    """Runs stages of one study, in this process or in the processes `others`."""
 
     study: Study
     folders: Folders
@@ -107,10 +107,10 @@ class Runner:
     @contextmanager
     def _clean_up(self) -> Iterator[None]:
         """Remove half-written files after a run that was stopped, or that had other processes."""
-        needs_removal = self.perform is None  # workers of a cluster go on writing
+        needs_removal = self.perform is None  # workers of a cluster continue to write
         try:
             yield
-            needs_removal = self.others is not None  # one may have been killed unnoticed
+            needs_removal = self.others is not None  # a process may have been killed unnoticed
         finally:
             if needs_removal and self.writable:
                 self._remove_leftovers()
@@ -148,10 +148,10 @@ class Runner:
         for entry in self.ledger.entries():
             self._before.setdefault(_part(entry.stage, entry.task), []).append(entry)
         self._progress = {part.step: Progress() for part in graph.parts}
-        self._open = Counter(map(stage_of, self._progress))  # steps of each stage that are not done
+        self._open = Counter(map(stage_of, self._progress))  # number of steps of each stage that are not done
         for part in graph.parts:
             self._progress[part.step].unplanned += _has_tasks(part)
-        self._due: dict[Part, int] = {}  # tasks that are not done
+        self._due: dict[Part, int] = {}  # number of tasks that are not done
         while True:
             for batch in iter(graph.next, []):
                 self._begin(graph, batch)
@@ -182,7 +182,7 @@ class Runner:
             self._count_done(graph, part)
 
     def _count_done(self, graph: Graph, part: Part) -> None:
-        """Count a task of a part as done, and with the last one the part."""
+        """Count a task of a part as done; after its last task, the part is done too."""
         self._due[part] -= 1
         if not self._due[part]:
             graph.finish(part)
@@ -235,7 +235,7 @@ class Runner:
         return self.ledger.reasons(self.ledger.entry(task.step, task.name), task.fingerprint)
 
     def _is_forced(self, task: Task) -> bool:
-        """Whether a task runs even if it is up to date: with --force, those of the named stages do."""
+        """Whether a task runs even if it is up to date: with --force, the tasks of the named stages do."""
         return self.force and stage_of(task.step) in self._named
 
     def _record(self, outcome: Outcome) -> None:
@@ -252,7 +252,7 @@ class Runner:
 
 
 def _has_tasks(part: Part) -> bool:
-    """Whether a part has tasks; that of all logs has none if its step goes log by log."""
+    """Whether a part has tasks; the part of all logs has none if its step runs log by log."""
     return part.log != ALL_LOGS or part.step == REPORT or not goes_by_log(declaration(part.step))
 
 

@@ -1,4 +1,4 @@
-"""Run the stages on studies: find their folders and logs, run, and print what came out."""
+"""Run the stages on studies: find their folders and logs, run, and print the results."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -18,7 +18,7 @@ from davinci_forces.study import Study, reading
 
 
 def folders(study: Path, processed: Path | None, reports: Path | None) -> Folders:
-    """The folders of a study; by default, processed/ and reports/ are beside the folder that holds the study."""
+    """The folders of a study; by default, processed/ and reports/ are next to the folder that contains the study."""
     home = study.resolve().parent.parent
     name = study.resolve().name
     return Folders(study, (processed or home / "processed") / name, (reports or home / "reports") / name)
@@ -83,7 +83,7 @@ def single_study(name: Path) -> Path:
 
 
 def results_of(name: Path, reports: Path | None = None) -> Path:
-    """The results.json of this name, or that of the report folder or study of this name.
+    """The results.json of this name, or the results.json of the report folder or study of this name.
 
     Raises
     ------
@@ -136,7 +136,7 @@ def run(
     dry_run: bool = False,
     cluster: str = "",
 ) -> bool:
-    """Run stages on one study after those that they need, or preview the run; return whether all tasks succeeded."""
+    """Run stages of one study and the stages that they need, or preview the run; return whether all tasks succeeded."""
     study = load(folder)
     terminal = console(verbosity)
     kind = VerboseRunner if verbosity == "verbose" else Runner

@@ -1,4 +1,4 @@
-"""Read from the signatures of a stage's functions what its steps take and make."""
+"""Read from the signatures of a stage's functions which records its steps read and make."""
 
 import re
 import types
@@ -17,7 +17,7 @@ from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.stages import module
 from davinci_forces.study import HapticScenario, LogEntry, Settings, Weighings
 
-FUNCTIONS = ("run", "gather", "apply")  # that a stage may export, in the order of their steps
+FUNCTIONS = ("run", "gather", "apply")  # functions that a stage may export, in the order of their steps
 FUNCTION = re.compile(r"^def (\w+)\(", re.MULTILINE)
 Kinds = tuple[type[Record], ...]
 ARGUMENT_KINDS = {
@@ -33,9 +33,9 @@ class Declaration:
     name: str  # of the step
     each: dict[str, Kinds]  # called once for each record of these kinds
     per_log: dict[str, Kinds]  # called once a log, with all its records of these kinds
-    in_turn: set[str]  # those of these parameters whose records are read one by one
-    optional: dict[str, Kinds]  # the record about the same, or None
-    every: dict[str, Kinds]  # all records about the same
+    in_turn: set[str]  # parameters of `per_log` whose records are read one by one
+    optional: dict[str, Kinds]  # the record about the same log and joint, or None
+    every: dict[str, Kinds]  # all records about the same log and joint
     given: dict[str, str]  # parameter -> "log", "entry", "joint", "robot", "weighings" or "haptics"
     roles: dict[str, str]  # parameter -> role of the logs whose records it takes, if not of all logs
     settings: tuple[str, ...]

@@ -21,9 +21,9 @@ from davinci_forces.runner.plan import Plan, Task
 from davinci_forces.runner.signature import declaration, stage_of
 from davinci_forces.study import Study, review
 
-MAX_NAMES = 5  # of files or tasks in one message
+MAX_NAMES = 5  # names of files or tasks in one message
 PAGES = ".html", ".pdf"
-ENTRY = re.compile(r"processed/tasks/[^./][^/]*/[^./][^/]*\.json")  # what a ledger reads
+ENTRY = re.compile(r"processed/tasks/[^./][^/]*/[^./][^/]*\.json")  # files that a ledger reads
 # Files that systems leave in any folder, the lock of a run, and the mark by which workers of a cluster know a folder.
 IGNORED = re.compile(
     r"(.*/)?(\.DS_Store|Thumbs\.db|desktop\.ini|\._[^/]*)|processed/\.(lock(-[0-9a-f]+)?(/.*)?|run-[0-9a-f]{12})"

@@ -16,10 +16,10 @@ from davinci_forces.maths.simulation.actuators import Regulator
 from davinci_forces.records import Column, Control, Excitation, Links, Lyapunov, Pose, Workspace
 from davinci_forces.robots.robot import ControlStudy, Joint, Robot
 
-STARTS = 8  # of the excitation's optimiser; `davinci-forces excite` uses more
-GRID_POINTS = 11  # along each joint's range
-MAX_GRID_JOINTS = 3  # that carry the tip
-SETTLING_BAND = 0.02  # of the step
+STARTS = 8  # random starts of the excitation's optimiser; `davinci-forces excite` uses more
+GRID_POINTS = 11  # poses along each joint's range
+MAX_GRID_JOINTS = 3  # joints that carry the tip; the wrist is left out
+SETTLING_BAND = 0.02  # half-width, as a share of the step
 
 
 def run(robot: Robot) -> Iterator[Links | Pose | Workspace | Control | Lyapunov | Excitation]:

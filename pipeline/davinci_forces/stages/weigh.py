@@ -30,14 +30,14 @@ from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Mot
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import AttachedMass, LogEntry, Weighing, Weighings
 
-FREE_ROLES = ("identification", "validation")  # of logs in which nothing touches the arm
-ROWS_PER_CUTOFF_PERIOD = 6.0  # of the low-pass
-MIN_LOAD = 1e-6  # effort per kilogram, below which a joint does not carry the mass
-MIN_ROWS = 2 * PARTS  # of a path
+FREE_ROLES = ("identification", "validation")  # roles of logs in which nothing touches the arm
+ROWS_PER_CUTOFF_PERIOD = 6.0  # rows of a Load per period of the low-pass's cutoff frequency
+MIN_LOAD = 1e-6  # [effort/kg]; a joint with less does not carry the mass
+MIN_ROWS = 2 * PARTS  # rows of a path in each joint
 MAX_TARE_DISTANCE = 0.1  # between the paths of a log and its tare, over the standard deviation of the position
-PHASES = 1000  # of a period, at which two paths are compared
-MAX_PERIOD_DIFFERENCE = 0.01  # between a log and its tare, over the period
-MIN_SIDE_DIFFERENCE = 2.0  # standard errors by which one side of a link has to explain the effort better
+PHASES = 1000  # phases of a period at which two paths are compared
+MAX_PERIOD_DIFFERENCE = 0.01  # between a log and its tare, relative to the period
+MIN_SIDE_DIFFERENCE = 2.0  # [standard errors] by which the better side of a link must explain the effort better
 
 
 def run(
@@ -51,7 +51,7 @@ def run(
 ) -> Iterator[Load | Diagnostic]:
     """Compute the joint effort per kilogram of each mass, along its weight log and along free motion.
 
-    One Load per weight and moving joint.  Its effort is measured minus modelled effort, not that of the filter, whose
+    One Load per weight and moving joint.  Its effort is measured minus modelled effort, not the filter's effort, whose
     lag and random walk would bias the mass.  Joints that the log does not hold are taken to be at 0.  Joints whose
     effort is in A are left out, because a current is not a force.
     """
@@ -109,7 +109,7 @@ def whole_motion(motions: Sequence[Motion], robot: Robot) -> tuple[Array, Array,
 
 
 def period_of(motions: Sequence[Motion], robot: Robot) -> float:
-    """Common period [s] of the joints; 0 where they do not repeat."""
+    """Common period [s] of the joints; 0 if the motion does not repeat."""
     part = max(segments(motions[0].segment), key=lambda part: part.stop - part.start)
     positions = [motion.q_measured[part] for motion in motions]
     lag = guess(positions)
@@ -133,7 +133,7 @@ def loads_per_kilogram(
 ) -> tuple[Array, Array]:
     """Joint effort of a kilogram (N, n) at the stated position, and at its mirror position on the link."""
     names = [joint.name for joint in robot.joints]
-    link = weight.moves_with  # a link, or a joint, with which a link moves
+    link = weight.moves_with  # names a link, or a joint with which a link moves
     if link in names:
         link = moved_with(chain, names.index(link))
     stated, opposite = (
@@ -143,7 +143,7 @@ def loads_per_kilogram(
 
 
 def path_means(t: Array, x: Array, first: float, length: float, count: int) -> Array:
-    """Mean of a signal (N,) in each of `count` parts of the path; NaN in parts that it does not reach."""
+    """Mean of a signal (N,) in each of `count` parts of the path; NaN in parts without samples."""
     part = ((t - first) / length % 1.0 * count).astype(np.int64) % count
     samples = np.bincount(part, minlength=count)
     sums = np.bincount(part, x, count)
@@ -179,10 +179,10 @@ def gather(loads: Iterable[Load], robot: Robot, weighings: Weighings) -> Iterato
 
 
 class FreeMotionErrors(NamedTuple):
-    """Errors of a mass, as free motion shows them."""
+    """Errors of a mass, estimated from logs of free motion."""
 
     sigma: dict[str, float]  # error of the model, by joint
-    fit_std: float  # [kg] of the error that all masses by this fit share
+    fit_std: float  # [kg] standard deviation of the error that all masses from this fit share
     widening: float
     masses: dict[str, MassEstimate]  # by log
     roles: dict[str, str]
@@ -247,8 +247,8 @@ def total_std(mass: MassEstimate, free: FreeMotionErrors) -> float:
 def free_motion_errors(weight_loads: Sequence[Load], logs: dict[str, list[Load]]) -> FreeMotionErrors:
     """Compute the errors of a mass from free motion that the fit has not seen.
 
-    The error of the fit is the mass that its identification logs seem to have, by refits that had not seen them.  The
-    masses of other logs of free motion over their errors give the factor that widens all errors.
+    The error of the fit is the apparent mass in its identification logs, from refits without these samples.  The
+    apparent masses of other logs of free motion, over their errors, give the factor that widens all errors.
     """
     joints = {load.joint for load in weight_loads}
     unseen = {
@@ -273,7 +273,7 @@ def free_motion_errors(weight_loads: Sequence[Load], logs: dict[str, list[Load]]
 
 
 def unseen_part(load: Load) -> Load | None:
-    """Rows of a load whose effort the fit has not seen, with that effort; None where they are too few."""
+    """Rows of a load with effort residuals from refits without those rows; None if the rows are too few."""
     unseen = np.isfinite(load.tau_ext_unseen)
     if unseen.sum() < MIN_ROWS:
         return None
@@ -290,7 +290,7 @@ def rows_of(loads: Sequence[Load], sigma: dict[str, float], column: str) -> list
 
 
 def subtract_tare(loads: Sequence[Load], tare: Sequence[Load]) -> tuple[list[Load], str]:
-    """Subtract the effort of the tare at the same places of the path; where that is not possible, say why."""
+    """Subtract the effort of the tare at the same positions of the path; if that is not possible, return the reason."""
     by_joint = {load.joint: load for load in tare}
     missing = [load.joint for load in loads if load.joint not in by_joint]
     if missing:
@@ -309,7 +309,7 @@ def subtract_tare(loads: Sequence[Load], tare: Sequence[Load]) -> tuple[list[Loa
 
 
 def even_positions(load: Load) -> Array:
-    """Position of a joint at `PHASES` phases of a period, or at its rate where it does not repeat."""
+    """Position of a joint at `PHASES` phases of a period, or at the load's rate if the motion does not repeat."""
     if load.period:
         phase = (np.arange(PHASES) + 0.5) / PHASES
         return np.asarray(np.interp(phase, load.t / load.period, load.q, period=1.0))
@@ -317,7 +317,7 @@ def even_positions(load: Load) -> Array:
 
 
 def subtract_joint_tare(load: Load, tare: Load, samples: float) -> Load:
-    """Subtract the effort of a joint's tare, which is `samples` later, on the part of the path that both cover."""
+    """Subtract the effort of a joint's tare, which lags by `samples`, on the part of the path that both logs cover."""
     if load.period:
         phase = load.t / load.period + samples / PHASES
         tare_effort = np.interp(phase, tare.t / tare.period, tare.tau_ext, period=1.0)

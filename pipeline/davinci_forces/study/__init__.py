@@ -30,7 +30,7 @@ class Settings:
     lowpass: float = 17.0  # [Hz] zero-phase low-pass where velocities and accelerations are differences
     harmonics: int = 0  # of the excitation; 0 takes the robot's
     fit: str = "chosen"  # the Fit that the filter runs with
-    q_tau: float = 0.0  # random walk of the external effort [effort/s^0.5]; 0 is the slowest that shows a push
+    q_tau: float = 0.0  # random walk of the external effort [effort/s^0.5]; 0: the smallest that follows a push
     effort: dict[str, float] = field(default_factory=dict)  # external effort to be detected on each joint [effort]
 
 
@@ -90,7 +90,7 @@ class LogEntry:
     files: tuple[str, ...]  # relative to the study
     role: str
     channels: tuple[Source, ...]
-    join: bool = False  # whether the files stand side by side, else they are parts in order
+    join: bool = False  # True: files with different channels; False: consecutive parts
     period: float | None = None
     rate: float | None = None
     skip: float = 0.0
@@ -104,7 +104,7 @@ class LogEntry:
     header: bool | None = None
     encoding: str | None = None
     dtype: str | None = None  # of raw binary numbers
-    columns: int | tuple[str, ...] | None = None  # of a row of them: how many, or their names
+    columns: int | tuple[str, ...] | None = None  # of raw binary numbers in a row: their count or names
 
     @property
     def has_known_free_motion(self) -> bool:
@@ -138,7 +138,7 @@ class Study:
     baseline: str = ""  # the results.json in the study's folder that the report is compared with, if there is one
     robot_file: str = ""  # the .toml or .urdf in the study's folder that describes the robot, if there is one
     lines: dict[str, int] = field(default_factory=dict, compare=False)  # of study.toml, by the file of a log they name
-    remarks: tuple[str, ...] = field(default=(), compare=False)  # what its author should know, each with its line
+    remarks: tuple[str, ...] = field(default=(), compare=False)  # warnings for the author, each with its line
 
     @property
     def name(self) -> str:

@@ -20,9 +20,9 @@ from davinci_forces.study.guessing import COMMAND_WORDS, SIGNAL_WORDS, Holding, 
 from davinci_forces.toml import TomlTable
 from davinci_forces.toml.file import TomlFile
 
-ROBOT_FILE = "robot.toml"  # written beside study.toml where no robot fits
+ROBOT_FILE = "robot.toml"  # written next to study.toml if no robot fits
 DEFAULT_ROBOT = "davinci"
-POSITION_COUNTS = (3, 6, 7)  # positions in a log of the arm: of its joints, with the wrist, and with the jaw
+POSITION_COUNTS = (3, 6, 7)  # positions in a log of the arm: of its joints, also of the wrist, also of the jaw
 MAX_SLIDE = 0.3  # [m] within which the instrument slides
 MAX_TURN = 1.6  # [rad] within which the hand turns
 TERMS = ("inertia", "gravity, sine", "gravity, cosine", "viscous friction", "Coulomb friction")
@@ -30,7 +30,7 @@ OTHER_SIGNALS = ("force", "forces", "wrench", "ft", "m")  # files of recordings 
 
 
 class Arm(NamedTuple):
-    """A robot, its name in a study, the reason for the choice, and the text of its file where that is to be written."""
+    """A robot, its name in a study, the reason for the choice, and the text of its file if a file must be written."""
 
     name: str
     robot: Robot
@@ -39,7 +39,7 @@ class Arm(NamedTuple):
 
 
 def arm_of(holdings: Sequence[Holding], folder: Path) -> Arm:
-    """Choose the robot of logs: a listed one that fits, a description beside them, or one that is written.
+    """Choose the robot of logs: a listed robot that fits, a description next to the logs, or a new robot.toml.
 
     Raises
     ------
@@ -131,7 +131,7 @@ def split_signal(file: Path) -> tuple[str, str]:
 
 
 def guess_joined(log: Joined) -> Holding:
-    """Guess the channels of joined files: joints in the order of columns, beside a time that increases throughout.
+    """Guess the channels of joined files: joints in the order of columns, and a time that always increases.
 
     Raises
     ------

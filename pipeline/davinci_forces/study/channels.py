@@ -29,7 +29,7 @@ WORDS_BY_QUANTITY = {
     "force": ("force", "load", "f"),
     "push": ("push", "probe", "poke", "press", "indent", "trial"),
 }
-RESULTANT_WORDS = ("norm", "magnitude", "total", "resultant", "abs")  # of several forces, one with such a name is taken
+RESULTANT_WORDS = ("norm", "magnitude", "total", "resultant", "abs")  # a force of such a name is preferred
 AXES = ("x", "y", "z")
 TIP_WORDS = {"tip", "tool", "pos", "position", "end", "effector", "ee", "probe", "m", "mm", "um", *AXES}
 
@@ -66,7 +66,7 @@ class Channels:
             self.complete_tissue(sources)
 
     def complete_vectors(self, has: set[str]) -> None:
-        """Check that a position and a force have all their components or none."""
+        """Check that a position or a force has all of its components or no component."""
         for names in (TIP, FORCE):
             missing = [name for name in names if name not in has]
             if missing and len(missing) < len(names):

@@ -12,9 +12,9 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.periods.repetition import repetition
 from davinci_forces.maths.signals import columns
 
-MAX_SAMPLES = 200_000  # of a log that are read
-MAX_CHANNELS = 400  # of a log whose samples are read
-MIN_REPEATING_SHARE = 0.5  # of a recording whose motion is said to repeat
+MAX_SAMPLES = 200_000  # samples of a log that are read
+MAX_CHANNELS = 400  # channels of a log whose samples are read
+MIN_REPEATING_SHARE = 0.5  # share of a recording that must repeat for its motion to count as periodic
 # Words for a quantity in names whose number is the joint's, the more specific first.
 SIGNAL_WORDS = {
     "i": ("current", "currents", "amp", "i"),
@@ -49,7 +49,7 @@ class Holding:
     moving: tuple[int, ...] = ()  # joints, counted from 0
     time: str = ""  # the channel of times, by its content or name
     why_time: str = ""
-    rate: float = 0.0  # [Hz] by the velocities, where the log gives none; 0 where it is unknown
+    rate: float = 0.0  # [Hz] from the velocities, if the log gives no rate; 0 if unknown
     repeats: bool = False
     steady: bool = False
     ranges: tuple[tuple[float, float], ...] = ()  # of the positions
@@ -141,7 +141,7 @@ def by_numbers(channels: Sequence[Channel]) -> dict[str, Meaning]:
 
 
 def _numbered(symbol: str, members: Sequence[tuple[str, str]]) -> dict[str, Meaning]:
-    """Assign channels of one name by their numbers, counted from the least, or by their order if these are words."""
+    """Assign channels of one name by their numbers, counted from the smallest, or by their order if they have words."""
     if not all(index.isdecimal() for index, _ in members):
         return {name: Meaning(symbol, k, f"number {k + 1} of these names") for k, (_, name) in enumerate(members)}
     least = min(int(index) for index, _ in members)

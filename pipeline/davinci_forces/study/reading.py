@@ -99,7 +99,7 @@ def _robot(table: TomlTable, folder: Path) -> Robot | None:
 
 
 def _haptics(table: TomlTable, folder: Path) -> HapticScenario:
-    """The scenario beside the study, its problems noted with the study's own."""
+    """The haptic scenario in the study's folder; its problems are noted with the problems of the study."""
     name = table.take("haptics", None, (str,), "a .toml file beside the study, as `davinci-forces haptics` takes it")
     if name is None or not is_inside(name):
         table.problem("haptics must name a file inside the study", "haptics")

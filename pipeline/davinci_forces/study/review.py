@@ -11,7 +11,7 @@ from davinci_forces.toml.lines import MOST_LISTED
 
 FILE = "review.toml"
 VERDICTS = ("accept", "doubt", "reject")
-SUBJECTS = ("figure", "run")  # what is rated: a figure by its label, or a log by its name
+SUBJECTS = ("figure", "run")  # subjects of a rating: a figure by its label, or a log by its name
 
 
 @dataclass(frozen=True)

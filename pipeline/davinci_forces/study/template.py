@@ -79,7 +79,7 @@ def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft
         if not file.resolve().is_relative_to(folder.resolve()):
             raise BadRequest(f"{file} lies outside {folder}; copy it there first, as a study holds its own logs")
     if robot_name:
-        robots.load(robot_name, folder)  # to refuse it before logs are read
+        robots.load(robot_name, folder)  # refuses an invalid robot before logs are read
     robot = robots.load(robot_name or DEFAULT_ROBOT, folder)
     drawn = _same_currents([_draft_log(members, robot) for members in group_recordings(files)])
     guesses = [draft.guess for draft in drawn]
@@ -163,7 +163,7 @@ def _log(drawn: DraftLog, folder: Path, robot: Robot, role: Role) -> Iterator[st
 
 
 def _rate(log: Log, holding: Holding, tissue: bool) -> Iterator[str]:
-    """The line of a log's rate, where it has no other clock."""
+    """The line of a log's rate, if the log has no other clock."""
     if has_clock(log) or named_time(log) or holding.time:
         return
     if holding.rate:

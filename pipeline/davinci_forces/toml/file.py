@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from davinci_forces.errors import PipelineError
 from davinci_forces.toml.lines import KeyPath
 
-MOST_PROBLEMS = 200  # of a file that are kept: after correcting so many, one reads it again
+MOST_PROBLEMS = 200  # problems of a file that are kept; after correcting these, the file is read again
 MAX_PROBLEM_LENGTH = 2_000  # characters
 
 
@@ -15,11 +15,11 @@ class TomlFile:
     def __init__(self, name: str, lines: Mapping[KeyPath, int]) -> None:
         self.name, self.lines = name, lines
         self.noted: set[tuple[int, str]] = set()
-        self.left_out = 0  # problems beyond the most that are kept
-        self.named: list[TomlFile] = []  # files whose problems are reported with its own
+        self.left_out = 0  # number of problems beyond `MOST_PROBLEMS`
+        self.named: list[TomlFile] = []  # files whose problems are reported with those of this file
 
     def line(self, path: KeyPath) -> int:
-        """The line of a key, or of the table that lacks it."""
+        """The line of a key, or of the table that lacks the key."""
         while path and path not in self.lines:
             path = path[:-1]
         return self.lines.get(path, 1)
@@ -43,6 +43,6 @@ class TomlFile:
         return texts + [problem for file in self.named for problem in file.problems()]
 
     def refuse(self, kind: type[PipelineError]) -> None:
-        """Raise every problem, one a line, as an error of that kind; nothing where there is none."""
+        """Raise every problem, one a line, as an error of that kind; do nothing if there are no problems."""
         if problems := self.problems():
             raise kind("\n".join(problems))

@@ -1,4 +1,4 @@
-"""The line of every key of a TOML file, which tomllib does not tell."""
+"""The line of every key of a TOML file, which tomllib does not provide."""
 
 import re
 import tomllib
@@ -7,7 +7,7 @@ from functools import cache
 
 KeyPath = tuple[str | int, ...]  # keys from the top of the file, and numbers in lists from 0
 
-# An unclosed string ends with its line or the text, so that no scan goes back over it.
+# An unclosed string ends with its line or the text, so that no scan reads it twice.
 QUOTED = r""""(?:[^"\\\n]++|\\.)*+"?|'[^'\n]*+'?"""
 LONG = r'''"""(?:[^"\\]++|\\.|"(?!""))*+"{0,5}|\'\'\'(?:[^']++|'(?!''))*+'{0,5}'''
 DATE = r"\d{4}-\d\d-\d\d \d[^][{}=,#\s]*"  # with a space before the time
@@ -25,9 +25,9 @@ COST_OF_NAME = 4  # words: what tomllib keeps of a name that a dot follows takes
 
 
 def excess(text: str) -> str:
-    """Find in one scan which limit of tomllib a text exceeds, and in which line; "" where none.
+    """Find in one scan which limit for tomllib a text exceeds, and in which line; "" if no limit is exceeded.
 
-    tomllib takes time by the square of the names of a key, 500 bytes for a name, and 100 for a digit.
+    tomllib's time grows with the square of the number of names in a key; a name takes 500 bytes, a digit 100.
     """
     line, words, listed, deep, names, length = 1, 0, 0, 0, 0, 0
     around, before, is_value = list[int](), "", False  # names and brackets that each open bracket stands in
@@ -57,7 +57,7 @@ def excess(text: str) -> str:
 
 
 def lines_of(text: str) -> dict[KeyPath, int]:
-    """The line, from 1, of every table, key and element of a list; `text` is one that tomllib takes."""
+    """The line, from 1, of every table, key and element of a list; `text` is valid for tomllib."""
     return _Scanner(text).scan()
 
 
@@ -72,7 +72,7 @@ def _tokens(text: str) -> Iterator[tuple[int, str]]:
 
 @cache
 def _unquoted(key: str) -> str:
-    """A quoted key, of which there are few, however often they are used."""
+    """A quoted key without its quotes; cached, because a file repeats a few keys often."""
     return key[1:-1] if "\\" not in key else str(tomllib.loads(f"key = {key}")["key"])
 
 
@@ -93,7 +93,7 @@ class _Scanner:
         return self.lines
 
     def skip_mark(self, mark: str) -> bool:
-        """Take a mark if it is next; whether it was."""
+        """Take a mark if it is the next token, and return whether it was."""
         return self.next[1] == mark and bool(self.take())
 
     def take(self) -> tuple[int, str]:
@@ -135,7 +135,7 @@ class _Scanner:
         return line, [_unquoted(part[0]) if part[1] else part[0] for part in PART.finditer(words)]
 
     def value(self, path: KeyPath) -> None:
-        """One word; or a list, whose elements have lines of their own, or an inline table, whose pairs do."""
+        """One word, or a list or an inline table; each element of a list and each pair of a table has its own line."""
         _, word = self.take()
         end = {"[": "]", "{": "}"}.get(word)
         number = 0

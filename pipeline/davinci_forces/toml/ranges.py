@@ -31,7 +31,7 @@ KIND_OF = {key: kind for kind, keys in KEYS.items() for key in keys.split()}
 
 
 def unlikely(key: str, value: float, kind: str = "") -> str:
-    """The problem of the size of a number, "" if it is likely; `kind` names its quantity where the key does not."""
+    """The problem of the size of a number, "" if it is likely; `kind` is the quantity if the key does not name it."""
     least, most, unit = KINDS[kind or KIND_OF.get(key, key if key in KINDS else "number")]
     if not value or least <= abs(value) <= most:
         return ""

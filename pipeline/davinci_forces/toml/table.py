@@ -15,21 +15,21 @@ from davinci_forces.toml.file import TomlFile
 from davinci_forces.toml.lines import KeyPath, excess, lines_of
 from davinci_forces.toml.ranges import unlikely
 
-MAX_NAME_LENGTH = 100  # characters of an unknown key that are compared with known keys
+MAX_NAME_LENGTH = 100  # characters of an unknown key; a longer key is cut before it is compared with known keys
 
 
 def is_number(value: Any) -> bool:
-    """Whether a value of TOML is a number that a float holds: neither inf nor nan, nor an integer beyond both."""
+    """Whether a value of TOML is a number that fits in a float: not inf, not nan, and not too large an integer."""
     return type(value) in (int, float) and abs(value) <= sys.float_info.max
 
 
 def are_numbers(value: Any, count: int | None = None) -> bool:
-    """Whether a value is a list of such numbers, as many as asked for."""
+    """Whether a value is a list of finite numbers of the length `count`."""
     return isinstance(value, list) and all(map(is_number, value)) and count in (None, len(value))
 
 
 def excerpt(value: Any) -> str:
-    """A value as text for a message, cut where it is long."""
+    """A value as text for a message; long text is cut."""
     try:
         text = repr(value)
     except ValueError:  # more digits than Python writes
@@ -78,7 +78,7 @@ class TomlTable:
         return float(value) if self.likely(key, (value,), kind) else math.nan
 
     def likely(self, key: str, values: Iterable[float], kind: str = "") -> bool:
-        """Whether numbers that the table gives have likely sizes; the first unlikely one is noted."""
+        """Whether numbers of the table have likely sizes; the first unlikely number is noted."""
         wrong = next(((text, x) for x in values if key in self.values and (text := unlikely(key, x, kind))), None)
         if wrong:
             self.problem(f"{wrong[0]}, not {excerpt(wrong[1])}", key)
@@ -92,7 +92,7 @@ class TomlTable:
         return 0 if value is None or not self.likely(key, (value,)) else int(value)
 
     def text(self, key: str, default: str | None = None, choices: Collection[str] = ()) -> str:
-        """Text, one of the choices where there are any."""
+        """Text; if choices are given, one of them."""
         words = f"one of {', '.join(choices)}" if choices else "text"
         value = self.take(key, default, (str,), words, lambda value: not choices or value in choices)
         return "" if value is None else str(value)
@@ -104,7 +104,7 @@ class TomlTable:
     def numbers(
         self, key: str, default: list[float] | None = None, count: int | None = None, words: str = ""
     ) -> tuple[float, ...]:
-        """A list of finite numbers, as many as asked for."""
+        """A list of finite numbers, of length `count` if that is given."""
         words = words or f"a list of {'' if count is None else f'{count} '}finite numbers"
         value = self.take(key, default, (list,), words, lambda value: are_numbers(value, count)) or ()
         return tuple(map(float, value)) if self.likely(key, value) else ()
@@ -112,7 +112,7 @@ class TomlTable:
     def pairs(
         self, key: str, words: str, default: list[Any] | None = None, least: int = 0
     ) -> tuple[tuple[float, float], ...]:
-        """A list of pairs of finite numbers, of at least so many."""
+        """A list of at least `least` pairs of finite numbers."""
         value = self.take(key, default, (list,), words, lambda value: all(are_numbers(pair, 2) for pair in value))
         if value is not None and len(value) < least:
             self.problem(f"{key} must be {words}, not {excerpt(value)}", key)
@@ -126,18 +126,18 @@ class TomlTable:
         return tuple(value or ())
 
     def table(self, key: str) -> "TomlTable":
-        """A table within this one; an empty one where it is missing."""
+        """A table within this table; an empty table if the key is missing."""
         self.asked[key] = None
         return TomlTable(self.values.get(key, {}), self.file, (*self.path, key), self._within(key))
 
     def subtables(self) -> list[tuple[str, "TomlTable"]]:
-        """The tables that this one is made of, by key."""
+        """The tables within this table, by key."""
         return [(key, self.table(key)) for key in self.values]
 
     def tables(self, key: str, none: str = "", most: int = 1000) -> list["TomlTable"]:
         """The tables of a list, such as [[log]]; if there are none, `none` is the problem to note, or "".
 
-        More than `most` are a problem, too, and those beyond are left out.
+        More than `most` tables are also a problem, and the tables beyond `most` are left out.
         """
         words = f"a list of tables: write [[{key}]]"
         entries = self.take(key, [], (list,), words, lambda value: all(isinstance(entry, dict) for entry in value))
@@ -149,7 +149,7 @@ class TomlTable:
         return [TomlTable(e, self.file, (*self.path, key, i), f"{place} {i + 1}") for i, e in enumerate(entries)]
 
     def unique(self, key: str, name: str, values: Iterable[tuple[int, str]], says: str) -> None:
-        """Note the tables of a list whose `name` an earlier one has; `values` are by number."""
+        """Note the tables of a list that repeat the `name` of an earlier table; `values` are by table number."""
         taken = set[str]()
         for number, value in values:
             if value in taken:
@@ -164,7 +164,7 @@ class TomlTable:
         words: str,
         good: Callable[[Any], object] = lambda value: True,
     ) -> Any:
-        """The value of a key, of one of these kinds and good, as `words` say; where it is not, the default."""
+        """The value of a key if it has one of these kinds and is `good`, as `words` describe; otherwise the default."""
         if key not in self:
             if default is None:
                 self.problem(f"{key} is missing; it is {words}")

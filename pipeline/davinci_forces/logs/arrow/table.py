@@ -16,7 +16,7 @@ from davinci_forces.logs.log import Block, Channel, Log, Options, unique
 from davinci_forces.logs.timeline import UNIX_EPOCH, moment
 from davinci_forces.maths.arrays import Array
 
-BATCH_ROWS = 1 << 14  # of a batch
+BATCH_ROWS = 1 << 14  # rows of a batch
 BUFFER = 1 << 18  # [bytes] of a column of Parquet that are read at a time
 MAPPED = 64 << 20  # [bytes] of a batch of a Feather file, above which it is mapped instead of read into memory
 UNIT_KEYS = (b"unit", b"units")

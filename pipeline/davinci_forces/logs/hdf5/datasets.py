@@ -43,7 +43,7 @@ def arrays_of(file: h5py.File, log: Log) -> Iterator[NamedArray]:
     names: list[bytes] = []
 
     def visit(name: bytes, about: Any) -> None:
-        # What MATLAB refers to is stored in /#refs#, and is read where it is referred to.
+        # MATLAB stores referenced data in /#refs#; they are read through the references.
         if about.type == h5py.h5o.TYPE_DATASET and not name.startswith(b"#"):
             names.append(name)
 

@@ -13,7 +13,7 @@ from davinci_forces.logs.lvm.walk import Run, Walk
 from davinci_forces.logs.timeline import OwnClock, equal_columns
 
 STEP_ROUNDING = 0.5e-6  # [s] LabVIEW writes six decimals
-MIN_CLOCK_ERROR = 1e-4  # relative, from which on it is reported
+MIN_CLOCK_ERROR = 1e-4  # relative; a larger error is reported
 
 
 def recognises(path: Path, head: bytes) -> bool:

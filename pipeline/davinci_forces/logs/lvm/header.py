@@ -48,7 +48,7 @@ class Layout:
     x0: float = 0.0
     step: float | None = None
     step_written: str = ""
-    sampled: tuple[Sampling | None, ...] = ()  # of every column that is measured
+    sampled: tuple[Sampling | None, ...] = ()  # sampling of every measured column
     remarks: tuple[str, ...] = ()  # what is wrong in the header, and what was done
     notes: str = ""
 

@@ -19,7 +19,7 @@ from davinci_forces.maths.arrays import Array, Booleans
 
 MIN_ABSOLUTE_X = 1e9  # [s] an x above this counts from 1904, not from the start of the file segment
 MAX_COMMENTS = 1000
-MAX_REMARKS_OF_A_KIND = 5  # that differ in numbers only; the others are counted
+MAX_REMARKS_OF_A_KIND = 5  # remarks that differ in numbers only; further ones are counted
 DIGITS = re.compile(r"\d+")
 
 
@@ -35,7 +35,7 @@ class Reading:
         others = {name for c in clocks for name in (*c.channels, c.x)}
         written = [c.name for c in log.channels if not c.derived and not c.name.startswith(X)]
         first = tuple(name for name in written if name not in others) if others else ()
-        self.together = (*self.own.channels, self.own.x) if self.own else first  # one of them has a sample in a row
+        self.together = (*self.own.channels, self.own.x) if self.own else first  # some have a sample in a row
         self.say = Remarks(log.warnings)
         self.walk, self.lines = Walk(encoding, self.say), Lines(log.path, encoding)
         self.write = self.rows = self.rows_in_segment = self.back = 0

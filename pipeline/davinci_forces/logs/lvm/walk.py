@@ -49,9 +49,9 @@ class Run:
         return self.layout.names[column] if column < self.layout.width else f"column_{column}"
 
     def looks_whole(self, lines: int) -> bool | None:
-        """Whether the separators are those of so many rows and no header ends in the block; None if not."""
+        """True if the separators fit this number of rows and no header ends in the block, None otherwise."""
         separators = int(np.count_nonzero(np.frombuffer(self.block, np.uint8) == ord(self.layout.file.separator)))
-        headed = b"*" in self.block and END in self.block  # one character is found far faster than a word
+        headed = b"*" in self.block and END in self.block  # finding a character is far faster than a word
         return (separators == lines * (self.width - 1) and not headed) or None
 
 
@@ -68,7 +68,7 @@ class Walk:
     layout: Layout | None = None
     line: int = 0
     met: dict[tuple[str, ...], Layout] = field(default_factory=dict)  # the first file segment with these columns
-    groups: list[list[str]] = field(default_factory=list)  # channels that were sampled together in all of them
+    groups: list[list[str]] = field(default_factory=list)  # channels that were sampled together in all file segments
     file_segments: int = 0
     narrow: int = 0  # rows with too few cells
     first_narrow: int = 0  # line of the first of them
@@ -81,7 +81,7 @@ class Walk:
     _run: Run | None = None
     _rows: list[bytes] = field(default_factory=list)
     _done: list[Run] = field(default_factory=list)
-    _like: tuple[bytes, ...] = ()  # the header of the file segment before, but for its date
+    _like: tuple[bytes, ...] = ()  # the header of the previous file segment, without its date
 
     def runs(self, block: Block, take: Callable[[Run, int], Taken | None]) -> Iterator[tuple[Run, Taken | None]]:
         """Split a block of complete lines into runs of rows.
@@ -265,7 +265,7 @@ class Walk:
         return line, cells
 
     def _comment_of_row_before(self, separator: bytes, run: Run) -> None:
-        """Move a comment out of the last channel: it stands there in the first row of a write with a channel fewer."""
+        """Move a comment out of the last channel, where it stands in the first row of a write with one channel less."""
         if not self._rows or not run.lines:
             return
         row, _, last = self._rows[-1].rpartition(separator)

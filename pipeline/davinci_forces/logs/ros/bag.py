@@ -15,7 +15,7 @@ from davinci_forces.logs.ros.storage import Bag
 from davinci_forces.logs.timeline import UNIX_EPOCH
 
 JOINTS = "sensor_msgs/msg/JointState"
-STATES = ("position", "velocity", "effort")  # of a joint, in SI: rad or m, which the message does not say
+STATES = ("position", "velocity", "effort")  # of a joint, in SI; the message does not state whether in rad or m
 # Messages with a header and vectors: the field that holds them, their names and units.
 VECTORS = {
     "geometry_msgs/msg/WrenchStamped": ("wrench", {"force": "N", "torque": "N m"}),

@@ -136,7 +136,7 @@ class TdmsLog(Log):
         return self._said(samples.apply_scales(read, scales), paths[0]) if scales else read
 
     def _said(self, read: Iterator[Block], path: str) -> Iterator[Block]:
-        """Pass on the blocks of npTDMS; its errors become a `BadLog` that names the channel."""
+        """Yield the blocks of npTDMS; an error of npTDMS becomes a `BadLog` that names the channel."""
         try:
             yield from read
         except Exception as error:

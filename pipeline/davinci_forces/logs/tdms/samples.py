@@ -23,7 +23,7 @@ from davinci_forces.logs.tdms.walk import BLOCK, Column, Region
 
 PIECE_ROWS = 1 << 17  # of a piece
 BLOCK_VALUES = 1 << 20  # of a block
-MIN_SKIP = 1 << 16  # [bytes] between the wanted parts of two records, from which on skipping is faster than reading
+MIN_SKIP = 1 << 16  # [bytes] between the wanted parts of two records; beyond this gap, skipping is faster than reading
 COUNT = "NI_Number_Of_Scales"
 NUMBERED = re.compile(r"NI_Scale\[(\d{1,6})\]_")
 MAX_SCALES = 1000  # scales of a channel

@@ -114,7 +114,7 @@ def _score(body: Sequence[Sequence[str]], number: re.Pattern[str]) -> tuple[int,
 
 
 def _are_mostly(count: int, cells: Sequence[str]) -> bool:
-    """Whether so many cells are most of them; cells of times count as empty: any delimiter keeps them."""
+    """Whether `count` is most of the cells; cells of times count as empty, because any delimiter keeps them."""
     filled = [cell for cell in cells if cell]
     return 2 * count >= len(filled) or 2 * count >= sum(not is_time(cell) for cell in filled)
 

@@ -56,7 +56,7 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Equation:
-    """A numbered equation in Typst's syntax, and the same in words for those who do not see it."""
+    """A numbered equation in Typst's syntax, with a description for readers who cannot see it."""
 
     typst: str
     alt: str
@@ -101,7 +101,7 @@ class Figure:
     columns: int = 1
     height: float = 48.0
     small: bool = False
-    samples: int = field(init=False)  # points of all marks, as they were given
+    samples: int = field(init=False)  # points of all marks before thinning
 
     def __post_init__(self) -> None:
         if self.small and self.zoomable:
@@ -111,7 +111,7 @@ class Figure:
 
 
 def _held(panel: Panel) -> Panel:
-    """A panel with what is kept of its marks."""
+    """A panel with its marks thinned."""
     return _shown(replace(panel, marks=tuple(_shown(thin_mark(mark, MAX_POINTS_OF_MARK)) for mark in panel.marks)))
 
 
@@ -153,7 +153,7 @@ class Section:
 
 @dataclass(frozen=True)
 class OnScreen:
-    """What only a screen has room for: folded in HTML until it is asked for; the PDF names its title and leaves it out.
+    """Content for the screen only: folded in HTML until the reader opens it; the PDF prints only its title.
 
     Figures, tables and equations in it are numbered S1, S2, ..., so that those of the PDF follow each other.
     """
@@ -203,7 +203,7 @@ class Document:
 
 
 def walk(parent: Document | Section | OnScreen) -> Iterator[Block]:
-    """Every block in reading order, sections before what they hold."""
+    """Every block in reading order, each section before its blocks."""
     for block in parent.sections if isinstance(parent, Document) else parent.blocks:
         yield block
         if isinstance(block, Section | OnScreen):
@@ -211,5 +211,5 @@ def walk(parent: Document | Section | OnScreen) -> Iterator[Block]:
 
 
 def name_of(block: Block) -> str | None:
-    """What references call a block: its label, or the anchor of a section or of what is on screen only."""
+    """The name of a block in references: its label, or the anchor of a section or of on-screen content."""
     return block.anchor if isinstance(block, Section | OnScreen) else getattr(block, "label", None)

@@ -25,7 +25,7 @@ class Span(NamedTuple):
 
     kind: Kind
     text: str
-    to: str = ""  # the file beside the document that a link leads to
+    to: str = ""  # target of a link: a file in the document's folder
 
 
 def literal(text: str) -> str:
@@ -65,7 +65,7 @@ def _unescaped(text: str) -> str:
 
 
 def _joined(spans: list[Span]) -> tuple[Span, ...]:
-    """Neighbouring texts as one, none of them empty."""
+    """The spans with neighbouring texts merged and empty texts removed."""
     joined: list[Span] = []
     for span in spans:
         if span.kind == "text" and joined and joined[-1].kind == "text":

@@ -1,4 +1,4 @@
-"""What all writers print alike: the numbers of blocks, references to them, and the columns of tables."""
+"""The parts that all writers print alike: the numbers of blocks, references to blocks, and the columns of tables."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -43,7 +43,7 @@ TEXTS: dict[type, Callable[[Any], tuple[str, ...]]] = {
 
 @dataclass(frozen=True, eq=False)
 class Placed:
-    """A block in its place: its kind, number and anchor, and for a section its depth and what it holds."""
+    """A block in its place: its kind, number and anchor, and for a section its depth and its blocks."""
 
     block: Block
     kind: str
@@ -68,7 +68,7 @@ def number_blocks(document: Document) -> tuple[Placed, ...]:
 
 
 def flatten(placed: tuple[Placed, ...]) -> Iterator[Placed]:
-    """Every block in reading order, each before what it holds."""
+    """Every block in reading order, each before the blocks that it contains."""
     for item in placed:
         yield item
         yield from flatten(item.blocks)
@@ -123,7 +123,7 @@ def _section(section: Section, number: str, depth: int, counters: Counter[str]) 
 
 
 def _block(block: Block, counters: Counter[str], series: str) -> Placed:
-    """A block that is no section; `series` comes before its number."""
+    """A block other than a section; `series` is the prefix of its number."""
     if isinstance(block, OnScreen):
         inside = tuple(_block(child, counters, "S") for child in block.blocks)
         return Placed(block, "onscreen", anchor=block.anchor, blocks=inside)

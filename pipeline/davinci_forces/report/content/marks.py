@@ -40,7 +40,7 @@ class Line(Mark):
 
 @dataclass(frozen=True, eq=False)
 class Points(Mark):
-    """Separate points, each with a bar of +- `y_std` about it and its name beside it where these are given."""
+    """Separate points; if given, each point has an error bar of +- `y_std` and a name next to it."""
 
     x: Array
     y: Array
@@ -94,7 +94,7 @@ class Histogram:
 
 @dataclass(frozen=True, eq=False)
 class Tiles(Mark):
-    """A square matrix of numbers from -1 to 1, row by row, each on a tile that is tinted by it, and its names."""
+    """A square matrix of numbers from -1 to 1, row by row, each on a tile tinted by it; and the names of rows."""
 
     value: Array  # (n^2,)
     names: tuple[str, ...]  # (n,) of rows, and of columns, at which their first words stand

@@ -21,7 +21,7 @@ class Number:
     std: float | None = None
     key: str | None = None
     digits: int = 4
-    least: float | None = None  # below which no more is said: of a probability, 0.001
+    least: float | None = None  # a smaller value is printed as less than this: 0.001 for a probability
 
     def __str__(self) -> str:
         """The number with its unit."""

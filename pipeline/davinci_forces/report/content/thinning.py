@@ -13,7 +13,7 @@ Indices = NDArray[np.intp]
 
 
 def thin_mark(mark: AnyMark, limit: int) -> AnyMark:
-    """The mark in at most `limit` points; one of fewer stays as it is, and so does a band that is no course of time."""
+    """The mark in at most `limit` points; a smaller mark, or a band whose x decreases, stays unchanged."""
     if not isinstance(mark, Line | Points | Band | Stems) or points_of(mark) <= limit:
         return mark
     if isinstance(mark, Band):
@@ -30,7 +30,7 @@ def thin_mark(mark: AnyMark, limit: int) -> AnyMark:
 
 
 def envelope(x: Array, y: Array, bins: int) -> Indices:
-    """Where the least and the greatest sample of each of `bins` equal ranges of x are, in order.
+    """Indices of the smallest and the largest sample in each of `bins` equal ranges of x, in order.
 
     An extreme is never lost, however short; a range without a finite sample keeps one, so that a gap stays a gap.
     x (N,) must not decrease; returns (n,) indices, n <= 2 bins.
@@ -50,7 +50,7 @@ def _first_of_each(chosen: NDArray[np.bool_], ranges: Indices) -> Indices:
 
 
 def _range_starts(x: Array, bins: int) -> Indices:
-    """The first sample of each of the equal ranges of x that hold any."""
+    """The first sample of each of the equal ranges of x that contain samples."""
     ranges = np.minimum((x - x[0]) / ((x[-1] - x[0]) or 1.0) * bins, bins - 1).astype(int)
     return np.flatnonzero(np.diff(ranges, prepend=-1))
 

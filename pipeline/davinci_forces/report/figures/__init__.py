@@ -1,1 +1,1 @@
-"""Figures as data become drawings: panels, marks, ticks and colours, by matplotlib."""
+"""Draw figures from data with matplotlib: panels, marks, ticks and colours."""

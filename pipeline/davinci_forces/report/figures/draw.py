@@ -1,4 +1,4 @@
-"""How matplotlib draws each mark: one function per mark, all with the same arguments."""
+"""Draw each mark with matplotlib: one function per mark, all with the same arguments."""
 
 from collections.abc import Sequence
 from functools import singledispatch
@@ -35,8 +35,8 @@ DASHES: dict[str, Any] = {
     "dotted": (0, (1, 1.4)),
     "dashdot": (0, (5, 1.4, 1, 1.4)),
 }
-BAR_WIDTH = 0.9  # [pt] of a line
-MANY = 60  # stems, beyond which they are thin and have no heads, so that what is behind them can be seen
+BAR_WIDTH = 0.9  # [pt] width of a line or an error bar
+MANY = 60  # more stems than this are thin and have no heads, so that marks behind them stay visible
 
 
 def escape_label(text: str) -> str:
@@ -45,13 +45,13 @@ def escape_label(text: str) -> str:
 
 
 def unescape_label(text: str) -> str:
-    """The text that `escape_label` was given."""
+    """The text that was passed to `escape_label`."""
     return text.removeprefix(" ")
 
 
 @singledispatch
 def draw_mark(mark: Any, axes: "Axes", order: float) -> None:
-    """Draw one mark, which knows its looks, on matplotlib axes."""
+    """Draw one mark on matplotlib axes, with the colour and style that it states."""
     raise TypeError(f"{type(mark).__name__} cannot be drawn")
 
 

@@ -1,4 +1,4 @@
-"""Where the panels of a figure stand: all axes of one size, in line, with room for the widest words beside them."""
+"""Arrange the panels of a figure: all axes of one size, aligned, with room for the widest words next to them."""
 
 from typing import TYPE_CHECKING
 
@@ -13,11 +13,11 @@ if TYPE_CHECKING:
 
 PAGE_WIDTH = 170.0  # [mm] of the text on an A4 page
 INCH = 25.4  # [mm]
-DIGIT = 1.8  # [mm] that a letter of the numbers on an axis takes
-TICK = 2.6  # [mm] from an axis to its numbers, and from these to its label
-RIGHT = 4.0  # [mm] beside the axes, where half of the last number may be
-NUMBERS = 3.4  # [mm] that a line of the numbers of an axis is high
-ROW_ABOVE = 2 * LINE_HEIGHT + 1.5  # [mm] of a heading of one line of title and one of legend
+DIGIT = 1.8  # [mm] width of a character of the numbers on an axis
+TICK = 2.6  # [mm] from an axis to its numbers, and from the numbers to the label
+RIGHT = 4.0  # [mm] right of the axes, room for half of the last number
+NUMBERS = 3.4  # [mm] height of a line of numbers on an axis
+ROW_ABOVE = 2 * LINE_HEIGHT + 1.5  # [mm] height of a heading with one line of title and one line of legend
 MIN_AXES_HEIGHT = 15.0  # [mm]
 
 
@@ -26,7 +26,7 @@ def arrange(canvas: "Canvas", figure: Figure) -> None:
     columns = figure.columns
     width = PAGE_WIDTH / columns
     rows = [canvas.axes[i : i + columns] for i in range(0, len(canvas.axes), columns)]
-    for axes, panel in zip(canvas.axes, figure.panels, strict=True):  # which may change the numbers beside the axes
+    for axes, panel in zip(canvas.axes, figure.panels, strict=True):  # drawing may change the numbers left of the axes
         make_room_for_names(axes, panel, max(figure.height - ROW_ABOVE - _room_below(axes), MIN_AXES_HEIGHT))
     numbers = max(_letters(axes.yaxis) for axes in canvas.axes) * DIGIT
     left = TICK + numbers + max(_lines(axes.get_ylabel()) for axes in canvas.axes) * LINE_HEIGHT + 1
@@ -36,7 +36,7 @@ def arrange(canvas: "Canvas", figure: Figure) -> None:
     headings = [plan_heading(panel, wide) for panel in figure.panels]
     rooms = [max(h.height for h in headings[i : i + columns]) for i in range(0, len(headings), columns)]
     below = [max(_room_below(axes) for axes in row) for row in rows]
-    # What a figure asks for holds its words, of headings two lines.
+    # The height that a figure asks for includes its words, with two lines of heading.
     asked = figure.height * len(rows) + sum(max(room - ROW_ABOVE, 0) for room in rooms)
     high = max((asked - sum(rooms) - sum(below)) / len(rows), MIN_AXES_HEIGHT)
     total = sum(rooms) + sum(below) + high * len(rows)
@@ -46,7 +46,7 @@ def arrange(canvas: "Canvas", figure: Figure) -> None:
         bottom -= room + high
         for j, axes in enumerate(row):
             axes.set_position(((j * width + left) / PAGE_WIDTH, bottom / total, wide / PAGE_WIDTH, high / total))
-            # Where a label is stands fixed: matplotlib would measure the numbers of every axis for it, twice.
+            # The place of a label is fixed; otherwise matplotlib would measure the numbers of every axis twice.
             axes.yaxis.set_label_coords(-(TICK + numbers) / wide, 0.5)
             axes.xaxis.set_label_coords(0.5, -(TICK + _lines_of_numbers(axes.xaxis) * NUMBERS) / high)
             draw_heading(axes, headings[i * columns + j], room, high)
@@ -54,7 +54,7 @@ def arrange(canvas: "Canvas", figure: Figure) -> None:
 
 
 def _room_below(axes: "Axes") -> float:
-    """What stands below axes [mm]: numbers, and a label."""
+    """Height of the numbers and the label below axes [mm]."""
     return TICK + _lines_of_numbers(axes.xaxis) * NUMBERS + _lines(axes.get_xlabel()) * LINE_HEIGHT + 0.5
 
 

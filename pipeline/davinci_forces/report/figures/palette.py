@@ -30,7 +30,7 @@ DARK: dict[str, str] = {
     "yellow": "#f0e442",
     "grey": "#9aa3ad",
 }
-# What surrounds the marks: the same in every figure, by what it is for.
+# Colours of the surroundings of marks, by use; the same in every figure.
 SURROUNDINGS: dict[str, tuple[str, str]] = {  # on a light page, on a dark one
     "words": ("#222222", "#e4e8ed"),
     "axes": ("#555555", "#a3adb8"),
@@ -44,7 +44,7 @@ M = TypeVar("M", bound=Any)
 
 
 def assign_looks(marks: Sequence[M]) -> Iterator[M]:
-    """Each mark with a colour and, if it is a line, a style; those that name none take turns."""
+    """Give each mark a colour and each line a style; marks that name none take the next in the palette."""
     colours, styles = cycle(TURN), cycle(STYLES)
     for mark in marks:
         look = {} if mark.colour else {"colour": next(colours)}

@@ -1,4 +1,4 @@
-"""Drawing one panel with matplotlib: its marks, its axes, and its title and legend above them."""
+"""Draw one panel with matplotlib: its marks, its axes, and its title and legend above the axes."""
 
 import textwrap
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ VERTICES, LOOP_VERTICES, SYMBOLS_PER_MM = (
     30,
     3,
 )  # of one mark in a millimetre: finer than its lines and symbols are wide
-LETTER_WIDTH = 1.65  # [mm] that a letter of a label takes
-LINE_HEIGHT = 3.9  # [mm] that a line of a label, a row of a legend takes
-SAMPLE = 10.0  # [mm] that the sample before a legend entry takes, with the gaps about it
+LETTER_WIDTH = 1.65  # [mm] width of a character of a label
+LINE_HEIGHT = 3.9  # [mm] height of a line of a label or a row of a legend
+SAMPLE = 10.0  # [mm] width of the sample before a legend entry, with the gaps around it
 
-NAME = 3.6  # [mm] above or below a point that its name takes
-ABOUT = 18.0  # [mm] of a panel's height that its words above and below take
+NAME = 3.6  # [mm] height of a point's name above or below the point
+ABOUT = 18.0  # [mm] of a panel's height for the words above and below the axes
 
 
 @dataclass(frozen=True)
@@ -42,7 +42,7 @@ class Heading:
 
     @property
     def height(self) -> float:
-        """Height of all of it [mm]."""
+        """Height of the whole heading [mm]."""
         # Entries that stand side by side have one line each.
         rows = -(-len(self.entries) // self.columns) if self.columns > 1 else sum(map(_lines, self.entries))
         lines = rows * (not self.beside) + (_lines(self.title) if self.title else 0)
@@ -99,14 +99,14 @@ def make_room_for_names(axes: "Axes", panel: Panel, height: float) -> None:
 
 
 def max_points(mark: AnyMark, width: float) -> int:
-    """Points beyond which more of them cannot be seen in a panel of this width [mm]."""
+    """The number of points beyond which further points are not visible in a panel of this width [mm]."""
     if isinstance(mark, Points | Stems):
         return round(SYMBOLS_PER_MM * width)
     return round((VERTICES if not isinstance(mark, Line) or is_sorted(mark.x) else LOOP_VERTICES) * width)
 
 
 def _ticks(axes: "Axes", name: str, log: bool, label: str, max_ticks: int) -> str:
-    """Put readable ticks on one axis; returns its label, with the power of ten that its numbers leave out."""
+    """Put readable ticks on one axis; return its label, with the power of ten that its numbers omit."""
     axis = axes.xaxis if name == "x" else axes.yaxis
     if log:
         axes.set_xscale("log") if name == "x" else axes.set_yscale("log")

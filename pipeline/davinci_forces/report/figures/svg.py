@@ -1,4 +1,4 @@
-"""Figures as SVG, drawn by matplotlib: the same bytes for the same figure, no date, words as words."""
+"""Draw figures as SVG with matplotlib: the same bytes for the same figure, no date, and words as text."""
 
 import io
 import re
@@ -38,7 +38,7 @@ STYLE: Any = {
     "grid.color": GRID,
     "grid.linewidth": 0.5,
     "legend.fontsize": 8.5,
-    "svg.fonttype": "none",  # words stay words, which either writer sets in a font of its own
+    "svg.fonttype": "none",  # words stay text, which each writer sets in its own font
     "svg.hashsalt": "davinci-forces",
     "text.color": WORDS,
     "xtick.color": AXES,
@@ -48,19 +48,19 @@ STYLE: Any = {
     "ytick.labelcolor": WORDS,
     "ytick.labelsize": 8,
 }
-LONG = 400  # letters of a path from which it is written in steps
+LONG = 400  # characters; a longer path is written in relative steps
 drawn: "WeakKeyDictionary[Figure | Figure3D, str]" = WeakKeyDictionary()
 
 
 def svg(figure: Figure | Figure3D) -> str:
-    """The figure as an SVG element; drawn once, however many reports show it."""
+    """The figure as an SVG element; a figure that several reports show is drawn once."""
     if figure not in drawn:
         drawn[figure] = draw_svg(figure)
     return drawn[figure]
 
 
 def draw_svg(figure: Figure | Figure3D) -> str:
-    """The figure as an SVG element, drawn anew."""
+    """Draw the figure as an SVG element, without the cache of `svg`."""
     import matplotlib as mpl
 
     with mpl.rc_context(STYLE):
@@ -72,7 +72,7 @@ def draw_svg(figure: Figure | Figure3D) -> str:
 
 
 def _round_coordinates(text: str) -> str:
-    """Coordinates to a hundredth of a point, in long paths to a tenth: a fifth of the size, and it cannot be seen."""
+    """Round coordinates to a hundredth of a point, in long paths to a tenth: invisible, and a fifth of the size."""
     text = re.sub(r'(?<= [xy]=")-?\d+\.\d{3,}', lambda n: f"{float(n[0]):.2f}", text)
     return re.sub(r' d="[^"]*"', lambda path: _round_path(path[0]), text)
 
@@ -85,7 +85,7 @@ def _round_path(path: str) -> str:
 
 
 def _steps(path: str) -> str:
-    """A path of straight lines as steps in tenths of a point: half the letters of its corners."""
+    """A path of straight lines as steps in tenths of a point: half the characters of absolute coordinates."""
     parts: list[str] = []
     here = (0, 0)
     for letter, x, y in re.findall(r"([ML])\s*(-?[\d.]+) (-?[\d.]+)", path):
@@ -99,7 +99,7 @@ def _steps(path: str) -> str:
 
 
 def _tenths(number: int) -> str:
-    """A number of tenths as it follows another number: ` 1.2`, ` .3`, `-4`."""
+    """A number of tenths as text after another number: ` 1.2`, ` .3`, `-4`."""
     text = f"{number / 10:g}".replace("0.", ".", 1) if abs(number) < 10 else f"{number / 10:g}"
     return text if text.startswith("-") else f" {text}"
 
@@ -126,7 +126,7 @@ def _canvas(height: float) -> "Canvas":
     from matplotlib.figure import Figure as Canvas
 
     canvas = Canvas(figsize=(PAGE_WIDTH / INCH, height / INCH), dpi=72)
-    FigureCanvasSVG(canvas)  # words are laid out by the sizes they have in SVG, not in pixels
+    FigureCanvasSVG(canvas)  # words are laid out by their sizes in SVG, not in pixels
     return canvas
 
 

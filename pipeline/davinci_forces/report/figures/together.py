@@ -1,4 +1,4 @@
-"""Drawing many figures at once: other processes of this program take a share, and this one the rest."""
+"""Draw many figures at once, shared between other processes of this program and this process."""
 
 import os
 import pickle
@@ -13,8 +13,8 @@ from davinci_forces.logs.isolated.process import block_interrupts
 from davinci_forces.report.content import Figure, Figure3D
 from davinci_forces.report.figures.svg import draw_svg, drawn
 
-MIN_FIGURES_PER_PROCESS = 8  # figures that are worth another process, which takes as long to begin
-MAX_PROCESSES = 4  # processes, this one among them
+MIN_FIGURES_PER_PROCESS = 8  # starting another process takes as long as drawing this many figures
+MAX_PROCESSES = 4  # processes, including this process
 PROGRAM = (
     "from davinci_forces.logs.isolated.process import end_with_parent; end_with_parent(); "
     "from davinci_forces.report.figures.together import serve; serve()"
@@ -22,7 +22,7 @@ PROGRAM = (
 
 
 def draw_together(figures: Iterable[Figure | Figure3D]) -> None:
-    """Draw the figures that are not drawn yet; the same bytes come out wherever one is drawn."""
+    """Draw the figures that are not drawn yet; every process gives the same bytes."""
     left = sorted((figure for figure in figures if figure not in drawn), key=_cost)
     processes = min(MAX_PROCESSES, os.cpu_count() or 1, max(len(left) // MIN_FIGURES_PER_PROCESS, 1))
     shares = [left[i::processes] for i in range(processes)]
@@ -33,13 +33,13 @@ def draw_together(figures: Iterable[Figure | Figure3D]) -> None:
 
 
 def serve() -> None:
-    """Draw the figures that another process asks for, until it has all of them."""
+    """Draw the figures that another process asks for, until that process has all figures."""
     figures = pickle.load(sys.stdin.buffer)
     pickle.dump([draw_svg(figure) for figure in figures], sys.stdout.buffer)
 
 
 def _cost(figure: Figure | Figure3D) -> int:
-    """What takes the time: the panels."""
+    """Sort key of a figure by its drawing time: minus its number of panels."""
     return -len(figure.panels) if isinstance(figure, Figure) else -1
 
 
@@ -49,7 +49,7 @@ def _draw(figures: list[Figure | Figure3D]) -> None:
 
 
 def _ask(share: list[Figure | Figure3D]) -> "subprocess.Popen[bytes]":
-    """Have another process draw a share.  It starts anew: a fork would inherit locks of threads that it has not."""
+    """Have a new process draw a share.  It is not forked: a fork inherits locks, but not the threads that hold them."""
     path = os.pathsep.join(filter(None, [str(Path(__file__).parents[3]), os.environ.get("PYTHONPATH")]))
     with block_interrupts():
         process = subprocess.Popen(
@@ -62,12 +62,12 @@ def _ask(share: list[Figure | Figure3D]) -> "subprocess.Popen[bytes]":
 
 def _send(share: list[Figure | Figure3D], pipe: IO[bytes] | None) -> None:
     assert pipe is not None
-    with suppress(OSError), pipe:  # one that has ended is found out when its share is taken
+    with suppress(OSError), pipe:  # a process that has ended is noticed when its share is taken
         pickle.dump(share, pipe)
 
 
 def _take(share: list[Figure | Figure3D], process: "subprocess.Popen[bytes]") -> None:
-    """Take what a process has drawn; where it could not, draw its share here, which says why."""
+    """Take the figures that a process has drawn; if it failed, draw its share here, which raises the error."""
     assert process.stdout is not None
     with process.stdout as pipe:
         output = pipe.read()

@@ -1,4 +1,4 @@
-"""How content becomes a file: one module per writer, exporting `render`, named as the ending of the file it makes."""
+"""Convert documents to files: each module exports `render` and has the name of its file's ending."""
 
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
@@ -27,7 +27,7 @@ def render_all(documents: tuple[Document, ...]) -> dict[str, bytes]:
 
 
 def figures_to_draw(parent: Document | Section | OnScreen, printed: bool = True) -> Iterator[Figure | Figure3D]:
-    """What matplotlib draws of a document: all that is printed, and on screen what is neither small nor zoomable."""
+    """The figures that matplotlib draws: all printed ones, and on screen those that are neither small nor zoomable."""
     for block in parent.sections if isinstance(parent, Document) else parent.blocks:
         if isinstance(block, Section | OnScreen):
             yield from figures_to_draw(block, printed and isinstance(block, Section))
@@ -36,5 +36,5 @@ def figures_to_draw(parent: Document | Section | OnScreen, printed: bool = True)
 
 
 def _is_light(figure: Figure | Figure3D) -> bool:
-    """Whether the HTML has no picture by matplotlib of a figure that is on screen only."""
+    """Whether the HTML shows an on-screen figure without a picture by matplotlib."""
     return isinstance(figure, Figure) and (figure.small or figure.zoomable)

@@ -1,4 +1,4 @@
-"""The report as one HTML file that needs nothing else: no network, no second file, no installed font."""
+"""The report as one HTML file that needs no network, no second file and no installed font."""
 
 import base64
 import hashlib
@@ -21,11 +21,11 @@ if TYPE_CHECKING:
     from markupsafe import Markup
 
 TEMPLATES = Path(__file__).parent / "templates"
-LARGEST = 4_700_000  # [bytes] of a file, of which the traces get what everything else leaves
-POINT_BYTES = 11  # of a point of a trace: two numbers in single precision, in base 64
-MOST_POINTS, FEWEST_POINTS = 20_000, 2_000  # of one zoomable figure
-STILL_POINTS = 2_000  # of a figure that does not zoom, for those who want its numbers
-SIGN = "\0"  # which no text can hold: it is not printable
+LARGEST = 4_700_000  # [bytes] of the whole file; the traces get the space that other content leaves
+POINT_BYTES = 11  # per point of a trace: two numbers in single precision, in base 64
+MOST_POINTS, FEWEST_POINTS = 20_000, 2_000  # points of one zoomable figure
+STILL_POINTS = 2_000  # points of a figure that does not zoom, for saving its numbers
+SIGN = "\0"  # placeholder; no text contains this unprintable character
 SCRIPTS = ("contents.js", "figures.js", "tables.js")
 REVIEW_SCRIPTS = ("review.js",)
 HTML_FORMATS = {"text": "{}", "code": "<code>{}</code>", "bold": "<strong>{}</strong>"}
@@ -67,7 +67,7 @@ def render(document: Document) -> bytes:
 
 
 def _put_in(text: str, kept: dict[str, tuple[str, str]]) -> str:
-    """The page with its numbers and notes where `_fill` left signs for them, once it is known what room there is."""
+    """The page with numbers and notes in place of the signs from `_fill`, once the room for them is known."""
     parts = text.split(SIGN)
     for i in range(1, len(parts), 2):
         part, _, name = parts[i].partition(" ")
@@ -76,7 +76,7 @@ def _put_in(text: str, kept: dict[str, tuple[str, str]]) -> str:
 
 
 def _picture(figure: Figure | Figure3D, on_screen_only: bool) -> str:
-    """The address of a figure's picture; that of a trace which is not printed stands in for it only."""
+    """The data URL of a figure's picture; for a trace on screen only, a small picture that the trace replaces."""
     if isinstance(figure, Figure) and (figure.small or (figure.zoomable and on_screen_only)):
         return address(miniature(figure, SMALL if figure.small else LARGER))
     return address(shrink(svg(figure)))
@@ -90,7 +90,7 @@ def _thin_figures(zooms: dict[str, Figure], room: int) -> dict[str, ThinnedFigur
 
 
 def _json(value: Any) -> str:
-    """Data for a script in the page, in which nothing can end the script's element."""
+    """Data for a script in the page, without any text that could close the script's element."""
     return json.dumps(value, ensure_ascii=False).replace("<", "\\u003c").replace(SIGN, "")
 
 
@@ -104,7 +104,7 @@ def _formulas(document: Document) -> list[Formula]:
 
 
 def _fill(page: Json, names: list[str]) -> str:
-    """The page, with signs where the numbers of the named figures belong, and the notes on them."""
+    """The page, with signs in place of the numbers of the named figures and of the notes on them."""
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
     from markupsafe import Markup
 
@@ -119,19 +119,19 @@ def _fill(page: Json, names: list[str]) -> str:
 
 
 def _finalize(value: Any) -> Any:
-    """Text that is not HTML yet, without what no page can hold."""
+    """Text that is not HTML yet, without characters that no page can hold."""
     return printable(value) if isinstance(value, str) and not hasattr(value, "__html__") else value
 
 
 def _attribute(text: str) -> "Markup":
-    """An address as an attribute holds it; it has no quotation mark, and `<` may stay."""
+    """A data URL as the value of an attribute; it has no quotation mark, and `<` needs no escape."""
     from markupsafe import Markup
 
     return Markup(text.replace("&", "&amp;"))
 
 
 def _hash(text: str) -> str:
-    """What the content security policy calls a script that may run."""
+    """The hash by which the content security policy allows a script to run."""
     return "sha256-" + base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()
 
 

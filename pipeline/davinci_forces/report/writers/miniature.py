@@ -1,6 +1,6 @@
-"""Figures drawn in few bytes, without matplotlib: what hundreds of runs leave room and time for.
+"""Draw figures in few bytes, without matplotlib: a report of hundreds of runs has no room or time for more.
 
-Lines, bands, points and windows, a legend, and of the axes their ends; other marks are left out.
+A figure has lines, bands, points, windows, a legend and the ends of the axes; other marks are left out.
 """
 
 from dataclasses import dataclass
@@ -15,8 +15,8 @@ from davinci_forces.report.content.marks import AnyMark
 from davinci_forces.report.content.thinning import thin_mark
 from davinci_forces.report.figures.palette import COLOURS, DARK, SURROUNDINGS, assign_looks
 
-WIDTH, LEFT, LINE, LETTER = 640, 64, 15, 6.2  # [px] of a figure, left of axes, of a line of words, of a letter of them
-LETTERS = 60  # of a title or a label
+WIDTH, LEFT, LINE, LETTER = 640, 64, 15, 6.2  # [px] figure, space left of axes, line of text, character
+LETTERS = 60  # characters of a title or a label
 MIN_LINE_POINTS = 12
 DASHES = {"dashed": "4 2", "dotted": "1 2", "dashdot": "5 2 1 2"}
 Box = tuple[float, float, float, float]
@@ -24,7 +24,7 @@ Box = tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class Scale:
-    """How large a figure is drawn: the height of its axes [px], the points of all its curves; and if with a legend."""
+    """Size of a figure: the height of its axes [px], the points of all its curves, and whether it has a legend."""
 
     height: int
     points: int
@@ -82,7 +82,7 @@ def _text(x: float, y: float, words: str, anchor: str) -> str:
 
 
 def _legend(marks: list[AnyMark], top: float) -> tuple[str, int]:
-    """The labels of marks in rows, each after a sample of its mark, and how many rows these are."""
+    """The labels of marks in rows, each after a sample of its mark, and the number of rows."""
     drawn, x, rows = "", float(LEFT), 0
     for mark in marks:
         if mark.label:
@@ -100,7 +100,7 @@ def _legend(marks: list[AnyMark], top: float) -> tuple[str, int]:
 
 
 def _box(panel: Panel, across: tuple[float, float] | None) -> Box:
-    """The ranges of x, `across` where that is given, and of y."""
+    """The ranges of x (`across`, if given) and of y."""
     curves = _curves(panel)
     ys = [y for mark in curves for y in ([mark.lower, mark.upper] if isinstance(mark, Band) else [mark.y])]
     return (*(across or panel.x_range or _ends([mark.x for mark in curves])), *(panel.y_range or _ends(ys)))
@@ -111,7 +111,7 @@ def _curves(panel: Panel) -> list[Line | Band | Points]:
 
 
 def _ends(columns: list[Array]) -> tuple[float, float]:
-    """The least and the greatest of all values, apart."""
+    """The smallest and the largest of all values, widened if they are equal."""
     values = np.concatenate([*columns, np.empty(0)])
     values = values[np.isfinite(values)]
     low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
@@ -158,7 +158,7 @@ def _place(x: Array, y: Array, box: Box, top: float, height: float) -> tuple[Arr
 
 
 def _path(x: Array, y: Array, box: Box, top: float, height: float) -> str:
-    """The path through points in whole pixels, broken where there is no number."""
+    """The path through points in whole pixels, interrupted at values that are not finite."""
     steps, here = [], None
     for a, b in zip(*_place(x, y, box, top, height), strict=True):
         if not np.isfinite(a + b):

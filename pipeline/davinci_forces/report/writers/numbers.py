@@ -1,4 +1,4 @@
-"""The numbers of a figure, in as many points as a page can carry: there they are drawn as traces and saved as CSV."""
+"""The numbers of a figure, in as many points as a page can hold; the page draws them and saves them as CSV."""
 
 import base64
 import json
@@ -19,8 +19,8 @@ PIXELS = 96 / 25.4  # of CSS in a millimetre
 
 
 def numbers_json(figure: Figure | Figure3D) -> str:
-    """The figure as JSON in which nothing can end the element that holds it."""
-    columns: dict[str, int] = {}  # encoded column -> its place; marks share those that are alike
+    """The figure as JSON without any text that could close the HTML element around it."""
+    columns: dict[str, int] = {}  # encoded column -> its index; marks share equal columns
     panels = figure.panels if isinstance(figure, Figure) else (_space(figure),)
     content = {
         "across": figure.columns if isinstance(figure, Figure) else 1,
@@ -32,7 +32,7 @@ def numbers_json(figure: Figure | Figure3D) -> str:
 
 
 def _space(figure: Figure3D) -> Panel:
-    """The marks in space as those of a panel."""
+    """The marks in space, in the form of a panel's marks."""
     return Panel("", figure.x_label, f"{figure.y_label}, {figure.z_label}", figure.marks)  # type: ignore[arg-type]
 
 
@@ -50,7 +50,7 @@ def _mark(mark: Any, columns: dict[str, int]) -> Json:
 
 
 def _plain(value: Any) -> Any:
-    """A value as JSON has it: no sign that a page cannot show, no number that is none."""
+    """A value for JSON, without characters that a page cannot show and without NaN or infinity."""
     if isinstance(value, tuple):
         return [_plain(item) for item in value]
     if isinstance(value, str):
@@ -61,7 +61,7 @@ def _plain(value: Any) -> Any:
 def _encode(column: Array) -> str:
     """A column as JSON: start, step and count where its steps are equal, else its bits in base 64.
 
-    Single precision (f) where that tells neighbouring samples apart, else double (d).
+    Single precision (f) if it distinguishes neighbouring samples, otherwise double (d).
     """
     if (step := _equal_step(column)) is not None:
         return json.dumps([float(column[0]), step, len(column)])
@@ -71,7 +71,7 @@ def _encode(column: Array) -> str:
 
 
 def _equal_step(column: Array) -> float | None:
-    """The step between samples that are equally apart, to a millionth of it."""
+    """The step between equidistant samples, to a millionth of the step."""
     if len(column) < 3 or not np.isfinite(column).all() or column[-1] == column[0]:
         return None
     step = float(column[-1] - column[0]) / (len(column) - 1)
@@ -86,7 +86,7 @@ def _typical_step(column: Array) -> float:
 
 @dataclass(frozen=True)
 class ThinnedFigure:
-    """A figure of few enough points, and how many it had."""
+    """A thinned figure, and its number of points before thinning."""
 
     figure: Figure | Figure3D
     samples: int
@@ -94,7 +94,7 @@ class ThinnedFigure:
 
     @property
     def note(self) -> str:
-        """The remark on it below its caption."""
+        """The remark on the thinning, below the figure's caption."""
         if self.shown == self.samples:
             return f"All {_group_digits(self.samples)} samples are shown."
         return f"Min–max envelope of {_group_digits(self.samples)} samples in {_group_digits(self.shown)} points."
@@ -103,7 +103,7 @@ class ThinnedFigure:
 def thin_figure(figure: Figure | Figure3D, limit: int) -> ThinnedFigure:
     """Share `limit` points fairly between the marks of a figure; marks that need less than their share keep all.
 
-    One in space is left as it is.
+    A figure in space is left unchanged.
     """
     if isinstance(figure, Figure3D):
         samples = sum(len(mark.x) for mark in figure.marks)

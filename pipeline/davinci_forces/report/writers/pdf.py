@@ -58,7 +58,7 @@ def _placed(item: Placed) -> Json:
 
 
 def _inline(text: str) -> list[Json]:
-    """Marked text as the template reads it."""
+    """Marked text in the form that the template reads."""
     return [span._asdict() for span in parse(text)]
 
 
@@ -86,7 +86,7 @@ def _figure(figure: Figure | Figure3D) -> Json:
     return {"caption": _inline(figure.caption), "alt": printable(figure.alt), "svg": svg(figure)}
 
 
-# What the template needs of a block besides kind, number, anchor and depth.
+# Data that the template needs of a block in addition to kind, number, anchor and depth.
 DATA: dict[type, Callable[[Any], Json]] = {
     Section: lambda section: {"title": _inline(section.title)},
     OnScreen: lambda folded: {"title": _inline(folded.title)},

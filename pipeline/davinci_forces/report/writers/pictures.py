@@ -8,24 +8,24 @@ from davinci_forces.report.figures.palette import COLOURS, DARK, SURROUNDINGS
 
 NAMES = {light: name for name, light in COLOURS.items()} | {light: name for name, (light, _) in SURROUNDINGS.items()}
 FONT = "system-ui,-apple-system,'Segoe UI',Roboto,Arial,'DejaVu Sans',sans-serif"
-# What an address cannot hold as it is, and is written by its number.
+# Characters that a data URL must escape as %XX.
 ESCAPED = re.compile(r"[^ !&'()*+,./:;<=>?@\[\]_{|}~0-9A-Za-z-]+")
 
 
 def looks(used: Collection[str]) -> tuple[str, ...]:
-    """The colours used of marks and of what surrounds them as CSS variables, on a light page and on a dark one."""
+    """The used colours of marks and their surroundings as CSS variables, on a light page and on a dark page."""
     light = COLOURS | {name: pair[0] for name, pair in SURROUNDINGS.items()}
     dark = DARK | {name: pair[1] for name, pair in SURROUNDINGS.items()}
     return tuple(";".join(f"--{name}:{side[name]}" for name in side if name in used) for side in (light, dark))
 
 
 def address(svg: str) -> str:
-    """The SVG as an address that holds all of it; `<` and `>` in it need no escape in an attribute, `&` does."""
+    """The SVG as a data URL; in an attribute, `<` and `>` need no escape, but `&` does."""
     return "data:image/svg+xml," + ESCAPED.sub(lambda signs: quote(signs[0]), svg)
 
 
 def shrink(svg: str) -> str:
-    """The same picture in a third of the letters: styles as classes, colours as variables, no names nobody uses."""
+    """The same picture in a third of the characters: styles as classes, colours as variables, no unused names."""
     svg = re.sub(r"<!--.*?-->|<metadata>.*?</metadata>|<defs>\s*<style.*?</style>\s*</defs>", "", svg, flags=re.DOTALL)
     svg = svg.replace("xlink:href", "href").replace(' xmlns:xlink="http://www.w3.org/1999/xlink"', "")
     svg = re.sub(r">\s+<", "><", svg)
@@ -37,7 +37,7 @@ def shrink(svg: str) -> str:
 
 
 def _in_tags(svg: str, change: Callable[[str], str]) -> str:
-    """Change tags and no text: in text `<` is escaped."""
+    """Apply a change to the tags of an SVG, not to its text; in text, `<` is escaped."""
     return re.sub(r"<[^<>]+>", lambda tag: change(tag[0]), svg)
 
 
@@ -59,7 +59,7 @@ def _letters(number: int) -> str:
 
 
 def _without_empty_groups(svg: str) -> str:
-    """The SVG without groups that say nothing of what they hold."""
+    """The SVG without groups that have no attributes."""
     before = ""
     while before != svg:
         before, svg = svg, re.sub(r"<g>((?:(?!</?g\b).)*)</g>", r"\1", svg, flags=re.DOTALL)

@@ -1,4 +1,4 @@
-"""Running Typst: no file, no system font, no clock, no package, and no warning goes unheard; equations as SVG."""
+"""Run Typst without files, system fonts, clock or packages; any warning is an error.  Draw equations as SVG."""
 
 import json
 import re
@@ -8,7 +8,7 @@ from typing import Any, Literal, NamedTuple
 
 from davinci_forces.errors import PipelineError
 
-EPOCH = 0  # the date that Typst puts in a file, so that the same content gives the same bytes
+EPOCH = 0  # date that Typst writes into a file; constant, so that the same content gives the same bytes
 
 
 class NotTypeset(PipelineError):
@@ -47,12 +47,12 @@ def typeset(template: Path, content: Any, output: Literal["pdf", "svg"]) -> list
 
 EQUATIONS_TEMPLATE = Path(__file__).parent / "templates/equations.typ"
 SIZE = 10.0  # [pt] of the text in the template
-STRUT = 20.0  # [pt] an inline formula stands on a strut of this height in the template, which tells its baseline
-ROOM = 12.0  # [pt] of the strut that is shown; formulas of a line of text are lower
+STRUT = 20.0  # [pt] height of the strut that an inline formula stands on in the template; it marks the baseline
+ROOM = 12.0  # [pt] of the strut that is shown; inline formulas are lower
 
 
 class Formula(NamedTuple):
-    """What one formula is: Typst's maths, and whether it stands on a line of its own."""
+    """One formula: Typst's maths, and whether it has a line of its own."""
 
     typst: str
     display: bool
@@ -84,7 +84,7 @@ def _pages(formulas: list[Formula]) -> list[bytes]:
     try:
         return typeset(EQUATIONS_TEMPLATE, [formula._asdict() for formula in formulas], "svg")
     except NotTypeset:
-        for formula in formulas:  # name the one that is wrong, which Typst does not
+        for formula in formulas:  # names the wrong formula, which Typst does not
             try:
                 typeset(EQUATIONS_TEMPLATE, [formula._asdict()], "svg")
             except NotTypeset as error:

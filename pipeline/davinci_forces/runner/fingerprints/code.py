@@ -1,4 +1,4 @@
-"""Hashes of the code that a result depends on: modules and everything of the pipeline that they import."""
+"""Hashes of the code that a result depends on: modules and all modules of the pipeline that they import."""
 
 import re
 from collections.abc import Iterable, Iterator

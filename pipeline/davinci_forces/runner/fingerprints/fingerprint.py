@@ -1,4 +1,4 @@
-"""The fingerprint of a task: all that its outputs depend on, and in words what changed."""
+"""The fingerprint of a task: all that its outputs depend on, and a description of what changed."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
@@ -30,12 +30,12 @@ def hash_of_text(text: str) -> str:
 
 
 def hash_of(value: Any) -> str:
-    """The sha256 of all that a value holds; arrays count by their bytes, since `repr` rounds."""
+    """The sha256 of a value's content; arrays are hashed by their bytes, since `repr` rounds."""
     return hash_of_text(canonical(value))
 
 
 def canonical(value: Any) -> str:
-    """A text that is the same for two values only if they hold the same.
+    """A text that is equal for two values only if their contents are equal.
 
     Raises
     ------
@@ -69,7 +69,7 @@ class Fingerprint:
     """Everything that the outputs of a task depend on."""
 
     inputs: dict[str, str]  # file -> sha256
-    given: dict[str, str]  # argument of the stage besides records -> sha256
+    given: dict[str, str]  # argument of the stage other than records -> sha256
     settings: dict[str, Any]
     schemas: dict[str, str]  # kind of record read or made -> sha256 of its declaration
     code: dict[str, str]  # module -> sha256
@@ -77,7 +77,7 @@ class Fingerprint:
 
 
 def differences(then: dict[str, Any], now: Fingerprint) -> list[str]:
-    """What changed from the fingerprint of an entry to the present one, in words."""
+    """Descriptions of the changes from the fingerprint of an entry to the present one."""
     if then == vars(now):
         return []
     changed = []

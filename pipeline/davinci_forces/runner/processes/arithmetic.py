@@ -1,6 +1,7 @@
 """The same floating-point arithmetic in every process: BLAS with one thread and with kernels common to processors.
 
-The last digits of sums of products depend on threads and kernels.  Numpy reads both once, so they are set before it.
+The last digits of sums of products depend on threads and kernels.  Numpy reads both once, so they are set before
+numpy is loaded.
 """
 
 import os
@@ -10,8 +11,8 @@ from functools import cache
 from pathlib import Path
 
 THREADS = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "OMP_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")
-KERNELS = "Haswell"  # of OpenBLAS, for every processor of the last ten years that has AVX2
-KERNEL_FEATURES = {"avx2", "fma"}  # of a processor, that these kernels need
+KERNELS = "Haswell"  # kernels of OpenBLAS for every processor of the last ten years that has AVX2
+KERNEL_FEATURES = {"avx2", "fma"}  # processor features that these kernels need
 
 
 def blas_variables() -> dict[str, str]:
@@ -34,7 +35,7 @@ def is_pinned() -> bool:
 
 
 def description() -> str:
-    """The arithmetic of this process in words, for the report and to compare machines."""
+    """A description of this process's arithmetic, for the report and to compare machines."""
     if not is_pinned():
         return "BLAS as it was loaded before davinci-forces was"
     kernels = blas_variables().get("OPENBLAS_CORETYPE", f"those for this {platform.machine()}")

@@ -22,14 +22,14 @@ from davinci_forces.runner.plan import Task
 from davinci_forces.runner.processes import arithmetic
 
 RESULT_PACKAGES = ("numpy", "scipy", "numba", "pyarrow", "statsmodels", "clarabel")
-# They print tracebacks when a connection is lost.
+# These loggers print tracebacks when a connection is lost.
 CONNECTION_LOGGERS = ("distributed", "distributed.client", "tornado.application", "asyncio")
 CONNECT_TIMEOUT = 10.0  # [s] for a scheduler to answer, and for a shared file system to show a new file
 
 
 @dataclass(frozen=True)
 class Terms:
-    """What a worker needs to have to run tasks of a study."""
+    """The conditions that a worker must meet to run tasks of a study."""
 
     mark: str  # a file in the processed folder
     code: str

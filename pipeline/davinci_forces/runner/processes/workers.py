@@ -23,13 +23,13 @@ from davinci_forces.stages import STAGES, module
 
 Perform = Callable[[Task], Outcome]
 Share = list[tuple[Perform, Task]]
-Fields = dict[str, Any]  # of an outcome, without its task
+Fields = dict[str, Any]  # fields of an outcome, without its task
 
-SECONDS_ALONE = 2.0  # [s] of work in this process before others are started, about the time to start them
-MAX_RESTARTS = 3  # of the pool
-SECONDS_PER_SHARE = 0.2  # [s] of work that is handed over at once, since each handover takes milliseconds
-MIN_SHARES_LEFT = 4  # for each process, so that all end at about the same time
-MAX_QUEUED_SHARES = 3  # per process; tasks that wait here can still be put into larger shares
+SECONDS_ALONE = 2.0  # [s] of work in this process before other processes are started; starting them takes about as long
+MAX_RESTARTS = 3  # restarts of the pool
+SECONDS_PER_SHARE = 0.2  # [s] of work in one handover, since each handover takes milliseconds
+MIN_SHARES_LEFT = 4  # per process, so that all processes end at about the same time
+MAX_QUEUED_SHARES = 3  # per process; tasks that are not queued yet can still be put into larger shares
 METHOD = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
 
 
@@ -72,7 +72,7 @@ def import_stages() -> None:
 
 
 def perform_all(share: Sequence[tuple[Perform, Task]]) -> list[Fields]:
-    """Run tasks one after the other; return the fields of their outcomes, without the tasks, which the caller has."""
+    """Run tasks one after the other; return the fields of their outcomes without the tasks, which the caller knows."""
     outcomes = [perform(task) for perform, task in share]
     return [{name: value for name, value in vars(outcome).items() if name != "task"} for outcome in outcomes]
 
@@ -88,9 +88,9 @@ class WorkerPool:
 
 @dataclass
 class TaskQueue:
-    """Runs tasks in this process or in others, and yields their outcomes as they are done.
+    """Runs tasks in this process or in other processes, and yields each outcome when its task is done.
 
-    Others are prepared once enough work is in sight, and started once there is work for them.
+    Other processes are prepared once enough work is expected, and started once there is work for them.
     """
 
     others: WorkerPool | None = None
@@ -117,7 +117,7 @@ class TaskQueue:
         return not self._waiting and not self._running
 
     def outcomes(self) -> Iterator[Outcome]:
-        """Wait for the next outcomes: of one task that runs here, or of all that others have finished."""
+        """Wait for the next outcomes: of one task that runs here, or of tasks that other processes have finished."""
         for outcome in self._outcomes():
             self.counts = self.counts[0] + 1, self.counts[1]
             yield outcome
@@ -128,7 +128,7 @@ class TaskQueue:
         Raises
         ------
         BrokenExecutor
-            If the others were killed too often.
+            If other processes were killed too often.
         """
         if self._is_work_for_others():
             self._started = self._started or self._start()
@@ -149,7 +149,7 @@ class TaskQueue:
             yield outcome
 
     def _is_work_for_others(self) -> bool:
-        """Whether others are started or worth starting; prepare them once enough work is in sight."""
+        """Whether other processes are started or worth starting; prepare them once enough work is expected."""
         if self._started or self.others is None:
             return self._started is not None
         ahead = sum(self._durations.get(task.step, 0.0) for _, task in self._waiting)
@@ -176,7 +176,7 @@ class TaskQueue:
             future.add_done_callback(self._ended.put)
 
     def _next_share(self, hands: int) -> Share:
-        """Take the first waiting task, and more of them as long as they are known to be short."""
+        """Take the first waiting task, and further tasks as long as they are known to be short."""
         unfinished = len(self._waiting) + sum(map(len, self._running.values()))
         share, seconds = [self._waiting.popleft()], 0.0
         while True:
@@ -190,7 +190,7 @@ class TaskQueue:
         ended = [self._ended.get()]
         while not self._ended.empty():
             ended.append(self._ended.get())
-        done = [future for future in ended if future in self._running]  # a broken pool leaves others
+        done = [future for future in ended if future in self._running]  # a broken pool leaves other futures
         if any(isinstance(future.exception(), BrokenExecutor) for future in done):
             done = list(wait_for(self._running).done)  # all of the pool have ended
         lost = [self._running.pop(future) for future in done if isinstance(future.exception(), BrokenExecutor)]
@@ -225,7 +225,7 @@ class TaskQueue:
         return self.others.start()
 
     def close(self) -> None:
-        """End the others, and kill those that still work, since nobody takes their results any more."""
+        """End the other processes, and kill those that still work, since nobody reads their results any more."""
         if self._started is not None:
             pool = getattr(self._started, "_processes", None) if self._running else None
             workers = list((pool or {}).values())
@@ -233,7 +233,7 @@ class TaskQueue:
                 worker.kill()
             for worker in workers:
                 worker.join()
-            for future in () if workers else self._running:  # a pool cannot tell a cancelled one that it has broken
+            for future in () if workers else self._running:  # a broken pool cannot report that to a cancelled future
                 future.cancel()
             self._started.shutdown(wait=not self._running)
             self._started = None

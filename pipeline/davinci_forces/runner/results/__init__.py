@@ -1,1 +1,1 @@
-"""Results of finished studies: as data frames, and those of many studies on one page."""
+"""Results of finished studies: as data frames, and the results of many studies on one page."""

@@ -30,7 +30,7 @@ from davinci_forces.report.verdicts import WORDS
 from davinci_forces.runner import runs
 from davinci_forces.runner.results import stated
 
-FALSE_ALARM_PROBABILITY = 0.05  # of the whole page
+FALSE_ALARM_PROBABILITY = 0.05  # for all tests of a page together
 
 
 def write(studies: Sequence[Path], reports: Path | None, out: Path | None) -> tuple[list[Path], list[str]]:
@@ -115,7 +115,7 @@ Test = tuple[str, Place, int]  # kind of test, its series, and the number of the
 
 
 def findings(series: Sequence[Series], studies: Sequence[CampaignStudy], by_date: bool) -> Findings:
-    """Drifts, variations and outliers of the series beyond their standard errors, where all have one."""
+    """Drifts, variations and outliers beyond the standard errors, in series in which every value has one."""
     time = times(studies, by_date)
     slopes: dict[Place, Slope] = {}
     tests: dict[Test, float] = {}

@@ -10,7 +10,7 @@ from davinci_forces.maths.uncertainty.error_band import levels
 from davinci_forces.records import FreeSpace, Threshold, Track
 from davinci_forces.study import LogEntry
 
-MARGIN_BEFORE_CONTACT = 0.5  # [s] in which the smoother already shows the contact
+MARGIN_BEFORE_CONTACT = 0.5  # [s] before a contact in which the smoother already responds to the contact
 MIN_SAMPLES_LEVEL = 100  # of free space
 
 

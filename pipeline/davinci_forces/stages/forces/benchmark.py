@@ -18,8 +18,8 @@ from davinci_forces.robots.robot import Kind, Robot
 from davinci_forces.study import LogEntry
 
 PUSH = {Kind.REVOLUTE: 0.5, Kind.PRISMATIC: 2.0}  # [N m], [N]
-MIN_SAMPLES_COMPARISON = 100  # of free space
-MIN_PUSH_SHARE = 0.5  # that the default filter shows without a warning
+MIN_SAMPLES_COMPARISON = 100  # samples of free space
+MIN_PUSH_SHARE = 0.5  # peak of the filtered push over the true peak; below this share, a warning is given
 INDEPENDENT = f"{DEFAULT}-independent"  # the default filter with the joint's own terms
 
 
@@ -34,7 +34,7 @@ def run(
 ) -> Iterator[Comparison | Diagnostic]:
     """Compare all filters on a moving joint in a log that no parameter was fitted to.
 
-    Each filter has the slowest random walk with which it shows a push, so that all are compared at the same speed.
+    Each filter has the smallest random walk with which it follows a push, so that all are compared at equal speed.
     """
     free = free_space(model.t, entry.contact, model.rate)
     unfitted = entry.role != "identification" and entry.has_known_free_motion
@@ -54,7 +54,7 @@ def run(
 def compare(
     label: str, name: str, model: JointModel, noise: NoiseModel, free: Booleans, push: float
 ) -> Iterator[Comparison | Diagnostic]:
-    """Filter a joint of a log, and the same with a push; measure the level in free space and the response."""
+    """Filter a joint of a log without and with a push; measure the level in free space and the response."""
     parts = smooth_filter_inputs(model) if name == "direct" else filter_inputs(model)
     estimate = filter_parts(name, parts, noise)
     if not np.isfinite(estimate.tau_ext).all():

@@ -25,7 +25,7 @@ def run(
 ) -> Iterator[FreeMotion]:
     """Compute the filter's error of a moving joint outside of contacts.
 
-    In an identification log, the model is that of refits which left out what they predict.
+    In an identification log, the model comes from refits that left out the predicted samples.
     """
     if not entry.has_known_free_motion or model.at_rest or noise is None or not model.scheme:
         return

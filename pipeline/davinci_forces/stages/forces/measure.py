@@ -20,7 +20,7 @@ def run(
 ) -> Iterator[Contact | Diagnostic]:
     """Measure the contacts of one moving joint: in windows that the study states, and others above the alarm level.
 
-    Logs of a weight or of tissue are left out, because the arm is loaded all along.
+    Logs of a weight or of tissue are left out, because the arm is loaded throughout.
     """
     if entry.role not in ("contact", "validation", "identification"):
         return
@@ -60,7 +60,7 @@ def match_windows(windows: Sequence[Window], detected: Sequence[Event]) -> Itera
 def contacts(
     track: Track, threshold: Threshold, placed: Sequence[tuple[Window, Event | None, bool]]
 ) -> Iterator[Contact]:
-    """The Contact of one joint of a log, if any sample lies in any of its contacts."""
+    """The Contact of one joint of a log, if any sample lies in one of the joint's contacts."""
     windows = [window for window, _, _ in placed]
     free = free_space(track.t, windows, track.rate)
     rows = []

@@ -10,8 +10,8 @@ from davinci_forces.filters.tuning import tune_noise
 from davinci_forces.maths.signals.smoothing import noise_std
 from davinci_forces.records import FilterNoise, JointModel, MeasurementNoise, Tuning
 
-POOLED = ("rate", "r_q", "r_dq", "r_tau", "q_tau", "viscous", "speed")  # by the median over all logs
-MIN_NOISE = 1e-9  # over the range of a signal: without noise, innovations have no covariance
+POOLED = ("rate", "r_q", "r_dq", "r_tau", "q_tau", "viscous", "speed")  # fields that are pooled by the median
+MIN_NOISE = 1e-9  # over the range of a signal: without noise, the innovations' covariance would be singular
 
 
 def run(model: JointModel, noise: MeasurementNoise | None, *, lowpass: float) -> Iterator[Tuning]:
@@ -44,9 +44,9 @@ def tuning(model: JointModel, before: NoiseModel) -> Tuning:
 
 
 def initial_noise(model: JointModel, between: MeasurementNoise, lowpass: float) -> NoiseModel:
-    """Estimate the noise of each signal by what a low-pass removes, so that slow errors do not count.
+    """Estimate the noise of each signal as the part that a low-pass removes, so that slow errors are excluded.
 
-    Where the sampling rate leaves nothing above the low-pass, it is the noise `between` periods.  Section 6.3.3
+    If the sampling rate leaves no band above the low-pass, the noise is the noise `between` periods.  Section 6.3.3
     """
     pairs = (
         (model.q_measured, between.sigma_q),
@@ -63,7 +63,7 @@ def initial_noise(model: JointModel, between: MeasurementNoise, lowpass: float) 
 def gather(tunings: Iterable[Tuning]) -> Iterator[FilterNoise]:
     """Pool the filter noise of each joint: the median over its identification logs.
 
-    The inertia is the largest, with which the filter is slowest.
+    The inertia is the largest one, because the filter is slowest with it.
     """
     by_joint: dict[str, list[Tuning]] = {}
     for tuning in tunings:

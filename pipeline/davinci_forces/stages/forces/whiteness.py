@@ -32,9 +32,9 @@ from davinci_forces.records import (
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
-LAGS = 100  # of the correlations in the report
-TESTED_LAGS = 20  # of the Ljung-Box statistic
-MIN_PROBABILITY = 0.01  # of a white signal
+LAGS = 100  # lags of the correlations in the report
+TESTED_LAGS = 20  # lags of the Ljung-Box statistic
+MIN_PROBABILITY = 0.01  # p-value of a test, above which a signal is called white
 UNKNOWN_CONTACT = "; the study states no contact windows, so contact could not be left out"
 THIS_LOG = "parameters of this log itself"
 
@@ -46,7 +46,7 @@ def run(subject: PeriodResidual | Residual | Track) -> Iterator[Whiteness]:
     elif isinstance(subject, Residual):
         signals = {f"tau.{subject.model}.{subject.estimator}": subject.tau - subject.tau_hat}
     else:
-        # Correlations across a gap mean nothing, and after one the filter starts anew.
+        # Correlations across a gap mean nothing, and after a gap the filter restarts.
         part = longest_run(subject.t, subject.rate)
         converged = is_past_transient(subject.t[part])
         signals = {name: getattr(subject, name)[part][converged] for name in ("innovation_q", "innovation_dq")}
@@ -111,7 +111,7 @@ def apply(
 ) -> Iterator[Innovation | Explanation]:
     """Compute the innovations of each moving joint over the longest run, and explain why they are not white.
 
-    A cause is named only where the innovations pass every test without it.  Section 7.4
+    A cause is named only if the innovations pass every test once the cause is removed.  Section 7.4
     """
     noise_of, modelled = {noise.joint: noise for noise in noises}, {model.joint for model in models}
     along = LogModels(Identified(robot, fits), [*models, *(m for m in motions if m.joint not in modelled)])
@@ -150,14 +150,14 @@ def alternatives(model: JointModel, along: LogModels, free: Booleans) -> Iterato
         yield THIS_LOG, longest_part(model, refit_effort(model, fit, along, free))
     structures = [f for f in identified.fits if f.group == joint and f.model != model.model]
     possible = [f for f in structures if set(along.joints) >= set(identified.model(f).joints)]
-    for alternative in possible[:1]:  # of those whose joints the log holds
+    for alternative in possible[:1]:  # of the models whose joints the log contains
         under = along.with_fit(model, alternative)
         if under.inertia.min() > 0:
             yield alternative.model, longest_part(under)
 
 
 def innovation_records(model: JointModel, result: Innovations, motion: tuple[Array, Array]) -> Iterator[Innovation]:
-    """The normalised square of both innovations, and their correlation with the motion before."""
+    """The normalised square of both innovations, and the correlation of the innovations with earlier motion."""
     converged = is_past_transient(np.arange(len(result.q)) / model.rate)
     dq, ddq = (x[converged] for x in motion)
     N = int(converged.sum())
@@ -174,7 +174,7 @@ def innovation_records(model: JointModel, result: Innovations, motion: tuple[Arr
 
 
 def explanation(model: JointModel, causes: CauseSearch, entry: LogEntry, clock_std: float) -> Explanation:
-    """The result of a search for the causes, trial by trial."""
+    """The result of a search for the causes of innovations that are not white, trial by trial."""
     trials, touched = causes.trials, entry.role in ("contact", "tissue") and not entry.contact
     caveat = UNKNOWN_CONTACT if touched and not (trials[0].white or causes.explaining) else ""
     return Explanation(

@@ -39,10 +39,10 @@ def run(
     fit: str,
     lowpass: float,
 ) -> Iterator[Choice | Fit | Prediction | Diagnostic]:
-    """Choose one model for the whole arm, estimate its parameters, and predict what each refit had not seen.
+    """Choose one model for the whole arm, estimate its parameters, and predict the samples that each refit left out.
 
-    Where a log moves several joints, and the robot has a chain, one model describes these joints together; joints
-    that move only in other logs keep their own terms.  The fit that the settings name is made, too.
+    If a log moves several joints and the robot has a chain, one model describes these joints together.  Joints
+    that move only in other logs keep their own terms.  The fit that the setting `fit` names is also computed.
     """
     logs = logs_of(motions, averages, robot, lowpass)
     separate, arm = modelled_logs(logs, robot)
@@ -72,7 +72,7 @@ def run(
 
 
 def logs_of(motions: Iterable[Motion], averages: Iterable[Average], robot: Robot, lowpass: float) -> list[Observed]:
-    """The joints of each log, in the robot's order; of several clocks, only joints on that of the first."""
+    """The joints of each log, in the robot's order; with several clocks, only joints on the first joint's clock."""
     joints, periods = [joint.name for joint in robot.joints], list(averages)
     records: dict[str, list[Motion]] = defaultdict(list)
     for record in motions:
@@ -87,7 +87,7 @@ def logs_of(motions: Iterable[Motion], averages: Iterable[Average], robot: Robot
 def modelled_logs(
     logs: Sequence[Observed], robot: Robot
 ) -> tuple[dict[str, tuple[Observed, ...]], tuple[Observed, ...]]:
-    """The logs of each moving joint by itself, and those that hold all joints, where some move together."""
+    """The logs of each moving joint by itself, and, if joints move together, the logs that contain all joints."""
     whole = tuple(log for log in logs if len(log.records) == len(robot.joints) and log.is_moving.any())
     arm = whole if robot.chain is not None and any(log.is_moving.sum() > 1 for log in whole) else ()
     separate: dict[str, list[Observed]] = defaultdict(list)
@@ -132,9 +132,9 @@ def best_of_structures(selection: Selection) -> list[Candidate]:
 
 
 def best_of_setting(selection: Selection, fit: str) -> list[Candidate]:
-    """The best candidate of the variant and estimator that the setting `fit` names, where it names one.
+    """The best candidate of the variant and estimator that the setting `fit` names, if there is one.
 
-    Consistent parameters follow from the best candidate of their variant, whatever its estimator.
+    Consistent parameters are computed from the best candidate of their variant, with any estimator.
     """
     variant, _, estimator = fit.rpartition(".")
     pairs = zip(selection.score.tolist(), selection.candidates, strict=True)
@@ -148,7 +148,7 @@ def consistent_fits(
     robot: Robot,
     reaches: dict[str, Reach],
 ) -> Iterator[Fit | Diagnostic]:
-    """Constrain the parameters of a candidate to those that some mechanism has, and state how much worse they fit."""
+    """Constrain the parameters of a candidate to be physically consistent, and state how much worse they fit."""
     name = f"{candidate.variant}.{candidate.estimator}"
     for (model, library, free), ridge in zip(estimates, candidate.ridges(), strict=True):
         cells = library.by_block.columns(library.columns(candidate.friction, reaches))

@@ -46,16 +46,16 @@ from davinci_forces.robots.models import independent
 from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.study import LogEntry
 
-MAX_PATHS = 20  # that a recording is compared with
+MAX_PATHS = 20  # number of fitted paths with which a recording is compared
 
 
 class Part(NamedTuple):
-    """Data of one joint from one log: an averaged period, or low-passed samples of a motion that does not repeat."""
+    """Data of one joint from one log: an averaged period, or low-passed samples of a motion without a period."""
 
     log: str
     rate: float
     periods: int
-    period: float  # [s], or the duration of a motion that does not repeat
+    period: float  # [s]; the duration of a motion without a period
     noise: tuple[float, float, float]  # standard deviations of q, dq and tau
     t: Column
     q: Column
@@ -74,7 +74,7 @@ def run(
 ]:
     """Estimate one Fit per joint and estimator; a diagnostic says why an estimator cannot be used.
 
-    A joint of several logs has a CrossFit, too, by which each of its logs can be predicted from others.
+    A joint with several logs also gets a CrossFit, which predicts each log from fits to the other logs.
     """
     averaged, moving, unaveraged = list(trajectories), list[tuple[str, str]](), list[Motion]()
     repeating = {(t.log, t.joint) for t in averaged}
@@ -100,7 +100,7 @@ def apply(
     *,
     lowpass: float,
 ) -> Iterator[Prediction | Diagnostic]:
-    """Predict the effort of an identification log by refits without parts of it, per estimator and joint."""
+    """Predict the effort of an identification log by refits without parts of the log, per estimator and joint."""
     if entry.role != "identification":
         return
     periods, refits = {t.joint: t for t in trajectories}, list(cross_fits)
@@ -316,7 +316,7 @@ def cross_fits(
 
 
 def fitted_paths(joint: str, parts: Sequence[Part]) -> Iterator[FittedPaths | Diagnostic]:
-    """The paths of a joint's logs, or the `MAX_PATHS` that differ most."""
+    """The paths of a joint's logs; of more than `MAX_PATHS` paths, those that differ most."""
     indices, likeness = most_different([(part.t, part.q, part.period) for part in parts], MAX_PATHS)
     if likeness < SAME_PATH:
         message = f"{joint}: its identification logs follow more than {MAX_PATHS} paths"
@@ -333,7 +333,7 @@ def fitted_paths(joint: str, parts: Sequence[Part]) -> Iterator[FittedPaths | Di
 
 
 def noise(joint: str, parts: Sequence[Part]) -> MeasurementNoise:
-    """Standard deviations between periods, or of what the low-pass removes, over all logs of a joint."""
+    """Noise of a joint over all logs: standard deviations between periods, or of the part that the low-pass removes."""
     sigma_q, sigma_dq, sigma_tau = np.sqrt(np.mean([np.square(part.noise) for part in parts], axis=0)).tolist()
     return MeasurementNoise(joint, sigma_q, sigma_dq, sigma_tau)
 

@@ -8,7 +8,7 @@ from davinci_forces.maths.periods import harmonics as fourier
 from davinci_forces.records import Average, Column, Diagnostic, Spectrum, Trajectory, diagnostic
 from davinci_forces.robots.robot import Joint
 
-MAX_OMITTED_HARMONIC = 0.01  # share of the largest harmonic, above which an omitted one is worth a remark
+MAX_OMITTED_HARMONIC = 0.01  # share of the largest harmonic; a larger omitted harmonic is reported
 
 
 def run(average: Average, joint: Joint, *, harmonics: int) -> Iterator[Trajectory | Spectrum | Diagnostic]:

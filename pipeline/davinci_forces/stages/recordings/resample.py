@@ -25,17 +25,17 @@ from davinci_forces.robots.robot import Joint
 
 Indices = NDArray[np.intp]
 
-EVEN = 0.02  # of a sampling time: clocks that stray less than this from a uniform one are taken as uniform
-MIN_MOTION = 0.01  # share of a joint's range, or of 1 rad or 1 m where it has no limits, below which it is at rest
-VELOCITY_CUTOFF = 5.0  # [Hz] below which a logged velocity is compared with that of the position
-MAX_VELOCITY_ERROR = 0.1  # of their ratio
-MAX_POSITION = 20.0  # times the limits of a joint
-MIN_SAMPLES_SEGMENT = 4  # that a cubic spline needs
+EVEN = 0.02  # of a sampling time: a clock that deviates less than this from a uniform clock counts as uniform
+MIN_MOTION = 0.01  # of a joint's range, or of 1 rad or 1 m without limits: a joint that moves less is at rest
+VELOCITY_CUTOFF = 5.0  # [Hz] below which a logged velocity is compared with the derivative of the position
+MAX_VELOCITY_ERROR = 0.1  # of the ratio of the two velocities
+MAX_POSITION = 20.0  # as a multiple of a joint's limits
+MIN_SAMPLES_SEGMENT = 4  # for a cubic spline
 MAX_LISTED_STRETCHES = 3  # in a remark
 
 
 def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signal | Motion | Diagnostic]:
-    """Make one Signal and one Motion of a recording.  Gaps start a new segment; nothing is interpolated across one.
+    """Make one Signal and one Motion of a recording.  A gap starts a new segment and is not interpolated across.
 
     Raises
     ------
@@ -88,9 +88,9 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
 
 
 def moves(q: Column, joint: Joint) -> bool:
-    """Whether a joint moves enough for its dynamics to show."""
+    """Whether a joint moves enough to reveal its dynamics."""
     low, high = joint.limits.q
-    # Percentiles, so that a single glitch of an encoder does not set a joint at rest moving.
+    # With percentiles, a single glitch of an encoder does not make a joint at rest count as moving.
     reach = float(np.subtract(*np.percentile(q, [99.0, 1.0])))
     return reach > MIN_MOTION * (high - low if np.isfinite(high - low) else 1.0)
 
@@ -102,7 +102,7 @@ def slow_velocity(q: Column, segment: Indices, rate: float, cutoff: float) -> Co
 
 
 def without_noise(signal: Signal, smooth: tuple[Column, Column, Column], lowpass: float) -> Motion:
-    """The Motion of a joint, also at rest, as others may move it along; its noise is what the low-pass removes."""
+    """The Motion of a joint, also of one at rest, which other joints may drive; the low-pass removes its noise."""
     q, dq, ddq = smooth
     passed, rate, segment = share_passed(signal.rate, lowpass), signal.rate, signal.segment
     sigma_q = white_std(signal.q - q, passed)
@@ -119,7 +119,7 @@ def without_noise(signal: Signal, smooth: tuple[Column, Column, Column], lowpass
 
 
 def velocity_faults(recording: Recording, q: Column, dq: Column, segment: Indices, rate: float) -> list[str]:
-    """State where a logged velocity is not that of the logged position, both low-passed."""
+    """State where a logged velocity differs from the derivative of the logged position, both low-passed."""
     if recording.velocity == "derived":
         return []
     cutoff = min(VELOCITY_CUTOFF, 0.1 * rate)
@@ -134,7 +134,7 @@ def velocity_faults(recording: Recording, q: Column, dq: Column, segment: Indice
 
 
 def faults(recording: Recording, joint: Joint) -> Iterator[str]:
-    """State where a sensor was stuck, a drive was at its limit, or a unit is not as stated."""
+    """State where a sensor was stuck, a drive was at its limit, or a unit differs from the stated one."""
     name, far = f"{recording.log}/{recording.joint}", max(map(abs, joint.limits.q))
     for stop in find_stuck(recording.t, recording.q):
         yield (
@@ -193,7 +193,7 @@ def remarks(recording: Recording, method: str, cuts: list[int], samples: int) ->
 
 
 def standstill(motion: Motion) -> str:
-    """State when a joint stands still, and what follows from that."""
+    """State when a joint stands still, and the consequences for fits and contacts."""
     still: Booleans = motion.standing > 0
     parts = [f"{motion.t[part][0]:.2f} to {motion.t[part][-1]:.2f} s" for part in runs(still)]
     where, more = ", ".join(parts[:MAX_LISTED_STRETCHES]), len(parts) - MAX_LISTED_STRETCHES

@@ -25,14 +25,14 @@ from davinci_forces.records import (
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
-TIP_JOINTS = 3  # that carry the tip; the wrist is taken to be straight
+TIP_JOINTS = 3  # number of joints that carry the tip; the wrist is assumed to be straight
 MIN_SAMPLES_FREE_SPACE = 100
 MAX_LOGS_CORRELATION = 20
 UNKNOWN = FreeSpaceLevels(*[float("nan")] * len(FreeSpaceLevels._fields))
 
 
 def run(tracks: Sequence[Track], entry: LogEntry, robot: Robot) -> Iterator[JointCorrelation]:
-    """Correlate the errors of the joints in free space, in a log in which all move and contacts are known."""
+    """Correlate the errors of the joints in free space, in a log in which all joints move and contacts are known."""
     names = [joint.name for joint in robot.joints[:TIP_JOINTS]]
     moving = [track for name in names for track in tracks if track.joint == name and not track.at_rest]
     if robot.chain is None or len(robot.joints) != TIP_JOINTS:
@@ -71,12 +71,12 @@ def apply(
 ) -> Iterator[TipForce | TipContact | TipBudget | Diagnostic]:
     """Compute the force at the tip in a log in which all joints that carry it move.  (7.26)
 
-    It holds if the arm touches nothing else than by its tip.
+    It holds if the arm touches its environment with the tip only.
     """
     if robot.chain is None or len(robot.joints) < TIP_JOINTS or entry.role in ("weight", "friction"):
         return
     by_joint = {track.joint: track for track in tracks}
-    if len(robot.joints) > TIP_JOINTS:  # the chain would be taken to stand still beyond them
+    if len(robot.joints) > TIP_JOINTS:  # the chain would assume that the joints beyond stand still
         if entry.role in ("contact", "tissue"):
             why = f"{robot.name} has {len(robot.joints)} joints, and it is computed only for arms of {TIP_JOINTS}"
             yield diagnostic("resolve", entry.name, "note", f"{entry.name}: no force at the tip: {why}")
@@ -111,7 +111,7 @@ def missing_joints(names: Sequence[str], tracks: dict[str, Track]) -> Iterator[s
 
 
 def correlation(log: str, correlations: Iterable[ArmCorrelation]) -> tuple[Array, str]:
-    """Correlation of the joints' errors (3,) in all other logs, and their names; 0 where they do not agree."""
+    """Correlation of the joints' errors (3,) in all other logs, and the logs' names; 0 where the logs disagree."""
     for arm in correlations:
         is_other = arm.source != log
         rho = shared_correlations(np.column_stack([arm.rho_12, arm.rho_13, arm.rho_23])[is_other])
@@ -121,7 +121,7 @@ def correlation(log: str, correlations: Iterable[ArmCorrelation]) -> tuple[Array
 
 
 def tip_force_of(tracks: Sequence[Track], chain: Chain, rho: Array, source: str, free: Booleans) -> TipForce:
-    """The force at the tip in one log, by the smoother: different lags of the joints would turn its direction."""
+    """The force at the tip in one log, by the smoother, since different lags of the joints would turn the force."""
     first, q = tracks[0], np.stack([track.q for track in tracks], axis=-1)
     J = evaluate_in_blocks(lambda block: jacobian(chain, block)[0], q)
     tau_ext, std = (np.stack([getattr(t, name) for t in tracks], axis=-1) for name in ("tau_ext_smooth", "tau_ext_std"))
@@ -149,7 +149,7 @@ def levels_of(f: Array, C: Array) -> FreeSpaceLevels:
 
 
 def budget(tracks: Sequence[Track], chain: Chain, which: Booleans) -> TipBudget:
-    """Force at the tip from each part of the error of each joint, at the median pose of some samples."""
+    """Force at the tip from each part of the error of each joint, at the median pose of the samples `which`."""
     median = np.array([float(np.median(track.q[which])) for track in tracks])
     lever = tip_force.lever(jacobian(chain, median)[0])
     noise, model, late = (
@@ -171,7 +171,7 @@ def model_variance_std(track: Track) -> float:
 
 
 def windows(entry: LogEntry, contacts: Iterable[Contact]) -> Iterator[tuple[float, float, bool]]:
-    """Start, end and whether it is stated, of the study's windows and of other contacts detected on any joint."""
+    """Start and end of the study's windows and of other contacts detected on any joint, and whether each is stated."""
     yield from ((start, end, True) for start, end in sorted(entry.contact))
     detected = sorted(
         (float(contact.onset[i]), float(contact.release[i]))
@@ -188,7 +188,7 @@ def windows(entry: LogEntry, contacts: Iterable[Contact]) -> Iterator[tuple[floa
 def tip_contacts(
     force: TipForce, tracks: Sequence[Track], chain: Chain, windows: Sequence[tuple[float, float, bool]]
 ) -> Iterator[TipContact]:
-    """The largest force in each window in which it is known."""
+    """The largest force in each window in which the force is known."""
     f = np.column_stack([force.f_x, force.f_y, force.f_z])
     size = np.where(np.isnan(f[:, 0]), -1.0, np.linalg.norm(f, axis=1))
     peaks = [(*window, k) for window in windows if (k := peak_sample(force.t, size, window)) is not None]
@@ -227,7 +227,7 @@ def half_axes_std(force: TipForce, tracks: Sequence[Track], chain: Chain, at: In
 
 
 def peak_sample(t: Array, size: Array, window: tuple[float, float, bool]) -> int | None:
-    """Index of the largest size (N,) within a window; None where none is above 0."""
+    """Index of the largest magnitude (N,) of the force within a window; None if no magnitude is above 0."""
     inside = np.where((t >= window[0]) & (t <= window[1]), size, -1.0)
     k = int(np.argmax(inside))
     return k if inside[k] > 0.0 else None

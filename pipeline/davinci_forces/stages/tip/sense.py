@@ -30,8 +30,8 @@ def run(
 ) -> Iterator[SensorForce | Diagnostic]:
     """Compare the force at the tip, by component and as a vector, with a sensor of three axes in base axes.
 
-    A sensor of one axis is compared with the magnitude of that force.  Where that is not known, it is compared with the
-    external effort of the prismatic joint, with the sign of their correlation.
+    A sensor of one axis is compared with the magnitude of the tip force.  If no tip force is known, the sensor is
+    compared with the external effort of the prismatic joint, with the sign of their correlation.
     """
     sensor = np.column_stack([getattr(touch, name) for name in ("force_x", "force_y", "force_z")])
     if not np.isfinite(sensor).all():
@@ -89,7 +89,7 @@ def size(force: EstimatedForce) -> EstimatedForce:
     """Magnitude of a force, with its variance along the force."""
     length = np.linalg.norm(force.f, axis=1)
     u = force.f / np.maximum(length, 1e-300)[:, None]
-    u[:, 0] += length == 0.0  # of no force, any direction
+    u[:, 0] += length == 0.0  # a zero force has no direction, so any serves
     return force._replace(f=length[:, None], C=np.einsum("ni,nij,nj->n", u, force.C, u)[:, None, None])
 
 

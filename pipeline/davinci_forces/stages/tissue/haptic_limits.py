@@ -29,8 +29,8 @@ from davinci_forces.records import (
 from davinci_forces.robots.robot import Joint, Kind, Robot
 from davinci_forces.study import HapticScenario
 
-UNSTABLE_STIFFNESS = 1.5  # times the limit of arbitrary switching, of the simulated motions
-MOTION_CYCLES = 5.0  # of the free hand, in a simulated motion
+UNSTABLE_STIFFNESS = 1.5  # tissue stiffness of the simulated motions, over the limit of arbitrary switching
+MOTION_CYCLES = 5.0  # duration of a simulated motion, in periods of the free hand
 PALPATION_FREQUENCY = 0.5  # [Hz] at which the rendered stiffness is stated
 FROM_FILE, FROM_THESIS = "the scenario", "the thesis"
 
@@ -60,7 +60,7 @@ def stability_map(robot: Robot) -> StabilityMap:
 
 
 def stability_limit(robot: Robot) -> StabilityLimit:
-    """The exact limits of the same plane, with a Lyapunov function and under arbitrary switching."""
+    """The exact limits of tissue over hand stiffness, with a Lyapunov function and under arbitrary switching."""
     k_h = np.geomspace(bimodal.MIN_HAND_STIFFNESS, bimodal.MAX_HAND_STIFFNESS, 101)
     hands = [THESIS_HAND._replace(k=k) for k in k_h.tolist()]
     proved, switching = (np.array([limit(hand) for hand in hands]) for limit in (cqlf_limit, switching_limit))
@@ -68,7 +68,7 @@ def stability_limit(robot: Robot) -> StabilityLimit:
 
 
 def delay_limits(robot: Robot) -> DelayLimit:
-    """The limit over the delay, for a continuous force and for one that the link holds between samples."""
+    """The stability limit over the delay, for a continuous force and for a force that the link samples and holds."""
     continuous = np.array([delay_limit(THESIS_HAND, delay) for delay in bimodal.DELAYS.tolist()])
     leaving = np.full(len(bimodal.DELAYS), np.nan)
     leaving[bimodal.SIMULATED_DELAYS] = bimodal.LEAVING_LIMITS
@@ -88,7 +88,7 @@ def delay_limits(robot: Robot) -> DelayLimit:
 
 
 def unstable_motion(robot: Robot, law: Law) -> HapticMotion:
-    """The motion of a released hand beside the tissue, with the worst or the actual switching.  Fig 8.8, 8.10"""
+    """The motion of a hand released at the tissue, with the worst or the actual switching.  Fig 8.8, 8.10"""
     k_t = UNSTABLE_STIFFNESS * switching_limit(THESIS_HAND)
     motion = simulate_switching(
         THESIS_HAND, k_t, (-0.01, 0.0), MOTION_CYCLES * 2.0 * np.pi / THESIS_HAND.frequency, law
@@ -98,7 +98,7 @@ def unstable_motion(robot: Robot, law: Law) -> HapticMotion:
 
 
 def slowest_filter(comparisons: list[Comparison], robot: Robot) -> tuple[str, float]:
-    """The prismatic joint, which palpates in section 8.4, else any, and the largest lag of its filter [s]."""
+    """The prismatic joint, which palpates in section 8.4, or else any joint; and the largest lag of its filter [s]."""
     default = [c for c in comparisons if c.default]
     prismatic = [c for c in default if robot.joint(c.joint).kind is Kind.PRISMATIC]
     latest = max(prismatic or default, key=lambda c: c.push_delay, default=None)
@@ -106,11 +106,11 @@ def slowest_filter(comparisons: list[Comparison], robot: Robot) -> tuple[str, fl
 
 
 def tissue_limit(tissue: Stiffness, joint: str, lag: float) -> TissueLimit:
-    """What a tissue requires of the hand: stiffness for a Lyapunov function, damping for the lag and the link."""
+    """The hand that a tissue requires: its stiffness for a Lyapunov function, its damping for the lag and the link."""
     m, b, k_t = THESIS_HAND.m, THESIS_HAND.b, tissue.stiffness
     needed = m * (max(k_t - b**2 / m, 0.0) / (2.0 * b)) ** 2
     has_lag = lag > 0.0
-    total = lag + 0.5 / bimodal.LINK_RATE  # a held force is half a sample later
+    total = lag + 0.5 / bimodal.LINK_RATE  # holding a force between samples delays it by half a sample on average
     return TissueLimit(
         log=tissue.log,
         stiffness=k_t,
@@ -149,7 +149,7 @@ def gather(
 
 
 def moving_body(robot: Robot, fits: Iterable[Fit], joint: Joint | None) -> tuple[Body, str]:
-    """The body that a prismatic joint moves, by the joint's fit, and its name; without a fit, that of the thesis."""
+    """The body that a prismatic joint moves, from the joint's fit, and its name; without a fit, the thesis's body."""
     identified = Identified(robot, fits)
     fit = identified.fit_of(joint.name, FALLBACK) if joint else None
     if fit is None or joint is None:

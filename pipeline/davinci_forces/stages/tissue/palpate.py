@@ -22,8 +22,8 @@ from davinci_forces.records import Column, Diagnostic, Push, Stiffness, TissueMo
 from davinci_forces.robots.robot import Kind, Robot
 from davinci_forces.study import WHOLE_LOG, LogEntry
 
-MIN_R2 = 0.9  # of a straight line, for a push that counts
-MIN_SAMPLES_PUSH = 8  # that a log needs, and a push by which models are compared
+MIN_R2 = 0.9  # of the straight line through a push that is used for the stiffness
+MIN_SAMPLES_PUSH = 8  # in a log, and in a push with which tissue models are compared
 FILTER = "ekf"
 
 
@@ -32,7 +32,7 @@ def run(
 ) -> Iterator[Push | Stiffness | TissueModel | Diagnostic]:
     """Find the pushes of a tissue log, and estimate the stiffness and the model of the tissue.
 
-    The force is that of a sensor's channel.  Without one, it is the external effort of the prismatic joint: its effort
+    The force is a sensor's channel.  Without a sensor, it is the external effort of the prismatic joint: its effort
     less the model's, low-passed without delay.  The filter's estimate would lag the depth, which shifts first contact
     and adds a false hysteresis loop; the model's error is in both alike.
     """
@@ -73,7 +73,7 @@ def has_force(touch: Touch) -> bool:
 
 
 def palpation_data(touch: Touch | None, slide: Track | None, cutoff: float) -> Probing | None:
-    """Force, depth and place of a log, by its own channels where it has them, else by the prismatic joint."""
+    """Force, depth and place of a log, from its own channels or, without such channels, from the prismatic joint."""
     if touch is not None and has_force(touch):
         is_scalar = np.isfinite(touch.force).any()
         force = touch.force[:, None] if is_scalar else np.column_stack([touch.force_x, touch.force_y, touch.force_z])
@@ -100,13 +100,14 @@ def palpation_data(touch: Touch | None, slide: Track | None, cutoff: float) -> P
 def model_std(slide: Track) -> Column:
     """Standard deviation (N,) of the error that pushes may share: that of the model, or where unknown, the total.
 
-    The residual of a line contains the noise, and its intercept the offset of the day; there is no lag.
+    The residual of a line contains the noise.  Its intercept contains the constant effort offset that differs
+    from day to day.  There is no lag.
     """
     return np.full(len(slide), slide.model_part) if slide.band_from else slide.tau_ext_std
 
 
 def depth_of(touch: Touch | None, slide: Track | None, t: Column) -> Array | None:
-    """Depth (N, 1), or position of the tip (N, 3), at times (N,), by a channel; else the prismatic joint's position."""
+    """Depth (N, 1) or tip position (N, 3) at times (N,), from channels, or else the prismatic joint's position."""
     for columns in ((touch.depth,), (touch.x, touch.y, touch.z)) if touch is not None else ():
         if np.isfinite(columns[0]).any():
             return np.column_stack([x if t is touch.t else np.interp(t, touch.t, x) for x in columns])  # type: ignore[union-attr]
@@ -124,7 +125,7 @@ def rate_of(t: Column) -> float:
 
 
 def choose_law(pushes: Sequence[PalpatedPush], *, clocked: bool) -> tuple[list[FittedLaw], FittedLaw | None, str]:
-    """Score every model of the tissue on pushes that it has not seen, and choose one; of at least two pushes."""
+    """Score every tissue model on left-out pushes, and choose one model; this needs at least two pushes."""
     long = [push for push in pushes if push.contact.inside.sum() >= MIN_SAMPLES_PUSH]
     if len(long) < 2:
         return [], None, ""
@@ -135,7 +136,7 @@ def choose_law(pushes: Sequence[PalpatedPush], *, clocked: bool) -> tuple[list[F
 
 
 def record_of(push: PalpatedPush, log: str, best: FittedLaw | None) -> Push:
-    """One push, with the force of the chosen model, or of the straight line where none was chosen."""
+    """One push, with the force of the chosen model, or of the straight line if no model was chosen."""
     inside, line = push.contact.inside, push.line
     assert line is not None
     fitted = line.c + line.k * push.depth

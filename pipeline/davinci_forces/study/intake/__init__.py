@@ -16,7 +16,7 @@ from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.study import WHOLE_LOG, LogEntry, Source
 from davinci_forces.study.intake.clocks import ALIGNED, UsedClocks
 
-# Channels of the log by the columns of a Touch; those of joints become recordings.
+# Channels of the log by the columns of a Touch; channels of joints become recordings.
 TOUCH_COLUMNS = {
     "depth": "depth", "force": "force", "force_x": "force_x", "force_y": "force_y", "force_z": "force_z",
     "x": "tip_x", "y": "tip_y", "z": "tip_z",
@@ -104,7 +104,7 @@ class Intake:
     def unit(self, source: Source, channel: Channel) -> float:
         """The size of a channel's unit in SI: as the study gives it, else the log, else 1."""
         log_unit = "s" if channel.kind == "time" else canonical(channel.unit)
-        if source.scale != 1.0:  # the unit is that after scaling
+        if source.scale != 1.0:  # the stated unit is the unit after scaling
             log_unit = ""
         if source.unit and log_unit in UNITS and log_unit != source.unit:
             raise BadLog(

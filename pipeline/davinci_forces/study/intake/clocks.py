@@ -1,4 +1,4 @@
-"""Find the channels of times of the channels that a study uses, and their times in seconds."""
+"""Find the time channels of the channels that a study uses, and compute their times in seconds."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
@@ -32,7 +32,7 @@ class UsedClocks:
     entry: LogEntry
     scale: float
     used: Sequence[str]  # channels of quantities
-    reference: str  # of them, the one whose clock all others are resampled on
+    reference: str  # the channel on whose clock all others are resampled
     done: Alignment = field(default_factory=Alignment)
 
     def __post_init__(self) -> None:

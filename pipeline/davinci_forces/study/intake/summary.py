@@ -10,7 +10,7 @@ from davinci_forces.maths.signals.clock import GAP
 from davinci_forces.records import LogSummary
 from davinci_forces.study.intake import Intake
 
-MOST_REPEATED = 0.1  # share of rows equal to the one before; above it, the recorder was faster than the robot
+MOST_REPEATED = 0.1  # share of rows equal to the previous row; above it, the recorder was faster than the robot
 MOST_JITTER = 0.1  # of the sampling time
 
 
