@@ -80,8 +80,7 @@ def control(robot: Robot, chain: Chain, bodies: Bodies) -> Iterator[Control | Ly
 
     for study in robot.control:
         start, target, K_p, K_d, K_i, viscous = map(
-            np.array,
-            (study.start, study.target, study.proportional, study.derivative, study.integral, study.viscous),
+            np.array, (study.start, study.target, study.proportional, study.derivative, study.integral, study.viscous)
         )
         law, rotors = Regulator(K_p, K_d, K_i, 1.0), np.zeros(len(start))
         plant, belief = (arm(chain, bodies.with_density_factor(share), rotors) for share in (1.0, study.known_masses))

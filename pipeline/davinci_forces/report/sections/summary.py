@@ -23,16 +23,7 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.verdicts import (
-    CAUTION,
-    COVERED,
-    DETECTABLE,
-    DETECTED,
-    GOOD,
-    Trust,
-    band_in_words,
-    percent,
-)
+from davinci_forces.report.verdicts import CAUTION, COVERED, DETECTABLE, DETECTED, GOOD, Trust, band_in_words, percent
 
 
 def section(context: Context) -> Section:

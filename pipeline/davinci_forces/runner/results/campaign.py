@@ -66,11 +66,7 @@ def read_study(folder: Path, place: Path) -> CampaignStudy:
     """Read a study from the files of its report; `place` is the folder of the page that links to it."""
     numbers, about = stated.read(folder / "results.json"), read_summary(folder / "summary.json")
     joints = {
-        str(joint["joint"]): JointVerdict(
-            joint["verdict"],
-            bool(joint["same_path"]),
-            {n: joint[n] for n in FLOORS},
-        )
+        str(joint["joint"]): JointVerdict(joint["verdict"], bool(joint["same_path"]), {n: joint[n] for n in FLOORS})
         for joint in about["joints"]
     }
     return CampaignStudy(

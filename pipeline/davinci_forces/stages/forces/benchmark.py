@@ -24,13 +24,7 @@ INDEPENDENT = f"{DEFAULT}-independent"  # the default filter with the joint's ow
 
 
 def run(
-    model: JointModel,
-    fits: Iterable[Fit],
-    noise: FilterNoise | None,
-    entry: LogEntry,
-    robot: Robot,
-    *,
-    q_tau: float,
+    model: JointModel, fits: Iterable[Fit], noise: FilterNoise | None, entry: LogEntry, robot: Robot, *, q_tau: float
 ) -> Iterator[Comparison | Diagnostic]:
     """Compare all filters on a moving joint in a log that no parameter was fitted to.
 

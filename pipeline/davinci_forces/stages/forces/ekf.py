@@ -18,13 +18,7 @@ from davinci_forces.study import LogEntry
 
 
 def run(
-    model: JointModel,
-    noise: FilterNoise | None,
-    band: ErrorBand | None,
-    entry: LogEntry,
-    joint: Joint,
-    *,
-    q_tau: float,
+    model: JointModel, noise: FilterNoise | None, band: ErrorBand | None, entry: LogEntry, joint: Joint, *, q_tau: float
 ) -> Iterator[Track | Diagnostic]:
     """Filter one joint of a log.
 

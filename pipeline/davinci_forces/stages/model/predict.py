@@ -8,16 +8,7 @@ from davinci_forces.identification.joint_models import LogModels, at_samples, re
 from davinci_forces.identification.scores import Scorer
 from davinci_forces.identification.used import FALLBACK, Identified
 from davinci_forces.maths.signals.windows import is_outside
-from davinci_forces.records import (
-    Choice,
-    Diagnostic,
-    Fit,
-    FittedPaths,
-    JointModel,
-    Motion,
-    Prediction,
-    diagnostic,
-)
+from davinci_forces.records import Choice, Diagnostic, Fit, FittedPaths, JointModel, Motion, Prediction, diagnostic
 from davinci_forces.records.prediction import CHOSEN, SAME_PATH
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
