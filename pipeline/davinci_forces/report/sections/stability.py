@@ -103,12 +103,11 @@ def without_delay(context: Context) -> str:
     return (
         "A common quadratic Lyapunov function proves stability without delay. It exists if and only if "
         f"$K_T < b^2/m + 2 b sqrt(K_H/m)$, here below {proved}; the numerical solutions of its linear matrix "
-        f"inequality (LMI) in [@stability-limits] agree. Above this limit lies {region}. "
-        "That is **not** a region of instability: **this criterion** merely proves nothing there. Even if the spring "
-        f"of the tissue switched on and off at arbitrary times, the hand would be stable below {switching}. Real "
-        "tissue acts only in contact, at $x >= 0$. The energy "
+        f"inequality (LMI) in [@stability-limits] agree. In {region} above, **this criterion** proves nothing; it is "
+        f"**not** a region of instability. A spring that switches on and off at arbitrary times is stable below "
+        f"{switching}. Real tissue acts only in contact, at $x >= 0$. The energy "
         "$V = 1/2 m dot(x)^2 + 1/2 K_H x^2 + 1/2 K_T max(x, 0)^2$ then falls by $b dot(x)^2$. So **every** "
-        "$K_T >= 0$ is stable without delay, also in that region."
+        "$K_T >= 0$ is stable without delay."
     )
 
 
@@ -118,20 +117,19 @@ def with_delay(context: Context, tissues: list[TissueLimit]) -> str:
     late = any(f"stability.{tissue.log}.force_lag" in context.results for tissue in tissues)
     lag = " The filter's delay is the time from the peak of a push of 1 s to the peak of its estimate." if late else ""
     return (
-        "The limit is due to the delay of the force. A delay $d$ reduces the damping of a hand in contact by about "
+        "A delay $d$ of the force reduces the damping of a hand in contact by about "
         f"$K_T d$. A communication link of {rate} holds each force for one period, which adds half a period of delay. "
-        "The stated limit applies to a hand that is pressed into the tissue. A hand that is not pressed bounces off; "
-        f"in simulation it is stable up to at least twice this stiffness.{lag}"
+        "The stated limit applies to a hand that is pressed into the tissue. In simulation, a hand that bounces off is "
+        f"stable up to at least twice this stiffness.{lag}"
     )
 
 
 def limits_figure(context: Context, delayed: DelayLimit, tissues: list[TissueLimit]) -> Figure:
     """The map without delay, and the limit over the delay."""
     return Figure(
-        "Limits of the tissue's stiffness. Left, without delay, against the stiffness of the hand: points where the "
-        "LMI solver found a Lyapunov function, the exact limit of this function, and the exact limit under the worst "
-        "switching. Real tissue, which acts only in contact, is stable above both limits, too. Right, against the "
-        "delay of the force: a hand that stays in contact, and by simulation a hand that leaves the tissue.",
+        "Limits of the tissue's stiffness. Left, without delay, against the hand's stiffness: points with a Lyapunov "
+        "function by the LMI solver, its exact limit, and that under the worst switching. Real tissue is stable above "
+        "both, too. Right, against the delay: a hand that stays in contact, and by simulation one that leaves it.",
         "Limits of the tissue's stiffness, rising with the stiffness of the hand and falling with the delay of the "
         "force.",
         (map_panel(context, tissues), delay_panel(context, delayed, tissues)),

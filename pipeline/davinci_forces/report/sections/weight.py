@@ -41,13 +41,12 @@ def section(context: Context) -> Section | None:
 def intro() -> Prose:
     """Explain the estimate of a mass and its standard error."""
     return Prose(
-        "A mass on a link adds its gravity and its inertia to the effort of the joints, as computed from the robot's "
-        "chain. The mass is estimated by regression of the external effort of all joints that move and carry it on the "
-        "effort that one kilogram would need. Here the external effort is measured minus modelled effort, low-passed "
-        "without delay. Each joint is weighted by the inverse of its model's squared error in free motion. The effort "
-        "of a joint can have a constant offset that differs from day to day (offset of the day). It is estimated, too, "
-        "if the data can separate it from the load. The standard error combines the standard error of the fit with a "
-        "jackknife, which leaves out one of six parts of the path at a time. It is widened if logs without a mass "
+        "A mass on a link adds gravity and inertia to the effort of the joints. It is estimated by regression of the "
+        "external effort of all joints that move and carry it on the effort per kilogram, from the robot's chain. The "
+        "external effort is measured minus modelled effort, low-passed without delay. Each joint is weighted by the "
+        "inverse of its model's squared error in free motion. A constant offset of the effort, which differs from day "
+        "to day (offset of the day), is estimated, too, if the data can separate it from the load. The standard error "
+        "combines that of the fit with a jackknife over six parts of the path. It is widened if logs without a mass "
         "appear to carry more than their standard errors allow."
     )
 
