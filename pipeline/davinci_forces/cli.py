@@ -269,7 +269,7 @@ def run_all(
     verbose: Verbose = False,
     dry_run: DryRun = False,
 ) -> None:
-    """Run all stages and write the report, for the named studies or for every study in raw/ that has its logs."""
+    """Run all stages and write the report, for the named studies or for every study in raw/ whose logs exist."""
     from davinci_forces.runner import runs
 
     level = verbosity(quiet, verbose)

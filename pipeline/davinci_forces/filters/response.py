@@ -1,4 +1,4 @@
-"""The response of a filter to a push, and the smallest random walk of the external effort that still follows one.
+"""The response of a filter to a push, and the smallest intensity q_tau of the random walk that follows one.
 
 The push is a half-sine of 1 s.  A filter follows it if its estimate reaches 90 % of the peak, at most 0.1 s late.
 """
@@ -19,9 +19,9 @@ from davinci_forces.robots.robot import Joint
 DURATION = 1.0  # [s] duration of the push
 MIN_SHARE, MAX_DELAY = 0.9, 0.1  # estimated peak / peak of the push; [s]
 BEFORE, AFTER = 2.0, 1.0  # [s] before and after the push, in the trial on a joint at rest
-WALK_RANGE = (1e-8, 1e6)  # search range of q_tau, relative to the effort of the joint's velocity noise
+WALK_RANGE = (1e-8, 1e6)  # search range of q_tau, relative to the effort that causes the velocity noise
 BISECTIONS = 60  # halvings of the logarithmic search range
-CACHED_WALKS = 256  # a few for each joint, because all stages and logs of a joint need the same
+CACHED_WALKS = 256  # size of a cache: all stages and logs of a joint need the same few results
 
 
 class Response(NamedTuple):
@@ -38,7 +38,7 @@ def half_sine(t: Array, start: float) -> Array:
 
 
 def response(change: Array, t: Array, start: float, peak: float) -> Response:
-    """Measure the response in the change (N,) of the estimated effort by a push of this peak."""
+    """Measure the response: `change` (N,) is the estimate with a push of this `peak`, minus that without it."""
     near = (t >= start) & (t <= start + 2.0 * DURATION)
     shares = change[near] / peak
     k = int(np.argmax(shares))

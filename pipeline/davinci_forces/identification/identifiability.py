@@ -60,8 +60,8 @@ def inertia_at_fault(
 ) -> str:
     """Explain from its fit why an inertia is not positive; `others` are joints that move in the same logs.
 
-    If the inertia may be positive, the motion did not excite it.  If friction is negative, too, a sign is wrong.
-    Otherwise the model lacks a term.
+    If the estimate is not significantly negative, the motion hardly excites the inertia.  If friction is negative, too,
+    a sign is wrong.  Otherwise the model lacks a term.
     """
     weights = np.array([term.a for term in joint.terms])  # share of each parameter in the inertia
     value = float(weights @ estimate.theta)
@@ -76,7 +76,7 @@ def inertia_at_fault(
     backward = friction & (estimate.theta < -MIN_Z * estimate.theta_std)
     if friction.any() and backward.sum() * 2 >= friction.sum():
         text = f"{inertia}, and friction is negative, too: the effort opposes the motion"
-        return f"{text}; correct the `sign` of one of them"
+        return f"{text}; correct the `sign` of the effort or of the position"
     text = f"{inertia}, while friction is not negative, so the signs are right"
     if others:
         return f"{text}{omitted}; record it by itself: {better_motion(robot, joint)}"

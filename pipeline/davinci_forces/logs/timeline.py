@@ -1,4 +1,4 @@
-"""Sample times of evenly sampled channels from headers of files or data blocks, and groups sampled together."""
+"""Compute sample times of evenly sampled channels from headers of files or blocks, and group channels by clock."""
 
 from bisect import bisect_right
 from collections.abc import Iterable, Sequence
@@ -34,7 +34,7 @@ class Timeline:
     rows: int = 0
 
     def add(self, rows: int, start: float | None, step: float) -> None:
-        """Append samples; if `start` [s] is None or the time that is `due`, they continue the last part."""
+        """Append samples; if `start` [s] is None or equals `due`, they continue the last part."""
         due = self.due
         continues = bool(self.first) and (start is None or abs(start - due) <= ROUNDING)
         if not continues or step != self.step[-1]:
@@ -104,7 +104,7 @@ class Sampling:
     step: float  # [s] sampling time
 
     def is_like(self, sampling: "Sampling", has_x_columns: bool) -> bool:
-        """Whether both were sampled together according to the header; columns of X make its X0 and step irrelevant."""
+        """Whether both were sampled together according to the header; X0 and step do not count beside columns of X."""
         if (self.start is None) != (sampling.start is None) or (self.step != sampling.step and not has_x_columns):
             return False
         start, other_start = self.start, sampling.start

@@ -26,11 +26,11 @@ from davinci_forces.maths.models.terms import Term
 Range = tuple[float, float]
 PERIOD_SAMPLES = 300  # K, of one period without its end point; this number reproduces Table 6.1
 # Largest matrix, in entries, that is factored in one piece: for a larger one, the library starts threads.  A search
-# factors thousands of matrices a second.  There, threads cost more time than they save, 20 times as much if the
-# machine is busy.
+# factors thousands of matrices a second.  For so small ones, threads
+# make the search slower, up to 20 times on a busy machine.
 MAX_TRIANGLE_ENTRIES = 8000
 RUN_IN_INSTANTS = 4000  # instants of a run-in at which the limits are checked
-LIMIT_MARGIN = 1e-5  # share of a limit that is kept free for extremes between two instants
+LIMIT_MARGIN = 1e-5  # margin, as a share of a limit, for peaks between the checked instants
 
 
 @dataclass(frozen=True)

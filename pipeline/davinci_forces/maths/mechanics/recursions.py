@@ -27,7 +27,7 @@ def vector(numbers: Any, first: int, s: Any) -> Vector:
 
 
 def store(numbers: Any, first: int, s: Any, x: Vector) -> None:
-    """Store a vector from number `first` of a body on."""
+    """Store a vector in three numbers of a body, beginning at number `first`."""
     numbers[first, s], numbers[first + 1, s], numbers[first + 2, s] = x
 
 

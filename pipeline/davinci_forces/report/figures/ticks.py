@@ -20,7 +20,7 @@ def power_of_ten(greatest: float) -> int:
 
 
 def scale_ticks(axis: "Axis", label: str) -> str:
-    """Divide the numbers of an axis by a power of ten, and return its label with this power; set its range first."""
+    """Divide the numbers of an axis by a power of ten, and return its label with this power, for its current range."""
     from matplotlib.ticker import FuncFormatter
 
     # By default, matplotlib writes the power at the end of the axis, where the legend is.
@@ -34,7 +34,7 @@ def scale_ticks(axis: "Axis", label: str) -> str:
 
 
 def spread_ticks(axis: "Axis", capacity: float) -> None:
-    """Reduce the numbers on a linear axis, which is `capacity` characters long, until no two of them touch."""
+    """Use fewer numbers on a linear axis, which is `capacity` characters long, until no two of them touch."""
     from matplotlib.ticker import MaxNLocator
 
     locator, (low, high) = axis.get_major_locator(), axis.get_view_interval()

@@ -41,9 +41,9 @@ def blocks(context: Context, choice: Choice) -> Iterator[Block]:
         "rest), or one to three `dahl` elements (elastic before sliding; the percentages are their presliding "
         "distances over the joint's range of motion). A ridge keeps poorly determined parameters small. Each candidate "
         "is refitted without a sixth of the path, without half of it, and without each log if there are several. Its "
-        "score is the relative error on the data left out: the mean over moving joints, after position, effort and "
-        "prediction pass the same low-pass. The whole arm gets the smallest candidate that is not clearly worse than "
-        f"the best, and whose inertia is positive definite along the trajectories. {MEASURES}"
+        "score is the error on the data left out over the RMS effort, averaged over moving joints; position, effort "
+        "and prediction pass the same low-pass. The whole arm gets the smallest candidate that is not clearly worse "
+        f"than the best, and whose inertia is positive definite along the trajectories. {MEASURES}"
     )
     yield Verdict("info", f"**Chosen: {literal(choice.chosen)}.** {literal(choice.why)}.")
     caption = "The best candidate of each structure and added friction."

@@ -123,8 +123,10 @@ def parameters(context: Context, joint: str, path: tuple[str, ...], theta: dict[
         return
     yield Table(f"{title(joint)}: true and estimated parameters.", ("Parameter", "True", "Estimated"), tuple(rows))
     good = max(errors) < WITHIN
-    judgement = "all lie" if good else "not all lie"
-    yield Verdict("good" if good else "bad", f"**{title(joint)}**: {judgement} within four of their standard errors.")
+    judgement = "all estimates lie" if good else "not all estimates lie"
+    yield Verdict(
+        "good" if good else "bad", f"**{title(joint)}**: {judgement} within four standard errors of the true values."
+    )
 
 
 def effort_figure(track: Track, pushes: list[Push]) -> Figure:

@@ -55,7 +55,7 @@ def verdict(context: Context, run: HapticRun) -> Verdict:
     """Whether a hand is stable against the measured tissue, and the stiffest tissue against which it settles."""
     key, name = f"haptics.{run.hand}", f"**Simulated**, hand “{hand_name(context, run)}”"
     limit, margin = context.numbers(key, ("k_t_settles", "stiffness_margin"), 2)
-    where = f"it settles against tissue up to {limit}, {margin} times the measured one"
+    where = f"it settles against tissue up to {limit}, {margin} times the measured stiffness"
     if not run.k_t_settles > 0.0:
         where = "no limit of the tissue's stiffness was found"
     if run.out_of_reach:

@@ -64,9 +64,9 @@ METHODS: tuple[tuple[type[Record], tuple[Block, ...]], ...] = (
         Prose(
             "**Periods.** The period is the shortest lag after which all moving joints repeat their motion. It is "
             "refined until the harmonics of the excitation fit the positions best. Samples rarely fall on the phases "
-            "of the averaged period. They are interpolated to these phases: a harmonic series is fitted and evaluated "
-            "there, and its residual, averaged over the $N_p$ periods, is added. The variance between periods is the "
-            "variance of a sample of one period; the variance of the mean is $N_p$ times smaller."
+            "of the averaged period. A harmonic series is fitted to all samples and evaluated at these phases. The "
+            "residual of the samples, averaged over the $N_p$ periods, is added. The variance between periods is that "
+            "of a sample of one period; the variance of the mean is $N_p$ times smaller."
         ),
         Equation(
             "overline(x)(k) = 1/N_p sum_(m=1)^(N_p) x_m (k), "
@@ -112,8 +112,8 @@ METHODS: tuple[tuple[type[Record], tuple[Block, ...]], ...] = (
         Prose(
             "**Filtering.** The state holds position, velocity and external effort, the last as a random walk. At each "
             "sample the state is corrected with the measurement, and then predicted to the next sample. The covariance "
-            "is corrected in Joseph's form. The external effort is what the robot exerts on its environment: a mass on "
-            "a vertical slide gives a negative one."
+            "is corrected in Joseph's form. The external effort is what the robot exerts on its environment: a mass "
+            "attached to a vertical slide gives a negative one."
         ),
         Equation(
             'f(x, tau) = [dot(q), M^(-1) (tau - V - F - G - tau_"ext"), 0]^T, quad A = (partial f) / (partial x), quad '

@@ -127,7 +127,7 @@ def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Cont
     if not windows:
         return text + "The study states no contact windows, so no contact is measured."
     return text + (
-        f"**{above} of {count(windows, 'contact window')}, counted joint by joint, exceed the detection level.** "
+        f"**{above} of {count(windows, 'contact window')}, counted for each joint, exceed the detection level.** "
         "Smaller efforts cannot be distinguished from the model's error."
     )
 
@@ -188,7 +188,7 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
     return Table(
         "Trust in the estimates. Model error: root mean square of measured minus modelled effort, without noise. "
         "Ceiling: largest $R^2$ that noise allows. Detection level: 99 % of free-space samples stay below it. "
-        "Coverage: their share in the 95 % band.",
+        "Coverage: share of free-space samples in the 95 % band.",
         header,
         tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts),
         label="trust-table",

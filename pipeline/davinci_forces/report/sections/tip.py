@@ -49,10 +49,10 @@ def section(context: Context) -> Section | None:
 def blocks(context: Context, forces: list[TipForce]) -> Iterator[Block]:
     """The section's content."""
     yield Prose(
-        "The force $f$ at the tip is what the robot exerts on its environment, in base axes. It follows from the "
-        "external efforts of the joints that carry it, at times when all of these joints move. Two assumptions are "
+        "The force $f$ at the tip is what the robot exerts on its environment, in base axes. It is computed "
+        "from the external efforts of the first three joints, at times when all of them move. Two assumptions are "
         "made: nothing but the tip is touched, and the wrist is straight. The efforts are those of the smoother, which "
-        "has no delay. Their covariance $C_tau$ holds the total standard deviations of the joints."
+        "has no delay. Their covariance $C_tau$ contains the total standard deviations of the joints."
     )
     yield Equation(
         'f = bold(J)_v^(-T) tau_"ext", quad C_f = bold(J)_v^(-T) C_tau bold(J)_v^(-1)',

@@ -75,7 +75,9 @@ def verdict(context: Context, tissue: Stiffness) -> Verdict:
     """Grade the stiffness of one log by its standard error."""
     name = f"**{literal(tissue.log)}**"
     if not tissue.pushes:
-        return Verdict("bad", f"{name}: a straight line explains 90 % of the force in none of {pushes(len(tissue))}.")
+        return Verdict(
+            "bad", f"{name}: a straight line explains 90 % of the force's variance in none of {pushes(len(tissue))}."
+        )
     level = grade(tissue.stiffness_std / tissue.stiffness, STIFF, STIFFER) if tissue.stiffness > 0 else "bad"
     stiffness = context.results[f"tissue.{tissue.log}.stiffness"].number()
     law = chosen_law(context, tissue.log)

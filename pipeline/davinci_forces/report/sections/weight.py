@@ -65,8 +65,8 @@ def summary(context: Context, weights: list[Weight]) -> Table:
     )
     return Table(
         "Masses with their standard errors, at the stated position and mirrored to the other side of the link, in case "
-        "the sign of the position is wrong. Better side: the side that explains the efforts better by two standard "
-        "errors or more. The scale is the estimated mass over the stated mass.",
+        "the sign of the position is wrong. Better side: the side with the smaller residual, if they differ by "
+        "two standard errors. The scale is the estimated mass over the stated mass.",
         ("Log", "Moves with", "Stated", "Mass", "Mirrored", "Scale", "Better side"),
         rows,
         "weight-table",

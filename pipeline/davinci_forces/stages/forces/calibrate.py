@@ -1,4 +1,4 @@
-"""Calibrate the error band of the external effort on free motion of all logs that no fit has used."""
+"""Calibrate the error band of the external effort on the free motion of logs that no fit has used."""
 
 from collections.abc import Iterable, Iterator
 

@@ -1,4 +1,4 @@
-"""Choose the arm model by cross-validation over blocks of path, fit it to all logs, and map friction over velocity."""
+"""Choose the arm model by cross-validation over parts of the path, fit it to all logs, and map friction."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence

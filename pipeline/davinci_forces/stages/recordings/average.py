@@ -18,8 +18,8 @@ from davinci_forces.study import LogEntry
 MIN_MISMATCH = 5e-4  # relative difference above which a stated period may be reported as wrong
 MIN_STANDARD_ERRORS = 4.0  # difference, in standard errors, above which the data exclude a stated period
 MAX_SEGMENTS = 5  # a repetition is searched for in this many of the longest segments
-MULTIPLES = (2, 3)  # the period may be this many times the one found, if the motion nearly repeats within it
-MIN_REMARKED_LOSS = 0.1  # next to a stop, a smaller share of a period is left out without a remark
+MULTIPLES = (2, 3)  # times the shortest period, also tried: motion may nearly repeat within a period
+MIN_REMARKED_LOSS = 0.1  # beside a standstill, a loss below this share of a period gets no remark
 MEASURED = ("q", "dq", "tau")
 
 

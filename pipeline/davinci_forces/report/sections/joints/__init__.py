@@ -139,7 +139,7 @@ def comparison(context: Context, fits: list[Fit]) -> Block:
         *correlations(context, group),
         *friction_maps(context, group),
     )
-    return OnScreen(f"{title(group)}: all fits, and what supports them", f"all-fits-{group}", (table, *more))
+    return OnScreen(f"{title(group)}: all fits, and tests of them", f"all-fits-{group}", (table, *more))
 
 
 def unidentified_parameters(context: Context, joint: str) -> Iterator[Verdict]:

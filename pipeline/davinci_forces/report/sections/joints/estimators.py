@@ -162,10 +162,12 @@ def left_out(context: Context, joint: str) -> Iterator[Block]:
         left_out_row(context, joint, [p for p in predictions if (p.model, p.estimator) == name]) for name in names
     )
     header = ("Fit", "Left out", "Relative error", "Path blocks left out, raw samples")
-    caption = f"{title(joint)}: relative error of its fits on data that were left out, in the worst log."
+    caption = f"{title(joint)}: relative error of the errors of its fits on data that were left out, in the worst log."
     table = Table(caption, header, rows, f"left-out-{joint}", "llrr")
     says = Prose(f"{MEASURES}{noise_share(context, joint)}")
-    yield OnScreen(f"{title(joint)}: its fits on data that were left out", f"all-left-out-{joint}", (says, table))
+    yield OnScreen(
+        f"{title(joint)}: the errors of its fits on data that were left out", f"all-left-out-{joint}", (says, table)
+    )
 
 
 def left_out_row(context: Context, joint: str, of_fit: list[Prediction]) -> tuple[Cell, ...]:
