@@ -11,7 +11,7 @@ import numpy as np
 from davinci_forces.filters import kalman
 from davinci_forces.filters.problem import FilterInput, NoiseModel, Tracked
 
-NAME = "Kalman filter, rate of effort"
+NAME = "Kalman filter, effort and its rate"
 
 
 def track(recording: FilterInput, noise: NoiseModel) -> Tracked:

@@ -24,7 +24,7 @@ class Links(RobotRecord):
     mass: Column
 
     def published(self) -> Iterator[Published]:
-        """The geometry of every link, and the worst condition of the tip's Jacobian."""
+        """The numbers of results.json: geometry of every link, and worst condition of the tip's Jacobian."""
         yield Published("robot.worst_condition", "worst_condition")
         for i, link in enumerate(self.link):
             yield from self.publish(f"robot.link.{link}", "alpha", "a", "d", "offset", "mass", row=i)

@@ -18,7 +18,7 @@ from davinci_forces.maths.mechanics.chain import Tree
 from davinci_forces.maths.mechanics.link import Vector, plus
 
 Samples = Iterable[Any]
-INERTIA = 13  # index of the first moment and the inertia, nine numbers, in a row of `tree.rows`
+INERTIA = 13  # in a row of `tree.rows`, from here: m times centre of mass (3), inertia (6)
 
 
 def vector(numbers: Any, first: int, s: Any) -> Vector:
@@ -134,8 +134,8 @@ def mass_matrix(tree: Tree, joints: Any, scratch: Any, M: Any, samples: Samples)
 def regressor(tree: Tree, gravity: float, joints: Any, scratch: Any, Y: Any, samples: Samples) -> None:
     """Store the ten columns of link i and coordinate k in Y[k, i] (10, S), if the coordinate moves the link.  (6.3)
 
-    `scratch` has 9 numbers of (n + 1) (L + 1) bodies: first the motion of every body.  Then, for each coordinate, they
-    have the velocity of every body if this coordinate has unit velocity and all others stand still.
+    `scratch` has 9 numbers for each of (n + 1) (L + 1) rows, L links and the base at a time.  The first L + 1 have the
+    motion of every body, then, for each coordinate, its velocity if only this coordinate moves, with unit velocity.
     """
     motions(tree, gravity, joints, scratch, samples)
     bodies = len(tree.parent) + 1

@@ -45,13 +45,13 @@ def blocks(context: Context, explained: list[Explanation]) -> Iterator[Block]:
     yield Prose(
         "An innovation is a measurement minus its prediction by the filter. Innovations are white (uncorrelated over "
         "time) if model and noise are as the filter assumes. Each run is tested as a whole, without its first second, "
-        "by the autocorrelation and the cumulative periodogram (power summed over frequency) of both innovations "
-        "([@thresholds]). If a run fails, possible causes are removed, first singly and then in combinations, until "
-        "the tests pass. Samples in contact, or around reversals, are left out. The random walk, the noise level, the "
-        "noise colour (a correlation over time), the sample times and the model are each replaced by their "
-        "maximum-likelihood estimate for this log. A cause is named only if the tests pass without it, with p-values "
-        "at least a hundred times larger. Leaving out as many samples elsewhere must not suffice. The "
-        f"filter's random walk is chosen to follow pushes{assumed}; free motion does not need this random walk, so it "
+        "by the autocorrelation and the cumulative periodogram (power summed over frequency) of the innovations of "
+        "position and velocity ([@thresholds]). If a run fails, possible causes are removed, first singly and then in "
+        "combinations, until the tests pass. Removing contact, or reversals, leaves out the samples there. The random "
+        "walk, the noise level, the noise colour (a correlation over time), the sample times and the model are each "
+        "replaced by their maximum-likelihood estimate for this log. A cause is named only if the tests pass without "
+        "it, with p-values at least a hundred times larger. Leaving out as many samples elsewhere must not suffice. "
+        f"The filter's random walk is chosen to follow pushes{assumed}; free motion does not need this walk, so it "
         "correlates the innovations a little.\n\n" + summary(explained)
     )
     yield from paper_or_screen(verdicts(context, explained))

@@ -139,7 +139,7 @@ def trace(context: Context, t: Track, why: str) -> Figure:
                 (
                     *windows,
                     Line(t.t[shown], t.tau_ext_direct[shown], "measured minus model", "grey", "dotted"),
-                    Band(t.t[shown], (t.tau_ext - sigma)[shown], (t.tau_ext + sigma)[shown], "± 2 σ, in total", "sky"),
+                    Band(t.t[shown], (t.tau_ext - sigma)[shown], (t.tau_ext + sigma)[shown], "± 2 σ (total)", "sky"),
                     Line(t.t[shown], t.tau_ext[shown], "filter", "vermillion"),
                 ),
             ),

@@ -41,8 +41,8 @@ def section(context: Context) -> Section | None:
 def intro() -> Prose:
     """Explain the estimate of a mass and its standard error."""
     return Prose(
-        "A mass on a link adds gravity and inertia to the effort of the joints. It is estimated by regression of the "
-        "external effort of all joints that move and carry it on the effort per kilogram, from the robot's chain. The "
+        "A mass on a link adds gravity and inertia to the effort of the joints. It is the slope of the external "
+        "effort, of all joints that move and carry it, over the effort per kilogram, from the robot's chain. The "
         "external effort is measured minus modelled effort, low-passed without delay. Each joint is weighted by the "
         "inverse of its model's squared error in free motion. A constant offset of the effort, which differs from day "
         "to day (offset of the day), is estimated, too, if the data can separate it from the load. The standard error "

@@ -1,4 +1,4 @@
-"""Compute the level of the external effort in free space, and the level above which a contact is detected."""
+"""Compute the level that external efforts in free space stay below, and the alarm level that detects a contact."""
 
 from collections.abc import Iterable, Iterator
 

@@ -129,10 +129,10 @@ def longest_stretch(
     return span, length
 
 
-def multiples(length: float, stated: float | None, M: int) -> list[int]:
+def multiples(length: float, stated: float | None, whole_periods: int) -> list[int]:
     """Factors by which the period may be longer than `length`; the factor of the stated period is the first."""
     stated_factor = [round(stated / length)] if stated else []
-    return [k for k in dict.fromkeys([*stated_factor, *MULTIPLES]) if 2 <= k <= M // 2]
+    return [k for k in dict.fromkeys([*stated_factor, *MULTIPLES]) if 2 <= k <= whole_periods // 2]
 
 
 def omissions(
@@ -161,7 +161,7 @@ def omissions(
 
 
 def gaps_at(signal: Signal, span: slice) -> str:
-    """Report the gaps in the clock at which a stretch ends; the motion shows that their duration is wrong."""
+    """Report clock gaps at the ends of the evaluated stretch: the motion after them has another phase than expected."""
     t, segment = signal.t, signal.segment
     edges = [i for i in (span.start, span.stop) if 0 < i < len(t) and segment[i] != segment[i - 1]]
     gaps = [f"{t[i] - t[i - 1]:.4g} s after {t[i - 1]:.2f} s" for i in edges]

@@ -1,4 +1,4 @@
-"""Compare the estimated force with the force sensor of a log, if it has one: error, range, lag and coverage."""
+"""Compare the estimated force with the force sensor of a log, if it has one: error, lag, and coverage of its band."""
 
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
