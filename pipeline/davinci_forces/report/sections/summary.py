@@ -186,9 +186,9 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
         "Joint", "Verdict", "Model error", "Error/effort", "$R^2$", "Ceiling", "Detection level", *sought, "Coverage",
     )  # fmt: skip
     return Table(
-        "Trust in the estimates. Model error: root mean square of measured minus modelled effort, without noise. "
+        "Trust in the estimates. Model error: RMS of measured minus modelled effort, without noise. "
         "Ceiling: largest $R^2$ that noise allows. Detection level: 99 % of free-space samples stay below it. "
-        "Coverage: share of free-space samples in the 95 % band.",
+        "Coverage: share of these samples in the 95 % band.",
         header,
         tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts),
         label="trust-table",
