@@ -43,8 +43,8 @@ def simulate(used, theta, tau_ext, tau, noise, seed=0, x=(0.1, -0.2), finer=20):
     return np.array(rows).T
 
 
-def recorded(used, theta, y, tau, first_std=1.0) -> FilterInput:
-    return FilterInput(arm.dynamics(used, theta, len(tau)), *y, np.zeros(len(tau)), tau, T_S, first_std)
+def recorded(used, theta, y, tau, initial_std=1.0) -> FilterInput:
+    return FilterInput(arm.dynamics(used, theta, len(tau)), *y, np.zeros(len(tau)), tau, T_S, initial_std)
 
 
 def walk(N, step, seed=1):
@@ -108,7 +108,7 @@ def test_the_steady_state_is_the_riccati_solution():
 def test_one_sample_at_a_time_is_the_whole_recording_at_once():
     recording, _ = matched("hand_roll", N=500)
     made = ekf.track(recording, NOISE)
-    s = stepping.first(recording.q[0], recording.dq[0], NOISE.r_q, NOISE.r_dq, recording.first_std)
+    s = stepping.first(recording.q[0], recording.dq[0], NOISE.r_q, NOISE.r_dq, recording.initial_std)
     joint = recording.joint
     for k, y in enumerate(zip(recording.q, recording.dq, strict=True)):
         drive = recording.tau[k] - joint.known[k]

@@ -12,7 +12,7 @@ import pytest
 from davinci_forces.errors import BadStudy
 from davinci_forces.study import reading
 from davinci_forces.toml.file import MOST_PROBLEMS
-from davinci_forces.toml.lines import MOST_LISTED
+from davinci_forces.toml.lines import MAX_TABLES
 from tests.logs.array_writers import SIGNATURE
 
 pytestmark = pytest.mark.skipif(sys.platform == "win32", reason="what a process took is told by POSIX")
@@ -42,7 +42,7 @@ STUDIES = {
     "dots of a table": ("[" + ".".join("a" * 50_000) + "]", "toml:1: it has more than 16 names"),
     "dots, often": ("".join(f"a{i}.b.c.d.e.f.g.h = 1\n" for i in range(150_000)), "it has more than 800000 names, val"),
     "keys": ("".join(f"k{i} = 1\n" for i in range(330_000)), "toml:266667: it has more than 800000 names, values"),
-    "logs": ('[[log]]\nname = "a"\n' * 85_000, f"toml:20001: it has more than {MOST_LISTED} [[tables]]"),
+    "logs": ('[[log]]\nname = "a"\n' * 85_000, f"toml:20001: it has more than {MAX_TABLES} [[tables]]"),
     "lists": (("a = " + "[" * 100 + "]" * 100 + "\n") * 15_000, "toml:1: it has more than 16 names and brackets"),
     "inline tables": ("a = " + "{a = " * 80 + "1" + "}" * 80, "toml:1: it has more than 16 names and brackets"),
     "numbers": ("a = [" + "1," * 1_900_000 + "]", "toml:1: it has more than 800000 names, values and marks"),
@@ -101,12 +101,12 @@ def test_a_study_that_would_cost_minutes_is_refused_in_words(tmp_path, what):
 
 @pytest.mark.medium
 def test_a_study_of_as_many_logs_as_may_be_is_read(tmp_path):
-    text = 'robot = "davinci"\n' + "".join(LOG.format(i) for i in range(MOST_LISTED))
+    text = 'robot = "davinci"\n' + "".join(LOG.format(i) for i in range(MAX_TABLES))
     (tmp_path / "study.toml").write_text(text)
     (tmp_path / "log.tdms").touch()
-    assert len(reading.read(tmp_path).logs) == MOST_LISTED
+    assert len(reading.read(tmp_path).logs) == MAX_TABLES
     (tmp_path / "study.toml").write_text(text + LOG.format("more"))
-    with pytest.raises(BadStudy, match=rf"it has more than {MOST_LISTED} \[\[tables\]\]"):
+    with pytest.raises(BadStudy, match=rf"it has more than {MAX_TABLES} \[\[tables\]\]"):
         reading.read(tmp_path)
 
 

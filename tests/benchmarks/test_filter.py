@@ -54,8 +54,8 @@ def track_in_cpp(loop, recording):
     short = np.array(joint.coefficients), np.array(NOISE)
     columns = (*short, joint.inertia, recording.q, recording.dq, drive, out)
     c, noise, inertia, y_q, y_dq, u, into = (x.ctypes.data_as(ctypes.c_void_p) for x in columns)
-    T_s, first_std, first = map(ctypes.c_double, (1e-3, 1.0, INITIAL_VARIANCE_RATIO))
-    loop(c, inertia, y_q, y_dq, u, ctypes.c_long(N), T_s, noise, first_std, first, into)
+    T_s, initial_std, first = map(ctypes.c_double, (1e-3, 1.0, INITIAL_VARIANCE_RATIO))
+    loop(c, inertia, y_q, y_dq, u, ctypes.c_long(N), T_s, noise, initial_std, first, into)
     return out
 
 

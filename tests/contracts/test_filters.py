@@ -33,9 +33,9 @@ STEPPED = pytest.mark.parametrize("name", ["ekf", "ekf_euler"])
 STATED = pytest.mark.parametrize("name", ["ekf", "ekf_euler", "rts"])  # of the model of chance that is simulated
 
 
-def recording(joint: JointDynamics, q, dq, tau, first_std=FIRST_STD) -> FilterInput:
+def recording(joint: JointDynamics, q, dq, tau, initial_std=FIRST_STD) -> FilterInput:
     """What a filter is given of a joint whose acceleration nobody measured."""
-    return FilterInput(joint, q, dq, np.zeros(len(q)), tau, T_S, first_std)
+    return FilterInput(joint, q, dq, np.zeros(len(q)), tau, T_S, initial_std)
 
 
 def swaying(N: int) -> JointDynamics:

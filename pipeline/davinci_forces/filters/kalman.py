@@ -42,7 +42,7 @@ def states(recording: FilterInput, noise: NoiseModel, n: int = 3) -> States:
     """Return the states of `ekf`, and n - 3 further states that are 0, constant and not measured."""
     R_q, R_dq, Q_qq, Q_qd, Q_dd, Q_tau = covariances(noise, recording.T_s)
     x, others = (float(recording.q[0]), float(recording.dq[0]), 0.0), [0.0] * (n - 3)
-    P = np.diag([INITIAL_VARIANCE_RATIO * R_q, INITIAL_VARIANCE_RATIO * R_dq, recording.first_std**2, *others])
+    P = np.diag([INITIAL_VARIANCE_RATIO * R_q, INITIAL_VARIANCE_RATIO * R_dq, recording.initial_std**2, *others])
     Q = np.diag([Q_qq, Q_dd, Q_tau, *others])
     Q[0, 1] = Q[1, 0] = Q_qd
     return States((*x, *others), P, np.array([R_q, R_dq]), np.eye(n), Q)

@@ -20,14 +20,14 @@ def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
     """Run the observer, exact for a drive that is constant over a sample."""
     from scipy.signal import lfilter
 
-    joint, q, dq, _, tau, T_s, first_std = recording
+    joint, q, dq, _, tau, T_s, initial_std = recording
     M = joint.inertia
     K, decay = gain(float(np.mean(M)), T_s, noise)
     p, inertia_rate_effort = M * dq, (np.gradient(M, T_s) if len(M) > 1 else np.zeros(1)) * dq
     drive = tau - bias(joint.coefficients, q, dq, 0.0)[0] - joint.known + inertia_rate_effort
     # z[k+1] = decay z[k] + (1 - decay) (drive[k] + K p[k]); z[0] = K p[0] stands for no external effort at first.
     z, _ = lfilter([0.0, 1.0 - decay], [1.0, -decay], drive + K * p, zi=[K * p[0]])
-    return Tracked(q, dq, z - K * p, deviation(M, K, decay, T_s, noise, first_std), *np.zeros((3, len(q))))
+    return Tracked(q, dq, z - K * p, deviation(M, K, decay, T_s, noise, initial_std), *np.zeros((3, len(q))))
 
 
 def gain(M: float, T_s: float, noise: NoiseModel) -> tuple[float, float]:
@@ -37,8 +37,8 @@ def gain(M: float, T_s: float, noise: NoiseModel) -> tuple[float, float]:
     return -float(np.log1p(-share)) / T_s, 1.0 - share
 
 
-def deviation(M: Array, K: float, decay: float, T_s: float, noise: NoiseModel, first_std: float) -> Array:
+def deviation(M: Array, K: float, decay: float, T_s: float, noise: NoiseModel, initial_std: float) -> Array:
     """Compute the standard deviation (N,): lagged noise of effort and velocity, and initial uncertainty."""
     ratio = (1.0 - decay) / (1.0 + decay)
     noise_var = ratio * (M * noise.q_dq / T_s) ** 2 + (1.0 + ratio) * (K * M * noise.r_dq) ** 2
-    return np.asarray(np.sqrt(noise_var + (first_std * decay ** np.arange(len(M))) ** 2))
+    return np.asarray(np.sqrt(noise_var + (initial_std * decay ** np.arange(len(M))) ** 2))

@@ -15,7 +15,7 @@ from davinci_forces.records import JointModel
 class FilterInput(NamedTuple):
     """A recording as a filter takes it: (N,) samples in the joint's units; T_s [s].
 
-    `ddq` has no delay; `first_std` is the standard deviation of the external effort before the first sample.
+    `ddq` has no delay; `initial_std` is the standard deviation of the external effort before the first sample.
     """
 
     joint: JointDynamics
@@ -24,20 +24,20 @@ class FilterInput(NamedTuple):
     ddq: Array
     tau: Array
     T_s: float
-    first_std: float
+    initial_std: float
 
     def part(self, which: slice) -> "FilterInput":
         """Return some of the samples, in their order."""
         joint = self.joint._replace(inertia=self.joint.inertia[which], known=self.joint.known[which])
         q, dq, ddq, tau = (x[which] for x in (self.q, self.dq, self.ddq, self.tau))
-        return FilterInput(joint, q, dq, ddq, tau, self.T_s, self.first_std)
+        return FilterInput(joint, q, dq, ddq, tau, self.T_s, self.initial_std)
 
 
-def stationary_joint(inertia: Array, viscous: float, tau: Array, T_s: float, first_std: float) -> FilterInput:
+def stationary_joint(inertia: Array, viscous: float, tau: Array, T_s: float, initial_std: float) -> FilterInput:
     """Return a joint at rest whose motor exerts an effort (N,) on the environment; a filter is linear there."""
     still = np.zeros(len(tau))
     coefficients = tuple(viscous if i == VISCOUS else 0.0 for i in range(len(COEFFICIENTS)))
-    return FilterInput(JointDynamics(inertia, coefficients, still), still, still, still, tau, T_s, first_std)  # type: ignore[arg-type]
+    return FilterInput(JointDynamics(inertia, coefficients, still), still, still, still, tau, T_s, initial_std)  # type: ignore[arg-type]
 
 
 class NoiseModel(NamedTuple):
@@ -85,6 +85,6 @@ def smooth_filter_inputs(model: JointModel) -> list[FilterInput]:
 def _segments(model: JointModel, q: Array, dq: Array, tau_known: Array) -> list[FilterInput]:
     gravity, friction = (model.gravity_sine, model.gravity_cosine), (model.viscous, model.coulomb, model.presliding)
     joint = JointDynamics(model.inertia, (model.constant, *gravity, model.spring, *friction), tau_known)
-    first_std = float(np.std(model.tau)) or 1.0
-    whole = FilterInput(joint, q, dq, model.ddq, model.tau, 1.0 / model.rate, first_std)
+    initial_std = float(np.std(model.tau)) or 1.0
+    whole = FilterInput(joint, q, dq, model.ddq, model.tau, 1.0 / model.rate, initial_std)
     return [whole.part(part) for part in segments(model.segment)]

@@ -18,7 +18,7 @@ def track(recording: FilterInput, noise: NoiseModel) -> Tracked:
     """Filter a recording: correct with y_k, then predict with tau_k."""
     T_s = recording.T_s
     model = kalman.states(recording, noise, 4)._replace(doubts=False)
-    model.P[3, 3] = recording.first_std**2
+    model.P[3, 3] = recording.initial_std**2
     model.Phi[2, 3] = T_s
     model.Q[2:, 2:] = noise.q_tau**2 / T_s**2 * np.array([[T_s**2 / 3.0, T_s / 2.0], [T_s / 2.0, 1.0]])
     return Tracked(*kalman.run_filter(recording, model))

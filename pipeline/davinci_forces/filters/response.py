@@ -48,7 +48,7 @@ def response(change: Array, t: Array, start: float, peak: float) -> Response:
 def push_response_at_rest(track: Filter, inertia: float, viscous: float, T_s: float, noise: NoiseModel) -> Response:
     """Compute the response of a filter to a push on a joint at rest, where the filter is linear."""
     t = np.asarray(T_s * np.arange(round((BEFORE + DURATION + AFTER) / T_s) + 1), np.float64)
-    pushed = stationary_joint(np.full(len(t), inertia), viscous, half_sine(t, BEFORE), T_s, first_std=1.0)
+    pushed = stationary_joint(np.full(len(t), inertia), viscous, half_sine(t, BEFORE), T_s, initial_std=1.0)
     return response(track(pushed, noise).tau_ext, t, BEFORE, 1.0)
 
 
@@ -57,7 +57,7 @@ def rise(track: Filter, recording: FilterInput, noise: NoiseModel) -> float:
     T_s, joint = recording.T_s, recording.joint
     t = np.asarray(T_s * np.arange(round(2.0 * BEFORE / T_s) + 1), np.float64)
     inertia, step = np.full(len(t), float(np.mean(joint.inertia))), np.where(t >= BEFORE, 1.0, 0.0)
-    stepped = stationary_joint(inertia, joint.coefficients[VISCOUS], step, T_s, first_std=1.0)
+    stepped = stationary_joint(inertia, joint.coefficients[VISCOUS], step, T_s, initial_std=1.0)
     return float(T_s / max(np.diff(track(stepped, noise).tau_ext).max(), 1e-9))
 
 
@@ -98,7 +98,7 @@ def lag(recordings: Sequence[FilterInput], noise: NoiseModel) -> tuple[Array, Ar
     """
     smooth = [rts.track(recording, noise).tau_ext for recording in recordings]
     inputs_at_rest = (
-        stationary_joint(part.joint.inertia, part.joint.coefficients[VISCOUS], tau_ext, part.T_s, part.first_std)
+        stationary_joint(part.joint.inertia, part.joint.coefficients[VISCOUS], tau_ext, part.T_s, part.initial_std)
         for part, tau_ext in zip(recordings, smooth, strict=True)
     )
     filtered = np.concatenate([ekf.track(part, noise).tau_ext for part in inputs_at_rest])

@@ -31,7 +31,7 @@ INITIAL_VARIANCE_RATIO = 1e6
 
 def arguments(recording: FilterInput, noise: NoiseModel) -> tuple[Any, ...]:
     """Return a recording and its noise as the compiled passes take them."""
-    before = first(float(recording.q[0]), float(recording.dq[0]), noise.r_q, noise.r_dq, recording.first_std)
+    before = first(float(recording.q[0]), float(recording.dq[0]), noise.r_q, noise.r_dq, recording.initial_std)
     return (before, *columns(recording), *covariances(noise, recording.T_s))
 
 
@@ -70,10 +70,10 @@ Belief = tuple[float, float, float, float, float, float, float, float, float]
 Transition = tuple[float, float, float, float, float, float]  # F = [f11 f12 f13; f21 f22 f23; 0 0 1], row by row
 
 
-def first(q: float, dq: float, r_q: float, r_dq: float, first_std: float) -> Belief:
+def first(q: float, dq: float, r_q: float, r_dq: float, initial_std: float) -> Belief:
     """Return the initial belief, at the first position and velocity instead of the printed x = 0, P = Q_0.  (7.6)"""
     q_var, dq_var = INITIAL_VARIANCE_RATIO * r_q * r_q, INITIAL_VARIANCE_RATIO * r_dq * r_dq
-    return q, dq, 0.0, q_var, 0.0, 0.0, dq_var, 0.0, first_std * first_std
+    return q, dq, 0.0, q_var, 0.0, 0.0, dq_var, 0.0, initial_std * initial_std
 
 
 @compile_function

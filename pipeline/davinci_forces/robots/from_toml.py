@@ -121,7 +121,7 @@ def change(joint: Joint, table: TomlTable) -> Joint:
         harmonics=table.take(
             "harmonics", joint.harmonics, (int,), "a whole number from 1 to 100", lambda x: 1 <= x <= 100
         ),
-        q_tau=table.number("q_tau", joint.q_tau, low=0.0, words="a number from 0 on"),
+        q_tau=table.number("q_tau", joint.q_tau, low=0.0, expected="a number from 0 on"),
     )
     if changed.effort != joint.effort and "limits" not in table:  # the effort limit is in the old unit
         changed = replace(changed, limits=replace(changed.limits, effort=math.inf))
@@ -152,7 +152,7 @@ def _limits(table: TomlTable) -> Limits:
     changed = Limits(q, dq, ddq)
     if "effort" in limits:
         changed = replace(
-            changed, effort=limits.number("effort", above=0.0, words="the largest effort of the drive", kind="force")
+            changed, effort=limits.number("effort", above=0.0, expected="the largest effort of the drive", kind="force")
         )
     limits.close()
     return changed
@@ -225,7 +225,7 @@ def _weight(table: TomlTable, row: TableRow) -> _Weight | None:
         return None
     if row.coordinate == FIXED:
         table.problem("a link without moved_by has no mass; add it to the link that carries this one", "mass")
-    mass = table.number("mass", low=0.0, words="a number of kg")
+    mass = table.number("mass", low=0.0, expected="a number of kg")
     centre = table.numbers("centre", [0.0] * 3, 3)
     inertia = table.numbers("inertia", [0.0] * 6, 6, "[Ixx, Ixy, Ixz, Iyy, Iyz, Izz]")
     if len(inertia) == 6 and np.linalg.eigvalsh(_tensor(inertia))[0] < 0:

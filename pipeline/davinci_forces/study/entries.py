@@ -12,7 +12,7 @@ from davinci_forces.robots.from_toml import wrong_name
 from davinci_forces.study import WHOLE_LOG, AttachedMass, LogEntry
 from davinci_forces.study.channels import Channels
 from davinci_forces.toml import TomlTable, excerpt
-from davinci_forces.toml.lines import MOST_LISTED
+from davinci_forces.toml.lines import MAX_TABLES
 
 ZERO_ALLOWED = ("skip", "harmonics", "q_tau")
 ROLES = ("identification", "validation", "contact", "weight", "tissue", "friction")
@@ -38,7 +38,7 @@ def check_positive(table: TomlTable, key: str, value: float) -> float:
 
 def entries_of(study: TomlTable, robot: Robot | None) -> tuple[LogEntry, ...]:
     """Read every [[log]]; `robot` is None if the study's robot is unknown."""
-    tables = study.tables("log", "it has no [[log]] table, so there is nothing to analyse", most=MOST_LISTED)
+    tables = study.tables("log", "it has no [[log]] table, so there is nothing to analyse", most=MAX_TABLES)
     logs = tuple(_entry(study, i, table, robot) for i, table in enumerate(tables))
     study.unique("log", "name", enumerate(log.name for log in logs), "two logs are named")
     by_name = {log.name: log for log in logs}
@@ -189,10 +189,10 @@ def _weight(table: TomlTable, robot: Robot | None) -> AttachedMass | None:
             table.problem("a weight log needs weight = { moves_with = ..., position = ... }, with mass = ... if known")
         return None
     weight = table.table("weight")
-    mass = weight.number("mass", above=0.0, words="a number of kg") if "mass" in weight else None
+    mass = weight.number("mass", above=0.0, expected="a number of kg") if "mass" in weight else None
     links = robot.chain.links if robot and robot.chain else ()
     moves_with = weight.text("moves_with", choices=[*(joint.name for joint in robot.joints), *links] if robot else ())
-    position = weight.numbers("position", count=3, words="[x, y, z] in metres")
+    position = weight.numbers("position", count=3, expected="[x, y, z] in metres")
     if position and max(map(abs, position)) > MAX_POSITION:
         must = f"position must lie within {MAX_POSITION:g} m of the remote centre"
         weight.problem(f"{must}, not {list(position)}; it is in metres", "position")

@@ -126,7 +126,7 @@ def _overridden(robot: Robot, overrides: TomlTable) -> Robot:
 def _with_tool(robot: Robot | None, table: TomlTable) -> Robot | None:
     """The robot with the tool length that the study gives."""
     tool = table.table("tool")
-    length = check_positive(tool, "length", tool.number("length", words="a number of metres", kind="tool"))
+    length = check_positive(tool, "length", tool.number("length", expected="a number of metres", kind="tool"))
     tool.close()
     try:
         return robot.with_tool(length) if robot and math.isfinite(length) else robot

@@ -7,7 +7,7 @@ from pathlib import Path
 from davinci_forces import toml
 from davinci_forces.errors import BadStudy
 from davinci_forces.toml import TomlTable
-from davinci_forces.toml.lines import MOST_LISTED
+from davinci_forces.toml.lines import MAX_TABLES
 
 FILE = "review.toml"
 VERDICTS = ("accept", "doubt", "reject")
@@ -36,7 +36,7 @@ def read(file: Path) -> tuple[Rating, ...]:
         With every problem of the file, each with its line.
     """
     table = toml.read(file, BadStudy)
-    ratings = tuple(_rating(entry) for entry in table.tables("rating", most=MOST_LISTED))
+    ratings = tuple(_rating(entry) for entry in table.tables("rating", most=MAX_TABLES))
     table.close()
     table.file.refuse(BadStudy)
     return ratings

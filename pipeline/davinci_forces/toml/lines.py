@@ -16,8 +16,8 @@ PART = re.compile(rf"""({QUOTED})|[^."']+""", re.DOTALL)
 
 # Limits of a file.  The largest study, ten thousand logs with all their channels, has 650 000 words and marks, two
 # brackets around a key of two names, and no word of 1000 characters outside quotes.
-MOST_WORDS = 800_000
-MOST_LISTED = 10_000
+MAX_WORDS = 800_000
+MAX_TABLES = 10_000
 MAX_DEPTH = 16
 MAX_WORD_LENGTH = 10_000
 NOTHING = (0, "")  # after the last word or mark
@@ -46,10 +46,10 @@ def excess(text: str) -> str:
             words, names = words + COST_OF_NAME * dots, names + 1 + dots
         length = len(word) if word[0] not in "\"'" else 0
         before, is_value = word, word == "="
-        if words > MOST_WORDS or listed > MOST_LISTED or deep + names > MAX_DEPTH or length > MAX_WORD_LENGTH:
+        if words > MAX_WORDS or listed > MAX_TABLES or deep + names > MAX_DEPTH or length > MAX_WORD_LENGTH:
             break
     counts = (
-        (words, MOST_WORDS, "names, values and marks"), (listed, MOST_LISTED, "[[tables]]"),
+        (words, MAX_WORDS, "names, values and marks"), (listed, MAX_TABLES, "[[tables]]"),
         (deep + names, MAX_DEPTH, "names and brackets inside each other"),
         (length, MAX_WORD_LENGTH, "characters in one name or number"),
     )  # fmt: skip

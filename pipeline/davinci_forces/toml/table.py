@@ -63,11 +63,11 @@ class TomlTable:
         default: float | None = None,
         low: float = -math.inf,
         above: float = -math.inf,
-        words: str = "a number",
+        expected: str = "a number",
         kind: str = "",
     ) -> float:
         """A finite number, at least `low` and greater than `above`, and of a likely size for its key or `kind`."""
-        value = self.take(key, default, (int, float), words)
+        value = self.take(key, default, (int, float), expected)
         if value is None:
             return math.nan
         if not math.isfinite(value) or value < low or value <= above:
@@ -93,8 +93,8 @@ class TomlTable:
 
     def text(self, key: str, default: str | None = None, choices: Collection[str] = ()) -> str:
         """Text; if choices are given, one of them."""
-        words = f"one of {', '.join(choices)}" if choices else "text"
-        value = self.take(key, default, (str,), words, lambda value: not choices or value in choices)
+        expected = f"one of {', '.join(choices)}" if choices else "text"
+        value = self.take(key, default, (str,), expected, lambda value: not choices or value in choices)
         return "" if value is None else str(value)
 
     def flag(self, key: str, default: bool | None = None) -> bool:
@@ -102,27 +102,27 @@ class TomlTable:
         return bool(self.take(key, default, (bool,), "true or false"))
 
     def numbers(
-        self, key: str, default: list[float] | None = None, count: int | None = None, words: str = ""
+        self, key: str, default: list[float] | None = None, count: int | None = None, expected: str = ""
     ) -> tuple[float, ...]:
         """A list of finite numbers, of length `count` if that is given."""
-        words = words or f"a list of {'' if count is None else f'{count} '}finite numbers"
-        value = self.take(key, default, (list,), words, lambda value: are_numbers(value, count)) or ()
+        expected = expected or f"a list of {'' if count is None else f'{count} '}finite numbers"
+        value = self.take(key, default, (list,), expected, lambda value: are_numbers(value, count)) or ()
         return tuple(map(float, value)) if self.likely(key, value) else ()
 
     def pairs(
-        self, key: str, words: str, default: list[Any] | None = None, least: int = 0
+        self, key: str, expected: str, default: list[Any] | None = None, least: int = 0
     ) -> tuple[tuple[float, float], ...]:
         """A list of at least `least` pairs of finite numbers."""
-        value = self.take(key, default, (list,), words, lambda value: all(are_numbers(pair, 2) for pair in value))
+        value = self.take(key, default, (list,), expected, lambda value: all(are_numbers(pair, 2) for pair in value))
         if value is not None and len(value) < least:
-            self.problem(f"{key} must be {words}, not {excerpt(value)}", key)
+            self.problem(f"{key} must be {expected}, not {excerpt(value)}", key)
         pairs = tuple((float(a), float(b)) for a, b in value or ())
         return pairs if self.likely(key, chain.from_iterable(pairs)) else ()
 
     def texts(self, key: str, default: list[str] | None, choices: Collection[str]) -> tuple[str, ...]:
         """A list of one or more of the choices."""
-        words = f"a list of {', '.join(map(repr, choices))}"
-        value = self.take(key, default, (list,), words, lambda value: value and all(x in [*choices] for x in value))
+        expected = f"a list of {', '.join(map(repr, choices))}"
+        value = self.take(key, default, (list,), expected, lambda value: value and all(x in [*choices] for x in value))
         return tuple(value or ())
 
     def table(self, key: str) -> "TomlTable":
@@ -139,8 +139,8 @@ class TomlTable:
 
         More than `most` tables are also a problem, and the tables beyond `most` are left out.
         """
-        words = f"a list of tables: write [[{key}]]"
-        entries = self.take(key, [], (list,), words, lambda value: all(isinstance(entry, dict) for entry in value))
+        expected = f"a list of tables: write [[{key}]]"
+        entries = self.take(key, [], (list,), expected, lambda value: all(isinstance(entry, dict) for entry in value))
         if none and self.values.get(key, []) == []:
             self.problem(none, key)
         if len(entries) > most:
@@ -161,19 +161,19 @@ class TomlTable:
         key: str,
         default: Any,
         kinds: tuple[type, ...],
-        words: str,
+        expected: str,
         good: Callable[[Any], object] = lambda value: True,
     ) -> Any:
-        """The value of a key if it has one of these kinds and is `good`, as `words` describe; otherwise the default."""
+        """The value of a key if it has one of these kinds and is `good`, as `expected` says; otherwise the default."""
         if key not in self:
             if default is None:
-                self.problem(f"{key} is missing; it is {words}")
+                self.problem(f"{key} is missing; it is {expected}")
             return default
         value = self.values[key]
         fits = type(value) is not int or float not in kinds or is_number(value)
         if type(value) in kinds and fits and good(value):
             return value
-        self.problem(f"{key} must be {words}, not {excerpt(value)}", key)
+        self.problem(f"{key} must be {expected}, not {excerpt(value)}", key)
         return default
 
     def close(self, outdated: Collection[str] = ()) -> None:

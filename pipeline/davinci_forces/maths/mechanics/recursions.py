@@ -18,7 +18,7 @@ from davinci_forces.maths.mechanics.chain import Tree
 from davinci_forces.maths.mechanics.link import Vector, plus
 
 Samples = Iterable[Any]
-INERTIA = 13  # in a row of `tree.rows`, from here: m times centre of mass (3), inertia (6)
+INERTIA = 13  # where a row of `tree.rows` (the constants of a link) has: m times centre of mass (3), inertia (6)
 
 
 def vector(numbers: Any, first: int, s: Any) -> Vector:
@@ -108,16 +108,16 @@ def mass_matrix(tree: Tree, joints: Any, scratch: Any, M: Any, samples: Samples)
             constants, joint, parent = tree.rows[i], joints[k], scratch[tree.parent[i]]
             for s in samples:
                 inertia = vector(body, 0, s), vector(body, 3, s), vector(body, 6, s)
-                h, I_x, I_yz = link.moved_inertia(slides, (joint[0, s], joint[1, s]), joint[2, s], m, inertia)
+                h, I_column_x, I_rest = link.moved_inertia(slides, (joint[0, s], joint[1, s]), joint[2, s], m, inertia)
                 store(body, 0, s, h)
-                store(body, 3, s, I_x)
-                store(body, 6, s, I_yz)
+                store(body, 3, s, I_column_x)
+                store(body, 6, s, I_rest)
             for s in samples:
                 inertia = vector(body, 0, s), vector(body, 3, s), vector(body, 6, s)
-                h, I_x, I_yz = link.carried_inertia(constants, m, inertia)
+                h, I_column_x, I_rest = link.carried_inertia(constants, m, inertia)
                 store(parent, 0, s, plus(vector(parent, 0, s), h))
-                store(parent, 3, s, plus(vector(parent, 3, s), I_x))
-                store(parent, 6, s, plus(vector(parent, 6, s), I_yz))
+                store(parent, 3, s, plus(vector(parent, 3, s), I_column_x))
+                store(parent, 6, s, plus(vector(parent, 6, s), I_rest))
         j = i
         while tree.parent[j] > 0:
             constants, slides, joint = tree.rows[j], tree.slides[j], joints[tree.coordinate[j]]

@@ -192,57 +192,57 @@ class _Periods(NamedTuple):
         return is_unlikely(ratio**2, _lag_one(noise), counts.shape[1], self.degrees[m])
 
 
-def stretch(t: Array, signals: Sequence[Array], length: float, core: slice, harmonics: int) -> tuple[slice, float]:
-    """Extend the repeating samples `core` to the longest run that repeats with one period; refine that period [s].
+def stretch(t: Array, signals: Sequence[Array], length: float, agreed: slice, harmonics: int) -> tuple[slice, float]:
+    """Extend the repeating samples `agreed` to the longest run that repeats with one period; refine that period [s].
 
-    The harmonics of `core` predict up to as many samples again on either side.  Samples that agree are added to `core`,
-    and the period is fitted again.  `t` (N,) [s], with or without gaps; `signals` (N,) each; `length` [s] precise
-    enough for the few periods of the initial `core`.
+    The harmonics of `agreed` predict up to as many samples again on either side.  Samples that agree are added, and the
+    period is fitted again.  `t` (N,) [s], with or without gaps; `signals` (N,) each; `length` [s] precise
+    enough for its first few periods.
     """
-    length = refine(t[core], [x[core] for x in signals], length, harmonics)
-    while (wide := _certain(t, signals, length, core, harmonics)) != core:
-        strays = _strays(t, signals, length, core, wide, harmonics)
-        ahead = _ahead(strays[core.stop - wide.start :])
-        behind = _ahead(strays[: core.start - wide.start][::-1])
-        longer = slice(core.start - behind, core.stop + ahead)
-        if longer == core:
+    length = refine(t[agreed], [x[agreed] for x in signals], length, harmonics)
+    while (wide := _certain(t, signals, length, agreed, harmonics)) != agreed:
+        strays = _strays(t, signals, length, agreed, wide, harmonics)
+        ahead = _ahead(strays[agreed.stop - wide.start :])
+        behind = _ahead(strays[: agreed.start - wide.start][::-1])
+        longer = slice(agreed.start - behind, agreed.stop + ahead)
+        if longer == agreed:
             break
-        core = longer
-        length = refine(t[core], [x[core] for x in signals], length, harmonics)
-    return core, length
+        agreed = longer
+        length = refine(t[agreed], [x[agreed] for x in signals], length, harmonics)
+    return agreed, length
 
 
-def _certain(t: Array, signals: Sequence[Array], length: float, core: slice, harmonics: int) -> slice:
-    """`core` and as many samples on either side, up to the first gap after which the phase is not known."""
-    reach = core.stop - core.start
-    wide = slice(max(core.start - reach, 0), min(core.stop + reach, len(t)))
+def _certain(t: Array, signals: Sequence[Array], length: float, agreed: slice, harmonics: int) -> slice:
+    """`agreed` and as many samples on either side, up to the first gap after which the phase is not known."""
+    reach = agreed.stop - agreed.start
+    wide = slice(max(agreed.start - reach, 0), min(agreed.stop + reach, len(t)))
     steps = np.diff(t[wide])
     # The error of a period is less than the period, so a shorter gap cannot matter.
     if not np.any(steps > UNSURE * length):
         return wide
-    std = standard_error(t[core], [x[core] for x in signals], length, harmonics)
+    std = standard_error(t[agreed], [x[agreed] for x in signals], length, harmonics)
     far = wide.start + 1 + np.flatnonzero(steps * std > UNSURE * length**2)
-    before, after = far[far <= core.start], far[far >= core.stop]
+    before, after = far[far <= agreed.start], far[far >= agreed.stop]
     return slice(int(before[-1]) if len(before) else wide.start, int(after[0]) if len(after) else wide.stop)
 
 
-def _strays(t: Array, signals: Sequence[Array], length: float, core: slice, wide: slice, harmonics: int) -> Booleans:
-    """Whether any signal differs from its mean period in `core` by more than its scatter, at each sample of `wide`."""
-    omega, since = 2 * np.pi / length, t[wide] - t[core.start]
-    inside = slice(core.start - wide.start, core.stop - wide.start)
-    N, rate = core.stop - core.start, (core.stop - core.start - 1) / (t[core.stop - 1] - t[core.start])
+def _strays(t: Array, signals: Sequence[Array], length: float, agreed: slice, wide: slice, harmonics: int) -> Booleans:
+    """Whether any signal differs from its mean period in `agreed` by more than its scatter, per sample of `wide`."""
+    omega, since = 2 * np.pi / length, t[wide] - t[agreed.start]
+    inside = slice(agreed.start - wide.start, agreed.stop - wide.start)
+    N, rate = agreed.stop - agreed.start, (agreed.stop - agreed.start - 1) / (t[agreed.stop - 1] - t[agreed.start])
     K = phases(length, rate)
     bins = nearest(since, length, K)
-    core_fit, wide_fit = (Harmonics(times, omega, harmonics) for times in (since[inside], since))
+    agreed_fit, wide_fit = (Harmonics(times, omega, harmonics) for times in (since[inside], since))
     counts = np.maximum(np.bincount(bins[inside], minlength=K), 1)
     strays = np.zeros(len(since), dtype=bool)
     for x in signals:
-        residual = wide_fit.evaluate(core_fit.project(x[core]))
+        residual = wide_fit.evaluate(agreed_fit.project(x[agreed]))
         np.subtract(x[wide], residual, out=residual)
         residual -= (np.bincount(bins[inside], residual[inside], K) / counts)[bins]
         # The mean of M periods contains their noise, so samples of other periods differ more from this mean.
         expected = np.sqrt(residual[inside] @ residual[inside] / max(N - K, 1) * (1 + K / N))
-        strays |= np.abs(residual) > max(STRAY_FACTOR * expected, MIN_STRAY * x[core].std())
+        strays |= np.abs(residual) > max(STRAY_FACTOR * expected, MIN_STRAY * x[agreed].std())
     return strays
 
 

@@ -27,7 +27,7 @@ class Repetition(NamedTuple):
     lag: float  # after which the section repeats
     start: int
     stop: int
-    core: int  # first sample of the two periods
+    two_periods: int  # their first sample
 
 
 class Lag(NamedTuple):
@@ -49,7 +49,9 @@ def repetition(signals: Sequence[Array]) -> Repetition | None:
     for start, stop in _parts(N):
         match = _search(x[:, start:stop]) if len(x) else None
         if match is not None:
-            return _shorten(x, Repetition(match.lag, match.start + start, match.stop + start, match.core + start))
+            return _shorten(
+                x, Repetition(match.lag, match.start + start, match.stop + start, match.two_periods + start)
+            )
     return None
 
 
@@ -66,7 +68,10 @@ def _parts(N: int) -> Iterator[tuple[int, int]]:
 def _shorten(x: Array, match: Repetition) -> Repetition:
     """Replace the lag of a section by the shortest lag after which its two best periods repeat."""
     lag, size = match.lag, round(PERIODS_SEARCHED * match.lag)
-    middle, best = round(match.core + match.lag), x[:, match.core : match.core + 2 * round(match.lag) + 1]
+    middle, best = (
+        round(match.two_periods + match.lag),
+        x[:, match.two_periods : match.two_periods + 2 * round(match.lag) + 1],
+    )
     while True:
         start = max(min(middle - size // 2, match.stop - size), match.start)
         shorter = _search(x[:, start : min(start + size, match.stop)])

@@ -67,7 +67,7 @@ def summary(context: Context, weights: list[Weight]) -> Table:
         "Masses with their standard errors, at the stated position and mirrored to the other side of the link, in case "
         "the sign of the position is wrong. Better side: the side with the smaller residual, if they differ by "
         "two standard errors. The scale is the estimated mass over the stated mass.",
-        ("Log", "Moves with", "Stated", "Mass", "Mirrored", "Scale", "Better side"),
+        ("Log", "Same motion as", "Stated", "Mass", "Mirrored", "Scale", "Better side"),
         rows,
         "weight-table",
         "llrrrrl",

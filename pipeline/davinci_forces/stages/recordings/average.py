@@ -99,7 +99,7 @@ def common_repetition(signals: Sequence[Signal]) -> Repetition | None:
     parts = sorted(segments(signals[0].segment), key=lambda part: part.start - part.stop)
     for part in parts[:MAX_SEGMENTS]:
         if repeat := repetition([signal.q[part] for signal in signals]):
-            return repeat._replace(core=part.start + repeat.core)
+            return repeat._replace(two_periods=part.start + repeat.two_periods)
     return None
 
 
@@ -114,7 +114,7 @@ def longest_stretch(
         If the stretch has fewer than two periods.
     """
     t, rate, positions = signals[0].t, signals[0].rate, [signal.q for signal in signals]
-    two_periods = slice(repeat.core, min(repeat.core + round(2 * repeat.lag), len(t)))
+    two_periods = slice(repeat.two_periods, min(repeat.two_periods + round(2 * repeat.lag), len(t)))
     span, length = stretch(t, positions, repeat.lag / rate, two_periods, max_harmonics)
     t, positions = t[span], [x[span] for x in positions]
     factors = multiples(length, entry.period, whole_periods(t, length, rate))
