@@ -3,23 +3,24 @@
 A library is a model with every friction that may be added.  A candidate is a choice of its columns, and a ridge.
 """
 
-from collections.abc import Iterator, Sequence
+import re
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.identification.observations import Observed, equations
-from davinci_forces.maths.arrays import Array, Booleans, Integers
+from davinci_forces.identification.observations import CellEquations, Observed, equations
+from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
-from davinci_forces.maths.models.model import Model
+from davinci_forces.maths.models.model import Model, Parameter
 from davinci_forces.maths.models.terms import Term, presliding_friction
 from davinci_forces.maths.selection import CrossValidation, Equations, Ridge, combine_efforts, cross_validate, solve
-from davinci_forces.robots.models import ARM, AddedFriction, Reach, coupled_arm, frictions, independent, round_scale
+from davinci_forces.robots.models import ARM, Reach, coupled_arm, frictions, independent, round_scale
 from davinci_forces.robots.robot import Robot
 
 RIDGES = {"independent": (0.0, 1e-3), "coupled": (1e-4, 1e-3, 1e-2, 3e-2)}
-WEIGHTS_RIDGE = Ridge(1e-3, np.ones(1), np.empty((0, 0)))
+WEIGHTS_RIDGE = 1e-3  # of the fits whose residual variances weigh the joints
 POSES = 50  # number of poses of each log at which the inertia has to be positive definite
 
 
@@ -28,114 +29,101 @@ class Library(NamedTuple):
 
     model: CoupledArm | IndependentJoint
     logs: tuple[Observed, ...]
-    added: tuple[tuple[Term, ...], ...]  # friction terms of each effort
-    samples: Integers  # (m,) number of samples in the equations of each effort
-    by_block: Equations
-    by_period: Equations
+    cells: CellEquations
     inertias: Array  # (S, m, m, p) with M = inertias theta, along the trajectories
-
-    def columns(self, friction: AddedFriction, reaches: dict[str, Reach]) -> list[int]:
-        """Return the indices of a candidate's parameters: those of the model, and those of one friction."""
-        suffixes = [f" of {effort}" if len(self.model.efforts) > 1 else "" for effort in self.model.efforts]
-        efforts = zip(self.model.efforts, suffixes, self.added, strict=True)
-        added = {f"{t.name}{suffix}": (effort, t) for effort, suffix, terms in efforts for t in terms}
-        indices = []
-        for i, parameter in enumerate(self.model.parameters):
-            effort, term = added.get(parameter.name, ("", None))
-            wanted = (
-                {(t.width, t.decay_velocity, t.displacement) for t in friction.terms(reaches[effort])}
-                if term
-                else set()
-            )
-            if term is None or (term.width, term.decay_velocity, term.displacement) in wanted:
-                indices.append(i)
-        return indices
 
     @property
     def combination(self) -> Array:
         """The combinations of inertial parameters that the model's first parameters are; empty for a single joint."""
         return self.model.base.combination if isinstance(self.model, CoupledArm) else np.empty((0, 0))
 
+    def columns(self, model: Model) -> list[int]:
+        """Return the indices of the parameters of a model with some of the terms."""
+        numbers = {_identity(parameter): i for i, parameter in enumerate(self.model.parameters)}
+        return [numbers[_identity(parameter)] for parameter in model.parameters]
 
-class Candidate(NamedTuple):
-    """A structure with a friction and a ridge: one model, or one per joint."""
 
-    structure: str
-    shared: bool  # whether the joints share parameters
-    friction: AddedFriction
-    strength: float  # of the ridge
-    libraries: tuple[Library, ...]
-    weights: tuple[Array, ...]  # of the efforts of each library
+def _identity(parameter: Parameter) -> tuple[str, float]:
+    """The name and the scale of a parameter, without the number of a presliding friction, which differs by model."""
+    return re.sub(r"friction \d+", "friction", parameter.name), parameter.scale
+
+
+class Part(NamedTuple):
+    """One model of a candidate: some columns of a library, with a ridge."""
+
+    model: Model
+    library: Library
+    columns: list[int]
+    ridge: Ridge
+
+    def with_ridge(self, strength: float) -> "Part":
+        """Return the part with a ridge of another strength."""
+        return self._replace(ridge=self.ridge._replace(strength=strength))
 
     @property
-    def variant(self) -> str:
-        """The name of the model, as in fits."""
-        return f"{self.structure}+{self.friction.variant}".removesuffix("+")
+    def by_block(self) -> Equations:
+        """The equations in cells of the path."""
+        return self.library.cells.by_block.columns(self.columns)
+
+    @property
+    def by_period(self) -> Equations:
+        """The equations in cells of the periods."""
+        return self.library.cells.by_period.columns(self.columns)
+
+    @property
+    def scored(self) -> Equations:
+        """The equations of the scores, in cells of the path."""
+        return self.library.cells.scored.columns(self.columns)
+
+
+class Candidate(NamedTuple):
+    """A structure with its terms and ridges: one model, or one per joint."""
+
+    name: str  # unique
+    variant: str  # name of the model, as in fits
+    added: str  # the terms that are added to the structure
+    parts: tuple[Part, ...]
+
+    @property
+    def structure(self) -> str:
+        """Whether joints are modelled as `independent` or as `coupled`."""
+        return "coupled" if isinstance(self.parts[0].model, CoupledArm) else "independent"
 
     @property
     def estimator(self) -> str:
         """The name of the candidate's estimator."""
-        return "ridge" if self.strength else "lse"
+        return "ridge" if any(part.ridge.strength for part in self.parts) else "lse"
 
     @property
-    def name(self) -> str:
-        """Unique name."""
-        friction = f"+{self.friction}" if self.friction.variant else ""
-        separate = ", joint by joint" if self.structure == "coupled" and not self.shared else ""
-        ridge = f", ridge {self.strength:g}" if self.strength else ""
-        return f"{self.structure}{friction}{separate}{ridge}"
+    def size(self) -> int:
+        """The number of parameters."""
+        return sum(len(part.columns) for part in self.parts)
 
-    def ridges(self) -> Iterator[Ridge]:
-        """Return the ridge of each library."""
-        for library, weights in zip(self.libraries, self.weights, strict=True):
-            yield Ridge(self.strength, weights, library.combination)
-
-    def size(self, reaches: dict[str, Reach]) -> int:
-        """Return the number of parameters."""
-        return sum(len(library.columns(self.friction, reaches)) for library in self.libraries)
-
-    def cross_validate(
-        self, schemes: Sequence[Booleans], reaches: dict[str, Reach], by_period: bool = False
-    ) -> CrossValidation | None:
+    def cross_validate(self, schemes: Sequence[Booleans], by_period: bool = False) -> CrossValidation | None:
         """Compute the errors on data left out; None if the remaining data do not separate the parameters."""
-        parts = []
-        for library, ridge in zip(self.libraries, self.ridges(), strict=True):
-            cells = library.by_period if by_period else library.by_block
+        results = []
+        for part in self.parts:
+            cells, scored = (part.by_period, None) if by_period else (part.by_block, part.scored)
             try:
-                parts.append(cross_validate(cells.columns(library.columns(self.friction, reaches)), ridge, schemes))
+                results.append(cross_validate(cells, part.ridge, schemes, scored))
             except np.linalg.LinAlgError:
                 return None
-        return combine_efforts(parts)
+        return combine_efforts(results)
 
-    def parameters(self, reaches: dict[str, Reach], out: Booleans | None = None) -> list[Array]:
-        """Fit theta of each library to all cells, or without some of them."""
+    def parameters(self, out: Booleans | None = None) -> list[Array]:
+        """Fit theta of each part to all cells, or without some of them."""
         thetas = []
-        for library, ridge in zip(self.libraries, self.ridges(), strict=True):
-            cells = library.by_block.columns(library.columns(self.friction, reaches))
-            thetas.append(solve(cells.sum_cells(np.ones(len(cells.gram), np.bool_) if out is None else ~out), ridge))
+        for part in self.parts:
+            cells = part.by_block
+            used = np.ones(len(cells.gram), np.bool_) if out is None else ~out
+            thetas.append(solve(cells.sum_cells(used), part.ridge))
         return thetas
 
-    def models(self, robot: Robot, reaches: dict[str, Reach]) -> list[Model]:
-        """Return the model of each library, with this friction only."""
-        models: list[Model] = []
-        for library in self.libraries:
-            efforts, group = library.model.efforts, library.model.group
-            added = [self.friction.terms(reaches[effort]) for effort in efforts]
-            if self.structure == "independent":
-                models.append(independent(robot.joint(group), added[0], self.friction.variant))
-            else:
-                rows = [library.model.joints.index(effort) for effort in efforts]
-                models.append(coupled_arm(robot, rows, added, self.friction.variant, group))
-        return models
-
-    def is_physical(self, reaches: dict[str, Reach]) -> bool:
+    @property
+    def is_physical(self) -> bool:
         """Whether the inertia is positive definite along the trajectories."""
-        for library, values in zip(self.libraries, self.parameters(reaches), strict=True):
-            theta = np.zeros(len(library.model.parameters))
-            theta[library.columns(self.friction, reaches)] = values
-            if np.linalg.eigvalsh(library.inertias @ theta).min() <= 0:
-                return False
-        return True
+        pairs = zip(self.parts, self.parameters(), strict=True)
+        return all(np.linalg.eigvalsh(p.library.inertias[..., p.columns] @ theta).min() > 0 for p, theta in pairs)
 
 
 def candidates(
@@ -150,19 +138,21 @@ def candidates(
     `separate` are the logs of each joint alone, `arm` the logs of all joints together.
     """
     added = {name: every_term(reach) for name, reach in reaches.items()}
-    independents = tuple(
-        library(independent(robot.joint(name), added[name]), logs, (added[name],), count)
-        for name, logs in separate.items()
-    )
-    models = variants("independent", False, independents, [np.ones(1)] * len(independents))
+    independents = [
+        library(independent(robot.joint(name), added[name]), logs, count) for name, logs in separate.items()
+    ]
+    models = variants(robot, "independent", reaches, independents)
     if not arm:
         return models
     rows = [i for i, joint in enumerate(robot.joints) if joint.name in separate]
-    libraries = [coupled_library(robot, [row], arm, added, count) for row in rows]
-    models += variants("coupled", False, tuple(libraries), [np.ones(1)] * len(libraries))
+    libraries = [library(coupled_joints(robot, [row], added), arm, count) for row in rows]
+    models += variants(robot, "coupled", reaches, libraries)
     if share_parameters(robot, rows):
-        weights = np.array([1.0 / residual_variance(part, reaches) for part in libraries])
-        models += variants("coupled", True, (coupled_library(robot, rows, arm, added, count),), [weights])
+        plain = next(c for c in models if c.structure == "coupled" and not c.added)
+        weights = 1.0 / np.array([residual_variance(part) for part in plain.parts])
+        models += variants(
+            robot, "coupled", reaches, [library(coupled_joints(robot, rows, added), arm, count)], weights
+        )
     return models
 
 
@@ -171,30 +161,48 @@ def share_parameters(robot: Robot, rows: Sequence[int]) -> bool:
     return len(rows) > 1 and not any(robot.joints[row].effort for row in rows)
 
 
-def coupled_library(
-    robot: Robot, rows: Sequence[int], arm: tuple[Observed, ...], added: dict[str, tuple[Term, ...]], count: int
-) -> Library:
-    """Return the library of joints (indices) of a coupled arm that share parameters."""
+def coupled_joints(
+    robot: Robot, rows: Sequence[int], added: Mapping[str, Sequence[Term]], name: str = "coupled"
+) -> CoupledArm:
+    """Return the model of joints (indices) of a coupled arm that share parameters, each with its added terms."""
     names = [robot.joints[row].name for row in rows]
-    terms = tuple(added[name] for name in names)
-    return library(coupled_arm(robot, rows, terms, group=ARM if len(rows) > 1 else names[0]), arm, terms, count)
+    group = ARM if len(rows) > 1 else names[0]
+    return coupled_arm(robot, rows, [added[joint] for joint in names], name, group)
 
 
-def variants(structure: str, shared: bool, libraries: tuple[Library, ...], weights: Sequence[Array]) -> list[Candidate]:
-    """Return the candidates of a structure, with every friction and ridge."""
-    return [
-        Candidate(structure, shared, friction, strength, libraries, tuple(weights))
-        for friction in frictions()
-        for strength in RIDGES[structure]
-    ]
+def variants(
+    robot: Robot, structure: str, reaches: dict[str, Reach], libraries: Sequence[Library], weights: Array | None = None
+) -> list[Candidate]:
+    """Return the candidates of a structure, with every friction and ridge; with `weights` (m,) joints share links."""
+    models = []
+    separate = ", joint by joint" if structure == "coupled" and weights is None else ""
+    for friction in frictions():
+        variant = f"{structure}+{friction.variant}".removesuffix("+")
+        added = str(friction) if friction.variant else ""
+        parts = []
+        for part in libraries:
+            terms = {effort: friction.terms(reaches[effort]) for effort in part.model.efforts}
+            if isinstance(part.model, CoupledArm):
+                model: Model = coupled_joints(robot, part.model.rows, terms, variant)
+            else:
+                model = independent(robot.joint(part.model.group), terms[part.model.group], variant)
+            ridge = Ridge(0.0, np.ones(1) if weights is None else weights, part.combination)
+            parts.append(Part(model, part, part.columns(model), ridge))
+        for strength in RIDGES[structure]:
+            name = f"{structure}{'+' * bool(added)}{added}{separate}{ridge_name(strength)}"
+            models.append(Candidate(name, variant, added, tuple(part.with_ridge(strength) for part in parts)))
+    return models
 
 
-def library(
-    model: CoupledArm | IndependentJoint, logs: tuple[Observed, ...], added: tuple[tuple[Term, ...], ...], count: int
-) -> Library:
+def ridge_name(strength: float) -> str:
+    """Return the end of a candidate's name that states its ridge."""
+    return f", ridge {strength:g}" if strength else ""
+
+
+def library(model: CoupledArm | IndependentJoint, logs: Sequence[Observed], count: int) -> Library:
     """Return a model with its equations."""
-    poses = np.concatenate([log.motion.q[:: max(1, len(log.tau) // POSES)] for log in logs])
-    return Library(model, logs, added, *equations(model, logs, count), model.inertia_columns(poses))
+    poses = np.concatenate([log.motions[0].q[:: max(1, len(log.block) // POSES)] for log in logs])
+    return Library(model, tuple(logs), equations(model, logs, count), model.inertia_columns(poses))
 
 
 def every_term(reach: Reach) -> tuple[Term, ...]:
@@ -205,20 +213,19 @@ def every_term(reach: Reach) -> tuple[Term, ...]:
     return (*others, *(presliding_friction(x, number) for number, x in enumerate(slow, start=1)))
 
 
-def residual_variance(part: Library, reaches: dict[str, Reach]) -> float:
-    """Return the residual variance of a joint of a coupled arm, with its own parameters and no added friction."""
-    cells = part.by_block.columns(part.columns(AddedFriction(""), reaches))
+def residual_variance(part: Part) -> float:
+    """Return the residual variance of a joint of a coupled arm, with its own parameters."""
+    cells = part.by_block
     total = cells.sum_cells(np.ones(len(cells.gram), np.bool_))
-    theta = solve(total, WEIGHTS_RIDGE._replace(combination=part.combination))
-    return float(total.errors(theta)[0, 0])
+    return float(total.errors(solve(total, part.ridge._replace(strength=WEIGHTS_RIDGE)))[0, 0])
 
 
 def reach_of(logs: Sequence[Observed], joint: str) -> Reach:
     """Return the range and the speed of a joint's motion, over all logs that move it."""
     ranges, squares, count = [0.0], 0.0, 0
     for log in logs:
-        i = [record.joint for record in log.records].index(joint)
-        q, dq = (x[:, i][log.records[i].standing == 0] for x in (log.motion.q, log.motion.dq))
+        i = log.joints.index(joint)
+        q, dq = (x[:, i][log.records[i].standing == 0] for x in (log.motions[i].q, log.motions[i].dq))
         low, high = np.percentile(q, [1.0, 99.0])
         ranges.append(float(high - low))
         squares += float(dq @ dq)

@@ -6,11 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.identification.candidates import Candidate, Library
+from davinci_forces.identification.candidates import Candidate, Part
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.estimation.conic import nearest
 from davinci_forces.maths.estimation.least_squares import Triangle
-from davinci_forces.maths.models.model import Model
 from davinci_forces.maths.selection import (
     MAX_GROUPS,
     PATH_BLOCKS,
@@ -23,8 +22,7 @@ from davinci_forces.maths.selection import (
     scaled_equations,
     standard_error,
 )
-from davinci_forces.robots.models import Reach
-from davinci_forces.robots.robot import Robot
+from davinci_forces.records.prediction import CHOSEN
 
 NEGLIGIBLE_EXCESS = 1e-8  # a smaller share of the effort's square is within the solver's accuracy
 
@@ -43,6 +41,10 @@ class Selection:
     best: Candidate
     why: str
 
+    def score_of(self, candidate: Candidate) -> float:
+        """Return the error of one of the candidates."""
+        return float(self.score[[c.name for c in self.candidates].index(candidate.name)])
+
 
 class BlockEstimate(NamedTuple):
     """Parameters (p,) with their standard errors: for uncorrelated residuals, and from blocks left out."""
@@ -56,16 +58,16 @@ class BlockEstimate(NamedTuple):
     condition: float
 
 
-def select_candidate(candidates: Sequence[Candidate], reaches: dict[str, Reach], count: int) -> Selection | None:
+def select_candidate(candidates: Sequence[Candidate], count: int) -> Selection | None:
     """Cross-validate all candidates on the same groups, and choose one; None if none can be refitted."""
     schemes = usable_schemes(candidates, count)
-    pairs = [(c, errors) for c in candidates if (errors := c.cross_validate(schemes, reaches))] if schemes else []
+    pairs = [(c, errors) for c in candidates if (errors := c.cross_validate(schemes))] if schemes else []
     if not pairs:
         return None
     models, results = (list(column) for column in zip(*pairs, strict=True))
-    physical = [c.is_physical(reaches) for c in models]
+    physical = [c.is_physical for c in models]
     eligible = physical if any(physical) else [True] * len(models)
-    sizes = [c.size(reaches) for c in models]
+    sizes = [c.size for c in models]
     chosen, best = choose_candidate(results, sizes, eligible)
     return Selection(
         candidates=tuple(models),
@@ -73,7 +75,7 @@ def select_candidate(candidates: Sequence[Candidate], reaches: dict[str, Reach],
         score=np.array([result.score for result in results]),
         score_std=np.array([standard_error(result) for result in results]),
         training=np.array([result.training.mean() for result in results]),
-        over_periods=np.array([over_periods(c, reaches, count) for c in models]),
+        over_periods=np.array([over_periods(c, count) for c in models]),
         chosen=models[chosen],
         best=models[best],
         why=reason(models, results, sizes, chosen, best),
@@ -81,21 +83,43 @@ def select_candidate(candidates: Sequence[Candidate], reaches: dict[str, Reach],
 
 
 def usable_schemes(candidates: Sequence[Candidate], count: int) -> list[Booleans]:
-    """Return the leave-out schemes in which each refit has data of every effort."""
+    """Return the leave-out schemes in which each refit has data of every effort of all candidates."""
+    by_library = {id(part.library): part.library.cells.by_block.squares for c in candidates for part in c.parts}
+    return schemes_of(np.concatenate(list(by_library.values()), axis=1), count)
+
+
+def schemes_of(squares: Array, count: int) -> list[Booleans]:
+    """Return the leave-out schemes in which each refit has data of every effort, of squares (C, m) in all cells."""
     log, block = np.repeat(np.arange(count), PATH_BLOCKS), np.tile(np.arange(PATH_BLOCKS), count)
-    by_library = {id(library): library.by_block.squares for c in candidates for library in c.libraries}
-    squares = np.concatenate(list(by_library.values()), axis=1)
     return [groups for groups in left_out(log, block) if all(bool((squares[~g].sum(axis=0) > 0).all()) for g in groups)]
 
 
-def over_periods(candidate: Candidate, reaches: dict[str, Reach], count: int) -> float:
+def better(fixed: Selection, searched: Selection | None) -> Selection:
+    """Return the selection whose chosen candidate errs less, named `chosen`, with the candidates of both."""
+    both = [fixed, *([searched] if searched else [])]
+    winner = min(both, key=lambda selection: selection.score_of(selection.chosen))
+    columns = {
+        name: np.concatenate([getattr(selection, name) for selection in both])
+        for name in ("score", "score_std", "training", "over_periods")
+    }
+    return Selection(
+        candidates=tuple(c for selection in both for c in selection.candidates),
+        physical=tuple(x for selection in both for x in selection.physical),
+        chosen=winner.chosen._replace(variant=CHOSEN),
+        best=winner.best,
+        why=winner.why,
+        **columns,
+    )
+
+
+def over_periods(candidate: Candidate, count: int) -> float:
     """Return the score on periods left out, whose path is that of the fitted periods; NaN if no path repeats."""
     number = np.tile(np.arange(MAX_GROUPS), count)
-    squares = np.concatenate([library.by_period.squares for library in candidate.libraries], axis=1)
+    squares = np.concatenate([part.library.cells.by_period.squares for part in candidate.parts], axis=1)
     groups = np.array([number == k for k in range(MAX_GROUPS) if squares[number == k].any()])
     if len(groups) < 2 or not all((squares[~group].sum(axis=0) > 0).all() for group in groups):
         return float("nan")
-    errors = candidate.cross_validate([groups], reaches, by_period=True)
+    errors = candidate.cross_validate([groups], by_period=True)
     return errors.score if errors else float("nan")
 
 
@@ -123,30 +147,34 @@ def reason(
     return text
 
 
-def parameters(
-    candidate: Candidate, robot: Robot, reaches: dict[str, Reach], count: int
-) -> Iterator[tuple[Model, Library, BlockEstimate]]:
-    """Fit a candidate's parameters to all data, one model at a time."""
+def parameters(candidate: Candidate, count: int) -> Iterator[tuple[Part, BlockEstimate]]:
+    """Fit a candidate's parameters to all data of `count` logs, one part at a time."""
     block = np.tile(np.arange(PATH_BLOCKS), count)
-    fits = candidate.parameters(reaches)
-    refits = [candidate.parameters(reaches, block == b) for b in range(PATH_BLOCKS)]
-    models = zip(candidate.models(robot, reaches), candidate.libraries, candidate.ridges(), strict=True)
-    for i, (model, library, ridge) in enumerate(models):
+    fits = candidate.parameters()
+    refits = [candidate.parameters(block == b) for b in range(PATH_BLOCKS)]
+    for i, part in enumerate(candidate.parts):
         theta, thetas = fits[i], np.array([refit[i] for refit in refits])
-        cells = library.by_block.columns(library.columns(candidate.friction, reaches))
-        total = cells.sum_cells(np.ones(len(cells.gram), np.bool_))
-        errors, samples = total.errors(theta)[0], library.samples
+        ridge, samples = part.ridge, part.library.cells.samples
+        total = sum_all(part.by_block)
+        errors = total.errors(theta)[0]
         jackknife = (PATH_BLOCKS - 1) / PATH_BLOCKS * ((thetas - thetas.mean(axis=0)) ** 2).sum(axis=0)
-        estimate = BlockEstimate(
-            theta=theta,
-            theta_std_classical=np.sqrt(np.diag(covariance(total, ridge, errors / samples))),
-            theta_std=np.sqrt(jackknife),
-            samples=int(samples.max()),
-            mse=float((errors / samples).sum()),
-            r2=float(1.0 - errors.sum() / total.squares[0].sum()),
-            condition=float(np.sqrt(np.linalg.cond(scaled_equations(total, ridge)[0]))),
+        yield (
+            part,
+            BlockEstimate(
+                theta=theta,
+                theta_std_classical=np.sqrt(np.diag(covariance(total, ridge, errors / samples))),
+                theta_std=np.sqrt(jackknife),
+                samples=int(samples.max()),
+                mse=float((errors / samples).sum()),
+                r2=float(1.0 - errors.sum() / total.squares[0].sum()),
+                condition=float(np.sqrt(np.linalg.cond(scaled_equations(total, ridge)[0]))),
+            ),
         )
-        yield model, library, estimate
+
+
+def sum_all(cells: Equations) -> Equations:
+    """Sum the equations of all cells."""
+    return cells.sum_cells(np.ones(len(cells.gram), np.bool_))
 
 
 class ConsistentFit(NamedTuple):
@@ -158,10 +186,8 @@ class ConsistentFit(NamedTuple):
     excess: float  # of the criterion over its minimum, as a share of the effort's square
 
 
-def fit_consistent(
-    model: Model, library: Library, equations: Equations, ridge: Ridge, free: BlockEstimate
-) -> ConsistentFit:
-    """Fit a candidate's parameters within those that a mechanism can have, to the equations (one cell) of all logs.
+def fit_consistent(part: Part, free: BlockEstimate) -> ConsistentFit:
+    """Fit a candidate's parameters within those that a mechanism can have, to the equations of all logs.
 
     The standard errors remain those of the candidate, as `consistent` keeps those of least squares.
 
@@ -170,12 +196,13 @@ def fit_consistent(
     NotIdentifiable
         If the conic program is not solved.
     """
-    fit = nearest(factor(equations, ridge), model.mechanism)
+    equations, samples = sum_all(part.by_block), part.library.cells.samples
+    fit = nearest(factor(equations, part.ridge), part.model.mechanism)
     errors, squares = equations.errors(fit.theta)[0], float(equations.squares.sum())
     estimate = free._replace(
-        theta=fit.theta, mse=float((errors / library.samples).sum()), r2=float(1.0 - errors.sum() / squares)
+        theta=fit.theta, mse=float((errors / samples).sum()), r2=float(1.0 - errors.sum() / squares)
     )
-    rmse, rmse_free = (np.sqrt(x / library.samples) for x in (errors, equations.errors(free.theta)[0]))
+    rmse, rmse_free = (np.sqrt(x / samples) for x in (errors, equations.errors(free.theta)[0]))
     return ConsistentFit(estimate, rmse, rmse_free, fit.excess)
 
 

@@ -6,11 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.identification.regression import joined_motion, recorded_motion
+from davinci_forces.identification.regression import joined_motion, motion_at
 from davinci_forces.identification.used import Identified
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.memory import efforts
 from davinci_forces.maths.models.model import ArmMotion, JointDynamics
+from davinci_forces.maths.signals.smoothing import delay_segments
 from davinci_forces.records import Fit, JointModel, Motion, Prediction
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.robots.models import ARM
@@ -21,52 +22,74 @@ MIN_SINGULAR_SHARE = 1e-3  # combinations with a smaller share of the largest si
 
 
 class LogModels:
-    """The models of fits along one log; results that the joints of an arm share are computed once."""
+    """The models of fits along one log; results that the joints of an arm share are computed once.
+
+    A model gets the motion through the low-pass of its fit, and delayed by the lag of the effort.
+    """
 
     def __init__(self, identified: Identified, motions: Iterable[Motion | JointModel]) -> None:
         self.identified = identified
-        self._motions = {motion.joint: recorded_motion(motion) for motion in motions}  # the other columns may be freed
-        self._efforts: dict[tuple[str, ...], Array] = {}
-        self._dynamics: dict[tuple[str, ...], tuple[JointDynamics, ...]] = {}
+        self._records = {motion.joint: motion for motion in motions}
+        self._motions: dict[tuple[str, float, float], ArmMotion] = {}
+        self._efforts: dict[tuple[object, ...], Array] = {}
+        self._dynamics: dict[tuple[object, ...], tuple[JointDynamics, ...]] = {}
 
     @property
     def joints(self) -> tuple[str, ...]:
         """The joints in the log."""
-        return tuple(self._motions)
+        return tuple(self._records)
 
     def joints_on_clock(self, joint: str) -> set[str]:
         """Return the joints of the log that share the clock of a joint."""
-        length = len(self._motions[joint].q)
-        return {name for name, motion in self._motions.items() if len(motion.q) == length}
+        length = len(self._records[joint])
+        return {name for name, record in self._records.items() if len(record) == length}
 
-    def motion(self, fit: Fit) -> ArmMotion:
-        """Return the low-passed motion of the joints of a fit's model; the log must contain these joints."""
-        return joined_motion([self._motions[name] for name in self.identified.model(fit).joints])
+    def joint_motion(self, joint: str, processing: tuple[float, float]) -> ArmMotion:
+        """Return the motion of one joint, low-passed at a cutoff [Hz] and delayed by a lag [s]."""
+        key = joint, *processing
+        if key not in self._motions:
+            self._motions[key] = motion_at(self._records[joint], *processing)
+        return self._motions[key]
+
+    def motion(self, fit: Fit, joint: str) -> ArmMotion:
+        """Return the motion of the joints of a fit's model, for a joint's effort; the log must contain these joints."""
+        processing = self.identified.processing(fit, joint)
+        return joined_motion([self.joint_motion(name, processing) for name in self.identified.model(fit).joints])
 
     def tau_hat(self, fit: Fit, joint: str) -> Array:
         """Compute the effort (N,) of a joint by a fit."""
         model = self.identified.model(fit)
-        tau_hat = self._efforts.get(fit.key)
+        key = *fit.key, self.identified.processing(fit, joint)
+        tau_hat = self._efforts.get(key)
         if tau_hat is None:
-            tau_hat = efforts(model, fit.theta, self.motion(fit))
+            tau_hat = efforts(model, fit.theta, self.motion(fit, joint))
             if fit.group == ARM:
-                self._efforts[fit.key] = tau_hat
+                self._efforts[key] = tau_hat
         return np.ascontiguousarray(tau_hat[:, model.efforts.index(joint)])
 
     def dynamics(self, fit: Fit, joint: str) -> JointDynamics:
         """Compute the dynamics of a joint by a fit, as a filter takes them.  (7.15), (7.16)"""
         model = self.identified.model(fit)
-        dynamics = self._dynamics.get(fit.key) or model.joint_dynamics(fit.theta, self.motion(fit))
+        key = *fit.key, self.identified.processing(fit, joint)
+        dynamics = self._dynamics.get(key) or model.joint_dynamics(fit.theta, self.motion(fit, joint))
         if fit.group == ARM:
-            self._dynamics[fit.key] = dynamics
+            self._dynamics[key] = dynamics
         return dynamics[model.efforts.index(joint)]
 
     def fields_of(self, fit: Fit, joint: str) -> dict[str, Any]:
         """Return the fields of a JointModel that follow from a fit."""
-        dynamics = self.dynamics(fit, joint)
+        dynamics, record, processing = (
+            self.dynamics(fit, joint),
+            self._records[joint],
+            self.identified.processing(fit, joint),
+        )
+        motion, (cutoff, effort_lag) = self.joint_motion(joint, processing), processing
+        delay = (effort_lag - record.effort_lag) * record.rate
+        q, dq = (delay_segments(x, record.segment, delay) for x in (record.q_measured, record.dq_measured))
         return {
             "model": fit.model, "estimator": fit.estimator, "inertia": dynamics.inertia, "tau_known": dynamics.known,
-            "tau_hat": self.tau_hat(fit, joint),
+            "tau_hat": self.tau_hat(fit, joint), "cutoff": cutoff, "effort_lag": effort_lag, "q_measured": q,
+            "dq_measured": dq, "q": motion.q[:, 0], "dq": motion.dq[:, 0], "ddq": motion.ddq[:, 0],
             **dict(zip(BIAS, map(float, dynamics.coefficients), strict=True)),
         }  # fmt: skip
 
@@ -100,7 +123,7 @@ def refit_effort(joint: JointModel, fit: Fit, along: LogModels, free: Booleans) 
     Phi (theta + D d),    d = arg min |tau - tau_hat - Phi D d|,    D scales each column of Phi to length 1
     """
     model = along.identified.model(fit)
-    regressor = model.regressor(along.motion(fit))
+    regressor = model.regressor(along.motion(fit, joint.joint))
     valid = free & regressor.known
     Phi = regressor.Phi[:, model.efforts.index(joint.joint)]
     length = np.linalg.norm(Phi[valid], axis=0)

@@ -97,7 +97,7 @@ def without_a_segment(
 ) -> Iterator[Prediction | Diagnostic]:
     """Predict each sixth of a log that does not repeat from fits to the other five."""
     log = observe([motion], (), lowpass, 0)
-    Phi = model.regressor(log.motion).Phi[:, 0]
+    Phi = model.regressor(log.motions[0]).Phi[:, 0]
     scorer = Scorer(motion, motion.standing == 0, lowpass)
     for name in ESTIMATORS:
         tau_hat = np.empty(len(motion))

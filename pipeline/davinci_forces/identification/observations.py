@@ -1,14 +1,17 @@
 """The joints of one identification log on one clock, ready for normal equations of any model."""
 
 from collections.abc import Iterable, Sequence
+from functools import reduce
 from typing import NamedTuple
 
 import numpy as np
 
 from davinci_forces.estimators.problem import NO_PRIOR, Prior, Regression
-from davinci_forces.identification.regression import joined_motion, recorded_motion
+from davinci_forces.identification.regression import joined_motion, motion_at, recorded_motion
+from davinci_forces.identification.scores import select_samples
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.memory import pieces
+from davinci_forces.maths.models.memory import select_samples as first_samples
 from davinci_forces.maths.models.model import ArmMotion, Model
 from davinci_forces.maths.selection import (
     MAX_GROUPS,
@@ -25,17 +28,30 @@ from davinci_forces.records import Average, Motion, Trajectory
 SAMPLES_PER_CUTOFF = 3  # samples per period of the low-pass's cutoff: more samples add no information
 
 
+class Processing(NamedTuple):
+    """The low-pass of the motion and the effort of a joint, and the delay of its effort after the motion."""
+
+    cutoff: float  # [Hz]
+    effort_lag: float  # [s]
+
+
 class Observed(NamedTuple):
     """The joints of one log on one clock."""
 
     records: tuple[Motion, ...]  # of n joints
-    motion: ArmMotion
-    tau: Array  # (N, n) low-passed effort; NaN while a joint stands still and its friction is undetermined
+    processing: tuple[Processing, ...]  # for the effort of each joint
+    motions: tuple[ArmMotion, ...]  # of all joints, as the effort of each joint is modelled with
+    still: Booleans  # (N, n) whether each joint stands still, so that its friction is undetermined
     block: Integers  # (N,) of the path
     period: Integers  # (N,) number of the repetition of the path; -1 if it does not repeat
-    lowpass: float  # [Hz]
+    lowpass: float  # [Hz] of the scores
     number: int  # of the log, from 0
     white: dict[str, float]  # standard deviation of each joint's effort noise, if periods repeat
+
+    @property
+    def joints(self) -> list[str]:
+        """The names of its joints."""
+        return [record.joint for record in self.records]
 
     @property
     def is_moving(self) -> Booleans:
@@ -44,31 +60,70 @@ class Observed(NamedTuple):
 
     def single_joint(self, joint: int) -> "Observed":
         """Return the log of one joint alone."""
-        column = slice(joint, joint + 1)
-        motion = self.motion._replace(**{name: getattr(self.motion, name)[:, column] for name in ("q", "dq", "ddq")})
-        return self._replace(records=self.records[column], motion=motion, tau=self.tau[:, column])
+        column, motion = slice(joint, joint + 1), self.motions[joint]
+        motion = motion._replace(**{name: getattr(motion, name)[:, column] for name in ("q", "dq", "ddq")})
+        return self._replace(
+            records=self.records[column],
+            processing=self.processing[column],
+            motions=(motion,),
+            still=self.still[:, column],
+        )
 
-    def rows(self, model: Model) -> tuple[Array, Array, Integers]:
+    def first_samples(self, number: int) -> "Observed":
+        """Return the first samples of a longer log."""
+        if number >= len(self.block):
+            return self
+        which = slice(number)
+        return self._replace(
+            records=tuple(select_samples(record, which) for record in self.records),
+            motions=tuple(first_samples(motion, which) for motion in self.motions),
+            **{name: getattr(self, name)[which] for name in ("still", "block", "period")},
+        )
+
+    def processed(self, processing: Sequence[Processing]) -> "Observed":
+        """Return the log with another processing for the effort of each joint."""
+        motions = {
+            p: joined_motion([motion_at(record, *p) for record in self.records]) for p in dict.fromkeys(processing)
+        }
+        return self._replace(processing=tuple(processing), motions=tuple(motions[p] for p in processing))
+
+    def rows(self, model: Model, cutoff: float | None = None) -> tuple[Array, Array, Integers]:
         """Return low-passed Phi (K, m, p) and tau (K, m) of a model of these joints, and their samples (K,).
 
-        Samples at which none of the model's joints moves are omitted.
+        Both pass the low-pass of their effort's processing, or one at `cutoff` [Hz].  An effort is NaN while its joint
+        stands still.  Samples at which none of the model's joints moves are omitted.
         """
-        names, rate = [record.joint for record in self.records], self.records[0].rate
-        tau = self.tau[:, [names.index(effort) for effort in model.efforts]]
-        step = max(1, int(rate / (SAMPLES_PER_CUTOFF * self.lowpass)))
-        wanted = (np.arange(len(tau)) % step == 0) & ~np.isnan(tau).all(axis=1)
-        rows, indices = [], []
-        for piece in pieces(model, self.motion, reach(rate, self.lowpass)):
+        columns = [self.joints.index(effort) for effort in model.efforts]
+        step = max(1, int(self.records[0].rate / (SAMPLES_PER_CUTOFF * self.lowpass)))
+        wanted = (np.arange(len(self.block)) % step == 0) & ~self.still[:, columns].all(axis=1)
+        parts = {}
+        for processing in dict.fromkeys(self.processing[i] for i in columns):
+            efforts = [m for m, i in enumerate(columns) if self.processing[i] == processing]
+            motion = self.motions[columns[efforts[0]]]
+            parts[tuple(efforts)] = self._smooth_rows(model, motion, efforts, cutoff or processing.cutoff, wanted)
+        samples = reduce(np.intersect1d, (taken for _, taken in parts.values()))
+        Phi = np.zeros((len(samples), len(columns), len(model.parameters)))
+        for efforts_of_part, (rows, taken) in parts.items():
+            Phi[:, list(efforts_of_part)] = rows[np.searchsorted(taken, samples)]
+        tau = [smooth_effort(self.records[i], cutoff or self.processing[i].cutoff)[samples] for i in columns]
+        return Phi, np.stack(tau, axis=1), samples
+
+    def _smooth_rows(
+        self, model: Model, motion: ArmMotion, efforts: Sequence[int], cutoff: float, wanted: Booleans
+    ) -> tuple[Array, Integers]:
+        """Low-passed Phi (K, e, p) of some efforts at the wanted samples (N,) where it is known, and these samples."""
+        rate, rows, indices = self.records[0].rate, [], []
+        for piece in pieces(model, motion, reach(rate, cutoff)):
             Phi, is_known = model.regressor(piece.motion)
+            Phi = Phi[:, efforts]
             taken = np.flatnonzero(is_known[piece.inside] & wanted[piece.place])
             smooth = np.zeros((len(taken), *Phi.shape[1:]))
             present = Phi.any(axis=0)  # most columns belong to one effort only
-            passed = lowpass_segments(Phi[:, present], piece.motion.segment, rate, self.lowpass)
+            passed = lowpass_segments(Phi[:, present], piece.motion.segment, rate, cutoff)
             smooth[:, present] = passed[piece.inside][taken]
             rows.append(smooth)
             indices.append(taken + piece.place.start)
-        samples = np.concatenate(indices)
-        return np.concatenate(rows), tau[samples], samples
+        return np.concatenate(rows), np.concatenate(indices)
 
 
 def observe(records: Sequence[Motion], averages: Iterable[Average], lowpass: float, number: int) -> Observed:
@@ -76,24 +131,27 @@ def observe(records: Sequence[Motion], averages: Iterable[Average], lowpass: flo
     first = records[0]
     by_joint = {a.joint: a for a in averages if a.log == first.log}
     average = next(iter(by_joint.values()), None)
-    tau = np.stack([smooth_effort(r, lowpass) for r in records], axis=1)
     motion = joined_motion([recorded_motion(record) for record in records])
-    moving = np.asarray(~np.isnan(tau).all(axis=1))
+    still = np.stack([is_still(record) for record in records], axis=1)
     white = {joint: a.sigma_tau_white for joint, a in by_joint.items()}
-    block = path_blocks(first.t, average.period if average else 0.0, moving)
+    block = path_blocks(first.t, average.period if average else 0.0, np.asarray(~still.all(axis=1)))
     period = np.full(len(first), -1)
     if average is not None:
         inside = averaged_samples(first.t, average)
         groups = min(average.periods, MAX_GROUPS)  # of whole periods
         period[inside] = repetitions(first.t[inside], average.period) * groups // average.periods
-    return Observed(tuple(records), motion, tau, block, period, lowpass, number, white)
+    n, processing = len(records), Processing(lowpass, 0.0)
+    return Observed(tuple(records), (processing,) * n, (motion,) * n, still, block, period, lowpass, number, white)
 
 
-def smooth_effort(record: Motion, lowpass: float) -> Array:
-    """Low-pass the effort (N,) of a joint; NaN while it stands still, and throughout if it is at rest."""
-    if record.at_rest:
-        return np.full(len(record), np.nan)
-    return np.where(record.standing > 0, np.nan, lowpass_segments(record.tau, record.segment, record.rate, lowpass))
+def is_still(record: Motion) -> Booleans:
+    """Whether a joint stands still at each sample (N,)."""
+    return np.asarray(record.standing > 0) | bool(record.at_rest)
+
+
+def smooth_effort(record: Motion, cutoff: float) -> Array:
+    """Low-pass the effort (N,) of a joint at `cutoff` [Hz]; NaN while the joint stands still."""
+    return np.where(is_still(record), np.nan, lowpass_segments(record.tau, record.segment, record.rate, cutoff))
 
 
 def averaged_samples(t: Array, average: Average | Trajectory) -> Booleans:
@@ -116,16 +174,27 @@ def pose_samples(
     return Regression(Phi[:, 0], tau[:, 0], np.zeros(len(samples)), ones, (0,), names, known), samples
 
 
-def equations(model: Model, logs: Sequence[Observed], count: int) -> tuple[Integers, Equations, Equations]:
-    """Return the normal equations of all `count` logs in cells of the path (6 a log) and of the periods (20 a log).
+class CellEquations(NamedTuple):
+    """The normal equations of a model, by cells of the data."""
 
-    The first result is the number of samples (m,) of each effort in the equations.
-    """
-    samples, by_block, by_period = np.zeros(len(model.efforts), np.int64), [], []
+    samples: Integers  # (m,) number of samples of each effort
+    by_block: Equations  # 6 cells a log
+    by_period: Equations  # 20 cells a log
+    scored: Equations  # 6 cells a log, of the motion and the effort as they are scored
+
+
+def equations(model: Model, logs: Sequence[Observed], count: int) -> CellEquations:
+    """Return the normal equations of all `count` logs, in cells of the path and of the periods."""
+    samples, by_block, by_period, scored = np.zeros(len(model.efforts), np.int64), [], [], []
     for log in logs:
         Phi, tau, rows = log.rows(model)
         samples += (~np.isnan(tau)).sum(axis=0)
         by_block.append(sum_equations(Phi, tau, log.block[rows], PATH_BLOCKS))
         by_period.append(sum_equations(Phi, tau, log.period[rows], MAX_GROUPS))
+        if any(processing.cutoff != log.lowpass for processing in log.processing):
+            Phi, tau, rows = log.rows(model, log.lowpass)
+            scored.append(sum_equations(Phi, tau, log.block[rows], PATH_BLOCKS))
+        else:
+            scored.append(by_block[-1])
     numbers = [log.number for log in logs]
-    return samples, side_by_side(by_block, numbers, count), side_by_side(by_period, numbers, count)
+    return CellEquations(samples, *(side_by_side(part, numbers, count) for part in (by_block, by_period, scored)))

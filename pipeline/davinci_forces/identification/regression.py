@@ -10,6 +10,7 @@ from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.model import ArmMotion
 from davinci_forces.maths.models.physical import ROUNDING, Box, physical_lumping
 from davinci_forces.maths.periods.harmonics import kept_noise
+from davinci_forces.maths.signals.smoothing import measured_motion
 from davinci_forces.maths.signals.standstill import is_standing_still
 from davinci_forces.records import JointModel, Motion, Trajectory
 from davinci_forces.robots.robot import Joint
@@ -74,6 +75,17 @@ def averaged_motion(trajectory: Trajectory) -> ArmMotion:
 def recorded_motion(record: Motion | JointModel) -> ArmMotion:
     """Return the low-passed motion of a joint of one recording."""
     return ArmMotion(record.q[:, None], record.dq[:, None], record.ddq[:, None], 1.0 / record.rate, record.segment)
+
+
+def motion_at(record: Motion | JointModel, cutoff: float, effort_lag: float) -> ArmMotion:
+    """Return the motion of a joint of one recording, low-passed at `cutoff` [Hz] and delayed by `effort_lag` [s]."""
+    if (cutoff, effort_lag) == (record.cutoff, record.effort_lag):
+        return recorded_motion(record)
+    logged = record.dq_measured if record.velocity == "logged" else None
+    delay = effort_lag - record.effort_lag
+    columns = measured_motion(record.q_measured, logged, record.segment, record.rate, cutoff, delay)
+    q, dq, ddq = (column[:, None] for column in columns)
+    return ArmMotion(q, dq, ddq, 1.0 / record.rate, record.segment)
 
 
 def joined_motion(motions: Sequence[ArmMotion]) -> ArmMotion:

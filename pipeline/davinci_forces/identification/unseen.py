@@ -9,17 +9,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.identification.candidates import Candidate, Library
+from davinci_forces.identification.candidates import Candidate, Part
 from davinci_forces.identification.observations import Observed
 from davinci_forces.identification.scores import Scorer, folds, select_samples
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.memory import efforts
-from davinci_forces.maths.models.model import Model
-from davinci_forces.maths.selection import MAX_GROUPS, PATH_BLOCKS, Equations, Ridge, solve
+from davinci_forces.maths.selection import MAX_GROUPS, PATH_BLOCKS, Equations, solve
 from davinci_forces.records import Prediction
 from davinci_forces.records.prediction import ANOTHER_PATH, CHOSEN, SAME_PATH
-from davinci_forces.robots.models import Reach
-from davinci_forces.robots.robot import Robot
 
 
 class Scheme(NamedTuple):
@@ -33,12 +30,12 @@ class Scheme(NamedTuple):
 
 
 class RefitModel:
-    """One model of a candidate, refitted without some of its cells; each refit is computed once."""
+    """One part of a candidate, refitted without some of its cells; each refit is computed once."""
 
-    def __init__(self, model: Model, library: Library, ridge: Ridge, columns: list[int], total: int) -> None:
-        self.model, self.logs, self.total = model, {log.number: log for log in library.logs}, total
-        self.by_block, self.by_period = library.by_block.columns(columns), library.by_period.columns(columns)
-        self._ridge, self._thetas = ridge, dict[bytes, Array]()
+    def __init__(self, part: Part, total: int) -> None:
+        self.model, self.logs, self.total = part.model, {log.number: log for log in part.library.logs}, total
+        self.by_block, self.by_period = part.by_block, part.by_period
+        self._ridge, self._thetas = part.ridge, dict[bytes, Array]()
 
     def theta(self, cells: Equations, out: Booleans) -> Array:
         """Fit the parameters (p,) without some cells (C,); raises LinAlgError if the others do not separate them."""
@@ -48,26 +45,20 @@ class RefitModel:
         return self._thetas[key]
 
 
-def predictions(
-    candidate: Candidate, is_chosen: bool, logs: Sequence[Observed], robot: Robot, reaches: dict[str, Reach]
-) -> Iterator[Prediction]:
+def predictions(candidate: Candidate, is_chosen: bool, logs: Sequence[Observed]) -> Iterator[Prediction]:
     """Predict the effort of each joint of all logs by refits of a candidate, by the scheme of the joints' own fits.
 
-    The chosen candidate is also refitted without blocks of path, as `chosen`.  Without a refit there is no prediction.
+    The chosen candidate is refitted without blocks of path instead.  Without a refit there is no prediction.
     """
     name = f"{candidate.variant}.{candidate.estimator}"
-    parts = zip(candidate.models(robot, reaches), candidate.libraries, candidate.ridges(), strict=True)
-    models = [
-        RefitModel(model, library, ridge, library.columns(candidate.friction, reaches), len(logs))
-        for model, library, ridge in parts
-    ]
+    models = [RefitModel(part, len(logs)) for part in candidate.parts]
     for number in (log.number for log in logs):
         for model in (model for model in models if number in model.logs):
             log = model.logs[number]
             if is_chosen:
                 scheme = leave_blocks_out(model, log, "leave a block of path out")
                 yield from predict_scheme(scheme, model, log, CHOSEN, name)
-            if name != "independent.lse":  # this candidate is the joint's own fit
+            elif name != "independent.lse":  # this candidate is the joint's own fit
                 scheme = scheme_of_own_fits(model, log)
                 yield from predict_scheme(scheme, model, log, candidate.variant, candidate.estimator)
 
@@ -81,14 +72,18 @@ def predict_scheme(
     except np.linalg.LinAlgError:
         return
     is_predicted = scheme.refit >= 0
-    tau_hat = efforts(refits.model, thetas, log.motion, scheme.refit)[is_predicted]
-    names = [record.joint for record in log.records]
+    predicted = {
+        p: efforts(refits.model, thetas, log.motions[i], scheme.refit)[is_predicted]
+        for p, i in {p: i for i, p in enumerate(log.processing) if log.joints[i] in refits.model.efforts}.items()
+    }
     for m, effort in enumerate(refits.model.efforts):
-        record = select_samples(log.records[names.index(effort)], is_predicted)
+        i = log.joints.index(effort)
+        record = select_samples(log.records[i], is_predicted)
         moves = record.standing == 0
         if not record.at_rest and moves.any():
+            tau_hat = predicted[log.processing[i]][:, m]
             scorer = Scorer(record, moves, log.lowpass, log.white.get(effort))
-            yield scorer.score(name, estimator, "identification", scheme.name, scheme.path, tau_hat[:, m])
+            yield scorer.score(name, estimator, "identification", scheme.name, scheme.path, tau_hat)
 
 
 def leave_blocks_out(refits: RefitModel, log: Observed, name: str) -> Scheme:

@@ -46,8 +46,13 @@ class Identified:
         """Return the model of a fit."""
         if fit.key not in self._models:
             scales, names = fit.scale.tolist(), [str(name) for name in fit.parameter]
-            self._models[fit.key] = model_of(self.robot, fit.model, fit.group, names, scales)
+            self._models[fit.key] = model_of(self.robot, fit.structure, fit.model, fit.group, names, scales)
         return self._models[fit.key]
+
+    def processing(self, fit: Fit, joint: str) -> tuple[float, float]:
+        """Return the cutoff [Hz] of a fit's motion and the lag [s] of the effort, for the effort of a joint."""
+        i = self.model(fit).efforts.index(joint)
+        return fit.cutoff[i], fit.effort_lag[i]
 
     def fits_of(self, joint: str) -> list[Fit]:
         """Return the fits of a joint's effort: its own, and those of its arm."""

@@ -187,22 +187,27 @@ class CrossValidation(NamedTuple):
         return float(self.errors.mean())
 
 
-def cross_validate(equations: Equations, ridge: Ridge, schemes: Sequence[Booleans]) -> CrossValidation:
+def cross_validate(
+    equations: Equations, ridge: Ridge, schemes: Sequence[Booleans], scored: Equations | None = None
+) -> CrossValidation:
     """Cross-validate a candidate: leave out each group (G, C) of cells in turn, and predict it.
+
+    The parameters solve `equations`.  The errors are those of `scored`, where candidates of other low-passes share one.
 
     Raises
     ------
     LinAlgError
         If the columns of the other cells are linearly dependent.
     """
-    whole = equations.squares.sum(axis=0)
+    scored = scored or equations
+    whole = scored.squares.sum(axis=0)
     unseen = []
     for groups in schemes:
         thetas = [solve(equations.omit_cells(out), ridge) for out in groups]
-        errors = [equations.sum_cells(out).errors(theta)[0] for out, theta in zip(groups, thetas, strict=True)]
+        errors = [scored.sum_cells(out).errors(theta)[0] for out, theta in zip(groups, thetas, strict=True)]
         unseen.append(np.array(errors) / whole)
     theta = solve(equations.sum_cells(np.ones(len(equations.gram), np.bool_)), ridge)
-    return CrossValidation(tuple(unseen), np.sqrt(equations.errors(theta).sum(axis=0) / whole))
+    return CrossValidation(tuple(unseen), np.sqrt(scored.errors(theta).sum(axis=0) / whole))
 
 
 def combine_efforts(parts: Sequence[CrossValidation]) -> CrossValidation:

@@ -20,6 +20,7 @@ from davinci_forces.records.model import (
     Guess,
     Identifiability,
     MeasurementNoise,
+    ModelSearch,
     Residual,
     SwarmSearch,
 )
@@ -69,7 +70,7 @@ __all__ = [
     "Control", "Counts", "CrossFit", "DelayLimit", "Diagnostic", "ErrorBand", "Excitation", "Explanation",
     "FilterNoise", "Fit", "FittedPaths", "FreeMotion", "FreeSpace", "FreeWeight", "FrictionMap", "Guess",
     "HapticMotion", "HapticResponse", "HapticRun", "Identifiability", "Innovation", "JointCorrelation", "JointModel",
-    "Labels", "Links", "Load", "LogSummary", "Lyapunov", "MeasurementNoise", "Motion", "Names", "Origin",
+    "Labels", "Links", "Load", "LogSummary", "Lyapunov", "MeasurementNoise", "ModelSearch", "Motion", "Names", "Origin",
     "PeriodResidual", "Pose", "Prediction", "Push", "Record", "Recording", "Residual", "SensorForce", "Signal",
     "Spectrum", "StabilityLimit", "StabilityMap", "Stiffness", "SwarmSearch", "Threshold", "TipBudget", "TipContact",
     "TipForce", "TissueLimit", "TissueModel", "Touch", "Track", "Trajectory", "Tuning", "Weight", "Whiteness",
@@ -81,9 +82,9 @@ KINDS: dict[str, type[Record]] = {
     for kind in (
         Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Touch, Signal, Motion, Average,
         PeriodResidual, Trajectory, Spectrum, Fit, CrossFit, Identifiability, FittedPaths, MeasurementNoise, Residual,
-        SwarmSearch, Guess, Choice, FrictionMap, Prediction, JointModel, Tuning, FilterNoise, FreeMotion, ErrorBand,
-        Track, FreeSpace, Threshold, Contact, Push, Stiffness, TissueModel, Load, Weight, FreeWeight, Comparison,
-        StabilityMap, StabilityLimit, DelayLimit, TissueLimit, HapticMotion, HapticResponse, HapticRun,
+        SwarmSearch, Guess, Choice, ModelSearch, FrictionMap, Prediction, JointModel, Tuning, FilterNoise, FreeMotion,
+        ErrorBand, Track, FreeSpace, Threshold, Contact, Push, Stiffness, TissueModel, Load, Weight, FreeWeight,
+        Comparison, StabilityMap, StabilityLimit, DelayLimit, TissueLimit, HapticMotion, HapticResponse, HapticRun,
         JointCorrelation, ArmCorrelation, TipForce, TipContact, TipBudget, SensorForce, Whiteness, Innovation,
         Explanation, Diagnostic,
     )

@@ -26,6 +26,9 @@ class Fit(Record):
     group: str
     model: str
     estimator: str
+    structure: str
+    cutoff: tuple[float, ...]  # of each effort of the model
+    effort_lag: tuple[float, ...]  # likewise
     logs: Names
     samples: int
     periods: int
@@ -201,6 +204,35 @@ class Choice(Record):
             prefix = f"choice.{self.group}.{slug(candidate)}"
             yield Published(f"{prefix}.score", "score", std="score_std", row=i)
             yield from self.publish(prefix, "training", "over_periods", "parameters", row=i)
+
+
+@dataclass(frozen=True, eq=False)
+class ModelSearch(JointRecord):
+    """The steps of the search for the model of a joint, and the processing and terms of the chosen step."""
+
+    ROWS = "step"
+
+    structure: str
+    cutoff: float
+    effort_lag: float
+    ridge: float
+    term: Names
+    term_scale: tuple[float, ...]
+    chosen_step: int
+    step: Labels
+    step_cutoff: Column
+    step_lag: Column
+    step_ridge: Column
+    parameters: Counts
+    score: Column
+    score_std: Column
+
+    def published(self) -> Iterator[Published]:
+        """The cutoff, the lag, the ridge and the added terms, each with its scale."""
+        prefix = f"choice.{self.joint}"
+        yield from self.publish(prefix, "cutoff", "effort_lag", "ridge")
+        for i, term in enumerate(self.term):
+            yield Published(f"{prefix}.term.{slug(term)}", "term_scale", row=i)
 
 
 @dataclass(frozen=True, eq=False)

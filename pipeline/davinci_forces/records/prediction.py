@@ -70,6 +70,9 @@ class JointModel(LogJointRecord):
     scheme: str  # of the refits without the samples; "" where there are none
     path_unseen: str
     rate: float
+    velocity: str
+    cutoff: float
+    effort_lag: float  # by which the motion is delayed here
     at_rest: int
     constant: float
     gravity_sine: float

@@ -9,11 +9,21 @@ from typing import NamedTuple
 from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.model import Model
-from davinci_forces.maths.models.terms import Term, coulomb, presliding_friction, smooth_sign, stribeck, viscous
+from davinci_forces.maths.models.terms import (
+    OF_MOTION,
+    TERMS,
+    Term,
+    coulomb,
+    presliding_friction,
+    smooth_sign,
+    stribeck,
+    viscous,
+)
 from davinci_forces.robots.robot import Joint, Robot
 
 STRUCTURES = ("independent", "coupled")
 FRICTIONS = ("", "smooth", "stribeck", "dahl", "dahl2", "dahl3")
+OPTIONAL_TERMS = ("offset", "stiffness", "gravity, sine", "gravity, cosine")  # that an independent joint may lack
 VARIANTS = tuple(f"{model}+{friction}".removesuffix("+") for model in STRUCTURES for friction in FRICTIONS)
 ARM = "arm"  # group of a model of the whole arm
 
@@ -66,15 +76,14 @@ def round_scale(scale: float) -> float:
     return float(f"{scale:.3g}")
 
 
-def independent(joint: Joint, added: Sequence[Term] = (), variant: str = "") -> IndependentJoint:
+def independent(joint: Joint, added: Sequence[Term] = (), name: str = "independent") -> IndependentJoint:
     """Model a joint independently of the others, with friction terms added to its own terms.  Section 6.1"""
     terms = (*joint.terms, *added)
-    name = f"independent+{variant}".removesuffix("+")
     return IndependentJoint(joint.name, terms, tuple(joint.unit(term.unit) for term in terms), name)
 
 
 def coupled_arm(
-    robot: Robot, rows: Sequence[int], added: Sequence[Sequence[Term]], variant: str = "", group: str = ARM
+    robot: Robot, rows: Sequence[int], added: Sequence[Sequence[Term]], name: str = "coupled", group: str = ARM
 ) -> CoupledArm:
     """Model coupled joints (indices `rows`), each with viscous, Coulomb and added friction.
 
@@ -90,27 +99,33 @@ def coupled_arm(
     units = tuple(
         {key: joint.unit(f"{{{key}}}") for key in ("inertia", "effort", "position", "gain")} for joint in joints
     )
-    return CoupledArm(group, names, tuple(rows), robot.chain, friction, units, f"coupled+{variant}".removesuffix("+"))
+    return CoupledArm(group, names, tuple(rows), robot.chain, friction, units, name)
 
 
-def model_of(robot: Robot, name: str, group: str, parameters: Sequence[str], scales: Sequence[float]) -> Model:
-    """Rebuild a model from its name, its group, and the names and scales of its parameters."""
-    structure, _, variant = name.partition("+")
-    by_name = dict(zip(parameters, scales, strict=True))
+def model_of(
+    robot: Robot, structure: str, name: str, group: str, parameters: Sequence[str], scales: Sequence[float]
+) -> Model:
+    """Rebuild a model from its structure, name and group, and the names and scales of its parameters."""
+    pairs = list(zip(parameters, scales, strict=True))
     if structure == "independent":
-        return independent(robot.joint(group), _terms_of(variant, by_name, ""), variant)
-    names = [joint.name for joint in robot.joints]
-    moving = [i for i, n in enumerate(names) if f"{viscous.name} of {n}" in by_name]
-    rows = [names.index(group)] if group != ARM else moving
-    suffixes = [f" of {names[row]}" if group == ARM and len(rows) > 1 else "" for row in rows]
-    return coupled_arm(robot, rows, [_terms_of(variant, by_name, suffix) for suffix in suffixes], variant, group)
+        joint = robot.joint(group)
+        names = {term.name for term in joint.terms}
+        added = [TERMS.get(name) or _added_term(name, scale) for name, scale in pairs if name not in names]
+        return independent(joint, [term for term in added if term], name)
+    names = {parameter for parameter, _ in pairs}
+    moving = [i for i, joint in enumerate(robot.joints) if f"{viscous.name} of {joint.name}" in names]
+    rows = moving if group == ARM else [[joint.name for joint in robot.joints].index(group)]
+    by_row = []
+    for row in rows:
+        suffix = f" of {robot.joints[row].name}" if len(rows) > 1 else ""
+        terms = [_added_term(x.removesuffix(suffix), scale) for x, scale in pairs if x.endswith(suffix)]
+        by_row.append([term for term in terms if term])
+    return coupled_arm(robot, rows, by_row, name, group)
 
 
-def _terms_of(variant: str, scales: dict[str, float], suffix: str) -> tuple[Term, ...]:
-    """The added terms of a joint, from the scales of its parameters."""
-    make = {"smooth": smooth_sign, "stribeck": stribeck}
-    if variant in make:
-        term = make[variant](1.0)
-        return (make[variant](scales[f"{term.name}{suffix}"]),)
-    numbered = ((n, scales.get(f"{presliding_friction(1.0, n).name}{suffix}", 0.0)) for n in range(1, len(scales) + 1))
-    return tuple(presliding_friction(scale, number) for number, scale in numbered if scale > 0)
+def _added_term(name: str, scale: float) -> Term | None:
+    """The added term with the name of a parameter and a scale; None for any other parameter."""
+    if scale == 0.0:
+        return OF_MOTION.get(name)
+    by_name = {term.name: term for term in (smooth_sign(scale), stribeck(scale))}
+    return by_name.get(name) or presliding_friction(scale, int(name.rpartition(" ")[2]))

@@ -65,7 +65,7 @@ class IndependentJoint:
         valid, Phi = np.ones(len(q), np.bool_), np.zeros((len(q), 1, len(self.terms)))
         for i, term in enumerate(self.terms):
             z: Array | float = 0.0
-            if term.scale:
+            if term.has_z:
                 z, z_valid = friction_state(motion, 0, term)
                 valid &= z_valid
             add(term, q, dq, ddq, z, Phi[:, 0, i])
@@ -99,7 +99,7 @@ class IndependentJoint:
     def joint_dynamics(self, theta: Array, motion: ArmMotion) -> tuple[JointDynamics]:
         """Terms of q, dq and ddq as inertia and coefficients; friction with a state z as known effort."""
         c = bias_coefficients(self.terms, theta)
-        of_z = [theta_i * bool(term.scale) for theta_i, term in zip(theta, self.terms, strict=True)]
+        of_z = [theta_i * term.has_z for theta_i, term in zip(theta, self.terms, strict=True)]
         known_effort = self.bias(np.array(of_z), motion)[:, 0] if any(of_z) else np.zeros(len(motion.q))
         return (JointDynamics(np.full(len(motion.q), inertia_of(self.terms, theta)), c, known_effort),)
 
@@ -127,6 +127,6 @@ def inertia_of(terms: Sequence[Term], theta: Array) -> float:
 
 def bias_coefficients(terms: Sequence[Term], theta: Array) -> Coefficients:
     """Coefficients of b = sum_i theta_i b_i, for `bias`, without terms of z."""
-    rows = np.array([term.coefficients if not term.scale else np.zeros(7) for term in terms])
+    rows = np.array([term.coefficients if not term.has_z else np.zeros(7) for term in terms])
     constant, sine, cosine, linear, viscous, coulomb, presliding = (np.asarray(theta) @ rows).tolist()
     return constant, sine, cosine, linear, viscous, coulomb, presliding

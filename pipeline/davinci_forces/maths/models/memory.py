@@ -12,7 +12,7 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.bias import deflect
 from davinci_forces.maths.models.model import ArmMotion, Model
-from davinci_forces.maths.models.terms import Term
+from davinci_forces.maths.models.terms import Z_OF_MOTION, Term
 from davinci_forces.maths.signals.smoothing import segments
 
 RUN_IN = 3.0  # travel, in displacements, after which the initial deflection has decayed to exp(-2 RUN_IN)
@@ -22,9 +22,9 @@ PIECE_SAMPLES = 1 << 15  # samples of a piece
 def friction_state(motion: ArmMotion, joint: int, term: Term) -> tuple[Array, Booleans]:
     """State z (N,) of a term of one joint, and at which samples it is known (N,).
 
-    z is a deflection, a smooth sign or Stribeck's peak; a term without z has the state 0, known at all samples.
+    z is a deflection, a smooth sign, Stribeck's peak or a function of the motion; a term without z has the state 0.
     """
-    dq = motion.dq[:, joint]
+    q, dq = motion.q[:, joint], motion.dq[:, joint]
     if term.displacement:
         return motion.memory.get((joint, term.displacement)) or deflection(motion, joint, term.displacement)
     valid = np.ones(len(dq), np.bool_)
@@ -32,7 +32,7 @@ def friction_state(motion: ArmMotion, joint: int, term: Term) -> tuple[Array, Bo
         return np.tanh(dq / term.width), valid
     if term.decay_velocity:
         return np.sign(dq) * np.exp(-((dq / term.decay_velocity) ** 2)), valid
-    return np.zeros(len(dq)), valid
+    return Z_OF_MOTION[term.of_motion](q, dq) if term.of_motion else np.zeros(len(dq)), valid
 
 
 def deflection(motion: ArmMotion, joint: int, x_0: float) -> tuple[Array, Booleans]:

@@ -8,11 +8,28 @@ One tuple of terms therefore gives the regressor for identification, and inertia
 filter.  b_i is a linear combination of the functions `COEFFICIENTS` of `bias`.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+
+from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.constants import GRAVITY
 from davinci_forces.maths.models.bias import COEFFICIENTS, Coefficients
+
+Z_OF_MOTION: dict[str, Callable[[Array, Array], Array]] = {  # z of terms that depend on position and velocity only
+    "|dq|": lambda q, dq: np.abs(dq),
+    "|dq| dq": lambda q, dq: np.abs(dq) * dq,
+    "q dq": lambda q, dq: q * dq,
+    "q sign(dq)": lambda q, dq: q * np.sign(dq),
+    "q^2 sign(dq)": lambda q, dq: q**2 * np.sign(dq),
+    "q^2": lambda q, dq: q**2,
+    "q^3": lambda q, dq: q**3,
+    "sin 2q": lambda q, dq: np.sin(2.0 * q),
+    "cos 2q": lambda q, dq: np.cos(2.0 * q),
+    "sin 3q": lambda q, dq: np.sin(3.0 * q),
+    "cos 3q": lambda q, dq: np.cos(3.0 * q),
+}
 
 
 @dataclass(frozen=True)
@@ -20,9 +37,9 @@ class Term:
     """One column of the regressor: phi = a ddq + sum of b[f] f(q, dq) over functions f of `COEFFICIENTS`.
 
     `unit` is the parameter's unit: the joint fills {inertia}, {mass_moment}, {effort} and {position}.  `typst` is phi
-    in Typst's maths.  By physics, a `positive` parameter is not negative.  A term of z has one scale, in the joint's
-    units (`friction_state`).  It is the `displacement` of a deflection, the `width` of a smooth sign [velocity], or the
-    `decay_velocity` of Stribeck's peak.
+    in Typst's maths.  By physics, a `positive` parameter is not negative.  A term of z (`friction_state`) states its z:
+    by one scale in the joint's units, the `displacement` of a deflection, the `width` of a smooth sign [velocity], or
+    the `decay_velocity` of Stribeck's peak; or as a function `of_motion`, named in `Z_OF_MOTION`.
     """
 
     name: str
@@ -34,17 +51,24 @@ class Term:
     displacement: float = 0.0
     width: float = 0.0
     decay_velocity: float = 0.0
+    of_motion: str = ""
 
     def __post_init__(self) -> None:
         if unknown := sorted(set(self.b) - set(COEFFICIENTS)):
             raise ValueError(f"term {self.name!r}: no functions {unknown}; there are {', '.join(COEFFICIENTS)}")
-        if sum(scale > 0 for scale in (self.displacement, self.width, self.decay_velocity)) != int("z" in self.b):
-            message = "a term of z needs one displacement, width or velocity above 0, and other terms have none"
+        scales = (self.displacement, self.width, self.decay_velocity)
+        if sum(scale > 0 for scale in scales) + (self.of_motion in Z_OF_MOTION) != int(self.has_z):
+            message = "a term of z needs one displacement, width or velocity above 0, or one function of the motion"
             raise ValueError(f"term {self.name!r}: {message}")
 
     @property
+    def has_z(self) -> bool:
+        """Whether it is a term of z, which a filter takes as known from the measured motion."""
+        return "z" in self.b
+
+    @property
     def scale(self) -> float:
-        """The displacement or velocity that z depends on, in the joint's units; 0 for a term without z."""
+        """The displacement or velocity that z depends on, in the joint's units; 0 for a term without."""
         return self.displacement or self.width or self.decay_velocity
 
     @property
@@ -79,6 +103,23 @@ def stribeck(decay_velocity: float) -> Term:
     phi = 'op("sign")(dot(q)) e^(-(dot(q) \\/ dot(q)_"s")^2)'
     return Term("Stribeck friction", phi, "{effort}", b={"z": 1.0}, decay_velocity=decay_velocity)
 
+
+OF_MOTION = {
+    name: Term(name, typst, unit, b={"z": 1.0}, of_motion=function)
+    for name, typst, unit, function in (
+        ("viscous friction, difference", "abs(dot(q))", "{effort} s/{position}", "|dq|"),
+        ("quadratic friction", "abs(dot(q)) dot(q)", "{effort} s^2/{position}^2", "|dq| dq"),
+        ("viscous friction, slope", "q dot(q)", "{effort} s/{position}^2", "q dq"),
+        ("Coulomb friction, slope", 'q op("sign")(dot(q))', "{effort}/{position}", "q sign(dq)"),
+        ("Coulomb friction, curvature", 'q^2 op("sign")(dot(q))', "{effort}/{position}^2", "q^2 sign(dq)"),
+        ("stiffness, slope", "q^2", "{effort}/{position}^2", "q^2"),
+        ("stiffness, curvature", "q^3", "{effort}/{position}^3", "q^3"),
+        ("second harmonic, sine", "sin(2 q)", "{effort}", "sin 2q"),
+        ("second harmonic, cosine", "cos(2 q)", "{effort}", "cos 2q"),
+        ("third harmonic, sine", "sin(3 q)", "{effort}", "sin 3q"),
+        ("third harmonic, cosine", "cos(3 q)", "{effort}", "cos 3q"),
+    )
+}
 
 TERMS = {
     term.name: term for term in (inertia, lifted_mass, gravity_sin, gravity_cos, viscous, coulomb, offset, stiffness)

@@ -78,8 +78,13 @@ def _motion(q: Array, dq: Array | None, rate: float, cutoff: float, lag: float) 
     return _delay(smooth, lag * rate), _delay(velocity, lag * rate), _delay(acceleration, lag * rate)
 
 
+def delay_segments(x: Array, segment: Integers, samples: float) -> Array:
+    """Delay each segment of a signal (N,) by `samples`; at the start of a segment the signal is constant."""
+    return np.concatenate([_delay(x[part], samples) for part in segments(segment)]) if samples else x
+
+
 def _delay(x: Array, samples: float) -> Array:
-    """Delay a low-passed signal (N,) by `samples`, with a cubic spline; beyond its ends the signal is constant."""
+    """Delay a signal (N,) by `samples`, with a cubic spline; beyond its ends the signal is constant."""
     if samples == 0.0:
         return x
     from scipy.interpolate import make_interp_spline

@@ -7,24 +7,37 @@ from typing import Annotated
 import numpy as np
 
 from davinci_forces.errors import NotIdentifiable
-from davinci_forces.identification.candidates import Candidate, Library, candidates, reach_of
+from davinci_forces.identification.candidates import Candidate, Part, candidates, reach_of
 from davinci_forces.identification.chosen import (
     NEGLIGIBLE_EXCESS,
     BlockEstimate,
     Selection,
+    better,
     fit_consistent,
     parameters,
     select_candidate,
 )
 from davinci_forces.identification.observations import Observed, observe
 from davinci_forces.identification.regression import recorded_motion
+from davinci_forces.identification.search import Search, search_joints, searched_candidates
 from davinci_forces.identification.unseen import predictions
 from davinci_forces.identification.used import Identified
-from davinci_forces.maths.models.model import Model
+from davinci_forces.maths.models.independent import IndependentJoint
+from davinci_forces.maths.selection import standard_error
 from davinci_forces.maths.signals.smoothing import lowpass_segments
 from davinci_forces.maths.signals.velocity_map import over_velocity
-from davinci_forces.records import Average, Choice, Diagnostic, Fit, FrictionMap, Motion, Prediction, diagnostic
-from davinci_forces.robots.models import Reach
+from davinci_forces.records import (
+    Average,
+    Choice,
+    Diagnostic,
+    Fit,
+    FrictionMap,
+    ModelSearch,
+    Motion,
+    Prediction,
+    diagnostic,
+)
+from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.robots.robot import Robot
 
 MAPPED_ROLES = ("identification", "friction")
@@ -38,7 +51,7 @@ def run(
     *,
     fit: str,
     lowpass: float,
-) -> Iterator[Choice | Fit | Prediction | Diagnostic]:
+) -> Iterator[Choice | ModelSearch | Fit | Prediction | Diagnostic]:
     """Choose one model for the whole arm, estimate its parameters, and predict the samples that each refit left out.
 
     If a log moves several joints and the robot has a chain, one model describes these joints together.  Joints
@@ -49,26 +62,37 @@ def run(
     if not separate:
         return
     reaches = {name: reach_of(joint_logs, name) for name, joint_logs in separate.items()}
-    selection = select_candidate(candidates(robot, separate, arm, reaches, len(logs)), reaches, len(logs))
-    if selection is None:
+    fixed = select_candidate(candidates(robot, separate, arm, reaches, len(logs)), len(logs))
+    if fixed is None:
         message = "no model could be chosen: no candidate can be fitted with a part of the path left out"
         yield diagnostic("choose", "arm", "warning", f"{message}; record more of the path, or more periods")
         return
-    yield from choice(selection, reaches, logs)
+    searches = search_joints(robot, separate, arm, reaches, lowpass)
+    searched = select_candidate(searched_candidates(robot, searches, separate, arm, len(logs)), len(logs))
+    selection = better(fixed, searched)
+    yield from choice(selection, logs)
+    yield from (search_record(search) for search in searches)
     if not any(selection.physical):
         message = "no candidate has a positive definite inertia along the paths, so the scores alone decide"
         yield diagnostic("choose", "arm", "warning", f"{message}; the remarks of stage fit on each inertia say why")
-    shown = (*best_of_structures(selection), *best_of_setting(selection, fit), selection.chosen)
-    by_name = {f"{c.variant}.{c.estimator}": c for c in shown}
+    shown = (*best_of_structures(fixed), *best_of_setting(fixed, fit))
+    by_name = {f"{c.variant}.{c.estimator}": c for c in (*shown, fixed.chosen)}
     by_variant = {c.variant: name for name, c in by_name.items()}
     for name, candidate in by_name.items():
         if name != "independent.lse":
-            estimates = list(parameters(candidate, robot, reaches, len(logs)))
-            yield from (fit_record(candidate, candidate.estimator, *part) for part in estimates)
-            if candidate.variant != "independent" and by_variant[candidate.variant] == name:
-                yield from consistent_fits(candidate, estimates, robot, reaches)
+            yield from fits(candidate, len(logs), robot, by_variant[candidate.variant] == name)
+    yield from fits(selection.chosen, len(logs), robot, with_consistent=True)
     for candidate in by_name.values():
-        yield from predictions(candidate, candidate is selection.chosen, logs, robot, reaches)
+        yield from predictions(candidate, False, logs)
+    yield from predictions(selection.chosen, True, logs)
+
+
+def fits(candidate: Candidate, count: int, robot: Robot, with_consistent: bool) -> Iterator[Fit | Diagnostic]:
+    """Fit a candidate to all logs; `with_consistent` also within the parameters that a mechanism can have."""
+    estimates = list(parameters(candidate, count))
+    yield from (fit_record(candidate, candidate.estimator, part, estimate) for part, estimate in estimates)
+    if with_consistent and candidate.structure != "independent":
+        yield from consistent_fits(candidate, estimates, robot)
 
 
 def logs_of(motions: Iterable[Motion], averages: Iterable[Average], robot: Robot, lowpass: float) -> list[Observed]:
@@ -99,14 +123,14 @@ def modelled_logs(
     return {name: tuple(separate[name]) for name in order}, arm
 
 
-def choice(selection: Selection, reaches: dict[str, Reach], logs: Sequence[Observed]) -> Iterator[Choice]:
+def choice(selection: Selection, logs: Sequence[Observed]) -> Iterator[Choice]:
     """One Choice per group of the chosen model, with all candidates and their scores."""
     chosen = selection.chosen
-    for library in chosen.libraries:
+    for part in chosen.parts:
         yield Choice(
-            group=library.model.group,
-            model=chosen.variant,
-            friction=str(chosen.friction),
+            group=part.model.group,
+            model=CHOSEN,
+            friction=chosen.added,
             estimator=chosen.estimator,
             chosen=chosen.name,
             best=selection.best.name,
@@ -114,7 +138,7 @@ def choice(selection: Selection, reaches: dict[str, Reach], logs: Sequence[Obser
             logs=tuple(log.records[0].log for log in logs),
             candidate=np.array([c.name for c in selection.candidates], object),
             variant=np.array([c.variant for c in selection.candidates], object),
-            parameters=np.array([c.size(reaches) for c in selection.candidates]),
+            parameters=np.array([c.size for c in selection.candidates]),
             physical=np.array(selection.physical, int),
             score=selection.score,
             score_std=selection.score_std,
@@ -123,12 +147,33 @@ def choice(selection: Selection, reaches: dict[str, Reach], logs: Sequence[Obser
         )
 
 
+def search_record(search: Search) -> ModelSearch:
+    """The steps of the search for the model of a joint."""
+    steps, chosen = search.steps, search.chosen
+    return ModelSearch(
+        joint=search.joint,
+        structure=search.structure,
+        cutoff=chosen.processing.cutoff,
+        effort_lag=chosen.processing.effort_lag,
+        ridge=chosen.strength,
+        term=tuple(term.name for term in chosen.terms),
+        term_scale=tuple(term.scale for term in chosen.terms),
+        chosen_step=steps.index(chosen),
+        step=np.array([step.name for step in steps], object),
+        step_cutoff=np.array([step.processing.cutoff for step in steps]),
+        step_lag=np.array([step.processing.effort_lag for step in steps]),
+        step_ridge=np.array([step.strength for step in steps]),
+        parameters=np.array([step.size for step in steps]),
+        score=np.array([step.score for step in steps]),
+        score_std=np.array([standard_error(step.errors, search.best.errors) for step in steps]),
+    )
+
+
 def best_of_structures(selection: Selection) -> list[Candidate]:
     """The best candidate of each structure that adds to the joints' own terms, for comparison."""
-    scores = dict(zip((c.name for c in selection.candidates), selection.score.tolist(), strict=True))
     more = [c for c in selection.candidates if c.variant != "independent"]
     structures = dict.fromkeys(c.structure for c in more)
-    return [min((c for c in more if c.structure == s), key=lambda c: scores[c.name]) for s in structures]
+    return [min((c for c in more if c.structure == s), key=selection.score_of) for s in structures]
 
 
 def best_of_setting(selection: Selection, fit: str) -> list[Candidate]:
@@ -137,29 +182,24 @@ def best_of_setting(selection: Selection, fit: str) -> list[Candidate]:
     Consistent parameters are computed from the best candidate of their variant, with any estimator.
     """
     variant, _, estimator = fit.rpartition(".")
-    pairs = zip(selection.score.tolist(), selection.candidates, strict=True)
-    matching = [(score, c) for score, c in pairs if c.variant == variant and estimator in (c.estimator, "consistent")]
-    return [min(matching, key=lambda pair: pair[0])[1]] if matching else []
+    matching = [c for c in selection.candidates if c.variant == variant and estimator in (c.estimator, "consistent")]
+    return [min(matching, key=selection.score_of)] if matching else []
 
 
 def consistent_fits(
-    candidate: Candidate,
-    estimates: Sequence[tuple[Model, Library, BlockEstimate]],
-    robot: Robot,
-    reaches: dict[str, Reach],
+    candidate: Candidate, estimates: Sequence[tuple[Part, BlockEstimate]], robot: Robot
 ) -> Iterator[Fit | Diagnostic]:
     """Constrain the parameters of a candidate to be physically consistent, and state how much worse they fit."""
     name = f"{candidate.variant}.{candidate.estimator}"
-    for (model, library, free), ridge in zip(estimates, candidate.ridges(), strict=True):
-        cells = library.by_block.columns(library.columns(candidate.friction, reaches))
-        every_cell = cells.sum_cells(np.ones(len(cells.gram), np.bool_))
+    for part, free in estimates:
+        model = part.model
         try:
-            consistent = fit_consistent(model, library, every_cell, ridge, free)
+            consistent = fit_consistent(part, free)
         except NotIdentifiable as error:
             message = f"{model.group}: {candidate.variant}.consistent is left out: {error}"
             yield diagnostic("choose", model.group, "warning", message)
             continue
-        yield fit_record(candidate, "consistent", model, library, consistent.estimate)
+        yield fit_record(candidate, "consistent", part, consistent.estimate)
         if consistent.excess > NEGLIGIBLE_EXCESS:
             units = [robot.joint(effort).unit("{effort}") for effort in model.efforts]
             errors = zip(model.efforts, consistent.rmse, consistent.rmse_free, units, strict=True)
@@ -169,14 +209,19 @@ def consistent_fits(
             yield diagnostic("choose", model.group, "note", f"{message}; {follows}")
 
 
-def fit_record(candidate: Candidate, estimator: str, model: Model, library: Library, estimate: BlockEstimate) -> Fit:
-    """The Fit of a candidate to all logs."""
+def fit_record(candidate: Candidate, estimator: str, part: Part, estimate: BlockEstimate) -> Fit:
+    """The Fit of a part of a candidate to all logs."""
+    model, log = part.model, part.library.logs[0]
+    processing = [log.processing[log.joints.index(effort)] for effort in model.efforts]
     defined = model.parameters
     return Fit(
         group=model.group,
         model=candidate.variant,
         estimator=estimator,
-        logs=tuple(log.records[0].log for log in library.logs),
+        structure="independent" if isinstance(model, IndependentJoint) else "coupled",
+        cutoff=tuple(p.cutoff for p in processing),
+        effort_lag=tuple(p.effort_lag for p in processing),
+        logs=tuple(log.records[0].log for log in part.library.logs),
         periods=0,
         correlated_lags=0,
         parameter=np.array([parameter.name for parameter in defined], object),

@@ -88,7 +88,7 @@ def run(
         parts += [sampled_part(model, motion, lowpass, prior) for motion in unaveraged if motion.joint == joint.name]
         if parts:
             others = moving_with(joint.name, [part.log for part in parts], moving)
-            yield from fit_joint(model, parts, robot, joint, others)
+            yield from fit_joint(model, parts, robot, joint, others, lowpass)
 
 
 def apply(
@@ -111,7 +111,7 @@ def apply(
 
 
 def fit_joint(
-    model: IndependentJoint, parts: Sequence[Part], robot: Robot, joint: Joint, others: Sequence[str]
+    model: IndependentJoint, parts: Sequence[Part], robot: Robot, joint: Joint, others: Sequence[str], lowpass: float
 ) -> Iterator[
     Fit | CrossFit | FittedPaths | Guess | Identifiability | MeasurementNoise | Residual | SwarmSearch | Diagnostic
 ]:
@@ -125,7 +125,7 @@ def fit_joint(
             yield diagnostic("fit", model.group, "warning", f"{model.group}: {name} is left out: {error}")
             continue
         estimates[name] = estimate
-        yield fit_record(parts, model, name, regression, estimate)
+        yield fit_record(parts, model, name, regression, estimate, lowpass)
         yield from residuals(parts, model, name, estimate)
         yield from (swarm_search(model, name, search) for search in estimate.searches)
     yield from identifiability(model, parts, regression, estimates, robot, joint, others)
@@ -228,7 +228,12 @@ def has_positive_inertia(model: IndependentJoint, theta: Array, parts: Sequence[
 
 
 def fit_record(
-    parts: Sequence[Part], model: IndependentJoint, name: str, regression: Regression, estimate: Estimate
+    parts: Sequence[Part],
+    model: IndependentJoint,
+    name: str,
+    regression: Regression,
+    estimate: Estimate,
+    lowpass: float,
 ) -> Fit:
     """The Fit of an estimate, with its mean square error and R2 on its own data."""
     residual = fit_residual(regression, estimate)
@@ -236,6 +241,9 @@ def fit_record(
         group=model.group,
         model=model.name,
         estimator=name,
+        structure="independent",
+        cutoff=(lowpass,),
+        effort_lag=(0.0,),
         logs=tuple(part.log for part in parts),
         samples=len(regression.tau),
         periods=min(part.periods for part in parts),

@@ -103,8 +103,8 @@ def apply(
             log=motion.log, joint=motion.joint, role=motion.role, stand_in=stand_in, path=path,
             scheme=refit.scheme if refit else "" if is_fitted else motion.role,
             path_unseen=refit.path if refit else "" if is_fitted else path,
-            rate=motion.rate, at_rest=motion.at_rest, t=motion.t, q=motion.q, dq=motion.dq, ddq=motion.ddq,
-            q_measured=motion.q_measured, dq_measured=motion.dq_measured, tau=motion.tau, segment=motion.segment,
+            rate=motion.rate, velocity=motion.velocity, at_rest=motion.at_rest, t=motion.t, tau=motion.tau,
+            segment=motion.segment,
             tau_hat_unseen=at_samples(refit, motion) if refit else np.full(len(motion), np.nan), **terms,
         )  # fmt: skip
 

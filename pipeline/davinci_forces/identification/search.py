@@ -1,0 +1,283 @@
+"""The search for the model of each joint: its terms, the processing of its motion and effort, and its ridge.
+
+A step changes the processing, or adds the term that most reduces the error on parts of the path left out.  The search
+ends where no term reduces it.  Of all steps, the first one is chosen that is not clearly worse than the best: by at
+most one standard error of the difference.  Errors of all steps are those of the scores, whatever a step's low-pass.
+"""
+
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+
+from davinci_forces.identification.candidates import (
+    Candidate,
+    Library,
+    Part,
+    coupled_joints,
+    library,
+    residual_variance,
+    ridge_name,
+    share_parameters,
+)
+from davinci_forces.identification.chosen import schemes_of
+from davinci_forces.identification.observations import Observed, Processing
+from davinci_forces.maths.arrays import Booleans
+from davinci_forces.maths.models.coupled import CoupledArm
+from davinci_forces.maths.models.independent import IndependentJoint
+from davinci_forces.maths.models.terms import (
+    OF_MOTION,
+    TERMS,
+    Term,
+    presliding_friction,
+    smooth_sign,
+    stribeck,
+)
+from davinci_forces.maths.selection import CLEARLY, CrossValidation, Ridge, cross_validate, standard_error
+from davinci_forces.records.prediction import CHOSEN
+from davinci_forces.robots.models import OPTIONAL_TERMS, Reach, independent, round_scale
+from davinci_forces.robots.robot import Joint, Kind, Robot
+
+CUTOFFS = (5.0, 6.0, 8.0, 10.0, 12.0, 14.0, 17.0, 20.0, 25.0, 30.0)  # [Hz], and the study's own
+MAX_CUTOFF = 0.4  # of the sampling rate
+LAGS = tuple(0.0025 * k for k in range(-4, 5))  # [s]
+RIDGES = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
+DISPLACEMENTS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1)  # of the range of the motion
+WIDTHS = (0.03, 0.1, 0.3)  # of the root mean square velocity
+DECAY_VELOCITIES = (0.1, 0.3, 0.6)  # likewise
+MAX_PRESLIDING = 2  # deflections of one joint
+MAX_TERMS = 8  # added to one joint
+MAX_SAMPLES_SEARCH = 20_000  # of each log
+MAX_LOGS_SEARCH = 6
+
+
+class Step(NamedTuple):
+    """One step of a search, with its error on parts of the path left out."""
+
+    name: str
+    processing: Processing
+    terms: tuple[Term, ...]
+    strength: float  # of the ridge
+    size: int  # number of parameters
+    errors: CrossValidation
+
+    @property
+    def score(self) -> float:
+        """The relative error."""
+        return self.errors.score
+
+
+class Search(NamedTuple):
+    """The steps of the search for the model of a joint, and the chosen one."""
+
+    joint: str
+    structure: str
+    steps: tuple[Step, ...]
+    chosen: Step
+    best: Step
+
+
+class JointSearch:
+    """The search for the model of one joint."""
+
+    def __init__(self, robot: Robot, joint: str, structure: str, logs: Sequence[Observed], reach: Reach) -> None:
+        self.robot, self.joint, self.structure, self.reach = robot, joint, structure, reach
+        self.logs = [log._replace(number=number) for number, log in enumerate(logs)]
+        self._schemes: list[Booleans] = []
+        self._libraries: dict[tuple[Processing, tuple[Term, ...]], Library] = {}
+        self._steps: dict[tuple[Processing, tuple[Term, ...]], Step | None] = {}
+
+    def model(self, terms: Sequence[Term], name: str = CHOSEN) -> CoupledArm | IndependentJoint:
+        """Return the model with these added terms."""
+        return joint_model(self.robot, self.joint, self.structure, terms, name)
+
+    def library(self, processing: Processing, terms: tuple[Term, ...]) -> Library:
+        """Return the equations of the model with these added terms."""
+        key = processing, terms
+        if key not in self._libraries:
+            logs = [log.processed([processing] * len(log.records)) for log in self.logs]
+            self._libraries = {key: library(self.model(terms), logs, len(logs))}  # only the last one is used again
+        return self._libraries[key]
+
+    def step(
+        self, name: str, processing: Processing, terms: tuple[Term, ...], near: float, among: tuple[Term, ...] = ()
+    ) -> Step | None:
+        """Cross-validate a model with the best of the ridges `near` one; None if it cannot be refitted.
+
+        `among` are the terms of a larger model, whose equations are used.
+        """
+        key = processing, terms
+        if key not in self._steps:
+            equations, model = self.library(processing, among or terms), self.model(terms)
+            columns = equations.columns(model)
+            self._schemes = self._schemes or schemes_of(equations.cells.scored.squares, len(self.logs))
+            cells, scored = (x.columns(columns) for x in (equations.cells.by_block, equations.cells.scored))
+            steps = []
+            for strength in neighbours(RIDGES, near, 1) if near else RIDGES:
+                ridge = Ridge(strength, np.ones(1), equations.combination)
+                try:
+                    errors = cross_validate(cells, ridge, self._schemes, scored)
+                except np.linalg.LinAlgError:
+                    continue
+                steps.append(Step(name, processing, terms, strength, len(columns), errors))
+            steps = steps if self._schemes else []
+            self._steps[key] = min(steps, key=lambda step: step.score) if steps else None
+        step = self._steps[key]
+        return step._replace(name=name) if step else None
+
+    def run(self, start: Processing) -> Search | None:
+        """Search from the model without added terms; None if it cannot be refitted."""
+        step = self.step("joint terms", start, (), 0.0)
+        if step is None:
+            return None
+        steps, is_first = [step], True
+        while step is not None:
+            moved = self.improve_processing(steps[-1], start, is_first)
+            steps += [moved] * (moved.processing != steps[-1].processing)
+            is_first, step = False, self.add_term(steps[-1])
+            steps += [step] if step else []
+        best = min(steps, key=lambda step: step.score)
+        chosen = next(s for s in steps if s.score - best.score <= CLEARLY * standard_error(s.errors, best.errors))
+        return Search(self.joint, self.structure, tuple(steps), chosen, best)
+
+    def improve_processing(self, step: Step, start: Processing, everywhere: bool) -> Step:
+        """Change the cutoff and the lag in turn while that reduces the error; search `everywhere`, or next to them."""
+        rate = min(log.records[0].rate for log in self.logs)
+        cutoffs = sorted({*(x for x in CUTOFFS if x <= MAX_CUTOFF * rate), start.cutoff})
+        while True:
+            cutoff, lag = step.processing
+            options = [Processing(x, lag) for x in (cutoffs if everywhere else neighbours(cutoffs, cutoff, 1))]
+            better = self.best_processing(step, options)
+            lags = LAGS if everywhere else neighbours(LAGS, lag, 1)
+            better = self.best_processing(better, [Processing(better.processing.cutoff, x) for x in lags])
+            if better.processing == step.processing:
+                return step
+            step, everywhere = better, False
+
+    def best_processing(self, step: Step, options: Sequence[Processing]) -> Step:
+        """Return the step with the best of some processings."""
+        steps = (self.step("low-pass and lag", option, step.terms, step.strength) for option in options)
+        return min((step, *(s for s in steps if s)), key=lambda s: s.score)
+
+    def add_term(self, step: Step) -> Step | None:
+        """Return the step with one more term that has the least error; None if no term reduces it."""
+        options = dict(self.options(step.terms)) if len(step.terms) < MAX_TERMS else {}
+        among = tuple(dict.fromkeys((*step.terms, *(term for terms in options.values() for term in terms))))
+        steps = [
+            self.step(name, step.processing, (*step.terms, *terms), step.strength, among)
+            for name, terms in options.items()
+        ]
+        least = min((s for s in steps if s), key=lambda s: s.score, default=step)
+        return least if least.score < step.score else None
+
+    def options(self, used: Sequence[Term]) -> Iterator[tuple[str, tuple[Term, ...]]]:
+        """Return the terms that may be added to those in use, by name.
+
+        Coulomb friction by direction is the sum of Coulomb friction and an offset, which coupled models have.
+        """
+        joint, names = self.robot.joint(self.joint), {term.name for term in used}
+        number = 1 + sum(term.displacement > 0 for term in used)
+        if number <= MAX_PRESLIDING:
+            for share in DISPLACEMENTS:
+                term = presliding_friction(round_scale(share * self.reach.displacement), number)
+                if term.displacement not in {t.displacement for t in used}:
+                    yield f"presliding friction, {100 * share:g} % of the range", (term,)
+        for make, shares in ((smooth_sign, WIDTHS), (stribeck, DECAY_VELOCITIES)):
+            for share in shares:
+                term = make(round_scale(share * self.reach.velocity))
+                if term.name not in names:
+                    yield f"{term.name}, {100 * share:g} % of the velocity", (term,)
+        for terms in sets_of_terms(joint, self.structure):
+            if not names & {term.name for term in terms}:
+                yield terms[0].name.partition(", sine")[0], terms
+
+
+def sets_of_terms(joint: Joint, structure: str) -> Iterator[tuple[Term, ...]]:
+    """Return the sets of terms without a scale that a joint's model may be given; angles have harmonics."""
+    pairs = [terms for terms in pairwise(OF_MOTION.values()) if terms[0].name.endswith(", sine")]
+    yield from ((term,) for term in OF_MOTION.values() if "harmonic" not in term.name)
+    yield from pairs if joint.kind is Kind.REVOLUTE else []
+    if structure == "independent":
+        lacking = [TERMS[name] for name in OPTIONAL_TERMS if name not in {term.name for term in joint.terms}]
+        sine = tuple(term for term in lacking if "gravity" in term.name)
+        yield from ((term,) for term in lacking if term not in sine)
+        yield from [sine] if sine and joint.kind is Kind.REVOLUTE else []
+
+
+def joint_model(
+    robot: Robot, joint: str, structure: str, terms: Sequence[Term], name: str = CHOSEN
+) -> CoupledArm | IndependentJoint:
+    """Return the model of a joint with added terms."""
+    if structure == "independent":
+        return independent(robot.joint(joint), terms, name)
+    return coupled_joints(robot, [[j.name for j in robot.joints].index(joint)], {joint: terms}, name)
+
+
+def neighbours(values: Sequence[float], value: float, reach: int) -> Sequence[float]:
+    """Return the value of a sorted list that is nearest to a number, and up to `reach` values on either side."""
+    i = int(np.argmin(np.abs(np.array(values) - value)))
+    return values[max(i - reach, 0) : i + reach + 1]
+
+
+def searched_logs(logs: Sequence[Observed]) -> list[Observed]:
+    """Return at most `MAX_LOGS_SEARCH` logs, evenly spread, and the first `MAX_SAMPLES_SEARCH` samples of each."""
+    numbers = np.unique(np.linspace(0, len(logs) - 1, min(len(logs), MAX_LOGS_SEARCH)).round().astype(int))
+    return [logs[number].first_samples(MAX_SAMPLES_SEARCH) for number in numbers.tolist()]
+
+
+def search_joints(
+    robot: Robot,
+    separate: dict[str, tuple[Observed, ...]],
+    arm: tuple[Observed, ...],
+    reaches: dict[str, Reach],
+    lowpass: float,
+) -> list[Search]:
+    """Search for the model of each joint, from the structure that errs least without added terms."""
+    searches = []
+    for joint, logs in separate.items():
+        by_structure = {"independent": logs, **({"coupled": arm} if arm else {})}
+        starts = [
+            JointSearch(robot, joint, structure, searched_logs(structure_logs), reaches[joint])
+            for structure, structure_logs in by_structure.items()
+        ]
+        processing = Processing(lowpass, 0.0)
+        steps = [(step, start) for start in starts if (step := start.step("", processing, (), 0.0))]
+        if steps:
+            _, search = min(steps, key=lambda pair: pair[0].score)
+            searches += [result] if (result := search.run(processing)) else []
+    return searches if len(searches) == len(separate) else []
+
+
+def searched_candidates(
+    robot: Robot,
+    searches: Sequence[Search],
+    separate: dict[str, tuple[Observed, ...]],
+    arm: tuple[Observed, ...],
+    count: int,
+) -> list[Candidate]:
+    """Return the models that were searched, each joint by itself, and with links that the joints share."""
+    if not searches:
+        return []
+    parts = []
+    for search in searches:
+        step, logs = search.chosen, separate[search.joint] if search.structure == "independent" else arm
+        model = joint_model(robot, search.joint, search.structure, step.terms)
+        equations = library(model, [log.processed([step.processing] * len(log.records)) for log in logs], count)
+        ridge = Ridge(step.strength, np.ones(1), equations.combination)
+        parts.append(Part(model, equations, equations.columns(model), ridge))
+    terms = {search.joint: search.chosen.terms for search in searches}
+    added = "; ".join(f"{joint}: {', '.join(t.name for t in of_joint) or 'none'}" for joint, of_joint in terms.items())
+    models = [Candidate("searched, joint by joint" if len(parts) > 1 else "searched", CHOSEN, added, tuple(parts))]
+    rows = [i for i, joint in enumerate(robot.joints) if joint.name in terms]
+    if all(search.structure == "coupled" for search in searches) and share_parameters(robot, rows):
+        by_joint = {search.joint: search.chosen.processing for search in searches}
+        processing = [by_joint.get(joint.name, arm[0].processing[0]) for joint in robot.joints]
+        together = coupled_joints(robot, rows, terms, CHOSEN)
+        equations = library(together, [log.processed(processing) for log in arm], count)
+        weights = 1.0 / np.array([residual_variance(part) for part in parts])
+        part = Part(together, equations, equations.columns(together), Ridge(0.0, weights, equations.combination))
+        models += [
+            Candidate(f"searched, links shared{ridge_name(x)}", CHOSEN, added, (part.with_ridge(x),)) for x in RIDGES
+        ]
+    return models
