@@ -56,6 +56,11 @@ class Part(NamedTuple):
     columns: list[int]
     ridge: Ridge
 
+    @property
+    def is_coupled(self) -> bool:
+        """Whether its joints are coupled to the others."""
+        return isinstance(self.model, CoupledArm)
+
     def with_ridge(self, strength: float) -> "Part":
         """Return the part with a ridge of another strength."""
         return self._replace(ridge=self.ridge._replace(strength=strength))
@@ -87,7 +92,7 @@ class Candidate(NamedTuple):
     @property
     def structure(self) -> str:
         """Whether joints are modelled as `independent` or as `coupled`."""
-        return "coupled" if isinstance(self.parts[0].model, CoupledArm) else "independent"
+        return "coupled" if self.parts[0].is_coupled else "independent"
 
     @property
     def estimator(self) -> str:

@@ -233,20 +233,22 @@ def search_joints(
     reaches: dict[str, Reach],
     lowpass: float,
 ) -> list[Search]:
-    """Search for the model of each joint, from the structure that errs least without added terms."""
+    """Search for the model of each joint, by itself and, if `arm` has logs of all joints, coupled to the others."""
     searches = []
     for joint, logs in separate.items():
-        by_structure = {"independent": logs, **({"coupled": arm} if arm else {})}
-        starts = [
-            JointSearch(robot, joint, structure, searched_logs(structure_logs), reaches[joint])
-            for structure, structure_logs in by_structure.items()
-        ]
-        processing = Processing(lowpass, 0.0)
-        steps = [(step, start) for start in starts if (step := start.step("", processing, (), 0.0))]
-        if steps:
-            _, search = min(steps, key=lambda pair: pair[0].score)
-            searches += [result] if (result := search.run(processing)) else []
-    return searches if len(searches) == len(separate) else []
+        for structure, used in (("independent", logs), ("coupled", arm)):
+            if used:
+                search = JointSearch(robot, joint, structure, searched_logs(used), reaches[joint])
+                searches += [result] if (result := search.run(Processing(lowpass, 0.0))) else []
+    return searches
+
+
+def best_of_joints(searches: Sequence[Search]) -> list[Search]:
+    """Return the search of each joint, with the structure of the lowest error."""
+    by_joint: dict[str, list[Search]] = {}
+    for search in searches:
+        by_joint.setdefault(search.joint, []).append(search)
+    return [min(of_joint, key=lambda search: search.chosen.score) for of_joint in by_joint.values()]
 
 
 def searched_candidates(
@@ -256,28 +258,39 @@ def searched_candidates(
     arm: tuple[Observed, ...],
     count: int,
 ) -> list[Candidate]:
-    """Return the models that were searched, each joint by itself, and with links that the joints share."""
-    if not searches:
+    """Return the models that were searched: the best of each joint by itself, and coupled joints that share links."""
+    best = best_of_joints(searches)
+    if len(best) < len(separate):
         return []
-    parts = []
-    for search in searches:
-        step, logs = search.chosen, separate[search.joint] if search.structure == "independent" else arm
-        model = joint_model(robot, search.joint, search.structure, step.terms)
-        equations = library(model, [log.processed([step.processing] * len(log.records)) for log in logs], count)
-        ridge = Ridge(step.strength, np.ones(1), equations.combination)
-        parts.append(Part(model, equations, equations.columns(model), ridge))
-    terms = {search.joint: search.chosen.terms for search in searches}
-    added = "; ".join(f"{joint}: {', '.join(t.name for t in of_joint) or 'none'}" for joint, of_joint in terms.items())
-    models = [Candidate("searched, joint by joint" if len(parts) > 1 else "searched", CHOSEN, added, tuple(parts))]
-    rows = [i for i, joint in enumerate(robot.joints) if joint.name in terms]
-    if all(search.structure == "coupled" for search in searches) and share_parameters(robot, rows):
-        by_joint = {search.joint: search.chosen.processing for search in searches}
-        processing = [by_joint.get(joint.name, arm[0].processing[0]) for joint in robot.joints]
-        together = coupled_joints(robot, rows, terms, CHOSEN)
-        equations = library(together, [log.processed(processing) for log in arm], count)
-        weights = 1.0 / np.array([residual_variance(part) for part in parts])
-        part = Part(together, equations, equations.columns(together), Ridge(0.0, weights, equations.combination))
+    parts = [searched_part(robot, s, separate[s.joint] if s.structure == "independent" else arm, count) for s in best]
+    name = "searched, joint by joint" if len(parts) > 1 else "searched"
+    models = [Candidate(name, CHOSEN, describe_terms(best), tuple(parts))]
+    coupled = [search for search in searches if search.structure == "coupled"]
+    rows = [i for i, joint in enumerate(robot.joints) if joint.name in separate]
+    if len(coupled) == len(separate) and share_parameters(robot, rows):
+        terms = {search.joint: search.chosen.terms for search in coupled}
+        processing = {search.joint: search.chosen.processing for search in coupled}
+        by_joint = [processing.get(joint.name, arm[0].processing[0]) for joint in robot.joints]
+        model = coupled_joints(robot, rows, terms, CHOSEN)
+        equations = library(model, [log.processed(by_joint) for log in arm], count)
+        weights = 1.0 / np.array([residual_variance(searched_part(robot, search, arm, count)) for search in coupled])
+        part = Part(model, equations, equations.columns(model), Ridge(0.0, weights, equations.combination))
         models += [
-            Candidate(f"searched, links shared{ridge_name(x)}", CHOSEN, added, (part.with_ridge(x),)) for x in RIDGES
+            Candidate(f"searched, links shared{ridge_name(x)}", CHOSEN, describe_terms(coupled), (part.with_ridge(x),))
+            for x in RIDGES
         ]
     return models
+
+
+def searched_part(robot: Robot, search: Search, logs: Sequence[Observed], count: int) -> Part:
+    """Return the chosen model of a joint, with the equations of all its logs."""
+    step = search.chosen
+    model = joint_model(robot, search.joint, search.structure, step.terms)
+    equations = library(model, [log.processed([step.processing] * len(log.records)) for log in logs], count)
+    return Part(model, equations, equations.columns(model), Ridge(step.strength, np.ones(1), equations.combination))
+
+
+def describe_terms(searches: Sequence[Search]) -> str:
+    """Name the added terms of each joint."""
+    names = ((search.joint, ", ".join(term.name for term in search.chosen.terms)) for search in searches)
+    return "; ".join(f"{joint}: {terms or 'none'}" for joint, terms in names)

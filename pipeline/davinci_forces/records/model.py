@@ -208,8 +208,9 @@ class Choice(Record):
 
 @dataclass(frozen=True, eq=False)
 class ModelSearch(JointRecord):
-    """The steps of the search for the model of a joint, and the processing and terms of the chosen step."""
+    """The steps of the search for the model of a joint in a structure; processing and terms are of the chosen step."""
 
+    KEY = ("joint", "structure")
     ROWS = "step"
 
     structure: str
@@ -218,6 +219,7 @@ class ModelSearch(JointRecord):
     ridge: float
     term: Names
     term_scale: tuple[float, ...]
+    used: int
     chosen_step: int
     step: Labels
     step_cutoff: Column
@@ -228,7 +230,9 @@ class ModelSearch(JointRecord):
     score_std: Column
 
     def published(self) -> Iterator[Published]:
-        """The cutoff, the lag, the ridge and the added terms, each with its scale."""
+        """The cutoff, the lag, the ridge and the added terms, each with its scale, if the chosen model has them."""
+        if not self.used:
+            return
         prefix = f"choice.{self.joint}"
         yield from self.publish(prefix, "cutoff", "effort_lag", "ridge")
         for i, term in enumerate(self.term):

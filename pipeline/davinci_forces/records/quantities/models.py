@@ -128,6 +128,7 @@ MODELS = {
     "ridge": Quantity("strength of the ridge, relative to the columns' squares"),
     "term": Quantity("added terms", ""),
     "term_scale": Quantity("displacement or velocity in an added term, in the joint's units; 0 for none", ""),
+    "used": Quantity("1 if the chosen model has these terms, else 0"),
     "chosen_step": Quantity("number of the chosen step, from 0"),
     "step": Quantity("change of the step", ""),
     "step_cutoff": Quantity("cutoff of the low-pass of motion and effort", "Hz"),

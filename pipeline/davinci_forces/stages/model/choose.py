@@ -22,7 +22,6 @@ from davinci_forces.identification.regression import recorded_motion
 from davinci_forces.identification.search import Search, search_joints, searched_candidates
 from davinci_forces.identification.unseen import predictions
 from davinci_forces.identification.used import Identified
-from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.selection import standard_error
 from davinci_forces.maths.signals.smoothing import lowpass_segments
 from davinci_forces.maths.signals.velocity_map import over_velocity
@@ -71,7 +70,7 @@ def run(
     searched = select_candidate(searched_candidates(robot, searches, separate, arm, len(logs)), len(logs))
     selection = better(fixed, searched)
     yield from choice(selection, logs)
-    yield from (search_record(search) for search in searches)
+    yield from (search_record(search, is_used(search, selection.chosen)) for search in searches)
     if not any(selection.physical):
         message = "no candidate has a positive definite inertia along the paths, so the scores alone decide"
         yield diagnostic("choose", "arm", "warning", f"{message}; the remarks of stage fit on each inertia say why")
@@ -147,7 +146,13 @@ def choice(selection: Selection, logs: Sequence[Observed]) -> Iterator[Choice]:
         )
 
 
-def search_record(search: Search) -> ModelSearch:
+def is_used(search: Search, chosen: Candidate) -> bool:
+    """Whether the chosen candidate has the terms of a search."""
+    parts = [part for part in chosen.parts if search.joint in part.model.efforts]
+    return chosen.name.startswith("searched") and parts[0].is_coupled == (search.structure == "coupled")
+
+
+def search_record(search: Search, used: bool) -> ModelSearch:
     """The steps of the search for the model of a joint."""
     steps, chosen = search.steps, search.chosen
     return ModelSearch(
@@ -158,6 +163,7 @@ def search_record(search: Search) -> ModelSearch:
         ridge=chosen.strength,
         term=tuple(term.name for term in chosen.terms),
         term_scale=tuple(term.scale for term in chosen.terms),
+        used=int(used),
         chosen_step=steps.index(chosen),
         step=np.array([step.name for step in steps], object),
         step_cutoff=np.array([step.processing.cutoff for step in steps]),
@@ -218,7 +224,7 @@ def fit_record(candidate: Candidate, estimator: str, part: Part, estimate: Block
         group=model.group,
         model=candidate.variant,
         estimator=estimator,
-        structure="independent" if isinstance(model, IndependentJoint) else "coupled",
+        structure="coupled" if part.is_coupled else "independent",
         cutoff=tuple(p.cutoff for p in processing),
         effort_lag=tuple(p.effort_lag for p in processing),
         logs=tuple(log.records[0].log for log in part.library.logs),
