@@ -1,8 +1,9 @@
 """The search for the model of each joint: its terms, the processing of its motion and effort, and its ridge.
 
-A step changes the processing, or adds the term that most reduces the error on parts of the path left out.  The search
-ends where no term reduces it.  Of all steps, the first one is chosen that is not clearly worse than the best: by at
-most one standard error of the difference.  Errors of all steps are those of the scores, whatever a step's low-pass.
+A step changes the processing, or adds the term that most reduces the error on parts of the path left out, and that
+reduces it on at least two thirds of the blocks.  The search ends where there is no such term.  Of all steps, the first
+one is chosen that is not clearly worse than the best: by at most one standard error of the difference.  The errors of
+all steps are those of the scores, whatever a step's low-pass.
 """
 
 from collections.abc import Iterator, Sequence
@@ -23,7 +24,7 @@ from davinci_forces.identification.candidates import (
 )
 from davinci_forces.identification.chosen import schemes_of
 from davinci_forces.identification.observations import Observed, Processing
-from davinci_forces.maths.arrays import Booleans
+from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.terms import (
@@ -48,6 +49,7 @@ WIDTHS = (0.03, 0.1, 0.3)  # of the root mean square velocity
 DECAY_VELOCITIES = (0.1, 0.3, 0.6)  # likewise
 MAX_PRESLIDING = 2  # deflections of one joint
 MAX_TERMS = 8  # added to one joint
+MIN_BETTER_BLOCKS = 2 / 3  # share of the blocks of path that a step has to improve
 MAX_SAMPLES_SEARCH = 20_000  # of each log
 MAX_LOGS_SEARCH = 6
 
@@ -66,6 +68,11 @@ class Step(NamedTuple):
     def score(self) -> float:
         """The relative error."""
         return self.errors.score
+
+    def improves(self, step: "Step") -> bool:
+        """Whether it has a lower error than another step, and so in most blocks of path."""
+        better = (self.errors.unseen[0] < step.errors.unseen[0]).mean()
+        return bool(self.score < step.score and better >= MIN_BETTER_BLOCKS)
 
 
 class Search(NamedTuple):
@@ -134,7 +141,7 @@ class JointSearch:
         steps, is_first = [step], True
         while step is not None:
             moved = self.improve_processing(steps[-1], start, is_first)
-            steps += [moved] * (moved.processing != steps[-1].processing)
+            steps += [moved] if moved.improves(steps[-1]) else []
             is_first, step = False, self.add_term(steps[-1])
             steps += [step] if step else []
         best = min(steps, key=lambda step: step.score)
@@ -168,8 +175,7 @@ class JointSearch:
             self.step(name, step.processing, (*step.terms, *terms), step.strength, among)
             for name, terms in options.items()
         ]
-        least = min((s for s in steps if s), key=lambda s: s.score, default=step)
-        return least if least.score < step.score else None
+        return min((s for s in steps if s and s.improves(step)), key=lambda s: s.score, default=None)
 
     def options(self, used: Sequence[Term]) -> Iterator[tuple[str, tuple[Term, ...]]]:
         """Return the terms that may be added to those in use, by name.
@@ -268,18 +274,35 @@ def searched_candidates(
     coupled = [search for search in searches if search.structure == "coupled"]
     rows = [i for i, joint in enumerate(robot.joints) if joint.name in separate]
     if len(coupled) == len(separate) and share_parameters(robot, rows):
-        terms = {search.joint: search.chosen.terms for search in coupled}
-        processing = {search.joint: search.chosen.processing for search in coupled}
-        by_joint = [processing.get(joint.name, arm[0].processing[0]) for joint in robot.joints]
-        model = coupled_joints(robot, rows, terms, CHOSEN)
-        equations = library(model, [log.processed(by_joint) for log in arm], count)
-        weights = 1.0 / np.array([residual_variance(searched_part(robot, search, arm, count)) for search in coupled])
-        part = Part(model, equations, equations.columns(model), Ridge(0.0, weights, equations.combination))
-        models += [
-            Candidate(f"searched, links shared{ridge_name(x)}", CHOSEN, describe_terms(coupled), (part.with_ridge(x),))
-            for x in RIDGES
-        ]
+        weights = [1.0 / residual_variance(searched_part(robot, search, arm, count)) for search in coupled]
+        for alone in [None, *range(len(parts))] if len(parts) > 2 else [None]:
+            sharing = [i for i in range(len(parts)) if i != alone]
+            part = shared_part(
+                robot, [coupled[i] for i in sharing], arm, count, np.array([weights[i] for i in sharing])
+            )
+            name = "" if alone is None else f" except for {coupled[alone].joint}"
+            separately = () if alone is None else (parts[alone],)
+            models += [
+                Candidate(
+                    f"searched, links shared{name}{ridge_name(strength)}",
+                    CHOSEN,
+                    describe_terms([best[i] if i == alone else search for i, search in enumerate(coupled)]),
+                    (part.with_ridge(strength), *separately),
+                )
+                for strength in RIDGES
+            ]
     return models
+
+
+def shared_part(robot: Robot, searches: Sequence[Search], arm: Sequence[Observed], count: int, weights: Array) -> Part:
+    """Return the chosen models of joints as one that shares the links, with the weights (m,) of their efforts."""
+    joints = [joint.name for joint in robot.joints]
+    terms = {search.joint: search.chosen.terms for search in searches}
+    processing = {search.joint: search.chosen.processing for search in searches}
+    by_joint = [processing.get(joint, arm[0].processing[0]) for joint in joints]
+    model = coupled_joints(robot, [joints.index(search.joint) for search in searches], terms, CHOSEN)
+    equations = library(model, [log.processed(by_joint) for log in arm], count)
+    return Part(model, equations, equations.columns(model), Ridge(0.0, weights, equations.combination))
 
 
 def searched_part(robot: Robot, search: Search, logs: Sequence[Observed], count: int) -> Part:
