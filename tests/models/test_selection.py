@@ -5,7 +5,8 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.identification import unseen
-from davinci_forces.identification.candidates import Library
+from davinci_forces.identification.candidates import CandidatePart, Library
+from davinci_forces.identification.observations import CellEquations
 from davinci_forces.identification.unseen import RefitModel
 from davinci_forces.maths.selection import (
     MAX_GROUPS,
@@ -60,8 +61,8 @@ def test_refits_that_several_logs_ask_for_are_made_once(monkeypatch):
     p = len(model.parameters)
     Phi = RNG.normal(size=(N, 1, p))
     cells = sum_equations(Phi, Phi @ np.ones(p), CELL, CELLS)
-    library = Library(model, (), ((),), np.array([N]), cells, cells, np.empty(0))
-    made = RefitModel(model, library, PLAIN, list(range(p)), 1)
+    library = Library(model, (), CellEquations(np.array([N]), cells, cells, cells), np.empty(0))
+    made = RefitModel(CandidatePart(model, library, list(range(p)), PLAIN), 1)
     solved = []
     monkeypatch.setattr(unseen, "solve", lambda *given: solved.append(given) or solve(*given))
     for out in (*np.eye(CELLS, dtype=bool), *np.eye(CELLS, dtype=bool)):

@@ -48,7 +48,7 @@ def _identity(parameter: Parameter) -> tuple[str, float]:
     return re.sub(r"friction \d+", "friction", parameter.name), parameter.scale
 
 
-class Part(NamedTuple):
+class CandidatePart(NamedTuple):
     """One model of a candidate: some columns of a library, with a ridge."""
 
     model: Model
@@ -61,7 +61,7 @@ class Part(NamedTuple):
         """Whether its joints are coupled to the others."""
         return isinstance(self.model, CoupledArm)
 
-    def with_ridge(self, strength: float) -> "Part":
+    def with_ridge(self, strength: float) -> "CandidatePart":
         """Return the part with a ridge of another strength."""
         return self._replace(ridge=self.ridge._replace(strength=strength))
 
@@ -76,7 +76,7 @@ class Part(NamedTuple):
         return self.library.cells.by_period.columns(self.columns)
 
     @property
-    def scored(self) -> Equations:
+    def score_cells(self) -> Equations:
         """The equations of the scores, in cells of the path."""
         return self.library.cells.scored.columns(self.columns)
 
@@ -87,7 +87,7 @@ class Candidate(NamedTuple):
     name: str  # unique
     variant: str  # name of the model, as in fits
     added: str  # the terms that are added to the structure
-    parts: tuple[Part, ...]
+    parts: tuple[CandidatePart, ...]
 
     @property
     def structure(self) -> str:
@@ -108,7 +108,7 @@ class Candidate(NamedTuple):
         """Compute the errors on data left out; None if the remaining data do not separate the parameters."""
         results = []
         for part in self.parts:
-            cells, scored = (part.by_period, None) if by_period else (part.by_block, part.scored)
+            cells, scored = (part.by_period, None) if by_period else (part.by_block, part.score_cells)
             try:
                 results.append(cross_validate(cells, part.ridge, schemes, scored))
             except np.linalg.LinAlgError:
@@ -192,7 +192,7 @@ def variants(
             else:
                 model = independent(robot.joint(part.model.group), terms[part.model.group], variant)
             ridge = Ridge(0.0, np.ones(1) if weights is None else weights, part.combination)
-            parts.append(Part(model, part, part.columns(model), ridge))
+            parts.append(CandidatePart(model, part, part.columns(model), ridge))
         for strength in RIDGES[structure]:
             name = f"{structure}{'+' * bool(added)}{added}{separate}{ridge_name(strength)}"
             models.append(Candidate(name, variant, added, tuple(part.with_ridge(strength) for part in parts)))
@@ -218,7 +218,7 @@ def every_term(reach: Reach) -> tuple[Term, ...]:
     return (*others, *(presliding_friction(x, number) for number, x in enumerate(slow, start=1)))
 
 
-def residual_variance(part: Part) -> float:
+def residual_variance(part: CandidatePart) -> float:
     """Return the residual variance of a joint of a coupled arm, with its own parameters."""
     cells = part.by_block
     total = cells.sum_cells(np.ones(len(cells.gram), np.bool_))

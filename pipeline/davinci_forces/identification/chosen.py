@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.identification.candidates import Candidate, Part
+from davinci_forces.identification.candidates import Candidate, CandidatePart
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.estimation.conic import nearest
 from davinci_forces.maths.estimation.least_squares import Triangle
@@ -147,7 +147,7 @@ def reason(
     return text
 
 
-def parameters(candidate: Candidate, count: int) -> Iterator[tuple[Part, BlockEstimate]]:
+def parameters(candidate: Candidate, count: int) -> Iterator[tuple[CandidatePart, BlockEstimate]]:
     """Fit a candidate's parameters to all data of `count` logs, one part at a time."""
     block = np.tile(np.arange(PATH_BLOCKS), count)
     fits = candidate.parameters()
@@ -186,7 +186,7 @@ class ConsistentFit(NamedTuple):
     excess: float  # of the criterion over its minimum, as a share of the effort's square
 
 
-def fit_consistent(part: Part, free: BlockEstimate) -> ConsistentFit:
+def fit_consistent(part: CandidatePart, free: BlockEstimate) -> ConsistentFit:
     """Fit a candidate's parameters within those that a mechanism can have, to the equations of all logs.
 
     The standard errors remain those of the candidate, as `consistent` keeps those of least squares.

@@ -53,13 +53,13 @@ class LogModels:
 
     def motion(self, fit: Fit, joint: str) -> ArmMotion:
         """Return the motion of the joints of a fit's model, for a joint's effort; the log must contain these joints."""
-        processing = self.identified.processing(fit, joint)
+        processing = self.identified.cutoff_and_lag(fit, joint)
         return joined_motion([self.joint_motion(name, processing) for name in self.identified.model(fit).joints])
 
     def tau_hat(self, fit: Fit, joint: str) -> Array:
         """Compute the effort (N,) of a joint by a fit."""
         model = self.identified.model(fit)
-        key = *fit.key, self.identified.processing(fit, joint)
+        key = *fit.key, self.identified.cutoff_and_lag(fit, joint)
         tau_hat = self._efforts.get(key)
         if tau_hat is None:
             tau_hat = efforts(model, fit.theta, self.motion(fit, joint))
@@ -70,7 +70,7 @@ class LogModels:
     def dynamics(self, fit: Fit, joint: str) -> JointDynamics:
         """Compute the dynamics of a joint by a fit, as a filter takes them.  (7.15), (7.16)"""
         model = self.identified.model(fit)
-        key = *fit.key, self.identified.processing(fit, joint)
+        key = *fit.key, self.identified.cutoff_and_lag(fit, joint)
         dynamics = self._dynamics.get(key) or model.joint_dynamics(fit.theta, self.motion(fit, joint))
         if fit.group == ARM:
             self._dynamics[key] = dynamics
@@ -81,7 +81,7 @@ class LogModels:
         dynamics, record, processing = (
             self.dynamics(fit, joint),
             self._records[joint],
-            self.identified.processing(fit, joint),
+            self.identified.cutoff_and_lag(fit, joint),
         )
         motion, (cutoff, effort_lag) = self.joint_motion(joint, processing), processing
         delay = (effort_lag - record.effort_lag) * record.rate

@@ -80,7 +80,7 @@ class Observed(NamedTuple):
             **{name: getattr(self, name)[which] for name in ("still", "block", "period")},
         )
 
-    def processed(self, processing: Sequence[Processing]) -> "Observed":
+    def process(self, processing: Sequence[Processing]) -> "Observed":
         """Return the log with another processing for the effort of each joint."""
         motions = {
             p: joined_motion([motion_at(record, *p) for record in self.records]) for p in dict.fromkeys(processing)

@@ -1,9 +1,9 @@
 """The search for the model of each joint: its terms, the processing of its motion and effort, and its ridge.
 
-A step changes the processing, or adds the term that most reduces the error on parts of the path left out, and that
-reduces it on at least two thirds of the blocks.  The search ends where there is no such term.  Of all steps, the first
-one is chosen that is not clearly worse than the best: by at most one standard error of the difference.  The errors of
-all steps are those of the scores, whatever a step's low-pass.
+A step changes the processing, or adds the term that most reduces the error on parts of the path left out.  It has to
+reduce the error of at least two thirds of the blocks of path.  The search ends where there is no such term.  Of all
+steps, the first one is chosen that is not clearly worse than the best: by at most one standard error of the difference.
+The errors of all steps are those of the scores, whatever a step's low-pass.
 """
 
 from collections.abc import Iterator, Sequence
@@ -14,8 +14,8 @@ import numpy as np
 
 from davinci_forces.identification.candidates import (
     Candidate,
+    CandidatePart,
     Library,
-    Part,
     coupled_joints,
     library,
     residual_variance,
@@ -40,13 +40,13 @@ from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.robots.models import OPTIONAL_TERMS, Reach, independent, round_scale
 from davinci_forces.robots.robot import Joint, Kind, Robot
 
-CUTOFFS = (5.0, 6.0, 8.0, 10.0, 12.0, 14.0, 17.0, 20.0, 25.0, 30.0)  # [Hz], and the study's own
+CUTOFF_GRID = (5.0, 6.0, 8.0, 10.0, 12.0, 14.0, 17.0, 20.0, 25.0, 30.0)  # [Hz], and the study's own
 MAX_CUTOFF = 0.4  # of the sampling rate
-LAGS = tuple(0.0025 * k for k in range(-4, 5))  # [s]
-RIDGES = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
-DISPLACEMENTS = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1)  # of the range of the motion
-WIDTHS = (0.03, 0.1, 0.3)  # of the root mean square velocity
-DECAY_VELOCITIES = (0.1, 0.3, 0.6)  # likewise
+LAG_GRID = tuple(0.0025 * k for k in range(-4, 5))  # [s]
+RIDGE_GRID = (1e-5, 3e-5, 1e-4, 3e-4, 1e-3, 3e-3, 1e-2, 3e-2, 1e-1)
+DISPLACEMENT_GRID = (0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1)  # of the range of the motion
+WIDTH_GRID = (0.03, 0.1, 0.3)  # of the root mean square velocity
+DECAY_VELOCITY_GRID = (0.1, 0.3, 0.6)  # likewise
 MAX_PRESLIDING = 2  # deflections of one joint
 MAX_TERMS = 8  # added to one joint
 MIN_BETTER_BLOCKS = 2 / 3  # share of the blocks of path that a step has to improve
@@ -75,7 +75,7 @@ class Step(NamedTuple):
         return bool(self.score < step.score and better >= MIN_BETTER_BLOCKS)
 
 
-class Search(NamedTuple):
+class SearchResult(NamedTuple):
     """The steps of the search for the model of a joint, and the chosen one."""
 
     joint: str
@@ -103,7 +103,7 @@ class JointSearch:
         """Return the equations of the model with these added terms."""
         key = processing, terms
         if key not in self._libraries:
-            logs = [log.processed([processing] * len(log.records)) for log in self.logs]
+            logs = [log.process([processing] * len(log.records)) for log in self.logs]
             self._libraries = {key: library(self.model(terms), logs, len(logs))}  # only the last one is used again
         return self._libraries[key]
 
@@ -121,7 +121,7 @@ class JointSearch:
             self._schemes = self._schemes or schemes_of(equations.cells.scored.squares, len(self.logs))
             cells, scored = (x.columns(columns) for x in (equations.cells.by_block, equations.cells.scored))
             steps = []
-            for strength in neighbours(RIDGES, near, 1) if near else RIDGES:
+            for strength in neighbours(RIDGE_GRID, near, 1) if near else RIDGE_GRID:
                 ridge = Ridge(strength, np.ones(1), equations.combination)
                 try:
                     errors = cross_validate(cells, ridge, self._schemes, scored)
@@ -133,7 +133,7 @@ class JointSearch:
         step = self._steps[key]
         return step._replace(name=name) if step else None
 
-    def run(self, start: Processing) -> Search | None:
+    def run(self, start: Processing) -> SearchResult | None:
         """Search from the model without added terms; None if it cannot be refitted."""
         step = self.step("joint terms", start, (), 0.0)
         if step is None:
@@ -146,17 +146,17 @@ class JointSearch:
             steps += [step] if step else []
         best = min(steps, key=lambda step: step.score)
         chosen = next(s for s in steps if s.score - best.score <= CLEARLY * standard_error(s.errors, best.errors))
-        return Search(self.joint, self.structure, tuple(steps), chosen, best)
+        return SearchResult(self.joint, self.structure, tuple(steps), chosen, best)
 
     def improve_processing(self, step: Step, start: Processing, everywhere: bool) -> Step:
         """Change the cutoff and the lag in turn while that reduces the error; search `everywhere`, or next to them."""
         rate = min(log.records[0].rate for log in self.logs)
-        cutoffs = sorted({*(x for x in CUTOFFS if x <= MAX_CUTOFF * rate), start.cutoff})
+        cutoffs = sorted({*(x for x in CUTOFF_GRID if x <= MAX_CUTOFF * rate), start.cutoff})
         while True:
             cutoff, lag = step.processing
             options = [Processing(x, lag) for x in (cutoffs if everywhere else neighbours(cutoffs, cutoff, 1))]
             better = self.best_processing(step, options)
-            lags = LAGS if everywhere else neighbours(LAGS, lag, 1)
+            lags = LAG_GRID if everywhere else neighbours(LAG_GRID, lag, 1)
             better = self.best_processing(better, [Processing(better.processing.cutoff, x) for x in lags])
             if better.processing == step.processing:
                 return step
@@ -185,11 +185,11 @@ class JointSearch:
         joint, names = self.robot.joint(self.joint), {term.name for term in used}
         number = 1 + sum(term.displacement > 0 for term in used)
         if number <= MAX_PRESLIDING:
-            for share in DISPLACEMENTS:
+            for share in DISPLACEMENT_GRID:
                 term = presliding_friction(round_scale(share * self.reach.displacement), number)
                 if term.displacement not in {t.displacement for t in used}:
                     yield f"presliding friction, {100 * share:g} % of the range", (term,)
-        for make, shares in ((smooth_sign, WIDTHS), (stribeck, DECAY_VELOCITIES)):
+        for make, shares in ((smooth_sign, WIDTH_GRID), (stribeck, DECAY_VELOCITY_GRID)):
             for share in shares:
                 term = make(round_scale(share * self.reach.velocity))
                 if term.name not in names:
@@ -238,7 +238,7 @@ def search_joints(
     arm: tuple[Observed, ...],
     reaches: dict[str, Reach],
     lowpass: float,
-) -> list[Search]:
+) -> list[SearchResult]:
     """Search for the model of each joint, by itself and, if `arm` has logs of all joints, coupled to the others."""
     searches = []
     for joint, logs in separate.items():
@@ -249,9 +249,9 @@ def search_joints(
     return searches
 
 
-def best_of_joints(searches: Sequence[Search]) -> list[Search]:
+def best_of_joints(searches: Sequence[SearchResult]) -> list[SearchResult]:
     """Return the search of each joint, with the structure of the lowest error."""
-    by_joint: dict[str, list[Search]] = {}
+    by_joint: dict[str, list[SearchResult]] = {}
     for search in searches:
         by_joint.setdefault(search.joint, []).append(search)
     return [min(of_joint, key=lambda search: search.chosen.score) for of_joint in by_joint.values()]
@@ -259,7 +259,7 @@ def best_of_joints(searches: Sequence[Search]) -> list[Search]:
 
 def searched_candidates(
     robot: Robot,
-    searches: Sequence[Search],
+    searches: Sequence[SearchResult],
     separate: dict[str, tuple[Observed, ...]],
     arm: tuple[Observed, ...],
     count: int,
@@ -289,31 +289,35 @@ def searched_candidates(
                     describe_terms([best[i] if i == alone else search for i, search in enumerate(coupled)]),
                     (part.with_ridge(strength), *separately),
                 )
-                for strength in RIDGES
+                for strength in RIDGE_GRID
             ]
     return models
 
 
-def shared_part(robot: Robot, searches: Sequence[Search], arm: Sequence[Observed], count: int, weights: Array) -> Part:
+def shared_part(
+    robot: Robot, searches: Sequence[SearchResult], arm: Sequence[Observed], count: int, weights: Array
+) -> CandidatePart:
     """Return the chosen models of joints as one that shares the links, with the weights (m,) of their efforts."""
     joints = [joint.name for joint in robot.joints]
     terms = {search.joint: search.chosen.terms for search in searches}
     processing = {search.joint: search.chosen.processing for search in searches}
     by_joint = [processing.get(joint, arm[0].processing[0]) for joint in joints]
     model = coupled_joints(robot, [joints.index(search.joint) for search in searches], terms, CHOSEN)
-    equations = library(model, [log.processed(by_joint) for log in arm], count)
-    return Part(model, equations, equations.columns(model), Ridge(0.0, weights, equations.combination))
+    equations = library(model, [log.process(by_joint) for log in arm], count)
+    return CandidatePart(model, equations, equations.columns(model), Ridge(0.0, weights, equations.combination))
 
 
-def searched_part(robot: Robot, search: Search, logs: Sequence[Observed], count: int) -> Part:
+def searched_part(robot: Robot, search: SearchResult, logs: Sequence[Observed], count: int) -> CandidatePart:
     """Return the chosen model of a joint, with the equations of all its logs."""
     step = search.chosen
     model = joint_model(robot, search.joint, search.structure, step.terms)
-    equations = library(model, [log.processed([step.processing] * len(log.records)) for log in logs], count)
-    return Part(model, equations, equations.columns(model), Ridge(step.strength, np.ones(1), equations.combination))
+    equations = library(model, [log.process([step.processing] * len(log.records)) for log in logs], count)
+    return CandidatePart(
+        model, equations, equations.columns(model), Ridge(step.strength, np.ones(1), equations.combination)
+    )
 
 
-def describe_terms(searches: Sequence[Search]) -> str:
+def describe_terms(searches: Sequence[SearchResult]) -> str:
     """Name the added terms of each joint."""
     names = ((search.joint, ", ".join(term.name for term in search.chosen.terms)) for search in searches)
     return "; ".join(f"{joint}: {terms or 'none'}" for joint, terms in names)

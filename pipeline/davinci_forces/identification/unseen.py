@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.identification.candidates import Candidate, Part
+from davinci_forces.identification.candidates import Candidate, CandidatePart
 from davinci_forces.identification.observations import Observed
 from davinci_forces.identification.scores import Scorer, folds, select_samples
 from davinci_forces.maths.arrays import Array, Booleans, Integers
@@ -32,7 +32,7 @@ class Scheme(NamedTuple):
 class RefitModel:
     """One part of a candidate, refitted without some of its cells; each refit is computed once."""
 
-    def __init__(self, part: Part, total: int) -> None:
+    def __init__(self, part: CandidatePart, total: int) -> None:
         self.model, self.logs, self.total = part.model, {log.number: log for log in part.library.logs}, total
         self.by_block, self.by_period = part.by_block, part.by_period
         self._ridge, self._thetas = part.ridge, dict[bytes, Array]()

@@ -49,7 +49,7 @@ class Identified:
             self._models[fit.key] = model_of(self.robot, fit.structure, fit.model, fit.group, names, scales)
         return self._models[fit.key]
 
-    def processing(self, fit: Fit, joint: str) -> tuple[float, float]:
+    def cutoff_and_lag(self, fit: Fit, joint: str) -> tuple[float, float]:
         """Return the cutoff [Hz] of a fit's motion and the lag [s] of the effort, for the effort of a joint."""
         i = self.model(fit).efforts.index(joint)
         return fit.cutoff[i], fit.effort_lag[i]

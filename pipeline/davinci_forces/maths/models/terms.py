@@ -37,9 +37,10 @@ class Term:
     """One column of the regressor: phi = a ddq + sum of b[f] f(q, dq) over functions f of `COEFFICIENTS`.
 
     `unit` is the parameter's unit: the joint fills {inertia}, {mass_moment}, {effort} and {position}.  `typst` is phi
-    in Typst's maths.  By physics, a `positive` parameter is not negative.  A term of z (`friction_state`) states its z:
-    by one scale in the joint's units, the `displacement` of a deflection, the `width` of a smooth sign [velocity], or
-    the `decay_velocity` of Stribeck's peak; or as a function `of_motion`, named in `Z_OF_MOTION`.
+    in Typst's maths.  By physics, a `positive` parameter is not negative.  A term of z (`friction_state`) has either
+    one scale in the joint's units or a function of the motion.  The scale is the `displacement` of a deflection, the
+    `width` of a smooth sign [velocity], or the `decay_velocity` of Stribeck's peak.  `of_motion` names the function in
+    `Z_OF_MOTION`.
     """
 
     name: str

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from davinci_forces.records import Choice, Fit, Prediction
+from davinci_forces.records import Choice, Fit, ModelSearch, Prediction
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.records.record import slug
 from davinci_forces.report.content import (
@@ -41,13 +41,20 @@ def blocks(context: Context, choice: Choice) -> Iterator[Block]:
         "rest), or one to three `dahl` elements (elastic before sliding; the percentages are their presliding "
         "distances over the joint's range of motion). A ridge keeps poorly determined parameters small. Each candidate "
         "is refitted without a sixth of the path, without half of it, and without each log if there are several. Its "
-        "score is the error on the data left out over the RMS effort, averaged over moving joints; position, effort "
-        "and prediction pass the same low-pass. The whole arm gets the smallest candidate that is not clearly worse "
-        f"than the best, and whose inertia is positive definite along the trajectories. {MEASURES}"
+        "score is the error on the data left out over the RMS effort, averaged over moving joints; effort and "
+        f"prediction pass the same low-pass. {MEASURES}"
+    )
+    yield Prose(
+        "A `searched` candidate is built for each joint step by step. A step changes the low-pass of motion and effort "
+        "or the delay of the effort after the motion, or adds one term. A step has to reduce the error on at least two "
+        "thirds of the sixths of the path. Among the steps, the first one counts that is at most one standard error "
+        "worse than the best. Then the joints share the links' parameters, if that is not clearly worse. The search "
+        "is used if its result has a lower error than the best candidate with fixed terms."
     )
     yield Verdict("info", f"**Chosen: {literal(choice.chosen)}.** {literal(choice.why)}.")
     caption = "The best candidate of each structure and added friction."
     yield table(context, choice, best_rows(choice), caption, "choice-table")
+    yield from search_tables(context)
     yield figure(choice)
     order = np.argsort(choice.score, kind="stable").tolist()
     yield OnScreen(
@@ -57,6 +64,26 @@ def blocks(context: Context, choice: Choice) -> Iterator[Block]:
     yield from overfitting_note(choice)
     yield from unseen(context)
     yield from parameters(context)
+
+
+def search_tables(context: Context) -> Iterator[Block]:
+    """The steps of the search for the model of each joint, up to the chosen one."""
+    header = ("Step", "Low-pass / Hz", "Lag / ms", "Ridge", "Parameters", "Path blocks left out")
+    for search in context.catalogue.select(ModelSearch):
+        if not search.used:
+            continue
+        rows = tuple(
+            (
+                literal(str(search.step[i])), f"{search.step_cutoff[i]:g}", f"{1e3 * search.step_lag[i]:g}",
+                f"{search.step_ridge[i]:g}", str(search.parameters[i]), f"{search.score[i]:.4f}",
+            )
+            for i in range(search.chosen_step + 1)
+        )  # fmt: skip
+        last = len(search) - 1
+        end = f" The last step, {last}, reaches {search.score[last]:.4f}, which is not clearly less."
+        caption = f"{title(search.joint)}, {search.structure}: relative error after each step of the search."
+        caption += end if search.chosen_step < last else " No further step reduced the error."
+        yield Table(caption, header, rows, f"search-{search.joint}", "lrrrrr")
 
 
 def best_rows(choice: Choice) -> list[int]:

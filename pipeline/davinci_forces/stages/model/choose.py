@@ -7,7 +7,7 @@ from typing import Annotated
 import numpy as np
 
 from davinci_forces.errors import NotIdentifiable
-from davinci_forces.identification.candidates import Candidate, Part, candidates, reach_of
+from davinci_forces.identification.candidates import Candidate, CandidatePart, candidates, reach_of
 from davinci_forces.identification.chosen import (
     NEGLIGIBLE_EXCESS,
     BlockEstimate,
@@ -19,7 +19,7 @@ from davinci_forces.identification.chosen import (
 )
 from davinci_forces.identification.observations import Observed, observe
 from davinci_forces.identification.regression import recorded_motion
-from davinci_forces.identification.search import Search, search_joints, searched_candidates
+from davinci_forces.identification.search import SearchResult, search_joints, searched_candidates
 from davinci_forces.identification.unseen import predictions
 from davinci_forces.identification.used import Identified
 from davinci_forces.maths.selection import standard_error
@@ -90,7 +90,7 @@ def fits(candidate: Candidate, count: int, robot: Robot, with_consistent: bool) 
     """Fit a candidate to all logs; `with_consistent` also within the parameters that a mechanism can have."""
     estimates = list(parameters(candidate, count))
     yield from (fit_record(candidate, candidate.estimator, part, estimate) for part, estimate in estimates)
-    if with_consistent and candidate.structure != "independent":
+    if with_consistent and candidate.variant != "independent":
         yield from consistent_fits(candidate, estimates, robot)
 
 
@@ -146,13 +146,13 @@ def choice(selection: Selection, logs: Sequence[Observed]) -> Iterator[Choice]:
         )
 
 
-def is_used(search: Search, chosen: Candidate) -> bool:
+def is_used(search: SearchResult, chosen: Candidate) -> bool:
     """Whether the chosen candidate has the terms of a search."""
     parts = [part for part in chosen.parts if search.joint in part.model.efforts]
     return chosen.name.startswith("searched") and parts[0].is_coupled == (search.structure == "coupled")
 
 
-def search_record(search: Search, used: bool) -> ModelSearch:
+def search_record(search: SearchResult, used: bool) -> ModelSearch:
     """The steps of the search for the model of a joint."""
     steps, chosen = search.steps, search.chosen
     return ModelSearch(
@@ -193,7 +193,7 @@ def best_of_setting(selection: Selection, fit: str) -> list[Candidate]:
 
 
 def consistent_fits(
-    candidate: Candidate, estimates: Sequence[tuple[Part, BlockEstimate]], robot: Robot
+    candidate: Candidate, estimates: Sequence[tuple[CandidatePart, BlockEstimate]], robot: Robot
 ) -> Iterator[Fit | Diagnostic]:
     """Constrain the parameters of a candidate to be physically consistent, and state how much worse they fit."""
     name = f"{candidate.variant}.{candidate.estimator}"
@@ -215,7 +215,7 @@ def consistent_fits(
             yield diagnostic("choose", model.group, "note", f"{message}; {follows}")
 
 
-def fit_record(candidate: Candidate, estimator: str, part: Part, estimate: BlockEstimate) -> Fit:
+def fit_record(candidate: Candidate, estimator: str, part: CandidatePart, estimate: BlockEstimate) -> Fit:
     """The Fit of a part of a candidate to all logs."""
     model, log = part.model, part.library.logs[0]
     processing = [log.processing[log.joints.index(effort)] for effort in model.efforts]
