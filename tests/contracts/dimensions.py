@@ -1,6 +1,9 @@
 """Dimensions, to compare the unit of a parameter with the term that it multiplies."""
 
+import re
 from dataclasses import dataclass
+from functools import reduce
+from operator import mul
 
 from davinci_forces.maths.constants import GRAVITY
 from davinci_forces.maths.models.terms import Term
@@ -53,8 +56,12 @@ def _product(text: str) -> Dimension:
 def of_phi(term: Term, kind: Kind) -> Dimension:
     """The dimension of a term for a kind of joint; raises TypeError where it has none."""
     second, position = of_unit("s"), of_unit(kind.unit("{position}"))
-    angle = Dimension() + position if {"sin q", "cos q"} & set(term.b) else Dimension()  # a length has no sine
+    of_sine = {"sin q", "cos q"} & set(term.b) or term.of_motion[:3] in ("sin", "cos")
+    angle = Dimension() + position if of_sine else Dimension()  # a length has no sine
     functions = {"1": angle, "sin q": angle, "cos q": angle, "q": position, "dq": position / second}
+    if term.of_motion and not of_sine:  # as in "q^2 sign(dq)": a product of powers, and a sign that has no dimension
+        powers = re.findall(r"(dq|q)(?:\^(\d))?", re.sub(r"sign\(dq\)", "", term.of_motion))
+        functions["z"] = reduce(mul, (functions[name] ** int(power or 1) for name, power in powers))
     # A factor of g has its dimension, and others are bare numbers; sign and deflection are bare numbers, too.
     parts = [
         functions.get(name, Dimension()) * (of_unit("m/s^2") if abs(factor) == GRAVITY else Dimension())

@@ -1,5 +1,7 @@
 """Every term of a joint's model: its parts are those of one expression, and its unit is that of what it multiplies."""
 
+import re
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -7,7 +9,9 @@ from numpy.testing import assert_allclose
 from davinci_forces.maths.models import kernels, terms
 from davinci_forces.maths.models.bias import bias as bias_of
 from davinci_forces.maths.models.independent import bias_coefficients, inertia_of, regressor
-from davinci_forces.maths.models.terms import TERMS, Term
+from davinci_forces.maths.models.memory import friction_state
+from davinci_forces.maths.models.model import ArmMotion
+from davinci_forces.maths.models.terms import OF_MOTION, TERMS, Term
 from davinci_forces.report.writers.typesetting import Formula, draw_formulas
 from davinci_forces.robots.robot import Kind
 from tests.contracts.dimensions import has_a_dimension, is_effort
@@ -77,7 +81,18 @@ def test_some_motion_excites_a_term(term):
     assert np.isfinite(phi).all()
 
 
-@TERM
+@pytest.mark.parametrize("term", OF_MOTION.values(), ids=OF_MOTION)
+def test_a_term_of_the_motion_is_its_function(term):
+    q, dq = np.array([[0.3], [-0.2]]), np.array([[0.4], [-0.5]])
+    z, known = friction_state(ArmMotion(q, dq, dq, 0.01, np.zeros(2, np.int64)), 0, term)
+    names = {"abs": np.abs, "sign": np.sign, "sin": np.sin, "cos": np.cos, "q": q[:, 0], "v": dq[:, 0]}
+    phi = term.typst.replace("dot(q)", "v").replace('op("sign")', "sign").replace("^", "**")
+    phi = re.sub(r"(?<=[\w)]) (?=\w)", " * ", phi)
+    assert_allclose(z, eval(phi, names), rtol=1e-14)
+    assert known.all()
+
+
+@pytest.mark.parametrize("term", [*TERMS.values(), *OF_MOTION.values()], ids=[*TERMS, *OF_MOTION])
 def test_the_unit_is_that_of_an_effort_over_the_term(term):
     """For every kind of joint that the term is for: gravity's sine is for those that turn, a lifted mass for slides."""
     kinds = [kind for kind in Kind if has_a_dimension(term, kind)]
@@ -87,5 +102,5 @@ def test_the_unit_is_that_of_an_effort_over_the_term(term):
 
 
 def test_every_term_can_be_typeset():
-    formulas = [Formula(term.typst, True) for term in TERMS.values()]
+    formulas = [Formula(term.typst, True) for term in (*TERMS.values(), *OF_MOTION.values())]
     assert set(draw_formulas(formulas)[0]) == set(formulas)
