@@ -30,7 +30,7 @@ def motion(added=(), noise=0.0, lag=0.0, seed=0) -> Motion:
         return np.sin(x) @ a, np.cos(x) @ (a * w), -np.sin(x) @ (a * w**2)
 
     def effort(t):
-        q, dq, _ = derivatives(t)
+        q, dq, ddq = derivatives(t)
         tau = 0.05 * ddq + 0.2 * dq + 0.3 * np.sign(dq)
         return tau + sum(size * function(q, dq) for size, function in added)
 
