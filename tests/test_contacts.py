@@ -27,16 +27,7 @@ from davinci_forces.maths.uncertainty.bootstrap import (
     standard_error,
 )
 from davinci_forces.maths.uncertainty.day_offset import day_offset
-from davinci_forces.maths.uncertainty.error_band import (
-    SpeedCells,
-    cells,
-    excess,
-    excess_std,
-    levels,
-    means,
-    units,
-    without_each,
-)
+from davinci_forces.maths.uncertainty.error_band import levels
 from davinci_forces.records import Threshold, Track
 from davinci_forces.stages.forces import assess, measure
 from tests import arm
@@ -48,7 +39,12 @@ T = np.arange(4000) / RATE
 
 def track(tau_ext, std=0.1, joint="hand_roll", log="push", role="contact", at_rest=0) -> Track:
     zero = np.zeros_like(T)
-    efforts = {"tau_ext": tau_ext, "tau_ext_smooth": tau_ext, "tau_ext_std": zero + std}
+    efforts = {
+        "tau_ext": tau_ext,
+        "tau_ext_smooth": tau_ext,
+        "tau_ext_std": zero + std,
+        "tau_ext_smooth_std": zero + std,
+    }
     columns = dict.fromkeys(Track.columns(), zero) | {"t": T, **efforts}
     scalars = dict.fromkeys(Track.scalars(), 0.0) | {"at_rest": at_rest, "rate": RATE, "filter": "ekf"}
     return Track(**columns, **scalars | {"log": log, "joint": joint, "role": role, "model": "m", "estimator": "e"})
@@ -103,24 +99,10 @@ def test_standard_errors_of_many_draws_at_once_are_those_of_one_draw_after_the_o
     assert np.isnan(error_of_quantile(x[:1], 0.5))
 
 
-@pytest.mark.parametrize("logs", [1, 2, 5])
-@pytest.mark.parametrize("together", [True, False])
-def test_means_without_each_part_are_those_of_the_others(logs, together):
-    rng, each = np.random.default_rng(logs), []
-    for log in range(logs):
-        dq = rng.standard_normal(60) * (0.2 if log else 3.0)  # slow logs leave ranges to the first alone
-        own = cells(rng.standard_normal(60), np.full(60, 0.1), dq, 1.0)
-        each.append(own._replace(source=np.full(len(own.source), 7 * log)))
-    of = SpeedCells(*(np.concatenate(column) for column in zip(*each, strict=True)))
-    for parts in (units(of), of.source * 6 + of.block):
-        one_by_one = [means(rest := of.select(parts != part), rest.mean_square, together) for part in np.unique(parts)]
-        np.testing.assert_allclose(without_each(of, of.mean_square, parts, together), one_by_one, rtol=1e-12)
-
-
 def test_a_triangle_has_its_peak_mean_and_impulse():
     push = 3.0 * np.clip(1 - np.abs(T - 10.0), 0, None)
     free = free_space(T, [(9.0, 11.0)], RATE)
-    found = summarise(T, noise(std=0.02) + push, np.full(len(T), 0.05), (9.0, 11.0), free)
+    found = summarise(T, noise(std=0.02) + push, np.full(len(T), 0.05), (9.0, 11.0), free, rise=0.0)
     assert found.peak == pytest.approx(3.0, abs=4 * 0.02)
     assert found.mean == pytest.approx(1.5, abs=0.02)
     assert found.impulse == pytest.approx(3.0, abs=0.04)
@@ -130,11 +112,20 @@ def test_a_triangle_has_its_peak_mean_and_impulse():
     assert found.impulse_std == pytest.approx(2.0 * found.mean_std)
 
 
+def test_what_a_smoother_rounds_off_a_peak_is_in_its_standard_error():
+    """The tip of a triangle of slope 3, under two-sided exponential weights with a rise of .2 s: it loses .3."""
+    weights = np.exp(-np.abs(np.arange(-200, 201)) / RATE / 0.1)
+    smooth = np.convolve(3.0 * np.clip(1 - np.abs(T - 10.0), 0, None), weights / weights.sum(), "same")
+    found = summarise(T, smooth, np.full(len(T), 0.01), (9.0, 11.0), free_space(T, [(9.0, 11.0)], RATE), rise=0.2)
+    assert 3.0 - found.peak == pytest.approx(0.3, rel=0.05)
+    assert found.peak_std == pytest.approx(3.0 - found.peak, rel=0.1)
+
+
 def test_a_bias_in_free_space_makes_means_uncertain_however_long_they_are():
     free = np.ones(len(T), bool)
     assert mean_size(noise() + 0.5, free, 1000) == pytest.approx(0.5, abs=0.02)
     assert np.isnan(mean_size(noise(), ~free, 10))
-    assert summarise(T, noise(), noise() ** 2, (100.0, 101.0), free) is None
+    assert summarise(T, noise(), noise() ** 2, (100.0, 101.0), free, 0.0) is None
 
 
 def test_free_space_leaves_out_what_still_settles():
@@ -166,7 +157,7 @@ def test_a_contact_stands_out_when_its_peak_exceeds_the_level_of_unseen_free_spa
 def test_nothing_is_said_of_a_joint_at_rest_or_of_a_contact_log_without_windows():
     assert not list(assess.run(track(noise(), at_rest=1), entry(role="contact", contact=((9.0, 11.0),))))
     assert not list(assess.run(track(noise()), entry(role="contact")))
-    [space] = assess.run(track(noise()), entry(role="validation"))
+    space, _ = assess.run(track(noise()), entry(role="validation"))
     about = entry(role="contact", contact=((9.0, 11.0),))
     assert measured(track(noise()), assess.gather([space]), about)
     [hidden] = measured(track(noise(), at_rest=1), assess.gather([space]), about)
@@ -222,19 +213,54 @@ def test_paths_that_differ_most_stand_for_all():
 def test_a_contact_is_judged_by_the_threshold_of_its_joint_and_filter():
     about = entry(role="contact", contact=((9.0, 11.0),))
     theirs = [
-        Threshold("hand_pitch", "ekf", 1.0, 0.1, 9.0, 0.9, "a"),
-        Threshold("hand_roll", "rts", 1.0, 0.1, 9.0, 0.9, "b"),
+        Threshold("hand_pitch", "rts", 1.0, 0.1, 9.0, 0.9, "a", 1, 0.95, 0.01, 0.2),
+        Threshold("hand_roll", "ekf", 1.0, 0.1, 9.0, 0.9, "b", 1, 0.95, 0.01, 0.2),
     ]
     assert not measured(track(noise()), theirs, about)
-    [contact] = measured(track(noise()), [*theirs, Threshold("hand_roll", "ekf", 0.01, 0.001, 9.0, 0.9, "c")], about)
+    [contact] = measured(
+        track(noise()), [*theirs, Threshold("hand_roll", "rts", 0.01, 0.001, 9.0, 0.9, "c", 1, 0.95, 0.01, 0.2)], about
+    )
     assert (contact.level_from, contact.detection_level, *contact.above) == ("c", 0.01, 1)
 
 
 def test_a_track_knows_when_it_was_not_touched_in_its_own_words():
-    [space] = assess.run(replace(track(noise()), log="x"), entry(role="validation"))
-    assert [n.key for n in space.published()] == [
-        f"ekf.x.hand_roll.{name}" for name in ("free_rms", "free_level", "detection_level", "coverage")
-    ]
+    moving = replace(track(noise()), log="x", q=np.sin(T), dq=np.cos(T))
+    names = ("free_rms", "free_level", "detection_level", "coverage")
+    quartiles = ("band_width", *(f"coverage_q{i}" for i in range(1, 5)))
+    smoothed, filtered = assess.run(moving, entry(role="validation"))
+    assert [n.key for n in smoothed.published()] == [f"effort.x.hand_roll.{name}" for name in names + quartiles]
+    assert [n.key for n in filtered.published()] == [f"ekf.x.hand_roll.{name}" for name in names]
+
+
+def test_results_are_the_smoothers_and_the_filters_stand_beside_them():
+    """Levels, coverage, threshold and contact by the smoother, where the filter's effort and deviation differ."""
+    push = np.where((T >= 20) & (T <= 22), 2.0, 0.0)
+    of_filter = {"tau_ext": noise(1, 0.5), "tau_ext_std": np.full(len(T), 0.1)}
+    both = replace(track(noise(2)), **of_filter)
+    smoothed, filtered = assess.run(both, entry(role="validation"))
+    assert (smoothed.free_rms, filtered.free_rms) == (pytest.approx(0.1, rel=0.1), pytest.approx(0.5, rel=0.1))
+    assert smoothed.coverage > 0.9 > 0.5 > filtered.coverage
+    [threshold] = assess.gather([smoothed, filtered])
+    assert threshold.detection_level == smoothed.detection_level
+    assert (threshold.coverage, threshold.coverage_std) == (smoothed.coverage, smoothed.coverage_std)
+    assert threshold.band_width == pytest.approx(1.96 * 0.1, rel=1e-3)
+    pushed = replace(track(push), **of_filter)
+    [contact] = measured(pushed, [threshold], entry(role="contact", contact=((20.0, 22.0),)))
+    assert (contact.peak[0], contact.mean[0]) == (2.0, pytest.approx(2.0))
+    assert contact.peak_std[0] == pytest.approx(0.1)
+
+
+def test_coverage_by_quartile_of_speed_leaves_standstill_out():
+    """A band that is half as wide in fast motion covers 67 % there; samples at rest count in no quartile."""
+    moves = T < 30
+    q, dq = (np.where(moves, x, 0.0) for x in (np.cos(2 * T), -2 * np.sin(2 * T)))
+    std = np.where(np.abs(dq) > np.median(np.abs(dq[moves])), 0.05, 0.1)
+    of = replace(track(noise(), role="validation"), q=q, dq=dq, tau_ext_smooth_std=std)
+    smoothed, _ = assess.run(of, entry(role="validation"))
+    assert smoothed.quartile_coverage == pytest.approx([0.95, 0.95, 0.673, 0.673], abs=0.05)
+    assert smoothed.quartile_coverage_std == pytest.approx(
+        np.sqrt([0.0475, 0.0475, 0.22, 0.22]) / np.sqrt(725), rel=0.6
+    )
 
 
 def slow_noise(std=0.05, seed=0, N=4000, cutoff=1.0):
@@ -276,7 +302,7 @@ def test_what_nearly_touches_is_one_contact_and_what_changes_sign_is_two():
 
 def test_a_contact_that_no_window_states_is_found_and_said_to_be():
     push = np.where((T >= 20) & (T <= 22), 2.0, 0.0) + np.where((T >= 9) & (T <= 11), 1.5, 0.0)
-    quiet_threshold = [Threshold("hand_roll", "ekf", 0.3, 0.03, 0.5, 0.05, "c")]
+    quiet_threshold = [Threshold("hand_roll", "rts", 0.3, 0.03, 0.5, 0.05, "c", 1, 0.95, 0.01, 0.2)]
     about = entry(role="contact", contact=((9.0, 11.0), (30.0, 31.0)))
     [contact] = measured(track(push + noise(std=0.01)), quiet_threshold, about)
     assert contact.stated.tolist() == [1, 1, 0]
@@ -286,20 +312,6 @@ def test_a_contact_that_no_window_states_is_found_and_said_to_be():
     [free] = measured(track(push, role="validation"), quiet_threshold, entry(role="validation"))
     assert free.stated.tolist() == [0, 0]
     assert not measured(track(noise(std=0.01), role="validation"), quiet_threshold, entry(role="validation"))
-
-
-def test_the_excess_is_the_variance_beyond_the_filters_own():
-    of = cells(noise(1, 0.5), np.full(len(T), 0.04), np.sin(T), speed=0.7)
-    assert excess(of) == pytest.approx(np.full(5, 0.25 - 0.04), rel=4 * np.sqrt(2 / len(T)))
-    assert (excess(cells(noise(1, 0.1), np.full(len(T), 0.04), np.sin(T), speed=0.7)) == 0).all()
-
-
-def test_the_band_is_by_speed_only_where_speed_tells_more():
-    dq = np.sin(T)
-    slow = np.abs(dq) < 0.25 * 0.5
-    found = excess(cells(noise(1) * np.where(slow, 10.0, 1.0), np.zeros(len(T)), dq, speed=0.5))
-    assert found[0] == pytest.approx(1.0, rel=0.3)
-    assert found[2:] == pytest.approx(np.full(3, 0.01), rel=0.3)
 
 
 def test_the_offset_of_free_windows_has_a_standard_error_and_a_drift():
@@ -317,15 +329,3 @@ def test_leaving_out_units_gives_the_standard_error_of_a_mean_of_units():
     found = bootstrap.jackknife_std(lambda kept: np.array([x[kept].mean()]), unit)
     assert found == pytest.approx(x[::50].std(ddof=1) / np.sqrt(8))
     assert np.isnan(bootstrap.jackknife_std(lambda kept: np.array([x[kept].mean()]), np.zeros(len(x), int))).all()
-
-
-def test_a_band_is_as_uncertain_as_its_logs_differ():
-    """Of logs whose variances scatter; the variance that is made of them scatters as its standard error says."""
-    random, made = np.random.default_rng(6), []
-    for _ in range(200):
-        of = [cells(noise(1, s), np.zeros(len(T)), np.ones(len(T)), speed=0.1) for s in random.uniform(0.5, 1.5, 6)]
-        own = SpeedCells(*(np.concatenate(columns) for columns in zip(*of, strict=True)))
-        own = own._replace(source=np.repeat(np.arange(6), [len(one.block) for one in of]))
-        made.append((excess(own)[0], excess_std(own)[0]))
-    values, errors = np.array(made).T
-    assert np.sqrt(np.mean(errors**2)) == pytest.approx(values.std(), rel=4 / np.sqrt(2 * 200))

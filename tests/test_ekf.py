@@ -184,7 +184,8 @@ def test_the_lag_is_what_the_filter_misses_of_a_push():
     push, still = np.clip(1 - np.abs(t - 10.0), 0, None), np.zeros(2000)
     fast = NOISE._replace(q_tau=1.0)
     recording = recorded(arm.joint("hand_roll").terms, np.array([0.4528, 0.0, 0.3706, 0.0]), (still, still), push)
-    smooth, late = lag([recording], fast)
+    smooth = rts.track(recording, fast).tau_ext
+    late = lag([recording], smooth, fast)
     missed = push - ekf.track(recording, fast).tau_ext
     assert np.abs(missed).max() > 0.01
     assert_allclose(late, missed, atol=0.35 * np.abs(missed).max())  # the smoother rounds the corners
@@ -271,28 +272,51 @@ def test_a_gap_starts_the_filter_anew(identified):
     assert made.tau_ext_std[first] > 1.5 * made.tau_ext_std[first - 1]
 
 
-def band_of(*logs, square, path="another path"):
-    """What free motion of other logs says, every block and speed alike."""
-    N = len(logs)
+def band_of(*logs, error, path="another path"):
+    """What free motion of other logs says: normal errors of this root mean square, alike at every speed."""
+    size, random = 1000, np.random.default_rng(0)
+    rows = len(logs) * size
     return ErrorBand(
-        joint="hand_roll", speed=0.3, band_rms=1.0, band_rms_std=0.1,
-        source=np.array(logs, object), path_of=np.array([path] * N, object),
-        block=np.arange(N), speed_bin=np.zeros(N, int), count=np.full(N, 100), mean_square=np.full(N, square),
-        filter_square=np.zeros(N), log_mean=np.zeros(N),
+        joint="hand_roll", band_rms=1.0, band_rms_std=0.1, source=np.repeat(np.array(logs, object), size),
+        path_of=np.array([path] * rows, object), block=np.tile(np.arange(size) * 6 // size, len(logs)),
+        dq=random.normal(size=rows), tau_ext_smooth=error * random.normal(size=rows),
+        tau_ext_std_filter=np.full(rows, 0.05), uncorrelated=np.ones(rows),
     )  # fmt: skip
 
 
 def test_the_band_is_the_error_that_other_logs_had_and_never_the_logs_own(identified):
     signal = arm.signal(seed=5, period=7.3, role="validation", log="run")
-    [alone] = tracked(identified, signal)
-    [made] = tracked(identified, signal, [band_of("other", square=4.0)])
-    assert_allclose(made.tau_ext_std**2 - alone.tau_ext_std**2, 4.0)
-    assert made.band_from == "other"
+    [made] = tracked(identified, signal, [band_of("other", "another", "third", error=2.0)])
+    # Eighteen blocks have a Student's factor of 2.10 / 1.96; a quantile of 3000 errors is known to 2 %.
+    assert_allclose(made.tau_ext_smooth_std, 2.0 * 2.10 / 1.96, rtol=0.1)
+    assert made.band_from == "other, another, third"
     assert (made.tau_ext_std > made.tau_ext_std_filter).all()
-    both = band_of("run", "other", square=4.0)
-    both.mean_square[0] = 1e6
-    [made] = tracked(identified, signal, [both])
-    assert_allclose(made.tau_ext_std**2 - alone.tau_ext_std**2, 4.0)
+    assert (made.tau_ext_std > made.tau_ext_smooth_std).all()  # the filter is late, and knows less
+    assert_allclose(np.hypot(made.smooth_part, made.model_part), made.tau_ext_smooth_std, rtol=0.1)
+    own = band_of("run", "other", "another", "third", error=2.0)
+    own.tau_ext_smooth[:1000] *= 1000.0
+    [with_own] = tracked(identified, signal, [own])
+    assert with_own.tau_ext_smooth_std.max() < 2.5
+
+
+def test_where_free_motion_errs_less_than_the_smoother_allows_the_band_is_as_narrow(identified):
+    """The smoother allows for a walk of the effort, which free motion lacks; the filter's deviation stays its own."""
+    signal = arm.signal(seed=5, period=7.3, role="validation", log="run")
+    [alone] = tracked(identified, signal)
+    band = band_of("other", "another", "third", error=0.02)
+    [made] = tracked(identified, signal, [band])
+    assert_allclose(made.tau_ext_smooth_std, 0.4 * alone.tau_ext_smooth_std, rtol=0.1)
+    assert (made.model_part, made.smooth_part) == (0.0, pytest.approx(0.4 * alone.smooth_part, rel=0.1))
+    assert_allclose(made.tau_ext_std, alone.tau_ext_std)
+
+
+def test_a_single_log_is_judged_by_its_other_blocks(identified):
+    signal, band = arm.signal(seed=5, period=7.3, role="validation", log="run"), band_of("run", error=0.2)
+    band.tau_ext_smooth[band.block == 5] *= 100.0
+    [made] = tracked(identified, signal, [band])
+    assert made.band_from == "its own other blocks"
+    last = np.arange(len(made)) >= 0.9 * len(made)
+    assert made.tau_ext_smooth_std[last].max() < 0.5 < 5.0 < made.tau_ext_smooth_std[~last].max()
 
 
 def test_an_offset_of_the_day_is_taken_off_and_its_error_stated(identified):
@@ -302,6 +326,7 @@ def test_an_offset_of_the_day_is_taken_off_and_its_error_stated(identified):
     assert made.day_offset == pytest.approx(0.5, abs=4 * made.day_offset_std)
     assert_allclose(without.tau_ext - made.tau_ext, made.day_offset)
     assert_allclose(made.tau_ext_std**2 - without.tau_ext_std**2, made.day_offset_std**2, rtol=1e-6)
+    assert_allclose(made.tau_ext_smooth_std**2 - without.tau_ext_smooth_std**2, made.day_offset_std**2, rtol=1e-6)
 
 
 def test_an_offset_that_drifts_is_remarked_on(identified):

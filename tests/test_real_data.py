@@ -117,6 +117,7 @@ def test_free_motion_looks_small_while_a_push_is_shown(results, joint, least, al
     assert results[f"ekf.{prefix}.push_share"] >= 0.9
     assert results[f"ekf.{prefix}.push_delay"] <= 0.101  # the peak of a sampled response is known to half a sample
     assert results[f"rts.{prefix}.free_rms"] < results[f"ekf.{prefix}.free_rms"]
+    assert results[f"effort.{prefix}.free_rms"] < results[f"ekf.{prefix}.free_rms"]
     assert results[f"ekf.{prefix}.nis_mean"] == pytest.approx(2.0, abs=0.4)
 
 
@@ -126,7 +127,7 @@ def test_the_bands_cover_free_motion_that_they_were_not_made_of(dvrk, results):
     for joint in ("hand_roll", "hand_pitch", "instrument_slide"):
         track = davinci_forces.read(dvrk, "Track", log="one-noweight", joint=joint)
         assert track["band_from"].iloc[0] == "one"
-        assert results[f"ekf.one-noweight.{joint}.coverage"] >= 0.90
+        assert results[f"effort.one-noweight.{joint}.coverage"] >= 0.90
 
 
 def test_page_one_says_that_the_path_is_the_one_that_was_fitted(dvrk):

@@ -47,10 +47,10 @@ def tracks(robot: str, tau, q=None, log="push", role="contact", at_rest=(0, 0, 0
     made = []
     for i, name in enumerate(NAMES):
         columns = dict.fromkeys(Track.columns(), zero) | {
-            "t": T, "q": q[:, i], "tau_ext_smooth": tau[:, i], "tau_ext_std": zero + STD[i]
+            "t": T, "q": q[:, i], "tau_ext_smooth": tau[:, i], "tau_ext_smooth_std": zero + STD[i]
         }  # fmt: skip
         scalars = dict.fromkeys(Track.scalars(), 0.0) | {"at_rest": at_rest[i], "rate": RATE, "filter": "ekf"}
-        parts = {"filter_part": 0.6 * STD[i], "model_part": 0.8 * STD[i]}
+        parts = {"smooth_part": 0.6 * STD[i], "model_part": 0.8 * STD[i]}
         about = {"log": log, "joint": name, "role": role, "model": "m", "estimator": "e", "path": "", "band_from": ""}
         made.append(Track(**columns, **scalars | parts | about))
     return made

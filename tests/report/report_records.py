@@ -22,7 +22,8 @@ def prediction(**scores: Any) -> Prediction:
 def free_space(**levels: Any) -> FreeSpace:
     """The free space of a run."""
     names = ("free_rms", "free_level", "detection_level", "coverage")
-    about = {"log": "run", "joint": "roll", "filter": "ekf", "role": "validation", "tested": 100}
-    of_smooth = ("smooth_rms", "smooth_max", "crossings")
-    values = about | dict.fromkeys((*names, *(f"{name}_std" for name in names), *of_smooth), 0.0)
+    about = {"log": "run", "joint": "roll", "filter": "rts", "role": "validation", "tested": 100}
+    motion = ("free_max", "crossings", "band_width")
+    quartiles = dict.fromkeys(("quartile_coverage", "quartile_coverage_std"), NOTHING)
+    values = about | quartiles | dict.fromkeys((*names, *(f"{name}_std" for name in names), *motion), 0.0)
     return FreeSpace(**(values | levels))  # type: ignore[arg-type]

@@ -68,7 +68,7 @@ def slid(seed=0, std=0.5, model=0.1, lag=0.1, way=1.0, rest=6.0, band_from="free
     late = way * np.interp(t - lag, t, force)
     zero = np.zeros_like(t)
     columns = dict.fromkeys(Track.columns(), zero) | {"t": t, "q": way * depth, "dq": way * dq, "tau_ext": late}
-    columns |= {"tau_ext_direct": direct, "tau_ext_std": zero + 3.0}
+    columns |= {"tau_ext_direct": direct, "tau_ext_smooth_std": zero + 3.0}
     scalars = dict.fromkeys(Track.scalars(), 0.0) | {"at_rest": 0, "rate": 100.0, "filter": "ekf"}
     scalars |= {"model_part": model, "band_from": band_from}
     named = {"log": "run", "joint": "instrument_slide", "role": "tissue", "model": "m", "estimator": "e"}

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.filters import DEFAULT, ekf, rts, tracker
+from davinci_forces.filters import DEFAULT, ekf, tracker
 from davinci_forces.filters.problem import Filter, FilterInput, NoiseModel, stationary_joint
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.models.bias import VISCOUS
@@ -90,16 +90,15 @@ def noise_model(tuned: FilterNoise, joint: Joint, T_s: float, q_tau: float, name
     )  # fmt: skip
 
 
-def lag(recordings: Sequence[FilterInput], noise: NoiseModel) -> tuple[Array, Array]:
-    """Return the smoothed external effort (N,) of all recordings, and the error that the filter's lag makes (N,).
+def lag(recordings: Sequence[FilterInput], smooth: Array, noise: NoiseModel) -> Array:
+    """Return the error (N,) that the filter's lag makes in recordings, by their smoothed external effort (N,).
 
     The error is the smoothed effort minus the filter's response to it.  That response is computed for a joint at rest,
     where the filter is linear: position and velocity stay 0.
     """
-    smooth = [rts.track(recording, noise).tau_ext for recording in recordings]
+    first = np.cumsum([len(recording.q) for recording in recordings])[:-1]
     inputs_at_rest = (
         stationary_joint(part.joint.inertia, part.joint.coefficients[VISCOUS], tau_ext, part.T_s, part.initial_std)
-        for part, tau_ext in zip(recordings, smooth, strict=True)
+        for part, tau_ext in zip(recordings, np.split(smooth, first), strict=True)
     )
-    filtered = np.concatenate([ekf.track(part, noise).tau_ext for part in inputs_at_rest])
-    return np.concatenate(smooth), np.concatenate(smooth) - filtered
+    return np.asarray(smooth - np.concatenate([ekf.track(part, noise).tau_ext for part in inputs_at_rest]))

@@ -5,6 +5,8 @@ from dataclasses import dataclass
 
 from davinci_forces.records.record import Column, Counts, JointRecord, Labels, LogJointRecord, Names, Published
 
+SMOOTHER = "rts"  # the filter whose external effort is the result; the default filter is what real time would see
+
 
 @dataclass(frozen=True, eq=False)
 class Tuning(LogJointRecord):
@@ -17,7 +19,6 @@ class Tuning(LogJointRecord):
     q_tau: float
     inertia: float
     viscous: float
-    speed: float
     likelihood_gain: float
     tested: int
 
@@ -34,7 +35,6 @@ class FilterNoise(JointRecord):
     q_tau: float
     inertia: float
     viscous: float
-    speed: float
 
     def published(self) -> Iterator[Published]:
         """The noise, and the random walk that follows a push at the rate of the identification logs."""
@@ -43,40 +43,37 @@ class FilterNoise(JointRecord):
 
 @dataclass(frozen=True, eq=False)
 class FreeMotion(LogJointRecord):
-    """The filter's external effort on one joint of a log of free motion, with a fit that did not use that log.
+    """The smoother's external effort on one joint of a log of free motion, with a fit that did not use that log.
 
-    A row is one sixth of the log, in one range of speeds.
+    It has at most 1000 rows, evenly spaced; each stands for so many uncorrelated samples.
     """
 
     path: str
     scheme: str
     tested: int
-    free_mean: float
     block: Counts
-    speed_bin: Counts
-    count: Counts
-    mean_square: Column
-    filter_square: Column
+    dq: Column
+    tau_ext_smooth: Column
+    tau_ext_std_filter: Column
+    uncorrelated: Column
 
 
 @dataclass(frozen=True, eq=False)
 class ErrorBand(JointRecord):
-    """The errors of a joint's external effort in free motion outside the fit, block by block, of at most 20 logs.
+    """The errors of a joint's smoothed external effort in free motion outside the fit, of at most 20 logs.
 
     The band of a log uses the rows of the other logs.
     """
 
-    speed: float
     band_rms: float
     band_rms_std: float
     source: Labels
     path_of: Labels
     block: Counts
-    speed_bin: Counts
-    count: Counts
-    mean_square: Column
-    filter_square: Column
-    log_mean: Column
+    dq: Column
+    tau_ext_smooth: Column
+    tau_ext_std_filter: Column
+    uncorrelated: Column
 
     def published(self) -> Iterator[Published]:
         """The error over all rows."""
@@ -85,10 +82,10 @@ class ErrorBand(JointRecord):
 
 @dataclass(frozen=True, eq=False)
 class Track(LogJointRecord):
-    """The external effort on one joint during one log, as a filter tracked it, with its standard deviation.
+    """The external effort on one joint during one log, by filter and smoother, each with its standard deviation.
 
-    The standard deviation combines the filter's covariance, the model's error in free motion outside the fit and the
-    filter's lag.  In a log with `free` windows, it includes the uncertainty of the day's offset.
+    Both combine the estimator's own covariance, the model's error in free motion outside the fit and, in a log with
+    `free` windows, the uncertainty of the day's offset.  The filter's includes its lag; the smoother has none.
     """
 
     model: str
@@ -110,6 +107,7 @@ class Track(LogJointRecord):
     model_part: float
     model_part_std: float
     lag_part: float
+    smooth_part: float
     smooth_rise: float
     band_from: str
     t: Column
@@ -121,6 +119,7 @@ class Track(LogJointRecord):
     tau_ext_std: Column
     tau_ext_std_filter: Column
     tau_ext_smooth: Column
+    tau_ext_smooth_std: Column
     tau_ext_direct: Column
     innovation_q: Column
     innovation_dq: Column
@@ -132,11 +131,17 @@ class Track(LogJointRecord):
         names = ("tau_ext_rms", "nis_mean", "r_q", "r_dq", "q_dq", "q_tau", "filter_part", "lag_part")
         yield from self.publish(prefix, *names)
         yield from self.publish(prefix, "model_part", "day_offset", with_std=True)
+        yield from self.publish(f"effort.{self.log}.{self.joint}", "smooth_part")
 
 
 @dataclass(frozen=True, eq=False)
 class FreeSpace(LogJointRecord):
-    """The external effort of one filter on one joint of one log, where nothing touched the robot."""
+    """The external effort of smoother or filter on one joint of one log, where nothing touched the robot.
+
+    A row is a quartile of speed in motion; there are none if the joint hardly moves.
+    """
+
+    KEY = ("log", "joint", "filter")
 
     filter: str
     role: str
@@ -149,19 +154,33 @@ class FreeSpace(LogJointRecord):
     detection_level_std: float
     coverage: float
     coverage_std: float
-    smooth_rms: float
-    smooth_max: float
+    band_width: float
+    free_max: float
     crossings: float
+    quartile_coverage: Column
+    quartile_coverage_std: Column
+
+    @property
+    def prefix(self) -> str:
+        """`effort.<log>.<joint>` of the smoother, whose effort is the result; `<filter>.<log>.<joint>` of a filter."""
+        return f"{'effort' if self.filter == SMOOTHER else self.filter}.{self.log}.{self.joint}"
 
     def published(self) -> Iterator[Published]:
-        """The levels, and the coverage of the stated band."""
-        prefix = f"{self.filter}.{self.log}.{self.joint}"
-        yield from self.publish(prefix, "free_rms", "free_level", "detection_level", "coverage", with_std=True)
+        """The levels, and the coverage of the stated band; of the smoother also by quartile of speed."""
+        yield from self.publish(self.prefix, "free_rms", "free_level", "detection_level", "coverage", with_std=True)
+        if self.filter != SMOOTHER:
+            return
+        yield from self.publish(self.prefix, "band_width")
+        for i in range(len(self)):
+            yield Published(f"{self.prefix}.coverage_q{i + 1}", "quartile_coverage", "quartile_coverage_std", i)
 
 
 @dataclass(frozen=True, eq=False)
 class Threshold(JointRecord):
-    """The detection level for contacts on a joint: the level of the log with the largest effort in free space."""
+    """The detection level for contacts on a joint: the level of the log with the largest effort in free space.
+
+    The coverage of the band is the mean over the same logs, those that were not fitted if there are any.
+    """
 
     KEY = ("joint", "filter")
 
@@ -171,11 +190,17 @@ class Threshold(JointRecord):
     alarm_level: float
     alarm_level_std: float
     level_from: str  # the log whose free space it is
+    tested: int  # logs
+    coverage: float
+    coverage_std: float
+    band_width: float
 
     def published(self) -> Iterator[Published]:
-        """Both levels."""
+        """Both levels, and the coverage and width of the band over all logs."""
         prefix = f"threshold.{self.joint}"
         yield from self.publish(prefix, "detection_level", "alarm_level", with_std=True)
+        yield from self.publish(f"band.{self.joint}", "coverage", with_std=True)
+        yield from self.publish(f"band.{self.joint}", "band_width")
 
 
 @dataclass(frozen=True, eq=False)
@@ -220,7 +245,7 @@ class Contact(LogJointRecord):
 class Comparison(LogJointRecord):
     """One filter on one joint of a log: its effort in free space, and its response to a push added in software.
 
-    The free space of the default filter is in FreeSpace.
+    The free space of the default filter, and of the smoother with its noise, is in FreeSpace.
     """
 
     KEY = ("log", "joint", "filter")

@@ -136,7 +136,6 @@ class TipBudget(LogRecord):
     filter_force: Column
     model_force: Column
     model_force_std: Column
-    lag_force: Column
     total_force: Column
     total_force_std: Column
 
@@ -144,8 +143,7 @@ class TipBudget(LogRecord):
         """The parts of every joint."""
         for i, joint in enumerate(self.of_joint):
             prefix = f"tip.{self.log}.{joint}"
-            for key, name in (("filter_part", "filter_force"), ("lag_part", "lag_force")):
-                yield Published(f"{prefix}.{key}", name, row=i)
+            yield Published(f"{prefix}.filter_part", "filter_force", row=i)
             for key, name in (("model_part", "model_force"), ("total", "total_force")):
                 yield Published(f"{prefix}.{key}", name, std=f"{name}_std", row=i)
 

@@ -58,7 +58,7 @@ def _joint(context: Context, joint: str) -> dict[str, Any]:
     """The verdict on one joint as on page one, and the keys of its numbers."""
     trusted = trust(context, joint)
     p, space = trusted.prediction, trusted.space
-    free = f"{space.filter}.{space.log}.{space.joint}" if space is not None else ""
+    free = space.prefix if space is not None else ""
     keys = {
         "model_error": f"{p.prefix}.model_error" if p is not None else "",
         "detection_level": f"{free}.detection_level",

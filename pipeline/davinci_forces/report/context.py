@@ -6,6 +6,7 @@ from typing import Any
 
 from davinci_forces.records import Fit, FreeSpace, Prediction, Record
 from davinci_forces.records.catalogue import Catalogue, Provenance
+from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.records.quantities import QUANTITIES
 from davinci_forces.report.changes import StatedValue
@@ -76,8 +77,8 @@ class Context:
         return next((name for name in (*wanted, BASELINE_FIT, *names) if name in names), self.study.settings.fit)
 
     def worst_space(self, joint: str) -> FreeSpace | None:
-        """The free space of a joint with the highest detection level, if possible of a log that was not fitted."""
-        spaces = self.catalogue.select(FreeSpace, joint=joint)
+        """The smoother's free space of a joint with the highest detection level, if possible of a log not fitted."""
+        spaces = self.catalogue.select(FreeSpace, joint=joint, filter=SMOOTHER)
         unseen = [space for space in spaces if space.role != "identification"]
         return max(unseen or spaces, key=lambda space: space.detection_level, default=None)
 

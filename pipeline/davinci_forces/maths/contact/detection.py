@@ -12,7 +12,8 @@ An onset is modelled as a ramp of duration T that the smoother widens about its 
 A window of contact is summarised by peak, mean and impulse of the external effort, with standard errors.  They are
 computed from free motion in windows of the same length, so the model's error is included.  That of a peak is the root
 mean square of the windows' largest samples; that of a mean is the root mean square of the windows' means.
-The standard deviation of the effort near a peak, which includes the lag of a filter, is added to that of the peak.
+The standard deviation of the effort at a peak is added to that of the peak, and so is what the smoother rounds off it:
+the peak minus the mean over `TIP_REACH` on either side.
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,7 +27,7 @@ from davinci_forces.maths.signals.windows import runs
 
 FALSE_ALARMS = 1.0 / 600.0  # [1/s] rate of false alarms
 MAX_GAP_CONTACT = 0.25  # [s] longest gap between two crossings of one sign that belong to one contact
-PEAK_REACH = 0.2  # [s] before and after a peak: a filter's lag causes its largest error within this time
+TIP_REACH = 1.0 + 0.5**0.5  # in T_s: exact for the tip of a triangle that exponential weights of either side round off
 
 
 class FreeMotionStatistics(NamedTuple):
@@ -123,10 +124,12 @@ class Summary(NamedTuple):
     impulse_std: float
 
 
-def summarise(t: Array, tau_ext: Array, std: Array, window: tuple[float, float], free: Booleans) -> Summary | None:
+def summarise(
+    t: Array, tau_ext: Array, std: Array, window: tuple[float, float], free: Booleans, rise: float
+) -> Summary | None:
     """Peak, mean and impulse of an external effort (N,) with deviation (N,) in a window [s]; None if that is empty.
 
-    `free` (N,) are the samples at which nothing touches the robot.
+    `free` (N,) are the samples at which nothing touches the robot; `rise` [s] is the duration T_s of a step.
     """
     start, end = window
     inside = tau_ext[(t >= start) & (t <= end)]
@@ -135,8 +138,8 @@ def summarise(t: Array, tau_ext: Array, std: Array, window: tuple[float, float],
     duration, mean = end - start, float(inside.mean())
     mean_std = mean_size(tau_ext, free, len(inside))
     k = int(np.searchsorted(t, start)) + int(np.argmax(np.abs(inside)))
-    std_near_peak = float(std[np.abs(t - t[k]) <= PEAK_REACH].max())
-    peak_std = float(np.hypot(std_near_peak, largest_size(tau_ext, free, len(inside))))
+    rounded_off = float(tau_ext[k] - tau_ext[np.abs(t - t[k]) <= TIP_REACH * rise].mean())
+    peak_std = float(np.linalg.norm([std[k], rounded_off, largest_size(tau_ext, free, len(inside))]))
     return Summary(float(tau_ext[k]), peak_std, mean, mean_std, mean * duration, mean_std * duration)
 
 

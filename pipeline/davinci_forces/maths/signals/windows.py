@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Array, Booleans
+from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.signals.smoothing import segments
 
 TRANSIENT = 1.0  # [s] duration of a filter's transient, left out of the statistics of the whole run
@@ -23,14 +23,19 @@ def is_past_transient(t: Array) -> Booleans:
     return t - t[0] >= TRANSIENT if t[-1] - t[0] > 5 * TRANSIENT else np.ones(len(t), dtype=bool)
 
 
-def free_space(t: Array, windows: Sequence[tuple[float, float]], rate: float) -> Booleans:
+def free_space(t: Array, windows: Sequence[tuple[float, float]], rate: float, before: float = 0.0) -> Booleans:
     """Whether nothing touches the robot at each time (N,) and the filter's transient is over; `rate` [Hz].
 
-    There is a transient at the start, after each gap and after each window.
+    There is a transient at the start, after each gap and after each window, and `before` [s] each window.
     """
-    widened = [(start, end + TRANSIENT) for start, end in windows]
+    widened = [(start - before, end + TRANSIENT) for start, end in windows]
     steady = np.concatenate([is_past_transient(t[part]) for part in unbroken(t, 1.5 / rate)])
     return np.asarray(is_outside(t, widened) & steady)
+
+
+def free_smoothed(t: Array, windows: Sequence[tuple[float, float]], rate: float) -> Booleans:
+    """Free space (N,) for the smoother, which responds to a contact as long before it as after it."""
+    return free_space(t, windows, rate, TRANSIENT)
 
 
 def runs(which: Booleans) -> list[slice]:
@@ -46,4 +51,9 @@ def longest_run(t: Array, rate: float) -> slice:
 
 def unbroken(t: Array, gap: float) -> list[slice]:
     """Split the times (N,) into runs that are no more than `gap` [s] apart."""
-    return list(segments(np.cumsum(np.diff(t, prepend=t[:1]) > gap)))
+    return list(segments(segment_numbers(t, gap)))
+
+
+def segment_numbers(t: Array, gap: float) -> Integers:
+    """Number the runs of times (N,) that are no more than `gap` [s] apart."""
+    return np.asarray(np.cumsum(np.diff(t, prepend=t[:1]) > gap))

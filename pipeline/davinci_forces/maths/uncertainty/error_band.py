@@ -1,8 +1,17 @@
-"""The error variance of an external effort beyond that of the filter, by speed where it depends on speed.
+"""The deviation of a smoothed external effort, calibrated on free motion outside the fits, by range of speed.
 
-It is estimated on free motion outside the fits: mean squares over blocks of a log and ranges of speed, less the
-variance of the filter.  Logs have equal weight, whatever their length.  `levels` checks the coverage of the resulting
-band on samples without contact.
+The smoother's own variance S^2 knows nothing of the model's error, whose variance is v = mean(e^2 - S^2), at least 0:
+
+    sigma = k (S^2 + v)^(1/2),    k = q / 1.96,    q the 95 % quantile of |e| / (S^2 + v)^(1/2)
+
+So 1.96 sigma has the stated coverage, whatever the distribution of the errors e.  All logs have equal weight.
+
+The quantile of a range of speed shrinks towards that of all speeds, in logarithms, where it has few errors.  Errors are
+correlated, so n uncorrelated ones are counted; as in conformal prediction, the quantile is that of (n + 1) / n times
+95 % (Vovk, Gammerman and Shafer, Algorithmic Learning in a Random World, 2005).  The model's error differs from log to
+log, and a few logs hardly show by how much: v is multiplied by the square of Student's 95 % point over 1.96.
+
+`levels` checks the coverage of the resulting band on samples without contact.
 """
 
 from typing import NamedTuple
@@ -10,133 +19,121 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers, evenly
-from davinci_forces.maths.uncertainty import bootstrap
 from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, error_of_quantile
 
-EDGES = (0.25, 0.5, 1.0, 1.5)  # between ranges of speed, in root mean squares of the identification's velocity
-BINS = len(EDGES) + 1
-LOG_BLOCKS = 6
-MIN_LOGS_BAND = 3  # with fewer logs, standard errors leave out blocks instead
+RANGES = 4  # ranges of speed, between quartiles of the calibrating motion
+LOG_BLOCKS = 6  # blocks of a log: each counts as a degree of freedom of the model's error
+MIN_LOGS_BAND = 3  # with fewer logs, standard errors compare blocks instead
+SHRINKAGE = 10.0  # uncorrelated errors at which the quantile of a range counts as much as that of all speeds
 DETECTED_SHARE = 0.99  # share of free-space samples below the detection level
 TYPICAL_SHARE = 0.95  # share of free-space samples below the lower level
+TINY = 1e-12  # size of an error of 0, so that it has a logarithm
 NORMAL_95 = 1.959963984540054
+MIN_SAMPLES_QUARTILES = 100
 MAX_SAMPLES_BOOTSTRAP = 20_000  # of more samples, evenly spaced ones are drawn
 
 
-class SpeedCells(NamedTuple):
-    """Blocks of logs at ranges of speed, (C,) each."""
+class FreeErrors(NamedTuple):
+    """Errors of a smoothed external effort in free motion outside the fits, (C,) each."""
 
     source: Integers  # number of the log
     block: Integers
-    speed_bin: Integers
-    samples: Integers
-    mean_square: Array  # of the external effort
-    filter_square: Array  # mean of the variance that the filter accounts for, its lag included
-    log_mean: Array  # of the external effort over the whole log
+    dq: Array
+    error: Array
+    std: Array  # the smoother's own
+    uncorrelated: Array  # number of uncorrelated errors that each stands for
 
-    def select(self, which: Booleans) -> "SpeedCells":
-        """Select cells."""
-        return SpeedCells(*(column[which] for column in self))  # type: ignore[arg-type]
+    def select(self, which: Booleans) -> "FreeErrors":
+        """Select errors."""
+        return FreeErrors(*(column[which] for column in self))  # type: ignore[arg-type]
 
+    @property
+    def weight(self) -> Array:
+        """Weight (C,) of each error: all logs together have 1, each log the same."""
+        _, log, count = np.unique(self.source, return_inverse=True, return_counts=True)
+        return np.asarray(1.0 / (count[log] * len(count)))
 
-def speed_bin(dq: Array, speed: float) -> Integers:
-    """Number of the range of speed of each sample (N,); `speed` is the RMS velocity of the identification."""
-    return np.searchsorted(np.array(EDGES) * speed, np.abs(dq))
-
-
-def cells(tau_ext: Array, variance: Array, dq: Array, speed: float) -> SpeedCells:
-    """Average one log's free motion by cells: external effort (N,), the filter's variance (N,) and velocity (N,)."""
-    block, bins = np.empty(len(dq), np.int64), speed_bin(dq, speed)
-    for number, part in enumerate(np.array_split(np.arange(len(dq)), LOG_BLOCKS)):
-        block[part] = number
-    cell, inverse, count = np.unique(block * BINS + bins, return_inverse=True, return_counts=True)
-    squares, filter_squares = (np.bincount(inverse, weights=x) / count for x in (tau_ext**2, variance))
-    mean = np.full(len(cell), tau_ext.mean())
-    return SpeedCells(np.zeros(len(cell), np.int64), cell // BINS, cell % BINS, count, squares, filter_squares, mean)
+    @property
+    def unit(self) -> Integers:
+        """Uncorrelated unit of each error (C,): its log, or its block if logs are few."""
+        return self.source if len(np.unique(self.source)) >= MIN_LOGS_BAND else self.source * LOG_BLOCKS + self.block
 
 
-def subtract_log_means(data: SpeedCells) -> SpeedCells:
-    """Subtract the squared mean of each log, as the subtraction of the log's constant day offset does."""
-    return data._replace(mean_square=data.mean_square - data.log_mean**2)
+class Calibration(NamedTuple):
+    """The deviation of a smoothed external effort in units of its own, by range of speed."""
+
+    edges: Array  # (RANGES - 1,) speeds between the ranges
+    factor: Array  # (RANGES,) k
+    model_variance: float  # v, as wide as the number of logs asks for
+    relative_std: float  # standard error of k, relative
+
+    def variance(self, std: Array, dq: Array) -> Array:
+        """Total variance (N,) from the smoother's own deviation (N,), along its velocity (N,)."""
+        return np.asarray(self.factor[speed_range(dq, self.edges)] ** 2 * (std**2 + self.model_variance))
 
 
-def excess(data: SpeedCells) -> Array:
-    """Variance (BINS,) beyond the filter's own; one value for all speeds if it does not depend on speed."""
-    if not len(data.samples):
-        return np.zeros(BINS)
-    variances = means(data, data.mean_square - data.filter_square, together=not depends_on_speed(data))
-    return np.maximum(variances, 0.0)
+def speed_range(dq: Array, edges: Array) -> Integers:
+    """Number of the range of speed of each sample (N,)."""
+    return np.searchsorted(edges, np.abs(dq))
 
 
-def excess_std(data: SpeedCells) -> Array:
-    """Standard error (BINS,) of `excess`, by the jackknife over logs, or over blocks if logs are few."""
-    if not len(data.samples):
-        return np.zeros(BINS)
-    left_out = without_each(data, data.mean_square - data.filter_square, units(data), not depends_on_speed(data))
-    return bootstrap.of_left_out(np.maximum(left_out, 0.0))
+def calibrate(data: FreeErrors) -> Calibration:
+    """Calibrate the deviation of an external effort on its errors in free motion (C,)."""
+    weight, n = data.weight, float(data.uncorrelated.sum())
+    v = max(float(np.sum(weight * (data.error**2 - data.std**2))), 0.0)
+    size, share = np.abs(data.error) / np.sqrt(data.std**2 + v) + TINY, min((1.0 + 1.0 / n) * TYPICAL_SHARE, 1.0)
+    edges = np.quantile(np.abs(data.dq), np.arange(1, RANGES) / RANGES)
+    inside = [speed_range(data.dq, edges) == number for number in range(RANGES)]
+    overall = np.log(weighted_quantile(size, weight, share))
+    by_range = np.array([np.log(weighted_quantile(size[r], weight[r], share)) if r.any() else overall for r in inside])
+    trust = np.array([data.uncorrelated[r].sum() for r in inside])
+    trust /= trust + SHRINKAGE
+    factor = np.exp(trust * by_range + (1.0 - trust) * overall) / NORMAL_95
+    widening = students_95(LOG_BLOCKS * len(np.unique(data.source))) / NORMAL_95
+    return Calibration(edges, factor, widening**2 * v, spread_of_units(size, data.unit))
 
 
-def units(data: SpeedCells) -> Integers:
-    """Uncorrelated unit of each cell (C,): its log, or its block if logs are few."""
-    return data.source if len(np.unique(data.source)) >= MIN_LOGS_BAND else data.source * LOG_BLOCKS + data.block
+def weighted_quantile(x: Array, weight: Array, share: float) -> float:
+    """The smallest of the values (C,) up to which lies a share of the weight (C,)."""
+    order = np.argsort(x)
+    total = np.cumsum(weight[order])
+    return float(x[order][min(int(np.searchsorted(total, share * total[-1])), len(x) - 1)])
 
 
-def means(data: SpeedCells, values: Array, together: bool) -> Array:
-    """Mean (BINS,) of cell values in each range, with equal weight of logs; one mean of all ranges if `together`.
+def students_95(degrees: int) -> float:
+    """The value that Student's t exceeds, on either side, with a probability of 5 %."""
+    from scipy.special import stdtrit
 
-    An empty range gets the mean of all ranges.
+    return float(stdtrit(degrees, 0.5 + 0.5 * TYPICAL_SHARE))
+
+
+def spread_of_units(size: Array, unit: Integers) -> float:
+    """Standard error of the logarithm of the quantile of sizes (C,), from its spread over units; NaN for one unit."""
+    logs = [np.log(np.quantile(size[unit == number], TYPICAL_SHARE)) for number in np.unique(unit)]
+    return float(np.std(logs, ddof=1) / len(logs) ** 0.5) if len(logs) > 1 else float("nan")
+
+
+def count_uncorrelated(x: Array) -> float:
+    """Number of uncorrelated samples in a series (N,): N over the sum of its autocorrelation up to its first zero."""
+    centred = x - x.mean()
+    power = np.abs(np.fft.rfft(centred, 2 * len(x))) ** 2
+    covariance = np.fft.irfft(power)[: len(x)]
+    if covariance[0] <= 0.0:
+        return 1.0
+    until = int(np.argmax(covariance < 0.0)) or len(x)
+    return float(max(len(x) / (1.0 + 2.0 * np.sum(covariance[1:until]) / covariance[0]), 1.0))
+
+
+def coverage_by_speed(tau_ext: Array, std: Array, dq: Array) -> tuple[Array, Array]:
+    """Coverage (4,) of a 95 % band in each quartile of speed, with standard errors, by block bootstrap.
+
+    `tau_ext` (N,) is in free space, with its standard deviation (N,) and velocity (N,).  Empty arrays where N < 100.
     """
-    totals, samples = sums(data, values, np.unique(data.source, return_inverse=True)[1])
-    return _of_ranges(_ratio(totals, samples).sum(0), (samples > 0).sum(0), together)
-
-
-def without_each(data: SpeedCells, values: Array, unit: Integers, together: bool) -> Array:
-    """The means (U, BINS) of `means` without each unit of cells (C,) in turn; a unit belongs to one log.
-
-    Leaving out a unit changes only the mean of its log, so all U means cost little more than one.
-    """
-    _, log = np.unique(data.source, return_inverse=True)
-    _, first, part = np.unique(unit, return_index=True, return_inverse=True)
-    totals, samples = sums(data, values, log)
-    out, out_samples = sums(data, values, part)
-    counts = samples[log[first]] - out_samples
-    changed = _ratio(totals[log[first]] - out, counts) - _ratio(totals, samples)[log[first]]
-    fewer = (counts > 0).astype(int) - (samples > 0)[log[first]]
-    return _of_ranges(_ratio(totals, samples).sum(0) + changed, (samples > 0).sum(0) + fewer, together)
-
-
-def sums(data: SpeedCells, values: Array, group: Integers) -> tuple[Array, Array]:
-    """Sum values over samples, and samples, by group (C,) and range (G, BINS + 1); the last column is the total."""
-    shape = int(group.max()) + 1, BINS
-    tables = (
-        np.bincount(group * BINS + data.speed_bin, weights=x, minlength=shape[0] * BINS).reshape(shape)
-        for x in (data.samples * values, data.samples)
-    )
-    weighted, samples = (np.column_stack([x, x.sum(1)]) for x in tables)
-    return weighted, samples
-
-
-def depends_on_speed(data: SpeedCells) -> bool:
-    """Whether variances by range of speed give omitted blocks a higher likelihood than one variance for all speeds."""
-    unit = np.unique(data.source * LOG_BLOCKS + data.block, return_inverse=True)[1]
-    if unit.max() < 2:
-        return False
-    variances = (without_each(data, data.mean_square, unit, together) for together in (True, False))
-    common, by_range = (variance[unit, data.speed_bin] for variance in variances)
-    gain = np.log(common / by_range) + data.mean_square * (1.0 / common - 1.0 / by_range)
-    return float(np.sum(data.samples / np.bincount(unit, weights=data.samples)[unit] * gain)) > 0.0
-
-
-def _of_ranges(total: Array, logs: Integers, together: bool) -> Array:
-    """Means (..., BINS) of sums over `logs` (..., BINS + 1), whose last column is for all ranges."""
-    mean = _ratio(total, logs)
-    overall = np.broadcast_to(mean[..., -1:], mean[..., :-1].shape)
-    return np.asarray(overall if together else np.where(logs[..., :-1] > 0, mean[..., :-1], overall))
-
-
-def _ratio(total: Array, count: Array | Integers) -> Array:
-    """Means; 0 where the count is 0."""
-    return np.divide(total, count, out=np.zeros(np.shape(total)), where=count > 0)
+    if len(dq) < MIN_SAMPLES_QUARTILES:
+        return np.zeros(0), np.zeros(0)
+    inside = (np.abs(tau_ext) <= NORMAL_95 * std).astype(float)
+    parts = [inside[np.sort(quartile)] for quartile in np.array_split(np.argsort(np.abs(dq), kind="stable"), 4)]
+    return np.array([part.mean() for part in parts]), np.array([error_of_pooled_mean(part) for part in parts])
 
 
 class FreeSpaceLevels(NamedTuple):

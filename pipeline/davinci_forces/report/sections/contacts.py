@@ -23,13 +23,13 @@ def blocks(context: Context) -> Iterator[Block]:
     if contacts:
         yield Prose(
             "A contact is measured on each joint that moves during the contact. The study states its window, or the "
-            "window is the time in which the smoothed external effort exceeds the alarm level. This level is set so "
-            "that free motion crosses it at most once in ten minutes. Each contact has an onset, a release, a peak "
-            "(the largest external effort), a mean and an impulse (effort times time). The standard error of each "
+            "window is the time in which the external effort, the smoother's, exceeds the alarm level. Free motion "
+            "crosses this level at most once in ten minutes. Each contact has an onset, a release, a peak (the largest "
+            "external effort), a mean and an impulse (effort times time). The standard error of each "
             "quantity is its spread over windows of the same length in free space; the standard error of a peak also "
-            "includes the filter's standard deviation at that peak. A contact is detected if its peak exceeds the "
-            "joint's detection level: 99 % of the samples of the joint's worst run in free space stay below this "
-            "level."
+            "includes the smoother's standard deviation at that peak, and what the smoother rounds off it. A contact "
+            "is detected if its peak exceeds the joint's detection level: 99 % of the samples of the joint's worst run "
+            "in free space stay below this level."
         )
         yield peaks(contacts)
         yield from paper_or_screen(

@@ -1,6 +1,6 @@
-"""The filter: its assumed noise, the parts of its standard deviation, and a comparison with other filters."""
+"""The filter: its noise, the parts of the standard deviation, the cost of real time, and a comparison of filters."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -42,12 +42,13 @@ def blocks(context: Context) -> Iterator[Block]:
     if worst:
         yield Prose(
             "The stated standard deviation of the external effort combines independent parts ([@error-budget]). The "
-            "filter's part comes from noise and random walk. The model's part is the model's error in free motion of "
-            "other logs, which were not fitted. The lag's part is the smoothed effort minus the filter's, due to the "
-            "filter's delay. The error of the offset of the day (a constant effort that differs from day to day) is "
-            "added if windows without contact determine this offset."
+            "smoother's part comes from noise and random walk. The model's part is the model's error in free motion of "
+            "other logs, which were not fitted. Together they are scaled, by range of speed, so that 95 % of the "
+            "errors in this free motion lie within 1.96 standard deviations. The error of the offset of the day (a "
+            "constant effort that differs from day to day) is added if windows without contact determine this offset."
         )
         yield budget(context, worst)
+        yield cost_of_real_time(context, worst)
     comparisons = [c for track in worst for c in context.catalogue.select(Comparison, log=track.log, joint=track.joint)]
     if comparisons:
         yield comparison(context, comparisons)
@@ -81,18 +82,40 @@ def tuning(context: Context, noises: list[FilterNoise]) -> Table:
 
 def budget(context: Context, tracks: list[Track]) -> Table:
     """The parts of the standard deviation of each joint's worst free run, beside the RMS and coverage of that run."""
-    names = ("filter_part", "model_part", "lag_part", "free_rms", "coverage")
-    rows: tuple[tuple[Cell, ...], ...] = tuple(
-        (title(t.joint), literal(t.log), *context.numbers(f"ekf.{t.log}.{t.joint}", names, 2)) for t in tracks
-    )
-    header = ("Joint", "Worst free run", "Filter", "Model", "Lag", "RMS", "Coverage")
+    keys = ("effort", "smooth_part"), ("ekf", "model_part"), ("effort", "free_rms"), ("effort", "coverage")
+    over_logs = ("coverage", "band_width")
+    rows = tuple((*run_row(context, t, keys), *context.numbers(f"band.{t.joint}", over_logs, 2)) for t in tracks)
+    header = ("Joint", "Worst free run", "Smoother", "Model", "RMS", "Coverage", "Over logs", "Half-width")
     return Table(
         "Parts of the standard deviation of the external effort, in each joint's worst run in free space (root mean "
-        "squares); RMS of the external effort in this run; and coverage, the share of its samples in the 95 % band.",
+        "squares); RMS of the external effort in this run; and coverage, the share of its samples in the 95 % band. "
+        "Over logs: the mean coverage of all logs that were not fitted, with its standard error over logs (over blocks "
+        "of fewer than 3 logs), and the mean half-width of their bands.",
         header,
         rows,
         "error-budget",
-        "llrrrrr",
+        "llrrrrrr",
+    )
+
+
+def run_row(context: Context, t: Track, keys: Sequence[tuple[str, str]]) -> tuple[Cell, ...]:
+    """The joint and log of a run, and its results `<prefix>.<log>.<joint>.<name>` by prefix and name."""
+    numbers = (context.number(f"{prefix}.{t.log}.{t.joint}.{name}", 2) for prefix, name in keys)
+    return (title(t.joint), literal(t.log), *numbers)
+
+
+def cost_of_real_time(context: Context, tracks: list[Track]) -> Table:
+    """Smoother and filter on the worst free run of each joint, and the delay and lag of the filter."""
+    keys = [(prefix, name) for name in ("free_rms", "detection_level") for prefix in ("effort", "ekf")]
+    rows = tuple(run_row(context, t, (*keys, ("ekf", "push_delay"), ("ekf", "lag_part"))) for t in tracks)
+    return Table(
+        "The cost of real time. Results are those of the smoother, which uses samples before and after each instant. "
+        "The filter is what real time would see: RMS and detection level in free space of both; the filter's delay of "
+        "the peak of a push of 1 s; and the part of its standard deviation due to its lag.",
+        ("Joint", "Worst free run", "RMS, smoother", "RMS, filter", "Level, smoother", "Level, filter", "Delay", "Lag"),
+        rows,
+        "real-time-cost",
+        "llrrrrrr",
     )
 
 

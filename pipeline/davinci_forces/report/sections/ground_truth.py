@@ -130,12 +130,12 @@ def parameters(context: Context, joint: str, path: tuple[str, ...], theta: dict[
 
 
 def effort_figure(track: Track, pushes: list[Push]) -> Figure:
-    """The effort exerted on a joint, and the filter's estimate of it."""
+    """The effort exerted on a joint, and the smoother's estimate of it."""
     t, effort = true_effort(pushes, float(track.t[-1]))
     name = run_name(track.log, track.joint)
-    marks = (Line(track.t, track.tau_ext, "filter", "vermillion"), Line(t, effort, "true", "black"))
+    marks = (Line(track.t, track.tau_ext_smooth, "smoother", "vermillion"), Line(t, effort, "true", "black"))
     return Figure(
-        f"{name}: external effort by the filter, and the true one.",
+        f"{name}: external effort by the smoother, and the true one.",
         f"External effort over time for {name}, tracked and true.",
         (Panel("External effort", "time [s]", label(track, "tau_ext", "external effort"), marks),),
         height=42,

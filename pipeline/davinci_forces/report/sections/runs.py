@@ -1,8 +1,9 @@
-"""Every run: its recording, its external effort tracked by the filter, and its traces."""
+"""Every run: its recording, its external effort by the smoother, and its traces."""
 
 from collections.abc import Iterator
 
 from davinci_forces.records import Diagnostic, Explanation, FilterNoise, FreeSpace, LogSummary, Signal, Track
+from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.report.content import (
     Band,
     Block,
@@ -20,7 +21,7 @@ from davinci_forces.report.content import (
 )
 from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.parts import contact_spans, effort_panel, first_on_paper, paper_or_screen, run_name
-from davinci_forces.report.verdicts import band_in_words
+from davinci_forces.report.verdicts import band_in_words, percent
 
 WORST = "the worst free run of this joint"
 ON_PAPER = 2  # joints whose worst run is drawn in the PDF
@@ -60,7 +61,8 @@ def intro(context: Context, tracks: list[Track]) -> Iterator[Prose]:
     tuned = ", tuned as in [@filter-tuning]" if context.catalogue.records(FilterNoise) else ""
     tested = " Its innovations test whether it fits the data ([@innovations])."
     yield Prose(
-        f"An extended Kalman filter estimates position, velocity and external effort of each joint by itself{tuned}."
+        f"An extended Kalman filter estimates position, velocity and external effort of each joint by itself{tuned}. "
+        "External efforts are those of its smoother, which uses the whole recording and has no delay."
         + (tested if context.catalogue.records(Explanation) else "")
     )
     at_rest = [run_name(t.log, t.joint) for t in tracks if t.at_rest]
@@ -84,25 +86,26 @@ def scores(context: Context, tracks: list[Track]) -> Table:
         (
             literal(t.log),
             title(t.joint),
-            *context.numbers(f"{t.filter}.{t.log}.{t.joint}", LEVELS, 2),
+            *context.numbers(f"effort.{t.log}.{t.joint}", LEVELS, 2),
             *coverage(context, t),
         )
         for t in tracks
     )
-    header = ("Log", "Joint", "RMS", "Detection level", "Coverage", "Band")
+    header = ("Log", "Joint", "RMS", "Detection level", "Coverage", "By speed", "Band")
     caption = (
         "External effort in free space, where nothing touches the robot: its root mean square (RMS), the level that "
-        "99 % of samples stay below (detection level), and the share of samples in the 95 % band (coverage). A dash "
-        "marks runs whose contacts are not known."
+        "99 % of samples stay below (detection level), and the share of samples in the 95 % band (coverage), also by "
+        "quartile of speed, standstill left out. A dash marks runs whose contacts are not known."
     )
-    return Table(caption, header, rows, "free-space-table", "llrrrl")
+    return Table(caption, header, rows, "free-space-table", "llrrrll")
 
 
-def coverage(context: Context, t: Track) -> tuple[Cell, Cell]:
-    """The coverage of a run's band, and whether this coverage is right."""
-    spaces = context.catalogue.select(FreeSpace, log=t.log, joint=t.joint, filter=t.filter)
+def coverage(context: Context, t: Track) -> tuple[Cell, Cell, Cell]:
+    """The coverage of a run's band, also by quartile of speed, and whether this coverage is right."""
+    spaces = context.catalogue.select(FreeSpace, log=t.log, joint=t.joint, filter=SMOOTHER)
     words = band_in_words(spaces[0].coverage) if spaces else "–"
-    return context.number(f"{t.filter}.{t.log}.{t.joint}.coverage", 2), words
+    by_speed = ", ".join(map(percent, spaces[0].quartile_coverage)) if spaces else ""
+    return context.number(f"effort.{t.log}.{t.joint}.coverage", 2), by_speed or "–", words
 
 
 def assumptions(context: Context, tracks: list[Track]) -> Table:
@@ -123,14 +126,14 @@ def assumptions(context: Context, tracks: list[Track]) -> Table:
 def trace(context: Context, t: Track, why: str) -> Figure:
     """One run over time.  Fig 7.6-7.11"""
     name, windows = run_name(t.log, t.joint), contact_spans(context, t.log, "stated contact")
-    sigma = 2 * t.tau_ext_std
+    effort, sigma = t.tau_ext_smooth, 2 * t.tau_ext_smooth_std
     # The filter has not converged in the first samples: their wide band would set the scale of the plot.
     shown = slice(min(int(0.25 * t.rate), len(t) // 10), None)
-    largest = float(abs(t.tau_ext[shown]).max()) if len(t.tau_ext[shown]) else 0.0
+    largest = float(abs(effort[shown]).max()) if len(effort[shown]) else 0.0
     return Figure(
-        f"{name}{f', {why}' if why else ''}: position; measured and modelled effort; external effort by the filter, "
+        f"{name}{f', {why}' if why else ''}: position; measured and modelled effort; external effort by the smoother, "
         "with a band of two standard deviations, and measured minus modelled effort.",
-        f"{name}: the tracked external effort reaches {context.size(t, 'tau_ext', largest)}.",
+        f"{name}: the external effort reaches {context.size(t, 'tau_ext', largest)}.",
         (
             Panel("Trajectory", "time [s]", label(t, "q", "position"), (*windows, Line(t.t, t.q, "", "blue"))),
             effort_panel(t, *windows),
@@ -139,8 +142,8 @@ def trace(context: Context, t: Track, why: str) -> Figure:
                 (
                     *windows,
                     Line(t.t[shown], t.tau_ext_direct[shown], "measured minus model", "grey", "dotted"),
-                    Band(t.t[shown], (t.tau_ext - sigma)[shown], (t.tau_ext + sigma)[shown], "± 2 σ (total)", "sky"),
-                    Line(t.t[shown], t.tau_ext[shown], "filter", "vermillion"),
+                    Band(t.t[shown], (effort - sigma)[shown], (effort + sigma)[shown], "± 2 σ (total)", "sky"),
+                    Line(t.t[shown], effort[shown], "smoother", "vermillion"),
                 ),
             ),
         ),

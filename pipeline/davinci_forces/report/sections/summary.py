@@ -145,7 +145,7 @@ def effort_panel(context: Context, trusted: Trust) -> Iterator[Panel]:
         levels = [trusted.space.free_level] if trusted.space is not None else []
         level = [HBand(-size, size, "free space: 95 % of samples") for size in levels]
         converged = track.t - track.t[0] >= 1.0
-        line = Line(track.t[converged], track.tau_ext[converged], "external effort", "vermillion")
+        line = Line(track.t[converged], track.tau_ext_smooth[converged], "external effort", "vermillion")
         peaks = [named_peaks(track, c) for c in contacts if c.log == track.log]
         heading = f"{title(track.joint)}, {track.log}"
         effort = label(track, "tau_ext", "effort")
@@ -169,8 +169,10 @@ def named_peaks(track: Track, contact: Contact) -> Points:
     places = []
     for start, end in zip(contact.onset, contact.release, strict=True):
         inside = np.flatnonzero((track.t >= start) & (track.t <= end))
-        places.append(inside[np.argmax(np.abs(track.tau_ext[inside]))])
-    return Points(track.t[places], track.tau_ext[places], "", "black", names=tuple(f"{p:+.3g}" for p in contact.peak))
+        places.append(inside[np.argmax(np.abs(track.tau_ext_smooth[inside]))])
+    return Points(
+        track.t[places], track.tau_ext_smooth[places], "", "black", names=tuple(f"{p:+.3g}" for p in contact.peak)
+    )
 
 
 def spoken(contact: Contact) -> str:
@@ -205,7 +207,7 @@ def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell
     else:
         r2, ceiling = context.numbers(p.prefix, ("r2", "r2_ceiling"), 2)
         row += [context.number(f"{p.prefix}.model_error", 2), percent(trusted.share), r2, ceiling]
-    key = f"{space.filter}.{space.log}.{space.joint}" if space is not None else ""
+    key = space.prefix if space is not None else ""
     row.append(context.number(f"{key}.detection_level", 2))
     if with_sought:
         row.append(

@@ -278,7 +278,7 @@ def windows(contact: TipContact) -> list[tuple[float, float]]:
 def budget_figure(force: TipForce, budget: TipBudget) -> Figure:
     """The error of the force at the tip due to each joint."""
     names = tuple(title(joint) for joint in budget.of_joint)
-    parts = (("filter_force", "sensor noise and filter"), ("model_force", "model"), ("lag_force", "lag of the filter"))
+    parts = (("filter_force", "sensor noise and smoother"), ("model_force", "model"))
     bars = tuple(Bars(names, getattr(budget, part), source) for part, source in parts)
     total = ", ".join(f"{name} {size:.2g} N" for name, size in zip(names, budget.total_force, strict=True))
     return Figure(

@@ -4,32 +4,41 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.contact.detection import FreeMotionStatistics, alarm_level, free_motion_statistics
-from davinci_forces.maths.signals.windows import free_space
-from davinci_forces.maths.uncertainty.error_band import levels
+from davinci_forces.maths.signals.standstill import is_standing_still
+from davinci_forces.maths.signals.windows import free_smoothed, free_space, segment_numbers
+from davinci_forces.maths.uncertainty.error_band import MIN_LOGS_BAND, NORMAL_95, coverage_by_speed, levels
 from davinci_forces.records import FreeSpace, Threshold, Track
+from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.study import LogEntry
 
-MARGIN_BEFORE_CONTACT = 0.5  # [s] before a contact in which the smoother already responds to the contact
 MIN_SAMPLES_LEVEL = 100  # of free space
 
 
 def run(track: Track, entry: LogEntry) -> Iterator[FreeSpace]:
-    """Compute the levels of one moving joint in one log in which the times of contact are known.
+    """Compute the levels of one moving joint, by smoother and by filter, in a log in which contacts are known.
 
     Joints at rest are left out: friction takes any value up to its Coulomb level, which hides a small external effort.
     """
-    free = free_space(track.t, entry.contact, track.rate)
-    if track.at_rest or not entry.has_known_free_motion or int(free.sum()) < MIN_SAMPLES_LEVEL:
+    if track.at_rest or not entry.has_known_free_motion:
         return
-    windows = [(start - MARGIN_BEFORE_CONTACT, end) for start, end in entry.contact]
-    free_smooth = free_space(track.t, windows, track.rate)
-    smooth = free_motion_statistics(track.tau_ext_smooth, free_smooth if free_smooth.any() else free, track.rate)
-    space = levels(track.tau_ext[free], track.tau_ext_std[free])
+    smoothed, filtered = (which(track.t, entry.contact, track.rate) for which in (free_smoothed, free_space))
+    yield from space_of(track, SMOOTHER, track.tau_ext_smooth, track.tau_ext_smooth_std, smoothed)
+    yield from space_of(track, track.filter, track.tau_ext, track.tau_ext_std, filtered)
+
+
+def space_of(track: Track, name: str, tau_ext: Array, std: Array, free: Booleans) -> Iterator[FreeSpace]:
+    """The levels of an external effort (N,) with its deviation (N,) in free space, if that has enough samples."""
+    if int(free.sum()) < MIN_SAMPLES_LEVEL:
+        return
+    space, statistics = levels(tau_ext[free], std[free]), free_motion_statistics(tau_ext, free, track.rate)
+    moving = free & ~is_standing_still(track.q, track.dq, segment_numbers(track.t, 1.5 / track.rate), track.rate)
+    coverage, coverage_std = coverage_by_speed(tau_ext[moving], std[moving], track.dq[moving])
     yield FreeSpace(
         log=track.log,
         joint=track.joint,
-        filter=track.filter,
+        filter=name,
         role=track.role,
         tested=int(np.sum(free)),
         free_rms=space.rms,
@@ -40,27 +49,39 @@ def run(track: Track, entry: LogEntry) -> Iterator[FreeSpace]:
         detection_level_std=space.level_99_std,
         coverage=space.coverage,
         coverage_std=space.coverage_std,
-        smooth_rms=smooth.rms,
-        smooth_max=smooth.largest,
-        crossings=smooth.crossings,
+        band_width=NORMAL_95 * float(std[free].mean()),
+        free_max=statistics.largest,
+        crossings=statistics.crossings,
+        quartile_coverage=coverage,
+        quartile_coverage_std=coverage_std,
     )
 
 
 def gather(spaces: Iterable[FreeSpace]) -> Iterator[Threshold]:
-    """Take the highest level of all logs, one Threshold per joint and filter with any free space."""
-    by_joint: dict[tuple[str, str], list[FreeSpace]] = {}
+    """Take the highest level of all logs, one Threshold per joint with any free space, by the smoother."""
+    by_joint: dict[str, list[FreeSpace]] = {}
     for space in spaces:
-        by_joint.setdefault((space.joint, space.filter), []).append(space)
-    for (joint, name), joint_spaces in by_joint.items():
+        if space.filter == SMOOTHER:
+            by_joint.setdefault(space.joint, []).append(space)
+    for joint, joint_spaces in by_joint.items():
         unfitted = [space for space in joint_spaces if space.role != "identification"] or joint_spaces
         worst = max(unfitted, key=lambda space: space.detection_level)
         level, source = max(((alarm_level_of(space), space) for space in unfitted), key=lambda pair: pair[0])
         yield Threshold(
-            joint, name, worst.detection_level, worst.detection_level_std, level,
-            level * source.free_rms_std / source.free_rms if source.free_rms else 0.0, worst.log,
+            joint, SMOOTHER, worst.detection_level, worst.detection_level_std, level,
+            level * source.free_rms_std / source.free_rms if source.free_rms else 0.0, worst.log, len(unfitted),
+            *pooled_coverage(unfitted), float(np.mean([space.band_width for space in unfitted])),
         )  # fmt: skip
+
+
+def pooled_coverage(spaces: list[FreeSpace]) -> tuple[float, float]:
+    """Mean coverage of logs, with its standard error by logs, or by the blocks of the logs if logs are few."""
+    shares, errors = (np.array([getattr(space, name) for space in spaces]) for name in ("coverage", "coverage_std"))
+    by_blocks = float(np.sqrt(np.sum(errors**2))) / len(shares)
+    by_logs = float(np.std(shares, ddof=1)) / len(shares) ** 0.5 if len(shares) >= MIN_LOGS_BAND else 0.0
+    return float(shares.mean()), max(by_blocks, by_logs)
 
 
 def alarm_level_of(space: FreeSpace) -> float:
     """Alarm level: the effort that free motion exceeds at most once in ten minutes; it grows with its rms."""
-    return alarm_level([FreeMotionStatistics(space.smooth_rms, space.smooth_max, space.crossings)])
+    return alarm_level([FreeMotionStatistics(space.free_rms, space.free_max, space.crossings)])

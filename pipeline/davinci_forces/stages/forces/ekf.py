@@ -1,11 +1,11 @@
-"""Estimate the external effort on every joint of every log with an extended Kalman filter."""
+"""Estimate the external effort on every joint of every log with an extended Kalman filter and its smoother."""
 
 from collections.abc import Iterator
 
 import numpy as np
 
 from davinci_forces.filters import DEFAULT, diverges, filter_parts, rts
-from davinci_forces.filters.error_bands import ModelVariance, model_variance
+from davinci_forces.filters.error_bands import TotalVariance, total_variance
 from davinci_forces.filters.problem import NoiseModel, filter_inputs
 from davinci_forces.filters.response import lag, noise_model, rise
 from davinci_forces.maths.arrays import Array
@@ -13,6 +13,7 @@ from davinci_forces.maths.signals.smoothing import segments
 from davinci_forces.maths.signals.windows import free_space, is_past_transient
 from davinci_forces.maths.uncertainty.day_offset import DayOffset, day_offset
 from davinci_forces.records import Diagnostic, ErrorBand, FilterNoise, JointModel, Track, diagnostic
+from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.robots.robot import Joint
 from davinci_forces.study import LogEntry
 
@@ -41,18 +42,20 @@ def track_effort(
         yield divergence_warning(model, float(np.mean(estimate.nis)))
         if not np.isfinite(estimate.tau_ext).all():
             return
-    smooth, late = lag(parts, noise)
+    smooth = filter_parts(SMOOTHER, parts, noise)
+    late = lag(parts, smooth.tau_ext, noise)
     smooth_rise = rise(rts.track, parts[0], noise)
     offset = day_offset(model.t, model.tau - model.tau_hat, entry.free)
     if offset.drifts:
         yield drift_warning(model, offset)
-    model_error = ModelVariance(np.zeros(len(model)), np.zeros(len(model)), "")
+    own = smooth.tau_ext_std
+    total = TotalVariance(own**2, np.zeros(len(model)), "")
     if band is not None:
-        model_error = model_variance(band, model.log, model.path, model.dq_measured, bool(entry.free))
-    total = estimate.tau_ext_std**2 + model_error.variance + late**2 + offset.std**2
+        total = total_variance(band, model.log, model.path, model.dq, own, bool(entry.free))
+    model_variance = np.maximum(total.variance - own**2, 0.0)
     converged = np.concatenate([is_past_transient(model.t[part]) for part in segments(model.segment)])
     free = free_space(model.t, entry.contact, model.rate)
-    model_part = float(np.sqrt(np.mean(model_error.variance)))
+    model_part = float(np.sqrt(np.mean(model_variance)))
     yield Track(
         log=model.log,
         joint=model.joint,
@@ -73,19 +76,21 @@ def track_effort(
         day_offset_std=offset.std,
         filter_part=rms(estimate.tau_ext_std[converged]),
         model_part=model_part,
-        model_part_std=float(np.sqrt(model_part**2 + np.mean(model_error.std))) - model_part,
+        model_part_std=float(np.sqrt(model_part**2 + np.mean(total.std))) - model_part,
         lag_part=rms(late[converged]),
+        smooth_part=rms(np.minimum(own, np.sqrt(total.variance))[converged]),
         smooth_rise=smooth_rise,
-        band_from=model_error.source,
+        band_from=total.source,
         t=model.t,
         q=estimate.q,
         dq=estimate.dq,
         tau=model.tau,
         tau_hat=model.tau_hat,
         tau_ext=estimate.tau_ext - offset.value,
-        tau_ext_std=np.sqrt(total),
+        tau_ext_std=np.sqrt(estimate.tau_ext_std**2 + late**2 + model_variance + offset.std**2),
         tau_ext_std_filter=estimate.tau_ext_std,
-        tau_ext_smooth=smooth - offset.value,
+        tau_ext_smooth=smooth.tau_ext - offset.value,
+        tau_ext_smooth_std=np.sqrt(total.variance + offset.std**2),
         tau_ext_direct=model.tau - model.tau_hat - offset.value,
         innovation_q=estimate.innovation_q,
         innovation_dq=estimate.innovation_dq,

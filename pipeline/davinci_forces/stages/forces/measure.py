@@ -6,8 +6,9 @@ import numpy as np
 
 from davinci_forces.identification.used import Identified
 from davinci_forces.maths.contact.detection import Event, events, summarise
-from davinci_forces.maths.signals.windows import free_space, is_past_transient
+from davinci_forces.maths.signals.windows import free_smoothed, is_past_transient
 from davinci_forces.records import Contact, Diagnostic, Fit, Threshold, Track, diagnostic
+from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
@@ -28,13 +29,15 @@ def run(
         if entry.role == "contact":
             yield stiction_note(track, fits, robot)
         return
-    threshold = next((t for t in thresholds if (t.joint, t.filter) == (track.joint, track.filter)), None)
+    threshold = next((t for t in thresholds if (t.joint, t.filter) == (track.joint, SMOOTHER)), None)
     if threshold is None:
         return
     converged = is_past_transient(track.t)
     detected = [
         event
-        for event in events(track.t, track.tau_ext_smooth, track.tau_ext_std, threshold.alarm_level, track.smooth_rise)
+        for event in events(
+            track.t, track.tau_ext_smooth, track.tau_ext_smooth_std, threshold.alarm_level, track.smooth_rise
+        )
         if converged[np.searchsorted(track.t, event.onset).clip(0, len(converged) - 1)]
     ]
     placed = list(match_windows(sorted(entry.contact), detected))
@@ -62,10 +65,11 @@ def contacts(
 ) -> Iterator[Contact]:
     """The Contact of one joint of a log, if any sample lies in one of the joint's contacts."""
     windows = [window for window, _, _ in placed]
-    free = free_space(track.t, windows, track.rate)
+    free = free_smoothed(track.t, windows, track.rate)
     rows = []
     for window, event, stated in placed:
-        summary = summarise(track.t, track.tau_ext, track.tau_ext_std, window, free)
+        effort = track.tau_ext_smooth, track.tau_ext_smooth_std
+        summary = summarise(track.t, *effort, window, free, track.smooth_rise)
         if summary is not None:
             onset, onset_std, release, release_std = times = event or Event(window[0], 0.0, window[1], 0.0)
             duration = (release - onset, float(np.hypot(onset_std, release_std)))
@@ -80,7 +84,7 @@ def contacts(
     yield Contact(
         log=track.log,
         joint=track.joint,
-        filter=track.filter,
+        filter=threshold.filter,
         detection_level=threshold.detection_level,
         alarm_level=threshold.alarm_level,
         level_from=threshold.level_from,

@@ -10,7 +10,7 @@ from davinci_forces.filters.tuning import tune_noise
 from davinci_forces.maths.signals.smoothing import noise_std
 from davinci_forces.records import FilterNoise, JointModel, MeasurementNoise, Tuning
 
-POOLED = ("rate", "r_q", "r_dq", "r_tau", "q_tau", "viscous", "speed")  # fields that are pooled by the median
+POOLED = ("rate", "r_q", "r_dq", "r_tau", "q_tau", "viscous")  # fields that are pooled by the median
 MIN_NOISE = 1e-9  # over the range of a signal: without noise, the innovations' covariance would be singular
 
 
@@ -37,7 +37,6 @@ def tuning(model: JointModel, before: NoiseModel) -> Tuning:
         q_tau=noise.q_tau / T_s**0.5,
         inertia=inertia,
         viscous=model.viscous,
-        speed=float(np.sqrt(np.mean(model.dq_measured**2))),
         likelihood_gain=final - initial,
         tested=len(model),
     )

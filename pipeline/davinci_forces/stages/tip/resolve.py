@@ -9,7 +9,7 @@ from davinci_forces.maths.mechanics import tip_force
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import evaluate_in_blocks, jacobian, tip
 from davinci_forces.maths.mechanics.tip_force import NEAR_SINGULAR, condition, matrix, shared_correlations
-from davinci_forces.maths.signals.windows import TRANSIENT, free_space
+from davinci_forces.maths.signals.windows import free_smoothed
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, FreeSpaceLevels, levels
 from davinci_forces.records import (
     ArmCorrelation,
@@ -39,7 +39,7 @@ def run(tracks: Sequence[Track], entry: LogEntry, robot: Robot) -> Iterator[Join
         return
     if len(moving) < TIP_JOINTS or not entry.has_known_free_motion:
         return
-    free = free_smoothed(moving[0], entry)
+    free = free_smoothed(moving[0].t, entry.contact, moving[0].rate)
     errors = np.array([track.tau_ext_smooth[free] for track in moving])
     if errors.shape[1] < MIN_SAMPLES_FREE_SPACE or not errors.std(1).all():
         return
@@ -88,17 +88,13 @@ def apply(
             yield diagnostic("resolve", entry.name, "note", f"{entry.name}: no force at the tip: {'; '.join(missing)}")
         return
     tracks = [by_joint[name] for name in names]
-    free = free_smoothed(tracks[0], entry) if entry.has_known_free_motion else np.zeros(len(tracks[0]), np.bool_)
+    first = tracks[0]
+    free = free_smoothed(first.t, entry.contact, first.rate) & entry.has_known_free_motion
     rho, source = correlation(entry.name, correlations)
     force = tip_force_of(tracks, robot.chain, rho, source, free)
     yield force
     yield budget(tracks, robot.chain, free if free.any() else ~free)
     yield from tip_contacts(force, tracks, robot.chain, [*windows(entry, contacts)])
-
-
-def free_smoothed(track: Track, entry: LogEntry) -> Booleans:
-    """Samples (N,) in free space for the smoother, which shows a contact before it begins."""
-    return free_space(track.t, [(start - TRANSIENT, end) for start, end in entry.contact], track.rate)
 
 
 def missing_joints(names: Sequence[str], tracks: dict[str, Track]) -> Iterator[str]:
@@ -124,7 +120,8 @@ def tip_force_of(tracks: Sequence[Track], chain: Chain, rho: Array, source: str,
     """The force at the tip in one log, by the smoother, since different lags of the joints would turn the force."""
     first, q = tracks[0], np.stack([track.q for track in tracks], axis=-1)
     J = evaluate_in_blocks(lambda block: jacobian(chain, block)[0], q)
-    tau_ext, std = (np.stack([getattr(t, name) for t in tracks], axis=-1) for name in ("tau_ext_smooth", "tau_ext_std"))
+    names = ("tau_ext_smooth", "tau_ext_smooth_std")
+    tau_ext, std = (np.stack([getattr(t, name) for t in tracks], axis=-1) for name in names)
     f, C = tip_force.from_efforts(J, tau_ext, tip_force.covariance(std, matrix(*rho.tolist())))
     blur, (x, y, z) = condition(J), evaluate_in_blocks(lambda block: tip(chain, block), q).T
     near = blur > NEAR_SINGULAR
@@ -152,16 +149,13 @@ def budget(tracks: Sequence[Track], chain: Chain, which: Booleans) -> TipBudget:
     """Force at the tip from each part of the error of each joint, at the median pose of the samples `which`."""
     median = np.array([float(np.median(track.q[which])) for track in tracks])
     lever = tip_force.lever(jacobian(chain, median)[0])
-    noise, model, late = (
-        lever * np.array([getattr(track, part) for track in tracks])
-        for part in ("filter_part", "model_part", "lag_part")
-    )
-    total = np.sqrt(noise**2 + model**2 + late**2)
+    noise, model = (lever * [getattr(track, part) for track in tracks] for part in ("smooth_part", "model_part"))
+    total = np.hypot(noise, model)
     wider = np.sqrt(total**2 + lever**2 * [model_variance_std(track) for track in tracks])
     return TipBudget(
         log=tracks[0].log, of_joint=np.array([track.joint for track in tracks], object), lever=lever,
         filter_force=noise, model_force=model, model_force_std=lever * [track.model_part_std for track in tracks],
-        lag_force=late, total_force=total, total_force_std=wider - total,
+        total_force=total, total_force_std=wider - total,
     )  # fmt: skip
 
 
@@ -215,7 +209,7 @@ def tip_contacts(
 def half_axes_std(force: TipForce, tracks: Sequence[Track], chain: Chain, at: Integers, sigma: Array) -> Array:
     """Standard errors (K, 3) of the half-axes at samples (K,), from the error of each joint's model variance."""
     J, _ = jacobian(chain, np.stack([track.q[at] for track in tracks], axis=-1))
-    std = np.stack([track.tau_ext_std[at] for track in tracks], axis=-1)
+    std = np.stack([track.tau_ext_smooth_std[at] for track in tracks], axis=-1)
     rho = matrix(force.rho_12, force.rho_13, force.rho_23)
     squares = np.zeros(sigma.shape)
     for i, track in enumerate(tracks):

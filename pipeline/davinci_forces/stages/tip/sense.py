@@ -66,7 +66,7 @@ def comparisons(
         return
     slide = prismatic_track(tracks, robot)
     if slide is not None and int(is_past_transient(slide.t).sum()) >= MIN_SAMPLES_ERROR:
-        f, C = slide.tau_ext_smooth[:, None], (slide.tau_ext_std**2)[:, None, None]
+        f, C = slide.tau_ext_smooth[:, None], (slide.tau_ext_smooth_std**2)[:, None, None]
         measured = sensor if sensor.shape[1] == 1 else np.linalg.norm(sensor, axis=1)[:, None]
         resampled = interpolate_sensor(slide.t, clock, measured, 3.0 / slide.rate)[:, 0]
         finite = np.isfinite(resampled)

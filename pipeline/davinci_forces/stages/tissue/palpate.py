@@ -103,7 +103,7 @@ def model_std(slide: Track) -> Column:
     The residual of a line contains the noise.  Its intercept contains the constant effort offset that differs
     from day to day.  There is no lag.
     """
-    return np.full(len(slide), slide.model_part) if slide.band_from else slide.tau_ext_std
+    return np.full(len(slide), slide.model_part) if slide.band_from else slide.tau_ext_smooth_std
 
 
 def depth_of(touch: Touch | None, slide: Track | None, t: Column) -> Array | None:
