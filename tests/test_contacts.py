@@ -37,7 +37,7 @@ RATE = 100.0
 T = np.arange(4000) / RATE
 
 
-def track(tau_ext, std=0.1, joint="hand_roll", log="push", role="contact", at_rest=0) -> Track:
+def track(tau_ext, std=0.1, joint="hand_roll", log="push", role="contact", at_rest=0, standing=None, **more) -> Track:
     zero = np.zeros_like(T)
     efforts = {
         "tau_ext": tau_ext,
@@ -45,14 +45,15 @@ def track(tau_ext, std=0.1, joint="hand_roll", log="push", role="contact", at_re
         "tau_ext_std": zero + std,
         "tau_ext_smooth_std": zero + std,
     }
-    columns = dict.fromkeys(Track.columns(), zero) | {"t": T, **efforts}
-    scalars = dict.fromkeys(Track.scalars(), 0.0) | {"at_rest": at_rest, "rate": RATE, "filter": "ekf"}
+    standing = np.full(len(T), at_rest) if standing is None else standing.astype(int)
+    columns = dict.fromkeys(Track.columns(), zero) | {"t": T, "standing": standing, **efforts}
+    scalars = dict.fromkeys(Track.scalars(), 0.0) | {"at_rest": at_rest, "rate": RATE, "filter": "ekf"} | more
     return Track(**columns, **scalars | {"log": log, "joint": joint, "role": role, "model": "m", "estimator": "e"})
 
 
 def measured(track_, thresholds, about):
-    """What the stage makes of a track, without the fits that a joint at rest asks for."""
-    return list(measure.run(track_, thresholds, [], about, arm.ARM))
+    """What the stage makes of a track."""
+    return list(measure.run(track_, thresholds, about, arm.ARM))
 
 
 def noise(seed=0, std=0.1):
@@ -154,14 +155,15 @@ def test_a_contact_stands_out_when_its_peak_exceeds_the_level_of_unseen_free_spa
     assert {"contact.push.hand_roll.1.peak", "contact.push.hand_roll.2.impulse"} <= keys
 
 
-def test_nothing_is_said_of_a_joint_at_rest_or_of_a_contact_log_without_windows():
+def test_no_level_is_that_of_a_joint_at_rest_or_of_a_contact_log_without_windows():
     assert not list(assess.run(track(noise(), at_rest=1), entry(role="contact", contact=((9.0, 11.0),))))
     assert not list(assess.run(track(noise()), entry(role="contact")))
     space, _ = assess.run(track(noise()), entry(role="validation"))
     about = entry(role="contact", contact=((9.0, 11.0),))
     assert measured(track(noise()), assess.gather([space]), about)
-    [hidden] = measured(track(noise(), at_rest=1), assess.gather([space]), about)
-    assert "the joint is at rest, so a contact of up to its stiction cannot be told" in hidden.text[0]
+    hidden, contact = measured(track(noise(), at_rest=1, static_friction=0.8), assess.gather([space]), about)
+    assert "the joint is at rest, so static friction hides a contact of up to 0.8 N m" in hidden.text[0]
+    assert not contact.above.any()
 
 
 def test_noise_is_told_from_the_error_of_a_model():

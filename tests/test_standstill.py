@@ -143,7 +143,8 @@ def test_the_reviewer_is_told_when_a_joint_stands_still():
     assert "run/hand_roll: it stands still from 3" in note.text[0]
     assert "to 45.99 s, 13 % of the log" in note.text[0]
     assert not kinds(resampled(arm.signal()), Diagnostic)
-    assert not kinds(resampled(signal, "validation"), Diagnostic)
+    assert [d.text[0] for d in kinds(resampled(signal, "validation"), Diagnostic)] == [note.text[0]]
+    assert not kinds(resampled(signal, "tissue"), Diagnostic)
 
 
 def test_every_fit_states_its_error_without_a_period_beside_the_joint_s_own_and_over_the_same_samples(held):

@@ -90,6 +90,7 @@ class LogModels:
             "model": fit.model, "estimator": fit.estimator, "inertia": dynamics.inertia, "tau_known": dynamics.known,
             "tau_hat": self.tau_hat(fit, joint), "cutoff": cutoff, "effort_lag": effort_lag, "q_measured": q,
             "dq_measured": dq, "q": motion.q[:, 0], "dq": motion.dq[:, 0], "ddq": motion.ddq[:, 0],
+            "static_friction": self.identified.static_friction(fit, joint),
             **dict(zip(BIAS, map(float, dynamics.coefficients), strict=True)),
         }  # fmt: skip
 

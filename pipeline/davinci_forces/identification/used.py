@@ -54,6 +54,16 @@ class Identified:
         i = self.model(fit).efforts.index(joint)
         return fit.cutoff[i], fit.effort_lag[i]
 
+    def static_friction(self, fit: Fit, joint: str) -> float:
+        """Return the largest friction of a joint at standstill: its friction parameters that are efforts, unsigned."""
+        suffix = f" of {joint}" if len(self.model(fit).efforts) > 1 else ""
+        effort = self.robot.joint(joint).unit("{effort}")
+        is_friction = [
+            "friction" in name and name.endswith(suffix) and unit == effort
+            for name, unit in zip(map(str, fit.parameter), map(str, fit.unit), strict=True)
+        ]
+        return float(np.abs(fit.theta[is_friction]).sum())
+
     def fits_of(self, joint: str) -> list[Fit]:
         """Return the fits of a joint's effort: its own, and those of its arm."""
         return [f for f in self.fits if f.group == joint or (f.group == ARM and joint in self.model(f).efforts)]

@@ -85,7 +85,8 @@ class Track(LogJointRecord):
     """The external effort on one joint during one log, by filter and smoother, each with its standard deviation.
 
     Both combine the estimator's own covariance, the model's error in free motion outside the fit and, in a log with
-    `free` windows, the uncertainty of the day's offset.  The filter's includes its lag; the smoother has none.
+    `free` windows, the uncertainty of the day's offset.  The filter's includes its lag; the smoother has none.  At
+    standstill both include friction, which takes any value up to the static level.
     """
 
     model: str
@@ -109,6 +110,7 @@ class Track(LogJointRecord):
     lag_part: float
     smooth_part: float
     smooth_rise: float
+    static_friction: float
     band_from: str
     t: Column
     q: Column
@@ -124,6 +126,7 @@ class Track(LogJointRecord):
     innovation_q: Column
     innovation_dq: Column
     nis: Column
+    standing: Counts
 
     def published(self) -> Iterator[Published]:
         """The effort outside contacts, the noise that the filter assumes, and the parts of its standard deviation."""

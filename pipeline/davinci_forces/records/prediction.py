@@ -81,6 +81,7 @@ class JointModel(LogJointRecord):
     viscous: float
     coulomb: float
     presliding: float
+    static_friction: float
     t: Column
     q: Column
     dq: Column
@@ -89,6 +90,7 @@ class JointModel(LogJointRecord):
     dq_measured: Column
     tau: Column
     segment: Counts
+    standing: Counts
     inertia: Column
     tau_known: Column
     tau_hat: Column

@@ -92,8 +92,8 @@ class Signal(LogJointRecord):
 class Motion(LogJointRecord):
     """The motion of one joint during one log after a low-pass filter without delay, and the measured motion.
 
-    The noise is what the filter removes.  Where the joint stands still, friction takes any value up to its Coulomb
-    level, so that no fit uses the effort there.
+    The noise is what the filter removes.  The velocity `dq` is 0 where its sign is not known.  Where the joint stands
+    still, friction takes any value up to its static level, so that the effort is neither fitted nor judged there.
     """
 
     role: str

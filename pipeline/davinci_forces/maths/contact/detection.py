@@ -61,10 +61,10 @@ def alarm_level(statistics: Sequence[FreeMotionStatistics]) -> float:
     return max(max(s.largest, s.rms * float(np.sqrt(2.0 * np.log(n)))) for s, n in zip(statistics, alarms, strict=True))
 
 
-def events(t: Array, tau_ext: Array, std: Array, level: float, rise: float) -> Iterator[Event]:
+def events(t: Array, tau_ext: Array, std: Array, level: float | Array, rise: float) -> Iterator[Event]:
     """Yield the contacts in a smoothed external effort (N,) with its standard deviation (N,), at times (N,) [s].
 
-    `rise` [s] is the duration T_s that the smoother gives a step.
+    They exceed the `level`, () or (N,).  `rise` [s] is the duration T_s that the smoother gives a step.
     """
     for start, stop in sign_runs(t, np.where(np.abs(tau_ext) > level, np.sign(tau_ext), 0.0)):
         size = tau_ext * np.sign(tau_ext[start])
@@ -122,6 +122,12 @@ class Summary(NamedTuple):
     mean_std: float
     impulse: float  # mean times duration
     impulse_std: float
+
+    def with_offset(self, std: float) -> "Summary":
+        """Add the standard deviation of an error that is constant over the window; that of the peak includes it."""
+        mean_std = float(np.hypot(self.mean_std, std))
+        scale = mean_std / self.mean_std if self.mean_std else 1.0
+        return self._replace(mean_std=mean_std, impulse_std=self.impulse_std * scale)
 
 
 def summarise(

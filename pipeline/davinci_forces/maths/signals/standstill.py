@@ -1,9 +1,9 @@
-"""Samples at which a joint stands still.  No model predicts its friction, which is anything up to the Coulomb level."""
+"""Samples at which a joint stands still.  No model predicts its friction, which is anything up to the static level."""
 
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers
-from davinci_forces.maths.signals.smoothing import segments
+from davinci_forces.maths.signals.smoothing import NORMAL_MAD, segments
 
 HOLD = 1.0  # [s] shortest standstill: longer than a motion takes to reverse
 STILL = 0.01  # a joint stands still below this share of its mean travel in `HOLD`
@@ -42,6 +42,15 @@ def _standing(q: Array, window: int, spread: int, least: float) -> Booleans:
     np.add.at(covers, np.maximum(first - spread, 0), 1)
     np.add.at(covers, np.minimum(first + window + spread, N), -1)
     return np.asarray(np.cumsum(covers[:-1]) > 0)
+
+
+def without_doubtful_signs(dq: Array, standing: Booleans, dq_std: float) -> Array:
+    """A low-passed velocity (N,), and 0 where its sign, and with it that of friction, is not known.
+
+    This is the case at standstill, and where the expected sign erf(|dq| / (sqrt(2) dq_std)), which the filter uses, is
+    below 1/2: it is then nearer to 0 than to a sign.  `dq_std` is the standard deviation of the velocity's noise.
+    """
+    return np.where(standing | (np.abs(dq) < NORMAL_MAD * dq_std), 0.0, dq)
 
 
 def is_far_from_reversals(dq: Array, T_s: float) -> Booleans:

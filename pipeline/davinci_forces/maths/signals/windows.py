@@ -38,6 +38,11 @@ def free_smoothed(t: Array, windows: Sequence[tuple[float, float]], rate: float)
     return free_space(t, windows, rate, TRANSIENT)
 
 
+def spans(t: Array, which: Booleans) -> list[tuple[float, float]]:
+    """The first and the last time [s] of each run of true samples (N,), at times t (N,)."""
+    return [(float(t[run.start]), float(t[run.stop - 1])) for run in runs(which)]
+
+
 def runs(which: Booleans) -> list[slice]:
     """The runs of true samples (N,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], which, [False]]))).reshape(-1, 2)

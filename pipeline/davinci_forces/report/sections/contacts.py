@@ -118,7 +118,7 @@ def reason(entry: LogEntry, track: Track | None) -> str:
         return "the joint has no fit to compare with; record an identification log of this joint"
     if track.at_rest:
         return (
-            "at rest, where friction takes any value up to its Coulomb level and hides efforts up to that level; move "
+            "at rest, where friction takes any value up to its static level and hides efforts up to that level; move "
             "the joint"
         )
     if entry.role != "contact":

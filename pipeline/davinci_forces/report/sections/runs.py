@@ -69,7 +69,7 @@ def intro(context: Context, tracks: list[Track]) -> Iterator[Prose]:
     if at_rest:
         yield Prose(
             f"Joints at rest are in the tables only ({', '.join(at_rest)}). At standstill friction takes any value up "
-            "to its Coulomb level, and hides external efforts up to that level."
+            "to its static level, and hides external efforts up to that level."
         )
 
 

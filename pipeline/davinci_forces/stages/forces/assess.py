@@ -6,8 +6,7 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.contact.detection import FreeMotionStatistics, alarm_level, free_motion_statistics
-from davinci_forces.maths.signals.standstill import is_standing_still
-from davinci_forces.maths.signals.windows import free_smoothed, free_space, segment_numbers
+from davinci_forces.maths.signals.windows import free_smoothed, free_space, spans
 from davinci_forces.maths.uncertainty.error_band import MIN_LOGS_BAND, NORMAL_95, coverage_by_speed, levels
 from davinci_forces.records import FreeSpace, Threshold, Track
 from davinci_forces.records.forces import SMOOTHER
@@ -19,11 +18,12 @@ MIN_SAMPLES_LEVEL = 100  # of free space
 def run(track: Track, entry: LogEntry) -> Iterator[FreeSpace]:
     """Compute the levels of one moving joint, by smoother and by filter, in a log in which contacts are known.
 
-    Joints at rest are left out: friction takes any value up to its Coulomb level, which hides a small external effort.
+    Standstill is left out: friction takes any value up to its static level, which hides a small external effort.
     """
     if track.at_rest or not entry.has_known_free_motion:
         return
-    smoothed, filtered = (which(track.t, entry.contact, track.rate) for which in (free_smoothed, free_space))
+    unjudged = [*entry.contact, *spans(track.t, track.standing > 0)]
+    smoothed, filtered = (which(track.t, unjudged, track.rate) for which in (free_smoothed, free_space))
     yield from space_of(track, SMOOTHER, track.tau_ext_smooth, track.tau_ext_smooth_std, smoothed)
     yield from space_of(track, track.filter, track.tau_ext, track.tau_ext_std, filtered)
 
@@ -33,8 +33,7 @@ def space_of(track: Track, name: str, tau_ext: Array, std: Array, free: Booleans
     if int(free.sum()) < MIN_SAMPLES_LEVEL:
         return
     space, statistics = levels(tau_ext[free], std[free]), free_motion_statistics(tau_ext, free, track.rate)
-    moving = free & ~is_standing_still(track.q, track.dq, segment_numbers(track.t, 1.5 / track.rate), track.rate)
-    coverage, coverage_std = coverage_by_speed(tau_ext[moving], std[moving], track.dq[moving])
+    coverage, coverage_std = coverage_by_speed(tau_ext[free], std[free], track.dq[free])
     yield FreeSpace(
         log=track.log,
         joint=track.joint,

@@ -10,7 +10,7 @@ from davinci_forces.filters.problem import NoiseModel, filter_inputs
 from davinci_forces.filters.response import lag, noise_model, rise
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals.smoothing import segments
-from davinci_forces.maths.signals.windows import free_space, is_past_transient
+from davinci_forces.maths.signals.windows import free_space, is_past_transient, spans
 from davinci_forces.maths.uncertainty.day_offset import DayOffset, day_offset
 from davinci_forces.records import Diagnostic, ErrorBand, FilterNoise, JointModel, Track, diagnostic
 from davinci_forces.records.forces import SMOOTHER
@@ -45,7 +45,9 @@ def track_effort(
     smooth = filter_parts(SMOOTHER, parts, noise)
     late = lag(parts, smooth.tau_ext, noise)
     smooth_rise = rise(rts.track, parts[0], noise)
-    offset = day_offset(model.t, model.tau - model.tau_hat, entry.free)
+    standing = model.standing > 0
+    settled = ~standing | bool(model.at_rest)
+    offset = day_offset(model.t[settled], (model.tau - model.tau_hat)[settled], entry.free)
     if offset.drifts:
         yield drift_warning(model, offset)
     own = smooth.tau_ext_std
@@ -53,8 +55,10 @@ def track_effort(
     if band is not None:
         total = total_variance(band, model.log, model.path, model.dq, own, bool(entry.free))
     model_variance = np.maximum(total.variance - own**2, 0.0)
+    # At standstill, friction is anywhere between its static levels: a uniform distribution.
+    friction = standing * model.static_friction**2 / 3.0
     converged = np.concatenate([is_past_transient(model.t[part]) for part in segments(model.segment)])
-    free = free_space(model.t, entry.contact, model.rate)
+    free = free_space(model.t, [*entry.contact, *spans(model.t, standing)], model.rate)
     model_part = float(np.sqrt(np.mean(model_variance)))
     yield Track(
         log=model.log,
@@ -80,6 +84,7 @@ def track_effort(
         lag_part=rms(late[converged]),
         smooth_part=rms(np.minimum(own, np.sqrt(total.variance))[converged]),
         smooth_rise=smooth_rise,
+        static_friction=model.static_friction,
         band_from=total.source,
         t=model.t,
         q=estimate.q,
@@ -87,14 +92,15 @@ def track_effort(
         tau=model.tau,
         tau_hat=model.tau_hat,
         tau_ext=estimate.tau_ext - offset.value,
-        tau_ext_std=np.sqrt(estimate.tau_ext_std**2 + late**2 + model_variance + offset.std**2),
+        tau_ext_std=np.sqrt(estimate.tau_ext_std**2 + late**2 + model_variance + offset.std**2 + friction),
         tau_ext_std_filter=estimate.tau_ext_std,
         tau_ext_smooth=smooth.tau_ext - offset.value,
-        tau_ext_smooth_std=np.sqrt(total.variance + offset.std**2),
+        tau_ext_smooth_std=np.sqrt(total.variance + offset.std**2 + friction),
         tau_ext_direct=model.tau - model.tau_hat - offset.value,
         innovation_q=estimate.innovation_q,
         innovation_dq=estimate.innovation_dq,
         nis=estimate.nis,
+        standing=model.standing,
     )
 
 

@@ -4,10 +4,10 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 
-from davinci_forces.identification.used import Identified
+from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.contact.detection import Event, events, summarise
-from davinci_forces.maths.signals.windows import free_smoothed, is_past_transient
-from davinci_forces.records import Contact, Diagnostic, Fit, Threshold, Track, diagnostic
+from davinci_forces.maths.signals.windows import TRANSIENT, free_smoothed, is_outside, is_past_transient, spans
+from davinci_forces.records import Contact, Diagnostic, Threshold, Track, diagnostic
 from davinci_forces.records.forces import SMOOTHER
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
@@ -16,28 +16,24 @@ Window = tuple[float, float]
 WINDOW_MARGIN = 0.5  # [s] by which a contact may begin before its window, or end after it
 
 
-def run(
-    track: Track, thresholds: Iterable[Threshold], fits: Iterable[Fit], entry: LogEntry, robot: Robot
-) -> Iterator[Contact | Diagnostic]:
-    """Measure the contacts of one moving joint: in windows that the study states, and others above the alarm level.
+def run(track: Track, thresholds: Iterable[Threshold], entry: LogEntry, robot: Robot) -> Iterator[Contact | Diagnostic]:
+    """Measure the contacts of one joint: in windows that the study states, and others above the alarm level.
 
+    At standstill a contact exceeds the alarm level by more than the static friction, which any effort there may be.
     Logs of a weight or of tissue are left out, because the arm is loaded throughout.
     """
     if entry.role not in ("contact", "validation", "identification"):
         return
-    if track.at_rest:
-        if entry.role == "contact":
-            yield stiction_note(track, fits, robot)
-        return
+    if track.at_rest and entry.role == "contact":
+        yield stiction_note(track, robot)
     threshold = next((t for t in thresholds if (t.joint, t.filter) == (track.joint, SMOOTHER)), None)
     if threshold is None:
         return
     converged = is_past_transient(track.t)
+    alarm_level = threshold.alarm_level + unknown_friction(track)
     detected = [
         event
-        for event in events(
-            track.t, track.tau_ext_smooth, track.tau_ext_smooth_std, threshold.alarm_level, track.smooth_rise
-        )
+        for event in events(track.t, track.tau_ext_smooth, track.tau_ext_smooth_std, alarm_level, track.smooth_rise)
         if converged[np.searchsorted(track.t, event.onset).clip(0, len(converged) - 1)]
     ]
     placed = list(match_windows(sorted(entry.contact), detected))
@@ -65,15 +61,21 @@ def contacts(
 ) -> Iterator[Contact]:
     """The Contact of one joint of a log, if any sample lies in one of the joint's contacts."""
     windows = [window for window, _, _ in placed]
-    free = free_smoothed(track.t, windows, track.rate)
-    rows = []
+    free = free_smoothed(track.t, [*windows, *spans(track.t, track.standing > 0)], track.rate)
+    free = free if free.any() else free_smoothed(track.t, windows, track.rate)
+    is_above = np.abs(track.tau_ext_smooth) > threshold.detection_level + unknown_friction(track)
+    rows, above = [], []
     for window, event, stated in placed:
         effort = track.tau_ext_smooth, track.tau_ext_smooth_std
         summary = summarise(track.t, *effort, window, free, track.smooth_rise)
         if summary is not None:
             onset, onset_std, release, release_std = times = event or Event(window[0], 0.0, window[1], 0.0)
             duration = (release - onset, float(np.hypot(onset_std, release_std)))
+            inside = ~is_outside(track.t, [window])
+            friction_std = track.static_friction / 3**0.5 * float(track.standing[inside].mean())
+            summary = summary.with_offset(friction_std)
             rows.append((int(stated), int(event is not None), *times, *duration, *summary))
+            above.append(is_above[inside].any())
     if not rows:
         return
     names = (
@@ -88,22 +90,22 @@ def contacts(
         detection_level=threshold.detection_level,
         alarm_level=threshold.alarm_level,
         level_from=threshold.level_from,
-        above=np.abs(columns["peak"]) > threshold.detection_level,
+        above=np.array(above, np.int64),
         **columns,
     )
 
 
-def stiction_note(track: Track, fits: Iterable[Fit], robot: Robot) -> Diagnostic:
-    """Note the effort up to which stiction hides a contact on a joint at rest."""
-    name = f"{track.log}/{track.joint}"
-    levels = [
-        abs(float(theta))
-        for fit in Identified(robot, fits).fits_of(track.joint)
-        if f"{fit.model}.{fit.estimator}" == "independent.lse"
-        for parameter, theta in zip(fit.parameter, fit.theta, strict=True)
-        if parameter == "Coulomb friction"
-    ]
-    unit = robot.joint(track.joint).kind.unit("{effort}")
-    up_to = f"about {levels[0]:.2g} {unit}, its Coulomb friction, " if levels else "its stiction "
-    message = f"{name}: the joint is at rest, so a contact of up to {up_to}cannot be told from friction"
+def unknown_friction(track: Track) -> Array:
+    """The static friction (N,) where the joint stands still, and 0 elsewhere.
+
+    The smoother spreads what it shows at standstill as a filter's transient does, to both sides.
+    """
+    spread = [(start - TRANSIENT, end + TRANSIENT) for start, end in spans(track.t, track.standing > 0)]
+    return np.where(is_outside(track.t, spread), 0.0, track.static_friction)
+
+
+def stiction_note(track: Track, robot: Robot) -> Diagnostic:
+    """Note the effort up to which static friction hides a contact on a joint at rest."""
+    effort = f"{track.static_friction:.2g} {robot.joint(track.joint).unit('{effort}')}"
+    message = f"{track.log}/{track.joint}: the joint is at rest, so static friction hides a contact of up to {effort}"
     return diagnostic("measure", f"{track.log}.{track.joint}", "note", f"{message}; move the joint")

@@ -15,7 +15,7 @@ from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals import whiteness
 from davinci_forces.maths.signals.standstill import is_far_from_reversals
 from davinci_forces.maths.signals.whiteness import TWO_SIDED_95, TWO_SIDED_99, cross_correlation, mean_square_band
-from davinci_forces.maths.signals.windows import is_outside, is_past_transient, longest_run
+from davinci_forces.maths.signals.windows import is_outside, is_past_transient, longest_run, spans
 from davinci_forces.records import (
     Column,
     Explanation,
@@ -46,10 +46,13 @@ def run(subject: PeriodResidual | Residual | Track) -> Iterator[Whiteness]:
     elif isinstance(subject, Residual):
         signals = {f"tau.{subject.model}.{subject.estimator}": subject.tau - subject.tau_hat}
     else:
-        # Correlations across a gap mean nothing, and after a gap the filter restarts.
-        part = longest_run(subject.t, subject.rate)
-        converged = is_past_transient(subject.t[part])
-        signals = {name: getattr(subject, name)[part][converged] for name in ("innovation_q", "innovation_dq")}
+        # Correlations across a gap mean nothing, and after a gap the filter restarts.  Standstill is not judged.
+        moving = subject.standing == 0
+        if not moving.any():
+            return
+        part = longest_run(subject.t[moving], subject.rate)
+        converged = is_past_transient(subject.t[moving][part])
+        signals = {name: getattr(subject, name)[moving][part][converged] for name in ("innovation_q", "innovation_dq")}
     results = {name: statistics(x) for name, x in signals.items()}
     all_white = int(all(r["white"] and float(r["periodogram_p"]) > MIN_PROBABILITY for r in results.values()))  # type: ignore[arg-type]
     for name, result in results.items():
@@ -121,7 +124,8 @@ def apply(
     clock_delays = delays([velocities(m)[0] for m in models], [result.q for result in results])
     for model, noise, result, delay in zip(models, filter_noises, results, clock_delays, strict=True):
         part = longest_run(model.t, model.rate)
-        motion, free = velocities(model), is_outside(model.t, entry.contact)
+        motion = velocities(model)
+        free = is_outside(model.t, [*entry.contact, *spans(model.t, model.standing > 0)])
         yield from innovation_records(model, result, motion)
         trials = dict(alternatives(model, along, free))
         if delay.any():
@@ -158,7 +162,8 @@ def alternatives(model: JointModel, along: LogModels, free: Booleans) -> Iterato
 
 def innovation_records(model: JointModel, result: Innovations, motion: tuple[Array, Array]) -> Iterator[Innovation]:
     """The normalised square of both innovations, and the correlation of the innovations with earlier motion."""
-    converged = is_past_transient(np.arange(len(result.q)) / model.rate)
+    moving = model.standing[longest_run(model.t, model.rate)] == 0
+    converged = is_past_transient(np.arange(len(result.q)) / model.rate) & moving
     dq, ddq = (x[converged] for x in motion)
     N = int(converged.sum())
     lags = min(LAGS, N // 4)

@@ -7,7 +7,7 @@ import numpy as np
 from davinci_forces.identification.joint_models import LogModels, at_samples, refits_of
 from davinci_forces.identification.scores import Scorer
 from davinci_forces.identification.used import FALLBACK, Identified
-from davinci_forces.maths.signals.windows import is_outside
+from davinci_forces.maths.signals.windows import is_outside, spans
 from davinci_forces.records import Choice, Diagnostic, Fit, FittedPaths, JointModel, Motion, Prediction, diagnostic
 from davinci_forces.records.prediction import CHOSEN, SAME_PATH
 from davinci_forces.robots.robot import Robot
@@ -24,8 +24,8 @@ def run(
 ) -> Iterator[Prediction | Diagnostic]:
     """Predict the effort of each moving joint by each fit, in a log that no parameter was fitted to.
 
-    A joint at rest is not predicted: at standstill friction takes any value up to its Coulomb level.  Stages `fit` and
-    `choose` predict identification logs.
+    A joint at rest is not predicted, and standstill is not scored: friction takes any value up to its static level
+    there.  Stages `fit` and `choose` predict identification logs.
     """
     if entry.role in ("validation", "contact"):
         along = LogModels(Identified(robot, fits), motions)
@@ -38,9 +38,10 @@ def predict_joint(
     motion: Motion, along: LogModels, entry: LogEntry, lowpass: float
 ) -> Iterator[Prediction | Diagnostic]:
     """Predict the effort of a joint by its own fits and by the chosen one."""
-    name, free = f"{motion.log}/{motion.joint}", is_outside(motion.t, entry.contact)
+    standstills = spans(motion.t, motion.standing > 0)
+    name, free = f"{motion.log}/{motion.joint}", is_outside(motion.t, [*entry.contact, *standstills])
     if not free.any():
-        message = f"{name}: its contact windows cover the whole log, so no prediction can be scored"
+        message = f"{name}: contact windows and standstill cover the whole log, so no prediction can be scored"
         yield diagnostic("predict", f"{motion.log}.{motion.joint}", "warning", message)
         return
     identified = along.identified
@@ -103,8 +104,8 @@ def apply(
             log=motion.log, joint=motion.joint, role=motion.role, stand_in=stand_in, path=path,
             scheme=refit.scheme if refit else "" if is_fitted else motion.role,
             path_unseen=refit.path if refit else "" if is_fitted else path,
-            rate=motion.rate, velocity=motion.velocity, at_rest=motion.at_rest, t=motion.t, tau=motion.tau,
-            segment=motion.segment,
+            rate=motion.rate, velocity=motion.velocity, at_rest=motion.at_rest, standing=motion.standing, t=motion.t,
+            tau=motion.tau, segment=motion.segment,
             tau_hat_unseen=at_samples(refit, motion) if refit else np.full(len(motion), np.nan), **terms,
         )  # fmt: skip
 

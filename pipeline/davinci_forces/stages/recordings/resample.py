@@ -18,7 +18,7 @@ from davinci_forces.maths.signals.smoothing import (
     share_passed,
     white_std,
 )
-from davinci_forces.maths.signals.standstill import is_standing_still
+from davinci_forces.maths.signals.standstill import is_standing_still, without_doubtful_signs
 from davinci_forces.maths.signals.windows import runs, unbroken
 from davinci_forces.records import Column, Diagnostic, Motion, Recording, Signal, diagnostic
 from davinci_forces.robots.robot import Joint
@@ -32,6 +32,7 @@ MAX_VELOCITY_ERROR = 0.1  # of the ratio of the two velocities
 MAX_POSITION = 20.0  # as a multiple of a joint's limits
 MIN_SAMPLES_SEGMENT = 4  # for a cubic spline
 MAX_LISTED_STRETCHES = 3  # in a remark
+JUDGED_ROLES = ("identification", "validation", "contact", "weight")  # of logs whose effort is fitted or judged
 
 
 def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signal | Motion | Diagnostic]:
@@ -80,7 +81,7 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
     motion = without_noise(signal, smooth, lowpass)
     yield motion
     yield from remarks(recording, method, cuts, sum(part.stop - part.start for part in parts))
-    if recording.role == "identification" and not at_rest and motion.standing.any():
+    if recording.role in JUDGED_ROLES and not at_rest and motion.standing.any():
         yield diagnostic("resample", f"{recording.log}.{recording.joint}", "note", standstill(motion))
     wrong = [] if at_rest else [*velocity_faults(recording, q, dq, segment, 1.0 / T_s), *faults(recording, joint)]
     if wrong:
@@ -107,14 +108,19 @@ def without_noise(signal: Signal, smooth: tuple[Column, Column, Column], lowpass
     passed, rate, segment = share_passed(signal.rate, lowpass), signal.rate, signal.segment
     sigma_q = white_std(signal.q - q, passed)
     logged = signal.velocity == "logged"
-    still = is_standing_still(q, dq, segment, rate, sigma_q * float(np.sqrt(passed)), round(rate / lowpass))
+    sigma_dq = white_std(signal.dq - dq, passed) if logged else noise_std(dq, segment, rate, lowpass)
+    at_rest, q_std = np.full(len(q), signal.at_rest > 0), sigma_q * float(np.sqrt(passed))
+    still, judged_still = (
+        at_rest | is_standing_still(q, dq, segment, rate, q_std, spread) for spread in (0, round(rate / lowpass))
+    )
+    dq = without_doubtful_signs(dq, still, sigma_dq * float(np.sqrt(passed)) if logged else sigma_dq)
     return Motion(
         log=signal.log, joint=signal.joint, role=signal.role, rate=rate, velocity=signal.velocity,
         cutoff=lowpass, effort_lag=0.0, at_rest=signal.at_rest, sigma_q=sigma_q,
-        sigma_dq=white_std(signal.dq - dq, passed) if logged else noise_std(dq, segment, rate, lowpass),
+        sigma_dq=sigma_dq,
         sigma_tau=noise_std(signal.tau, segment, rate, lowpass),
         t=signal.t, q=q, dq=dq, ddq=ddq, q_measured=signal.q, dq_measured=signal.dq, tau=signal.tau, segment=segment,
-        standing=still.astype(np.int64),
+        standing=judged_still.astype(np.int64),
     )  # fmt: skip
 
 

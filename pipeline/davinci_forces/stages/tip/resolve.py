@@ -9,7 +9,7 @@ from davinci_forces.maths.mechanics import tip_force
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import evaluate_in_blocks, jacobian, tip
 from davinci_forces.maths.mechanics.tip_force import NEAR_SINGULAR, condition, matrix, shared_correlations
-from davinci_forces.maths.signals.windows import free_smoothed
+from davinci_forces.maths.signals.windows import free_smoothed, spans
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, FreeSpaceLevels, levels
 from davinci_forces.records import (
     ArmCorrelation,
@@ -39,7 +39,7 @@ def run(tracks: Sequence[Track], entry: LogEntry, robot: Robot) -> Iterator[Join
         return
     if len(moving) < TIP_JOINTS or not entry.has_known_free_motion:
         return
-    free = free_smoothed(moving[0].t, entry.contact, moving[0].rate)
+    free = free_of(moving, entry)
     errors = np.array([track.tau_ext_smooth[free] for track in moving])
     if errors.shape[1] < MIN_SAMPLES_FREE_SPACE or not errors.std(1).all():
         return
@@ -88,13 +88,18 @@ def apply(
             yield diagnostic("resolve", entry.name, "note", f"{entry.name}: no force at the tip: {'; '.join(missing)}")
         return
     tracks = [by_joint[name] for name in names]
-    first = tracks[0]
-    free = free_smoothed(first.t, entry.contact, first.rate) & entry.has_known_free_motion
+    free = free_of(tracks, entry) & entry.has_known_free_motion
     rho, source = correlation(entry.name, correlations)
     force = tip_force_of(tracks, robot.chain, rho, source, free)
     yield force
     yield budget(tracks, robot.chain, free if free.any() else ~free)
     yield from tip_contacts(force, tracks, robot.chain, [*windows(entry, contacts)])
+
+
+def free_of(tracks: Sequence[Track], entry: LogEntry) -> Booleans:
+    """Whether all joints move in free space at each sample (N,), for the smoother."""
+    t, standstills = tracks[0].t, (span for track in tracks for span in spans(track.t, track.standing > 0))
+    return free_smoothed(t, [*entry.contact, *standstills], tracks[0].rate)
 
 
 def missing_joints(names: Sequence[str], tracks: dict[str, Track]) -> Iterator[str]:
