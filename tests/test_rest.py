@@ -147,10 +147,49 @@ def test_a_velocity_within_its_noise_has_no_sign_and_a_presliding_friction_keeps
     t = np.arange(2000) / RATE
     dq = np.where(t < 10.0, np.sin(t), 1e-3 * np.random.default_rng(0).normal(size=len(t)))
     standing = np.zeros(len(t), bool)
-    signs = np.sign(without_doubtful_signs(dq, standing, 1e-3))
+    signs = np.sign(without_doubtful_signs(dq, standing, 0.0, 1e-3))
     assert np.mean(signs[t >= 10.0] == 0.0) == pytest.approx(0.5, abs=0.06)
     assert np.mean(signs[t < 10.0] == 0.0) < 0.01
-    held = without_doubtful_signs(dq, t >= 10.0, 1e-3)[:, None]
+    held = without_doubtful_signs(dq, t >= 10.0, 0.0, 1e-3)[:, None]
     z, _ = deflection(ArmMotion(held, held, held, 1.0 / RATE, np.zeros(len(t), int)), 0, 0.01)
     assert np.ptp(z[t >= 10.0 + 1.0 / RATE]) == 0.0
     assert abs(z[-1]) > 0.99
+
+
+def judged(signal, fits, **stated):
+    """The relative errors of a log, and what is said of steps in it."""
+    about = replace(entry(signal.role), **stated)
+    made = list(predict.run([arm.motion(signal)], fits, about, arm.ARM, lowpass=LOWPASS))
+    errors = {r.estimator: r.relative_error for r in made if isinstance(r, Prediction)}
+    return errors, [text for r in made if not isinstance(r, Prediction) for text in r.text]
+
+
+@pytest.mark.parametrize(("first", "last"), [(0.0, 3.0), (57.5, 60.0)])
+def test_a_step_as_the_controller_starts_or_stops_is_named_and_not_scored(identified, first, last):
+    whole = arm.signal("hand_roll", periods=6, seed=5, role="validation", log="check")
+    off = (whole.t >= first) & (whole.t < last)
+    stepped = replace(whole, tau=whole.tau + 1.0 * off)
+    (errors, remarks), (wanted, none) = (judged(signal, identified[0]) for signal in (stepped, whole))
+    assert not none
+    assert len(remarks) == 1
+    start, end = (float(x) for x in remarks[0].split(": ")[1].split(" s are")[0].split(" to "))
+    assert (start, end) == pytest.approx((first, last), abs=0.15)
+    assert errors["lse"] == pytest.approx(wanted["lse"], rel=0.1)
+    [model] = arm.models([stepped], identified[0])
+    assert_allclose(model.t[model.judged == 0][[0, -1]], (start, end), atol=0.02)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_no_part_of_motion_that_is_hard_to_predict_and_no_contact_is_left_out(identified, seed):
+    """Friction three times as large, which jumps at reversals, of which one log has one, near its start; and a push."""
+    signal = arm.signal("hand_roll", periods=3, seed=seed, role="validation", log="check")
+    harder = replace(signal, tau=signal.tau + 2.0 * COULOMB * np.sign(signal.dq))
+    reversals = signal.t[1:][np.diff(np.sign(arm.excitation("hand_roll", signal.t)[1])) != 0]
+    gap = np.argmax(np.diff(reversals))
+    once = (signal.t > reversals[gap] - 0.3) & (signal.t < reversals[gap + 1] - 0.3)
+    single = replace(harder, **{name: getattr(harder, name)[once] for name in ("t", "q", "dq", "tau", "segment")})
+    touched = replace(signal, tau=signal.tau + np.where((signal.t > 2.0) & (signal.t < 3.0), 1.0, 0.0))
+    for log in (harder, single):
+        assert not judged(log, identified[0])[1]
+    assert not judged(replace(touched, role="contact"), identified[0], contact=((1.9, 3.1),))[1]
+    assert judged(touched, identified[0])[1]  # nobody stated it: named

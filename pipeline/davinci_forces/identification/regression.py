@@ -83,9 +83,9 @@ def motion_at(record: Motion | JointModel, cutoff: float, effort_lag: float) -> 
         return recorded_motion(record)
     logged = record.dq_measured if record.velocity == "logged" else None
     delay = effort_lag - record.effort_lag
-    columns = measured_motion(record.q_measured, logged, record.segment, record.rate, cutoff, delay)
-    q, dq, ddq = (column[:, None] for column in columns)
-    return ArmMotion(q, dq, ddq, 1.0 / record.rate, record.segment)
+    q, dq, ddq = measured_motion(record.q_measured, logged, record.segment, record.rate, cutoff, delay)
+    dq = np.where(record.dq == 0.0, 0.0, dq)  # where its sign is not known
+    return ArmMotion(q[:, None], dq[:, None], ddq[:, None], 1.0 / record.rate, record.segment)
 
 
 def joined_motion(motions: Sequence[ArmMotion]) -> ArmMotion:

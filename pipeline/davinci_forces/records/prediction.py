@@ -91,6 +91,7 @@ class JointModel(LogJointRecord):
     tau: Column
     segment: Counts
     standing: Counts
+    judged: Counts
     inertia: Column
     tau_known: Column
     tau_hat: Column

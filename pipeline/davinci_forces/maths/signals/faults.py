@@ -1,7 +1,8 @@
-"""Sensor faults in a recording: stuck positions and saturated efforts.
+"""Faults in a recording: stuck positions, saturated efforts, and steps of the effort as the controller starts or stops.
 
 A stuck sensor repeats one value exactly, and then jumps by more than any motion does.  A saturated effort stays exactly
-at its largest value, of either sign.
+at its largest value, of either sign.  A step is a change that the motion does not explain: of the effort less that of
+a model.
 """
 
 from typing import NamedTuple
@@ -15,6 +16,8 @@ MIN_TIME_STUCK = 0.25  # [s] shortest time at one value before a jump
 MIN_JUMP_RATIO = 5.0  # of a jump to the largest usual step between samples
 USUAL_STEP_QUANTILE = 0.999  # quantile of all steps, taken as the largest step of a motion
 MIN_SAMPLES_SATURATED = 5  # in a row at the largest value
+END_SHARE = 6  # a start-up ends in the first such part of a recording; the model's error is that of the parts between
+MIN_STEP_RATIO = 2.0  # of a step to the largest change between the ends, as of a period that differs from the others
 
 
 class Stuck(NamedTuple):
@@ -47,6 +50,28 @@ def count_saturated(x: Array) -> int:
         for a, b in repeated_runs((x[:-1] == level) & (x[1:] == level))
         if b - a + 1 >= MIN_SAMPLES_SATURATED and level != 0.0
     )
+
+
+def beyond_steps(residual: Array, judged: Booleans, slack: Array, width: int) -> Booleans:
+    """The samples (N,) before a step of a residual effort (N,) near the start, or after one near the end.
+
+        D_k = mean of the `width` samples from k on, less that of the `width` samples before k
+
+    Only changes D_k among `judged` samples (N,) count.  A step exceeds twice the largest change between the ends by
+    more than the `slack` (N,), which friction explains.
+    """
+    sums, excluded = (np.cumsum(np.concatenate([[0.0], x])) for x in (residual, ~judged))
+    k = np.arange(width, len(residual) - width + 1)
+    k = k[excluded[k + width] == excluded[k - width]]
+    size, n = np.abs(sums[k + width] - 2.0 * sums[k] + sums[k - width]), len(k) // END_SHARE
+    beyond = np.zeros(len(residual), np.bool_)
+    if n:
+        steps = size > MIN_STEP_RATIO * size[n:-n].max() + slack[k]
+        for step in k[:n][steps[:n]]:
+            beyond[: step + width] = True
+        for step in k[-n:][steps[-n:]]:
+            beyond[step - width :] = True
+    return beyond
 
 
 def repeated_runs(same: Booleans) -> list[tuple[int, int]]:

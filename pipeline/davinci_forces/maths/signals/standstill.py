@@ -22,11 +22,15 @@ def is_standing_still(
     It stands still throughout every window of `HOLD` in which its position, with noise of `q_std`, hardly changes.  The
     `spread` samples before and after are part of the standstill: a low-pass spreads its effort over them.
     """
-    usual_travel = float(np.sqrt(np.mean(dq**2))) * HOLD if len(dq) else 0.0
-    least = min(max(STILL * usual_travel, NOISE * q_std), STILL_AT_MOST * usual_travel)
-    window = round(HOLD * rate) + 1
+    least, window = least_travel(dq, q_std), round(HOLD * rate) + 1
     parts = [_standing(q[part], window, spread, least) for part in segments(segment)]
     return np.concatenate(parts) if parts else np.zeros(0, np.bool_)
+
+
+def least_travel(dq: Array, q_std: float) -> float:
+    """Travel in `HOLD`, below which a joint with velocity (N,) stands still, if its position has noise of `q_std`."""
+    usual_travel = float(np.sqrt(np.mean(dq**2))) * HOLD if len(dq) else 0.0
+    return min(max(STILL * usual_travel, NOISE * q_std), STILL_AT_MOST * usual_travel)
 
 
 def _standing(q: Array, window: int, spread: int, least: float) -> Booleans:
@@ -44,13 +48,14 @@ def _standing(q: Array, window: int, spread: int, least: float) -> Booleans:
     return np.asarray(np.cumsum(covers[:-1]) > 0)
 
 
-def without_doubtful_signs(dq: Array, standing: Booleans, dq_std: float) -> Array:
+def without_doubtful_signs(dq: Array, standing: Booleans, q_std: float, dq_std: float) -> Array:
     """A low-passed velocity (N,), and 0 where its sign, and with it that of friction, is not known.
 
-    This is the case at standstill, and where the expected sign erf(|dq| / (sqrt(2) dq_std)), which the filter uses, is
-    below 1/2: it is then nearer to 0 than to a sign.  `dq_std` is the standard deviation of the velocity's noise.
+    This is the case at standstill, but for the ends of its `spread`, and where the expected sign that the filter uses,
+    erf(|dq| / (sqrt(2) dq_std)), is below 1/2, so nearer to 0 than to a sign.  `q_std` and `dq_std` are the noise.
     """
-    return np.where(standing | (np.abs(dq) < NORMAL_MAD * dq_std), 0.0, dq)
+    rests = standing & (np.abs(dq) <= max(least_travel(dq, q_std) / HOLD, NOISE * dq_std))
+    return np.where(rests | (np.abs(dq) < NORMAL_MAD * dq_std), 0.0, dq)
 
 
 def is_far_from_reversals(dq: Array, T_s: float) -> Booleans:

@@ -46,7 +46,7 @@ def track_effort(
     late = lag(parts, smooth.tau_ext, noise)
     smooth_rise = rise(rts.track, parts[0], noise)
     standing = model.standing > 0
-    settled = ~standing | bool(model.at_rest)
+    settled = (model.judged > 0) | bool(model.at_rest)
     offset = day_offset(model.t[settled], (model.tau - model.tau_hat)[settled], entry.free)
     if offset.drifts:
         yield drift_warning(model, offset)
@@ -58,7 +58,7 @@ def track_effort(
     # At standstill, friction is anywhere between its static levels: a uniform distribution.
     friction = standing * model.static_friction**2 / 3.0
     converged = np.concatenate([is_past_transient(model.t[part]) for part in segments(model.segment)])
-    free = free_space(model.t, [*entry.contact, *spans(model.t, standing)], model.rate)
+    free = free_space(model.t, [*entry.contact, *spans(model.t, model.judged == 0)], model.rate)
     model_part = float(np.sqrt(np.mean(model_variance)))
     yield Track(
         log=model.log,
@@ -101,6 +101,7 @@ def track_effort(
         innovation_dq=estimate.innovation_dq,
         nis=estimate.nis,
         standing=model.standing,
+        judged=model.judged,
     )
 
 

@@ -7,6 +7,9 @@ import numpy as np
 from davinci_forces.identification.joint_models import LogModels, at_samples, refits_of
 from davinci_forces.identification.scores import Scorer
 from davinci_forces.identification.used import FALLBACK, Identified
+from davinci_forces.maths.arrays import Booleans
+from davinci_forces.maths.signals.faults import beyond_steps
+from davinci_forces.maths.signals.standstill import is_far_from_reversals
 from davinci_forces.maths.signals.windows import is_outside, spans
 from davinci_forces.records import Choice, Diagnostic, Fit, FittedPaths, JointModel, Motion, Prediction, diagnostic
 from davinci_forces.records.prediction import CHOSEN, SAME_PATH
@@ -38,12 +41,7 @@ def predict_joint(
     motion: Motion, along: LogModels, entry: LogEntry, lowpass: float
 ) -> Iterator[Prediction | Diagnostic]:
     """Predict the effort of a joint by its own fits and by the chosen one."""
-    standstills = spans(motion.t, motion.standing > 0)
-    name, free = f"{motion.log}/{motion.joint}", is_outside(motion.t, [*entry.contact, *standstills])
-    if not free.any():
-        message = f"{name}: contact windows and standstill cover the whole log, so no prediction can be scored"
-        yield diagnostic("predict", f"{motion.log}.{motion.joint}", "warning", message)
-        return
+    name = f"{motion.log}/{motion.joint}"
     identified = along.identified
     independent = [f for f in identified.fits if f.group == motion.joint and f.model == "independent"]
     chosen = identified.fit_of(motion.joint, CHOSEN)
@@ -55,6 +53,14 @@ def predict_joint(
     labelled = [(f.model, f.estimator, f) for f in independent]
     if chosen is not None:
         labelled.append((CHOSEN, f"{chosen.model}.{chosen.estimator}", chosen))
+    judged = is_judged(motion, along, chosen, entry)
+    free = judged & is_outside(motion.t, entry.contact)
+    if not free.any():
+        message = f"{name}: contact windows and standstill cover the whole log, so no prediction can be scored"
+        yield diagnostic("predict", f"{motion.log}.{motion.joint}", "warning", message)
+        return
+    if steps := [step_warning(name, *part) for part in spans(motion.t, ~judged & (motion.standing == 0))]:
+        yield diagnostic("predict", f"{motion.log}.{motion.joint}.steps", "warning", *steps)
     scorer, path = Scorer(motion, free, lowpass), identified.path(motion)
     for model, estimator, fit in labelled:
         yield scorer.score(model, estimator, entry.role, entry.role, path, along.tau_hat(fit, motion.joint))
@@ -105,9 +111,31 @@ def apply(
             scheme=refit.scheme if refit else "" if is_fitted else motion.role,
             path_unseen=refit.path if refit else "" if is_fitted else path,
             rate=motion.rate, velocity=motion.velocity, at_rest=motion.at_rest, standing=motion.standing, t=motion.t,
-            tau=motion.tau, segment=motion.segment,
+            tau=motion.tau, segment=motion.segment, judged=is_judged(motion, along, joint_fit, entry).astype(np.int64),
             tau_hat_unseen=at_samples(refit, motion) if refit else np.full(len(motion), np.nan), **terms,
         )  # fmt: skip
+
+
+def is_judged(motion: Motion, along: LogModels, fit: Fit | None, entry: LogEntry) -> Booleans:
+    """The samples (N,) at which models are judged: not at standstill, nor where the controller starts or stops.
+
+    Steps of the effort are sought in free motion that `fit` has not seen.  Friction may change by twice its static
+    level, but not while the joint moves on.
+    """
+    moves: Booleans = motion.standing == 0
+    if fit is None or entry.role not in ("validation", "contact") or not entry.has_known_free_motion:
+        return moves
+    free = moves & is_outside(motion.t, entry.contact) & (np.diff(motion.segment, prepend=motion.segment[:1]) == 0)
+    friction = 2.0 * along.identified.static_friction(fit, motion.joint)
+    slack = np.where(is_far_from_reversals(motion.dq, 1.0 / motion.rate), 0.0, friction)
+    residual = motion.tau - along.tau_hat(fit, motion.joint)
+    return np.asarray(moves & ~beyond_steps(residual, free, slack, round(motion.rate / motion.cutoff)))
+
+
+def step_warning(name: str, start: float, end: float) -> str:
+    """State which part of a log is not scored, and the remedy."""
+    why = "the effort changes there in a step that the motion does not explain, as where a controller starts or stops"
+    return f"{name}: {start:.2f} to {end:.2f} s are not scored: {why}; leave them out by `skip` and `until`"
 
 
 def inertia_warning(motion: Motion, fit: Fit) -> str:

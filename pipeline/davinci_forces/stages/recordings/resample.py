@@ -109,18 +109,19 @@ def without_noise(signal: Signal, smooth: tuple[Column, Column, Column], lowpass
     sigma_q = white_std(signal.q - q, passed)
     logged = signal.velocity == "logged"
     sigma_dq = white_std(signal.dq - dq, passed) if logged else noise_std(dq, segment, rate, lowpass)
-    at_rest, q_std = np.full(len(q), signal.at_rest > 0), sigma_q * float(np.sqrt(passed))
-    still, judged_still = (
-        at_rest | is_standing_still(q, dq, segment, rate, q_std, spread) for spread in (0, round(rate / lowpass))
-    )
-    dq = without_doubtful_signs(dq, still, sigma_dq * float(np.sqrt(passed)) if logged else sigma_dq)
+    q_std, dq_std = sigma_q * float(np.sqrt(passed)), sigma_dq * float(np.sqrt(passed) if logged else 1.0)
+    if signal.at_rest:
+        dq, still = np.zeros_like(dq), np.ones(len(dq), np.bool_)
+    else:
+        still = is_standing_still(q, dq, segment, rate, q_std, round(rate / lowpass))
+        dq = without_doubtful_signs(dq, still, q_std, dq_std)
     return Motion(
         log=signal.log, joint=signal.joint, role=signal.role, rate=rate, velocity=signal.velocity,
         cutoff=lowpass, effort_lag=0.0, at_rest=signal.at_rest, sigma_q=sigma_q,
         sigma_dq=sigma_dq,
         sigma_tau=noise_std(signal.tau, segment, rate, lowpass),
         t=signal.t, q=q, dq=dq, ddq=ddq, q_measured=signal.q, dq_measured=signal.dq, tau=signal.tau, segment=segment,
-        standing=judged_still.astype(np.int64),
+        standing=still.astype(np.int64),
     )  # fmt: skip
 
 
