@@ -13,6 +13,7 @@ from davinci_forces.estimators import ESTIMATORS, estimator
 from davinci_forces.estimators.problem import Regression
 from davinci_forces.estimators.wlse import pool_variance
 from davinci_forces.identification.scores import folds
+from davinci_forces.identification.used import Identified
 from davinci_forces.records import (
     Average,
     CrossFit,
@@ -20,6 +21,7 @@ from davinci_forces.records import (
     Fit,
     FittedPaths,
     MeasurementNoise,
+    PathShare,
     Prediction,
     Residual,
     Trajectory,
@@ -180,7 +182,15 @@ def predictions(signal, role, fitted, trajectories=(), **changes):
         *fit.apply(motions, own, refits, about, arm.ARM, lowpass=17.0),
         *predict.run(motions, identified, about, arm.ARM, lowpass=17.0),
     ]
+    every = [r for r in every if not isinstance(r, PathShare)]
     return [r for r in every if not isinstance(r, Prediction) or r.model != "chosen"]
+
+
+def path_new(signal, seen):
+    """The share of a recording's path that none of the averages of other logs follows."""
+    motion = arm.motion(signal)
+    identified = Identified(arm.ARM, [r for r in fitted_to(seen) if isinstance(r, FittedPaths)])
+    return identified.path_new(motion)
 
 
 def fitted_to(trajectories, smoothed=()):
@@ -275,6 +285,15 @@ def test_a_recording_is_told_to_follow_a_path_that_was_fitted():
     other = replace(other, q=other.q * np.cos(0.3 * other.t))
     for signal, path in ((again, "same path"), (other, "another path")):
         assert {r.path for r in predictions(signal, "validation", fitted.values(), seen)} == {path}
+
+
+def test_the_path_of_a_fitted_log_is_new_only_where_no_other_fitted_log_follows_it():
+    one, again, other = (arm.signal(seed=i, log=name) for i, name in enumerate(("one", "again", "other")))
+    other = replace(other, q=other.q * np.cos(0.3 * other.t))
+    assert path_new(one, [trajectory(one)]) == 1.0  # its own path tells nothing
+    assert path_new(one, [trajectory(one), trajectory(again)]) < 0.01
+    assert path_new(one, [trajectory(one), trajectory(again), trajectory(other)]) < 0.01
+    assert path_new(other, [trajectory(one), trajectory(again)]) > 0.1
 
 
 def test_of_many_fitted_paths_those_that_differ_most_are_kept_and_it_is_said_when_they_do_not_stand_for_all():

@@ -4,9 +4,10 @@ import re
 from dataclasses import replace
 from importlib import import_module
 
+import numpy as np
 import pytest
 
-from davinci_forces.records import KINDS, Diagnostic, LogSummary, Stiffness, Track
+from davinci_forces.records import KINDS, Diagnostic, Fit, LogSummary, Stiffness, Track
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.records.record import diagnostic
 from davinci_forces.report.changes import StatedValue
@@ -28,7 +29,7 @@ from davinci_forces.report.content import (
 from davinci_forces.report.content.layout import number_blocks
 from davinci_forces.report.context import Context
 from davinci_forces.report.results import Results, collect
-from davinci_forces.report.sections import DOCUMENTS, SECTIONS, runs, tissue
+from davinci_forces.report.sections import DOCUMENTS, SECTIONS, joints, runs, tissue
 from davinci_forces.study.review import Rating
 from tests.contracts.conftest import Lab
 from tests.test_words import LONG_SENTENCE, MEDIAN_SENTENCE, median_and_90th_percentile
@@ -141,15 +142,31 @@ def test_a_precise_stiffness_that_misses_the_truth_is_not_called_good(full: Cont
 
 
 def test_logs_are_not_called_good_above_the_remarks_of_a_stage(full: Context, catalogue: Catalogue):
-    def levels(about: Context) -> set[str]:
-        return {v.level for v in runs.recording_blocks(about, summaries) if isinstance(v, Verdict)}
+    def verdicts(about: Context) -> list[tuple[str, str]]:
+        return [(v.level, v.text) for v in runs.recording_blocks(about, summaries) if isinstance(v, Verdict)]
 
     [summary, *_] = full.catalogue.records(LogSummary)
     summaries = [replace(summary, warnings=(), dropped=0, duplicates=0, jitter=0.0)]
-    assert levels(replace(full, catalogue=without(catalogue, Diagnostic))) == {"good"}
-    remark = diagnostic("average", "push", "warning", "a transient was left out")
+    [(level, text)] = verdicts(replace(full, catalogue=without(catalogue, Diagnostic)))
+    assert (level, text) == ("good", "Every log was read without a remark.")
+    remark = diagnostic("average", f"{summary.log}.roll", "warning", "a transient was left out")
     with_remark = Catalogue(lambda kind: [remark] if kind is Diagnostic else catalogue.records(kind))
-    assert levels(replace(full, catalogue=with_remark)) == {"info"}
+    assert not verdicts(replace(full, catalogue=with_remark))  # none was read without one
+    summaries.append(replace(summaries[0], log="another"))
+    assert verdicts(replace(full, catalogue=with_remark)) == [("info", "1 of 2 logs were read without a remark.")]
+
+
+def test_a_mass_that_six_estimators_make_slightly_negative_is_remarked_once_and_calls_for_no_caution(full: Context):
+    def fits(std: float) -> list[Fit]:
+        fit = full.own_fits()[0]
+        values = {"theta": np.full(len(fit), 0.5), "theta_std": np.full(len(fit), std), "positive": np.ones(len(fit))}
+        values["theta"][0] = -0.0045
+        return [replace(fit, estimator=name, **values) for name in ("lse", "wlse", "tls", "huber", "prior", "iv")]
+
+    [verdict] = joints.implausible(fits(0.02))
+    assert (verdict.level, "cannot be distinguished from zero" in verdict.text) == ("info", True)
+    [verdict] = joints.implausible(fits(0.001))
+    assert (verdict.level, "physically impossible" in verdict.text) == ("warn", True)
 
 
 def test_sentences_of_a_report_are_short(full: Context):

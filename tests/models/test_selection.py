@@ -1,11 +1,14 @@
 """Choosing a model: refits without parts of the path against refits from scratch, ridges, and which candidate wins."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.identification import unseen
 from davinci_forces.identification.candidates import CandidatePart, Library
+from davinci_forces.identification.chosen import reason
 from davinci_forces.identification.observations import CellEquations
 from davinci_forces.identification.unseen import RefitModel
 from davinci_forces.maths.selection import (
@@ -145,6 +148,15 @@ def test_the_smallest_is_preferred_unless_it_is_clearly_worse():
     assert choose_candidate(doubtful, [20, 10, 5], [True] * 3) == (1, 0)
     certain = [worth(0.100), worth(0.101), worth(0.5)]  # all groups alike: a difference is one
     assert choose_candidate(certain, [20, 10, 5], [True] * 3) == (0, 0)
+
+
+@pytest.mark.parametrize(("score", "overfits"), [(0.1, False), (0.1 + 1e-13, False), (0.101, False), (0.3, True)])
+def test_the_candidate_that_fits_best_overfits_only_if_it_predicts_clearly_worse(score, overfits):
+    """0.101 is within the standard error of the difference; equal scores are no overfitting."""
+    results = [worth(0.1, 0.9, 1), worth(score, 0.9, 2)._replace(training=np.array([0.01]))]
+    assert standard_error(results[1], results[0]) > 0.001
+    named = [SimpleNamespace(name="small"), SimpleNamespace(name="large")]
+    assert ("overfits" in reason(named, results, [3, 9], 0, 0)) == overfits
 
 
 def test_a_candidate_that_physics_forbids_is_not_chosen_however_good():

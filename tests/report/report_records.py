@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from davinci_forces.records import FreeSpace, Prediction
+from davinci_forces.records import FreeSpace, Prediction, Stiffness, Weight
 
 NOTHING = np.zeros(0)
 
@@ -27,3 +27,16 @@ def free_space(**levels: Any) -> FreeSpace:
     quartiles = dict.fromkeys(("quartile_coverage", "quartile_coverage_std"), NOTHING)
     values = about | quartiles | dict.fromkeys((*names, *(f"{name}_std" for name in names), *motion), 0.0)
     return FreeSpace(**(values | levels))  # type: ignore[arg-type]
+
+
+def weight(**scores: Any) -> Weight:
+    """The mass of a weight log."""
+    about = {"log": "run", "moves_with": "roll", "tare": "", "side": "as stated"}
+    return Weight(**(dict.fromkeys(Weight.scalars(), 0.0) | dict.fromkeys(Weight.columns(), NOTHING) | about | scores))
+
+
+def stiffness(contacts: int, **scores: Any) -> Stiffness:
+    """The stiffness of a log with this number of pushes in contact."""
+    columns = dict.fromkeys(Stiffness.columns(), np.zeros(contacts))
+    about = {"log": "run", "source": "force sensor"}
+    return Stiffness(**(dict.fromkeys(Stiffness.scalars(), 0.0) | columns | about | scores))

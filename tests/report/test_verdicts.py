@@ -2,10 +2,26 @@
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
-from report_records import free_space, prediction
+from report_records import free_space, prediction, stiffness, weight
 
-from davinci_forces.report.verdicts import Trust, band, band_in_words, grade, thresholds, verdict_words
+from davinci_forces.maths.periods.shift import SAME_PATH
+from davinci_forces.records import PathShare
+from davinci_forces.report import verdicts
+from davinci_forces.report.verdicts import (
+    Trust,
+    band,
+    band_in_words,
+    decisive,
+    grade,
+    is_impossible,
+    mass_level,
+    stiffness_level,
+    thresholds,
+    truth_level,
+    verdict_words,
+)
 
 
 def trust(error: float = 0.05, path: str = "another path", level: float = 0.3, sought: float | None = None) -> Trust:
@@ -59,6 +75,109 @@ def test_a_joint_whose_band_is_too_narrow_is_not_called_good_and_keeps_its_level
 )
 def test_a_band_is_right_where_it_covers_what_it_says(coverage, level, said):
     assert (band(coverage), band_in_words(coverage)) == (level, said)
+
+
+# The run that decides
+
+
+def test_a_path_is_new_to_the_report_where_it_is_new_to_the_stages():
+    assert pytest.approx(1.0 - SAME_PATH**2) == verdicts.MIN_NEW_PATH
+
+
+def path_share(log, path_new=1.0, moving=1.0):
+    return PathShare(log, "roll", "identification", path_new, moving)
+
+
+def by_blocks(log="one", error=0.05):
+    return prediction(log=log, role="identification", scheme="leave a block of path out", model_error=error)
+
+
+def by_log(log="one", error=0.2):
+    return prediction(log=log, role="identification", scheme="leave one log out", model_error=error)
+
+
+def level_of(predictions, shares):
+    run, about = decisive(predictions, shares)
+    return Trust("roll", run, None, None, about)
+
+
+def test_a_whole_log_left_out_decides_and_not_its_blocks_of_path():
+    shares = [path_share("one"), path_share("two")]
+    both = level_of([by_blocks("one"), by_blocks("two"), by_log("one", 0.15), by_log("two", 0.2)], shares)
+    assert (both.level, both.prediction.model_error, both.new_path) == ("warn", 0.2, "100 %")
+    alone = level_of([by_blocks()], shares[:1])
+    assert (alone.level, alone.new_path) == ("good", "–")  # a single log has no other
+
+
+def test_a_log_left_out_whose_path_other_logs_repeat_is_not_good_whatever_its_scheme_says():
+    same = level_of([by_log(error=0.05)], [path_share("one", path_new=0.02)])
+    assert (same.level, same.words, same.new_path) == ("warn", "▲\N{NO-BREAK SPACE}Caution, same path", "2 %")
+    assert level_of([by_log(error=0.05)], [path_share("one", path_new=0.5)]).level == "good"
+
+
+def test_the_role_of_a_log_turns_no_verdict():
+    """A log judged as validation log, or left out of two identification logs, gets the same verdict."""
+    shares = [path_share("one"), path_share("two")]
+    validation = level_of([by_blocks("one"), prediction(log="two", model_error=0.14)], shares)
+    left_out = level_of([by_blocks("one"), by_blocks("two"), by_log("one", 0.1), by_log("two", 0.14)], shares)
+    assert validation.level == left_out.level == "warn"
+
+
+def test_a_validation_log_on_the_fitted_path_says_less_than_a_log_left_out_on_a_new_one():
+    shares = [path_share("one"), path_share("two"), path_share("check", path_new=0.0)]
+    decided = level_of([by_log("one", 0.06), by_log("two", 0.08), prediction(log="check", model_error=0.01)], shares)
+    assert (decided.level, decided.prediction.log) == ("good", "two")
+
+
+def test_a_joint_at_rest_is_no_problem_and_does_not_decide_where_another_run_moves():
+    rest = prediction(log="rest", model_error=3.0)
+    shares = [path_share("rest", moving=0.1), path_share("move")]
+    assert level_of([rest, prediction(log="move")], shares).prediction.log == "move"
+    alone = level_of([rest], shares)
+    assert (alone.level, alone.words) == ("warn", "▲\N{NO-BREAK SPACE}Caution, at rest")
+    assert level_of([prediction(log="move", model_error=3.0)], shares).level == "bad"
+
+
+# Masses, stiffnesses, parameters
+
+
+@pytest.mark.parametrize(
+    ("mass", "std", "stated", "level"),
+    [
+        (0.058, 0.030, 0.097, "warn"),  # its interval contains the stated mass, and zero
+        (0.095, 0.005, 0.097, "good"),
+        (0.080, 0.005, 0.097, "warn"),
+        (0.080, 0.005, float("nan"), "info"),
+    ],
+)
+def test_a_mass_is_good_where_a_narrow_interval_contains_it(mass, std, stated, level):
+    assert mass_level(weight(mass=mass, mass_std=std, stated_mass=stated)) == level
+    assert mass_level(weight(mass=0.097, mass_std=0.001, stated_mass=0.097, side="the other one")) == "warn"
+
+
+@pytest.mark.parametrize(("used", "level"), [(72, "warn"), (180, "good"), (359, "good"), (1, "warn"), (0, "bad")])
+def test_a_stiffness_of_a_minority_of_pushes_is_not_good(used, level):
+    """72 of 359 pushes count: the median is of the few that a straight line fits."""
+    assert stiffness_level(stiffness(359, pushes=used, stiffness=320.6, stiffness_std=5.8)) == level
+
+
+def test_a_negative_mass_within_its_error_of_zero_is_not_impossible():
+    assert not is_impossible(-0.0045, 0.02)
+    assert is_impossible(-0.0045, 0.002)
+
+
+def test_estimates_against_truth_pass_as_95_percent_intervals_do_and_can_fail():
+    """Three of five within four standard errors would pass; of 14, three beyond two standard errors are too many."""
+    right = [0.1, 0.3, 0.5, 0.6, 0.8, 0.9, 1.1, 1.2, 1.3, 1.6, 1.9, 0.2, 0.7, 2.1]
+    assert truth_level(right) == ("good", "8 within 1, 13 within 2, 14 within 4")
+    beyond = [*right[:10], 2.5, 3.0, 3.3, 3.9]
+    assert truth_level(beyond)[0] == "bad"
+    assert truth_level([*right[:-1], 6.0])[0] == "bad"
+    assert truth_level([0.1] * 14)[0] == "info"  # intervals so wide that nothing could miss them
+    rng = np.random.default_rng(0)
+    draws = [truth_level(np.abs(rng.normal(size=14)).tolist())[0] for _ in range(2000)]
+    assert draws.count("bad") / len(draws) < 0.02
+    assert draws.count("info") / len(draws) < 0.02
 
 
 def test_the_table_of_thresholds_says_what_the_verdicts_do():

@@ -24,6 +24,7 @@ from davinci_forces.maths.selection import (
 )
 from davinci_forces.records.prediction import CHOSEN
 
+LAST_DIGIT = 1e-4  # of printed errors; scores closer than this are equal
 NEGLIGIBLE_EXCESS = 1e-8  # a smaller share of the effort's square is within the solver's accuracy
 
 
@@ -139,7 +140,8 @@ def reason(
         )
     training = [result.training.mean() for result in results]
     closest = int(np.argmin(training))
-    if results[closest].score > results[i].score:
+    excess = results[closest].score - results[i].score
+    if excess > max(LAST_DIGIT, standard_error(results[closest], results[i])):
         text += (
             f"; {candidates[closest].name} fits better ({training[closest]:.4f} instead of {training[i]:.4f}) and "
             f"predicts worse ({results[closest].score:.4f}): it overfits"

@@ -16,7 +16,7 @@ from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.memory import efforts
 from davinci_forces.maths.selection import MAX_GROUPS, PATH_BLOCKS, Equations, solve
 from davinci_forces.records import Prediction
-from davinci_forces.records.prediction import ANOTHER_PATH, CHOSEN, SAME_PATH
+from davinci_forces.records.prediction import ANOTHER_PATH, CHOSEN, CHOSEN_BY_LOG, SAME_PATH
 
 
 class Scheme(NamedTuple):
@@ -48,7 +48,8 @@ class RefitModel:
 def predictions(candidate: Candidate, is_chosen: bool, logs: Sequence[Observed]) -> Iterator[Prediction]:
     """Predict the effort of each joint of all logs by refits of a candidate, by the scheme of the joints' own fits.
 
-    The chosen candidate is refitted without blocks of path instead.  Without a refit there is no prediction.
+    The chosen candidate is refitted without blocks of path, as `chosen`, and without whole logs if it has several, as
+    `chosen_by_log`.  Without a refit there is no prediction.
     """
     name = f"{candidate.variant}.{candidate.estimator}"
     models = [RefitModel(part, len(logs)) for part in candidate.parts]
@@ -58,6 +59,8 @@ def predictions(candidate: Candidate, is_chosen: bool, logs: Sequence[Observed])
             if is_chosen:
                 scheme = leave_blocks_out(model, log, "leave a block of path out")
                 yield from predict_scheme(scheme, model, log, CHOSEN, name)
+                if len(model.logs) > 1:
+                    yield from predict_scheme(scheme_of_own_fits(model, log), model, log, CHOSEN_BY_LOG, name)
             elif name != "independent.lse":  # this candidate is the joint's own fit
                 scheme = scheme_of_own_fits(model, log)
                 yield from predict_scheme(scheme, model, log, candidate.variant, candidate.estimator)

@@ -17,15 +17,15 @@ from davinci_forces.robots.robot import Robot
 FALLBACK = "independent.lse"  # for joints that the chosen model does not cover
 
 
-def follows(motion: Motion, paths: FittedPaths) -> bool:
-    """Whether the longest segment of a recording follows one of the paths."""
+def path_likeness(motion: Motion, paths: FittedPaths) -> float | None:
+    """Return how closely the longest segment follows the nearest path of another log; None if there is no other."""
     part = max(segments(motion.segment), key=lambda s: s.stop - s.start)
-    path_rows = [np.flatnonzero(paths.source == log) for log in dict.fromkeys(paths.source)]
+    path_rows = [np.flatnonzero(paths.source == log) for log in dict.fromkeys(paths.source) if log != motion.log]
     likenesses = [
         likeness(motion.t[part], motion.q_measured[part], paths.q[rows], float(paths.period[rows[0]]))
         for rows in path_rows
     ]
-    return max(likenesses) > LIKE
+    return max(likenesses, default=None)
 
 
 class Identified:
@@ -94,6 +94,14 @@ class Identified:
         return stand_in, f"{needs}, so {FALLBACK} is used; add their channels"
 
     def path(self, motion: Motion) -> str:
-        """Return whether a recording follows a fitted path, as `SAME_PATH` or `ANOTHER_PATH`."""
+        """Return whether a recording follows a path fitted in other logs, as `SAME_PATH` or `ANOTHER_PATH`."""
+        return SAME_PATH if self.path_new(motion) < 1.0 - LIKE**2 else ANOTHER_PATH
+
+    def path_new(self, motion: Motion) -> float:
+        """Return the share of a position's variance that no path of another log explains: 1 - r^2, r the likeness.
+
+        It is 1 if no other log's path is known.
+        """
         paths = self._paths.get(motion.joint)
-        return SAME_PATH if paths is not None and follows(motion, paths) else ANOTHER_PATH
+        r = path_likeness(motion, paths) if paths is not None else None
+        return 1.0 if r is None else 1.0 - max(r, 0.0) ** 2

@@ -25,7 +25,7 @@ from davinci_forces.records.model import (
     SwarmSearch,
 )
 from davinci_forces.records.plan import Control, Excitation, Links, Lyapunov, Pose, Workspace
-from davinci_forces.records.prediction import JointModel, Prediction
+from davinci_forces.records.prediction import JointModel, PathShare, Prediction
 from davinci_forces.records.record import (
     COLUMN_DTYPES,
     AnyRecord,
@@ -71,6 +71,7 @@ __all__ = [
     "FilterNoise", "Fit", "FittedPaths", "FreeMotion", "FreeSpace", "FreeWeight", "FrictionMap", "Guess",
     "HapticMotion", "HapticResponse", "HapticRun", "Identifiability", "Innovation", "JointCorrelation", "JointModel",
     "Labels", "Links", "Load", "LogSummary", "Lyapunov", "MeasurementNoise", "ModelSearch", "Motion", "Names", "Origin",
+    "PathShare",
     "PeriodResidual", "Pose", "Prediction", "Push", "Record", "Recording", "Residual", "SensorForce", "Signal",
     "Spectrum", "StabilityLimit", "StabilityMap", "Stiffness", "SwarmSearch", "Threshold", "TipBudget", "TipContact",
     "TipForce", "TissueLimit", "TissueModel", "Touch", "Track", "Trajectory", "Tuning", "Weight", "Whiteness",
@@ -82,7 +83,8 @@ KINDS: dict[str, type[Record]] = {
     for kind in (
         Links, Pose, Workspace, Control, Lyapunov, Excitation, LogSummary, Recording, Touch, Signal, Motion, Average,
         PeriodResidual, Trajectory, Spectrum, Fit, CrossFit, Identifiability, FittedPaths, MeasurementNoise, Residual,
-        SwarmSearch, Guess, Choice, ModelSearch, FrictionMap, Prediction, JointModel, Tuning, FilterNoise, FreeMotion,
+        SwarmSearch, Guess, Choice, ModelSearch, FrictionMap, Prediction, PathShare, JointModel, Tuning, FilterNoise,
+        FreeMotion,
         ErrorBand, Track, FreeSpace, Threshold, Contact, Push, Stiffness, TissueModel, Load, Weight, FreeWeight,
         Comparison, StabilityMap, StabilityLimit, DelayLimit, TissueLimit, HapticMotion, HapticResponse, HapticRun,
         JointCorrelation, ArmCorrelation, TipForce, TipContact, TipBudget, SensorForce, Whiteness, Innovation,

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from davinci_forces.records.record import Column, Counts, LogJointRecord, Published
 
 CHOSEN = "chosen"
+CHOSEN_BY_LOG = "chosen_by_log"  # the chosen model, refitted without whole logs instead of blocks of path
 SAME_PATH, ANOTHER_PATH = "same path", "another path"  # as fitted
 
 
@@ -13,7 +14,7 @@ SAME_PATH, ANOTHER_PATH = "same path", "another path"  # as fitted
 class Prediction(LogJointRecord):
     """The effort of a log that was left out of a fit, and the effort that the fit predicts for that log.
 
-    For the chosen model, `model` is "chosen" and `estimator` names its fit.
+    For the chosen model, `model` is `CHOSEN` or `CHOSEN_BY_LOG`, and `estimator` names its fit.
     """
 
     KEY = ("log", "joint", "model", "estimator")
@@ -39,8 +40,8 @@ class Prediction(LogJointRecord):
 
     @property
     def prefix(self) -> str:
-        """`predict.<log>.<joint>.<model>.<estimator>` or `.chosen`; `cv.` for identification logs."""
-        key = self.key[:-1] if self.model == CHOSEN else self.key
+        """`predict.<log>.<joint>.<model>.<estimator>`, `.chosen` or `.chosen_by_log`; `cv.` for identification logs."""
+        key = self.key[:-1] if self.model in (CHOSEN, CHOSEN_BY_LOG) else self.key
         return ".".join(("cv" if self.role == "identification" else "predict", *key))
 
     def published(self) -> Iterator[Published]:
@@ -48,6 +49,19 @@ class Prediction(LogJointRecord):
         scores = ("rmse", "nrmse", "r2", "fit_percent", "r2_ceiling", "effort_rms")
         yield from self.publish(self.prefix, *scores, "relative_error", "relative_error_1111")
         yield from self.publish(self.prefix, "model_error", with_std=True)
+
+
+@dataclass(frozen=True, eq=False)
+class PathShare(LogJointRecord):
+    """The share of a joint's path that no other identification log follows, and the share of time in motion."""
+
+    role: str
+    path_new: float
+    moving: float
+
+    def published(self) -> Iterator[Published]:
+        """Both shares."""
+        yield from self.publish(f"path.{self.log}.{self.joint}", "path_new", "moving")
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from davinci_forces.report.context import Context
 from davinci_forces.report.sections.summary import first_looks_in_order, fitted_joints, trust, trust_row
 from davinci_forces.report.sections.tissue import verdict
 
-HEADER = ("joint", "verdict", "model error", "error/effort", "R2", "ceiling", "detection level", "coverage")
+HEADER = ("joint", "verdict", "new path", "model error", "error/effort", "R2", "ceiling", "detection level", "coverage")
 
 
 def answer(context: Context) -> str:

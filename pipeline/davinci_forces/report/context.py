@@ -7,7 +7,7 @@ from typing import Any
 from davinci_forces.records import Fit, FreeSpace, Prediction, Record
 from davinci_forces.records.catalogue import Catalogue, Provenance
 from davinci_forces.records.forces import SMOOTHER
-from davinci_forces.records.prediction import CHOSEN
+from davinci_forces.records.prediction import CHOSEN, CHOSEN_BY_LOG
 from davinci_forces.records.quantities import QUANTITIES
 from davinci_forces.report.changes import StatedValue
 from davinci_forces.report.content import Number, literal
@@ -65,6 +65,11 @@ class Context:
             return chosen[0]
         return self.own_fit(joint)
 
+    def predicting_fits(self, joint: str) -> tuple[str, str]:
+        """The names, in predictions, of the fit that the filter used, and of its refits without whole logs."""
+        fit = self.used_fit(joint)
+        return fit, fit.replace(CHOSEN, CHOSEN_BY_LOG, 1)
+
     def own_fit(self, joint: str) -> str:
         """`<model>.<estimator>` of the fit of a joint by itself: the fit that the filter used, or least squares."""
         names = [f"{fit.model}.{fit.estimator}" for fit in self.own_fits() if fit.group == joint]
@@ -89,10 +94,10 @@ class Context:
 
 def fit_name(model: str, estimator: str) -> str:
     """The printed name of a fit, as 'independent, LSE' or 'chosen: independent, LSE'."""
-    if model != CHOSEN:
+    if model not in (CHOSEN, CHOSEN_BY_LOG):
         return f"{model}, {estimator_name(estimator)}"
     structure, _, by = estimator.rpartition(".")
-    return f"chosen: {structure}, {estimator_name(by)}"
+    return f"chosen{', by log' if model == CHOSEN_BY_LOG else ''}: {structure}, {estimator_name(by)}"
 
 
 def estimator_name(estimator: str) -> str:

@@ -1,17 +1,30 @@
-"""All thresholds of the report: the limits of good, caution and problem."""
+"""All rules of the report: the limits of good, caution and problem."""
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
-from davinci_forces.records import FreeSpace, Prediction
+from scipy.special import bdtr
+
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95
+from davinci_forces.records import FreeSpace, LogSummary, PathShare, Prediction, Stiffness, Weight
 from davinci_forces.report.content import Cell, Level
 
 GOOD, CAUTION = 0.10, 0.25  # model error over the root mean square of the measured effort
 DETECTED, DETECTABLE = 1 / 3, 1.0  # detection level over the effort that the user wants to see
-STIFF, STIFFER = 0.10, 0.25  # standard error of a stiffness over the stiffness
+PRECISE, ROUGH = 0.10, 0.25  # standard error of a stiffness or a mass over its value
+MIN_COUNTED = 0.5  # share of the pushes in contact that a stiffness is the median of; it is not that of a minority
+MIN_NEW_PATH = (
+    0.0975  # share of a path's variance that no fitted path explains; the stage `predict` uses the same limit
+)
+MIN_MOVING = 0.5  # share of a run in motion; at rest, friction takes any value, and the run says nothing of the model
 COVERED = (0.90, 0.98)  # coverage of a right 95 % band: not too narrow, not too wide
 NEAR_SINGULAR = 100.0  # condition number of the tip's Jacobian; the stage `resolve` uses the same limit
-WITHIN = 4.0  # largest accepted error of an estimate in standard errors
+WITHIN = {1: 0.6827, 2: 0.95, 4: 0.99994}  # share of right errors below this number of standard errors
+UNLIKELY = 0.01  # probability below which a test fails
+MAX_PERIOD_NOISE = 3.0  # noise of a period over that of the median period
+MAX_DUPLICATES = 0.1  # share of the rows of a log that repeat the row before
+MAX_JITTER = 0.1  # standard deviation of a clock over its interval
 WORDS: dict[Level, str] = {  # the mark and its word stay on one line
     "good": "●\N{NO-BREAK SPACE}Good",
     "warn": "▲\N{NO-BREAK SPACE}Caution",
@@ -21,12 +34,13 @@ WORDS: dict[Level, str] = {  # the mark and its word stay on one line
 
 @dataclass(frozen=True)
 class Trust:
-    """The trust in the external effort of one joint, from its worst run that was not fitted."""
+    """The trust in the external effort of one joint, from its worst run that was not fitted (see `decisive`)."""
 
     joint: str
     prediction: Prediction | None
     space: FreeSpace | None
     sought: float | None  # the effort that the user wants to see
+    about: PathShare | None = None  # of the predicted run
 
     @property
     def share(self) -> float:
@@ -41,14 +55,28 @@ class Trust:
 
     @property
     def same_path(self) -> bool:
-        """Whether the run repeats the fitted path; there the model's error repeats, too."""
-        return self.prediction is not None and self.prediction.path == "same path"
+        """Whether the run repeats the path of another fitted log, or of its own; there the model's error repeats."""
+        return self.prediction is not None and repeats_path(self.prediction, self.about)
+
+    @property
+    def new_path(self) -> str:
+        """The share of the run's path that no fit had, as it is printed; a dash where parts of a fitted log decide."""
+        whole = self.prediction is not None and is_out_of_log(self.prediction)
+        return percent(self.about.path_new if whole and self.about is not None else math.nan)
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether the joint stands still for most of the run."""
+        return self.about is not None and self.about.moving < MIN_MOVING
 
     @property
     def level(self) -> Level:
-        """The verdict by the effort sought if one is stated, else by the model error; never good on the same path."""
+        """The verdict by the effort sought if one is stated, else by the model error.
+
+        It is never good on the same path.  A joint at rest is neither good nor a problem.
+        """
         by = grade(self.fineness, DETECTED, DETECTABLE) if self.sought else grade(self.share, GOOD, CAUTION)
-        return "warn" if by == "good" and self.same_path else by
+        return "warn" if self.at_rest or (by == "good" and self.same_path) else by
 
     @property
     def narrow(self) -> bool:
@@ -58,7 +86,105 @@ class Trust:
     @property
     def words(self) -> str:
         """The verdict as it is printed."""
-        return verdict_words(self.level, self.same_path, self.narrow)
+        return verdict_words(self.level, self.same_path, self.narrow) + (", at rest" if self.at_rest else "")
+
+
+def is_out_of_log(p: Prediction) -> bool:
+    """Whether the fit has seen no part of the log."""
+    return p.role != "identification" or p.scheme.endswith(("log out", "logs out"))
+
+
+def repeats_path(p: Prediction, about: PathShare | None) -> bool:
+    """Whether a run that was predicted repeats a fitted path."""
+    if is_out_of_log(p) and about is not None:
+        return about.path_new < MIN_NEW_PATH
+    return p.path == "same path"
+
+
+def decisive(
+    predictions: Sequence[Prediction], shares: Sequence[PathShare]
+) -> tuple[Prediction | None, PathShare | None]:
+    """Choose the run that decides on a joint: the worst of those that say most about unseen motion.
+
+    A run in motion says more than one mostly at rest, and a whole log more than parts of one.  Among them, a new path
+    says more than a fitted one, and a log that no fit uses more than one that refits leave out.
+    """
+    by_log = {share.log: share for share in shares}
+
+    def rank(p: Prediction) -> tuple[bool, ...]:
+        about = by_log.get(p.log)
+        moves = about is None or about.moving >= MIN_MOVING
+        return moves, is_out_of_log(p), not repeats_path(p, about), p.role != "identification"
+
+    best = max(map(rank, predictions), default=())
+    worst = max((p for p in predictions if rank(p) == best), key=lambda p: p.model_error, default=None)
+    return worst, by_log.get(worst.log) if worst is not None else None
+
+
+def stiffness_level(tissue: Stiffness, true: float | None = None) -> Level:
+    """Grade a stiffness by its standard error; good needs two pushes, half of all, and an interval with the truth."""
+    if not tissue.pushes or tissue.stiffness <= 0:
+        return "bad"
+    level = grade(tissue.stiffness_std / tissue.stiffness, PRECISE, ROUGH)
+    if level == "good" and (tissue.pushes == 1 or is_minority(tissue)):
+        return "warn"
+    missed = true is not None and abs(tissue.stiffness - true) > NORMAL_95 * tissue.stiffness_std
+    return "info" if level == "good" and missed else level
+
+
+def is_minority(tissue: Stiffness) -> bool:
+    """Whether most of the pushes in contact do not count."""
+    return tissue.pushes < MIN_COUNTED * len(tissue)
+
+
+def mass_level(weight: Weight) -> Level:
+    """Grade a mass: good needs the right side, the stated mass in its interval, and an interval that tells it."""
+    if weight.side == "the other one":
+        return "warn"
+    if math.isnan(weight.stated_mass):
+        return "info"
+    return "good" if is_in_interval(weight) and is_precise(weight) else "warn"
+
+
+def is_in_interval(weight: Weight) -> bool:
+    """Whether the stated mass lies in the 95 % interval."""
+    return abs(weight.mass - weight.stated_mass) <= NORMAL_95 * weight.mass_std
+
+
+def is_precise(weight: Weight) -> bool:
+    """Whether the standard error of a mass is small against the stated mass."""
+    return weight.mass_std <= PRECISE * weight.stated_mass
+
+
+def truth_level(errors: Sequence[float]) -> tuple[Level, str]:
+    """Whether errors in standard errors are as small as right intervals make them, and how many lie within 1, 2 and 4.
+
+    It is a problem if so few within 2 or 4 are unlikely (binomial), and information if so many within 1 are.
+    """
+    n = len(errors)
+    counts = {width: sum(error <= width for error in errors) for width in WITHIN}
+    words = ", ".join(f"{k} within {width}" for width, k in counts.items())
+    if any(bdtr(counts[width], n, WITHIN[width]) < UNLIKELY for width in (2, 4)):
+        return "bad", f"{words}; the stated errors are too small"
+    too_wide = 1.0 - bdtr(counts[1] - 1, n, WITHIN[1]) < UNLIKELY
+    return ("info", f"{words}; the stated errors are too large") if too_wide else ("good", words)
+
+
+def is_impossible(value: float, std: float) -> bool:
+    """Whether a value that physics makes positive is negative beyond its standard error."""
+    return value + NORMAL_95 * std < 0.0
+
+
+def log_remarks(summary: LogSummary) -> list[str]:
+    """The remarks about a log; a log without any is read well."""
+    texts = list(summary.warnings)
+    if summary.dropped:
+        texts.append(f"{summary.dropped} rows could not be used")
+    if summary.duplicates > MAX_DUPLICATES * summary.rows:
+        texts.append(f"{summary.duplicates} of {summary.rows} rows repeat the row before")
+    if summary.jitter * summary.rate >= MAX_JITTER:
+        texts.append(f"the clock jitters by {summary.jitter * 1e3:.3g} ms")
+    return texts
 
 
 def verdict_words(level: Level, same_path: bool, narrow: bool) -> str:
@@ -96,16 +222,19 @@ def thresholds() -> tuple[tuple[Cell, ...], ...]:
         ("External effort of a joint, if the study states the `effort` sought", "detection level over this effort",
          f"at most {percent(DETECTED)}", f"at most {percent(DETECTABLE)}", "beyond"),
         ("External effort of a joint, if no `effort` is stated", "model error over the root mean square of the effort",
-         f"at most {percent(GOOD)}, on a path that was not fitted", f"at most {percent(CAUTION)}, or the same path",
-         "beyond"),
+         f"at most {percent(GOOD)}, on a path of which more than {percent(MIN_NEW_PATH)} was not fitted",
+         f"at most {percent(CAUTION)}, or the same path, or at rest for most of the run", "beyond"),
         ("95 % band of the external effort", "coverage: share of free-space samples in the band",
          f"{percent(COVERED[0])} to {percent(COVERED[1])}", f"above {percent(COVERED[1])}: too wide",
          f"below {percent(COVERED[0])}: too narrow"),
         ("Stiffness of tissue", "standard error over stiffness",
-         f"at most {percent(STIFF)}, from at least two pushes", f"at most {percent(STIFFER)}",
-         "beyond, or no usable push"),
+         f"at most {percent(PRECISE)}, from at least two pushes and {percent(MIN_COUNTED)} of all",
+         f"at most {percent(ROUGH)}", "beyond, or no usable push"),
+        ("Mass", "standard error over stated mass",
+         f"at most {percent(PRECISE)}, with the stated mass in its 95 % interval", "beyond", "–"),
         ("Pose of the tip", "condition number of its Jacobian", "–", f"above {NEAR_SINGULAR:g}: near singular", "–"),
-        ("Parameter of a simulated study", "standard errors from the truth", f"at most {WITHIN:g}", "–", "beyond"),
+        ("Estimates of a simulated study", "probability that so few lie within 2 standard errors, or 4, of the truth",
+         f"at least {percent(UNLIKELY)}", "–", "below"),
         ("White noise", "p-value of the Ljung-Box test over 20 lags", "above 1 %", "–", "–"),
         ("Innovations of the filter", "p-values of this test and of the cumulative periodogram, both signals",
          "each above 1 %, in the whole run or outside contact and reversals",

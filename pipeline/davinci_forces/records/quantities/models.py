@@ -160,6 +160,8 @@ MODELS = {
     "tau_hat_unseen": Quantity("effort predicted by refits without the sample", "{effort}"),
     # predictions
     "path": Quantity("whether the recording follows a path that was fitted", ""),
+    "path_new": Quantity("share of the position's variance that no other fitted path explains"),
+    "moving": Quantity("share of samples at which the joint is not at rest"),
     "rmse": Quantity("root mean squared error of the predicted effort", "{effort}"),
     "nrmse": Quantity("root mean squared error over the range of the effort"),
     "r2": Quantity("share of the effort's variance explained, R2"),

@@ -24,7 +24,6 @@ from davinci_forces.report.context import Context, fit_name, title
 from davinci_forces.report.sections.parts import MEASURES, paper_or_screen
 
 MAX_RUNS_ON_PAPER = 9
-ERROR_TOLERANCE = 1e-9  # relative errors closer than this are equal
 
 
 def section(context: Context) -> Section | None:
@@ -61,7 +60,6 @@ def blocks(context: Context, choice: Choice) -> Iterator[Block]:
         "Every candidate", "all-candidates",
         (table(context, choice, order, "Every candidate, the best first.", "candidates-table"),),
     )  # fmt: skip
-    yield from overfitting_note(choice)
     yield from unseen(context)
     yield from parameters(context)
 
@@ -133,21 +131,6 @@ def figure(choice: Choice) -> Figure:
         label="choice-figure",
         height=46,
     )
-
-
-def overfitting_note(choice: Choice) -> Iterator[Verdict]:
-    """Whether the candidate that fits best predicts worse than the chosen one."""
-    closest, chosen = int(np.argmin(choice.training)), choice.row_number(choice.chosen)
-    if (
-        choice.score[closest] > choice.score[chosen] + ERROR_TOLERANCE
-        and choice.training[closest] < choice.training[chosen]
-    ):
-        yield Verdict(
-            "info",
-            f"{literal(str(choice.candidate[closest]))} fits best but overfits: its error is "
-            f"{choice.training[closest]:.3f} on fitted data and {choice.score[closest]:.3f} on data left out. The "
-            f"chosen candidate has {choice.training[chosen]:.3f} and {choice.score[chosen]:.3f}.",
-        )
 
 
 def unseen(context: Context) -> Iterator[Block]:

@@ -25,9 +25,9 @@ from davinci_forces.report.content import (
 )
 from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.parts import autocorrelation, run_name
+from davinci_forces.report.verdicts import MAX_PERIOD_NOISE
 
 NOISE_FIELDS = {"q_noise": "position", "dq_noise": "velocity", "tau_noise": "effort"}
-MIN_OUTLIER = 3.0  # smallest noise of an outlying period over that of the median period
 MAX_BARS = 24  # periods in the bar plot
 
 
@@ -101,7 +101,7 @@ def outliers(context: Context, average: Average) -> Iterator[Verdict]:
     for residual in context.catalogue.select(PeriodResidual, log=average.log, joint=average.joint):
         for signal, meaning in NOISE_FIELDS.items():
             rms = by_period(residual, average, getattr(residual, signal))
-            noisy = [i for i, value in enumerate(rms, 1) if len(rms) > 2 and value > MIN_OUTLIER * np.median(rms)]
+            noisy = [i for i, value in enumerate(rms, 1) if len(rms) > 2 and value > MAX_PERIOD_NOISE * np.median(rms)]
             if noisy:
                 times = ", ".join(f"{rms[i - 1] / np.median(rms):.1f}" for i in noisy[:5])
                 name = f"**{run_name(average.log, average.joint)}**"

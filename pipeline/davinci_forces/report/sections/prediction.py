@@ -13,7 +13,7 @@ from davinci_forces.report.sections.parts import (
     paper_or_screen,
     run_name,
 )
-from davinci_forces.report.verdicts import percent
+from davinci_forces.report.verdicts import is_out_of_log, percent
 
 
 def section(context: Context) -> Section | None:
@@ -27,18 +27,20 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
     yield Prose(
         "A fit is tested on data that it was not fitted to: validation logs, contact logs outside their contact "
         "windows, and identification logs. Identification logs are predicted by fits that leave the log out; if a "
-        "joint has more than 20 such logs, groups of successive logs are left out together. If a joint has one log "
+        "joint has more than 20 such logs, groups of successive logs are left out together. The chosen model is also "
+        "refitted without blocks of path, and by log only if there are several. If a joint has one log "
         "only, each of its periods is left out in turn. On the fitted path the model's error repeats, so scores there "
         "are too good. $R^2$ refers to the raw effort; noise alone keeps it below its ceiling "
         '$1 - sigma^2 \\/ "var"(tau)$. The model error is the root mean square of measured minus predicted effort, '
         "after the noise variance is subtracted. Samples of identification logs at which the joint stands still are "
         "left out, as friction can then take any value; other logs are tested throughout."
     )
-    used = [p for p in predictions if f"{p.model}.{p.estimator}" == context.used_fit(p.joint)]
-    header = ("Log", "Joint", "Left out", "Path", "Model error", "Error/effort", "$R^2$", "Ceiling")
+    used = [p for p in predictions if f"{p.model}.{p.estimator}" in context.predicting_fits(p.joint)]
+    header = ("Log", "Joint", "Left out", "New path", "Model error", "Error/effort", "$R^2$", "Ceiling")
     caption = (
-        "Prediction of unseen effort by the fit that the filter uses, one row a run: data left out of the fit, path of "
-        "the run compared with the fitted one, model error, and its ratio to the root mean square of the effort."
+        "Prediction of unseen effort by the fit that the filter uses, one row a run: data left out of the fit; share "
+        "of the run's path (the variance of its position) that no fitted path explains; model error; and its ratio to "
+        "the root mean square of the effort."
     )
     yield from paper_or_screen(
         Table(caption, header, tuple(row(context, p) for p in used), "prediction-table", "llllrrrr")
@@ -61,9 +63,11 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
 def row(context: Context, p: Prediction) -> tuple[Cell, ...]:
     """The scores of one run."""
     share = percent(p.model_error / p.effort_rms if p.effort_rms > 0 else float("nan"))
-    how = LEFT_OUT.get(p.scheme, "never fitted")
+    how = LEFT_OUT.get(p.scheme, p.scheme.removeprefix("leave ").removesuffix(" out"))
+    key = f"path.{p.log}.{p.joint}.path_new"
+    new = percent(context.results[key].value) if is_out_of_log(p) and key in context.results else p.path.split()[0]
     error, r2, ceiling = context.numbers(p.prefix, ("model_error", "r2", "r2_ceiling"), 2)
-    return literal(p.log), title(p.joint), how, p.path.removesuffix(" path"), error, share, r2, ceiling
+    return literal(p.log), title(p.joint), how, new, error, share, r2, ceiling
 
 
 def every_score(context: Context, predictions: list[Prediction]) -> Table:

@@ -21,7 +21,7 @@ from davinci_forces.report.content import (
 )
 from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.parts import contact_spans, effort_panel, first_on_paper, paper_or_screen, run_name
-from davinci_forces.report.verdicts import band_in_words, percent
+from davinci_forces.report.verdicts import band_in_words, log_remarks, percent
 
 WORST = "the worst free run of this joint"
 ON_PAPER = 2  # joints whose worst run is drawn in the PDF
@@ -158,17 +158,18 @@ def recording_blocks(context: Context, summaries: list[LogSummary]) -> Iterator[
     if not summaries:
         return
     yield from paper_or_screen(overview(context, summaries))
-    remarks_of_stages = [
-        literal(text)
+    diagnostics = [
+        diagnostic
         for diagnostic in context.catalogue.records(Diagnostic)
         if diagnostic.stage in ("ingest", "resample", "average")
-        for text in diagnostic.text
     ]
-    remarked = {summary.log: texts for summary in summaries if (texts := remarks(summary))}
-    if clean := len(summaries) - len(remarked):
-        which = f"{clean} of {count(len(summaries), 'log')} were" if remarked else "Every log was"
-        # Remarks of the stages follow, so the verdict is not "Good" yet.
-        yield Verdict("info" if remarks_of_stages else "good", f"{which} read without a warning.")
+    remarks_of_stages = [literal(text) for diagnostic in diagnostics for text in diagnostic.text]
+    remarked = {summary.log: texts for summary in summaries if (texts := log_remarks(summary))}
+    followed = {diagnostic.subject.partition(".")[0] for diagnostic in diagnostics}  # logs with remarks of the stages
+    if clean := len({summary.log for summary in summaries} - followed - set(remarked)):
+        every = clean == len(summaries)
+        which = "Every log was" if every else f"{clean} of {count(len(summaries), 'log')} were"
+        yield Verdict("good" if every and not diagnostics else "info", f"{which} read without a remark.")
     yield from (Verdict("warn", f"**{literal(log)}**: {literal('; '.join(texts))}.") for log, texts in remarked.items())
     methods = sorted({(s.method, s.velocity) for s in context.catalogue.records(Signal)})
     if methods:
@@ -206,15 +207,3 @@ def overview(context: Context, summaries: list[LogSummary]) -> Table:
     )
     header = ("Log", "Role", "Format", "Samples", "Rate", "Duration", "Clock jitter", "Period", "Periods")
     return Table("The logs of the study.", header, rows, label="recorded-table", align="lllrrrrrr")
-
-
-def remarks(summary: LogSummary) -> list[str]:
-    """The warnings about a log."""
-    texts = list(summary.warnings)
-    if summary.dropped:
-        texts.append(f"{summary.dropped} rows could not be used")
-    if summary.duplicates > 0.1 * summary.rows:
-        texts.append(f"{summary.duplicates} of {summary.rows} rows repeat the row before")
-    if summary.jitter * summary.rate >= 0.1:
-        texts.append(f"the clock jitters by {summary.jitter * 1e3:.3g} ms")
-    return texts

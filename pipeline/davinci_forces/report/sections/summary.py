@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from davinci_forces.records import Contact, Diagnostic, Prediction, Record, Stiffness, Track
+from davinci_forces.records import Contact, Diagnostic, PathShare, Prediction, Record, Stiffness, Track
 from davinci_forces.report.content import (
     Block,
     Bullets,
@@ -23,7 +23,17 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, count, label, title
-from davinci_forces.report.verdicts import CAUTION, COVERED, DETECTABLE, DETECTED, GOOD, Trust, band_in_words, percent
+from davinci_forces.report.verdicts import (
+    CAUTION,
+    COVERED,
+    DETECTABLE,
+    DETECTED,
+    GOOD,
+    Trust,
+    band_in_words,
+    decisive,
+    percent,
+)
 
 
 def section(context: Context) -> Section:
@@ -97,20 +107,12 @@ def fitted_joints(context: Context) -> list[str]:
 
 
 def trust(context: Context, joint: str) -> Trust:
-    """The worst unseen prediction of a joint by the fit that the filter uses, and its worst free space."""
-    fit = context.used_fit(joint)
-    scored = [
-        p for p in context.catalogue.records(Prediction) if p.joint == joint and f"{p.model}.{p.estimator}" == fit
-    ]
+    """The prediction that decides on a joint, by the fit that the filter uses, and its worst free space."""
+    fits = context.predicting_fits(joint)
+    scored = [p for p in context.catalogue.select(Prediction, joint=joint) if f"{p.model}.{p.estimator}" in fits]
     scored = [p for p in scored if p.role != "contact" or context.study.log(p.log).contact]
-    others = [p for p in scored if p.role != "identification"] or scored
-    unseen = [p for p in others if p.path == "another path"] or others
-    return Trust(
-        joint,
-        max(unseen, key=lambda p: p.model_error, default=None),
-        context.worst_space(joint),
-        context.study.settings.effort.get(joint),
-    )
+    run, about = decisive(scored, context.catalogue.select(PathShare, joint=joint))
+    return Trust(joint, run, context.worst_space(joint), context.study.settings.effort.get(joint), about)
 
 
 def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Contact]) -> str:
@@ -185,12 +187,13 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
     """One row a joint."""
     sought = ("Sought",) if any(trust.sought for trust in trusts) else ()
     header = (
-        "Joint", "Verdict", "Model error", "Error/effort", "$R^2$", "Ceiling", "Detection level", *sought, "Coverage",
+        "Joint", "Verdict", "New path", "Model error", "Error/effort", "$R^2$", "Ceiling", "Detection level", *sought,
+        "Coverage",
     )  # fmt: skip
     return Table(
-        "Trust in the estimates. Model error: RMS of measured minus modelled effort, without noise. "
-        "Ceiling: largest $R^2$ that noise allows. Detection level: 99 % of free-space samples stay below it. "
-        "Coverage: share of these samples in the 95 % band.",
+        "Trust in the estimates. New path: share not fitted. Model error: RMS of measured minus modelled effort, "
+        "without noise. Ceiling: largest $R^2$ that noise allows. Detection level: 99 % of free-space samples are "
+        "lower. Coverage: their share in the 95 % band.",
         header,
         tuple(trust_row(context, trusted, bool(sought)) for trusted in trusts),
         label="trust-table",
@@ -201,7 +204,7 @@ def trust_table(context: Context, trusts: list[Trust]) -> Table:
 def trust_row(context: Context, trusted: Trust, with_sought: bool) -> tuple[Cell, ...]:
     """The numbers of one joint."""
     p, space = trusted.prediction, trusted.space
-    row: list[Cell] = [title(trusted.joint), trusted.words]
+    row: list[Cell] = [title(trusted.joint), trusted.words, trusted.new_path]
     if p is None:
         row += ["–"] * 4
     else:

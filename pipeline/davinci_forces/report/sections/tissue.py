@@ -28,7 +28,7 @@ from davinci_forces.report.content import (
 from davinci_forces.report.content.marks import AnyMark, Colour
 from davinci_forces.report.context import Context, title
 from davinci_forces.report.sections.parts import MM, THESIS_TISSUE
-from davinci_forces.report.verdicts import STIFF, STIFFER, grade
+from davinci_forces.report.verdicts import is_minority, stiffness_level
 
 FIGURES_ON_PAPER = 1  # figures of force, and as many maps, in the PDF; the others are on screen only
 PUSHES_PER_PANEL = 8
@@ -78,18 +78,15 @@ def verdict(context: Context, tissue: Stiffness) -> Verdict:
         return Verdict(
             "bad", f"{name}: a straight line explains 90 % of the force's variance in none of {pushes(len(tissue))}."
         )
-    level = grade(tissue.stiffness_std / tissue.stiffness, STIFF, STIFFER) if tissue.stiffness > 0 else "bad"
     stiffness = context.results[f"tissue.{tissue.log}.stiffness"].number()
     law = chosen_law(context, tissue.log)
     text = f"{name}: {stiffness} from {tissue.pushes} of {pushes(len(tissue))}{f'; best model: {law}' if law else ''}"
+    text += "; most pushes do not count" if is_minority(tissue) else ""
     true = true_stiffness(context, tissue.log)
-    missed = true is not None and abs(tissue.stiffness - true) > NORMAL_95 * tissue.stiffness_std
     if true is not None:
+        missed = abs(tissue.stiffness - true) > NORMAL_95 * tissue.stiffness_std
         text += f"; the 95 % interval {'misses' if missed else 'contains'} the true {true:g} N/m"
-    if level == "good" and (missed or tissue.pushes == 1):
-        # A small error is not called good from one push only, or if the interval misses the truth.
-        level = "info" if missed and tissue.pushes > 1 else "warn"
-    return Verdict(level, f"{text}.")
+    return Verdict(stiffness_level(tissue, true), f"{text}.")
 
 
 def true_stiffness(context: Context, log: str) -> float | None:

@@ -3,7 +3,6 @@
 import math
 from collections.abc import Iterator
 
-from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import FreeWeight, Load, Weight
 from davinci_forces.report.content import (
     Block,
@@ -20,6 +19,7 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, label, title
+from davinci_forces.report.verdicts import PRECISE, is_in_interval, is_precise, mass_level, percent
 
 SIDES = {"not told": "undecided"}  # words of the table for the sides in records
 
@@ -89,18 +89,19 @@ def log_blocks(context: Context, weight: Weight) -> Iterator[Block]:
 def verdict(context: Context, weight: Weight) -> Verdict:
     """Whether the estimated mass agrees with the stated one, and what follows for the scale of the efforts."""
     mass = context.number(f"weight.{weight.log}.mass", 3)
-    name = f"**{literal(weight.log)}**: the mass estimated from the efforts is {mass}"
+    name, level = f"**{literal(weight.log)}**: the mass estimated from the efforts is {mass}", mass_level(weight)
     if weight.side == "the other one":
-        return Verdict("warn", f"{name}. The other side of its link explains the efforts better: check its position.")
+        return Verdict(level, f"{name}. The other side of its link explains the efforts better: check its position.")
     if math.isnan(weight.stated_mass):
-        return Verdict("info", f"{name}. The study states no mass, so the scale of the efforts is not known.")
-    within = abs(weight.mass - weight.stated_mass) <= NORMAL_95 * weight.mass_std
+        return Verdict(level, f"{name}. The study states no mass, so the scale of the efforts is not known.")
     stated, scale = Number(weight.stated_mass, "kg"), context.number(f"weight.{weight.log}.scale", 3)
-    if within:
-        return Verdict("good", f"{name}, and {stated} is stated. The scale, {scale}, agrees with 1.")
-    return Verdict(
-        "warn", f"{name}, but {stated} is stated. Efforts are {scale} times too large: check gear and motor."
-    )
+    if not is_in_interval(weight):
+        follows = f"Efforts are {scale} times too large: check gear and motor."
+        return Verdict(level, f"{name}, but {stated} is stated. {follows}")
+    if not is_precise(weight):
+        follows = f"The standard error is more than {percent(PRECISE)} of it, so the interval hardly tests the scale."
+        return Verdict(level, f"{name}, and {stated} is stated. {follows}")
+    return Verdict(level, f"{name}, and {stated} is stated. The scale, {scale}, agrees with 1.")
 
 
 def disagreement(context: Context, weight: Weight) -> Prose:

@@ -12,7 +12,7 @@ from davinci_forces.maths.signals.faults import beyond_steps
 from davinci_forces.maths.signals.standstill import is_far_from_reversals
 from davinci_forces.maths.signals.windows import is_outside, spans
 from davinci_forces.records import Choice, Diagnostic, Fit, FittedPaths, JointModel, Motion, Prediction, diagnostic
-from davinci_forces.records.prediction import CHOSEN, SAME_PATH
+from davinci_forces.records.prediction import CHOSEN, SAME_PATH, PathShare
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
 
@@ -24,16 +24,21 @@ def run(
     robot: Robot,
     *,
     lowpass: float,
-) -> Iterator[Prediction | Diagnostic]:
+) -> Iterator[Prediction | PathShare | Diagnostic]:
     """Predict the effort of each moving joint by each fit, in a log that no parameter was fitted to.
 
-    A joint at rest is not predicted, and standstill is not scored: friction takes any value up to its static level
-    there.  Stages `fit` and `choose` predict identification logs.
+    Of every log of free motion or contact, the share of its path that other logs do not follow is computed.  A joint
+    at rest is not predicted, and standstill is not scored: friction takes any value up to its static level there.
+    Stages `fit` and `choose` predict identification logs.
     """
-    if entry.role in ("validation", "contact"):
-        along = LogModels(Identified(robot, fits), motions)
-        for motion in motions:
-            if not motion.at_rest:
+    if entry.role not in ("identification", "validation", "contact"):
+        return
+    along = LogModels(Identified(robot, fits), motions)
+    for motion in motions:
+        if not motion.at_rest:
+            new, moving = along.identified.path_new(motion), float(np.mean(motion.standing == 0))
+            yield PathShare(motion.log, motion.joint, motion.role, new, moving)
+            if entry.role != "identification":
                 yield from predict_joint(motion, along, entry, lowpass)
 
 

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.estimators import title_of
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Fit, Identifiability, Residual
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.records.record import slug
@@ -28,6 +29,7 @@ from davinci_forces.report.sections.joints.estimators import convergence, estima
 from davinci_forces.report.sections.joints.friction import friction_maps
 from davinci_forces.report.sections.joints.residuals import residual_blocks
 from davinci_forces.report.sections.parts import run_name
+from davinci_forces.report.verdicts import is_impossible
 
 
 def section(context: Context) -> Section | None:
@@ -73,17 +75,19 @@ def joint_blocks(context: Context, fits: list[Fit]) -> Iterator[Block]:
 
 
 def implausible(fits: list[Fit]) -> Iterator[Verdict]:
-    """Negative values of parameters that are positive in every mechanism."""
+    """Each parameter that fits make negative although it is positive in every mechanism, once for all fits."""
+    values: dict[str, list[tuple[float, float, str]]] = {}
     for fit in fits:
-        negative = [
-            f"{name} ({value:.2g} ± {std:.1g})"
-            for name, value, std, positive in zip(fit.parameter, fit.theta, fit.theta_std, fit.positive, strict=True)
-            if value < 0 and positive
-        ]
-        if negative:
-            who = f"{title_of(fit.estimator)} ({fit.model})"
-            message = f"{who} gives a negative {', '.join(negative)}, which is physically impossible."
-            yield Verdict("warn", message)
+        for name, value, std, positive in zip(fit.parameter, fit.theta, fit.theta_std, fit.positive, strict=True):
+            if value < 0 and positive:
+                values.setdefault(str(name), []).append((value, std, title_of(fit.estimator)))
+    for name, negative in values.items():
+        clear = [each for each in negative if is_impossible(*each[:2])]
+        value, std, _ = min(clear or negative, key=lambda each: each[0] + NORMAL_95 * each[1])
+        who = ", ".join(dict.fromkeys(estimator for *_, estimator in clear or negative))
+        follows = "which is physically impossible" if clear else "which cannot be distinguished from zero"
+        text = f"**{literal(name)}** is negative ({value:.2g} ± {std:.1g}), {follows}, by {who}."
+        yield Verdict("warn" if clear else "info", text)
 
 
 def parameters(context: Context, fit: Fit) -> Table:

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from davinci_forces.records import Average, Fit, Prediction, Residual, SwarmSearch
-from davinci_forces.records.prediction import CHOSEN
+from davinci_forces.records.prediction import CHOSEN, CHOSEN_BY_LOG
 from davinci_forces.records.record import slug
 from davinci_forces.report.content import Block, Bullets, Cell, Figure, Line, OnScreen, Panel, Prose, Table, literal
 from davinci_forces.report.content.marks import Colour
@@ -153,7 +153,9 @@ def table(context: Context, fit: Fit, printed: Printed) -> Table:
 def left_out(context: Context, joint: str) -> Iterator[Block]:
     """Every fit of a joint by its error on logs or periods left out; the chosen one also by blocks of path left out."""
     predictions = [
-        p for p in context.catalogue.select(Prediction, joint=joint, role="identification") if p.model != CHOSEN
+        p
+        for p in context.catalogue.select(Prediction, joint=joint, role="identification")
+        if p.model not in (CHOSEN, CHOSEN_BY_LOG)
     ]
     if not predictions:
         return
