@@ -12,8 +12,8 @@ An onset is modelled as a ramp of duration T that the smoother widens about its 
 A window of contact is summarised by peak, mean and impulse of the external effort, with standard errors.  They are
 computed from free motion in windows of the same length, so the model's error is included.  That of a peak is the root
 mean square of the windows' largest samples; that of a mean is the root mean square of the windows' means.
-The standard deviation of the effort at a peak is added to that of the peak, and so is what the smoother rounds off it:
-the peak minus the mean over `TIP_REACH` on either side.
+The standard deviation of the effort at a peak is added to that of the peak.  What the smoother rounds off is added.
+It is taken as the peak minus the mean over `TIP_REACH` on either side.
 """
 
 from collections.abc import Iterator, Sequence

@@ -7,9 +7,9 @@ The smoother's own variance S^2 knows nothing of the model's error, whose varian
 So 1.96 sigma has the stated coverage, whatever the distribution of the errors e.  All logs have equal weight.
 
 The quantile of a range of speed shrinks towards that of all speeds, in logarithms, where it has few errors.  Errors are
-correlated, so n uncorrelated ones are counted; as in conformal prediction, the quantile is that of (n + 1) / n times
-95 % (Vovk, Gammerman and Shafer, Algorithmic Learning in a Random World, 2005).  The model's error differs from log to
-log, and a few logs hardly show by how much: v is multiplied by the square of Student's 95 % point over 1.96.
+correlated, so n uncorrelated ones are counted.  As in conformal prediction, the quantile is that of (n + 1) / n times
+95 %.  The model's error differs from log to log, and a few logs hardly show by how much.  So v is multiplied by the
+square of Student's 95 % point over 1.96.  Vovk, Gammerman and Shafer, Algorithmic Learning in a Random World (2005).
 
 `levels` checks the coverage of the resulting band on samples without contact.
 """
@@ -21,7 +21,7 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, Booleans, Integers, evenly
 from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, error_of_quantile
 
-RANGES = 4  # ranges of speed, between quartiles of the calibrating motion
+SPEED_RANGES = 4  # ranges of speed, between quartiles of the calibrating motion
 LOG_BLOCKS = 6  # blocks of a log: each counts as a degree of freedom of the model's error
 MIN_LOGS_BAND = 3  # with fewer logs, standard errors compare blocks instead
 SHRINKAGE = 10.0  # uncorrelated errors at which the quantile of a range counts as much as that of all speeds
@@ -62,8 +62,8 @@ class FreeErrors(NamedTuple):
 class Calibration(NamedTuple):
     """The deviation of a smoothed external effort in units of its own, by range of speed."""
 
-    edges: Array  # (RANGES - 1,) speeds between the ranges
-    factor: Array  # (RANGES,) k
+    edges: Array  # (SPEED_RANGES - 1,) speeds between the ranges
+    factor: Array  # (SPEED_RANGES,) k
     model_variance: float  # v, as wide as the number of logs asks for
     relative_std: float  # standard error of k, relative
 
@@ -82,8 +82,8 @@ def calibrate(data: FreeErrors) -> Calibration:
     weight, n = data.weight, float(data.uncorrelated.sum())
     v = max(float(np.sum(weight * (data.error**2 - data.std**2))), 0.0)
     size, share = np.abs(data.error) / np.sqrt(data.std**2 + v) + TINY, min((1.0 + 1.0 / n) * TYPICAL_SHARE, 1.0)
-    edges = np.quantile(np.abs(data.dq), np.arange(1, RANGES) / RANGES)
-    inside = [speed_range(data.dq, edges) == number for number in range(RANGES)]
+    edges = np.quantile(np.abs(data.dq), np.arange(1, SPEED_RANGES) / SPEED_RANGES)
+    inside = [speed_range(data.dq, edges) == number for number in range(SPEED_RANGES)]
     overall = np.log(weighted_quantile(size, weight, share))
     by_range = np.array([np.log(weighted_quantile(size[r], weight[r], share)) if r.any() else overall for r in inside])
     trust = np.array([data.uncorrelated[r].sum() for r in inside])
