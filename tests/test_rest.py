@@ -181,9 +181,9 @@ def test_a_step_as_the_controller_starts_or_stops_is_named_and_not_scored(identi
 
 @pytest.mark.parametrize("seed", range(8))
 def test_no_part_of_motion_that_is_hard_to_predict_and_no_contact_is_left_out(identified, seed):
-    """Friction three times as large, which jumps at reversals, of which one log has one, near its start; and a push."""
+    """Friction twice as large, which jumps at reversals, of which one log has one, near its start; and a push."""
     signal = arm.signal("hand_roll", periods=3, seed=seed, role="validation", log="check")
-    harder = replace(signal, tau=signal.tau + 2.0 * COULOMB * np.sign(signal.dq))
+    harder = replace(signal, tau=signal.tau + COULOMB * np.sign(signal.dq))
     reversals = signal.t[1:][np.diff(np.sign(arm.excitation("hand_roll", signal.t)[1])) != 0]
     gap = np.argmax(np.diff(reversals))
     once = (signal.t > reversals[gap] - 0.3) & (signal.t < reversals[gap + 1] - 0.3)

@@ -63,7 +63,7 @@ def beyond_steps(residual: Array, judged: Booleans, slack: Array, width: int) ->
     sums, excluded = (np.cumsum(np.concatenate([[0.0], x])) for x in (residual, ~judged))
     k = np.arange(width, len(residual) - width + 1)
     k = k[excluded[k + width] == excluded[k - width]]
-    size, n = np.abs(sums[k + width] - 2.0 * sums[k] + sums[k - width]), len(k) // END_SHARE
+    size, n = np.abs(sums[k + width] - 2.0 * sums[k] + sums[k - width]) / width, len(k) // END_SHARE
     beyond = np.zeros(len(residual), np.bool_)
     if n:
         steps = size > MIN_STEP_RATIO * size[n:-n].max() + slack[k]
