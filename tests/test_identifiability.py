@@ -127,7 +127,7 @@ def test_an_inertia_that_is_negative_alone_is_blamed_on_what_the_model_leaves_ou
     assert "logged at different times" in said
     coupled = blamed([-0.45, 0.01, 0.37, 0.22], [0.01] * 4, ["pan", "lift"])
     assert "pan and lift move in the same logs" in coupled
-    assert "record it by itself" in coupled
+    assert "record the joint by itself" in coupled
 
 
 def test_an_effort_that_its_own_terms_do_not_describe_is_said_to_be_one():

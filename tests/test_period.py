@@ -281,7 +281,8 @@ def test_a_step_of_the_clock_costs_the_shorter_side_at_most(by, at):
     if by != 5.0:
         [text] = said
         assert made.periods == int(max(at, 50 - at) // 5)
-        assert f"after the clock's gap of {by + 0.01:.4g} s after {at - 0.01:.2f} s" in text
+        gap = f"{by + 0.01:.4g} s at {at - 0.01:.2f} s"
+        assert f"after the clock's gap of {gap}, the motion does not continue in phase" in text
 
 
 def test_a_step_of_the_clock_that_leaves_less_than_two_periods_is_refused():

@@ -39,7 +39,7 @@ FIRST_PANEL, LAST_PANEL = "Start here", "Other commands"  # panels of the help b
 FIRST_COMMANDS = ("all", "new", "inspect", "compare", REPORT)
 
 
-class Stages(TyperGroup):
+class CommandLine(TyperGroup):
     """The command line, with its commands in panels.  The stages share one command under different names and help."""
 
     def __init__(self, *, commands: dict[str, Any], **attributes: Any) -> None:
@@ -72,7 +72,7 @@ def escape_tags(text: str) -> str:
 
 
 app = typer.Typer(
-    cls=Stages,
+    cls=CommandLine,
     no_args_is_help=True,
     context_settings={"help_option_names": ["-h", "--help"]},
     pretty_exceptions_enable=False,
@@ -83,7 +83,7 @@ StudyFolder = Annotated[Path, typer.Argument(help="Folder of a study: raw/<study
 Studies = Annotated[list[Path] | None, typer.Argument(help="Folders of studies; without any, all studies in raw/.")]
 Processed = Annotated[Path | None, typer.Option(help="Folder for processed files, instead of processed/ next to raw/.")]
 Reports = Annotated[Path | None, typer.Option(help="Folder for reports, instead of reports/ next to raw/.")]
-Force = Annotated[bool, typer.Option("--force", help="Run the named stages even if they are up to date.")]
+Force = Annotated[bool, typer.Option("--force", help="Run the stages of this command even if they are up to date.")]
 Jobs = Annotated[int, typer.Option(min=1, help="Number of processes to run tasks in.")]
 Cluster = Annotated[
     str, typer.Option(metavar="ADDRESS", help="Run tasks on the Dask cluster of this scheduler: tcp://host:8786.")
@@ -160,7 +160,7 @@ def leave(code: int) -> None:
 
 
 @contextmanager
-def messages() -> Iterator[None]:
+def errors_as_messages() -> Iterator[None]:
     """Print errors of the pipeline and of the system without a traceback, and exit with code 1."""
     try:
         yield
@@ -184,7 +184,7 @@ def print_errors(run: Callable[..., Any]) -> Callable[..., Any]:
 
     @wraps(run)
     def command(*args: Any, **kwargs: Any) -> Any:
-        with messages():
+        with errors_as_messages():
             return run(*args, **kwargs)
 
     return command
@@ -206,7 +206,7 @@ Version = Annotated[
 
 @app.callback(help=__doc__)
 def options(version: Version = False) -> None:
-    """Declare the options without a command: only --version, which `print_version` handles."""
+    """Declare the options of the program itself: only --version, which `print_version` handles."""
 
 
 def verbosity(quiet: bool, verbose: bool) -> "Verbosity":
@@ -227,7 +227,7 @@ def run_stages(study: Path, names: tuple[str, ...], *options: Any) -> bool:
     from davinci_forces.runner import runs
 
     try:
-        with messages():
+        with errors_as_messages():
             return runs.run(study, names, *options)
     except typer.Exit:
         return False
@@ -280,6 +280,7 @@ def run_all(
 
 
 for name in COMMANDS:
-    code = import_module(f"davinci_forces.commands.{name}")
+    command_module = import_module(f"davinci_forces.commands.{name}")
     panel = FIRST_PANEL if name in FIRST_COMMANDS else LAST_PANEL
-    app.command(name, help=code.__doc__, rich_help_panel=panel, cls=ShownAsWritten)(print_errors(code.run))
+    command = app.command(name, help=command_module.__doc__, rich_help_panel=panel, cls=ShownAsWritten)
+    command(print_errors(command_module.run))

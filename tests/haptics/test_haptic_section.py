@@ -40,10 +40,10 @@ def written(*records: Record) -> Section | None:
 @pytest.mark.parametrize(
     ("about", "level", "words"),
     [
-        ({}, "good", "stable; it settles against tissue up to 900 N/m, 2.0 times the measured stiffness"),
-        ({"k_t_settles": NAN, "stiffness_margin": NAN, "delay_margin": NAN}, "good", "no limit of the tissue's"),
+        ({}, "good", "measured tissue. It settles against tissue up to 900 N/m, 2.0 times the measured stiffness"),
+        ({"k_t_settles": NAN, "stiffness_margin": NAN, "delay_margin": NAN}, "good", "No limit of the tissue's"),
         ({"delay_margin": 0.0}, "warn", "within reach, but is **unstable** when it stays in the tissue"),
-        ({"out_of_reach": 1}, "warn", "**unstable**, leaves the reach of the device at 10.0 s; it settles"),
+        ({"out_of_reach": 1}, "warn", "**unstable** against the measured tissue: it leaves the device's reach at 10"),
     ],
 )
 def test_a_hand_is_said_to_be_stable_or_not_and_where_its_limit_is(about, level, words):

@@ -22,13 +22,14 @@ def run(
     ] = None,
     harmonics: Annotated[int | None, typer.Option(min=1, help="Number of harmonics; default: the joint's.")] = None,
     criterion: Annotated[
-        str, typer.Option(help="What to minimise: `determinant`, -log10 det(F'F), or `condition`, log10 cond(F).")
+        str,
+        typer.Option(help="Minimise -log10 det(F'F) (`determinant`) or log10 cond(F) (`condition`) of regressor F."),
     ] = "determinant",
     q: Annotated[str | None, typer.Option(help="Position limits, lower,upper, instead of the joint's.")] = None,
     dq: Annotated[str | None, typer.Option(help="Velocity limits, in the same form.")] = None,
     ddq: Annotated[str | None, typer.Option(help="Acceleration limits, in the same form.")] = None,
-    starts: Annotated[int, typer.Option(min=1, help="Random search starts; half as many if JOINT is `all`.")] = 24,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of the random starts.")] = 0,
+    starts: Annotated[int, typer.Option(min=1, help="Random starting points; half as many if JOINT is `all`.")] = 24,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the random starting points.")] = 0,
     samples: Annotated[int, typer.Option(min=2, help="Samples K per period at which the criterion is computed.")] = 300,
     rate: Annotated[float, typer.Option(help="Sampling rate [Hz] of the table of --csv.")] = 100.0,
     csv: Annotated[Path | None, typer.Option(help="Write a table for the controller: t, q, dq, ddq.")] = None,

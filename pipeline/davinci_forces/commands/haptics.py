@@ -20,7 +20,7 @@ def run(
     ] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
     csv: Annotated[
-        Path | None, typer.Option(help="Folder for the motion and force of each hand over time, <hand>.csv.")
+        Path | None, typer.Option(help="Folder for <hand>.csv: motion and force of each hand of the scenario.")
     ] = None,
     template: Annotated[
         Path | None, typer.Option(help="Only write the scenario of thesis section 8.4 to this file, to be edited.")

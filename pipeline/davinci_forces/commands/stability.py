@@ -22,9 +22,9 @@ def run(
     b_h: Annotated[float, typer.Option(help="Damping b_H of the hand [N s/m].")] = 1.0,
     m: Annotated[float, typer.Option(help="Mass m of the hand and what it holds [kg].")] = 1.0,
     delay: Annotated[
-        float | None, typer.Option(help="Delay of the force on the hand [s], by filter and data link.")
+        float | None, typer.Option(help="Delay [s] of the force on the hand, due to filter and data link.")
     ] = None,
-    rate: Annotated[float | None, typer.Option(help="Update rate [Hz] of the force, held in between.")] = None,
+    rate: Annotated[float | None, typer.Option(help="Rate [Hz] at which the hand receives a new force.")] = None,
     as_json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Print the largest stable tissue stiffness K_T [N/m]: by (8.10), by arbitrary switching, by delay and sampling."""

@@ -1,4 +1,4 @@
-"""The response of a filter to a push, and the smallest intensity q_tau of the random walk that follows one.
+"""The response of a filter to a push, and the smallest random walk q_tau with which the filter follows a push.
 
 The push is a half-sine of 1 s.  A filter follows it if its estimate reaches 90 % of the peak, at most 0.1 s late.
 """
@@ -19,7 +19,7 @@ from davinci_forces.robots.robot import Joint
 DURATION = 1.0  # [s] duration of the push
 MIN_SHARE, MAX_DELAY = 0.9, 0.1  # estimated peak / peak of the push; [s]
 BEFORE, AFTER = 2.0, 1.0  # [s] before and after the push, in the trial on a joint at rest
-WALK_RANGE = (1e-8, 1e6)  # search range of q_tau, relative to the effort that causes the velocity noise
+WALK_RANGE = (1e-8, 1e6)  # search range of q_tau, in units of inertia * velocity noise / T_s
 BISECTIONS = 60  # halvings of the logarithmic search range
 CACHED_WALKS = 256  # size of a cache: all stages and logs of a joint need the same few results
 
@@ -38,7 +38,7 @@ def half_sine(t: Array, start: float) -> Array:
 
 
 def response(change: Array, t: Array, start: float, peak: float) -> Response:
-    """Measure the response: `change` (N,) is the estimate with a push of this `peak`, minus that without it."""
+    """Measure the response: `change` (N,) is the estimate with a push of this `peak`, minus the estimate without it."""
     near = (t >= start) & (t <= start + 2.0 * DURATION)
     shares = change[near] / peak
     k = int(np.argmax(shares))
@@ -63,9 +63,9 @@ def rise(track: Filter, recording: FilterInput, noise: NoiseModel) -> float:
 
 @lru_cache(CACHED_WALKS)
 def smallest_q_tau(track: Filter, inertia: float, viscous: float, T_s: float, noise: NoiseModel) -> float:
-    """Find the smallest random walk `q_tau` per sample with which a filter follows a push.
+    """Find the smallest random walk `q_tau` [effort per sample] with which a filter follows a push.
 
-    A filter without a random walk does not use `q_tau`, so any value will do; the lowest one searched is returned.
+    A filter without a random walk does not use `q_tau`, so the lowest value of the search range is returned.
     """
     noise_effort = inertia * float(np.hypot(noise.q_dq, noise.r_dq)) / T_s
     low, high = (ratio * noise_effort for ratio in WALK_RANGE)
@@ -76,16 +76,16 @@ def smallest_q_tau(track: Filter, inertia: float, viscous: float, T_s: float, no
     return high
 
 
-def noise_model(tuned: FilterNoise, joint: Joint, T_s: float, q_tau: float, name: str = DEFAULT) -> NoiseModel:
+def noise_model(tuned: FilterNoise, joint: Joint, T_s: float, walk: float, name: str = DEFAULT) -> NoiseModel:
     """Compute the noise per sample of T_s [s] for the filter of that name, from the joint's tuned noise.
 
-    The effort's noise drives the model, as an acceleration that is constant over a sample.  `q_tau` is the random walk
-    of the external effort [effort/s^0.5] from the settings.  If it is 0, the `q_tau` of the joint is used.  If that is
-    0, too, the smallest `q_tau` with which this filter follows a push is used.
+    The effort's noise drives the model, as an acceleration that is constant over a sample.  `walk` is the random walk
+    of the external effort [effort/s^0.5] from the settings.  If `walk` is 0, the walk of the joint is used.  If that is
+    0, too, the smallest walk with which this filter follows a push is used.
     """
-    q_tau = q_tau or joint.q_tau
-    noise = NoiseModel(tuned.r_q, tuned.r_dq, 0.0, tuned.r_tau * T_s / tuned.inertia, q_tau * T_s**0.5)
-    return noise if q_tau else noise._replace(
+    walk = walk or joint.q_tau
+    noise = NoiseModel(tuned.r_q, tuned.r_dq, 0.0, tuned.r_tau * T_s / tuned.inertia, walk * T_s**0.5)
+    return noise if walk else noise._replace(
         q_tau=smallest_q_tau(tracker(name), tuned.inertia, tuned.viscous, T_s, noise)
     )  # fmt: skip
 

@@ -28,7 +28,8 @@ def describe_correlated(names: Sequence[str], conditioning: least_squares.Column
     for members, ratio in least_squares.uncertain_combinations(conditioning, MIN_UNCERTAINTY_RATIO, MIN_PART_NAMED):
         if len(members) > 1 and set(members) not in reported:
             parameters = join_names([names[i] for i in members])
-            texts.append(f"one combination of {parameters} is {ratio:.0f} times less certain than the best one")
+            certainty = f"{ratio:.0f} times less certain than the combination that the data determine best"
+            texts.append(f"one combination of {parameters} is {certainty}")
     return texts
 
 
@@ -63,23 +64,23 @@ def inertia_at_fault(
     If the estimate is not significantly negative, the motion hardly excites the inertia.  If friction is negative, too,
     a sign is wrong.  Otherwise the model lacks a term.
     """
-    weights = np.array([term.a for term in joint.terms])  # share of each parameter in the inertia
-    value = float(weights @ estimate.theta)
-    std = least_squares.std_of_sum(conditioning.correlation, estimate.theta_std, weights)
+    inertia_shares = np.array([term.a for term in joint.terms])  # term.a is the coefficient of the acceleration
+    value = float(inertia_shares @ estimate.theta)
+    std = least_squares.std_of_sum(conditioning.correlation, estimate.theta_std, inertia_shares)
     inertia = f"{value:.2g} ± {std:.1g} {joint.unit('{inertia}')}"
-    omitted = f", and {joints_move(others)} in the same logs, which this model omits" if others else ""
+    omitted = f", and this model omits that {joints_move(others)} in the same logs" if others else ""
     if value > -MIN_Z * std:
         text = f"{inertia} may be positive, because the motion hardly excites it{omitted}"
         by_itself = "by itself, " if others else ""
-        return f"{text}; record it {by_itself}accelerating more: {better_motion(robot, joint)}"
-    friction = np.array([term.positive and not term.a for term in joint.terms])
-    backward = friction & (estimate.theta < -MIN_Z * estimate.theta_std)
-    if friction.any() and backward.sum() * 2 >= friction.sum():
+        return f"{text}; record the joint {by_itself}accelerating more: {better_motion(robot, joint)}"
+    friction = np.array([term.positive for term in joint.terms]) & (inertia_shares == 0)
+    negative_friction = friction & (estimate.theta < -MIN_Z * estimate.theta_std)
+    if friction.any() and negative_friction.sum() * 2 >= friction.sum():
         text = f"{inertia}, and friction is negative, too: the effort opposes the motion"
         return f"{text}; correct the `sign` of the effort or of the position"
     text = f"{inertia}, while friction is not negative, so the signs are right"
     if others:
-        return f"{text}{omitted}; record it by itself: {better_motion(robot, joint)}"
+        return f"{text}{omitted}; record the joint by itself: {better_motion(robot, joint)}"
     causes = "effort and motion may be logged at different times, or friction acts as a spring at reversals"
     return f"{text}: {causes}"
 
@@ -90,7 +91,7 @@ def hardly_described(joint: Joint, r2: float, others: Sequence[str]) -> str:
         return ""
     text = f"its own terms explain {percent(max(r2, 0.0))} of the effort's variance"
     if others:
-        return f"{text}: {joints_move(others)} in the same logs, which its terms omit; record it moving by itself"
+        return f"{text}: {joints_move(others)} in the same logs, which its terms omit; record the joint by itself"
     return f"{text}: check that its effort and motion are channels of one joint, and which terms its model needs"
 
 

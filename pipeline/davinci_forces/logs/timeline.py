@@ -67,7 +67,7 @@ class Timeline:
         """Whether both were sampled together; one may have more samples than the other."""
         if self.first != timeline.first:
             return False
-        # The drift over the first part shows most differences between clocks, without arrays.
+        # A fast check without arrays: the drift over the first part already separates most clocks that differ.
         difference, shorter = abs(self.step[0] - timeline.step[0]), min(abs(self.step[0]), abs(timeline.step[0]))
         if difference * (self.first[1] if len(self.first) > 1 else max(self.rows, timeline.rows)) > SKEW * shorter:
             return False
@@ -100,11 +100,11 @@ class Sampling:
     """The sampling of one channel as a header states it."""
 
     start: Decimal | None  # [s] since the year 1, in local time
-    x0: float  # [s] value of X, the time since `start`, at the first sample
+    x0: float  # [s] time since `start` (X in LabVIEW) at the first sample
     step: float  # [s] sampling time
 
     def is_like(self, sampling: "Sampling", has_x_columns: bool) -> bool:
-        """Whether both were sampled together according to the header; X0 and step do not count beside columns of X."""
+        """Whether the header says that both were sampled together; X0 and step are ignored if the file has times X."""
         if (self.start is None) != (sampling.start is None) or (self.step != sampling.step and not has_x_columns):
             return False
         start, other_start = self.start, sampling.start
@@ -120,7 +120,7 @@ class OwnClock:
 
     time: str  # name of the channel that is added with the times of this clock
     channels: tuple[str, ...]  # in the order of the file
-    x: str = ""  # name of the column of X of these channels; "" if the file has none
+    x: str = ""  # name of the column with the times X of these channels; "" if the file has none
 
 
 def refine_groups(groups: Sequence[list[str]], sampled: dict[str, Sampling], has_x_columns: bool) -> list[list[str]]:

@@ -62,8 +62,8 @@ class Control(Record):
 
     controller: str
     joint: str
-    start: float
-    reference: float
+    start: float  # initial position [rad or m]
+    reference: float  # desired position [rad or m]
     settling_time: float  # NaN if the joint does not settle, or its reference has no step
     overshoot: float
     error_10: float  # position error after 10 s
@@ -104,7 +104,7 @@ class Excitation(JointRecord):
 
     source: str
     period: float
-    objective: float
+    objective: float  # -log10 det(F'F), the criterion "determinant"
     condition: float
     coefficients: tuple[float, ...]
     excess_q: float

@@ -1,4 +1,4 @@
-"""Write the reports of a study: report and robot as .html and .pdf, results.json, and the answer as summary.txt."""
+"""Write the report of a study and the description of its robot (.html, .pdf), results.json and a short summary.txt."""
 
 import hashlib
 from collections.abc import Mapping

@@ -20,7 +20,7 @@ TARE_ROLES = ("validation", "identification")  # roles of logs in which nothing 
 MAX_LISTED = 100  # names of logs that one message lists
 MAX_POSITION = 3.0  # [m] distance from the remote centre; a larger position is probably in another unit
 WINDOWS = "a list of [start, end] in seconds, with 0 <= start < end"
-SEVERAL = ("files", "join")  # keys with several files: parts of a log in order, or files with its channels side by side
+SEVERAL = ("files", "join")  # keys of several files: successive parts of a log; files with different channels of a log
 ALL = "all"  # value of `contact` in a tissue log whose samples are all in contact
 
 
@@ -133,7 +133,7 @@ def _end(table: TomlTable) -> float | None:
 
 def _delimiter(table: TomlTable) -> str | None:
     if table.values.get("delimiter") == "":
-        table.problem("delimiter must not be empty; without it, it is detected from the file", "delimiter")
+        table.problem("delimiter must not be empty; leave the key out, and it is detected from the file", "delimiter")
     return table.text("delimiter") if "delimiter" in table else None
 
 

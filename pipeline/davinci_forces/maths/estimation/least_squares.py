@@ -1,14 +1,12 @@
 """Least squares by QR factorisation, in one pass over the rows.
 
-    W^(1/2) [Phi tau] = Q [[U, y], [0, e]],    theta = U^-1 y,    |W^(1/2) (tau - Phi theta)|^2 = |U theta - y|^2 + e^2
+    W^(1/2) [Phi D^-1, tau] = Q [[U, y], [0, e]],    |W^(1/2) (tau - Phi theta)|^2 = |U D theta - y|^2 + e^2
+    theta = D^-1 U^-1 y,    cov(theta) ~ (Phi' W Phi)^-1,    U = A diag(singular_values) B'
 
-The triangular factor contains all information of the data for least squares, with or without bounds.  Its singular
-values show which parameters the data determine one by one, and which only in combination:
-
-    cov(theta) ~ (Phi' Phi)^-1,    Phi D^-1 = Q U,    U = A diag(singular_values) B'
-
-D scales the columns to unit length.  A column of B with a small singular value is a combination of parameters that
-hardly changes the effort.  If two estimates are correlated, an error of one comes with an error of the other.
+D holds the lengths of the weighted columns, so U has columns of unit length.  The triangular factor U contains all
+information of the data for least squares, with or without bounds.  Its singular values show which parameters the data
+determine one by one, and which only in combination.  A column of B with a small singular value is a combination of
+parameters that hardly changes the effort.  If two estimates are correlated, so are their errors.
 """
 
 from typing import NamedTuple
@@ -23,8 +21,8 @@ class Triangle(NamedTuple):
 
     U: Array  # (p, p) upper triangular
     y: Array  # (p,)
-    squares: float  # e^2, the minimum of the weighted sum of squared residuals
-    scale: Array  # (p,) lengths of the columns
+    squares: float  # e^2, minimum of the weighted sum of squared residuals
+    scale: Array  # (p,) lengths of the weighted columns: the diagonal of D
 
     @property
     def theta(self) -> Array:
@@ -32,7 +30,7 @@ class Triangle(NamedTuple):
         return np.asarray(np.linalg.solve(self.U, self.y) / self.scale)
 
     def excess(self, theta: Array) -> Array:
-        """Excess (...) of the weighted sum of squared residuals over its minimum, at parameters (..., p)."""
+        """The weighted sum of squared residuals at parameters theta (..., p), minus its minimum; shape (...)."""
         return np.asarray((((theta * self.scale) @ self.U.T - self.y) ** 2).sum(axis=-1))
 
 
@@ -47,18 +45,18 @@ def triangle(Phi: Array, tau: Array, weight: Array) -> Triangle:
     return Triangle(R[:p, :p] / np.where(scale > 0, scale, 1.0), R[:p, p], float(R[p, p] ** 2), scale)
 
 
-def solve_bounded(R: Triangle, positive: Booleans) -> Array:
+def solve_bounded(factor: Triangle, positive: Booleans) -> Array:
     """Least-squares parameters (p,), of which those marked in `positive` (p,) are not negative.
 
     The active-set method (Stark and Parker, 1995) meets an active bound exactly.
     """
     from scipy.optimize import lsq_linear
 
-    theta = R.theta
+    theta = factor.theta
     if (theta[positive] >= 0).all():
         return theta
-    solution = lsq_linear(R.U, R.y, (np.where(positive, 0.0, -np.inf), np.inf), method="bvls", tol=1e-14)
-    return np.asarray(solution.x / R.scale)
+    solution = lsq_linear(factor.U, factor.y, (np.where(positive, 0.0, -np.inf), np.inf), method="bvls", tol=1e-14)
+    return np.asarray(solution.x / factor.scale)
 
 
 class ColumnAnalysis(NamedTuple):
@@ -74,12 +72,12 @@ class ColumnAnalysis(NamedTuple):
         return float(self.singular_values[0] / self.singular_values[-1])
 
 
-def analyse_columns(R: Triangle) -> ColumnAnalysis:
+def analyse_columns(factor: Triangle) -> ColumnAnalysis:
     """Analyse the columns of a triangular factor; they must be linearly independent."""
-    inverse = np.linalg.inv(R.U)
+    inverse = np.linalg.inv(factor.U)
     covariance = inverse @ inverse.T
     std = np.sqrt(np.diag(covariance))
-    _, singular_values, directions = np.linalg.svd(R.U)
+    _, singular_values, directions = np.linalg.svd(factor.U)
     return ColumnAnalysis(covariance / std / std[:, None], singular_values, directions)
 
 
@@ -95,7 +93,7 @@ def uncertain_combinations(
 ) -> list[tuple[tuple[int, ...], float]]:
     """Combinations at least `min_ratio` times less certain than the best one: their parameters and that ratio.
 
-    A parameter belongs to a combination if its squared component in the unit vector is at least `min_part`.
+    A parameter belongs to a combination if its squared component in the singular vector is at least `min_part`.
     """
     ratios = analysis.singular_values[0] / analysis.singular_values
     return [

@@ -25,9 +25,8 @@ from davinci_forces.maths.models.terms import Term
 
 Range = tuple[float, float]
 PERIOD_SAMPLES = 300  # K, of one period without its end point; this number reproduces Table 6.1
-# Largest matrix, in entries, that is factored in one piece: for a larger one, the library starts threads.  A search
-# factors thousands of matrices a second.  For so small ones, threads
-# make the search slower, up to 20 times on a busy machine.
+# Number of entries of the largest matrix that is factored in one piece: for a larger one, the library starts threads.
+# The matrices here are so small that threads make the search slower, up to 20 times on a busy machine.
 MAX_TRIANGLE_ENTRIES = 8000
 RUN_IN_INSTANTS = 4000  # instants of a run-in at which the limits are checked
 LIMIT_MARGIN = 1e-5  # margin, as a share of a limit, for peaks between the checked instants
@@ -76,7 +75,7 @@ def turning_points(series: Fourier) -> tuple[Array, Array, Array]:
 
     Multiplied by z^N, z = exp(i omega t), the derivative of a trigonometric polynomial is a polynomial in z.  Its roots
     on the unit circle are the extrema.  The angles of *all* roots are returned: rounding may move a double root off the
-    circle.  Additional angles do no harm, because the series takes its values there, too.
+    circle.  Additional angles do no harm, since a value of the series at any angle lies within its range.
     """
     k = np.arange(1, len(series.a) + 1)
     velocity = np.array(series.a) - 1j * np.array(series.b)  # a_k cos + b_k sin = Re(velocity_k z^k)
@@ -113,19 +112,19 @@ Criterion = Callable[[Array], Array]
 
 
 def determinant(F: Array) -> Array:
-    """-log10 det(F^T F) (...).  (6.20)"""
+    """-log10 det(F^T F) for each of the leading indices of F, shape (...).  (6.20)"""
     diagonal = np.abs(np.diagonal(triangle(F), axis1=-2, axis2=-1))
     return _where_full_rank(F, diagonal.min(-1), diagonal.max(-1), lambda: -2 * np.log10(diagonal).sum(-1))
 
 
 def condition(F: Array) -> Array:
-    """log10 of the condition number (...)."""
+    """log10 of the condition number for each of the leading indices of F, shape (...)."""
     s: Array = np.asarray(np.linalg.svd(triangle(F), compute_uv=False), np.float64)
     return _where_full_rank(F, s[..., -1], s[..., 0], lambda: np.log10(s[..., 0] / s[..., -1]))
 
 
 def triangle(F: Array) -> Array:
-    """R (..., p, p) of F = Q R; F with many samples is factored in blocks, and then the R of all blocks together."""
+    """The factor R (..., p, p) of F = Q R; for many samples, blocks of F are factored, then the factors together."""
     samples, parameters = F.shape[-2:]
     rows = max(2 * parameters, MAX_TRIANGLE_ENTRIES // parameters)
     if samples <= rows:

@@ -101,7 +101,7 @@ def wrench_of(row: Row, motion: Motion) -> Wrench:
     return f, plus(cross(h, a), plus(times(inertia, e), cross(w, times(inertia, w))))
 
 
-def carrier_wrench(row: Row, slides: bool, cos_sin: CosSin, q: Number, wrench: Wrench) -> Wrench:
+def wrench_in_parent_frame(row: Row, slides: bool, cos_sin: CosSin, q: Number, wrench: Wrench) -> Wrench:
     """Transform a wrench on a link to the origin and the axes of its parent."""
     f, n = wrench
     if slides:
@@ -143,12 +143,12 @@ def shifted_inertia(m: float, r: Vector, inertia: Inertia) -> Inertia:
     return (h[0] + m * r[0], h[1] + m * r[1], h[2] + m * r[2]), xx_xy_xz, yy_yz_zz
 
 
-def moved_inertia(slides: bool, cos_sin: CosSin, q: Number, m: float, inertia: Inertia) -> Inertia:
+def inertia_in_joint_frame(slides: bool, cos_sin: CosSin, q: Number, m: float, inertia: Inertia) -> Inertia:
     """Transform the inertia of a link and all its descendants to the frame of its joint at q = 0."""
     return shifted_inertia(m, (0.0 * q, 0.0 * q, q), inertia) if slides else turned_inertia(cos_sin, inertia)
 
 
-def carried_inertia(row: Row, m: float, inertia: Inertia) -> Inertia:
+def inertia_in_parent_frame(row: Row, m: float, inertia: Inertia) -> Inertia:
     """Transform an inertia of mass m from the frame of a joint at q = 0 to the frame of the parent link."""
     h, (xx, xy, xz), (yy, yz, zz) = inertia
     x, y, z = times(row, (xx, xy, xz)), times(row, (xy, yy, yz)), times(row, (xz, yz, zz))  # columns of R I

@@ -4,10 +4,10 @@ Recursive Newton-Euler and composite rigid bodies (Featherstone 2008, chapters 5
 the equations of one link.  The effort of a coordinate that moves several links is the sum over these links.
 
 The same source runs on numpy arrays and in compiled loops (`kernels`).  The last axis of every array has S samples.
-`samples` are the indices to compute with: one slice of all in numpy, `range(S)` in compiled loops.  `joints` (n + 1, 5,
-S) has cos q, sin q, q, dq, ddq of each coordinate, and a last row of zeros for links that no coordinate moves.
-`scratch` (bodies, numbers, S) has the intermediate results of every body, the base first.  The caller sets it to 0
-before its first use.
+Loops run over `samples`: in numpy, one slice of all samples; in compiled code, `range(S)`.  `joints` (n + 1, 5, S) has
+cos q, sin q, q, dq, ddq of each coordinate, and a last row of zeros for links that no coordinate moves.  `scratch`
+(bodies, numbers, S) has the intermediate results of every body, the base first.  The caller sets it to 0 before its
+first use.
 """
 
 from collections.abc import Iterable
@@ -18,23 +18,23 @@ from davinci_forces.maths.mechanics.chain import Tree
 from davinci_forces.maths.mechanics.link import Vector, plus
 
 Samples = Iterable[Any]
-INERTIA = 13  # where a row of `tree.rows` (the constants of a link) has: m times centre of mass (3), inertia (6)
+FIRST_MOMENT = 13  # index in a row of `tree.rows` of the first moment (3 numbers), which the inertia (6) follows
 
 
-def vector(numbers: Any, first: int, s: Any) -> Vector:
-    """Read the vector that begins at number `first` of a body."""
-    return numbers[first, s], numbers[first + 1, s], numbers[first + 2, s]
+def vector(body: Any, first: int, s: Any) -> Vector:
+    """Read a vector from three numbers of a body (numbers, S), from index `first` on."""
+    return body[first, s], body[first + 1, s], body[first + 2, s]
 
 
-def store(numbers: Any, first: int, s: Any, x: Vector) -> None:
-    """Store a vector in three numbers of a body, beginning at number `first`."""
-    numbers[first, s], numbers[first + 1, s], numbers[first + 2, s] = x
+def store(body: Any, first: int, s: Any, x: Vector) -> None:
+    """Store a vector in three numbers of a body (numbers, S), from index `first` on."""
+    body[first, s], body[first + 1, s], body[first + 2, s] = x
 
 
-def fill(numbers: Any, value: float, samples: Samples) -> None:
-    """Set all samples to one value."""
+def fill(signal: Any, value: float, samples: Samples) -> None:
+    """Set all samples of a signal (S,) to one value."""
     for s in samples:
-        numbers[s] = value
+        signal[s] = value
 
 
 def add_effort(total: Any, wrench: Any, slides: bool, samples: Samples) -> None:
@@ -79,7 +79,7 @@ def inverse_dynamics(tree: Tree, gravity: float, joints: Any, scratch: Any, tau:
         add_effort(tau[tree.coordinate[i]], body[9:], slides, samples)
         for s in samples:
             wrench = vector(body, 9, s), vector(body, 12, s)
-            f, n = link.carrier_wrench(constants, slides, (joint[0, s], joint[1, s]), joint[2, s], wrench)
+            f, n = link.wrench_in_parent_frame(constants, slides, (joint[0, s], joint[1, s]), joint[2, s], wrench)
             store(parent, 9, s, plus(vector(parent, 9, s), f))
             store(parent, 12, s, plus(vector(parent, 12, s), n))
 
@@ -87,8 +87,9 @@ def inverse_dynamics(tree: Tree, gravity: float, joints: Any, scratch: Any, tau:
 def mass_matrix(tree: Tree, joints: Any, scratch: Any, M: Any, samples: Samples) -> None:
     """Fill M (n, n, S).  (4.38)
 
-    `scratch` has 9 numbers of each body: the first moment and the inertia of the body with all links that it carries.
-    The numbers of the base have another use: the wrench of a unit acceleration of one joint, carried inwards.
+    `scratch` has 9 numbers of each body: the first moment and the inertia of the body with all links that it carries,
+    whose mass is in `tree.carried`.  The base's row is reused for the wrench that a unit acceleration of one joint
+    causes; it is transformed from link to link towards the base.
     """
     wrench = scratch[0]
     for k in range(tree.n):
@@ -96,7 +97,7 @@ def mass_matrix(tree: Tree, joints: Any, scratch: Any, M: Any, samples: Samples)
             fill(M[k, column], 0.0, samples)
     for i in range(len(tree.parent)):
         for c in range(9):
-            fill(scratch[i + 1, c], tree.rows[i][INERTIA + c], samples)
+            fill(scratch[i + 1, c], tree.rows[i][FIRST_MOMENT + c], samples)
     for i in range(len(tree.parent) - 1, -1, -1):
         k, slides, m, body = tree.coordinate[i], tree.slides[i], tree.carried[i], scratch[i + 1]
         for s in samples:
@@ -108,22 +109,23 @@ def mass_matrix(tree: Tree, joints: Any, scratch: Any, M: Any, samples: Samples)
             constants, joint, parent = tree.rows[i], joints[k], scratch[tree.parent[i]]
             for s in samples:
                 inertia = vector(body, 0, s), vector(body, 3, s), vector(body, 6, s)
-                h, I_column_x, I_rest = link.moved_inertia(slides, (joint[0, s], joint[1, s]), joint[2, s], m, inertia)
+                cos_sin = joint[0, s], joint[1, s]
+                h, I_xx_xy_xz, I_yy_yz_zz = link.inertia_in_joint_frame(slides, cos_sin, joint[2, s], m, inertia)
                 store(body, 0, s, h)
-                store(body, 3, s, I_column_x)
-                store(body, 6, s, I_rest)
+                store(body, 3, s, I_xx_xy_xz)
+                store(body, 6, s, I_yy_yz_zz)
             for s in samples:
                 inertia = vector(body, 0, s), vector(body, 3, s), vector(body, 6, s)
-                h, I_column_x, I_rest = link.carried_inertia(constants, m, inertia)
+                h, I_xx_xy_xz, I_yy_yz_zz = link.inertia_in_parent_frame(constants, m, inertia)
                 store(parent, 0, s, plus(vector(parent, 0, s), h))
-                store(parent, 3, s, plus(vector(parent, 3, s), I_column_x))
-                store(parent, 6, s, plus(vector(parent, 6, s), I_rest))
+                store(parent, 3, s, plus(vector(parent, 3, s), I_xx_xy_xz))
+                store(parent, 6, s, plus(vector(parent, 6, s), I_yy_yz_zz))
         j = i
         while tree.parent[j] > 0:
             constants, slides, joint = tree.rows[j], tree.slides[j], joints[tree.coordinate[j]]
             for s in samples:
-                link_wrench = vector(wrench, 0, s), vector(wrench, 3, s)
-                f, n = link.carrier_wrench(constants, slides, (joint[0, s], joint[1, s]), joint[2, s], link_wrench)
+                cos_sin, link_wrench = (joint[0, s], joint[1, s]), (vector(wrench, 0, s), vector(wrench, 3, s))
+                f, n = link.wrench_in_parent_frame(constants, slides, cos_sin, joint[2, s], link_wrench)
                 store(wrench, 0, s, f)
                 store(wrench, 3, s, n)
             j = tree.parent[j] - 1
@@ -134,8 +136,8 @@ def mass_matrix(tree: Tree, joints: Any, scratch: Any, M: Any, samples: Samples)
 def regressor(tree: Tree, gravity: float, joints: Any, scratch: Any, Y: Any, samples: Samples) -> None:
     """Store the ten columns of link i and coordinate k in Y[k, i] (10, S), if the coordinate moves the link.  (6.3)
 
-    `scratch` has 9 numbers for each of (n + 1) (L + 1) rows, L links and the base at a time.  The first L + 1 have the
-    motion of every body, then, for each coordinate, its velocity if only this coordinate moves, with unit velocity.
+    `scratch` has n + 1 blocks of L + 1 rows (the base and L links) of 9 numbers.  Block 0 has the motion of every body.
+    Block k + 1 has the velocity of every body if only coordinate k moves, with unit velocity: a column of its Jacobian.
     """
     motions(tree, gravity, joints, scratch, samples)
     bodies = len(tree.parent) + 1

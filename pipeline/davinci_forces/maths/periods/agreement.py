@@ -66,7 +66,7 @@ def _shorten(t: Array, span: slice, odd: Difference, M: int, length: float, rate
     return slice(start if start > span.start + 1 else int(np.searchsorted(t, next_one)), span.stop)
 
 
-def alternation(t: Array, signals: Sequence[Array], length: float, rate: float, among: Sequence[int]) -> int:
+def multiple_of_period(t: Array, signals: Sequence[Array], length: float, rate: float, among: Sequence[int]) -> int:
     """The number k, the first of `among`, for which signals (N,) repeat only after k of these periods, or 1.
 
     A motion may nearly repeat within its period.  Then every k-th period agrees with the first, and the periods between

@@ -150,9 +150,9 @@ def left_out(t: Array, x: Array, period: float, K: int, groups: Integers) -> Ite
 
 def noise_std(folded: Folded) -> float:
     """Standard deviation of the noise, with one degree of freedom spent per phase.  (6.32), corrected"""
-    return float(np.sqrt(folded.noise @ folded.noise / degrees(folded)))
+    return float(np.sqrt(folded.noise @ folded.noise / degrees_of_freedom(folded)))
 
 
-def degrees(folded: Folded) -> int:
+def degrees_of_freedom(folded: Folded) -> int:
     """Degrees of freedom of the noise: all samples less one per phase."""
     return len(folded.noise) - int((folded.counts > 0).sum())

@@ -27,7 +27,7 @@ class Repetition(NamedTuple):
     lag: float  # after which the section repeats
     start: int
     stop: int
-    two_periods: int  # their first sample
+    best_start: int  # first sample of the two periods
 
 
 class Lag(NamedTuple):
@@ -49,9 +49,7 @@ def repetition(signals: Sequence[Array]) -> Repetition | None:
     for start, stop in _parts(N):
         match = _search(x[:, start:stop]) if len(x) else None
         if match is not None:
-            return _shorten(
-                x, Repetition(match.lag, match.start + start, match.stop + start, match.two_periods + start)
-            )
+            return _shorten(x, Repetition(match.lag, match.start + start, match.stop + start, match.best_start + start))
     return None
 
 
@@ -69,8 +67,8 @@ def _shorten(x: Array, match: Repetition) -> Repetition:
     """Replace the lag of a section by the shortest lag after which its two best periods repeat."""
     lag, size = match.lag, round(PERIODS_SEARCHED * match.lag)
     middle, best = (
-        round(match.two_periods + match.lag),
-        x[:, match.two_periods : match.two_periods + 2 * round(match.lag) + 1],
+        round(match.best_start + match.lag),
+        x[:, match.best_start : match.best_start + 2 * round(match.lag) + 1],
     )
     while True:
         start = max(min(middle - size // 2, match.stop - size), match.start)

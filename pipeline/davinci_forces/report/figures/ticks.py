@@ -20,7 +20,7 @@ def power_of_ten(greatest: float) -> int:
 
 
 def scale_ticks(axis: "Axis", label: str) -> str:
-    """Divide the numbers of an axis by a power of ten, and return its label with this power, for its current range."""
+    """Divide the numbers on an axis by a power of ten that suits its range, and return the label with this power."""
     from matplotlib.ticker import FuncFormatter
 
     # By default, matplotlib writes the power at the end of the axis, where the legend is.

@@ -120,12 +120,12 @@ def cost_of_real_time(context: Context, tracks: list[Track]) -> Table:
 
 
 def comparison(context: Context, compared: list[Comparison]) -> Table:
-    """Every filter on the worst free run of each joint."""
+    """Every filter on the worst run in free space of each joint."""
     rows = tuple(compared_row(context, c) for c in compared)
     caption = (
-        "Filters compared on the worst free run of each joint, each with the smallest random walk that follows a push: "
-        "RMS and detection level of the external effort in free motion; and, for a push that software adds to the "
-        "recorded effort, estimated over true peak, and the delay of the estimated peak."
+        "Filters compared on each joint's worst run in free space. Each has the smallest random walk with which it "
+        "follows a push. RMS and detection level: of the external effort in free motion. Peak ratio and delay: the "
+        "estimated divided by the true peak of a push that software adds to the recorded effort, and the peak's delay."
     )
     return Table(
         caption,
@@ -156,7 +156,7 @@ def overlay(compared: list[Comparison]) -> Figure:
     return Figure(
         "External effort in free motion by four filters. The true one is 0; the deviation is mainly the model's error, "
         "which all filters share. The smoother has no delay.",
-        f"External effort by four filters over {SECONDS_DRAWN:g} s of the worst free run of {len(joints)} joints.",
+        f"External effort by four filters over {SECONDS_DRAWN:g} s of the worst run of {len(joints)} joints.",
         panels,
         "filters-figure",
         columns=1,

@@ -55,15 +55,18 @@ def verdict(context: Context, run: HapticRun) -> Verdict:
     """Whether a hand is stable against the measured tissue, and the stiffest tissue against which it settles."""
     key, name = f"haptics.{run.hand}", f"**Simulated**, hand “{hand_name(context, run)}”"
     limit, margin = context.numbers(key, ("k_t_settles", "stiffness_margin"), 2)
-    where = f"it settles against tissue up to {limit}, {margin} times the measured stiffness"
+    where = f"It settles against tissue up to {limit}, {margin} times the measured stiffness"
     if not run.k_t_settles > 0.0:
-        where = "no limit of the tissue's stiffness was found"
+        where = "No limit of the tissue's stiffness was found"
     if run.out_of_reach:
-        return Verdict("warn", f"{name}: **unstable**, leaves the reach of the device at {run.t[-1]:.1f} s; {where}.")
+        leaves = f"it leaves the device's reach at {run.t[-1]:.1f} s"
+        return Verdict("warn", f"{name}: **unstable** against the measured tissue: {leaves}. {where}.")
     stable = run.delay_margin != 0.0  # NaN if the hand is stable with every delay tried
     off = context.number(f"{key}.felt_error", 2)
-    motion = "stable" if stable else "goes in and out within reach, but is **unstable** when it stays in the tissue"
-    return Verdict("good" if stable else "warn", f"{name}: {motion}; {where}. RMS error of the felt force: {off}.")
+    motion = "stable against the measured tissue"
+    if not stable:
+        motion = "goes in and out within reach, but is **unstable** when it stays in the tissue"
+    return Verdict("good" if stable else "warn", f"{name}: {motion}. {where}. RMS error of the felt force: {off}.")
 
 
 def experiment(context: Context, responses: list[HapticResponse]) -> str:

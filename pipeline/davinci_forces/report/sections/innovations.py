@@ -28,7 +28,7 @@ FINDINGS = {  # from the best to the least known
     "white": "white throughout",
     "left out": "white outside contact or reversals",
     "mended": "white if tested causes are corrected",
-    UNEXPLAINED: "not white for reasons that no tested cause explains",
+    UNEXPLAINED: "not white, whatever tested cause is corrected",
 }
 INNOVATION_FIELDS = (("innovation_q", "position"), ("innovation_dq", "velocity"))
 
@@ -50,15 +50,15 @@ def blocks(context: Context, explained: list[Explanation]) -> Iterator[Block]:
         "combinations, until the tests pass. Removing contact, or reversals, leaves out the samples there. The random "
         "walk, the noise level, the noise colour (a correlation over time), the sample times and the model are each "
         "replaced by their maximum-likelihood estimate for this log. A cause is named only if the tests pass without "
-        "it, with p-values at least a hundred times larger. Leaving out as many samples elsewhere must not suffice. "
-        f"The filter's random walk is chosen to follow pushes{assumed}; free motion does not need this walk, so it "
-        "correlates the innovations a little.\n\n" + summary(explained)
+        "it, with p-values at least a hundred times larger, and fail if as many samples are left out elsewhere. "
+        f"The filter's random walk is chosen to follow pushes{assumed}. In free motion this walk is larger than "
+        "necessary, so the innovations are slightly correlated.\n\n" + summary(explained)
     )
     yield from paper_or_screen(verdicts(context, explained))
     drawn = [e for e in explained if is_worst(context, e)]
     drawn.sort(key=lambda e: least_probability(e)[0])
     figures = [figure(context, e, whole=True) for e in drawn]
-    yield from first_on_paper(figures, "Innovations of the worst free run of each other joint", "innovations-worst")
+    yield from first_on_paper(figures, "Innovations of the worst run of each other joint", "innovations-worst")
     yield OnScreen("Tests of the innovations, run by run", "innovation-tests", (tests(context, explained),))
     others = tuple(
         OnScreen(
@@ -189,7 +189,7 @@ def figure(context: Context, e: Explanation, whole: bool) -> Figure:
     ]
     firsts = " and ".join(f"{w.acf1:.2f}" for field, _ in INNOVATION_FIELDS if (w := white.get(field)))
     return Figure(
-        f"{name}, the worst free run of this joint: innovations, their autocorrelation, their cumulative periodogram "
+        f"{name}, the worst run of this joint: innovations, their autocorrelation, their cumulative periodogram "
         "minus that of white noise, and their correlation with the preceding motion. White noise stays in the bands of "
         "95 % (grey) and 99 % (blue)."
         if whole

@@ -19,7 +19,7 @@ SYMBOLS = (
     ("$i, K_m, eta$", "motor current, torque constant and gear ratio", "A, N m/A, –"),
     ("$theta_m$", "motor angle", "rad"),
     ("$N_p$", "number of periods that are averaged", ""),
-    ("$sigma$", "standard deviation of the noise of the signal in the index", ""),
+    ("$sigma$", "standard deviation of the noise of the signal in the subscript", ""),
     ("$T_s$", "sampling time", "s"),
     ("$x, y, hat(x), tilde(y)$", "state and measurement of the filter, estimated state, innovation", ""),
     ("$P, R, S, K$", "covariance of the state, of the measurement noise and of the innovation; Kalman gain", ""),
@@ -65,8 +65,8 @@ METHODS: tuple[tuple[type[Record], tuple[Block, ...]], ...] = (
             "**Periods.** The period is the shortest lag after which all moving joints repeat their motion. It is "
             "refined until the harmonics of the excitation fit the positions best. Samples rarely fall on the phases "
             "of the averaged period. A harmonic series is fitted to all samples and evaluated at these phases. The "
-            "residual of the samples, averaged over the $N_p$ periods, is added. The variance between periods is that "
-            "of a sample of one period; the variance of the mean is $N_p$ times smaller."
+            "mean residual of the samples nearest to a phase is added, so that motion beyond the harmonics is kept. "
+            "$sigma_x^2$ is the variance of a sample of one period; the variance of the mean is $N_p$ times smaller."
         ),
         Equation(
             "overline(x)(k) = 1/N_p sum_(m=1)^(N_p) x_m (k), "

@@ -25,15 +25,15 @@ def blocks(context: Context) -> Iterator[Block]:
         f"Made by davinci-forces {provenance.version}. The report ID on page one is the first half of the SHA-256 of "
         "`manifest.txt`. This file lists raw files, study file, processed files and numbers, each with its own "
         "SHA-256. Two reports with the same ID have the same content. `davinci-forces verify --id` checks whether "
-        "files and pages are those of an ID. Every number of the tables is in `results.json` under its own key, with "
-        "the processed file and the field that it comes from."
+        "the study and its report have a given ID. Every number of the tables is in `results.json` under its own key, "
+        "with the processed file and the field that it comes from."
     )
     raw = tuple((literal(file), f"`{sha[:16]}`") for file, sha in provenance.raw.items())
     caption = "Raw files, with the first 16 digits of their SHA-256."
     yield from paper_or_screen(Table(caption, ("File", "SHA-256"), raw, "raw-files", "ll"))
     versions = Table("Versions.", ("Package", "Version"), tuple(provenance.packages.items()), align="ll")
     yield OnScreen("Versions of packages", "versions", (versions,))
-    yield Prose("Settings used, defaults included:")
+    yield Prose("Settings used, defaults included; 0 for `harmonics` or `q_tau` means from the robot, or computed:")
     settings = [f"{name} = {value!r}" for name, value in asdict(study.settings).items()]
     yield Listing("\n".join("; ".join(settings[i : i + PER_LINE]) for i in range(0, len(settings), PER_LINE)))
     if study.changed:
@@ -42,7 +42,7 @@ def blocks(context: Context) -> Iterator[Block]:
     number = len(provenance.processed)
     yield Prose(f"This report is made from {number} processed files; their hashes are in `manifest.txt`.")
     if number:
-        yield OnScreen("Records that were made, and records without input data", "made", (record_counts(provenance),))
+        yield OnScreen("Processed files of each kind; kinds without input data", "made", (record_counts(provenance),))
     if summaries := context.catalogue.records(LogSummary):
         tables = (start_times(summaries), channels(summaries))
         yield OnScreen("Files, dates and channels of every log", "channels", tables)
@@ -57,7 +57,7 @@ def record_counts(provenance: Provenance) -> Table:
         (name, str(folders[kind.folder()]) if folders[kind.folder()] else "skipped: no input for it")
         for name, kind in KINDS.items()
     )
-    return Table("Records, and how many files of each were made.", ("Record", "Files"), rows)
+    return Table("Kinds of record, and the number of processed files of each kind.", ("Record", "Files"), rows)
 
 
 def channels(summaries: list[LogSummary]) -> Table:

@@ -23,7 +23,7 @@ from davinci_forces.report.context import Context, count, label, title
 from davinci_forces.report.sections.parts import contact_spans, effort_panel, first_on_paper, paper_or_screen, run_name
 from davinci_forces.report.verdicts import band_in_words, log_remarks, percent
 
-WORST = "the worst free run of this joint"
+WORST = "the worst run of this joint in free space"
 ON_PAPER = 2  # joints whose worst run is drawn in the PDF
 LEVELS = ("free_rms", "detection_level")
 
@@ -46,7 +46,7 @@ def track_blocks(context: Context, tracks: list[Track]) -> Iterator[Block]:
     worst = list(worst_runs(context, tracks))
     drawn = {(t.log, t.joint) for t in worst}
     traces = [trace(context, t, WORST) for t in worst]
-    yield from first_on_paper(traces, "The worst free run of each other joint", "worst-runs", ON_PAPER)
+    yield from first_on_paper(traces, "The worst run of each other joint", "worst-runs", ON_PAPER)
     yield OnScreen("Noise that the filter assumes, run by run", "filter-assumptions", (assumptions(context, tracks),))
     others = [t for t in tracks if (t.log, t.joint) not in drawn and not t.at_rest]
     if others:
@@ -115,7 +115,8 @@ def assumptions(context: Context, tracks: list[Track]) -> Table:
     return Table(
         "Noise that the filter assumes (standard deviations): of the measured position and velocity, of the velocity "
         "per sample due to effort noise, and of the random walk of the external effort. The first three maximise the "
-        "likelihood of the innovations of identification logs; the random walk is the smallest that follows a push.",
+        "likelihood of the innovations of identification logs. The random walk is the smallest with which the filter "
+        "follows a push.",
         ("Log", "Joint", "Position", "Velocity", "Process, $dot(q)$", "Random walk"),
         rows,
         "filter-noise",

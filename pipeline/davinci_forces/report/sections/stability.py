@@ -103,9 +103,9 @@ def without_delay(context: Context) -> str:
     return (
         "A common quadratic Lyapunov function proves stability without delay. It exists if and only if "
         f"$K_T < b^2/m + 2 b sqrt(K_H/m)$, here below {proved}; the numerical solutions of its linear matrix "
-        f"inequality (LMI) in [@stability-limits] agree. In {region} above, **this criterion** proves nothing; it is "
-        f"**not** a region of instability. A spring that switches on and off at arbitrary times is stable below "
-        f"{switching}. Real tissue acts only in contact, at $x >= 0$. The energy "
+        f"inequality (LMI) in [@stability-limits] agree. Above this limit, in {region}, **this criterion** proves "
+        "nothing; the hand may be stable there, too. A spring that switches on and off at arbitrary times is stable "
+        f"below {switching}. Real tissue acts only in contact, at $x >= 0$. The energy "
         "$V = 1/2 m dot(x)^2 + 1/2 K_H x^2 + 1/2 K_T max(x, 0)^2$ then falls by $b dot(x)^2$. So **every** "
         "$K_T >= 0$ is stable without delay."
     )
@@ -119,7 +119,7 @@ def with_delay(context: Context, tissues: list[TissueLimit]) -> str:
     return (
         "A delay $d$ of the force reduces the damping of a hand in contact by about "
         f"$K_T d$. A communication link of {rate} holds each force for one period, which adds half a period of delay. "
-        "The stated limit applies to a hand that is pressed into the tissue. In simulation, a hand that bounces off is "
+        "The limit with this delay applies to a hand that stays in contact. In simulation, a hand that bounces off is "
         f"stable up to at least twice this stiffness.{lag}"
     )
 
@@ -127,9 +127,9 @@ def with_delay(context: Context, tissues: list[TissueLimit]) -> str:
 def limits_figure(context: Context, delayed: DelayLimit, tissues: list[TissueLimit]) -> Figure:
     """The map without delay, and the limit over the delay."""
     return Figure(
-        "Limits of the tissue's stiffness. Left, without delay, against the hand's stiffness: points with a Lyapunov "
-        "function by the LMI solver, its exact limit, and that under the worst switching. Real tissue is stable above "
-        "both, too. Right, against the delay: a hand that stays in contact, and by simulation one that leaves it.",
+        "Limits of the tissue's stiffness. Left, without delay: up to which a Lyapunov function exists (points: LMI "
+        "solver; line: exact), and up to which the worst switching is stable (dashed). Real tissue is stable above "
+        "both, too. Right, with delay: for a hand that stays in contact (lines) or leaves it (points, simulated).",
         "Limits of the tissue's stiffness, rising with the stiffness of the hand and falling with the delay of the "
         "force.",
         (map_panel(context, tissues), delay_panel(context, delayed, tissues)),

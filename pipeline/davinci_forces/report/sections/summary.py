@@ -76,17 +76,17 @@ def nothing_identified(context: Context) -> Verdict:
 def thresholds_in_words(trusts: list[Trust]) -> str:
     """State in words the thresholds of the table's verdicts."""
     by_error = (
-        f"the model error is at most {percent(GOOD)} of the effort (root mean square), on a path that was not fitted "
-        f"(caution: at most {percent(CAUTION)}, or a fitted path)"
+        f"on a path that was not fitted, the model error is at most {percent(GOOD)} of the effort (root mean square). "
+        f"Caution: at most {percent(CAUTION)}, on any path"
     )
     by_level = (
-        "the detection level is at most a third of `effort` in study.toml, the effort sought (caution: up to all of it)"
+        "the detection level is at most a third of `effort` in study.toml, the effort sought. Caution: at most `effort`"
     )
     stated = [trust.sought is not None for trust in trusts]
-    rule = by_level if all(stated) else f"{by_level}; without `effort`, {by_error}" if any(stated) else by_error
+    rule = by_level if all(stated) else f"{by_level}. Good, without `effort`: {by_error}" if any(stated) else by_error
     return (
-        f"Each row shows the joint's worst run that was not fitted. Good: {rule}. A band is right if its coverage is "
-        f"{percent(COVERED[0])} to {percent(COVERED[1])}. See [@thresholds]."
+        f"Each row shows the joint's worst run (one joint in one log) that was not fitted. Good: {rule}. A band is "
+        f"right if its coverage is {percent(COVERED[0])} to {percent(COVERED[1])}. See [@thresholds]."
     )
 
 
@@ -118,19 +118,19 @@ def trust(context: Context, joint: str) -> Trust:
 def opening_paragraph(context: Context, trusts: list[Trust], contacts: list[Contact]) -> str:
     """One paragraph: what was estimated, and which contacts stand out."""
     kind = "simulated " if context.study.simulated else ""
-    runs = len({track.log for track in context.catalogue.records(Track)})
+    logs = len({track.log for track in context.catalogue.records(Track)})
     windows = sum(len(contact) for contact in contacts)
     above = sum(int(contact.above.sum()) for contact in contacts)
     text = (
         "External effort is what the robot exerts on its environment: torque [N m] at joints that turn, force [N] at "
-        f"joints that slide. It was estimated on {count(len(trusts), 'joint')} in {count(runs, kind + 'run')} of the "
+        f"joints that slide. It was estimated on {count(len(trusts), 'joint')} in {count(logs, kind + 'log')} of the "
         f"{literal(context.study.robot.title)}, from motor currents and joint positions, without a force sensor. "
     )
     if not windows:
         return text + "The study states no contact windows, so no contact is measured."
     return text + (
-        f"**{above} of {count(windows, 'contact window')}, counted for each joint, exceed the detection level.** "
-        "Smaller efforts cannot be distinguished from the model's error."
+        f"**In {above} of {count(windows, 'contact')} (one window on one joint), the effort exceeds the detection "
+        "level.** Smaller efforts cannot be distinguished from the model's error."
     )
 
 

@@ -52,7 +52,7 @@ def blocks(context: Context, forces: list[TipForce]) -> Iterator[Block]:
         "The force $f$ at the tip is what the robot exerts on its environment, in base axes. It is computed "
         "from the external efforts of the first three joints, at times when all of them move. Two assumptions are "
         "made: nothing but the tip is touched, and the wrist is straight. The efforts are those of the smoother, which "
-        "has no delay. Their covariance $C_tau$ contains the total standard deviations of the joints."
+        "has no delay. Their covariance $C_tau$ contains the squares of their standard deviations."
     )
     yield Equation(
         'f = bold(J)_v^(-T) tau_"ext", quad C_f = bold(J)_v^(-T) C_tau bold(J)_v^(-1)',
@@ -88,8 +88,8 @@ def correlations(forces: Sequence[TipForce]) -> str:
     correlated = [force for force in forces if force.correlation_from]
     if not correlated:
         return (
-            "The joints' errors are taken as independent. Their correlation could not be estimated: at least two other "
-            "logs with free motion would have to give consistent values."
+            "The joints' errors are taken as independent, because their correlation could not be estimated: at least "
+            "two other logs are needed whose correlations in free motion agree."
         )
     sizes = [max(abs(f.rho_12), abs(f.rho_13), abs(f.rho_23)) for f in correlated]
     return (

@@ -146,11 +146,11 @@ def nearest(tissue: Stiffness) -> int:
 
 
 def force_figure(tissue: Stiffness, pushes: Sequence[Push], typical: Push) -> Figure:
-    """Pushes with the line of a typical push, the residual of this line, and its loop or a histogram."""
+    """Pushes with the line of a typical push, the residual of this line, and its hysteresis or a histogram."""
     name = literal(tissue.log)
     many = len(tissue) > MAX_PUSHES_LISTED
-    last = spread_panel(tissue) if many else loop_panel(typical)
-    third = "the distribution of the stiffness of pushes" if many else "its loop on the way in and out"
+    last = spread_panel(tissue) if many else hysteresis_panel(typical)
+    third = "the distribution of the stiffness of pushes" if many else "its force on the way in and out (hysteresis)"
     return Figure(
         f"{name}: force against depth of contact, with the line of push {typical.push} and its 95 % interval; the "
         f"residual of the line; and {third}. The stiffness of this push is nearest to that of the log.",
@@ -185,12 +185,12 @@ def residual_panel(push: Push) -> Panel:
     return Panel("Residual", "depth [mm]", "force [N]", marks)
 
 
-def loop_panel(push: Push) -> Panel:
-    """The loop of one push, with the force of the chosen model."""
+def hysteresis_panel(push: Push) -> Panel:
+    """The hysteresis of one push, with the force of the chosen model."""
     inside, loading = push.inside == 1, push.loading == 1
     model = Line(MM * push.depth, push.fitted, "model", "black", "solid")
     marks: tuple[AnyMark, ...] = (*in_and_out(MM * push.depth, push.force, inside, loading), model)
-    return Panel(f"Loop of push {push.push}", "depth [mm]", "force [N]", marks)
+    return Panel(f"Hysteresis of push {push.push}", "depth [mm]", "force [N]", marks)
 
 
 def in_and_out(x: Column, y: Column, inside: Booleans, loading: Booleans) -> tuple[Points, ...]:

@@ -41,13 +41,13 @@ def section(context: Context) -> Section | None:
 def intro() -> Prose:
     """Explain the estimate of a mass and its standard error."""
     return Prose(
-        "A mass on a link adds gravity and inertia to the effort of the joints. It is the slope of the external "
-        "effort, of all joints that move and carry it, over the effort per kilogram, from the robot's chain. The "
-        "external effort is measured minus modelled effort, low-passed without delay. Each joint is weighted by the "
-        "inverse of its model's squared error in free motion. A constant offset of the effort, which differs from day "
-        "to day (offset of the day), is estimated, too, if the data can separate it from the load. The standard error "
-        "combines that of the fit with a jackknife over six parts of the path. It is widened if logs without a mass "
-        "appear to carry more than their standard errors allow."
+        "A mass on a link adds gravity and inertia to the effort of the joints. The mass is estimated as the slope of "
+        "a line: the external effort of all moving joints that carry it, against the effort that 1 kg causes according "
+        "to the robot's chain. The external effort is measured minus modelled effort, low-passed without delay. Each "
+        "joint is weighted by the inverse of its model's squared error in free motion. A constant offset of the "
+        "effort, which differs from day to day (offset of the day), is estimated, too, if the data can separate it "
+        "from the load. The standard error combines the error of the fit with a jackknife over six parts of the path. "
+        "It is increased if logs without a mass give a mass that its standard error does not explain."
     )
 
 
@@ -66,8 +66,8 @@ def summary(context: Context, weights: list[Weight]) -> Table:
     return Table(
         "Masses with their standard errors, at the stated position and mirrored to the other side of the link, in case "
         "the sign of the position is wrong. Better side: the side with the smaller residual, if they differ by "
-        "two standard errors. The scale is the estimated mass over the stated mass.",
-        ("Log", "Same motion as", "Stated", "Mass", "Mirrored", "Scale", "Better side"),
+        "two standard errors. The scale is the estimated mass divided by the stated mass.",
+        ("Log", "Moves with joint or link", "Stated", "Mass", "Mirrored", "Scale", "Better side"),
         rows,
         "weight-table",
         "llrrrrl",
@@ -127,10 +127,10 @@ def figure(weight: Weight, loads: list[Load]) -> Figure:
     by = "estimated" if math.isnan(weight.stated_mass) else "stated"
     offsets = dict(zip(weight.loaded, weight.joint_offset, strict=True))
     name, subtracted = literal(weight.log), ", before the tare is subtracted" if weight.tare else ""
-    once = "over one period, averaged" if loads[0].period else "over the run"
+    once = "over one averaged period" if loads[0].period else "over the run"
     return Figure(
-        f"{name}: external effort of each joint that carries the mass {once}{subtracted}, and the effort of the {by} "
-        "mass, plus the joint's offset of the day.",
+        f"{name}: external effort {once} of each joint that carries the mass{subtracted}, and the effort of the {by} "
+        "mass plus the joint's offset of the day.",
         f"{name}: the external effort of {', '.join(title(load.joint) for load in loads)} follows the load of "
         f"{Number(mass, 'kg')}.",
         tuple(

@@ -61,7 +61,7 @@ def as_frame(record: Record) -> pd.DataFrame:
 
 
 def units(records: list[Any]) -> dict[str, str | dict[str, str]]:
-    """The unit of each field; its units by joint, or by `group` of joints, if they differ."""
+    """Map each field to its unit, or to a dictionary from joint (or `group` of joints) to unit if units differ."""
     units_by_joint: dict[str, dict[str, str]] = {}
     for record in records:
         for name, unit in record.origin.units.items():

@@ -6,7 +6,7 @@ import numpy as np
 
 from davinci_forces.errors import NotPeriodic
 from davinci_forces.maths.periods import averaging
-from davinci_forces.maths.periods.agreement import Difference, agreeing_stretch, alternation, stretch
+from davinci_forces.maths.periods.agreement import Difference, agreeing_stretch, multiple_of_period, stretch
 from davinci_forces.maths.periods.averaging import Folded, Phases, end, phases, whole_periods
 from davinci_forces.maths.periods.period import Period, refine, standard_error
 from davinci_forces.maths.periods.repetition import Repetition, repetition
@@ -18,8 +18,8 @@ from davinci_forces.study import LogEntry
 MIN_MISMATCH = 5e-4  # relative difference above which a stated period may be reported as wrong
 MIN_STANDARD_ERRORS = 4.0  # difference, in standard errors, above which the data exclude a stated period
 MAX_SEGMENTS = 5  # a repetition is searched for in this many of the longest segments
-MULTIPLES = (2, 3)  # times the shortest period, also tried: motion may nearly repeat within a period
-MIN_REMARKED_LOSS = 0.1  # beside a standstill, a loss below this share of a period gets no remark
+MULTIPLES = (2, 3)  # multiples of the shortest period that are tried, since motion may almost repeat within a period
+MIN_REMARKED_LOSS = 0.1  # share of a period; a shorter transient next to a standstill is not reported
 MEASURED = ("q", "dq", "tau")
 
 
@@ -99,14 +99,14 @@ def common_repetition(signals: Sequence[Signal]) -> Repetition | None:
     parts = sorted(segments(signals[0].segment), key=lambda part: part.start - part.stop)
     for part in parts[:MAX_SEGMENTS]:
         if repeat := repetition([signal.q[part] for signal in signals]):
-            return repeat._replace(two_periods=part.start + repeat.two_periods)
+            return repeat._replace(best_start=part.start + repeat.best_start)
     return None
 
 
 def longest_stretch(
     signals: Sequence[Signal], repeat: Repetition, max_harmonics: int, entry: LogEntry
 ) -> tuple[slice, float]:
-    """The longest stretch around a repetition that has one period, and that period.
+    """The longest stretch around a repetition in which the period is constant, and the period.
 
     Raises
     ------
@@ -114,11 +114,11 @@ def longest_stretch(
         If the stretch has fewer than two periods.
     """
     t, rate, positions = signals[0].t, signals[0].rate, [signal.q for signal in signals]
-    two_periods = slice(repeat.two_periods, min(repeat.two_periods + round(2 * repeat.lag), len(t)))
+    two_periods = slice(repeat.best_start, min(repeat.best_start + round(2 * repeat.lag), len(t)))
     span, length = stretch(t, positions, repeat.lag / rate, two_periods, max_harmonics)
     t, positions = t[span], [x[span] for x in positions]
     factors = multiples(length, entry.period, whole_periods(t, length, rate))
-    factor = alternation(t, positions, length, rate, factors)
+    factor = multiple_of_period(t, positions, length, rate, factors)
     if factor > 1:
         length = refine(t, positions, factor * length, max_harmonics)
     if whole_periods(t, length, rate) < 2:
@@ -138,7 +138,7 @@ def multiples(length: float, stated: float | None, whole_periods: int) -> list[i
 def omissions(
     first: Signal, span: slice, agreeing: slice, length: float, differing: Sequence[tuple[str, Difference]]
 ) -> list[str]:
-    """Describe samples that do not repeat or repeat badly, and the keys of study.toml that confirm their omission."""
+    """Describe samples that do not repeat or repeat badly, and the keys of study.toml that leave them out."""
     t = first.t
     sides = [f"the {t[agreeing.start] - t[0]:.2f} s before"] * (span.start > 0)
     sides += [f"the {t[-1] - t[agreeing.stop - 1]:.2f} s after"] * (span.stop < len(t))
@@ -153,23 +153,24 @@ def omissions(
             faults.append(f"{differs}, {d.ratio:.1f} times what noise explains, {what}")
     keys = [f"skip = {np.floor(t[agreeing.start] * 1e4 + 1e-3) / 1e4:.10g}"] * (agreeing.start > 0)
     keys += [f"until = {np.ceil(t[agreeing.stop - 1] * 1e4 - 1e-3) / 1e4:.10g}"] * (agreeing.stop < len(t))
-    advice = f"; other samples are left out: write {' and '.join(keys)} in study.toml to confirm that" if keys else ""
-    return [
-        f"{first.log}: {t[agreeing.start]:.2f} to {t[agreeing.stop - 1]:.2f} s are evaluated, which repeat every "
-        f"{length:.4f} s; {'; '.join(faults)}{advice}"
-    ] * bool(faults)
+    evaluated = f"{'only ' * bool(keys)}{t[agreeing.start]:.2f} to {t[agreeing.stop - 1]:.2f} s are evaluated"
+    advice = f"; to confirm this, write {' and '.join(keys)} in study.toml" if keys else ""
+    return [f"{first.log}: joints repeat every {length:.4f} s; {'; '.join(faults)}; {evaluated}{advice}"] * bool(faults)
 
 
 def gaps_at(signal: Signal, span: slice) -> str:
-    """Report clock gaps at the ends of the evaluated stretch: the motion after them has another phase than expected."""
+    """Report clock gaps at the ends of the evaluated stretch, after which the phase of the motion is unexpected."""
     t, segment = signal.t, signal.segment
     edges = [i for i in (span.start, span.stop) if 0 < i < len(t) and segment[i] != segment[i - 1]]
-    gaps = [f"{t[i] - t[i - 1]:.4g} s after {t[i - 1]:.2f} s" for i in edges]
-    return f"; the motion is not where it should be after the clock's gap of {' and of '.join(gaps)}" if gaps else ""
+    gaps = [f"{t[i] - t[i - 1]:.4g} s at {t[i - 1]:.2f} s" for i in edges]
+    return f"; after the clock's gap of {' and of '.join(gaps)}, the motion does not continue in phase" if gaps else ""
 
 
 def reconcile_period(estimate: Period, entry: LogEntry) -> tuple[Period, list[str]]:
-    """The stated period, or the estimated one and a remark if the data exclude it; the standard error is estimated."""
+    """The stated period, or the estimate if the data exclude the stated one, with a remark if they differ much.
+
+    The standard error is that of the estimate.
+    """
     stated = entry.period
     if not stated:
         return estimate, []
@@ -226,5 +227,5 @@ def white_noise(folded: Folded, segment: Counts, rate: float, lowpass: float) ->
     The mean at each phase takes one degree of freedom.  A ripple of the drive is fast, too, but it repeats.  Errors
     that depend on the motion are slower.
     """
-    correction = float(np.sqrt(len(folded.noise) / averaging.degrees(folded)))
+    correction = float(np.sqrt(len(folded.noise) / averaging.degrees_of_freedom(folded)))
     return noise_std(folded.noise, segment, rate, lowpass) * correction

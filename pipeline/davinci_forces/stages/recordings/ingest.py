@@ -1,4 +1,4 @@
-"""Read every log into SI units at the joint side of the gears: one recording per joint, and contact force and depth."""
+"""Read every log and convert it to SI units of the joints: one recording per joint, and contact force and depth."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""Compare the estimated force with the force sensor of a log, if it has one: error, lag, and coverage of its band."""
+"""Compare the estimated force with the force sensor of a log, if it has one: error, lag, and coverage of the band."""
 
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple

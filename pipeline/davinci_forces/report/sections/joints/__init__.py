@@ -101,9 +101,9 @@ def parameters(context: Context, fit: Fit) -> Table:
         rows.append((f"$theta_{i + 1}$", name, unit, *values, f"{z:.1f}" if np.isfinite(z) else "–"))
     mse = context.number(f"{'.'.join(('fit', *fit.key))}.mse", 3)
     return Table(
-        f"Parameters of the {literal(fit.group.replace('_', ' '))} ({fit.model}: without coupling to other joints; "
-        f"{title_of(fit.estimator)}), {fit_in_use(context, fit)}, from {literal(', '.join(fit.logs))}; "
-        f"mean squared error {mse} of the averaged effort.",
+        f"Parameters of the {literal(fit.group.replace('_', ' '))}. Model: {fit.model} (without coupling to other "
+        f"joints), {fit_in_use(context, fit)}. Estimator: {title_of(fit.estimator)}. Data: "
+        f"{literal(', '.join(fit.logs))}. Mean squared error of the averaged effort: {mse}.",
         ("Symbol", "Parameter", "Unit", "Value", "Classical standard error", "$z$"),
         tuple(rows),
         label=f"theta-{fit.group}",
@@ -115,7 +115,7 @@ def fit_in_use(context: Context, fit: Fit) -> str:
     """State whether the filter uses this fit or another."""
     used = context.used_fit(fit.group)
     if used.removeprefix(f"{CHOSEN}.") == f"{fit.model}.{fit.estimator}":
-        return "the fit that the filter uses"
+        return "used by the filter"
     return f"while the filter uses {fit_name(*used.split('.', 1))}"
 
 

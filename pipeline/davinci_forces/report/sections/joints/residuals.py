@@ -90,9 +90,9 @@ def in_words(residual: Residual, errors: Column, q: Column | None) -> str:
     """
     motions = {"velocity": residual.dq} | ({} if q is None else {"position": q})
     shares = {name: explained_by(x, errors) for name, x in motions.items()}
-    shares_in_words = " and ".join(f"{percent(max(share, 0.0))} over {name}" for name, share in shares.items())
+    shares_in_words = " and ".join(f"{percent(max(share, 0.0))} against {name}" for name, share in shares.items())
     follows = max(shares, key=lambda name: shares[name])
-    text = f"Of the residual's variance, the means in these bins explain {shares_in_words}"
+    text = f"Share of the residual's variance that the means in bins explain: {shares_in_words}"
     if shares[follows] > MIN_SHARE_FOLLOWED:
         tries = {
             "position": "a spring, gravity or friction that varies with position, or the coupling to other joints",
@@ -102,7 +102,7 @@ def in_words(residual: Residual, errors: Column, q: Column | None) -> str:
     within = share_within_reversals(errors, residual.dq)
     if within > MIN_RATIO_REVERSALS:
         larger = f"Around reversals of velocity the residual's RMS is {within:.1f} times its RMS elsewhere"
-        return f"{text}. {larger}. Worth trying: presliding."
+        return f"{text}. {larger}. Worth trying: presliding friction (a dahl element)."
     return f"{text}. These plots show no missing term that depends on position alone or on velocity alone."
 
 
