@@ -249,4 +249,5 @@ def choose_candidate(
         for i in indices
         if candidates[i].score - candidates[best].score <= CLEARLY * standard_error(candidates[i], candidates[best])
     ]
-    return min(near, key=lambda i: (sizes[i], candidates[i].score)), best
+    smallest = min(sizes[i] for i in near)
+    return min((i for i in indices if sizes[i] == smallest), key=lambda i: candidates[i].score), best

@@ -57,7 +57,7 @@ def blocks(context: Context) -> Iterator[Block]:
             f"External effort over time, one panel a joint: {'; '.join(map(spoken, contacts[:3])) or 'no contact'}.",
             tuple(in_column(panels)),
             label="answer-figure",
-            height=31,
+            height=27,
         )
     yield trust_table(context, trusts)
     yield Prose(thresholds_in_words(trusts))
