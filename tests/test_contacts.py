@@ -103,7 +103,7 @@ def test_standard_errors_of_many_draws_at_once_are_those_of_one_draw_after_the_o
 def test_a_triangle_has_its_peak_mean_and_impulse():
     push = 3.0 * np.clip(1 - np.abs(T - 10.0), 0, None)
     free = free_space(T, [(9.0, 11.0)], RATE)
-    found = summarise(T, noise(std=0.02) + push, np.full(len(T), 0.05), (9.0, 11.0), free, rise=0.0)
+    found = summarise(T, (noise(std=0.02) + push, np.full(len(T), 0.05)), (9.0, 11.0), free, rise=0.0)
     assert found.peak == pytest.approx(3.0, abs=4 * 0.02)
     assert found.mean == pytest.approx(1.5, abs=0.02)
     assert found.impulse == pytest.approx(3.0, abs=0.04)
@@ -117,7 +117,7 @@ def test_what_a_smoother_rounds_off_a_peak_is_in_its_standard_error():
     """The tip of a triangle of slope 3, under two-sided exponential weights with a rise of .2 s: it loses .3."""
     weights = np.exp(-np.abs(np.arange(-200, 201)) / RATE / 0.1)
     smooth = np.convolve(3.0 * np.clip(1 - np.abs(T - 10.0), 0, None), weights / weights.sum(), "same")
-    found = summarise(T, smooth, np.full(len(T), 0.01), (9.0, 11.0), free_space(T, [(9.0, 11.0)], RATE), rise=0.2)
+    found = summarise(T, (smooth, np.full(len(T), 0.01)), (9.0, 11.0), free_space(T, [(9.0, 11.0)], RATE), rise=0.2)
     assert 3.0 - found.peak == pytest.approx(0.3, rel=0.05)
     assert found.peak_std == pytest.approx(3.0 - found.peak, rel=0.1)
 
@@ -126,7 +126,7 @@ def test_a_bias_in_free_space_makes_means_uncertain_however_long_they_are():
     free = np.ones(len(T), bool)
     assert mean_size(noise() + 0.5, free, 1000) == pytest.approx(0.5, abs=0.02)
     assert np.isnan(mean_size(noise(), ~free, 10))
-    assert summarise(T, noise(), noise() ** 2, (100.0, 101.0), free, 0.0) is None
+    assert summarise(T, (noise(), noise() ** 2), (100.0, 101.0), free, 0.0) is None
 
 
 def test_free_space_leaves_out_what_still_settles():

@@ -127,7 +127,7 @@ class Track(LogJointRecord):
     innovation_dq: Column
     nis: Column
     standing: Counts
-    judged: Counts
+    unscored: Counts
 
     def published(self) -> Iterator[Published]:
         """The effort outside contacts, the noise that the filter assumes, and the parts of its standard deviation."""

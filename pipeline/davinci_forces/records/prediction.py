@@ -105,7 +105,7 @@ class JointModel(LogJointRecord):
     tau: Column
     segment: Counts
     standing: Counts
-    judged: Counts
+    unscored: Counts
     inertia: Column
     tau_known: Column
     tau_hat: Column

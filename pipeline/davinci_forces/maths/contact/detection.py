@@ -123,26 +123,28 @@ class Summary(NamedTuple):
     impulse: float  # mean times duration
     impulse_std: float
 
-    def with_offset(self, std: float) -> "Summary":
-        """Add the standard deviation of an error that is constant over the window; that of the peak includes it."""
-        mean_std = float(np.hypot(self.mean_std, std))
-        scale = mean_std / self.mean_std if self.mean_std else 1.0
-        return self._replace(mean_std=mean_std, impulse_std=self.impulse_std * scale)
-
 
 def summarise(
-    t: Array, tau_ext: Array, std: Array, window: tuple[float, float], free: Booleans, rise: float
+    t: Array,
+    effort: tuple[Array, Array],
+    window: tuple[float, float],
+    free: Booleans,
+    rise: float,
+    constant_std: Array | None = None,
 ) -> Summary | None:
-    """Peak, mean and impulse of an external effort (N,) with deviation (N,) in a window [s]; None if that is empty.
+    """Peak, mean and impulse of an external effort (N,) with its deviation (N,) in a window [s]; None if that is empty.
 
-    `free` (N,) are the samples at which nothing touches the robot; `rise` [s] is the duration T_s of a step.
+    `free` (N,) are the samples at which nothing touches the robot; `rise` [s] is the duration T_s of a step;
+    `constant_std` (N,) is the part of the deviation that no mean reduces and that free motion does not show.
     """
-    start, end = window
-    inside = tau_ext[(t >= start) & (t <= end)]
+    (tau_ext, std), (start, end) = effort, window
+    within = (t >= start) & (t <= end)
+    inside = tau_ext[within]
     if not len(inside):
         return None
     duration, mean = end - start, float(inside.mean())
-    mean_std = mean_size(tau_ext, free, len(inside))
+    constant = 0.0 if constant_std is None else float(constant_std[within].mean())
+    mean_std = float(np.hypot(mean_size(tau_ext, free, len(inside)), constant))
     k = int(np.searchsorted(t, start)) + int(np.argmax(np.abs(inside)))
     rounded_off = float(tau_ext[k] - tau_ext[np.abs(t - t[k]) <= TIP_REACH * rise].mean())
     peak_std = float(np.linalg.norm([std[k], rounded_off, largest_size(tau_ext, free, len(inside))]))

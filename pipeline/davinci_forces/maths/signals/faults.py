@@ -52,25 +52,23 @@ def count_saturated(x: Array) -> int:
     )
 
 
-def beyond_steps(residual: Array, judged: Booleans, slack: Array, width: int) -> Booleans:
+def beyond_steps(residual: Array, scored: Booleans, slack: Array, width: int) -> Booleans:
     """The samples (N,) before a step of a residual effort (N,) near the start, or after one near the end.
 
         D_k = mean of the `width` samples from k on, less that of the `width` samples before k
 
-    Only changes D_k among `judged` samples (N,) count.  A step exceeds twice the largest change between the ends by
+    Only changes D_k among `scored` samples (N,) count.  A step exceeds twice the largest change between the ends by
     more than the `slack` (N,), which friction explains.
     """
-    sums, excluded = (np.cumsum(np.concatenate([[0.0], x])) for x in (residual, ~judged))
+    sums, excluded = (np.cumsum(np.concatenate([[0.0], x])) for x in (residual, ~scored))
     k = np.arange(width, len(residual) - width + 1)
     k = k[excluded[k + width] == excluded[k - width]]
     size, n = np.abs(sums[k + width] - 2.0 * sums[k] + sums[k - width]) / width, len(k) // END_SHARE
     beyond = np.zeros(len(residual), np.bool_)
     if n:
         steps = size > MIN_STEP_RATIO * size[n:-n].max() + slack[k]
-        for step in k[:n][steps[:n]]:
-            beyond[: step + width] = True
-        for step in k[-n:][steps[-n:]]:
-            beyond[step - width :] = True
+        beyond[: k[:n][steps[:n]].max(initial=-width) + width] = True
+        beyond[k[-n:][steps[-n:]].min(initial=len(residual) + width) - width :] = True
     return beyond
 
 

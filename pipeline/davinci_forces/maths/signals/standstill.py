@@ -51,8 +51,9 @@ def _standing(q: Array, window: int, spread: int, least: float) -> Booleans:
 def without_doubtful_signs(dq: Array, standing: Booleans, q_std: float, dq_std: float) -> Array:
     """A low-passed velocity (N,), and 0 where its sign, and with it that of friction, is not known.
 
-    This is the case at standstill, but for the ends of its `spread`, and where the expected sign that the filter uses,
-    erf(|dq| / (sqrt(2) dq_std)), is below 1/2, so nearer to 0 than to a sign.  `q_std` and `dq_std` are the noise.
+    It is not known at standstill, but for the ends of its `spread`.  It is not known either where the expected sign of
+    the filter, erf(|dq| / (sqrt(2) dq_std)), is below 1/2, so nearer to 0 than to a sign.  `q_std` and `dq_std` are
+    the deviations of the noise.
     """
     rests = standing & (np.abs(dq) <= max(least_travel(dq, q_std) / HOLD, NOISE * dq_std))
     return np.where(rests | (np.abs(dq) < NORMAL_MAD * dq_std), 0.0, dq)

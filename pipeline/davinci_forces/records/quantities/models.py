@@ -60,7 +60,7 @@ MODELS = {
     "segment": Quantity("number of the segment without a gap that a sample belongs to"),
     "at_rest": Quantity("1 when the joint does not move during the recording, else 0"),
     "standing": Quantity("1 where the joint stands still for at least 1 s, else 0"),
-    "judged": Quantity("1 where the effort is predicted to be judged: not at standstill, nor in a start-up, else 0"),
+    "unscored": Quantity("1 where no model is scored: at standstill, and as a controller starts or stops, else 0"),
     "static_friction": Quantity("largest friction at standstill: Coulomb, Stribeck and presliding", "{effort}"),
     "gaps": Quantity("interruptions of the recording"),
     "method": Quantity("method of resampling to a uniform clock", ""),

@@ -22,8 +22,8 @@ def run(track: Track, entry: LogEntry) -> Iterator[FreeSpace]:
     """
     if track.at_rest or not entry.has_known_free_motion:
         return
-    unjudged = [*entry.contact, *spans(track.t, track.judged == 0)]
-    smoothed, filtered = (which(track.t, unjudged, track.rate) for which in (free_smoothed, free_space))
+    unscored = [*entry.contact, *spans(track.t, track.unscored > 0)]
+    smoothed, filtered = (which(track.t, unscored, track.rate) for which in (free_smoothed, free_space))
     yield from space_of(track, SMOOTHER, track.tau_ext_smooth, track.tau_ext_smooth_std, smoothed)
     yield from space_of(track, track.filter, track.tau_ext, track.tau_ext_std, filtered)
 

@@ -45,9 +45,8 @@ def track_effort(
     smooth = filter_parts(SMOOTHER, parts, noise)
     late = lag(parts, smooth.tau_ext, noise)
     smooth_rise = rise(rts.track, parts[0], noise)
-    standing = model.standing > 0
-    settled = (model.judged > 0) | bool(model.at_rest)
-    offset = day_offset(model.t[settled], (model.tau - model.tau_hat)[settled], entry.free)
+    moving = (model.unscored == 0) | bool(model.at_rest)
+    offset = day_offset(model.t[moving], (model.tau - model.tau_hat)[moving], entry.free)
     if offset.drifts:
         yield drift_warning(model, offset)
     own = smooth.tau_ext_std
@@ -56,9 +55,9 @@ def track_effort(
         total = total_variance(band, model.log, model.path, model.dq, own, bool(entry.free))
     model_variance = np.maximum(total.variance - own**2, 0.0)
     # At standstill, friction is anywhere between its static levels: a uniform distribution.
-    friction = standing * model.static_friction**2 / 3.0
+    friction = model.standing * model.static_friction**2 / 3.0
     converged = np.concatenate([is_past_transient(model.t[part]) for part in segments(model.segment)])
-    free = free_space(model.t, [*entry.contact, *spans(model.t, model.judged == 0)], model.rate)
+    free = free_space(model.t, [*entry.contact, *spans(model.t, model.unscored > 0)], model.rate)
     model_part = float(np.sqrt(np.mean(model_variance)))
     yield Track(
         log=model.log,
@@ -101,7 +100,7 @@ def track_effort(
         innovation_dq=estimate.innovation_dq,
         nis=estimate.nis,
         standing=model.standing,
-        judged=model.judged,
+        unscored=model.unscored,
     )
 
 

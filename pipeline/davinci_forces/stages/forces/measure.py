@@ -61,21 +61,19 @@ def contacts(
 ) -> Iterator[Contact]:
     """The Contact of one joint of a log, if any sample lies in one of the joint's contacts."""
     windows = [window for window, _, _ in placed]
-    free = free_smoothed(track.t, [*windows, *spans(track.t, track.judged == 0)], track.rate)
+    free = free_smoothed(track.t, [*windows, *spans(track.t, track.unscored > 0)], track.rate)
     free = free if free.any() else free_smoothed(track.t, windows, track.rate)
     is_above = np.abs(track.tau_ext_smooth) > threshold.detection_level + unknown_friction(track)
+    friction_std = np.asarray(track.static_friction / 3**0.5 * track.standing, np.float64)
     rows, above = [], []
     for window, event, stated in placed:
         effort = track.tau_ext_smooth, track.tau_ext_smooth_std
-        summary = summarise(track.t, *effort, window, free, track.smooth_rise)
+        summary = summarise(track.t, effort, window, free, track.smooth_rise, friction_std)
         if summary is not None:
             onset, onset_std, release, release_std = times = event or Event(window[0], 0.0, window[1], 0.0)
             duration = (release - onset, float(np.hypot(onset_std, release_std)))
-            inside = ~is_outside(track.t, [window])
-            friction_std = track.static_friction / 3**0.5 * float(track.standing[inside].mean())
-            summary = summary.with_offset(friction_std)
             rows.append((int(stated), int(event is not None), *times, *duration, *summary))
-            above.append(is_above[inside].any())
+            above.append(is_above[~is_outside(track.t, [window])].any())
     if not rows:
         return
     names = (

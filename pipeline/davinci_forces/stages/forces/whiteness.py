@@ -47,7 +47,7 @@ def run(subject: PeriodResidual | Residual | Track) -> Iterator[Whiteness]:
         signals = {f"tau.{subject.model}.{subject.estimator}": subject.tau - subject.tau_hat}
     else:
         # Correlations across a gap mean nothing, and after a gap the filter restarts.  Standstill is not judged.
-        moving = subject.judged > 0
+        moving = subject.unscored == 0
         if not moving.any():
             return
         part = longest_run(subject.t[moving], subject.rate)
@@ -125,7 +125,7 @@ def apply(
     for model, noise, result, delay in zip(models, filter_noises, results, clock_delays, strict=True):
         part = longest_run(model.t, model.rate)
         motion = velocities(model)
-        free = is_outside(model.t, [*entry.contact, *spans(model.t, model.judged == 0)])
+        free = is_outside(model.t, [*entry.contact, *spans(model.t, model.unscored > 0)])
         yield from innovation_records(model, result, motion)
         trials = dict(alternatives(model, along, free))
         if delay.any():
@@ -162,7 +162,7 @@ def alternatives(model: JointModel, along: LogModels, free: Booleans) -> Iterato
 
 def innovation_records(model: JointModel, result: Innovations, motion: tuple[Array, Array]) -> Iterator[Innovation]:
     """The normalised square of both innovations, and the correlation of the innovations with earlier motion."""
-    moving = model.judged[longest_run(model.t, model.rate)] > 0
+    moving = model.unscored[longest_run(model.t, model.rate)] == 0
     converged = is_past_transient(np.arange(len(result.q)) / model.rate) & moving
     dq, ddq = (x[converged] for x in motion)
     N = int(converged.sum())

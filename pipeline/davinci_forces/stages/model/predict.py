@@ -58,13 +58,13 @@ def predict_joint(
     labelled = [(f.model, f.estimator, f) for f in independent]
     if chosen is not None:
         labelled.append((CHOSEN, f"{chosen.model}.{chosen.estimator}", chosen))
-    judged = is_judged(motion, along, chosen, entry)
-    free = judged & is_outside(motion.t, entry.contact)
+    scored = is_scored(motion, along, chosen, entry)
+    free = scored & is_outside(motion.t, entry.contact)
     if not free.any():
         message = f"{name}: contact windows and standstill cover the whole log, so no prediction can be scored"
         yield diagnostic("predict", f"{motion.log}.{motion.joint}", "warning", message)
         return
-    if steps := [step_warning(name, *part) for part in spans(motion.t, ~judged & (motion.standing == 0))]:
+    if steps := [step_warning(name, *part) for part in spans(motion.t, ~scored & (motion.standing == 0))]:
         yield diagnostic("predict", f"{motion.log}.{motion.joint}.steps", "warning", *steps)
     scorer, path = Scorer(motion, free, lowpass), identified.path(motion)
     for model, estimator, fit in labelled:
@@ -116,13 +116,14 @@ def apply(
             scheme=refit.scheme if refit else "" if is_fitted else motion.role,
             path_unseen=refit.path if refit else "" if is_fitted else path,
             rate=motion.rate, velocity=motion.velocity, at_rest=motion.at_rest, standing=motion.standing, t=motion.t,
-            tau=motion.tau, segment=motion.segment, judged=is_judged(motion, along, joint_fit, entry).astype(np.int64),
+            tau=motion.tau, segment=motion.segment,
+            unscored=(~is_scored(motion, along, joint_fit, entry)).astype(np.int64),
             tau_hat_unseen=at_samples(refit, motion) if refit else np.full(len(motion), np.nan), **terms,
         )  # fmt: skip
 
 
-def is_judged(motion: Motion, along: LogModels, fit: Fit | None, entry: LogEntry) -> Booleans:
-    """The samples (N,) at which models are judged: not at standstill, nor where the controller starts or stops.
+def is_scored(motion: Motion, along: LogModels, fit: Fit | None, entry: LogEntry) -> Booleans:
+    """The samples (N,) at which models are scored: not at standstill, nor where the controller starts or stops.
 
     Steps of the effort are sought in free motion that `fit` has not seen.  Friction may change by twice its static
     level, but not while the joint moves on.

@@ -32,7 +32,6 @@ MAX_VELOCITY_ERROR = 0.1  # of the ratio of the two velocities
 MAX_POSITION = 20.0  # as a multiple of a joint's limits
 MIN_SAMPLES_SEGMENT = 4  # for a cubic spline
 MAX_LISTED_STRETCHES = 3  # in a remark
-JUDGED_ROLES = ("identification", "validation", "contact", "weight")  # of logs whose effort is fitted or judged
 
 
 def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signal | Motion | Diagnostic]:
@@ -81,7 +80,7 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
     motion = without_noise(signal, smooth, lowpass)
     yield motion
     yield from remarks(recording, method, cuts, sum(part.stop - part.start for part in parts))
-    if recording.role in JUDGED_ROLES and not at_rest and motion.standing.any():
+    if recording.role not in ("tissue", "friction") and not at_rest and motion.standing.any():
         yield diagnostic("resample", f"{recording.log}.{recording.joint}", "note", standstill(motion))
     wrong = [] if at_rest else [*velocity_faults(recording, q, dq, segment, 1.0 / T_s), *faults(recording, joint)]
     if wrong:

@@ -98,8 +98,8 @@ def apply(
 
 def free_of(tracks: Sequence[Track], entry: LogEntry) -> Booleans:
     """Whether all joints move in free space at each sample (N,), for the smoother."""
-    t, unjudged = tracks[0].t, (span for track in tracks for span in spans(track.t, track.judged == 0))
-    return free_smoothed(t, [*entry.contact, *unjudged], tracks[0].rate)
+    t, unscored = tracks[0].t, (span for track in tracks for span in spans(track.t, track.unscored > 0))
+    return free_smoothed(t, [*entry.contact, *unscored], tracks[0].rate)
 
 
 def missing_joints(names: Sequence[str], tracks: dict[str, Track]) -> Iterator[str]:
