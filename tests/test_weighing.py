@@ -7,9 +7,11 @@ import pytest
 from numpy.testing import assert_allclose
 
 from davinci_forces.maths.contact.weighing import (
+    MIN_AGREEMENT,
     PARTS,
     MassEstimate,
     Rows,
+    agreement,
     better,
     fit_mass,
     offset,
@@ -18,6 +20,7 @@ from davinci_forces.maths.contact.weighing import (
 )
 from davinci_forces.maths.periods.shift import circular, roll, straight
 from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Motion, Signal, Weight
+from davinci_forces.report.sections.weight import SIDES
 from davinci_forces.robots import dvrk_psm
 from davinci_forces.stages import weigh
 from davinci_forces.study import AttachedMass, Weighing, Weighings
@@ -130,10 +133,11 @@ def left_by_the_model(t, seed):
     return np.array([0.05, 0.1, 0.1]) * slow + 0.05 * np.random.default_rng(len(t)).normal(size=slow.shape)
 
 
-def log(name, role, seed, hung=None, path=0.0, day=0.0, t=T):
-    """Models and motions of one log; `hung` says what truly hangs."""
+def log(name, role, seed, hung=None, path=0.0, day=0.0, t=T, false=0.0):
+    """Models and motions of one log; `hung` says what truly hangs, `false` the mass that roll alone shows more."""
     q, dq, ddq = motion(path, t)
     tau = left_by_the_model(t, seed) + day
+    tau[:, 0] += false * unit_load(ROBOT.chain, "end_link", HUNG.position, q, dq, ddq)[:, 0]
     if hung is not None:
         tau = tau + MASS * unit_load(ROBOT.chain, "end_link", hung, q, dq, ddq)
     segment = np.zeros(len(t), int)
@@ -191,6 +195,67 @@ def test_a_hung_mass_is_found_within_its_interval():
     assert np.std(off) > 0.4  # nor are intervals so wide that nothing could miss them
 
 
+# Joints that agree, and joints that do not
+
+
+def at_another_speed(seed, free):
+    """A weight log at a speed at which roll loses half of the mass; with free motion at that speed or not."""
+    logs = [
+        log("fitted", "identification", 100 + seed),
+        *([log("slow", "validation", 200 + seed, path=0.8, false=-0.5 * MASS)] if free else []),
+        log("heavy", "weight", 300 + seed, HUNG.position, path=0.4, false=-0.5 * MASS),
+    ]
+    weight, _, said = analysed(logs, Weighing("heavy", HUNG, ""))
+    return weight, " ".join(said)
+
+
+def test_joints_that_tell_different_masses_are_named_and_widen_the_interval():
+    for seed in range(20):
+        weight, said = at_another_speed(seed, free=False)
+        (roll, roll_std), (pitch, pitch_std) = zip(weight.mass_alone, weight.mass_alone_std, strict=True)
+        assert weight.agreement < MIN_AGREEMENT
+        assert weight.birge_ratio == pytest.approx(abs(roll - pitch) / np.hypot(roll_std, pitch_std))
+        narrow = weight.widening * np.hypot(weight.run_std, weight.fit_std)
+        assert weight.mass_std >= weight.birge_ratio * narrow * (1 - 1e-9)
+        assert abs(weight.mass - MASS) < 1.96 * weight.mass_std
+        assert abs(weight.mass - MASS) > 3 * narrow  # which it would have been sure of
+        assert weight.differing in JOINTS
+        assert f"tell different masses (hand_roll {roll:.3g} ± {roll_std:.2g} kg, hand_pitch" in said
+
+
+def test_free_motion_at_another_speed_is_part_of_the_error_of_each_joint():
+    for seed in range(8):
+        alone, free = (at_another_speed(seed, free)[0] for free in (False, True))
+        assert free.false_mass[0] == pytest.approx(0.5 * MASS / np.sqrt(2), rel=0.2)  # in one of two logs
+        assert free.mass_alone_std[0] > free.false_mass[0] > 4 * alone.false_mass[0]
+        assert (free.agreement > MIN_AGREEMENT, free.differing, free.birge_ratio) == (True, "", 1.0)
+        assert abs(free.mass - MASS) < 1.96 * free.mass_std
+        assert abs(free.mass - MASS) < 0.6 * abs(alone.mass - MASS)  # a joint counts less where it shows false masses
+
+
+def test_joints_with_the_same_errors_as_in_free_motion_do_not_contradict_each_other():
+    weights = [study(seed)[0] for seed in range(40)]
+    assert sum(weight.differing != "" for weight in weights) <= 2  # 1 % of 40, and a jackknife over six parts
+    assert {weight.birge_ratio for weight in weights if not weight.differing} == {1.0}
+
+
+def test_a_tare_takes_the_false_masses_away_that_repeat_along_its_path():
+    assert_allclose(study(3, tare="empty")[0].false_mass, 0.0)
+
+
+def test_masses_that_agree_have_a_fair_probability():
+    rng = np.random.default_rng(5)
+    std = np.array([0.01, 0.02, 0.05])
+    draws = [agreement([MassEstimate(0.1 + s * rng.normal(), s) for s in std]) for _ in range(4000)]
+    p = np.array([draw.probability for draw in draws])
+    assert np.mean(p < 0.5) == pytest.approx(0.5, abs=0.03)
+    assert np.mean(p < MIN_AGREEMENT) == pytest.approx(MIN_AGREEMENT, abs=0.006)
+    assert {draw.ratio for draw in draws if draw.probability >= MIN_AGREEMENT} == {1.0}
+    worst = agreement([MassEstimate(0.105, 0.007), MassEstimate(0.058, 0.007), MassEstimate(0.11, 0.01)])
+    assert (worst.differing, worst.probability < 1e-4, worst.ratio > 2.0) == (1, True, True)
+    assert agreement([MassEstimate(0.1, 0.01)]) == (1.0, 1.0, 0)  # one joint contradicts nobody
+
+
 def test_a_run_of_free_motion_weighs_nothing_within_its_interval():
     free = [study(seed)[1] for seed in range(15)]
     off = [f.free_mass / f.free_mass_std for each in free for f in each.values()]
@@ -221,6 +286,10 @@ def test_the_side_that_the_mass_does_not_hang_on_tells():
     assert wrong[0].side == "the other one"
     assert wrong[0].mass_mirrored == pytest.approx(right[0].mass)
     assert right[0].mass_mirrored == pytest.approx(wrong[0].mass)
+
+
+def test_a_side_that_no_effort_tells_is_called_so_in_the_words_that_the_report_knows():
+    assert weigh.side_of(0.0) in SIDES
 
 
 def test_an_offset_of_the_day_costs_no_mass():

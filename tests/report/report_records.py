@@ -31,7 +31,7 @@ def free_space(**levels: Any) -> FreeSpace:
 
 def weight(**scores: Any) -> Weight:
     """The mass of a weight log."""
-    about = {"log": "run", "moves_with": "roll", "tare": "", "side": "as stated"}
+    about = {"log": "run", "moves_with": "roll", "tare": "", "side": "as stated", "differing": ""}
     return Weight(**(dict.fromkeys(Weight.scalars(), 0.0) | dict.fromkeys(Weight.columns(), NOTHING) | about | scores))
 
 

@@ -105,6 +105,8 @@ def test_a_whole_log_left_out_decides_and_not_its_blocks_of_path():
     shares = [path_share("one"), path_share("two")]
     both = level_of([by_blocks("one"), by_blocks("two"), by_log("one", 0.15), by_log("two", 0.2)], shares)
     assert (both.level, both.prediction.model_error, both.new_path) == ("warn", 0.2, "100 %")
+    worse = level_of([by_blocks("one", 0.3), by_log("one", 0.05), by_log("two", 0.05)], shares)
+    assert (worse.level, worse.prediction.model_error) == ("good", 0.05)
     alone = level_of([by_blocks()], shares[:1])
     assert (alone.level, alone.new_path) == ("good", "–")  # a single log has no other
 
@@ -151,8 +153,10 @@ def test_a_joint_at_rest_is_no_problem_and_does_not_decide_where_another_run_mov
     ],
 )
 def test_a_mass_is_good_where_a_narrow_interval_contains_it(mass, std, stated, level):
-    assert mass_level(weight(mass=mass, mass_std=std, stated_mass=stated)) == level
-    assert mass_level(weight(mass=0.097, mass_std=0.001, stated_mass=0.097, side="the other one")) == "warn"
+    assert mass_level(weight(mass=mass, mass_std=std, stated_mass=stated))[0] == level
+    exact = {"mass": 0.097, "mass_std": 0.001, "stated_mass": 0.097}
+    assert mass_level(weight(**exact, side="the other one")) == ("warn", "side")
+    assert mass_level(weight(**exact, differing="roll")) == ("warn", "joints")
 
 
 @pytest.mark.parametrize(("used", "level"), [(72, "warn"), (180, "good"), (359, "good"), (1, "warn"), (0, "bad")])

@@ -2,8 +2,6 @@
 
 from collections.abc import Collection, Iterable
 
-import numpy as np
-
 from davinci_forces.errors import PipelineError
 from davinci_forces.maths.models.model import Model
 from davinci_forces.maths.periods.shift import SAME_PATH as LIKE
@@ -15,17 +13,6 @@ from davinci_forces.robots.models import ARM, model_of
 from davinci_forces.robots.robot import Robot
 
 FALLBACK = "independent.lse"  # for joints that the chosen model does not cover
-
-
-def path_likeness(motion: Motion, paths: FittedPaths) -> float | None:
-    """Return how closely the longest segment follows the nearest path of another log; None if there is no other."""
-    part = max(segments(motion.segment), key=lambda s: s.stop - s.start)
-    path_rows = [np.flatnonzero(paths.source == log) for log in dict.fromkeys(paths.source) if log != motion.log]
-    likenesses = [
-        likeness(motion.t[part], motion.q_measured[part], paths.q[rows], float(paths.period[rows[0]]))
-        for rows in path_rows
-    ]
-    return max(likenesses, default=None)
 
 
 class Identified:
@@ -103,5 +90,12 @@ class Identified:
         It is 1 if no other log's path is known.
         """
         paths = self._paths.get(motion.joint)
-        r = path_likeness(motion, paths) if paths is not None else None
-        return 1.0 if r is None else 1.0 - max(r, 0.0) ** 2
+        if paths is None:
+            return 1.0
+        part = max(segments(motion.segment), key=lambda s: s.stop - s.start)
+        others = [paths.source == log for log in dict.fromkeys(paths.source) if log != motion.log]
+        likenesses = [
+            likeness(motion.t[part], motion.q_measured[part], paths.q[rows], float(paths.period[rows][0]))
+            for rows in others
+        ]
+        return 1.0 - max([0.0, *likenesses]) ** 2

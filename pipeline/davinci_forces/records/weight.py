@@ -42,6 +42,10 @@ class Weight(LogRecord):
     run_std: float
     fit_std: float
     widening: float
+    agreement: float
+    agreement_mirrored: float
+    birge_ratio: float
+    differing: str  # the joint that differs most from the others; "" if they agree
     mass_mirrored: float
     mass_mirrored_std: float
     side: str
@@ -53,6 +57,9 @@ class Weight(LogRecord):
     unit: Labels
     mass_alone: Column
     mass_alone_std: Column
+    mirrored_alone: Column
+    mirrored_alone_std: Column
+    false_mass: Column
     joint_offset: Column
     left_rms: Column
     free_error: Column
@@ -62,10 +69,14 @@ class Weight(LogRecord):
         for key, field in (("mass", "mass"), ("mass_mirrored", "mass_mirrored"), ("scale", "mass_scale")):
             yield Published(f"weight.{self.log}.{key}", field, std=f"{field}_std")
         yield from self.publish(f"weight.{self.log}", "tare_mass", with_std=True)
-        yield from self.publish(f"weight.{self.log}", "run_std", "fit_std", "widening")
+        yield from self.publish(
+            f"weight.{self.log}", "run_std", "fit_std", "widening", "agreement", "agreement_mirrored", "birge_ratio"
+        )
         for i, joint in enumerate(self.loaded):
-            yield Published(f"weight.{self.log}.{joint}.mass", "mass_alone", std="mass_alone_std", row=i)
-            yield from self.publish(f"weight.{self.log}.{joint}", "joint_offset", "left_rms", "free_error", row=i)
+            prefix = f"weight.{self.log}.{joint}"
+            yield Published(f"{prefix}.mass", "mass_alone", std="mass_alone_std", row=i)
+            yield Published(f"{prefix}.mass_mirrored", "mirrored_alone", std="mirrored_alone_std", row=i)
+            yield from self.publish(prefix, "false_mass", "joint_offset", "left_rms", "free_error", row=i)
 
 
 @dataclass(frozen=True, eq=False)

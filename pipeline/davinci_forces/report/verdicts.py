@@ -137,23 +137,17 @@ def is_minority(tissue: Stiffness) -> bool:
     return tissue.pushes < MIN_COUNTED * len(tissue)
 
 
-def mass_level(weight: Weight) -> Level:
-    """Grade a mass: good needs the right side, the stated mass in its interval, and an interval that tells it."""
+def mass_level(weight: Weight) -> tuple[Level, str]:
+    """Grade a mass, and say why; good needs the side, agreeing joints, and a narrow interval with the stated mass."""
     if weight.side == "the other one":
-        return "warn"
+        return "warn", "side"
+    if weight.differing:
+        return "warn", "joints"
     if math.isnan(weight.stated_mass):
-        return "info"
-    return "good" if is_in_interval(weight) and is_precise(weight) else "warn"
-
-
-def is_in_interval(weight: Weight) -> bool:
-    """Whether the stated mass lies in the 95 % interval."""
-    return abs(weight.mass - weight.stated_mass) <= NORMAL_95 * weight.mass_std
-
-
-def is_precise(weight: Weight) -> bool:
-    """Whether the standard error of a mass is small against the stated mass."""
-    return weight.mass_std <= PRECISE * weight.stated_mass
+        return "info", "unstated"
+    if abs(weight.mass - weight.stated_mass) > NORMAL_95 * weight.mass_std:
+        return "warn", "scale"
+    return ("good", "right") if weight.mass_std <= PRECISE * weight.stated_mass else ("warn", "wide")
 
 
 def truth_level(errors: Sequence[float]) -> tuple[Level, str]:
@@ -231,7 +225,8 @@ def thresholds() -> tuple[tuple[Cell, ...], ...]:
          f"at most {percent(PRECISE)}, from at least two pushes and {percent(MIN_COUNTED)} of all",
          f"at most {percent(ROUGH)}", "beyond, or no usable push"),
         ("Mass", "standard error over stated mass",
-         f"at most {percent(PRECISE)}, with the stated mass in its 95 % interval", "beyond", "–"),
+         f"at most {percent(PRECISE)}, with the stated mass in its 95 % interval, from joints that agree",
+         "beyond, or the joints contradict each other", "–"),
         ("Pose of the tip", "condition number of its Jacobian", "–", f"above {NEAR_SINGULAR:g}: near singular", "–"),
         ("Estimates of a simulated study", "probability that so few lie within 2 standard errors, or 4, of the truth",
          f"at least {percent(UNLIKELY)}", "–", "below"),

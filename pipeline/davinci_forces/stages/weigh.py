@@ -10,8 +10,10 @@ import numpy as np
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.contact.weighing import (
     PARTS,
+    Agreement,
     MassEstimate,
     Rows,
+    agreement,
     better,
     fit_mass,
     mirror_position,
@@ -19,6 +21,7 @@ from davinci_forces.maths.contact.weighing import (
     moved_with,
     offset,
     residual,
+    shares,
     unit_load,
     widening_factor,
 )
@@ -26,6 +29,7 @@ from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.periods.period import guess, refine
 from davinci_forces.maths.periods.shift import circular, straight
 from davinci_forces.maths.signals.smoothing import lowpass_segments, segments
+from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Motion, Weight, diagnostic
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import AttachedMass, LogEntry, Weighing, Weighings
@@ -183,6 +187,7 @@ class FreeMotionErrors(NamedTuple):
 
     sigma: dict[str, float]  # error of the model, by joint
     fit_std: float  # [kg] standard deviation of the error that all masses from this fit share
+    false_mass: dict[str, float]  # [kg] root mean square of the mass that each joint alone tells in free motion
     widening: float
     masses: dict[str, MassEstimate]  # by log
     roles: dict[str, str]
@@ -190,46 +195,67 @@ class FreeMotionErrors(NamedTuple):
 
 def estimate_mass(
     weighing: Weighing, loads: Sequence[Load], tare: Sequence[Load], logs: dict[str, list[Load]], units: dict[str, str]
-) -> Iterator[Weight | FreeWeight]:
+) -> Iterator[Weight | FreeWeight | Diagnostic]:
     """Estimate the mass of one weight log, by its loads without the `tare`, and the mass in logs of free motion."""
     free = free_motion_errors(loads, logs)
     loads = tare or loads
     sides = [rows_of(loads, free.sigma, column) for column in ("load", "load_mirrored")]
+    joints = [load.joint for load in loads]
+    false = np.zeros(len(loads)) if tare else np.array([free.false_mass.get(joint, 0.0) for joint in joints])
     fit_std = 0.0 if tare else free.fit_std
+    alone = [
+        [MassEstimate(mass, float(np.hypot(std, error))) for (mass, std), error in zip(masses, false, strict=True)]
+        for masses in ([fit_mass([row]) for row in side] for side in sides)
+    ]
+    test, mirrored_test = (agreement(masses) for masses in alone)
     (mass, run_std), (mass_mirrored, mirrored_run_std) = (fit_mass(rows) for rows in sides)
-    std, mirrored_std = (free.widening * float(np.hypot(part, fit_std)) for part in (run_std, mirrored_run_std))
-    advantage = better(*sides)
+    std = widen(free.widening * float(np.hypot(run_std, fit_std)), mass, alone[0], test)
+    mirrored_std = free.widening * float(np.hypot(mirrored_run_std, fit_std))
     stated = float("nan") if weighing.weight.mass is None else weighing.weight.mass
     tare_mass = free.masses.get(weighing.tare, MassEstimate(float("nan"), float("nan"))) if tare else None
-    by_joint = [fit_mass([row]) for row in sides[0]]
-    residual_rms = [float(np.sqrt(np.mean(residual(row, mass) ** 2))) for row in sides[0]]
+    differing = joints[test.differing] if test.ratio > 1.0 else ""
+    if differing:
+        yield diagnostic(
+            "weigh", f"{weighing.log}.joints", "warning", contradiction(weighing.log, joints, alone[0], test)
+        )
     yield Weight(
-        log=weighing.log,
-        moves_with=weighing.weight.moves_with,
-        tare=weighing.tare if tare else "",
-        stated_mass=stated,
-        mass=mass,
-        mass_std=std,
-        run_std=run_std,
-        fit_std=fit_std,
-        widening=free.widening,
-        mass_mirrored=mass_mirrored,
-        mass_mirrored_std=mirrored_std,
-        side=side_of(advantage),
-        mass_scale=mass / stated,
-        mass_scale_std=std / stated,
+        log=weighing.log, moves_with=weighing.weight.moves_with, tare=weighing.tare if tare else "",
+        stated_mass=stated, mass=mass, mass_std=std, run_std=run_std, fit_std=fit_std, widening=free.widening,
+        agreement=test.probability, agreement_mirrored=mirrored_test.probability, birge_ratio=test.ratio,
+        differing=differing, mass_mirrored=mass_mirrored,
+        mass_mirrored_std=widen(mirrored_std, mass_mirrored, alone[1], mirrored_test),
+        side=side_of(better(*sides)), mass_scale=mass / stated, mass_scale_std=std / stated,
         tare_mass=tare_mass.mass if tare_mass else float("nan"),
         tare_mass_std=total_std(tare_mass, free) if tare_mass else float("nan"),
-        loaded=np.array([load.joint for load in loads], object),
-        unit=np.array([units[load.joint] for load in loads], object),
-        mass_alone=np.array([m.mass for m in by_joint]),
-        mass_alone_std=np.array([m.std for m in by_joint]),
-        joint_offset=np.array([offset(row, mass) for row in sides[0]]),
-        left_rms=np.array(residual_rms),
-        free_error=np.array([free.sigma[load.joint] for load in loads]),
-    )
+        loaded=np.array(joints, object), unit=np.array([units[joint] for joint in joints], object),
+        mass_alone=np.array([m.mass for m in alone[0]]), mass_alone_std=np.array([m.std for m in alone[0]]),
+        mirrored_alone=np.array([m.mass for m in alone[1]]), mirrored_alone_std=np.array([m.std for m in alone[1]]),
+        false_mass=false, joint_offset=np.array([offset(row, mass) for row in sides[0]]),
+        left_rms=np.array([float(np.sqrt(np.mean(residual(row, mass) ** 2))) for row in sides[0]]),
+        free_error=np.array([free.sigma[joint] for joint in joints]),
+    )  # fmt: skip
     for log, free_mass in free.masses.items():
         yield FreeWeight(log, weighing.log, free.roles[log], free_mass.mass, total_std(free_mass, free))
+
+
+def widen(std: float, mass: float, alone: Sequence[MassEstimate], test: Agreement) -> float:
+    """Widen a standard error by the Birge ratio, and until its interval contains that of every contradicting joint.
+
+    Which joint is right is not known, and the mean is near the joint with the smallest standard error.
+    """
+    if test.ratio == 1.0:
+        return std
+    return max(test.ratio * std, *(abs(joint.mass - mass) / NORMAL_95 + joint.std for joint in alone))
+
+
+def contradiction(log: str, joints: Sequence[str], alone: Sequence[MassEstimate], test: Agreement) -> str:
+    """State that the joints tell different masses, and by which joint."""
+    masses = ", ".join(f"{joint} {m.mass:.3g} ± {m.std:.2g} kg" for joint, m in zip(joints, alone, strict=True))
+    return (
+        f"{log}: the joints tell different masses ({masses}; probability {test.probability:.1g} if they agree), "
+        f"{joints[test.differing]} most of all; the interval is widened to contain all: check this joint's "
+        "model at this speed, its gear and motor, and the position of the mass"
+    )
 
 
 def side_of(advantage: float) -> str:
@@ -247,8 +273,10 @@ def total_std(mass: MassEstimate, free: FreeMotionErrors) -> float:
 def free_motion_errors(weight_loads: Sequence[Load], logs: dict[str, list[Load]]) -> FreeMotionErrors:
     """Compute the errors of a mass from free motion that the fit has not seen.
 
-    The error of the fit is the apparent mass in its identification logs, from refits without these samples.  The
-    apparent masses of other logs of free motion, over their errors, give the factor that widens all errors.
+    The error of a joint is the mass that it alone shows in free motion, at the speeds of these logs; there are refits
+    without the samples of identification logs.  The error of the fit combines the joints, or is the apparent mass in
+    identification logs if that is larger.  The apparent masses of other logs, over their errors, give the factor that
+    widens all errors.
     """
     joints = {load.joint for load in weight_loads}
     unseen = {
@@ -267,9 +295,15 @@ def free_motion_errors(weight_loads: Sequence[Load], logs: dict[str, list[Load]]
     masses = {log: fit_mass(log_rows) for log, log_rows in rows.items()}
     fitted = [row for log, log_rows in rows.items() if roles[log] == "identification" for row in log_rows]
     of_fitted = fit_mass(fitted) if fitted else MassEstimate(0.0, 0.0)
-    fit_std = max(abs(of_fitted.mass), of_fitted.std)
+    false_mass = {
+        joint: float(np.sqrt(np.mean([np.max(np.square(fit_mass([row]))) for row in joint_rows])))
+        for joint, joint_rows in by_joint.items()
+    }
+    weight_shares = shares(rows_of(weight_loads, sigma, "load"))
+    by_shares = np.linalg.norm(weight_shares * [false_mass.get(load.joint, 0.0) for load in weight_loads])
+    fit_std = max(abs(of_fitted.mass), of_fitted.std, float(by_shares))
     validation = [mass for log, mass in masses.items() if roles[log] != "identification"]
-    return FreeMotionErrors(sigma, fit_std, widening_factor(validation, fit_std), masses, roles)
+    return FreeMotionErrors(sigma, fit_std, false_mass, widening_factor(validation, fit_std), masses, roles)
 
 
 def unseen_part(load: Load) -> Load | None:

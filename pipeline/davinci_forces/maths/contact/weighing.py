@@ -17,6 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
+from scipy.special import chdtrc
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.mechanics.bodies import Bodies
@@ -27,6 +28,7 @@ from davinci_forces.maths.mechanics.rigid_body import inverse_dynamics
 PARTS = 6  # number of blocks of a path, as in the cross-validation of models
 # If a smaller share of a column's power is variance, an offset more than doubles the standard error.
 MIN_VARIANCE_SHARE = 0.25
+MIN_AGREEMENT = 0.01  # probability of the joints' chi-square, below which they contradict each other
 
 
 class Rows(NamedTuple):
@@ -55,6 +57,14 @@ class MassEstimate(NamedTuple):
     std: float
 
 
+class Agreement(NamedTuple):
+    """Whether the masses that joints tell alone agree: the probability of their chi-square if they do."""
+
+    probability: float
+    ratio: float  # by which the spread exceeds the standard errors (Birge); 1 if the masses agree
+    differing: int  # the mass furthest from the mean, in standard errors
+
+
 def fit_mass(rows: Sequence[Rows]) -> MassEstimate:
     """Estimate the mass from all joints, with its standard error by the jackknife over sixths of the path.
 
@@ -73,6 +83,26 @@ def _mass(rows: Sequence[Rows], without: int | None = None) -> float:
         numerator += float(x @ y) / row.sigma**2
         denominator += float(x @ x) / row.sigma**2
     return numerator / denominator if denominator > 0 else float("nan")
+
+
+def agreement(masses: Sequence[MassEstimate]) -> Agreement:
+    """Test masses with independent errors against their weighted mean.
+
+    chi^2 = sum_j (m_j - m)^2 / s_j^2,    ratio = sqrt(chi^2 / (J - 1))                                (Birge, 1932)
+    """
+    mass, std = np.array(masses).T
+    weight = 1.0 / np.maximum(std, np.finfo(float).tiny ** 0.25) ** 2
+    squares = weight * (mass - weight @ mass / weight.sum()) ** 2
+    free = len(masses) - 1
+    probability = float(chdtrc(free, squares.sum())) if free else 1.0
+    ratio = float(np.sqrt(squares.sum() / free)) if probability < MIN_AGREEMENT else 1.0
+    return Agreement(probability, ratio, int(squares.argmax()))
+
+
+def shares(rows: Sequence[Rows]) -> Array:
+    """Share (J,) of each joint in the mass."""
+    power = np.array([float(np.sum(row.centre()[0] ** 2)) / row.sigma**2 for row in rows])
+    return np.asarray(power / power.sum())
 
 
 def offset(row: Rows, mass: float) -> float:

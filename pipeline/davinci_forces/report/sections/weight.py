@@ -19,7 +19,7 @@ from davinci_forces.report.content import (
     literal,
 )
 from davinci_forces.report.context import Context, label, title
-from davinci_forces.report.verdicts import PRECISE, is_in_interval, is_precise, mass_level, percent
+from davinci_forces.report.verdicts import PRECISE, mass_level, percent
 
 SIDES = {"not told": "undecided"}  # words of the table for the sides in records
 
@@ -47,7 +47,8 @@ def intro() -> Prose:
         "joint is weighted by the inverse of its model's squared error in free motion. A constant offset of the "
         "effort, which differs from day to day (offset of the day), is estimated, too, if the data can separate it "
         "from the load. The standard error combines the error of the fit with a jackknife over six parts of the path. "
-        "It is increased if logs without a mass give a mass that its standard error does not explain."
+        "It is increased if logs without a mass give a mass that its standard error does not explain, or if the masses "
+        "that the joints give differ."
     )
 
 
@@ -88,20 +89,18 @@ def log_blocks(context: Context, weight: Weight) -> Iterator[Block]:
 
 def verdict(context: Context, weight: Weight) -> Verdict:
     """Whether the estimated mass agrees with the stated one, and what follows for the scale of the efforts."""
-    mass = context.number(f"weight.{weight.log}.mass", 3)
-    name, level = f"**{literal(weight.log)}**: the mass estimated from the efforts is {mass}", mass_level(weight)
-    if weight.side == "the other one":
-        return Verdict(level, f"{name}. The other side of its link explains the efforts better: check its position.")
-    if math.isnan(weight.stated_mass):
-        return Verdict(level, f"{name}. The study states no mass, so the scale of the efforts is not known.")
-    stated, scale = Number(weight.stated_mass, "kg"), context.number(f"weight.{weight.log}.scale", 3)
-    if not is_in_interval(weight):
-        follows = f"Efforts are {scale} times too large: check gear and motor."
-        return Verdict(level, f"{name}, but {stated} is stated. {follows}")
-    if not is_precise(weight):
-        follows = f"The standard error is more than {percent(PRECISE)} of it, so the interval hardly tests the scale."
-        return Verdict(level, f"{name}, and {stated} is stated. {follows}")
-    return Verdict(level, f"{name}, and {stated} is stated. The scale, {scale}, agrees with 1.")
+    mass, scale = (context.number(f"weight.{weight.log}.{name}", 3) for name in ("mass", "scale"))
+    stated = f"{Number(weight.stated_mass, 'kg')} is stated."
+    level, why = mass_level(weight)
+    follows = {
+        "side": ". The other side of its link explains the efforts better: check its position.",
+        "joints": f". The joints tell different masses, {literal(weight.differing)} most; the interval contains all.",
+        "unstated": ". The study states no mass, so the scale of the efforts is not known.",
+        "scale": f", but {stated} Efforts are {scale} times too large: check gear and motor.",
+        "wide": f", and {stated} The standard error exceeds {percent(PRECISE)} of it and hardly tests the scale.",
+        "right": f", and {stated} The scale, {scale}, agrees with 1.",
+    }
+    return Verdict(level, f"**{literal(weight.log)}**: the mass estimated from the efforts is {mass}{follows[why]}")
 
 
 def disagreement(context: Context, weight: Weight) -> Prose:
@@ -150,17 +149,21 @@ def figure(weight: Weight, loads: list[Load]) -> Figure:
 
 def by_joint(context: Context, weight: Weight) -> Table:
     """The mass estimated from each joint alone."""
-    names = ("mass", "joint_offset", "left_rms", "free_error")
+    names = ("mass", "mass_mirrored", "false_mass", "joint_offset", "left_rms", "free_error")
     rows = tuple((title(joint), *context.numbers(f"weight.{weight.log}.{joint}", names)) for joint in weight.loaded)
+    agree, mirrored = (
+        context.probability(f"weight.{weight.log}.{name}") for name in ("agreement", "agreement_mirrored")
+    )
     return Table(
-        f"{literal(weight.log)}, joint by joint: the mass estimated from that joint alone, with the standard error "
-        "from parts of the path; the joint's offset of the day; and the root mean squares of the residual with the "
-        "mass and of the model's error in free motion. If the residual is larger than in free motion, "
-        "something other than the mass has changed, too.",
-        ("Joint", "Mass alone", "Offset", "Residual", "Free motion"),
+        f"{literal(weight.log)}, joint by joint: the mass estimated from that joint alone, at the stated position and "
+        "mirrored, and the mass that it alone shows in free motion (root mean square), which its standard error "
+        f"includes. If the joints agree, their chi-square has a probability of {agree} ({mirrored} mirrored); below "
+        "0.01 they contradict each other. Also the joint's offset of the day, and the root mean squares of the "
+        "residual with the mass and of the model's error in free motion.",
+        ("Joint", "Mass alone", "Mirrored", "False mass", "Offset", "Residual", "Free motion"),
         rows,
         f"weight-joints-{weight.log}",
-        "lrrrr",
+        "lrrrrrr",
     )
 
 
