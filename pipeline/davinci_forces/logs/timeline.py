@@ -116,7 +116,7 @@ class Sampling:
 
 @dataclass(frozen=True)
 class OwnClock:
-    """A further clock of a log, and the channels that were sampled by it."""
+    """The own clock of some channels of a log, in addition to the clock of the log."""
 
     time: str  # name of the channel that is added with the times of this clock
     channels: tuple[str, ...]  # in the order of the file

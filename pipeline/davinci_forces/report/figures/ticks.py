@@ -13,7 +13,7 @@ PLAIN_RANGE = (2e-3, 2e4)  # no power of ten is taken out if the largest magnitu
 
 
 def power_of_ten(greatest: float) -> int:
-    """The power of ten, a multiple of three, that leaves numbers from 1 to 1000; 0 if `greatest` needs no power."""
+    """The exponent, a multiple of three, that leaves numbers from 1 to 1000; 0 if `greatest` needs no power of ten."""
     if greatest == 0 or PLAIN_RANGE[0] <= greatest < PLAIN_RANGE[1]:
         return 0
     return 3 * math.floor(math.log10(greatest) / 3)
@@ -48,7 +48,7 @@ def spread_ticks(axis: "Axis", capacity: float) -> None:
 
 
 def set_log_ticks(axis: "Axis") -> None:
-    """Number a logarithmic axis at 1, 2 and 5 of each decade, or a long one at powers of ten; set its range first."""
+    """Number a logarithmic axis of a given range at 1, 2 and 5 of each decade, or at powers of ten if it is long."""
     from matplotlib.ticker import FixedLocator, FuncFormatter, NullFormatter, NullLocator
 
     low, high = sorted(math.log10(limit) for limit in axis.get_view_interval())

@@ -29,7 +29,7 @@ def blocks(context: Context) -> Iterator[Block]:
             "quantity is its spread over windows of the same length in free space; the standard error of a peak also "
             "includes the smoother's standard deviation at that peak, and what the smoother rounds off it. A contact "
             "is detected if its peak exceeds the joint's detection level: 99 % of the samples of the joint's worst run "
-            "in free space stay below this level."
+            "in free space stay below this level." + simulated_friction(context)
         )
         yield peaks(contacts)
         yield from paper_or_screen(
@@ -50,6 +50,16 @@ def blocks(context: Context) -> Iterator[Block]:
             unused,
             "not-analysed",
         )
+
+
+def simulated_friction(context: Context) -> str:
+    """Explain the names of simulated logs by their friction, if this friction differs between logs."""
+    families = dict.fromkeys(log.get("family", "") for log in context.study.truth.get("log", []))
+    matched = [name for name in families if name in context.study.truth.get("theta", {})]
+    others = [name for name in families if name and name not in matched]
+    first, second = (literal(", ".join(names)) for names in (matched, others))
+    text = f" Logs named {first}-… are simulated with the friction of the joint models, {second}-… with another."
+    return text if matched and others else ""
 
 
 def rows(context: Context, contact: Contact) -> Iterator[tuple[Cell, ...]]:

@@ -41,8 +41,8 @@ def blocks(context: Context) -> Iterator[Block]:
     """The section's content."""
     yield Prose(
         "This study is simulated, so the ground truth is known. It is stored with the logs, but no stage of the "
-        "analysis reads it. This section compares external efforts with it, and parameters where the simulated "
-        "friction is that of the model."
+        "analysis reads it. This section compares external efforts with it, and parameters, if the logs were "
+        "simulated with the friction of the model."
     )
     yield from of_friction(context)
     errors: list[float] = []

@@ -47,7 +47,7 @@ def blocks(context: Context, explained: list[Explanation]) -> Iterator[Block]:
         "time) if model and noise are as the filter assumes. Each run is tested as a whole, without its first second, "
         "by the autocorrelation and the cumulative periodogram (power summed over frequency) of the innovations of "
         "position and velocity ([@thresholds]). If a run fails, possible causes are removed, first singly and then in "
-        "combinations, until the tests pass. Removing contact, or reversals, leaves out the samples there. The random "
+        "combinations, until the tests pass. To remove contact or reversals, their samples are left out. The random "
         "walk, the noise level, the noise colour (a correlation over time), the sample times and the model are each "
         "replaced by their maximum-likelihood estimate for this log. A cause is named only if the tests pass without "
         "it, with p-values at least a hundred times larger, and fail if as many samples are left out elsewhere. "

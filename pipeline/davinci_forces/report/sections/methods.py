@@ -65,7 +65,7 @@ METHODS: tuple[tuple[type[Record], tuple[Block, ...]], ...] = (
             "**Periods.** The period is the shortest lag after which all moving joints repeat their motion. It is "
             "refined until the harmonics of the excitation fit the positions best. Samples rarely fall on the phases "
             "of the averaged period. A harmonic series is fitted to all samples and evaluated at these phases. The "
-            "mean residual of the samples nearest to a phase is added, so that motion beyond the harmonics is kept. "
+            "mean residual of the samples nearest to a phase is added there, to keep motion beyond the harmonics. "
             "$sigma_x^2$ is the variance of a sample of one period; the variance of the mean is $N_p$ times smaller."
         ),
         Equation(
@@ -113,7 +113,7 @@ METHODS: tuple[tuple[type[Record], tuple[Block, ...]], ...] = (
             "**Filtering.** The state holds position, velocity and external effort, the last as a random walk. At each "
             "sample the state is corrected with the measurement, and then predicted to the next sample. The covariance "
             "is corrected in Joseph's form. The external effort is what the robot exerts on its environment: a mass "
-            "attached to a vertical slide gives a negative one."
+            "attached to a vertical slide gives a negative external effort."
         ),
         Equation(
             'f(x, tau) = [dot(q), M^(-1) (tau - V - F - G - tau_"ext"), 0]^T, quad A = (partial f) / (partial x), quad '

@@ -33,7 +33,7 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
         "are too good. $R^2$ refers to the raw effort; noise alone keeps it below its ceiling "
         '$1 - sigma^2 \\/ "var"(tau)$. The model error is the root mean square of measured minus predicted effort, '
         "after the noise variance is subtracted. Samples of identification logs at which the joint stands still are "
-        "left out, as friction can then take any value; other logs are tested throughout."
+        "left out, as friction can then take any value; of other logs, all samples are tested."
     )
     used = [p for p in predictions if f"{p.model}.{p.estimator}" in context.predicting_fits(p.joint)]
     header = ("Log", "Joint", "Left out", "New path", "Model error", "Error/effort", "$R^2$", "Ceiling")

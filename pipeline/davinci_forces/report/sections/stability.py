@@ -119,8 +119,8 @@ def with_delay(context: Context, tissues: list[TissueLimit]) -> str:
     return (
         "A delay $d$ of the force reduces the damping of a hand in contact by about "
         f"$K_T d$. A communication link of {rate} holds each force for one period, which adds half a period of delay. "
-        "The limit with this delay applies to a hand that stays in contact. In simulation, a hand that bounces off is "
-        f"stable up to at least twice this stiffness.{lag}"
+        "All limits with delay apply to a hand that stays in contact. In simulation, a hand that bounces off is "
+        f"stable up to at least twice this limit.{lag}"
     )
 
 

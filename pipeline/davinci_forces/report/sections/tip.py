@@ -239,7 +239,7 @@ def in_space(force: TipForce, contact: TipContact) -> Figure3D:
     )
     return Figure3D(
         f"{literal(force.log)}: the path of the tip, and the force that it exerts in each contact, numbered in the "
-        f"order of [@tip-contacts]; 1 N is {1e3 * per_newton:.2g} mm long. The black line at its end is the 95 % "
+        f"order of [@tip-contacts]; 1 N is drawn {1e3 * per_newton:.2g} mm long. The black line at its end is the 95 % "
         "interval along the least certain direction.",
         f"The path of the tip in space in {literal(force.log)}, with the force in each contact as a line from it.",
         marks,

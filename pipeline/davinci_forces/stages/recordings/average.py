@@ -83,8 +83,8 @@ def periodic_joints(moving: list[Signal], entry: LogEntry) -> tuple[list[Signal]
         )
     if repeat is None:
         return moving, None, []
-    out = [signal.joint for signal in moving if signal not in periodic]
-    remarks = [f"{entry.name}: {j} does not repeat, unlike the other joints, and is left out" for j in out]
+    aperiodic = [signal.joint for signal in moving if signal not in periodic]
+    remarks = [f"{entry.name}: {j} does not repeat, unlike the other joints, and is left out" for j in aperiodic]
     return periodic, repeat, remarks
 
 
