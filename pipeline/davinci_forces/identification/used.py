@@ -2,6 +2,8 @@
 
 from collections.abc import Collection, Iterable
 
+import numpy as np
+
 from davinci_forces.errors import PipelineError
 from davinci_forces.maths.models.model import Model
 from davinci_forces.maths.periods.shift import SAME_PATH as LIKE
