@@ -132,11 +132,11 @@ def reason(
     if i == best:
         text += ", less than any other"
     else:
-        difference = results[i].score - results[best].score
+        difference, std = results[i].score - results[best].score, standard_error(results[i], results[best])
+        clearly = "it is not clearly better" if difference <= std else "not all of that size are clearly worse"
         text += (
-            f"; the best, {candidates[best].name}, errs by {difference:.4f} less, with a standard error of "
-            f"{standard_error(results[i], results[best]):.4f}: it is not clearly better, and has {sizes[best]} "
-            f"parameters instead of {sizes[i]}"
+            f"; the best, {candidates[best].name}, errs by {difference:.4f} less, with a standard error of {std:.4f}: "
+            f"{clearly}, and it has {sizes[best]} parameters instead of {sizes[i]}"
         )
     training = [result.training.mean() for result in results]
     closest = int(np.argmin(training))
