@@ -16,6 +16,7 @@ from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.model import Model, Parameter
 from davinci_forces.maths.models.terms import Term, presliding_friction
 from davinci_forces.maths.selection import CrossValidation, Equations, Ridge, combine_efforts, cross_validate, solve
+from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.robots.models import ARM, Reach, coupled_arm, frictions, independent, round_scale
 from davinci_forces.robots.robot import Robot
 
@@ -103,6 +104,16 @@ class Candidate(NamedTuple):
     def size(self) -> int:
         """The number of parameters."""
         return sum(len(part.columns) for part in self.parts)
+
+    @property
+    def rank(self) -> int:
+        """The preference among candidates that are not clearly worse than the best; the lowest is preferred.
+
+        Among models with the same terms it is the number of parameters.  Among models that were searched, whose terms
+        differ by joint, those of shared links precede, because only they hold for any motion of the joints together.
+        """
+        shares_links = any(len(part.model.efforts) > 1 for part in self.parts)
+        return int(not shares_links) if self.variant == CHOSEN else self.size
 
     def cross_validate(self, schemes: Sequence[Booleans], by_period: bool = False) -> CrossValidation | None:
         """Compute the errors on data left out; None if the remaining data do not separate the parameters."""

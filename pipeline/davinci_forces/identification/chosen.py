@@ -68,8 +68,7 @@ def select_candidate(candidates: Sequence[Candidate], count: int) -> Selection |
     models, results = (list(column) for column in zip(*pairs, strict=True))
     physical = [c.is_physical for c in models]
     eligible = physical if any(physical) else [True] * len(models)
-    sizes = [c.size for c in models]
-    chosen, best = choose_candidate(results, sizes, eligible)
+    chosen, best = choose_candidate(results, [c.rank for c in models], eligible)
     return Selection(
         candidates=tuple(models),
         physical=tuple(physical),
@@ -79,7 +78,7 @@ def select_candidate(candidates: Sequence[Candidate], count: int) -> Selection |
         over_periods=np.array([over_periods(c, count) for c in models]),
         chosen=models[chosen],
         best=models[best],
-        why=reason(models, results, sizes, chosen, best),
+        why=reason(models, results, [c.size for c in models], chosen, best),
     )
 
 
@@ -133,7 +132,7 @@ def reason(
         text += ", less than any other"
     else:
         difference, std = results[i].score - results[best].score, standard_error(results[i], results[best])
-        clearly = "it is not clearly better" if difference <= std else "not all of that size are clearly worse"
+        clearly = "it is not clearly better" if difference <= std else "not all models of this kind are clearly worse"
         text += (
             f"; the best, {candidates[best].name}, errs by {difference:.4f} less, with a standard error of {std:.4f}: "
             f"{clearly}, and it has {sizes[best]} parameters instead of {sizes[i]}"

@@ -274,19 +274,18 @@ def searched_candidates(
     coupled = [search for search in searches if search.structure == "coupled"]
     rows = [i for i, joint in enumerate(robot.joints) if joint.name in separate]
     if len(coupled) == len(separate) and share_parameters(robot, rows):
-        weights = [1.0 / residual_variance(searched_part(robot, search, arm, count)) for search in coupled]
-        for alone in [None, *range(len(parts))] if len(parts) > 2 else [None]:
-            sharing = [i for i in range(len(parts)) if i != alone]
-            part = shared_part(
-                robot, [coupled[i] for i in sharing], arm, count, np.array([weights[i] for i in sharing])
-            )
+        alone_parts = [searched_part(robot, search, arm, count) for search in coupled]
+        weights = 1.0 / np.array([residual_variance(part) for part in alone_parts])
+        for alone in [None, *range(len(coupled))] if len(coupled) > 2 else [None]:
+            sharing = [i for i in range(len(coupled)) if i != alone]
+            part = shared_part(robot, [coupled[i] for i in sharing], arm, count, weights[sharing])
             name = "" if alone is None else f" except for {coupled[alone].joint}"
-            separately = () if alone is None else (parts[alone],)
+            separately = () if alone is None else (alone_parts[alone],)
             models += [
                 Candidate(
                     f"searched, links shared{name}{ridge_name(strength)}",
                     CHOSEN,
-                    describe_terms([best[i] if i == alone else search for i, search in enumerate(coupled)]),
+                    describe_terms(coupled),
                     (part.with_ridge(strength), *separately),
                 )
                 for strength in RIDGE_GRID

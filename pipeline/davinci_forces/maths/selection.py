@@ -231,11 +231,12 @@ def standard_error(candidate: CrossValidation, reference: CrossValidation | None
 
 
 def choose_candidate(
-    candidates: Sequence[CrossValidation], sizes: Sequence[int], eligible: Sequence[bool]
+    candidates: Sequence[CrossValidation], ranks: Sequence[int], eligible: Sequence[bool]
 ) -> tuple[int, int]:
-    """Indices of the chosen candidate and of the best: the chosen one is the smallest that is not clearly worse.
+    """Indices of the chosen candidate and of the best.
 
-    Among equally small candidates, the better one is chosen; `sizes` are numbers of parameters.
+    The chosen one has the lowest rank, such as the number of parameters, that has a candidate not clearly worse than
+    the best.  Of that rank it is the one with the least error.
 
     Raises
     ------
@@ -249,5 +250,5 @@ def choose_candidate(
         for i in indices
         if candidates[i].score - candidates[best].score <= CLEARLY * standard_error(candidates[i], candidates[best])
     ]
-    smallest = min(sizes[i] for i in near)
-    return min((i for i in indices if sizes[i] == smallest), key=lambda i: candidates[i].score), best
+    lowest = min(ranks[i] for i in near)
+    return min((i for i in indices if ranks[i] == lowest), key=lambda i: candidates[i].score), best

@@ -47,8 +47,8 @@ def blocks(context: Context, choice: Choice) -> Iterator[Block]:
         "A `searched` candidate is built for each joint step by step. A step changes the low-pass of motion and effort "
         "or the delay of the effort after the motion, or adds one term. A step has to reduce the error on at least two "
         "thirds of the sixths of the path. Among the steps, the first one counts that is at most one standard error "
-        "worse than the best. Then the joints share the links' parameters, if that is not clearly worse. The search "
-        "is used if its result has a lower error than the best candidate with fixed terms."
+        "worse than the best. Then all joints, or all but one, share the links' parameters, if that is not clearly "
+        "worse. The search is used if its result has a lower error than the best candidate with fixed terms."
     )
     yield Verdict("info", f"**Chosen: {literal(choice.chosen)}.** {literal(choice.why)}.")
     caption = "The best candidate of each structure and added friction."
