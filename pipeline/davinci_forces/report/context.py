@@ -93,11 +93,12 @@ class Context:
 
 
 def fit_name(model: str, estimator: str) -> str:
-    """The printed name of a fit, as 'independent, LSE' or 'chosen: independent, LSE'."""
+    """The printed name of a fit, as 'independent, LSE', 'chosen, ridge', or 'chosen: independent, LSE' for another."""
     if model not in (CHOSEN, CHOSEN_BY_LOG):
         return f"{model}, {estimator_name(estimator)}"
     structure, _, by = estimator.rpartition(".")
-    return f"chosen{', by log' if model == CHOSEN_BY_LOG else ''}: {structure}, {estimator_name(by)}"
+    name = "chosen, by log" if model == CHOSEN_BY_LOG else "chosen"
+    return f"{name}{f': {structure}' * (structure not in ('', CHOSEN))}, {estimator_name(by)}"
 
 
 def estimator_name(estimator: str) -> str:
