@@ -257,7 +257,8 @@ def test_coverage_by_quartile_of_speed_leaves_standstill_out():
     moves = T < 30
     q, dq = (np.where(moves, x, 0.0) for x in (np.cos(2 * T), -2 * np.sin(2 * T)))
     std = np.where(np.abs(dq) > np.median(np.abs(dq[moves])), 0.05, 0.1)
-    of = replace(track(noise(), role="validation"), q=q, dq=dq, tau_ext_smooth_std=std)
+    still = (~moves).astype(int)
+    of = replace(track(noise(), role="validation"), q=q, dq=dq, tau_ext_smooth_std=std, unscored=still)
     smoothed, _ = assess.run(of, entry(role="validation"))
     assert smoothed.quartile_coverage == pytest.approx([0.95, 0.95, 0.673, 0.673], abs=0.05)
     assert smoothed.quartile_coverage_std == pytest.approx(

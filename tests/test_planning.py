@@ -126,7 +126,7 @@ def test_what_is_read_counts_by_name_type_and_unit_and_what_is_written_by_meanin
 
     before = {stage: schemas(stage) for stage in ("predict", "fit", "whiteness")}
     read = {"Motion", "FittedPaths", "Fit", "Choice"}
-    assert before["predict"].keys() == {*read, "Prediction", "Diagnostic"}
+    assert before["predict"].keys() == {*read, "Prediction", "PathShare", "Diagnostic"}
 
     def changed(**what: str) -> set[tuple[str, str]]:
         schemas.cache_clear()

@@ -253,6 +253,6 @@ def test_forces_are_drawn_from_where_the_tip_is_and_to_scale():
     [largest] = [mark for mark in figure.marks if mark.label == "where it is largest"]
     drawn = np.array([largest.x[1] - largest.x[0], largest.y[1] - largest.y[0], largest.z[1] - largest.z[0]])
     np.testing.assert_allclose(drawn / np.linalg.norm(drawn), np.array([3.0, -4.0, 12.0]) / 13.0, atol=1e-9)
-    per_newton = float(re.search(r"1 N is ([\d.]+) mm", figure.caption)[1])
+    per_newton = float(re.search(r"1 N is drawn ([\d.]+) mm", figure.caption)[1])
     assert 1e3 * np.linalg.norm(drawn) == pytest.approx(13.0 * per_newton, rel=0.05)  # two digits are printed
     assert largest.x[0] == pytest.approx(made[TipContact].x[0])

@@ -134,7 +134,7 @@ def summarise(
 ) -> Summary | None:
     """Peak, mean and impulse of an external effort (N,) with its deviation (N,) in a window [s]; None if that is empty.
 
-    `free` (N,) are the samples at which nothing touches the robot; `rise` [s] is the duration T_s of a step;
+    `free` (N,) are the samples at which nothing touches the robot.  `rise` [s] is the duration T_s of a step.
     `constant_std` (N,) is the part of the deviation that no mean reduces and that free motion does not show.
     """
     (tau_ext, std), (start, end) = effort, window
