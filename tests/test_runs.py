@@ -216,8 +216,8 @@ def test_editing_a_term_of_the_model_makes_the_fit_run_again_and_says_why(finish
 def test_a_reworded_meaning_runs_what_stores_it_and_what_reads_that(finished, package):
     edit(
         package / "records" / "quantities" / "forces.py",
-        "standard deviation of the external effort",
-        "how uncertain it is",
+        "measured effort minus the model's",
+        "the effort that the model does not explain",
     )
     edit(package / "records" / "prediction.py", "The scores.", "How good it is.")
     said = run_by(package, "all", finished)
