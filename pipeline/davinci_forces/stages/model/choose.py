@@ -1,4 +1,4 @@
-"""Choose the arm model by cross-validation over parts of the path, fit it to all logs, and map friction."""
+"""Search for the model of each joint by cross-validation, fit it to all logs, and average friction over velocity."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
