@@ -15,11 +15,13 @@ TOKEN = re.compile(rf"""({LONG}|{QUOTED}|{DATE}|[^][{{}}=,#\s"']+|[][{{}}=,])|#[
 PART = re.compile(rf"""({QUOTED})|[^."']+""", re.DOTALL)
 
 # Limits of a file.  The largest study, ten thousand logs with all their channels, has 650 000 words and marks, two
-# brackets around a key of two names, and no word of 1000 characters outside quotes.
+# brackets around a key of two names, and no word of 1000 characters outside quotes.  tomllib takes a second for a text
+# of four million escaped characters.
 MAX_WORDS = 800_000
 MAX_TABLES = 10_000
 MAX_DEPTH = 16
 MAX_WORD_LENGTH = 10_000
+MAX_TEXT_LENGTH = 100_000
 NOTHING = (0, "")  # after the last word or mark
 COST_OF_NAME = 4  # words: what tomllib keeps of a name that a dot follows takes as much memory
 
@@ -29,7 +31,7 @@ def excess(text: str) -> str:
 
     tomllib's time grows with the square of the number of names in a key; a name takes 500 bytes, a digit 100.
     """
-    line, words, listed, deep, names, length = 1, 0, 0, 0, 0, 0
+    line, words, listed, deep, names, length, quoted = 1, 0, 0, 0, 0, 0, 0
     around, before, is_value = list[int](), "", False  # names and brackets that each open bracket stands in
     for line, word in _tokens(text):  # noqa: B007 - of the word that is too much
         words += 1
@@ -44,14 +46,17 @@ def excess(text: str) -> str:
         elif word != "=":
             dots = word.count(".") if word[0] not in "\"'" else 0
             words, names = words + COST_OF_NAME * dots, names + 1 + dots
-        length = len(word) if word[0] not in "\"'" else 0
+        length, quoted = (len(word), 0) if word[0] not in "\"'" else (0, len(word))
         before, is_value = word, word == "="
-        if words > MAX_WORDS or listed > MAX_TABLES or deep + names > MAX_DEPTH or length > MAX_WORD_LENGTH:
+        if words > MAX_WORDS or listed > MAX_TABLES or deep + names > MAX_DEPTH:
+            break
+        if length > MAX_WORD_LENGTH or quoted > MAX_TEXT_LENGTH:
             break
     counts = (
         (words, MAX_WORDS, "names, values and marks"), (listed, MAX_TABLES, "[[tables]]"),
         (deep + names, MAX_DEPTH, "names and brackets inside each other"),
         (length, MAX_WORD_LENGTH, "characters in one name or number"),
+        (quoted, MAX_TEXT_LENGTH, "characters in one text"),
     )  # fmt: skip
     return next((f"{line}: it has more than {most} {what}" for number, most, what in counts if number > most), "")
 
