@@ -172,12 +172,15 @@ def close_all() -> None:
 
 
 @contextmanager
-def block_interrupts() -> Iterator[None]:
-    """Start processes that ignore Ctrl-C, which a terminal sends to all: their parent ends them."""
+def block_interrupts(*also: signal.Signals) -> Iterator[None]:
+    """Start processes that ignore Ctrl-C, which a terminal sends to all: their parent ends them.
+
+    Other signals that are named wait meanwhile, too.
+    """
     if sys.platform == "win32":
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT, *also})
     try:
         yield
     finally:

@@ -167,12 +167,13 @@ class TaskQueue:
         assert self.others is not None
         while self._waiting and len(self._running) < MAX_QUEUED_SHARES * self.others.hands:
             share = self._next_share(self.others.hands)
-            try:
-                future = self._started.submit(perform_all, share)
+            try:  # it may start a process, and `close` must know every one
+                with process.block_interrupts(signal.SIGTERM):
+                    future = self._started.submit(perform_all, share)
+                    self._running[future] = share
             except BrokenExecutor:
                 self._waiting.extendleft(reversed(share))
                 raise
-            self._running[future] = share
             future.add_done_callback(self._ended.put)
 
     def _next_share(self, hands: int) -> Share:
