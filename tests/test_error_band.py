@@ -48,6 +48,20 @@ def covered(logs, model, studies):
 
 
 @pytest.mark.parametrize("model", [0.0, 0.1])
+def test_the_stated_error_of_a_coverage_holds_the_right_one(model):
+    """Of the cells (log, quartile of speed) of unseen logs; a log of few uncorrelated errors hardly has one outside."""
+    hits = []
+    for seed in range(25):
+        *others, (dq, error) = [free_motion(100 * seed + i, model) for i in range(7)]
+        std = np.sqrt(calibrate(of_logs(others)).variance(np.full(len(dq), STD), dq))
+        coverage, coverage_std = coverage_by_speed(error, std, dq)
+        hits.append(np.abs(coverage - 0.95) <= 1.96 * coverage_std)
+        assert (coverage_std > 0.01).all()
+        assert (coverage_std < 0.5 / np.sqrt(count_uncorrelated(error / std) / 4)).all()
+    assert np.mean(hits) > 0.9
+
+
+@pytest.mark.parametrize("model", [0.0, 0.1])
 @pytest.mark.parametrize("logs", [1, 6])
 def test_an_unseen_log_is_covered_overall_and_at_every_speed(logs, model, request):
     """An exact model and a poor one, which errs thrice as much in fast motion; one log of it errs to wide."""

@@ -133,7 +133,18 @@ def coverage_by_speed(tau_ext: Array, std: Array, dq: Array) -> tuple[Array, Arr
         return np.zeros(0), np.zeros(0)
     inside = (np.abs(tau_ext) <= NORMAL_95 * std).astype(float)
     parts = [inside[np.sort(quartile)] for quartile in np.array_split(np.argsort(np.abs(dq), kind="stable"), 4)]
-    return np.array([part.mean() for part in parts]), np.array([error_of_pooled_mean(part) for part in parts])
+    n = count_uncorrelated(tau_ext / std) / len(parts)
+    return np.array([part.mean() for part in parts]), np.array([error_of_coverage(part, n) for part in parts])
+
+
+def error_of_coverage(inside: Array, n: float) -> float:
+    """Standard error of the share of samples (N,) inside a band, which stand for n uncorrelated ones.
+
+    By block bootstrap, but at least that of n draws with two more inside and two more outside, since blocks without a
+    sample outside do not show that none will be.  Agresti and Coull, The American Statistician 52 (1998).
+    """
+    share = (n * float(inside.mean()) + 2.0) / (n + 4.0)
+    return float(np.fmax(error_of_pooled_mean(inside), np.sqrt(share * (1.0 - share) / (n + 4.0))))
 
 
 class FreeSpaceLevels(NamedTuple):
@@ -161,5 +172,5 @@ def levels(tau_ext: Array, std: Array) -> FreeSpaceLevels:
         level_99=float(np.quantile(size, DETECTED_SHARE)),
         level_99_std=error_of_quantile(size, DETECTED_SHARE),
         coverage=float(np.mean(inside)),
-        coverage_std=error_of_pooled_mean(inside),
+        coverage_std=error_of_coverage(inside, count_uncorrelated(tau_ext[samples] / std[samples])),
     )
