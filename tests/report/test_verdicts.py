@@ -16,6 +16,7 @@ from davinci_forces.report.verdicts import (
     decisive,
     grade,
     is_impossible,
+    is_mostly_constant,
     mass_level,
     stiffness_level,
     thresholds,
@@ -75,6 +76,11 @@ def test_a_joint_whose_band_is_too_narrow_is_not_called_good_and_keeps_its_level
 )
 def test_a_band_is_right_where_it_covers_what_it_says(coverage, level, said):
     assert (band(coverage), band_in_words(coverage)) == (level, said)
+
+
+@pytest.mark.parametrize(("mean", "std", "named"), [(0.6, 0.0, False), (-0.8, 0.1, True), (0.8, 0.3, False)])
+def test_the_constant_part_of_an_error_is_named_where_it_is_most_of_it_and_certain(mean, std, named):
+    assert is_mostly_constant(prediction(model_error=1.0, mean_error=mean, mean_error_std=std)) == named
 
 
 # The run that decides

@@ -9,7 +9,7 @@ from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators.problem import Estimator, Regression
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.signals.smoothing import lowpass_segments, share_passed, white_std
-from davinci_forces.maths.uncertainty.bootstrap import model_error
+from davinci_forces.maths.uncertainty.bootstrap import error_of_pooled_mean, model_error
 from davinci_forces.records import Motion, Prediction
 
 MAX_FOLDS = 20  # this number of refits is enough for out-of-sample errors, whatever the amount of data
@@ -88,6 +88,8 @@ class Scorer:
             r2_ceiling=1.0 - noise**2 / self.variance,
             model_error=beyond_noise,
             model_error_std=beyond_noise_std,
+            mean_error=float(np.mean(slow)),
+            mean_error_std=error_of_pooled_mean(slow),
             effort_rms=float(np.sqrt(np.mean(self.smooth**2))),
             relative_error=relative(slow, self.smooth),
             relative_error_1111=relative(slow[:SAMPLES_RIVAL], self.smooth[:SAMPLES_RIVAL]),

@@ -31,6 +31,8 @@ class Prediction(LogJointRecord):
     r2_ceiling: float
     model_error: float
     model_error_std: float
+    mean_error: float
+    mean_error_std: float
     effort_rms: float
     relative_error: float
     relative_error_1111: float
@@ -48,7 +50,7 @@ class Prediction(LogJointRecord):
         """The scores."""
         scores = ("rmse", "nrmse", "r2", "fit_percent", "r2_ceiling", "effort_rms")
         yield from self.publish(self.prefix, *scores, "relative_error", "relative_error_1111")
-        yield from self.publish(self.prefix, "model_error", with_std=True)
+        yield from self.publish(self.prefix, "model_error", "mean_error", with_std=True)
 
 
 @dataclass(frozen=True, eq=False)

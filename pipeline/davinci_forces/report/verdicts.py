@@ -13,6 +13,7 @@ from davinci_forces.report.content import Cell, Level
 GOOD, CAUTION = 0.10, 0.25  # model error over the root mean square of the measured effort
 DETECTED, DETECTABLE = 1 / 3, 1.0  # detection level over the effort that the user wants to see
 PRECISE, ROUGH = 0.10, 0.25  # standard error of a stiffness or a mass over its value
+CONSTANT = 0.5  # share of a model error's square above which its mean is named
 MIN_COUNTED = 0.5  # share of the pushes in contact that a stiffness is the median of; it is not that of a minority
 MIN_NEW_PATH = (
     0.0975  # share of a path's variance that no fitted path explains; the stage `predict` uses the same limit
@@ -193,6 +194,11 @@ def grade(share: float, good: float, caution: float) -> Level:
     if math.isnan(share):
         return "warn"
     return "good" if share <= good else "warn" if share <= caution else "bad"
+
+
+def is_mostly_constant(p: Prediction) -> bool:
+    """Whether most of a model's squared error is that of its mean, beyond four standard errors of the mean."""
+    return p.mean_error**2 > CONSTANT * p.model_error**2 and abs(p.mean_error) > 4.0 * p.mean_error_std
 
 
 def band(coverage: float) -> Level:

@@ -140,7 +140,7 @@ def coverage_by_speed(tau_ext: Array, std: Array, dq: Array) -> tuple[Array, Arr
 def error_of_coverage(inside: Array, n: float) -> float:
     """Standard error of the share of samples (N,) inside a band, which stand for n uncorrelated ones.
 
-    By block bootstrap, but at least that of n draws with two more inside and two more outside, since blocks without a
+    By block bootstrap, but at least that of n draws with two more inside and two more outside.  For blocks without a
     sample outside do not show that none will be.  Agresti and Coull, The American Statistician 52 (1998).
     """
     share = (n * float(inside.mean()) + 2.0) / (n + 4.0)

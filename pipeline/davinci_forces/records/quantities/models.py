@@ -169,6 +169,8 @@ MODELS = {
     "r2_ceiling": Quantity("R2 of a model without error, given the noise of the effort"),
     "model_error": Quantity("root mean square of the model's low-passed error, without noise", "{effort}"),
     "model_error_std": Quantity("standard error of the model's error", "{effort}"),
+    "mean_error": Quantity("mean of the measured minus the predicted effort, as of another payload", "{effort}"),
+    "mean_error_std": Quantity("standard error of that mean", "{effort}"),
     "effort_rms": Quantity("root mean square of the effort after the low-pass filter", "{effort}"),
     "relative_error": Quantity("norm of the error over the norm of the effort, after the same low-pass filter"),
     "relative_error_1111": Quantity("relative error over the first 1111 samples"),

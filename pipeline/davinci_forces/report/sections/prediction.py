@@ -32,18 +32,18 @@ def blocks(context: Context, predictions: list[Prediction]) -> Iterator[Block]:
         "only, each of its periods is left out in turn. On the fitted path the model's error repeats, so scores there "
         "are too good. $R^2$ refers to the raw effort; noise alone keeps it below its ceiling "
         '$1 - sigma^2 \\/ "var"(tau)$. The model error is the root mean square of measured minus predicted effort, '
-        "after the noise variance is subtracted. Samples of identification logs at which the joint stands still are "
-        "left out, as friction can then take any value; of other logs, all samples are tested."
+        "after the noise variance is subtracted; its mean is the constant part, as from another payload. Samples at "
+        "which the joint stands still are left out, as friction can then take any value."
     )
     used = [p for p in predictions if f"{p.model}.{p.estimator}" in context.predicting_fits(p.joint)]
-    header = ("Log", "Joint", "Left out", "New path", "Model error", "Error/effort", "$R^2$", "Ceiling")
+    header = ("Log", "Joint", "Left out", "New path", "Model error", "Mean", "Error/effort", "$R^2$", "Ceiling")
     caption = (
         "Prediction of unseen effort by the fit that the filter uses, one row a run: data left out of the fit; share "
-        "of the run's path (the variance of its position) that no fitted path explains; model error; and its ratio to "
-        "the root mean square of the effort."
+        "of the run's path (the variance of its position) that no fitted path explains; model error; its mean; and the "
+        "model error over the root mean square of the effort."
     )
     yield from paper_or_screen(
-        Table(caption, header, tuple(row(context, p) for p in used), "prediction-table", "llllrrrr")
+        Table(caption, header, tuple(row(context, p) for p in used), "prediction-table", "llllrrrrr")
     )
     yield from estimators(context, predictions)
     yield OnScreen("Every score of every fit in every run", "all-scores", (every_score(context, predictions),))
@@ -66,8 +66,8 @@ def row(context: Context, p: Prediction) -> tuple[Cell, ...]:
     how = LEFT_OUT.get(p.scheme, p.scheme.removeprefix("leave ").removesuffix(" out"))
     key = f"path.{p.log}.{p.joint}.path_new"
     new = percent(context.results[key].value) if is_out_of_log(p) and key in context.results else p.path.split()[0]
-    error, r2, ceiling = context.numbers(p.prefix, ("model_error", "r2", "r2_ceiling"), 2)
-    return literal(p.log), title(p.joint), how, new, error, share, r2, ceiling
+    error, mean, r2, ceiling = context.numbers(p.prefix, ("model_error", "mean_error", "r2", "r2_ceiling"), 2)
+    return literal(p.log), title(p.joint), how, new, error, mean, share, r2, ceiling
 
 
 def every_score(context: Context, predictions: list[Prediction]) -> Table:

@@ -32,6 +32,7 @@ from davinci_forces.report.verdicts import (
     Trust,
     band_in_words,
     decisive,
+    is_mostly_constant,
     percent,
 )
 
@@ -259,9 +260,18 @@ def looks_at_model(context: Context, trusted: Trust) -> Iterator[tuple[float, st
     p, name, see_runs = trusted.prediction, title(trusted.joint), see(context, Prediction, "prediction")
     if p is not None and trusted.share > GOOD:
         error = context.results[f"{p.prefix}.model_error"].number(2)
-        text = f"the model error is {error}, {percent(trusted.share)} of the effort."
+        text = f"the model error is {error}, {percent(trusted.share)} of the effort{constant_part(context, p)}."
         by_level = " The verdict follows from the detection level." if trusted.level == "good" else ""
         yield trusted.share / GOOD, f"**{name}, {literal(p.log)}**: {text}{by_level}{see_runs}"
+
+
+def constant_part(context: Context, p: Prediction) -> str:
+    """Name the constant part of a model error where it is most of it, and the error without it."""
+    if not is_mostly_constant(p):
+        return ""
+    mean = context.results[f"{p.prefix}.mean_error"].number(2)
+    left = context.size(p, "model_error", max(p.model_error**2 - p.mean_error**2, 0.0) ** 0.5, 2)
+    return f"; {left} without its constant part, {mean}, as of another payload"
 
 
 def looks_at_band(context: Context, trusted: Trust) -> Iterator[tuple[float, str]]:
