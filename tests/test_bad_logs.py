@@ -65,7 +65,7 @@ def call_any(name, folder) -> str:
     ("change", "says"),
     [
         (lambda lines: cell(lines, 40, 2, "broken"), "bad.csv"),
-        (lambda lines: cell(lines, 40, 2, "nan"), "channel 'hand_roll.dq' holds nan at row 39 (counted from 0)"),
+        (lambda lines: cell(lines, 40, 2, "inf"), "channel 'hand_roll.dq' holds inf at row 39 (counted from 0)"),
         (
             lambda lines: cell(lines, 40, 0, "0.5"),
             "time does not increase at row 39 (counted from 0): 0.76 s, then 0.5 s",
@@ -83,7 +83,7 @@ def call_any(name, folder) -> str:
         ),
     ],
     ids=[
-        "text", "nan", "time goes back", "time stands still", "header only", "one row", "no channel",
+        "text", "infinite", "time goes back", "time stands still", "header only", "one row", "no channel",
         "constant",
     ],
 )  # fmt: skip
@@ -100,7 +100,7 @@ def test_a_log_of_one_period_is_not_averaged_which_is_remarked_on(lab):
 
 
 def test_what_is_kept_of_an_error_knows_no_folder_of_this_machine(lab, tmp_path):
-    edit(lab, lambda lines: cell(lines, 40, 2, "nan"))
+    edit(lab, lambda lines: cell(lines, 40, 2, "inf"))
     run(lab)
     kept = contents(tmp_path / "processed")
     assert any(b"bad.csv: channel" in content for content in kept.values())

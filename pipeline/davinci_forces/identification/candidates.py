@@ -241,7 +241,7 @@ def reach_of(logs: Sequence[Observed], joint: str) -> Reach:
     ranges, squares, count = [0.0], 0.0, 0
     for log in logs:
         i = log.joints.index(joint)
-        q, dq = (x[:, i][log.records[i].standing == 0] for x in (log.motions[i].q, log.motions[i].dq))
+        q, dq = (x[:, i][log.records[i].evaluated] for x in (log.motions[i].q, log.motions[i].dq))
         low, high = np.percentile(q, [1.0, 99.0])
         ranges.append(float(high - low))
         squares += float(dq @ dq)

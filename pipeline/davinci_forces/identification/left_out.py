@@ -41,7 +41,7 @@ def without_the_log(
 ) -> Iterator[Prediction]:
     """Predict a log from fits to other identification logs."""
     part = motion if average is None else select_samples(motion, whole_periods(motion.t, average))
-    scorer = Scorer(part, part.standing == 0, lowpass, average.sigma_tau_white if average else None)
+    scorer = Scorer(part, part.evaluated, lowpass, average.sigma_tau_white if average else None)
     along = recorded_motion(part)
     for fit in cross_fits:
         left_out = [str(names).split(", ") for names in fit.left_out]
@@ -60,7 +60,7 @@ def without_a_period(
     part = select_samples(motion, whole_periods(motion.t, average))
     runs, others = without_folds(part, average, model, prior)
     Phi = model.regressor(recorded_motion(part)).Phi[:, 0]
-    scorer = Scorer(part, part.standing == 0, lowpass, average.sigma_tau_white)
+    scorer = Scorer(part, part.evaluated, lowpass, average.sigma_tau_white)
     for name in ESTIMATORS:
         try:
             thetas = [estimator(name)(regression).theta for regression in others]
@@ -76,11 +76,13 @@ def without_folds(
     part: Motion, average: Trajectory, model: IndependentJoint, prior: Prior
 ) -> tuple[list[slice], list[Regression]]:
     """Return the samples of each fold of a log's whole periods, and the least squares problem of the other folds."""
-    fold = fold_of(part.t, average)
+    fold, measured = fold_of(part.t, average), part.filled == 0
     problem, moving = pose(model, [average], prior), ~stands_still(average)
     others = [
         replace(problem, tau=effort.mean, tau_var=effort.var, periods=np.where(moving, effort.counts, 0))
-        for effort in averaging.left_out(part.t, part.tau, average.period, len(average.t), fold)
+        for effort in averaging.left_out(
+            part.t[measured], part.tau[measured], average.period, len(average.t), fold[measured]
+        )
     ]
     ends = np.searchsorted(fold, np.arange(len(others) + 1)).tolist()
     return [slice(start, end) for start, end in pairwise(ends)], others
@@ -98,7 +100,7 @@ def without_a_segment(
     """Predict each sixth of a log that does not repeat from fits to the other five."""
     log = observe([motion], (), lowpass, 0)
     Phi = model.regressor(log.motions[0]).Phi[:, 0]
-    scorer = Scorer(motion, motion.standing == 0, lowpass)
+    scorer = Scorer(motion, motion.evaluated, lowpass)
     for name in ESTIMATORS:
         tau_hat = np.empty(len(motion))
         try:

@@ -145,12 +145,12 @@ def observe(records: Sequence[Motion], averages: Iterable[Average], lowpass: flo
 
 
 def is_still(record: Motion) -> Booleans:
-    """Whether a joint stands still at each sample (N,)."""
-    return np.asarray(record.standing > 0) | bool(record.at_rest)
+    """Whether a joint stands still at each sample (N,), or the sample is only filled in: its effort is not used."""
+    return ~record.evaluated | bool(record.at_rest)
 
 
 def smooth_effort(record: Motion, cutoff: float) -> Array:
-    """Low-pass the effort (N,) of a joint at `cutoff` [Hz]; NaN while the joint stands still."""
+    """Low-pass the effort (N,) of a joint at `cutoff` [Hz]; NaN where it is not used."""
     return np.where(is_still(record), np.nan, lowpass_segments(record.tau, record.segment, record.rate, cutoff))
 
 

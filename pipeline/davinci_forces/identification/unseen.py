@@ -82,7 +82,7 @@ def predict_scheme(
     for m, effort in enumerate(refits.model.efforts):
         i = log.joints.index(effort)
         record = select_samples(log.records[i], is_predicted)
-        moves = record.standing == 0
+        moves = record.evaluated
         if not record.at_rest and moves.any():
             tau_hat = predicted[log.processing[i]][:, m]
             scorer = Scorer(record, moves, log.lowpass, log.white.get(effort))

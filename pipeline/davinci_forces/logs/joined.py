@@ -2,8 +2,8 @@
 
 Channels are interpolated by cubics, never across a gap.  The error on a motion is proportional to the fourth power of
 the sampling time; for straight lines, to its second power.  Cubics leave 64 to 100 % of the variance of white noise,
-straight lines 50 to 100 %.  A channel sampled at least twice as fast as the clock is first averaged over the clock's
-sampling time, so that noise above the clock's Nyquist frequency is not aliased.
+straight lines 50 to 100 %.  A channel sampled at least twice as fast as the clock is first low-passed without delay, so
+that noise above the clock's Nyquist frequency is not aliased.  Clocks whose stamps agree within jitter are one clock.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -16,10 +16,25 @@ from davinci_forces.errors import BadLog
 from davinci_forces.logs import open_log
 from davinci_forces.logs.log import UNIT_OF_COUNTS, Block, Channel, Log, Options, unique
 from davinci_forces.logs.parts import ABSOLUTE, SAMPLED_KINDS, require_different, starts_of
+from davinci_forces.logs.timeline import SKEW
 from davinci_forces.maths.arrays import Array, Booleans
-from davinci_forces.maths.signals.clock import GAP, ClockStatistics, cubic, means
+from davinci_forces.maths.signals.clock import (
+    MAX_PERIOD_RATIO,
+    ClockStatistics,
+    are_gaps,
+    are_missing,
+    bridged,
+    cubic,
+    distances,
+    flat_lowpass,
+    half_width,
+)
 
-MAX_PERIOD_RATIO = 10.0  # sampling time of a channel over the clock's; beyond it, the channel is not interpolated
+FILLED_IN = "\n"  # name in a block of the flags of rows in which a missing sample was filled in: 1, else 0
+MIN_FLAG = 0.25  # an interpolated flag from which on a row is taken as filled in
+MIN_RATIO_FILTERED = 1.9  # of the sampling rate of a channel to the clock's, above which it is low-passed
+MIN_STAMPS_AGREEING = 10  # of two clocks, to compare them
+MIN_SHARE_AGREEING = 0.95  # of stamps that agree with those of another clock, if both are one clock
 
 
 def open_joined(files: Sequence[Path], options: Options) -> Log:
@@ -124,6 +139,7 @@ class Joined(Log):
 
 
 TimedBlock = tuple[Array, Block]  # times (N,) [s], and samples (N,) by the names of their channels
+TimedSamples = tuple[Array, Array]  # times (N,) [s], and samples (N, C)
 Refuse = Callable[[str], BadLog]
 
 
@@ -139,7 +155,7 @@ class Alignment:
     @property
     def clocks_differ(self) -> bool:
         """Whether the clocks differed, so that rows were dropped, interpolated or averaged."""
-        return bool(self.left_out) or any(f.interpolated or f.many > 1 for f in self.others.values())
+        return bool(self.left_out) or any(f.interpolated or f.ratio > 1.0 for f in self.others.values())
 
 
 def align(
@@ -162,11 +178,13 @@ def align(
         if not done.others:
             done.period = _period(t)
             done.others |= {name: Follower(name, source, done.period, refuse) for name, source in others.items()}
-        keep = np.ones(len(t), dtype=bool)
+        keep, flags = np.ones(len(t), dtype=bool), block.pop(FILLED_IN, np.zeros(len(t)))
         for follower in done.others.values():
-            samples, present = follower.samples_at(t)
+            samples, present, filled = follower.samples_at(t)
             keep &= present
+            flags = np.maximum(flags, filled)
             block = block | samples
+        block = block | {FILLED_IN: flags}
         done.kept += int(np.count_nonzero(keep))
         done.left_out += int(np.count_nonzero(~keep))
         yield t[keep], {name: values[keep] for name, values in block.items()}
@@ -217,9 +235,9 @@ class Follower:
         self.source, self.rising = source, _Rising(name, refuse)
         self.names: list[str] = []
         self.interpolated = 0  # interpolated rows
-        self.many, self.ended = 1, False  # number of samples that are averaged into one
+        self.ended = False
         self.t, self.x = np.empty(0), np.empty((0, 0))
-        self.waiting = self.t, self.x  # too few to be averaged yet
+        self.waiting = self.t, self.x, 0  # samples of the low-pass, and how many of them are done
         following = self._next()
         self.period = _period(following[0]) if following else 0.0  # [s] median sampling time
         if self.period > MAX_PERIOD_RATIO * period:
@@ -227,20 +245,27 @@ class Follower:
                 f"{name} is sampled every {self.period:.4g} s, more than {MAX_PERIOD_RATIO:g} times as slow as the "
                 f"positions (every {period:.4g} s): too slow to interpolate; record it faster, or leave it out"
             )
-        self.many = max(1, int(period / self.period + 0.1)) if self.period else 1
-        self.gap = GAP * self.period
+        ratio = period / self.period if self.period else 1.0
+        self.ratio = ratio if ratio > MIN_RATIO_FILTERED else 1.0  # of sampling rates, if the faster is low-passed
+        self.within = np.nan  # [s] distance of stamps that are the same; unknown before the first
         self._take(following)
 
-    def samples_at(self, t: Array) -> tuple[Block, Booleans]:
-        """Interpolate at times (N,), which increase from call to call; also returns where samples exist."""
+    def samples_at(self, t: Array) -> tuple[Block, Booleans, Array]:
+        """Interpolate at times (N,), which increase from call to call; also returns where samples exist and flags."""
         while not self.ended and not (len(self.t) > 1 and self.t[-2] > t[-1]):
             self._take(self._next())
-        x, exact, between = cubic(self.t, self.x, self.gap * self.many, t)
+        if np.isnan(self.within) and len(self.t):
+            apart = distances(self.t, t[(t >= self.t[0]) & (t <= self.t[-1])]) > SKEW * self.period
+            agree = len(apart) >= MIN_STAMPS_AGREEING and 1.0 - apart.mean() >= MIN_SHARE_AGREEING
+            self.within = SKEW * self.period if agree else 0.0
+        x, exact, between = cubic(self.t, self.x, bridged(self.period), t, self.within)
         self.interpolated += int(np.count_nonzero(between))
+        filled = between & are_missing(self.t, t, self.period)
         last = int(np.searchsorted(self.t, t[-1], side="right")) - 1
         begin = max(last - 1, 0)  # the slope at the last sample needs the sample before it
         self.t, self.x = self.t[begin:], self.x[begin:]
-        return dict(zip(self.names, x.T, strict=True)), exact | between
+        samples = dict(zip(self.names, x.T, strict=True))
+        return samples, exact | between, np.maximum(filled, samples.pop(FILLED_IN, filled) > MIN_FLAG)
 
     def _next(self) -> TimedBlock | None:
         following = next((timed for timed in self.source if len(timed[0])), None)
@@ -250,14 +275,22 @@ class Follower:
         return following
 
     def _take(self, timed: TimedBlock | None) -> None:
-        """Append samples to those kept."""
-        if timed is None:
-            return
-        self.names = list(timed[1])
-        t, x = timed[0], np.column_stack(list(timed[1].values()))
-        if self.many > 1:
-            t, x = np.concatenate((self.waiting[0], t)), np.concatenate((self.waiting[1].reshape(-1, x.shape[1]), x))
-            mean_t, mean, remaining = means(t, x, self.many, self.gap)
-            self.waiting = t[len(t) - remaining :], x[len(x) - remaining :]
-            t, x = mean_t, mean
+        """Append samples to those kept, low-passed if there are too many of them."""
+        if timed is not None:
+            self.names = list(timed[1])
+        t, x = (timed[0], np.column_stack(list(timed[1].values()))) if timed else (self.t[:0], self.x[:0])
+        if self.ratio > 1.0:
+            t, x = self._lowpassed(t, x)
         self.t, self.x = np.concatenate((self.t, t)), np.concatenate((self.x.reshape(-1, x.shape[1]), x))
+
+    def _lowpassed(self, t: Array, x: Array) -> TimedSamples:
+        """Low-pass the samples that wait and are followed by enough others, or by the end, between gaps."""
+        before_t, before_x, done = self.waiting
+        t, x = np.concatenate((before_t, t)), np.concatenate((before_x.reshape(-1, x.shape[1]), x))
+        reach = half_width(self.ratio)
+        ready = len(t) if self.ended else max(len(t) - reach, done)
+        starts = np.flatnonzero(are_gaps(t, self.period)) + 1
+        smooth = np.concatenate([x[:0], *(flat_lowpass(part, self.ratio) for part in np.split(x, starts) if len(part))])
+        begin = max(ready - reach, 0)
+        self.waiting = t[begin:], x[begin:], ready - begin
+        return t[done:ready], smooth[done:ready]

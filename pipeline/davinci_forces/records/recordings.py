@@ -1,8 +1,11 @@
 """Records of measurements: as read, on a uniform clock, and averaged over periods."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+import numpy as np
+
+from davinci_forces.maths.arrays import Booleans
 from davinci_forces.records.record import Column, Counts, Labels, LogJointRecord, LogRecord, Names, Published
 
 
@@ -58,8 +61,24 @@ class Touch(LogRecord):
     z: Column
 
 
+def none_filled() -> Counts:
+    """Return the default flags of a `SampledRecord`: no sample is filled in."""
+    return np.zeros(0, np.int64)
+
+
+class SampledRecord(LogJointRecord):
+    """A record of samples, some of which may be `filled` in where they were missing."""
+
+    filled: Counts
+
+    def __post_init__(self) -> None:
+        if not np.any(self.filled):
+            object.__setattr__(self, "filled", np.zeros(len(self.t), np.int64))  # type: ignore[attr-defined]
+        super().__post_init__()
+
+
 @dataclass(frozen=True, eq=False)
-class Recording(LogJointRecord):
+class Recording(SampledRecord):
     """One joint during one log, as recorded: on the log's clock, in joint units."""
 
     role: str
@@ -69,10 +88,11 @@ class Recording(LogJointRecord):
     q: Column
     dq: Column
     tau: Column
+    filled: Counts = field(default_factory=none_filled)
 
 
 @dataclass(frozen=True, eq=False)
-class Signal(LogJointRecord):
+class Signal(SampledRecord):
     """One joint during one log on a uniform clock, with its velocity; a gap starts a new segment."""
 
     role: str
@@ -86,14 +106,16 @@ class Signal(LogJointRecord):
     dq: Column
     tau: Column
     segment: Counts
+    filled: Counts = field(default_factory=none_filled)
 
 
 @dataclass(frozen=True, eq=False)
-class Motion(LogJointRecord):
+class Motion(SampledRecord):
     """The motion of one joint during one log after a low-pass filter without delay, and the measured motion.
 
     The noise is what the filter removes.  The velocity `dq` is 0 where its sign is not known.  Where the joint stands
     still, friction takes any value up to its static level, so that the effort is neither fitted nor judged there.
+    Samples that are filled in are not used either.
     """
 
     role: str
@@ -114,6 +136,12 @@ class Motion(LogJointRecord):
     tau: Column
     segment: Counts
     standing: Counts
+    filled: Counts = field(default_factory=none_filled)
+
+    @property
+    def evaluated(self) -> Booleans:
+        """Whether each sample (N,) is fitted and judged: the joint moves, and the sample was measured."""
+        return np.asarray((self.standing == 0) & (self.filled == 0))
 
 
 @dataclass(frozen=True, eq=False)

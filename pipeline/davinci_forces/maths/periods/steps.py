@@ -8,22 +8,56 @@ from davinci_forces.maths.signals.clock import GAP
 REACH = 10  # samples on either side of a step that show whether the motion continues
 POLYNOMIAL_ORDER = 4  # a polynomial of this order is fitted to the motion over these samples
 BREAK_PROBABILITY = 1e-3  # probability that noise makes a continuous motion look broken
+MAX_RATE_CHANGE = 0.1  # of the mean interval before a step to that after it
+MAX_PAUSE = 86400.0  # [s] a recorder that waits for the motion to repeat does not wait longer
+SAME_PLACE = 0.6  # of the largest travel between samples; half a sample's travel, and noise
 MIN_TRAVEL = 10.0  # a motion over the time of a gap is evidence from this many standard errors on
 
 
 def steps(t: Array, x: Array) -> list[tuple[int, float]]:
     """Find the first sample after each step of a clock, and the jump beyond one sampling time [s].
 
-    `t` (N,) [s] increases; `x` (J, N) are positions.  A gap is a step of the clock if the motion of no joint jumps
-    there.  But a joint must move so fast that it would jump if the time had passed.  Gaps with fewer than `REACH`
-    samples on either side are left as they are.
+    `t` (N,) [s]; `x` (J, N) are positions.  An interval is a step of the clock if it stands alone between stretches of
+    one sampling time, and the motion of no joint jumps there.  But a joint must move so fast that it would jump if the
+    time had passed.  Intervals with fewer than `REACH` samples on either side are left as they are, and so is a time
+    after which the motion would be the same because it repeats.
     """
     intervals = np.diff(t)
     T_s = float(np.median(intervals)) if len(intervals) else 0.0
-    gaps = (np.flatnonzero(intervals > GAP * T_s) + 1).tolist()
-    windows = [(i, x[:, i - REACH : i + REACH]) for i in gaps if REACH <= i <= len(t) - REACH]
-    jumps = [(i, part, float(intervals[i - 1]) - T_s) for i, part in windows]
-    return [(i, jump) for i, part, jump in jumps if is_continuous(part, jump / T_s)]
+    odd = (np.flatnonzero((intervals > GAP * T_s) | (intervals <= 0.0)) + 1).tolist()
+    alone = [i for i in odd if REACH <= i <= len(t) - REACH and stands_alone(intervals[i - REACH : i + REACH - 1])]
+    jumps = [(i, float(intervals[i - 1]) - float(np.median(intervals[i - REACH : i + REACH - 1]))) for i in alone]
+    return [
+        (i, jump)
+        for i, jump in jumps
+        if is_continuous(x[:, i - REACH : i + REACH], abs(jump) / T_s) and not may_have_repeated(t, x, i, jump)
+    ]
+
+
+def stands_alone(intervals: Array) -> bool:
+    """Whether all intervals (2 `REACH` - 1,) between samples but the middle one are usual ones, alike on both sides."""
+    before, after = intervals[: REACH - 1], intervals[REACH:]
+    usual = float(np.median(np.concatenate([before, after])))
+    alike = abs(float(before.mean()) - float(after.mean())) <= MAX_RATE_CHANGE * usual
+    return alike and bool(max(before.max(), after.max()) < GAP * usual and min(before.min(), after.min()) > 0.0)
+
+
+def may_have_repeated(t: Array, x: Array, i: int, jump: float) -> bool:
+    """Whether a motion (J, N) that repeats explains that it continues at sample `i`, although the time has passed.
+
+    The motion repeats after each lag at which all joints were within `SAME_PLACE` of a sample's travel of where they are
+    before `i`.  The jump is then a multiple of the lag, to half a sample for each.
+    """
+    if not 0.0 < jump < MAX_PAUSE:
+        return False
+    recent = x[:, i - REACH : i]
+    travel = SAME_PLACE * np.abs(np.diff(recent, axis=1)).max(axis=1)
+    earlier = np.lib.stride_tricks.sliding_window_view(x[:, : i - REACH], REACH, axis=1)
+    distance = np.abs(earlier - recent[:, None]).max(axis=2)
+    lags = t[i - REACH] - t[np.flatnonzero(np.all(distance <= travel[:, None], axis=0))]
+    T_s = float(np.median(np.diff(t[i - REACH : i])))
+    many = np.maximum(np.rint(jump / lags), 1.0)
+    return bool(np.any(np.abs(jump - many * lags) <= (1.0 + many) * T_s / 2))
 
 
 def is_continuous(x: Array, lost: float) -> bool:

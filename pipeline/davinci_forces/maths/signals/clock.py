@@ -1,14 +1,26 @@
-"""Statistics of a log's clock, computed block by block, and interpolation between its samples."""
+"""Statistics of a log's clock, computed block by block, and interpolation between its samples.
+
+`cubic` fills up to `FILLED` of missing samples, so that filters pass, and never bridges a longer gap.
+"""
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache
 
 import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans, Integers
+from davinci_forces.maths.signals.windows import runs
 
-GAP = 2.5  # sampling times: a longer interval between two samples is an interruption
+GAP = 2.5  # sampling times: a longer interval is an interruption, unless at most `FILLED` is missing
+MISSING = 1.5  # sampling times: a longer interval lacks a sample
+FILLED = 0.02  # [s] longest time without samples that is interpolated: a third of a period at the usual low-pass, 17 Hz
+ALIKE = 0.25  # of an interval: largest difference to the next one in an even stretch
+MIN_INTERVALS_EVEN = 10  # an even stretch at another rate has at least so many intervals
+MAX_PERIOD_RATIO = 10.0  # a sampling time over the usual one; slower samples are not interpolated
+MIN_SHARE_RHYTHM = 0.9  # of the times without samples, in a column that is sampled in a rhythm of its own
+ROUNDING = 1e-6  # relative, of times
 
 
 @dataclass
@@ -76,21 +88,24 @@ class ClockStatistics:
         return std if std > 1e-9 * abs(self._mean) else 0.0
 
 
-def cubic(t: Array, x: Array, gap: float, at: Array) -> tuple[Array, Booleans, Booleans]:
+def cubic(t: Array, x: Array, gap: float, at: Array, within: float = 0.0) -> tuple[Array, Booleans, Booleans]:
     """Interpolate signals `x` (N, C), sampled at times `t` (N,), at the times `at` (K,).
 
-    Returns the values, a mask of the times of samples, and a mask of the times between two samples at most `gap` [s]
-    apart.  Between two samples the values follow the cubic through both.  Its slope at a sample is that of the parabola
-    through the sample and its neighbours.  Values at all other times have no meaning.  (Catmull and Rom 1974)
+    Returns the values, a mask of the times `within` [s] of a sample, and one of the times between two samples at most
+    `gap` [s] apart.  Between two samples the values follow the cubic through both.  Its slope at a sample is that of
+    the parabola through the sample and its neighbours.  Values at all other times have no meaning.  (Catmull and Rom
+    1974)
     """
     before: Integers = np.searchsorted(t, at, side="right") - 1
     if not len(t):
         return np.full((len(at), x.shape[1]), np.nan), before >= 0, before >= 0
-    exact = (before >= 0) & (t[np.maximum(before, 0)] == at)
+    left, right = np.maximum(before, 0), np.minimum(before + 1, len(t) - 1)
+    nearest = np.where(np.abs(at - t[left]) <= np.abs(t[right] - at), left, right)
+    exact = np.abs(t[nearest] - at) <= within
     h = np.diff(t)
     inside = (before >= 0) & (before < len(h)) & ~exact
     inside[inside] = h[before[inside]] <= gap
-    values = x[np.maximum(before, 0)]
+    values = x[nearest]
     if inside.any():
         i = before[inside]
         m, step = _slopes(x, h, gap), h[i][:, None]
@@ -118,13 +133,85 @@ def _slopes(x: Array, h: Array, gap: float) -> Array:
     return np.asarray((weight[:, :, None] * all_chords).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-300)[:, None])
 
 
-def means(t: Array, x: Array, many: int, gap: float) -> tuple[Array, Array, int]:
-    """Average every `many` consecutive times (N,) and samples (N, C) into one, none across a gap.
+def bridged(T_s: float) -> float:
+    """The longest interval [s] between samples that is interpolated, for a sampling time of `T_s` [s].
 
-    Also returns the number of samples at the end that are too few for a mean.
+    Up to `FILLED` may be missing; of slower clocks, one sample.
     """
-    cuts = np.flatnonzero(np.diff(t) > gap) + 1
-    begins, ends = np.array([0, *cuts]), np.array([*cuts, len(t)])
-    whole = np.concatenate([np.arange(b, e - many + 1, many) for b, e in zip(begins, ends, strict=True)])
-    indices = whole[:, None] + np.arange(many)
-    return t[indices].mean(axis=1), x[indices].mean(axis=1), int((ends[-1] - begins[-1]) % many)
+    return max(GAP * T_s, T_s + FILLED) * (1.0 + ROUNDING)
+
+
+def are_gaps(t: Array, T_s: float) -> Booleans:
+    """Whether each interval (N-1,) between samples at times (N,) is a gap, for a usual sampling time of `T_s` [s].
+
+    Even sampling at another rate has no gaps.
+    """
+    h = np.diff(t)
+    even = np.zeros(len(h), np.bool_)
+    for run in runs(np.abs(np.diff(h)) <= ALIKE * h[:-1]):
+        even[run.start : run.stop + 1] = run.stop + 1 - run.start >= MIN_INTERVALS_EVEN
+    return np.asarray((h > bridged(T_s)) & ~(even & (h <= MAX_PERIOD_RATIO * T_s)))
+
+
+def distances(t: Array, at: Array) -> Array:
+    """Time [s] from each time `at` (K,) to the nearest sample; the samples are at times `t` (N,)."""
+    after = np.searchsorted(t, at)
+    return np.asarray(
+        np.minimum(np.abs(at - t[np.maximum(after - 1, 0)]), np.abs(t[np.minimum(after, len(t) - 1)] - at))
+    )
+
+
+def are_missing(t: Array, at: Array, T_s: float) -> Booleans:
+    """Whether a sample is missing at each time `at` (K,), to which no sample at times `t` (N,) is near."""
+    return np.asarray(distances(t, at) > MISSING / 2 * (1.0 + ROUNDING) * T_s)
+
+
+def fill(t: Array, x: Array, T_s: float) -> Array:
+    """Fill the missing samples, NaN, of a signal (N,) at times (N,) that the neighbours are near enough to interpolate.
+
+    The samples of longer gaps, and before the first and after the last sample, stay NaN.
+    """
+    missing = np.isnan(x)
+    values, _, inside = cubic(t[~missing], x[~missing, None], bridged(T_s), t[missing])
+    filled = x.copy()
+    filled[missing] = np.where(inside, values[:, 0], np.nan)
+    return filled
+
+
+def is_slower(t: Array, missing: Booleans) -> bool:
+    """Whether the samples that are not missing (N,) follow in a rhythm of their own, so that none is missing.
+
+    Almost none of the times without samples is longer than the rhythm, as in a table of several topics.
+    """
+    samples = np.flatnonzero(~missing)
+    if len(samples) <= MIN_INTERVALS_EVEN:
+        return False
+    h, empty = np.diff(t[samples]), np.diff(samples) > 1
+    in_rhythm = h[empty] <= MISSING * np.median(h)
+    return int(empty.sum()) >= MIN_INTERVALS_EVEN and float(in_rhythm.mean()) >= MIN_SHARE_RHYTHM
+
+
+def flat_lowpass(x: Array, ratio: float) -> Array:
+    """Low-pass evenly sampled columns (N, C) without delay, for a clock that is `ratio` times as slow.
+
+    A Kaiser window of 60 dB: it passes 0.4 of the slower rate unchanged and nothing from 0.6 of it on, so that noise is
+    not aliased onto what is passed.  The columns go on beyond their ends by reflection in the end samples.
+    """
+    from scipy.signal import fftconvolve
+
+    h = half_width(ratio)
+    padded = np.pad(x, ((h, h), (0, 0)), mode="reflect", reflect_type="odd")
+    return np.asarray(fftconvolve(padded, taps(ratio)[:, None], mode="valid", axes=0))
+
+
+def half_width(ratio: float) -> int:
+    """Number of samples on either side that `flat_lowpass` weighs."""
+    return math.ceil(9.1 * ratio)  # (60 - 7.95) / (2.285 * 2 pi 0.2) / 2 clock samples (Kaiser 1974)
+
+
+@cache
+def taps(ratio: float) -> Array:
+    """Weights (2 h + 1,) of `flat_lowpass`; their sum is 1."""
+    from scipy.signal import firwin
+
+    return np.asarray(firwin(2 * half_width(ratio) + 1, 1.0 / ratio, window=("kaiser", 5.653)))

@@ -23,19 +23,25 @@ def is_past_transient(t: Array) -> Booleans:
     return t - t[0] >= TRANSIENT if t[-1] - t[0] > 5 * TRANSIENT else np.ones(len(t), dtype=bool)
 
 
-def free_space(t: Array, windows: Sequence[tuple[float, float]], rate: float, before: float = 0.0) -> Booleans:
+def free_space(
+    t: Array, windows: Sequence[tuple[float, float]], rate: float, unscored: Integers | None = None, before: float = 0.0
+) -> Booleans:
     """Whether nothing touches the robot at each time (N,) and the filter's transient is over; `rate` [Hz].
 
-    There is a transient at the start, after each gap and after each window, and `before` [s] each window.
+    There is a transient at the start, after each gap and after each window, and `before` [s] each window.  Samples at
+    which no model is scored (N,) are left out, the stretches of 1 as windows, those of 2 alone.
     """
-    widened = [(start - before, end + TRANSIENT) for start, end in windows]
+    unscored = np.zeros(len(t), np.int64) if unscored is None else unscored
+    widened = [(start - before, end + TRANSIENT) for start, end in (*windows, *spans(t, unscored == 1))]
     steady = np.concatenate([is_past_transient(t[part]) for part in unbroken(t, 1.5 / rate)])
-    return np.asarray(is_outside(t, widened) & steady)
+    return np.asarray(is_outside(t, widened) & steady & (unscored == 0))
 
 
-def free_smoothed(t: Array, windows: Sequence[tuple[float, float]], rate: float) -> Booleans:
+def free_smoothed(
+    t: Array, windows: Sequence[tuple[float, float]], rate: float, unscored: Integers | None = None
+) -> Booleans:
     """Free space (N,) for the smoother, which responds to a contact as long before it as after it."""
-    return free_space(t, windows, rate, TRANSIENT)
+    return free_space(t, windows, rate, unscored, TRANSIENT)
 
 
 def spans(t: Array, which: Booleans) -> list[tuple[float, float]]:

@@ -60,7 +60,11 @@ MODELS = {
     "segment": Quantity("number of the segment without a gap that a sample belongs to"),
     "at_rest": Quantity("1 when the joint does not move during the recording, else 0"),
     "standing": Quantity("1 where the joint stands still for at least 1 s, else 0"),
-    "unscored": Quantity("1 where no model is scored: at standstill, and as a controller starts or stops, else 0"),
+    "filled": Quantity("1 where a missing sample was filled in, neither fitted nor judged, else 0"),
+    "unscored": Quantity(
+        "1 where no model is scored: at standstill, and as a controller starts or stops; 2 where only a missing sample "
+        "was filled in; else 0"
+    ),
     "static_friction": Quantity("largest friction at standstill: Coulomb, Stribeck and presliding", "{effort}"),
     "gaps": Quantity("interruptions of the recording"),
     "method": Quantity("method of resampling to a uniform clock", ""),

@@ -6,7 +6,7 @@ import numpy as np
 
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.contact.detection import FreeMotionStatistics, alarm_level, free_motion_statistics
-from davinci_forces.maths.signals.windows import free_smoothed, free_space, spans
+from davinci_forces.maths.signals.windows import free_smoothed, free_space
 from davinci_forces.maths.uncertainty.error_band import MIN_LOGS_BAND, NORMAL_95, coverage_by_speed, levels
 from davinci_forces.records import FreeSpace, Threshold, Track
 from davinci_forces.records.forces import SMOOTHER
@@ -22,8 +22,8 @@ def run(track: Track, entry: LogEntry) -> Iterator[FreeSpace]:
     """
     if track.at_rest or not entry.has_known_free_motion:
         return
-    unscored = [*entry.contact, *spans(track.t, track.unscored > 0)]
-    smoothed, filtered = (which(track.t, unscored, track.rate) for which in (free_smoothed, free_space))
+    place = track.t, entry.contact, track.rate, track.unscored
+    smoothed, filtered = (which(*place) for which in (free_smoothed, free_space))
     yield from space_of(track, SMOOTHER, track.tau_ext_smooth, track.tau_ext_smooth_std, smoothed)
     yield from space_of(track, track.filter, track.tau_ext, track.tau_ext_std, filtered)
 

@@ -11,7 +11,7 @@ from davinci_forces.filters.response import DURATION, half_sine, noise_model, re
 from davinci_forces.identification.joint_models import LogModels
 from davinci_forces.identification.used import FALLBACK, Identified
 from davinci_forces.maths.arrays import Array, Booleans
-from davinci_forces.maths.signals.windows import free_space, runs, spans
+from davinci_forces.maths.signals.windows import free_space, runs
 from davinci_forces.maths.uncertainty.error_band import levels
 from davinci_forces.records import Comparison, Diagnostic, FilterNoise, Fit, JointModel, diagnostic
 from davinci_forces.robots.robot import Kind, Robot
@@ -30,7 +30,7 @@ def run(
 
     Each filter has the smallest random walk with which it follows a push, so that all are compared at equal speed.
     """
-    free = free_space(model.t, [*entry.contact, *spans(model.t, model.unscored > 0)], model.rate)
+    free = free_space(model.t, entry.contact, model.rate, model.unscored)
     unfitted = entry.role != "identification" and entry.has_known_free_motion
     if not unfitted or model.at_rest or noise is None or int(free.sum()) < MIN_SAMPLES_COMPARISON:
         return

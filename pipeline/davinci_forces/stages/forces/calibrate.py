@@ -8,7 +8,7 @@ from davinci_forces.filters import diverges, filter_parts
 from davinci_forces.filters.problem import filter_inputs
 from davinci_forces.filters.response import noise_model
 from davinci_forces.maths.arrays import Array, evenly
-from davinci_forces.maths.signals.windows import free_smoothed, spans
+from davinci_forces.maths.signals.windows import free_smoothed
 from davinci_forces.maths.uncertainty import bootstrap
 from davinci_forces.maths.uncertainty.error_band import LOG_BLOCKS, MIN_LOGS_BAND, count_uncorrelated
 from davinci_forces.records import ErrorBand, FilterNoise, FreeMotion, JointModel
@@ -30,7 +30,7 @@ def run(
     """
     if not entry.has_known_free_motion or model.at_rest or noise is None or not model.scheme:
         return
-    free = free_smoothed(model.t, [*entry.contact, *spans(model.t, model.unscored > 0)], model.rate)
+    free = free_smoothed(model.t, entry.contact, model.rate, model.unscored)
     if int(free.sum()) < MIN_SAMPLES_BAND:
         return
     filter_noise = noise_model(noise, joint, 1.0 / model.rate, q_tau)

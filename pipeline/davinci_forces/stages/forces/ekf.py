@@ -10,7 +10,7 @@ from davinci_forces.filters.problem import NoiseModel, filter_inputs
 from davinci_forces.filters.response import lag, noise_model, rise
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.signals.smoothing import segments
-from davinci_forces.maths.signals.windows import free_space, is_past_transient, spans
+from davinci_forces.maths.signals.windows import free_space, is_past_transient
 from davinci_forces.maths.uncertainty.day_offset import DayOffset, day_offset
 from davinci_forces.records import Diagnostic, ErrorBand, FilterNoise, JointModel, Track, diagnostic
 from davinci_forces.records.forces import SMOOTHER
@@ -57,7 +57,7 @@ def track_effort(
     # At standstill, friction is anywhere between its static levels: a uniform distribution.
     friction = model.standing * model.static_friction**2 / 3.0
     converged = np.concatenate([is_past_transient(model.t[part]) for part in segments(model.segment)])
-    free = free_space(model.t, [*entry.contact, *spans(model.t, model.unscored > 0)], model.rate)
+    free = free_space(model.t, entry.contact, model.rate, model.unscored)
     model_part = float(np.sqrt(np.mean(model_variance)))
     yield Track(
         log=model.log,

@@ -61,7 +61,7 @@ def contacts(
 ) -> Iterator[Contact]:
     """The Contact of one joint of a log, if any sample lies in one of the joint's contacts."""
     windows = [window for window, _, _ in placed]
-    free = free_smoothed(track.t, [*windows, *spans(track.t, track.unscored > 0)], track.rate)
+    free = free_smoothed(track.t, windows, track.rate, track.unscored)
     free = free if free.any() else free_smoothed(track.t, windows, track.rate)
     is_above = np.abs(track.tau_ext_smooth) > threshold.detection_level + unknown_friction(track)
     friction_std = np.asarray(track.static_friction / 3**0.5 * track.standing, np.float64)

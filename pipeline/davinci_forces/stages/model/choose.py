@@ -259,7 +259,7 @@ def friction_map(motion: Motion, fit: Fit, identified: Identified, lowpass: floa
     tau, theta = lowpass_segments(motion.tau, motion.segment, motion.rate, lowpass), fit.theta
     measured = tau - Phi[:, 0] @ np.where(is_friction, 0.0, theta)
     modelled = Phi[:, 0] @ np.where(is_friction, theta, 0.0)
-    valid &= motion.standing == 0
+    valid &= motion.evaluated
     means = over_velocity(motion.dq[valid], motion.ddq[valid], np.column_stack([measured, modelled])[valid])
     return FrictionMap(
         log=motion.log,

@@ -64,7 +64,7 @@ def predict_joint(
         message = f"{name}: contact windows and standstill cover the whole log, so no prediction can be scored"
         yield diagnostic("predict", f"{motion.log}.{motion.joint}", "warning", message)
         return
-    if steps := [step_warning(name, *part) for part in spans(motion.t, ~scored & (motion.standing == 0))]:
+    if steps := [step_warning(name, *part) for part in spans(motion.t, ~scored & motion.evaluated)]:
         yield diagnostic("predict", f"{motion.log}.{motion.joint}.steps", "warning", *steps)
     scorer, path = Scorer(motion, free, lowpass), identified.path(motion)
     for model, estimator, fit in labelled:
@@ -117,7 +117,7 @@ def apply(
             path_unseen=refit.path if refit else "" if is_fitted else path,
             rate=motion.rate, velocity=motion.velocity, at_rest=motion.at_rest, standing=motion.standing, t=motion.t,
             tau=motion.tau, segment=motion.segment,
-            unscored=(~is_scored(motion, along, joint_fit, entry)).astype(np.int64),
+            unscored=np.where(motion.evaluated | (motion.standing > 0), ~is_scored(motion, along, joint_fit, entry), 2),
             tau_hat_unseen=at_samples(refit, motion) if refit else np.full(len(motion), np.nan), **terms,
         )  # fmt: skip
 
@@ -128,7 +128,7 @@ def is_scored(motion: Motion, along: LogModels, fit: Fit | None, entry: LogEntry
     Steps of the effort are sought in free motion that `fit` has not seen.  Friction may change by twice its static
     level, but not while the joint moves on.
     """
-    moves: Booleans = motion.standing == 0
+    moves = motion.evaluated
     if fit is None or entry.role not in ("validation", "contact") or not entry.has_known_free_motion:
         return moves
     free = moves & is_outside(motion.t, entry.contact) & (np.diff(motion.segment, prepend=motion.segment[:1]) == 0)

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from davinci_forces.errors import NotPeriodic
+from davinci_forces.maths.arrays import Integers
 from davinci_forces.maths.periods import averaging
 from davinci_forces.maths.periods.agreement import Difference, agreeing_stretch, multiple_of_period, stretch
 from davinci_forces.maths.periods.averaging import Folded, Phases, end, phases, whole_periods
@@ -55,7 +56,10 @@ def run(
     std = standard_error(t[agreeing], [x[agreeing] for x in positions], length, max_harmonics)
     period, period_remarks = reconcile_period(Period(length, std), entry)
     remarks += period_remarks
-    used = slice(agreeing.start, end(t, agreeing, period.length, rate))
+    filled = np.any([signal.filled for signal in moving], axis=0)
+    start = agreeing.start + int(np.argmin(filled[agreeing]))
+    used = np.arange(start, end(t, slice(start, agreeing.stop), period.length, rate))
+    used = used[~filled[used]]
     phased = Phases(t[used], period.length, phases(period.length, rate))
     for signal in moving:
         yield from average_joint(signal, used, phased, period, entry.period or 0.0, lowpass)
@@ -187,7 +191,7 @@ def reconcile_period(estimate: Period, entry: LogEntry) -> tuple[Period, list[st
 
 
 def average_joint(
-    signal: Signal, used: slice, phased: Phases, period: Period, stated: float, lowpass: float
+    signal: Signal, used: Integers, phased: Phases, period: Period, stated: float, lowpass: float
 ) -> Iterator[Average | PeriodResidual]:
     """Average one joint over its periods at each phase, from the first used sample on."""
     slow_tau = lowpass_segments(signal.tau, signal.segment, signal.rate, lowpass)

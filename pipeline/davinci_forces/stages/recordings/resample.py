@@ -1,6 +1,7 @@
 """Resample every recording on a uniform clock, with its gaps marked, and low-pass and differentiate its motion."""
 
 from collections.abc import Iterator
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 from davinci_forces.errors import BadLog
 from davinci_forces.maths.arrays import Booleans
 from davinci_forces.maths.periods.harmonics import are_apart, even_step
-from davinci_forces.maths.signals.clock import GAP
+from davinci_forces.maths.signals.clock import are_gaps, are_missing, bridged
 from davinci_forces.maths.signals.faults import count_saturated, find_stuck
 from davinci_forces.maths.signals.smoothing import (
     lowpass_segments,
@@ -19,8 +20,8 @@ from davinci_forces.maths.signals.smoothing import (
     white_std,
 )
 from davinci_forces.maths.signals.standstill import is_standing_still, without_doubtful_signs
-from davinci_forces.maths.signals.windows import runs, unbroken
-from davinci_forces.records import Column, Diagnostic, Motion, Recording, Signal, diagnostic
+from davinci_forces.maths.signals.windows import runs
+from davinci_forces.records import Column, Counts, Diagnostic, Motion, Recording, Signal, diagnostic
 from davinci_forces.robots.robot import Joint
 
 Indices = NDArray[np.intp]
@@ -43,8 +44,8 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
         If no segment between gaps holds more than a few samples.
     """
     T_s = even_step(recording.t) or float(np.median(np.diff(recording.t)))
-    whole = unbroken(recording.t, GAP * T_s)
-    cuts = [part.start for part in whole[1:]]
+    cuts = (np.flatnonzero(are_gaps(recording.t, T_s)) + 1).tolist()
+    whole = [slice(*edges) for edges in pairwise([0, *cuts, len(recording)])]
     parts = [part for part in whole if part.stop - part.start >= MIN_SAMPLES_SEGMENT]
     if not parts:
         raise BadLog(f"{recording.log}/{recording.joint}: no segment without a gap holds {MIN_SAMPLES_SEGMENT} samples")
@@ -56,7 +57,7 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
         method = "cubic spline through the samples of each segment"
         columns = [on_uniform_clock(recording, part, T_s) for part in parts]
     segment = np.repeat(np.arange(len(parts)), [len(t) for t, *_ in columns])
-    t, q, dq, tau = (np.concatenate(column) if len(parts) > 1 else column[0] for column in zip(*columns, strict=True))
+    t, q, dq, tau, filled = (np.concatenate(c) if len(parts) > 1 else c[0] for c in zip(*columns, strict=True))
     smooth = measured_motion(q, None if recording.velocity == "derived" else dq, segment, 1.0 / T_s, lowpass)
     if recording.velocity == "derived":
         dq = smooth[1]
@@ -75,11 +76,12 @@ def run(recording: Recording, joint: Joint, *, lowpass: float) -> Iterator[Signa
         dq=dq,
         tau=tau,
         segment=segment,
+        filled=filled,
     )
     yield signal
     motion = without_noise(signal, smooth, lowpass)
     yield motion
-    yield from remarks(recording, method, cuts, sum(part.stop - part.start for part in parts))
+    yield from remarks(signal, recording, T_s, cuts, sum(part.stop - part.start for part in parts))
     if recording.role not in ("tissue", "friction") and not at_rest and motion.standing.any():
         yield diagnostic("resample", f"{recording.log}.{recording.joint}", "note", standstill(motion))
     wrong = [] if at_rest else [*velocity_faults(recording, q, dq, segment, 1.0 / T_s), *faults(recording, joint)]
@@ -120,7 +122,7 @@ def without_noise(signal: Signal, smooth: tuple[Column, Column, Column], lowpass
         sigma_dq=sigma_dq,
         sigma_tau=noise_std(signal.tau, segment, rate, lowpass),
         t=signal.t, q=q, dq=dq, ddq=ddq, q_measured=signal.q, dq_measured=signal.dq, tau=signal.tau, segment=segment,
-        standing=still.astype(np.int64),
+        standing=still.astype(np.int64), filled=signal.filled,
     )  # fmt: skip
 
 
@@ -168,32 +170,45 @@ def step_of(t: Column) -> float:
     return float((t[-1] - t[0]) / (len(t) - 1))
 
 
-def as_recorded(recording: Recording, part: slice) -> tuple[Column, ...]:
-    """Time, position, velocity and effort of one segment, in the memory of the recording."""
-    return recording.t[part], recording.q[part], recording.dq[part], recording.tau[part]
+def as_recorded(recording: Recording, part: slice) -> tuple[Column | Counts, ...]:
+    """Time, position, velocity, effort and flags of one segment, in the memory of the recording."""
+    return recording.t[part], recording.q[part], recording.dq[part], recording.tau[part], recording.filled[part]
 
 
-def on_uniform_clock(recording: Recording, part: slice, T_s: float) -> tuple[Column, ...]:
-    """Time, position, velocity and effort of one segment on a uniform clock, to at most its last sample."""
+def on_uniform_clock(recording: Recording, part: slice, T_s: float) -> tuple[Column | Counts, ...]:
+    """Time, position, velocity, effort and flags of one segment on a uniform clock, to at most its last sample.
+
+    A time that is far from all measured samples is flagged as filled in.
+    """
     from scipy.interpolate import make_interp_spline
 
-    t, *columns = as_recorded(recording, part)
+    t, *columns, filled = as_recorded(recording, part)
     steps = int(np.floor((t[-1] - t[0]) / T_s * (1 + 1e-12)))
     clock = t[0] + T_s * np.arange(steps + 1)
-    return clock, *np.ascontiguousarray(make_interp_spline(t, np.column_stack(columns), k=3)(clock).T)
+    flags = are_missing(t[filled == 0], clock, T_s) if not filled.all() else np.ones(len(clock), np.int64)
+    return clock, *np.ascontiguousarray(make_interp_spline(t, np.column_stack(columns), k=3)(clock).T), flags
 
 
-def remarks(recording: Recording, method: str, cuts: list[int], samples: int) -> Iterator[Diagnostic]:
-    """Note the gaps of the clock, the samples that were left out, and the resampling of an uneven clock."""
-    name, notes = f"{recording.log}/{recording.joint}", []
+def remarks(signal: Signal, recording: Recording, T_s: float, cuts: list[int], samples: int) -> Iterator[Diagnostic]:
+    """Note gaps, samples that were left out, another rate, the resampling of an uneven clock, and filled samples."""
+    name, notes, t = f"{recording.log}/{recording.joint}", [], recording.t
     if cuts:
-        where = ", ".join(f"{recording.t[c - 1]:.3f} s" for c in cuts[:5])
+        where = ", ".join(f"{t[c - 1]:.3f} s" for c in cuts[:5])
         notes.append(f"{name}: {len(cuts)} gaps, not bridged, after {where}{' ...' if len(cuts) > 5 else ''}")
     if samples < len(recording):
         short = f"segments of fewer than {MIN_SAMPLES_SEGMENT}"
         notes.append(f"{name}: {len(recording) - samples} samples in {short} were left out")
-    if method != "as recorded":
-        notes.append(f"{name}: the clock is uneven, so the samples were put on a uniform one: {method}")
+    slow: Booleans = (np.diff(t) > bridged(T_s)) & ~are_gaps(t, T_s)
+    for part in runs(slow)[:MAX_LISTED_STRETCHES]:
+        notes.append(
+            f"{name}: from {t[part.start]:.3f} to {t[part.stop]:.3f} s the log is sampled at "
+            f"{1 / step_of(t[part.start : part.stop + 1]):.4g} Hz, not at {1 / T_s:.4g} Hz; its times are kept"
+        )
+    if signal.method != "as recorded":
+        notes.append(f"{name}: the clock is uneven, so the samples were put on a uniform one: {signal.method}")
+    if count := int(signal.filled.sum()):
+        share = f"{count} of {len(signal)} samples ({count / len(signal):.2g})"
+        notes.append(f"{name}: {share} are filled in between measured ones, and neither fitted nor judged")
     if notes:
         yield diagnostic("resample", f"{recording.log}.{recording.joint}", "note", *notes)
 

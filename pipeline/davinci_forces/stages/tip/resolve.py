@@ -9,7 +9,7 @@ from davinci_forces.maths.mechanics import tip_force
 from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.mechanics.kinematics import evaluate_in_blocks, jacobian, tip
 from davinci_forces.maths.mechanics.tip_force import NEAR_SINGULAR, condition, matrix, shared_correlations
-from davinci_forces.maths.signals.windows import free_smoothed, spans
+from davinci_forces.maths.signals.windows import free_smoothed
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95, FreeSpaceLevels, levels
 from davinci_forces.records import (
     ArmCorrelation,
@@ -98,8 +98,8 @@ def apply(
 
 def free_of(tracks: Sequence[Track], entry: LogEntry) -> Booleans:
     """Whether all joints move in free space at each sample (N,), for the smoother."""
-    t, unscored = tracks[0].t, (span for track in tracks for span in spans(track.t, track.unscored > 0))
-    return free_smoothed(t, [*entry.contact, *unscored], tracks[0].rate)
+    free = [free_smoothed(track.t, entry.contact, track.rate, track.unscored) for track in tracks]
+    return np.asarray(np.all(free, axis=0))
 
 
 def missing_joints(names: Sequence[str], tracks: dict[str, Track]) -> Iterator[str]:

@@ -2,19 +2,23 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import chain
 
 import numpy as np
 
 from davinci_forces.errors import BadLog
+from davinci_forces.logs.joined import FILLED_IN
 from davinci_forces.logs.log import Block, Channel, Log
 from davinci_forces.maths.arrays import Booleans
-from davinci_forces.maths.periods.steps import REACH, steps
+from davinci_forces.maths.periods.steps import steps
 from davinci_forces.maths.signals.clock import ClockStatistics
 from davinci_forces.maths.units import SI, UNITS, canonical, measures, size
 from davinci_forces.records import Column, Counts, Recording, Touch
 from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.study import WHOLE_LOG, LogEntry, Source
 from davinci_forces.study.intake.clocks import ALIGNED, UsedClocks
+
+HISTORY = 1 << 13  # samples before a jump of the clock in which the motion may have repeated
 
 # Channels of the log by the columns of a Touch; channels of joints become recordings.
 TOUCH_COLUMNS = {
@@ -66,7 +70,6 @@ class Intake:
     robot: Robot
     clock: ClockStatistics = field(default_factory=ClockStatistics)
     rows: int = 0
-    lost: int = 0  # rows at the end of a truncated file
     ended: bool = False  # whether the `until` of the study was reached
     jumps: list[tuple[float, float]] = field(default_factory=list)  # times of clock jumps, and their sizes [s]
 
@@ -93,8 +96,7 @@ class Intake:
                 f"{self.log.path}: the log has no clock, but skip, until and contact windows are in seconds; give "
                 'rate = ... [Hz], or leave them out; contact = "all" needs no clock'
             )
-        whole = [channel.name for quantity, channel in self.channels.items()] if not self.clocks.are_several else used
-        self.names = list(dict.fromkeys([*whole, *([self.clocks.time] if self.clocks.time else [])]))
+        self.names = list(dict.fromkeys([*used, *([self.clocks.time] if self.clocks.time else [])]))
 
     @property
     def has_clock(self) -> bool:
@@ -134,7 +136,8 @@ class Intake:
         if not len(block[self.names[0]]):
             return
         for name in self.names:
-            self.require_numbers(name, block[name])
+            if name in block:
+                self.require_numbers(name, block[name])
         t = self.times(block)
         self.clock.update(t, [block[c.name] for q, c in self.channels.items() if q != "time"])
         self.require_increasing()
@@ -157,20 +160,11 @@ class Intake:
                 q=q[selected],
                 dq=np.zeros(int(selected.sum())) if dq is None else dq[selected],
                 tau=tau[selected],
+                filled=block[FILLED_IN][selected].astype(np.int64),
             )
         if touch := touch_of(self, block, t - first, selected):
             yield touch
         self.rows += len(t)
-
-    def without_cut_end(self, block: Block) -> Block:
-        """A block without the last rows of a truncated file, which some channels lack."""
-        if not self.log.cut:
-            return block
-        whole = np.all([np.isfinite(block[name]) for name in self.names], axis=0)
-        rows = np.flatnonzero(whole)
-        end = int(rows[-1]) + 1 if len(rows) else 0
-        self.lost += len(whole) - end
-        return {name: values[:end] for name, values in block.items()}
 
     def until_the_end(self, block: Block) -> Block:
         """A block without the rows after the study's `until`, whatever they hold."""
@@ -213,16 +207,15 @@ class Intake:
         return value if joint.effort else value * ratio * joint.torque_constant
 
     def require_numbers(self, name: str, values: Column) -> None:
-        """Refuse a channel with samples that are missing or not numbers."""
+        """Refuse a time that is missing or a sample that is infinite."""
         bad = np.flatnonzero(~np.isfinite(values))
         if not len(bad):
             return
         row = self.rows + int(bad[0])
-        missing = self.log.nulls.get(name, 0)
-        what = f"has no sample at row {row}" if missing else f"holds {values[bad[0]]} at row {row}"
         raise BadLog(
-            f"{self.log.path}: channel {name!r} {what} (counted from 0), and {len(bad)} of the {len(values)} rows "
-            "read with it lack a number; record the log again, or save the part before this row as a separate log"
+            f"{self.log.path}: channel {name!r} holds {values[bad[0]]} at row {row} (counted from 0), and {len(bad)} "
+            f"of the {len(values)} rows read with it lack a number; record the log again, or save the part before this "
+            "row as a separate log"
         )
 
     def require_increasing(self) -> None:
@@ -240,26 +233,28 @@ def without_clock_jumps(intake: Intake, blocks: Iterator[Block]) -> Iterator[Blo
     """Remove jumps of the clock from its channel, where the motion shows that no time passed.
 
     Only for identification logs: others lose nothing by a gap, and their contact windows are times of their clock.
-    The end of a block waits for the next, which shows how the motion continues.
+    The end of a block waits for the next, which shows how the motion continues, and whether it repeats.
     """
+    blocks = iter(blocks)
+    first = next(blocks, None)  # with it, the clocks are known
     several = intake.clocks.are_several
     name = ALIGNED if several else intake.clocks.time
-    complete = (intake.without_cut_end(block) for block in blocks)
-    if not (name or several) or intake.entry.role != "identification":
-        yield from complete
+    blocks = chain([first] if first else [], blocks)
+    if not name or intake.entry.role != "identification":
+        yield from blocks
         return
     from_study = intake.clocks.groups[0].is_stated and not several
     scale = intake.sources["time"].sign * intake.scales["time"] if from_study else 1.0
     passed = 0.0  # sum of the jumps, in the channel's unit
     waiting: Block = {}
-    for block in complete:
+    for block in blocks:
         late = block | {name: block[name] - passed} if passed else block
         joined = {key: np.concatenate([waiting[key], late[key]]) for key in late} if waiting else late
         for i, jump in steps(intake.times(joined), intake.positions(joined)):
             joined = joined | {name: joined[name] - np.where(np.arange(len(joined[name])) < i, 0.0, jump / scale)}
             passed += jump / scale
             intake.jumps.append((float(intake.times(joined)[i - 1]), jump))
-        ready = max(len(joined[name]) - 2 * REACH, 0)
+        ready = max(len(joined[name]) - HISTORY, 0)
         waiting = {key: values[ready:] for key, values in joined.items()}
         yield {key: values[:ready] for key, values in joined.items()}
     if waiting:

@@ -1,7 +1,8 @@
 """Find the time channels of the channels that a study uses, and compute their times in seconds."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from itertools import chain
 
 import numpy as np
 
@@ -9,8 +10,8 @@ from davinci_forces.errors import BadLog
 from davinci_forces.logs.joined import Alignment, Follower, TimedBlock, align
 from davinci_forces.logs.log import UNIT_OF_COUNTS, Block, Log
 from davinci_forces.maths.arrays import Array
-from davinci_forces.maths.signals.clock import GAP
 from davinci_forces.study import LogEntry, Source
+from davinci_forces.study.intake.missing import MissingSamples, split_by_rhythm, without_empty_rows
 
 ALIGNED = ""  # name in a block of the times of channels that were resampled on one clock [s]
 
@@ -22,6 +23,7 @@ class ClockGroup:
     names: tuple[str, ...]
     time: str
     is_stated: bool  # the study names this channel
+    has_empty_rows: bool = False  # their table has rows of other channels, in which these have no samples
 
 
 @dataclass
@@ -34,6 +36,7 @@ class UsedClocks:
     used: Sequence[str]  # channels of quantities
     reference: str  # the channel on whose clock all others are resampled
     done: Alignment = field(default_factory=Alignment)
+    missing: MissingSamples = field(default_factory=MissingSamples)
 
     def __post_init__(self) -> None:
         groups = [part for time, names in self.log.by_clock(self.used).items() for part in self._split(time, names)]
@@ -43,6 +46,7 @@ class UsedClocks:
                 "the log has a clock for these, so leave time out of [log.channels]"
             )
         self.groups = sorted(groups, key=lambda group: self.reference not in group.names)
+        self.missing.until = np.inf if self.entry.until is None else self.entry.until
 
     @property
     def time_source(self) -> Source | None:
@@ -90,11 +94,19 @@ class UsedClocks:
             yield ClockGroup(tuple(members), time, is_stated=True)
 
     def blocks(self) -> Iterator[Block]:
-        """The samples of all channels, on one clock where there are several."""
+        """The samples of all channels, on one clock where there are several, with `FILLED_IN`."""
         if not self.are_several:
-            names = (*self.groups[0].names, *([self.time] if self.time else []))
-            yield from self.log.blocks(list(dict.fromkeys(names)))
-            return
+            read = self._timed(self.log, self.groups[0])
+            opening = next(read, None)
+            rhythms = split_by_rhythm(*opening, self.groups[0].names) if opening else []
+            if not rhythms:
+                yield from self._on_one_clock(chain([opening] if opening else [], read))
+                return
+            groups = [replace(self.groups[0], names=names, has_empty_rows=True) for names in rhythms]
+            self.groups = sorted(groups, key=lambda group: self.reference not in group.names)
+            if not self.are_several:
+                yield from self._on_one_clock(self._timed(self.log, self.groups[0]))
+                return
         if not self.all_timed:
             without = next(group for group in self.groups if not self._is_known(group))
             raise BadLog(
@@ -102,7 +114,8 @@ class UsedClocks:
                 "clocks; name its time in [log.channels], give rate = ... [Hz] for all channels, or leave it out"
             )
         logs = [self.log.independent_copy() for _ in self.groups]
-        first, *others = (self._timed(log, group) for log, group in zip(logs, self.groups, strict=True))
+        timed = (self._timed(log, group) for log, group in zip(logs, self.groups, strict=True))
+        first, *others = (self._filled(blocks, group) for blocks, group in zip(timed, self.groups, strict=True))
         followers = {_listed(group.names): follower for group, follower in zip(self.groups[1:], others, strict=True)}
         try:
             for t, block in align(first, followers, self.done, lambda why: BadLog(f"{self.log.path}: {why}")):
@@ -110,11 +123,22 @@ class UsedClocks:
         finally:
             self._noticed(logs)
 
+    def _on_one_clock(self, timed: Iterator[TimedBlock]) -> Iterator[Block]:
+        """Yield the samples of the only clock, with times where rows that are left out would spoil a count."""
+        for t, block in self._filled(timed, self.groups[0]):
+            yield block if self.groups[0].time else block | {ALIGNED: t}
+
+    def _filled(self, timed: Iterator[TimedBlock], group: ClockGroup) -> Iterator[TimedBlock]:
+        """Fill short runs of missing samples, and leave out the rows of longer ones."""
+        timed = without_empty_rows(timed, group.names) if group.has_empty_rows else timed
+        filled = self.missing.filled(timed, group.names)
+        return ((t, {k: x for k, x in b.items() if k != group.time}) for t, b in filled) if self.are_several else filled
+
     def _timed(self, log: Log, group: ClockGroup) -> Iterator[TimedBlock]:
         rows = 0
         for block in log.blocks(list(dict.fromkeys((*group.names, *([group.time] if group.time else []))))):
             count = len(next(iter(block.values())))
-            yield self.times(block, rows, count, group), {name: block[name] for name in group.names}
+            yield self.times(block, rows, count, group), block
             rows += count
 
     def _noticed(self, logs: Sequence[Log]) -> None:
@@ -154,17 +178,17 @@ class UsedClocks:
         if done.left_out:
             yield (
                 f"{name}: {done.left_out} of {done.kept + done.left_out} rows are left out, because another clock has "
-                f"no samples on both sides within {GAP:g} of its sampling times"
+                "no samples near enough on both sides"
             )
 
 
 def _how(name: str, follower: Follower) -> str:
     """How the channels of one clock were resampled."""
     rate = f"{name} ({1 / follower.period:.6g} Hz)" if follower.period else name
-    if not follower.interpolated:
+    if not follower.interpolated and follower.ratio == 1.0:
         return f"{rate} has the same times"
-    mean = f"averaged over {follower.many} samples and " if follower.many > 1 else ""
-    return f"{rate} was {mean}interpolated by cubics between neighbours, but not across gaps"
+    filtered = "low-passed without delay and " if follower.ratio > 1.0 else ""
+    return f"{rate} was {filtered}interpolated by cubics between neighbours, but not across gaps"
 
 
 def _listed(names: Sequence[str]) -> str:

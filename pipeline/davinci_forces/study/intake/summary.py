@@ -6,7 +6,7 @@ import numpy as np
 
 from davinci_forces.errors import BadLog
 from davinci_forces.files import visible
-from davinci_forces.maths.signals.clock import GAP
+from davinci_forces.maths.signals.clock import FILLED, GAP
 from davinci_forces.records import LogSummary
 from davinci_forces.study.intake import Intake
 
@@ -23,6 +23,8 @@ def summary(intake: Intake) -> LogSummary:
         If nothing is left to analyse.
     """
     clock, log, entry, nan = intake.clock, intake.log, intake.entry, float("nan")
+    missing = intake.clocks.missing
+    missing.require_most(log)
     if clock.samples < 2 or clock.last - clock.first <= entry.skip:
         until = f" and those after {entry.until:g} s left out" if intake.ended else ""
         raise BadLog(
@@ -51,7 +53,7 @@ def summary(intake: Intake) -> LogSummary:
         backward=clock.backward,
         repeated=clock.repeated,
         duplicates=clock.duplicates,
-        dropped=log.dropped + intake.lost,
+        dropped=log.dropped + missing.left_out,
         facts=tuple(visible(f"{key}: {value}") for key, value in facts.items()),
         warnings=tuple(map(visible, log.warnings)),
         channel=np.array([*map(visible, names)], object),
@@ -84,8 +86,15 @@ def remarks(intake: Intake) -> Iterator[str]:
             f"until = {entry.until:g} s leaves nothing out, because the log ends after "
             f"{clock.last - clock.first:g} s; both count from its first sample"
         )
-    if intake.lost:
-        yield f"the file is truncated: its last {intake.lost} rows lack some channels and are left out"
+    missing = intake.clocks.missing
+    if end := missing.at_end if intake.log.cut else 0:
+        yield f"the file is truncated: its last {end} rows lack some channels and are left out"
+    if missing.filled_rows or missing.left_out > end:
+        lacking = ", ".join(f"{name!r} {c.count}" for name, c in missing.channels.items() if c.count > c.at_end)
+        yield (
+            f"samples are missing ({lacking}): {missing.filled_rows} rows with up to {1e3 * FILLED:g} ms or one sample "
+            f"missing are filled by cubics, and neither fitted nor judged; {missing.left_out - end} rows are gaps"
+        )
     if clock.duplicates > MOST_REPEATED * clock.samples:
         yield (
             f"{clock.duplicates} of {clock.samples} rows ({clock.duplicates / clock.samples:.0%}) repeat the one "
