@@ -64,6 +64,7 @@ class Joined(Log):
             facts={"joined": ", ".join(names), **first.facts}, cut=any(part.cut for part in parts),
         )  # fmt: skip
         self.parts = dict(zip(unique([Path(name.removesuffix(".gz")).stem for name in names]), parts, strict=True))
+        self.lent = {f"{stem}/{n}": f"{stem}/{c}" for stem, part in self.parts.items() for n, c in part.lent.items()}
         starts = starts_of(parts)
         self.offsets = dict.fromkeys(self.parts, 0.0)
         if starts:

@@ -90,6 +90,7 @@ class Log(ABC):
     nans: dict[str, int] = field(default_factory=dict)  # samples logged as NaN of every channel read
     dropped: int = 0  # unusable rows
     cut: bool = False  # the file is truncated, so channels may end in missing samples
+    lent: dict[str, str] = field(default_factory=dict)  # by channel without a clock, the one whose clock it is given
     _lookup: tuple[tuple[Channel, ...], dict[str, tuple[Channel, str]]] | None = field(
         default=None, init=False, repr=False
     )

@@ -60,21 +60,22 @@ class Parts(Log):
             if _written(part) != _written(first):
                 raise BadLog(f"{part.path}: its channels differ from those of {first.path}, so they are not one log")
         self.facts = {"parts": ", ".join(part.path.name for part in parts), **first.facts}
-        self.cut = parts[-1].cut
+        self.cut, self.lent = parts[-1].cut, first.lent
         self.starts = starts_of(parts)
         self.remarks: list[str] = []
-        if self.starts:
-            self._place()
-        elif first.clock:
+        self.times: dict[str, frozenset[str]] = {}  # by time channel, the channels on that clock
+        if not self.starts and first.clock:
             self.remarks.append(
                 "not all parts say when they started; each is assumed to begin directly after the one before"
             )
+        if self.starts or (first.clock and any(part.clock != first.clock for part in parts)):
+            self._place()
 
     def _place(self) -> None:
         """Give every clock of the parts a time channel, and check the starts."""
         _require_order(self.parts, self.starts)
         for before, after in pairwise(self.parts):
-            if before.zone == "local" and clocks_may_change(before.started, after.started):
+            if self.starts and before.zone == "local" and clocks_may_change(before.started, after.started):
                 self.remarks.append(f"{after.path.name} started after {before.path.name}, and {REMARK}")
         shared = _partition(self.parts[0])
         if any(_partition(part).keys() != shared.keys() for part in self.parts):
@@ -83,7 +84,6 @@ class Parts(Log):
                 "separate log"
             )
         written = [channel for channel in self.channels if not (channel.derived and channel.kind == "time")]
-        self.times: dict[str, frozenset[str]] = {}  # by time channel, the channels on that clock
         names = [channel.name for channel in written]
         for names_of_clock in shared:
             clocks = [_partition(part)[names_of_clock] for part in self.parts]
@@ -118,7 +118,7 @@ class Parts(Log):
         """
         self._restart(names, kinds=SAMPLED_KINDS)
         self.warnings[:] = self.remarks
-        time = next((time for time in names if self.starts and time in self.times), "")
+        time = next((time for time in names if time in self.times), "")
         axis = _Axis(self.parts, self.starts)
         for number, part in enumerate(self.parts):
             if not time:
@@ -194,7 +194,7 @@ class _Axis:
     def count(self, number: int, part: Log, count: int) -> Array:
         """Compute the times of the next samples of a part that counts them."""
         assert part.clock is not None
-        new = number != self.part
+        new = number != self.part and bool(self.starts)  # without starts, a part follows the one before directly
         self.timeline.add(0, self._since(number) + part.clock.start if new else None, part.clock.step)
         t = self.timeline.times(self.timeline.rows, count)
         self.timeline.rows += count
@@ -210,7 +210,7 @@ class _Axis:
         return self._checked(number, t + self.offset)
 
     def _since(self, number: int) -> float:
-        return (self.starts[number] - self.starts[0]).total_seconds()
+        return (self.starts[number] - self.starts[0]).total_seconds() if self.starts else 0.0
 
     def _checked(self, number: int, t: Array) -> Array:
         if not len(t):

@@ -200,6 +200,7 @@ def _describe_time(
     }
     clocks = clocks_of(log.channels, sampled, log.cut)
     log.channels, log.clock, log.time, log.made = clocks.channels, clocks.clock, clocks.time, clocks.made
+    log.lent = clocks.lent
     starts = (words.get("wf_start_time") for path, words in properties.items() if path in log.names)
     if started := started or next((start for start in starts if isinstance(start, datetime)), None):
         log.zone, log.started = "UTC", started.replace(tzinfo=None).isoformat()

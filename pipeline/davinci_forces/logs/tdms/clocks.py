@@ -30,6 +30,7 @@ class ClocksFound:
     clock: Clock | None = None
     time: str = ""
     made: dict[str, Timeline] = field(default_factory=dict)  # the derived time channels
+    lent: dict[str, str] = field(default_factory=dict)  # by channel without words on its clock, whose clock it is given
 
 
 def clocks_of(channels: Sequence[Channel], sampled: Mapping[str, Sampled], ends_anywhere: bool) -> ClocksFound:
@@ -38,6 +39,7 @@ def clocks_of(channels: Sequence[Channel], sampled: Mapping[str, Sampled], ends_
     The first clock becomes that of the log, unless some channels have no clock: they would wrongly inherit it.
     """
     clock_of = _shared(channels, sampled, ends_anywhere)
+    lent = {n: c for n, c in clock_of.items() if c and sampled[c].timeline and not sampled[n].timeline}
     clocks = list(dict.fromkeys(clock_of.values()))
     if not any(clocks):
         return ClocksFound(tuple(channels))
@@ -48,9 +50,9 @@ def clocks_of(channels: Sequence[Channel], sampled: Mapping[str, Sampled], ends_
     timed = tuple(replace(c, time="" if clock_of[c.name] in (main, "") else named[clock_of[c.name]]) for c in channels)
     if main and named[main] in derived and derived[named[main]].is_uniform:
         timeline = derived.pop(named[main])
-        return ClocksFound(_with(timed, derived), Clock(timeline.step[0], timeline.start[0]), "", derived)
+        return ClocksFound(_with(timed, derived), Clock(timeline.step[0], timeline.start[0]), "", derived, lent)
     time = named[main] if main else ""
-    return ClocksFound(_with(timed, derived, time), None, time, derived)
+    return ClocksFound(_with(timed, derived, time), None, time, derived, lent)
 
 
 def _with(channels: tuple[Channel, ...], derived: Mapping[str, Timeline], main: str = "") -> tuple[Channel, ...]:

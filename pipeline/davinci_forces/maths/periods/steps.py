@@ -45,8 +45,8 @@ def stands_alone(intervals: Array) -> bool:
 def may_have_repeated(t: Array, x: Array, i: int, jump: float) -> bool:
     """Whether a motion (J, N) that repeats explains that it continues at sample `i`, although the time has passed.
 
-    The motion repeats after each lag at which all joints were within `SAME_PLACE` of a sample's travel of where they are
-    before `i`.  The jump is then a multiple of the lag, to half a sample for each.
+    The motion repeats after each lag before which all joints were in the same place, to `SAME_PLACE` of a sample's
+    travel.  The jump is then a multiple of the lag, to half a sample for each.
     """
     if not 0.0 < jump < MAX_PAUSE:
         return False

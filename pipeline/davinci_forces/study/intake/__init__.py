@@ -245,6 +245,7 @@ def without_clock_jumps(intake: Intake, blocks: Iterator[Block]) -> Iterator[Blo
         return
     from_study = intake.clocks.groups[0].is_stated and not several
     scale = intake.sources["time"].sign * intake.scales["time"] if from_study else 1.0
+    scale *= intake.clocks.units.get(name, 1.0)
     passed = 0.0  # sum of the jumps, in the channel's unit
     waiting: Block = {}
     for block in blocks:

@@ -1,5 +1,6 @@
 """Find the time channels of the channels that a study uses, and compute their times in seconds."""
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import chain
@@ -13,6 +14,7 @@ from davinci_forces.maths.arrays import Array
 from davinci_forces.study import LogEntry, Source
 from davinci_forces.study.intake.missing import MissingSamples, split_by_rhythm, without_empty_rows
 
+MAX_SECONDS = 1e11  # [s] a later time since 1970 than the year 5138 is in a smaller unit
 ALIGNED = ""  # name in a block of the times of channels that were resampled on one clock [s]
 
 
@@ -37,6 +39,7 @@ class UsedClocks:
     reference: str  # the channel on whose clock all others are resampled
     done: Alignment = field(default_factory=Alignment)
     missing: MissingSamples = field(default_factory=MissingSamples)
+    units: dict[str, float] = field(default_factory=dict)  # by time channel, its unit since 1970 [s]
 
     def __post_init__(self) -> None:
         groups = [part for time, names in self.log.by_clock(self.used).items() for part in self._split(time, names)]
@@ -47,6 +50,18 @@ class UsedClocks:
             )
         self.groups = sorted(groups, key=lambda group: self.reference not in group.names)
         self.missing.until = np.inf if self.entry.until is None else self.entry.until
+        self._require_clocks_of_used()
+
+    def _require_clocks_of_used(self) -> None:
+        """Refuse the clock of a channel that is not used, if the log says nothing of the clock of those that are."""
+        lent = self.log.lent
+        for group in () if self.entry.rate else self.groups:
+            names = [self.log.find(name).name for name in group.names]
+            if not group.is_stated and all(name in lent and lent[name] not in names for name in names):
+                raise BadLog(
+                    f"{self.log.path}: the log states no sampling time of channel {names[0]!r}, only of "
+                    f"{lent[names[0]]!r}, which is not used; give rate = ... [Hz], or name its time in [log.channels]"
+                )
 
     @property
     def time_source(self) -> Source | None:
@@ -156,18 +171,42 @@ class UsedClocks:
         group = group or self.groups[0]
         number = rows + np.arange(count)
         if group.is_stated and self.time_source:
-            return (block[group.time] + self.time_source.offset) * (self.time_source.sign * self.scale)
+            t = (block[group.time] + self.time_source.offset) * (self.time_source.sign * self.scale)
+            return t * self._since_1970(group.time, t)
         if self.entry.rate:
             return number / self.entry.rate
         if group.time:
-            return block[group.time]
+            return block[group.time] * self._since_1970(group.time, block[group.time])
         if self.log.clock is None:
             return number.astype(np.float64)
         return np.asarray(self.log.clock.start + number * self.log.clock.step, dtype=np.float64)
 
+    def _since_1970(self, name: str, t: Array) -> float:
+        """The size [s] of ms, us or ns if times since 1970 are in it, but taken as seconds; else 1.
+
+        Raises
+        ------
+        BadLog
+            If no unit of time gives a date, or the study or the log states the unit.
+        """
+        if name not in self.units and len(t):
+            size = float(np.median(np.abs(t)))
+            power = 3 * math.ceil(math.log10(size / MAX_SECONDS) / 3) if MAX_SECONDS < size < np.inf else 0
+            stated = self.log.find(name).unit or (self.time_source.unit if self.time_source else "")
+            if power > 9 or (power and stated):
+                raise BadLog(
+                    f"{self.log.path}: channel {name!r} holds times of {size:.4g} s, which is no date; correct the unit "
+                    "of time in study.toml, or name another time channel"
+                )
+            self.units[name] = 10.0**-power
+        return self.units.get(name, 1.0)
+
     def note(self) -> Iterator[str]:
-        """Notes on how channels were resampled on one clock."""
+        """Notes on how times were read, and on how channels were resampled on one clock."""
         done, name = self.done, self.entry.name
+        for channel, unit in self.units.items():
+            if unit != 1.0:
+                yield f"{name}: the times in {channel!r} are read in units of {unit:g} s since 1970, not in seconds"
         if not done.clocks_differ:
             return
         how = "; ".join(_how(follower_name, follower) for follower_name, follower in done.others.items())

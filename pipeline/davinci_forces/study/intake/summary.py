@@ -71,7 +71,7 @@ def remarks(intake: Intake) -> Iterator[str]:
         when = ", ".join(f"{jump:.6g} s after {t - clock.first:.3f} s" for t, jump in intake.jumps[:5])
         more = " ..." if len(intake.jumps) > 5 else ""
         yield (
-            f"the clock jumps while the motion continues, by {when}{more}. The later times are moved back by the jump; "
+            f"the clock jumps while the motion continues, by {when}{more}. The later times are moved by the jump; "
             "find out why the recorder's clock jumps"
         )
     for start, end in entry.contact:
