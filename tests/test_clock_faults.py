@@ -115,7 +115,7 @@ def fault(name: str, rng: np.random.Generator) -> tuple[Samples, Samples]:
         case "drift":
             return t * (1 + rng.normal() * 1e-3), t
         case "jitter":
-            return t + rng.exponential(1e-3, len(t)), t
+            return t + np.minimum(rng.exponential(1e-3, len(t)), 5e-3), t
         case "duplicate":
             stamps = t.copy()
             stamps[np.argmax(after)] = stamps[np.argmax(after) - 1]

@@ -195,8 +195,8 @@ class UsedClocks:
             stated = self.log.find(name).unit or (self.time_source.unit if self.time_source else "")
             if power > 9 or (power and stated):
                 raise BadLog(
-                    f"{self.log.path}: channel {name!r} holds times of {size:.4g} s, which is no date; correct the unit "
-                    "of time in study.toml, or name another time channel"
+                    f"{self.log.path}: channel {name!r} holds times of {size:.4g} s, which is no date; correct the "
+                    "unit of time in study.toml, or name another time channel"
                 )
             self.units[name] = 10.0**-power
         return self.units.get(name, 1.0)
