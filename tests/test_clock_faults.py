@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 import davinci_forces
 from davinci_forces.cli import app
+from davinci_forces.maths.signals.windows import UNSCORED_SAMPLE, free_space
 from tests import arm
 from tests.logs.test_clocks import said, tdms
 from tests.test_runs import call
@@ -151,11 +152,14 @@ def test_missing_samples_are_filled_for_filters_and_neither_fitted_nor_judged(la
     table = table.drop(index=[900, 1100, 1101])
     table.to_csv(lab / "run.csv", index=False)
     describe(lab)
-    call("fit", lab)
-    signal, motion_of, summary = read(lab, "Signal", "Motion", "LogSummary")
+    call("predict", lab)
+    signal, motion_of, summary, model = read(lab, "Signal", "Motion", "LogSummary", "JointModel")
     times = np.rint(signal["t"] * 100).astype(int)
     assert sorted(times[signal["filled"] == 1]) == [300, 500, 501, 900, 1100, 1101]
     assert_array_equal(motion_of["filled"], signal["filled"])
+    assert_array_equal(model["unscored"] == UNSCORED_SAMPLE, signal["filled"])
+    free = free_space(model["t"].to_numpy(), [], 100.0, model["unscored"].to_numpy())
+    assert_array_equal(free[times > 850], signal["filled"][times > 850] == 0)
     assert set(range(2000)) - set(times) == {700, 701, 702}
     assert signal["segment"].max() == 1
     measured = signal["filled"] == 0

@@ -29,6 +29,7 @@ from davinci_forces.maths.mechanics.chain import Chain
 from davinci_forces.maths.periods.period import guess, refine
 from davinci_forces.maths.periods.shift import circular, straight
 from davinci_forces.maths.signals.smoothing import lowpass_segments, segments
+from davinci_forces.maths.signals.windows import UNSCORED_SAMPLE
 from davinci_forces.maths.uncertainty.error_band import NORMAL_95
 from davinci_forces.records import Diagnostic, FreeWeight, JointModel, Load, Motion, Weight, diagnostic
 from davinci_forces.robots.robot import Robot
@@ -93,7 +94,7 @@ def run(
                 "tau_ext": path_means(*efforts[model.joint], first, length, count),
                 "tau_ext_unseen": path_means(*unseen[model.joint], first, length, count),
             }
-            reached = np.isfinite(columns["q"])
+            reached = np.isfinite(columns["q"]) & np.isfinite(columns["tau_ext"])
             yield Load(
                 log=model.log, joint=model.joint, weight=weighing.log, role=model.role, rate=count / length,
                 period=period, t=((np.arange(count) + 0.5) / count * length)[reached],
@@ -124,12 +125,13 @@ def period_of(motions: Sequence[Motion], robot: Robot) -> float:
 
 
 def external_effort(model: JointModel, tau_hat: Array, lowpass: float) -> tuple[Array, Array]:
-    """Times (K,) at which the effort is predicted, and the low-passed difference to the measured effort (K,)."""
+    """Times (K,) at which the effort is measured and predicted, and the low-passed difference (K,)."""
     predicted = np.isfinite(tau_hat)
     tau_ext = (model.tau - tau_hat)[predicted]
     if predicted.any():
         tau_ext = lowpass_segments(tau_ext, model.segment[predicted], model.rate, lowpass)
-    return model.t[predicted], tau_ext
+    measured = model.unscored[predicted] != UNSCORED_SAMPLE
+    return model.t[predicted][measured], tau_ext[measured]
 
 
 def loads_per_kilogram(

@@ -7,6 +7,7 @@ import numpy as np
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.signals.smoothing import segments
 
+UNSCORED_STRETCH, UNSCORED_SAMPLE = 1, 2  # flags of samples that are not scored: with their transients, or alone
 TRANSIENT = 1.0  # [s] duration of a filter's transient, left out of the statistics of the whole run
 
 
@@ -29,10 +30,10 @@ def free_space(
     """Whether nothing touches the robot at each time (N,) and the filter's transient is over; `rate` [Hz].
 
     There is a transient at the start, after each gap and after each window, and `before` [s] each window.  Samples at
-    which no model is scored (N,) are left out, the stretches of 1 as windows, those of 2 alone.
+    which no model is scored (N,) are left out, as windows or alone.
     """
     unscored = np.zeros(len(t), np.int64) if unscored is None else unscored
-    widened = [(start - before, end + TRANSIENT) for start, end in (*windows, *spans(t, unscored == 1))]
+    widened = [(start - before, end + TRANSIENT) for start, end in (*windows, *spans(t, unscored == UNSCORED_STRETCH))]
     steady = np.concatenate([is_past_transient(t[part]) for part in unbroken(t, 1.5 / rate)])
     return np.asarray(is_outside(t, widened) & steady & (unscored == 0))
 

@@ -10,8 +10,18 @@ from davinci_forces.identification.used import FALLBACK, Identified
 from davinci_forces.maths.arrays import Booleans
 from davinci_forces.maths.signals.faults import beyond_steps
 from davinci_forces.maths.signals.standstill import is_far_from_reversals
-from davinci_forces.maths.signals.windows import is_outside, spans
-from davinci_forces.records import Choice, Diagnostic, Fit, FittedPaths, JointModel, Motion, Prediction, diagnostic
+from davinci_forces.maths.signals.windows import UNSCORED_SAMPLE, UNSCORED_STRETCH, is_outside, spans
+from davinci_forces.records import (
+    Choice,
+    Counts,
+    Diagnostic,
+    Fit,
+    FittedPaths,
+    JointModel,
+    Motion,
+    Prediction,
+    diagnostic,
+)
 from davinci_forces.records.prediction import CHOSEN, SAME_PATH, PathShare
 from davinci_forces.robots.robot import Robot
 from davinci_forces.study import LogEntry
@@ -117,7 +127,7 @@ def apply(
             path_unseen=refit.path if refit else "" if is_fitted else path,
             rate=motion.rate, velocity=motion.velocity, at_rest=motion.at_rest, standing=motion.standing, t=motion.t,
             tau=motion.tau, segment=motion.segment,
-            unscored=np.where(motion.evaluated | (motion.standing > 0), ~is_scored(motion, along, joint_fit, entry), 2),
+            unscored=unscored(motion, is_scored(motion, along, joint_fit, entry)),
             tau_hat_unseen=at_samples(refit, motion) if refit else np.full(len(motion), np.nan), **terms,
         )  # fmt: skip
 
@@ -136,6 +146,12 @@ def is_scored(motion: Motion, along: LogModels, fit: Fit | None, entry: LogEntry
     slack = np.where(is_far_from_reversals(motion.dq, 1.0 / motion.rate), 0.0, friction)
     residual = motion.tau - along.tau_hat(fit, motion.joint)
     return np.asarray(moves & ~beyond_steps(residual, free, slack, round(motion.rate / motion.cutoff)))
+
+
+def unscored(motion: Motion, scored: Booleans) -> Counts:
+    """The flags (N,) of samples that are not scored; a sample that is only filled in has no transient."""
+    alone = (motion.filled > 0) & (motion.standing == 0)
+    return np.where(scored, 0, np.where(alone, UNSCORED_SAMPLE, UNSCORED_STRETCH))
 
 
 def step_warning(name: str, start: float, end: float) -> str:

@@ -117,6 +117,7 @@ class UsedClocks:
             if not rhythms:
                 yield from self._on_one_clock(chain([opening] if opening else [], read))
                 return
+            del read, opening  # the log is read again, one clock after the other
             groups = [replace(self.groups[0], names=names, has_empty_rows=True) for names in rhythms]
             self.groups = sorted(groups, key=lambda group: self.reference not in group.names)
             if not self.are_several:
