@@ -162,7 +162,7 @@ class Intake:
                 tau=tau[selected],
                 filled=block[FILLED_IN][selected].astype(np.int64),
             )
-        if touch := touch_of(self, block, t - first, selected):
+        if touch := touch_of(self, block, t - first, selected & (block[FILLED_IN] == 0)):
             yield touch
         self.rows += len(t)
 
