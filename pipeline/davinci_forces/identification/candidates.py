@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from davinci_forces.identification.observations import CellEquations, Observed, equations
+from davinci_forces.identification.observations import CellEquations, Observed, equations, is_evaluated
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
@@ -241,7 +241,7 @@ def reach_of(logs: Sequence[Observed], joint: str) -> Reach:
     ranges, squares, count = [0.0], 0.0, 0
     for log in logs:
         i = log.joints.index(joint)
-        q, dq = (x[:, i][log.records[i].evaluated] for x in (log.motions[i].q, log.motions[i].dq))
+        q, dq = (x[:, i][is_evaluated(log.records[i])] for x in (log.motions[i].q, log.motions[i].dq))
         low, high = np.percentile(q, [1.0, 99.0])
         ranges.append(float(high - low))
         squares += float(dq @ dq)

@@ -9,7 +9,7 @@ import numpy as np
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators import ESTIMATORS, estimator
 from davinci_forces.estimators.problem import Prior, Regression
-from davinci_forces.identification.observations import averaged_samples, observe, pose_samples
+from davinci_forces.identification.observations import averaged_samples, is_evaluated, observe, pose_samples
 from davinci_forces.identification.regression import known_of, pose, recorded_motion, stands_still
 from davinci_forces.identification.scores import Scorer, folds, select_samples
 from davinci_forces.maths.arrays import Array, Integers
@@ -41,7 +41,7 @@ def without_the_log(
 ) -> Iterator[Prediction]:
     """Predict a log from fits to other identification logs."""
     part = motion if average is None else select_samples(motion, whole_periods(motion.t, average))
-    scorer = Scorer(part, part.evaluated, lowpass, average.sigma_tau_white if average else None)
+    scorer = Scorer(part, is_evaluated(part), lowpass, average.sigma_tau_white if average else None)
     along = recorded_motion(part)
     for fit in cross_fits:
         left_out = [str(names).split(", ") for names in fit.left_out]
@@ -60,7 +60,7 @@ def without_a_period(
     part = select_samples(motion, whole_periods(motion.t, average))
     runs, others = without_folds(part, average, model, prior)
     Phi = model.regressor(recorded_motion(part)).Phi[:, 0]
-    scorer = Scorer(part, part.evaluated, lowpass, average.sigma_tau_white)
+    scorer = Scorer(part, is_evaluated(part), lowpass, average.sigma_tau_white)
     for name in ESTIMATORS:
         try:
             thetas = [estimator(name)(regression).theta for regression in others]
@@ -100,7 +100,7 @@ def without_a_segment(
     """Predict each sixth of a log that does not repeat from fits to the other five."""
     log = observe([motion], (), lowpass, 0)
     Phi = model.regressor(log.motions[0]).Phi[:, 0]
-    scorer = Scorer(motion, motion.evaluated, lowpass)
+    scorer = Scorer(motion, is_evaluated(motion), lowpass)
     for name in ESTIMATORS:
         tau_hat = np.empty(len(motion))
         try:

@@ -144,9 +144,14 @@ def observe(records: Sequence[Motion], averages: Iterable[Average], lowpass: flo
     return Observed(tuple(records), (processing,) * n, (motion,) * n, still, block, period, lowpass, number, white)
 
 
+def is_evaluated(record: Motion) -> Booleans:
+    """Whether each sample (N,) is fitted and scored: the joint moves there, and the sample was measured."""
+    return np.asarray((record.standing == 0) & (record.filled == 0))
+
+
 def is_still(record: Motion) -> Booleans:
     """Whether a joint stands still at each sample (N,), or the sample is only filled in: its effort is not used."""
-    return ~record.evaluated | bool(record.at_rest)
+    return ~is_evaluated(record) | bool(record.at_rest)
 
 
 def smooth_effort(record: Motion, cutoff: float) -> Array:

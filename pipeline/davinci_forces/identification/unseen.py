@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.identification.candidates import Candidate, CandidatePart
-from davinci_forces.identification.observations import Observed
+from davinci_forces.identification.observations import Observed, is_evaluated
 from davinci_forces.identification.scores import Scorer, folds, select_samples
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.memory import efforts
@@ -82,7 +82,7 @@ def predict_scheme(
     for m, effort in enumerate(refits.model.efforts):
         i = log.joints.index(effort)
         record = select_samples(log.records[i], is_predicted)
-        moves = record.evaluated
+        moves = is_evaluated(record)
         if not record.at_rest and moves.any():
             tau_hat = predicted[log.processing[i]][:, m]
             scorer = Scorer(record, moves, log.lowpass, log.white.get(effort))

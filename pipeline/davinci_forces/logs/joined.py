@@ -23,11 +23,11 @@ from davinci_forces.maths.signals.clock import (
     ClockStatistics,
     are_gaps,
     are_missing,
-    bridged,
     cubic,
     distances,
     flat_lowpass,
     half_width,
+    longest_bridge,
 )
 
 FILLED_IN = "\n"  # name in a block of the flags of rows in which a missing sample was filled in: 1, else 0
@@ -259,7 +259,7 @@ class Follower:
             apart = distances(self.t, t[(t >= self.t[0]) & (t <= self.t[-1])]) > SKEW * self.period
             agree = len(apart) >= MIN_STAMPS_AGREEING and 1.0 - apart.mean() >= MIN_SHARE_AGREEING
             self.within = SKEW * self.period if agree else 0.0
-        x, exact, between = cubic(self.t, self.x, bridged(self.period), t, self.within)
+        x, exact, between = cubic(self.t, self.x, longest_bridge(self.period), t, self.within)
         self.interpolated += int(np.count_nonzero(between))
         filled = between & are_missing(self.t, t, self.period)
         last = int(np.searchsorted(self.t, t[-1], side="right")) - 1

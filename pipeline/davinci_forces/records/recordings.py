@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from davinci_forces.maths.arrays import Booleans
 from davinci_forces.records.record import Column, Counts, Labels, LogJointRecord, LogRecord, Names, Published
 
 
@@ -137,11 +136,6 @@ class Motion(SampledRecord):
     segment: Counts
     standing: Counts
     filled: Counts = field(default_factory=none_filled)
-
-    @property
-    def evaluated(self) -> Booleans:
-        """Whether each sample (N,) is fitted and judged: the joint moves, and the sample was measured."""
-        return np.asarray((self.standing == 0) & (self.filled == 0))
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ ALIKE = 0.25  # of an interval: largest difference to the next one in an even st
 MIN_INTERVALS_EVEN = 10  # an even stretch at another rate has at least so many intervals
 MAX_PERIOD_RATIO = 10.0  # a sampling time over the usual one; slower samples are not interpolated
 MIN_SHARE_RHYTHM = 0.9  # of the times without samples, in a column that is sampled in a rhythm of its own
-ROUNDING = 1e-6  # relative, of times
+TIME_ROUNDING = 1e-6  # relative, of times
 
 
 @dataclass
@@ -133,12 +133,12 @@ def _slopes(x: Array, h: Array, gap: float) -> Array:
     return np.asarray((weight[:, :, None] * all_chords).sum(axis=0) / np.maximum(weight.sum(axis=0), 1e-300)[:, None])
 
 
-def bridged(T_s: float) -> float:
+def longest_bridge(T_s: float) -> float:
     """The longest interval [s] between samples that is interpolated, for a sampling time of `T_s` [s].
 
     Up to `FILLED` may be missing; of slower clocks, one sample.
     """
-    return max(GAP * T_s, T_s + FILLED) * (1.0 + ROUNDING)
+    return max(GAP * T_s, T_s + FILLED) * (1.0 + TIME_ROUNDING)
 
 
 def are_gaps(t: Array, T_s: float) -> Booleans:
@@ -150,7 +150,7 @@ def are_gaps(t: Array, T_s: float) -> Booleans:
     even = np.zeros(len(h), np.bool_)
     for run in runs(np.abs(np.diff(h)) <= ALIKE * h[:-1]):
         even[run.start : run.stop + 1] = run.stop + 1 - run.start >= MIN_INTERVALS_EVEN
-    return np.asarray((h > bridged(T_s)) & ~(even & (h <= MAX_PERIOD_RATIO * T_s)))
+    return np.asarray((h > longest_bridge(T_s)) & ~(even & (h <= MAX_PERIOD_RATIO * T_s)))
 
 
 def distances(t: Array, at: Array) -> Array:
@@ -163,7 +163,7 @@ def distances(t: Array, at: Array) -> Array:
 
 def are_missing(t: Array, at: Array, T_s: float) -> Booleans:
     """Whether a sample is missing at each time `at` (K,), to which no sample at times `t` (N,) is near."""
-    return np.asarray(distances(t, at) > MISSING / 2 * (1.0 + ROUNDING) * T_s)
+    return np.asarray(distances(t, at) > MISSING / 2 * (1.0 + TIME_ROUNDING) * T_s)
 
 
 def fill(t: Array, x: Array, T_s: float) -> Array:
@@ -172,7 +172,7 @@ def fill(t: Array, x: Array, T_s: float) -> Array:
     The samples of longer gaps, and before the first and after the last sample, stay NaN.
     """
     missing = np.isnan(x)
-    values, _, inside = cubic(t[~missing], x[~missing, None], bridged(T_s), t[missing])
+    values, _, inside = cubic(t[~missing], x[~missing, None], longest_bridge(T_s), t[missing])
     filled = x.copy()
     filled[missing] = np.where(inside, values[:, 0], np.nan)
     return filled
@@ -194,8 +194,8 @@ def is_slower(t: Array, missing: Booleans) -> bool:
 def flat_lowpass(x: Array, ratio: float) -> Array:
     """Low-pass evenly sampled columns (N, C) without delay, for a clock that is `ratio` times as slow.
 
-    A Kaiser window of 60 dB: it passes 0.4 of the slower rate unchanged and nothing from 0.6 of it on, so that noise is
-    not aliased onto what is passed.  The columns go on beyond their ends by reflection in the end samples.
+    The filter has a Kaiser window of 60 dB.  It passes 0.4 of the slower rate unchanged, and nothing from 0.6 of it on.
+    So noise is not aliased onto what is passed.  The columns go on beyond their ends by reflection in the end samples.
     """
     from scipy.signal import fftconvolve
 

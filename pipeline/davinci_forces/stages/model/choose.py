@@ -17,7 +17,7 @@ from davinci_forces.identification.chosen import (
     parameters,
     select_candidate,
 )
-from davinci_forces.identification.observations import Observed, observe
+from davinci_forces.identification.observations import Observed, is_evaluated, observe
 from davinci_forces.identification.regression import recorded_motion
 from davinci_forces.identification.search import SearchResult, search_joints, searched_candidates
 from davinci_forces.identification.unseen import predictions
@@ -259,7 +259,7 @@ def friction_map(motion: Motion, fit: Fit, identified: Identified, lowpass: floa
     tau, theta = lowpass_segments(motion.tau, motion.segment, motion.rate, lowpass), fit.theta
     measured = tau - Phi[:, 0] @ np.where(is_friction, 0.0, theta)
     modelled = Phi[:, 0] @ np.where(is_friction, theta, 0.0)
-    valid &= motion.evaluated
+    valid &= is_evaluated(motion)
     means = over_velocity(motion.dq[valid], motion.ddq[valid], np.column_stack([measured, modelled])[valid])
     return FrictionMap(
         log=motion.log,

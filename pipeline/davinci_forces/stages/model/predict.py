@@ -5,6 +5,7 @@ from collections.abc import Collection, Iterable, Iterator
 import numpy as np
 
 from davinci_forces.identification.joint_models import LogModels, at_samples, refits_of
+from davinci_forces.identification.observations import is_evaluated
 from davinci_forces.identification.scores import Scorer
 from davinci_forces.identification.used import FALLBACK, Identified
 from davinci_forces.maths.arrays import Booleans
@@ -74,7 +75,7 @@ def predict_joint(
         message = f"{name}: contact windows and standstill cover the whole log, so no prediction can be scored"
         yield diagnostic("predict", f"{motion.log}.{motion.joint}", "warning", message)
         return
-    if steps := [step_warning(name, *part) for part in spans(motion.t, ~scored & motion.evaluated)]:
+    if steps := [step_warning(name, *part) for part in spans(motion.t, ~scored & is_evaluated(motion))]:
         yield diagnostic("predict", f"{motion.log}.{motion.joint}.steps", "warning", *steps)
     scorer, path = Scorer(motion, free, lowpass), identified.path(motion)
     for model, estimator, fit in labelled:
@@ -127,7 +128,7 @@ def apply(
             path_unseen=refit.path if refit else "" if is_fitted else path,
             rate=motion.rate, velocity=motion.velocity, at_rest=motion.at_rest, standing=motion.standing, t=motion.t,
             tau=motion.tau, segment=motion.segment,
-            unscored=unscored(motion, is_scored(motion, along, joint_fit, entry)),
+            unscored=unscored_flags(motion, is_scored(motion, along, joint_fit, entry)),
             tau_hat_unseen=at_samples(refit, motion) if refit else np.full(len(motion), np.nan), **terms,
         )  # fmt: skip
 
@@ -138,7 +139,7 @@ def is_scored(motion: Motion, along: LogModels, fit: Fit | None, entry: LogEntry
     Steps of the effort are sought in free motion that `fit` has not seen.  Friction may change by twice its static
     level, but not while the joint moves on.
     """
-    moves = motion.evaluated
+    moves = is_evaluated(motion)
     if fit is None or entry.role not in ("validation", "contact") or not entry.has_known_free_motion:
         return moves
     free = moves & is_outside(motion.t, entry.contact) & (np.diff(motion.segment, prepend=motion.segment[:1]) == 0)
@@ -148,7 +149,7 @@ def is_scored(motion: Motion, along: LogModels, fit: Fit | None, entry: LogEntry
     return np.asarray(moves & ~beyond_steps(residual, free, slack, round(motion.rate / motion.cutoff)))
 
 
-def unscored(motion: Motion, scored: Booleans) -> Counts:
+def unscored_flags(motion: Motion, scored: Booleans) -> Counts:
     """The flags (N,) of samples that are not scored; a sample that is only filled in has no transient."""
     alone = (motion.filled > 0) & (motion.standing == 0)
     return np.where(scored, 0, np.where(alone, UNSCORED_SAMPLE, UNSCORED_STRETCH))

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from davinci_forces.errors import BadLog
 from davinci_forces.maths.arrays import Booleans
 from davinci_forces.maths.periods.harmonics import are_apart, even_step
-from davinci_forces.maths.signals.clock import are_gaps, are_missing, bridged
+from davinci_forces.maths.signals.clock import are_gaps, are_missing, longest_bridge
 from davinci_forces.maths.signals.faults import count_saturated, find_stuck
 from davinci_forces.maths.signals.smoothing import (
     lowpass_segments,
@@ -194,11 +194,11 @@ def remarks(signal: Signal, recording: Recording, T_s: float, cuts: list[int], s
     name, notes, t = f"{recording.log}/{recording.joint}", [], recording.t
     if cuts:
         where = ", ".join(f"{t[c - 1]:.3f} s" for c in cuts[:5])
-        notes.append(f"{name}: {len(cuts)} gaps, not bridged, after {where}{' ...' if len(cuts) > 5 else ''}")
+        notes.append(f"{name}: {len(cuts)} gaps, not longest_bridge, after {where}{' ...' if len(cuts) > 5 else ''}")
     if samples < len(recording):
         short = f"segments of fewer than {MIN_SAMPLES_SEGMENT}"
         notes.append(f"{name}: {len(recording) - samples} samples in {short} were left out")
-    slow: Booleans = (np.diff(t) > bridged(T_s)) & ~are_gaps(t, T_s)
+    slow: Booleans = (np.diff(t) > longest_bridge(T_s)) & ~are_gaps(t, T_s)
     for part in runs(slow)[:MAX_LISTED_STRETCHES]:
         notes.append(
             f"{name}: from {t[part.start]:.3f} to {t[part.stop]:.3f} s the log is sampled at "

@@ -147,7 +147,7 @@ class UsedClocks:
     def _filled(self, timed: Iterator[TimedBlock], group: ClockGroup) -> Iterator[TimedBlock]:
         """Fill short runs of missing samples, and leave out the rows of longer ones."""
         timed = without_empty_rows(timed, group.names) if group.has_empty_rows else timed
-        filled = self.missing.filled(timed, group.names)
+        filled = self.missing.without_missing(timed, group.names)
         return ((t, {k: x for k, x in b.items() if k != group.time}) for t, b in filled) if self.are_several else filled
 
     def _timed(self, log: Log, group: ClockGroup) -> Iterator[TimedBlock]:

@@ -54,7 +54,7 @@ class MissingSamples:
     left_out: int = 0  # rows with longer runs
     at_end: int = 0  # of those, the rows after the last that is not left out
 
-    def filled(self, timed: Iterator[TimedBlock], names: Sequence[str]) -> Iterator[TimedBlock]:
+    def without_missing(self, timed: Iterator[TimedBlock], names: Sequence[str]) -> Iterator[TimedBlock]:
         """Yield the rows in which no sample of these channels is missing; `FILLED_IN` is 1 where one was filled in.
 
         Rows with missing samples wait for those that follow them.
@@ -68,13 +68,13 @@ class MissingSamples:
                 T_s, end = float(np.median(np.diff(t))), float(t[0]) + self.until
             waits = any(np.isnan(block[name][done:]).any() for name in names)
             ready = max(len(t) - REACH_ROWS, done) if waits else len(t)
-            yield self._whole_rows(t, block, names, slice(done, ready), T_s, end)
+            yield self._part(t, block, names, slice(done, ready), T_s, end)
             begin = max(ready - REACH_ROWS, 0)
             t, block, done = t[begin:], {name: x[begin:] for name, x in block.items()}, ready - begin
         if done < len(t):
-            yield self._whole_rows(t, block, names, slice(done, len(t)), T_s, end)
+            yield self._part(t, block, names, slice(done, len(t)), T_s, end)
 
-    def _whole_rows(
+    def _part(
         self, t: Array, block: dict[str, Array], names: Sequence[str], part: slice, T_s: float, end: float
     ) -> TimedBlock:
         """The rows of a part of a block (N,) in which no sample is missing any more."""
@@ -96,9 +96,9 @@ class MissingSamples:
             state.rows += int(counted.sum())
             state.count += int(mask.sum())
             state.at_end = int(mask[after:].sum()) + (0 if whole.any() else state.at_end)
-        gone = ~whole & counted
-        self.left_out += int(gone.sum())
-        self.at_end = int(gone[after:].sum()) + (0 if whole.any() else self.at_end)
+        incomplete = ~whole & counted
+        self.left_out += int(incomplete.sum())
+        self.at_end = int(incomplete[after:].sum()) + (0 if whole.any() else self.at_end)
         self.filled_rows += int((whole & counted & np.any([*missing.values()], axis=0)).sum())
 
     def require_most(self, log: Log) -> None:
