@@ -17,6 +17,7 @@ Number = TypeVar("Number", np.float64, np.int64)
 
 NUMBER = re.compile(rb"[+-]?((\d+[.,]?\d*|[.,]\d+)([eE][+-]?\d+)?|nan|inf|infinity)", re.IGNORECASE)
 UNREADABLE = pa.ArrowInvalid
+MISSING = frozenset(("NA", "N/A", "n/a", "#N/A", "<NA>", "null", "NULL", "None", "-", "--"))  # words for no sample
 PARSE_BYTES = 1 << 20  # [bytes] that one thread of Arrow parses at a time
 
 
@@ -105,7 +106,7 @@ def parse(
         convert_options=csv.ConvertOptions(
             column_types=types,
             include_columns=list(types),
-            null_values=["", " "],
+            null_values=["", " ", *MISSING],
             strings_can_be_null=bool(times),
             decimal_point=decimal.decode(),
             check_utf8=False,
@@ -157,5 +158,5 @@ def check(
     """
     for i, row in enumerate(rows):
         for column, pattern in zip(wanted, patterns or [NUMBER] * len(wanted), strict=True):
-            if row[column] and not pattern.fullmatch(row[column]):
+            if row[column] and not pattern.fullmatch(row[column]) and row[column].decode("latin-1") not in MISSING:
                 raise NotANumber(i, column, row[column])

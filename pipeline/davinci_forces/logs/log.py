@@ -14,7 +14,6 @@ To read several clocks at once, use `Log.independent_copy`, which is shallow; `b
 own pass.
 """
 
-import re
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -31,7 +30,6 @@ from davinci_forces.errors import BadLog
 
 Block = dict[str, NDArray[np.float64]]  # channel name -> samples; every array of a block has one length
 UNIT_OF_COUNTS = "samples"  # unit of a time channel that only counts samples
-IN_BRACKETS = re.compile(r".*\S\s*[\[(]\s*([^\[\]()]*?)\s*[\])]\s*")
 BLOCK_ROWS = 1 << 16  # rows of a full block
 BLOCK_CELLS = 1 << 20  # of a full block of many channels
 
@@ -213,12 +211,6 @@ def unique(names: Sequence[str], taken: Iterable[str] = ()) -> tuple[str, ...]:
             free = f"{name}_{number}"
         used[free] = None
     return tuple(used)[len(used) - len(names) :]
-
-
-def unit_in(name: str) -> str:
-    """The unit of a name such as `q [rad]` or `q (rad)`, else ""."""
-    unit = IN_BRACKETS.fullmatch(name)
-    return unit.group(1) if unit else ""
 
 
 def renaming_remarks(written: Sequence[str], names: Sequence[str]) -> list[str]:

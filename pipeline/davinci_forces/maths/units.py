@@ -1,17 +1,25 @@
-"""Units of the quantities in logs, and their size in SI."""
+"""Units of the quantities in logs, their size in SI, and the units that names of channels state."""
 
 import math
+import re
 
 # name -> (what it measures, its size in SI)
 UNITS: dict[str, tuple[str, float]] = {
     "rad": ("angle", 1.0),
+    "mrad": ("angle", 1e-3),
     "deg": ("angle", math.pi / 180),
     "rev": ("angle", 2 * math.pi),
     "m": ("length", 1.0),
+    "cm": ("length", 1e-2),
     "mm": ("length", 1e-3),
     "um": ("length", 1e-6),
     "s": ("time", 1.0),
     "ms": ("time", 1e-3),
+    "us": ("time", 1e-6),
+    "ns": ("time", 1e-9),
+    "min": ("time", 60.0),
+    "h": ("time", 3600.0),
+    "day": ("time", 86400.0),
     "A": ("current", 1.0),
     "mA": ("current", 1e-3),
     "N": ("force", 1.0),
@@ -28,17 +36,93 @@ SI = {
     "force": "N", "torque": "N m", "count": "",
 }  # fmt: skip
 
+# other words for units, in lower case, without blanks, and without the s of the plural
 SPELLINGS = {
-    "°": "deg", "degree": "deg", "degrees": "deg", "radian": "rad", "radians": "rad", "µm": "um", "μm": "um",
-    "Nm": "N m", "N*m": "N m", "N.m": "N m", "N·m": "N m", "N-m": "N m", "mNm": "mN m", "sec": "s",
-    "second": "s", "seconds": "s", "Seconds": "s", "Amperes": "A", "Amps": "A", "meter": "m", "meters": "m",
-    "Newtons": "N", "Newton": "N", "1/min": "rpm", "rev/min": "rpm", "°/s": "deg/s",
+    "°": "deg", "degree": "deg", "radian": "rad", "revolution": "rev", "turn": "rev", "meter": "m", "metre": "m",
+    "millimeter": "mm", "millimetre": "mm", "sec": "s", "second": "s", "msec": "ms", "millisec": "ms",
+    "millisecond": "ms", "usec": "us", "microsec": "us", "microsecond": "us", "nsec": "ns", "nanosec": "ns",
+    "nanosecond": "ns", "minute": "min", "hour": "h", "amp": "a", "ampere": "a", "milliamp": "ma", "newton": "n",
+    "newtonmeter": "nm", "newtonmetre": "nm", "nmm": "mnm", "dps": "deg/s", "rps": "rev/s", "mps": "m/s",
+    "1/min": "rpm", "/min": "rpm", "rev/min": "rpm", "r/min": "rpm", "u/min": "rpm",
 }  # fmt: skip
+LISTED = {unit.lower().replace(" ", ""): unit for unit in UNITS}
+# words for units that no quantity has: counts have no size, and kg or lb of force depend on their definition
+UNSIZED = {
+    "count", "cnt", "tick", "pulse", "inc", "lsb", "adc", "volt", "v", "mv", "percent", "pct", "permille", "%",
+    "kg", "kgf", "gf", "g", "lbf", "lb", "inch",
+}  # fmt: skip
+TIMES = ("time", "t", "elapsed", "timestamp", "stamp", "clock", "duration")
+# words that are units only after these words: `time_min` is in minutes, but `q_min` is a minimum
+ONLY_AFTER = {
+    **dict.fromkeys(("s", "min", "h", "day"), TIMES), "A": ("current", "curr", "i"), "N": ("force", "load"),
+    "m": ("depth", "displacement"), "g": ("load", "weight"), "v": ("force", "load", "sensor"),
+}  # fmt: skip
+IN_BRACKETS = re.compile(r"(?<=\S)\s*[\[({]\s*([^\[\](){}]*?)\s*[\])}]")
+INDEX = re.compile(r"\d*|[^\W\d]\w*_\w*|[^\W\d]+ ?\d+")  # `q[0]`, `effort[outer_yaw]`, `q (joint 1)`
+CAPITAL = re.compile(r"(?<=[a-z]{3})(?=m(?:A|Nm?)$)|(?<=[a-z])(?=[A-Z])")  # `currentmA`, `angleDeg`
 
 
 def canonical(unit: str) -> str:
     """The listed spelling of a unit, or the unit as it stands."""
-    return SPELLINGS.get(unit.strip(), unit.strip())
+    unit = unit.strip()
+    if unit in UNITS or (len(unit) == 1 and unit != "°"):
+        return unit
+    text = re.sub(r"[\s·*.]*\b(s|min)(?:\^?-1|⁻¹)$|\s+per\s+", r"/\1", re.sub("[µμ]", "u", unit.lower()))
+    text = "/".join(_spelled(re.sub(r"[\s·*.()-]", "", part)) for part in text.split("/"))
+    return LISTED.get(_spelled(text), unit)
+
+
+def _spelled(word: str) -> str:
+    singular = word.removesuffix("s") if len(word) > 3 else word
+    return SPELLINGS.get(word, SPELLINGS.get(singular, singular if singular in LISTED else word))
+
+
+def unit_in(name: str) -> str:
+    """The unit that a channel's name states, as in `q [deg]`, `time / ms`, `q_deg` or `posDeg`, else ""."""
+    return split_ratio(name)[1] or _in_brackets(name) or _in_words(name)
+
+
+def split_ratio(name: str) -> tuple[str, str]:
+    """Split `time / ms`, a quantity over its unit, into both; the unit of any other name is ""."""
+    for slash in re.finditer("/", "" if measures(name) else name):
+        quantity, unit = name[: slash.start()].strip(), name[slash.end() :].strip()
+        if not quantity.startswith("/") and not re.search(r"[\[({][^\])}]*$", quantity) and quantity and _is_unit(unit):
+            return quantity, unit.strip("()")
+    return name, ""
+
+
+def _is_unit(word: str) -> bool:
+    return bool(measures(word)) or word.lower().removesuffix("s") in UNSIZED
+
+
+def _in_brackets(name: str) -> str:
+    """The last listed unit in brackets, or whatever the brackets at the end of a name hold that is no index."""
+    brackets = [match for match in IN_BRACKETS.finditer(name) if not INDEX.fullmatch(match[1]) or measures(match[1])]
+    listed = [match[1] for match in brackets if measures(match[1])]
+    return listed[-1] if listed else next((match[1] for match in brackets if match.end() == len(name.rstrip())), "")
+
+
+def _in_words(name: str) -> str:
+    """The last unit among the words of a name but for the first."""
+    if "/" in name and measures(name):
+        return name
+    words = re.findall(r"[^\W\d_]+|[°%]", name.rpartition("/")[2] if name.startswith("/") else name)
+    units = (_unit_at(words, i) for i in reversed(range(len(words))))
+    return next(filter(None, units), "")
+
+
+def _unit_at(words: list[str], i: int) -> str:
+    """The unit that begins at a word: `deg_per_s`, `deg_s`, `N_m`, `deg`, or the end of `posDeg`."""
+    tails = [words[i][match.start() :] for match in CAPITAL.finditer(words[i])]
+    joined = ["/".join(words[i : i + 2]), *(" ".join(words[i : i + n]) for n in (3, 2, 1))] if i else []
+    for word in [*joined, *(CAPITAL.sub(" ", tail) for tail in tails)]:
+        unit = canonical(LISTED.get(word.lower(), word))
+        before = ONLY_AFTER.get(unit if unit in UNITS else unit.lower())
+        if word.lower() == "rev":
+            return "rev?"  # revolutions, or reverse: unlisted, so that the study has to say it
+        if _is_unit(unit) and (before is None or (i and words[i - 1].lower() in before) or len(word) > 4):
+            return unit
+    return ""
 
 
 def measures(unit: str) -> str | None:

@@ -6,17 +6,32 @@ from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
 
+import numpy as np
+
 from davinci_forces.errors import BadLog
-from davinci_forces.logs.cells import UNREADABLE, Cells, NotANumber, check, parse
+from davinci_forces.logs.cells import MISSING, UNREADABLE, Cells, NotANumber, check, parse
 from davinci_forces.logs.lines import GZIP, Lines, decode
-from davinci_forces.logs.log import Block, Channel, Log, Options, read_ahead
-from davinci_forces.logs.text.dialect import NAMES, Dialect, Unclear, find_dialect, split_cells
+from davinci_forces.logs.log import Block, Log, Options, read_ahead
+from davinci_forces.logs.text.dialect import Dialect, find_dialect
+from davinci_forces.logs.text.marks import NAMED
+from davinci_forces.logs.text.rows import (
+    FRAME_BYTES,
+    NO_ROW,
+    NUMBERS,
+    TWO_READINGS,
+    Unclear,
+    both_readings,
+    split_cells,
+    without_groups,
+)
 from davinci_forces.logs.text.stamps import REMARK, Unwrapped, clocks_may_change
 
 VALUE_BYTES = rb"[+-]?((\d+MARK?\d*|MARK\d+)([eE][+-]?\d+)?|nan|inf|infinity)"
 NUMBER_PATTERNS_BYTES = {
     mark.decode(): re.compile(VALUE_BYTES.replace(b"MARK", re.escape(mark)), re.IGNORECASE) for mark in (b".", b",")
 }
+NAMES = {delimiter: name for name, delimiter in NAMED.items() if name != "\\t"}
+MAX_COMMENTS = 100  # lines between rows that are shown
 
 
 def recognises(path: Path, head: bytes) -> bool:
@@ -39,15 +54,12 @@ def read(path: Path, options: Options) -> Log:
         dialect = find_dialect([line.rstrip("\r") for line in head], options)
     except Unclear as problem:
         raise BadLog(f"{path}: {problem}") from None
-    channels = tuple(
-        Channel(name, unit, kind) for name, unit, kind in zip(dialect.names, dialect.units, dialect.kinds, strict=True)
-    )
     facts = {
         "delimiter": NAMES.get(dialect.delimiter, dialect.delimiter),
         "decimal mark": dialect.decimal,
-        "header": f"{dialect.header} lines" if dialect.named else "none: columns are numbered from 0",
+        "header": f"{dialect.header} lines" if dialect.names else "none: columns are numbered from 0",
     }
-    shown = channels[: len(channels) - dialect.trailing]
+    shown = dialect.channels[: len(dialect.channels) - dialect.trailing]
     comments = list(dialect.preamble)
     time = next((channel.name for channel in shown if channel.kind == "time"), "")
     dated = next((stamps for stamps in dialect.stamps.values() if stamps.has_date), None)
@@ -67,8 +79,11 @@ class TextLog(Log):
 
     def blocks(self, names: Sequence[str]) -> Iterator[Block]:
         """Read the samples of these channels, as `Log.blocks` says."""
-        self._restart(names, kinds=("number", "time"))
         assert self.dialect is not None
+        for i, why in self.dialect.unread.items():
+            if (name := self.dialect.channels[i].name) in names:
+                raise BadLog(f"{self.path}: column {i} ({name}) {why}")
+        self._restart(names, kinds=("number", "time"))
         yield from read_ahead(_Reading(self, self.dialect, tuple(names)).blocks())
 
 
@@ -77,10 +92,11 @@ class _Reading:
 
     def __init__(self, log: TextLog, dialect: Dialect, names: tuple[str, ...]) -> None:
         self.log, self.dialect, self.names = log, dialect, names
-        self.columns = {name: dialect.names.index(name) for name in names}
-        behind = [len(dialect.names) - 1] if dialect.trailing else []  # a column that must stay empty
+        self.width = len(dialect.channels)
+        self.columns = {c.name: i for i, c in enumerate(dialect.channels) if c.name in names}
+        behind = [self.width - 1] if dialect.trailing else []  # a column that must stay empty
         self.wanted = sorted({*self.columns.values(), *behind})
-        self.rows = self.narrow = self.first_narrow = 0
+        self.rows = self.narrow = self.first_narrow = self.no_rows = self.headers = self.first_header = 0
         self.times = {i: stamps.seconds for i, stamps in dialect.stamps.items() if i in self.wanted}
         self.latest = 0.0  # [s] of columns with dates
         self.days = {i: Unwrapped() for i in self.times if not dialect.stamps[i].has_date}
@@ -104,7 +120,14 @@ class _Reading:
         self._close(lines)
 
     def _block(self, first: int, block: bytes) -> Block:
-        cells = self._at_once(block) or self._row_by_row(first, block)
+        if self.dialect.framed:
+            block = FRAME_BYTES.sub(b"", block)
+        if b"#" in block or b"%" in block:
+            block = self._without_comments(first, block)
+        cells = self._at_once(block)
+        if cells is None:
+            block = self._without_comments(first, block)
+            cells = self._at_once(block) or self._row_by_row(first, block)
         self.rows += cells.rows
         for i in self.times.keys() - self.days.keys():
             self.latest = max(self.latest, *cells.columns[i][-1:].tolist())
@@ -113,12 +136,27 @@ class _Reading:
         nulls = {name: cells.nulls[i] for name, i in self.columns.items()}
         return self.log.count_nans({name: cells.columns[i] for name, i in self.columns.items()}, nulls)
 
+    def _without_comments(self, first: int, block: bytes) -> bytes:
+        """Blank the comments between rows, and keep the first of them."""
+
+        def blank(match: re.Match[bytes]) -> bytes:
+            if match[0].strip():
+                self._comment(first + block.count(b"\n", 0, match.start()), decode(match[0], self.log.encoding))
+            return b""
+
+        return block if self.dialect.marked else NO_ROW.sub(blank, block)
+
+    def _comment(self, line: int, text: str) -> None:
+        self.no_rows += 1
+        if self.no_rows <= MAX_COMMENTS:
+            self.log.comments.append(f"line {line}: {text.strip()}")
+
     def _at_once(self, block: bytes) -> Cells | None:
         """Parse a block whose rows are all regular, else return None."""
         dialect = self.dialect
         if dialect.delimiter == " ":
             return None
-        delimiter, decimal, width = dialect.delimiter.encode(), dialect.decimal.encode(), len(dialect.names)
+        delimiter, decimal, width = dialect.delimiter.encode(), dialect.decimal.encode(), self.width
         try:
             cells = parse(block, width, delimiter, decimal, self.wanted, quoted=dialect.quoted, times=self.times)
         except UNREADABLE:
@@ -130,26 +168,68 @@ class _Reading:
         rows, lines = [], []
         for line, row in enumerate(block.split(b"\n"), start=first):
             if row.strip():
-                texts = self._fitted(line, split_cells(decode(row, "latin-1"), self.dialect.delimiter))
-                rows.append([texts[i].encode("latin-1") for i in self.wanted])
-                lines.append(line)
+                text = decode(row, "latin-1")
+                cells = split_cells(text, self.dialect.delimiter)
+                if self._is_row(line, text, cells):
+                    fitted = self._fitted(line, cells)
+                    rows.append([fitted[i].encode("latin-1") for i in self.wanted])
+                    lines.append(line)
+        if not rows:
+            return Cells(0, {i: np.empty(0) for i in self.wanted}, dict.fromkeys(self.wanted, 0), texts=[])
+        patterns = [self._pattern(i) for i in self.wanted]
         try:
-            check(rows, range(len(self.wanted)), [self._pattern(i) for i in self.wanted])
+            check(rows, range(len(self.wanted)), patterns)
+        except NotANumber:
+            rows = [[self._without_groups(i, cell) for i, cell in zip(self.wanted, row, strict=True)] for row in rows]
+        try:
+            check(rows, range(len(self.wanted)), patterns)
         except NotANumber as bad:
             raise BadLog(self._no_number(lines[bad.row], self.wanted[bad.column], bad.cell)) from None
-        text = b"".join(b"\t".join(row) + b"\n" for row in rows).replace(b"\n\n", b"\n \n")
+        content = b"".join(b"\t".join(row) + b"\n" for row in rows).replace(b"\n\n", b"\n \n")
         times = {self.wanted.index(i): seconds for i, seconds in self.times.items()}
         try:
-            cells = parse(
-                text, len(self.wanted), b"\t", self.dialect.decimal.encode(), range(len(self.wanted)), times=times
+            parsed = parse(
+                content, len(self.wanted), b"\t", self.dialect.decimal.encode(), range(len(self.wanted)), times=times
             )
         except UNREADABLE as bad:
             raise BadLog(
                 f"{self.log.path}:{lines[0]}: from this line on there is a time that is not a valid date ({bad}); "
                 "correct the cell, or take the row out of the log"
             ) from None
-        columns = {self.wanted[i]: column for i, column in cells.columns.items()}
-        return Cells(cells.rows, columns, {self.wanted[i]: count for i, count in cells.nulls.items()}, texts=[])
+        columns = {self.wanted[i]: column for i, column in parsed.columns.items()}
+        return Cells(parsed.rows, columns, {self.wanted[i]: count for i, count in parsed.nulls.items()}, texts=[])
+
+    def _without_groups(self, column: int, cell: bytes) -> bytes:
+        text = cell.decode("latin-1")
+        return cell if column in self.times else without_groups(text, self.dialect.decimal).encode("latin-1")
+
+    def _is_row(self, line: int, row: str, cells: list[str]) -> bool:
+        """Whether a line holds samples, and is neither a remark between rows nor the header again.
+
+        Raises
+        ------
+        BadLog
+            At another header.
+        """
+        number, times = NUMBERS[self.dialect.decimal], self.dialect.stamps
+        if any(map(number.fullmatch, cells)) or not any(cell and cell not in MISSING for cell in cells):
+            return True
+        if any(times[i].pattern.fullmatch(cells[i]) for i in times if i < len(cells)):
+            return True
+        text = decode(row.encode("latin-1"), self.log.encoding).strip()
+        if text in self.dialect.header_lines:
+            self.headers, self.first_header = self.headers + 1, self.first_header or line
+        elif len(cells) < self.width:
+            self._comment(line, text)
+        else:
+            return self.width == 1 or self._refuse_header(line, text)
+        return False
+
+    def _refuse_header(self, line: int, text: str) -> bool:
+        raise BadLog(
+            f"{self.log.path}:{line}: {text[:80]!r} is neither a row nor the header; if another table begins here, "
+            "save each as a file of its own, else take the line out of the log"
+        )
 
     def _pattern(self, column: int) -> re.Pattern[bytes]:
         """Return the pattern of the cells of a column."""
@@ -159,13 +239,13 @@ class _Reading:
 
     def _fitted(self, line: int, cells: list[str]) -> list[str]:
         """Fill up the cells of a row to the number of columns."""
-        width = len(self.dialect.names)
-        if any(cells[width:]):
-            raise BadLog(
-                f"{self.log.path}:{line}: the row has {len(cells)} cells, but the log has {width} columns; correct the "
-                "row, or set `delimiter` and `decimal` for this log in study.toml"
-            )
-        if len(cells) < width - self.dialect.trailing:
+        width, trailing = self.width, self.dialect.trailing
+        where = f"{self.log.path}:{line}: the row has {len(cells)} cells, but the log has {width - trailing} columns"
+        if any(cells[width:]) or (trailing and NUMBERS[self.dialect.decimal].fullmatch("".join(cells[width - 1 :]))):
+            raise BadLog(f"{where}; correct the row, or set `delimiter` and `decimal` for this log in study.toml")
+        if len(cells) < width - trailing:
+            if self.dialect.delimiter == " ":
+                raise BadLog(f"{where} between blanks, so which are missing is not known; export with a delimiter")
             self.narrow, self.first_narrow = self.narrow + 1, self.first_narrow or line
         return cells + [""] * (width - len(cells))
 
@@ -174,7 +254,9 @@ class _Reading:
         if column not in self.times:
             what = f"number with the decimal mark {self.dialect.decimal!r}"
             remedy = "set `decimal` for this log in study.toml"
-        where = f"{decode(cell, self.log.encoding)[:40]!r} in column {column} ({self.dialect.names[column]})"
+        where = f"{decode(cell, self.log.encoding)[:40]!r} in column {column} ({self.dialect.channels[column].name})"
+        if any(readings.fullmatch(cell.decode("latin-1")) for readings in TWO_READINGS.values()):
+            return f"{self.log.path}:{line}: {where} {both_readings(cell.decode('latin-1'))}"
         return f"{self.log.path}:{line}: {where} is not a {what}; correct the cell, or {remedy}"
 
     def _close(self, lines: Lines) -> None:
@@ -182,6 +264,10 @@ class _Reading:
         say = self.log.warnings.append
         if self.narrow:
             say(f"line {self.first_narrow}: the first of {self.narrow} rows with too few cells; missing ones are nulls")
+        if self.no_rows:
+            say(f"{self.no_rows} lines between the rows hold no samples, and are listed as comments")
+        if self.headers:
+            say(f"line {self.first_header}: the header again, so this file may hold more than one recording")
         if lines.cut.strip():
             self.log.dropped += 1
             say(f"line {lines.cut_at}: the file ends within this row, which is dropped")

@@ -1,8 +1,8 @@
-"""Convert dates and times of day in the cells of a text log to seconds: ISO 8601 or HH:MM:SS."""
+"""Convert dates and times of day in the cells of a text log to seconds: ISO 8601, HH:MM:SS, and other orders."""
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime, timedelta
 
 import numpy as np
@@ -15,10 +15,30 @@ from davinci_forces.maths.arrays import Array
 CLOCK = r"\d?\d:\d\d:\d\d(?:[.,]\d+)?"
 DATE = r"\d{4}[-/]\d\d[-/]\d\d"
 ZONE = r"\s?(?:Z|[+-]\d\d(?::?\d\d)?)"
+HALF = r"(?P<half>\s?[AaPp]\.?[Mm]\.?)?"  # of the day
+OTHER_DATE = rf"(\d\d?)([./-])(\d\d?)\2\d{{4}}(?:[.,]?[T ]+\d?\d:\d\d(?::\d\d(?:[.,]\d+)?)?{HALF})"
+MONTH_NAMES = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+NAMED_DATE = rf"\d\d?[- ](?:{'|'.join(MONTH_NAMES)})[- ]\d{{4}} {CLOCK}"
 MOMENT = re.compile(rf"{DATE}[T ]\d\d:\d\d(?::\d\d(?:[.,]\d+)?)?(?P<zone>{ZONE})?", re.ASCII)
-TIME_OF_DAY = re.compile(CLOCK, re.ASCII)
-DAY_ALONE = re.compile(DATE, re.ASCII)
-DAY = 86400.0  # [s]
+DAY_FIRST, MONTH_FIRST = (re.compile(rf"(?#{order}){OTHER_DATE}", re.ASCII) for order in ("d/m", "m/d"))
+MONTH_NAMED = re.compile(NAMED_DATE, re.ASCII | re.IGNORECASE)
+COMPACT = re.compile(r"20\d\d[01]\d[0-3]\d[T_ -]?[0-2]\d[0-5]\d[0-5]\d(?:[.,]\d+)?", re.ASCII)
+TIME_OF_DAY = re.compile(CLOCK + HALF, re.ASCII)
+DAY_ALONE = re.compile(rf"{DATE}|\d\d?([./-])\d\d?\1\d{{4}}", re.ASCII)
+PADDED = ((r"-0(\d\d)", r"-\1"), (r" (\d):", r" 0\1:"))
+# how the cells of each pattern become ISO 8601
+REWRITTEN: dict[re.Pattern[str], tuple[tuple[str, str], ...]] = {
+    MOMENT: ((r"\s+([Z+-])", r"\1"), ("/", "-")),
+    DAY_FIRST: ((r"^(\d+)[./-](\d+)[./-](\d+)\.?[T ]+", r"\3-0\2-0\1 "), *PADDED),
+    MONTH_FIRST: ((r"^(\d+)[./-](\d+)[./-](\d+)\.?[T ]+", r"\3-0\1-0\2 "), *PADDED),
+    MONTH_NAMED: (
+        *((f"(?i)[- ]{name}[- ]", f"-{number}-") for number, name in enumerate(MONTH_NAMES, start=1)),
+        (r"^(\d+)-(\d+)-(\d+) ", r"\3-0\2-0\1 "), *PADDED,
+    ),
+    COMPACT: ((r"^(\d{4})(\d\d)(\d\d)[T_ -]?(\d\d)(\d\d)(\d\d)", r"\1-\2-\3 \4:\5:\6"),),
+    TIME_OF_DAY: ((r"^(\d\d?:)", r"1970-01-01 0\1"), (r" 0(\d\d:)", r" \1")),
+}  # fmt: skip
+DAY, HOUR = 86400.0, 3600.0  # [s]
 MONTHS = (3, 4, 9, 10, 11)  # in which clocks change in some country, on a Sunday night
 HOURS = (1, 2, 3)  # of these changes, in local time
 REMARK = (
@@ -34,11 +54,12 @@ class Stamps:
     pattern: re.Pattern[str]
     zoned: bool = False
     zero: int = 0  # [ns] since 1970 of the first cell; midnight for times of day
+    has_halves: bool = False  # whether hours are those of half a day, with AM or PM
 
     @property
     def has_date(self) -> bool:
         """Whether the cells have a date."""
-        return self.pattern is MOMENT
+        return self.pattern is not TIME_OF_DAY
 
     @property
     def first_moment(self) -> str:
@@ -55,42 +76,68 @@ class Stamps:
             At a cell of another format.
         """
         text = pc.replace_substring(pc.utf8_trim_whitespace(cells), ",", ".")
-        if self.has_date:
-            text = pc.replace_substring(pc.replace_substring_regex(text, r"\s+([Z+-])", r"\1"), "/", "-")
-        else:
-            text = pc.replace_substring_regex(text, r"^(\d\d?:)", r"1970-01-01 0\1")
-            text = pc.replace_substring_regex(text, r" 0(\d\d:)", r" \1")
+        late = np.zeros(len(text))  # [s] of the second half of the day, and of its first hour, which is written 12
+        if self.has_halves:
+            after, noon = (pc.fill_null(pc.match_substring_regex(text, p), False) for p in (r"(?i)p\.?m", r"\b12:"))
+            late = 12 * HOUR * (after.to_numpy().astype(float) - noon.to_numpy())
+            text = pc.replace_substring_regex(text, r"(?i)\s*[ap]\.?m\.?$", "")
+        for pattern, iso in REWRITTEN[self.pattern]:
+            text = pc.replace_substring_regex(text, pattern, iso)
         text = pc.replace_substring_regex(text, r"(\.\d{9})\d+", r"\1")
         moments = pc.cast(text, pa.timestamp("ns", tz="UTC" if self.zoned else None)).cast(pa.int64())
-        return np.where(absent(moments), np.nan, (integers(moments) - self.zero) / 1e9)
+        return np.where(absent(moments), np.nan, (integers(moments) - self.zero) / 1e9 + late)
+
+    def from_first(self, cells: Sequence[str]) -> "Stamps | None":
+        """Set the zero of dated stamps to the first dated cell; None if it is not a valid date."""
+        if not self.has_date:
+            return self
+        first = next(cell for cell in cells if self.pattern.fullmatch(cell))
+        try:
+            seconds = self.seconds(pa.chunked_array([[first]]))
+        except pa.ArrowInvalid:
+            return None
+        return replace(self, zero=round(float(seconds[0]) * 1e6) * 1000)
 
 
-def stamps_of(cells: Sequence[str]) -> Stamps | None:
-    """Find the time format of a text column, if most cells have one; any other cell is later an error with its line."""
+def stamps_of(cells: Sequence[str], is_text: bool) -> Stamps | None:
+    """Find the time format of a column, if most cells have one; any other cell is later an error with its line."""
     filled = [cell for cell in cells if cell]
-    for pattern in (MOMENT, TIME_OF_DAY):
+    patterns = (MOMENT, TIME_OF_DAY, MONTH_NAMED, COMPACT, *_orders(cells)) if is_text else (COMPACT,)
+    for pattern in patterns:
         matches = [match for match in map(pattern.fullmatch, filled) if match]
-        if 2 * len(matches) > len(filled):
-            zones = {bool(match.groupdict().get("zone")) for match in matches}
-            return Stamps(pattern, zoned=zones == {True}) if len(zones) == 1 else None
+        if (2 if is_text else 1) * len(matches) > (len(filled) if is_text else len(filled) - 1) > 0:
+            zones, halves = ({bool(m.groupdict().get(g)) for m in matches} for g in ("zone", "half"))
+            return (
+                Stamps(pattern, zones == {True}, has_halves=halves == {True})
+                if len(zones) == len(halves) == 1
+                else None
+            )
     return None
+
+
+def _orders(cells: Sequence[str]) -> list[re.Pattern[str]]:
+    """The orders of day and month that dates of a column can have; a point is only written after a day."""
+    parts = [match.groups() for match in map(DAY_FIRST.fullmatch, cells) if match]
+    if any(mark == "." or int(first) > 12 for first, mark, *_ in parts):
+        return [DAY_FIRST]
+    return [MONTH_FIRST] if any(int(second) > 12 for _, _, second, *_ in parts) else []
+
+
+def both_dates(cells: Sequence[str]) -> str:
+    """Say which two dates a column may hold, where both day and month are at most 12; else ""."""
+    dates = [cell for cell in cells if DAY_FIRST.fullmatch(cell)]
+    if not dates or _orders(cells):
+        return ""
+    first, second = re.split("[/-]", dates[0])[:2]
+    return (
+        f"holds {dates[0]!r}, which may be day {first} of month {second}, or day {second} of month {first}; export "
+        "dates as in ISO 8601, 2026-10-15 14:02:06"
+    )
 
 
 def is_time(cell: str) -> bool:
     """Whether a cell is a date, a time of day or both."""
-    return cell[:1].isdecimal() and any(pattern.fullmatch(cell) for pattern in (MOMENT, TIME_OF_DAY, DAY_ALONE))
-
-
-def from_first_cell(stamps: Stamps, cells: Sequence[str]) -> Stamps | None:
-    """Set the zero of dated stamps to the first dated cell; None if it is not a valid date."""
-    if not stamps.has_date:
-        return stamps
-    first = next(cell for cell in cells if stamps.pattern.fullmatch(cell))
-    try:
-        seconds = stamps.seconds(pa.chunked_array([[first]]))
-    except pa.ArrowInvalid:
-        return None
-    return Stamps(stamps.pattern, stamps.zoned, round(float(seconds[0]) * 1e6) * 1000)
+    return cell[:1].isdecimal() and any(pattern.fullmatch(cell) for pattern in (*REWRITTEN, DAY_ALONE))
 
 
 class Unwrapped:

@@ -1,0 +1,105 @@
+"""Find names and units of the columns of a text log in the lines before its rows."""
+
+import re
+from collections.abc import Sequence
+from typing import NamedTuple
+
+from davinci_forces.logs.log import Options
+from davinci_forces.logs.text.rows import COMMENT, RULER, Unclear, split_cells
+from davinci_forces.maths.units import UNSIZED, canonical, measures, split_ratio, unit_in
+
+BRACKETED = re.compile(r"\s*[\[(].*[\])]\s*")
+DELIMITERS = (r"\t+", ";", ",", r"\|", r"\s{2,}", r"\s+")  # of a header with another delimiter than the rows
+COUNTING = re.compile(r"[+-]?[\d.,]+([eE][+-]?\d+)?")
+
+
+class Header(NamedTuple):
+    """Names and units of all columns, empty where there are none."""
+
+    names: list[str]
+    aliases: list[str]  # names as written, where these hold the unit after a slash
+    units: list[str]
+    preamble: list[str]  # the other lines
+
+
+def read_header(lines: Sequence[str], body: Sequence[str], delimiter: str, width: int, options: Options) -> Header:
+    """Read the lines before the first row; `body` are rows of `width` cells.
+
+    Raises
+    ------
+    Unclear
+        If the last line has other columns than the rows, or holds numbers and text.
+    """
+    rows = [_fitted(line, body, delimiter, width) for line in lines]
+    fits = [i for i, row in enumerate(rows) if len(row) == width and not RULER.fullmatch(lines[i])]
+    below = [i for i in range((fits or [-1])[-1] + 1, len(rows)) if not COMMENT.match(lines[i])]
+    odd = next((rows[i] for i in below if len(rows[i]) > 1 and (not fits or _are_units(rows[i]))), None)
+    if odd or (below and options.header and not fits):
+        raise Unclear(_other_columns(odd or rows[-1], width))
+    of_units = next((i for i in fits[::-1] if len(fits) > 1 and _are_units(rows[i])), None)
+    above = [i for i in fits if of_units is None or i < of_units]
+    of_names = (above or [i for i in fits if i != of_units] or [None])[-1]
+    names = [] if of_names is None else rows[of_names]
+    if any(COUNTING.fullmatch(cell) for cell in names) and options.header is None:
+        raise Unclear(
+            f"a line before the rows holds numbers and text ({', '.join(names[:6])}); correct the cell, or set "
+            "`header = true` for this log in study.toml if these are names"
+        )
+    units = [cell.strip("[](){} ") for cell in rows[of_units]] if of_units is not None else [""] * width
+    preamble = [line for i, line in enumerate(lines) if i not in (of_names, of_units)]
+    return _split(names or [""] * width, units, preamble)
+
+
+def _split(names: list[str], units: list[str], preamble: list[str]) -> Header:
+    """Take the units out of the names: where one name is a quantity over its unit, all of that form are."""
+    ratios = [split_ratio(name) for name in names]
+    if any(unit for _, unit in ratios):
+        ratios = [ratio if ratio[1] else _over(ratio[0]) for ratio in ratios]
+    stems = [stem for stem, _ in ratios]
+    aliases = [name if name != stem else "" for name, stem in zip(names, stems, strict=True)]
+    stated = [unit or ratio[1] or unit_in(name) for unit, ratio, name in zip(units, ratios, names, strict=True)]
+    return Header(stems, aliases, stated, preamble)
+
+
+def _over(name: str) -> tuple[str, str]:
+    stem, slash, unit = name.rpartition(" / ")
+    return (stem.strip(), unit.strip()) if slash else (name, "")
+
+
+def _fitted(line: str, body: Sequence[str], delimiter: str, width: int) -> list[str]:
+    """Split a line of the header into as many cells as the rows have, if it has them with any delimiter."""
+    text = COMMENT.sub("", line, count=1) if COMMENT.match(line) else line
+    cells = split_cells(text, delimiter)
+    if len(cells) == width + 1 and cells[-1] in ("", "Comment"):
+        return cells[:-1]
+    if len(cells) == width - 1 and all(not split_cells(row, delimiter)[-1] for row in body):
+        return [*cells, ""]  # rows end in a delimiter
+    if len(cells) == width - 1 and _numbers_rows(line, body):
+        return ["row", *cells]
+    splits = ([cell.strip() for cell in re.split(pattern, text.strip())] for pattern in DELIMITERS)
+    named = (split for split in splits if len(split) == width > 1 and all(split))
+    return cells if len(cells) == width or '"' in text else next(named, cells)
+
+
+def _numbers_rows(line: str, body: Sequence[str]) -> bool:
+    """Whether only the names, and the first cell of every row, are quoted: R's write.table names and numbers rows."""
+    return line.lstrip().startswith('"') and all(row.lstrip().startswith('"') and row.count('"') == 2 for row in body)
+
+
+def _are_units(cells: Sequence[str]) -> bool:
+    filled = [cell for cell in cells if cell]
+    sized = [bool(BRACKETED.fullmatch(cell) or measures(canonical(cell))) for cell in filled]
+    known = (cell.lower().removesuffix("s") in UNSIZED or cell in "-–1" for cell in filled)
+    return any(sized) and all(a or b for a, b in zip(sized, known, strict=True))
+
+
+def _other_columns(cells: Sequence[str], width: int) -> str:
+    short = (
+        "which column has no name is not known, for it may be the first, as a number of the row, or the last: name "
+        "all (in R: write.csv(..., row.names = FALSE); in pandas: to_csv(index=False))"
+    )
+    remedy = short if len(cells) == width - 1 else "correct it"
+    return (
+        f"the header names {len(cells)} columns ({', '.join(cells[:6])}), but rows have {width}; {remedy}, "
+        "or set `header = false` for this log in study.toml"
+    )

@@ -1,0 +1,64 @@
+"""Units, their spellings, and the units that names of channels state."""
+
+import pytest
+
+from davinci_forces.maths.units import UNITS, canonical, measures, size, split_ratio, unit_in
+
+SPELLED = {
+    "deg": ("°", "Deg", "DEGREES", "degs"), "deg/s": ("°/s", "deg/sec", "degrees per second", "deg s^-1", "dps", "deg·s⁻¹"),
+    "rad/s": ("radians/s", "rad s-1"), "N m": ("Nm", "N-m", "N·m", "N*m", "nm", "NEWTON METERS"), "mN m": ("mNm", "N mm"),
+    "ms": ("msec", "Milliseconds", "MS"), "us": ("µs", "μs", "usecs"), "ns": ("nanosec",), "s": ("Sec", "seconds", "sec."),
+    "rpm": ("RPM", "1/min", "rev/min", "min^-1", "U/min"), "A": ("Amps", "Ampere"), "mA": ("milliamps", "ma"),
+    "um": ("µm",), "min": ("minutes", "mins"), "rev": ("turns", "revs"),
+}  # fmt: skip
+NAMED = {
+    "deg": (
+        "q [deg]", "q(deg)", "q {deg}", "q / deg", "q/deg", "q_deg", "q deg", "q-deg", "q.deg", "qDeg", "posDeg", "q_DEG",
+        "q_deg_1", "q_deg_filtered", "q[0] (deg)", "q_deg[0]", "Angle [deg] J1", "q / (deg)", "q (joint 1) [deg]", "q, deg",
+        "/arm/joint1/q_deg", "q_degrees",
+    ),
+    "°": ("q [°]", "q / °"), "deg/s": ("dq_deg_s", "dq_deg_per_s", "dq / deg/s", "dq [deg/s]", "dqDegPerS", "dq_dps", "deg/s"),
+    "ms": ("time / ms", "time_ms", "TimeMs", "time (ms)", "time_msec", "t ms"), "us": ("t_us", "time_usec"),
+    "ns": ("t_ns", "time_nanosec", "/js/stamp/t_nsec"), "min": ("time_min", "t / min"), "s": ("t_s", "t/s", "time_sec"),
+    "N m": ("tau_Nm", "tau_N_m", "torqueNm", "tau / Nm", "tau_nm"), "mN m": ("tau_mNm", "tau_mN_m", "torquemNm", "tau / (mN m)"),
+    "mA": ("i_mA", "i_ma", "currentmA", "i / mA"), "A": ("current_A", "I / A"), "rpm": ("speed_rpm", "motorRpm", "n_rev_min"),
+    "mm": ("x_mm", "x / mm"), "m": ("depth_m",), "counts": ("q_counts", "q / counts"), "V": ("force_V", "u [V]"),
+    "kgf": ("load_kgf",), "lbf": ("q [lbf]",), "rev?": ("q_rev",), "rad/s^2": ("ddq [rad/s^2]",), "outer yaw": ("q (outer yaw)",),
+    "": (
+        "q", "q[0]", "q(1)", "effort[outer_yaw]", "tau (joint 2)", "theta_m", "q_min", "q_s", "tau_g", "x_m", "deg_q",
+        "ms", "grad", "position", "/joint_states/position/panda_joint1", "field.position0", "%time", "secs", "q_1", "", "phase_b",
+        "/arm/rad/q", "arm / q", "radius", "current", "Motor Pos", "f_N",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("unit", "written"), [(u, w) for u, all_of in SPELLED.items() for w in all_of])
+def test_spellings_of_a_unit_are_one_unit(unit, written):
+    assert canonical(written) == unit
+
+
+@pytest.mark.parametrize(
+    "word", ["M", "S", "g", "V", "counts", "rad/s^2", "deg/s2", "10^-3 rad", "1e-3 rad", "kN m", "joint", ""]
+)
+def test_other_words_are_no_units(word):
+    assert measures(word) is None
+    assert canonical(word) == word
+
+
+@pytest.mark.parametrize(("unit", "name"), [(u, n) for u, names in NAMED.items() for n in names])
+def test_a_name_states_the_unit_that_people_read_in_it(unit, name):
+    assert canonical(unit_in(name)) == canonical(unit)
+
+
+def test_a_quantity_over_its_unit_is_split():
+    assert split_ratio("time / ms") == ("time", "ms")
+    assert split_ratio("dq / (deg/s)") == ("dq", "deg/s")
+    assert split_ratio("dq (deg/s)") == ("dq (deg/s)", "")
+    assert split_ratio("/arm/s") == ("/arm/s", "")
+
+
+def test_sizes_are_those_of_si():
+    assert size("mN m") == 1e-3
+    assert 6 * size("deg/s") == pytest.approx(size("rpm"))
+    assert size("h") == 60 * size("min") == 3600 * size("s")
+    assert all(canonical(unit) == unit for unit in UNITS)
