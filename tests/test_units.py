@@ -18,7 +18,7 @@ NAMED = {
         "/arm/joint1/q_deg", "q_degrees",
     ),
     "°": ("q [°]", "q / °"), "deg/s": ("dq_deg_s", "dq_deg_per_s", "dq / deg/s", "dq [deg/s]", "dqDegPerS", "dq_dps", "deg/s"),
-    "ms": ("time / ms", "time_ms", "TimeMs", "time (ms)", "time_msec", "t ms"), "us": ("t_us", "time_usec"),
+    "ms": ("time / ms", "time_ms", "TimeMs", "time (ms)", "time_msec", "t ms"), "us": ("t_us", "time_usec", "us"),
     "ns": ("t_ns", "time_nanosec", "/js/stamp/t_nsec"), "min": ("time_min", "t / min"), "s": ("t_s", "t/s", "time_sec"),
     "N m": ("tau_Nm", "tau_N_m", "torqueNm", "tau / Nm", "tau_nm"), "mN m": ("tau_mNm", "tau_mN_m", "torquemNm", "tau / (mN m)"),
     "mA": ("i_mA", "i_ma", "currentmA", "i / mA"), "A": ("current_A", "I / A"), "rpm": ("speed_rpm", "motorRpm", "n_rev_min"),
@@ -26,7 +26,7 @@ NAMED = {
     "kgf": ("load_kgf",), "lbf": ("q [lbf]",), "rev?": ("q_rev",), "rad/s^2": ("ddq [rad/s^2]",), "outer yaw": ("q (outer yaw)",),
     "": (
         "q", "q[0]", "q(1)", "effort[outer_yaw]", "tau (joint 2)", "theta_m", "q_min", "q_s", "tau_g", "x_m", "deg_q",
-        "ms", "grad", "position", "/joint_states/position/panda_joint1", "field.position0", "%time", "secs", "q_1", "", "phase_b",
+        "grad", "position", "/joint_states/position/panda_joint1", "field.position0", "%time", "sec", "m", "q_1", "", "phase_b",
         "/arm/rad/q", "arm / q", "radius", "current", "Motor Pos", "f_N",
     ),
 }  # fmt: skip

@@ -49,7 +49,7 @@ LISTED = {unit.lower().replace(" ", ""): unit for unit in UNITS}
 # words for units that no quantity has: counts have no size, and kg or lb of force depend on their definition
 UNSIZED = {
     "count", "cnt", "tick", "pulse", "inc", "lsb", "adc", "volt", "v", "mv", "percent", "pct", "permille", "%",
-    "kg", "kgf", "gf", "g", "lbf", "lb", "inch",
+    "kg", "kgf", "gf", "g", "lbf", "lb", "inch", "inches", "kn", "knm", "ncm", "ua", "mdeg", "grad", "gon",
 }  # fmt: skip
 TIMES = ("time", "t", "elapsed", "timestamp", "stamp", "clock", "duration")
 # words that are units only after these words: `time_min` is in minutes, but `q_min` is a minimum
@@ -103,8 +103,8 @@ def _in_brackets(name: str) -> str:
 
 
 def _in_words(name: str) -> str:
-    """The last unit among the words of a name but for the first."""
-    if "/" in name and measures(name):
+    """The last unit among the words of a name but for the first, or the name that is a unit itself."""
+    if measures(name) and len(canonical(name)) > 1:
         return name
     words = re.findall(r"[^\W\d_]+|[°%]", name.rpartition("/")[2] if name.startswith("/") else name)
     units = (_unit_at(words, i) for i in reversed(range(len(words))))

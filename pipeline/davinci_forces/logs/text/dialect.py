@@ -5,6 +5,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+from davinci_forces.logs.cells import MISSING
 from davinci_forces.logs.log import Channel, Options, renaming_remarks, unique
 from davinci_forces.logs.text.columns import counted_unit, kind_of, why_text
 from davinci_forces.logs.text.header import Header, read_header
@@ -13,6 +14,8 @@ from davinci_forces.logs.text.rows import COMMENT, FRAME, NUMBERS, RULER, Unclea
 from davinci_forces.logs.text.stamps import Stamps, stamps_of
 
 SAMPLE_LINES = 1000  # lines from which the format is found
+ABSENT = MISSING | {""}
+MAX_FOLDED = 4  # lines of a quoted name
 SEPARATOR_LINE = re.compile(r'"?sep=(.)"?\s*')  # the first line of files for Excel
 
 
@@ -49,7 +52,7 @@ def find_dialect(lines: Sequence[str], options: Options) -> Dialect:
         If no delimiter makes columns of numbers, a mark may be a decimal mark or something else, or the header has
         other columns than the rows.
     """
-    lines = lines[:SAMPLE_LINES]
+    lines = _unfolded(lines[:SAMPLE_LINES])
     if lines and (separator := SEPARATOR_LINE.fullmatch(lines[0])):
         options, lines = replace(options, delimiter=options.delimiter or separator[1]), ["", *lines[1:]]
     rows = [line for line in lines if line.strip()]
@@ -83,6 +86,18 @@ def find_dialect(lines: Sequence[str], options: Options) -> Dialect:
             *(f"column {i} ({channels[i].name}) {remark}" for i, remark in remarks.items()),
         ),
     )  # fmt: skip
+
+
+def _unfolded(lines: Sequence[str]) -> list[str]:
+    """Join the lines of quoted names that span several; the number of lines stays."""
+    unfolded = [*lines]
+    for i, line in enumerate(unfolded):
+        for n in range(2, MAX_FOLDED + 1) if line.count('"') % 2 else ():
+            joined = " ".join(unfolded[i : i + n])
+            if joined.count('"') % 2 == 0:
+                unfolded[i : i + n] = [""] * (n - 1) + [joined]
+                break
+    return unfolded
 
 
 def _body(rows: Sequence[str]) -> list[str]:
@@ -128,7 +143,7 @@ def _first_row(
         return filled[0] + options.header
     for i in filled:
         cells = split_cells(lines[i], delimiter)
-        measured = [cell for cell, kind in zip(cells, kinds, strict=False) if kind == "number" and cell]
+        measured = [cell for cell, kind in zip(cells, kinds, strict=False) if kind == "number" and cell not in ABSENT]
         dated = all(cells[column][:1].isdecimal() for column in stamps if column < len(cells) and cells[column])
         if len(cells) == len(kinds) and dated and (measured or stamps) and all(map(number.fullmatch, measured)):
             return i

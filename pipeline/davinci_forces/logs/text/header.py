@@ -37,8 +37,9 @@ def read_header(lines: Sequence[str], body: Sequence[str], delimiter: str, width
     if odd or (below and options.header and not fits):
         raise Unclear(_other_columns(odd or rows[-1], width))
     of_units = next((i for i in fits[::-1] if len(fits) > 1 and _are_units(rows[i])), None)
-    above = [i for i in fits if of_units is None or i < of_units]
-    of_names = (above or [i for i in fits if i != of_units] or [None])[-1]
+    above = [i for i in fits if of_units is None or i < of_units] or [i for i in fits if i != of_units]
+    distinct = (i for i in above[::-1] if len({*filter(None, rows[i])}) == len([*filter(None, rows[i])]))
+    of_names = next(distinct, above[-1] if above else None)  # a row of types repeats itself
     names = [] if of_names is None else rows[of_names]
     if any(COUNTING.fullmatch(cell) for cell in names) and options.header is None:
         raise Unclear(
@@ -46,6 +47,8 @@ def read_header(lines: Sequence[str], body: Sequence[str], delimiter: str, width
             "`header = true` for this log in study.toml if these are names"
         )
     units = [cell.strip("[](){} ") for cell in rows[of_units]] if of_units is not None else [""] * width
+    cells_above = zip(units, *(rows[i] for i in above[::-1]), strict=True) if above else ()
+    units = [unit or next(filter(None, map(unit_in, cells)), "") for unit, *cells in cells_above] or units
     preamble = [line for i, line in enumerate(lines) if i not in (of_names, of_units)]
     return _split(names or [""] * width, units, preamble)
 
@@ -57,7 +60,7 @@ def _split(names: list[str], units: list[str], preamble: list[str]) -> Header:
         ratios = [ratio if ratio[1] else _over(ratio[0]) for ratio in ratios]
     stems = [stem for stem, _ in ratios]
     aliases = [name if name != stem else "" for name, stem in zip(names, stems, strict=True)]
-    stated = [unit or ratio[1] or unit_in(name) for unit, ratio, name in zip(units, ratios, names, strict=True)]
+    stated = [unit or ratio[1] for unit, ratio in zip(units, ratios, strict=True)]
     return Header(stems, aliases, stated, preamble)
 
 
@@ -72,13 +75,14 @@ def _fitted(line: str, body: Sequence[str], delimiter: str, width: int) -> list[
     cells = split_cells(text, delimiter)
     if len(cells) == width + 1 and cells[-1] in ("", "Comment"):
         return cells[:-1]
-    if len(cells) == width - 1 and all(not split_cells(row, delimiter)[-1] for row in body):
-        return [*cells, ""]  # rows end in a delimiter
+    ends = [(row[0], row[-1]) for row in (split_cells(row, delimiter) for row in body)]
+    if len(cells) == width - 1 and not all(any(column) for column in zip(*ends, strict=True)):
+        return ["", *cells] if any(last for _, last in ends) else [*cells, ""]  # rows begin or end in a delimiter
     if len(cells) == width - 1 and _numbers_rows(line, body):
         return ["row", *cells]
     splits = ([cell.strip() for cell in re.split(pattern, text.strip())] for pattern in DELIMITERS)
-    named = (split for split in splits if len(split) == width > 1 and all(split))
-    return cells if len(cells) == width or '"' in text else next(named, cells)
+    fitting = (split for split in splits if len(split) == width > 1 and all(split))
+    return cells if '"' in text or (len(cells) == width and delimiter != " ") else next(fitting, cells)
 
 
 def _numbers_rows(line: str, body: Sequence[str]) -> bool:
@@ -89,7 +93,8 @@ def _numbers_rows(line: str, body: Sequence[str]) -> bool:
 def _are_units(cells: Sequence[str]) -> bool:
     filled = [cell for cell in cells if cell]
     sized = [bool(BRACKETED.fullmatch(cell) or measures(canonical(cell))) for cell in filled]
-    known = (cell.lower().removesuffix("s") in UNSIZED or cell in "-–1" for cell in filled)
+    words = (cell.lower().strip(":").removesuffix("s") for cell in filled)
+    known = (word in UNSIZED or word in ("-", "–", "1", "unit", "einheit") for word in words)
     return any(sized) and all(a or b for a, b in zip(sized, known, strict=True))
 
 

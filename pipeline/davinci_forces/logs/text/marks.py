@@ -33,6 +33,8 @@ def find_marks(rows: Sequence[str], body: Sequence[str], options: Options) -> tu
     quoted = any('"' in line for line in body)
     scores = {(d, m): _score(cells[d], NUMBERS[m]) for d in delimiters for m in decimals if d != m or quoted}
     best = max(scores, key=lambda marks: scores[marks], default=(",", ","))
+    tabs = ("\t", best[1])  # blanks between numbers of cells apart by tabs are thousands separators
+    best = tabs if best[0] == " " and "\t" in body[0] and scores.get(tabs, ())[:2] == scores[best][:2] else best
     if not scores or 2 * scores[best][0] < len(body):
         start = rows[0].lstrip()
         hint = next((f"; {hint}" for mark, hint in EXPORTS.items() if start.startswith(mark)), "")
@@ -54,11 +56,15 @@ def _require_decimal_mark(cells: Sequence[Sequence[str]], mark: str) -> None:
         raise Unclear(f"{marked[0]!r} {both_readings(marked[0])}")
 
 
-def _score(body: Sequence[Sequence[str]], number: re.Pattern[str]) -> tuple[int, int]:
-    """Count the lines that are mostly numbers, and the numbers in them."""
+def _score(body: Sequence[Sequence[str]], number: re.Pattern[str]) -> tuple[int, bool, int]:
+    """Count the lines that are mostly numbers; whether they are so throughout; count the numbers in them."""
     numbers = [len(cells) - [*map(number.fullmatch, cells)].count(None) for cells in body]
-    good = [count for count, cells in zip(numbers, body, strict=True) if count and _are_mostly(count, cells)]
-    return len(good), sum(good)
+    good = [
+        (count, len([*filter(None, row)]))
+        for count, row in zip(numbers, body, strict=True)
+        if count and _are_mostly(count, row)
+    ]
+    return len(good), all(count == cells for count, cells in good), sum(count for count, _ in good)
 
 
 def _are_mostly(count: int, cells: Sequence[str]) -> bool:

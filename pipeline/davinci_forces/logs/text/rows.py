@@ -10,7 +10,7 @@ FRAME = re.compile(r"^[ \t]*\|[ \t]*|[ \t]*\|[ \t]*(?=\r?$)", re.MULTILINE)  # o
 FRAME_BYTES = re.compile(FRAME.pattern.encode(), re.MULTILINE)
 # Thousands: by a blank or an apostrophe in any encoding, or by the mark that the same cell shows not to be decimal.
 BLANK = r"(?:[' \xa0\u2009\u202f\u2019\x92]|\xc2\xa0|\xe2\x80[\xaf\x89\x99])"
-GROUPED = rf"\d{{1,3}}(?:(?:{BLANK}\d{{3}})+(?:DECIMAL\d+)?|(?:GROUP\d{{3}})+DECIMAL\d+|(?:GROUP\d{{3}}){{2,}})"
+GROUPED = rf"[1-9]\d{{0,2}}(?:(?:{BLANK}\d{{3}})+(?:DECIMAL\d+)?|(?:GROUP\d{{3}})+DECIMAL\d+|(?:GROUP\d{{3}}){{2,}})"
 VALUE = rf"[+-]?(?:(?:\d+(?:DECIMAL\d{{END}})?|DECIMAL\d+)(?:[eE][+-]?\d+)?|{GROUPED}|nan|inf|infinity)"
 NUMBERS = {
     mark: re.compile(VALUE.replace("DECIMAL", decimal).replace("GROUP", group).replace("{END}", end), re.IGNORECASE)
