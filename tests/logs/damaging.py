@@ -1,6 +1,6 @@
 """Files of every format with random damages, each read to its end; run by itself, so that its memory can be measured.
 
-    python -m tests.logs.damaging <seed> <count>
+    python -m tests.logs.damaging <seed> <count> [1 for texts alone]
 
 prints what happened as JSON: how many were refused, what was raised that is no BadLog, and the most memory and time.
 """
@@ -22,6 +22,7 @@ from davinci_forces.logs.isolated.process import close_all
 from davinci_forces.logs.log import Options
 from tests.contracts.test_formats import EXAMPLES
 from tests.logs import array_writers, bag_writer
+from tests.logs.test_dialects import READ, REFUSED
 
 ROWS = 200
 MOST_DATA = 2 << 30  # [bytes] so that what asks for more does not take the machine down
@@ -44,10 +45,15 @@ class Example:
         return home / Path(next(iter(files))).parts[0]
 
 
-def examples() -> Iterator[Example]:
-    """Those of the contract, and larger ones: packed, in groups, in structs, with several topics."""
+def examples(all_texts: bool = False) -> Iterator[Example]:
+    """Those of the contract, and larger ones: packed, in groups, in structs, with several topics; or texts alone."""
     for name, (_, written) in EXAMPLES.items():
         yield Example(name, {written.file: written.content}, written.options)
+    texts = {name: dialect.text for name, dialect in [*READ.items(), *REFUSED.items()]}
+    for name, content in texts.items() if all_texts else [("dialect", texts["German dates"])]:
+        yield Example(name, {"log.csv": content if isinstance(content, bytes) else content.encode()})
+    if all_texts:
+        return
     x = np.random.default_rng(0).normal(size=(ROWS, 3))
     packed = {"chunks": (50, 3), "compression": "gzip", "shuffle": True, "fletcher32": False}
     yield Example(
@@ -105,13 +111,13 @@ def own_peak() -> int:
     return int(line.split()[1])
 
 
-def main(seed: int, count: int) -> None:
+def main(seed: int, count: int, all_texts: int = 0) -> None:
     """Damage and read so many files."""
     import resource
 
     resource.setrlimit(resource.RLIMIT_DATA, (MOST_DATA, MOST_DATA))
     random = np.random.default_rng(seed)
-    all_of_them = list(examples())
+    all_of_them = list(examples(bool(all_texts)))
     outcomes: Counter[str] = Counter()
     failures: list[str] = []
     slowest = 0.0

@@ -14,11 +14,16 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="memory is limit
 
 
 @pytest.mark.parametrize(
-    ("seed", "count"),
-    [pytest.param(0, 150, marks=pytest.mark.medium), pytest.param(1, 3000, marks=pytest.mark.slow)],
+    ("seed", "count", "texts"),
+    [
+        pytest.param(0, 150, 0, marks=pytest.mark.medium),
+        pytest.param(1, 3000, 0, marks=pytest.mark.slow),
+        pytest.param(2, 600, 1, marks=pytest.mark.medium),
+        pytest.param(3, 6000, 1, marks=pytest.mark.slow),
+    ],
 )
-def test_a_damaged_file_is_read_or_refused_within_limits(seed, count):
-    command = [sys.executable, "-m", "tests.logs.damaging", str(seed), str(count)]
+def test_a_damaged_file_is_read_or_refused_within_limits(seed, count, texts):
+    command = [sys.executable, "-m", "tests.logs.damaging", str(seed), str(count), str(texts)]
     done = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[2])
     assert done.returncode == 0, done.stderr[-4000:]
     said = json.loads(done.stdout)

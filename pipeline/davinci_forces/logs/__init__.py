@@ -1,11 +1,13 @@
 """Open measurement logs: one module per format, tried in the order of `FORMATS`."""
 
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
 from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
-from davinci_forces.logs.log import Log, Options
+from davinci_forces.logs.log import Channel, Log, Options
+from davinci_forces.maths.units import unit_in
 
 # Text last: it recognises anything that looks like columns of numbers. Raw binary goes by the file's suffix.
 FORMATS = ("tdms", "lvm", "tdm", "ros", "mat", "hdf5", "arrow", "binary", "text")
@@ -32,5 +34,13 @@ def open_log(path: Path, options: Options = Options()) -> Log:  # noqa: B008 - f
         module = import_module(f"davinci_forces.logs.{name}")
         if options.dtype or module.recognises(path, head):
             log: Log = module.read(path, options)
+            log.channels = tuple(_with_unit(channel) for channel in log.channels)
             return log
     raise BadLog(f"{path}: not a log of a known format ({', '.join(FORMATS)})")
+
+
+def _with_unit(channel: Channel) -> Channel:
+    """A channel with the unit that its name states, if the log states none."""
+    is_quantity = channel.kind == "number" and not channel.derived
+    unit = unit_in(channel.name.rpartition("/")[2]) if is_quantity and not channel.unit else ""
+    return replace(channel, unit=unit) if unit else channel

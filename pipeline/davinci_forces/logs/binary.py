@@ -10,8 +10,7 @@ import numpy as np
 
 from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
-from davinci_forces.logs.log import BLOCK_CELLS, Block, Channel, Log, Options, read_ahead, unique
-from davinci_forces.maths.units import unit_in
+from davinci_forces.logs.log import BLOCK_CELLS, Block, Channel, Log, Options, read_ahead, unique, unit_in
 
 SUFFIXES = (".bin", ".dat")
 # LabVIEW counts bits and numpy's short names count bytes; i8 and u8 are ambiguous and therefore refused.

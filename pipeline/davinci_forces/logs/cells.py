@@ -1,7 +1,7 @@
 """Parse numbers from rows of delimited cells, one block at a time, with Arrow."""
 
 import re
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 from typing import TypeVar
@@ -87,10 +87,11 @@ def parse(
     text: int = -1,
     quoted: bool = False,
     times: Mapping[int, Callable[[pa.ChunkedArray], Array]] = MappingProxyType({}),
+    missing: Iterable[str] = (),
 ) -> Cells:
     """Convert the `wanted` columns of rows of `width` cells to numbers; column `text` is not converted.
 
-    `times` converts those wanted columns that are not written as numbers.
+    `times` converts those wanted columns that are not written as numbers.  Empty cells and the words `missing` are NaN.
 
     Raises
     ------
@@ -106,7 +107,7 @@ def parse(
         convert_options=csv.ConvertOptions(
             column_types=types,
             include_columns=list(types),
-            null_values=["", " ", *MISSING],
+            null_values=["", " ", *missing],
             strings_can_be_null=bool(times),
             decimal_point=decimal.decode(),
             check_utf8=False,

@@ -27,6 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from davinci_forces.errors import BadLog
+from davinci_forces.maths.units import unit_in as unit_in
 
 Block = dict[str, NDArray[np.float64]]  # channel name -> samples; every array of a block has one length
 UNIT_OF_COUNTS = "samples"  # unit of a time channel that only counts samples

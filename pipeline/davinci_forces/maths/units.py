@@ -79,7 +79,7 @@ def _spelled(word: str) -> str:
 
 def unit_in(name: str) -> str:
     """The unit that a channel's name states, as in `q [deg]`, `time / ms`, `q_deg` or `posDeg`, else ""."""
-    return split_ratio(name)[1] or _in_brackets(name) or _in_words(name)
+    return split_ratio(name)[1] or _in_brackets(name) or unit_among_words(name)
 
 
 def split_ratio(name: str) -> tuple[str, str]:
@@ -102,8 +102,8 @@ def _in_brackets(name: str) -> str:
     return listed[-1] if listed else next((match[1] for match in brackets if match.end() == len(name.rstrip())), "")
 
 
-def _in_words(name: str) -> str:
-    """The last unit among the words of a name but for the first, or the name that is a unit itself."""
+def unit_among_words(name: str) -> str:
+    """The last unit among the words of a name but for the first, as in `q_deg`, or the name that is a unit itself."""
     if measures(name) and len(canonical(name)) > 1:
         return name
     words = re.findall(r"[^\W\d_]+|[°%]", name.rpartition("/")[2] if name.startswith("/") else name)

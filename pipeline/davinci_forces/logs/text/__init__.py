@@ -1,7 +1,7 @@
 """Columns of numbers in text, with or without a header, with any delimiter and decimal mark."""
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime, timedelta
 from pathlib import Path
@@ -127,7 +127,7 @@ class _Reading:
         cells = self._at_once(block)
         if cells is None:
             block = self._without_comments(first, block)
-            cells = self._at_once(block) or self._row_by_row(first, block)
+            cells = self._at_once(block, MISSING) or self._row_by_row(first, block)
         self.rows += cells.rows
         for i in self.times.keys() - self.days.keys():
             self.latest = max(self.latest, *cells.columns[i][-1:].tolist())
@@ -151,14 +151,16 @@ class _Reading:
         if self.no_rows <= MAX_COMMENTS:
             self.log.comments.append(f"line {line}: {text.strip()}")
 
-    def _at_once(self, block: bytes) -> Cells | None:
+    def _at_once(self, block: bytes, missing: Iterable[str] = ()) -> Cells | None:
         """Parse a block whose rows are all regular, else return None."""
         dialect = self.dialect
         if dialect.delimiter == " ":
             return None
         delimiter, decimal, width = dialect.delimiter.encode(), dialect.decimal.encode(), self.width
         try:
-            cells = parse(block, width, delimiter, decimal, self.wanted, quoted=dialect.quoted, times=self.times)
+            cells = parse(
+                block, width, delimiter, decimal, self.wanted, quoted=dialect.quoted, times=self.times, missing=missing
+            )
         except UNREADABLE:
             return None
         return None if dialect.trailing and cells.nulls[width - 1] < cells.rows else cells
@@ -189,7 +191,13 @@ class _Reading:
         times = {self.wanted.index(i): seconds for i, seconds in self.times.items()}
         try:
             parsed = parse(
-                content, len(self.wanted), b"\t", self.dialect.decimal.encode(), range(len(self.wanted)), times=times
+                content,
+                len(self.wanted),
+                b"\t",
+                self.dialect.decimal.encode(),
+                range(len(self.wanted)),
+                times=times,
+                missing=MISSING,
             )
         except UNREADABLE as bad:
             raise BadLog(

@@ -11,6 +11,7 @@ from davinci_forces.logs.text.stamps import both_dates
 
 DATES = (9.4e8, 4.2e9)  # [s] since 1970, of the years 2000 to 2100
 DAYS = ((36525, 73051), (730486, 767011))  # of the same years, as Excel and MATLAB count them
+COUNTED_CELLS = 50  # from which a date as a count is recognised
 STEP_IN_DAYS = 2e-5  # a shorter sampling time is 1.7 s in days; in seconds, no robot samples so fast
 TICKS = ((1.25e17, 1.6e17), (6.3e17, 6.7e17))  # of 100 ns in the same years, as Windows and .NET count them
 MEASURED = re.compile(r"[+-]?\d+(?:[.,]\d+)?\s*[^\W\d_°%]+[^\d]*|[+-]?\d+(?:[.,]\d+)?\s*[°%]")
@@ -25,7 +26,7 @@ def kind_of(cells: Sequence[str], number: re.Pattern[str]) -> str:
 def counted_unit(cells: Sequence[str]) -> str:
     """The unit of a column that counts since 1970 or an earlier day, if its numbers say so; else ""."""
     try:
-        x = np.array([float(cell.replace(",", ".")) for cell in cells if cell and cell not in MISSING])
+        x = np.array([float(cell.replace(",", ".")) for cell in cells[:COUNTED_CELLS] if cell not in MISSING])
     except ValueError:
         return ""
     if not len(x):

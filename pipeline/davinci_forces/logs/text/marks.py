@@ -27,7 +27,8 @@ def find_marks(rows: Sequence[str], body: Sequence[str], options: Options) -> tu
     Unclear
         If none makes columns of numbers, or if a mark may be a decimal mark or something else.
     """
-    delimiters = (NAMED.get(options.delimiter, options.delimiter),) if options.delimiter else CANDIDATES
+    occurring = [mark for mark in CANDIDATES if mark == "\t" or any(mark in line for line in body)]
+    delimiters = [NAMED.get(options.delimiter, options.delimiter)] if options.delimiter else occurring
     decimals = (options.decimal,) if options.decimal else (".", ",")
     cells = {delimiter: [split_cells(line, delimiter) for line in body] for delimiter in delimiters}
     quoted = any('"' in line for line in body)

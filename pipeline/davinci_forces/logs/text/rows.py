@@ -11,7 +11,7 @@ FRAME_BYTES = re.compile(FRAME.pattern.encode(), re.MULTILINE)
 # Thousands: by a blank or an apostrophe in any encoding, or by the mark that the same cell shows not to be decimal.
 BLANK = r"(?:[' \xa0\u2009\u202f\u2019\x92]|\xc2\xa0|\xe2\x80[\xaf\x89\x99])"
 GROUPED = rf"[1-9]\d{{0,2}}(?:(?:{BLANK}\d{{3}})+(?:DECIMAL\d+)?|(?:GROUP\d{{3}})+DECIMAL\d+|(?:GROUP\d{{3}}){{2,}})"
-VALUE = rf"[+-]?(?:(?:\d+(?:DECIMAL\d{{END}})?|DECIMAL\d+)(?:[eE][+-]?\d+)?|{GROUPED}|nan|inf|infinity)"
+VALUE = rf"[+-]?(?:(?:\d+(?:DECIMAL\d{{END}})?|DECIMAL\d+)(?:[eE][+-]?\d+)?|nan|inf|infinity|{GROUPED})"
 NUMBERS = {
     mark: re.compile(VALUE.replace("DECIMAL", decimal).replace("GROUP", group).replace("{END}", end), re.IGNORECASE)
     for mark, decimal, group, end in ((".", r"\.", ",", "*"), (",", ",", r"\.", "+"))

@@ -12,7 +12,7 @@ from davinci_forces.logs.log import Block, Channel, Log
 from davinci_forces.maths.arrays import Booleans
 from davinci_forces.maths.periods.steps import steps
 from davinci_forces.maths.signals.clock import ClockStatistics
-from davinci_forces.maths.units import SI, UNITS, canonical, measures, size
+from davinci_forces.maths.units import SI, UNITS, canonical, measures, size, unit_among_words
 from davinci_forces.records import Column, Counts, Recording, Touch
 from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.study import WHOLE_LOG, LogEntry, Source
@@ -106,7 +106,9 @@ class Intake:
     def unit(self, source: Source, channel: Channel) -> float:
         """The size of a channel's unit in SI: as the study gives it, else the log, else 1."""
         log_unit = "s" if channel.kind == "time" else canonical(channel.unit)
-        if source.scale != 1.0:  # the stated unit is the unit after scaling
+        by_word = channel.name[-1:] not in "])}" and log_unit == canonical(unit_among_words(channel.name))
+        misread = source.unit is not None and by_word and measures(log_unit) != source.measures  # `q_ma`: an average
+        if misread or source.scale != 1.0:  # the stated unit is the unit after scaling
             log_unit = ""
         if source.unit and log_unit in UNITS and log_unit != source.unit:
             raise BadLog(
