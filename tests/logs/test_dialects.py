@@ -13,6 +13,7 @@ from numpy.testing import assert_allclose
 
 from davinci_forces.errors import BadLog
 from davinci_forces.maths.units import measures, size
+from tests.logs.cutting import is_cut_honestly
 from tests.logs.reading import read
 
 ROWS, STEP = 60, 0.01
@@ -293,3 +294,11 @@ def test_any_other_dialect_is_refused_with_the_remedy(name, tmp_path):
 def test_there_are_a_hundred_dialects_and_few_are_refused():
     assert len(READ) + len(REFUSED) >= 100
     assert len(REFUSED) <= MAX_REFUSED
+
+
+@pytest.mark.parametrize("name", READ)
+def test_a_dialect_that_is_cut_loses_its_last_rows_alone(name):
+    text = READ[name].text
+    content = text if isinstance(text, bytes) else text.encode()
+    for length in np.random.default_rng(len(content)).integers(len(content) // 3, len(content), 4).tolist():
+        is_cut_honestly(content, length, "log.csv")
