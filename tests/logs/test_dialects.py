@@ -146,7 +146,6 @@ def read_dialects() -> Iterator[tuple[str, Dialect]]:
         "names and words of types": plain("t,q,i\nfloat,float,float").replace("t,q,i\nfloat,float,float", "float,float,float\nt,q,i"),
         "pandas without index": in_pandas(False), "pandas with index": in_pandas(True),
         "numpy savetxt": plain("# t q i", delimiter=" ", form=".18e"), "R write.csv": in_pandas(True, quoting=2),
-        "R write.table": '"t" "q" "i"\n' + "".join(f'"{k + 1}" {" ".join(row)}\n' for k, row in enumerate(rows(T, Q, I))),
         "a comment in the middle": inserted(plain(), "# pause here, 3, 4"), "a remark in the middle": inserted(plain(), "-- Trial 2 --"),
         "words in the middle": inserted(plain(), "Pause"), "the header again": inserted(plain(), "t,q,i"),
         "a count below the rows": plain() + "(60 rows)\n", "a comment at the end": plain() + "% end\n",
@@ -230,7 +229,9 @@ def refused_dialects() -> Iterator[tuple[str, Dialect]]:
     short = plain("t,q")
     few = [[number(t, ","), f"{1234 + k}"[:1] + "." + f"{1234 + k}"[1:]] for k, t in enumerate(T)]
     for name, text, words in (
-        ("a header one name short", short, "names 2 columns .* but rows have 3; which column has no name is not known"),
+        ("a header one name short", short, "names 2 columns .* but rows have 3; which one has no name is not known"),
+        ("R's row names", '"t" "q" "i"\n' + "".join(f'"{k + 1}" {" ".join(row)}\n' for k, row in enumerate(rows(T, Q, I))), "row.names = FALSE"),
+        ("names one short below a preamble as wide as the rows", plain("Subject,A,left\nt,q"), "names 2 columns"),
         ("a header two names long", plain("t,q,i,x,y"), "names 5 columns"),
         ("units one short", plain("t q i\ns rad", delimiter=" "), "names 2 columns"),
         ("names with blanks between blanks", plain("Time Joint pos Motor cur", delimiter=" "), "names 5 columns"),

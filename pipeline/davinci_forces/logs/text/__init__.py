@@ -14,16 +14,7 @@ from davinci_forces.logs.lines import GZIP, Lines, decode
 from davinci_forces.logs.log import Block, Log, Options, read_ahead
 from davinci_forces.logs.text.dialect import Dialect, find_dialect
 from davinci_forces.logs.text.marks import NAMED
-from davinci_forces.logs.text.rows import (
-    FRAME_BYTES,
-    NO_ROW,
-    NUMBERS,
-    TWO_READINGS,
-    Unclear,
-    both_readings,
-    split_cells,
-    without_groups,
-)
+from davinci_forces.logs.text.rows import FRAME_BYTES, NO_ROW, NUMBERS, Unclear, both_readings, split_cells, ungrouped
 from davinci_forces.logs.text.stamps import REMARK, Unwrapped, clocks_may_change
 
 VALUE_BYTES = rb"[+-]?((\d+MARK?\d*|MARK\d+)([eE][+-]?\d+)?|nan|inf|infinity)"
@@ -178,27 +169,20 @@ class _Reading:
                     lines.append(line)
         if not rows:
             return Cells(0, {i: np.empty(0) for i in self.wanted}, dict.fromkeys(self.wanted, 0), texts=[])
-        patterns = [self._pattern(i) for i in self.wanted]
+        all_wanted, patterns = range(len(self.wanted)), [self._pattern(i) for i in self.wanted]
         try:
-            check(rows, range(len(self.wanted)), patterns)
+            check(rows, all_wanted, patterns)
         except NotANumber:
-            rows = [[self._without_groups(i, cell) for i, cell in zip(self.wanted, row, strict=True)] for row in rows]
+            rows = [[self._ungrouped(i, cell) for i, cell in zip(self.wanted, row, strict=True)] for row in rows]
         try:
-            check(rows, range(len(self.wanted)), patterns)
+            check(rows, all_wanted, patterns)
         except NotANumber as bad:
             raise BadLog(self._no_number(lines[bad.row], self.wanted[bad.column], bad.cell)) from None
         content = b"".join(b"\t".join(row) + b"\n" for row in rows).replace(b"\n\n", b"\n \n")
         times = {self.wanted.index(i): seconds for i, seconds in self.times.items()}
         try:
-            parsed = parse(
-                content,
-                len(self.wanted),
-                b"\t",
-                self.dialect.decimal.encode(),
-                range(len(self.wanted)),
-                times=times,
-                missing=MISSING,
-            )
+            decimal = self.dialect.decimal.encode()
+            parsed = parse(content, len(self.wanted), b"\t", decimal, all_wanted, times=times, missing=MISSING)
         except UNREADABLE as bad:
             raise BadLog(
                 f"{self.log.path}:{lines[0]}: from this line on there is a time that is not a valid date ({bad}); "
@@ -207,9 +191,9 @@ class _Reading:
         columns = {self.wanted[i]: column for i, column in parsed.columns.items()}
         return Cells(parsed.rows, columns, {self.wanted[i]: count for i, count in parsed.nulls.items()}, texts=[])
 
-    def _without_groups(self, column: int, cell: bytes) -> bytes:
+    def _ungrouped(self, column: int, cell: bytes) -> bytes:
         text = cell.decode("latin-1")
-        return cell if column in self.times else without_groups(text, self.dialect.decimal).encode("latin-1")
+        return cell if column in self.times else ungrouped(text, self.dialect.decimal).encode("latin-1")
 
     def _is_row(self, line: int, row: str, cells: list[str]) -> bool:
         """Whether a line holds samples, and is neither a remark between rows nor the header again.
@@ -229,15 +213,12 @@ class _Reading:
             self.headers, self.first_header = self.headers + 1, self.first_header or line
         elif len(cells) < self.width:
             self._comment(line, text)
-        else:
-            return self.width == 1 or self._refuse_header(line, text)
-        return False
-
-    def _refuse_header(self, line: int, text: str) -> bool:
-        raise BadLog(
-            f"{self.log.path}:{line}: {text[:80]!r} is neither a row nor the header; if another table begins here, "
-            "save each as a file of its own, else take the line out of the log"
-        )
+        elif self.width > 1:
+            raise BadLog(
+                f"{self.log.path}:{line}: {text[:80]!r} is neither a row nor the header; if another table begins here, "
+                "save each as a file of its own, else take the line out of the log"
+            )
+        return self.width == 1 and text not in self.dialect.header_lines
 
     def _pattern(self, column: int) -> re.Pattern[bytes]:
         """Return the pattern of the cells of a column."""
@@ -263,8 +244,8 @@ class _Reading:
             what = f"number with the decimal mark {self.dialect.decimal!r}"
             remedy = "set `decimal` for this log in study.toml"
         where = f"{decode(cell, self.log.encoding)[:40]!r} in column {column} ({self.dialect.channels[column].name})"
-        if any(readings.fullmatch(cell.decode("latin-1")) for readings in TWO_READINGS.values()):
-            return f"{self.log.path}:{line}: {where} {both_readings(cell.decode('latin-1'))}"
+        if readings := both_readings(cell.decode("latin-1")):
+            return f"{self.log.path}:{line}: {where} {readings}"
         return f"{self.log.path}:{line}: {where} is not a {what}; correct the cell, or {remedy}"
 
     def _close(self, lines: Lines) -> None:

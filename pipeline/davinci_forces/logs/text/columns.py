@@ -6,7 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from davinci_forces.logs.cells import MISSING
-from davinci_forces.logs.text.rows import NUMBERS, TWO_READINGS, both_readings
+from davinci_forces.logs.text.rows import NUMBERS, both_readings
 from davinci_forces.logs.text.stamps import both_dates
 
 DATES = (9.4e8, 4.2e9)  # [s] since 1970, of the years 2000 to 2100
@@ -48,8 +48,8 @@ def why_text(cells: Sequence[str]) -> str:
     cell = next(cell for cell in cells if cell and cell not in MISSING)
     if readings := both_dates(cells):
         return readings
-    if any(map(TWO_READINGS["."].fullmatch, cells)) or any(map(TWO_READINGS[","].fullmatch, cells)):
-        return f"holds {cell!r}, which {both_readings(cell)}"
+    if readings := both_readings(cell):
+        return f"holds {cell!r}, which {readings}"
     if any(number.fullmatch(cell) for number in NUMBERS.values()):
         return f"holds {cell!r}, with another decimal mark than other columns; export all with one mark"
     if re.search(r"\d:\d|\d[-./ ]\w+[-./ ]\d", cell):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from davinci_forces.logs.cells import MISSING
 from davinci_forces.logs.log import Channel, Options, renaming_remarks, unique
 from davinci_forces.logs.text.columns import counted_unit, kind_of, why_text
-from davinci_forces.logs.text.header import Header, read_header
+from davinci_forces.logs.text.header import read_header
 from davinci_forces.logs.text.marks import find_marks
 from davinci_forces.logs.text.rows import COMMENT, FRAME, NUMBERS, RULER, Unclear, split_cells
 from davinci_forces.logs.text.stamps import Stamps, stamps_of
@@ -69,13 +69,15 @@ def find_dialect(lines: Sequence[str], options: Options) -> Dialect:
     first = _first_row(lines, delimiter, kinds, NUMBERS[decimal], stamps, options)
     if options.header is None and _are_numbers_of_columns(split_cells(lines[first], delimiter), columns, decimal):
         first, options = first + 1, replace(options, header=True)
-    header = read_header([line for line in lines[:first] if line.strip()], body, delimiter, len(kinds), options)
+    header = read_header([line for line in lines[:first] if line.strip()], columns, delimiter, len(kinds), options)
     stamps = _from_first_row(stamps, [split_cells(line, delimiter) for line in lines[first:]], len(kinds))
     kinds = ["time" if i in stamps else kind for i, kind in enumerate(kinds)]
     unread = {i: why for i, kind in enumerate(kinds) if kind == "text" and (why := why_text(columns[i]))}
     unitless = [i for i, kind in enumerate(kinds) if kind == "number" and not header.units[i]]
     counted = {i: unit for i in unitless if (unit := counted_unit(columns[i]))}
-    channels = _channels(header, kinds, counted)
+    units = [unit or counted.get(i, "") for i, unit in enumerate(header.units)]
+    described = zip(unique(header.names), units, kinds, header.aliases, strict=True)
+    channels = tuple(Channel(name, unit, kind, alias=alias) for name, unit, kind, alias in described)
     remarks = unread | {i: f"holds {columns[i][-1]}, the date as a count: its unit is {counted[i]}" for i in counted}
     return Dialect(
         delimiter=delimiter, decimal=decimal, channels=channels, stamps=stamps, header=first, unread=unread,
@@ -114,14 +116,6 @@ def _columns(body: list[str], delimiter: str) -> list[tuple[str, ...]]:
     return [*zip(*(row for row in rows if len(row) == width), strict=True)]
 
 
-def _channels(header: Header, kinds: Sequence[str], counted: dict[int, str]) -> tuple[Channel, ...]:
-    columns = zip(unique(header.names), header.units, kinds, header.aliases, strict=True)
-    return tuple(
-        Channel(name, unit or counted.get(i, ""), kind, alias=alias)
-        for i, (name, unit, kind, alias) in enumerate(columns)
-    )
-
-
 def _from_first_row(stamps: dict[int, Stamps], rows: Sequence[Sequence[str]], width: int) -> dict[int, Stamps]:
     """Count times from the first row; a column whose first date is not valid is text."""
     cells = {i: [row[i] for row in rows if len(row) == width] for i in stamps}
@@ -130,13 +124,9 @@ def _from_first_row(stamps: dict[int, Stamps], rows: Sequence[Sequence[str]], wi
 
 
 def _first_row(
-    lines: Sequence[str],
-    delimiter: str,
-    kinds: Sequence[str],
-    number: re.Pattern[str],
-    stamps: dict[int, Stamps],
+    lines: Sequence[str], delimiter: str, kinds: Sequence[str], number: re.Pattern[str], stamps: dict[int, Stamps],
     options: Options,
-) -> int:
+) -> int:  # fmt: skip
     """Count the lines before the first row."""
     filled = [i for i, line in enumerate(lines) if line.strip()]
     if options.header is not None:

@@ -22,8 +22,10 @@ class Header(NamedTuple):
     preamble: list[str]  # the other lines
 
 
-def read_header(lines: Sequence[str], body: Sequence[str], delimiter: str, width: int, options: Options) -> Header:
-    """Read the lines before the first row; `body` are rows of `width` cells.
+def read_header(
+    lines: Sequence[str], body: Sequence[Sequence[str]], delimiter: str, width: int, options: Options
+) -> Header:
+    """Read the lines before the first row; `body` are the cells of `width` columns.
 
     Raises
     ------
@@ -32,8 +34,10 @@ def read_header(lines: Sequence[str], body: Sequence[str], delimiter: str, width
     """
     rows = [_fitted(line, body, delimiter, width) for line in lines]
     fits = [i for i, row in enumerate(rows) if len(row) == width and not RULER.fullmatch(lines[i])]
-    below = [i for i in range((fits or [-1])[-1] + 1, len(rows)) if not COMMENT.match(lines[i])]
-    odd = next((rows[i] for i in below if len(rows[i]) > 1 and (not fits or _are_units(rows[i]))), None)
+    remarks = [i for i, line in enumerate(lines) if COMMENT.match(line) or RULER.fullmatch(line)]
+    below = [i for i in range((fits or [-1])[-1] + 1, len(rows)) if i not in remarks]
+    free = bool(fits) and delimiter == " "  # blanks also separate the words of a remark
+    odd = next((rows[i] for i in below if len(rows[i]) > 1 and (not free or _are_units(rows[i]))), None)
     if odd or (below and options.header and not fits):
         raise Unclear(_other_columns(odd or rows[-1], width))
     of_units = next((i for i in fits[::-1] if len(fits) > 1 and _are_units(rows[i])), None)
@@ -57,37 +61,25 @@ def _split(names: list[str], units: list[str], preamble: list[str]) -> Header:
     """Take the units out of the names: where one name is a quantity over its unit, all of that form are."""
     ratios = [split_ratio(name) for name in names]
     if any(unit for _, unit in ratios):
-        ratios = [ratio if ratio[1] else _over(ratio[0]) for ratio in ratios]
+        over = (name.partition(" / ") for name in names)
+        ratios = [ratio if ratio[1] else (name, unit) for ratio, (name, _, unit) in zip(ratios, over, strict=True)]
     stems = [stem for stem, _ in ratios]
     aliases = [name if name != stem else "" for name, stem in zip(names, stems, strict=True)]
     stated = [unit or ratio[1] for unit, ratio in zip(units, ratios, strict=True)]
     return Header(stems, aliases, stated, preamble)
 
 
-def _over(name: str) -> tuple[str, str]:
-    stem, slash, unit = name.rpartition(" / ")
-    return (stem.strip(), unit.strip()) if slash else (name, "")
-
-
-def _fitted(line: str, body: Sequence[str], delimiter: str, width: int) -> list[str]:
+def _fitted(line: str, body: Sequence[Sequence[str]], delimiter: str, width: int) -> list[str]:
     """Split a line of the header into as many cells as the rows have, if it has them with any delimiter."""
     text = COMMENT.sub("", line, count=1) if COMMENT.match(line) else line
     cells = split_cells(text, delimiter)
     if len(cells) == width + 1 and cells[-1] in ("", "Comment"):
         return cells[:-1]
-    ends = [(row[0], row[-1]) for row in (split_cells(row, delimiter) for row in body)]
-    if len(cells) == width - 1 and not all(any(column) for column in zip(*ends, strict=True)):
-        return ["", *cells] if any(last for _, last in ends) else [*cells, ""]  # rows begin or end in a delimiter
-    if len(cells) == width - 1 and _numbers_rows(line, body):
-        return ["row", *cells]
+    if len(cells) == width - 1 and not all(columns := (any(body[0]), any(body[-1]))):
+        return [*cells, ""] if columns[0] else ["", *cells]  # rows end or begin in a delimiter
     splits = ([cell.strip() for cell in re.split(pattern, text.strip())] for pattern in DELIMITERS)
     fitting = (split for split in splits if len(split) == width > 1 and all(split))
     return cells if '"' in text or (len(cells) == width and delimiter != " ") else next(fitting, cells)
-
-
-def _numbers_rows(line: str, body: Sequence[str]) -> bool:
-    """Whether only the names, and the first cell of every row, are quoted: R's write.table names and numbers rows."""
-    return line.lstrip().startswith('"') and all(row.lstrip().startswith('"') and row.count('"') == 2 for row in body)
 
 
 def _are_units(cells: Sequence[str]) -> bool:
@@ -100,8 +92,8 @@ def _are_units(cells: Sequence[str]) -> bool:
 
 def _other_columns(cells: Sequence[str], width: int) -> str:
     short = (
-        "which column has no name is not known, for it may be the first, as a number of the row, or the last: name "
-        "all (in R: write.csv(..., row.names = FALSE); in pandas: to_csv(index=False))"
+        "which one has no name is not known, the first, as a number of the row, or another: name all (in R by "
+        "write.csv(..., row.names = FALSE), in pandas by to_csv(index=False))"
     )
     remedy = short if len(cells) == width - 1 else "correct it"
     return (

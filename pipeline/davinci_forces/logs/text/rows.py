@@ -34,7 +34,7 @@ def split_cells(line: str, delimiter: str) -> list[str]:
     return [cell.strip() for cell in cells]
 
 
-def without_groups(cell: str, decimal: str) -> str:
+def ungrouped(cell: str, decimal: str) -> str:
     """A number without thousands separators, if it has any."""
     if not NUMBERS[decimal].fullmatch(cell):
         return cell
@@ -42,7 +42,9 @@ def without_groups(cell: str, decimal: str) -> str:
 
 
 def both_readings(cell: str) -> str:
-    """Say which two numbers a cell may be."""
+    """Say which two numbers a cell may be; "" for any other cell."""
+    if not any(readings.fullmatch(cell) for readings in TWO_READINGS.values()):
+        return ""
     digits = re.sub("[.,]", "", cell)
     return (
         f"may be {digits} with a thousands separator, or {digits[:-3]}.{digits[-3:]}; export it without thousands "

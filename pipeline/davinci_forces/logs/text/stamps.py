@@ -91,7 +91,7 @@ class Stamps:
         """Set the zero of dated stamps to the first dated cell; None if it is not a valid date."""
         if not self.has_date:
             return self
-        first = next(cell for cell in cells if self.pattern.fullmatch(cell))
+        first = next((cell for cell in cells if self.pattern.fullmatch(cell)), "")
         try:
             seconds = self.seconds(pa.chunked_array([[first]]))
         except pa.ArrowInvalid:
