@@ -51,10 +51,10 @@ UNSIZED = {
     "count", "cnt", "tick", "pulse", "inc", "lsb", "adc", "volt", "v", "mv", "percent", "pct", "permille", "%",
     "kg", "kgf", "gf", "g", "lbf", "lb", "inch", "inches", "kn", "knm", "ncm", "ua", "mdeg", "grad", "gon",
 }  # fmt: skip
-TIMES = ("time", "t", "elapsed", "timestamp", "stamp", "clock", "duration")
+TIME_WORDS = ("time", "t", "elapsed", "timestamp", "stamp", "clock", "duration")
 # words that are units only after these words: `time_min` is in minutes, but `q_min` is a minimum
 ONLY_AFTER = {
-    **dict.fromkeys(("s", "min", "h", "day"), TIMES), "A": ("current", "curr", "i"), "N": ("force", "load"),
+    **dict.fromkeys(("s", "min", "h", "day"), TIME_WORDS), "A": ("current", "curr", "i"), "N": ("force", "load"),
     "m": ("depth", "displacement"), "g": ("load", "weight"), "v": ("force", "load", "sensor"),
 }  # fmt: skip
 IN_BRACKETS = re.compile(r"(?<=\S)\s*[\[({]\s*([^\[\](){}]*?)\s*[\])}]")

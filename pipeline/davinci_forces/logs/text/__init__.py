@@ -14,7 +14,15 @@ from davinci_forces.logs.lines import GZIP, Lines, decode
 from davinci_forces.logs.log import Block, Log, Options, read_ahead
 from davinci_forces.logs.text.dialect import Dialect, find_dialect
 from davinci_forces.logs.text.marks import NAMED
-from davinci_forces.logs.text.rows import FRAME_BYTES, NO_ROW, NUMBERS, Unclear, both_readings, split_cells, ungrouped
+from davinci_forces.logs.text.rows import (
+    FRAME_BYTES,
+    NO_ROW,
+    NUMBERS,
+    Unclear,
+    both_readings,
+    split_cells,
+    ungroup,
+)
 from davinci_forces.logs.text.stamps import REMARK, Unwrapped, clocks_may_change
 
 VALUE_BYTES = rb"[+-]?((\d+MARK?\d*|MARK\d+)([eE][+-]?\d+)?|nan|inf|infinity)"
@@ -22,7 +30,7 @@ NUMBER_PATTERNS_BYTES = {
     mark.decode(): re.compile(VALUE_BYTES.replace(b"MARK", re.escape(mark)), re.IGNORECASE) for mark in (b".", b",")
 }
 NAMES = {delimiter: name for name, delimiter in NAMED.items() if name != "\\t"}
-MAX_COMMENTS = 100  # lines between rows that are shown
+MAX_LISTED_LINES = 100  # lines between rows that are shown
 
 
 def recognises(path: Path, head: bytes) -> bool:
@@ -50,7 +58,7 @@ def read(path: Path, options: Options) -> Log:
         "decimal mark": dialect.decimal,
         "header": f"{dialect.header} lines" if dialect.names else "none: columns are numbered from 0",
     }
-    shown = dialect.channels[: len(dialect.channels) - dialect.trailing]
+    shown = dialect.channels[: len(dialect.channels) - dialect.has_trailing]
     comments = list(dialect.preamble)
     time = next((channel.name for channel in shown if channel.kind == "time"), "")
     dated = next((stamps for stamps in dialect.stamps.values() if stamps.has_date), None)
@@ -85,7 +93,7 @@ class _Reading:
         self.log, self.dialect, self.names = log, dialect, names
         self.width = len(dialect.channels)
         self.columns = {c.name: i for i, c in enumerate(dialect.channels) if c.name in names}
-        behind = [self.width - 1] if dialect.trailing else []  # a column that must stay empty
+        behind = [self.width - 1] if dialect.has_trailing else []  # a column that must stay empty
         self.wanted = sorted({*self.columns.values(), *behind})
         self.rows = self.narrow = self.first_narrow = self.no_rows = self.headers = self.first_header = 0
         self.times = {i: stamps.seconds for i, stamps in dialect.stamps.items() if i in self.wanted}
@@ -139,7 +147,7 @@ class _Reading:
 
     def _comment(self, line: int, text: str) -> None:
         self.no_rows += 1
-        if self.no_rows <= MAX_COMMENTS:
+        if self.no_rows <= MAX_LISTED_LINES:
             self.log.comments.append(f"line {line}: {text.strip()}")
 
     def _at_once(self, block: bytes, missing: Iterable[str] = ()) -> Cells | None:
@@ -154,7 +162,7 @@ class _Reading:
             )
         except UNREADABLE:
             return None
-        return None if dialect.trailing and cells.nulls[width - 1] < cells.rows else cells
+        return None if dialect.has_trailing and cells.nulls[width - 1] < cells.rows else cells
 
     def _row_by_row(self, first: int, block: bytes) -> Cells:
         """Parse any other block: keep only the wanted cells, and locate a cell that is not a number."""
@@ -173,7 +181,7 @@ class _Reading:
         try:
             check(rows, all_wanted, patterns)
         except NotANumber:
-            rows = [[self._ungrouped(i, cell) for i, cell in zip(self.wanted, row, strict=True)] for row in rows]
+            rows = [[self._ungroup(i, cell) for i, cell in zip(self.wanted, row, strict=True)] for row in rows]
         try:
             check(rows, all_wanted, patterns)
         except NotANumber as bad:
@@ -191,9 +199,9 @@ class _Reading:
         columns = {self.wanted[i]: column for i, column in parsed.columns.items()}
         return Cells(parsed.rows, columns, {self.wanted[i]: count for i, count in parsed.nulls.items()}, texts=[])
 
-    def _ungrouped(self, column: int, cell: bytes) -> bytes:
+    def _ungroup(self, column: int, cell: bytes) -> bytes:
         text = cell.decode("latin-1")
-        return cell if column in self.times else ungrouped(text, self.dialect.decimal).encode("latin-1")
+        return cell if column in self.times else ungroup(text, self.dialect.decimal).encode("latin-1")
 
     def _is_row(self, line: int, row: str, cells: list[str]) -> bool:
         """Whether a line holds samples, and is neither a remark between rows nor the header again.
@@ -228,7 +236,7 @@ class _Reading:
 
     def _fitted(self, line: int, cells: list[str]) -> list[str]:
         """Fill up the cells of a row to the number of columns."""
-        width, trailing = self.width, self.dialect.trailing
+        width, trailing = self.width, self.dialect.has_trailing
         where = f"{self.log.path}:{line}: the row has {len(cells)} cells, but the log has {width - trailing} columns"
         if any(cells[width:]) or (trailing and NUMBERS[self.dialect.decimal].fullmatch("".join(cells[width - 1 :]))):
             raise BadLog(f"{where}; correct the row, or set `delimiter` and `decimal` for this log in study.toml")

@@ -38,7 +38,7 @@ class Dialect:
     remarks: tuple[str, ...]  # on changed names, units by the size of numbers, and unread columns
 
     @property
-    def trailing(self) -> bool:
+    def has_trailing(self) -> bool:
         """Whether every row ends in a delimiter."""
         return len(self.names) > 1 and not self.names[-1]
 

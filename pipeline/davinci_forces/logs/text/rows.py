@@ -34,7 +34,7 @@ def split_cells(line: str, delimiter: str) -> list[str]:
     return [cell.strip() for cell in cells]
 
 
-def ungrouped(cell: str, decimal: str) -> str:
+def ungroup(cell: str, decimal: str) -> str:
     """A number without thousands separators, if it has any."""
     if not NUMBERS[decimal].fullmatch(cell):
         return cell
