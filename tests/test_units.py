@@ -22,7 +22,7 @@ NAMED = {
     "ns": ("t_ns", "time_nanosec", "/js/stamp/t_nsec"), "min": ("time_min", "t / min"), "s": ("t_s", "t/s", "time_sec"),
     "N m": ("tau_Nm", "tau_N_m", "torqueNm", "tau / Nm", "tau_nm"), "mN m": ("tau_mNm", "tau_mN_m", "torquemNm", "tau / (mN m)"),
     "mA": ("i_mA", "i_ma", "currentmA", "i / mA"), "A": ("current_A", "I / A"), "rpm": ("speed_rpm", "motorRpm", "n_rev_min"),
-    "mm": ("x_mm", "x / mm"), "m": ("depth_m",), "counts": ("q_counts", "q / counts"), "V": ("force_V", "u [V]"),
+    "mm": ("x_mm", "x / mm"), "m": ("depth_m", "x / m"), "counts": ("q_counts", "q / counts"), "V": ("force_V", "u [V]"),
     "kgf": ("load_kgf",), "lbf": ("q [lbf]",), "rev?": ("q_rev",), "rad/s^2": ("ddq [rad/s^2]",), "outer yaw": ("q (outer yaw)",),
     "": (
         "q", "q[0]", "q(1)", "effort[outer_yaw]", "tau (joint 2)", "theta_m", "q_min", "q_s", "tau_g", "x_m", "deg_q",

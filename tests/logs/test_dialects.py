@@ -147,7 +147,7 @@ def read_dialects() -> Iterator[tuple[str, Dialect]]:
         "pandas without index": in_pandas(False), "pandas with index": in_pandas(True),
         "numpy savetxt": plain("# t q i", delimiter=" ", form=".18e"), "R write.csv": in_pandas(True, quoting=2),
         "a comment in the middle": inserted(plain(), "# pause here, 3, 4"), "a remark in the middle": inserted(plain(), "-- Trial 2 --"),
-        "words in the middle": inserted(plain(), "Pause"), "the header again": inserted(plain(), "t,q,i"),
+        "slashes in the middle": inserted(plain(), "// pause, 3, 4"), "words in the middle": inserted(plain(), "Pause"), "the header again": inserted(plain(), "t,q,i"),
         "a count below the rows": plain() + "(60 rows)\n", "a comment at the end": plain() + "% end\n",
         "NA among the text": plain("t,q,i,note").replace("\n0", ",NA\n0").replace("note,NA", "note"),
     }.items():  # fmt: skip
@@ -209,6 +209,9 @@ def read_dialects() -> Iterator[tuple[str, Dialect]]:
         "ISO 8601": stamped(lambda m: m.isoformat() + "Z"), "ISO 8601 with a comma": stamped(lambda m: f"{m:%Y-%m-%d} {fraction(m, ',')}"),
     }.items():  # fmt: skip
         yield name, Dialect(text, dated())
+    hours = stamped(lambda m: f"{m.month}/{m.day}/{m.year} {half_day(m)}", step=997.0)
+    yield "US dates past one o'clock and midnight", Dialect(hours, dated(997.0))
+    yield "Markdown, by number", Dialect(framed(False), NUMBERED)
     yield "times of day", Dialect(stamped(fraction), {"when": 43199.8 + T, "q": Q})
     yield "times of half a day", Dialect(stamped(half_day), {"when": 43199.8 + T, "q": Q})
     two = [row[0].split() + row[1:] for row in rows([f"{NOON:%d.%m.%Y} {fraction(NOON + timedelta(seconds=t))}" for t in T.tolist()], Q)]
@@ -239,6 +242,8 @@ def refused_dialects() -> Iterator[tuple[str, Dialect]]:
         ("a blank where a sample is missing", inserted(plain("t q i", delimiter=" "), "0.3 0.5"), ":31: the row has 2 cells, .* not known"),
         ("rows that become wider", inserted(plain(), "0.3,0.5,1,2"), ":31: the row has 4 cells"),
         ("a thousand or a decimal mark", table(["t;n"], few, ";"), r"'(1)\.(\d+)' may be \1\2 with a thousands separator, or \1\.\2; export"),
+        ("a column of thousands or fractions", table(["t;n"], [[number(t), f"{1 + k % 9},{200 + k}"] for k, t in enumerate(T)], ";"),
+         r"column 1 \(n\) holds '(\d),(\d+)', which may be \1\2 with a thousands separator, or \1\.\2; export"),
         ("every mark may be of thousands", table(["t;n"], [[c.split(",")[0] or "0", n] for c, n in few], ";"), r"'(1)\.(\d+)' may be \1\2 with"),
         ("dates of two readings", stamped(lambda m: f"05/10/{m.year} {fraction(m)}"), "may be day 05 of month 10, or day 10 of month 05"),
         ("minutes and seconds", stamped(lambda m: f"{m:%M:%S}.{m.microsecond // 1000:03}"), "in a format that is not read; export seconds"),

@@ -7,6 +7,8 @@ import pytest
 
 import davinci_forces
 from tests import arm
+from tests.logs.array_writers import matlab
+from tests.logs.reading import read
 from tests.test_bad_logs import edit, lab, run  # noqa: F401 - a fixture
 from tests.test_runs import call
 
@@ -68,3 +70,8 @@ def test_nanoseconds_since_1970_are_no_seconds(lab):  # noqa: F811
     call("ingest", lab)
     good, bad = (davinci_forces.read(lab, "Recording", log=log) for log in ("good", "bad"))
     np.testing.assert_allclose(bad["t"], good["t"], atol=1e-6)
+
+
+def test_names_state_units_in_other_formats_too():
+    log, _ = read(matlab({"t_ms": np.arange(9.0), "arm": {"q_deg": np.ones(9), "tau": np.ones(9)}}), "log.mat")
+    assert {channel.name: channel.unit for channel in log.channels} == {"t_ms": "ms", "arm/q_deg": "deg", "arm/tau": ""}
