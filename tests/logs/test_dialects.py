@@ -252,6 +252,7 @@ def refused_dialects() -> Iterator[tuple[str, Dialect]]:
         ("commas for all", plain("", delimiter=",", mark=",", form=".3f"), "the comma may be the delimiter, the decimal mark, or both"),
         ("commas for all, one digit", plain("", delimiter=",", mark=",", form=".1f").replace("-", ""), "the comma may be"),
         ("commas for all, below names", plain(mark=",", form=".3f").replace("-", ""), "the comma may be"),
+        ("one column of thousands", "F\n" + "".join(f"{1000 + k:,}.5\n" for k in range(ROWS)), "the delimiter, or separate thousands"),
         ("JSON", "".join(json.dumps(dict(zip(TRUTH, row, strict=True))) + "\n" for row in zip(T, Q, I, strict=True)), "JSON: write columns"),
         ("XML", "<log>\n" + "".join(f"<row><t>{t}</t><q>{q}</q></row>\n" for t, q in zip(T, Q, strict=True)), "save the table as CSV"),
         ("YAML of rostopic echo", "".join(f"header:\n  seq: {k}\nposition: [{q}]\n---\n" for k, q in enumerate(Q)), "rostopic echo -p"),

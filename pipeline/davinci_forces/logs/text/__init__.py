@@ -153,8 +153,10 @@ class _Reading:
     def _at_once(self, block: bytes, missing: Iterable[str] = ()) -> Cells | None:
         """Parse a block whose rows are all regular, else return None."""
         dialect = self.dialect
-        if dialect.delimiter == " ":
+        if dialect.delimiter == " " and dialect.quoted:
             return None
+        if dialect.delimiter == " ":
+            block = b"\n".join(b" ".join(row.split()) for row in block.split(b"\n"))
         delimiter, decimal, width = dialect.delimiter.encode(), dialect.decimal.encode(), self.width
         try:
             cells = parse(

@@ -10,6 +10,10 @@ from davinci_forces.logs.text.stamps import is_time
 NAMED = {"tab": "\t", "comma": ",", "semicolon": ";", "space": " ", "pipe": "|", "\\t": "\t"}
 CANDIDATES = ("\t", ";", ",", "|", " ")
 WHOLE_NUMBER = re.compile(r"[+-]?\d*([eE][+-]?\d+)?")
+COMMA = (
+    "the comma may be the delimiter, {}; set `delimiter` or `decimal` for this log in study.toml, or export it with "
+    "another delimiter"
+)
 # what to export instead of a text without columns, by its beginning
 EXPORTS = {
     "{": "it looks like JSON: write columns, as pandas' to_csv does",
@@ -44,6 +48,8 @@ def find_marks(rows: Sequence[str], body: Sequence[str], options: Options) -> tu
             f"`delimiter` and `decimal` for this log in study.toml, or take it out{hint}"
         )
     if best == (",", ".") and not options.delimiter and not options.decimal:
+        if scores["\t", "."][:2] == scores[best][:2]:
+            raise Unclear(COMMA.format("or separate thousands"))  # for whole lines are numbers as well
         return _comma(rows, body)
     if best[0] != "," and not options.decimal:
         _require_decimal_mark(cells[best[0]], best[1])
@@ -101,8 +107,5 @@ def _comma(rows: Sequence[str], body: Sequence[str]) -> tuple[str, str]:
     )
     spaced = all(re.search(r",\s", line) and re.search(r",\S", line) for line in body)
     if widths == {2} or (pairs and (uneven or spaced or 2 * len(first) == len(cells[-1]))):
-        raise Unclear(
-            "the comma may be the delimiter, the decimal mark, or both; set `delimiter` or `decimal` for this log in "
-            "study.toml, or export it with another delimiter"
-        )
+        raise Unclear(COMMA.format("the decimal mark, or both"))
     return ",", "."

@@ -139,7 +139,8 @@ def both_dates(cells: Sequence[str]) -> str:
 
 def is_time(cell: str) -> bool:
     """Whether a cell is a date, a time of day or both."""
-    return cell[:1].isdecimal() and any(pattern.fullmatch(cell) for pattern in (*REWRITTEN, DAY_ALONE))
+    patterns = REWRITTEN if ":" in cell else (COMPACT, DAY_ALONE)
+    return cell[:1].isdecimal() and any(pattern.fullmatch(cell) for pattern in patterns)
 
 
 class Unwrapped:
