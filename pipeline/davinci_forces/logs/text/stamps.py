@@ -107,13 +107,10 @@ def stamps_of(cells: Sequence[str], is_text: bool) -> Stamps | None:
     patterns = (MOMENT, TIME_OF_DAY, MONTH_NAMED, COMPACT, *_orders(cells)) if is_text else (COMPACT,)
     for pattern in patterns:
         matches = [match for match in map(pattern.fullmatch, filled) if match]
-        if (2 if is_text else 1) * len(matches) > (len(filled) if is_text else len(filled) - 1) > 0:
+        if matches and len(matches) >= (len(filled) / 2 if is_text else max(len(filled), 2)):
             zones, halves = ({bool(m.groupdict().get(g)) for m in matches} for g in ("zone", "half"))
-            return (
-                Stamps(pattern, zones == {True}, has_halves=halves == {True})
-                if len(zones) == len(halves) == 1
-                else None
-            )
+            same = len(zones) == len(halves) == 1
+            return Stamps(pattern, zones == {True}, has_halves=halves == {True}) if same else None
     return None
 
 
