@@ -11,7 +11,7 @@ from davinci_forces.maths.units import unit_in
 
 # Text last: it recognises anything that looks like columns of numbers. Raw binary goes by the file's suffix.
 FORMATS = ("tdms", "lvm", "tdm", "ros", "mat", "hdf5", "arrow", "binary", "text")
-BAG = "metadata.yaml"  # in a folder that is a log: a ROS 2 bag
+BAG = ("metadata.yaml", "*.db3", "*.mcap")  # files in a folder that is a log: a ROS 2 bag
 
 
 def open_log(path: Path, options: Options = Options()) -> Log:  # noqa: B008 - frozen
@@ -24,9 +24,10 @@ def open_log(path: Path, options: Options = Options()) -> Log:  # noqa: B008 - f
     """
     if not path.exists():
         raise BadLog(f"{path}: there is no such file")
-    if path.is_dir() and not (path / BAG).is_file():
-        raise BadLog(f"{path}: this folder has no {BAG}, so it is not a ROS 2 bag; name a file in it")
-    with open_file(path / BAG if path.is_dir() else path) as file:
+    inside = [file for pattern in BAG for file in sorted(path.glob(pattern))] if path.is_dir() else [path]
+    if not inside:
+        raise BadLog(f"{path}: this folder has no {' or '.join(BAG)}, so it is not a ROS 2 bag; name a file in it")
+    with open_file(inside[0]) as file:
         head = file.read(4096)
     if not head:
         raise BadLog(f"{path}: the file is empty (0 bytes); record it again, or take it out of study.toml")

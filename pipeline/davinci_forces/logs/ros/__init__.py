@@ -1,4 +1,4 @@
-"""Bags of ROS 1 and 2, and MCAP: joint states, wrenches, twists and poses, by topic."""
+"""Bags of ROS 1 and 2, and MCAP: the numbers in messages of any type, by topic and field."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ def recognises(path: Path, head: bytes) -> bool:
 
 
 def read(path: Path, options: Options) -> Log:
-    """Open the bag, and list its topics and the content of their first messages.
+    """Open the bag, and list its topics and the numbers in their messages.
 
     Raises
     ------

@@ -1,9 +1,8 @@
-"""Read a bag as a log: the values of its topics as channels, with one clock per topic."""
+"""Read a bag as a log: the numbers in messages of any type as channels, with one clock per topic."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from datetime import timedelta
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -11,89 +10,15 @@ import numpy as np
 
 from davinci_forces.errors import BadLog
 from davinci_forces.logs.log import Block, Channel, Log, Options, unique
-from davinci_forces.logs.ros.storage import Bag
+from davinci_forces.logs.ros.layout import Layout, Unlike, layout_of, numbers_at, stamps_at
+from davinci_forces.logs.ros.scan import Batch
+from davinci_forces.logs.ros.storage import Bag, types_of
 from davinci_forces.logs.timeline import UNIX_EPOCH
 
-JOINTS = "sensor_msgs/msg/JointState"
-STATES = ("position", "velocity", "effort")  # of a joint, in SI; the message does not state whether in rad or m
-# Messages with a header and vectors: the field that holds them, their names and units.
-VECTORS = {
-    "geometry_msgs/msg/WrenchStamped": ("wrench", {"force": "N", "torque": "N m"}),
-    "geometry_msgs/msg/TwistStamped": ("twist", {"linear": "m/s", "angular": "rad/s"}),
-    "geometry_msgs/msg/PoseStamped": ("pose", {"position": "m", "orientation": ""}),
-    "geometry_msgs/msg/TransformStamped": ("transform", {"translation": "m", "rotation": ""}),
-}
-KNOWN = (JOINTS, *VECTORS)
-BLOCK_MESSAGES = 1 << 13  # messages of a block
-
-
-class Unlike(ValueError):
-    """A message that differs from the first of its topic; the text says how."""
-
-
-class Vectors:
-    """Vectors and quaternions; `columns` are their components: "force.x"."""
-
-    names: Sequence[str] = ()  # of joints; vectors have none
-
-    def __init__(self, kind: str, message: Any) -> None:
-        self.holder, units = VECTORS[kind]
-        axes = {name: tuple("xyzw" if hasattr(getattr(self._held(message), name), "w") else "xyz") for name in units}
-        self.paths = tuple((name, axis) for name in units for axis in axes[name])
-        self.columns = tuple(Channel(f"{name}.{axis}", units[name]) for name, axis in self.paths)
-
-    def _held(self, message: Any) -> Any:
-        return getattr(message, self.holder)
-
-    def numbers(self, message: Any) -> Sequence[float]:
-        """Return the components of one message."""
-        held = self._held(message)
-        return [getattr(getattr(held, name), axis) for name, axis in self.paths]
-
-
-class Joints:
-    """Position, velocity and effort of joints, in the order of the first message: "effort[0]", "effort[outer_yaw]"."""
-
-    def __init__(self, first: Any) -> None:
-        self.names: list[str] = list(first.name)
-        self.counts = [len(getattr(first, state)) for state in STATES]
-        if self.names and any(count not in (0, len(self.names)) for count in self.counts):
-            raise Unlike(f"names {len(self.names)} joints but has {self._counted(self.counts)}")
-        names = unique(self.names)
-        self.columns = tuple(
-            Channel(f"{state}[{i}]", alias=f"{state}[{names[i]}]" if self.names else "")
-            for state, count in zip(STATES, self.counts, strict=True)
-            for i in range(count)
-        )
-        self.orders: dict[tuple[str, ...], list[int] | None] = {tuple(self.names): None}
-
-    def numbers(self, message: Any) -> Sequence[float] | None:
-        """Return the states of one message in the order of the first one; None if it has none of the joints."""
-        arrays = [getattr(message, state) for state in STATES]
-        names = tuple(message.name)
-        if names not in self.orders:
-            if self.names and names and not set(self.names) & set(names):
-                return None
-            self.orders[names] = self._order(names)
-        order = self.orders[names]
-        for had, array in zip(self.counts, arrays, strict=True):
-            if len(array) != (had and len(names)) and (names or len(array) != had):
-                counts = self._counted([len(array) for array in arrays])
-                raise Unlike(f"has {counts}, but the first message has {self._counted(self.counts)}")
-        if order is None:
-            return list(chain.from_iterable(arrays))
-        return [array[i] for array in arrays if len(array) for i in order]
-
-    def _order(self, names: tuple[str, ...]) -> list[int]:
-        """Return the positions of the first message's joints in another message."""
-        if missing := [name for name in self.names if name not in names]:
-            raise Unlike(f"lacks {', '.join(missing)}, which the first message has")
-        if not self.names or len(set(self.names)) < len(self.names):
-            raise Unlike(f"is of {', '.join(names) or 'joints without names'}, but the first message is not")
-        return [names.index(name) for name in self.names]
-
-    def _counted(self, counts: Sequence[int]) -> str:
-        return ", ".join(f"{count} of {state}" for count, state in zip(counts, STATES, strict=True))
+UNSTEADY = "lists of unsteady length"  # kind of their channels
+SERVICES = ("rosgraph_msgs/msg/Log", "rcl_interfaces/msg/")  # types that ROS needs itself
+ENCODINGS_OF_MESSAGES = ("cdr", "ros1")
+SHOWN_TOPICS = 12
 
 
 @dataclass
@@ -102,9 +27,10 @@ class Topic:
 
     name: str  # "/PSM1/measured_js"
     connections: list[Any]
-    layout: Vectors | Joints
+    first: Layout  # of the first message, or of one with more numbers
+    started: int  # [ns] since 1970
     stamped: bool  # whether headers have time stamps; else only the recorder's times exist
-    first: int  # [ns] since 1970
+    unsteady: set[str]  # numbers that some messages lack
 
     @property
     def stamp_channel(self) -> str:
@@ -117,16 +43,22 @@ class Topic:
         return f"{self.name}/received"
 
     def channels(self, alone: bool) -> list[Channel]:
-        """List its clocks and values; if it is the only topic, they are on the clock of the log."""
-        times = [self.stamp_channel, self.receipt_channel]
-        clock = times[not self.stamped]
+        """List its clocks and numbers; if it is the only topic, they are on the clock of the log."""
+        times = [self.stamp_channel, self.receipt_channel] if self.first.stamp else [self.receipt_channel]
+        clock = self.stamp_channel if self.stamped else self.receipt_channel
         time = "" if alone else clock
         clocks = [Channel(name, "s", "time", time="" if alone or name == clock else clock) for name in times]
-        numbers = [
-            Channel(f"{self.name}/{c.name}", c.unit, time=time, alias=c.alias and f"{self.name}/{c.alias}")
-            for c in self.layout.columns
-        ]
-        return clocks + numbers
+        joints = {path: unique(names) for path, names in self.first.joints_of.items()}
+        for number, place in self.first.numbers.items():
+            path, _, i = number.rstrip("]").rpartition("[")
+            alias = f"{self.name}/{path}[{joints[path][int(i)]}]" if joints.get(path) else ""
+            kind = UNSTEADY if number in self.unsteady else "number"
+            clocks.append(Channel(f"{self.name}/{number}", place.unit, kind, time=time, alias=alias))
+        return clocks
+
+    def is_of_others(self, layout: Layout) -> bool:
+        """Whether a message names joints, but none of those in the first."""
+        return bool(self.first.joints and layout.joints) and not set(self.first.joints) & set(layout.joints)
 
 
 def open_in_child(path: Path, options: Options) -> Log:
@@ -135,18 +67,14 @@ def open_in_child(path: Path, options: Options) -> Log:
     Raises
     ------
     BadLog
-        If none of its topics has a supported type.
+        If none of its topics has numbers.
     """
     bag = Bag(path)
-    log = BagLog(path, "ros", (), zone="UTC", bag=bag)
+    log = BagLog(path, "ros", (), zone="UTC", bag=bag, cut=bag.cut, warnings=bag.warnings)
     log.topics = _topics(log, bag)
     if not log.topics:
-        there = ", ".join(f"{c.topic} ({_short(c.msgtype)})" for c in bag.connections[:12]) or "none"
-        raise BadLog(
-            f"{path}: the bag has no message of a supported type ({', '.join(map(_short, KNOWN))}); its topics are "
-            f"{there}"
-        )
-    microseconds = min(topic.first for topic in log.topics) // 1000  # the resolution of dates
+        raise BadLog(f"{path}: the bag has no message with numbers; its topics are {log.facts.get('left out', 'none')}")
+    microseconds = min(topic.started for topic in log.topics) // 1000  # the resolution of dates
     log.origin = microseconds * 1000
     log.started = (UNIX_EPOCH + timedelta(microseconds=microseconds)).replace(tzinfo=None).isoformat()
     alone = len(log.topics) == 1
@@ -158,44 +86,77 @@ def open_in_child(path: Path, options: Options) -> Log:
 
 
 def _topics(log: Log, bag: Bag) -> list[Topic]:
-    """List the supported topics by name; other topics become a fact."""
+    """List the topics with numbers by name; other topics become a fact."""
     by_name: dict[tuple[str, str], list[Any]] = {}
     for connection in bag.connections:
         by_name.setdefault((f"/{connection.topic.strip('/')}", connection.msgtype), []).append(connection)
-    topics: list[Topic] = []
+    topics: dict[str, Topic] = {}
     others: list[str] = []
     for (name, kind), connections in sorted(by_name.items(), key=lambda item: item[0]):
-        first = next(bag.messages(connections), None) if kind in KNOWN else None
-        if first is None or any(topic.name == name for topic in topics):
-            others.append(f"{name} ({_short(kind)})")
-            continue
-        topics.append(_topic(log, name, kind, connections, *first))
+        try:
+            if name in topics or kind.startswith(SERVICES):
+                raise Unlike("")
+            topics[name] = _topic(log, bag, name, kind, connections)
+        except Unlike as why:
+            others.append(f"{name} ({_short(kind)}{f': {why}' if str(why) else ''})")
     if others:
-        log.facts["left out"] = ", ".join(others)
-    return topics
+        more = [f"{len(others) - SHOWN_TOPICS} more"] if len(others) > SHOWN_TOPICS else []
+        log.facts["left out"] = ", ".join([*others[:SHOWN_TOPICS], *more])
+    return list(topics.values())
 
 
-def _topic(log: Log, name: str, kind: str, connections: list[Any], received: int, message: Any) -> Topic:
+def _topic(log: Log, bag: Bag, name: str, kind: str, connections: list[Any]) -> Topic:
+    """Describe a topic by messages of different sizes; the one with the most numbers stands for it."""
+    samples = [(c, time, content) for c in connections for time, content in bag.samples(c)]
+    if not samples:
+        raise Unlike("no message")
+    samples.sort(key=lambda sample: sample[1])
+    layouts, problems = [], []
+    for connection, _, content in samples:
+        try:
+            layouts.append((_layout(connection, content), content))
+        except Unlike as problem:
+            problems.append(problem)
+    if not layouts:
+        raise Unlike(f"a message {problems[0]}")
+    earliest, content = layouts[0]
+    first = max((layout for layout, _ in layouts), key=lambda layout: len(layout.numbers))
+    if not first.numbers:
+        raise Unlike(_wide(first) or "no numbers outside of lists of messages")
+    start = int(stamps_at(earliest.stamp, np.frombuffer(content, np.uint8)[None])[0]) if earliest.stamp else 0
+    topic = Topic(name, connections, first, start or samples[0][1], start != 0, set())
+    for connection, _, sample in samples:
+        topic.unsteady |= first.numbers.keys() - _numbers_of(topic, connection, sample)
+    if not start:
+        log.warnings.append(f"the messages of {name} carry no time; its clock is when its messages were recorded")
+    parts = [_short(kind), f"{sum(connection.msgcount for connection in connections)} messages"]
+    parts += [f"joints {', '.join(first.joints)}"] if first.joints else []
+    log.facts[name] = ", ".join([*parts, *([f"without {_wide(first)}"] if first.wide else [])])
+    return topic
+
+
+def _numbers_of(topic: Topic, connection: Any, content: bytes) -> set[str]:
+    """The numbers of a message; all, where it is of other joints, or is refused when it is read."""
     try:
-        layout = Joints(message) if kind == JOINTS else Vectors(kind, message)
-    except Unlike as how:
-        raise BadLog(f"{log.path}: message 0 of {name} {how}") from None
-    stamped = _stamp(message) != 0
-    if not stamped:
-        log.warnings.append(f"the headers of {name} carry no time; its clock is when its messages were recorded")
-    joints = ", ".join(layout.names)
-    count = sum(connection.msgcount for connection in connections)
-    log.facts[name] = f"{_short(kind)}, {count} messages" + (f", joints {joints}" if joints else "")
-    return Topic(name, connections, layout, stamped, _stamp(message) or received)
+        layout = _layout(connection, content, topic.first)
+    except Unlike:
+        return set(topic.first.numbers)
+    return set((topic.first if topic.is_of_others(layout) else layout).numbers)
+
+
+def _wide(layout: Layout) -> str:
+    return ", ".join(f"{path} ({length} numbers)" for path, length in layout.wide.items())
+
+
+def _layout(connection: Any, content: bytes, first: Layout | None = None) -> Layout:
+    if connection.ext not in ENCODINGS_OF_MESSAGES:
+        raise Unlike(f"is encoded as {connection.ext}")
+    ros1 = connection.ext == "ros1"
+    return layout_of(content, connection.msgtype, types_of(connection.msgdef, connection.msgtype, ros1), ros1, first)
 
 
 def _short(kind: str) -> str:
     return kind.replace("/msg/", "/")
-
-
-def _stamp(message: Any) -> int:
-    """Time stamp of a message [ns] since 1970."""
-    return int(message.header.stamp.sec) * 10**9 + int(message.header.stamp.nanosec)
 
 
 @dataclass
@@ -211,35 +172,63 @@ class BagLog(Log):
         self._restart(names, kinds=("number", "time"))
         if not names:
             return
-        topic, columns = next(
-            (t, c) for t in self.topics if names[0] in (c := [channel.name for channel in t.channels(True)])
-        )
-        where = [columns.index(name) for name in names]
-        rows: list[list[float]] = []
-        for row in self._rows(topic):
-            rows.append(row)
-            if len(rows) == BLOCK_MESSAGES:
-                yield self._block(names, where, rows)
-                rows = []
-        if rows:
-            yield self._block(names, where, rows)
-
-    def _rows(self, topic: Topic) -> Iterator[list[float]]:
         assert self.bag
-        for number, (received, message) in enumerate(self.bag.messages(topic.connections)):
-            try:
-                numbers = topic.layout.numbers(message)
-            except Unlike as how:
-                raise BadLog(f"{self.path}: message {number} of {topic.name} {how}; record these separately") from None
-            if numbers is None:
-                self.dropped += 1
-                if self.dropped == 1:
-                    others = f"message {number} of {topic.name} is of other joints ({', '.join(message.name)})"
-                    self.warnings.append(f"{others}; such messages are left out: record them on a separate topic")
-                continue
-            yield [(_stamp(message) - self.origin) / 1e9, (received - self.origin) / 1e9, *numbers]
+        topic = next(t for t in self.topics if any(channel.name == names[0] for channel in t.channels(True)))
+        number = 0  # of the first message of a batch
+        for connections, batch in self.bag.batches(topic.connections):
+            yield self._block(topic, names, connections, batch, number)
+            number += len(batch.times)
 
-    def _block(self, names: Sequence[str], where: Sequence[int], rows: list[list[float]]) -> Block:
-        table = np.array(rows, np.float64)
-        columns = zip(names, where, strict=True)
-        return self.count_nans({name: np.ascontiguousarray(table[:, column]) for name, column in columns})
+    def _block(
+        self, topic: Topic, names: Sequence[str], connections: Sequence[Any], batch: Batch, number: int
+    ) -> Block:
+        """Read messages, the first of them with a number; those of one size and layout at once."""
+        values = np.empty((len(names), len(batch.times)))
+        is_read = np.ones(len(batch.times), bool)
+        kinds = np.array(batch.owners) + len(connections) * batch.sizes
+        for kind in np.unique(kinds):
+            rows = np.flatnonzero(kinds == kind)
+            table = batch.table(rows)
+            while len(rows):
+                first = number + int(rows[0])
+                layout = self._layout_of(topic, connections[batch.owners[rows[0]]], table[0].tobytes(), first)
+                alike = (table[:, layout.fixed] == table[0, layout.fixed]).all(axis=1)
+                if topic.is_of_others(layout):
+                    is_read[rows[alike]] = False
+                    self._drop(topic, layout, first, int(alike.sum()))
+                else:
+                    part = table if alike.all() else table[alike]
+                    for column, name in zip(values, names, strict=True):
+                        column[rows[alike]] = self._column(topic, name, layout, part, first)
+                rows, table = rows[~alike], table[~alike]
+        if topic.receipt_channel in names:
+            values[names.index(topic.receipt_channel)] = (batch.times - self.origin) / 1e9
+        return self.count_nans(dict(zip(names, values[:, is_read], strict=True)))
+
+    def _layout_of(self, topic: Topic, connection: Any, content: bytes, number: int) -> Layout:
+        try:
+            return _layout(connection, content, topic.first)
+        except Unlike as how:
+            raise BadLog(f"{self.path}: message {number} of {topic.name} {how}; record these separately") from None
+
+    def _column(self, topic: Topic, name: str, layout: Layout, table: Any, number: int) -> Any:
+        """The samples of a channel in messages of one layout."""
+        quantity = name.removeprefix(f"{topic.name}/")
+        if name == topic.receipt_channel:
+            return 0.0
+        if quantity == "stamp" and layout.stamp:
+            return (stamps_at(layout.stamp, table) - self.origin) / 1e9
+        if place := layout.numbers.get(quantity):
+            return numbers_at(place, table)
+        joint = topic.first.numbers[quantity].joint
+        raise BadLog(
+            f"{self.path}: message {number} of {topic.name} has no {quantity}{f' ({joint})' if joint else ''}, which "
+            "the first message has; record these separately"
+        )
+
+    def _drop(self, topic: Topic, layout: Layout, number: int, count: int) -> None:
+        """Leave out messages of other joints."""
+        if not self.dropped:
+            others = f"message {number} of {topic.name} is of other joints ({', '.join(layout.joints)})"
+            self.warnings.append(f"{others}; such messages are left out: record them on a separate topic")
+        self.dropped += count

@@ -1,107 +1,219 @@
-"""Read the messages of a bag of ROS 1 or 2, from any storage, with rosbags."""
+"""Read the messages of a bag of ROS 1 or 2, from any storage, as bytes with the definitions of their types."""
 
+import sqlite3
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, ClassVar
 from urllib.parse import quote
 
-from rosbags import rosbag1, rosbag2
-from rosbags.interfaces import MessageDefinitionFormat
+import numpy as np
+from numpy.typing import NDArray
+from rosbags import rosbag2
+from rosbags.interfaces import Connection, MessageDefinition, MessageDefinitionFormat
 from rosbags.rosbag2.reader import DirectoryReader
-from rosbags.rosbag2.storage_mcap import McapReader
-from rosbags.rosbag2.storage_sqlite3 import Sqlite3Reader
-from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+from rosbags.typesys import Stores, TypesysError, get_types_from_idl, get_types_from_msg, get_typestore
 
 from davinci_forces.errors import BadLog
 from davinci_forces.files import open_file
+from davinci_forces.logs.ros.mcap import Mcap
+from davinci_forces.logs.ros.rosbag1 import Rosbag1
+from davinci_forces.logs.ros.scan import BATCH_BYTES, BATCH_MESSAGES, SIZES, Batch, Integers, Table, decompress
 
 RULE = "=" * 80 + "\n"  # between definitions in IDL
 LITERAL = "/:"  # characters of a path that an SQLite address may hold unquoted
 PAGES = slice(28, 32)  # bytes of a database's header with the number of pages
 PAGE = slice(16, 18)  # and with the size of a page
+TABLES = ("topics", "message_definitions", "messages")
+STORAGES = (".db3", ".mcap")  # of a bag in a folder
+FORMATS_OF_ROS_2 = {"ros2msg": MessageDefinitionFormat.MSG, "ros2idl": MessageDefinitionFormat.IDL}
 
 
-class Database(Sqlite3Reader):  # type: ignore[misc]  # rosbags is not there for everybody who checks types
-    """An SQLite storage with a quoted path: rosbags makes an address of it, which `#` or `?` in a name would end."""
+class Database:
+    """An SQLite storage.  Of one that is cut, the rows before the first page that is not whole."""
 
     def __init__(self, path: Path) -> None:
-        super().__init__(Path(quote(path.as_posix(), safe=LITERAL)))
+        self.path = path
+        self.connections: list[Any] = []
+        self.sizes: dict[int, list[list[int]]] = {}  # by topic: first message of each size, the size, and their count
+        self.warnings: list[str] = []
+        self.cut = False
+
+    def open(self) -> None:
+        """List the topics.
+
+        Raises
+        ------
+        BadLog
+            If it is no bag.
+        """
+        address = f"file:{quote(self.path.as_posix(), safe=LITERAL)}?immutable=1"  # no file appears beside it
+        try:
+            self.base = self._whole_rows() or sqlite3.connect(address, uri=True)
+            self.connections = list(self._listed())
+        except sqlite3.Error as error:
+            raise BadLog(f"{self.path}: this bag cannot be read ({error}); record it again") from None
+        journal = self.path.with_name(f"{self.path.name}-wal")
+        if journal.is_file() and journal.stat().st_size:
+            self.warnings.append(
+                f"messages in {journal.name} are not read; open the bag with sqlite3 once to move them"
+            )
+
+    def _whole_rows(self) -> sqlite3.Connection | None:
+        """Copy the rows of a database that lacks pages; SQLite would refuse it, or take the missing bytes for zeros."""
+        with open_file(self.path) as file:
+            head = file.read(100)
+            page, pages = int.from_bytes(head[PAGE]), int.from_bytes(head[PAGES])
+            page = page if page > 1 else 1 << 16
+            there = self.path.stat().st_size // page
+            if there >= pages or not head.startswith(b"SQLite"):
+                return None
+            content = bytearray(head + file.read(there * page - len(head)))
+        content[PAGES] = there.to_bytes(4)
+        damaged, whole = sqlite3.connect(":memory:"), sqlite3.connect(":memory:")
+        damaged.deserialize(bytes(content))
+        for name, definition in damaged.execute("SELECT name, sql FROM sqlite_master WHERE type = 'table'").fetchall():
+            if name in TABLES:
+                whole.execute(definition)
+                with suppress(sqlite3.DatabaseError):  # at the first page that is not there
+                    for row in damaged.execute(f"SELECT * FROM {name} NOT INDEXED ORDER BY rowid"):
+                        whole.execute(f"INSERT INTO {name} VALUES ({','.join('?' * len(row))})", row)
+        self.cut = True
+        [(count, span)] = whole.execute("SELECT count(*), (max(timestamp) - min(timestamp)) / 1e9 FROM messages")
+        self.warnings.append(
+            f"{self.path.name} is cut: {there} of its {pages} pages are there; {count} messages over {span or 0:.3f} s "
+            "are whole and are read"
+        )
+        return whole
+
+    def _listed(self) -> Iterator[Any]:
+        definitions = {}
+        if self.base.execute("SELECT name FROM sqlite_master WHERE name = 'message_definitions'").fetchall():
+            query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
+            definitions = {kind: (encoding, text) for kind, encoding, text in self.base.execute(query)}
+        for number, *size in self.base.execute(
+            "SELECT topic_id, min(id), length(data), count(*) FROM messages GROUP BY topic_id, length(data)"
+        ):
+            self.sizes.setdefault(number, []).append(size)
+        for number, topic, kind, serialization in self.base.execute(
+            "SELECT id, name, type, serialization_format FROM topics ORDER BY id"
+        ):
+            encoding, text = definitions.get(kind, ("", ""))
+            definition = MessageDefinition(FORMATS_OF_ROS_2.get(encoding, MessageDefinitionFormat.NONE), text)
+            count = sum(count for _, _, count in self.sizes.setdefault(number, []))
+            yield Connection(number, topic, kind, definition, "", count, serialization, self)
+
+    def batches(self, connections: Sequence[Any]) -> Iterator[Batch]:
+        """Yield the messages of some connections in the order of time."""
+        by_id = {connection.id: connection for connection in connections}
+        query = "SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({}) ORDER BY timestamp, id"
+        largest = max((size for number in by_id for _, size, _ in self.sizes[number]), default=1)
+        cursor = self.base.execute(query.format(",".join("?" * len(by_id))), [*by_id])
+        while rows := cursor.fetchmany(max(1, min(BATCH_MESSAGES, BATCH_BYTES // largest))):
+            owners, times, contents = zip(*rows, strict=True)
+            numbers = dict(zip(by_id, range(len(by_id)), strict=True))
+            yield Batch([numbers[i] for i in owners], np.array(times, np.int64), *_joined(contents))
+
+    def samples(self, connection: Any) -> list[tuple[int, bytes]]:
+        """Time and content of the first message, and of one message of other sizes."""
+        first = sorted(number for number, _, _ in self.sizes[connection.id])[:SIZES]
+        query = "SELECT timestamp, data FROM messages WHERE id = ?"
+        return [row for number in first for row in self.base.execute(query, [number])]
+
+    def close(self) -> None:
+        """Release the file."""
+        self.base.close()
 
 
-class Folder(DirectoryReader):  # type: ignore[misc]
-    """A bag in a folder."""
+class Folder(DirectoryReader):  # type: ignore[misc]  # rosbags is not there for everybody who checks types
+    """A bag in a folder, with its description."""
 
-    STORAGE_PLUGINS: ClassVar[dict[str, Any]] = {**DirectoryReader.STORAGE_PLUGINS, "sqlite3": Database}
+    STORAGE_PLUGINS: ClassVar[dict[str, Any]] = {"mcap": Mcap, "sqlite3": Database}
 
 
 class Bag:
-    """An opened bag."""
+    """An opened bag: its storages, one after the other."""
 
     def __init__(self, path: Path) -> None:
-        head = b"" if path.is_dir() else _head(path)
-        self.ros1 = head.startswith(b"#ROSBAG")
+        self.warnings: list[str] = []
+        self.packed = False  # whether each message is compressed
+        self.storages: Sequence[Any] = self._described(path) if path.is_dir() else _opened([path])
+        self.warnings += [warning for storage in self.storages for warning in storage.warnings]
+        self.cut = any(storage.cut for storage in self.storages)
+
+    def _described(self, path: Path) -> Sequence[Any]:
+        if not (path / "metadata.yaml").exists():
+            files = sorted((f for f in path.iterdir() if f.suffix in STORAGES), key=lambda f: (len(f.name), f.name))
+            self.warnings.append(f"no metadata.yaml describes {', '.join(f.name for f in files)}; all are read")
+            return _opened(files)
+        self.folder = Folder(path)  # which removes files that it decompressed when it is forgotten
         try:
-            self.storage = _storage(path, head)
-            self.storage.open()
-        except (rosbag1.ReaderError, rosbag2.ReaderError) as error:
-            remedy = "run `rosbag reindex` on it" if "not indexed" in str(error) else "record it again"
-            raise BadLog(f"{path}: this bag cannot be read ({error}); {remedy}") from None
-        for database in path.glob("*.db3") if path.is_dir() else [path]:
-            _require_pages(database)
+            self.folder.open()
+        except rosbag2.ReaderError as error:
+            raise BadLog(f"{path}: this bag cannot be read ({error}); record it again") from None
+        self.packed = self.folder.metadata.compression_mode == "message"
+        stated = self.folder.metadata.message_count
+        count = sum(connection.msgcount for storage in self.folder.storages for connection in storage.connections)
+        if count != stated:
+            self.warnings.append(f"metadata.yaml counts {stated} messages, but its files hold {count}")
+        return self.folder.storages  # type: ignore[no-any-return]
 
     @property
     def connections(self) -> Sequence[Any]:
-        """Its topics with their types; in ROS 1 one connection per publisher."""
-        return self.storage.connections  # type: ignore[no-any-return]
+        """Its topics with their types; in ROS 1 one connection per publisher, in ROS 2 one per storage."""
+        return [connection for storage in self.storages for connection in storage.connections]
 
-    def messages(self, connections: Sequence[Any]) -> Iterator[tuple[int, Any]]:
-        """Yield the time at which each message was received [ns] since 1970, and the message."""
-        for connection, received, content in self.storage.messages(connections):
-            types = _types(connection.msgdef, connection.msgtype, self.ros1)
-            read = types.deserialize_ros1 if self.ros1 else types.deserialize_cdr
-            yield received, read(content, connection.msgtype)
+    def batches(self, connections: Sequence[Any]) -> Iterator[tuple[Sequence[Any], Batch]]:
+        """Yield the messages of some connections, each storage's in the order of time, and those of its connections."""
+        for storage in self.storages:
+            if mine := [connection for connection in connections if connection.owner is storage]:
+                batches = storage.batches(mine)
+                yield from ((mine, _unpacked(batch) if self.packed else batch) for batch in batches)
+
+    def samples(self, connection: Any) -> list[tuple[int, bytes]]:
+        """Time and content of the first message, and of one message of other sizes."""
+        samples = connection.owner.samples(connection)
+        return [(time, decompress(content)) for time, content in samples] if self.packed else samples
 
 
-def _head(path: Path) -> bytes:
+def _joined(contents: Sequence[bytes]) -> tuple[Integers, Table]:
+    """Sizes of messages, and what joins those of one size."""
+
+    def table(rows: Integers) -> NDArray[np.uint8]:
+        return np.frombuffer(b"".join([contents[row] for row in rows.tolist()]), np.uint8).reshape(len(rows), -1)
+
+    return np.array([len(content) for content in contents]), table
+
+
+def _unpacked(batch: Batch) -> Batch:
+    """Decompress each message."""
+    rows = np.arange(len(batch.times))[:, None]
+    return Batch(batch.owners, batch.times, *_joined([decompress(batch.table(row).tobytes()) for row in rows]))
+
+
+def _opened(paths: Sequence[Path]) -> Sequence[Any]:
+    storages = [_storage(path) for path in paths]
+    for storage in storages:
+        storage.open()
+    return storages
+
+
+def _storage(path: Path) -> Any:
     with open_file(path) as file:
-        return file.read(32)
-
-
-def _storage(path: Path, head: bytes) -> Any:
-    if path.is_dir():
-        return Folder(path)
-    if head.startswith(b"#ROSBAG"):
-        return rosbag1.Reader(path)
-    return McapReader(path) if head.startswith(b"\x89MCAP") else Database(path)
-
-
-def _require_pages(path: Path) -> None:
-    """Refuse a truncated database; SQLite would take the missing pages for zeros, or for an index it does not need.
-
-    Raises
-    ------
-    BadLog
-        If it lacks pages.
-    """
-    head = _head(path)
-    page, pages = int.from_bytes(head[PAGE]), int.from_bytes(head[PAGES])
-    if head.startswith(b"SQLite") and path.stat().st_size < (page if page > 1 else 1 << 16) * pages:
-        raise BadLog(f"{path}: this bag cannot be read (it lacks some of its {pages} pages); record it again")
+        head = file.read(8)
+    return (Rosbag1 if head.startswith(b"#ROSBAG") else Mcap if head.startswith(b"\x89MCAP") else Database)(path)
 
 
 @lru_cache(maxsize=64)  # bags of one robot share definitions, and parsing them takes longer than reading a small bag
-def _types(definition: Any, kind: str, ros1: bool) -> Any:
-    """Return the types in a message, as the bag defines them, else as ROS does."""
+def types_of(definition: Any, kind: str, ros1: bool) -> Any:
+    """The fields of a type and of those in it, as the bag defines them, else as ROS does."""
     if definition.format == MessageDefinitionFormat.NONE:
-        return get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.LATEST)
-    types = get_typestore(Stores.EMPTY)
-    types.register(_defined(definition, kind))
-    return types
-
-
-def _defined(definition: Any, kind: str) -> dict[str, Any]:
-    if definition.format == MessageDefinitionFormat.MSG:
-        return dict(get_types_from_msg(definition.data, kind))
-    parts = definition.data.split(RULE)[1:] if definition.data.startswith(f"{RULE}IDL: ") else [f"\n{definition.data}"]
-    return {name: fields for part in parts for name, fields in get_types_from_idl(part.split("\n", 1)[1]).items()}
+        return get_typestore(Stores.ROS1_NOETIC if ros1 else Stores.LATEST).fielddefs
+    with suppress(TypesysError):
+        if definition.format == MessageDefinitionFormat.MSG:
+            return get_types_from_msg(definition.data, kind)
+        text = definition.data
+        parts = text.split(RULE)[1:] if text.startswith(f"{RULE}IDL: ") else [f"\n{text}"]
+        return {name: fields for part in parts for name, fields in get_types_from_idl(part.split("\n", 1)[1]).items()}
+    return {}
