@@ -201,6 +201,7 @@ class Scan:
     def samples(self, connection: Any) -> list[tuple[int, bytes]]:
         """Time and content of the first message, and of one message of other sizes."""
         places = np.frombuffer(self.places[connection.id], np.int64).reshape(-1, 4)
+        places = places[np.argsort(places[:, 0], kind="stable")]
         first = np.sort(np.unique(places[:, 3] - places[:, 2], return_index=True)[1])[:SIZES]
         return [(time, bytes(self.content_of(chunk)[begin:end])) for time, chunk, begin, end in places[first].tolist()]
 

@@ -36,7 +36,7 @@ class Database:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.connections: list[Any] = []
-        self.sizes: dict[int, list[list[int]]] = {}  # by topic: first message of each size, the size, and their count
+        self.sizes: dict[int, list[list[int]]] = {}  # by topic: of messages of a size, time and id of the first, size, count
         self.warnings: list[str] = []
         self.cut = False
 
@@ -93,7 +93,7 @@ class Database:
             query = "SELECT topic_type, encoding, encoded_message_definition FROM message_definitions"
             definitions = {kind: (encoding, text) for kind, encoding, text in self.base.execute(query)}
         for number, *size in self.base.execute(
-            "SELECT topic_id, min(id), length(data), count(*) FROM messages GROUP BY topic_id, length(data)"
+            "SELECT topic_id, min(timestamp), id, length(data), count(*) FROM messages GROUP BY topic_id, length(data)"
         ):
             self.sizes.setdefault(number, []).append(size)
         for number, topic, kind, serialization in self.base.execute(
@@ -101,14 +101,14 @@ class Database:
         ):
             encoding, text = definitions.get(kind, ("", ""))
             definition = MessageDefinition(FORMATS_OF_ROS_2.get(encoding, MessageDefinitionFormat.NONE), text)
-            count = sum(count for _, _, count in self.sizes.setdefault(number, []))
+            count = sum(size[-1] for size in self.sizes.setdefault(number, []))
             yield Connection(number, topic, kind, definition, "", count, serialization, self)
 
     def batches(self, connections: Sequence[Any]) -> Iterator[Batch]:
         """Yield the messages of some connections in the order of time."""
         by_id = {connection.id: connection for connection in connections}
         query = "SELECT topic_id, timestamp, data FROM messages WHERE topic_id IN ({}) ORDER BY timestamp, id"
-        largest = max((size for number in by_id for _, size, _ in self.sizes[number]), default=1)
+        largest = max((size[-2] for number in by_id for size in self.sizes[number]), default=1)
         cursor = self.base.execute(query.format(",".join("?" * len(by_id))), [*by_id])
         while rows := cursor.fetchmany(max(1, min(BATCH_MESSAGES, BATCH_BYTES // largest))):
             owners, times, contents = zip(*rows, strict=True)
@@ -117,7 +117,7 @@ class Database:
 
     def samples(self, connection: Any) -> list[tuple[int, bytes]]:
         """Time and content of the first message, and of one message of other sizes."""
-        first = sorted(number for number, _, _ in self.sizes[connection.id])[:SIZES]
+        first = [number for _, number, *_ in sorted(self.sizes[connection.id])[:SIZES]]
         query = "SELECT timestamp, data FROM messages WHERE id = ?"
         return [row for number in first for row in self.base.execute(query, [number])]
 
