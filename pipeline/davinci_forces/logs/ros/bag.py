@@ -193,17 +193,19 @@ class BagLog(Log):
                 first = number + int(rows[0])
                 layout = self._layout_of(topic, connections[batch.owners[rows[0]]], table[0].tobytes(), first)
                 alike = (table[:, layout.fixed] == table[0, layout.fixed]).all(axis=1)
+                same, part = (rows, table) if alike.all() else (rows[alike], table[alike])
                 if topic.is_of_others(layout):
-                    is_read[rows[alike]] = False
-                    self._drop(topic, layout, first, int(alike.sum()))
+                    is_read[same] = False
+                    self._drop(topic, layout, first, len(same))
                 else:
-                    part = table if alike.all() else table[alike]
+                    there = slice(None) if len(same) == len(kinds) else same
                     for column, name in zip(values, names, strict=True):
-                        column[rows[alike]] = self._column(topic, name, layout, part, first)
+                        if name != topic.receipt_channel:
+                            column[there] = self._column(topic, name, layout, part, first)
                 rows, table = rows[~alike], table[~alike]
         if topic.receipt_channel in names:
             values[names.index(topic.receipt_channel)] = (batch.times - self.origin) / 1e9
-        return self.count_nans(dict(zip(names, values[:, is_read], strict=True)))
+        return self.count_nans(dict(zip(names, values if is_read.all() else values[:, is_read], strict=True)))
 
     def _layout_of(self, topic: Topic, connection: Any, content: bytes, number: int) -> Layout:
         try:
@@ -214,8 +216,6 @@ class BagLog(Log):
     def _column(self, topic: Topic, name: str, layout: Layout, table: Any, number: int) -> Any:
         """The samples of a channel in messages of one layout."""
         quantity = name.removeprefix(f"{topic.name}/")
-        if name == topic.receipt_channel:
-            return 0.0
         if quantity == "stamp" and layout.stamp:
             return (stamps_at(layout.stamp, table) - self.origin) / 1e9
         if place := layout.numbers.get(quantity):
