@@ -103,7 +103,7 @@ def _bag(file: str, name: str = "") -> Written:
     names = dict(zip(COLUMNS, ("/arm/measured_js/position[0]", "/arm/measured_js/effort[roll]"), strict=True))
     return Written(
         bag_writer.content(name or file, messages), file, names, "/arm/measured_js/stamp", knows=True,
-        whole_only=file.endswith(".db3"), units=UNITLESS, resolution=1e-9,
+        whole_only=not file.endswith(".bag"), units=UNITLESS, resolution=1e-9,
     )  # fmt: skip
 
 

@@ -119,9 +119,10 @@ def test_of_a_bag_with_checksums_no_damage_is_read(name, count):
     assert sum(number == 0 for number in numbers) > count / 2
 
 
-@pytest.mark.parametrize("name", [name for name in BAGS if name not in CHECKED])
+@pytest.mark.parametrize("name", ["log.bag", "bz2.bag", "log.db3", "log.mcap"])
 @pytest.mark.parametrize("count", [20, pytest.param(150, marks=pytest.mark.slow)])
 def test_damage_of_any_other_bag_is_refused_or_changes_no_more_than_what_it_hit(name, count):
+    """But of lz4 and zstd without checksums, which unpack to something else in silence."""
     content, random = bag(name), np.random.default_rng(count)
     for _ in range(count):
         try:

@@ -219,7 +219,9 @@ class _Walk:
 
     def layout(self, kind: str, first: Layout | None) -> Layout:
         """Name the numbers."""
-        layout = Layout(names=self.names, stamp=self.stamp, fixed=np.array([at for places in self.fixed for at in places], np.intp))
+        layout = Layout(
+            names=self.names, stamp=self.stamp, fixed=np.array([at for places in self.fixed for at in places], np.intp)
+        )
         for path, length, place in self.lists:
             if length is None:
                 layout.numbers[path] = place
