@@ -81,8 +81,8 @@ def _made(store, message: Message, number: int, ros1: bool):
 def write(
     path: Path,
     messages: Iterable[Message],
-    definitions: dict[str, str] = {},
-    big: bool = False,  # noqa: B006
+    definitions: dict[str, str] = {},  # noqa: B006
+    big: bool = False,
     compression: str = "",
 ) -> Path:
     """A bag of ROS 1 where the name ends in .bag; else a folder, of MCAP where that ends in _mcap, else of SQLite.

@@ -127,11 +127,13 @@ def _topic(log: Log, bag: Bag, name: str, kind: str, connections: list[Any]) -> 
     topic = Topic(name, connections, first, start or samples[0][1], start != 0, set())
     for connection, _, sample in samples:
         topic.unsteady |= first.numbers.keys() - _numbers_of(topic, connection, sample)
-    if not start:
-        log.warnings.append(f"the messages of {name} carry no time; its clock is when its messages were recorded")
+    if first.stamp and not start:
+        log.warnings.append(f"the headers of {name} carry no time; its clock is when its messages were recorded")
     parts = [_short(kind), f"{sum(connection.msgcount for connection in connections)} messages"]
+    parts += ["on the recorder's clock"] if not first.stamp else []
     parts += [f"joints {', '.join(first.joints)}"] if first.joints else []
-    log.facts[name] = ", ".join([*parts, *([f"without {_wide(first)}"] if first.wide else [])])
+    parts += [f"without {_wide(first)}"] if first.wide else []
+    log.facts[name] = ", ".join(parts)
     return topic
 
 
