@@ -189,3 +189,42 @@ def test_a_wrong_checksum_and_a_wrong_count_are_named():
     content[info + 14] ^= 1  # of the messages of a topic in the last chunk
     with pytest.raises(BadLog, match="its index counts"):
         read(bytes(content), "log.bag")
+
+
+def test_mcap_without_chunks_and_without_a_summary_is_read():
+    content, data = bag("log.mcap"), b""
+    for kind, begin, end in records(content, MAGIC):
+        if kind == 1:
+            data += content[begin - 9 : end]
+        elif kind == 6:
+            data += content[begin + 28 + 4 + 8 : end]
+    data = content[:MAGIC] + data + struct.pack("<BQI", 15, 4, 0) + struct.pack("<BQQQI", 2, 20, 0, 0, 0)
+    for ending in (content[:MAGIC], b""):
+        log, samples = read(data + ending, "log.mcap")
+        assert log.cut == (not ending)
+        for channel, values in samples.items():
+            assert_array_equal(values, truth("log.mcap")[channel])
+
+
+def test_the_open_chunk_of_a_recorder_that_crashed_is_read():
+    """The recorder of ROS 1 writes the size of a chunk when it closes it; until then it is 0."""
+    content = bag("log.bag")
+    at, crashed = len(b"#ROSBAG V2.0\n"), b""
+    while at < len(content):
+        header = struct.unpack_from("<I", content, at)[0]
+        length = struct.unpack_from("<I", content, at + 4 + header)[0]
+        end = at + 8 + header + length
+        if b"op=\x03" in content[at : at + header]:
+            index = content.index(b"index_pos=", at) + len(b"index_pos=")
+            crashed += content[:index] + bytes(8) + content[index + 8 : end]
+        elif b"op=\x05" in content[at : at + 4 + header]:
+            sizes = content[at : at + 4 + header]
+            place = sizes.index(b"size=") + 5
+            data = content[at + 8 + header : end]
+            crashed += sizes[:place] + bytes(4) + sizes[place + 4 :] + bytes(4) + data
+        at = end
+    log, samples = read(crashed[:-1000], "log.bag")
+    assert "is cut" in log.warnings[0]
+    for channel, values in samples.items():
+        assert len(values) > 0.99 * len(truth("log.bag")[channel]) - 2
+        assert_array_equal(values, truth("log.bag")[channel][: len(values)])

@@ -150,7 +150,7 @@ class _Walk:
             with self._left_out():
                 self.message(of, path, "")
                 if path == "header":
-                    self.stamp = next((place for _, _, place in self.lists if place.dtype.names), None)
+                    self.stamp = self.stamp or next((p for _, _, p in self.lists if p.dtype.names), None)
         elif node == Nodetype.NAME:
             if of in TIMES:
                 self._number(path, TIME, 4, None, "s")

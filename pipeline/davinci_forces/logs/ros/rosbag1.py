@@ -15,7 +15,9 @@ from davinci_forces.logs.ros.scan import Chunk, Damage, Scan
 MAGIC_1 = b"#ROSBAG V2.0\n"
 MESSAGE, BAG, INDEX, CHUNK, CHUNK_INFO, CONNECTION = 2, 3, 4, 5, 6, 7  # kinds of records
 # A message's header, with its fields in any order, and the length of its content.
-MESSAGE_HEAD = re.compile(rb"\x26\0\0\0(?:\x09\0\0\0conn=(.{4})|\x04\0\0\0op=\x02|\x0d\0\0\0time=(.{8})){3}(.{4})", re.DOTALL)
+MESSAGE_HEAD = re.compile(
+    rb"\x26\0\0\0(?:\x09\0\0\0conn=(.{4})|\x04\0\0\0op=\x02|\x0d\0\0\0time=(.{8})){3}(.{4})", re.DOTALL
+)
 VALUES = struct.Struct("<IIII").unpack
 U32 = struct.Struct("<I").unpack_from
 Fields = dict[bytes, bytes]

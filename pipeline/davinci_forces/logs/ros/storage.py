@@ -36,9 +36,7 @@ class Database:
     def __init__(self, path: Path) -> None:
         self.path = path
         self.connections: list[Any] = []
-        self.sizes: dict[
-            int, list[list[int]]
-        ] = {}  # by topic: of messages of a size, time and id of the first, size, count
+        self.sizes: dict[int, list[list[int]]] = {}  # by topic: time and id of the first of a size, the size, count
         self.warnings: list[str] = []
         self.cut = False
 
