@@ -147,7 +147,7 @@ def test_every_number_is_what_rosbags_deserialises(name, big, tmp_path):
         prefix = f"{HOLDERS[f'/{topic}']}." if f"/{topic}" in HOLDERS else ""
         assert_array_equal(read, [value(message, prefix + field) for _, message in truth])
         count += 1
-    assert count == 1 + 6 + 6 + 37 + 3 + 6 + 6 + 6 + 85 + 2 * 10 + 1 + 61 + 13
+    assert count == 1 + 5 + 6 + 37 + 3 + 6 + 6 + 6 + 85 + 2 * 10 + 1 + 61 + 13
     assert not [channel for channel in log.channels if channel.kind not in ("number", "time")]
 
 

@@ -14,6 +14,7 @@ from davinci_forces.logs.arrays import MAX_COLUMNS
 from davinci_forces.maths.arrays import Array
 
 HEADER = "std_msgs/msg/Header"
+DIMENSIONS = "std_msgs/msg/MultiArrayLayout"  # of a list, which is read as it is
 JOINTS = "sensor_msgs/msg/JointState"
 JOINT_LISTS = ("name", "names", "joint_names", "joints")  # fields that name the joints of other fields
 PLACEHOLDER = "structure_needs_at_least_one_member"  # of an empty message, which ROS 1 does not write
@@ -146,7 +147,7 @@ class _Walk:
     def _field(self, path: str, node: Any, of: Any, unit: str, scope: str) -> None:
         if node == Nodetype.BASE:
             self._base(path, of[0], None, unit)
-        elif of == HEADER:
+        elif of in (HEADER, DIMENSIONS):
             with self._left_out():
                 self.message(of, path, "")
                 if path == "header":
