@@ -184,6 +184,12 @@ def test_a_wrong_checksum_and_a_wrong_count_are_named():
     struct.pack_into("<Q", content, statistics + 48, COUNT + 7)
     with pytest.raises(BadLog, match="its statistics counts 907 messages of /PSM1/measured_js, but 900 are there"):
         read(bytes(content), "log.mcap")
+    struct.pack_into("<I", content, statistics + 42, 0)  # whose counts of topics may be left out
+    struct.pack_into("<Q", content, statistics, 1234)
+    with pytest.raises(BadLog, match="counts 1234 messages of all topics, but 1200 are there"):
+        read(bytes(content), "log.mcap")
+    struct.pack_into("<Q", content, statistics, 1200)
+    assert not read(bytes(content), "log.mcap")[0].warnings
     content = bytearray(bag("log.bag"))
     info = content.rindex(b"count=")
     content[info + 14] ^= 1  # of the messages of a topic in the last chunk

@@ -24,8 +24,8 @@ class Mcap(Scan):
     """A file of MCAP."""
 
     schemas: dict[int, tuple[str, MessageDefinition]] = field(default_factory=dict)
-    stated: dict[int, int] = field(default_factory=dict)  # by connection: messages that the statistics count
-    has_statistics: bool = False
+    total: int | None = None  # messages that the statistics count
+    stated: dict[int, int] = field(default_factory=dict)  # and of each connection; a recorder need not write them
 
     def scan(self, content: memoryview) -> None:
         """Go through the records of the file, and of its chunks."""
@@ -35,7 +35,7 @@ class Mcap(Scan):
             if kind == CHUNK_OF_MCAP:
                 self._scan_chunk(record, end <= len(content))
             elif kind == STATISTICS:
-                self.has_statistics = True
+                self.total = struct.unpack_from("<Q", record)[0]
                 self.stated = dict(struct.iter_unpack("<HQ", record[46 : 46 + struct.unpack_from("<I", record, 42)[0]]))
             elif kind == DATA_END:
                 _require_crc(struct.unpack("<I", record)[0], content[: begin - 9], "the data")
@@ -55,9 +55,12 @@ class Mcap(Scan):
 
     def compare(self) -> None:
         """Compare the messages with the statistics."""
-        for connection in self.connections if self.has_statistics else ():
-            count = len(self.places[connection.id]) // 4
-            self.require_count("its statistics", connection.topic, self.stated.get(connection.id, 0), count)
+        counts = {connection.id: len(self.places[connection.id]) // 4 for connection in self.connections}
+        for connection in self.connections if self.stated else ():
+            stated = self.stated.get(connection.id, 0)
+            self.require_count("its statistics", connection.topic, stated, counts[connection.id])
+        if self.total is not None:
+            self.require_count("its statistics", "all topics", self.total, sum(counts.values()))
 
     def _scan_chunk(self, record: memoryview, whole: bool) -> None:
         _, _, size, crc = CHUNK_HEADER.unpack_from(record)

@@ -57,7 +57,7 @@ class Rosbag1(Scan):
         """Whether the index of chunks is there, as the recorder writes it last."""
         if not 0 < self.index < len(content):
             return False
-        return self.at < self.index or (self.listed, len(self.stated)) >= self.ends
+        return self.at < self.index or (self.listed >= self.ends[0] and len(self.stated) >= self.ends[1])
 
     def compare(self) -> None:
         """Compare the messages of each chunk with those that the index states."""
