@@ -101,7 +101,7 @@ def test_advice_is_a_command_for_that_joint_and_only_where_something_is_wanting(
 
 def guess(theta, std) -> Estimate:
     std = np.array(std)
-    return Estimate(np.array(theta), lambda: StandardErrors(std, std, 0.0))
+    return Estimate(np.array(theta), lambda: StandardErrors(std, std, 0.0 * std, 0.0))
 
 
 def blamed(theta, std, others=()) -> str:

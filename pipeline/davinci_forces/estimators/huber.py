@@ -55,6 +55,7 @@ def fit_robustly(problem: Regression, weight: Array, R: Triangle) -> RobustFit:
 
 def robust_standard_errors(problem: Regression, weight: Array, R: Triangle, fit: RobustFit) -> StandardErrors:
     """Compute the standard errors from pseudo-residuals."""
-    share_inside = float(np.mean(np.abs(fit.off[weight > 0]) < HUBER_K))
+    is_inside = np.abs(fit.off) < HUBER_K
+    share_inside = float(np.mean(is_inside[weight > 0]))
     pseudo = fit.deviation * np.clip(fit.off, -HUBER_K, HUBER_K) / share_inside
-    return standard_errors(problem, weight, R, fit.theta, pseudo)
+    return standard_errors(problem, weight, R, fit.theta, pseudo, is_inside / share_inside)

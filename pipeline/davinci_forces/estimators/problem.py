@@ -45,6 +45,8 @@ class Regression:
     starts: tuple[int, ...]  # where each log begins
     names: tuple[str, ...]  # of the parameters
     known: Prior = NO_PRIOR
+    noise: Array | None = None  # (K,) noise like that of tau, without the motion; None: the residual is taken for it
+    model_std: Array | float = 0.0  # (p,) standard errors of the parameters due to the model
     Phi_cov: Array | None = None  # (S, p, p) mean covariance of a row's errors in each log; None: not known
 
     @cached_property
@@ -62,8 +64,14 @@ class StandardErrors(NamedTuple):
     """Standard errors of parameters."""
 
     classical: Array  # (p,) standard errors for residuals that are uncorrelated and of equal variance
-    stated: Array  # (p,) for residuals that are correlated and of varying variance
-    lags: float  # the sum of the residuals' correlations over all lags but 0
+    noise: Array  # (p,) for noise that is correlated and of varying variance
+    model: Array  # (p,)
+    lags: float  # the sum of the noise's correlations over all lags but 0
+
+    @property
+    def stated(self) -> Array:
+        """Standard errors (p,) of noise and model together."""
+        return np.hypot(self.noise, self.model)
 
 
 class Search(NamedTuple):
@@ -104,12 +112,12 @@ class Estimate:
 
     @property
     def theta_std(self) -> Array:
-        """Standard errors (p,) for residuals that are correlated and of varying variance."""
+        """Standard errors (p,) of noise and model together."""
         return self.standard_errors.stated
 
     @property
     def correlated_lags(self) -> int:
-        """The number of lags over which residuals are correlated, each weighted by its correlation."""
+        """The number of lags over which noise is correlated, each weighted by its correlation."""
         return round(self.standard_errors.lags)
 
 
@@ -146,29 +154,40 @@ def factorise(problem: Regression, weight: Array) -> Triangle:
     return R
 
 
-def standard_errors_by(problem: Regression, weight: Array, theta: Array, Q: Array, D: Array) -> StandardErrors:
-    """Compute the standard errors of theta = D Q' tau (p,), with orthonormal columns Q (K, p), and D (p, p)."""
-    residual = np.sqrt(weight) * (problem.tau - problem.Phi @ theta)
-    degrees = int((weight > 0).sum()) - len(theta)
-    classical = np.sqrt(residual @ residual / degrees * (D**2).sum(axis=1))
-    stated = correlated_variance(Q, residual, problem.starts, D, degrees)
-    return StandardErrors(classical, np.sqrt(stated.variance), stated.lags)
-
-
-def standard_errors(
-    problem: Regression, weight: Array, R: Triangle, theta: Array, residual: Array | None = None
+def standard_errors_by(
+    problem: Regression,
+    weight: Array,
+    theta: Array,
+    Q: Array,
+    D: Array,
+    residual: Array | None = None,
+    influence: Array | float = 1.0,
 ) -> StandardErrors:
-    """Compute the standard errors of parameters of least squares, or close to them.
+    """Compute the standard errors of theta = D Q' tau (p,), with orthonormal columns Q (K, p), and D (p, p).
 
-    They follow from the weighted residuals, or from a `residual` (K,) instead.
+    The classical ones follow from the weighted residuals, or from a `residual` (K,) instead.  Those of noise follow
+    from the noise of the problem, of which each sample has an `influence` (K,), or from the same residuals without it.
     """
-    inverse = np.linalg.inv(R.U)
     root = np.sqrt(weight)
-    Q = ((inverse.T / R.scale) @ problem.Phi.T).T  # columns contiguous, for their transform
-    Q *= root[:, None]
     if residual is None:
         residual = root * (problem.tau - problem.Phi @ theta)
     degrees = int((weight > 0).sum()) - len(theta)
-    classical = np.sqrt(residual @ residual / degrees * (inverse**2).sum(axis=1)) / R.scale
-    stated = correlated_variance(Q, residual, problem.starts, inverse / R.scale[:, None], degrees)
-    return StandardErrors(classical, np.sqrt(stated.variance), stated.lags)
+    classical = np.sqrt(residual @ residual / degrees * (D**2).sum(axis=1))
+    noise = residual if problem.noise is None else root * problem.noise * influence
+    variance, lags = correlated_variance(Q, noise, problem.starts, D, degrees)
+    return StandardErrors(classical, np.sqrt(variance), np.zeros(len(theta)) + problem.model_std, lags)
+
+
+def standard_errors(
+    problem: Regression,
+    weight: Array,
+    R: Triangle,
+    theta: Array,
+    residual: Array | None = None,
+    influence: Array | float = 1.0,
+) -> StandardErrors:
+    """Compute the standard errors of parameters of least squares, or close to them, as `standard_errors_by` does."""
+    inverse = np.linalg.inv(R.U)
+    Q = ((inverse.T / R.scale) @ problem.Phi.T).T  # columns contiguous, for their transform
+    Q *= np.sqrt(weight)[:, None]
+    return standard_errors_by(problem, weight, theta, Q, inverse / R.scale[:, None], residual, influence)

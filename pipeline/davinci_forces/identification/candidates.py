@@ -14,11 +14,19 @@ from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.coupled import CoupledArm
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.models.model import Model, Parameter
-from davinci_forces.maths.models.terms import Term, presliding_friction
-from davinci_forces.maths.selection import CrossValidation, Equations, Ridge, combine_efforts, cross_validate, solve
+from davinci_forces.maths.models.terms import Term, offset, presliding_friction
+from davinci_forces.maths.selection import (
+    CrossValidation,
+    Equations,
+    Ridge,
+    combine_efforts,
+    cross_validate,
+    solve,
+    sum_all,
+)
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.robots.models import ARM, Reach, coupled_arm, frictions, independent, round_scale
-from davinci_forces.robots.robot import Robot
+from davinci_forces.robots.robot import Joint, Robot
 
 RIDGES = {"independent": (0.0, 1e-3), "coupled": (1e-4, 1e-3, 1e-2, 3e-2)}
 WEIGHTS_RIDGE = 1e-3  # of the fits whose residual variances weigh the joints
@@ -40,11 +48,11 @@ class Library(NamedTuple):
 
     def columns(self, model: Model) -> list[int]:
         """Return the indices of the parameters of a model with some of the terms."""
-        numbers = {_identity(parameter): i for i, parameter in enumerate(self.model.parameters)}
-        return [numbers[_identity(parameter)] for parameter in model.parameters]
+        numbers = {identity(parameter): i for i, parameter in enumerate(self.model.parameters)}
+        return [numbers[identity(parameter)] for parameter in model.parameters]
 
 
-def _identity(parameter: Parameter) -> tuple[str, float]:
+def identity(parameter: Parameter) -> tuple[str, float]:
     """The name and the scale of a parameter, without the number of a presliding friction, which differs by model."""
     return re.sub(r"friction \d+", "friction", parameter.name), parameter.scale
 
@@ -154,9 +162,8 @@ def candidates(
     `separate` are the logs of each joint alone, `arm` the logs of all joints together.
     """
     added = {name: every_term(reach) for name, reach in reaches.items()}
-    independents = [
-        library(independent(robot.joint(name), added[name]), logs, count) for name, logs in separate.items()
-    ]
+    every = {name: with_every_term(robot.joint(name), reach) for name, reach in reaches.items()}
+    independents = [library(every[name], logs, count) for name, logs in separate.items()]
     models = variants(robot, "independent", reaches, independents)
     if not arm:
         return models
@@ -229,10 +236,15 @@ def every_term(reach: Reach) -> tuple[Term, ...]:
     return (*others, *(presliding_friction(x, number) for number, x in enumerate(slow, start=1)))
 
 
+def with_every_term(joint: Joint, reach: Reach) -> IndependentJoint:
+    """Return the model of a joint by itself with all friction that may be added, and an offset."""
+    return independent(joint, (*every_term(reach), *(() if offset in joint.terms else (offset,))))
+
+
 def residual_variance(part: CandidatePart) -> float:
     """Return the residual variance of a joint of a coupled arm, with its own parameters."""
     cells = part.by_block
-    total = cells.sum_cells(np.ones(len(cells.gram), np.bool_))
+    total = sum_all(cells)
     return float(total.errors(solve(total, part.ridge._replace(strength=WEIGHTS_RIDGE)))[0, 0])
 
 

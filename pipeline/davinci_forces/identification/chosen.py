@@ -7,20 +7,21 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.identification.candidates import Candidate, CandidatePart
+from davinci_forces.identification.model_error import model_std, std_over_periods
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.estimation.conic import nearest
 from davinci_forces.maths.estimation.least_squares import Triangle
 from davinci_forces.maths.selection import (
     MAX_GROUPS,
-    PATH_BLOCKS,
     CrossValidation,
     Equations,
     Ridge,
     choose_candidate,
     covariance,
-    left_out,
     scaled_equations,
+    schemes_of,
     standard_error,
+    sum_all,
 )
 from davinci_forces.records.prediction import CHOSEN
 
@@ -48,10 +49,12 @@ class Selection:
 
 
 class BlockEstimate(NamedTuple):
-    """Parameters (p,) with their standard errors: for uncorrelated residuals, and from blocks left out."""
+    """Parameters (p,) with their standard errors: for uncorrelated residuals, of noise, of the model, and in total."""
 
     theta: Array
     theta_std_classical: Array
+    theta_std_noise: Array
+    theta_std_model: Array
     theta_std: Array
     samples: int
     mse: float
@@ -86,12 +89,6 @@ def usable_schemes(candidates: Sequence[Candidate], count: int) -> list[Booleans
     """Return the leave-out schemes in which each refit has data of every effort of all candidates."""
     by_library = {id(part.library): part.library.cells.by_block.squares for c in candidates for part in c.parts}
     return schemes_of(np.concatenate(list(by_library.values()), axis=1), count)
-
-
-def schemes_of(squares: Array, count: int) -> list[Booleans]:
-    """Return the leave-out schemes in which each refit has data of every effort, of squares (C, m) in all cells."""
-    log, block = np.repeat(np.arange(count), PATH_BLOCKS), np.tile(np.arange(PATH_BLOCKS), count)
-    return [groups for groups in left_out(log, block) if all(bool((squares[~g].sum(axis=0) > 0).all()) for g in groups)]
 
 
 def better(fixed: Selection, searched: Selection | None) -> Selection:
@@ -148,34 +145,30 @@ def reason(
     return text
 
 
-def parameters(candidate: Candidate, count: int) -> Iterator[tuple[CandidatePart, BlockEstimate]]:
-    """Fit a candidate's parameters to all data of `count` logs, one part at a time."""
-    block = np.tile(np.arange(PATH_BLOCKS), count)
-    fits = candidate.parameters()
-    refits = [candidate.parameters(block == b) for b in range(PATH_BLOCKS)]
-    for i, part in enumerate(candidate.parts):
-        theta, thetas = fits[i], np.array([refit[i] for refit in refits])
+def parameters(
+    candidate: Candidate, count: int, others: Sequence[Candidate]
+) -> Iterator[tuple[CandidatePart, BlockEstimate]]:
+    """Fit a candidate's parameters to all data of `count` logs, one part at a time, and compare them with others."""
+    for part, theta in zip(candidate.parts, candidate.parameters(), strict=True):
         ridge, samples = part.ridge, part.library.cells.samples
         total = sum_all(part.by_block)
         errors = total.errors(theta)[0]
-        jackknife = (PATH_BLOCKS - 1) / PATH_BLOCKS * ((thetas - thetas.mean(axis=0)) ** 2).sum(axis=0)
+        noise = std_over_periods(part, count)
+        model = model_std(part, theta, noise, others, count)
         yield (
             part,
             BlockEstimate(
                 theta=theta,
                 theta_std_classical=np.sqrt(np.diag(covariance(total, ridge, errors / samples))),
-                theta_std=np.sqrt(jackknife),
+                theta_std_noise=noise,
+                theta_std_model=model,
+                theta_std=np.hypot(noise, model),
                 samples=int(samples.max()),
                 mse=float((errors / samples).sum()),
                 r2=float(1.0 - errors.sum() / total.squares[0].sum()),
                 condition=float(np.sqrt(np.linalg.cond(scaled_equations(total, ridge)[0]))),
             ),
         )
-
-
-def sum_all(cells: Equations) -> Equations:
-    """Sum the equations of all cells."""
-    return cells.sum_cells(np.ones(len(cells.gram), np.bool_))
 
 
 class ConsistentFit(NamedTuple):

@@ -7,7 +7,13 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces.estimators.problem import NO_PRIOR, Prior, Regression
-from davinci_forces.identification.regression import joined_motion, motion_at, recorded_motion
+from davinci_forces.identification.regression import (
+    averaged_motion,
+    joined_motion,
+    motion_at,
+    recorded_motion,
+    stands_still,
+)
 from davinci_forces.identification.scores import select_samples
 from davinci_forces.maths.arrays import Array, Booleans, Integers
 from davinci_forces.maths.models.memory import pieces
@@ -177,6 +183,16 @@ def pose_samples(
         Phi, tau, samples = Phi[which[samples]], tau[which[samples]], samples[which[samples]]
     names, ones = tuple(parameter.name for parameter in model.parameters), np.ones(len(samples), np.int64)
     return Regression(Phi[:, 0], tau[:, 0], np.zeros(len(samples)), ones, (0,), names, known), samples
+
+
+def block_equations(model: Model, log: "Trajectory | Observed") -> Equations:
+    """Return the normal equations of the model of a joint by blocks of path, of a period or of a log's samples."""
+    if isinstance(log, Observed):
+        Phi, tau, rows = log.rows(model)
+        return sum_equations(Phi, tau, log.block[rows], PATH_BLOCKS)
+    root = np.sqrt(np.where(stands_still(log), 0, log.count))[:, None]
+    Phi = model.regressor(averaged_motion(log)).Phi
+    return sum_equations(root[:, :, None] * Phi, root * log.tau[:, None], path_blocks(log.t, log.period), PATH_BLOCKS)
 
 
 class CellEquations(NamedTuple):

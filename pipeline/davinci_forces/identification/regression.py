@@ -30,6 +30,7 @@ def pose(model: IndependentJoint, trajectories: Sequence[Trajectory], known: Pri
         starts=tuple(np.cumsum([0, *lengths[:-1]]).tolist()),
         names=tuple(parameter.name for parameter in model.parameters),
         known=known,
+        noise=np.concatenate([t.tau_alternating for t in trajectories]),
         Phi_cov=np.array([row_covariance(model, t) for t in trajectories]),
     )
 
@@ -53,7 +54,8 @@ def row_covariance(model: IndependentJoint, t: Trajectory) -> Array:
 def join_regressions(parts: Sequence[Regression]) -> Regression:
     """Return the least squares problem of several parts together."""
     ends = np.cumsum([0, *(len(p.tau) for p in parts[:-1])]).tolist()
-    noises = [p.Phi_cov for p in parts if p.Phi_cov is not None]
+    covariances = [p.Phi_cov for p in parts if p.Phi_cov is not None]
+    noises = [p.noise for p in parts if p.noise is not None]
     return Regression(
         Phi=np.concatenate([p.Phi for p in parts]),
         tau=np.concatenate([p.tau for p in parts]),
@@ -62,7 +64,8 @@ def join_regressions(parts: Sequence[Regression]) -> Regression:
         starts=tuple(end + start for end, p in zip(ends, parts, strict=True) for start in p.starts),
         names=parts[0].names,
         known=parts[0].known,
-        Phi_cov=np.concatenate(noises) if len(noises) == len(parts) else None,
+        noise=np.concatenate(noises) if len(noises) == len(parts) else None,
+        Phi_cov=np.concatenate(covariances) if len(covariances) == len(parts) else None,
     )
 
 

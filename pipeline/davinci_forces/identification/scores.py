@@ -44,6 +44,7 @@ def select_logs(problem: Regression, logs: Sequence[int]) -> Regression:
         tau_var=problem.tau_var[rows],
         periods=problem.periods[rows],
         starts=tuple(np.cumsum([0, *map(len, parts[:-1])]).tolist()),
+        noise=None if problem.noise is None else problem.noise[rows],
         Phi_cov=None if problem.Phi_cov is None else problem.Phi_cov[list(logs)],
     )
 

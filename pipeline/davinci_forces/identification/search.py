@@ -22,7 +22,6 @@ from davinci_forces.identification.candidates import (
     ridge_name,
     share_parameters,
 )
-from davinci_forces.identification.chosen import schemes_of
 from davinci_forces.identification.observations import Observed, Processing
 from davinci_forces.maths.arrays import Array, Booleans
 from davinci_forces.maths.models.coupled import CoupledArm
@@ -35,7 +34,7 @@ from davinci_forces.maths.models.terms import (
     smooth_sign,
     stribeck,
 )
-from davinci_forces.maths.selection import CLEARLY, CrossValidation, Ridge, cross_validate, standard_error
+from davinci_forces.maths.selection import CLEARLY, CrossValidation, Ridge, cross_validate, schemes_of, standard_error
 from davinci_forces.records.prediction import CHOSEN
 from davinci_forces.robots.models import OPTIONAL_TERMS, Reach, independent, round_scale
 from davinci_forces.robots.robot import Joint, Kind, Robot

@@ -76,6 +76,11 @@ def sum_equations(Phi: Array, tau: Array, cell: Integers, cells: int) -> Equatio
     return equations
 
 
+def sum_all(cells: Equations) -> Equations:
+    """Sum the equations of all cells."""
+    return cells.sum_cells(np.ones(len(cells.gram), np.bool_))
+
+
 def side_by_side(parts: Sequence[Equations], places: Sequence[int], count: int) -> Equations:
     """Join equations of equally many cells into `count` parts, each at its place; all other parts are 0."""
     joined = Equations(*(np.zeros((count, *column.shape)) for column in parts[0]))
@@ -170,6 +175,12 @@ def left_out(log: Integers, block: Integers) -> tuple[Booleans, ...]:
     return (sixths, halves, by_log) if len(logs) > 1 else (sixths, halves)
 
 
+def schemes_of(squares: Array, count: int) -> list[Booleans]:
+    """Return the leave-out schemes in which each refit has data of every effort, of squares (C, m) in all cells."""
+    log, block = np.repeat(np.arange(count), PATH_BLOCKS), np.tile(np.arange(PATH_BLOCKS), count)
+    return [groups for groups in left_out(log, block) if all(bool((squares[~g].sum(axis=0) > 0).all()) for g in groups)]
+
+
 class CrossValidation(NamedTuple):
     """Relative squared errors of a candidate on the data that its fits left out, by scheme."""
 
@@ -206,7 +217,7 @@ def cross_validate(
         thetas = [solve(equations.omit_cells(out), ridge) for out in groups]
         errors = [scored.sum_cells(out).errors(theta)[0] for out, theta in zip(groups, thetas, strict=True)]
         unseen.append(np.array(errors) / whole)
-    theta = solve(equations.sum_cells(np.ones(len(equations.gram), np.bool_)), ridge)
+    theta = solve(sum_all(equations), ridge)
     return CrossValidation(tuple(unseen), np.sqrt(scored.errors(theta).sum(axis=0) / whole))
 
 

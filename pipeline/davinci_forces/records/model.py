@@ -43,14 +43,17 @@ class Fit(Record):
     positive: Column
     theta: Column
     theta_std: Column
+    theta_std_noise: Column
+    theta_std_model: Column
     theta_std_classical: Column
 
     def published(self) -> Iterator[Published]:
-        """The parameters with both standard errors, and the fit to the averaged effort."""
+        """The parameters with their standard errors, and the fit to the averaged effort."""
         prefix = ".".join(("fit", *self.key))
         for i, parameter in enumerate(self.parameter):
             yield Published(f"{prefix}.{slug(parameter)}", "theta", std="theta_std", row=i)
-            yield Published(f"{prefix}.{slug(parameter)}.std_classical", "theta_std_classical", row=i)
+            for part in ("noise", "model", "classical"):
+                yield Published(f"{prefix}.{slug(parameter)}.std_{part}", f"theta_std_{part}", row=i)
         yield from self.publish(prefix, "mse", "r2", "condition", "samples", "periods")
         yield Published(f"{prefix}.hac_lags", "correlated_lags")  # results.json had this key before the field
 

@@ -160,6 +160,7 @@ class Average(LogJointRecord):
     q_var: Column
     dq_var: Column
     tau_var: Column
+    tau_alternating: Column
     count: Counts
 
     def published(self) -> Iterator[Published]:
@@ -198,6 +199,7 @@ class Trajectory(LogJointRecord):
     ddq: Column
     tau: Column
     tau_var: Column
+    tau_alternating: Column
     count: Counts
 
 

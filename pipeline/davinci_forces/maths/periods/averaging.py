@@ -148,6 +148,17 @@ def left_out(t: Array, x: Array, period: float, K: int, groups: Integers) -> Ite
         yield Folded(mean + smooth, var, counts, np.empty(0))
 
 
+def alternating_mean(folded: Folded, phased: Phases) -> Array:
+    """Average the noise with the opposite sign in every other period (K,): noise as in the mean, without the motion.
+
+    Schimmel, The (+-) reference: accuracy of estimated mean components in average response studies, Science 157 (1967).
+    """
+    period = np.floor((phased.t - phased.t[0]) / phased.period + 0.5 / phased.K).astype(np.int64)
+    sums = np.bincount(phased.bins, np.where(period % 2, -folded.noise, folded.noise), phased.K)
+    M = int(period[-1]) + 1
+    return np.asarray(sums / np.maximum(folded.counts, 1) / np.sqrt(1.0 - M % 2 / M**2))  # an odd one is not balanced
+
+
 def noise_std(folded: Folded) -> float:
     """Standard deviation of the noise, with one degree of freedom spent per phase.  (6.32), corrected"""
     return float(np.sqrt(folded.noise @ folded.noise / degrees_of_freedom(folded)))

@@ -78,12 +78,7 @@ def series_of(studies: Sequence[CampaignStudy], joint: str) -> Iterator[Series]:
         results = study.joints.get(joint)
         floors = [(title, results.keys.get(name)) for name, title in FLOORS.items()] if results else []
         for name, key in [*named, *floors]:
-            if (
-                key is not None
-                and key in study.numbers
-                and name not in ABOUT_THE_FIT
-                and not name.endswith(".std_classical")
-            ):
+            if key is not None and key in study.numbers and name not in ABOUT_THE_FIT and ".std_" not in name:
                 keyed.setdefault((name, study.numbers[key].unit), []).append((study, key))
     for (name, unit), places in keyed.items():
         numbers = [study.numbers[key] for study, key in places]

@@ -74,8 +74,8 @@ def of_friction(context: Context) -> Iterator[Block]:
         f"**What friction does to a fit.** Parameters are identified from the recordings {literal(', '.join(fitted))}, "
         "whose friction differs by direction, rises near rest and yields elastically before it slides. The true "
         f"parameters below are those of the recordings {literal(', '.join(matched))}, which differ only in having the "
-        "friction of the models. So the error of an estimate is the effect of the other friction. The standard errors "
-        "are wide because the residual repeats in every period."
+        "friction of the models. So the error of an estimate is the effect of the other friction. It is far larger "
+        "than the noise, and the model's part of the standard errors has to hold it."
     )
     yield errors_by_family(context, family)
 

@@ -79,16 +79,18 @@ def run(
     by_variant = {c.variant: name for name, c in by_name.items()}
     for name, candidate in by_name.items():
         if name != "independent.lse":
-            yield from fits(candidate, len(logs), robot, by_variant[candidate.variant] == name)
-    yield from fits(selection.chosen, len(logs), robot, with_consistent=True)
+            yield from fits(candidate, fixed.candidates, len(logs), robot, by_variant[candidate.variant] == name)
+    yield from fits(selection.chosen, fixed.candidates, len(logs), robot, with_consistent=True)
     for candidate in by_name.values():
         yield from predictions(candidate, False, logs)
     yield from predictions(selection.chosen, True, logs)
 
 
-def fits(candidate: Candidate, count: int, robot: Robot, with_consistent: bool) -> Iterator[Fit | Diagnostic]:
+def fits(
+    candidate: Candidate, others: Sequence[Candidate], count: int, robot: Robot, with_consistent: bool
+) -> Iterator[Fit | Diagnostic]:
     """Fit a candidate to all logs; `with_consistent` also within the parameters that a mechanism can have."""
-    estimates = list(parameters(candidate, count))
+    estimates = list(parameters(candidate, count, others))
     yield from (fit_record(candidate, candidate.estimator, part, estimate) for part, estimate in estimates)
     if with_consistent and candidate.variant != "independent":
         yield from consistent_fits(candidate, estimates, robot)

@@ -1,13 +1,15 @@
 """Estimate the parameters of every joint, from all identification logs and from parts of them, by each estimator."""
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import Annotated, NamedTuple
 
 import numpy as np
 
 from davinci_forces.errors import NotIdentifiable
 from davinci_forces.estimators import ESTIMATORS, estimator
-from davinci_forces.estimators.problem import NO_PRIOR, Estimate, Prior, Regression, Search
+from davinci_forces.estimators.problem import NO_PRIOR, Estimate, Prior, Regression, Search, standard_errors
+from davinci_forces.identification.candidates import Library, variants, with_every_term
 from davinci_forces.identification.identifiability import (
     advice,
     correlation_entries,
@@ -19,13 +21,15 @@ from davinci_forces.identification.identifiability import (
     moving_with,
 )
 from davinci_forces.identification.left_out import left_out
-from davinci_forces.identification.observations import observe, pose_samples
+from davinci_forces.identification.model_error import model_std
+from davinci_forces.identification.observations import CellEquations, Observed, block_equations, observe, pose_samples
 from davinci_forces.identification.regression import join_regressions, known_of, pose
 from davinci_forces.identification.scores import folds, refits
 from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.estimation.least_squares import analyse_columns
 from davinci_forces.maths.models.independent import IndependentJoint
 from davinci_forces.maths.periods.shift import SAME_PATH, most_different
+from davinci_forces.maths.selection import side_by_side
 from davinci_forces.records import (
     Column,
     CrossFit,
@@ -42,7 +46,7 @@ from davinci_forces.records import (
     Trajectory,
     diagnostic,
 )
-from davinci_forces.robots.models import independent
+from davinci_forces.robots.models import Reach, independent, round_scale
 from davinci_forces.robots.robot import Joint, Robot
 from davinci_forces.study import LogEntry
 
@@ -61,6 +65,7 @@ class Part(NamedTuple):
     q: Column
     dq: Column
     regression: Regression
+    source: Trajectory | Observed
 
 
 def run(
@@ -117,6 +122,7 @@ def fit_joint(
 ]:
     """Fit one joint by every estimator, with residuals, identifiability and noise; `others` move in its logs, too."""
     regression = join_regressions([part.regression for part in parts])
+    regression = replace(regression, model_std=model_errors(model, parts, robot, regression))
     estimates: dict[str, Estimate] = {}
     for name in ESTIMATORS:
         try:
@@ -136,6 +142,26 @@ def fit_joint(
     yield from guesses(model, regression)
     yield from fitted_paths(model.group, parts)
     yield noise(model.group, parts)
+
+
+def model_errors(model: IndependentJoint, parts: Sequence[Part], robot: Robot, regression: Regression) -> Array | float:
+    """Return the standard errors of the parameters due to the model (p,); 0 if least squares are not possible."""
+    ranges, dq = [float(np.ptp(part.q)) for part in parts], np.concatenate([part.dq for part in parts])
+    reach = Reach(round_scale(max(ranges)), round_scale(float(np.sqrt(np.mean(dq**2)))))
+    every = with_every_term(robot.joint(model.group), reach)
+    cells = side_by_side([block_equations(every, part.source) for part in parts], range(len(parts)), len(parts))
+    candidates = variants(
+        robot,
+        "independent",
+        {model.group: reach},
+        [Library(every, (), CellEquations(np.zeros(1, int), cells, cells, cells), np.empty(0))],
+    )
+    try:
+        R = regression.triangle
+        noise_std = standard_errors(regression, regression.weight, R, R.theta).noise
+        return model_std(candidates[0].parts[0], R.theta, noise_std, candidates, len(parts))
+    except (NotIdentifiable, np.linalg.LinAlgError):
+        return 0.0
 
 
 def identifiability(
@@ -210,16 +236,17 @@ def r_squared(regression: Regression, estimate: Estimate) -> float:
 def periodic_part(model: IndependentJoint, t: Trajectory, prior: Prior = NO_PRIOR) -> Part:
     """Regression over an averaged period; `prior` holds parameters from tables."""
     sigmas = (t.sigma_q, t.sigma_dq, t.sigma_tau)
-    return Part(t.log, t.rate, t.periods, t.period, sigmas, t.t, t.q, t.dq, pose(model, [t], prior))
+    return Part(t.log, t.rate, t.periods, t.period, sigmas, t.t, t.q, t.dq, pose(model, [t], prior), t)
 
 
 def sampled_part(model: IndependentJoint, record: Motion, lowpass: float, prior: Prior) -> Part:
     """Regression over samples of a motion that does not repeat, with motion and effort through one low-pass."""
-    regression, rows = pose_samples(model, observe([record], (), lowpass, 0), known=prior)
+    log = observe([record], (), lowpass, 0)
+    regression, rows = pose_samples(model, log, known=prior)
     step = float(np.median(np.diff(rows))) if len(rows) > 1 else 1.0
     t, q, dq = (x[rows] for x in (record.t, record.q, record.dq))
     sigmas = (record.sigma_q, record.sigma_dq, record.sigma_tau)
-    return Part(record.log, record.rate / step, 1, float(t[-1] - t[0]), sigmas, t, q, dq, regression)
+    return Part(record.log, record.rate / step, 1, float(t[-1] - t[0]), sigmas, t, q, dq, regression, log)
 
 
 def has_positive_inertia(model: IndependentJoint, theta: Array, parts: Sequence[Part]) -> bool:
@@ -258,6 +285,8 @@ def fit_record(
         positive=np.array([parameter.positive for parameter in model.parameters], float),
         theta=estimate.theta,
         theta_std=estimate.theta_std,
+        theta_std_noise=estimate.standard_errors.noise,
+        theta_std_model=estimate.standard_errors.model,
         theta_std_classical=estimate.theta_std_classical,
     )
 

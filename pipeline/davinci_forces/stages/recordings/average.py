@@ -220,6 +220,7 @@ def average_joint(
         q_var=q.var,
         dq_var=dq.var,
         tau_var=tau.var,
+        tau_alternating=averaging.alternating_mean(tau, phased),
         count=q.counts,
     )
     yield PeriodResidual(signal.log, signal.joint, t=phased.t, q_noise=q.noise, dq_noise=dq.noise, tau_noise=tau.noise)

@@ -33,6 +33,7 @@ def run(average: Average, joint: Joint, *, harmonics: int) -> Iterator[Trajector
         ddq=ddq,
         tau=average.tau,
         tau_var=average.tau_var,
+        tau_alternating=average.tau_alternating,
         count=average.count,
     )
     amplitude = fourier.amplitudes(average.q)

@@ -49,9 +49,11 @@ def intro() -> Prose:
     """Explain the columns of the tables."""
     return Prose(
         "The parameters of each joint are fitted to the averaged periods of all its identification logs. The standard "
-        "error after each value allows for correlated residuals; the classical one takes them as independent. Where "
-        "the two differ much, the model lacks an effect that repeats in every period. $z$ is the value over its "
-        "standard error. A parameter with $abs(z) < 2$ cannot be distinguished from zero."
+        "error after each value has two parts. That of noise follows from the differences between periods, or from the "
+        "residuals of a log without periods. That of the model is the change of the parameter if blocks of path are "
+        "left out, or if friction is added to the model that predicts as well. No motion separates friction that "
+        "differs by direction from the weight of a vertical slide, so half of that weight is in the model's part. "
+        "$z$ is the value over its standard error. A parameter with $abs(z) < 2$ cannot be distinguished from zero."
     )
 
 
@@ -97,17 +99,17 @@ def parameters(context: Context, fit: Fit) -> Table:
         key = ".".join(("fit", *fit.key, slug(name)))
         z = fit.theta[i] / fit.theta_std[i] if fit.theta_std[i] > 0 else np.nan
         unit = format_unit(fit.unit[i]) or "–"
-        values = (context.number(name, 2, unit="") for name in (key, f"{key}.std_classical"))
+        values = (context.number(f"{key}{part}", 2, unit="") for part in ("", ".std_noise", ".std_model"))
         rows.append((f"$theta_{i + 1}$", name, unit, *values, f"{z:.1f}" if np.isfinite(z) else "–"))
     mse = context.number(f"{'.'.join(('fit', *fit.key))}.mse", 3)
     return Table(
         f"Parameters of the {literal(fit.group.replace('_', ' '))}. Model: {fit.model} (without coupling to other "
         f"joints), {fit_in_use(context, fit)}. Estimator: {title_of(fit.estimator)}. Data: "
         f"{literal(', '.join(fit.logs))}. Mean squared error of the averaged effort: {mse}.",
-        ("Symbol", "Parameter", "Unit", "Value", "Classical standard error", "$z$"),
+        ("Symbol", "Parameter", "Unit", "Value", "Error of noise", "Error of the model", "$z$"),
         tuple(rows),
         label=f"theta-{fit.group}",
-        align="lllrrr",
+        align="lllrrrr",
     )
 
 

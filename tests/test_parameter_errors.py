@@ -1,0 +1,75 @@
+"""Intervals of 95 % hold the true parameters of simulated arms, whether the model has their friction or not."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.special import stdtrit
+
+from davinci_forces.records import Average, Fit, Motion, Recording, Signal, Trajectory
+from davinci_forces.simulation.motion import simulate_log, theta
+from davinci_forces.simulation.scenario.reading import load
+from davinci_forces.simulation.study_folder import record_channels
+from davinci_forces.stages.model import fit
+from davinci_forces.stages.recordings import average, differentiate, resample
+from tests.test_averaging import entry
+
+SEEDS = range(20)  # chosen before the first run
+LOWPASS = 17.0
+
+
+def recordings(scenario, log, run):
+    """The joints of a log, as they are read from its files."""
+    channels = {channel.quantity: channel.samples for channel in record_channels(scenario, log, run)}
+    recorded = run.t >= log.skip
+    for name in log.joints:
+        joint = scenario.robot.joint(name)
+        unit = 1e-3 if log.current_unit == "mA" else 1.0
+        q, dq = channels[f"{name}.theta_m"] / joint.gear_ratio, channels[f"{name}.dtheta_m"] / joint.gear_ratio
+        tau = channels[f"{name}.i"] * unit * joint.gear_ratio * joint.torque_constant
+        columns = {"t": run.t, "q": q, "dq": dq, "tau": tau}
+        columns = {symbol: x[recorded] for symbol, x in columns.items()}
+        yield Recording(log.name, name, "identification", scenario.rate, "logged", **columns)
+
+
+def fitted(scenario, runs) -> list[Fit]:
+    """The fits of the joints to the identification logs, with the noise of the scenario's seed."""
+    trajectories, motions = [], []
+    for log, run in runs:
+        made = [
+            record
+            for recording in recordings(scenario, log, run)
+            for record in resample.run(recording, scenario.robot.joint(recording.joint), lowpass=LOWPASS)
+        ]
+        motions += [record for record in made if isinstance(record, Motion)]
+        about = entry(name=log.name, period=next(iter(log.moves.values())).period)
+        signals = [record for record in made if isinstance(record, Signal)]
+        for record in average.run(signals, about, scenario.robot, harmonics=0, lowpass=LOWPASS):
+            if isinstance(record, Average):
+                trajectories += differentiate.run(record, scenario.robot.joint(record.joint), harmonics=0)
+    trajectories = [record for record in trajectories if isinstance(record, Trajectory)]
+    return [r for r in fit.run(trajectories, motions, scenario.robot, lowpass=LOWPASS) if isinstance(r, Fit)]
+
+
+@pytest.fixture(scope="module", params=["davinci-demo", "davinci-thesis"])
+def errors(request) -> dict[str, np.ndarray]:
+    """Errors of the parameters over their standard errors, (seeds, parameters) of each estimator."""
+    scenario = load(request.param)
+    truth = theta(scenario, "matched")
+    runs = [(log, simulate_log(scenario, log)) for log in scenario.logs if log.role == "identification"]
+    scores = {name: [] for name in ("lse", "wlse")}
+    for seed in SEEDS:
+        records = {(r.group, r.estimator): r for r in fitted(replace(scenario, seed=seed), runs)}
+        for name, of_estimator in scores.items():
+            each = [(records[joint, name].theta - x) / records[joint, name].theta_std for joint, x in truth.items()]
+            of_estimator.append(np.concatenate(each))
+    return {name: np.array(of_estimator) for name, of_estimator in scores.items()}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["lse", "wlse"])
+def test_intervals_of_95_percent_hold_the_truth_in_90_to_98_percent_of_20_seeds(errors, name):
+    """The interval of the share is stated, by seed: parameters of one seed have one noise."""
+    shares = (np.abs(errors[name]) < 1.96).mean(axis=1)
+    half = stdtrit(len(SEEDS) - 1, 0.975) * shares.std(ddof=1) / np.sqrt(len(SEEDS))
+    assert 0.90 <= shares.mean() <= 0.98, f"{shares.mean():.3f} +- {half:.3f} of {errors[name].size} intervals"
