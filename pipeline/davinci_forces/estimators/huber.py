@@ -1,5 +1,6 @@
 """Robust least squares: samples far from the fit have a bounded influence.  (Huber, 1964)"""
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -58,4 +59,6 @@ def robust_standard_errors(problem: Regression, weight: Array, R: Triangle, fit:
     is_inside = np.abs(fit.off) < HUBER_K
     share_inside = float(np.mean(is_inside[weight > 0]))
     pseudo = fit.deviation * np.clip(fit.off, -HUBER_K, HUBER_K) / share_inside
-    return standard_errors(problem, weight, R, fit.theta, pseudo, is_inside / share_inside)
+    if problem.noise is not None:
+        problem = replace(problem, noise=problem.noise * is_inside / share_inside)
+    return standard_errors(problem, weight, R, fit.theta, pseudo)

@@ -155,39 +155,28 @@ def factorise(problem: Regression, weight: Array) -> Triangle:
 
 
 def standard_errors_by(
-    problem: Regression,
-    weight: Array,
-    theta: Array,
-    Q: Array,
-    D: Array,
-    residual: Array | None = None,
-    influence: Array | float = 1.0,
+    problem: Regression, weight: Array, theta: Array, Q: Array, D: Array, residual: Array | None = None
 ) -> StandardErrors:
     """Compute the standard errors of theta = D Q' tau (p,), with orthonormal columns Q (K, p), and D (p, p).
 
     The classical ones follow from the weighted residuals, or from a `residual` (K,) instead.  Those of noise follow
-    from the noise of the problem, of which each sample has an `influence` (K,), or from the same residuals without it.
+    from the noise of the problem, or from the same residuals if it is not known.
     """
     root = np.sqrt(weight)
     if residual is None:
         residual = root * (problem.tau - problem.Phi @ theta)
     degrees = int((weight > 0).sum()) - len(theta)
     classical = np.sqrt(residual @ residual / degrees * (D**2).sum(axis=1))
-    noise = residual if problem.noise is None else root * problem.noise * influence
+    noise = residual if problem.noise is None else root * problem.noise
     variance, lags = correlated_variance(Q, noise, problem.starts, D, degrees)
     return StandardErrors(classical, np.sqrt(variance), np.zeros(len(theta)) + problem.model_std, lags)
 
 
 def standard_errors(
-    problem: Regression,
-    weight: Array,
-    R: Triangle,
-    theta: Array,
-    residual: Array | None = None,
-    influence: Array | float = 1.0,
+    problem: Regression, weight: Array, R: Triangle, theta: Array, residual: Array | None = None
 ) -> StandardErrors:
     """Compute the standard errors of parameters of least squares, or close to them, as `standard_errors_by` does."""
     inverse = np.linalg.inv(R.U)
     Q = ((inverse.T / R.scale) @ problem.Phi.T).T  # columns contiguous, for their transform
     Q *= np.sqrt(weight)[:, None]
-    return standard_errors_by(problem, weight, theta, Q, inverse / R.scale[:, None], residual, influence)
+    return standard_errors_by(problem, weight, theta, Q, inverse / R.scale[:, None], residual)

@@ -90,18 +90,14 @@ def other_models(
     part: CandidatePart, candidates: Iterable[Candidate], logs: int
 ) -> Iterator[tuple[CandidatePart, CrossValidation]]:
     """Cross-validate the candidates' models of the same joints, each also with an offset; some cannot be refitted."""
-    same = [p for c in candidates for p in c.parts if is_alike(p, part)]
+    parts = [p for c in candidates for p in c.parts if p.is_coupled == part.is_coupled]
+    same = [p for p in parts if p.model.efforts == part.model.efforts]
     schemes = schemes_of(part.library.cells.scored.squares, logs)
     for model in (more for p in same for more in with_offset(p)):
         try:
             yield model, cross_validate(model.by_block, model.ridge, schemes, model.score_cells)
         except np.linalg.LinAlgError:
             continue
-
-
-def is_alike(part: CandidatePart, other: CandidatePart) -> bool:
-    """Whether two parts model the same joints, and both with or both without their coupling."""
-    return part.model.efforts == other.model.efforts and part.is_coupled == other.is_coupled
 
 
 def with_offset(part: CandidatePart) -> Iterator[CandidatePart]:
