@@ -69,7 +69,7 @@ class StandardErrors(NamedTuple):
     lags: float  # the sum of the noise's correlations over all lags but 0
 
     @property
-    def stated(self) -> Array:
+    def total(self) -> Array:
         """Standard errors (p,) of noise and model together."""
         return np.hypot(self.noise, self.model)
 
@@ -113,7 +113,7 @@ class Estimate:
     @property
     def theta_std(self) -> Array:
         """Standard errors (p,) of noise and model together."""
-        return self.standard_errors.stated
+        return self.standard_errors.total
 
     @property
     def correlated_lags(self) -> int:
