@@ -82,7 +82,7 @@ def test_standard_errors_cost_a_few_dozen_products_of_the_columns(rows, name, lo
         times.append((middle - start, time.process_time() - middle))
         # Uncorrelated noise of variance 1 on columns of variance 1: both kinds are 1 / sqrt(K).
         assert_allclose(errors.classical, ROWS**-0.5, rtol=0.02)
-        assert_allclose(errors.stated, ROWS**-0.5, rtol=0.02)
+        assert_allclose(errors.total, ROWS**-0.5, rtol=0.02)
     own, product = (min(column) for column in zip(*times, strict=True))
     with capsys.disabled():
         print(f"\n{name} with standard errors, {logs} logs: {own:.3f} s, {own / product:.0f} products Phi' Phi", end="")
