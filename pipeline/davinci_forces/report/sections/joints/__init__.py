@@ -52,7 +52,7 @@ def intro() -> Prose:
         "error after each value has two parts. That of noise follows from the differences between periods, or from the "
         "residuals of a log without periods. That of the model is the change of the parameter if blocks of path are "
         "left out, or if friction is added to the model that predicts as well. No motion separates friction that "
-        "differs by direction from the weight of a vertical slide, so half of that weight is in the model's part. "
+        "differs by direction from the weight of a vertical slide, so the model's part of that weight is large. "
         "$z$ is the value over its standard error. A parameter with $abs(z) < 2$ cannot be distinguished from zero."
     )
 
