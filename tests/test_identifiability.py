@@ -170,3 +170,14 @@ def test_effort_of_the_wrong_sign_is_said_once_for_all_estimators():
     (wrong,) = [text for text in said if "not positive" in text]
     assert wrong.startswith("hand_roll: lse, wlse,")
     assert "the effort opposes the motion" in wrong
+
+
+def test_a_parameter_that_only_the_model_makes_uncertain_is_seen():
+    """Its noise excludes zero, and so do the data; another model would change it."""
+    small, large = 0.1 * np.abs(THETA), 10.0 * np.abs(THETA)
+    by_model, by_noise = (
+        Estimate(THETA, lambda noise=noise, model=model: StandardErrors(small, noise, model, 0.0))
+        for noise, model in ((small, large), (large, small))
+    )
+    assert describe_insignificant(problem(), by_model) == []
+    assert len(describe_insignificant(problem(), by_noise)) == len(THETA)

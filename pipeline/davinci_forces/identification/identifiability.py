@@ -13,7 +13,7 @@ from davinci_forces.robots.robot import Joint, Robot
 MIN_CORRELATION = 0.95  # two parameters are reported as correlated from this correlation on
 MIN_UNCERTAINTY_RATIO = 20.0  # a combination this many times less certain than the best one is reported
 MIN_PART_NAMED = 0.1  # a combination is reported with the parameters whose squared component is at least this
-MIN_Z = 2.0  # a parameter within this many standard errors of zero is not significant
+MIN_Z = 2.0  # a parameter within this many standard errors of noise from zero is not significant
 MIN_R2 = 0.5  # a model that explains less of the effort's variance hardly describes the effort
 
 
@@ -34,10 +34,14 @@ def describe_correlated(names: Sequence[str], conditioning: least_squares.Column
 
 
 def describe_insignificant(problem: Regression, estimate: Estimate) -> list[str]:
-    """Describe parameters that do not differ significantly from zero, with an upper bound of their effort."""
+    """Describe parameters that noise alone may cause, with an upper bound of their effort.
+
+    The error of the model is no reason: the data show a parameter that other terms would change.
+    """
+    noise_std = estimate.standard_errors.noise
     upper = np.abs(estimate.theta) + MIN_Z * estimate.theta_std
     shares = upper * np.linalg.norm(problem.Phi, axis=0) / (np.linalg.norm(problem.tau) or 1.0)
-    numbers = zip(problem.names, estimate.theta, estimate.theta_std, shares, strict=True)
+    numbers = zip(problem.names, estimate.theta, noise_std, shares, strict=True)
     return [
         f"{name} is not significant: {theta:.2g} ± {std:.1g}, at most {percent(share)} of the effort"
         for name, theta, std, share in numbers

@@ -53,7 +53,8 @@ def intro() -> Prose:
         "residuals of a log without periods. That of the model is the change of the parameter if blocks of path are "
         "left out, or if friction is added to the model that predicts as well. No motion separates friction that "
         "differs by direction from the weight of a vertical slide, so the model's part of that weight is large. "
-        "$z$ is the value over its standard error. A parameter with $abs(z) < 2$ cannot be distinguished from zero."
+        "$z$ is the value over its standard error. A parameter with $abs(z) < 2$ may be zero in a better model. One "
+        "that is called not significant is within two standard errors of noise of zero, so the data do not show it."
     )
 
 
