@@ -62,7 +62,7 @@ def describe(file: Path, head: int, options: "Options | None" = None) -> dict[st
     """
     from davinci_forces.logs import open_log
     from davinci_forces.logs.log import Options
-    from davinci_forces.study.guessing import named_time
+    from davinci_forces.study.timing import named_time
 
     log = open_log(file, options or Options())
     names = [channel.name for channel in log.channels if channel.kind in ("number", "time")]

@@ -1,15 +1,19 @@
 """Write a commented study.toml for logs, with a guess of what their channels measure."""
 
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from davinci_forces.runner.console import echo
 
+if TYPE_CHECKING:
+    from davinci_forces.study.template import Row
+
 
 def run(
-    files: Annotated[list[Path], typer.Argument(help="Logs, in the folder of the study: raw/<study>/<log>.")],
+    files: Annotated[list[Path], typer.Argument(help="Logs, or the folder of the study that holds them: raw/<study>.")],
     robot: Annotated[
         str,
         typer.Option(help="A listed robot, or a .toml or .urdf file in the study's folder.", show_default="guessed"),
@@ -17,13 +21,13 @@ def run(
     study: Annotated[Path | None, typer.Option(help="Folder of the study, instead of the first log's.")] = None,
     show: Annotated[bool, typer.Option("--print", help="Print the text instead of writing study.toml.")] = False,
 ) -> None:
-    """Describe logs in a study.toml; an existing file is never overwritten."""
+    """Describe logs in a study.toml, and print what to check; an existing file is never overwritten."""
     from davinci_forces.errors import BadRequest
     from davinci_forces.files import write_bytes
     from davinci_forces.study import template
 
-    folder = study or files[0].parent
-    draft = template.describe(files, folder, robot)
+    folder = study or (files[0] if template.is_folder(files[0]) else files[0].parent)
+    draft = template.describe(template.logs_in(files), folder, robot)
     if show:
         echo(draft.text)
         return
@@ -34,4 +38,13 @@ def run(
         write_bytes(folder / draft.robot_file, draft.robot_text.encode())
         echo(f"{folder / draft.robot_file}: written; check the kinds of its joints and their terms")
     write_bytes(target, draft.text.encode())
+    echo("\n".join(_table(draft.rows)))
     echo(f"{target}: written; check the channels, then run `davinci-forces all {folder}`")
+
+
+def _table(rows: "Sequence[Row]") -> Iterator[str]:
+    """The logs as lines of a table; the reasons, which may be long, last."""
+    titles = ("file", "role", "rate", "joints", "look at")
+    widths = [max(len(row[i]) for row in (titles, *rows)) for i in range(len(titles) - 1)]
+    for row in (titles, *rows):
+        yield "  ".join([*(cell.ljust(width) for cell, width in zip(row, widths, strict=False)), row[-1]]).rstrip()

@@ -5,7 +5,8 @@ The robot follows from the number of joints and the ranges of their positions; a
 
 import re
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
@@ -16,7 +17,10 @@ from davinci_forces.logs.joined import Joined
 from davinci_forces.maths.signals import columns
 from davinci_forces.robots.from_toml import robot_of
 from davinci_forces.robots.robot import Kind, Robot
-from davinci_forces.study.guessing import COMMAND_WORDS, SIGNAL_WORDS, Holding, Meaning, samples_of, with_motion
+from davinci_forces.maths.units import measures
+from davinci_forces.study.guessing import Holding, Meaning, with_motion
+from davinci_forces.study.names import COMMAND_WORDS, SIGNAL_WORDS, words_of
+from davinci_forces.study.timing import Timing, samples_of
 from davinci_forces.toml import TomlTable
 from davinci_forces.toml.file import TomlFile
 
@@ -25,6 +29,8 @@ DEFAULT_ROBOT = "davinci"
 POSITION_COUNTS = (3, 6, 7)  # positions in a log of the arm: of its joints, also of the wrist, also of the jaw
 MAX_SLIDE = 0.3  # [m] within which the instrument slides
 MAX_TURN = 1.6  # [rad] within which the hand turns
+DAVINCI_WORDS = ("davinci", "dvrk", "psm")
+OTHER_ARMS = {"kuka", "lbr", "iiwa", "franka", "panda", "ur", "kinova", "mtm", "ecm"}
 TERMS = ("inertia", "gravity, sine", "gravity, cosine", "viscous friction", "Coulomb friction")
 OTHER_SIGNALS = ("force", "forces", "wrench", "ft", "m")  # files of recordings that hold no quantity of a joint
 
@@ -38,59 +44,92 @@ class Arm(NamedTuple):
     text: str = ""
 
 
-def arm_of(holdings: Sequence[Holding], folder: Path) -> Arm:
-    """Choose the robot of logs: a listed robot that fits, a description next to the logs, or a new robot.toml.
+def candidates(folder: Path) -> list[Arm]:
+    """The robots whose joints the channels of logs may name: those described beside the logs, then the listed ones."""
+    arms = []
+    for file in sorted([*folder.glob("*.urdf"), *folder.glob("*.toml")]):
+        if file.name not in ("study.toml", "review.toml"):
+            with suppress(BadRobot):
+                arms.append(Arm(file.name, robots.load(file.name, folder), "the file beside the logs"))
+    return [*arms, *(Arm(name, robots.load(name, folder), "") for name in robots.ROBOTS)]
 
-    Raises
-    ------
-    BadRobot
-        If the robot beside the logs cannot be read.
+
+def arm_of(holdings: Sequence[Holding], folder: Path, names: Sequence[str]) -> Arm:
+    """Choose the robot of logs: one whose joints the channels name, one that fits, or a new robot.toml.
+
+    `names` are those of the folder, the files and the channels, which may name a robot.
     """
-    counted = [guess for guess in holdings if guess.joints]
+    counted = [holding for holding in holdings if holding.joints]
     if not counted:
         return Arm(DEFAULT_ROBOT, robots.load(DEFAULT_ROBOT, folder), "")
-    n = max(guess.joints for guess in counted)
-    current = any("i" in guess.symbols() for guess in counted)
-    if all(_is_davinci(guess) for guess in counted):
+    arms = candidates(folder)
+    for arm in arms:
+        if any(holding.robot == arm.robot for holding in counted):
+            return _of_the_kit(arm, names, folder)._replace(reason=arm.reason or "by the joints in channel names")
+    n = max(holding.joints for holding in counted)
+    current = any("i" in holding.symbols() for holding in counted)
+    beside = [arm for arm in arms if arm.name not in robots.ROBOTS and len(arm.robot.joints) == n]
+    if beside:
+        return beside[0]._replace(reason=f"the file beside the logs, with {n} joints as they have")
+    words = {word for name in names for word in words_of(name)}
+    said = next((word for word in DAVINCI_WORDS if word in words), "")
+    if all(_is_davinci(holding, bool(said)) for holding in counted) and not words & OTHER_ARMS:
         name = "davinci" if current else "dvrk_psm"
         robot = robots.load(name, folder)
         count = "" if n == len(robot.joints) else f"; these are the first {len(robot.joints)} of {n}"
+        by_name = f'"{said}" in the names, ' if said else ""
         efforts = "currents" if current else "efforts"
-        return Arm(name, robot, f"CHECK: guessed from a third joint that slides, and logs of {efforts}{count}")
-    for file in sorted([*folder.glob("*.urdf"), *folder.glob("*.toml")]):
-        if file.name in ("study.toml", "review.toml"):
-            continue
-        try:
-            robot = robots.load(file.name, folder)
-        except BadRobot:
-            continue
-        if len(robot.joints) == n:
-            return Arm(file.name, robot, f"the file beside the logs, with {n} joints as they have")
+        return Arm(name, robot, f"CHECK: by {by_name}a third joint that slides, and logs of {efforts}{count}")
     name = ROBOT_FILE if not (folder / ROBOT_FILE).exists() else f"robot-of-{n}.toml"
-    text = robot_text(n, current)
+    largest = max(counted, key=lambda holding: holding.joints)
+    text = robot_text(_joint_names(largest), current, _prismatic(counted))
     new_robot = robot_of(TomlTable(tomllib.loads(text), TomlFile(name, {})), "robot")
     assert new_robot is not None
     return Arm(name, new_robot, f"written for the {n} joints of the logs, as no listed robot fits", text)
 
 
-def _is_davinci(guess: Holding) -> bool:
-    """Whether positions fit the da Vinci arm: two joints turn by less than half a turn, and the third slides."""
-    if guess.joints not in POSITION_COUNTS or len(guess.ranges) < 3:
+def _of_the_kit(arm: Arm, names: Sequence[str], folder: Path) -> Arm:
+    """The arm of the da Vinci Research Kit, where names say that; its joints have the names of `davinci`."""
+    words = {word for name in names for word in words_of(name)}
+    is_kit = arm.name == DEFAULT_ROBOT and words & {"psm", "dvrk"}
+    return Arm("dvrk_psm", robots.load("dvrk_psm", folder), "") if is_kit else arm
+
+
+def _is_davinci(holding: Holding, is_named: bool) -> bool:
+    """Whether positions fit the da Vinci arm: two joints turn by less than half a turn, and the third slides.
+
+    Three joints are as many as it has. More may be of any arm, unless names say which.
+    """
+    if holding.joints not in (POSITION_COUNTS if is_named else POSITION_COUNTS[:1]) or len(holding.ranges) < 3:
         return False
-    (low, high), turning = guess.ranges[2], guess.ranges[:2]
+    (low, high), turning = holding.ranges[2], holding.ranges[:2]
     slides = low >= -MAX_SLIDE and high <= MAX_SLIDE and high > low
     return slides and all(least >= -MAX_TURN and most <= MAX_TURN for least, most in turning)
 
 
-def robot_text(n: int, current: bool) -> str:
-    """Write the text of a robot of n revolute joints, of which nothing more is known."""
-    lines = ['name = "robot"', f'title = "Arm of {n} joint{"s" if n > 1 else ""}"']
-    for k in range(n):
+def _joint_names(holding: Holding) -> list[str]:
+    """Names for the joints of a new robot: their labels in the log, where these are words."""
+    labels = [re.sub(r"[^a-z0-9_-]+", "_", label.lower()).strip("_-") for label in holding.labels]
+    usable = len(set(labels)) == holding.joints and all(re.match("[a-z]", label) for label in labels)
+    return labels if usable else [f"joint_{k + 1}" for k in range(holding.joints)]
+
+
+def _prismatic(holdings: Sequence[Holding]) -> set[int]:
+    """Joints whose positions or efforts are in units of length or force."""
+    meanings = [meaning for holding in holdings for meaning in holding.meanings.values()]
+    return {m.joint for m in meanings if m.symbol in ("q", "dq", "tau") and str(measures(m.unit)).startswith(("length", "force"))}
+
+
+def robot_text(names: Sequence[str], current: bool, prismatic: Collection[int] = ()) -> str:
+    """Write the text of a robot of which the logs tell the joints and whether they slide."""
+    lines = ['name = "robot"', f'title = "Arm of {len(names)} joint{"s" if len(names) > 1 else ""}"']
+    for k, name in enumerate(names):
+        kind, or_kind = (Kind.PRISMATIC, Kind.REVOLUTE)[:: 1 if k in prismatic else -1]
         lines += [
             "",
             "[[joint]]",
-            f'name = "joint_{k + 1}"',
-            f'kind = "{Kind.REVOLUTE.value}"  # or "{Kind.PRISMATIC.value}": CHECK',
+            f'name = "{name}"',
+            f'kind = "{kind.value}"  # or "{or_kind.value}": CHECK',
             f"terms = [{', '.join(f'{chr(34)}{term}{chr(34)}' for term in TERMS)}]",
         ]
         if current:
@@ -153,7 +192,8 @@ def guess_joined(log: Joined) -> Holding:
                 meanings[f"{stem}/{name}"] = Meaning(symbol, k, f"column {k + 1} of the signal in the file's name")
                 samples[f"{stem}/{name}"] = values[name]
     joints = 1 + max((meaning.joint for meaning in meanings.values()), default=-1)
-    holding = Holding(meanings, joints)
+    holding = with_motion(log, Holding(meanings, joints), samples, unnamed=True)
     if len(set(times)) == 1 and times[0] is not None:
-        holding = replace(holding, time=str(times[0]), why_time="it increases throughout in every file; in seconds")
-    return with_motion(holding, samples)
+        reason = "it increases throughout in every file; in seconds"
+        holding = replace(holding, timing=Timing(str(times[0]), reason=reason))
+    return holding

@@ -1,4 +1,4 @@
-"""Draft a study.toml for logs, from the names and units of their channels."""
+"""Draft a study.toml for logs, from the names, units and values of their channels."""
 
 import json
 import re
@@ -10,52 +10,54 @@ from typing import NamedTuple
 import numpy as np
 
 from davinci_forces import robots
-from davinci_forces.errors import BadRequest
-from davinci_forces.logs import open_log
+from davinci_forces.errors import BadLog, BadRequest
+from davinci_forces.logs import BAG, open_log
 from davinci_forces.logs.joined import Joined
 from davinci_forces.logs.log import Channel, Log
+from davinci_forces.maths.arrays import Array
 from davinci_forces.maths.units import SI, canonical, measures
-from davinci_forces.robots.robot import Joint, Robot
-from davinci_forces.study.belonging import DEFAULT_ROBOT, Arm, arm_of, group_recordings, guess_joined, split_signal
+from davinci_forces.robots.robot import Kind, Robot
+from davinci_forces.study.belonging import Arm, arm_of, candidates, group_recordings, guess_joined, split_signal
 from davinci_forces.study.channels import OF_THE_LOG, is_tissue, tissue_channels, unit_of
-from davinci_forces.study.guessing import (
-    Holding,
-    Meaning,
-    Role,
-    clock_hint,
-    guess,
-    has_clock,
-    is_time,
-    named_time,
-    roles_of,
-    samples_of,
-)
+from davinci_forces.study.entries import ROLES
+from davinci_forces.study.guessing import POSITIONS, VELOCITIES, Holding, Meaning, guess
+from davinci_forces.study.names import is_time
+from davinci_forces.study.roles import Recording, Role, roles_of
+from davinci_forces.study.timing import samples_of
 
-# Words of a channel's name by symbol, the more specific first.
-JOINT_WORDS = {
-    "i": ("current", "amp", "i"),
-    "dq": ("velocity", "speed", "rate", "dq", "vel"),
-    "tau": ("torque", "effort", "force", "tau"),
-    "q": ("position", "angle", "pos", "q", "theta"),
-}
 MAX_SPAN = 0.5  # [m] of a tip's path or a push's depth; values that span more are in mm
+MAX_TURN = 6.6  # [rad] just over a turn either way, which drives with limits do not exceed; larger may be degrees
+MIN_EARLY_RISE = 0.05  # share of a push's force within the first quarter of its depth, if it touches from the start
+NO_LOGS = {".toml", ".urdf", ".xacro", ".md", ".json", ".pdf", ".html", ".png", ".jpg", ".py", ".m", ".tdms_index"}
+
+
+class Row(NamedTuple):
+    """One log in the table that `new` ends with."""
+
+    file: str
+    role: str
+    rate: str
+    joints: str
+    look_at: str
 
 
 class Draft(NamedTuple):
-    """The text of a study.toml, and the file of its robot where that has to be written, too."""
+    """The text of a study.toml, the file of its robot where that has to be written, too, and a row for each log."""
 
     text: str
     robot_file: str = ""
     robot_text: str = ""
+    rows: tuple[Row, ...] = ()
 
 
 @dataclass(frozen=True)
 class DraftLog:
-    """One [[log]]: its files, the opened log, and the guess of its channels."""
+    """One [[log]]: its files, the opened log, the guess of its channels, and its pushes' quantities by channel."""
 
     files: list[Path]
     log: Log
     guess: Holding
+    touching: dict[str, str]
 
     @property
     def name(self) -> str:
@@ -65,41 +67,128 @@ class DraftLog:
         return re.sub(r"[^a-z0-9_-]+", "-", name.lower()).strip("-_") or "log"
 
 
+def is_folder(path: Path) -> bool:
+    """Whether a path is a folder of logs; a ROS 2 bag is a folder, too, but one log."""
+    return path.is_dir() and not (path / BAG).is_file()
+
+
+def logs_in(paths: Sequence[Path]) -> list[Path]:
+    """The files of folders, and of their folders, besides descriptions and documents; other paths as they are."""
+    files: list[Path] = []
+    for path in paths:
+        if is_folder(path):
+            inside = [file for file in sorted(path.iterdir()) if not file.name.startswith(".")]
+            files += logs_in([file for file in inside if file.suffix.lower() not in NO_LOGS])
+        else:
+            files.append(path)
+    return files
+
+
 def describe(files: Sequence[Path], folder: Path, robot_name: str = "") -> Draft:
     """Draft a study.toml that names every channel of every log and guesses its content; "" guesses the robot, too.
 
     Raises
     ------
     BadRequest
-        If a log lies outside the study's folder.
-    BadLog, BadRobot
-        If a log or the robot cannot be read.
+        If a log lies outside the study's folder, or there is none.
+    BadLog
+        If no log can be read, with the reason for each.
+    BadRobot
+        If the robot cannot be read.
     """
     for file in files:
         if not file.resolve().is_relative_to(folder.resolve()):
             raise BadRequest(f"{file} lies outside {folder}; copy it there first, as a study holds its own logs")
-    if robot_name:
-        robots.load(robot_name, folder)  # refuses an invalid robot before logs are read
-    robot = robots.load(robot_name or DEFAULT_ROBOT, folder)
-    drawn = _same_currents([_draft_log(members, robot) for members in group_recordings(files)])
-    guesses = [draft.guess for draft in drawn]
-    arm = Arm(robot_name, robot, "") if robot_name else arm_of(guesses, folder)
+    if not files:
+        raise BadRequest(f"{folder} holds no logs")
+    arms = [Arm(robot_name, robots.load(robot_name, folder), "")] if robot_name else candidates(folder)
+    drawn, refused = _read(group_recordings(files), [arm.robot for arm in arms])
+    if not drawn:
+        raise BadLog("\n".join(refused.values()))
+    drawn = _same_currents(drawn)
+    names = [folder.resolve().name, *(file.name for file in files), *(c.name for d in drawn for c in d.log.channels)]
+    arm = arms[0] if robot_name else arm_of([draft.guess for draft in drawn], folder, names)
+    drawn = _named_as(arm.robot, drawn)
+    roles = roles_of([_recording(draft, folder, arm.robot) for draft in drawn])
+    blocks, rows = [], []
+    for draft, role in zip(_distinct(drawn), roles, strict=True):
+        writer = _Writer(*draft, folder, arm.robot, role)
+        blocks += writer.lines()
+        rows.append(writer.row())
+    for file, why in refused.items():
+        blocks += ["", f"# {_path([file], folder)[0]}: left out: {why}"]
+        rows.append(Row(_path([file], folder)[0], "-", "-", "-", f"left out: {why}"))
+    text = "\n".join([*_head(arm, folder, drawn), *blocks]) + "\n"
+    return Draft(text, arm.name if arm.text else "", arm.text, tuple(rows))
+
+
+def _read(groups: Sequence[list[Path]], listed: Sequence[Robot]) -> tuple[list[DraftLog], dict[Path, str]]:
+    """Open recordings and guess their content; the reasons of those that cannot be read, by file."""
+    drawn: list[DraftLog] = []
+    refused: dict[Path, str] = {}
+    for members in groups:
+        try:
+            drawn.append(_draft_log(members, listed))
+        except (BadLog, OSError) as why:
+            refused[members[0]] = str(why)
+    return drawn, refused
+
+
+def _draft_log(files: list[Path], listed: Sequence[Robot]) -> DraftLog:
+    if len(files) > 1:
+        joined = Joined([open_log(file) for file in files])
+        return DraftLog(files, joined, guess_joined(joined), {})
+    log = open_log(files[0])
+    holding = guess(log, listed)
+    touching = tissue_channels([channel for channel in log.channels if not is_time(channel)])
+    touching = {name: quantity for name, quantity in touching.items() if name not in holding.meanings}
+    return DraftLog(files, log, holding, touching if is_tissue([*touching.values()]) and not holding.meanings else {})
+
+
+def _recording(draft: DraftLog, folder: Path, robot: Robot) -> Recording:
+    path = draft.files[0].resolve().relative_to(folder.resolve())
+    moving = [robot.joints[k].kind for k in draft.guess.moving if k < len(robot.joints)]
+    text = (path.parent / draft.files[0].name.partition(".")[0]).as_posix()
+    return Recording(draft.name, text, draft.guess, bool(draft.touching), Kind.PRISMATIC in moving)
+
+
+def _distinct(drawn: Sequence[DraftLog]) -> Iterator[tuple[DraftLog, str]]:
+    """Each log with a name of its own: logs of one name get their folder's, or a number."""
+    used: set[str] = set()
+    for draft in drawn:
+        name, number = draft.name, 1
+        if name in used:
+            name = f"{re.sub(r'[^a-z0-9_-]+', '-', draft.files[0].parent.name.lower()).strip('-_')}-{name}".strip("-")
+        while name in used:
+            number += 1
+            name = f"{draft.name}-{number}"
+        used.add(name)
+        yield draft, name
+
+
+def _named_as(robot: Robot, drawn: Sequence[DraftLog]) -> list[DraftLog]:
+    """Assign channels to the robot's joints of the same names as their labels, in whatever order the log has them."""
+    joints = {joint.name: k for k, joint in enumerate(robot.joints)}
+    return [
+        replace(draft, guess=draft.guess.renumbered([joints[label] for label in draft.guess.labels]))
+        if draft.guess.labels and set(draft.guess.labels) <= joints.keys() else draft
+        for draft in drawn
+    ]  # fmt: skip
+
+
+def _head(arm: Arm, folder: Path, drawn: Sequence[DraftLog]) -> Iterator[str]:
     robot = arm.robot
     reason = f"; {arm.reason}" if arm.reason else ""
-    head = [
-        f"title = {_text(folder.resolve().name)}",
-        f"robot = {_text(arm.name)}  # {robot.title}: joints {', '.join(j.name for j in robot.joints)}{reason}",
-        "simulated = false",
-        *([f"# tool = {{ length = {robot.tool.length} }}  # [m] length of the tool's shaft"] if robot.tool else []),
-        "",
-        "[settings]  # every key has a default; the report lists the values used",
-        "# lowpass = 17.0  # [Hz] zero-phase low-pass of differentiated velocities and accelerations",
-    ]
-    if arm.name.endswith(".urdf") and any("i" in draft.symbols() for draft in guesses):
-        head += _in_amperes(robot)
-    roles = roles_of([draft.name for draft in drawn], guesses)
-    logs = (line for draft, role in zip(drawn, roles, strict=True) for line in _log(draft, folder, robot, role))
-    return Draft("\n".join([*head, *logs]) + "\n", arm.name if arm.text else "", arm.text)
+    yield f"title = {_text(folder.resolve().name)}"
+    yield f"robot = {_text(arm.name)}  # {robot.title}: joints {', '.join(j.name for j in robot.joints)}{reason}"
+    yield "simulated = false"
+    if robot.tool:
+        yield f"# tool = {{ length = {robot.tool.length} }}  # [m] length of the tool's shaft"
+    yield ""
+    yield "[settings]  # every key has a default; the report lists the values used"
+    yield "# lowpass = 17.0  # [Hz] zero-phase low-pass of differentiated velocities and accelerations"
+    if arm.name.endswith(".urdf") and any("i" in draft.guess.symbols() for draft in drawn):
+        yield from _in_amperes(robot)
 
 
 def _in_amperes(robot: Robot) -> Iterator[str]:
@@ -110,132 +199,212 @@ def _in_amperes(robot: Robot) -> Iterator[str]:
         yield 'effort = "A"  # the log holds currents; if the constant is known, torque_constant = ... [N m/A]'
 
 
-def _draft_log(files: list[Path], robot: Robot) -> DraftLog:
-    if len(files) > 1:
-        joined = Joined([open_log(file) for file in files])
-        return DraftLog(files, joined, guess_joined(joined))
-    log = open_log(files[0])
-    named = _names_joints(log, robot) or is_tissue([*_touching(log, robot).values()])
-    return DraftLog(files, log, Holding() if named else guess(log))
-
-
 def _same_currents(drawn: list[DraftLog]) -> list[DraftLog]:
-    """Take efforts as currents in all logs with as many channels as one that holds currents."""
-    widths = {len(draft.log.channels) for draft in drawn if "i" in draft.guess.symbols()}
+    """Take efforts as currents in all logs without names that have as many channels as one that holds currents."""
+    widths = {len(d.log.channels) for d in drawn if "i" in d.guess.symbols()}
     return [_as_currents(draft) if len(draft.log.channels) in widths else draft for draft in drawn]
 
 
 def _as_currents(drawn: DraftLog) -> DraftLog:
     meanings = {
         name: replace(meaning, symbol="i", reason="CHECK: current, as in another log of as many channels")
-        if meaning.symbol == "tau" else meaning
+        if meaning.symbol == "tau" and meaning.reason.startswith("CHECK") else meaning
         for name, meaning in drawn.guess.meanings.items()
     }  # fmt: skip
     return replace(drawn, guess=replace(drawn.guess, meanings=meanings))
 
 
-def _log(drawn: DraftLog, folder: Path, robot: Robot, role: Role) -> Iterator[str]:
-    log, holding = drawn.log, drawn.guess
-    touching = _touching(log, robot)
-    tissue = not holding.meanings and is_tissue([*touching.values()])
-    paths = [_text(file.resolve().relative_to(folder.resolve()).as_posix()) for file in drawn.files]
-    yield ""
-    yield "[[log]]"
-    yield f"name = {_text(drawn.name)}"
-    yield f"file = {paths[0]}" if len(paths) == 1 else f"join = [{', '.join(paths)}]  # one signal per file"
-    choices = "identification, validation, contact, weight, tissue or friction"
-    if holding.meanings:
-        yield f'role = "{role.role}"  # {role.reason}; or {choices}'
-        yield from role.more
-    else:
-        yield f'role = "{"tissue" if tissue else "identification"}"  # {choices}'
-    if not tissue:
-        yield "# period = 10.0  # [s] estimated from the data; a given value is checked against them"
-    yield from _rate(log, holding, tissue)
-    yield "# skip = 1.0  # [s] start-up transient to leave out"
-    yield "# until = 60.0  # [s] end of the log: later samples, a stop for instance, are left out"
-    if tissue:
-        yield '# contact = "all"  # if every sample is in contact; otherwise contact is detected'
-    else:
-        yield "# contact = [[12.0, 14.5]]  # [s] known contact windows"
-    yield "[log.channels]"
-    yield from _channels(drawn, robot, touching if tissue else {})
+@dataclass(frozen=True)
+class _Writer:
+    """Writes the [[log]] of one recording, and its row of the table."""
 
+    draft: DraftLog
+    name: str
+    folder: Path
+    robot: Robot
+    role: Role
 
-def _rate(log: Log, holding: Holding, tissue: bool) -> Iterator[str]:
-    """The line of a log's rate, if the log has no other clock."""
-    if has_clock(log) or named_time(log) or holding.time:
-        return
-    if holding.rate:
-        yield f"rate = {holding.rate!r}  # [Hz] at which the velocities match the derivatives of the positions"
-        return
-    hint = "" if tissue else clock_hint(log)
-    needs = "only the damping of the tissue needs it" if tissue else "CORRECT THIS"
-    needs += f"; or {hint}" if hint else ""
-    yield f"{'# ' if tissue else ''}rate = 100.0  # [Hz] the log has no clock: {needs}"
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing in it can be used, so that it is written commented out."""
+        return not self.draft.guess.meanings and not self.draft.touching
 
+    def lines(self) -> list[str]:
+        """The lines of the [[log]]; all of them comments if nothing in the log can be used."""
+        paths = [_text(path) for path in _path(self.draft.files, self.folder)]
+        join = f"join = [{', '.join(paths)}]  # one signal per file"
+        block = [
+            "[[log]]",
+            f"name = {_text(self.name)}",
+            f"file = {paths[0]}" if len(paths) == 1 else join,
+            *self._role(),
+            *([] if self.draft.touching else ["# period = 10.0  # [s] estimated from the data; a given value is checked"]),
+            *self._rate(),
+            "# skip = 1.0  # [s] start-up transient to leave out",
+            "# until = 60.0  # [s] end of the log: later samples, a stop for instance, are left out",
+            self._contact(),
+            "[log.channels]",
+            *self._channels(),
+            "# quantities of a joint: q or theta_m, dq or dtheta_m, tau or i",
+            "# of the log: time; for tissue also push, depth or tip_x, tip_y, tip_z, force or force_x, force_y, force_z",
+        ]
+        if not self.is_empty:
+            return ["", *block]
+        return ["", f"# {self.name}: left out: {self.why_empty}", *(f"# {line.removeprefix('# ')}" for line in block)]
 
-def _touching(log: Log, robot: Robot) -> dict[str, str]:
-    """Quantities of pushes into tissue by channel name, where no channel is of a joint."""
-    if _names_joints(log, robot):
-        return {}
-    return tissue_channels([channel for channel in log.channels if not is_time(channel)])
-
-
-def _names_joints(log: Log, robot: Robot) -> bool:
-    return any(_guess(channel, robot) not in ("", "time") for channel in log.channels)
-
-
-def _channels(drawn: DraftLog, robot: Robot, touching: dict[str, str]) -> Iterator[str]:
-    log, holding = drawn.log, drawn.guess
-    taken: set[str] = set()
-    time_channel = named_time(log)
-    if holding.time.isdecimal():
-        taken.add("time")
-        yield f"time = {holding.time}  # {holding.why_time}"
-    big = _in_millimetres(log, touching)
-    for channel in log.channels:
-        if channel.derived:
-            continue
-        if quantity := touching.get(channel.name):
-            yield _touch_line(channel, quantity, channel.name in big)
-            continue
-        unit_note = f"  # in {channel.unit}" if channel.unit else "  # the log gives no unit: SI is assumed"
-        if meaning := holding.meanings.get(channel.name):
-            yield _meaning_line(channel, meaning, holding, robot)
-            continue
-        guessed = (
-            "time"
-            if holding.meanings and channel.name == time_channel
-            else ""
-            if holding.meanings
-            else _guess(channel, robot)
+    @property
+    def why_empty(self) -> str:
+        """Why nothing in the log can be used."""
+        names = [channel.name for channel in self.draft.log.channels if not channel.derived]
+        return f"no position and effort of a joint, and no depth and force, among {', '.join(names[:8])}" + (
+            " ..." if len(names) > 8 else ""
         )
-        if channel.name == holding.time and not time_channel:
-            guessed, unit_note = "time", f"  # {holding.why_time}"
-        if guessed and guessed not in taken and channel.kind == "number":
-            taken.add(guessed)
-            clocked = guessed == "time" and log.clock is not None and not time_channel
-            yield (
-                f"{'# ' if clocked else ''}{_text(guessed) if '.' in guessed else guessed} = {_text(channel.name)}"
-                f"{'  # the log has its own clock' if clocked else unit_note}"
-            )
-        else:
-            yield f'# "<joint>.<quantity>" = {_text(channel.name)}{unit_note}'
-    yield "# quantities of a joint: q or theta_m, dq or dtheta_m, tau or i"
-    yield "# of the log: time; for tissue also push, depth or tip_x, tip_y, tip_z, force or force_x, force_y, force_z"
+
+    def row(self) -> Row:
+        """The log in the table: its role, its rate, its joints, and what to look at first."""
+        timing, holding = self.draft.guess.timing, self.draft.guess
+        rate = f"{1 / timing.step:.5g} Hz" if timing.step else "missing" if timing.missing else "-"
+        joints = [self.robot.joints[k].name for k in holding.moving if k < len(self.robot.joints)]
+        look = [self.why_empty] if self.is_empty else [*self._doubts(), self.role.reason]
+        role = "left out" if self.is_empty else self.role.role or "missing"
+        file = ", ".join(_path(self.draft.files[:1], self.folder)) + (" ..." if len(self.draft.files) > 1 else "")
+        return Row(file, role, rate, ", ".join(joints) or "-", "; ".join(filter(None, look)))
+
+    def _doubts(self) -> Iterator[str]:
+        timing = self.draft.guess.timing
+        if not self.draft.touching:
+            yield timing.missing and f"rate: {timing.missing}"
+        yield timing.remark
+        yield from (f"unit of {name}" for name in self._unknown_units())
+        if self.role.role == "weight":
+            yield "weight = ... is missing: without it no mass is estimated"
+
+    def _role(self) -> Iterator[str]:
+        others = ", ".join(role for role in ROLES if role != self.role.role)
+        if not self.role.role:
+            yield f'# role = "..."  # MISSING, as {self.role.reason}: {", ".join(ROLES)}'
+            return
+        yield f'role = "{self.role.role}"  # {self.role.reason}; or {others}'
+        if self.role.role == "weight":
+            mass = f"mass = {self.role.mass:g}, " if self.role.mass else ""
+            yield f'# weight = {{ {mass}moves_with = "<joint>", position = [0.0, 0.0, 0.0] }}  # where the mass hangs'
+
+    def _rate(self) -> Iterator[str]:
+        timing, tissue = self.draft.guess.timing, bool(self.draft.touching)
+        if timing.rate:
+            yield f"rate = {timing.rate!r}  # [Hz] {timing.reason}"
+        elif timing.missing:
+            needs = "only the damping of the tissue needs it" if tissue else f"MISSING, as {timing.missing}"
+            yield f"# rate = ...  # [Hz] {needs}"
+        if timing.remark:
+            yield f"# CHECK: {timing.remark}"
+
+    def _contact(self) -> str:
+        if not self.draft.touching:
+            return "# contact = [[12.0, 14.5]]  # [s] known contact windows"
+        if reason := _touches_throughout(self.draft):
+            return f'contact = "all"  # {reason}'
+        return '# contact = "all"  # if every sample is in contact; otherwise contact is detected'
+
+    def _unknown_units(self) -> set[str]:
+        """Channels of angles without a unit that turn farther than a drive, so that they may be in degrees."""
+        wide = {j for j, (low, high) in zip(self.draft.guess.joints_of_ranges(), self.draft.guess.ranges, strict=True)
+                if max(-low, high) > MAX_TURN}  # fmt: skip
+        units = {channel.name: channel.unit for channel in self.draft.log.channels}
+        return {
+            name for name, m in self.draft.guess.meanings.items()
+            if m.joint in wide and m.symbol in ("q", "dq") and not m.unit and not units.get(name)
+            and m.joint < len(self.robot.joints) and self.robot.joints[m.joint].kind is Kind.REVOLUTE
+        }  # fmt: skip
+
+    def _channels(self) -> Iterator[str]:
+        """A line for each channel: what it is, with its unit and the reason, or a comment."""
+        log, holding, touching = self.draft.log, self.draft.guess, self.draft.touching
+        timing, unknown = holding.timing, self._unknown_units()
+        if timing.time.isdecimal():
+            yield f"time = {timing.time}  # {timing.reason}"
+        big = _in_millimetres(log, touching)
+        for channel in log.channels:
+            meaning = holding.meanings.get(channel.name)
+            if channel.derived:
+                continue
+            if channel.name in touching:
+                yield _touch_line(channel, touching[channel.name], channel.name in big)
+            elif meaning:
+                yield self._meaning_line(channel, meaning, channel.name in unknown)
+            elif channel.name == timing.time:
+                yield _time_line(channel, timing.size, timing.reason)
+            elif is_time(channel) and log.clock is not None:
+                yield f"# time = {_text(channel.name)}  # the log has its own clock"
+            else:
+                yield f'# "<joint>.<quantity>" = {_text(channel.name)}{f"  # in {channel.unit}" if channel.unit else ""}'
+
+    def _meaning_line(self, channel: Channel, meaning: Meaning, unit_unknown: bool) -> str:
+        """The line of a joint's channel; commented out where the joint does not move or is unknown."""
+        if meaning.joint >= len(self.robot.joints):
+            count = f"joint {meaning.joint + 1}, but {self.robot.name} has {len(self.robot.joints)}"
+            return f'# "<joint>.{meaning.symbol}" = {_text(channel.name)}  # {count}'
+        joint, holding = self.robot.joints[meaning.joint], self.draft.guess
+        unit = _fitting(meaning, joint.kind)
+        value = f"{{ channel = {_text(channel.name)}, unit = {_text(unit)} }}" if unit else _text(channel.name)
+        note = f"in {channel.unit}" if channel.unit else f"in {unit}" if unit else "no unit: SI"
+        if unit_unknown:
+            rate = "/s" if meaning.symbol == "dq" else ""
+            value = f'{{ channel = {_text(channel.name)}, unit = "" }}'
+            note = f"MISSING: the unit is deg{rate} or rad{rate}; the angle exceeds a turn if it is in rad"
+        line = f"{_text(f'{joint.name}.{meaning.symbol}')} = {value}"
+        if holding.moving and meaning.joint not in holding.moving and holding.robot is None:
+            return f"# {line}  # the joint does not move"
+        return f"{line}  # {meaning.reason}; {note}"
 
 
-def _meaning_line(channel: Channel, meaning: Meaning, holding: Holding, robot: Robot) -> str:
-    """The line of a channel that was guessed; commented out where the joint does not move or is unknown."""
-    if meaning.joint >= len(robot.joints):
-        count = f"joint {meaning.joint + 1}, but {robot.name} has {len(robot.joints)}"
-        return f'# "<joint>.{meaning.symbol}" = {_text(channel.name)}  # {count}'
-    joint = robot.joints[meaning.joint]
-    line = f"{_text(f'{joint.name}.{meaning.symbol}')} = {_text(channel.name)}"
-    if holding.moving and meaning.joint not in holding.moving:
-        return f"# {line}  # the joint does not move"
-    return f"{line}  # {meaning.reason}"
+def _fitting(meaning: Meaning, kind: Kind) -> str:
+    """The unit in a channel's name, if it measures the quantity; a velocity called deg is in deg/s."""
+    unit = f"{meaning.unit}/s" if meaning.symbol in VELOCITIES and measures(f"{meaning.unit}/s") else meaning.unit
+    revolute = kind is Kind.REVOLUTE or meaning.symbol.endswith("_m")
+    needed = (
+        ("angle" if revolute else "length") if meaning.symbol in POSITIONS
+        else ("angle rate" if revolute else "length rate") if meaning.symbol in VELOCITIES
+        else "current" if meaning.symbol == "i" else "torque" if revolute else "force"
+    )  # fmt: skip
+    return unit if measures(unit) == needed else ""
+
+
+def _time_line(channel: Channel, size: float, reason: str) -> str:
+    """The line of a channel of times, with its unit where the log does not state one that is known."""
+    units = {1.0: "", 1e-3: ', unit = "ms"'}
+    if measures(canonical(channel.unit)) == "time" or size == 1.0:
+        return f"time = {_text(channel.name)}  # {reason}"
+    unit = units.get(size, f', scale = {size!r}, unit = "s"')
+    return f"time = {{ channel = {_text(channel.name)}{unit} }}  # {reason}"
+
+
+def _path(files: Sequence[Path], folder: Path) -> list[str]:
+    return [file.resolve().relative_to(folder.resolve()).as_posix() for file in files]
+
+
+def _touches_throughout(draft: DraftLog) -> str:
+    """Why every sample of numbered pushes is of contact: the force rises from the first sample on; "" if it does not."""
+    by_quantity = {quantity: name for name, quantity in draft.touching.items()}
+    names = [by_quantity.get(quantity, "") for quantity in ("push", "depth", "force")]
+    if not all(names) or len(draft.log.by_clock(names)) > 1:
+        return ""
+    push, depth, force = (samples_of(draft.log, names)[name] for name in names)
+    starts = np.flatnonzero(np.diff(push)) + 1
+    rises = [_early_rise(d, f) for d, f in zip(np.split(depth, starts), np.split(force, starts), strict=True)]
+    if rises and float(np.median(rises)) >= MIN_EARLY_RISE:
+        return "the force rises from the first sample of each push on, as of a probe that touches the surface"
+    return ""
+
+
+def _early_rise(depth: Array, force: Array) -> float:
+    """Rise of the force within the first quarter of a push's depth, as a share of its whole rise."""
+    deepest = int(np.argmax(np.abs(depth - depth[0])))
+    way = np.abs(depth[: deepest + 1] - depth[0])
+    if deepest < 4 or not way[-1] > 0:
+        return 0.0
+    quarter, whole = np.interp(0.25 * way[-1], way, force[: deepest + 1]) - force[0], force[deepest] - force[0]
+    return float(quarter / whole) if whole else 0.0
 
 
 def _in_millimetres(log: Log, touching: dict[str, str]) -> set[str]:
@@ -261,29 +430,6 @@ def _touch_line(channel: Channel, quantity: str, in_millimetres: bool) -> str:
     return (
         f"{quantity} = {{ channel = {_text(channel.name)}, unit = {_text(unit or SI[OF_THE_LOG[quantity]])} }}{where}"
     )
-
-
-def _guess(channel: Channel, robot: Robot) -> str:
-    if is_time(channel):
-        return "time"
-    words = re.findall(r"[a-z]+|\d+", channel.name.lower())
-    joints = [joint for joint in robot.joints if _named(joint, words, channel.name)]
-    symbol = next((s for s, telling in JOINT_WORDS.items() if set(telling) & set(words)), "")
-    if len(joints) != 1 or not symbol:
-        return ""
-    return f"{joints[0].name}.{_side(symbol, words, channel, joints[0])}"
-
-
-def _side(symbol: str, words: Sequence[str], channel: Channel, joint: Joint) -> str:
-    """The symbol on the joint's or the motor's side, by the channel's name or by a unit that only one side has."""
-    unit = measures(canonical(channel.unit))
-    motor = "motor" in words or (unit == "angle" and joint.unit("{position}") == "m")
-    return {"q": "theta_m", "dq": "dtheta_m"}.get(symbol, symbol) if motor else symbol
-
-
-def _named(joint: Joint, words: Sequence[str], name: str) -> bool:
-    parts = joint.name.split("_")
-    return joint.name in name.lower() or set(parts) <= set(words) or parts[-1] in words
 
 
 def _text(value: str) -> str:

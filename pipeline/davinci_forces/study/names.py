@@ -1,0 +1,139 @@
+"""Read what a channel measures from its name: its symbol, its joint and its unit, as recorders and laboratories write.
+
+Known are CRTK and dVRK (`measured_js`), RTDE of Universal Robots (`actual_q_0`), Franka (`tau_J`), KUKA
+(`measuredJointPosition`), Kinova (`actuators[0].torque`), `rostopic echo -p` (`field.position0`), PlotJuggler
+(`/joint_states/panda_joint1/position`) and what people type (`q1`, `Joint1_Pos`, `ang`, `q_raw`).
+"""
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from davinci_forces.logs.log import Channel, unit_in
+from davinci_forces.maths.units import canonical, measures
+
+# Words for a quantity of a joint, the more specific first: an angular velocity is a velocity.
+SIGNAL_WORDS = {
+    "i": ("current", "currents", "amp", "i", "cur", "curr"),
+    "dq": ("velocity", "velocities", "speed", "speeds", "rate", "dq", "qd", "qdot", "vel", "omega"),
+    "tau": ("torque", "torques", "effort", "efforts", "tau", "eff", "trq", "moment", "moments"),
+    "q": ("position", "positions", "angle", "angles", "pos", "q", "theta", "ang"),
+}
+COMMAND_WORDS = (
+    "desired", "target", "setpoint", "command", "commanded", "reference", "goal", "ref", "des", "cmd", "sp", "demand",
+    "demanded", "nominal", "soll", "asp", "asi", "servo",
+)  # fmt: skip
+# Words of quantities that are not measured at a joint: at the tip, of models, of the electronics.
+OTHER_WORDS = {
+    "tcp", "pose", "cartesian", "cp", "cv", "cf", "wrench", "tip", "tool", "ee", "ext", "external", "residual",
+    "gravity", "friction", "model", "estimated", "predicted", "temperature", "temperatures", "voltage", "error", "err",
+    "acceleration", "dtau", "jaw", "gripper",
+}  # fmt: skip
+ROUGH_WORDS = ("raw", "unfiltered")  # a signal of such a name is taken where there is no other
+TIME_WORDS = {"time", "t", "timestamp", "stamp", "elapsed", "seconds", "secs", "zeit", "clock"}
+TIME_QUALIFIERS = {"robot", "ros", "system", "rel", "relative", "abs", "header", "elapsed", "epoch", "unix", "field", "x"}
+# Units in names, besides those of `maths/units`: by their lower case.
+UNIT_WORDS = {
+    "deg": "deg", "degs": "deg", "degree": "deg", "degrees": "deg", "rad": "rad", "rads": "rad", "radians": "rad",
+    "mm": "mm", "um": "um", "ms": "ms", "msec": "ms", "millis": "ms", "us": "us", "usec": "us", "micros": "us",
+    "ns": "ns", "nsec": "ns", "nanos": "ns", "ma": "mA", "nm": "N m", "mnm": "mN m", "mn": "mN", "rpm": "rpm",
+    "dps": "deg/s", "rps": "rev/s",
+}  # fmt: skip
+SHORT_TIMES = {"us": 1e-6, "ns": 1e-9, "µs": 1e-6}  # [s] units of time that a study gives as a scale
+IN_DEGREES = ("actuator", "actuators", "ai")  # words of recorders that state angles in degrees: Kinova, KUKA's RSI
+WORD = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+")
+PSM_JOINTS = {"yaw": "hand_roll", "pitch": "hand_pitch", "insertion": "instrument_slide"}  # of the da Vinci Research Kit
+
+
+@dataclass(frozen=True)
+class Numbered:
+    """Channels of one quantity of several joints: their names by the label of the joint, in the order of the log."""
+
+    symbol: str
+    names: dict[str, str]
+    words: tuple[str, ...]
+
+
+def words_of(name: str) -> list[str]:
+    """The words and numbers of a name, in lower case: `measuredJointPosition`, `actual_qd_0`."""
+    return [word.lower() for word in WORD.findall(name)]
+
+
+def unit_of_name(name: str) -> str:
+    """The unit in a name: `time / ms`, `q [deg]`, `q (deg)`, `q_deg_1`, `vel_deg_s`; else "".
+
+    Single letters count in brackets and after a stroke only.
+    """
+    last = re.split(r"[/\s]", name.strip())[-1]
+    for written in (unit_in(name), last if "/" in name else "", "/".join(name.split("/")[-2:]).split()[-1]):
+        if written and (measures(written) or written in SHORT_TIMES):
+            return canonical(written)
+    parts = re.split(r"[^A-Za-z]+", unit_in(name) or name)
+    for k, part in enumerate(parts):
+        if unit := UNIT_WORDS.get(part.lower(), ""):
+            after = [following.lower() for following in parts[k + 1 : k + 3]]
+            per_second = after[:1] == ["s"] or after == ["per", "s"] or after == ["per", "sec"]
+            return f"{unit}/s" if per_second and unit in ("deg", "rad", "mm") else unit
+    return ""
+
+
+def is_time(channel: Channel) -> bool:
+    """Whether a channel is named as a time, whatever its group and its unit."""
+    name = re.sub(r"[\[(].*|\s/.*", "", channel.name.strip())
+    words = words_of(re.split(r"[/.]", name)[-1])
+    if words == ["x", "value"]:  # LabVIEW
+        return True
+    words = [word for word in words if word not in UNIT_WORDS and word != "s"] or words
+    return bool(set(words) & TIME_WORDS) and set(words) <= TIME_WORDS | TIME_QUALIFIERS
+
+
+def symbol_of(words: Sequence[str]) -> str:
+    """The symbol of a measured quantity of a joint; "" for commands, quantities of the tip, and anything else."""
+    if set(words) & {*COMMAND_WORDS, *OTHER_WORDS} or ("d" in words and set(words) & {"q", "dq", "tau"}):
+        return ""
+    return next((symbol for symbol, telling in SIGNAL_WORDS.items() if set(telling) & set(words)), "")
+
+
+def numbered(channels: Sequence[Channel]) -> list[Numbered]:
+    """Group channels by all of their name but the joint's number or label; of one quantity, measured signals first."""
+    groups: dict[str, dict[str, str]] = {}
+    for channel in channels:
+        for key, label in _labels(channel):
+            groups.setdefault(key, {}).setdefault(label, channel.name)
+    chosen: dict[str, dict[str, str]] = {}
+    for channel in channels:
+        keys = dict(_labels(channel))
+        if keys and not is_time(channel):
+            key = max(keys, key=lambda key: len(groups[key]))
+            chosen.setdefault(key, {})[keys[key]] = channel.name
+    signals = [Numbered(symbol_of(words), names, tuple(words)) for key, names in chosen.items() for words in [_words(key)]]
+    return sorted((group for group in signals if group.symbol), key=lambda group: bool(set(ROUGH_WORDS) & {*group.words}))
+
+
+def _words(key: str) -> list[str]:
+    """The words of a name without the joint: those of its last part with a symbol, and commands of any part."""
+    parts = [words_of(part) for part in re.split(r"[/.]", key)]
+    last = next((words for words in reversed(parts) if symbol_of(words)), [])
+    marking = {*COMMAND_WORDS, *OTHER_WORDS}
+    return last + [word for words in parts for word in words if word in marking]
+
+
+def _labels(channel: Channel) -> Iterator[tuple[str, str]]:
+    """Ways to read a joint from a name, the likelier first: what is left of the name, and the label of the joint."""
+    name = channel.name
+    spans = [m.span(1) for m in re.finditer(r"\[([^\]]+)\]", name)] + [m.span() for m in re.finditer(r"\d+", name)][::-1]
+    parts = re.split(r"([/.])", name)
+    ends = [sum(map(len, parts[: k + 1])) for k in range(len(parts))]
+    spans += [
+        (ends[k] - len(part), ends[k]) for k, part in enumerate(parts)
+        if len(parts) > 2 and part not in ("", "/", ".") and not symbol_of(words_of(part))
+    ]  # fmt: skip
+    for start, end in dict.fromkeys(spans):
+        yield f"{name[:start]}#{name[end:]}", name[start:end]
+    yield name, ""
+
+
+def psm_joint(words: Sequence[str]) -> str:
+    """The joint of the da Vinci Research Kit's patient-side arm that its own label names; "" for those of the wrist."""
+    label = set(words) & PSM_JOINTS.keys()
+    return PSM_JOINTS[label.pop()] if len(label) == 1 and "wrist" not in words else ""

@@ -1,0 +1,193 @@
+"""Guess the roles of logs: by words in the names of files and folders, else by their motions and efforts."""
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import chain
+from typing import NamedTuple
+
+from davinci_forces.maths.contact.unexplained import (
+    MIN_UNEXPLAINED,
+    Course,
+    has_outliers,
+    unexplained_share,
+)
+from davinci_forces.study.guessing import Holding
+
+# Words by role; `\b` stands at the edges of the words of a name, in which capitals, `_` and digits separate, too.
+WORDS = {
+    "free": r"(no|without) (weight|load|mass|contact|touch)|noweight|noload|nomass|nocontact|unloaded|free|in air",
+    "weight": r"weights?|payloads?|load|loaded|\d+ ?k?g",
+    "tissue": r"tissue|palp\w*|phantom|indent\w*|probes?|probing",
+    "contact": r"contacts?|touch\w*|push\w*|pok\w*|press\w*|collisions?|collid\w*|hits?",
+    "friction": r"friction|stribeck|breakaway|const\w* ?(vel\w*|speeds?)",
+    "validation": r"valid\w*|val|hold ?out|verif\w*",
+    "identification": r"ident\w*|sys ?id|calib\w*|train\w*",
+    "excitation": r"excit\w*|exc",
+    "test": r"test",
+}
+MASS = re.compile(r"(\d+(?:[.p]\d+)?) ?(k?g)\b")
+WIDER = 1.2  # times the range of the logs before: a motion that reaches farther identifies, too
+
+
+@dataclass(frozen=True)
+class Recording:
+    """What is known of a log: its name, its folders and file as one text, its guessed content."""
+
+    name: str
+    path: str
+    holding: Holding
+    touches_tissue: bool = False  # it has a depth and a force
+    slides: bool = False  # a prismatic joint moves
+
+
+class Role(NamedTuple):
+    """A role, "" if it is not known, the reason for it, and the mass that the name states [kg]."""
+
+    role: str
+    reason: str
+    mass: float = 0.0
+
+
+def roles_of(recordings: Sequence[Recording]) -> list[Role]:
+    """Guess the role of each log: by a word of its file or folders, else by its motion and effort beside the others'."""
+    words = [_word(recording.path) for recording in recordings]
+    if len(words) > 1 and all(word[0] == "test" for word in words):
+        words = [("", "")] * len(words)  # a word that all share tells none from the others
+    roles = [_by_word(recording, *word) for recording, word in zip(recordings, words, strict=True)]
+    open_ones = [i for i, role in enumerate(roles) if role is None]
+    touched = {i: reason for i in open_ones if (reason := _touched(recordings[i].holding))}
+    rest = [i for i in open_ones if i not in touched]
+    fixed = [i for i, role in enumerate(roles) if role is not None and role.role == "identification"]
+    chosen = _by_motion(recordings, rest, fixed, [role is not None and role.role == "validation" for role in roles])
+    reference = [recordings[i].holding for i in [*fixed, *(i for i in rest if chosen[i].role == "identification")]]
+    for i in rest:
+        if chosen[i].role != "identification" and (reason := _unlike(recordings[i].holding, reference)):
+            touched[i] = reason
+    named = [role or (Role("contact", touched[i]) if i in touched else chosen[i]) for i, role in enumerate(roles)]
+    return _with_identification(recordings, named)
+
+
+def _word(path: str) -> tuple[str, str]:
+    """The kind of the first word that tells a role, and the word: of the file first, then of its folders upwards."""
+    for part in reversed(path.split("/")):
+        text = " ".join(re.findall(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|\d+(?:\.\d+)?", part)).lower()
+        kinds = [(kind, match[0]) for kind, words in WORDS.items() if (match := re.search(rf"\b({words})\b", text))]
+        if kinds:
+            clash = {kind for kind, _ in kinds} & {"identification", "contact", "tissue", "weight"}
+            if kinds[0][0] != "free" and "identification" in clash and len(clash) > 1:
+                return "clash", " and ".join(word for _, word in kinds)
+            return kinds[0]
+    return "", ""
+
+
+def _by_word(recording: Recording, kind: str, word: str) -> Role | None:
+    """The role that a word tells; None where the motion has to tell it."""
+    reason = f'"{word}" in its name'
+    if kind == "clash":
+        return Role("", f"{reason} mean different roles")
+    if recording.touches_tissue and (kind in ("", "tissue", "contact", "test") or not recording.holding.meanings):
+        return Role("tissue", "it has a depth and a force")
+    match kind:
+        case "free" | "test":
+            return Role("validation", f"{reason}: free motion for validation" if kind == "free" else reason)
+        case "weight":
+            mass = MASS.search(word)
+            kilograms = float(mass[1].replace("p", ".")) * (1.0 if mass[2] == "kg" else 1e-3) if mass else 0.0
+            return Role("weight", reason, kilograms)
+        case "tissue" if not recording.slides:
+            return Role("contact", f"{reason}, but it has no depth, and no joint of it slides")
+        case "" | "excitation":
+            return None
+    return Role(kind, reason)
+
+
+def _touched(holding: Holding) -> str:
+    """Why a log is of contact, by itself: it stands still, or its effort has outliers."""
+    if holding.ranges and not holding.moving:
+        return "no joint moves in it, so nothing can be identified from it"
+    pushed = [str(joint + 1) for joint, course in holding.courses.items() if has_outliers(course)]
+    return f"the effort of joint {', '.join(pushed)} has outliers, as pushes make them" if pushed else ""
+
+
+def _unlike(holding: Holding, references: Sequence[Holding]) -> str:
+    """Why a log is of contact, beside those that identify the same joints: their model does not explain its effort."""
+    for joint, course in holding.courses.items():
+        same: list[Course] = [other.courses[joint] for other in references if joint in other.courses]
+        share = unexplained_share(course, same) if same else 0.0
+        if share >= MIN_UNEXPLAINED:
+            return f"{share:.0%} of the effort of joint {joint + 1} is not as in free motion"
+    return ""
+
+
+def _by_motion(
+    recordings: Sequence[Recording], rest: Sequence[int], fixed: Sequence[int], tested: Sequence[bool]
+) -> dict[int, Role]:
+    """Identify from the motions that repeat and reach farthest, then from any that add joints; test on the others."""
+    reach: dict[int, tuple[float, str]] = {}
+    roles: dict[int, Role] = {}
+    for i in fixed:
+        _cover(reach, recordings[i])
+    excited = {i: _word(recordings[i].path)[0] == "excitation" for i in rest}
+    order = sorted(rest, key=lambda i: (not recordings[i].holding.repeats, not excited[i], *_size(recordings[i].holding)))
+    varied = {joint for i in [*rest, *fixed] if not recordings[i].holding.steady for joint in recordings[i].holding.moving}
+    late: list[int] = []
+    for i in order:
+        holding, spans = recordings[i].holding, _spans(recordings[i].holding)
+        within = next((reach[joint][1] for joint in spans if joint in reach), "")
+        if holding.steady and not excited[i] and varied & set(holding.moving):
+            roles[i] = Role("friction", "its joint moves at one constant velocity after another")
+        elif not holding.repeats and not excited[i] and set(spans) - set(reach):
+            late.append(i)
+        elif any(span > WIDER * reach.get(joint, (0.0, ""))[0] for joint, span in spans.items()) and (
+            holding.repeats or excited[i]
+        ):
+            roles[i] = Role("identification", '"excitation" in its name' if excited[i] else "its motion repeats")
+            _cover(reach, recordings[i])
+        elif holding.repeats:
+            roles[i] = Role("validation", f"its motion stays within that of {within}, which identifies")
+        else:
+            roles[i] = Role("validation", f"its motion does not repeat, but that of {within} does")
+    return roles | _not_repeating(recordings, late, reach, any(tested))
+
+
+def _not_repeating(
+    recordings: Sequence[Recording], late: Sequence[int], reach: dict[int, tuple[float, str]], is_tested: bool
+) -> dict[int, Role]:
+    """Identify from motions that do not repeat where none does; the shortest whose joints others move is the test."""
+    why = "it moves joints that no log with a repeating motion moves" if reach else "no log has a motion that repeats"
+    roles = {i: Role("identification", why) for i in late}
+    moved = {i: set(recordings[i].holding.moving) for i in late}
+    spare = [i for i in late if moved[i] and moved[i] <= {*reach, *chain(*(moved[k] for k in late if k != i))}]
+    if spare and not is_tested:
+        last = min(spare, key=lambda i: (_samples(recordings[i].holding), -i))
+        roles[last] = Role("validation", "the shortest motion of joints that other logs move: it tests the fit")
+    return roles
+
+
+def _samples(holding: Holding) -> float:
+    return max((len(course.q) for course in holding.courses.values()), default=0)
+
+
+def _spans(holding: Holding) -> dict[int, float]:
+    """The range of each joint that moves."""
+    return {joint: float(c.q.max() - c.q.min()) for joint, c in holding.courses.items()} or dict.fromkeys(holding.moving, 1.0)
+
+
+def _size(holding: Holding) -> tuple[float, float]:
+    """Order of logs: those that move most joints first, then those that move them farthest."""
+    return -len(holding.moving), -sum(_spans(holding).values())
+
+
+def _cover(reach: dict[int, tuple[float, str]], recording: Recording) -> None:
+    for joint, span in _spans(recording.holding).items():
+        reach[joint] = max(reach.get(joint, (0.0, "")), (span, recording.name))
+
+
+def _with_identification(recordings: Sequence[Recording], roles: list[Role]) -> list[Role]:
+    """Where no log identifies, take the free motion that reaches farthest."""
+    free = [i for i, role in enumerate(roles) if role.role == "validation" and recordings[i].holding.moving]
+    if free and not any(role.role == "identification" for role in roles):
+        best = min(free, key=lambda i: _size(recordings[i].holding))
+        roles[best] = Role("identification", f"{roles[best].reason}; but there is no other log to identify from")
+    return roles

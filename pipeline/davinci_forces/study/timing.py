@@ -1,0 +1,181 @@
+"""Guess the times of a log: by its format, by names, by values; and check them against positions and velocities."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from davinci_forces.logs.log import Channel, Log
+from davinci_forces.maths.arrays import Array
+from davinci_forces.maths.signals import columns
+from davinci_forces.maths.units import measures, size
+from davinci_forces.study.names import SHORT_TIMES, is_time, unit_of_name
+
+MAX_SAMPLES = 200_000  # samples of a log that are read
+MAX_CHANNELS = 400  # channels of a log whose samples are read
+MIN_CORRELATION = 0.9  # of a velocity with the slope of its position, to judge times by them
+TOLERANCE_RATE = 0.05  # relative; beyond it, and beyond the noise of the velocities, two rates disagree
+MIN_RISING_SHARE = 0.9  # of the steps of a time; recorders repeat some stamps
+MIN_RATE, MAX_RATE = 5.0, 20e3  # [Hz] of a robot's recorder, by which a time without a unit is judged
+YEARS = 946684800.0, 4102444800.0  # [s] since 1970 of the years 2000 and 2100
+SIZES = {"s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9}  # [s]
+RATIOS = {("dq", "deg/s"): 180 / math.pi, ("q", "deg"): math.pi / 180}  # velocity over slope where one is in degrees
+
+
+class Slope(NamedTuple):
+    """Velocity over the slope of the position, as the median of the joints that move, and their correlation."""
+
+    correlation: float
+    ratio: float  # [Hz] where the slope is per sample
+
+    def agrees(self, ratio: float) -> bool:
+        """Whether the ratio is within the noise: the slopes of the two regressions bracket the true one."""
+        low, high = self.ratio * self.correlation, self.ratio / max(self.correlation, 1e-9)
+        return low * (1 - TOLERANCE_RATE) <= ratio <= high * (1 + TOLERANCE_RATE)
+
+
+@dataclass(frozen=True)
+class Timing:
+    """The time channel of a log or its rate, with the reason; `missing` says why neither is known."""
+
+    time: str = ""
+    size: float = 1.0  # [s] of a unit of the channel, where the log does not state it
+    reason: str = ""
+    rate: float = 0.0  # [Hz] to be stated; 0 where the log has a clock, a time or nothing
+    missing: str = ""
+    remark: str = ""  # what a reviewer has to look at
+    units: tuple[tuple[str, str], ...] = ()  # of symbols, by the ratio of velocity to slope
+    step: float = 0.0  # [s] mean sampling time
+
+
+def samples_of(log: Log, names: Sequence[str]) -> dict[str, Array]:
+    """Read the first samples of these channels of one clock, without the last rows that a channel lacks.
+
+    Raises
+    ------
+    BadLog
+        Where the log is damaged.
+    """
+    parts: dict[str, list[Array]] = {name: [] for name in names}
+    rows = 0
+    for block in log.blocks(list(names)):
+        for name in names:
+            parts[name].append(block[name])
+        rows += len(block[names[0]])
+        if rows >= MAX_SAMPLES:
+            break
+    samples = {name: np.concatenate(part) if part else np.zeros(0) for name, part in parts.items()}
+    complete = np.flatnonzero(np.all([np.isfinite(values) for values in samples.values()], axis=0))
+    return {name: values[: complete[-1] + 1 if len(complete) else 0] for name, values in samples.items()}
+
+
+def has_clock(log: Log) -> bool:
+    """Whether the format gives the time of every sample: by a clock, by a channel of times, or by one for each."""
+    return bool(log.clock or log.time or all(channel.time for channel in log.channels if channel.kind == "number"))
+
+
+def named_time(log: Log) -> str:
+    """The channel of times: the format's own, else one named as a time, unless the format has a clock."""
+    if log.time or has_clock(log):
+        return log.time
+    return next((channel.name for channel in log.channels if channel.kind == "number" and is_time(channel)), "")
+
+
+def slope_of(pairs: Sequence[tuple[Array, Array]], t: Array | None = None) -> Slope | None:
+    """Compare velocities (N,) with the slopes of positions (N,), per sample or per second of `t`; None if unrelated."""
+    moves = columns.moving_positions([q for q, _ in pairs]) if pairs and len(pairs[0][0]) else ()
+    both = [columns.derivative(*pairs[i], t) for i in moves]
+    alike = [Slope(*pair) for pair in both if pair[0] >= MIN_CORRELATION]
+    if not alike:
+        return None
+    return Slope(*(float(np.median([getattr(slope, name) for slope in alike])) for name in Slope._fields))
+
+
+def timing_of(log: Log, samples: Mapping[str, Array], pairs: Sequence[tuple[Array, Array]], unnamed: bool) -> Timing:
+    """Guess the times of a log from the first samples of its channels, and from position and velocity of its joints.
+
+    `unnamed`: names tell nothing, so that the first channel that rises may be the time.
+    """
+    per_sample = slope_of(pairs)
+    if has_clock(log):
+        return _checked_clock(log, samples, pairs, per_sample)
+    numbers = [c for c in log.channels if c.kind == "number" and not c.derived and c.name in samples]
+    times = [channel for channel in numbers if is_time(channel) and _rises(samples[channel.name])]
+    if unnamed and not times:
+        first = columns.first_rising_column([samples[channel.name] for channel in numbers])
+        times = [numbers[first]] if first is not None else []
+    judged = [_judged(channel, samples[channel.name], pairs, unnamed) for channel in times]
+    known = [timing for timing in judged if timing is not None]
+    if known:
+        return next((timing for timing in known if timing.time), known[0])
+    if per_sample is not None:
+        rate = columns.round_rate(per_sample.ratio)
+        return Timing(rate=rate, reason="at which the velocities match the derivatives of the positions", step=1 / rate)
+    return Timing(missing="no channel is a time, and no velocity tells the rate")
+
+
+def _rises(t: Array) -> bool:
+    steps = np.diff(t[np.isfinite(t)])
+    return len(steps) > 1 and bool((steps >= 0).all()) and float((steps > 0).mean()) >= MIN_RISING_SHARE
+
+
+def _step(t: Array) -> float:
+    return float(t[-1] - t[0]) / (len(t) - 1)
+
+
+def _judged(channel: Channel, t: Array, pairs: Sequence[tuple[Array, Array]], unnamed: bool) -> Timing | None:
+    """The times of a channel in the unit that it states or that its values tell; None where it only counts samples."""
+    stated = channel.unit or unit_of_name(channel.name)
+    unit = {"s": 1.0} | SHORT_TIMES
+    known = size(stated) if measures(stated) == "time" else unit.get(stated, 0.0)
+    strict = np.concatenate([[True], np.diff(t) > 0])
+    slope = slope_of([(q[strict], dq[strict]) for q, dq in pairs if len(q) == len(t)], t[strict])
+    shape = "increases throughout" if strict.all() else "increases"
+    if np.all(np.diff(t) == 1.0) and not known and not (slope and slope.agrees(1.0)):
+        return None  # a counter of samples
+    since = next((name for name, s in SIZES.items() if YEARS[0] < t[0] * s < YEARS[1]), "")
+    sizes = [known] if known else [SIZES[since]] if since else []
+    if not sizes and slope:
+        sizes = [s for s in SIZES.values() if slope.agrees(1 / s)]
+    if not sizes:
+        sizes = [s for s in SIZES.values() if MIN_RATE <= 1 / (_step(t) * s) <= MAX_RATE]
+        if not (1.0 in sizes or len(sizes) == 1) or (sizes[0] != 1.0 and not slope):
+            unit_list = " or ".join(f"{name} ({1 / (_step(t) * s):.4g} Hz)" for name, s in SIZES.items() if s in sizes)
+            return Timing(missing=f"channel {channel.name!r} is a time of unknown unit: {unit_list or 'none fits'}")
+    seconds = sizes[0]
+    rate = 1 / (_step(t) * seconds)
+    how = "" if known else " by its size since 1970" if since else " by the velocities" if seconds != 1.0 else ""
+    name = next((name for name, s in SIZES.items() if s == seconds), "")
+    what = f"{shape} ({rate:.6g} Hz if it is in seconds)" if unnamed and not how else f"{shape}, {rate:.6g} Hz"
+    timing = Timing(channel.name, seconds, what + (f"; in {name}{how}" if how else ""), step=_step(t) * seconds)
+    return _compared(timing, slope and slope._replace(ratio=slope.ratio * seconds), rate, channel.name)
+
+
+def _compared(timing: Timing, slope: Slope | None, rate: float, name: str) -> Timing:
+    """Times as they are where velocities agree; in degrees what that explains; else no times, and both rates said."""
+    if slope is None or slope.agrees(1.0):
+        return timing
+    units = tuple(key for key, ratio in RATIOS.items() if slope.agrees(ratio))
+    if units:
+        return Timing(**vars(timing) | {"units": units})
+    told = columns.round_rate(slope.ratio * rate)
+    clash = f"by {name!r} the rate is {rate:.6g} Hz, but the velocities fit the positions at {told:g} Hz"
+    return Timing(missing=f"{clash}: write rate = {told:g}, or time = {name!r}", step=timing.step)
+
+
+def _checked_clock(
+    log: Log, samples: Mapping[str, Array], pairs: Sequence[tuple[Array, Array]], slope: Slope | None
+) -> Timing:
+    """The clock of a format, with a remark where the velocities tell another rate."""
+    t = samples.get(log.time, np.zeros(0)) if log.time else np.zeros(0)
+    step = log.clock.step if log.clock else _step(t) if len(t) > 1 else 0.0
+    timing = Timing(step=step)
+    if not step or slope is None or slope.agrees(1 / step):
+        return timing
+    told = columns.round_rate(slope.ratio)
+    unit = next((key for key, ratio in RATIOS.items() if slope.agrees(ratio / step)), None)
+    if unit:
+        return Timing(step=step, units=(unit,))
+    return Timing(step=step, remark=f"the clock is at {1 / step:.6g} Hz, but the velocities fit the positions at {told:g} Hz")
